@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: Apache-2.0
+#
+# wheelwright_room(NAME HEADERS h... [SOURCES s...] [USES room...] [LINK lib...] [LINK_PRIVATE lib...])
+#
+# One target per room: wheelwright_NAME, alias Wheelwright::NAME. Headers are seen as <wheelwright/NAME/x.hpp>
+# through one symbolic link per room in the build tree, which is also the base of the installed FILE_SET.
+
+set(WHEELWRIGHT_INCLUDE_TREE ${CMAKE_BINARY_DIR}/include)
+set(WHEELWRIGHT_WARNINGS -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual -Werror)
+
+function(wheelwright_room name)
+  cmake_parse_arguments(ROOM "" "" "HEADERS;SOURCES;USES;LINK;LINK_PRIVATE" ${ARGN})
+  file(MAKE_DIRECTORY ${WHEELWRIGHT_INCLUDE_TREE}/wheelwright)
+  file(CREATE_LINK ${CMAKE_CURRENT_SOURCE_DIR} ${WHEELWRIGHT_INCLUDE_TREE}/wheelwright/${name} SYMBOLIC)
+  list(TRANSFORM ROOM_HEADERS PREPEND ${WHEELWRIGHT_INCLUDE_TREE}/wheelwright/${name}/)
+  list(TRANSFORM ROOM_USES PREPEND Wheelwright::)
+
+  set(target wheelwright_${name})
+  if(ROOM_SOURCES)
+    set(scope PUBLIC)
+    add_library(${target} ${ROOM_SOURCES})
+    # No fused multiply-add: batch and streaming, and every machine, give the same digits.
+    target_compile_options(${target} PRIVATE ${WHEELWRIGHT_WARNINGS} -ffp-contract=off)
+  else()
+    set(scope INTERFACE)
+    add_library(${target} INTERFACE)
+  endif()
+  add_library(Wheelwright::${name} ALIAS ${target})
+  target_sources(${target} ${scope} FILE_SET HEADERS BASE_DIRS ${WHEELWRIGHT_INCLUDE_TREE} FILES ${ROOM_HEADERS})
+  target_compile_features(${target} ${scope} cxx_std_20)
+  target_link_libraries(${target} ${scope} ${ROOM_USES} ${ROOM_LINK})
+  if(ROOM_LINK_PRIVATE)
+    target_link_libraries(${target} PRIVATE ${ROOM_LINK_PRIVATE})
+  endif()
+  set_target_properties(${target} PROPERTIES EXPORT_NAME ${name} VERIFY_INTERFACE_HEADER_SETS ON
+    POSITION_INDEPENDENT_CODE ON)
+  set_property(GLOBAL APPEND PROPERTY WHEELWRIGHT_ROOMS ${target})
+  install(TARGETS ${target} EXPORT WheelwrightTargets FILE_SET HEADERS)
+endfunction()

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// What is thrown when a caller hands in something wrong. What the data say is never thrown: it is returned.
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+namespace wheelwright {
+
+/// Base of every exception of the library.
+class Error : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// An argument of a function is outside its documented domain (a shape, a range, a non-finite number).
+class InvalidArgument : public Error {
+ public:
+  using Error::Error;
+};
+
+/// A file or stream holds something that cannot be used. The message names file, line or key, the value, and what was
+/// expected.
+class InputError : public Error {
+ public:
+  using Error::Error;
+};
+
+}  // namespace wheelwright

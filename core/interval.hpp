@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Closed intervals with outward rounding.
+///
+/// Every operation returns an interval that contains the exact result for all points of its operands: the rounded-to-
+/// nearest result is moved outward by one unit in the last place (std::nextafter), which encloses it in every rounding
+/// mode a compiler may assume. Moore, Kearfott and Cloud 2009, chapter 2.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace wheelwright {
+
+/// The next double below `x`; −infinity stays.
+inline double round_down(double x) { return std::nextafter(x, -std::numeric_limits<double>::infinity()); }
+/// The next double above `x`; +infinity stays.
+inline double round_up(double x) { return std::nextafter(x, std::numeric_limits<double>::infinity()); }
+
+/// A closed interval [lower, upper]; lower <= upper wherever it is an answer.
+struct Interval {
+  double lower = 0.0;  ///< lower end, unit of the quantity
+  double upper = 0.0;  ///< upper end, unit of the quantity
+
+  /// Length of the interval, rounded up.
+  [[nodiscard]] double width() const { return round_up(upper - lower); }
+  /// Mid-point, rounded to nearest.
+  [[nodiscard]] double centre() const { return lower + 0.5 * (upper - lower); }
+  /// Whether `x` lies in the interval, ends included.
+  [[nodiscard]] bool contains(double x) const { return lower <= x && x <= upper; }
+  friend bool operator==(const Interval&, const Interval&) = default;
+};
+
+/// { x + y }, enclosed.
+inline Interval operator+(Interval x, Interval y) {
+  return {round_down(x.lower + y.lower), round_up(x.upper + y.upper)};
+}
+
+/// { x − y }, enclosed.
+inline Interval operator-(Interval x, Interval y) {
+  return {round_down(x.lower - y.upper), round_up(x.upper - y.lower)};
+}
+
+/// { x·y }, enclosed.
+inline Interval operator*(Interval x, Interval y) {
+  const double a = x.lower * y.lower, b = x.lower * y.upper, c = x.upper * y.lower, d = x.upper * y.upper;
+  return {round_down(std::min({a, b, c, d})), round_up(std::max({a, b, c, d}))};
+}
+
+}  // namespace wheelwright

@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/core/log.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+#include <wheelwright/core/check.hpp>
+
+namespace wheelwright {
+
+std::optional<std::size_t> LogSource::find(std::string_view name) const {
+  const auto& names = columns();
+  const auto it = std::find(names.begin(), names.end(), name);
+  if (it == names.end()) {
+    return std::nullopt;
+  }
+  return static_cast<std::size_t>(it - names.begin());
+}
+
+const std::vector<double>& LogTable::column(std::string_view name) const {
+  const auto it = std::find(names.begin(), names.end(), name);
+  if (it == names.end()) {
+    throw InvalidArgument("log: no column '" + std::string(name) + "'");
+  }
+  return columns[static_cast<std::size_t>(it - names.begin())];
+}
+
+std::vector<double>& LogTable::column(std::string_view name) {
+  return const_cast<std::vector<double>&>(std::as_const(*this).column(name));
+}
+
+double median_step(const std::vector<double>& t) {
+  if (t.size() < 2) {
+    return 0.0;
+  }
+  std::vector<double> steps(t.size() - 1);
+  for (std::size_t k = 0; k < steps.size(); ++k) {
+    steps[k] = t[k + 1] - t[k];
+  }
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  return *middle;
+}
+
+LogTable slice(const LogTable& table, std::size_t first, std::size_t last) {
+  check::that(first <= last && last <= table.rows(), "slice", "first <= last <= rows of the table");
+  const auto part = [&](const std::vector<double>& from) {
+    return std::vector<double>(from.begin() + static_cast<std::ptrdiff_t>(first),
+                               from.begin() + static_cast<std::ptrdiff_t>(last));
+  };
+  LogTable out;
+  out.names = table.names;
+  out.t = part(table.t);
+  for (const auto& column : table.columns) {
+    out.columns.push_back(part(column));
+  }
+  out.segment_starts.push_back(0);
+  for (const std::size_t start : table.segment_starts) {
+    if (start > first && start < last) {
+      out.segment_starts.push_back(start - first);
+    }
+  }
+  return out;
+}
+
+TableSource::TableSource(const LogTable& table, std::size_t block_rows)
+    : table_(&table), block_rows_(block_rows), median_step_(wheelwright::median_step(table.t)) {
+  check::that(block_rows > 0, "block_rows", "at least 1");
+  check::that(table.names.size() == table.columns.size(), "log", "one name for each column");
+  for (std::size_t c = 0; c < table.columns.size(); ++c) {
+    check::that(table.columns[c].size() == table.rows(), "log column '" + table.names[c] + "'",
+                "as many values as there are times");
+    for (const double value : table.columns[c]) {
+      check::finite(value, "log column '" + table.names[c] + "'");
+    }
+  }
+  for (std::size_t k = 0; k < table.rows(); ++k) {
+    check::finite(table.t[k], "log time");
+    const bool starts = k == 0 || std::binary_search(table.segment_starts.begin(), table.segment_starts.end(), k);
+    check::that(starts || table.t[k] > table.t[k - 1], "log time", "strictly increasing inside a segment");
+  }
+}
+
+const std::vector<std::string>& TableSource::columns() const { return table_->names; }
+
+void TableSource::rewind() { position_ = 0; }
+
+double TableSource::median_step() const { return median_step_; }
+
+bool TableSource::next(LogBlock& block) {
+  const std::size_t rows = std::min(block_rows_, table_->rows() - position_);
+  const auto copy = [&](const std::vector<double>& from, std::vector<double>& to) {
+    to.assign(from.begin() + static_cast<std::ptrdiff_t>(position_),
+              from.begin() + static_cast<std::ptrdiff_t>(position_ + rows));
+  };
+  block.first_row = position_;
+  block.columns.resize(table_->columns.size());
+  copy(table_->t, block.t);
+  for (std::size_t c = 0; c < table_->columns.size(); ++c) {
+    copy(table_->columns[c], block.columns[c]);
+  }
+  block.segment_starts.clear();
+  if (position_ == 0 && rows > 0) {
+    block.segment_starts.push_back(0);
+  }
+  const auto& starts = table_->segment_starts;
+  for (auto it = std::lower_bound(starts.begin(), starts.end(), std::max<std::size_t>(position_, 1));
+       it != starts.end() && *it < position_ + rows; ++it) {
+    block.segment_starts.push_back(*it - position_);
+  }
+  position_ += rows;
+  return rows > 0;
+}
+
+JoinedSource::JoinedSource(std::vector<LogSource*> sources) : sources_(std::move(sources)) {
+  check::that(!sources_.empty(), "sources", "at least one log");
+  for (const auto& name : sources_.front()->columns()) {
+    if (std::all_of(sources_.begin(), sources_.end(), [&](const LogSource* s) { return s->find(name).has_value(); })) {
+      names_.push_back(name);
+    }
+  }
+  for (const LogSource* source : sources_) {
+    auto& pick = pick_.emplace_back();
+    for (const auto& name : names_) {
+      pick.push_back(*source->find(name));
+    }
+  }
+}
+
+const std::vector<std::string>& JoinedSource::columns() const { return names_; }
+
+void JoinedSource::rewind() {
+  for (LogSource* source : sources_) {
+    source->rewind();
+  }
+  current_ = 0;
+  first_row_ = 0;
+}
+
+bool JoinedSource::next(LogBlock& block) {
+  while (current_ < sources_.size()) {
+    if (sources_[current_]->next(scratch_)) {
+      block.first_row = first_row_;
+      block.t.swap(scratch_.t);
+      block.segment_starts.swap(scratch_.segment_starts);
+      block.columns.resize(names_.size());
+      for (std::size_t c = 0; c < names_.size(); ++c) {
+        block.columns[c] = scratch_.columns[pick_[current_][c]];
+      }
+      first_row_ += block.rows();
+      return true;
+    }
+    ++current_;
+  }
+  block.t.clear();
+  return false;
+}
+
+double JoinedSource::median_step() const {
+  std::vector<double> steps;
+  for (const LogSource* source : sources_) {
+    steps.push_back(source->median_step());
+  }
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  return *middle;
+}
+
+LogTable read_all(LogSource& source) {
+  source.rewind();
+  LogTable table;
+  table.names = source.columns();
+  table.columns.resize(table.names.size());
+  LogBlock block;
+  while (source.next(block)) {
+    for (const std::size_t start : block.segment_starts) {
+      table.segment_starts.push_back(table.t.size() + start);
+    }
+    table.t.insert(table.t.end(), block.t.begin(), block.t.end());
+    for (std::size_t c = 0; c < table.columns.size(); ++c) {
+      table.columns[c].insert(table.columns[c].end(), block.columns[c].begin(), block.columns[c].end());
+    }
+  }
+  source.rewind();
+  return table;
+}
+
+}  // namespace wheelwright

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// The table of a log, in blocks: what `io` hands out and `filter` takes in.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace wheelwright {
+
+/// A stretch of consecutive rows of a log. Columns have the names of the log contract (`t` apart), SI units.
+struct LogBlock {
+  std::size_t first_row = 0;                 ///< number of row 0 of this block within the whole log
+  std::vector<double> t;                     ///< time of each row, s; strictly increasing inside a segment
+  std::vector<std::vector<double>> columns;  ///< columns[c][row], in the order of LogSource::columns()
+  std::vector<std::size_t> segment_starts;   ///< ascending rows of this block (0-based) at which a new segment starts;
+                                             ///< row 0 of the first block of a log is always one
+
+  /// Number of rows.
+  [[nodiscard]] std::size_t rows() const { return t.size(); }
+};
+
+/// A log that can be walked from beginning to end any number of times, block by block, in bounded memory.
+/// Rows are clean: finite where a value is required by nobody is NaN-free, times strictly increase inside a segment, and
+/// segments are split at gaps and resets.
+class LogSource {
+ public:
+  virtual ~LogSource() = default;
+  /// Names of the columns, in the order of LogBlock::columns (time is not among them).
+  [[nodiscard]] virtual const std::vector<std::string>& columns() const = 0;
+  /// Fills `block` with the next rows and returns true; returns false at the end (block is then empty). Buffers of
+  /// `block` are reused.
+  virtual bool next(LogBlock& block) = 0;
+  /// Goes back to the first row.
+  virtual void rewind() = 0;
+  /// Median time step over the log, s (0 when the log has fewer than two rows).
+  [[nodiscard]] virtual double median_step() const = 0;
+
+  /// Index of column `name`, or nothing.
+  [[nodiscard]] std::optional<std::size_t> find(std::string_view name) const;
+};
+
+/// A whole log in memory: for short logs, tests and users who bring their own data.
+struct LogTable {
+  std::vector<std::string> names;            ///< names of the columns, `t` apart
+  std::vector<double> t;                     ///< time, s, strictly increasing inside a segment
+  std::vector<std::vector<double>> columns;  ///< columns[c][row]
+  std::vector<std::size_t> segment_starts;   ///< ascending; empty means one segment
+
+  /// Number of rows.
+  [[nodiscard]] std::size_t rows() const { return t.size(); }
+  /// The column called `name`. Throws InvalidArgument where there is none.
+  [[nodiscard]] const std::vector<double>& column(std::string_view name) const;
+  /// The same, to be written.
+  [[nodiscard]] std::vector<double>& column(std::string_view name);
+};
+
+/// Median of the steps of `t` (the steps across segment starts included), s; 0 for fewer than two rows.
+[[nodiscard]] double median_step(const std::vector<double>& t);
+
+/// Rows [first, last) of `table`; a segment that is cut starts anew. Throws InvalidArgument unless
+/// first <= last <= rows.
+[[nodiscard]] LogTable slice(const LogTable& table, std::size_t first, std::size_t last);
+
+/// A LogSource over a table, which must outlive it.
+class TableSource final : public LogSource {
+ public:
+  /// Throws InvalidArgument when columns differ in length, time does not increase inside a segment, or a value is not
+  /// finite.
+  explicit TableSource(const LogTable& table, std::size_t block_rows = 4096);
+  [[nodiscard]] const std::vector<std::string>& columns() const override;
+  bool next(LogBlock& block) override;
+  void rewind() override;
+  [[nodiscard]] double median_step() const override;
+
+ private:
+  const LogTable* table_;
+  std::size_t block_rows_;
+  std::size_t position_ = 0;
+  double median_step_ = 0.0;
+};
+
+/// Several logs one after the other, each starting a new segment. The sources must outlive it; their columns may be in
+/// any order, and only those that all of them have are handed on.
+class JoinedSource final : public LogSource {
+ public:
+  /// Throws InvalidArgument when `sources` is empty.
+  explicit JoinedSource(std::vector<LogSource*> sources);
+  [[nodiscard]] const std::vector<std::string>& columns() const override;
+  bool next(LogBlock& block) override;
+  void rewind() override;
+  /// Median of the sources' median steps, s.
+  [[nodiscard]] double median_step() const override;
+
+ private:
+  std::vector<LogSource*> sources_;
+  std::vector<std::string> names_;
+  std::vector<std::vector<std::size_t>> pick_;
+  std::size_t current_ = 0;
+  std::size_t first_row_ = 0;
+  LogBlock scratch_;
+};
+
+/// Reads all of `source` (from its beginning) into a table.
+[[nodiscard]] LogTable read_all(LogSource& source);
+
+}  // namespace wheelwright

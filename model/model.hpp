@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// A robot as linear-in-parameters dynamics: u(t) = Y(q, v, v̇) θ_L (20), stated as data that the filter can walk.
+///
+/// A model names its joints (what the log measures), the motion coordinates (fixed linear combinations of the joint
+/// motions: v1, v2), the outputs (fixed linear combinations of the joint efforts: the left side of (15)), and the
+/// terms of Y: speed or acceleration of a coordinate, or any instantaneous function of the motion. A new robot is one
+/// function or small type that fills this struct; see examples/own_model.cpp.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include <wheelwright/core/interval.hpp>
+
+namespace wheelwright {
+
+/// One entry θ_L,j of the parameter vector (20).
+struct Parameter {
+  std::string name;           ///< as in results, e.g. "r_mass"
+  std::string unit;           ///< unit with torque as effort, e.g. "kg·m"
+  std::string physical;       ///< the physical quantity behind it, e.g. "mass"
+  std::string physical_unit;  ///< e.g. "kg"
+  double per_physical = 1.0;  ///< θ_L,j = per_physical · physical quantity (the wheel radius r for the robot of the paper)
+  Interval prior;             ///< wide physical default of the physical quantity, in physical_unit
+  std::string excite;         ///< what to do when a log does not show it, e.g. "drive in curves"
+};
+
+/// A measured joint: which columns of the log hold its angle, speed and effort.
+struct Joint {
+  std::string angle;    ///< e.g. "phi_r"
+  std::string speed;    ///< e.g. "omega_r"
+  std::string torque;   ///< e.g. "tau_r"
+  std::string current;  ///< e.g. "current_r"
+  std::string voltage;  ///< e.g. "voltage_r"
+};
+
+/// What an instantaneous term may look at, at one instant.
+struct MotionState {
+  std::span<const double> speed;        ///< speed of each motion coordinate (v1, v2), m/s, rad/s
+  std::span<const double> speed_error;  ///< bound on the error of each speed (0 where nothing is declared)
+  double heading = 0.0;                 ///< θ of the pose, rad: measured where the log has it, else odometry
+  double heading_error = 0.0;           ///< bound on its error, rad
+};
+
+/// A value of a term with a bound on its error.
+struct TermValue {
+  double value = 0.0;
+  double error = 0.0;  ///< >= 0: the exact value is within `error` of `value`
+};
+
+/// One non-zero entry of Y: what stands at (output, parameter).
+struct Term {
+  /// What the entry is made of.
+  enum class Kind {
+    acceleration,  ///< scale · d²/dt² of a coordinate
+    speed,         ///< scale · d/dt of a coordinate
+    function,      ///< scale · function(state)
+  };
+  std::size_t output = 0;
+  std::size_t parameter = 0;
+  Kind kind = Kind::speed;
+  std::size_t coordinate = 0;                           ///< for acceleration and speed
+  double scale = 1.0;
+  TermValue (*function)(const MotionState&) = nullptr;  ///< for Kind::function
+};
+
+/// Linear-in-parameters dynamics of a robot.
+struct Model {
+  std::string name;
+  std::vector<Parameter> parameters;     ///< p entries of θ_L
+  std::vector<std::string> outputs;      ///< n names of channels, e.g. "sum", "difference"
+  std::vector<std::string> output_units; ///< n units with torque as effort
+  std::vector<std::string> coordinates;  ///< names of the motion coordinates, e.g. "v1", "v2"
+  std::vector<Joint> joints;
+  Eigen::MatrixXd motion;                ///< coordinates × joints: coordinate speeds = motion · joint speeds, (5)
+  Eigen::MatrixXd input;                 ///< outputs × joints: left side of (15) = input · joint efforts
+  std::vector<Term> terms;               ///< the non-zero entries of Y
+  int heading_coordinate = -1;           ///< coordinate whose integral is the heading, −1 where there is none
+  bool heading_used = false;             ///< whether a term looks at the heading
+
+  /// n.
+  [[nodiscard]] std::size_t n() const { return outputs.size(); }
+  /// p.
+  [[nodiscard]] std::size_t p() const { return parameters.size(); }
+};
+
+/// Throws InvalidArgument, naming the field, unless the shapes and indices of `model` agree, every parameter has a term,
+/// and every number is finite.
+void validate(const Model& model);
+
+/// Y(v, v̇) (n × p) of (20) at one instant: what the filtered regressor is the filter of. `acceleration` has one value
+/// per coordinate.
+[[nodiscard]] Eigen::MatrixXd regressor(const Model& model, const MotionState& state,
+                                        std::span<const double> acceleration);
+
+}  // namespace wheelwright

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// What an engineer knows of a robot before its first drive: the robot file as a plain struct.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <wheelwright/core/interval.hpp>
+#include <wheelwright/model/model.hpp>
+
+namespace wheelwright {
+
+/// What the effort columns hold.
+enum class EffortKind {
+  torque,   ///< N·m at the wheel (N at a linear axis)
+  current,  ///< A
+  voltage,  ///< V
+};
+
+/// How the effort behaves between two samples.
+enum class Hold {
+  zero_order,   ///< a command, constant from its time stamp to the next one
+  first_order,  ///< measured, linear between samples
+};
+
+/// Where logged wheel speeds come from.
+enum class SpeedSource {
+  automatic,           ///< found from the data
+  encoder_difference,  ///< encoder counts differenced over a sampling interval: angles are rebuilt from them
+  measured,            ///< samples of the speed itself
+};
+
+/// A bound |n| <= value on the noise of a sensor, or the wish that it be estimated from the log.
+struct NoiseBound {
+  std::optional<double> value;  ///< unit of the column; nothing means "estimate"
+};
+
+/// Declared noise of the sensors. A bound that is not declared is estimated.
+struct SensorNoise {
+  NoiseBound wheel_speed;  ///< rad/s
+  NoiseBound wheel_angle;  ///< rad
+  NoiseBound effort;       ///< unit of the effort
+  NoiseBound position;     ///< m (pose, or the single axis's own position, m or rad)
+  NoiseBound heading;      ///< rad
+};
+
+/// Filter constants of (24); what is not given is chosen from the data.
+struct FilterWish {
+  std::optional<int> order;     ///< 1 (the paper's) or 2
+  std::optional<double> alpha;  ///< 1/s; equal to beta where it is not given
+  std::optional<double> beta;   ///< 1/s
+};
+
+/// Constants of the motors, which make physical quantities of current or voltage. Gear ratio: motor turns per wheel turn.
+struct Motor {
+  std::optional<double> torque_constant;  ///< N·m/A at the motor shaft
+  std::optional<double> resistance;       ///< Ω
+  std::optional<double> back_emf;         ///< V·s/rad at the motor shaft
+  double gear_ratio = 1.0;                ///< –
+};
+
+/// A robot as its file describes it. Names of parameters are those of Model::parameters' `physical` names.
+struct Robot {
+  std::string name = "robot";
+  std::string model = "differential_drive";     ///< differential_drive | single_axis
+  double wheel_radius = 0.0;                    ///< r, m (differential drive)
+  double track_width = 0.0;                     ///< D, m (differential drive)
+  bool lever_arm_is_track = false;              ///< ℓ = D, the paper's convention, instead of D/2
+  bool anisotropic_friction = false;            ///< five parameters (f1 ≠ f2) instead of four
+  EffortKind effort = EffortKind::torque;
+  Hold hold = Hold::first_order;
+  bool effort_unsigned = false;                 ///< only |effort| was logged
+  std::map<std::string, double> nominal;        ///< physical parameter -> value as designed
+  std::map<std::string, Interval> prior;        ///< physical parameter -> bounds known beforehand
+  std::optional<std::vector<std::string>> parameters;  ///< requested parameters; nothing means the model's choice
+  SensorNoise noise;
+  FilterWish filter;
+  std::optional<double> encoder_counts_per_turn;
+  SpeedSource speed_source = SpeedSource::automatic;
+  std::map<std::string, double> limits;         ///< effort, speed, acceleration
+  std::optional<Motor> motor;
+};
+
+/// The model of `robot` with the parameters that it requests (those it names in `parameters`, else the model's
+/// basic set). Throws InvalidArgument when the robot's geometry or its requests make no sense.
+[[nodiscard]] Model make_model(const Robot& robot);
+
+/// Prior box of θ_L in the order of `model.parameters`: the robot's own prior where it has one, else the model's wide
+/// physical default.
+struct PriorBox {
+  std::vector<Interval> bounds;   ///< p intervals, units of θ_L
+  std::vector<bool> declared;     ///< whether the bound came from the robot file
+};
+[[nodiscard]] PriorBox prior_box(const Robot& robot, const Model& model);
+
+}  // namespace wheelwright
