@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/model/robot.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <wheelwright/core/check.hpp>
+#include <wheelwright/model/differential_drive.hpp>
+#include <wheelwright/model/single_axis.hpp>
+
+namespace wheelwright {
+namespace {
+
+// An unknown effort constant (A or V per N·m) is taken to lie below this in a default prior.
+constexpr double widest_effort_constant = 1e3;
+
+// Everything the robot's kind of model can have, before the robot's own choice of parameters.
+Model full_model(const Robot& robot) {
+  if (robot.model == "differential_drive") {
+    return DifferentialDrive{robot.wheel_radius, robot.track_width, robot.lever_arm_is_track,
+                             robot.anisotropic_friction}
+        .model();
+  }
+  if (robot.model == "single_axis") {
+    return SingleAxis{.coulomb = true, .offset = true}.model();
+  }
+  throw InvalidArgument("model is '" + robot.model + "': expected differential_drive or single_axis");
+}
+
+void require_parameter(const Model& model, const std::string& name, const std::string& where) {
+  std::string known;
+  for (const Parameter& parameter : model.parameters) {
+    if (parameter.physical == name) {
+      return;
+    }
+    known += (known.empty() ? "" : ", ") + parameter.physical;
+  }
+  throw InvalidArgument(where + ": the model " + model.name + " has no parameter '" + name + "', expected one of " +
+                        known);
+}
+
+// The model with those parameters only that `keep` names, in the model's order.
+Model select(const Model& model, const std::vector<std::string>& keep) {
+  Model selected = model;
+  selected.parameters.clear();
+  selected.terms.clear();
+  for (std::size_t j = 0; j < model.p(); ++j) {
+    if (std::find(keep.begin(), keep.end(), model.parameters[j].physical) == keep.end()) {
+      continue;
+    }
+    for (Term term : model.terms) {
+      if (term.parameter == j) {
+        term.parameter = selected.parameters.size();
+        selected.terms.push_back(term);
+      }
+    }
+    selected.parameters.push_back(model.parameters[j]);
+  }
+  return selected;
+}
+
+// Effort at the wheel per unit of torque, where the motor's constants tell: 1/(N k_t) for currents, R/(N k_t) for
+// voltages (the back-EMF then belongs to the viscous terms).
+std::optional<double> effort_per_torque(const Robot& robot) {
+  if (robot.effort == EffortKind::torque) {
+    return 1.0;
+  }
+  if (!robot.motor || !robot.motor->torque_constant) {
+    return std::nullopt;
+  }
+  const double torque_per_current = check::positive(*robot.motor->torque_constant, "motor.torque_constant") *
+                                    check::positive(robot.motor->gear_ratio, "motor.gear_ratio");
+  if (robot.effort == EffortKind::current) {
+    return 1.0 / torque_per_current;
+  }
+  if (!robot.motor->resistance) {
+    return std::nullopt;
+  }
+  return check::positive(*robot.motor->resistance, "motor.resistance") / torque_per_current;
+}
+
+}  // namespace
+
+Model make_model(const Robot& robot) {
+  const Model full = full_model(robot);
+  for (const auto& [name, value] : robot.nominal) {
+    require_parameter(full, name, "nominal");
+    check::finite(value, "nominal." + name);
+  }
+  for (const auto& [name, bounds] : robot.prior) {
+    require_parameter(full, name, "prior");
+    check::that(bounds.lower <= bounds.upper, "prior." + name, "lower <= upper");
+  }
+  const std::vector<std::string> basic_axis = {"inertia", "viscous"};
+  Model model = full;
+  if (robot.parameters) {
+    check::that(!robot.parameters->empty(), "parameters", "at least one name");
+    for (const std::string& name : *robot.parameters) {
+      require_parameter(full, name, "parameters");
+    }
+    model = select(full, *robot.parameters);
+  } else if (robot.model == "single_axis") {
+    model = select(full, basic_axis);
+  }
+  if (const std::optional<double> scale = effort_per_torque(robot)) {
+    for (Parameter& parameter : model.parameters) {
+      parameter.per_physical *= *scale;
+    }
+  }
+  validate(model);
+  return model;
+}
+
+PriorBox prior_box(const Robot& robot, const Model& model) {
+  const bool scale_known = effort_per_torque(robot).has_value();
+  PriorBox box;
+  for (const Parameter& parameter : model.parameters) {
+    const auto found = robot.prior.find(parameter.physical);
+    const bool declared = found != robot.prior.end();
+    Interval physical = declared ? found->second : parameter.prior;
+    if (declared) {
+      check::that(physical.lower <= physical.upper, "prior." + found->first, "lower <= upper");
+      check::that(scale_known, "prior." + found->first,
+                  "effort as torque, or the motor's constants, to make effort of " + parameter.physical_unit);
+    } else if (!scale_known) {
+      physical = {physical.lower * widest_effort_constant, physical.upper * widest_effort_constant};
+    }
+    const Interval scale = {parameter.per_physical, parameter.per_physical};
+    Interval bound = scale * physical;
+    if (physical.lower == 0.0 && parameter.per_physical > 0.0) {
+      bound.lower = 0.0;
+    }
+    box.bounds.push_back(bound);
+    box.declared.push_back(declared);
+  }
+  return box;
+}
+
+}  // namespace wheelwright

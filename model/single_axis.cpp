@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/model/single_axis.hpp>
+
+#include <cmath>
+
+namespace wheelwright {
+namespace {
+
+// At rest dry friction is anywhere in [−1, 1]; where the sign of the speed is in doubt it may be the other one.
+TermValue sign_of_speed(const MotionState& state) {
+  const double v = state.speed[0];
+  const double sign = v > 0.0 ? 1.0 : (v < 0.0 ? -1.0 : 0.0);
+  const bool in_doubt = std::abs(v) <= state.speed_error[0];
+  return {sign, in_doubt ? 1.0 + std::abs(sign) : 0.0};
+}
+
+TermValue one(const MotionState&) { return {1.0, 0.0}; }
+
+}  // namespace
+
+Model SingleAxis::model() const {
+  Model m;
+  m.name = "single_axis";
+  m.outputs = {"effort"};
+  m.output_units = {"N (rotary: N·m)"};
+  m.coordinates = {"velocity"};
+  m.joints = {{"position", "velocity", "effort", "effort", "effort"}};
+  m.motion = Eigen::MatrixXd::Ones(1, 1);
+  m.input = Eigen::MatrixXd::Ones(1, 1);
+
+  const auto add = [&m](std::string name, std::string unit, Interval prior, std::string excite, Term term) {
+    term.parameter = m.parameters.size();
+    m.parameters.push_back({name, unit, name, unit, 1.0, prior, std::move(excite)});
+    m.terms.push_back(term);
+  };
+  add("inertia", "kg (rotary: kg·m²)", {0.0, 1e4}, "accelerate and brake", {.kind = Term::Kind::acceleration});
+  add("viscous", "N·s/m (rotary: N·m·s/rad)", {0.0, 1e5}, "move at different speeds", {.kind = Term::Kind::speed});
+  if (coulomb) {
+    add("coulomb", "N (rotary: N·m)", {0.0, 1e5}, "move in both directions",
+        {.kind = Term::Kind::function, .function = sign_of_speed});
+  }
+  if (offset) {
+    add("offset", "N (rotary: N·m)", {-1e5, 1e5}, "move in both directions",
+        {.kind = Term::Kind::function, .function = one});
+  }
+  return m;
+}
+
+}  // namespace wheelwright
