@@ -1,0 +1,233 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Checks the layering of the house and a few of its habits; ctest runs it.
+
+    check_layers.py [ROOT]        every finding on a line "file:line: message"; exit code 1 when there is one
+    check_layers.py --self-test   plants each violation in a scratch tree and expects it to be found
+"""
+
+import os
+import re
+import sys
+import tempfile
+from pathlib import Path
+
+# Room -> rooms whose headers it may include (its own apart). None: all of them.
+WALK = ["core", "model", "filter", "bounds", "identify", "detector", "commission", "design", "gap", "sensitivity"]
+
+
+def before(room):
+    return set(WALK[: WALK.index(room)])
+
+
+MAY_INCLUDE = {
+    "core": set(),
+    "model": {"core"},
+    "filter": {"core", "model"},
+    "bounds": {"core"},
+    "identify": {"core", "filter"},
+    "detector": {"core", "model", "filter", "bounds"},
+    "commission": before("commission"),
+    "design": before("design"),
+    "gap": before("gap"),
+    "sensitivity": before("sensitivity"),
+    "sim": {"core", "model"},
+    "io": set(WALK),
+    "report": set(WALK),
+    "app": None,
+    "python": None,
+    "reality": {"core", "io"},
+    "tests": None,
+    "examples": None,
+    "bench": None,
+}
+
+# Only `io` opens files; results are functions of their arguments (seeds are arguments).
+PURE = set(WALK) | {"sim", "report"}
+BANNED_HEADERS = {
+    "fstream": "only io opens files",
+    "iostream": "results are returned, not printed",
+    "filesystem": "only io opens files",
+    "chrono": "no clock here",
+    "ctime": "no clock here",
+    "time.h": "no clock here",
+}
+BANNED_CODE = {
+    r"\bstd::random_device\b": "generators are seeded and local",
+    r"(?<![\w.>])(?:std::)?s?rand\s*\(": "generators are seeded and local",
+    r"\bstd::(?:time|clock)\s*\(": "no clock here",
+    r"\bstd::(?:cout|cerr|clog)\b": "results are returned, not printed",
+    r"\bf?printf\s*\(": "results are returned, not printed",
+    r"\bfopen\s*\(": "only io opens files",
+}
+
+# Third-party headers that belong to some rooms only: pattern -> (rooms, why).
+OUTSIDE = {
+    r"ceres/|nlopt": ({"identify", "design", "gap"}, "solvers stay where they are used"),
+    r"[Cc]lp|[Cc]oin": ({"bounds"}, "the linear programming library stays in bounds"),
+    r"yaml-cpp/": ({"io", "app"}, "files are read in io"),
+    r"nlohmann/": ({"io", "app", "report"}, "files are read in io"),
+}
+SOLVERS_IN_SOURCES_ONLY = r"ceres/|nlopt|[Cc]lp|[Cc]oin"
+
+# Paths of somebody's machine have no place in the project; written so that this file does not name them.
+PRIVATE_PATHS = re.compile(r"(?<![\w.~-])/(?:" + "wor" + r"k(?![\w-])|" + "tmp/bash" + r"_jobs|" + "roo" + r"t/|" + "hom" + r"e/\w)")
+
+CODE = {".hpp", ".cpp", ".cmake", ".py", ".sh", ".js", ".css"}
+TEXT = CODE | {".md", ".yaml", ".yml", ".json", ".txt", ".cff", ".bib", ".in", ""}
+SKIP = re.compile(r"^(?:\.git|\.cache|build.*|node_modules|out|__pycache__)$")
+INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]')
+
+
+def files(root):
+    for directory, names, leaves in os.walk(root):
+        names[:] = sorted(n for n in names if not SKIP.match(n))
+        for leaf in sorted(leaves):
+            path = Path(directory) / leaf
+            if path.suffix in TEXT and not path.is_symlink():
+                yield path
+
+
+def without_comments(text):
+    """The text with comments and string literals blanked, line by line as it was."""
+    blank = lambda m: re.sub(r"[^\n]", " ", m.group(0))
+    return re.sub(r'//[^\n]*|/\*.*?\*/|R"(\w*)\(.*?\)\1"|"(?:\\.|[^"\\\n])*"', blank, text, flags=re.S)
+
+
+def check_code(room, relative, text, report):
+    for number, line in enumerate(text.splitlines(), 1):
+        match = INCLUDE.match(line)
+        if not match:
+            continue
+        header = match.group(1)
+        ours = re.match(r"wheelwright/(\w+)/", header)
+        if ours and room in MAY_INCLUDE:
+            allowed = MAY_INCLUDE[room]
+            if allowed is not None and ours.group(1) != room and ours.group(1) not in allowed:
+                report(relative, number, f"{room}/ may not include {header}")
+        if room in PURE and header in BANNED_HEADERS:
+            report(relative, number, f"<{header}> in {room}/: {BANNED_HEADERS[header]}")
+        if room in WALK or room in ("sim", "io", "report"):
+            for pattern, (rooms, why) in OUTSIDE.items():
+                if re.match(pattern, header) and room not in rooms:
+                    report(relative, number, f"<{header}> in {room}/: {why}")
+            if relative.suffix == ".hpp" and re.match(SOLVERS_IN_SOURCES_ONLY, header):
+                report(relative, number, f"<{header}> in a header: solvers belong in .cpp files")
+    if room in PURE:
+        for number, line in enumerate(without_comments(text).splitlines(), 1):
+            for pattern, why in BANNED_CODE.items():
+                found = re.search(pattern, line)
+                if found:
+                    report(relative, number, f"{found.group(0).strip()} in {room}/: {why}")
+    if relative.suffix == ".hpp" and not re.search(r"^#pragma once$", text, re.M):
+        report(relative, 1, "no #pragma once")
+
+
+def check_links(room, relative, text, report):
+    """What the room's CMakeLists.txt links is what the table lets it include."""
+    allowed = MAY_INCLUDE[room]
+    used = re.search(r"\bUSES\s+([a-z_\s]+)", text)
+    if allowed is None or not used:
+        return
+    number = text[: used.start()].count("\n") + 1
+    for other in used.group(1).split():
+        if other != room and other not in allowed:
+            report(relative, number, f"{room}/ may not use {other}")
+
+
+def check(root):
+    findings = []
+    report = lambda path, line, message: findings.append(f"{path}:{line}: {message}")
+    for path in files(root):
+        relative = path.relative_to(root)
+        room = relative.parts[0] if len(relative.parts) > 1 else ""
+        try:
+            text = path.read_text(encoding="utf-8")
+        except UnicodeDecodeError:
+            if path.suffix in CODE:
+                report(relative, 1, "not UTF-8")
+            continue
+        script = path.suffix == "" and text.startswith("#!")
+        if path.suffix in CODE or path.name == "CMakeLists.txt" or script:
+            if not re.search(r"SPDX-License-Identifier: Apache-2\.0", "\n".join(text.splitlines()[:3])):
+                report(relative, 1, "no SPDX-License-Identifier: Apache-2.0 in the first lines")
+        for number, line in enumerate(text.splitlines(), 1):
+            named = PRIVATE_PATHS.search(line)
+            if named:
+                report(relative, number, f"names {named.group(0)}, a path of one machine")
+        if path.suffix in (".hpp", ".cpp"):
+            check_code(room, relative, text, report)
+        if path.name == "CMakeLists.txt" and room in MAY_INCLUDE:
+            check_links(room, relative, text, report)
+    return findings
+
+
+def self_test():
+    spdx = "// SPDX-License-Identifier: Apache-2.0\n"
+    head = spdx + "#pragma once\n"
+    clean = {
+        "core/a.hpp": head + "#include <vector>\n// a random comment on rand() and std::cout\n",
+        "bounds/b.hpp": head + "#include <wheelwright/core/a.hpp>\n",
+        "io/c.cpp": spdx + "#include <fstream>\n#include <wheelwright/bounds/b.hpp>\n",
+        "bounds/clp.cpp": spdx + "#include <ClpSimplex.hpp>\n",
+        "detector/CMakeLists.txt": "# SPDX-License-Identifier: Apache-2.0\nwheelwright_room(detector\n  USES core filter\n  LINK x)\n",
+        "docs/framework.md": "framework/works on http://host/working and a/" + "work\n",
+    }
+    violations = {
+        "upward include": ("bounds/x.hpp", head + "#include <wheelwright/filter/f.hpp>\n"),
+        "sim in io": ("io/x.cpp", spdx + "#include <wheelwright/sim/s.hpp>\n"),
+        "io in report": ("report/x.cpp", spdx + "#include <wheelwright/io/s.hpp>\n"),
+        "linked upwards": ("filter/CMakeLists.txt", "# SPDX-License-Identifier: Apache-2.0\nwheelwright_room(filter\n  USES core bounds)\n"),
+        "file opened": ("commission/x.cpp", spdx + "#include <fstream>\n"),
+        "printing": ("filter/x.cpp", spdx + "void f() { std::cout << 1; }\n"),
+        "clock": ("identify/x.cpp", spdx + "#include <chrono>\n"),
+        "device": ("sim/x.cpp", spdx + "std::random_device device;\n"),
+        "rand": ("sim/x.cpp", spdx + "int f() { return rand(); }\n"),
+        "solver in header": ("bounds/x.hpp", head + "#include <ClpSimplex.hpp>\n"),
+        "solver elsewhere": ("detector/x.cpp", spdx + "#include <nlopt.hpp>\n"),
+        "no licence": ("core/x.cpp", "int x;\n"),
+        "no licence in a script": ("tools/x", "#!/bin/sh\ntrue\n"),
+        "no guard": ("core/x.hpp", spdx),
+        "private path": ("docs/x.md", "see /" + "work/main\n"),
+        "another private path": ("examples/x.yaml", "log: /" + "tmp/bash_jobs.0/x\n"),
+    }
+    failures = 0
+
+    def tree(extra):
+        with tempfile.TemporaryDirectory() as root:
+            for name, text in {**clean, **extra}.items():
+                path = Path(root) / name
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_text(text, encoding="utf-8")
+            return check(Path(root))
+
+    found = tree({})
+    if found:
+        failures += 1
+        print("clean tree:", *found, sep="\n  ")
+    for what, (name, text) in violations.items():
+        found = tree({name: text})
+        if len(found) != 1 or not found[0].startswith(name + ":"):
+            failures += 1
+            print(f"{what}: expected one finding in {name}, got", *(found or ["none"]), sep="\n  ")
+    print(f"{len(violations) + 1 - failures} passed, {failures} failed")
+    return failures
+
+
+def main(arguments):
+    if arguments == ["--self-test"]:
+        return 1 if self_test() else 0
+    if len(arguments) > 1 or (arguments and arguments[0].startswith("-")):
+        print(__doc__, file=sys.stderr)
+        return 2
+    root = Path(arguments[0]) if arguments else Path(__file__).resolve().parent.parent
+    findings = check(root)
+    for finding in findings:
+        print(finding)
+    if not findings:
+        print("layers: nothing to report")
+    return 1 if findings else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

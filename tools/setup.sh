@@ -1,0 +1,58 @@
+#!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
+#
+# Installs what the build needs and is not there yet. The second run does nothing.
+#
+#   tools/setup.sh         Debian packages for the program and the tests, and uPlot from npm
+#   tools/setup.sh --ci    the same and clang-format, clang-tidy and clang, which continuous integration uses
+set -eu
+cd "$(dirname "$0")/.."
+
+packages="g++ cmake ninja-build pkg-config python3
+  libeigen3-dev libfmt-dev libyaml-cpp-dev nlohmann-json3-dev zlib1g-dev libzstd-dev coinor-libclp-dev libboost-dev
+  libgtest-dev libgmock-dev librapidcheck-dev libbenchmark-dev"
+case "${1:-}" in
+  '') ;;
+  --ci) packages="$packages clang clang-format clang-tidy" ;;
+  *) echo "usage: tools/setup.sh [--ci]" >&2; exit 2 ;;
+esac
+
+# install PACKAGE...: the ones that dpkg does not have.
+install() {
+  missing=''
+  for package in "$@"; do
+    if [ "$(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null)" != installed ]; then
+      missing="$missing $package"
+    fi
+  done
+  [ -n "$missing" ] || return 0
+  sudo=''
+  if [ "$(id -u)" -ne 0 ]; then
+    if ! command -v sudo >/dev/null; then
+      echo "setup: these packages are missing, and neither root nor sudo is here to install them:$missing" >&2
+      exit 1
+    fi
+    sudo=sudo
+  fi
+  echo "setup: installing from Debian:$missing"
+  $sudo apt-get update -qq
+  # shellcheck disable=SC2086
+  $sudo env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $missing >/dev/null
+}
+
+if ! command -v apt-get >/dev/null; then
+  echo "setup: this system has no apt-get; the packages needed are, by their Debian names:" >&2
+  # shellcheck disable=SC2086
+  echo $packages nodejs npm >&2
+  exit 1
+fi
+# shellcheck disable=SC2086
+install $packages
+
+# uPlot draws the time series of the report. npm checks it against package-lock.json.
+if ! cmp -s package-lock.json node_modules/.wheelwright-lock; then
+  command -v node >/dev/null && command -v npm >/dev/null || install ca-certificates nodejs npm
+  echo "setup: installing uPlot from npm"
+  npm ci --silent --no-audit --no-fund --ignore-scripts
+  cp package-lock.json node_modules/.wheelwright-lock
+fi
