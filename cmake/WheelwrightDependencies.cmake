@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # What the rooms link; shared by the build and by the installed package.
 find_package(Eigen3 3.4 REQUIRED NO_MODULE)
+find_package(Boost 1.74 REQUIRED)
 find_package(fmt REQUIRED)
 find_package(yaml-cpp REQUIRED)
 find_package(nlohmann_json REQUIRED)

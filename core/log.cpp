@@ -2,7 +2,7 @@
 #include <wheelwright/core/log.hpp>
 
 #include <algorithm>
-#include <cmath>
+#include <utility>
 
 #include <wheelwright/core/check.hpp>
 

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/filter/encoder.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include <wheelwright/core/check.hpp>
+
+namespace wheelwright {
+namespace {
+
+constexpr double kMostRounding = 0.25;    // of a count: beyond it a multiple cannot be told from its neighbour
+constexpr std::size_t kFewest = 50;       // distinct non-zero speeds below which chance cannot be excluded
+constexpr double kMostCounts = 4194304.0;  // 2^22
+
+double turn_over(double quantum, double step) { return 2.0 * std::numbers::pi / (quantum * step); }
+
+double worst_rounding(std::span<const double> magnitudes, double quantum) {
+  double worst = 0.0;
+  for (const double m : magnitudes) {
+    const double counts = m / quantum;
+    worst = std::max(worst, std::abs(counts - std::round(counts)));
+    if (worst >= kMostRounding) {
+      break;
+    }
+  }
+  return worst;
+}
+
+// From the smallest speed upwards every multiple sharpens the quantum for the next.
+double refine(std::span<const double> magnitudes, double quantum) {
+  double sum_wn = 0.0;
+  double sum_nn = 0.0;
+  for (const double m : magnitudes) {
+    const double n = std::round(m / quantum);
+    if (std::abs(m / quantum - n) >= kMostRounding) {
+      return 0.0;
+    }
+    sum_wn += m * n;
+    sum_nn += n * n;
+    quantum = sum_wn / sum_nn;
+  }
+  return quantum;
+}
+
+bool is_decimal(double quantum) {
+  const double scaled = quantum / std::pow(10.0, std::floor(std::log10(quantum * (1.0 + 1e-6))));
+  return std::ranges::any_of(std::vector{1.0, 2.0, 5.0}, [&](double d) { return std::abs(scaled / d - 1.0) < 1e-6; });
+}
+
+}  // namespace
+
+std::optional<EncoderFinding> find_encoder(std::span<const double> speeds, double step,
+                                           std::optional<double> counts_per_turn) {
+  check::positive(step, "find_encoder step");
+  std::vector<double> magnitudes;
+  magnitudes.reserve(speeds.size());
+  for (const double speed : speeds) {
+    if (speed != 0.0) {
+      magnitudes.push_back(std::abs(speed));
+    }
+  }
+  std::sort(magnitudes.begin(), magnitudes.end());
+  magnitudes.erase(std::unique(magnitudes.begin(), magnitudes.end()), magnitudes.end());
+  if (counts_per_turn) {
+    const double quantum = turn_over(check::positive(*counts_per_turn, "encoder_counts_per_turn"), step);
+    const double rounding = worst_rounding(magnitudes, quantum);
+    if (magnitudes.empty() || rounding >= kMostRounding) {
+      return std::nullopt;
+    }
+    return EncoderFinding{*counts_per_turn, quantum, rounding};
+  }
+  if (magnitudes.size() < kFewest) {
+    return std::nullopt;
+  }
+  for (int divisor = 1; divisor <= 16; ++divisor) {
+    double quantum = refine(magnitudes, magnitudes.front() / divisor);
+    if (quantum <= 0.0) {
+      continue;
+    }
+    const double counts = turn_over(quantum, step);
+    if (counts < 8.0 || counts > kMostCounts || is_decimal(quantum)) {
+      return std::nullopt;
+    }
+    const double whole = turn_over(std::round(counts), step);
+    double found = std::round(counts);
+    if (worst_rounding(magnitudes, whole) < kMostRounding) {
+      quantum = whole;
+    } else {
+      found = counts;
+    }
+    const double rounding = worst_rounding(magnitudes, quantum);
+    if (rounding < kMostRounding) {
+      return EncoderFinding{found, quantum, rounding};
+    }
+  }
+  return std::nullopt;
+}
+
+}  // namespace wheelwright

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Wheel speeds that are differenced encoder counts are recognised, and the encoder's resolution found.
+#pragma once
+
+#include <optional>
+#include <span>
+
+namespace wheelwright {
+
+/// What was found.
+struct EncoderFinding {
+  double counts_per_turn = 0.0;  ///< N
+  double speed_step = 0.0;       ///< 2π/(N h), rad/s: every speed is a whole multiple of it
+  double rounding = 0.0;         ///< largest distance of a speed from a multiple, in counts (< 0.25)
+};
+
+/// The largest quantum q such that all `speeds` (rad/s, sampled with the constant step `step`, s) are whole multiples
+/// of it up to the decimals they were printed with, where q = 2π/(N·step) for a whole N between 8 and 2²² that explains
+/// them; nothing where there is none. A log whose speeds were merely printed with few decimals has a decimal quantum
+/// (1, 2 or 5 · 10ᵏ rad/s): that is no encoder and is not taken for one.
+///
+/// `counts_per_turn`, where it is known, is checked instead of searched for.
+[[nodiscard]] std::optional<EncoderFinding> find_encoder(std::span<const double> speeds, double step,
+                                                         std::optional<double> counts_per_turn = std::nullopt);
+
+}  // namespace wheelwright

@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/filter/measurement.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+#include <wheelwright/core/check.hpp>
+#include <wheelwright/filter/encoder.hpp>
+
+namespace wheelwright {
+namespace {
+
+constexpr std::size_t kMostSpeeds = 200000;  // enough to find an encoder; longer logs are not searched further
+constexpr double kEvenSteps = 0.02;          // steps further apart than this share are not one sampling interval
+
+std::string join(const std::vector<std::string>& words) {
+  std::string out;
+  for (const auto& word : words) {
+    out += (out.empty() ? "" : ", ") + word;
+  }
+  return out;
+}
+
+std::string effort_column(const Joint& joint, EffortKind kind) {
+  switch (kind) {
+    case EffortKind::torque:
+      return joint.torque;
+    case EffortKind::current:
+      return joint.current;
+    case EffortKind::voltage:
+      return joint.voltage;
+  }
+  return {};
+}
+
+template <typename Pick>
+bool has_all(const LogSource& log, const Model& model, Pick pick) {
+  return std::ranges::all_of(model.joints, [&](const Joint& joint) { return log.find(pick(joint)).has_value(); });
+}
+
+// Speeds of all joints and whether the steps are even enough to speak of a sampling interval.
+struct SpeedSample {
+  std::vector<double> speeds;
+  bool even = true;
+};
+
+SpeedSample sample_speeds(LogSource& log, const std::vector<std::string>& columns) {
+  SpeedSample sample;
+  std::vector<std::size_t> pick;
+  for (const auto& column : columns) {
+    pick.push_back(*log.find(column));
+  }
+  const double nominal = log.median_step();
+  std::size_t uneven = 0;
+  std::size_t steps = 0;
+  log.rewind();
+  LogBlock block;
+  while (sample.speeds.size() < kMostSpeeds && log.next(block)) {
+    for (const std::size_t c : pick) {
+      sample.speeds.insert(sample.speeds.end(), block.columns[c].begin(), block.columns[c].end());
+    }
+    for (std::size_t k = 1; k < block.rows(); ++k) {
+      ++steps;
+      uneven += std::abs(block.t[k] - block.t[k - 1] - nominal) > kEvenSteps * nominal ? 1 : 0;
+    }
+  }
+  log.rewind();
+  sample.even = uneven * 1000 <= steps;
+  return sample;
+}
+
+}  // namespace
+
+std::vector<std::string> Measurement::columns() const {
+  std::vector<std::string> all = motion_columns;
+  all.insert(all.end(), effort_columns.begin(), effort_columns.end());
+  if (!heading_column.empty()) {
+    all.push_back(heading_column);
+  }
+  return all;
+}
+
+Measurement find_measurement(LogSource& log, const Robot& robot, const Model& model, int order) {
+  Measurement m;
+  m.hold = robot.hold;
+  m.effort_unsigned = robot.effort_unsigned;
+  m.nominal_step = log.median_step();
+
+  std::vector<std::string> angles, speeds;
+  for (const Joint& joint : model.joints) {
+    angles.push_back(joint.angle);
+    speeds.push_back(joint.speed);
+    m.effort_columns.push_back(effort_column(joint, robot.effort));
+  }
+  const bool have_angles = has_all(log, model, [](const Joint& j) { return j.angle; });
+  const bool have_speeds = has_all(log, model, [](const Joint& j) { return j.speed; });
+  if (!have_angles && !have_speeds) {
+    throw InputError("the log has columns t, " + join(log.columns()) + ": expected the motion of every joint, " +
+                     join(speeds) + " or " + join(angles) + " (use --map to rename columns)");
+  }
+  if (order == 1 && !have_speeds) {
+    throw InvalidArgument("filter order is 1, which works on speeds, but the log has angles only (" + join(angles) +
+                          "): expected order 2, or a log with " + join(speeds));
+  }
+  if (!has_all(log, model, [&](const Joint& j) { return effort_column(j, robot.effort); })) {
+    throw InputError("the log has columns t, " + join(log.columns()) + ": expected the effort of every joint, " +
+                     join(m.effort_columns) + " (effort.kind in the robot file says which effort is used; --map " +
+                     "renames columns)");
+  }
+  m.motion = order == 2 && have_angles ? MotionKind::angle : MotionKind::speed;
+  m.motion_columns = m.motion == MotionKind::angle ? angles : speeds;
+  if (m.motion == MotionKind::speed && order == 2 && robot.speed_source != SpeedSource::measured) {
+    const SpeedSample sample = sample_speeds(log, speeds);
+    const auto encoder =
+        sample.even ? find_encoder(sample.speeds, m.nominal_step, robot.encoder_counts_per_turn) : std::nullopt;
+    if (encoder) {
+      m.motion = MotionKind::mean_speed;
+      m.count = encoder->speed_step;
+    } else if (robot.speed_source == SpeedSource::encoder_difference) {
+      m.motion = MotionKind::mean_speed;
+    }
+  }
+  if (model.heading_used && log.find("theta")) {
+    m.heading_column = "theta";
+  }
+  return m;
+}
+
+}  // namespace wheelwright

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// How a log measures a robot: which columns, what kind of motion signal, how it behaves between samples.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <wheelwright/core/log.hpp>
+#include <wheelwright/model/model.hpp>
+#include <wheelwright/model/robot.hpp>
+
+namespace wheelwright {
+
+/// What the motion columns hold.
+enum class MotionKind {
+  angle,       ///< joint angle at the time stamp; linear between samples
+  mean_speed,  ///< encoder counts over a sampling interval, divided by it, stamped in its middle: the angle at the
+               ///< interval's ends is exact to half a count, and linear between
+  speed,       ///< samples of the speed; linear between samples
+};
+
+/// Everything the filter needs to know of a log's columns. Part of a commissioned model: a detector reads the same way.
+struct Measurement {
+  MotionKind motion = MotionKind::speed;
+  std::vector<std::string> motion_columns;  ///< one for each joint
+  std::vector<std::string> effort_columns;  ///< one for each joint
+  std::string heading_column;               ///< empty where the heading is odometry
+  Hold hold = Hold::first_order;            ///< of the effort
+  bool effort_unsigned = false;             ///< the sign of an effort is taken from its joint's direction of motion
+  double count = 0.0;                       ///< mean_speed: speeds are whole multiples of this, rad/s (0: not rounded)
+  double nominal_step = 0.0;                ///< median step of the log it was found on, s
+
+  /// Columns in the order in which RegressorFilter wants a sample: motion, effort, heading where there is one.
+  [[nodiscard]] std::vector<std::string> columns() const;
+};
+
+/// Finds how `log` measures `robot`: angles where the log has them, else speeds; for order 2 and speed_source automatic
+/// the log is searched for count-differenced speeds (encoder.hpp). Walks the log once. Throws InputError when a joint
+/// has no usable motion or effort column (naming the columns that were looked for), InvalidArgument when order 1 is
+/// asked of a log that has angles only.
+[[nodiscard]] Measurement find_measurement(LogSource& log, const Robot& robot, const Model& model, int order);
+
+}  // namespace wheelwright

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/filter/noise.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <wheelwright/core/check.hpp>
+#include <wheelwright/filter/exact.hpp>
+
+namespace wheelwright {
+namespace {
+
+// Squared weights with which one sample of the motion, and one of the effort, enter the filtered signals at all later
+// instants. A unit sample among zeros is sent through the cascades.
+struct Energies {
+  double acceleration = 0.0;
+  double speed = 0.0;
+  double effort = 0.0;
+};
+
+Energies impulse_energies(const FilterDesign& d, MotionKind motion, Hold hold, double h) {
+  const StepWeights w(d.beta, h);
+  const double gain = std::pow(d.alpha, d.order);
+  const auto out = [&](const Cascade& c) { return gain * (d.order == 1 ? c.z1 : c.z2); };
+  const bool angles = motion != MotionKind::speed;
+  Cascade effort, speed, slope;
+  Energies e;
+  const auto steps = static_cast<long>(std::ceil(60.0 / (d.beta * h))) + 3;
+  double before = 0.0;
+  for (long k = 0; k < steps; ++k) {
+    const double now = k == 0 ? 1.0 : 0.0;
+    if (angles) {
+      speed.held(w, (now - before) / h);
+    } else {
+      speed.linear(w, before, now);
+      slope.increment(w, now - before);
+    }
+    if (hold == Hold::zero_order) {
+      effort.held(w, before);
+    } else {
+      effort.linear(w, before, now);
+    }
+    const double a = angles ? gain * (speed.z1 - d.beta * speed.z2) : out(slope);
+    e.acceleration += a * a;
+    e.speed += out(speed) * out(speed);
+    e.effort += out(effort) * out(effort);
+    before = now;
+  }
+  return e;
+}
+
+KernelNorms roots(const Energies& e) { return {std::sqrt(e.acceleration), std::sqrt(e.speed), std::sqrt(e.effort)}; }
+
+}  // namespace
+
+KernelNorms worst_case_norms(const FilterDesign& d, MotionKind motion) {
+  validate(d);
+  const double a2 = d.alpha * d.alpha;
+  if (d.order == 1) {
+    return {2.0 * d.alpha, d.alpha / d.beta, d.alpha / d.beta};
+  }
+  const double rate = 2.0 * a2 / (std::numbers::e * d.beta);
+  const double level = a2 / (d.beta * d.beta);
+  if (motion == MotionKind::speed) {
+    return {rate, level, level};
+  }
+  return {2.0 * a2 * (1.0 + std::exp(-2.0)), rate, level};
+}
+
+KernelNorms statistical_norms(const FilterDesign& design, MotionKind motion, double step) {
+  validate(design);
+  check::positive(step, "statistical_norms step");
+  const Energies linear = impulse_energies(design, motion, Hold::first_order, step);
+  const Energies held = impulse_energies(design, motion, Hold::zero_order, step);
+  return roots({linear.acceleration, linear.speed, std::max(linear.effort, held.effort)});
+}
+
+SignalErrors propagate(const Model& model, const FilterDesign& design, const Measurement& measurement,
+                       const SensorErrors& sensors, const PropagationOptions& options) {
+  check::non_negative(sensors.motion, "motion error bound");
+  check::non_negative(sensors.effort, "effort error bound");
+  check::non_negative(sensors.heading, "heading error bound");
+  KernelNorms norms = worst_case_norms(design, measurement.motion);
+  double factor = 1.0;
+  if (options.mode == NoiseMode::statistical) {
+    check::that(options.confidence > 0.0 && options.confidence < 1.0, "confidence", "a number inside (0, 1)");
+    check::that(options.rows >= 1.0, "rows", "at least 1");
+    const KernelNorms energy = statistical_norms(design, measurement.motion, options.largest_step);
+    // Hoeffding (1963): P(|Σ w_k n_k| > s) <= 2 exp(−s²/(2 n̄² Σ w_k²)), and as many events as rows have entries.
+    const double entries = options.rows * static_cast<double>(2 * model.coordinates.size() + model.n());
+    factor = std::sqrt(2.0 * std::log(2.0 * entries / (1.0 - options.confidence)));
+    norms.acceleration = std::min(norms.acceleration, factor * energy.acceleration);
+    norms.speed = std::min(norms.speed, factor * energy.speed);
+    norms.effort = std::min(norms.effort, factor * energy.effort);
+  }
+  // Independent noise of several joints adds up in squares, the worst case in absolute values.
+  const auto across = [&](const Eigen::MatrixXd& map) -> Eigen::VectorXd {
+    if (options.mode == NoiseMode::statistical) {
+      return map.rowwise().norm();
+    }
+    return map.cwiseAbs().rowwise().sum();
+  };
+  const Eigen::VectorXd motion = across(model.motion) * sensors.motion;
+  const Eigen::VectorXd sample = model.motion.cwiseAbs().rowwise().sum() * sensors.motion;
+  SignalErrors errors;
+  errors.acceleration = norms.acceleration * motion;
+  errors.speed = norms.speed * motion;
+  errors.output = norms.effort * sensors.effort * across(model.input);
+  errors.heading = sensors.heading;
+  if (measurement.motion == MotionKind::speed) {
+    errors.speed_sample = sample;
+  } else {
+    check::that(sensors.motion == 0.0 || measurement.nominal_step > 0.0, "measurement nominal_step", "a step > 0");
+    errors.speed_sample = sensors.motion > 0.0 ? Eigen::VectorXd(2.0 / measurement.nominal_step * sample) : sample;
+  }
+  return errors;
+}
+
+}  // namespace wheelwright

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Sensor noise propagated through the filters: what the rows of the regression can be wrong by.
+#pragma once
+
+#include <Eigen/Core>
+
+#include <wheelwright/filter/design.hpp>
+#include <wheelwright/filter/measurement.hpp>
+#include <wheelwright/model/model.hpp>
+
+namespace wheelwright {
+
+/// Which of the two propagations a bound stands on.
+enum class NoiseMode {
+  worst_case,   ///< for every noise |n(t)| <= n̄: L1 norm of the filter's kernel
+  statistical,  ///< for independent zero-mean noise |n_k| <= n̄: Hoeffding's bound on the filtered sum, at a stated
+                ///< confidence over all rows of a log together (union bound)
+};
+
+/// Bounds on the sensors' errors, units of the columns; 0 means exact (or "not declared": then the equation error that
+/// is estimated from the data covers it).
+struct SensorErrors {
+  double motion = 0.0;   ///< n̄ of the motion column: rad for angles, rad/s for speeds; for mean speeds the *angle's*
+                         ///< error at the interval's ends, rad (half a count)
+  double effort = 0.0;   ///< n̄_τ
+  double heading = 0.0;  ///< rad
+};
+
+/// How the worst case is to be judged.
+struct PropagationOptions {
+  NoiseMode mode = NoiseMode::worst_case;
+  double confidence = 0.999;   ///< statistical: probability that every row of the log obeys its bound
+  double rows = 1e6;           ///< statistical: number of instants of a log that the confidence is about
+  double largest_step = 0.0;   ///< statistical: largest sampling step, s (> 0)
+};
+
+/// Error bounds of filtered signals, ready to be written into rows.
+struct SignalErrors {
+  Eigen::VectorXd acceleration;  ///< per coordinate: of its filtered acceleration (empty: all zero)
+  Eigen::VectorXd speed;         ///< per coordinate: of its filtered speed
+  Eigen::VectorXd output;        ///< per output: of τ_f
+  Eigen::VectorXd speed_sample;  ///< per coordinate: of its unfiltered speed inside a piece, for function terms
+  double heading = 0.0;          ///< rad
+};
+
+/// Norms of the kernels that turn a motion or effort error of size 1 into the error of a filtered signal.
+struct KernelNorms {
+  double acceleration = 0.0;
+  double speed = 0.0;
+  double effort = 0.0;
+};
+
+/// L1 norms (sup |f * n| over |n| <= 1), exact for the continuous kernels:
+///   order 1, speeds:  f*n: α/β;  f*ṅ: 2α
+///   order 2, angles:  f₂*n: α²/β²;  f₂*ṅ: 2α²/(eβ);  f₂*n̈: 2α²(1 + e⁻²)
+///   order 2, speeds:  f₂*n: α²/β²;  f₂*ṅ: 2α²/(eβ)
+/// The angle's own error at the segment's start adds sup|f₂'| = α² t e^{−βt} terms that have decayed when rows begin
+/// (FilterDesign::settle).
+[[nodiscard]] KernelNorms worst_case_norms(const FilterDesign& design, MotionKind motion);
+
+/// L2 norms (root of the summed squares of the weights of all samples) for a constant step `step` (s), found by sending
+/// a unit sample through the filter itself. For small βh: f*n: α√(h/(2β)), f*ṅ: about α, f₂*n: α²√(h/(4β³)),
+/// f₂*ṅ: α²√(h/(4β)), f₂*n̈: about α².
+[[nodiscard]] KernelNorms statistical_norms(const FilterDesign& design, MotionKind motion, double step);
+
+/// Bounds on the filtered signals for sensors with the errors `sensors`. Throws InvalidArgument on negative bounds, a
+/// confidence outside (0, 1), or a missing largest step where it is needed.
+[[nodiscard]] SignalErrors propagate(const Model& model, const FilterDesign& design, const Measurement& measurement,
+                                     const SensorErrors& sensors, const PropagationOptions& options = {});
+
+}  // namespace wheelwright

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Samples in, rows {τ_f, Y_f} out: the one recursion behind the batch and the online use of the filter.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include <wheelwright/core/regression.hpp>
+#include <wheelwright/filter/design.hpp>
+#include <wheelwright/filter/exact.hpp>
+#include <wheelwright/filter/measurement.hpp>
+#include <wheelwright/filter/noise.hpp>
+#include <wheelwright/model/model.hpp>
+
+namespace wheelwright {
+
+/// One instant of the filtered regression (25).
+struct FilteredRow {
+  RowMatrix Y;         ///< n × p, Y_f
+  RowMatrix dY;        ///< n × p, Δ >= 0
+  Eigen::VectorXd y;   ///< n, τ_f
+  Eigen::VectorXd dy;  ///< n, n̄ >= 0
+};
+
+/// Filters torque and regressor sample by sample: (28) for τ_f, the identities of theory section 2 for Y_f, discretised
+/// exactly for steps of any length.
+///
+/// Between samples: angles linear; mean speeds constant over their interval, whose ends are the mid-points between time
+/// stamps; measured speeds linear; efforts as Measurement::hold says. Functions of the motion (friction terms) are taken
+/// at the speeds of each such piece, and filtered like them.
+///
+/// step() does not allocate. Batch filtering is this class in a loop, so that both give the same bits.
+class RegressorFilter {
+ public:
+  /// Throws InvalidArgument when `model`, `design` or `measurement` is not valid. `errors` says what dY and dy are.
+  RegressorFilter(Model model, FilterDesign design, Measurement measurement, SignalErrors errors = {});
+
+  /// Forgets all samples: the next one starts a segment.
+  void restart();
+
+  /// Takes the sample at time `t` (s): motion of each joint, effort of each joint, heading where
+  /// Measurement::heading_column names one (the order of Measurement::columns()). `t` must exceed that of the sample
+  /// before. Returns whether row() now holds an instant of the regression: not for the first sample of a segment, nor
+  /// before the filter has settled (FilterDesign::settle).
+  bool step(double t, std::span<const double> sample);
+
+  /// The instant at the last sample.
+  [[nodiscard]] const FilteredRow& row() const { return row_; }
+  [[nodiscard]] const Model& model() const { return model_; }
+  [[nodiscard]] const FilterDesign& design() const { return design_; }
+  [[nodiscard]] const Measurement& measurement() const { return measurement_; }
+
+ private:
+  struct FunctionTerm {
+    std::size_t term;
+    Cascade value;
+    Cascade error;
+    double last_value = 0.0;
+    double last_error = 0.0;
+  };
+
+  void read_motion(std::span<const double> sample);
+  void read_efforts(std::span<const double> sample);
+  void evaluate_functions(const Eigen::VectorXd& speed);
+  void advance_piece(const StepWeights& w, const Eigen::VectorXd& speed);
+  void advance_speeds(const StepWeights& w);
+  void advance_efforts(const StepWeights& w);
+  void advance_functions_held(const StepWeights& w, const Eigen::VectorXd& speed);
+  void write_row();
+  [[nodiscard]] double filtered(const Cascade& c) const;
+
+  Model model_;
+  FilterDesign design_;
+  Measurement measurement_;
+  SignalErrors errors_;
+
+  StepWeights whole_;
+  StepWeights half_;
+  bool started_ = false;
+  double t0_ = 0.0;
+  double t_ = 0.0;
+  double heading_ = 0.0;
+  double heading_now_ = 0.0;
+  Eigen::VectorXd joint_, joint_before_, joint_work_;   // motion as measured
+  Eigen::VectorXd speed_, speed_before_, first_speed_;  // of coordinates
+  Eigen::VectorXd effort_, effort_before_;              // of outputs
+  std::vector<Cascade> motion_;                         // driven by the coordinates' speeds
+  std::vector<Cascade> slope_;                          // driven by their derivatives (measured speeds only)
+  std::vector<Cascade> torque_;
+  std::vector<FunctionTerm> functions_;
+  std::vector<double> state_speed_;
+  FilteredRow row_;
+};
+
+}  // namespace wheelwright
