@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/sim/trajectory.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include <wheelwright/core/check.hpp>
+
+namespace wheelwright {
+namespace {
+
+using std::numbers::pi;
+constexpr std::array<std::string_view, 7> kind_names = {"straight", "circle", "figure_eight", "multi_sine",
+                                                        "spin",     "stops",  "commissioning"};
+constexpr double first_zero_of_j0 = 2.404825557695773;
+constexpr double soft_start = 1.0;  // s
+
+// A function of time and its derivative.
+struct Signal {
+  double value = 0.0;
+  double rate = 0.0;
+};
+
+Signal operator*(Signal a, Signal b) { return {a.value * b.value, a.rate * b.value + a.value * b.rate}; }
+Signal operator*(double a, Signal b) { return {a * b.value, a * b.rate}; }
+Signal operator+(Signal a, Signal b) { return {a.value + b.value, a.rate + b.rate}; }
+
+Signal sine(double w, double t, double phase = 0.0) { return {std::sin(w * t + phase), w * std::cos(w * t + phase)}; }
+
+// 0 → 1 over `length`, 3s² − 2s³.
+Signal smooth_step(double t, double length) {
+  if (t <= 0.0) {
+    return {0.0, 0.0};
+  }
+  if (t >= length) {
+    return {1.0, 0.0};
+  }
+  const double s = t / length;
+  return {s * s * (3.0 - 2.0 * s), 6.0 * s * (1.0 - s) / length};
+}
+
+// max(0, sin)²: half of the period at rest.
+Signal go_and_stop(double w, double t) {
+  const Signal s = sine(w, t);
+  return s.value > 0.0 ? s * s : Signal{};
+}
+
+struct Pair {
+  Signal v1, v2;
+};
+
+Pair steady(const Trajectory& r, Trajectory::Kind kind, double t) {
+  const double w = 2.0 * pi / r.period;
+  const Signal one{1.0, 0.0};
+  switch (kind) {
+    case Trajectory::Kind::straight: return {r.speed * (0.6 * one + 0.4 * sine(w, t)), {}};
+    case Trajectory::Kind::circle: return {r.speed * one, r.yaw_rate * one};
+    case Trajectory::Kind::figure_eight: return {r.speed * one, first_zero_of_j0 * w * sine(w, t, pi / 2.0)};
+    case Trajectory::Kind::multi_sine:
+      return {r.speed * (0.5 * sine(w, t) + 0.3 * sine(2.7 * w, t) + 0.2 * sine(5.9 * w, t)),
+              r.yaw_rate * (0.5 * sine(1.3 * w, t) + 0.3 * sine(3.1 * w, t) + 0.2 * sine(6.7 * w, t))};
+    case Trajectory::Kind::spin: return {{}, r.yaw_rate * (0.7 * sine(w, t) + 0.3 * sine(3.3 * w, t))};
+    case Trajectory::Kind::stops: {
+      const Signal go = go_and_stop(w, t);
+      return {r.speed * go, r.yaw_rate * (go * sine(0.43 * w, t))};
+    }
+    case Trajectory::Kind::commissioning: break;
+  }
+  // One stage after the other, each from standstill to standstill.
+  constexpr std::array stages = {Trajectory::Kind::straight, Trajectory::Kind::figure_eight,
+                                 Trajectory::Kind::multi_sine, Trajectory::Kind::spin, Trajectory::Kind::stops};
+  const double number = std::floor(t / r.period);
+  const double local = t - number * r.period;
+  Pair pair = steady(r, stages[static_cast<std::size_t>(std::fmod(number, static_cast<double>(stages.size())))], local);
+  const double ramp = 0.15 * r.period;
+  const Signal end = smooth_step(local - (r.period - ramp), ramp);
+  const Signal window = smooth_step(local, ramp) * Signal{1.0 - end.value, -end.rate};
+  return {window * pair.v1, window * pair.v2};
+}
+
+}  // namespace
+
+std::string_view to_string(Trajectory::Kind kind) { return kind_names.at(static_cast<std::size_t>(kind)); }
+
+void validate(const Trajectory& trajectory) {
+  check::non_negative(trajectory.speed, "trajectory.speed");
+  check::non_negative(trajectory.yaw_rate, "trajectory.yaw_rate");
+  check::positive(trajectory.period, "trajectory.period");
+}
+
+ReferenceSpeed reference_speed(const Trajectory& trajectory, double t) {
+  const Pair pair = steady(trajectory, trajectory.kind, t);
+  const Signal start = smooth_step(t, soft_start);
+  const Signal v1 = start * pair.v1, v2 = start * pair.v2;
+  return {{v1.value, v2.value}, {v1.rate, v2.rate}};
+}
+
+Eigen::Vector3d advance_reference(const Trajectory& trajectory, const Eigen::Vector3d& pose, double t, double h) {
+  const Eigen::Vector2d twist = reference_speed(trajectory, t + 0.5 * h).speed;
+  const double half_turn = 0.5 * h * twist[1];
+  const double chord = h * twist[0] * (std::abs(half_turn) < 1e-4 ? 1.0 - half_turn * half_turn / 6.0
+                                                                  : std::sin(half_turn) / half_turn);
+  return {pose[0] + chord * std::cos(pose[2] + half_turn), pose[1] + chord * std::sin(pose[2] + half_turn),
+          pose[2] + 2.0 * half_turn};
+}
+
+}  // namespace wheelwright
