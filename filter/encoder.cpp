@@ -12,7 +12,8 @@ namespace wheelwright {
 namespace {
 
 constexpr double kMostRounding = 0.25;    // of a count: beyond it a multiple cannot be told from its neighbour
-constexpr std::size_t kFewest = 50;       // distinct non-zero speeds below which chance cannot be excluded
+constexpr std::size_t kFewest = 50;       // non-zero speeds below which nothing is claimed
+constexpr double kSharp = 0.01;           // with fewer distinct speeds, how near N must be to a whole number
 constexpr double kMostCounts = 4194304.0;  // 2^22
 
 double turn_over(double quantum, double step) { return 2.0 * std::numbers::pi / (quantum * step); }
@@ -62,6 +63,7 @@ std::optional<EncoderFinding> find_encoder(std::span<const double> speeds, doubl
       magnitudes.push_back(std::abs(speed));
     }
   }
+  const std::size_t moving = magnitudes.size();
   std::sort(magnitudes.begin(), magnitudes.end());
   magnitudes.erase(std::unique(magnitudes.begin(), magnitudes.end()), magnitudes.end());
   if (counts_per_turn) {
@@ -72,7 +74,7 @@ std::optional<EncoderFinding> find_encoder(std::span<const double> speeds, doubl
     }
     return EncoderFinding{*counts_per_turn, quantum, rounding};
   }
-  if (magnitudes.size() < kFewest) {
+  if (moving < kFewest || magnitudes.size() < 2) {
     return std::nullopt;
   }
   for (int divisor = 1; divisor <= 16; ++divisor) {
@@ -92,7 +94,8 @@ std::optional<EncoderFinding> find_encoder(std::span<const double> speeds, doubl
       found = counts;
     }
     const double rounding = worst_rounding(magnitudes, quantum);
-    if (rounding < kMostRounding) {
+    const bool many = magnitudes.size() >= kFewest;
+    if (many ? rounding < kMostRounding : rounding < kSharp && std::abs(counts - std::round(counts)) < kSharp) {
       return EncoderFinding{found, quantum, rounding};
     }
   }

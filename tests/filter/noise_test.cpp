@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/filter/noise.hpp>
+
+#include <cmath>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include <wheelwright/filter/regressor_filter.hpp>
+#include <wheelwright/model/single_axis.hpp>
+
+namespace wheelwright {
+namespace {
+
+Measurement axis(MotionKind motion) {
+  Measurement m;
+  m.motion = motion;
+  m.motion_columns = {motion == MotionKind::angle ? "position" : "velocity"};
+  m.effort_columns = {"effort"};
+  m.nominal_step = 0.01;
+  return m;
+}
+
+// Noise alone, sent through the filter: |row| is the error that the bounds promise to cover.
+struct Worst {
+  double acceleration = 0.0, speed = 0.0, effort = 0.0;
+  double acceleration_square = 0.0;
+  long rows = 0;
+};
+
+template <typename Draw>
+Worst noise_through(const FilterDesign& design, MotionKind motion, Draw draw, int samples) {
+  RegressorFilter filter(SingleAxis{}.model(), design, axis(motion));
+  Worst worst;
+  for (int k = 0; k < samples; ++k) {
+    const double t = 0.01 * k;
+    const std::array<double, 2> sample{k == 0 && motion == MotionKind::mean_speed ? 0.0 : draw(k), draw(k + 1000000)};
+    if (!filter.step(t, sample)) {
+      continue;
+    }
+    const auto& row = filter.row();
+    worst.acceleration = std::max(worst.acceleration, std::abs(row.Y(0, 0)));
+    worst.speed = std::max(worst.speed, std::abs(row.Y(0, 1)));
+    worst.effort = std::max(worst.effort, std::abs(row.y[0]));
+    worst.acceleration_square += row.Y(0, 0) * row.Y(0, 0);
+    ++worst.rows;
+  }
+  return worst;
+}
+
+TEST(WorstCaseNorms, CoverHostileNoiseAndAreNearlyReached) {
+  struct Case {
+    int order;
+    MotionKind motion;
+  };
+  for (const Case c : {Case{1, MotionKind::speed}, Case{2, MotionKind::speed}, Case{2, MotionKind::angle}}) {
+    const FilterDesign design{.order = c.order, .alpha = 8.0, .beta = 5.0};
+    const KernelNorms norms = worst_case_norms(design, c.motion);
+    Worst worst;
+    // Square waves of many periods come close to the worst sign pattern of each kernel.
+    for (int period = 2; period < 400; period = period * 5 / 4 + 1) {
+      const Worst w = noise_through(design, c.motion, [&](int k) { return (k / period) % 2 == 0 ? 1.0 : -1.0; }, 3000);
+      worst.acceleration = std::max(worst.acceleration, w.acceleration);
+      worst.speed = std::max(worst.speed, w.speed);
+      worst.effort = std::max(worst.effort, w.effort);
+    }
+    EXPECT_LE(worst.acceleration, norms.acceleration);
+    EXPECT_LE(worst.speed, norms.speed);
+    EXPECT_LE(worst.effort, norms.effort);
+    EXPECT_GT(worst.acceleration, 0.7 * norms.acceleration);
+    EXPECT_GT(worst.speed, 0.7 * norms.speed);
+    EXPECT_GT(worst.effort, 0.7 * norms.effort);
+  }
+}
+
+TEST(StatisticalNorms, AreTheStandardDeviationOfFilteredWhiteNoise) {
+  for (const MotionKind motion : {MotionKind::speed, MotionKind::angle}) {
+    const FilterDesign design{.order = 2, .alpha = 8.0, .beta = 5.0};
+    std::mt19937_64 rng(2);
+    std::normal_distribution<double> gauss;
+    const Worst w = noise_through(design, motion, [&](int) { return gauss(rng); }, 400000);
+    const double sd = std::sqrt(w.acceleration_square / static_cast<double>(w.rows));
+    EXPECT_NEAR(sd / statistical_norms(design, motion, 0.01).acceleration, 1.0, 0.03);
+  }
+}
+
+TEST(StatisticalNorms, ApproachTheClosedFormsForSmallSteps) {
+  const double h = 1e-4;
+  const FilterDesign first{.order = 1, .alpha = 8.0, .beta = 5.0};
+  const KernelNorms n1 = statistical_norms(first, MotionKind::speed, h);
+  EXPECT_NEAR(n1.speed / (8.0 * std::sqrt(h / 10.0)), 1.0, 1e-3);
+  EXPECT_NEAR(n1.acceleration / 8.0, 1.0, 1e-3);
+  const FilterDesign second{.order = 2, .alpha = 8.0, .beta = 5.0};
+  const KernelNorms n2 = statistical_norms(second, MotionKind::angle, h);
+  EXPECT_NEAR(n2.effort / (64.0 * std::sqrt(h / (4.0 * 125.0))), 1.0, 1e-3);
+  EXPECT_NEAR(n2.speed / (64.0 * std::sqrt(h / 20.0)), 1.0, 1e-3);
+  EXPECT_NEAR(n2.acceleration / 64.0, 1.0, 1e-2);
+}
+
+TEST(Propagate, StatisticalBoundsAreNeverWiderThanTheWorstCase) {
+  const Model model = SingleAxis{}.model();
+  const FilterDesign design;
+  const SensorErrors sensors{.motion = 1e-3, .effort = 0.1};
+  const SignalErrors worst = propagate(model, design, axis(MotionKind::angle), sensors);
+  const SignalErrors usual = propagate(model, design, axis(MotionKind::angle), sensors,
+                                       {.mode = NoiseMode::statistical, .largest_step = 0.001});
+  EXPECT_LT(usual.speed[0], worst.speed[0]);
+  EXPECT_LT(usual.output[0], worst.output[0]);
+  EXPECT_LE(usual.acceleration[0], worst.acceleration[0]);
+}
+
+}  // namespace
+}  // namespace wheelwright
