@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
+#
+# The package that find_package(Wheelwright) finds, in the build tree's install tree.
 include(CMakePackageConfigHelpers)
 set(WHEELWRIGHT_CMAKE_DIR ${CMAKE_INSTALL_LIBDIR}/cmake/Wheelwright)
 install(EXPORT WheelwrightTargets NAMESPACE Wheelwright:: DESTINATION ${WHEELWRIGHT_CMAKE_DIR})
-file(WRITE ${CMAKE_BINARY_DIR}/WheelwrightConfig.cmake
-"include(CMakeFindDependencyMacro)
-include(\${CMAKE_CURRENT_LIST_DIR}/WheelwrightDependencies.cmake)
-include(\${CMAKE_CURRENT_LIST_DIR}/WheelwrightTargets.cmake)
-")
+configure_package_config_file(cmake/WheelwrightConfig.cmake.in ${CMAKE_BINARY_DIR}/WheelwrightConfig.cmake
+  INSTALL_DESTINATION ${WHEELWRIGHT_CMAKE_DIR})
+# Below 1.0 a minor version may change the interface.
 write_basic_package_version_file(${CMAKE_BINARY_DIR}/WheelwrightConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${CMAKE_BINARY_DIR}/WheelwrightConfig.cmake ${CMAKE_BINARY_DIR}/WheelwrightConfigVersion.cmake
-  ${CMAKE_CURRENT_SOURCE_DIR}/cmake/WheelwrightDependencies.cmake DESTINATION ${WHEELWRIGHT_CMAKE_DIR})
+  cmake/WheelwrightDependencies.cmake DESTINATION ${WHEELWRIGHT_CMAKE_DIR})
+install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
