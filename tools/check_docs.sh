@@ -1,0 +1,32 @@
+#!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
+#
+# Lets clang read the documentation comments of every header: a \param that names no parameter, a comment that belongs
+# to nothing, a malformed command are errors. Each header is compiled alone (syntax only); nothing has to be built.
+set -eu
+cd "$(dirname "$0")/.."
+clang=$(command -v clang++-14 || command -v clang++) || {
+  echo "docs: clang is missing; tools/setup.sh --ci installs it" >&2
+  exit 2
+}
+scratch=$(mktemp -d)
+trap 'rm -rf "$scratch"' EXIT
+ln -s "$PWD" "$scratch/wheelwright"
+
+status=0
+count=0
+for header in */*.hpp; do
+  case $header in
+    build*/* | tests/* | node_modules/*) continue ;;
+  esac
+  count=$((count + 1))
+  printf '#include <wheelwright/%s>\n' "$header" > "$scratch/one.cpp"
+  # shellcheck disable=SC2046
+  "$clang" -std=c++20 -fsyntax-only -Wdocumentation -Werror=documentation -I "$scratch" \
+    $(pkg-config --cflags-only-I eigen3 | sed 's/-I/-isystem /g') "$scratch/one.cpp" || {
+    echo "docs: $header" >&2
+    status=1
+  }
+done
+[ $status -eq 0 ] && echo "docs: $count headers, nothing to report"
+exit $status
