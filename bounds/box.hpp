@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Boxes of parameters and their support function.
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include <wheelwright/core/check.hpp>
+#include <wheelwright/core/interval.hpp>
+
+namespace wheelwright {
+
+/// { θ : lower_j <= θ_j <= upper_j }. Sides have the units of the parameters.
+struct Box {
+  std::vector<Interval> sides;  ///< one side per parameter
+
+  /// Number of parameters p.
+  [[nodiscard]] std::size_t dimension() const noexcept { return sides.size(); }
+
+  /// Support function h(a) = max { a·θ : θ in box } = Σ_j max(a_j lower_j, a_j upper_j), rounded outward: never below the
+  /// exact value. `a` has p finite entries (unchecked). Allocates nothing.
+  [[nodiscard]] double support(std::span<const double> a) const noexcept {
+    double sum = 0.0, magnitude = 0.0, terms = 0.0;
+    for (std::size_t j = 0; j < sides.size(); ++j) {
+      if (a[j] != 0.0) {
+        const double term = a[j] * (a[j] > 0.0 ? sides[j].upper : sides[j].lower);
+        sum += term;
+        magnitude += std::abs(term);
+        terms += 1.0;
+      }
+    }
+    if (terms == 0.0) {
+      return 0.0;
+    }
+    // Rounding of k products and k − 1 sums is at most 2k·2⁻⁵³·Σ|term| plus an underflow each (Higham 2002, section 3.1);
+    // four times that covers the rounding of the bound itself.
+    constexpr double epsilon = std::numeric_limits<double>::epsilon();
+    return round_up(sum + (4.0 * (terms + 1.0) * epsilon * magnitude + terms * std::numeric_limits<double>::denorm_min()));
+  }
+
+  /// The same, and writes a corner where the maximum is attained to `maximiser` (p entries).
+  double support(std::span<const double> a, std::span<double> maximiser) const noexcept {
+    for (std::size_t j = 0; j < sides.size(); ++j) {
+      maximiser[j] = a[j] > 0.0 ? sides[j].upper : sides[j].lower;
+    }
+    return support(a);
+  }
+
+  /// Always true: support() never allocates and its work is bounded.
+  [[nodiscard]] bool is_online() const noexcept { return true; }
+
+  /// Whether θ lies in the box, sides included. `theta` has p entries.
+  [[nodiscard]] bool contains(std::span<const double> theta) const noexcept {
+    for (std::size_t j = 0; j < sides.size(); ++j) {
+      if (!sides[j].contains(theta[j])) {
+        return false;
+      }
+    }
+    return true;
+  }
+
+  /// Mid-point of every side.
+  [[nodiscard]] std::vector<double> centre() const {
+    std::vector<double> c;
+    c.reserve(sides.size());
+    for (const Interval& side : sides) {
+      c.push_back(side.centre());
+    }
+    return c;
+  }
+
+  friend bool operator==(const Box&, const Box&) = default;
+};
+
+/// Throws InvalidArgument, naming `what`, unless every side is finite and lower <= upper.
+inline void check_finite(const Box& box, const char* what) {
+  for (const Interval& side : box.sides) {
+    check::that(std::isfinite(side.lower) && std::isfinite(side.upper) && side.lower <= side.upper, what,
+                "finite sides with lower <= upper");
+  }
+}
+
+/// The smallest box that contains both. Throws InvalidArgument unless the dimensions agree.
+[[nodiscard]] inline Box hull(const Box& x, const Box& y) {
+  check::that(x.dimension() == y.dimension(), "hull", "boxes of the same dimension");
+  Box result = x;
+  for (std::size_t j = 0; j < y.sides.size(); ++j) {
+    result.sides[j] = {std::min(x.sides[j].lower, y.sides[j].lower), std::max(x.sides[j].upper, y.sides[j].upper)};
+  }
+  return result;
+}
+
+}  // namespace wheelwright

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// The working set of a feasible set: keeps, of all half-spaces offered, those that cut.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <wheelwright/bounds/infeasibility.hpp>
+#include <wheelwright/bounds/linear_program.hpp>
+
+namespace wheelwright {
+
+/// One certified bound of a parameter over a set, and the rows that set it.
+struct CertifiedBound {
+  double value = 0.0;                ///< never inside the exact bound
+  std::vector<WeightedRow> binding;  ///< at most p rows (sides of the prior box among them) whose multipliers prove it
+};
+
+/// { θ in box : a·θ <= b for every half-space offered }, held by the few half-spaces that matter.
+///
+/// Half-spaces may be offered in any order and portions. One that does not cut the set held so far (by more than 1e-10 of
+/// its size) is dropped for good, which is right since the set only shrinks: memory depends on the facets, not on the
+/// rows offered, and the set held is never smaller than the exact one.
+class CuttingPlanes {
+ public:
+  /// Starts with a finite box. `information` (p × p, symmetric, positive semi-definite) is Σ aaᵀ/w² over rows of
+  /// half-width w: it whitens the coordinates, and matters for speed and digits only. `parameters` are the numbers that
+  /// the sides of the box carry as origins.
+  CuttingPlanes(const Box& box, const Eigen::MatrixXd& information, std::vector<std::size_t> parameters = {});
+
+  /// Whether a closed form shows that the half-space does not cut: a box around the set in the whitened coordinates.
+  [[nodiscard]] bool implied(const Eigen::VectorXd& a, double b) const;
+
+  /// Adds those of `candidates` that cut.
+  void add(std::vector<HalfSpace> candidates);
+  /// Drops every row that the others imply.
+  void reduce();
+
+  /// Whether the set is proved empty; then nothing more is added.
+  [[nodiscard]] bool is_empty() const { return contradiction_.has_value(); }
+  /// The proof (data rows only; the box is understood). Call only where is_empty().
+  [[nodiscard]] const std::vector<WeightedRow>& contradiction() const { return *contradiction_; }
+  /// The rows held, sides of the box among them.
+  [[nodiscard]] const std::vector<HalfSpace>& rows() const { return rows_; }
+  /// Half-spaces left out because floating point found them contradictory but no rigorous proof could be given.
+  [[nodiscard]] std::size_t undecided() const { return undecided_; }
+  /// The box it started from.
+  [[nodiscard]] const Box& box() const { return box_; }
+  /// Coordinates in which the set lies in about [−1, 1]ᵖ.
+  [[nodiscard]] const Coordinates& coordinates() const { return coordinates_; }
+
+  /// max a·θ by linear program, uncertified; nothing where the program fails.
+  [[nodiscard]] std::optional<LpSolution> maximise(const Eigen::VectorXd& a);
+  /// Rigorous upper bound of a·θ over the set, proved over `within`, a box that contains the set.
+  [[nodiscard]] CertifiedBound certified_maximum(const Eigen::VectorXd& a, const Box& within);
+  /// Certified lower and upper bounds, 2p of them: bound j of the first is min θ_j, of the second max θ_j.
+  [[nodiscard]] std::pair<std::vector<CertifiedBound>, std::vector<CertifiedBound>> certified_hull();
+
+ private:
+  void insert(std::span<const HalfSpace> rows);
+  void rebuild();
+  void update_box();
+  void recentre();
+  /// Half-widths below which an axis of z is as good as flat: a few units in the last place of θ.
+  [[nodiscard]] Eigen::VectorXd resolution() const;
+  bool resolve_infeasibility(std::size_t first_new);
+
+  Box box_;
+  Coordinates coordinates_;
+  std::vector<HalfSpace> rows_;
+  Eigen::VectorXd norms_;
+  LinearProgram program_;
+  Eigen::VectorXd z_lower_, z_upper_;
+  Eigen::MatrixXd vertices_;
+  std::size_t reduced_size_;
+  std::size_t undecided_ = 0;
+  std::optional<std::vector<WeightedRow>> contradiction_;
+};
+
+}  // namespace wheelwright

@@ -1,0 +1,263 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/bounds/polytope.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include <wheelwright/bounds/certificate.hpp>
+
+namespace wheelwright {
+namespace {
+
+constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+
+Eigen::VectorXd pick(const Eigen::VectorXd& all, const std::vector<std::size_t>& parameters) {
+  Eigen::VectorXd part(static_cast<Eigen::Index>(parameters.size()));
+  for (std::size_t k = 0; k < parameters.size(); ++k) {
+    part[static_cast<Eigen::Index>(k)] = all[static_cast<Eigen::Index>(parameters[k])];
+  }
+  return part;
+}
+
+HalfSpace spread(const HalfSpace& row, const std::vector<std::size_t>& parameters, std::size_t p) {
+  HalfSpace full{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(p)), row.b, row.origin};
+  for (std::size_t k = 0; k < parameters.size(); ++k) {
+    full.a[static_cast<Eigen::Index>(parameters[k])] = row.a[static_cast<Eigen::Index>(k)];
+  }
+  return full;
+}
+
+CertifiedBound spread(CertifiedBound bound, const std::vector<std::size_t>& parameters, std::size_t p) {
+  for (WeightedRow& weighted : bound.binding) {
+    weighted.row = spread(weighted.row, parameters, p);
+  }
+  return bound;
+}
+
+/// Largest ball inside the rows in θ / half: centre into `block`, radius >= 0.
+void find_chebyshev_centre(Polytope::Block& block, const Eigen::VectorXd& half, const Eigen::VectorXd& fallback) {
+  const auto p = static_cast<Eigen::Index>(block.parameters.size());
+  const auto m = static_cast<Eigen::Index>(block.facets.size());
+  Eigen::MatrixXd a(p + 1, m);
+  Eigen::VectorXd b(m);
+  for (Eigen::Index i = 0; i < m; ++i) {
+    const HalfSpace& row = block.facets[static_cast<std::size_t>(i)];
+    const Eigen::VectorXd g = block.coordinates.transform.transpose() * row.a;
+    const double norm = std::max(g.norm(), 1e-300);
+    a.col(i) << g / norm, (row.a.array() * half.array()).matrix().norm() / norm;
+    b[i] = (row.b - row.a.dot(block.coordinates.centre)) / norm;
+  }
+  LinearProgram program(p + 1);
+  program.add_rows(a, b);
+  const LpSolution solution = program.maximise(Eigen::VectorXd::Unit(p + 1, p));
+  block.chebyshev_centre = fallback;
+  if (solution.status == LpSolution::Status::optimal) {
+    block.chebyshev_centre = block.coordinates.centre + block.coordinates.transform * solution.x.head(p);
+    block.chebyshev_radius = std::max(0.0, solution.value);
+  }
+}
+
+/// Certified maximum of a·θ over a block by a linear program, `at` a maximiser; the support of `within` where it fails.
+double certified_support(const Polytope::Block& block, const Eigen::VectorXd& a, const Box& within,
+                         Eigen::VectorXd& at) {
+  const std::span<const double> direction(a.data(), static_cast<std::size_t>(a.size()));
+  at.resize(a.size());
+  const double outer = within.support(direction, {at.data(), direction.size()});
+  const Eigen::VectorXd c = block.coordinates.transform.transpose() * a;
+  if (!(c.norm() > 0.0)) {
+    return outer;
+  }
+  const auto m = static_cast<Eigen::Index>(block.facets.size());
+  Eigen::MatrixXd normals(a.size(), m);
+  Eigen::VectorXd b(m), norms(m);
+  for (Eigen::Index i = 0; i < m; ++i) {
+    const HalfSpace& row = block.facets[static_cast<std::size_t>(i)];
+    const Eigen::VectorXd g = block.coordinates.transform.transpose() * row.a;
+    norms[i] = std::max(g.norm(), 1e-300);
+    normals.col(i) = g / norms[i];
+    b[i] = (row.b - row.a.dot(block.coordinates.centre)) / norms[i];
+  }
+  LinearProgram program(a.size());
+  program.add_rows(normals, b);
+  const LpSolution solution = program.maximise(c / c.norm());
+  if (solution.status != LpSolution::Status::optimal) {
+    return outer;
+  }
+  at = block.coordinates.centre + block.coordinates.transform * solution.x;
+  std::vector<WeightedRow> binding;
+  for (std::size_t k = 0; k < solution.rows.size(); ++k) {
+    const int i = solution.rows[k];
+    binding.push_back({block.facets[static_cast<std::size_t>(i)],
+                       solution.multipliers[static_cast<Eigen::Index>(k)] * c.norm() / norms[i]});
+  }
+  return std::min(outer, certified_upper_bound(direction, binding, within));
+}
+
+}  // namespace
+
+std::vector<std::vector<std::size_t>> independent_blocks(std::span<const HalfSpace> rows, std::size_t p) {
+  std::vector<std::size_t> leader(p);
+  std::iota(leader.begin(), leader.end(), std::size_t{0});
+  const auto find = [&](std::size_t j) {
+    while (leader[j] != j) {
+      j = leader[j];
+    }
+    return j;
+  };
+  for (const HalfSpace& row : rows) {
+    std::size_t first = p;
+    for (std::size_t j = 0; j < p; ++j) {
+      if (row.a[static_cast<Eigen::Index>(j)] != 0.0) {
+        first = first == p ? find(j) : first;
+        const std::size_t x = find(first), y = find(j);
+        leader[std::max(x, y)] = std::min(x, y);
+      }
+    }
+  }
+  std::vector<std::vector<std::size_t>> groups(p);
+  for (std::size_t j = 0; j < p; ++j) {
+    groups[find(j)].push_back(j);
+  }
+  std::erase_if(groups, [](const auto& group) { return group.empty(); });
+  return groups;
+}
+
+Polytope::Polytope(std::vector<HalfSpace> rows, const Box& box, const PolytopeOptions& options) {
+  const std::size_t p = box.dimension();
+  check_finite(box, "box of a polytope");
+  for (const HalfSpace& row : rows) {
+    check::that(row.a.size() == static_cast<Eigen::Index>(p), "rows of a polytope", "as many coefficients as sides");
+    check::that(row.a.allFinite() && std::isfinite(row.b), "rows of a polytope", "finite numbers");
+    check::that(!row.a.isZero(0.0) || row.b >= 0.0, "polytope", "a set that is not empty");
+  }
+  auto data = std::make_shared<Data>();
+  data->hull.sides.resize(p);
+  data->lower.resize(p);
+  data->upper.resize(p);
+  data->centre.resize(p);
+  for (const std::vector<std::size_t>& parameters : independent_blocks(rows, p)) {
+    const auto q = static_cast<Eigen::Index>(parameters.size());
+    Box part;
+    for (const std::size_t j : parameters) {
+      part.sides.push_back(box.sides[j]);
+    }
+    std::vector<HalfSpace> own;
+    Eigen::MatrixXd information = Eigen::MatrixXd::Zero(q, q);
+    for (const HalfSpace& row : rows) {
+      if (row.a[static_cast<Eigen::Index>(parameters.front())] != 0.0 || !pick(row.a, parameters).isZero(0.0)) {
+        own.push_back({pick(row.a, parameters), row.b, row.origin});
+        const Eigen::VectorXd scaled = own.back().a.array() / part.support({own.back().a.data(), parameters.size()});
+        if (scaled.allFinite()) {
+          information += scaled * scaled.transpose();
+        }
+      }
+    }
+    CuttingPlanes planes(part, information, parameters);
+    planes.add(std::move(own));
+    planes.reduce();
+    check::that(!planes.is_empty(), "polytope", "a set that is not empty");
+    auto [lower, upper] = planes.certified_hull();
+
+    Block block;
+    block.parameters = parameters;
+    block.facets = planes.rows();
+    block.coordinates = planes.coordinates();
+    block.vertices = enumerate_vertices(block.facets, block.coordinates, options.vertex_limit);
+    Eigen::VectorXd half(q), middle(q);
+    for (Eigen::Index k = 0; k < q; ++k) {
+      const auto i = static_cast<std::size_t>(k);
+      const std::size_t j = parameters[i];
+      data->hull.sides[j] = {std::min(lower[i].value, upper[i].value), std::max(lower[i].value, upper[i].value)};
+      half[k] = 0.5 * data->hull.sides[j].width();
+      middle[k] = data->hull.sides[j].centre();
+      data->lower[j] = spread(std::move(lower[i]), parameters, p);
+      data->upper[j] = spread(std::move(upper[i]), parameters, p);
+    }
+    find_chebyshev_centre(block, half, middle);
+    for (Eigen::Index k = 0; k < q; ++k) {
+      data->centre[parameters[static_cast<std::size_t>(k)]] = block.chebyshev_centre[k];
+    }
+    if (block.vertices) {
+      // The radius of the points, and the rounding of a p-term product with any of them.
+      const double gamma = 8.0 * static_cast<double>(p + 4) * kEpsilon;
+      block.margin = block.vertices->radius * (1.0 + gamma) +
+                     gamma * block.vertices->points.cwiseAbs().rowwise().maxCoeff() +
+                     Eigen::VectorXd::Constant(q, std::numeric_limits<double>::min());
+      data->vertex_count += static_cast<std::size_t>(block.vertices->points.cols());
+    } else {
+      data->online = false;
+    }
+    for (const HalfSpace& facet : block.facets) {
+      data->facets.push_back(spread(facet, parameters, p));
+    }
+    data->blocks.push_back(std::move(block));
+  }
+  if (!data->online) {
+    data->vertex_count = 0;
+  }
+  data_ = std::move(data);
+}
+
+double Polytope::support(std::span<const double> a) const noexcept { return support(a, std::span<double>{}); }
+
+double Polytope::support(std::span<const double> a, std::span<double> maximiser) const noexcept {
+  double total = 0.0;
+  for (const Block& block : data_->blocks) {
+    const auto q = static_cast<Eigen::Index>(block.parameters.size());
+    double bound = 0.0;
+    if (block.vertices) {
+      const Eigen::MatrixXd& points = block.vertices->points;
+      double best = -std::numeric_limits<double>::infinity(), margin = 0.0;
+      Eigen::Index where = 0;
+      for (Eigen::Index v = 0; v < points.cols(); ++v) {
+        const double* point = points.data() + v * q;
+        double value = 0.0;
+        for (Eigen::Index k = 0; k < q; ++k) {
+          value += a[block.parameters[static_cast<std::size_t>(k)]] * point[k];
+        }
+        if (value > best) {
+          best = value;
+          where = v;
+        }
+      }
+      for (Eigen::Index k = 0; k < q; ++k) {
+        margin += std::abs(a[block.parameters[static_cast<std::size_t>(k)]]) * block.margin[k];
+      }
+      bound = margin == 0.0 ? 0.0 : round_up(best + round_up(margin * (1.0 + 64.0 * kEpsilon)));
+      for (Eigen::Index k = 0; k < q && !maximiser.empty(); ++k) {
+        maximiser[block.parameters[static_cast<std::size_t>(k)]] = points(k, where);
+      }
+    } else {
+      Eigen::VectorXd direction(q);
+      Box within;
+      for (Eigen::Index k = 0; k < q; ++k) {
+        const std::size_t j = block.parameters[static_cast<std::size_t>(k)];
+        direction[k] = a[j];
+        within.sides.push_back(data_->hull.sides[j]);
+      }
+      Eigen::VectorXd at;
+      bound = certified_support(block, direction, within, at);
+      for (Eigen::Index k = 0; k < q && !maximiser.empty(); ++k) {
+        maximiser[block.parameters[static_cast<std::size_t>(k)]] = at[k];
+      }
+    }
+    total = bound == 0.0 ? total : round_up(total + bound);
+  }
+  return std::min(total, data_->hull.support(a));
+}
+
+bool Polytope::contains(std::span<const double> theta) const noexcept {
+  const Eigen::Map<const Eigen::VectorXd> point(theta.data(), static_cast<Eigen::Index>(theta.size()));
+  const double gamma = 4.0 * (static_cast<double>(theta.size()) + 2.0) * kEpsilon;
+  return std::all_of(data_->facets.begin(), data_->facets.end(), [&](const HalfSpace& row) {
+    double sum = 0.0, magnitude = std::abs(row.b);
+    for (Eigen::Index j = 0; j < point.size(); ++j) {
+      sum += row.a[j] * point[j];
+      magnitude += std::abs(row.a[j] * point[j]);
+    }
+    return sum <= row.b + gamma * magnitude;
+  });
+}
+
+}  // namespace wheelwright

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Polytopes of parameters: facets, vertices, support function, interval hull.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include <wheelwright/bounds/box.hpp>
+#include <wheelwright/bounds/cutting_planes.hpp>
+#include <wheelwright/bounds/vertices.hpp>
+
+namespace wheelwright {
+
+/// Options of Polytope.
+struct PolytopeOptions {
+  std::size_t vertex_limit = 4096;  ///< most vertices per independent block; beyond it the support function is an LP
+};
+
+/// Groups of parameters that no row couples, each ascending, ordered by their first member: the sets are then a product.
+/// Parameters in no row form groups of their own.
+[[nodiscard]] std::vector<std::vector<std::size_t>> independent_blocks(std::span<const HalfSpace> rows, std::size_t p);
+
+/// { θ in box : a·θ <= b for every row }: bounded by its box; held as the product of its independent blocks.
+///
+/// Everything it publishes as a bound (support, hull) is rounded outward: never inside the exact value. Copies share
+/// their data; a Polytope is immutable and may be read from several threads.
+class Polytope {
+ public:
+  /// A set of independent parameters and all that is known of it.
+  struct Block {
+    std::vector<std::size_t> parameters;  ///< ascending
+    std::vector<HalfSpace> facets;        ///< non-redundant, in these parameters only
+    Coordinates coordinates;              ///< the block has size about one in these
+    std::optional<VertexSet> vertices;    ///< proved complete, where few
+    Eigen::VectorXd margin;               ///< support: h(a) <= max over points a·v + Σ|a_j| margin_j, roundings included
+    Eigen::VectorXd chebyshev_centre;     ///< see Polytope::chebyshev_centre
+    double chebyshev_radius = 0.0;        ///< relative to the hull
+  };
+
+  /// Takes the intersection of `rows` with a finite box. Throws InvalidArgument when shapes disagree, a number is not
+  /// finite, or the set is proved empty.
+  Polytope(std::vector<HalfSpace> rows, const Box& box, const PolytopeOptions& options = {});
+
+  /// Number of parameters p.
+  [[nodiscard]] std::size_t dimension() const noexcept { return data_->hull.dimension(); }
+  /// The independent blocks.
+  [[nodiscard]] const std::vector<Block>& blocks() const noexcept { return data_->blocks; }
+  /// All facets with p coefficients each, block by block; sides of the box that matter are among them.
+  [[nodiscard]] const std::vector<HalfSpace>& facets() const noexcept { return data_->facets; }
+  /// Certified interval hull.
+  [[nodiscard]] const Box& hull() const noexcept { return data_->hull; }
+  /// Lower bound of each parameter with the rows that prove it (coefficients in all p parameters).
+  [[nodiscard]] const std::vector<CertifiedBound>& lower() const noexcept { return data_->lower; }
+  /// Upper bound of each parameter with the rows that prove it.
+  [[nodiscard]] const std::vector<CertifiedBound>& upper() const noexcept { return data_->upper; }
+
+  /// Whether all vertices are known: support() then allocates nothing and its work is bounded by their number.
+  [[nodiscard]] bool is_online() const noexcept { return data_->online; }
+  /// Number of vertices, summed over blocks (of a product: as many support() looks at); 0 unless is_online().
+  [[nodiscard]] std::size_t vertex_count() const noexcept { return data_->vertex_count; }
+
+  /// Support function h(a) = max { a·θ : θ in set }, rounded outward, for p finite entries `a` (unchecked). Never above
+  /// the support of hull(). Where is_online(): maximum over vertices, summed over blocks, plus the margin; no allocation.
+  /// Otherwise: a linear program per block, certified by its multipliers; allocates (where memory runs out the program
+  /// terminates), and falls back to the hull where the program fails.
+  [[nodiscard]] double support(std::span<const double> a) const noexcept;
+  /// The same, and writes a maximiser (to rounding) to `maximiser` (p entries).
+  double support(std::span<const double> a, std::span<double> maximiser) const noexcept;
+
+  /// Whether θ satisfies every facet, within the rounding of its evaluation: never false for an exact member.
+  [[nodiscard]] bool contains(std::span<const double> theta) const noexcept;
+
+  /// Centre of the largest ball of each block, after division of every parameter by half its hull's width (the ball then
+  /// does not depend on units). A member of the set wherever the set has an interior; a least-squares estimate need not be.
+  [[nodiscard]] const std::vector<double>& chebyshev_centre() const noexcept { return data_->centre; }
+
+ private:
+  struct Data {
+    std::vector<Block> blocks;
+    std::vector<HalfSpace> facets;
+    Box hull;
+    std::vector<CertifiedBound> lower, upper;
+    std::vector<double> centre;
+    bool online = true;
+    std::size_t vertex_count = 0;
+  };
+  std::shared_ptr<const Data> data_;
+};
+
+}  // namespace wheelwright
