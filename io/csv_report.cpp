@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/io/csv_report.hpp>
+
+#include <fmt/format.h>
+
+namespace wheelwright {
+
+std::vector<std::string> sentences(const LogReport& report) {
+  std::vector<std::string> out;
+  const auto say = [&](const Occurrences& met, std::string_view one, std::string_view many, std::string_view rest) {
+    if (met.count > 0) {
+      out.push_back(fmt::format("{} {} {} (first at {})", met.count, met.count == 1 ? one : many, rest, met.first));
+    }
+  };
+  say(report.empty, "row", "rows", "dropped: a field that is needed is empty");
+  say(report.not_finite, "row", "rows", "dropped: a value that is needed is NaN or infinite");
+  say(report.duplicates, "row", "rows", "dropped: the same time stamp as the row before");
+  say(report.truncated, "row", "rows", "dropped: the last line of the file is cut off");
+  say(report.resets, "new segment", "new segments", "where time goes backwards");
+  say(report.gaps, "new segment", "new segments",
+      fmt::format("at gaps longer than 5 x the median step of {:.6g} s", report.median_step));
+  return out;
+}
+
+}  // namespace wheelwright

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// A place in a YAML file that knows its line and key: what the readers of YAML files are written with.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace wheelwright {
+
+/// A node of a YAML document. What is of another kind than asked for throws InputError
+/// "robot.yaml:4: wheel_radius: 'abc': expected a number > 0".
+class YamlPlace {
+ public:
+  /// Parses `text`; `file` is for messages, and `lines` says whether they name lines. Throws InputError, naming file and
+  /// line, when it is no YAML or holds no mapping.
+  static YamlPlace parse(std::string_view text, std::string file, bool lines = true);
+
+  /// Members of a mapping in the order of the file. Throws for a node that is none, for keys that are not plain names,
+  /// for repeated keys, and for keys not in `known` (with the nearest that is).
+  [[nodiscard]] std::vector<std::pair<std::string, YamlPlace>> members(const std::vector<std::string>& known) const;
+
+  /// Whether this is a single value (neither a list nor a mapping, nor nothing).
+  [[nodiscard]] bool is_scalar() const;
+  /// Elements of a list.
+  [[nodiscard]] std::vector<YamlPlace> elements(std::string_view expected) const;
+  /// A single value as text.
+  [[nodiscard]] std::string text(std::string_view expected = "a name") const;
+  /// Index of the word that this is among `words`.
+  [[nodiscard]] std::size_t choice(const std::vector<std::string>& words) const;
+  /// Throws unless this is `word`.
+  void demand(const std::string& word) const;
+  /// A finite number (not in quotes) for which `accepted` holds.
+  [[nodiscard]] double number(std::string_view expected, const std::function<bool(double)>& accepted) const;
+  /// A number > 0.
+  [[nodiscard]] double positive() const;
+  /// true or false.
+  [[nodiscard]] bool boolean() const;
+
+  /// Throws InputError "file:line: key: value: expected `expected`".
+  [[noreturn]] void fail(std::string_view expected) const;
+  /// Throws InputError "file:line: `message`".
+  [[noreturn]] void say(std::string_view message) const;
+
+ private:
+  struct Node;
+  YamlPlace(std::shared_ptr<const Node> node, std::string key);
+
+  std::shared_ptr<const Node> node_;
+  std::string key_;
+};
+
+}  // namespace wheelwright
