@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// From a log of fault-free driving to a model that a detector can carry: the paper, front to back.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <wheelwright/bounds/feasible_set.hpp>
+#include <wheelwright/bounds/minimax.hpp>
+#include <wheelwright/commission/filter_choice.hpp>
+#include <wheelwright/commission/folds.hpp>
+#include <wheelwright/commission/survey.hpp>
+#include <wheelwright/commission/validation.hpp>
+#include <wheelwright/core/log.hpp>
+#include <wheelwright/detector/detector.hpp>
+#include <wheelwright/identify/excitation.hpp>
+#include <wheelwright/identify/noise_level.hpp>
+#include <wheelwright/identify/residual_statistics.hpp>
+#include <wheelwright/model/robot.hpp>
+
+namespace wheelwright {
+
+/// Where the noise bound ē of an output comes from.
+enum class NoiseOrigin {
+  declared,   ///< the sensors' declared bounds, propagated through the filter
+  estimated,  ///< extrapolated from the residuals of this log (noise_level.hpp), on top of what is declared
+};
+
+/// The bound on what τ_f − Y_f θ can be without a fault, in one output.
+struct OutputNoise {
+  NoiseOrigin origin = NoiseOrigin::estimated;
+  double bound = 0.0;           ///< n̄ with ē: what stands in the rows' dy
+  double declared = 0.0;        ///< the part that comes from declared effort noise
+  double estimated = 0.0;       ///< ē, 0 where everything is declared
+  ExtrapolatedBound how;        ///< meaningful where estimated
+};
+
+/// Everything that a detector needs, and nothing else: the part of a commissioned model that is used on-line.
+struct CommissionedModel {
+  Robot robot;
+  Model model;
+  Measurement measurement;
+  FilterDesign filter;
+  SignalErrors errors;              ///< dY and dy of the rows, ē included
+  Eigen::VectorXd estimate;         ///< θ̂_L; for a parameter that the log does not show, the Chebyshev centre's value
+  std::vector<HalfSpace> facets;    ///< of the feasible set, p coefficients each
+  Box box;                          ///< finite box that bounds the set (the certified hull)
+  Persistence persistence;
+};
+
+/// What commissioning found about one parameter.
+struct ParameterResult {
+  Parameter parameter;
+  Excitation excitation = Excitation::identified;
+  std::string reason;                       ///< why it is not identified, for people
+  std::optional<double> estimate;           ///< nothing where the log does not show the parameter
+  std::optional<double> standard_error;     ///< honest under autocorrelated residuals
+  double lower = 0.0;                       ///< guaranteed bounds (certified hull)
+  double upper = 0.0;
+  double chebyshev = 0.0;                   ///< centre of the feasible set
+  bool lower_is_prior = false;              ///< the bound is the prior box's: the log does not tighten it
+  bool upper_is_prior = false;
+  bool estimate_inside = true;              ///< least squares may leave the hull
+  std::vector<RowOrigin> lower_binding;     ///< samples that set the lower bound
+  std::vector<RowOrigin> upper_binding;
+};
+
+/// The result of commissioning.
+struct Commissioning {
+  /// What became of the log.
+  enum class Status {
+    done,      ///< a model came out
+    partial,   ///< a model came out, but some parameters are not excited: their bounds are the prior's
+    empty,     ///< no θ explains the log within the declared noise: see contradiction; no model
+    nothing,   ///< no parameter is excited: no model
+  };
+  Status status = Status::done;
+  std::string message;                          ///< one sentence for people, with what to do next where that is needed
+  CommissionedModel model;
+  std::vector<ParameterResult> parameters;
+  Survey survey;
+  std::vector<OutputNoise> noise;               ///< one for each output
+  NoiseMode noise_mode = NoiseMode::worst_case;
+  FilterChoice filter_choice;                   ///< the curve is empty where the filter was given
+  ResidualSummary residuals;                    ///< of θ̂ on the whole log
+  int rank = 0;
+  double condition = 0.0;
+  std::vector<OutputValidation> validation;     ///< on held-out blocks, of a model made from the other blocks
+  FoldOptions folds;
+  double minimax = 0.0;                         ///< smallest factor on the rows' dy (and dY) for which the set is not
+                                                ///< empty; <= 1 unless status is empty
+  FeasibleSet feasible;                         ///< the set, its hull, certificates
+  double polytope_over_box = 1.0;               ///< median width of [l, u]: polytope over box, held out, worst output
+  std::vector<std::string> notes;               ///< what was assumed, repaired or chosen, for people
+};
+
+/// Options of commission().
+struct CommissionOptions {
+  FilterChoiceOptions filter_choice;
+  FoldOptions folds;                          ///< purge is set to the filter's memory
+  ExtrapolationOptions extrapolation;
+  NoiseMode noise_mode = NoiseMode::worst_case;  ///< for declared noise
+  double confidence = 0.999;                  ///< statistical noise mode
+  std::size_t outliers = 0;                   ///< instants that the feasible set may leave out
+  Persistence persistence;
+  std::function<void(std::string_view stage, double share)> progress;  ///< told of every stage; may be empty
+};
+
+/// Log → filtered regression → θ̂_L → feasible set and bounds → ρ(t) → validation. Walks the log several times and never
+/// holds it. Throws InputError or InvalidArgument for a log or robot that cannot be used at all; what the data say,
+/// unwelcome or not, is in the result.
+[[nodiscard]] Commissioning commission(LogSource& log, const Robot& robot, const CommissionOptions& options = {});
+
+/// The detector of a commissioned model.
+[[nodiscard]] Detector make_detector(const CommissionedModel& model, DetectorOptions options = {});
+
+}  // namespace wheelwright

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/detector/threshold.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include <wheelwright/core/check.hpp>
+
+namespace wheelwright {
+
+ThresholdRule::ThresholdRule(Polytope set, Eigen::VectorXd estimate, ParameterSetKind kind)
+    : set_(std::move(set)), estimate_(std::move(estimate)), kind_(kind), direction_(set_.dimension()) {
+  check::that(static_cast<std::size_t>(estimate_.size()) == set_.dimension(), "estimate", "one value for each parameter");
+  check::that(estimate_.allFinite(), "estimate", "finite values");
+}
+
+Threshold ThresholdRule::at(std::span<const double> y, std::span<const double> dy_regressor,
+                            double dy_output) const noexcept {
+  const std::size_t p = direction_.size();
+  double extra = dy_output;
+  double predicted = 0.0;
+  double magnitude = dy_output;
+  const auto shifted = [&](double sign) {
+    for (std::size_t j = 0; j < p; ++j) {
+      const Interval& side = set_.hull().sides[j];
+      const double shift = side.lower >= 0.0 ? dy_regressor[j] : side.upper <= 0.0 ? -dy_regressor[j] : 0.0;
+      direction_[j] = sign * y[j] + shift;
+    }
+    return support(direction_);
+  };
+  for (std::size_t j = 0; j < p; ++j) {
+    const double term = y[j] * estimate_[static_cast<Eigen::Index>(j)];
+    predicted += term;
+    magnitude += std::abs(term);
+    const Interval& side = set_.hull().sides[j];
+    if (dy_regressor[j] > 0.0 && side.lower < 0.0 && side.upper > 0.0) {
+      extra += dy_regressor[j] * std::max(-side.lower, side.upper);
+    }
+  }
+  const double above = shifted(1.0);
+  const double below = shifted(-1.0);
+  // Sums of p + 3 terms, and as many in the residual that is compared with the result: Higham 2002, section 3.1. The
+  // rounding of the direction itself is covered by the terms Δ|θ| inside `above` and `below`.
+  magnitude += extra + std::abs(above) + std::abs(below);
+  const double rounding = 4.0 * static_cast<double>(p + 4) * std::numeric_limits<double>::epsilon() * magnitude;
+  return {-below - predicted - extra - rounding, above - predicted + extra + rounding};
+}
+
+Interval ThresholdRule::prediction(std::span<const double> y) const noexcept {
+  std::transform(y.begin(), y.end(), direction_.begin(), [](double v) { return -v; });
+  const double below = support(direction_);
+  return {-below, support(y)};
+}
+
+}  // namespace wheelwright

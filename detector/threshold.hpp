@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// The tight threshold ρ(t) of (34): what the residual can be without a fault, for every θ in the feasible set.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include <wheelwright/bounds/box.hpp>
+#include <wheelwright/bounds/polytope.hpp>
+
+namespace wheelwright {
+
+/// Which outer description of the feasible set a threshold is made of.
+enum class ParameterSetKind {
+  box,       ///< the interval hull: closed form, never tighter than the polytope
+  polytope,  ///< the set itself
+};
+
+/// Threshold of one output at one instant, for the residual ε = τ_f − Y_f θ̂ (29).
+struct Threshold {
+  double lower = 0.0;  ///< l <= ε without a fault
+  double upper = 0.0;  ///< ε <= u without a fault
+  /// ρ = max(u, −l), the paper's symmetric threshold.
+  [[nodiscard]] double rho() const noexcept { return upper > -lower ? upper : -lower; }
+  /// w = u − l.
+  [[nodiscard]] double width() const noexcept { return upper - lower; }
+};
+
+/// Thresholds along a log (theory section 4):
+///
+///     u = h(y + Δ) − yθ̂ + n̄        l = −h(−y + Δ) − yθ̂ − n̄
+///
+/// with h the support function of the feasible set, y a row of Y_f, Δ the bound on its error and n̄ that of τ_f. The
+/// shift by Δ holds for θ_j >= 0; it changes sign where θ_j <= 0 on the whole set, and where θ_j has either sign it is
+/// replaced by Δ_j max|θ_j|. All results are rounded outward.  One object serves one thread.
+class ThresholdRule {
+ public:
+  /// For the feasible set `set` and the best guess `estimate` (p), which need not lie in it.
+  ThresholdRule(Polytope set, Eigen::VectorXd estimate, ParameterSetKind kind = ParameterSetKind::polytope);
+
+  /// The threshold for the regressor row `y` (p) with error bound `dy_regressor` (p, Δ >= 0) and `dy_output` (n̄ >= 0).
+  /// Does not allocate where the set is_online() or its box is used.
+  [[nodiscard]] Threshold at(std::span<const double> y, std::span<const double> dy_regressor,
+                             double dy_output) const noexcept;
+
+  /// min and max of yθ over the set, outward: the noise-free prediction interval.
+  [[nodiscard]] Interval prediction(std::span<const double> y) const noexcept;
+
+  [[nodiscard]] const Polytope& set() const noexcept { return set_; }
+  [[nodiscard]] const Eigen::VectorXd& estimate() const noexcept { return estimate_; }
+  [[nodiscard]] ParameterSetKind kind() const noexcept { return kind_; }
+
+ private:
+  [[nodiscard]] double support(std::span<const double> a) const noexcept {
+    return kind_ == ParameterSetKind::box ? set_.hull().support(a) : set_.support(a);
+  }
+
+  Polytope set_;
+  Eigen::VectorXd estimate_;
+  ParameterSetKind kind_;
+  mutable std::vector<double> direction_;
+};
+
+}  // namespace wheelwright
