@@ -13,8 +13,7 @@ namespace {
 TermValue share_of_speed(double share, const MotionState& state) {
   const double share_error = std::min(1.0, state.heading_error);
   const double speed = state.speed[0];
-  return {share * speed,
-          std::min(1.0, share + share_error) * state.speed_error[0] + share_error * std::abs(speed)};
+  return {share * speed, std::min(1.0, share + share_error) * state.speed_error[0] + share_error * std::abs(speed)};
 }
 
 TermValue along_x(const MotionState& state) {
@@ -75,11 +74,21 @@ Model DifferentialDrive::model() const {
     m.parameters.push_back(std::move(parameter));
     m.terms.push_back(term);
   };
-  add({.name = "r_mass", .unit = "kg·m", .physical = "mass", .physical_unit = "kg", .per_physical = r,
-       .prior = {0.0, 1e4}, .excite = "accelerate and brake"},
+  add({.name = "r_mass",
+       .unit = "kg·m",
+       .physical = "mass",
+       .physical_unit = "kg",
+       .per_physical = r,
+       .prior = {0.0, 1e4},
+       .excite = "accelerate and brake"},
       {.output = 0, .kind = Term::Kind::acceleration, .coordinate = 0});
-  add({.name = "r_yaw_inertia", .unit = "kg·m³", .physical = "yaw_inertia", .physical_unit = "kg·m²",
-       .per_physical = r, .prior = {0.0, 1e5}, .excite = "turn with changing yaw rate"},
+  add({.name = "r_yaw_inertia",
+       .unit = "kg·m³",
+       .physical = "yaw_inertia",
+       .physical_unit = "kg·m²",
+       .per_physical = r,
+       .prior = {0.0, 1e5},
+       .excite = "turn with changing yaw rate"},
       {.output = 1, .kind = Term::Kind::acceleration, .coordinate = 1});
   if (anisotropic_friction) {
     add(viscous("x", r), {.output = 0, .kind = Term::Kind::function, .function = along_x});
@@ -88,8 +97,13 @@ Model DifferentialDrive::model() const {
   } else {
     add(viscous("linear", r), {.output = 0, .kind = Term::Kind::speed, .coordinate = 0});
   }
-  add({.name = "r_viscous_yaw", .unit = "N·m²·s/rad", .physical = "viscous_yaw", .physical_unit = "N·m·s/rad",
-       .per_physical = r, .prior = {0.0, 1e5}, .excite = "drive in curves"},
+  add({.name = "r_viscous_yaw",
+       .unit = "N·m²·s/rad",
+       .physical = "viscous_yaw",
+       .physical_unit = "N·m·s/rad",
+       .per_physical = r,
+       .prior = {0.0, 1e5},
+       .excite = "drive in curves"},
       {.output = 1, .kind = Term::Kind::speed, .coordinate = 1});
   return m;
 }

@@ -32,9 +32,8 @@ double rise_rate(TimeProfile::Shape shape, double since, double rise_time) {
   return (shape == TimeProfile::Shape::ramp ? 1.0 : 0.5 * pi * std::sin(pi * since / rise_time)) / rise_time;
 }
 
-constexpr std::array<std::string_view, 8> kind_names = {"wheel_radius", "wheel_radius_right", "wheel_radius_left",
-                                                        "slip_x",       "slip_y",             "slip_yaw",
-                                                        "matched",      "unmatched"};
+constexpr std::array<std::string_view, 8> kind_names = {
+    "wheel_radius", "wheel_radius_right", "wheel_radius_left", "slip_x", "slip_y", "slip_yaw", "matched", "unmatched"};
 
 // v⁺ = K v is what unequal or changed radii add to the body speed: K = G diag(δ1R, δ1L) (r G)⁻¹, G = [½ ½; 1/D −1/D].
 Eigen::Matrix2d radius_gain(const DifferentialDrive& drive, const Eigen::Vector2d& radius) {
@@ -61,7 +60,9 @@ void validate(const DriveParameters& p) {
   check::non_negative(p.viscous_yaw, "viscous_yaw");
 }
 
-double TimeProfile::value(double t) const { return rise(shape, t - onset, rise_time) - rise(shape, t - end, rise_time); }
+double TimeProfile::value(double t) const {
+  return rise(shape, t - onset, rise_time) - rise(shape, t - end, rise_time);
+}
 
 double TimeProfile::rate(double t) const {
   return rise_rate(shape, t - onset, rise_time) - rise_rate(shape, t - end, rise_time);
@@ -129,8 +130,8 @@ Eigen::Vector3d delta(const DifferentialDrive& drive, const FaultState& fault, c
 Eigen::Vector3d delta_rate(const DifferentialDrive& drive, const FaultState& fault, const DriveMotion& motion) {
   const double c = std::cos(motion.heading), s = std::sin(motion.heading);
   const Eigen::Vector2d gained = radius_gain(drive, fault.radius) * motion.speed;
-  const Eigen::Vector2d gained_rate = radius_gain(drive, fault.radius) * motion.acceleration +
-                                      radius_gain(drive, fault.radius_rate) * motion.speed;
+  const Eigen::Vector2d gained_rate =
+      radius_gain(drive, fault.radius) * motion.acceleration + radius_gain(drive, fault.radius_rate) * motion.speed;
   const double yaw_rate = motion.speed[1] + gained[1] + fault.slip[2];
   const Eigen::Vector3d along(c, s, 0.0), right(s, -c, 0.0);
   return fault.slip_rate + kinematic_matrix(motion.heading) * gained_rate + fault.matched_rate * along +

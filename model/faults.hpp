@@ -14,7 +14,8 @@
 
 namespace wheelwright {
 
-/// Physical parameters of a differential-drive robot; friction acts along the world axes, F_d = diag(f1, f2, f3) of (13).
+/// Physical parameters of a differential-drive robot; friction acts along the world axes, F_d = diag(f1, f2, f3) of
+/// (13).
 struct DriveParameters {
   double mass = 0.0;         ///< m, kg
   double yaw_inertia = 0.0;  ///< I, kg·m² (in the lever-arm convention of the DifferentialDrive it is used with)
@@ -37,8 +38,8 @@ struct TimeProfile {
     smooth,  ///< half a cosine, (1 − cos πs)/2
   };
   Shape shape = Shape::step;
-  double onset = 0.0;                                     ///< T of (7), s
-  double rise_time = 0.0;                                 ///< s, > 0 for ramp and smooth
+  double onset = 0.0;                                    ///< T of (7), s
+  double rise_time = 0.0;                                ///< s, > 0 for ramp and smooth
   double end = std::numeric_limits<double>::infinity();  ///< s, >= onset + rise time
 
   /// Share of the magnitude at time `t` (s), in [0, 1].
@@ -68,8 +69,8 @@ struct Fault {
 /// Name of a kind as scenario files write it, e.g. "wheel_radius_right".
 [[nodiscard]] std::string_view to_string(Fault::Kind kind);
 
-/// Throws InvalidArgument, naming the fault, unless magnitudes and times are finite (`end` may be infinite), profiles are
-/// as TimeProfile says, and the radii stay positive at all times whatever falls together, r + δ1 > 0 (12).
+/// Throws InvalidArgument, naming the fault, unless magnitudes and times are finite (`end` may be infinite), profiles
+/// are as TimeProfile says, and the radii stay positive at all times whatever falls together, r + δ1 > 0 (12).
 void validate(std::span<const Fault> faults, const DifferentialDrive& drive);
 
 /// The sum of all faults at one instant, and its rate.
@@ -102,8 +103,8 @@ struct DriveMotion {
 [[nodiscard]] Eigen::Vector3d delta_rate(const DifferentialDrive& drive, const FaultState& fault,
                                          const DriveMotion& motion);
 
-/// ζ(t) of (16), N·m, N·m²: [1 1; ℓ −ℓ]τ − r(M̄ v̇ + F̄ v). For unequal radii (Remark 1) the wheel forces are τ_R/(r+δ1R)
-/// and τ_L/(r+δ1L), and
+/// ζ(t) of (16), N·m, N·m²: [1 1; ℓ −ℓ]τ − r(M̄ v̇ + F̄ v). For unequal radii (Remark 1) the wheel forces are
+/// τ_R/(r+δ1R) and τ_L/(r+δ1L), and
 ///   ζ = A (M̄ v̇ + F̄ v + SᵀM δ̇ + SᵀF_d δ) − r (M̄ v̇ + F̄ v),  A = [1 1; ℓ −ℓ] diag(r+δ1R, r+δ1L) [1 1; ℓ −ℓ]⁻¹,
 /// which is (16) when they are equal.
 [[nodiscard]] Eigen::Vector2d zeta(const DifferentialDrive& drive, const DriveParameters& parameters,

@@ -53,9 +53,9 @@ void validate(const Model& model) {
   check::that(!model.coordinates.empty(), "Model::coordinates", "at least one coordinate");
   check::that(joints > 0, "Model::joints", "at least one joint");
   check::that(model.output_units.size() == model.n(), "Model::output_units", "one unit per output");
-  check::that(model.motion.rows() == static_cast<Eigen::Index>(model.coordinates.size()) &&
-                  model.motion.cols() == joints,
-              "Model::motion", "a matrix of coordinates × joints");
+  check::that(
+      model.motion.rows() == static_cast<Eigen::Index>(model.coordinates.size()) && model.motion.cols() == joints,
+      "Model::motion", "a matrix of coordinates × joints");
   check::that(model.input.rows() == static_cast<Eigen::Index>(model.n()) && model.input.cols() == joints,
               "Model::input", "a matrix of outputs × joints");
   check::that(model.motion.allFinite(), "Model::motion", "finite entries");

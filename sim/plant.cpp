@@ -56,8 +56,8 @@ void Plant::reset(const DriveState& state, double t) {
 
 void Plant::set_time(double t) {
   t_ = t;
-  const bool inside = (interval_ == 0 || t_ >= breaks_[interval_ - 1]) &&
-                      (interval_ == breaks_.size() || t_ < breaks_[interval_]);
+  const bool inside =
+      (interval_ == 0 || t_ >= breaks_[interval_ - 1]) && (interval_ == breaks_.size() || t_ < breaks_[interval_]);
   if (!inside) {
     enter_interval();
   }
@@ -78,9 +78,7 @@ void Plant::enter_interval() {
            parameters_.viscous_x == parameters_.viscous_y;
 }
 
-Eigen::Vector2d Plant::wheel_speed() const {
-  return wheel_speed(state_, moving_ ? fault_state(faults_, t_) : fault_);
-}
+Eigen::Vector2d Plant::wheel_speed() const { return wheel_speed(state_, moving_ ? fault_state(faults_, t_) : fault_); }
 
 Eigen::Vector2d Plant::wheel_speed(const DriveState& state, const FaultState& fault) const {
   const double c = std::cos(state.pose[2]), s = std::sin(state.pose[2]);
@@ -98,11 +96,11 @@ Plant::Derivative Plant::derivative(const DriveState& state, const FaultState& f
   const double right = torque[0] / (drive_.wheel_radius + fault.radius[0]);
   const double left = torque[1] / (drive_.wheel_radius + fault.radius[1]);
   const double friction = c * parameters_.viscous_x * x_rate + s * parameters_.viscous_y * y_rate;
-  return {state.yaw_rate * across + (right + left - friction) / parameters_.mass,
-          (0.5 * drive_.track_width * (right - left) - parameters_.viscous_yaw * state.yaw_rate) /
-              parameters_.yaw_inertia,
-          {x_rate, y_rate, state.yaw_rate},
-          wheel_speed(state, fault)};
+  return {
+      state.yaw_rate * across + (right + left - friction) / parameters_.mass,
+      (0.5 * drive_.track_width * (right - left) - parameters_.viscous_yaw * state.yaw_rate) / parameters_.yaw_inertia,
+      {x_rate, y_rate, state.yaw_rate},
+      wheel_speed(state, fault)};
 }
 
 void Plant::advance(const Eigen::Vector2d& torque, const Eigen::Vector2d& torque_end, double h) {
@@ -188,10 +186,11 @@ void Plant::runge_kutta(const Eigen::Vector2d& torque, const Eigen::Vector2d& sl
     const Derivative k2 = derivative(moved(state_, k1, 0.5 * step), middle, torque + (s + 0.5 * step) * slope);
     const Derivative k3 = derivative(moved(state_, k2, 0.5 * step), middle, torque + (s + 0.5 * step) * slope);
     const Derivative k4 = derivative(moved(state_, k3, step), fault_at(step), torque + (s + step) * slope);
-    state_ = moved(state_, {(k1.forward + 2.0 * k2.forward + 2.0 * k3.forward + k4.forward) / 6.0,
-                            (k1.yaw + 2.0 * k2.yaw + 2.0 * k3.yaw + k4.yaw) / 6.0,
-                            (k1.pose + 2.0 * k2.pose + 2.0 * k3.pose + k4.pose) / 6.0,
-                            (k1.angle + 2.0 * k2.angle + 2.0 * k3.angle + k4.angle) / 6.0},
+    state_ = moved(state_,
+                   {(k1.forward + 2.0 * k2.forward + 2.0 * k3.forward + k4.forward) / 6.0,
+                    (k1.yaw + 2.0 * k2.yaw + 2.0 * k3.yaw + k4.yaw) / 6.0,
+                    (k1.pose + 2.0 * k2.pose + 2.0 * k3.pose + k4.pose) / 6.0,
+                    (k1.angle + 2.0 * k2.angle + 2.0 * k3.angle + k4.angle) / 6.0},
                    step);
   }
 }

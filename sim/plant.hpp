@@ -14,12 +14,12 @@
 
 namespace wheelwright {
 
-/// Where the robot is and how it moves. The speeds are the true ones of the body, u = ẋ cosθ + ẏ sinθ and θ̇, which stay
-/// continuous when a fault sets in; what the encoders see jumps.
+/// Where the robot is and how it moves. The speeds are the true ones of the body, u = ẋ cosθ + ẏ sinθ and θ̇, which
+/// stay continuous when a fault sets in; what the encoders see jumps.
 struct DriveState {
-  double forward_speed = 0.0;                          ///< u, m/s
-  double yaw_rate = 0.0;                               ///< θ̇, rad/s
-  Eigen::Vector3d pose = Eigen::Vector3d::Zero();      ///< [x, y, θ], m, m, rad
+  double forward_speed = 0.0;                             ///< u, m/s
+  double yaw_rate = 0.0;                                  ///< θ̇, rad/s
+  Eigen::Vector3d pose = Eigen::Vector3d::Zero();         ///< [x, y, θ], m, m, rad
   Eigen::Vector2d wheel_angle = Eigen::Vector2d::Zero();  ///< [φ_R, φ_L], rad
 };
 

@@ -29,16 +29,16 @@ enum class Sampling {
 struct Sensors {
   Sampling sampling = Sampling::instant;
   NoiseShape noise = NoiseShape::uniform;
-  double wheel_speed = 0.0;                      ///< bound, rad/s
-  double wheel_angle = 0.0;                      ///< bound before quantisation, rad
-  double effort = 0.0;                           ///< bound, unit of the effort
-  double position = 0.0;                         ///< bound on x and y, m
-  double heading = 0.0;                          ///< bound, rad
-  std::optional<double> encoder_counts_per_turn; ///< rounds wheel angles to the nearest count
-  bool angles = true;                            ///< columns phi_r, phi_l
-  bool speeds = true;                            ///< columns omega_r, omega_l
-  bool pose = true;                              ///< columns x, y, theta
-  bool commands = true;                          ///< columns command_r, command_l
+  double wheel_speed = 0.0;                       ///< bound, rad/s
+  double wheel_angle = 0.0;                       ///< bound before quantisation, rad
+  double effort = 0.0;                            ///< bound, unit of the effort
+  double position = 0.0;                          ///< bound on x and y, m
+  double heading = 0.0;                           ///< bound, rad
+  std::optional<double> encoder_counts_per_turn;  ///< rounds wheel angles to the nearest count
+  bool angles = true;                             ///< columns phi_r, phi_l
+  bool speeds = true;                             ///< columns omega_r, omega_l
+  bool pose = true;                               ///< columns x, y, theta
+  bool commands = true;                           ///< columns command_r, command_l
 };
 
 /// A simulated drive of a differential-drive robot.
@@ -48,9 +48,9 @@ struct Scenario {
   DriveParameters parameters;  ///< the truth, physical (ℓ = D/2)
   Trajectory trajectory;
   ControllerGains controller;
-  std::optional<double> torque_limit;                              ///< saturation of each wheel, N·m
-  Eigen::Vector3d initial_pose = Eigen::Vector3d::Zero();          ///< of the reference, m, m, rad
-  Eigen::Vector3d initial_pose_error = Eigen::Vector3d::Zero();    ///< robot minus reference, m, m, rad
+  std::optional<double> torque_limit;                            ///< saturation of each wheel, N·m
+  Eigen::Vector3d initial_pose = Eigen::Vector3d::Zero();        ///< of the reference, m, m, rad
+  Eigen::Vector3d initial_pose_error = Eigen::Vector3d::Zero();  ///< robot minus reference, m, m, rad
   std::vector<Fault> faults;
   Sensors sensors;
   double duration = 60.0;      ///< s
@@ -69,9 +69,9 @@ void validate(const Scenario& scenario);
 /// What the controller believes: the robot's nominal values where they are given, else the truth.
 [[nodiscard]] DriveParameters nominal_parameters(const Scenario& scenario);
 
-/// θ_L of the scenario's truth in the order of `model.parameters`, units of θ_L; in the model's own lever-arm convention
-/// (with ℓ = D inertia and friction of yaw come out doubled). Throws InvalidArgument when the model has a parameter that
-/// a differential drive does not, or has one viscous_linear while the truth is anisotropic.
+/// θ_L of the scenario's truth in the order of `model.parameters`, units of θ_L; in the model's own lever-arm
+/// convention (with ℓ = D inertia and friction of yaw come out doubled). Throws InvalidArgument when the model has a
+/// parameter that a differential drive does not, or has one viscous_linear while the truth is anisotropic.
 [[nodiscard]] Eigen::VectorXd true_parameters(const Scenario& scenario, const Model& model);
 
 }  // namespace wheelwright

@@ -17,12 +17,12 @@
 
 namespace wheelwright {
 
-/// The log of a scenario, block by block in bounded memory; the same scenario gives the same log each time it is walked,
-/// whatever the size of the blocks. Noise is drawn without the standard library's distributions; what is left to the
+/// The log of a scenario, block by block in bounded memory; the same scenario gives the same log each time it is
+/// walked, whatever the size of the blocks. Noise is drawn without the standard library's distributions; what is left to the
 /// machine is the last digit of its sine, cosine and exponential.
 ///
-/// With Hold::zero_order a row's effort acts from its stamp to the next one, and with Hold::first_order efforts are linear
-/// between stamps, in the simulated world too: a noise-free log of Sampling::instant satisfies the model exactly. The
+/// With Hold::zero_order a row's effort acts from its stamp to the next one, and with Hold::first_order efforts are
+/// linear between stamps, in the simulated world too: a noise-free log of Sampling::instant satisfies the model exactly. The
 /// feedback uses true angles and pose, so sensors do not change the motion.
 class Simulation final : public LogSource {
  public:

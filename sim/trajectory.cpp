@@ -100,8 +100,8 @@ ReferenceSpeed reference_speed(const Trajectory& trajectory, double t) {
 Eigen::Vector3d advance_reference(const Trajectory& trajectory, const Eigen::Vector3d& pose, double t, double h) {
   const Eigen::Vector2d twist = reference_speed(trajectory, t + 0.5 * h).speed;
   const double half_turn = 0.5 * h * twist[1];
-  const double chord = h * twist[0] * (std::abs(half_turn) < 1e-4 ? 1.0 - half_turn * half_turn / 6.0
-                                                                  : std::sin(half_turn) / half_turn);
+  const double chord =
+      h * twist[0] * (std::abs(half_turn) < 1e-4 ? 1.0 - half_turn * half_turn / 6.0 : std::sin(half_turn) / half_turn);
   return {pose[0] + chord * std::cos(pose[2] + half_turn), pose[1] + chord * std::sin(pose[2] + half_turn),
           pose[2] + 2.0 * half_turn};
 }

@@ -41,8 +41,8 @@ struct ReferenceSpeed {
 /// v_d and v̇_d at time `t` (s, >= 0).
 [[nodiscard]] ReferenceSpeed reference_speed(const Trajectory& trajectory, double t);
 
-/// The pose [x, y, θ] (m, m, rad) of the reference robot one step `h` (s) after `pose` at time `t`: the arc of the twist
-/// at the middle of the step, exact for constant speeds, else with an error of O(h³) a step.
+/// The pose [x, y, θ] (m, m, rad) of the reference robot one step `h` (s) after `pose` at time `t`: the arc of the
+/// twist at the middle of the step, exact for constant speeds, else with an error of O(h³) a step.
 [[nodiscard]] Eigen::Vector3d advance_reference(const Trajectory& trajectory, const Eigen::Vector3d& pose, double t,
                                                 double h);
 

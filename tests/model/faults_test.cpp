@@ -16,12 +16,13 @@ namespace {
 using Kind = Fault::Kind;
 using Shape = TimeProfile::Shape;
 
-constexpr std::array all_kinds = {Kind::wheel_radius, Kind::wheel_radius_right, Kind::wheel_radius_left, Kind::slip_x,
-                                  Kind::slip_y,       Kind::slip_yaw,           Kind::matched,           Kind::unmatched};
+constexpr std::array all_kinds = {
+    Kind::wheel_radius, Kind::wheel_radius_right, Kind::wheel_radius_left, Kind::slip_x,
+    Kind::slip_y,       Kind::slip_yaw,           Kind::matched,           Kind::unmatched};
 const DifferentialDrive drive{.wheel_radius = 0.1, .track_width = 0.4};
 const DriveParameters body{.mass = 20.0, .yaw_inertia = 0.9, .viscous_x = 4.0, .viscous_y = 4.0, .viscous_yaw = 0.5};
-const DriveParameters anisotropic{.mass = 20.0, .yaw_inertia = 0.9, .viscous_x = 4.0, .viscous_y = 9.0,
-                                  .viscous_yaw = 0.5};
+const DriveParameters anisotropic{
+    .mass = 20.0, .yaw_inertia = 0.9, .viscous_x = 4.0, .viscous_y = 9.0, .viscous_yaw = 0.5};
 const DriveMotion motion{.heading = 0.7, .speed = {0.5, -0.8}, .acceleration = {1.5, 2.5}};
 
 FaultState at(std::vector<Fault> faults, double t = 0.0) { return fault_state(faults, t); }
@@ -64,8 +65,8 @@ TEST(TimeProfile, RateIntegratesToTheValue) {
 TEST(Delta, RadiusFaultIsEquationSix) {
   const double d1 = -0.01, c = std::cos(motion.heading), s = std::sin(motion.heading);
   const Eigen::Vector2d w = drive.wheel_speed(motion.speed);
-  const Eigen::Vector3d six = d1 / 2.0 * Eigen::Vector3d((w[0] + w[1]) * c, (w[0] + w[1]) * s,
-                                                         2.0 * (w[0] - w[1]) / drive.track_width);
+  const Eigen::Vector3d six =
+      d1 / 2.0 * Eigen::Vector3d((w[0] + w[1]) * c, (w[0] + w[1]) * s, 2.0 * (w[0] - w[1]) / drive.track_width);
   EXPECT_LT((delta(drive, at({{Kind::wheel_radius, d1, {}}}), motion) - six).norm(), 1e-15);
 }
 
@@ -99,9 +100,9 @@ TEST(DeltaRate, IsTheDerivativeOfDeltaForEveryFault) {
       return DriveMotion{motion.heading + by * yaw_rate + 0.5 * by * by * yaw_acceleration,
                          motion.speed + by * motion.acceleration, motion.acceleration};
     };
-    const Eigen::Vector3d difference = (delta(drive, fault_state(faults, t + h), moved(h)) -
-                                        delta(drive, fault_state(faults, t - h), moved(-h))) /
-                                       (2.0 * h);
+    const Eigen::Vector3d difference =
+        (delta(drive, fault_state(faults, t + h), moved(h)) - delta(drive, fault_state(faults, t - h), moved(-h))) /
+        (2.0 * h);
     const Eigen::Vector3d rate = delta_rate(drive, now, motion);
     EXPECT_GT(rate.norm(), 0.0) << to_string(kind);
     EXPECT_LT((difference - rate).norm(), 1e-8 * (1.0 + rate.norm())) << to_string(kind);

@@ -81,9 +81,8 @@ TEST(DifferentialDrive, FiveParametersAreTheProjectedWorldFriction) {
   for (const double heading : {0.0, 0.3, 1.5, -2.4, 11.0}) {
     const Eigen::Matrix<double, 3, 2> s = kinematic_matrix(heading);
     const Eigen::Vector2d v(0.6, -0.8), a(0.2, 1.1);
-    const Eigen::Vector2d expected =
-        r * (Eigen::Vector2d(m * a[0], inertia * a[1]) +
-             s.transpose() * Eigen::Vector3d(f1, f2, f3).asDiagonal() * s * v);
+    const Eigen::Vector2d expected = r * (Eigen::Vector2d(m * a[0], inertia * a[1]) +
+                                          s.transpose() * Eigen::Vector3d(f1, f2, f3).asDiagonal() * s * v);
     const Eigen::VectorXd theta = r * (Eigen::VectorXd(5) << m, inertia, f1, f2, f3).finished();
     EXPECT_LT((regressor_at(model, {v[0], v[1]}, {a[0], a[1]}, heading) * theta - expected).norm(), 1e-14);
   }
@@ -106,8 +105,8 @@ TEST(DifferentialDrive, ErrorBoundOfTheFrictionTermsCoversEveryErrorOfHeadingAnd
       }
       const TermValue value =
           term.function({.speed = v, .speed_error = bound, .heading = heading, .heading_error = heading_error});
-      const TermValue exact = term.function(
-          {.speed = exact_v, .speed_error = exact_bound, .heading = heading + unit() * heading_error});
+      const TermValue exact =
+          term.function({.speed = exact_v, .speed_error = exact_bound, .heading = heading + unit() * heading_error});
       EXPECT_LE(std::abs(exact.value - value.value), value.error);
       tightest = std::max(tightest, std::abs(exact.value - value.value) / value.error);
     }

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <array>
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include <wheelwright/core/error.hpp>
+#include <wheelwright/sim/trajectory.hpp>
+
+namespace wheelwright {
+namespace {
+
+using Kind = Trajectory::Kind;
+constexpr std::array all_kinds = {Kind::straight, Kind::circle, Kind::figure_eight, Kind::multi_sine,
+                                  Kind::spin,     Kind::stops,  Kind::commissioning};
+
+TEST(Trajectory, AccelerationIsTheDerivativeOfSpeed) {
+  for (const Kind kind : all_kinds) {
+    const Trajectory trajectory{.kind = kind};
+    constexpr double h = 1e-5;
+    for (double t = 0.0123; t < 60.0; t += 0.0917) {
+      const Eigen::Vector2d difference =
+          (reference_speed(trajectory, t + h).speed - reference_speed(trajectory, t - h).speed) / (2.0 * h);
+      // Speeds are once continuously differentiable: h times a jump of the second derivative at worst.
+      EXPECT_LT((difference - reference_speed(trajectory, t).acceleration).norm(), 1e-4)
+          << to_string(kind) << " at " << t;
+    }
+  }
+}
+
+TEST(Trajectory, StartsFromRestAndKeepsToItsLimits) {
+  for (const Kind kind : all_kinds) {
+    const Trajectory trajectory{.kind = kind, .speed = 0.6, .yaw_rate = 1.7, .period = 12.0};
+    EXPECT_EQ(reference_speed(trajectory, 0.0).speed, Eigen::Vector2d::Zero());
+    double v1 = 0.0, v2 = 0.0;
+    for (double t = 0.0; t < 120.0; t += 0.01) {
+      const Eigen::Vector2d v = reference_speed(trajectory, t).speed;
+      v1 = std::max(v1, std::abs(v[0]));
+      v2 = std::max(v2, std::abs(v[1]));
+    }
+    EXPECT_LE(v1, 0.6 * (1.0 + 1e-12)) << to_string(kind);
+    EXPECT_LE(v2, 1.7 * (1.0 + 1e-12)) << to_string(kind);
+  }
+}
+
+TEST(Trajectory, CircleIsACircle) {
+  const Trajectory trajectory{.kind = Kind::circle, .speed = 0.5, .yaw_rate = 0.8};
+  Eigen::Vector3d pose(1.0, 2.0, 0.3);
+  double t = 5.0;  // past the soft start
+  for (int i = 0; i < 500; ++i, t += 0.03) {
+    pose = advance_reference(trajectory, pose, t, 0.03);
+    const double turned = 0.8 * 0.03 * (i + 1);
+    EXPECT_NEAR(pose[0], 1.0 + 0.5 / 0.8 * (std::sin(0.3 + turned) - std::sin(0.3)), 1e-12);
+    EXPECT_NEAR(pose[1], 2.0 - 0.5 / 0.8 * (std::cos(0.3 + turned) - std::cos(0.3)), 1e-12);
+  }
+}
+
+TEST(Trajectory, FigureEightCloses) {
+  const Trajectory trajectory{.kind = Kind::figure_eight, .speed = 0.5, .period = 10.0};
+  const Eigen::Vector3d start(1.0, 2.0, 0.3);
+  Eigen::Vector3d pose = start;
+  constexpr int steps = 100000;
+  for (int i = 0; i < steps; ++i) {
+    pose = advance_reference(trajectory, pose, 10.0 + 10.0 * i / steps, 10.0 / steps);
+  }
+  EXPECT_LT((pose - start).norm(), 1e-8);
+}
+
+TEST(Trajectory, RefusesWhatIsNone) {
+  EXPECT_THROW(validate(Trajectory{.speed = -0.1}), InvalidArgument);
+  EXPECT_THROW(validate(Trajectory{.yaw_rate = std::nan("")}), InvalidArgument);
+  EXPECT_THROW(validate(Trajectory{.period = 0.0}), InvalidArgument);
+}
+
+}  // namespace
+}  // namespace wheelwright
