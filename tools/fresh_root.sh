@@ -24,7 +24,8 @@ if [ ! -e "$root/etc/debian_version" ]; then
 fi
 root=$(cd "$root" && pwd)
 
-# How this machine reaches its registries.
+# How this machine reaches its registries, in place of what debootstrap wrote.
+rm -f "$root/etc/apt/sources.list"
 cp -a /etc/resolv.conf /etc/hosts "$root/etc/" 2>/dev/null || true
 for path in /etc/apt/sources.list /etc/apt/sources.list.d /etc/apt/apt.conf /etc/apt/apt.conf.d /etc/apt/trusted.gpg.d \
     /etc/apt/keyrings /usr/share/keyrings /usr/local/share/ca-certificates /etc/ssl/certs /usr/share/ca-certificates; do
@@ -42,11 +43,11 @@ finish() {
   done
 }
 trap finish EXIT
-for what in proc dev; do
+for what in proc dev dev/pts; do
   if ! mountpoint -q "$root/$what"; then
     case $what in
       proc) mount -t proc proc "$root/proc" ;;
-      dev) mount --bind /dev "$root/dev" ;;
+      *) mount --bind "/$what" "$root/$what" ;;
     esac
     mounted="$root/$what $mounted"
   fi
