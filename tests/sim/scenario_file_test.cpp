@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <filesystem>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <wheelwright/core/error.hpp>
+#include <wheelwright/io/scenario_file.hpp>
+#include <wheelwright/sim/simulation.hpp>
+
+namespace wheelwright {
+namespace {
+
+const std::string head =
+    "robot:\n"                                                                          // line 1
+    "  wheel_radius: 0.0975\n"                                                          // line 2
+    "  track_width: 0.381\n"                                                            // line 3
+    "  effort: {kind: torque, hold: zero_order}\n"                                      // line 4
+    "parameters: {mass: 21, yaw_inertia: 0.9, viscous_linear: 4, viscous_yaw: 0.5}\n";  // line 5
+
+std::string message(const std::string& text) {
+  try {
+    static_cast<void>(parse_scenario(text, "s.yaml"));
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+TEST(ScenarioFile, EveryKeyArrives) {
+  const Scenario s = parse_scenario(head + R"(
+trajectory: {kind: figure_eight, speed: 0.7, yaw_rate: 1.1, period: 12}
+controller: {along: 1.5, across: 5, heading: 3, speed: 9, integral: 7, torque_limit: 6}
+start: {pose: [1, 2, 0.5], error: [0.1, -0.1, 0.2]}
+faults:
+  - {kind: wheel_radius_left, magnitude: -0.01, onset: 20, shape: ramp, rise_time: 2}
+  - {kind: unmatched, magnitude: 0.2, onset: 30, end: 31}
+sensors:
+  sampling: interval
+  noise: truncated_gaussian
+  wheel_speed: 0.01
+  wheel_angle: 0.02
+  effort: 0.03
+  position: 0.04
+  heading: 0.05
+  encoder_counts_per_turn: 4096
+  log: [speeds, pose]
+duration: 90
+rate: 200
+time_jitter: 0.1
+gaps: [[10, 12], [40, 41.5]]
+seed: 77
+)",
+                                    "s.yaml");
+  EXPECT_EQ(s.robot.wheel_radius, 0.0975);
+  EXPECT_EQ(s.robot.hold, Hold::zero_order);
+  EXPECT_EQ(s.parameters.mass, 21.0);
+  EXPECT_EQ(s.parameters.viscous_x, 4.0);
+  EXPECT_EQ(s.parameters.viscous_y, 4.0);
+  EXPECT_EQ(s.parameters.viscous_yaw, 0.5);
+  EXPECT_EQ(s.trajectory.kind, Trajectory::Kind::figure_eight);
+  EXPECT_EQ(s.trajectory.yaw_rate, 1.1);
+  EXPECT_EQ(s.controller.integral, 7.0);
+  EXPECT_EQ(s.torque_limit, 6.0);
+  EXPECT_EQ(s.initial_pose, Eigen::Vector3d(1.0, 2.0, 0.5));
+  EXPECT_EQ(s.initial_pose_error, Eigen::Vector3d(0.1, -0.1, 0.2));
+  ASSERT_EQ(s.faults.size(), 2U);
+  EXPECT_EQ(s.faults[0].kind, Fault::Kind::wheel_radius_left);
+  EXPECT_EQ(s.faults[0].profile.shape, TimeProfile::Shape::ramp);
+  EXPECT_EQ(s.faults[0].profile.rise_time, 2.0);
+  EXPECT_EQ(s.faults[1].profile.end, 31.0);
+  EXPECT_EQ(s.sensors.sampling, Sampling::interval);
+  EXPECT_EQ(s.sensors.noise, NoiseShape::truncated_gaussian);
+  EXPECT_EQ(s.sensors.heading, 0.05);
+  EXPECT_EQ(s.sensors.encoder_counts_per_turn, 4096.0);
+  EXPECT_FALSE(s.sensors.angles);
+  EXPECT_TRUE(s.sensors.speeds);
+  EXPECT_FALSE(s.sensors.commands);
+  EXPECT_EQ(s.duration, 90.0);
+  EXPECT_EQ(s.rate, 200.0);
+  EXPECT_EQ(s.time_jitter, 0.1);
+  ASSERT_EQ(s.gaps.size(), 2U);
+  EXPECT_EQ(s.gaps[1].upper, 41.5);
+  EXPECT_EQ(s.seed, 77U);
+}
+
+TEST(ScenarioFile, FaultKindsAreCalledAsInTheLibrary) {
+  for (int kind = 0; kind < 8; ++kind) {
+    const auto expected = static_cast<Fault::Kind>(kind);
+    const Scenario s =
+        parse_scenario(head + "faults: [{kind: " + std::string(to_string(expected)) + ", magnitude: 0.01}]", "s.yaml");
+    EXPECT_EQ(s.faults.at(0).kind, expected);
+  }
+  for (int kind = 0; kind < 7; ++kind) {
+    const auto expected = static_cast<Trajectory::Kind>(kind);
+    const Scenario s = parse_scenario(head + "trajectory: {kind: " + std::string(to_string(expected)) + "}", "s.yaml");
+    EXPECT_EQ(s.trajectory.kind, expected);
+  }
+}
+
+TEST(ScenarioFile, MessagesNameFileLineKeyValueAndExpectation) {
+  using testing::AllOf;
+  using testing::HasSubstr;
+  EXPECT_EQ(message(head), "accepted");
+  EXPECT_THAT(message(head + "duration: soon\n"), AllOf(HasSubstr("s.yaml:6: duration"), HasSubstr("'soon'")));
+  EXPECT_THAT(message(head + "\ndurations: 3\n"), AllOf(HasSubstr("s.yaml:7"), HasSubstr("durations")));
+  EXPECT_THAT(message(head + "trajectory: {kind: oval}\n"), AllOf(HasSubstr("s.yaml:6"), HasSubstr("figure_eight")));
+  EXPECT_THAT(message(head + "faults:\n  - {kind: flat_tyre, magnitude: 1}\n"),
+              AllOf(HasSubstr("s.yaml:7"), HasSubstr("flat_tyre"), HasSubstr("wheel_radius")));
+  EXPECT_THAT(message(head + "faults:\n  - {kind: slip_x}\n"), AllOf(HasSubstr("s.yaml:7"), HasSubstr("magnitude")));
+  EXPECT_THAT(message(head + "sensors: {effort: -1}\n"),
+              AllOf(HasSubstr("s.yaml:6: sensors.effort"), HasSubstr(">= 0")));
+  EXPECT_THAT(message(head + "seed: 1.5\n"), AllOf(HasSubstr("s.yaml:6: seed"), HasSubstr("whole")));
+  EXPECT_THAT(message(head + "gaps: [[1, 2, 3]]\n"), AllOf(HasSubstr("s.yaml:6: gaps"), HasSubstr("[from, to]")));
+  EXPECT_THAT(message(head + "start: {pose: [1, 2]}\n"), AllOf(HasSubstr("s.yaml:6: start.pose"), HasSubstr("three")));
+  EXPECT_THAT(message(head + "rate: 0\n"), AllOf(HasSubstr("s.yaml:6: rate"), HasSubstr("> 0")));
+  EXPECT_THAT(message(head + "rate: 10\nrate: 20\n"), HasSubstr("s.yaml:7"));
+}
+
+TEST(ScenarioFile, TheRobotsOwnMessagesNameItsOwnLines) {
+  using testing::AllOf;
+  using testing::HasSubstr;
+  std::string bad = head;
+  bad.replace(bad.find("0.381"), 5, "wide!");
+  EXPECT_THAT(message(bad), AllOf(HasSubstr("s.yaml:3: track_width"), HasSubstr("wide!")));
+  EXPECT_THAT(
+      message("# flow\nrobot: {wheel_radius: 0.1,\n  track_widht: 0.4}\n" + head.substr(head.find("parameters"))),
+      AllOf(HasSubstr("s.yaml:3"), HasSubstr("track_widht")));
+  EXPECT_THAT(message("robot: [1]\n" + head.substr(head.find("parameters"))), HasSubstr("s.yaml:1: robot"));
+  EXPECT_EQ(message("{robot: {wheel_radius: 0.1, track_width: 0.4}, parameters: {mass: 21, yaw_inertia: 0.9, "
+                    "viscous_linear: 4, viscous_yaw: 0.5}}"),
+            "accepted");
+}
+
+TEST(ScenarioFile, WhatDoesNotGoTogetherIsAnInputError) {
+  using testing::HasSubstr;
+  EXPECT_THAT(message(head + "faults: [{kind: wheel_radius, magnitude: -0.1}]\n"), HasSubstr("r + δ1 > 0"));
+  EXPECT_THAT(message(head + "faults: [{kind: slip_x, magnitude: 0.1, shape: ramp}]\n"), HasSubstr("rise_time"));
+  EXPECT_THAT(message("duration: 3\n"), HasSubstr("robot"));
+  EXPECT_THAT(message(head.substr(0, head.find("parameters"))), HasSubstr("parameters"));
+  const std::string robot = head.substr(0, head.find("parameters"));
+  EXPECT_THAT(message(robot + "parameters: {mass: 21, yaw_inertia: 1, viscous_yaw: 1}\n"), HasSubstr("viscous_linear"));
+  EXPECT_THAT(
+      message(robot + "parameters: {mass: 21, yaw_inertia: 1, viscous_x: 1, viscous_linear: 2, viscous_yaw: 1}\n"),
+      HasSubstr("viscous_linear"));
+  EXPECT_THAT(message(robot + "parameters: {mass: 21, viscous_linear: 2, viscous_yaw: 1}\n"), HasSubstr("yaw_inertia"));
+  EXPECT_THAT(message("robot: nowhere.yaml\n" + head.substr(head.find("parameters"))), HasSubstr("nowhere.yaml"));
+}
+
+TEST(ScenarioFile, ExamplesCanBeDriven) {
+  int files = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(WHEELWRIGHT_SOURCE_DIR "/examples/scenarios")) {
+    Scenario s = read_scenario(entry.path());
+    s.duration = 2.0;
+    EXPECT_GT(simulate(s).rows(), 100U) << entry.path();
+    ++files;
+  }
+  EXPECT_GE(files, 3);
+}
+
+}  // namespace
+}  // namespace wheelwright
