@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numeric>
 
-#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 
 #include <wheelwright/bounds/certificate.hpp>
 
@@ -14,30 +14,13 @@ namespace {
 
 constexpr double kCut = 1e-10;  // of the size of the set: what cuts less than that is left out
 
-/// T with Tᵀ information T ≈ 1, after scaling of the columns; directions without information keep the size of the box.
-Eigen::MatrixXd whitening(const Box& box, const Eigen::MatrixXd& information) {
-  const auto p = static_cast<Eigen::Index>(box.dimension());
-  Eigen::MatrixXd full = information;
-  for (Eigen::Index j = 0; j < p; ++j) {
-    const double half = 0.5 * box.sides[static_cast<std::size_t>(j)].width();
-    full(j, j) += 1.0 / std::max(half * half, 1e-280);
-  }
-  const Eigen::VectorXd scale = full.diagonal().cwiseSqrt().cwiseInverse();
-  const Eigen::MatrixXd correlation = scale.asDiagonal() * full * scale.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(correlation);
-  const Eigen::VectorXd roots = eigen.eigenvalues().cwiseMax(1e-14).cwiseSqrt().cwiseInverse();
-  return scale.asDiagonal() * eigen.eigenvectors() * roots.asDiagonal();
-}
-
 }  // namespace
 
 CuttingPlanes::CuttingPlanes(const Box& box, const Eigen::MatrixXd& information, std::vector<std::size_t> parameters)
     : box_(box), program_(static_cast<Eigen::Index>(box.dimension())) {
   check_finite(box, "box of cutting planes");
   const auto p = static_cast<Eigen::Index>(box.dimension());
-  const std::vector<double> centre = box.centre();
-  coordinates_.centre = Eigen::Map<const Eigen::VectorXd>(centre.data(), p);
-  coordinates_.transform = whitening(box, information);
+  coordinates_ = whitened(box, information);
   rows_ = sides_as_rows(box, parameters);
   reduced_size_ = rows_.size();
   // Half-widths of the box seen from z: |z| = |T⁻¹ (θ − centre)|.

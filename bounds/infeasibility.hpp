@@ -8,15 +8,10 @@
 #include <vector>
 
 #include <wheelwright/bounds/box.hpp>
+#include <wheelwright/bounds/coordinates.hpp>
 #include <wheelwright/bounds/half_space.hpp>
 
 namespace wheelwright {
-
-/// Affine coordinates z of parameters in which a set has a size of about one: θ = centre + transform z.
-struct Coordinates {
-  Eigen::VectorXd centre;     ///< θ at z = 0
-  Eigen::MatrixXd transform;  ///< p × p, regular
-};
 
 /// The 2p half-spaces of a box, lower before upper side, with their origin marked as prior. Where `parameters` is given,
 /// side j belongs to parameter parameters[j].

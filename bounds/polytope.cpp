@@ -123,13 +123,22 @@ std::vector<std::vector<std::size_t>> independent_blocks(std::span<const HalfSpa
   return groups;
 }
 
-Polytope::Polytope(std::vector<HalfSpace> rows, const Box& box, const PolytopeOptions& options) {
+Polytope::Polytope(const std::vector<HalfSpace>& rows, const Box& box, const PolytopeOptions& options) {
+  auto result = intersect(rows, box, options);
+  check::that(std::holds_alternative<Polytope>(result), "polytope", "a set that is not empty");
+  *this = std::move(std::get<Polytope>(result));
+}
+
+std::variant<Polytope, std::vector<WeightedRow>> Polytope::intersect(const std::vector<HalfSpace>& rows, const Box& box,
+                                                                     const PolytopeOptions& options) {
   const std::size_t p = box.dimension();
   check_finite(box, "box of a polytope");
   for (const HalfSpace& row : rows) {
     check::that(row.a.size() == static_cast<Eigen::Index>(p), "rows of a polytope", "as many coefficients as sides");
     check::that(row.a.allFinite() && std::isfinite(row.b), "rows of a polytope", "finite numbers");
-    check::that(!row.a.isZero(0.0) || row.b >= 0.0, "polytope", "a set that is not empty");
+    if (row.a.isZero(0.0) && row.b < 0.0) {
+      return std::vector<WeightedRow>{{row, 1.0}};
+    }
   }
   auto data = std::make_shared<Data>();
   data->hull.sides.resize(p);
@@ -156,7 +165,13 @@ Polytope::Polytope(std::vector<HalfSpace> rows, const Box& box, const PolytopeOp
     CuttingPlanes planes(part, information, parameters);
     planes.add(std::move(own));
     planes.reduce();
-    check::that(!planes.is_empty(), "polytope", "a set that is not empty");
+    if (planes.is_empty()) {
+      std::vector<WeightedRow> contradiction = planes.contradiction();
+      for (WeightedRow& weighted : contradiction) {
+        weighted.row = spread(weighted.row, parameters, p);
+      }
+      return contradiction;
+    }
     auto [lower, upper] = planes.certified_hull();
 
     Block block;
@@ -184,6 +199,7 @@ Polytope::Polytope(std::vector<HalfSpace> rows, const Box& box, const PolytopeOp
       block.margin = block.vertices->radius * (1.0 + gamma) +
                      gamma * block.vertices->points.cwiseAbs().rowwise().maxCoeff() +
                      Eigen::VectorXd::Constant(q, std::numeric_limits<double>::min());
+      data->looseness = std::max(data->looseness, block.vertices->looseness);
       data->vertex_count += static_cast<std::size_t>(block.vertices->points.cols());
     } else {
       data->online = false;
@@ -196,7 +212,7 @@ Polytope::Polytope(std::vector<HalfSpace> rows, const Box& box, const PolytopeOp
   if (!data->online) {
     data->vertex_count = 0;
   }
-  data_ = std::move(data);
+  return Polytope(std::shared_ptr<const Data>(std::move(data)));
 }
 
 double Polytope::support(std::span<const double> a) const noexcept { return support(a, std::span<double>{}); }

@@ -5,6 +5,7 @@
 
 #include <memory>
 #include <span>
+#include <variant>
 #include <vector>
 
 #include <wheelwright/bounds/box.hpp>
@@ -41,7 +42,12 @@ class Polytope {
 
   /// Takes the intersection of `rows` with a finite box. Throws InvalidArgument when shapes disagree, a number is not
   /// finite, or the set is proved empty.
-  Polytope(std::vector<HalfSpace> rows, const Box& box, const PolytopeOptions& options = {});
+  Polytope(const std::vector<HalfSpace>& rows, const Box& box, const PolytopeOptions& options = {});
+
+  /// The same, for sets that may be empty: the polytope, or the rows whose multipliers prove that there is none.
+  [[nodiscard]] static std::variant<Polytope, std::vector<WeightedRow>> intersect(const std::vector<HalfSpace>& rows,
+                                                                                const Box& box,
+                                                                                const PolytopeOptions& options = {});
 
   /// Number of parameters p.
   [[nodiscard]] std::size_t dimension() const noexcept { return data_->hull.dimension(); }
@@ -60,6 +66,10 @@ class Polytope {
   [[nodiscard]] bool is_online() const noexcept { return data_->online; }
   /// Number of vertices, summed over blocks (of a product: as many support() looks at); 0 unless is_online().
   [[nodiscard]] std::size_t vertex_count() const noexcept { return data_->vertex_count; }
+
+  /// How far, relative to its size in Block::coordinates, the facets were shifted outward to know the vertices (1e-10 or
+  /// so, more where many facets meet in one vertex; 0 where support() is a linear program).
+  [[nodiscard]] double looseness() const noexcept { return data_->looseness; }
 
   /// Support function h(a) = max { a·θ : θ in set }, rounded outward, for p finite entries `a` (unchecked). Never above
   /// the support of hull(). Where is_online(): maximum over vertices, summed over blocks, plus the margin; no allocation.
@@ -85,7 +95,10 @@ class Polytope {
     std::vector<double> centre;
     bool online = true;
     std::size_t vertex_count = 0;
+    double looseness = 0.0;
   };
+  explicit Polytope(std::shared_ptr<const Data> data) : data_(std::move(data)) {}
+
   std::shared_ptr<const Data> data_;
 };
 

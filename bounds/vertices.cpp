@@ -140,7 +140,7 @@ bool enclose(const std::vector<Vertex>& vertices, std::span<const HalfSpace> row
              const Coordinates& coordinates, VertexSet& result) {
   const Eigen::Index p = coordinates.centre.size();
   const auto m = static_cast<Eigen::Index>(rows.size());
-  const double gamma = 8.0 * static_cast<double>(p + 4) * kEpsilon;  // covers every rounding of a p-term sum, four times over
+  const double gamma = 2.0 * static_cast<double>(p + 4) * kEpsilon;  // roundings of a p-term sum (Higham 2002), four times over
   const Eigen::VectorXd size = coordinates.transform.cwiseAbs().rowwise().sum();
   Eigen::MatrixXd a(p, m);
   for (Eigen::Index i = 0; i < m; ++i) {
@@ -220,7 +220,7 @@ std::optional<VertexSet> enumerate_vertices(std::span<const HalfSpace> rows, con
   b[m + p] = kAround * static_cast<double>(p);
 
   std::mt19937_64 generator(0x5EEDULL);
-  for (const double shift : {1e-10, 1e-8, 1e-6}) {
+  for (const double shift : {1e-10, 1e-9, 1e-8, 1e-7, 1e-6}) {
     Eigen::VectorXd shifted(m);
     for (Eigen::Index i = 0; i < m; ++i) {
       const HalfSpace& row = rows[static_cast<std::size_t>(i)];

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/bounds/coordinates.hpp>
+
+#include <Eigen/Eigenvalues>
+
+namespace wheelwright {
+
+Coordinates whitened(const Box& box, const Eigen::MatrixXd& information) {
+  check_finite(box, "box of coordinates");
+  const auto p = static_cast<Eigen::Index>(box.dimension());
+  Eigen::MatrixXd full = information;
+  for (Eigen::Index j = 0; j < p; ++j) {
+    const double half = 0.5 * box.sides[static_cast<std::size_t>(j)].width();
+    full(j, j) += 1.0 / std::max(half * half, 1e-280);
+  }
+  const Eigen::VectorXd scale = full.diagonal().cwiseSqrt().cwiseInverse();
+  const Eigen::MatrixXd correlation = scale.asDiagonal() * full * scale.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(correlation);
+  const Eigen::VectorXd roots = eigen.eigenvalues().cwiseMax(1e-14).cwiseSqrt().cwiseInverse();
+  const std::vector<double> centre = box.centre();
+  return {Eigen::Map<const Eigen::VectorXd>(centre.data(), p),
+          scale.asDiagonal() * eigen.eigenvectors() * roots.asDiagonal()};
+}
+
+}  // namespace wheelwright

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// The minimax (Chebyshev) fit: the smallest error bound with which a model explains all rows.
+#pragma once
+
+#include <vector>
+
+#include <wheelwright/bounds/box.hpp>
+#include <wheelwright/bounds/half_space.hpp>
+#include <wheelwright/core/regression.hpp>
+
+namespace wheelwright {
+
+/// Options of minimax_fit().
+struct MinimaxOptions {
+  std::vector<double> weights;                ///< w per output, > 0; infinity leaves an output out; empty: all 1
+  std::vector<std::size_t> excluded_samples;  ///< row numbers (RegressionBlock::sample) left out, any order
+  double tolerance = 1e-9;                    ///< wanted (upper − lower) / upper
+  std::size_t pass_limit = 24;                ///< most passes over the source, per pattern of open signs
+};
+
+/// Result of minimax_fit(): lower <= γ* <= upper whatever the number of passes.
+struct MinimaxFit {
+  double lower = 0.0;                ///< certified by `active` in outward arithmetic
+  double upper = 0.0;                ///< what `theta` reaches over all rows, rounded outward
+  std::vector<double> theta;         ///< p parameters in the prior box, with which `upper` is reached
+  std::vector<WeightedRow> active;   ///< rows a·θ − wγ <= b (last coefficient −w) and multipliers that prove `lower`
+  std::size_t passes = 0;            ///< passes over the source
+  bool converged = false;            ///< the bracket is as narrow as the tolerance asks, or as double precision allows
+};
+
+/// γ* = min γ over θ in prior such that |y_r − Y_r θ| <= γ w_i + dy_r + dY_r |θ| for every row r of output i.
+///
+/// With dy = dY = 0 it is the Chebyshev fit; with declared bounds it is by how much they must be raised (0: not at all).
+/// By cutting planes: each pass adds the rows that the present fit violates most, and the last one, which adds none,
+/// evaluates the fit on all rows. Signs that the prior leaves open in noisy columns are examined one pattern at a time
+/// (up to four such parameters; beyond, `lower` stands on the convex description of SlabRows and the bracket may stay
+/// open). Throws InvalidArgument when shapes disagree, a number is not finite, or no output is left.
+[[nodiscard]] MinimaxFit minimax_fit(RegressionSource& source, const Box& prior, const MinimaxOptions& options = {});
+
+}  // namespace wheelwright

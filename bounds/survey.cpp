@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/bounds/survey.hpp>
+
+#include <algorithm>
+#include <numeric>
+
+namespace wheelwright {
+namespace {
+
+constexpr std::size_t kSample = 1024;
+
+/// Keeps every stride-th instant, with the stride doubled each time the sample is full.
+class EvenSample {
+ public:
+  EvenSample(std::size_t outputs, std::size_t parameters) {
+    block_.resize(kSample, outputs, parameters);
+  }
+
+  void offer(const RegressionBlock& block, std::size_t k) {
+    if (seen_++ % stride_ != 0) {
+      return;
+    }
+    if (count_ == kSample) {
+      for (std::size_t i = 0; i < kSample / 2; ++i) {
+        copy(block_, 2 * i, i);
+      }
+      count_ = kSample / 2;
+      stride_ *= 2;
+      if ((seen_ - 1) % stride_ != 0) {
+        return;
+      }
+    }
+    copy(block, k, count_++);
+  }
+
+  [[nodiscard]] RegressionBlock take() {
+    RegressionBlock result;
+    result.resize(count_, block_.outputs, block_.parameters);
+    std::swap(result, block_);
+    for (std::size_t i = 0; i < count_; ++i) {
+      copy(result, i, i);
+    }
+    return std::move(block_);
+  }
+
+ private:
+  void copy(const RegressionBlock& from, std::size_t k, std::size_t to) {
+    const auto n = static_cast<Eigen::Index>(block_.outputs);
+    const auto source = static_cast<Eigen::Index>(k) * n, target = static_cast<Eigen::Index>(to) * n;
+    block_.sample[to] = from.sample[k];
+    block_.t[to] = from.t[k];
+    for (Eigen::Index i = 0; i < n; ++i) {
+      block_.Y.row(target + i) = from.Y.row(source + i);
+      block_.dY.row(target + i) = from.dY.row(source + i);
+      block_.y[target + i] = from.y[source + i];
+      block_.dy[target + i] = from.dy[source + i];
+    }
+  }
+
+  RegressionBlock block_;
+  std::size_t count_ = 0, stride_ = 1, seen_ = 0;
+};
+
+/// Disjoint sets of parameters.
+class Groups {
+ public:
+  explicit Groups(std::size_t p) : leader_(p) { std::iota(leader_.begin(), leader_.end(), std::size_t{0}); }
+  std::size_t find(std::size_t j) const {
+    while (leader_[j] != j) {
+      j = leader_[j];
+    }
+    return j;
+  }
+  void join(std::size_t i, std::size_t j) {
+    const std::size_t x = find(i), y = find(j);
+    leader_[std::max(x, y)] = std::min(x, y);
+  }
+  std::vector<std::vector<std::size_t>> list() const {
+    std::vector<std::vector<std::size_t>> groups(leader_.size());
+    for (std::size_t j = 0; j < leader_.size(); ++j) {
+      groups[find(j)].push_back(j);
+    }
+    std::erase_if(groups, [](const auto& group) { return group.empty(); });
+    return groups;
+  }
+
+ private:
+  std::vector<std::size_t> leader_;
+};
+
+}  // namespace
+
+Survey survey(RegressionSource& source, const Box& prior, const std::vector<std::size_t>& excluded) {
+  const std::size_t p = prior.dimension();
+  check::that(p > 0 && source.parameters() == p, "prior box", "one side per parameter of the regression");
+  check_finite(prior, "prior box");
+  check::that(source.outputs() > 0, "regression", "at least one output");
+  const auto cols = static_cast<Eigen::Index>(p);
+  Survey result;
+  result.noisy.assign(p, false);
+  result.information = Eigen::MatrixXd::Zero(cols, cols);
+  result.moment = Eigen::VectorXd::Zero(cols);
+  Eigen::VectorXd reach(cols);
+  for (Eigen::Index j = 0; j < cols; ++j) {
+    const Interval& side = prior.sides[static_cast<std::size_t>(j)];
+    reach[j] = std::max(std::abs(side.lower), std::abs(side.upper));
+  }
+  Groups groups(p);
+  EvenSample sample(source.outputs(), p);
+  RegressionBlock block;
+  std::vector<Eigen::Index> support;
+  source.rewind();
+  while (source.next(block)) {
+    check::that(block.parameters == p && block.outputs == source.outputs(), "regression block", "the source's shape");
+    for (std::size_t k = 0; k < block.instants(); ++k) {
+      if (std::binary_search(excluded.begin(), excluded.end(), block.sample[k])) {
+        continue;
+      }
+      sample.offer(block, k);
+      ++result.instants;
+      for (std::size_t i = 0; i < block.outputs; ++i) {
+        const auto row = static_cast<Eigen::Index>(k * block.outputs + i);
+        const double* Y = block.Y.data() + row * cols;
+        const double* dY = block.dY.data() + row * cols;
+        ++result.rows;
+        support.clear();
+        double width = block.dy[row], size = std::abs(block.y[row]), sum = block.y[row] + block.dy[row];
+        bool negative = block.dy[row] < 0.0;
+        for (Eigen::Index j = 0; j < cols; ++j) {
+          if (Y[j] != 0.0 || dY[j] != 0.0) {
+            support.push_back(j);
+            width += dY[j] * reach[j];
+            size += std::abs(Y[j]) * reach[j];
+            sum += Y[j] + dY[j];
+            negative = negative || dY[j] < 0.0;
+            if (dY[j] != 0.0) {
+              result.noisy[static_cast<std::size_t>(j)] = true;
+            }
+          }
+        }
+        check::that(!negative && std::isfinite(sum), "regression row", "finite numbers and error bounds >= 0");
+        const double weight = 1.0 / std::max({width, 1e-9 * size, 1e-150});
+        for (std::size_t u = 0; u < support.size(); ++u) {
+          const Eigen::Index ju = support[u];
+          if (u > 0) {
+            groups.join(static_cast<std::size_t>(support.front()), static_cast<std::size_t>(ju));
+          }
+          const double scaled = Y[ju] * weight;
+          result.moment[ju] += scaled * (block.y[row] * weight);
+          for (std::size_t v = 0; v <= u; ++v) {
+            result.information(ju, support[v]) += scaled * (Y[support[v]] * weight);
+          }
+        }
+      }
+    }
+  }
+  result.information = result.information.selfadjointView<Eigen::Lower>();
+  result.blocks = groups.list();
+  result.sample = sample.take();
+  return result;
+}
+
+}  // namespace wheelwright

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// The first pass over a regression: what must be known before cutting starts.
+#pragma once
+
+#include <vector>
+
+#include <wheelwright/bounds/box.hpp>
+#include <wheelwright/core/regression.hpp>
+
+namespace wheelwright {
+
+/// What one pass over all rows tells.
+struct Survey {
+  std::size_t instants = 0;                      ///< instants seen (excluded ones not counted)
+  std::size_t rows = 0;                          ///< rows seen: outputs × instants
+  std::vector<std::vector<std::size_t>> blocks;  ///< groups of parameters that no row couples; see independent_blocks()
+  std::vector<bool> noisy;                       ///< per parameter: some dY of its column is not 0
+  Eigen::MatrixXd information;                   ///< p × p: Σ YᵀY / w², w the half-width of the row over the prior box
+  Eigen::VectorXd moment;                        ///< p: Σ Yᵀ y / w²
+  RegressionBlock sample;                        ///< at most 1024 instants, evenly spread
+};
+
+/// Walks `source` once. Instants whose number is in `excluded` (ascending) are skipped. A row of half-width 0 (no error
+/// bounds) gets the weight of a half-width 1e-9 of its reach over the prior box. Throws InvalidArgument when shapes
+/// disagree, a number is not finite, or a bound is negative.
+[[nodiscard]] Survey survey(RegressionSource& source, const Box& prior, const std::vector<std::size_t>& excluded = {});
+
+}  // namespace wheelwright
