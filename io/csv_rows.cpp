@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <numbers>
 #include <utility>
@@ -17,9 +18,13 @@
 namespace wheelwright {
 namespace {
 
+/// Nothing, or one of the words NA, N/A, null and none in any case.
 bool means_missing(std::string_view text) {
-  constexpr std::array<std::string_view, 5> words = {"", "na", "n_a", "null", "none"};
-  return std::find(words.begin(), words.end(), plain_name(text)) != words.end();
+  constexpr std::array<std::string_view, 5> words = {"", "na", "n/a", "null", "none"};
+  return std::any_of(words.begin(), words.end(), [&](std::string_view word) {
+    return std::equal(word.begin(), word.end(), text.begin(), text.end(),
+                      [](char a, char b) { return a == std::tolower(static_cast<unsigned char>(b)); });
+  });
 }
 
 bool is_blank(char c) { return c == ' ' || c == '\t'; }

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+// Reading and cleaning a CSV log against reading the same bytes and doing nothing with them.
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include <wheelwright/core/error.hpp>
+#include <wheelwright/io/atomic_file.hpp>
+#include <wheelwright/io/csv.hpp>
+
+#include "bench.hpp"
+
+namespace wheelwright::bench {
+namespace {
+
+constexpr std::size_t rows = 1000000;
+constexpr int repetitions = 5;
+
+/// A file that is gone when the benchmark is.
+struct TemporaryFile {
+  std::filesystem::path path = std::filesystem::temp_directory_path() / fmt::format("wheelwright-bench-{}.csv",
+                                                                                    std::random_device{}());
+  TemporaryFile() = default;
+  TemporaryFile(const TemporaryFile&) = delete;
+  TemporaryFile& operator=(const TemporaryFile&) = delete;
+  ~TemporaryFile() {
+    std::error_code ignored;
+    std::filesystem::remove(path, ignored);
+  }
+};
+
+/// A log of a differential-drive robot at 100 Hz with pose, as loggers print it.
+void write_log(const std::filesystem::path& path) {
+  AtomicFile file(path);
+  std::string text = "t,omega_r,omega_l,tau_r,tau_l,x,y,theta\n";
+  for (std::size_t k = 0; k < rows; ++k) {
+    const double t = 0.01 * static_cast<double>(k);
+    text += fmt::format("{:.3f},{:.4f},{:.4f},{:.3f},{:.3f},{:.4f},{:.4f},{:.4f}\n", t, 5.0 * std::sin(0.7 * t),
+                        5.0 * std::cos(0.9 * t), 2.0 * std::cos(0.7 * t), 2.0 * std::sin(1.1 * t), std::sin(0.1 * t),
+                        std::cos(0.1 * t), std::remainder(0.3 * t, 6.283185307179586));
+    if (text.size() > (std::size_t{1} << 20)) {
+      file.write(text);
+      text.clear();
+    }
+  }
+  file.write(text);
+  file.commit();
+}
+
+void read_bare(const std::filesystem::path& path) {
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"), &std::fclose);
+  if (!file) {
+    throw Error(path.string() + ": cannot be opened");
+  }
+  std::setvbuf(file.get(), nullptr, _IONBF, 0);
+  std::vector<char> buffer(std::size_t{1} << 18);
+  while (std::fread(buffer.data(), 1, buffer.size(), file.get()) > 0) {
+    keep(buffer);
+  }
+}
+
+void walk(LogSource& log) {
+  log.rewind();
+  LogBlock block;
+  double sum = 0.0;
+  while (log.next(block)) {
+    sum += block.columns.front().front();
+  }
+  keep(sum);
+}
+
+Measurement measure(const std::string& name, const std::filesystem::path& path, const std::function<void()>& ours) {
+  const auto [seconds, peer_seconds] = interleaved_medians(ours, [&] { read_bare(path); }, repetitions);
+  const double megabytes = 1e-6 * static_cast<double>(std::filesystem::file_size(path));
+  return {name, rows, 0, 1, seconds, "bare read", peer_seconds, fmt::format("{:.0f} MB/s", megabytes / seconds)};
+}
+
+std::vector<Measurement> csv_against_bare_read() {
+  const TemporaryFile file;
+  write_log(file.path);
+  CsvLog log({file.path});
+  return {measure("io/csv walk", file.path, [&] { walk(log); }),
+          measure("io/csv open and walk", file.path, [&] {
+            CsvLog fresh({file.path});
+            walk(fresh);
+          })};
+}
+
+const bool registered = register_bench("io/csv", csv_against_bare_read);
+
+}  // namespace
+}  // namespace wheelwright::bench
