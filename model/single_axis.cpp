@@ -28,9 +28,9 @@ Model SingleAxis::model() const {
   m.motion = Eigen::MatrixXd::Ones(1, 1);
   m.input = Eigen::MatrixXd::Ones(1, 1);
 
-  const auto add = [&m](std::string name, std::string unit, Interval prior, std::string excite, Term term) {
+  const auto add = [&m](const char* name, const char* unit, Interval prior, const char* excite, Term term) {
     term.parameter = m.parameters.size();
-    m.parameters.push_back({name, unit, name, unit, 1.0, prior, std::move(excite)});
+    m.parameters.push_back({name, unit, name, unit, 1.0, prior, excite});
     m.terms.push_back(term);
   };
   add("inertia", "kg (rotary: kg·m²)", {0.0, 1e4}, "accelerate and brake", {.kind = Term::Kind::acceleration});

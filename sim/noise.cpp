@@ -26,8 +26,12 @@ double Noise::uniform() { return 2.0 * (static_cast<double>(generator_() >> 11U)
 double Noise::unit() {
   double x = uniform();
   if (shape_ == NoiseShape::truncated_gaussian) {
-    // Rejection from the uniform: density ∝ exp(−(3x)²/2) on [−1, 1].
-    while (0.5 * (uniform() + 1.0) > std::exp(-4.5 * x * x)) {
+    // Rejection from the uniform: density ∝ exp(−(3x)²/2) on [−1, 1]; 1 − (3x)²/2 lies below it and spares most of exp.
+    for (;;) {
+      const double height = 0.5 * (uniform() + 1.0);
+      if (height <= 1.0 - 4.5 * x * x || height <= std::exp(-4.5 * x * x)) {
+        break;
+      }
       x = uniform();
     }
   }

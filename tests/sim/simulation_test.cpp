@@ -6,6 +6,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <Eigen/Cholesky>
 
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/sim/simulation.hpp>
@@ -93,6 +94,46 @@ TEST(Simulation, LeverArmOfTheTrackDoublesTheTrueYawParameters) {
   const Eigen::VectorXd full = true_parameters(s, make_model(s.robot));
   EXPECT_LT((full - half.cwiseProduct(Eigen::Vector4d(1.0, 2.0, 1.0, 2.0))).norm(), 1e-15);
   EXPECT_DOUBLE_EQ(half[0], 0.0975 * 21.0);
+}
+
+// Five parameters from an exact log by least squares on (15) averaged over a few periods: inertia columns exactly, from
+// speeds, friction columns by the trapezoidal rule.
+TEST(Simulation, AnisotropicFrictionIsFoundInTheRegressorOfFiveParameters) {
+  Scenario s = scenario();
+  s.robot.anisotropic_friction = true;
+  s.parameters.viscous_y = 9.0;
+  s.trajectory.kind = Kind::figure_eight;
+  const LogTable log = simulate(s);
+  const Model model = make_model(s.robot);
+  ASSERT_EQ(model.p(), 5U);
+  const auto error_with = [&](std::size_t stride) {
+    Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(5, 5);
+    Eigen::VectorXd right = Eigen::VectorXd::Zero(5);
+    const auto wheels = [&](std::size_t i) {
+      return Eigen::Vector2d(log.column("omega_r")[i], log.column("omega_l")[i]);
+    };
+    const auto instant = [&](std::size_t i, const Eigen::Vector2d& acceleration) {
+      const Eigen::Vector2d v = model.motion * wheels(i);
+      const std::array<double, 2> speed = {v[0], v[1]}, error = {0.0, 0.0}, rate = {acceleration[0], acceleration[1]};
+      return regressor(model, {.speed = speed, .speed_error = error, .heading = log.column("theta")[i]}, rate);
+    };
+    for (std::size_t i = 0; i + stride < log.rows(); i += stride) {
+      const double h = log.t[i + stride] - log.t[i];
+      const Eigen::Vector2d mean_acceleration = model.motion * (wheels(i + stride) - wheels(i)) / h;
+      const Eigen::MatrixXd y = 0.5 * (instant(i, mean_acceleration) + instant(i + stride, mean_acceleration));
+      Eigen::Vector2d torque = Eigen::Vector2d::Zero();
+      for (std::size_t k = i; k < i + stride; ++k) {
+        torque += Eigen::Vector2d(log.column("tau_r")[k], log.column("tau_l")[k]) / static_cast<double>(stride);
+      }
+      normal += y.transpose() * y;
+      right += y.transpose() * (model.input * torque);
+    }
+    const Eigen::VectorXd found = normal.ldlt().solve(right), truth = true_parameters(s, model);
+    return ((found - truth).array() / truth.array()).abs().maxCoeff();
+  };
+  // The trapezoidal rule is of second order: four times the period, sixteen times the error (and a margin of a third).
+  EXPECT_LT(error_with(1), 1e-3);
+  EXPECT_GT(error_with(8), 0.66 * 16.0 * error_with(2));
 }
 
 TEST(Simulation, SpeedsAreTheDerivativeOfAnglesAndPoseIsTheirOdometry) {
