@@ -32,7 +32,7 @@ MAY_INCLUDE = {
     "gap": before("gap"),
     "sensitivity": before("sensitivity"),
     "sim": {"core", "model"},
-    "io": set(WALK),
+    "io": set(WALK) | {"sim"},  # its scenario is a struct that comes from a file (docs/decisions.md, 14)
     "report": set(WALK),
     "app": None,
     "python": None,
@@ -175,7 +175,8 @@ def self_test():
     }
     violations = {
         "upward include": ("bounds/x.hpp", head + "#include <wheelwright/filter/f.hpp>\n"),
-        "sim in io": ("io/x.cpp", spdx + "#include <wheelwright/sim/s.hpp>\n"),
+        "sim in report": ("report/x.cpp", spdx + "#include <wheelwright/sim/s.hpp>\n"),
+        "report in io": ("io/x.cpp", spdx + "#include <wheelwright/report/s.hpp>\n"),
         "io in report": ("report/x.cpp", spdx + "#include <wheelwright/io/s.hpp>\n"),
         "linked upwards": ("filter/CMakeLists.txt", "# SPDX-License-Identifier: Apache-2.0\nwheelwright_room(filter\n  USES core bounds)\n"),
         "file opened": ("commission/x.cpp", spdx + "#include <fstream>\n"),
