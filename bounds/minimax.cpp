@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Cholesky>
-
 #include <wheelwright/bounds/certificate.hpp>
 #include <wheelwright/bounds/infeasibility.hpp>
 #include <wheelwright/bounds/linear_program.hpp>
@@ -17,9 +15,9 @@ namespace {
 
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 
-/// γ that row `row` asks for at θ, and a bound on the rounding of it.
+/// γ that row `row` asks for at θ, a bound on the rounding of it, and what it asks for without dy and dY.
 struct Demand {
-  double value = 0.0, doubt = 0.0;
+  double value = 0.0, doubt = 0.0, residual = 0.0;
 };
 
 Demand demand(const RegressionBlock& block, Eigen::Index row, const Eigen::VectorXd& theta, double weight) {
@@ -33,7 +31,8 @@ Demand demand(const RegressionBlock& block, Eigen::Index row, const Eigen::Vecto
     allowance += noise;
     magnitude += std::abs(term) + noise;
   }
-  return {(std::abs(residual) - allowance) / weight, 4.0 * static_cast<double>(p + 4) * kEpsilon * magnitude / weight};
+  return {(std::abs(residual) - allowance) / weight, 4.0 * static_cast<double>(p + 4) * kEpsilon * magnitude / weight,
+          std::abs(residual) / weight};
 }
 
 /// The working set of the epigraph problem in (θ, γ): min γ.
@@ -43,10 +42,8 @@ class Epigraph {
       : prior_(prior), rows_(prior), weights_(weights), program_(static_cast<Eigen::Index>(prior.dimension()) + 1) {
     const auto p = static_cast<Eigen::Index>(prior.dimension());
     coordinates_ = whitened(prior, survey.information);
-    // Centre: weighted least squares, towards the middle of the prior box where the rows say nothing.
     const Eigen::MatrixXd& T = coordinates_.transform;
-    const Eigen::VectorXd pull = T.transpose() * (survey.moment - survey.information * coordinates_.centre);
-    theta_ = coordinates_.centre + T * pull;
+    theta_ = weighted_estimate(survey, prior);
     clamp();
     coordinates_.centre = theta_;
     // z and γ are scaled so that both take part in a row alike.
@@ -55,7 +52,7 @@ class Epigraph {
     for (Eigen::Index r = 0; r < sample.rows(); ++r) {
       const double w = weight(r, sample.outputs);
       if (std::isfinite(w)) {
-        scale_ = std::max(scale_, demand(sample, r, theta_, w).value);
+        scale_ = std::max(scale_, demand(sample, r, theta_, w).residual);
         steepest = std::max(steepest, (T.transpose() * sample.Y.row(r).transpose()).norm() / w);
         size = std::max(size, std::abs(sample.y[r]) / w);
       }
@@ -97,7 +94,8 @@ class Epigraph {
         const double w = weight(r, block.outputs);
         const std::size_t i = static_cast<std::size_t>(r) % block.outputs;
         if (!std::isfinite(w) || !(demand(block, r, theta_, w).value > std::min(worst[2 * i], worst[2 * i + 1])) ||
-            std::binary_search(excluded.begin(), excluded.end(), block.sample[static_cast<std::size_t>(r) / block.outputs])) {
+            std::binary_search(excluded.begin(), excluded.end(),
+                               block.sample[static_cast<std::size_t>(r) / block.outputs])) {
           continue;
         }
         rows_.half_spaces(block, r, upper_, lower_);

@@ -5,6 +5,8 @@
 #include <map>
 #include <set>
 
+#include <wheelwright/bounds/survey.hpp>
+
 namespace wheelwright {
 namespace {
 
@@ -21,9 +23,6 @@ class Trials {
     set.excluded_samples.insert(set.excluded_samples.end(), dropped.begin(), dropped.end());
     ++count;
     FeasibleSet result = feasible_set(source_, prior_, set);
-    for (const std::size_t sample : members(result)) {
-      ++seen[sample];
-    }
     one_part = one_part && result.sign_parts == 1;
     return result;
   }
@@ -36,8 +35,19 @@ class Trials {
     return samples;
   }
 
+  /// The member of the contradiction of `set`, computed without `dropped`, with the largest share at least squares.
+  std::size_t most_suspect(const FeasibleSet& set, const Samples& dropped) {
+    std::vector<std::size_t> excluded = options_.set.excluded_samples;
+    excluded.insert(excluded.end(), dropped.begin(), dropped.end());
+    std::sort(excluded.begin(), excluded.end());
+    const Eigen::VectorXd theta = weighted_estimate(survey(source_, prior_, excluded), prior_);
+    const auto share = [&](const WeightedRow& each) { return each.multiplier * (each.row.a.dot(theta) - each.row.b); };
+    const auto suspect = std::max_element(set.contradiction.begin(), set.contradiction.end(),
+                                          [&](const auto& x, const auto& y) { return share(x) < share(y); });
+    return suspect->row.origin.sample;
+  }
+
   std::size_t count = 0;
-  std::map<std::size_t, std::size_t> seen;
   bool one_part = true;
 
  private:
@@ -91,16 +101,13 @@ OutlierResult feasible_set_with_outliers(RegressionSource& source, const Box& pr
   }
 
   Samples dropped;
-  Samples contradiction = Trials::members(plain);
-  while (dropped.size() < options.most && !contradiction.empty()) {
-    dropped.insert(*std::max_element(contradiction.begin(), contradiction.end(), [&](std::size_t x, std::size_t y) {
-      return trials.seen[x] < trials.seen[y];
-    }));
-    FeasibleSet set = trials.without(dropped);
+  FeasibleSet set = plain;
+  while (dropped.size() < options.most && !set.contradiction.empty()) {
+    dropped.insert(trials.most_suspect(set, dropped));
+    set = trials.without(dropped);
     if (set.status == FeasibleSet::Status::nonempty) {
       return answer(std::move(set), dropped, false, trials.count);
     }
-    contradiction = Trials::members(set);
   }
   return answer(std::move(plain), {}, false, trials.count);
 }

@@ -30,8 +30,9 @@ struct OutlierResult {
 ///
 /// Exact while the budget lasts: every choice that makes the set non-empty must drop a member of every contradiction, so
 /// the search branches over the members of the one just found, layer by layer. Beyond the budget a heuristic drops, again
-/// and again, the member of the present contradiction that was in most contradictions so far (the earliest of equals), and
-/// `minimal` is false; it also is where open signs of noisy columns needed several parts, whose contradictions differ.
+/// and again, the member of the present contradiction with the largest share λ(a·θ − b) in it at the least-squares
+/// estimate θ of the rows still there, and `minimal` is false; it also is where open signs of noisy columns needed several
+/// parts, whose contradictions differ.
 [[nodiscard]] OutlierResult feasible_set_with_outliers(RegressionSource& source, const Box& prior,
                                                        const OutlierOptions& options);
 

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <numeric>
 
+#include <wheelwright/bounds/coordinates.hpp>
+
 namespace wheelwright {
 namespace {
 
@@ -158,6 +160,12 @@ Survey survey(RegressionSource& source, const Box& prior, const std::vector<std:
   result.blocks = groups.list();
   result.sample = sample.take();
   return result;
+}
+
+Eigen::VectorXd weighted_estimate(const Survey& survey, const Box& prior) {
+  const Coordinates at = whitened(prior, survey.information);
+  const Eigen::VectorXd pull = at.transform.transpose() * (survey.moment - survey.information * at.centre);
+  return at.centre + at.transform * pull;
 }
 
 }  // namespace wheelwright

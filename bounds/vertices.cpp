@@ -68,7 +68,7 @@ Eigen::VectorXd meet(const Facets& facets, const Eigen::MatrixXd& normals, const
 
 /// Vertices of { z : normalsᵀ z <= b }, whose last p + 1 columns are a simplex around it that must not remain.
 std::optional<std::vector<Vertex>> insert_all(const Eigen::MatrixXd& normals, const Eigen::VectorXd& b,
-                                              std::size_t limit) {
+                                              std::size_t limit, bool& too_many) {
   const auto p = static_cast<std::size_t>(normals.rows());
   const auto m = static_cast<int>(normals.cols());
   const int first_artificial = m - static_cast<int>(p) - 1;
@@ -108,11 +108,13 @@ std::optional<std::vector<Vertex>> insert_all(const Eigen::MatrixXd& normals, co
       }
     }
     vertices = std::move(kept);
-    if (vertices.empty() || vertices.size() > 4 * limit + 64) {
+    too_many = vertices.size() > 2 * limit + 64;
+    if (vertices.empty() || too_many) {
       return std::nullopt;
     }
   }
-  if (vertices.size() > limit) {
+  too_many = vertices.size() > limit;
+  if (too_many) {
     return std::nullopt;
   }
   for (const Vertex& vertex : vertices) {
@@ -219,6 +221,7 @@ std::optional<VertexSet> enumerate_vertices(std::span<const HalfSpace> rows, con
   normals.col(m + p) = Eigen::VectorXd::Ones(p);
   b[m + p] = kAround * static_cast<double>(p);
 
+  bool too_many = false;
   std::mt19937_64 generator(0x5EEDULL);
   for (const double shift : {1e-10, 1e-9, 1e-8, 1e-7, 1e-6}) {
     Eigen::VectorXd shifted(m);
@@ -228,7 +231,10 @@ std::optional<VertexSet> enumerate_vertices(std::span<const HalfSpace> rows, con
       shifted[i] = round_up(row.b + norms[i] * shift * (1.0 + uniform));
       b[i] = (shifted[i] - row.a.dot(coordinates.centre)) / norms[i];
     }
-    const std::optional<std::vector<Vertex>> vertices = insert_all(normals, b, limit);
+    const std::optional<std::vector<Vertex>> vertices = insert_all(normals, b, limit, too_many);
+    if (too_many) {
+      break;
+    }
     VertexSet result;
     if (vertices && closed_under_adjacency(*vertices, static_cast<std::size_t>(p)) &&
         enclose(*vertices, rows, shifted, coordinates, result)) {
