@@ -39,7 +39,8 @@ struct Box {
     // Rounding of k products and k − 1 sums is at most 2k·2⁻⁵³·Σ|term| plus an underflow each (Higham 2002, section 3.1);
     // four times that covers the rounding of the bound itself.
     constexpr double epsilon = std::numeric_limits<double>::epsilon();
-    return round_up(sum + (4.0 * (terms + 1.0) * epsilon * magnitude + terms * std::numeric_limits<double>::denorm_min()));
+    return round_up(sum +
+                    (4.0 * (terms + 1.0) * epsilon * magnitude + terms * std::numeric_limits<double>::denorm_min()));
   }
 
   /// The same, and writes a corner where the maximum is attained to `maximiser` (p entries).

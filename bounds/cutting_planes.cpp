@@ -281,8 +281,8 @@ CertifiedBound CuttingPlanes::certified_maximum(const Eigen::VectorXd& a, const 
   CertifiedBound bound{within.support(direction), {}};
   if (const std::optional<LpSolution> solution = maximise(a)) {
     for (std::size_t k = 0; k < solution->rows.size(); ++k) {
-      bound.binding.push_back({rows_[static_cast<std::size_t>(solution->rows[k])],
-                               solution->multipliers[static_cast<Eigen::Index>(k)]});
+      bound.binding.push_back(
+          {rows_[static_cast<std::size_t>(solution->rows[k])], solution->multipliers[static_cast<Eigen::Index>(k)]});
     }
     bound.value = std::min(bound.value, certified_upper_bound(direction, bound.binding, within));
   }

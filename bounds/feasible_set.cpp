@@ -11,8 +11,8 @@
 namespace wheelwright {
 namespace {
 
-constexpr std::size_t kBatch = 512;         // candidates gathered before they are tested together
-constexpr std::size_t kInstants = 8192;     // instants after which candidates are tested in any case
+constexpr std::size_t kBatch = 512;      // candidates gathered before they are tested together
+constexpr std::size_t kInstants = 8192;  // instants after which candidates are tested in any case
 constexpr std::size_t kMostOpenSigns = 4;
 
 /// The independent blocks of parameters, each with its working set; takes instants one by one.

@@ -33,12 +33,12 @@ struct FeasibleSet {
   /// (proves_empty); at most p + 1, and no proof is found with any of them left out. Where sign parts were needed, the
   /// contradiction of the first part.
   std::vector<WeightedRow> contradiction;
-  std::size_t passes = 0;        ///< passes over the source
-  std::size_t rows = 0;          ///< rows in a pass
-  std::size_t working_set = 0;   ///< largest number of half-spaces held at once
-  std::size_t undecided = 0;     ///< rows left out: found contradictory in floating point, but without proof
-  std::size_t sign_parts = 1;    ///< parts examined, one per pattern of open signs of noisy columns
-  bool convexified = false;      ///< several parts are not empty: polytope is a convex outer set of their union
+  std::size_t passes = 0;       ///< passes over the source
+  std::size_t rows = 0;         ///< rows in a pass
+  std::size_t working_set = 0;  ///< largest number of half-spaces held at once
+  std::size_t undecided = 0;    ///< rows left out: found contradictory in floating point, but without proof
+  std::size_t sign_parts = 1;   ///< parts examined, one per pattern of open signs of noisy columns
+  bool convexified = false;     ///< several parts are not empty: polytope is a convex outer set of their union
 };
 
 /// { θ in prior : for every row there is |Y° − Y| <= dY with |y − Y°θ| <= dy }, by cutting planes.

@@ -44,7 +44,8 @@ std::optional<std::vector<WeightedRow>> elastic_multipliers(std::span<const Half
   for (std::size_t k = 0; k < solution.rows.size(); ++k) {
     const int i = solution.rows[k];
     if (i < static_cast<int>(rows.size())) {
-      members.push_back({all[static_cast<std::size_t>(i)], solution.multipliers[static_cast<Eigen::Index>(k)] / norms[i]});
+      members.push_back(
+          {all[static_cast<std::size_t>(i)], solution.multipliers[static_cast<Eigen::Index>(k)] / norms[i]});
     }
   }
   if (!proves_empty(members, box)) {

@@ -21,12 +21,12 @@ struct MinimaxOptions {
 
 /// Result of minimax_fit(): lower <= γ* <= upper whatever the number of passes.
 struct MinimaxFit {
-  double lower = 0.0;                ///< certified by `active` in outward arithmetic
-  double upper = 0.0;                ///< what `theta` reaches over all rows, rounded outward
-  std::vector<double> theta;         ///< p parameters in the prior box, with which `upper` is reached
-  std::vector<WeightedRow> active;   ///< rows a·θ − wγ <= b (last coefficient −w) and multipliers that prove `lower`
-  std::size_t passes = 0;            ///< passes over the source
-  bool converged = false;            ///< the bracket is as narrow as the tolerance asks, or as double precision allows
+  double lower = 0.0;               ///< certified by `active` in outward arithmetic
+  double upper = 0.0;               ///< what `theta` reaches over all rows, rounded outward
+  std::vector<double> theta;        ///< p parameters in the prior box, with which `upper` is reached
+  std::vector<WeightedRow> active;  ///< rows a·θ − wγ <= b (last coefficient −w) and multipliers that prove `lower`
+  std::size_t passes = 0;           ///< passes over the source
+  bool converged = false;           ///< the bracket is as narrow as the tolerance asks, or as double precision allows
 };
 
 /// γ* = min γ over θ in prior such that |y_r − Y_r θ| <= γ w_i + dy_r + dY_r |θ| for every row r of output i.

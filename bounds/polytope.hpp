@@ -35,9 +35,9 @@ class Polytope {
     std::vector<HalfSpace> facets;        ///< non-redundant, in these parameters only
     Coordinates coordinates;              ///< the block has size about one in these
     std::optional<VertexSet> vertices;    ///< proved complete, where few
-    Eigen::VectorXd margin;               ///< support: h(a) <= max over points a·v + Σ|a_j| margin_j, roundings included
-    Eigen::VectorXd chebyshev_centre;     ///< see Polytope::chebyshev_centre
-    double chebyshev_radius = 0.0;        ///< relative to the hull
+    Eigen::VectorXd margin;            ///< support: h(a) <= max over points a·v + Σ|a_j| margin_j, roundings included
+    Eigen::VectorXd chebyshev_centre;  ///< see Polytope::chebyshev_centre
+    double chebyshev_radius = 0.0;     ///< relative to the hull
   };
 
   /// Takes the intersection of `rows` with a finite box. Throws InvalidArgument when shapes disagree, a number is not
@@ -46,8 +46,8 @@ class Polytope {
 
   /// The same, for sets that may be empty: the polytope, or the rows whose multipliers prove that there is none.
   [[nodiscard]] static std::variant<Polytope, std::vector<WeightedRow>> intersect(const std::vector<HalfSpace>& rows,
-                                                                                const Box& box,
-                                                                                const PolytopeOptions& options = {});
+                                                                                  const Box& box,
+                                                                                  const PolytopeOptions& options = {});
 
   /// Number of parameters p.
   [[nodiscard]] std::size_t dimension() const noexcept { return data_->hull.dimension(); }

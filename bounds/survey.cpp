@@ -14,9 +14,7 @@ constexpr std::size_t kSample = 1024;
 /// Keeps every stride-th instant, with the stride doubled each time the sample is full.
 class EvenSample {
  public:
-  EvenSample(std::size_t outputs, std::size_t parameters) {
-    block_.resize(kSample, outputs, parameters);
-  }
+  EvenSample(std::size_t outputs, std::size_t parameters) { block_.resize(kSample, outputs, parameters); }
 
   void offer(const RegressionBlock& block, std::size_t k) {
     if (seen_++ % stride_ != 0) {

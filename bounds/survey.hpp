@@ -16,9 +16,9 @@ struct Survey {
   std::size_t rows = 0;                          ///< rows seen: outputs × instants
   std::vector<std::vector<std::size_t>> blocks;  ///< groups of parameters that no row couples; see independent_blocks()
   std::vector<bool> noisy;                       ///< per parameter: some dY of its column is not 0
-  Eigen::MatrixXd information;                   ///< p × p: Σ YᵀY / w², w the half-width of the row over the prior box
-  Eigen::VectorXd moment;                        ///< p: Σ Yᵀ y / w²
-  RegressionBlock sample;                        ///< at most 1024 instants, evenly spread
+  Eigen::MatrixXd information;  ///< p × p: Σ YᵀY / w², w the half-width of the row over the prior box
+  Eigen::VectorXd moment;       ///< p: Σ Yᵀ y / w²
+  RegressionBlock sample;       ///< at most 1024 instants, evenly spread
 };
 
 /// Walks `source` once. Instants whose number is in `excluded` (ascending) are skipped. A row of half-width 0 (no error

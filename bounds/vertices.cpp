@@ -142,7 +142,8 @@ bool enclose(const std::vector<Vertex>& vertices, std::span<const HalfSpace> row
              const Coordinates& coordinates, VertexSet& result) {
   const Eigen::Index p = coordinates.centre.size();
   const auto m = static_cast<Eigen::Index>(rows.size());
-  const double gamma = 2.0 * static_cast<double>(p + 4) * kEpsilon;  // roundings of a p-term sum (Higham 2002), four times over
+  const double gamma =
+      2.0 * static_cast<double>(p + 4) * kEpsilon;  // roundings of a p-term sum (Higham 2002), four times over
   const Eigen::VectorXd size = coordinates.transform.cwiseAbs().rowwise().sum();
   Eigen::MatrixXd a(p, m);
   for (Eigen::Index i = 0; i < m; ++i) {

@@ -12,9 +12,9 @@ namespace wheelwright {
 
 /// Vertices of a polytope P' that contains P and exceeds it by about `looseness` of P's size.
 struct VertexSet {
-  Eigen::MatrixXd points;       ///< p × V, one vertex per column
-  Eigen::VectorXd radius;       ///< p: each point is within radius_j of an exact vertex of P' in coordinate j
-  double looseness = 0.0;       ///< outward shift of the facets, relative to the size of P in `coordinates`
+  Eigen::MatrixXd points;  ///< p × V, one vertex per column
+  Eigen::VectorXd radius;  ///< p: each point is within radius_j of an exact vertex of P' in coordinate j
+  double looseness = 0.0;  ///< outward shift of the facets, relative to the size of P in `coordinates`
 };
 
 /// Enumerates the vertices of P = { θ : a·θ <= b for every row }, bounded and with an interior, at most `limit` of them.

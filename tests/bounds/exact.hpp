@@ -137,7 +137,8 @@ inline bool contradict(std::span<const WeightedRow> members, const Box& box) {
     }
   }
   for (std::size_t j = 0; j < box.dimension(); ++j) {
-    const Rational lower = -combined[j] * rational(box.sides[j].lower), upper = -combined[j] * rational(box.sides[j].upper);
+    const Rational lower = -combined[j] * rational(box.sides[j].lower),
+                   upper = -combined[j] * rational(box.sides[j].upper);
     bound += lower > upper ? lower : upper;
   }
   return bound < 0;

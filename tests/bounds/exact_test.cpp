@@ -248,8 +248,8 @@ TEST(SlabRows, no_member_is_cut_off) {
   for (int trial = 0; trial < 300; ++trial) {
     Box prior;
     prior.sides = {{0.0, 3.0}, {-3.0, 0.0}, {-1.3, 2.9}};
-    const std::vector<double> Y = random.vector(3), theta{3.0 * random.unit(), -3.0 * random.unit(),
-                                                          -1.3 + 4.2 * random.unit()};
+    const std::vector<double> Y = random.vector(3),
+                              theta{3.0 * random.unit(), -3.0 * random.unit(), -1.3 + 4.2 * random.unit()};
     const std::vector<double> dY{0.1 * random.unit(), 0.1 * random.unit(), 0.1 * random.unit()};
     const double dy = 0.1 * random.unit();
     // y is chosen so that the row holds with equality up to rounding, and then enlarged by one rounding.
