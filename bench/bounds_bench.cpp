@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+// Feasible set and minimax fit against a bare read of the same rows and against CLP on all rows at once.
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include <wheelwright/bounds/feasible_set.hpp>
+#include <wheelwright/bounds/linear_program.hpp>
+#include <wheelwright/bounds/minimax.hpp>
+
+#include "bench.hpp"
+
+namespace wheelwright::bench {
+namespace {
+
+constexpr double noise = 0.1;
+
+double uniform(std::mt19937_64& generator) { return 2.0 * static_cast<double>(generator() >> 11) * 0x1.0p-53 - 1.0; }
+
+/// Rows y = Yθ + e with |e| <= noise, θ = (1, 2, …). With `separate` outputs take turns with the columns.
+RegressionTable rows_of(std::size_t instants, std::size_t outputs, std::size_t p, bool separate) {
+  std::mt19937_64 generator(1);
+  RegressionBlock block;
+  block.resize(instants, outputs, p);
+  block.Y.setZero();
+  block.dY.setZero();
+  block.dy.setConstant(noise);
+  for (std::size_t k = 0; k < instants; ++k) {
+    block.sample[k] = k;
+    block.t[k] = 0.01 * static_cast<double>(k);
+    for (std::size_t i = 0; i < outputs; ++i) {
+      const auto row = static_cast<Eigen::Index>(k * outputs + i);
+      double y = noise * uniform(generator);
+      for (std::size_t j = separate ? i : 0; j < p; j += separate ? outputs : 1) {
+        const double value = std::sin(0.001 * static_cast<double>(k * (j + 1))) + 0.3 * uniform(generator);
+        block.Y(row, static_cast<Eigen::Index>(j)) = value;
+        y += value * static_cast<double>(j + 1);
+      }
+      block.y[row] = y;
+    }
+  }
+  return RegressionTable(std::move(block));
+}
+
+Box positive(std::size_t p) {
+  Box box;
+  box.sides.assign(p, {0.0, 100.0});
+  return box;
+}
+
+void read_bare(RegressionTable& table) {
+  const RegressionBlock& block = table.block();
+  keep(block.Y.sum() + block.dY.sum() + block.y.sum() + block.dy.sum());
+}
+
+/// The 2p hull programs by CLP (dual form, warm starts) with every row in the program.
+void hull_by_clp(const RegressionBlock& block) {
+  const auto p = static_cast<Eigen::Index>(block.parameters);
+  const Eigen::Index m = block.rows();
+  Eigen::MatrixXd a(p, 2 * m + 2 * p);
+  Eigen::VectorXd b(2 * m + 2 * p);
+  a << block.Y.transpose(), -block.Y.transpose(), Eigen::MatrixXd::Identity(p, p), -Eigen::MatrixXd::Identity(p, p);
+  b << block.y + block.dy, block.dy - block.y, Eigen::VectorXd::Constant(p, 100.0), Eigen::VectorXd::Zero(p);
+  LinearProgram program(p);
+  program.add_rows(a, b);
+  for (Eigen::Index j = 0; j < p; ++j) {
+    keep(program.maximise(Eigen::VectorXd::Unit(p, j)).value);
+    keep(program.maximise(-Eigen::VectorXd::Unit(p, j)).value);
+  }
+}
+
+std::vector<Measurement> sets() {
+  std::vector<Measurement> result;
+  const auto measure = [&](const char* name, RegressionTable& table, const char* peer, const auto& ours,
+                           const auto& theirs, int repetitions) {
+    const auto [seconds, peer_seconds] = interleaved_medians(ours, theirs, repetitions);
+    const auto rows = static_cast<std::size_t>(table.block().rows());
+    result.push_back({name, rows, static_cast<int>(table.parameters()), 1, seconds, peer, peer_seconds,
+                      fmt::format("{:.0f} ns a row", 1e9 * seconds / static_cast<double>(rows))});
+  };
+  {
+    RegressionTable table = rows_of(1000000, 2, 4, true);
+    const auto bare = [&] { read_bare(table); };
+    measure(
+        "bounds/feasible set", table, "bare read", [&] { keep(feasible_set(table, positive(4)).hull); }, bare, 3);
+    measure(
+        "bounds/minimax", table, "bare read", [&] { keep(minimax_fit(table, positive(4)).upper); }, bare, 3);
+  }
+  {
+    RegressionTable table = rows_of(20000, 1, 8, false);
+    measure(
+        "bounds/hull", table, "clp, all rows", [&] { keep(feasible_set(table, positive(8)).hull); },
+        [&] { hull_by_clp(table.block()); }, 3);
+  }
+  return result;
+}
+
+const bool registered = register_bench("bounds", sets);
+
+}  // namespace
+}  // namespace wheelwright::bench
