@@ -33,10 +33,10 @@ enum class NoiseOrigin {
 /// The bound on what τ_f − Y_f θ can be without a fault, in one output.
 struct OutputNoise {
   NoiseOrigin origin = NoiseOrigin::estimated;
-  double bound = 0.0;           ///< n̄ with ē: what stands in the rows' dy
-  double declared = 0.0;        ///< the part that comes from declared effort noise
-  double estimated = 0.0;       ///< ē, 0 where everything is declared
-  ExtrapolatedBound how;        ///< meaningful where estimated
+  double bound = 0.0;           ///< for driving to come: n̄ with ē, what a detector's rows have as dy
+  double learning = 0.0;        ///< for the rows of this log, from which the feasible set is made; what was seen needs
+                                ///< no extrapolation, so it is the smaller of the two
+  ExtrapolatedBound how;        ///< how `bound` came about, meaningful where estimated
 };
 
 /// Everything that a detector needs, and nothing else: the part of a commissioned model that is used on-line.

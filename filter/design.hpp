@@ -10,8 +10,9 @@ struct FilterDesign {
   int order = 2;         ///< 1 (the paper's) or 2
   double alpha = 20.0;   ///< α, 1/s
   double beta = 20.0;    ///< β, 1/s
-  double settle = 12.0;  ///< order 2 on angles: rows before settle/β from the start of a segment are dropped, since
-                         ///< they hold the unmeasured initial speed with weight α² t e^{−βt}; 12 leaves 7e-5 of it
+  double settle = 12.0;  ///< order 2 on angles: rows before settle/β from the start of a segment are dropped (unless it
+                         ///< begins at standstill), since they hold the error of the first angle difference with weight
+                         ///< α² t e^{−βt}; 12 leaves 7e-5 of it
 
   /// Gain at frequency zero: (α/β)^order.
   [[nodiscard]] double static_gain() const;

@@ -15,9 +15,9 @@ namespace wheelwright {
 
 /// What the motion columns hold.
 enum class MotionKind {
-  angle,       ///< joint angle at the time stamp; linear between samples
-  mean_speed,  ///< encoder counts over a sampling interval, divided by it, stamped in its middle: the angle at the
-               ///< interval's ends is exact to half a count, and linear between
+  angle,       ///< joint angle at the time stamp
+  mean_speed,  ///< encoder counts over a sampling interval, divided by it, stamped in its middle: the angles at the
+               ///< interval's ends are exact to half a count, for ever
   speed,       ///< samples of the speed; linear between samples
 };
 

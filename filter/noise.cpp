@@ -28,24 +28,22 @@ Energies impulse_energies(const FilterDesign& d, MotionKind motion, Hold hold, d
   Energies e;
   const auto steps = static_cast<long>(std::ceil(60.0 / (d.beta * h))) + 3;
   double before = 0.0;
+  double speed_before = 0.0;
   for (long k = 0; k < steps; ++k) {
     const double now = k == 0 ? 1.0 : 0.0;
-    if (angles) {
-      speed.held(w, (now - before) / h);
-    } else {
-      speed.linear(w, before, now);
-      slope.increment(w, now - before);
-    }
+    const double speed_now = angles ? (now - before) / h : now;
+    speed.linear(w, speed_before, speed_now);
+    slope.increment(w, speed_now - speed_before);
     if (hold == Hold::zero_order) {
       effort.held(w, before);
     } else {
       effort.linear(w, before, now);
     }
-    const double a = angles ? gain * (speed.z1 - d.beta * speed.z2) : out(slope);
-    e.acceleration += a * a;
+    e.acceleration += out(slope) * out(slope);
     e.speed += out(speed) * out(speed);
     e.effort += out(effort) * out(effort);
     before = now;
+    speed_before = speed_now;
   }
   return e;
 }

@@ -55,13 +55,13 @@ struct KernelNorms {
 ///   order 1, speeds:  f*n: α/β;  f*ṅ: 2α
 ///   order 2, angles:  f₂*n: α²/β²;  f₂*ṅ: 2α²/(eβ);  f₂*n̈: 2α²(1 + e⁻²)
 ///   order 2, speeds:  f₂*n: α²/β²;  f₂*ṅ: 2α²/(eβ)
-/// The angle's own error at the segment's start adds sup|f₂'| = α² t e^{−βt} terms that have decayed when rows begin
-/// (FilterDesign::settle).
+/// Mean speeds, linear between the mid-points of their intervals, are a moving average of the slope of the angles: an
+/// average does not raise an L1 norm. The error of the first mean speed of a segment is added by RegressorFilter.
 [[nodiscard]] KernelNorms worst_case_norms(const FilterDesign& design, MotionKind motion);
 
 /// L2 norms (root of the summed squares of the weights of all samples) for a constant step `step` (s), found by sending
 /// a unit sample through the filter itself. For small βh: f*n: α√(h/(2β)), f*ṅ: about α, f₂*n: α²√(h/(4β³)),
-/// f₂*ṅ: α²√(h/(4β)), f₂*n̈: about α².
+/// f₂*ṅ: α²√(h/(4β)), f₂*n̈: about α²/√2 (the newest two angles enter with half of α² each).
 [[nodiscard]] KernelNorms statistical_norms(const FilterDesign& design, MotionKind motion, double step);
 
 /// Bounds on the filtered signals for sensors with the errors `sensors`. Throws InvalidArgument on negative bounds, a

@@ -28,9 +28,10 @@ struct FilteredRow {
 /// Filters torque and regressor sample by sample: (28) for τ_f, the identities of theory section 2 for Y_f, discretised
 /// exactly for steps of any length.
 ///
-/// Between samples: angles linear; mean speeds constant over their interval, whose ends are the mid-points between time
-/// stamps; measured speeds linear; efforts as Measurement::hold says. Functions of the motion (friction terms) are taken
-/// at the speeds of each such piece, and filtered like them.
+/// Between samples: speeds and functions of the motion (friction terms) linear; efforts as Measurement::hold says. Angles
+/// are first reduced to mean speeds over their intervals, and efforts to means alike, both at the intervals' mid-points:
+/// a moving average of both sides of (20), which leaves the equation as it is. Where both sides are interpolated alike the
+/// errors of second order in the step cancel; a filter of the angles themselves would keep (βh)²/12 of the inertia.
 ///
 /// step() does not allocate. Batch filtering is this class in a loop, so that both give the same bits.
 class RegressorFilter {
@@ -54,6 +55,10 @@ class RegressorFilter {
   [[nodiscard]] const Measurement& measurement() const { return measurement_; }
 
  private:
+  // One FOH sample of all signals, at time `t`.
+  bool advance(double t);
+  void begin(double t);
+
   struct FunctionTerm {
     std::size_t term;
     Cascade value;
@@ -65,10 +70,8 @@ class RegressorFilter {
   void read_motion(std::span<const double> sample);
   void read_efforts(std::span<const double> sample);
   void evaluate_functions(const Eigen::VectorXd& speed);
-  void advance_piece(const StepWeights& w, const Eigen::VectorXd& speed);
-  void advance_speeds(const StepWeights& w);
+  void advance_motion(const StepWeights& w);
   void advance_efforts(const StepWeights& w);
-  void advance_functions_held(const StepWeights& w, const Eigen::VectorXd& speed);
   void write_row();
   [[nodiscard]] double filtered(const Cascade& c) const;
 
@@ -77,18 +80,22 @@ class RegressorFilter {
   Measurement measurement_;
   SignalErrors errors_;
 
-  StepWeights whole_;
-  StepWeights half_;
-  bool started_ = false;
-  double t0_ = 0.0;
-  double t_ = 0.0;
+  StepWeights weights_;
+  bool started_ = false;   // a sample of this segment was seen
+  bool running_ = false;   // the recursion has its first instant
+  bool at_rest_ = false;   // the segment begins at standstill
+  double t0_ = 0.0;        // first instant of the recursion
+  double t_ = 0.0;         // last instant of the recursion
+  double sample_time_ = 0.0;
   double heading_ = 0.0;
-  double heading_now_ = 0.0;
-  Eigen::VectorXd joint_, joint_before_, joint_work_;   // motion as measured
-  Eigen::VectorXd speed_, speed_before_, first_speed_;  // of coordinates
-  Eigen::VectorXd effort_, effort_before_;              // of outputs
+  double heading_sample_ = 0.0;
+  Eigen::VectorXd joint_, joint_before_, joint_speed_;    // motion as measured
+  Eigen::VectorXd joint_effort_;
+  Eigen::VectorXd speed_, speed_before_;                  // of coordinates
+  Eigen::VectorXd effort_sample_, effort_sample_before_;  // of outputs, as measured
+  Eigen::VectorXd effort_, effort_before_;                // of outputs, at the instants of the recursion
   std::vector<Cascade> motion_;                         // driven by the coordinates' speeds
-  std::vector<Cascade> slope_;                          // driven by their derivatives (measured speeds only)
+  std::vector<Cascade> slope_;                          // driven by their derivatives
   std::vector<Cascade> torque_;
   std::vector<FunctionTerm> functions_;
   std::vector<double> state_speed_;

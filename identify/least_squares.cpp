@@ -70,11 +70,16 @@ void LeastSquares::merge(const LeastSquares& other) {
   instants_ += other.instants_;
 }
 
-LeastSquaresFit LeastSquares::solve() const {
+LeastSquaresFit LeastSquares::solve(const std::vector<bool>& excluded) const {
   check::that(instants_ > 0, "least squares", "at least one instant");
   fold();
   const auto p = static_cast<Eigen::Index>(p_);
-  const Eigen::MatrixXd R = stack_.topLeftCorner(p, p).triangularView<Eigen::Upper>();
+  Eigen::MatrixXd R = stack_.topLeftCorner(p, p).triangularView<Eigen::Upper>();
+  for (std::size_t j = 0; j < excluded.size(); ++j) {
+    if (excluded[j]) {
+      R.col(static_cast<Eigen::Index>(j)).setZero();
+    }
+  }
   const Eigen::VectorXd c = stack_.col(p).head(p);
 
   LeastSquaresFit fit;

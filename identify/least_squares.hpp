@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstddef>
+#include <vector>
 
 #include <Eigen/Core>
 
@@ -37,8 +38,9 @@ class LeastSquares {
   void add(const RegressionBlock& block, std::size_t first = 0, std::size_t last = static_cast<std::size_t>(-1));
   /// Adds all that `other` has seen; it must have the same parameters and weights.
   void merge(const LeastSquares& other);
-  /// The fit to what was added. Throws InvalidArgument when nothing was.
-  [[nodiscard]] LeastSquaresFit solve() const;
+  /// The fit to what was added, with θ_j = 0 where `excluded[j]` (empty: none). Throws InvalidArgument when nothing was
+  /// added.
+  [[nodiscard]] LeastSquaresFit solve(const std::vector<bool>& excluded = {}) const;
 
  private:
   void fold() const;

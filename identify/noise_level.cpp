@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include <boost/math/distributions/chi_squared.hpp>
+#include <boost/math/distributions/fisher_f.hpp>
 #include <boost/math/distributions/normal.hpp>
 #include <boost/math/distributions/students_t.hpp>
 
@@ -34,6 +35,27 @@ ExtrapolatedBound extrapolate(const OutputResidual& residual, std::size_t instan
   result.over_largest = residual.largest > 0.0 ? result.bound / residual.largest : 0.0;
   result.over_rms = residual.rms > 0.0 ? result.bound / residual.rms : 0.0;
   return result;
+}
+
+Eigen::VectorXd largest_plausible_error(RegressionSource& rows, const Eigen::VectorXd& theta,
+                                        const ResidualSummary& summary, double risk) {
+  check::that(risk > 0.0 && risk < 1.0, "risk", "a number inside (0, 1)");
+  const auto p = static_cast<double>(theta.size());
+  const double f = boost::math::quantile(boost::math::complement(
+      boost::math::fisher_f(p, std::max(summary.freedom, 1.0)), risk));
+  const Eigen::MatrixXd scaled = p * f * summary.covariance;
+  Eigen::VectorXd largest = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(rows.outputs()));
+  RegressionBlock block;
+  rows.rewind();
+  while (rows.next(block)) {
+    const auto n = static_cast<Eigen::Index>(block.outputs);
+    for (Eigen::Index row = 0; row < block.rows(); ++row) {
+      const double residual = std::abs(block.y[row] - block.Y.row(row).dot(theta));
+      const double variance = block.Y.row(row) * scaled * block.Y.row(row).transpose();
+      largest[row % n] = std::max(largest[row % n], residual + std::sqrt(std::max(variance, 0.0)));
+    }
+  }
+  return largest;
 }
 
 double student_quantile(double confidence, double freedom) {

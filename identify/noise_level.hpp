@@ -33,6 +33,16 @@ struct ExtrapolatedBound {
 [[nodiscard]] ExtrapolatedBound extrapolate(const OutputResidual& residual, std::size_t instants,
                                             const ExtrapolationOptions& options = {});
 
+/// Per output, the largest equation error |y − Yθ| that the rows of a log can have had at the *true* parameters, at
+/// confidence 1 − risk: the residual |y − Yθ̂| that was seen, and what θ̂ may be off by,
+///
+///     max over rows of |y − Yθ̂| + √(p·F_{p,ν}(1 − risk) · Y Σ Yᵀ)
+///
+/// with Σ the covariance of θ̂ and ν its degrees of freedom (Scheffé: all rows at once). Nothing is extrapolated: the
+/// rows are those that were seen. One walk over `rows`.
+[[nodiscard]] Eigen::VectorXd largest_plausible_error(RegressionSource& rows, const Eigen::VectorXd& theta,
+                                                      const ResidualSummary& summary, double risk);
+
 /// Two-sided Student-t quantile: P(|T| <= q) = `confidence` with `freedom` degrees of freedom.
 [[nodiscard]] double student_quantile(double confidence, double freedom);
 

@@ -86,7 +86,7 @@ double worst_equation_error(MotionKind motion, int order, double h, Clock clock)
   double worst = 0.0;
   for (std::size_t k = 0; k < rows.instants(); ++k) {
     if (rows.t[k] < 3.0) {
-      continue;  // the initial speed of the angles is measured by a difference only
+      continue;  // the same instants for all kinds
     }
     for (Eigen::Index i = 0; i < 2; ++i) {
       const auto row = 2 * static_cast<Eigen::Index>(k) + i;

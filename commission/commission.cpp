@@ -1,0 +1,476 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/commission/commission.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+
+#include <fmt/format.h>
+
+#include <wheelwright/bounds/outliers.hpp>
+#include <wheelwright/commission/noise_budget.hpp>
+#include <wheelwright/commission/parameter_choice.hpp>
+#include <wheelwright/core/check.hpp>
+#include <wheelwright/filter/regression_stream.hpp>
+
+namespace wheelwright {
+namespace {
+
+constexpr double kConfidence = 0.95;       // of the statistical intervals
+constexpr std::size_t kFewestInstants = 50;
+
+// What is known before anything is fitted.
+struct Setting {
+  Robot robot;
+  Model model;
+  Measurement measurement;
+  FilterDesign filter;
+  SignalErrors declared;  // of the rows, from declared noise only
+  bool noise_complete = false;
+  Box prior;
+  std::vector<bool> prior_declared;
+  std::size_t log_rows = 0;
+  FoldOptions folds;
+};
+
+// θ̂, what it leaves, and what the log shows.
+struct Fit {
+  Eigen::VectorXd weights;
+  LeastSquaresFit squares;
+  ResidualSummary residuals;
+  std::vector<ExcitationFinding> excitation;
+  Eigen::VectorXd plausible;  // per output, largest_plausible_error
+};
+
+RegressionStream make_rows(LogSource& log, const Setting& s, const SignalErrors& errors) {
+  return RegressionStream(log, RegressorFilter(s.model, s.filter, s.measurement, errors));
+}
+
+Eigen::VectorXd output_weights(RegressionSource& rows) {
+  const std::size_t n = rows.outputs();
+  std::vector<LeastSquares> fits(n, LeastSquares(rows.parameters()));
+  RegressionBlock block, one;
+  rows.rewind();
+  while (rows.next(block)) {
+    one.resize(block.instants(), 1, block.parameters);
+    for (std::size_t i = 0; i < n; ++i) {
+      const auto pick = Eigen::seqN(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(block.instants()),
+                                    static_cast<Eigen::Index>(n));
+      one.Y = block.Y(pick, Eigen::all);
+      one.y = block.y(pick);
+      fits[i].add(one);
+    }
+  }
+  Eigen::VectorXd weights(static_cast<Eigen::Index>(n));
+  for (std::size_t i = 0; i < n; ++i) {
+    const LeastSquaresFit fit = fits[i].solve();
+    const double rms = std::sqrt(fit.weighted_rss / static_cast<double>(fit.instants));
+    const double scale = std::sqrt(fit.weighted_tss / static_cast<double>(fit.instants));
+    const double floor = std::max(1e-9 * scale, std::numeric_limits<double>::min());
+    weights[static_cast<Eigen::Index>(i)] = 1.0 / std::max(rms, floor);
+  }
+  return weights;
+}
+
+// Root mean square of what sensor noise alone puts into each weighted column; zero where the sensor is not known.
+Eigen::VectorXd column_noise(const Setting& s, const Survey& log, const Eigen::VectorXd& weights) {
+  Eigen::VectorXd squares = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(s.model.p()));
+  const auto bound = motion_error(s.robot, s.measurement);
+  if (!bound) {
+    return squares;
+  }
+  const KernelNorms norms = statistical_norms(s.filter, s.measurement.motion, log.median_step);
+  const Eigen::VectorXd sd = *bound / std::sqrt(3.0) * s.model.motion.rowwise().norm();
+  for (const Term& term : s.model.terms) {
+    if (term.kind == Term::Kind::function) {
+      continue;
+    }
+    const double norm = term.kind == Term::Kind::acceleration ? norms.acceleration : norms.speed;
+    const double weighted = weights[static_cast<Eigen::Index>(term.output)] * term.scale * norm *
+                            sd[static_cast<Eigen::Index>(term.coordinate)];
+    squares[static_cast<Eigen::Index>(term.parameter)] += weighted * weighted;
+  }
+  return squares.cwiseSqrt();
+}
+
+Fit fit_rows(RegressionSource& rows, const Setting& s, const Survey& log, double risk) {
+  Fit fit;
+  fit.weights = output_weights(rows);
+  LeastSquares squares(rows.parameters(), fit.weights);
+  RegressionBlock block;
+  rows.rewind();
+  while (rows.next(block)) {
+    squares.add(block);
+  }
+  fit.squares = squares.solve();
+  const auto summarise = [&] {
+    ResidualStatistics statistics(fit.squares.estimate, fit.weights);
+    rows.rewind();
+    while (rows.next(block)) {
+      statistics.add(block);
+    }
+    fit.residuals = statistics.summary(fit.squares.inverse_gram);
+    const double t = student_quantile(kConfidence, std::max(fit.residuals.freedom, 1.0));
+    fit.excitation =
+        judge_excitation(fit.squares, fit.residuals.standard_error, t, column_noise(s, log, fit.weights));
+  };
+  summarise();
+  std::vector<bool> excluded;
+  for (const ExcitationFinding& finding : fit.excitation) {
+    excluded.push_back(finding.state == Excitation::not_excited);
+  }
+  if (std::ranges::any_of(excluded, [](bool e) { return e; })) {
+    const auto findings = fit.excitation;
+    fit.squares = squares.solve(excluded);
+    summarise();
+    for (std::size_t j = 0; j < excluded.size(); ++j) {
+      if (excluded[j]) {
+        fit.excitation[j] = findings[j];
+      }
+    }
+  }
+  if (!s.noise_complete) {
+    fit.plausible = largest_plausible_error(rows, fit.squares.estimate, fit.residuals, risk);
+  }
+  return fit;
+}
+
+std::vector<OutputNoise> output_noise(const Setting& s, const Fit& fit, const ExtrapolationOptions& options) {
+  std::vector<OutputNoise> noise(s.model.n());
+  for (std::size_t i = 0; i < noise.size(); ++i) {
+    OutputNoise& o = noise[i];
+    if (s.noise_complete) {
+      o.origin = NoiseOrigin::declared;
+      o.learning = o.bound = s.declared.output[static_cast<Eigen::Index>(i)];
+    } else {
+      o.how = extrapolate(fit.residuals.outputs[i], fit.residuals.instants, options);
+      o.learning = fit.plausible[static_cast<Eigen::Index>(i)];
+      o.bound = std::max(o.how.bound, o.learning);
+    }
+  }
+  return noise;
+}
+
+enum class For { learning, driving };
+
+SignalErrors with_noise(const Setting& s, const std::vector<OutputNoise>& noise, For use) {
+  SignalErrors errors = s.declared;
+  errors.output.resize(static_cast<Eigen::Index>(noise.size()));
+  for (std::size_t i = 0; i < noise.size(); ++i) {
+    errors.output[static_cast<Eigen::Index>(i)] = use == For::learning ? noise[i].learning : noise[i].bound;
+  }
+  return errors;
+}
+
+// The feasible set; where an *estimated* bound is too small for the prior box (θ̂ may lie outside it), it is raised to
+// just above the minimax fit.
+FeasibleSet bounded_set(LogSource& log, const Setting& s, Part part, std::vector<OutputNoise>& noise,
+                        std::size_t outliers, std::vector<std::string>& notes) {
+  constexpr double kAboveMinimax = 1.05;
+  for (int attempt = 0;; ++attempt) {
+    RegressionStream rows = make_rows(log, s, with_noise(s, noise, For::learning));
+    FoldedSource folded(rows, part, s.log_rows, s.folds);
+    FeasibleSet set;
+    if (outliers > 0) {
+      OutlierResult relaxed = feasible_set_with_outliers(folded, s.prior, {.most = outliers, .set = {}});
+      if (!relaxed.dropped.empty()) {
+        notes.push_back(fmt::format("{} instants were left out of the feasible set as outliers (at rows {})",
+                                    relaxed.dropped.size(), fmt::join(relaxed.dropped, ", ")));
+      }
+      set = std::move(relaxed.set);
+    } else {
+      set = feasible_set(folded, s.prior);
+    }
+    if (set.status == FeasibleSet::Status::nonempty || s.noise_complete || attempt > 0) {
+      return set;
+    }
+    MinimaxOptions options;
+    for (const OutputNoise& o : noise) {
+      options.weights.push_back(std::max(o.learning, std::numeric_limits<double>::min()));
+    }
+    RegressionStream bare = make_rows(log, s, s.declared);
+    FoldedSource bare_folded(bare, part, s.log_rows, s.folds);
+    const double factor = kAboveMinimax * minimax_fit(bare_folded, s.prior, options).upper;
+    notes.push_back(fmt::format("the estimated noise bound was raised by {:.3g}: within the prior box no parameters "
+                                "explain the log with less",
+                                factor));
+    for (OutputNoise& o : noise) {
+      o.learning *= factor;
+      o.bound = std::max(o.bound, o.learning);
+    }
+  }
+}
+
+Eigen::VectorXd best_guess(const Fit& fit, const Polytope& set) {
+  Eigen::VectorXd guess = fit.squares.estimate;
+  for (std::size_t j = 0; j < fit.excitation.size(); ++j) {
+    if (fit.excitation[j].state == Excitation::not_excited) {
+      guess[static_cast<Eigen::Index>(j)] = set.chebyshev_centre()[j];
+    }
+  }
+  return guess;
+}
+
+std::vector<RowOrigin> binding(const CertifiedBound& bound) {
+  std::vector<RowOrigin> rows;
+  for (const WeightedRow& weighted : bound.binding) {
+    if (weighted.multiplier > 0.0) {
+      rows.push_back(weighted.row.origin);
+    }
+  }
+  return rows;
+}
+
+bool is_prior(const std::vector<RowOrigin>& rows, const Interval& prior, double bound, double other) {
+  const bool on_side = bound == prior.lower || bound == prior.upper;
+  const bool only_prior = std::ranges::all_of(rows, [](const RowOrigin& row) { return row.is_prior; });
+  return on_side || (only_prior && bound != other);
+}
+
+std::vector<ParameterResult> parameter_results(const Setting& s, const Fit& fit, const FeasibleSet& set) {
+  std::vector<ParameterResult> results;
+  for (std::size_t j = 0; j < s.model.p(); ++j) {
+    const auto at = static_cast<Eigen::Index>(j);
+    ParameterResult r;
+    r.parameter = s.model.parameters[j];
+    r.excitation = fit.excitation[j].state;
+    r.reason = fit.excitation[j].reason;
+    if (r.excitation == Excitation::not_excited) {
+      r.reason += ": " + r.parameter.excite;
+    } else {
+      r.estimate = fit.squares.estimate[at];
+      r.standard_error = fit.residuals.standard_error[at];
+    }
+    r.lower = set.hull.sides[j].lower;
+    r.upper = set.hull.sides[j].upper;
+    if (set.status == FeasibleSet::Status::nonempty) {
+      r.chebyshev = set.polytope->chebyshev_centre()[j];
+      r.lower_binding = binding(set.lower[j]);
+      r.upper_binding = binding(set.upper[j]);
+    }
+    r.lower_is_prior = is_prior(r.lower_binding, s.prior.sides[j], r.lower, r.upper);
+    r.upper_is_prior = is_prior(r.upper_binding, s.prior.sides[j], r.upper, r.lower);
+    r.estimate_inside = !r.estimate || (r.lower <= *r.estimate && *r.estimate <= r.upper);
+    results.push_back(std::move(r));
+  }
+  return results;
+}
+
+CommissionedModel finished_model(const Setting& s, const std::vector<OutputNoise>& noise, const Fit& fit,
+                                 const FeasibleSet& set, Persistence persistence) {
+  CommissionedModel model;
+  model.robot = s.robot;
+  model.model = s.model;
+  model.measurement = s.measurement;
+  model.filter = s.filter;
+  model.errors = with_noise(s, noise, For::driving);
+  model.estimate = best_guess(fit, *set.polytope);
+  model.facets = set.polytope->facets();
+  model.box = set.hull;
+  model.persistence = persistence;
+  return model;
+}
+
+void tell(const CommissionOptions& options, std::string_view stage, double share) {
+  if (options.progress) {
+    options.progress(stage, share);
+  }
+}
+
+// A single axis whose robot file leaves the friction model open gets dry friction and an offset where they are worth it.
+void settle_parameters(LogSource& log, Setting& s, std::vector<std::string>& notes) {
+  if (s.robot.model != "single_axis" || s.robot.parameters) {
+    return;
+  }
+  const std::size_t basic = s.model.p();
+  Setting wide = s;
+  wide.robot.parameters = std::vector<std::string>{"inertia", "viscous", "coulomb", "offset"};
+  wide.model = make_model(wide.robot);
+  RegressionStream rows = make_rows(log, wide, {});
+  const ParameterChoice choice = choose_parameters(rows, basic, s.log_rows, s.folds);
+  if (choice.full) {
+    s.robot.parameters = wide.robot.parameters;
+    s.model = wide.model;
+    notes.push_back(fmt::format("dry friction (coulomb) and an offset were added to the model: on held-out blocks the "
+                                "relative error falls from {:.3g} to {:.3g}; `parameters:` in the robot file decides "
+                                "otherwise",
+                                choice.nrmse_basic, choice.nrmse_full));
+  } else {
+    notes.push_back(fmt::format("inertia and viscous friction suffice: with coulomb and offset the held-out relative "
+                                "error is {:.3g} instead of {:.3g}",
+                                choice.nrmse_full, choice.nrmse_basic));
+  }
+}
+
+Setting settle(LogSource& log, const Robot& robot, const CommissionOptions& options, Commissioning& result) {
+  Setting s;
+  s.robot = robot;
+  s.model = make_model(robot);
+  const int order = robot.filter.order.value_or(2);
+  s.measurement = find_measurement(log, robot, s.model, order);
+  tell(options, "looking at the log", 0.05);
+  result.survey = survey(log, s.measurement);
+  s.log_rows = result.survey.rows;
+  check::that(result.survey.rows >= kFewestInstants, "log",
+              fmt::format("at least {} rows (it has {})", kFewestInstants, result.survey.rows));
+  if (robot.filter.beta) {
+    const double beta = *robot.filter.beta;
+    s.filter = {.order = order, .alpha = robot.filter.alpha.value_or(beta), .beta = beta};
+  } else {
+    tell(options, "choosing the filter", 0.1);
+    Setting wide = s;
+    if (robot.model == "single_axis" && !robot.parameters) {
+      wide.robot.parameters = std::vector<std::string>{"inertia", "viscous", "coulomb", "offset"};
+      wide.model = make_model(wide.robot);
+    }
+    result.filter_choice =
+        choose_filter(log, wide.model, s.measurement, order, result.survey, options.filter_choice);
+    s.filter = result.filter_choice.design;
+    if (robot.filter.alpha) {
+      s.filter.alpha = *robot.filter.alpha;
+    }
+  }
+  validate(s.filter);
+  s.folds = options.folds;
+  s.folds.purge = 0.5 * s.filter.settle / s.filter.beta;
+  settle_parameters(log, s, result.notes);
+
+  const PriorBox prior = prior_box(s.robot, s.model);
+  s.prior.sides = prior.bounds;
+  s.prior_declared = prior.declared;
+  const NoiseBudget budget = noise_budget(s.robot, s.measurement, result.survey);
+  s.noise_complete = budget.complete;
+  if (budget.complete) {
+    s.declared = propagate(s.model, s.filter, s.measurement, budget.sensors,
+                           {.mode = options.noise_mode,
+                            .confidence = options.confidence,
+                            .rows = static_cast<double>(s.log_rows),
+                            .largest_step = result.survey.largest_step});
+  }
+  return s;
+}
+
+void describe_assumptions(const Setting& s, Commissioning& result) {
+  auto& notes = result.notes;
+  if (s.measurement.motion == MotionKind::mean_speed) {
+    notes.push_back(s.measurement.count > 0.0
+                        ? fmt::format("wheel speeds are differenced encoder counts ({:.0f} counts per turn): angles were "
+                                      "rebuilt from them, each speed taken as the mean over the interval around its time",
+                                      2.0 * 3.14159265358979323846 / (s.measurement.count * s.measurement.nominal_step))
+                        : "wheel speeds were taken as means over the sampling interval, as the robot file says");
+  } else if (s.measurement.motion == MotionKind::speed && s.filter.order == 2) {
+    notes.push_back("wheel speeds are not differenced encoder counts: they were taken as samples of the speed");
+  }
+  if (!s.noise_complete) {
+    notes.push_back("the noise bounds are extrapolated from the residuals of this log: they hold while the noise and "
+                    "the driving stay like it; declare `noise:` in the robot file for bounds that stand on the sensors");
+  }
+  if (s.measurement.effort_unsigned) {
+    notes.push_back("the effort is unsigned: its sign was taken from the direction of motion, which is wrong while a "
+                    "motor brakes; what the log says of inertia then rests on accelerating only");
+  }
+  for (std::size_t j = 0; j < s.model.p(); ++j) {
+    if (!s.prior_declared[j] && (result.parameters[j].lower_is_prior || result.parameters[j].upper_is_prior)) {
+      notes.push_back(fmt::format("a bound of {} is the tool's own wide default, not the robot's",
+                                  result.parameters[j].parameter.name));
+    }
+  }
+}
+
+std::string status_message(const Commissioning& result) {
+  std::string missing, todo;
+  for (const ParameterResult& p : result.parameters) {
+    if (p.excitation == Excitation::not_excited) {
+      missing += (missing.empty() ? "" : ", ") + p.parameter.name;
+      todo += (todo.find(p.parameter.excite) == std::string::npos ? (todo.empty() ? "" : "; ") + p.parameter.excite : "");
+    }
+  }
+  switch (result.status) {
+    case Commissioning::Status::done:
+      return "commissioned";
+    case Commissioning::Status::partial:
+      return "commissioned, but the log says nothing about " + missing + ": " + todo +
+             ", and commission again; until then their bounds are those of the prior";
+    case Commissioning::Status::nothing:
+      return "the log says nothing about any parameter: " + todo;
+    case Commissioning::Status::empty:
+      return fmt::format("no parameters explain the log within the declared noise: it would have to be {:.3g} times as "
+                         "large; a fault, an effect that the model lacks, or noise bounds that are too small",
+                         result.minimax);
+  }
+  return {};
+}
+
+}  // namespace
+
+Commissioning commission(LogSource& log, const Robot& robot, const CommissionOptions& options) {
+  Commissioning result;
+  result.noise_mode = options.noise_mode;
+  const Setting s = settle(log, robot, options, result);
+  result.folds = s.folds;
+
+  tell(options, "identifying", 0.2);
+  RegressionStream rows = make_rows(log, s, s.declared);
+  const Fit fit = fit_rows(rows, s, result.survey, options.extrapolation.risk);
+  result.residuals = fit.residuals;
+  result.rank = fit.squares.rank;
+  result.condition = fit.squares.condition;
+
+  tell(options, "bounding", 0.4);
+  result.noise = output_noise(s, fit, options.extrapolation);
+  result.feasible = bounded_set(log, s, Part::everything, result.noise, options.outliers, result.notes);
+  result.parameters = parameter_results(s, fit, result.feasible);
+  describe_assumptions(s, result);
+
+  if (result.feasible.status == FeasibleSet::Status::empty) {
+    tell(options, "measuring the contradiction", 0.7);
+    MinimaxOptions minimax;
+    for (const OutputNoise& o : result.noise) {
+      minimax.weights.push_back(std::max(o.bound, std::numeric_limits<double>::min()));
+    }
+    SignalErrors without_output = s.declared;
+    without_output.output.setZero();
+    RegressionStream bare = make_rows(log, s, without_output);
+    result.minimax = minimax_fit(bare, s.prior, minimax).upper;
+    result.status = Commissioning::Status::empty;
+    result.message = status_message(result);
+    return result;
+  }
+
+  const auto unexcited = std::ranges::count_if(
+      result.parameters, [](const ParameterResult& p) { return p.excitation == Excitation::not_excited; });
+  result.status = unexcited == 0                                             ? Commissioning::Status::done
+                  : unexcited == static_cast<std::ptrdiff_t>(s.model.p()) ? Commissioning::Status::nothing
+                                                                            : Commissioning::Status::partial;
+  result.message = status_message(result);
+  result.model = finished_model(s, result.noise, fit, result.feasible, options.persistence);
+
+  tell(options, "validating on held-out blocks", 0.7);
+  FoldedSource training(rows, Part::training, s.log_rows, s.folds);
+  const Fit trained = fit_rows(training, s, result.survey, options.extrapolation.risk);
+  std::vector<OutputNoise> noise = output_noise(s, trained, options.extrapolation);
+  std::vector<std::string> unused;
+  const FeasibleSet set = bounded_set(log, s, Part::training, noise, options.outliers, unused);
+  if (set.status == FeasibleSet::Status::nonempty) {
+    RegressionStream unseen = make_rows(log, s, with_noise(s, noise, For::driving));
+    FoldedSource held_out(unseen, Part::held_out, s.log_rows, s.folds);
+    result.validation = validate_on(held_out, ThresholdRule(*set.polytope, best_guess(trained, *set.polytope)));
+    result.polytope_over_box = 0.0;
+    for (const OutputValidation& v : result.validation) {
+      const double ratio = v.median_width_box > 0.0 ? v.median_width / v.median_width_box : 1.0;
+      result.polytope_over_box = std::max(result.polytope_over_box, ratio);
+    }
+  }
+  log.rewind();
+  tell(options, "done", 1.0);
+  return result;
+}
+
+Detector make_detector(const CommissionedModel& model, DetectorOptions options) {
+  options.persistence = options.persistence.n > 1 ? options.persistence : model.persistence;
+  return Detector(RegressorFilter(model.model, model.filter, model.measurement, model.errors),
+                  ThresholdRule(Polytope(model.facets, model.box), model.estimate, options.set), options);
+}
+
+}  // namespace wheelwright

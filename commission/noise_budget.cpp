@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/commission/noise_budget.hpp>
+
+#include <numbers>
+
+namespace wheelwright {
+
+std::optional<double> motion_error(const Robot& robot, const Measurement& measurement) {
+  const bool axis = robot.model == "single_axis";
+  switch (measurement.motion) {
+    case MotionKind::mean_speed:
+      if (measurement.count > 0.0) {
+        return 0.5 * measurement.count * measurement.nominal_step;
+      }
+      break;
+    case MotionKind::angle: {
+      const NoiseBound& declared = axis ? robot.noise.position : robot.noise.wheel_angle;
+      if (declared.value) {
+        return declared.value;
+      }
+      break;
+    }
+    case MotionKind::speed:
+      return robot.noise.wheel_speed.value;
+  }
+  if (robot.encoder_counts_per_turn) {
+    return std::numbers::pi / *robot.encoder_counts_per_turn;
+  }
+  return std::nullopt;
+}
+
+NoiseBudget noise_budget(const Robot& robot, const Measurement& measurement, const Survey& survey) {
+  NoiseBudget budget;
+  const auto motion = motion_error(robot, measurement);
+  const bool declared_motion = robot.noise.wheel_speed.value || robot.noise.wheel_angle.value ||
+                               robot.noise.position.value || robot.encoder_counts_per_turn;
+  if (!motion || !declared_motion || !robot.noise.effort.value) {
+    return budget;
+  }
+  budget.complete = true;
+  budget.sensors.motion = *motion + interpolation_error(survey, measurement.motion);
+  budget.sensors.effort = *robot.noise.effort.value;
+  budget.sensors.heading = robot.noise.heading.value.value_or(0.0);
+  return budget;
+}
+
+}  // namespace wheelwright

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/commission/physical.hpp>
+
+namespace wheelwright {
+namespace {
+
+void replace_all(std::string& text, const std::string& from, const std::string& to) {
+  for (std::size_t at = text.find(from); at != std::string::npos; at = text.find(from, at + to.size())) {
+    text.replace(at, from.size(), to);
+  }
+}
+
+std::string in_effort_unit(const Robot& robot, const std::string& unit) {
+  if (robot.effort == EffortKind::torque) {
+    return unit;
+  }
+  const std::string effort = robot.effort == EffortKind::current ? "A" : "V";
+  if (unit == "N·m") {
+    return effort;
+  }
+  if (unit == "N·m²") {
+    return effort + "·m";
+  }
+  return {};
+}
+
+}  // namespace
+
+std::optional<std::vector<PhysicalScale>> physical_scales(const Robot& robot, const Model& model) {
+  const bool torque = robot.effort == EffortKind::torque;
+  const bool voltage = robot.effort == EffortKind::voltage;
+  const bool known = robot.motor && robot.motor->torque_constant &&
+                     (!voltage || (robot.motor->resistance && robot.motor->back_emf));
+  if (!torque && !known) {
+    return std::nullopt;
+  }
+  std::vector<PhysicalScale> scales;
+  for (const Parameter& parameter : model.parameters) {
+    PhysicalScale scale{1.0 / parameter.per_physical, 0.0};
+    if (voltage && parameter.physical.starts_with("viscous")) {
+      const Motor& motor = *robot.motor;
+      const double braking =
+          *motor.torque_constant * *motor.back_emf * motor.gear_ratio * motor.gear_ratio / *motor.resistance;
+      const double r = robot.wheel_radius;
+      const double arm = robot.lever_arm_is_track ? robot.track_width : 0.5 * robot.track_width;
+      if (robot.model == "single_axis") {
+        scale.offset = braking;
+      } else if (parameter.physical == "viscous_yaw") {
+        scale.offset = braking * arm * robot.track_width / (r * r);
+      } else {
+        scale.offset = 2.0 * braking / (r * r);
+      }
+    }
+    scales.push_back(scale);
+  }
+  return scales;
+}
+
+std::string parameter_unit(const Robot& robot, const Parameter& parameter) {
+  if (robot.effort == EffortKind::torque) {
+    return parameter.unit;
+  }
+  const std::string effort = robot.effort == EffortKind::current ? "A" : "V";
+  std::string unit = parameter.unit;
+  if (parameter.name == "r_mass") {
+    return effort + "·s²/m";
+  }
+  if (parameter.name == "r_yaw_inertia") {
+    return effort + "·m·s²/rad";
+  }
+  if (parameter.name == "r_viscous_yaw") {
+    return effort + "·m·s/rad";
+  }
+  if (parameter.name.starts_with("r_viscous")) {
+    return effort + "·s/m";
+  }
+  replace_all(unit, "N·m", effort);
+  replace_all(unit, "N", effort);
+  return unit;
+}
+
+std::string output_unit(const Robot& robot, const std::string& unit) {
+  const std::string known = in_effort_unit(robot, unit);
+  return known.empty() ? unit + " (of effort)" : known;
+}
+
+}  // namespace wheelwright
