@@ -21,8 +21,8 @@ struct Box {
   /// Number of parameters p.
   [[nodiscard]] std::size_t dimension() const noexcept { return sides.size(); }
 
-  /// Support function h(a) = max { a·θ : θ in box } = Σ_j max(a_j lower_j, a_j upper_j), rounded outward: never below the
-  /// exact value. `a` has p finite entries (unchecked). Allocates nothing.
+  /// Support function h(a) = max { a·θ : θ in box } = Σ_j max(a_j lower_j, a_j upper_j), rounded outward: never below
+  /// the exact value. `a` has p finite entries (unchecked). Allocates nothing.
   [[nodiscard]] double support(std::span<const double> a) const noexcept {
     double sum = 0.0, magnitude = 0.0, terms = 0.0;
     for (std::size_t j = 0; j < sides.size(); ++j) {
@@ -36,8 +36,8 @@ struct Box {
     if (terms == 0.0) {
       return 0.0;
     }
-    // Rounding of k products and k − 1 sums is at most 2k·2⁻⁵³·Σ|term| plus an underflow each (Higham 2002, section 3.1);
-    // four times that covers the rounding of the bound itself.
+    // Rounding of k products and k − 1 sums is at most 2k·2⁻⁵³·Σ|term| plus an underflow each (Higham 2002, section
+    // 3.1); four times that covers the rounding of the bound itself.
     constexpr double epsilon = std::numeric_limits<double>::epsilon();
     return round_up(sum +
                     (4.0 * (terms + 1.0) * epsilon * magnitude + terms * std::numeric_limits<double>::denorm_min()));

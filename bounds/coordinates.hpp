@@ -15,8 +15,9 @@ struct Coordinates {
   Eigen::MatrixXd transform;  ///< p × p, regular
 };
 
-/// Coordinates about the centre of `box` with Tᵀ (information + D⁻²) T ≈ 1, D the half-widths of the box: whitened where
-/// `information` (p × p, symmetric, positive semi-definite, units 1/θ²) says something, as wide as the box elsewhere.
+/// Coordinates about the centre of `box` with Tᵀ (information + D⁻²) T ≈ 1, D the half-widths of the box: whitened
+/// where `information` (p × p, symmetric, positive semi-definite, units 1/θ²) says something, as wide as the box
+/// elsewhere.
 [[nodiscard]] Coordinates whitened(const Box& box, const Eigen::MatrixXd& information);
 
 }  // namespace wheelwright

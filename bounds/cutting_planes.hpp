@@ -20,9 +20,9 @@ struct CertifiedBound {
 
 /// { θ in box : a·θ <= b for every half-space offered }, held by the few half-spaces that matter.
 ///
-/// Half-spaces may be offered in any order and portions. One that does not cut the set held so far (by more than 1e-10 of
-/// its size) is dropped for good, which is right since the set only shrinks: memory depends on the facets, not on the
-/// rows offered, and the set held is never smaller than the exact one.
+/// Half-spaces may be offered in any order and portions. One that does not cut the set held so far (by more than 1e-10
+/// of its size) is dropped for good, which is right since the set only shrinks: memory depends on the facets, not on
+/// the rows offered, and the set held is never smaller than the exact one.
 class CuttingPlanes {
  public:
   /// Starts with a finite box. `information` (p × p, symmetric, positive semi-definite) is Σ aaᵀ/w² over rows of

@@ -47,8 +47,9 @@ struct FeasibleSet {
 /// for the working set only. Bounds are certified: never inside the exact ones. The result does not depend on how the
 /// source is cut into blocks.
 ///
-/// Where θ_j may have either sign and its column has dY ≠ 0, the set is a union over the signs: each part is bounded and
-/// the hull of the parts is taken; with more than four such parameters the convex outer description of SlabRows serves.
+/// Where θ_j may have either sign and its column has dY ≠ 0, the set is a union over the signs: each part is bounded
+/// and the hull of the parts is taken; with more than four such parameters the convex outer description of SlabRows
+/// serves.
 ///
 /// `prior` must be finite. Throws InvalidArgument when shapes disagree or a number is not finite.
 [[nodiscard]] FeasibleSet feasible_set(RegressionSource& source, const Box& prior,

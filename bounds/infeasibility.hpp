@@ -13,8 +13,8 @@
 
 namespace wheelwright {
 
-/// The 2p half-spaces of a box, lower before upper side, with their origin marked as prior. Where `parameters` is given,
-/// side j belongs to parameter parameters[j].
+/// The 2p half-spaces of a box, lower before upper side, with their origin marked as prior. Where `parameters` is
+/// given, side j belongs to parameter parameters[j].
 [[nodiscard]] std::vector<HalfSpace> sides_as_rows(const Box& box, std::span<const std::size_t> parameters = {});
 
 /// Looks for a Farkas certificate that { θ in box : row·θ <= row.b for every row } is empty: at most p + 1 of the rows,

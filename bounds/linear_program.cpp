@@ -47,8 +47,8 @@ struct LinearProgram::Engine {
     return worst;
   }
 
-  /// The answer of CLP's basis, computed anew: x = A_B⁻¹ b_B and λ = A_B⁻ᵀ c, or CLP's own numbers where the basis holds
-  /// fewer rows than variables.
+  /// The answer of CLP's basis, computed anew: x = A_B⁻¹ b_B and λ = A_B⁻ᵀ c, or CLP's own numbers where the basis
+  /// holds fewer rows than variables.
   LpSolution answer(const Eigen::VectorXd& c) {
     const Eigen::Index p = a.rows();
     std::vector<int> basic;

@@ -31,11 +31,11 @@ struct MinimaxFit {
 
 /// γ* = min γ over θ in prior such that |y_r − Y_r θ| <= γ w_i + dy_r + dY_r |θ| for every row r of output i.
 ///
-/// With dy = dY = 0 it is the Chebyshev fit; with declared bounds it is by how much they must be raised (0: not at all).
-/// By cutting planes: each pass adds the rows that the present fit violates most, and the last one, which adds none,
-/// evaluates the fit on all rows. Signs that the prior leaves open in noisy columns are examined one pattern at a time
-/// (up to four such parameters; beyond, `lower` stands on the convex description of SlabRows and the bracket may stay
-/// open). Throws InvalidArgument when shapes disagree, a number is not finite, or no output is left.
+/// With dy = dY = 0 it is the Chebyshev fit; with declared bounds it is by how much they must be raised (0: not at
+/// all). By cutting planes: each pass adds the rows that the present fit violates most, and the last one, which adds
+/// none, evaluates the fit on all rows. Signs that the prior leaves open in noisy columns are examined one pattern at a
+/// time (up to four such parameters; beyond, `lower` stands on the convex description of SlabRows and the bracket may
+/// stay open). Throws InvalidArgument when shapes disagree, a number is not finite, or no output is left.
 [[nodiscard]] MinimaxFit minimax_fit(RegressionSource& source, const Box& prior, const MinimaxOptions& options = {});
 
 }  // namespace wheelwright

@@ -24,15 +24,15 @@ struct OutlierResult {
   std::size_t sets = 0;              ///< feasible sets computed
 };
 
-/// The feasible set after dropping the smallest number d <= q of instants (all their rows) that makes it non-empty. With
-/// d = 0 it is feasible_set(). Where several choices of d instants would do, the first found is returned: it is one
-/// consistent explanation, not the union over all of them.
+/// The feasible set after dropping the smallest number d <= q of instants (all their rows) that makes it non-empty.
+/// With d = 0 it is feasible_set(). Where several choices of d instants would do, the first found is returned: it is
+/// one consistent explanation, not the union over all of them.
 ///
-/// Exact while the budget lasts: every choice that makes the set non-empty must drop a member of every contradiction, so
-/// the search branches over the members of the one just found, layer by layer. Beyond the budget a heuristic drops, again
-/// and again, the member of the present contradiction with the largest share λ(a·θ − b) in it at the least-squares
-/// estimate θ of the rows still there, and `minimal` is false; it also is where open signs of noisy columns needed several
-/// parts, whose contradictions differ.
+/// Exact while the budget lasts: every choice that makes the set non-empty must drop a member of every contradiction,
+/// so the search branches over the members of the one just found, layer by layer. Beyond the budget a heuristic drops,
+/// again and again, the member of the present contradiction with the largest share λ(a·θ − b) in it at the
+/// least-squares estimate θ of the rows still there, and `minimal` is false; it also is where open signs of noisy
+/// columns needed several parts, whose contradictions differ.
 [[nodiscard]] OutlierResult feasible_set_with_outliers(RegressionSource& source, const Box& prior,
                                                        const OutlierOptions& options);
 

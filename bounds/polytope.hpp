@@ -19,8 +19,8 @@ struct PolytopeOptions {
   std::size_t vertex_limit = 4096;  ///< most vertices per independent block; beyond it the support function is an LP
 };
 
-/// Groups of parameters that no row couples, each ascending, ordered by their first member: the sets are then a product.
-/// Parameters in no row form groups of their own.
+/// Groups of parameters that no row couples, each ascending, ordered by their first member: the sets are then a
+/// product. Parameters in no row form groups of their own.
 [[nodiscard]] std::vector<std::vector<std::size_t>> independent_blocks(std::span<const HalfSpace> rows, std::size_t p);
 
 /// { θ in box : a·θ <= b for every row }: bounded by its box; held as the product of its independent blocks.
@@ -67,14 +67,14 @@ class Polytope {
   /// Number of vertices, summed over blocks (of a product: as many support() looks at); 0 unless is_online().
   [[nodiscard]] std::size_t vertex_count() const noexcept { return data_->vertex_count; }
 
-  /// How far, relative to its size in Block::coordinates, the facets were shifted outward to know the vertices (1e-10 or
-  /// so, more where many facets meet in one vertex; 0 where support() is a linear program).
+  /// How far, relative to its size in Block::coordinates, the facets were shifted outward to know the vertices (1e-10
+  /// or so, more where many facets meet in one vertex; 0 where support() is a linear program).
   [[nodiscard]] double looseness() const noexcept { return data_->looseness; }
 
   /// Support function h(a) = max { a·θ : θ in set }, rounded outward, for p finite entries `a` (unchecked). Never above
-  /// the support of hull(). Where is_online(): maximum over vertices, summed over blocks, plus the margin; no allocation.
-  /// Otherwise: a linear program per block, certified by its multipliers; allocates (where memory runs out the program
-  /// terminates), and falls back to the hull where the program fails.
+  /// the support of hull(). Where is_online(): maximum over vertices, summed over blocks, plus the margin; no
+  /// allocation. Otherwise: a linear program per block, certified by its multipliers; allocates (where memory runs out
+  /// the program terminates), and falls back to the hull where the program fails.
   [[nodiscard]] double support(std::span<const double> a) const noexcept;
   /// The same, and writes a maximiser (to rounding) to `maximiser` (p entries).
   double support(std::span<const double> a, std::span<double> maximiser) const noexcept;
@@ -82,8 +82,9 @@ class Polytope {
   /// Whether θ satisfies every facet, within the rounding of its evaluation: never false for an exact member.
   [[nodiscard]] bool contains(std::span<const double> theta) const noexcept;
 
-  /// Centre of the largest ball of each block, after division of every parameter by half its hull's width (the ball then
-  /// does not depend on units). A member of the set wherever the set has an interior; a least-squares estimate need not be.
+  /// Centre of the largest ball of each block, after division of every parameter by half its hull's width (the ball
+  /// then does not depend on units). A member of the set wherever the set has an interior; a least-squares estimate
+  /// need not be.
   [[nodiscard]] const std::vector<double>& chebyshev_centre() const noexcept { return data_->centre; }
 
  private:

@@ -16,8 +16,8 @@ namespace wheelwright {
 ///     (Y − σ dY)θ <= y + dy   and   (Y + σ dY)θ >= y − dy,   σ_j = +1 where θ_j >= 0, −1 where θ_j <= 0.
 ///
 /// Where the box leaves the sign of θ_j open and dY_j > 0, |θ_j| is replaced by its chord over the side,
-/// |θ_j| <= (s θ_j + t), s = (u + l)/(u − l), t = −2ul/(u − l): the convex hull of that row's set, an outer description.
-/// All rounding is outward: no admissible θ of the box is cut off.
+/// |θ_j| <= (s θ_j + t), s = (u + l)/(u − l), t = −2ul/(u − l): the convex hull of that row's set, an outer
+/// description. All rounding is outward: no admissible θ of the box is cut off.
 class SlabRows {
  public:
   /// Throws InvalidArgument unless the box is finite.

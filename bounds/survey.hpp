@@ -26,8 +26,8 @@ struct Survey {
 /// disagree, a number is not finite, or a bound is negative.
 [[nodiscard]] Survey survey(RegressionSource& source, const Box& prior, const std::vector<std::size_t>& excluded = {});
 
-/// Least squares with the weights of the survey, drawn to the middle of the box by the weight of its half-widths (so that
-/// it exists for any rank). Uncertified; it need not lie in the box.
+/// Least squares with the weights of the survey, drawn to the middle of the box by the weight of its half-widths (so
+/// that it exists for any rank). Uncertified; it need not lie in the box.
 [[nodiscard]] Eigen::VectorXd weighted_estimate(const Survey& survey, const Box& prior);
 
 }  // namespace wheelwright

@@ -54,7 +54,8 @@ TEST(ClosedForm, all_sign_rows_give_the_l1_ball) {
         largest = std::max(largest, std::abs(x));
       }
       EXPECT_GE(set.polytope->support(a), largest) << p;
-      // The ball's inner radius is 1/√p: facets that are shifted by s scale it by 1 + s√p at most (p to spare a rotation).
+      // The ball's inner radius is 1/√p: facets that are shifted by s scale it by 1 + s√p at most (p to spare a
+      // rotation).
       EXPECT_LE(set.polytope->support(a), largest * (1.0 + set.polytope->looseness() * static_cast<double>(p)) + 1e-9);
     }
   }

@@ -69,8 +69,8 @@ TEST(FeasibleSet, holds_the_truth_where_signs_are_open) {
   }
 }
 
-// {|θ − 1| <= 0.5 + |θ|/2}: θ >= 0 gives [1/3, 3], θ <= 0 gives nothing but 1 − θ <= 0.5 − θ/2, never. And with y = 0.1:
-// |θ − 0.1| <= 0.5 + |θ|/2 is [−0.8, 1.2], a union of two signs.
+// {|θ − 1| <= 0.5 + |θ|/2}: θ >= 0 gives [1/3, 3], θ <= 0 gives nothing but 1 − θ <= 0.5 − θ/2, never. And with y =
+// 0.1: |θ − 0.1| <= 0.5 + |θ|/2 is [−0.8, 1.2], a union of two signs.
 TEST(FeasibleSet, errors_in_variables_in_closed_form) {
   const auto hull_of = [](double y) {
     Rows rows(1);
