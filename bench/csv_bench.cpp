@@ -24,8 +24,8 @@ constexpr int repetitions = 5;
 
 /// A file that is gone when the benchmark is.
 struct TemporaryFile {
-  std::filesystem::path path = std::filesystem::temp_directory_path() / fmt::format("wheelwright-bench-{}.csv",
-                                                                                    std::random_device{}());
+  std::filesystem::path path =
+      std::filesystem::temp_directory_path() / fmt::format("wheelwright-bench-{}.csv", std::random_device{}());
   TemporaryFile() = default;
   TemporaryFile(const TemporaryFile&) = delete;
   TemporaryFile& operator=(const TemporaryFile&) = delete;
@@ -76,7 +76,8 @@ void walk(LogSource& log) {
 }
 
 Measurement measure(const std::string& name, const std::filesystem::path& path, const std::function<void()>& ours) {
-  const auto [seconds, peer_seconds] = interleaved_medians(ours, [&] { read_bare(path); }, repetitions);
+  const auto [seconds, peer_seconds] = interleaved_medians(
+      ours, [&] { read_bare(path); }, repetitions);
   const double megabytes = 1e-6 * static_cast<double>(std::filesystem::file_size(path));
   return {name, rows, 0, 1, seconds, "bare read", peer_seconds, fmt::format("{:.0f} MB/s", megabytes / seconds)};
 }
@@ -85,8 +86,7 @@ std::vector<Measurement> csv_against_bare_read() {
   const TemporaryFile file;
   write_log(file.path);
   CsvLog log({file.path});
-  return {measure("io/csv walk", file.path, [&] { walk(log); }),
-          measure("io/csv open and walk", file.path, [&] {
+  return {measure("io/csv walk", file.path, [&] { walk(log); }), measure("io/csv open and walk", file.path, [&] {
             CsvLog fresh({file.path});
             walk(fresh);
           })};

@@ -30,9 +30,14 @@ std::vector<std::string> words_of(std::string_view text) {
 }
 
 std::string json_line(const Measurement& m) {
-  nlohmann::ordered_json line = {{"name", m.name},       {"rows", m.rows}, {"p", m.p},
-                                 {"threads", m.threads}, {"seconds", m.seconds}, {"peer", m.peer},
-                                 {"peer_seconds", m.peer_seconds}, {"ratio", m.peer_seconds / m.seconds}};
+  nlohmann::ordered_json line = {{"name", m.name},
+                                 {"rows", m.rows},
+                                 {"p", m.p},
+                                 {"threads", m.threads},
+                                 {"seconds", m.seconds},
+                                 {"peer", m.peer},
+                                 {"peer_seconds", m.peer_seconds},
+                                 {"ratio", m.peer_seconds / m.seconds}};
   if (!m.note.empty()) {
     line["note"] = m.note;
   }
@@ -46,9 +51,10 @@ std::string table_line(const Measurement& m) {
 }
 
 int usage() {
-  fmt::print(stderr, "usage: wheelwright-bench [--filter WORDS] [--json]\n"
-                     "  --filter WORDS  only benchmarks whose name has one of the words (separated by blanks or commas)\n"
-                     "  --json          one JSON object a line\n");
+  fmt::print(stderr,
+             "usage: wheelwright-bench [--filter WORDS] [--json]\n"
+             "  --filter WORDS  only benchmarks whose name has one of the words (separated by blanks or commas)\n"
+             "  --json          one JSON object a line\n");
   return 2;
 }
 

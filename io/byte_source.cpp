@@ -186,11 +186,15 @@ constexpr std::array<Magic, 9> not_text = {{{"PK\x03\x04", "a zip archive"},
                                             {"SQLite format 3", "an SQLite file (rosbag2?)"},
                                             {"\x89HDF", "an HDF5 file"},
                                             {"\x89MCAP", "an MCAP file"},
-                                            {"\xFD" "7zXZ", "an xz file"},
+                                            {"\xFD"
+                                             "7zXZ",
+                                             "an xz file"},
                                             {"BZh", "a bzip2 file"},
                                             {"\xFF\xFE", "UTF-16 text"},
                                             {"\xFE\xFF", "UTF-16 text"},
-                                            {"\x7F" "ELF", "a program"}}};
+                                            {"\x7F"
+                                             "ELF",
+                                             "a program"}}};
 
 }  // namespace
 

@@ -26,8 +26,8 @@ class ByteSource {
   [[nodiscard]] virtual const char* packing() const = 0;
 };
 
-/// Opens `path`. Throws InputError, naming it, when it is missing, a directory, not a regular file, empty, unreadable, or
-/// a known format that is not text (zip, SQLite, HDF5, MCAP, xz, bzip2, UTF-16).
+/// Opens `path`. Throws InputError, naming it, when it is missing, a directory, not a regular file, empty, unreadable,
+/// or a known format that is not text (zip, SQLite, HDF5, MCAP, xz, bzip2, UTF-16).
 [[nodiscard]] std::unique_ptr<ByteSource> open_bytes(const std::filesystem::path& path, bool hashed = false);
 
 /// All bytes of `path`, unpacked. Throws InputError as open_bytes does, and when there are more than `limit`.

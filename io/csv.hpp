@@ -23,8 +23,8 @@ namespace wheelwright {
 class CsvLog final : public LogSource {
  public:
   /// Reads all of `paths` once: the median step, the hashes, and everything that report() says. Each file begins a new
-  /// segment; columns() are those that all files have, in the order of the first. What is repaired and counted, and what
-  /// is not:
+  /// segment; columns() are those that all files have, in the order of the first. What is repaired and counted, and
+  /// what is not:
   /// - a row with an empty, NaN or infinite used field, or with the time of the row before, is dropped;
   /// - time that goes backwards, and a step of more than 5 × the median step, begin a new segment;
   /// - `theta` is unwrapped inside a segment, so that no step exceeds π;
@@ -66,8 +66,8 @@ class CsvRowParser {
 
   /// Columns of the rows, time apart.
   [[nodiscard]] const std::vector<std::string>& columns() const;
-  /// Reads the next line (its line end may be there or not). Returns true with the row in `block`; false when the line is
-  /// blank, a comment, or dropped (see report()). Throws InputError as CsvLog does; the parser can go on after that.
+  /// Reads the next line (its line end may be there or not). Returns true with the row in `block`; false when the line
+  /// is blank, a comment, or dropped (see report()). Throws InputError as CsvLog does; the parser can go on after that.
   bool parse(std::string_view line, LogBlock& block);
   /// What was met so far; LogReport::files is empty.
   [[nodiscard]] const LogReport& report() const;
@@ -77,19 +77,19 @@ class CsvRowParser {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Throws InputError, naming each missing column, `file`, what the file has and the nearest name, unless `source` has all
-/// of `names`. A name may list alternatives of which one suffices: "omega_r|phi_r". `header` is what the file has as
-/// written; where it is empty, the columns of `source` are named.
+/// Throws InputError, naming each missing column, `file`, what the file has and the nearest name, unless `source` has
+/// all of `names`. A name may list alternatives of which one suffices: "omega_r|phi_r". `header` is what the file has
+/// as written; where it is empty, the columns of `source` are named.
 void require_columns(const LogSource& source, const std::vector<std::string>& names, std::string_view file,
                      const std::vector<std::string>& header = {});
 
 /// The same for a CSV log, which knows its files.
 void require_columns(const CsvLog& log, const std::vector<std::string>& names);
 
-/// Writes `table` with the header t, names...; numbers are the shortest that read back exactly. Packed with gzip or zstd
-/// when the name ends in .gz or .zst. The file appears whole or not at all. Segments are not marked: a reader finds those
-/// that begin at a gap or a reset. Throws InvalidArgument when the columns differ in length, a value is not finite or a
-/// name is not fit for a header; InputError when the file cannot be written.
+/// Writes `table` with the header t, names...; numbers are the shortest that read back exactly. Packed with gzip or
+/// zstd when the name ends in .gz or .zst. The file appears whole or not at all. Segments are not marked: a reader
+/// finds those that begin at a gap or a reset. Throws InvalidArgument when the columns differ in length, a value is not
+/// finite or a name is not fit for a header; InputError when the file cannot be written.
 void write_csv(const std::filesystem::path& path, const LogTable& table);
 
 }  // namespace wheelwright

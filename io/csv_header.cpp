@@ -35,9 +35,8 @@ char find_separator(std::string_view line) {
 }
 
 void check_is_text(std::string_view line, const std::string& place) {
-  const bool binary = std::any_of(line.begin(), line.end(), [](char c) {
-    return static_cast<unsigned char>(c) < 0x20 && c != '\t' && c != '\r';
-  });
+  const bool binary = std::any_of(
+      line.begin(), line.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20 && c != '\t' && c != '\r'; });
   if (binary) {
     throw InputError(place + ": binary data: expected a header line with the names of the columns");
   }
@@ -78,20 +77,21 @@ std::size_t demand_field(const std::vector<std::string>& fields, const std::stri
     }
     return *field;
   }
-  throw InputError(fmt::format("{}: no column {} ({}): expected one of {}{}", place, shown(name), why,
-                               listed(fields), did_you_mean(name, fields)));
+  throw InputError(fmt::format("{}: no column {} ({}): expected one of {}{}", place, shown(name), why, listed(fields),
+                               did_you_mean(name, fields)));
 }
 
 void recognise(CsvHeader& header, const CsvOptions& options, const std::string& place) {
   std::map<std::string, std::vector<std::size_t>> candidates;
   for (std::size_t k = 0; k < header.fields.size(); ++k) {
-    const bool taken = std::any_of(header.found.begin(), header.found.end(), [&](const auto& f) { return f.second == k; });
+    const bool taken =
+        std::any_of(header.found.begin(), header.found.end(), [&](const auto& f) { return f.second == k; });
     const LogColumn* column = recognise_log_column(header.fields[k]);
     if (taken || column == nullptr || header.found.contains(column->name)) {
       continue;
     }
-    if (column->name != "t" && options.only && std::find(options.only->begin(), options.only->end(), column->name) ==
-                                                   options.only->end()) {
+    if (column->name != "t" && options.only &&
+        std::find(options.only->begin(), options.only->end(), column->name) == options.only->end()) {
       continue;
     }
     candidates[column->name].push_back(k);

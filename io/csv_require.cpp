@@ -38,7 +38,8 @@ void require_columns(const LogSource& source, const std::vector<std::string>& na
   std::string missing, hint;
   for (const std::string& name : names) {
     const auto alternatives = alternatives_of(name);
-    if (std::any_of(alternatives.begin(), alternatives.end(), [&](const auto& n) { return n == "t" || source.find(n); })) {
+    if (std::any_of(alternatives.begin(), alternatives.end(),
+                    [&](const auto& n) { return n == "t" || source.find(n); })) {
       continue;
     }
     std::string wanted;

@@ -158,8 +158,8 @@ CsvRowReader::Outcome CsvRowReader::read(std::string_view line, std::size_t line
     return Outcome::dropped;
   }
   if (!countable) {
-    throw InputError(fmt::format("{}: {} fields: expected {}, as the header has ({})", at(line_number), fields, known,
-                                 shown(line)));
+    throw InputError(
+        fmt::format("{}: {} fields: expected {}, as the header has ({})", at(line_number), fields, known, shown(line)));
   }
   if (defect.fault == Fault::text || defect.fault == Fault::limit) {
     throw InputError(at(line_number) + ": " + describe(defect));

@@ -27,16 +27,16 @@ class CsvRowReader {
   /// `names` are the columns to read, time apart. What is met is counted in `report` where that is not null.
   CsvRowReader(std::vector<std::string> names, LogReport* report);
 
-  /// Begins a file (and with it a segment) with this header. Throws InputError when two of the columns are one field, or
-  /// a name is not in the header.
+  /// Begins a file (and with it a segment) with this header. Throws InputError when two of the columns are one field,
+  /// or a name is not in the header.
   void begin_file(const CsvHeader& header, std::string path);
 
   /// Steps longer than `seconds` are gaps.
   void set_longest_step(double seconds) { longest_step_ = seconds; }
 
-  /// Reads one line that has content. A line that is not `terminated` may be cut off: it is then dropped where otherwise
-  /// it would be an error. Throws InputError (and keeps the state of before) for text instead of a number, a wrong number
-  /// of fields, and a value beyond LogColumn::limit.
+  /// Reads one line that has content. A line that is not `terminated` may be cut off: it is then dropped where
+  /// otherwise it would be an error. Throws InputError (and keeps the state of before) for text instead of a number, a
+  /// wrong number of fields, and a value beyond LogColumn::limit.
   Outcome read(std::string_view line, std::size_t line_number, bool terminated);
 
   /// Time of the last row, s.
@@ -66,16 +66,16 @@ class CsvRowReader {
 
   std::string path_;
   std::vector<std::string> fields_;
-  std::vector<int> slots_;             ///< field -> index in values_, or −1
-  std::vector<double> limits_;         ///< of each value
+  std::vector<int> slots_;      ///< field -> index in values_, or −1
+  std::vector<double> limits_;  ///< of each value
   char separator_ = ',';
 
-  std::vector<double> values_;         ///< time, then the columns
+  std::vector<double> values_;  ///< time, then the columns
   double t_ = 0.0;
-  bool fresh_ = true;                  ///< the next row begins a segment whatever its time
-  std::size_t theta_ = 0;              ///< index of the heading in values_, 0 where there is none
-  double theta_before_ = 0.0;          ///< as logged
-  double turns_ = 0.0;                 ///< whole turns to add
+  bool fresh_ = true;          ///< the next row begins a segment whatever its time
+  std::size_t theta_ = 0;      ///< index of the heading in values_, 0 where there is none
+  double theta_before_ = 0.0;  ///< as logged
+  double turns_ = 0.0;         ///< whole turns to add
 };
 
 }  // namespace wheelwright

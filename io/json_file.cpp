@@ -52,16 +52,13 @@ Json parse_json(std::string_view text, const std::string& file) {
     const auto line = 1 + std::count(before.begin(), before.end(), '\n');
     const std::size_t newline = before.rfind('\n');
     const std::size_t column = newline == std::string_view::npos ? byte + 1 : byte - newline;
-    throw InputError(
-        fmt::format("{}:{}:{}: {}: expected JSON", file, line, column, shown(text.substr(byte, 20))));
+    throw InputError(fmt::format("{}:{}:{}: {}: expected JSON", file, line, column, shown(text.substr(byte, 20))));
   } catch (const Json::exception& error) {
     throw InputError(fmt::format("{}: {}: expected JSON", file, error.what()));
   }
 }
 
-Json read_json(const std::filesystem::path& path) {
-  return parse_json(read_bytes(path, longest_file), path.string());
-}
+Json read_json(const std::filesystem::path& path) { return parse_json(read_bytes(path, longest_file), path.string()); }
 
 JsonPlace::JsonPlace(const Json& value, std::string file) : JsonPlace(value, std::move(file), "") {}
 

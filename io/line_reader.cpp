@@ -31,8 +31,7 @@ bool LineReader::next(std::string_view& line) {
   std::size_t searched = 0;
   const char* newline = nullptr;
   while (newline == nullptr) {
-    newline = static_cast<const char*>(
-        std::memchr(buffer_.data() + begin_ + searched, '\n', end_ - begin_ - searched));
+    newline = static_cast<const char*>(std::memchr(buffer_.data() + begin_ + searched, '\n', end_ - begin_ - searched));
     searched = end_ - begin_;
     if (newline == nullptr && !refill()) {
       break;

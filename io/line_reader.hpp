@@ -19,8 +19,8 @@ class LineReader {
   /// Takes `source` over; `path` is for messages.
   LineReader(std::unique_ptr<ByteSource> source, std::string path);
 
-  /// Sets `line` to the next line, its end removed, and returns true; false at the end of the stream. `line` stays valid
-  /// until the next call. Throws InputError for a line of more than 2^18 bytes.
+  /// Sets `line` to the next line, its end removed, and returns true; false at the end of the stream. `line` stays
+  /// valid until the next call. Throws InputError for a line of more than 2^18 bytes.
   bool next(std::string_view& line);
 
   /// Number of the line that was returned last; the first is 1.

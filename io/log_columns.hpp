@@ -12,11 +12,11 @@ namespace wheelwright {
 
 /// One column of the contract.
 struct LogColumn {
-  std::string name;           ///< e.g. "omega_r"
-  std::string_view meaning;   ///< e.g. "speed of the right wheel"
-  std::string_view unit;      ///< SI
-  double limit;               ///< |value| above this cannot be meant in `unit`
-  std::string_view spellings; ///< other names, separated by blanks; '@' stands for r|right (l|left)
+  std::string name;            ///< e.g. "omega_r"
+  std::string_view meaning;    ///< e.g. "speed of the right wheel"
+  std::string_view unit;       ///< SI
+  double limit;                ///< |value| above this cannot be meant in `unit`
+  std::string_view spellings;  ///< other names, separated by blanks; '@' stands for r|right (l|left)
 };
 
 /// All columns of the contract, time first.

@@ -19,8 +19,7 @@ bool is_digit(char c) { return static_cast<unsigned char>(c - '0') < 10; }
 /// Whether the decimal number in [first, last), known to be out of range, is too large and not too small: its leading
 /// non-zero digit stands at 10^k with k > 0.
 bool is_too_large(const char* first, const char* last) {
-  const char* const mantissa_end =
-      std::find_if(first, last, [](char c) { return c == 'e' || c == 'E'; });
+  const char* const mantissa_end = std::find_if(first, last, [](char c) { return c == 'e' || c == 'E'; });
   const char* const point = std::find(first, mantissa_end, '.');
   const char* const leading = std::find_if(first, mantissa_end, [](char c) { return c != '0' && c != '.'; });
   long exponent = 0;

@@ -183,8 +183,8 @@ struct RobotReader {
         continue;
       }
       if (name == "order") {
-        robot.filter.order =
-            static_cast<int>(value.number("1, 2 or auto", [](double number) { return number == 1.0 || number == 2.0; }));
+        robot.filter.order = static_cast<int>(
+            value.number("1, 2 or auto", [](double number) { return number == 1.0 || number == 2.0; }));
       } else {
         const double rate = value.number("a rate > 0 in 1/s, or auto", [](double number) { return number > 0.0; });
         (name == "alpha" ? robot.filter.alpha : robot.filter.beta) = rate;

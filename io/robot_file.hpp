@@ -17,15 +17,16 @@ namespace wheelwright {
 ///
 ///     name, model: differential_drive | single_axis, wheel_radius (m), track_width (m), lever_arm: half_track | track,
 ///     friction: isotropic | anisotropic, parameters: [physical names], effort: {kind: torque | current | voltage,
-///     hold: zero_order | first_order, unsigned: bool}, nominal: {physical name: value}, prior: {physical name: [lo, hi]},
-///     noise: estimate | {wheel_speed, wheel_angle, effort, position, heading: bound | estimate},
-///     filter: auto | {order: 1 | 2, alpha, beta: 1/s}, encoder_counts_per_turn, speed_source: auto | encoder_difference
-///     | measured, limits: {effort, speed, acceleration}, motor: {torque_constant, resistance, back_emf, gear_ratio}
+///     hold: zero_order | first_order, unsigned: bool}, nominal: {physical name: value}, prior: {physical name: [lo,
+///     hi]}, noise: estimate | {wheel_speed, wheel_angle, effort, position, heading: bound | estimate},
+///     filter: auto | {order: 1 | 2, alpha, beta: 1/s}, encoder_counts_per_turn, speed_source: auto |
+///     encoder_difference | measured, limits: {effort, speed, acceleration}, motor: {torque_constant, resistance,
+///     back_emf, gear_ratio}
 ///
-/// Physical names: mass, yaw_inertia, viscous_linear, viscous_yaw (differential_drive; viscous_x and viscous_y instead of
-/// viscous_linear where the friction is anisotropic); inertia, viscous, coulomb, offset (single_axis).
-/// Throws InputError, naming file, line, key, value and what was expected, for unknown or repeated keys, wrong types and
-/// impossible values.
+/// Physical names: mass, yaw_inertia, viscous_linear, viscous_yaw (differential_drive; viscous_x and viscous_y instead
+/// of viscous_linear where the friction is anisotropic); inertia, viscous, coulomb, offset (single_axis).
+/// Throws InputError, naming file, line, key, value and what was expected, for unknown or repeated keys, wrong types
+/// and impossible values.
 [[nodiscard]] Robot read_robot(const std::filesystem::path& path);
 
 /// The same from text; `file` is for messages.
@@ -37,7 +38,8 @@ void write_robot(const std::filesystem::path& path, const Robot& robot);
 /// The robot as a JSON object with the keys of the robot file (schema: io/robot.schema.json).
 [[nodiscard]] Json to_json(const Robot& robot);
 
-/// The Robot of such an object. `where` ("model.json: /robot") is for messages; InputError as read_robot, without lines.
+/// The Robot of such an object. `where` ("model.json: /robot") is for messages; InputError as read_robot, without
+/// lines.
 [[nodiscard]] Robot robot_from_json(const Json& object, const std::string& where);
 
 }  // namespace wheelwright

@@ -25,9 +25,7 @@ Word load(const char* data) {
   return word;
 }
 
-std::uint64_t round(std::uint64_t lane, std::uint64_t word) {
-  return std::rotl(lane + word * prime2, 31) * prime1;
-}
+std::uint64_t round(std::uint64_t lane, std::uint64_t word) { return std::rotl(lane + word * prime2, 31) * prime1; }
 
 }  // namespace
 

@@ -26,19 +26,16 @@ struct YamlPlace::Node {
   }
   [[nodiscard]] std::string value() const {
     switch (node.Type()) {
-      case YAML::NodeType::Scalar:
-        return shown(node.Scalar());
-      case YAML::NodeType::Sequence:
-        return fmt::format("a list of {}", node.size());
-      case YAML::NodeType::Map:
-        return "a mapping";
-      default:
-        return "nothing";
+      case YAML::NodeType::Scalar: return shown(node.Scalar());
+      case YAML::NodeType::Sequence: return fmt::format("a list of {}", node.size());
+      case YAML::NodeType::Map: return "a mapping";
+      default: return "nothing";
     }
   }
 };
 
-YamlPlace::YamlPlace(std::shared_ptr<const Node> node, std::string key) : node_(std::move(node)), key_(std::move(key)) {}
+YamlPlace::YamlPlace(std::shared_ptr<const Node> node, std::string key)
+    : node_(std::move(node)), key_(std::move(key)) {}
 
 YamlPlace YamlPlace::parse(std::string_view text, std::string file, bool lines) {
   if (text.find('\0') != std::string_view::npos) {
@@ -56,8 +53,8 @@ YamlPlace YamlPlace::parse(std::string_view text, std::string file, bool lines) 
     }
     YamlPlace place(std::make_shared<const Node>(Node{root, shared, lines}), "");
     if (!root.IsMap()) {
-      throw InputError(fmt::format("{}: {}: expected keys with values (name: my_robot, ...)", *shared,
-                                   place.node_->value()));
+      throw InputError(
+          fmt::format("{}: {}: expected keys with values (name: my_robot, ...)", *shared, place.node_->value()));
     }
     return place;
   } catch (const YAML::Exception& error) {

@@ -16,8 +16,8 @@ namespace wheelwright {
 /// "robot.yaml:4: wheel_radius: 'abc': expected a number > 0".
 class YamlPlace {
  public:
-  /// Parses `text`; `file` is for messages, and `lines` says whether they name lines. Throws InputError, naming file and
-  /// line, when it is no YAML or holds no mapping.
+  /// Parses `text`; `file` is for messages, and `lines` says whether they name lines. Throws InputError, naming file
+  /// and line, when it is no YAML or holds no mapping.
   static YamlPlace parse(std::string_view text, std::string file, bool lines = true);
 
   /// Members of a mapping in the order of the file. Throws for a node that is none, for keys that are not plain names,

@@ -16,11 +16,11 @@ namespace {
 using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-using ::testing::IsEmpty;
 using testing::input_error;
+using ::testing::IsEmpty;
 
-/// A log of `rows` rows t, omega_r, omega_l, tau_r, tau_l, theta at 100 Hz with a gap after a third and a reset after two
-/// thirds.
+/// A log of `rows` rows t, omega_r, omega_l, tau_r, tau_l, theta at 100 Hz with a gap after a third and a reset after
+/// two thirds.
 LogTable sample_table(std::size_t rows, unsigned seed = 1) {
   std::mt19937_64 random(seed);
   const auto uniform = [&] { return static_cast<double>(random() >> 11) * 0x1p-52 - 1.0; };
@@ -123,13 +123,14 @@ TEST_F(Csv, BlocksDoNotDependOnTheirSize) {
 
 TEST_F(Csv, EachFileBeginsASegmentAndSharedColumnsAreKept) {
   put("a.csv", "t,omega_r,tau_r\n" + rows_of(0, 30));
-  put("b.csv", "tau_r;t;x\n" + [] {
-    std::string text;
-    for (int k = 30; k < 50; ++k) {
-      text += "5;" + std::to_string(k) + ";7\n";
-    }
-    return text;
-  }());
+  put(
+      "b.csv", "tau_r;t;x\n" + [] {
+        std::string text;
+        for (int k = 30; k < 50; ++k) {
+          text += "5;" + std::to_string(k) + ";7\n";
+        }
+        return text;
+      }());
   CsvLog log({path("a.csv"), path("b.csv")});
   const LogTable table = read_all(log);
   EXPECT_THAT(table.names, ElementsAre("tau_r"));
@@ -193,8 +194,9 @@ TEST_F(Csv, OnlyWantedColumnsMatter) {
 }
 
 TEST_F(Csv, CountsEveryRowThatItDrops) {
-  const LogTable table = read("t,omega_r,tau_r\n" + rows_of(0, 10) + "10,,2\n10.2,nan,2\n10.4,1,-inf\n10.5,1,NA\n11,1,2\n" +
-                              "11,3,4\n11.0,5,6\n" + rows_of(12, 30) + "30,1");
+  const LogTable table =
+      read("t,omega_r,tau_r\n" + rows_of(0, 10) + "10,,2\n10.2,nan,2\n10.4,1,-inf\n10.5,1,NA\n11,1,2\n" +
+           "11,3,4\n11.0,5,6\n" + rows_of(12, 30) + "30,1");
   EXPECT_EQ(table.rows(), 10u + 1u + 18u);
   EXPECT_EQ(report.rows, table.rows());
   EXPECT_EQ(report.rows_read, table.rows() + 7u);
@@ -302,9 +304,8 @@ TEST_F(CsvError, Headers) {
     return input_error([&] { read(header + "\n" + rows_of(0, 30), options); });
   };
   EXPECT_THAT(error("0.1,2.5,3"), AllOf(HasSubstr("log.csv:1"), HasSubstr("expected a header line")));
-  EXPECT_THAT(error("tme,omega_r,tau_r"),
-              AllOf(HasSubstr("log.csv:1: no column for t (time, s)"), HasSubstr("tme, omega_r, tau_r"),
-                    HasSubstr("did you mean 'tme'?")));
+  EXPECT_THAT(error("tme,omega_r,tau_r"), AllOf(HasSubstr("log.csv:1: no column for t (time, s)"),
+                                                HasSubstr("tme, omega_r, tau_r"), HasSubstr("did you mean 'tme'?")));
   EXPECT_THAT(error("Time [ms],omega_r,tau_r"), HasSubstr("no column for t (time, s)"));
   EXPECT_THAT(error("t,w_r,wheel_right_vel"),
               AllOf(HasSubstr("'w_r' and 'wheel_right_vel' both mean omega_r"), HasSubstr("--map omega_r=COLUMN")));
@@ -329,9 +330,10 @@ TEST_F(CsvError, Rows) {
   EXPECT_THAT(error("12:30:01,1,2"), HasSubstr("log.csv:32: column 't': '12:30:01': expected a number"));
   EXPECT_THAT(error("31,1"), AllOf(HasSubstr("log.csv:32: 2 fields: expected 3"), HasSubstr("'31,1'")));
   EXPECT_THAT(error("31,1,2,3"), HasSubstr("log.csv:32: 4 fields: expected 3"));
-  EXPECT_THAT(error("31,57000,2"),
-              HasSubstr("log.csv:32: column 'omega_r': '57000': expected speed of the right wheel in rad/s, of magnitude "
-                        "at most 10000"));
+  EXPECT_THAT(
+      error("31,57000,2"),
+      HasSubstr("log.csv:32: column 'omega_r': '57000': expected speed of the right wheel in rad/s, of magnitude "
+                "at most 10000"));
   EXPECT_THAT(error("1.7e18,1,2"), HasSubstr("column 't': '1.7e18': expected time in s"));
   EXPECT_THAT(error(std::string("31,\0\0\0,2", 8)), HasSubstr("expected a number"));
   EXPECT_THAT(input_error([&] { read("t;omega_r\n0;0,5\n1;0,7\n"); }),
@@ -353,7 +355,9 @@ TEST_F(CsvError, MissingColumnsAreNamedWithTheNearest) {
   put("log.csv", "t,omega_r,torqe_r\n" + rows_of(0, 20));
   CsvLog log({path("log.csv")});
   require_columns(log, {"t", "omega_r", "omega_r|phi_r", "phi_r|omega_r"});
-  EXPECT_THAT(input_error([&] { require_columns(log, {"omega_r", "tau_r|torque_r", "x"}); }),
+  EXPECT_THAT(input_error([&] {
+                require_columns(log, {"omega_r", "tau_r|torque_r", "x"});
+              }),
               AllOf(HasSubstr("log.csv: no column for tau_r (torque at the right wheel, N·m) or torque_r; x"),
                     HasSubstr("the file has t, omega_r, torqe_r"), HasSubstr("did you mean 'torqe_r'?")));
   const LogTable table = sample_table(30);
@@ -383,7 +387,7 @@ TEST_F(CsvError, Writing) {
 }
 
 TEST(CsvRowParser, CleansAsTheFileReaderDoes) {
-  const std::string lines[] = {"0,0.5,3.0", "1,0.6,3.1", "# note", "1,0.7,3.1", "2,nan,3.1",  "3,0.8,-3.1",
+  const std::string lines[] = {"0,0.5,3.0", "1,0.6,3.1", "# note", "1,0.7,3.1", "2,nan,3.1",     "3,0.8,-3.1",
                                "",          "4,,1",      "5,1,-3", "20,1,3",    "21,1,-3.1\r\n", "2,1,0"};
   CsvRowParser parser("t,omega_r,theta\n", {}, 1.0);
   EXPECT_THAT(parser.columns(), ElementsAre("omega_r", "theta"));

@@ -23,20 +23,11 @@ std::string mutated(std::string text, std::mt19937_64& random, const std::string
   for (std::uint64_t left = random() % 6; left > 0 && !text.empty(); --left) {
     const std::size_t at = random() % text.size();
     switch (random() % 5) {
-      case 0:
-        text[at] = static_cast<char>(random());
-        break;
-      case 1:
-        text.erase(at, 1 + random() % 8);
-        break;
-      case 2:
-        text.insert(at, 1, spice[random() % spice.size()]);
-        break;
-      case 3:
-        text.insert(at, text.substr(random() % text.size(), random() % 40));
-        break;
-      default:
-        text[at] = spice[random() % spice.size()];
+      case 0: text[at] = static_cast<char>(random()); break;
+      case 1: text.erase(at, 1 + random() % 8); break;
+      case 2: text.insert(at, 1, spice[random() % spice.size()]); break;
+      case 3: text.insert(at, text.substr(random() % text.size(), random() % 40)); break;
+      default: text[at] = spice[random() % spice.size()];
     }
   }
   return text;
@@ -111,7 +102,8 @@ TEST_F(Fuzz, RowParser) {
     try {
       if (parser.parse(random() % 2 == 0 ? line : mutated(line, random, ",;\"\r\n#-+.e0123456789nai "), block)) {
         ++rows;
-        ASSERT_TRUE(std::isfinite(block.t[0]) && std::isfinite(block.columns[0][0]) && std::isfinite(block.columns[1][0]));
+        ASSERT_TRUE(std::isfinite(block.t[0]) && std::isfinite(block.columns[0][0]) &&
+                    std::isfinite(block.columns[1][0]));
       }
     } catch (const InputError&) {
     }
@@ -144,7 +136,8 @@ TEST_F(Fuzz, Robot) {
 
 TEST_F(Fuzz, JsonText) {
   std::mt19937_64 random(15);
-  const std::string good = R"({"schema": "wheelwright/model/1", "parameters": [{"name": "m", "lower": 1.5}], "x": null})";
+  const std::string good =
+      R"({"schema": "wheelwright/model/1", "parameters": [{"name": "m", "lower": 1.5}], "x": null})";
   for (int k = 0; k < 5000; ++k) {
     try {
       const Json value = parse_json(mutated(good, random, "{}[],:\"\\0123456789eE-+.tfn "), "m.json");

@@ -37,8 +37,9 @@ TEST(Number, ReadsWhatTheCLibraryReads) {
 }
 
 TEST(Number, RoundsHalfwayCasesToEven) {
-  for (const char* text : {"9007199254740993", "9007199254740991", "1.00000000000000011102230246251565", "0.1e23", "1e23",
-                           "123456789012345678", "8.5e-22", "0.3", "2.2250738585072011e-308", "4.9e-324", "-0.0", "-0"}) {
+  for (const char* text :
+       {"9007199254740993", "9007199254740991", "1.00000000000000011102230246251565", "0.1e23", "1e23",
+        "123456789012345678", "8.5e-22", "0.3", "2.2250738585072011e-308", "4.9e-324", "-0.0", "-0"}) {
     ASSERT_EQ(bits(to_number(text).value()), bits(std::strtod(text, nullptr))) << text;
   }
 }
@@ -61,8 +62,8 @@ TEST(Number, KnowsNanAndInfinity) {
 }
 
 TEST(Number, RejectsWhatIsNoNumber) {
-  for (const char* text : {"", " ", "abc", "1,5", "1.2.3", "0x10", "--1", "+-1", "-", "+", ".", "e5", "1e", "1e+", "1 2",
-                           "12:30", "1_000", "1.5m"}) {
+  for (const char* text : {"", " ", "abc", "1,5", "1.2.3", "0x10", "--1", "+-1", "-", "+", ".", "e5", "1e", "1e+",
+                           "1 2", "12:30", "1_000", "1.5m"}) {
     EXPECT_FALSE(to_number(text).has_value()) << text;
   }
 }

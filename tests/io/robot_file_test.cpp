@@ -71,8 +71,10 @@ TEST(RobotFile, DefaultsAreThoseOfRobot) {
 }
 
 TEST(RobotFile, SingleAxisAndAnisotropicFriction) {
-  const Robot axis = parse_robot("model: single_axis\nparameters: [inertia, viscous, coulomb, offset]\n"
-                                 "prior: {offset: [-10, 10]}\nnominal: {offset: -3, coulomb: 0}\n", "f");
+  const Robot axis = parse_robot(
+      "model: single_axis\nparameters: [inertia, viscous, coulomb, offset]\n"
+      "prior: {offset: [-10, 10]}\nnominal: {offset: -3, coulomb: 0}\n",
+      "f");
   EXPECT_EQ(axis.prior.at("offset"), (Interval{-10.0, 10.0}));
   EXPECT_EQ(axis.parameters.value().size(), 4u);
   const Robot drive = parse_robot("nominal: {viscous_x: 1, viscous_y: 2}\nfriction: anisotropic\n" + least, "f");
@@ -99,7 +101,8 @@ TEST_F(RobotFiles, FilesThatAreNone) {
   EXPECT_THAT(input_error([&] { (void)read_robot(directory_); }), HasSubstr("is a directory"));
   EXPECT_THAT(input_error([&] { (void)read_robot(put("e.yaml", "")); }), HasSubstr("e.yaml: is empty"));
   EXPECT_THAT(input_error([&] { (void)read_robot(put("b.yaml", std::string("a\0b", 3))); }), HasSubstr("binary data"));
-  EXPECT_THAT(input_error([&] { (void)read_robot(put("l.yaml", std::string(2000000, 'a'))); }), HasSubstr("longer than"));
+  EXPECT_THAT(input_error([&] { (void)read_robot(put("l.yaml", std::string(2000000, 'a'))); }),
+              HasSubstr("longer than"));
 }
 
 struct Bad {
@@ -124,12 +127,15 @@ INSTANTIATE_TEST_SUITE_P(
         Bad{"lever_arm: half", "lever_arm: 'half': expected one of half_track, track"},
         Bad{"lever_arm: [track]", "lever_arm: a list of 1: expected one of half_track, track"},
         Bad{"friction: none", "friction: 'none': expected one of isotropic, anisotropic"},
-        Bad{"friction: isotropc", "friction: 'isotropc': expected one of isotropic, anisotropic; did you mean 'isotropic'?"},
+        Bad{"friction: isotropc",
+            "friction: 'isotropc': expected one of isotropic, anisotropic; did you mean 'isotropic'?"},
         Bad{"effort: torque", "effort: 'torque': expected keys with values, of kind, hold, unsigned"},
-        Bad{"effort: {kind: torqe}", "effort.kind: 'torqe': expected one of torque, current, voltage; did you mean 'torque'?"},
+        Bad{"effort: {kind: torqe}",
+            "effort.kind: 'torqe': expected one of torque, current, voltage; did you mean 'torque'?"},
         Bad{"effort: {hold: none}", "effort.hold: 'none': expected one of zero_order, first_order"},
         Bad{"effort: {unsigned: maybe}", "effort.unsigned: 'maybe': expected one of true, false"},
-        Bad{"effort: {knd: torque}", "effort: unknown key 'knd': expected one of kind, hold, unsigned; did you mean 'kind'?"},
+        Bad{"effort: {knd: torque}",
+            "effort: unknown key 'knd': expected one of kind, hold, unsigned; did you mean 'kind'?"},
         Bad{"nominal: {mas: 3}", "nominal: unknown key 'mas'"},
         Bad{"nominal: {mass: -3}", "nominal.mass: '-3': expected a number > 0"},
         Bad{"nominal: {mass: heavy}", "nominal.mass: 'heavy': expected a number > 0"},
@@ -163,8 +169,7 @@ INSTANTIATE_TEST_SUITE_P(
         Bad{"parameters: [mass, mass]", "parameters: 'mass': expected each name once"},
         Bad{"parameters: [coulomb]", "parameters: 'coulomb': expected one of mass"},
         Bad{"parameters: []", "parameters: a list of 0: expected at least one of"},
-        Bad{"name: {a: b}", "name: a mapping: expected a name"},
-        Bad{"[a, b]: c", "a list of 2: expected a key"}));
+        Bad{"name: {a: b}", "name: a mapping: expected a name"}, Bad{"[a, b]: c", "a list of 2: expected a key"}));
 
 TEST(RobotFile, BadValuesElsewhere) {
   const auto error = [](const std::string& text) {

@@ -25,7 +25,8 @@ TEST(Xxh64, AgreesWithTheReference) {
   EXPECT_EQ(hash_of("abc"), 0x44bc2cf5ad770999ULL);
   EXPECT_EQ(hash_of("wheelwright"), 0xa083bd29736a3a82ULL);
   EXPECT_EQ(hash_of("t,omega_r,omega_l,tau_r,tau_l,x,y"), 0x4ef97f8cd8011811ULL);
-  EXPECT_EQ(hash_of("t,omega_r,omega_l,tau_r,tau_l,x,y,theta,gyro_z,command_r,command_l, 0.005,-0.0383,0.0000,-0.011,0.056,-0.1129"),
+  EXPECT_EQ(hash_of("t,omega_r,omega_l,tau_r,tau_l,x,y,theta,gyro_z,command_r,command_l, "
+                    "0.005,-0.0383,0.0000,-0.011,0.056,-0.1129"),
             0x498f98ab647b6599ULL);
 }
 
