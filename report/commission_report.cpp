@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/report/commission_report.hpp>
+
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include <wheelwright/report/commission_words.hpp>
+#include <wheelwright/report/data_sections.hpp>
+#include <wheelwright/report/page.hpp>
+#include <wheelwright/report/parameter_table.hpp>
+#include <wheelwright/report/parameter_view.hpp>
+#include <wheelwright/report/signals.hpp>
+#include <wheelwright/report/text.hpp>
+
+namespace wheelwright {
+
+using namespace report;
+
+namespace {
+
+TimeAxis axis_for(const ReportContext& context) {
+  if (context.signals && context.signals->rows() > 0) {
+    return TimeAxis(context.signals->t);
+  }
+  return context.own_log ? TimeAxis(context.own_log->trace.t) : TimeAxis();
+}
+
+const char* status_class(Standing standing) {
+  switch (standing) {
+    case Standing::good: return "good";
+    case Standing::caution: return "caution";
+    case Standing::bad: return "bad";
+  }
+  return "bad";
+}
+
+std::vector<ChartMark> contradiction_marks(const Commissioning& result) {
+  std::vector<ChartMark> marks;
+  for (const WeightedRow& w : result.feasible.contradiction) {
+    const RowOrigin& o = w.row.origin;
+    if (!o.is_prior) {
+      marks.push_back({o.t, o.t, output_name(result.model.model, o.output)});
+    }
+  }
+  return marks;
+}
+
+std::string residual_section(const Commissioning& result, const Detection& own, const TimeAxis& axis) {
+  const CommissionedModel& m = result.model;
+  return paragraph(
+             "ε = τ_f − Y_f θ̂ must stay inside the grey band [l, u] while there is no fault: the band holds for every "
+             "parameter of the feasible set and every admissible noise. Drag to zoom (all charts follow), Shift and "
+             "drag to pan, double click for the whole log.") +
+         residual_charts(own.trace, m.robot, m.model, {}, axis) + torque_charts(own.trace, m.robot, m.model, axis);
+}
+
+std::string signals_section(const ReportContext& context, const std::vector<ChartMark>& marks, const TimeAxis& axis) {
+  return context.signals ? signal_charts(*context.signals, marks, axis)
+                         : paragraph("The raw signals were not handed to this page.");
+}
+
+}  // namespace
+
+std::string commission_report(const Commissioning& result, const ReportContext& context) {
+  const TimeAxis axis = axis_for(context);
+  PageContent content;
+  content.title = context.title.empty() ? "Commissioning of " + result.model.robot.name : context.title;
+  content.status = status_class(standing(result));
+  content.verdict = verdict(result);
+  content.sentences = commission_words(result);
+  content.software = context.software;
+  const auto add = [&](const char* id, const char* heading, std::string body) {
+    if (!body.empty()) {
+      content.sections.push_back({id, heading, std::move(body)});
+    }
+  };
+  add("contradiction", "Contradiction", contradiction_section(result, axis));
+  add("parameters", "Parameters", parameter_table(result, axis));
+  if (context.own_log && !context.own_log->trace.t.empty()) {
+    add("residual", "Residual and threshold", residual_section(result, *context.own_log, axis));
+  }
+  add("signals", "Raw signals", signals_section(context, contradiction_marks(result), axis));
+  if (result.status != Commissioning::Status::empty) {
+    add("validation", "Validation on held-out driving", validation_section(result));
+  }
+  add("noise", "Noise", noise_section(result));
+  add("filter", "Filter", filter_section(result));
+  add("data", "Data", data_section(result, context, axis));
+  return page(content);
+}
+
+std::string failure_report(const std::string& error_message, const ReportContext& context) {
+  const TimeAxis axis = axis_for(context);
+  PageContent content;
+  content.title = context.title.empty() ? "Commissioning failed" : context.title;
+  content.status = "bad";
+  content.verdict = "No result: commissioning stopped with an error.";
+  content.sentences = {error_message, "What could be read of the log is shown below, as it was measured."};
+  content.software = context.software;
+  content.sections.push_back({"signals", "Raw signals", signals_section(context, {}, axis)});
+  std::string data = provenance(context, axis);
+  if (!context.warnings.empty()) {
+    data += "<h3>Repairs and remarks of the log reader</h3>\n" + bullets(context.warnings);
+  }
+  if (!data.empty()) {
+    content.sections.push_back({"data", "Data", std::move(data)});
+  }
+  return page(content);
+}
+
+}  // namespace wheelwright

@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/report/data_sections.hpp>
+
+#include <cmath>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include <wheelwright/report/commission_words.hpp>
+#include <wheelwright/report/drawing.hpp>
+#include <wheelwright/report/page.hpp>
+#include <wheelwright/report/parameter_view.hpp>
+#include <wheelwright/report/text.hpp>
+
+namespace wheelwright::report {
+namespace {
+
+std::string unit_cell(const Commissioning& result, std::size_t i) {
+  return escape(output_name(result.model.model, i)) + " <span class=\"unit\">" +
+         escape(output_unit_of(result.model.robot, result.model.model, i)) + "</span>";
+}
+
+std::string ratio(double part, double whole) { return whole > 0.0 ? number(part / whole) : "–"; }
+
+std::string smallest_change(const Commissioning& result, double kappa) {
+  if (!(kappa > 0.0) || !std::isfinite(kappa)) {
+    return "none";
+  }
+  return result.model.robot.model == "differential_drive" ? percent(radius_change(kappa)) : "–";
+}
+
+std::string joint_list(const std::vector<double>& values) {
+  std::vector<std::string> items;
+  for (const double x : values) {
+    items.push_back(number(x));
+  }
+  return items.empty() ? "–" : list(items);
+}
+
+}  // namespace
+
+std::string validation_section(const Commissioning& result) {
+  if (result.validation.empty()) {
+    return paragraph("The thresholds were not tried on held-out driving.");
+  }
+  std::vector<std::vector<Cell>> rows;
+  for (std::size_t i = 0; i < result.validation.size(); ++i) {
+    const OutputValidation& v = result.validation[i];
+    rows.push_back({unit_cell(result, i), numeric(count(v.instants)), numeric(count(v.outside)),
+                    numeric(percent(v.coverage, 4)), numeric(percent(v.coverage_noise_free)), numeric(percent(v.nrmse)),
+                    numeric(percent(v.utilisation)), numeric(ratio(v.median_width, v.torque_rms)),
+                    numeric(ratio(v.median_width_box, v.torque_rms)),
+                    numeric(v.smallest_kappa > 0.0 ? number(v.smallest_kappa) : "–"),
+                    numeric(smallest_change(result, v.smallest_kappa))});
+  }
+  std::string out =
+      paragraph(fmt::format("A model was made from part of the log ({} blocks; every {}{} is held out, and {} s at the "
+                            "beginning of each block are "
+                            "purged, so that nothing is shared with its neighbour) and tried on the rest.",
+                            result.folds.blocks, result.folds.hold_out_every,
+                            result.folds.hold_out_every == 2   ? "nd"
+                            : result.folds.hold_out_every == 3 ? "rd"
+                                                               : "th",
+                            number(result.folds.purge)));
+  out += table(
+      {"Output", numeric("instants"), numeric("false alarms"), numeric("coverage"), numeric("noise-free coverage"),
+       numeric("NRMSE"), numeric("utilisation"), numeric("width / torque,<br>polytope"),
+       numeric("width / torque,<br>box"), numeric("smallest<br>certain κ"), numeric("wheel radius<br>change")},
+      rows);
+  out += bullets({
+      "Coverage: share of instants with the residual inside [l, u]. Noise-free coverage: the same with the parameters’ "
+      "uncertainty alone, no noise allowed.",
+      "NRMSE: rms of the residual over rms of the filtered effort.",
+      "Utilisation: how far the residual went towards its threshold at most. Near 0 the threshold can never fire; at "
+      "100 % "
+      "the residual touched it.",
+      "Width / torque: median of u − l over the rms of the filtered effort, with the feasible set itself and with its "
+      "interval hull. Smallest certain κ: change of all forces ζ = κ·Yθ that some instant shows for every admissible "
+      "parameter and noise; a change of both wheel radii has |δ1|/r = √(1+κ) − 1.",
+  });
+  return out;
+}
+
+std::string noise_section(const Commissioning& result) {
+  std::vector<std::vector<Cell>> rows;
+  for (std::size_t i = 0; i < result.noise.size(); ++i) {
+    const OutputNoise& n = result.noise[i];
+    std::string how;
+    if (n.origin == NoiseOrigin::declared) {
+      how = result.noise_mode == NoiseMode::worst_case
+                ? "declared bounds of the sensors, worst case through the filter"
+                : "declared bounds of the sensors, statistical: independent samples at the stated confidence";
+    } else {
+      how = fmt::format("extrapolated from this log’s residuals: {} × the largest, {} × rms; {} tail",
+                        number(n.how.over_largest), number(n.how.over_rms),
+                        n.how.heavy_tail ? "heavier than Gaussian, hence exponential" : "Gaussian");
+    }
+    std::string rms = "–", largest = "–";
+    if (i < result.residuals.outputs.size()) {
+      rms = number(result.residuals.outputs[i].rms);
+      largest = number(result.residuals.outputs[i].largest);
+    }
+    rows.push_back({unit_cell(result, i), numeric(number(n.bound)), numeric(number(n.learning)), numeric(rms),
+                    numeric(largest), escape(how)});
+  }
+  if (rows.empty()) {
+    return paragraph("No noise bound was reached.");
+  }
+  return paragraph(
+             "The bound of the thresholds is for driving to come; the bound of the parameter set is for the rows of "
+             "this "
+             "log, which need no extrapolation.") +
+         table({"Output", numeric("bound of the thresholds"), numeric("bound of the parameter set"),
+                numeric("residual rms"), numeric("largest residual"), "where it comes from"},
+               rows);
+}
+
+std::string filter_section(const Commissioning& result) {
+  const FilterDesign& f = result.filter_choice.curve.empty() ? result.model.filter : result.filter_choice.design;
+  std::string out = paragraph(fmt::format(
+      "Order {}, α = {} 1/s, β = {} 1/s: a slow change is seen {} late. {}", f.order, number(f.alpha), number(f.beta),
+      with_unit(number(f.delay()), "s"),
+      f.order == 1
+          ? "This is the paper’s filter f(t) = α e<sup>−βt</sup>."
+          : "This is the paper’s filter applied twice, f₂(t) = α² t e<sup>−βt</sup>, so that wheel angles suffice."));
+  const std::string curve = filter_curve(result.filter_choice);
+  if (curve.empty()) {
+    return out + paragraph("The constants were given, not chosen.");
+  }
+  out += paragraph("Chosen from the data: the fastest candidate that is nearly as quiet as the quietest one.");
+  return out + "<figure>" + curve + "</figure>\n";
+}
+
+std::string contradiction_section(const Commissioning& result, const TimeAxis& axis) {
+  if (result.feasible.contradiction.empty()) {
+    return {};
+  }
+  std::vector<std::vector<Cell>> rows;
+  for (const WeightedRow& w : result.feasible.contradiction) {
+    const RowOrigin& o = w.row.origin;
+    const std::string side = o.side == Side::upper ? "upper" : "lower";
+    if (o.is_prior) {
+      const std::string name = o.parameter < result.parameters.size() ? result.parameters[o.parameter].parameter.name
+                                                                      : "parameter " + std::to_string(o.parameter + 1);
+      rows.push_back({side + " side of the prior", escape(words(name)), "–", numeric(number(w.multiplier))});
+    } else {
+      rows.push_back({time_button(o.t - 1.0, o.t + 1.0, axis.text(o.t), axis),
+                      escape(output_name(result.model.model, o.output)) + ", " + side + " bound",
+                      numeric(count(o.sample)), numeric(number(w.multiplier))});
+    }
+  }
+  return paragraph(
+             "These constraints exclude one another: no parameter satisfies all of them, and none of them can be left "
+             "out. The multipliers prove it (Farkas).") +
+         table({"Time", "constraint", numeric("row of the log"), numeric("multiplier")}, rows);
+}
+
+std::string data_section(const Commissioning& result, const ReportContext& context, const TimeAxis& axis) {
+  const Survey& s = result.survey;
+  std::string out = definitions({
+      {"Rows", count(s.rows) + " in " + plural(s.segments, "segment")},
+      {"Driving time",
+       with_unit(number(s.seconds, 4), "s") + ", longest segment " + with_unit(number(s.longest_segment, 4), "s")},
+      {"Steps", "median " + with_unit(number(s.median_step), "s") + ", largest within a segment " +
+                    with_unit(number(s.largest_step), "s")},
+      {"Regression", count(result.residuals.instants) + " instants"},
+      {"Joints", "largest speeds " + joint_list(s.largest_speed) + " per s, largest accelerations " +
+                     joint_list(s.largest_acceleration) + " per s², reversals " + joint_list(s.reversals)},
+  });
+  out += provenance(context, axis);
+  if (!context.warnings.empty()) {
+    out += "<h3>Repairs and remarks of the log reader</h3>\n" + bullets(context.warnings);
+  } else {
+    out += paragraph("The log reader had nothing to repair or to remark.");
+  }
+  if (!result.notes.empty()) {
+    std::vector<std::string> notes;
+    for (const std::string& note : result.notes) {
+      notes.push_back(capital(note) + (note.ends_with('.') ? "" : "."));
+    }
+    out += "<h3>Assumptions and choices</h3>\n" + bullets(notes);
+  }
+  return out;
+}
+
+}  // namespace wheelwright::report

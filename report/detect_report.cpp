@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/report/detect_report.hpp>
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include <wheelwright/report/page.hpp>
+#include <wheelwright/report/parameter_view.hpp>
+#include <wheelwright/report/signals.hpp>
+#include <wheelwright/report/text.hpp>
+
+namespace wheelwright {
+
+using namespace report;
+
+namespace {
+
+TimeAxis axis_for(const Detection& detection, const ReportContext& context) {
+  return context.signals && context.signals->rows() > 0 ? TimeAxis(context.signals->t) : TimeAxis(detection.trace.t);
+}
+
+double largest(const std::vector<double>& values) {
+  return values.empty() ? 0.0 : *std::max_element(values.begin(), values.end());
+}
+
+std::string verdict(const Detection& detection) {
+  if (detection.instants == 0) {
+    return "Nothing was watched: the log has no instant with a decision.";
+  }
+  return detection.events.empty() ? "No fault was seen."
+                                  : fmt::format("{}: the robot did not behave like its model.",
+                                                capital(plural(detection.events.size(), "event")));
+}
+
+std::vector<std::string> sentences(const Detection& detection, const CommissionedModel& model, const TimeAxis& axis) {
+  std::vector<std::string> out = {fmt::format("{} instants were watched over {} of driving.", count(detection.instants),
+                                              with_unit(number(detection.seconds, 4), "s"))};
+  if (detection.instants == 0) {
+    out.emplace_back(
+        "The filter needs some time to settle at the beginning of every segment: the log, or each of its "
+        "segments, is too short.");
+    return out;
+  }
+  if (detection.events.empty()) {
+    out.push_back(
+        fmt::format("The residual stayed inside its threshold or left it too briefly for an alarm; it went {} of "
+                    "the way to the threshold at most.",
+                    percent(largest(detection.utilisation))));
+    out.emplace_back(
+        "A fault smaller than the threshold allows for, or one that does not show in this driving, is not "
+        "excluded.");
+    return out;
+  }
+  const Event& first = *std::min_element(detection.events.begin(), detection.events.end(),
+                                         [](const Event& a, const Event& b) { return a.alarm < b.alarm; });
+  const Event& worst = *std::max_element(detection.events.begin(), detection.events.end(),
+                                         [](const Event& a, const Event& b) { return a.peak_ratio < b.peak_ratio; });
+  out.push_back(fmt::format("The first alarm came at {} in the output {}; the residual had left its threshold at {}.",
+                            axis.text(first.alarm), output_name(model.model, first.output), axis.text(first.start)));
+  out.push_back(
+      fmt::format("The clearest excess is at {} in the output {}: {} times as far from the middle of [l, u] as the "
+                  "threshold allows.",
+                  axis.text(worst.peak_time), output_name(model.model, worst.output), number(worst.peak_ratio)));
+  out.emplace_back(
+      "Without a fault no parameter of the feasible set and no admissible noise explains this: a fault, an effect "
+      "that was absent when the robot was commissioned (payload, floor), or noise beyond its bounds.");
+  return out;
+}
+
+std::string event_table(const Detection& detection, const CommissionedModel& model, const TimeAxis& axis) {
+  if (detection.events.empty()) {
+    return paragraph("None.");
+  }
+  constexpr std::size_t most_rows = 500;
+  std::vector<std::vector<Cell>> rows;
+  for (std::size_t k = 0; k < detection.events.size() && k < most_rows; ++k) {
+    const Event& e = detection.events[k];
+    rows.push_back({time_button(e.start, e.end, "event " + std::to_string(k + 1), axis),
+                    escape(output_name(model.model, e.output)), numeric(axis.text(e.start)),
+                    numeric(axis.text(e.alarm)), numeric(axis.text(e.end)), numeric(axis.text(e.peak_time)),
+                    numeric(number(e.peak_residual)), numeric(number(e.peak_ratio)), numeric(count(e.instants))});
+  }
+  std::string out = table({"", "Output", numeric("start"), numeric("alarm"), numeric("end"), numeric("peak at"),
+                           numeric("ε at the peak"), numeric("peak ratio"), numeric("instants outside")},
+                          rows);
+  if (detection.events.size() > most_rows) {
+    out += paragraph(fmt::format("The first {} of {} events.", count(most_rows), count(detection.events.size())));
+  }
+  return out +
+         paragraph(
+             "<span class=\"note\">Peak ratio: distance of ε from the middle of [l, u] over half its width; above "
+             "1 is outside. A click on an event zooms all charts to it.</span>");
+}
+
+std::string output_table(const Detection& detection, const CommissionedModel& model) {
+  std::vector<std::vector<Cell>> rows;
+  for (std::size_t i = 0; i < detection.utilisation.size(); ++i) {
+    const std::size_t outside = i < detection.outside.size() ? detection.outside[i] : 0;
+    const std::string nrmse = i < detection.nrmse.size() ? percent(detection.nrmse[i]) : "–";
+    rows.push_back({escape(output_name(model.model, i)), numeric(count(detection.instants)), numeric(count(outside)),
+                    numeric(percent(detection.utilisation[i])), numeric(nrmse)});
+  }
+  return table({"Output", numeric("instants"), numeric("outside"), numeric("utilisation"), numeric("NRMSE")}, rows) +
+         paragraph(
+             "<span class=\"note\">Utilisation: how far the residual went from the middle of [l, u] at most, 100 % "
+             "being "
+             "the threshold. NRMSE: rms of the residual over rms of the filtered effort.</span>");
+}
+
+}  // namespace
+
+std::string detect_report(const Detection& detection, const CommissionedModel& model, const ReportContext& context) {
+  const TimeAxis axis = axis_for(detection, context);
+  std::vector<std::vector<ChartMark>> marks(detection.trace.outputs.size());
+  std::vector<ChartMark> all_marks;
+  for (std::size_t k = 0; k < detection.events.size(); ++k) {
+    const Event& e = detection.events[k];
+    const ChartMark mark{e.start, e.end, std::to_string(k + 1)};
+    all_marks.push_back(mark);
+    if (e.output < marks.size()) {
+      marks[e.output].push_back(mark);
+    }
+  }
+
+  PageContent content;
+  content.title = context.title.empty() ? "Detection on " + model.robot.name : context.title;
+  content.status = detection.instants == 0 ? "caution" : detection.events.empty() ? "good" : "bad";
+  content.verdict = verdict(detection);
+  content.sentences = sentences(detection, model, axis);
+  content.software = context.software;
+  content.sections.push_back({"events", "Events", event_table(detection, model, axis)});
+  if (!detection.trace.t.empty()) {
+    content.sections.push_back(
+        {"residual", "Residual and threshold",
+         paragraph("Without a fault ε = τ_f − Y_f θ̂ stays inside the grey band [l, u]. Events are shaded and numbered. "
+                   "Drag to "
+                   "zoom (all charts follow), Shift and drag to pan, double click for the whole log.") +
+             residual_charts(detection.trace, model.robot, model.model, marks, axis) +
+             torque_charts(detection.trace, model.robot, model.model, axis)});
+  }
+  content.sections.push_back({"signals", "Raw signals",
+                              context.signals ? signal_charts(*context.signals, all_marks, axis)
+                                              : paragraph("The raw signals were not handed to this page.")});
+  std::string data = output_table(detection, model);
+  data += paragraph(
+      fmt::format("{} rows; an alarm is raised when {} of {} successive instants lie outside; filter of order {}, "
+                  "β = {} 1/s, delay {}.",
+                  count(detection.rows), model.persistence.k, model.persistence.n, model.filter.order,
+                  number(model.filter.beta), with_unit(number(model.filter.delay()), "s")));
+  data += provenance(context, axis);
+  if (!context.warnings.empty()) {
+    data += "<h3>Repairs and remarks of the log reader</h3>\n" + bullets(context.warnings);
+  }
+  content.sections.push_back({"data", "Data", std::move(data)});
+  return page(content);
+}
+
+}  // namespace wheelwright

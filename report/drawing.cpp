@@ -1,0 +1,222 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/report/drawing.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <limits>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include <wheelwright/report/text.hpp>
+
+namespace wheelwright::report {
+namespace {
+
+// Range of numbers that have to be seen.
+struct Range {
+  double low = std::numeric_limits<double>::infinity();
+  double high = -std::numeric_limits<double>::infinity();
+
+  void take(double x) {
+    if (std::isfinite(x)) {
+      low = std::min(low, x);
+      high = std::max(high, x);
+    }
+  }
+  void pad(double share) {
+    if (!(low <= high)) {
+      low = 0.0;
+      high = 1.0;
+    }
+    const double margin = high > low ? share * (high - low) : (high != 0.0 ? 0.1 * std::abs(high) : 1.0);
+    low -= margin;
+    high += margin;
+  }
+};
+
+// Linear map of a range to pixels.
+struct Scale {
+  Range range;
+  double from = 0.0, to = 1.0;
+  [[nodiscard]] double operator()(double x) const {
+    return from + (to - from) * (x - range.low) / (range.high - range.low);
+  }
+};
+
+// A tip at (x, y) that points right (direction 1) or left (−1).
+std::string arrow(double x, double y, double direction) {
+  return fmt::format("<path class=\"whisker\" d=\"M{0:.1f} {1:.1f}L{2:.1f} {3:.1f}L{0:.1f} {4:.1f}\"/>",
+                     x - 5.0 * direction, y - 4.0, x, y, y + 4.0);
+}
+
+}  // namespace
+
+std::string interval_bar(const ParameterView& v) {
+  constexpr double width = 230.0, height = 34.0, middle = 15.0, left = 10.0, right = width - 10.0;
+  Range range;
+  if (!v.lower_is_prior) {
+    range.take(v.lower);
+  }
+  if (!v.upper_is_prior) {
+    range.take(v.upper);
+  }
+  if (v.estimate) {
+    range.take(*v.estimate);
+    range.take(*v.estimate - v.spread.value_or(0.0));
+    range.take(*v.estimate + v.spread.value_or(0.0));
+  }
+  if (v.nominal) {
+    range.take(*v.nominal);
+  }
+  const bool known = range.low < range.high;
+  if (!known) {
+    range.take(v.lower);
+    range.take(v.upper);
+  }
+  range.pad(0.12);
+  const Scale scale{range, left, right};
+  const bool beyond_left = v.lower<range.low, beyond_right = v.upper> range.high;
+  const double x0 = scale(std::clamp(v.lower, range.low, range.high));
+  const double x1 = scale(std::clamp(v.upper, range.low, range.high));
+  std::string out = fmt::format(
+      "<svg viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\" role=\"img\" "
+      "aria-label=\"intervals of {2}\"><line class=\"axis\" x1=\"{3}\" x2=\"{4}\" y1=\"{5}\" "
+      "y2=\"{5}\"/>",
+      width, height, escape(words(v.name)), left, right, middle);
+  const bool open = v.lower_is_prior || v.upper_is_prior;
+  out += fmt::format("<rect class=\"bar{}\" x=\"{:.1f}\" y=\"{}\" width=\"{:.1f}\" height=\"14\"/>",
+                     open ? " open" : "", x0, middle - 7.0, std::max(x1 - x0, 1.0));
+  out += beyond_left ? arrow(left - 6.0, middle, -1.0) : "";
+  out += beyond_right ? arrow(right + 6.0, middle, 1.0) : "";
+  if (v.nominal) {
+    out += fmt::format("<line class=\"nominal\" x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"1\" y2=\"{1}\"/>", scale(*v.nominal),
+                       middle + 13.0);
+  }
+  if (v.estimate) {
+    const double s = v.spread.value_or(0.0);
+    out += fmt::format("<path class=\"whisker\" d=\"M{0:.1f} {2}v6M{1:.1f} {2}v6M{0:.1f} {3}H{1:.1f}\"/>",
+                       scale(*v.estimate - s), scale(*v.estimate + s), middle - 3.0, middle);
+    out += fmt::format("<circle class=\"point\" cx=\"{:.1f}\" cy=\"{}\" r=\"2.6\"/>", scale(*v.estimate), middle);
+  }
+  if (std::isfinite(v.centre) && v.centre >= range.low && v.centre <= range.high) {
+    out += fmt::format("<circle class=\"centre\" cx=\"{:.1f}\" cy=\"{}\" r=\"4.2\"/>", scale(v.centre), middle);
+  }
+  return out + "</svg>";
+}
+
+std::string filter_curve(const FilterChoice& choice) {
+  std::vector<std::pair<double, double>> points;  // log10 β, log10 criterion
+  for (const FilterCandidate& c : choice.curve) {
+    if (c.design.beta > 0.0 && c.criterion > 0.0 && std::isfinite(c.criterion) && std::isfinite(c.design.beta)) {
+      points.emplace_back(std::log10(c.design.beta), std::log10(c.criterion));
+    }
+  }
+  if (points.size() < 2) {
+    return {};
+  }
+  std::sort(points.begin(), points.end());
+  constexpr double width = 520.0, height = 230.0;
+  Scale x{{}, 62.0, width - 14.0}, y{{}, height - 40.0, 14.0};
+  for (const auto& [b, c] : points) {
+    x.range.take(b);
+    y.range.take(c);
+  }
+  x.range.pad(0.05);
+  y.range.pad(0.1);
+  std::string out = fmt::format(
+      "<svg viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\" role=\"img\" "
+      "aria-label=\"residual over torque for each candidate filter\">",
+      width, height);
+  // Decades, with 2 and 5 between them.
+  for (const double m : {1.0, 2.0, 5.0}) {
+    for (int e = -9; e <= 9; ++e) {
+      const double at = std::log10(m) + e;
+      const std::string label = number(m * std::pow(10.0, e), 1);
+      if (at > x.range.low && at < x.range.high) {
+        out += fmt::format(
+            "<line class=\"axis\" x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"14\" y2=\"{1}\"/><text x=\"{0:.1f}\" "
+            "y=\"{2}\" text-anchor=\"middle\">{3}</text>",
+            x(at), height - 40.0, height - 25.0, label);
+      }
+      if (at > y.range.low && at < y.range.high) {
+        out += fmt::format(
+            "<line class=\"axis\" x1=\"62\" x2=\"{1}\" y1=\"{0:.1f}\" y2=\"{0:.1f}\"/><text x=\"57\" "
+            "y=\"{2:.1f}\" text-anchor=\"end\">{3}</text>",
+            y(at), width - 14.0, y(at) + 4.0, label);
+      }
+    }
+  }
+  out += "<polyline class=\"curve\" points=\"";
+  for (const auto& [b, c] : points) {
+    out += fmt::format("{:.1f},{:.1f} ", x(b), y(c));
+  }
+  out += "\"/>";
+  for (const auto& [b, c] : points) {
+    const bool chosen = std::abs(b - std::log10(choice.design.beta)) < 1e-9;
+    out += fmt::format("<circle class=\"dot{}\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{}\"/>", chosen ? " chosen" : "", x(b),
+                       y(c), chosen ? 5 : 3);
+    if (chosen) {
+      out += fmt::format("<text class=\"ink\" x=\"{:.1f}\" y=\"{:.1f}\">chosen</text>", x(b) + 8.0, y(c) + 13.0);
+    }
+  }
+  out += fmt::format("<text x=\"{:.1f}\" y=\"{}\" text-anchor=\"middle\">β, 1/s</text>", 0.5 * (62.0 + width),
+                     height - 8.0);
+  out += fmt::format(
+      "<text x=\"14\" y=\"{0}\" transform=\"rotate(-90 14 {0})\" text-anchor=\"middle\">residual rms / "
+      "torque rms</text></svg>",
+      0.5 * (height - 26.0));
+  return out;
+}
+
+std::string driven_path(const LogTable& signals) {
+  const auto column = [&](std::string_view name) -> const std::vector<double>* {
+    const auto found = std::find(signals.names.begin(), signals.names.end(), name);
+    return found == signals.names.end() ? nullptr
+                                        : &signals.columns[static_cast<std::size_t>(found - signals.names.begin())];
+  };
+  const std::vector<double>* x = column("x");
+  const std::vector<double>* y = column("y");
+  if (x == nullptr || y == nullptr) {
+    return {};
+  }
+  Range across, up;
+  for (std::size_t i = 0; i < x->size(); ++i) {
+    across.take((*x)[i]);
+    up.take((*y)[i]);
+  }
+  const double span = std::max(across.high - across.low, up.high - up.low);
+  if (!(span > 0.0) || !std::isfinite(span)) {
+    return {};
+  }
+  constexpr double longest = 340.0, margin = 8.0;
+  const double unit = longest / span;
+  const double width = (across.high - across.low) * unit + 2.0 * margin;
+  const double height = (up.high - up.low) * unit + 2.0 * margin;
+  std::string out = fmt::format(
+      "<svg viewBox=\"0 0 {0:.0f} {1:.0f}\" width=\"{0:.0f}\" height=\"{1:.0f}\" role=\"img\" "
+      "aria-label=\"driven path\"><path class=\"path\" d=\"",
+      width, height);
+  const std::size_t step = std::max<std::size_t>(1, x->size() / 1500);
+  bool pen = false;
+  std::size_t next_segment = 0;
+  for (std::size_t i = 0; i < x->size(); i += step) {
+    while (next_segment < signals.segment_starts.size() && signals.segment_starts[next_segment] <= i) {
+      pen = false;
+      ++next_segment;
+    }
+    if (!std::isfinite((*x)[i]) || !std::isfinite((*y)[i])) {
+      pen = false;
+      continue;
+    }
+    fmt::format_to(std::back_inserter(out), "{}{:.1f} {:.1f}", pen ? 'L' : 'M', margin + ((*x)[i] - across.low) * unit,
+                   margin + (up.high - (*y)[i]) * unit);
+    pen = true;
+  }
+  return out + "\"/></svg>";
+}
+
+}  // namespace wheelwright::report

@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/report/parameter_table.hpp>
+
+#include <algorithm>
+#include <array>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include <wheelwright/report/drawing.hpp>
+#include <wheelwright/report/page.hpp>
+#include <wheelwright/report/parameter_view.hpp>
+#include <wheelwright/report/text.hpp>
+
+namespace wheelwright::report {
+namespace {
+
+constexpr double binding_margin = 1.0;  // s, shown on either side of a binding sample
+
+std::string binding_samples(const std::vector<RowOrigin>& rows, const Model& model, const TimeAxis& axis) {
+  std::string out;
+  for (const RowOrigin& row : rows) {
+    if (row.is_prior) {
+      continue;
+    }
+    out += out.empty() ? "" : ", ";
+    out += time_button(row.t - binding_margin, row.t + binding_margin, axis.text(row.t), axis);
+    out += fmt::format(" {}", escape(output_name(model, row.output)));
+  }
+  return out;
+}
+
+std::string set_by(const char* side, const std::vector<RowOrigin>& rows, bool is_prior, const Commissioning& result,
+                   const TimeAxis& axis) {
+  const std::string samples = binding_samples(rows, result.model.model, axis);
+  const bool touches_prior = std::any_of(rows.begin(), rows.end(), [](const RowOrigin& row) { return row.is_prior; });
+  std::string text = samples;
+  if (is_prior) {
+    text = "<span class=\"tag\">the prior’s own</span>";
+  } else if (touches_prior && !samples.empty()) {
+    text += " with the prior";
+  }
+  return fmt::format("<small>{}: {}</small>", side, text.empty() ? "–" : text);
+}
+
+std::string interval_cells(const ParameterView& v) {
+  const auto [lower, upper] = outward(v.lower, v.upper);
+  const std::string statistical =
+      v.estimate && v.spread
+          ? fmt::format("{} to {}", beside(*v.estimate - *v.spread, *v.estimate - *v.spread, *v.estimate + *v.spread),
+                        beside(*v.estimate + *v.spread, *v.estimate - *v.spread, *v.estimate + *v.spread))
+          : "–";
+  const std::string nominal = v.nominal ? number(*v.nominal, 4) : "–";
+  // A prior bound is wide; the other numbers keep the digits that their own uncertainty leaves them.
+  const bool wide = v.lower_is_prior || v.upper_is_prior;
+  const double low = wide && v.estimate && v.spread ? *v.estimate - *v.spread : v.lower;
+  const double high = wide && v.estimate && v.spread ? *v.estimate + *v.spread : v.upper;
+  return fmt::format(
+      "<td class=\"n\">{}</td><td class=\"n\">{} to {}</td><td class=\"n\">{}</td><td class=\"n\">{}</td>"
+      "<td class=\"n\">{}</td>",
+      v.estimate ? beside(*v.estimate, low, high) : "–", lower, upper, statistical, beside(v.centre, low, high),
+      nominal);
+}
+
+std::string head_cell(const ParameterView& v) {
+  return fmt::format("<th scope=\"row\">{} <span class=\"unit\">{}</span></th>", escape(words(v.name)), escape(v.unit));
+}
+
+std::string rows_of(const ParameterViews& views, const ParameterResult& r, const Commissioning& result,
+                    const TimeAxis& axis) {
+  const int span = views.physical ? 2 : 1;
+  std::string out = fmt::format("<tr{}>", span == 2 ? " class=\"joined\"" : "");
+  out += head_cell(views.best()) + interval_cells(views.best());
+  out += fmt::format("<td rowspan=\"{}\">{}</td>", span, interval_bar(views.best()));
+  out += fmt::format("<td rowspan=\"{}\" class=\"from\">{}{}</td></tr>\n", span,
+                     set_by("lower", r.lower_binding, r.lower_is_prior, result, axis),
+                     set_by("upper", r.upper_binding, r.upper_is_prior, result, axis));
+  if (views.physical) {
+    out += fmt::format("<tr class=\"theta\">{}{}</tr>\n", head_cell(views.theta), interval_cells(views.theta));
+  }
+  return out;
+}
+
+std::string remarks(const Commissioning& result, const std::vector<ParameterViews>& views) {
+  std::vector<std::string> items;
+  for (std::size_t j = 0; j < views.size(); ++j) {
+    const ParameterResult& r = result.parameters[j];
+    const std::string name = words(views[j].best().name);
+    if (r.excitation != Excitation::identified && !r.reason.empty()) {
+      items.push_back(capital(name) + ": " + r.reason + ".");
+    }
+    if (!r.estimate_inside) {
+      items.push_back("The least-squares estimate of " + name +
+                      " lies outside the guaranteed interval; the Chebyshev centre lies inside.");
+    }
+  }
+  if (physical_values_unknown(result)) {
+    items.push_back(
+        "Physical values (kg, kg·m², N·s/m) are not identifiable: the effort is not a torque, and the robot file does "
+        "not "
+        "give the motor's constants (motor: torque_constant, resistance, back_emf, gear_ratio).");
+  }
+  return bullets(items);
+}
+
+}  // namespace
+
+std::string parameter_table(const Commissioning& result, const TimeAxis& axis) {
+  if (result.parameters.empty()) {
+    return {};
+  }
+  const std::vector<ParameterViews> views = parameter_views(result);
+  std::string out =
+      "<div class=\"wide\"><table class=\"parameters\"><thead><tr><th scope=\"col\">Parameter</th>"
+      "<th scope=\"col\" class=\"n\">estimate</th><th scope=\"col\" class=\"n\">guaranteed</th>"
+      "<th scope=\"col\" class=\"n\">95 % statistical</th><th scope=\"col\" class=\"n\">Chebyshev centre</th>"
+      "<th scope=\"col\" class=\"n\">nominal</th><th scope=\"col\">intervals</th><th scope=\"col\">bound set by</th>"
+      "</tr></thead><tbody>\n";
+  for (std::size_t j = 0; j < views.size(); ++j) {
+    out += rows_of(views[j], result.parameters[j], result, axis);
+  }
+  out += "</tbody></table></div>\n";
+  out +=
+      "<p class=\"note\">Box: guaranteed interval (a dashed side is the prior's; an arrow: it goes on beyond the "
+      "drawing). Black dot and whiskers: least-squares estimate with its 95 % interval. Ring: Chebyshev centre. Dashed "
+      "line: nominal value. “Bound set by” names the samples that prove each bound: those moments of the log decide. ";
+  out += fmt::format("The regressor has rank {} of {} and condition number {}.</p>\n", result.rank,
+                     result.parameters.size(), number(result.condition));
+  return out + remarks(result, views);
+}
+
+}  // namespace wheelwright::report

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// One parameter in one unit, ready to be printed: θ_L,j itself or the physical quantity behind it.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <wheelwright/commission/commission.hpp>
+
+namespace wheelwright::report {
+
+/// What commissioning says of one quantity. All numbers are in `unit`.
+struct ParameterView {
+  std::string name;  ///< identifier, e.g. "mass" or "r_mass"
+  std::string unit;
+  std::optional<double> estimate;
+  std::optional<double> spread;  ///< half of the 95 % interval, t·standard error
+  double lower = 0.0;            ///< guaranteed
+  double upper = 0.0;
+  double centre = 0.0;            ///< Chebyshev centre
+  std::optional<double> nominal;  ///< of the robot file
+  bool lower_is_prior = false;
+  bool upper_is_prior = false;
+};
+
+/// A parameter as θ_L,j, and as a physical quantity where the robot file tells the scale and the two differ.
+struct ParameterViews {
+  ParameterView theta;
+  std::optional<ParameterView> physical;
+
+  /// The physical quantity where there is one.
+  [[nodiscard]] const ParameterView& best() const { return physical ? *physical : theta; }
+};
+
+/// Views of all parameters, in their order.
+[[nodiscard]] std::vector<ParameterViews> parameter_views(const Commissioning& result);
+
+/// Whether the effort is not torque and the robot file lacks the motor's constants.
+[[nodiscard]] bool physical_values_unknown(const Commissioning& result);
+
+/// Name of output `i`; "output 2" where the model has none.
+[[nodiscard]] std::string output_name(const Model& model, std::size_t i);
+/// Unit of output `i` with the effort that was used; empty where the model has none.
+[[nodiscard]] std::string output_unit_of(const Robot& robot, const Model& model, std::size_t i);
+
+}  // namespace wheelwright::report

@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/report/signals.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <string_view>
+#include <utility>
+
+#include <wheelwright/report/drawing.hpp>
+#include <wheelwright/report/page.hpp>
+#include <wheelwright/report/parameter_view.hpp>
+#include <wheelwright/report/text.hpp>
+
+namespace wheelwright::report {
+namespace {
+
+constexpr std::size_t most_signal_points = 6000;
+
+struct Group {
+  std::string_view title;
+  std::string_view unit;
+  std::vector<std::string_view> columns;
+};
+
+const std::vector<Group>& groups() {
+  static const std::vector<Group> all = {
+      {"Wheel speeds", "rad/s", {"omega_r", "omega_l"}},
+      {"Commanded wheel speeds", "rad/s", {"command_r", "command_l"}},
+      {"Wheel angles", "rad", {"phi_r", "phi_l"}},
+      {"Torques", "N·m", {"tau_r", "tau_l"}},
+      {"Currents", "A", {"current_r", "current_l"}},
+      {"Voltages", "V", {"voltage_r", "voltage_l"}},
+      {"Position", "m", {"x", "y"}},
+      {"Heading", "rad", {"theta"}},
+      {"Gyroscope", "rad/s", {"gyro_z"}},
+      {"Accelerometer", "m/s²", {"accel_x"}},
+      {"Position of the axis", "m (rotary: rad)", {"position"}},
+      {"Velocity of the axis", "m/s (rotary: rad/s)", {"velocity"}},
+      {"Effort of the axis", "N (rotary: N·m)", {"effort"}},
+  };
+  return all;
+}
+
+// Start of the bin after the one that starts at `first`: `rows` on, or at the next segment.
+std::size_t bin_end(const LogTable& table, std::size_t first, std::size_t rows) {
+  const auto next = std::upper_bound(table.segment_starts.begin(), table.segment_starts.end(), first);
+  const std::size_t limit = next == table.segment_starts.end() ? table.rows() : *next;
+  return std::min(first + rows, limit);
+}
+
+// Smallest and largest of values [first, last) in the order of their occurrence. What is not finite is passed over.
+std::pair<double, double> extremes(const std::vector<double>& values, std::size_t first, std::size_t last) {
+  std::size_t low = last, high = last;
+  for (std::size_t i = first; i < last; ++i) {
+    if (std::isfinite(values[i])) {
+      low = low == last || values[i] < values[low] ? i : low;
+      high = high == last || values[i] > values[high] ? i : high;
+    }
+  }
+  if (low == last) {
+    return {std::nan(""), std::nan("")};
+  }
+  return {values[std::min(low, high)], values[std::max(low, high)]};
+}
+
+Chart signal_chart(const LogTable& table, const Group& group, const std::vector<std::size_t>& columns,
+                   const std::vector<ChartMark>& marks) {
+  Chart chart{.title = std::string(group.title),
+              .unit = std::string(group.unit),
+              .t = table.t,
+              .series = {},
+              .bands = {},
+              .marks = marks,
+              .breaks = table.segment_starts};
+  constexpr Line lines[] = {Line::first, Line::second, Line::third};
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    chart.series.push_back({table.names[columns[i]], table.columns[columns[i]], lines[i % 3]});
+  }
+  return chart;
+}
+
+}  // namespace
+
+LogTable thinned(const LogTable& table, std::size_t most) {
+  if (table.rows() <= most || most < 2) {
+    return table;
+  }
+  const std::size_t bin = (2 * table.rows() + most - 1) / most;
+  LogTable out;
+  out.names = table.names;
+  out.columns.resize(table.columns.size());
+  for (std::size_t first = 0; first < table.rows();) {
+    const std::size_t last = bin_end(table, first, bin);
+    if (std::binary_search(table.segment_starts.begin(), table.segment_starts.end(), first)) {
+      out.segment_starts.push_back(out.t.size());
+    }
+    const std::size_t middle = first + (last - first) / 2;
+    const bool single = middle == first;
+    out.t.push_back(table.t[first]);
+    if (!single) {
+      out.t.push_back(table.t[middle]);
+    }
+    for (std::size_t c = 0; c < table.columns.size(); ++c) {
+      const auto [a, b] = extremes(table.columns[c], first, last);
+      out.columns[c].push_back(a);
+      if (!single) {
+        out.columns[c].push_back(b);
+      }
+    }
+    first = last;
+  }
+  return out;
+}
+
+std::string signal_charts(const LogTable& signals, const std::vector<ChartMark>& marks, const TimeAxis& axis) {
+  const LogTable table = thinned(signals, most_signal_points);
+  std::vector<bool> used(table.names.size(), false);
+  std::string out;
+  for (const Group& group : groups()) {
+    std::vector<std::size_t> columns;
+    for (const std::string_view wanted : group.columns) {
+      for (std::size_t c = 0; c < table.names.size(); ++c) {
+        if (table.names[c] == wanted && !used[c]) {
+          used[c] = true;
+          columns.push_back(c);
+        }
+      }
+    }
+    if (!columns.empty()) {
+      out += figure(signal_chart(table, group, columns, marks), axis);
+    }
+  }
+  for (std::size_t c = 0; c < table.names.size(); ++c) {
+    if (!used[c]) {
+      out += figure(signal_chart(table, {table.names[c], "", {}}, {c}, marks), axis);
+    }
+  }
+  if (table.rows() < signals.rows()) {
+    out += paragraph("<span class=\"note\">" + count(signals.rows()) +
+                     " rows, drawn as the smallest and largest value of each short stretch: no peak is lost.</span>");
+  }
+  if (const std::string path = driven_path(table); !path.empty()) {
+    out += "<figure><figcaption>Driven path <span class=\"unit\">x to the right, y up, one scale</span></figcaption>" +
+           path + "</figure>\n";
+  }
+  return out.empty() ? paragraph("The raw signals were not handed to this page.") : out;
+}
+
+std::string residual_charts(const Trace& trace, const Robot& robot, const Model& model,
+                            const std::vector<std::vector<ChartMark>>& marks, const TimeAxis& axis) {
+  std::string out;
+  for (std::size_t i = 0; i < trace.outputs.size(); ++i) {
+    const OutputTrace& o = trace.outputs[i];
+    const Chart chart{.title = "Residual of the output " + output_name(model, i),
+                      .unit = output_unit_of(robot, model, i),
+                      .t = trace.t,
+                      .series = {{"u (upper threshold)", o.upper, Line::bound},
+                                 {"l (lower threshold)", o.lower, Line::bound},
+                                 {"ε, largest", o.residual_high, Line::first},
+                                 {"ε, smallest", o.residual_low, Line::first}},
+                      .bands = {{0, 1, true}, {2, 3, false}},
+                      .marks = i < marks.size() ? marks[i] : std::vector<ChartMark>{},
+                      .breaks = trace.breaks};
+    out += figure(chart, axis);
+  }
+  return out;
+}
+
+std::string torque_charts(const Trace& trace, const Robot& robot, const Model& model, const TimeAxis& axis) {
+  std::string out;
+  for (std::size_t i = 0; i < trace.outputs.size(); ++i) {
+    const OutputTrace& o = trace.outputs[i];
+    const Chart chart{
+        .title = "Filtered effort of the output " + output_name(model, i),
+        .unit = output_unit_of(robot, model, i),
+        .t = trace.t,
+        .series = {{"measured τ_f", o.torque, Line::first}, {"predicted Y_f θ̂", o.predicted, Line::second}},
+        .bands = {},
+        .marks = {},
+        .breaks = trace.breaks};
+    out += figure(chart, axis);
+  }
+  return out;
+}
+
+}  // namespace wheelwright::report

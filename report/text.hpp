@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Numbers and names as a reader wants them. Everything returns UTF-8 text that is not yet escaped, escape() apart.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace wheelwright::report {
+
+/// `text` with & < > " ' as character references: fit for HTML text and quoted attributes. Control characters other than
+/// tab and line feed become U+FFFD.
+[[nodiscard]] std::string escape(std::string_view text);
+
+/// An identifier as words: "yaw_inertia" → "yaw inertia".
+[[nodiscard]] std::string words(std::string_view identifier);
+
+/// `text` with its first letter (ASCII) in upper case.
+[[nodiscard]] std::string capital(std::string text);
+
+/// `x` with `digits` significant digits, trailing zeros kept: "21.3", "−0.0210", "1.20·10⁻⁷"; "–" where not finite.
+[[nodiscard]] std::string number(double x, int digits = 3);
+
+/// `x` with `decimals` decimals; "–" where not finite.
+[[nodiscard]] std::string decimal(double x, int decimals);
+
+/// An integer in groups of three digits: "12 345".
+[[nodiscard]] std::string count(std::size_t n);
+
+/// "no event", "1 event", "2 events": the plural is `noun` with s.
+[[nodiscard]] std::string plural(std::size_t n, std::string_view noun);
+
+/// A share as a percentage: 0.0414 → "4.14 %".
+[[nodiscard]] std::string percent(double share, int digits = 3);
+
+/// `text` followed by a unit, if there is one.
+[[nodiscard]] std::string with_unit(std::string text, std::string_view unit);
+
+/// The ends of a guaranteed interval in decimals that show its width to two digits, rounded outward: what is printed
+/// contains [lower, upper]. "–" for an end that is not finite.
+[[nodiscard]] std::pair<std::string, std::string> outward(double lower, double upper);
+
+/// `x` with as many decimals as outward(lower, upper) shows; as number() where that interval has no width.
+[[nodiscard]] std::string beside(double x, double lower, double upper);
+
+/// "a", "a and b", "a, b and c".
+[[nodiscard]] std::string list(const std::vector<std::string>& items);
+
+}  // namespace wheelwright::report
