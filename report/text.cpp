@@ -146,9 +146,9 @@ std::string percent(double share, int digits) {
   // A share that is not whole never reads as 100 %.
   const double size = 100.0 * share;
   if (size < 100.0 && size > 99.0) {
-    const int decimals = std::clamp(-magnitude(100.0 - size), 1, 9);
+    const int decimals = std::clamp(-magnitude((100.0 - size) * (1.0 + 1e-9)), 1, 9);
     const double unit = std::pow(10.0, -decimals);
-    return fmt::format("{:.{}f} %", std::floor(size / unit) * unit, decimals);
+    return fmt::format("{:.{}f} %", std::floor(size / unit * (1.0 + 1e-14)) * unit, decimals);
   }
   return number(size, digits) + " %";
 }

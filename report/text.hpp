@@ -30,7 +30,7 @@ namespace wheelwright::report {
 /// An integer in groups of three digits: "12 345".
 [[nodiscard]] std::string count(std::size_t n);
 
-/// "no event", "1 event", "2 events": the plural is `noun` with s.
+/// "no events", "1 event", "2 events": the plural is `noun` with s.
 [[nodiscard]] std::string plural(std::size_t n, std::string_view noun);
 
 /// A share as a percentage: 0.0414 → "4.14 %".

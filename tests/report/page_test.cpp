@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// What must hold of every page, whatever it says.
+#include <cmath>
+#include <limits>
+#include <regex>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include <wheelwright/report/chart.hpp>
+#include <wheelwright/report/commission_report.hpp>
+#include <wheelwright/report/detect_report.hpp>
+#include <wheelwright/report/signals.hpp>
+
+#include "report/example.hpp"
+
+namespace wheelwright {
+namespace {
+
+namespace example = report_example;
+
+std::vector<std::pair<std::string, std::string>> all_pages() {
+  const ReportContext context = example::context(900);
+  return {{"done", commission_report(example::done(), context)},
+          {"partial", commission_report(example::partial(), context)},
+          {"nothing", commission_report(example::nothing(), context)},
+          {"empty", commission_report(example::empty(), context)},
+          {"failure", failure_report("no column tau_r", context)},
+          {"fault", detect_report(example::detection(900, true), example::done().model, context)},
+          {"healthy", detect_report(example::detection(900, false), example::done().model, context)},
+          {"default result", commission_report({}, {})},
+          {"default detection", detect_report({}, {}, {})}};
+}
+
+// The JSON blocks of a page.
+std::vector<nlohmann::json> blocks(const std::string& page) {
+  std::vector<nlohmann::json> found;
+  const std::string open = "<script type=\"application/json\">";
+  for (std::size_t at = page.find(open); at != std::string::npos; at = page.find(open, at)) {
+    at += open.size();
+    found.push_back(nlohmann::json::parse(page.substr(at, page.find("</script>", at) - at)));
+  }
+  return found;
+}
+
+// The page without scripts and styles: what a reader sees.
+std::string visible(const std::string& page) {
+  static const std::string ends[][2] = {{"<script", "</script>"}, {"<style", "</style>"}};
+  std::string text = page;
+  for (const auto& [open, close] : ends) {
+    for (std::size_t at = text.find(open); at != std::string::npos; at = text.find(open, at)) {
+      text.erase(at, text.find(close, at) + close.size() - at);
+    }
+  }
+  return text;
+}
+
+TEST(EveryPage, LoadsNothing) {
+  for (const auto& [name, page] : all_pages()) {
+    SCOPED_TRACE(name);
+    EXPECT_TRUE(example::holds(page, {"Content-Security-Policy\" content=\"default-src 'none'"}));
+    const std::string text = visible(page);
+    EXPECT_TRUE(example::lacks(text, {"http:"}));
+    EXPECT_TRUE(example::lacks(text, {"https:"}));
+    for (const char* loads : {" src=", "<link", "<img", "<iframe", "<object", "@import", "url("}) {
+      EXPECT_TRUE(example::lacks(page, {loads})) << loads;
+    }
+  }
+}
+
+TEST(EveryPage, HoldsFiniteNumbersOnly) {
+  for (const auto& [name, page] : all_pages()) {
+    SCOPED_TRACE(name);
+    EXPECT_FALSE(std::regex_search(visible(page), std::regex("\\b(nan|inf|NaN|Infinity)\\b")));
+    for (const nlohmann::json& chart : blocks(page)) {  // JSON knows no NaN: parsing would have thrown
+      for (const nlohmann::json& series : chart["series"]) {
+        EXPECT_EQ(series["y"].size(), chart["t"].size());
+      }
+    }
+  }
+}
+
+TEST(EveryPage, EscapesEveryName) {
+  const std::string evil = "</script><script>alert(1)</script><b onclick=\"x\">&";
+  ReportContext context = example::context(300);
+  context.title = context.software = context.command_line = evil;
+  context.log_files = context.warnings = {evil};
+  context.seeds = {{evil, 1}};
+  context.signals->names[0] = evil;
+  Commissioning result = example::partial();
+  result.message = evil;
+  result.notes = {evil};
+  result.model.robot.name = evil;
+  for (std::string* text : {&result.model.model.outputs[0], &result.model.model.output_units[0],
+                            &result.parameters[0].parameter.name, &result.parameters[0].parameter.physical,
+                            &result.parameters[0].parameter.unit, &result.parameters[0].parameter.physical_unit,
+                            &result.parameters[1].reason, &result.parameters[1].parameter.excite}) {
+    *text = evil;
+  }
+  Commissioning contradicted = example::empty();
+  contradicted.model.model.outputs[0] = contradicted.parameters[0].parameter.name = evil;
+  const Detection fault = example::detection(300, true);
+  for (const std::string& page : {commission_report(result, context), commission_report(contradicted, context),
+                                  detect_report(fault, result.model, context), failure_report(evil, context)}) {
+    EXPECT_TRUE(example::lacks(page, {"<script>alert"}));
+    EXPECT_TRUE(example::lacks(page, {"<b onclick"}));
+    EXPECT_TRUE(example::holds(page, {"&lt;script&gt;alert"}));
+  }
+}
+
+TEST(EveryPage, ClosesWhatItOpens) {
+  for (const auto& [name, page] : all_pages()) {
+    const std::string text = visible(page);
+    for (const std::string tag :
+         {"table", "tr", "td", "section", "figure", "svg", "p", "ul", "li", "dl", "button", "span"}) {
+      const auto times = [&](const std::string& pattern) {
+        const std::regex r(pattern);
+        return std::distance(std::sregex_iterator(text.begin(), text.end(), r), std::sregex_iterator());
+      };
+      EXPECT_EQ(times("<" + tag + "[ >]"), times("</" + tag + ">")) << name << ": " << tag;
+    }
+  }
+}
+
+TEST(Page, OfSixThousandBinsIsBelowTwoMegabytes) {
+  const ReportContext context = example::context(6000);
+  EXPECT_LT(commission_report(example::done(), context).size(), 2'000'000U);
+  EXPECT_LT(detect_report(example::detection(6000, true), example::done().model, context).size(), 2'000'000U);
+}
+
+TEST(Chart, ResolvesEachSeriesAndBreaksBetweenSegments) {
+  report::Chart chart{
+      .title = "c", .unit = "", .t = {}, .series = {{"a", {}}}, .bands = {}, .marks = {}, .breaks = {0, 50}};
+  for (int i = 0; i < 100; ++i) {
+    chart.t.push_back(1.7e9 + 0.01 * i);
+    chart.series[0].y.push_back(1000.0 + 0.001 * std::sin(0.1 * i));  // a small motion far from zero
+  }
+  chart.series[0].y[7] = std::numeric_limits<double>::quiet_NaN();
+  const auto found = blocks(report::figure(chart, report::TimeAxis(chart.t)));
+  ASSERT_EQ(found.size(), 1U);
+  const nlohmann::json& y = found[0]["series"][0]["y"];
+  ASSERT_EQ(y.size(), 101U);  // one more than the data: the break
+  EXPECT_TRUE(y[50].is_null());
+  EXPECT_TRUE(y[7].is_null());
+  for (std::size_t i = 0; i < 100; ++i) {
+    const nlohmann::json& shown = y[i < 50 ? i : i + 1];
+    if (i != 7) {
+      EXPECT_NEAR(shown.get<double>(), chart.series[0].y[i], 0.002 / 2e4) << i;
+    }
+    EXPECT_NEAR(found[0]["t"][i < 50 ? i : i + 1].get<double>(), 0.01 * static_cast<double>(i), 1e-6);
+  }
+}
+
+TEST(Thinned, KeepsEveryPeakAndEverySegment) {
+  LogTable table = example::signals(100'000);
+  table.columns[0][77'777] = 123.0;
+  table.columns[0][33'333] = -45.0;
+  const LogTable thin = report::thinned(table, 6000);
+  EXPECT_LE(thin.rows(), 6004U);
+  EXPECT_EQ(thin.segment_starts.size(), table.segment_starts.size());
+  EXPECT_EQ(thin.t[thin.segment_starts[1]], table.t[table.segment_starts[1]]);
+  EXPECT_EQ(*std::max_element(thin.columns[0].begin(), thin.columns[0].end()), 123.0);
+  EXPECT_EQ(*std::min_element(thin.columns[0].begin(), thin.columns[0].end()), -45.0);
+  for (std::size_t c = 0; c < thin.columns.size(); ++c) {
+    EXPECT_EQ(thin.columns[c].size(), thin.rows());
+  }
+}
+
+}  // namespace
+}  // namespace wheelwright
