@@ -305,6 +305,9 @@ std::pair<std::vector<CertifiedBound>, std::vector<CertifiedBound>> CuttingPlane
     lower[j].value = -std::min(lower[j].value, certified_upper_bound(axis, lower[j].binding, first));
     axis[j] = 1.0;
     upper[j].value = std::min(upper[j].value, certified_upper_bound(axis, upper[j].binding, first));
+    // The sides of the box are exact: no rounding leads beyond them.
+    lower[j].value = std::max(lower[j].value, box_.sides[j].lower);
+    upper[j].value = std::min(upper[j].value, box_.sides[j].upper);
   }
   return {std::move(lower), std::move(upper)};
 }

@@ -257,19 +257,22 @@ std::vector<ParameterResult> parameter_results(const Setting& s, const Fit& fit,
   return results;
 }
 
-CommissionedModel finished_model(const Setting& s, const std::vector<OutputNoise>& noise, const Fit& fit,
-                                 const FeasibleSet& set, Persistence persistence) {
+CommissionedModel described_model(const Setting& s, Persistence persistence) {
   CommissionedModel model;
   model.robot = s.robot;
   model.model = s.model;
   model.measurement = s.measurement;
   model.filter = s.filter;
+  model.persistence = persistence;
+  return model;
+}
+
+void finish_model(CommissionedModel& model, const Setting& s, const std::vector<OutputNoise>& noise, const Fit& fit,
+                  const FeasibleSet& set) {
   model.errors = with_noise(s, noise, For::driving);
   model.estimate = best_guess(fit, *set.polytope);
   model.facets = set.polytope->facets();
   model.box = set.hull;
-  model.persistence = persistence;
-  return model;
 }
 
 void tell(const CommissionOptions& options, std::string_view stage, double share) {
@@ -278,28 +281,35 @@ void tell(const CommissionOptions& options, std::string_view stage, double share
   }
 }
 
-// A single axis whose robot file leaves the friction model open gets dry friction and an offset where they are worth it.
+// The widest model that the robot may have, where its file leaves the parameters open.
+Setting widened(const Setting& s) {
+  Setting wide = s;
+  if (!s.robot.parameters) {
+    wide.robot.parameters = possible_parameters(s.robot);
+    wide.model = make_model(wide.robot);
+  }
+  return wide;
+}
+
+// Dry friction (and an offset) are taken in where the robot file leaves it open and they are worth it.
 void settle_parameters(LogSource& log, Setting& s, std::vector<std::string>& notes) {
-  if (s.robot.model != "single_axis" || s.robot.parameters) {
+  const std::size_t basic = s.model.p();
+  const Setting wide = widened(s);
+  if (wide.model.p() == basic) {
     return;
   }
-  const std::size_t basic = s.model.p();
-  Setting wide = s;
-  wide.robot.parameters = std::vector<std::string>{"inertia", "viscous", "coulomb", "offset"};
-  wide.model = make_model(wide.robot);
   RegressionStream rows = make_rows(log, wide, {});
   const ParameterChoice choice = choose_parameters(rows, basic, s.log_rows, s.folds);
   if (choice.full) {
+    std::vector<std::string> added;
+    for (std::size_t j = basic; j < wide.model.p(); ++j) {
+      added.push_back(wide.model.parameters[j].physical);
+    }
     s.robot.parameters = wide.robot.parameters;
     s.model = wide.model;
-    notes.push_back(fmt::format("dry friction (coulomb) and an offset were added to the model: on held-out blocks the "
-                                "relative error falls from {:.3g} to {:.3g}; `parameters:` in the robot file decides "
-                                "otherwise",
-                                choice.nrmse_basic, choice.nrmse_full));
-  } else {
-    notes.push_back(fmt::format("inertia and viscous friction suffice: with coulomb and offset the held-out relative "
-                                "error is {:.3g} instead of {:.3g}",
-                                choice.nrmse_full, choice.nrmse_basic));
+    notes.push_back(fmt::format("the model was given {}: on held-out blocks the relative error falls from {:.3g} to "
+                                "{:.3g} (`parameters:` in the robot file decides otherwise)",
+                                fmt::join(added, " and "), choice.nrmse_basic, choice.nrmse_full));
   }
 }
 
@@ -319,13 +329,8 @@ Setting settle(LogSource& log, const Robot& robot, const CommissionOptions& opti
     s.filter = {.order = order, .alpha = robot.filter.alpha.value_or(beta), .beta = beta};
   } else {
     tell(options, "choosing the filter", 0.1);
-    Setting wide = s;
-    if (robot.model == "single_axis" && !robot.parameters) {
-      wide.robot.parameters = std::vector<std::string>{"inertia", "viscous", "coulomb", "offset"};
-      wide.model = make_model(wide.robot);
-    }
     result.filter_choice =
-        choose_filter(log, wide.model, s.measurement, order, result.survey, options.filter_choice);
+        choose_filter(log, widened(s).model, s.measurement, order, result.survey, options.filter_choice);
     s.filter = result.filter_choice.design;
     if (robot.filter.alpha) {
       s.filter.alpha = *robot.filter.alpha;
@@ -333,7 +338,9 @@ Setting settle(LogSource& log, const Robot& robot, const CommissionOptions& opti
   }
   validate(s.filter);
   s.folds = options.folds;
-  s.folds.purge = 0.5 * s.filter.settle / s.filter.beta;
+  // As long as the filter remembers, but never the better part of a block.
+  const double block = result.survey.seconds / static_cast<double>(s.folds.blocks);
+  s.folds.purge = std::min(0.5 * s.filter.settle / s.filter.beta, 0.3 * block);
   settle_parameters(log, s, result.notes);
 
   const PriorBox prior = prior_box(s.robot, s.model);
@@ -409,6 +416,7 @@ Commissioning commission(LogSource& log, const Robot& robot, const CommissionOpt
   result.noise_mode = options.noise_mode;
   const Setting s = settle(log, robot, options, result);
   result.folds = s.folds;
+  result.model = described_model(s, options.persistence);
 
   tell(options, "identifying", 0.2);
   RegressionStream rows = make_rows(log, s, s.declared);
@@ -444,7 +452,7 @@ Commissioning commission(LogSource& log, const Robot& robot, const CommissionOpt
                   : unexcited == static_cast<std::ptrdiff_t>(s.model.p()) ? Commissioning::Status::nothing
                                                                             : Commissioning::Status::partial;
   result.message = status_message(result);
-  result.model = finished_model(s, result.noise, fit, result.feasible, options.persistence);
+  finish_model(result.model, s, result.noise, fit, result.feasible);
 
   tell(options, "validating on held-out blocks", 0.7);
   FoldedSource training(rows, Part::training, s.log_rows, s.folds);

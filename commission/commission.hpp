@@ -80,7 +80,7 @@ struct Commissioning {
   };
   Status status = Status::done;
   std::string message;                          ///< one sentence for people, with what to do next where that is needed
-  CommissionedModel model;
+  CommissionedModel model;                      ///< without estimate, facets and box where the status gives no model
   std::vector<ParameterResult> parameters;
   Survey survey;
   std::vector<OutputNoise> noise;               ///< one for each output

@@ -15,8 +15,7 @@ namespace {
 
 constexpr std::array kBetas{2.0, 3.0, 4.0, 5.0, 7.0, 10.0, 14.0, 20.0, 30.0, 40.0, 60.0, 80.0, 120.0, 200.0};
 constexpr double kMostBetaStep = 0.5;
-constexpr double kMemory = 12.0;       // time constants after which nothing is left
-constexpr double kShareOfLog = 0.2;    // of the longest segment that a filter may take to settle
+constexpr double kShareOfLog = 0.2;    // of the longest segment that a filter may take to settle or to answer
 
 // One candidate's filter with a fit for each output.
 class Trial {
@@ -65,7 +64,9 @@ FilterChoice choose_filter(LogSource& log, const Model& model, const Measurement
                            const Survey& survey, const FilterChoiceOptions& options) {
   check::positive(options.longest_delay, "longest_delay");
   check::that(options.tolerance >= 1.0, "tolerance", "at least 1");
-  const double slowest = std::max(order / options.longest_delay, kMemory / (kShareOfLog * survey.longest_segment));
+  // Measured speeds need no settling; three time constants are what it takes to see a step.
+  const double memory = measurement.motion == MotionKind::speed ? 3.0 : FilterDesign{}.settle;
+  const double slowest = std::max(order / options.longest_delay, memory / (kShareOfLog * survey.longest_segment));
   const double fastest = kMostBetaStep / survey.median_step;
   std::vector<Trial> trials;
   for (const double beta : kBetas) {

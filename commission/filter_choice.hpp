@@ -32,7 +32,8 @@ struct FilterChoice {
 };
 
 /// Candidates β (α = β) from 2 to 200 1/s in steps of a factor of about 1.4 as far as the delay, the sampling (βh <= 0.5)
-/// and the length of the log (twelve time constants within a fifth of the longest segment) allow, all fitted in one walk.
+/// and the length of the log (settling, or three time constants for measured speeds, within a fifth of the longest
+/// segment) allow, all fitted in one walk.
 /// The criterion stands for the smallest certain fault: noise of the residual against torque. The largest β within
 /// `tolerance` of the best is taken, for the shortest delay.
 [[nodiscard]] FilterChoice choose_filter(LogSource& log, const Model& model, const Measurement& measurement, int order,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Whether a single axis needs dry friction and an offset, where the robot file leaves it open.
+/// Whether a robot needs dry friction (a single axis also an offset), where its file leaves it open.
 #pragma once
 
 #include <vector>

@@ -90,6 +90,7 @@ std::vector<OutputValidation> validate_on(RegressionSource& rows, const Threshol
     OutputValidation& v = results[i];
     const Running& r = running[i];
     if (v.instants == 0) {
+      v.smallest_kappa = 0.0;
       continue;
     }
     const auto count = static_cast<double>(v.instants);

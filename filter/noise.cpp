@@ -100,18 +100,16 @@ SignalErrors propagate(const Model& model, const FilterDesign& design, const Mea
     return map.cwiseAbs().rowwise().sum();
   };
   const Eigen::VectorXd motion = across(model.motion) * sensors.motion;
-  const Eigen::VectorXd sample = model.motion.cwiseAbs().rowwise().sum() * sensors.motion;
   SignalErrors errors;
   errors.acceleration = norms.acceleration * motion;
   errors.speed = norms.speed * motion;
   errors.output = norms.effort * sensors.effort * across(model.input);
   errors.heading = sensors.heading;
-  if (measurement.motion == MotionKind::speed) {
-    errors.speed_sample = sample;
-  } else {
-    check::that(sensors.motion == 0.0 || measurement.nominal_step > 0.0, "measurement nominal_step", "a step > 0");
-    errors.speed_sample = sensors.motion > 0.0 ? Eigen::VectorXd(2.0 / measurement.nominal_step * sample) : sample;
+  errors.joint_sample = sensors.motion;
+  if (measurement.motion != MotionKind::speed && sensors.motion > 0.0) {
+    errors.joint_sample *= 2.0 / check::positive(measurement.nominal_step, "measurement nominal_step");
   }
+  errors.speed_sample = model.motion.cwiseAbs().rowwise().sum() * errors.joint_sample;
   return errors;
 }
 

@@ -41,6 +41,7 @@ struct SignalErrors {
   Eigen::VectorXd speed;         ///< per coordinate: of its filtered speed
   Eigen::VectorXd output;        ///< per output: of τ_f
   Eigen::VectorXd speed_sample;  ///< per coordinate: of its unfiltered speed inside a piece, for function terms
+  double joint_sample = 0.0;     ///< of each joint's unfiltered speed, for function terms
   double heading = 0.0;          ///< rad
 };
 

@@ -39,6 +39,8 @@ RegressorFilter::RegressorFilter(Model model, FilterDesign design, Measurement m
   slope_.resize(model_.coordinates.size());
   torque_.resize(model_.n());
   state_speed_.resize(model_.coordinates.size());
+  state_joint_.resize(model_.joints.size());
+  joint_error_.assign(model_.joints.size(), errors_.joint_sample);
   for (std::size_t k = 0; k < model_.terms.size(); ++k) {
     if (model_.terms[k].kind == Term::Kind::function) {
       functions_.push_back(FunctionTerm{k, {}, {}});
@@ -83,11 +85,18 @@ void RegressorFilter::read_efforts(std::span<const double> sample) {
 }
 
 void RegressorFilter::evaluate_functions(const Eigen::VectorXd& speed) {
+  if (functions_.empty()) {
+    return;
+  }
   for (std::size_t c = 0; c < state_speed_.size(); ++c) {
     state_speed_[c] = speed[static_cast<Eigen::Index>(c)];
   }
+  const Eigen::VectorXd& joints = measurement_.motion == MotionKind::angle ? joint_speed_ : joint_;
+  for (std::size_t j = 0; j < state_joint_.size(); ++j) {
+    state_joint_[j] = joints[static_cast<Eigen::Index>(j)];
+  }
   const std::span<const double> error(errors_.speed_sample.data(), state_speed_.size());
-  const MotionState state{state_speed_, error, heading_, errors_.heading};
+  const MotionState state{state_speed_, error, state_joint_, joint_error_, heading_, errors_.heading};
   for (FunctionTerm& f : functions_) {
     const Term& term = model_.terms[f.term];
     const TermValue value = term.function(state);

@@ -98,7 +98,7 @@ class RegressorFilter {
   std::vector<Cascade> slope_;                          // driven by their derivatives
   std::vector<Cascade> torque_;
   std::vector<FunctionTerm> functions_;
-  std::vector<double> state_speed_;
+  std::vector<double> state_speed_, state_joint_, joint_error_;
   FilteredRow row_;
 };
 

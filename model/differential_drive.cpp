@@ -26,6 +26,21 @@ TermValue along_y(const MotionState& state) {
   return share_of_speed(s * s, state);
 }
 
+// sgn ω_R ± sgn ω_L; where a sign is in doubt its friction is any number in [−1, 1].
+TermValue signs(const MotionState& state, double of_left) {
+  TermValue sum;
+  for (std::size_t j = 0; j < 2; ++j) {
+    const double w = state.joint_speed[j];
+    const double sign = static_cast<double>(w > 0.0) - static_cast<double>(w < 0.0);
+    sum.value += (j == 0 ? 1.0 : of_left) * sign;
+    sum.error += state.joint_error[j] > 0.0 && std::abs(w) <= state.joint_error[j] ? 1.0 + std::abs(sign) : 0.0;
+  }
+  return sum;
+}
+
+TermValue signs_sum(const MotionState& state) { return signs(state, 1.0); }
+TermValue signs_difference(const MotionState& state) { return signs(state, -1.0); }
+
 Parameter viscous(const char* axis, double r) {
   return {.name = std::string("r_viscous_") + axis,
           .unit = "N·s",
@@ -105,6 +120,21 @@ Model DifferentialDrive::model() const {
        .prior = {0.0, 1e5},
        .excite = "drive in curves"},
       {.output = 1, .kind = Term::Kind::speed, .coordinate = 1});
+  if (coulomb) {
+    add({.name = "coulomb",
+         .unit = "N·m",
+         .physical = "coulomb",
+         .physical_unit = "N·m",
+         .per_physical = 1.0,
+         .prior = {0.0, 1e4},
+         .excite = "drive in both directions"},
+        {.output = 0, .kind = Term::Kind::function, .function = signs_sum});
+    m.terms.push_back({.output = 1,
+                       .parameter = m.terms.back().parameter,
+                       .kind = Term::Kind::function,
+                       .scale = l,
+                       .function = signs_difference});
+  }
   return m;
 }
 

@@ -15,6 +15,7 @@ struct DifferentialDrive {
   double track_width = 0.0;           ///< D, m
   bool lever_arm_is_track = false;    ///< ℓ = D as the paper writes (14), instead of the physical D/2
   bool anisotropic_friction = false;  ///< friction f1 ≠ f2 along the world axes: five parameters
+  bool coulomb = false;               ///< with dry friction at both wheels, not in the paper: one parameter more
 
   /// The yaw lever arm ℓ, m.
   [[nodiscard]] double lever_arm() const { return lever_arm_is_track ? track_width : 0.5 * track_width; }
@@ -29,7 +30,8 @@ struct DifferentialDrive {
   [[nodiscard]] Eigen::Vector2d channels(const Eigen::Vector2d& torque) const;
 
   /// The model with θ_L = r·[m, I, f1, f3] (20); with anisotropic friction r·[m, I, f1, f2, f3], where the friction of
-  /// the sum channel is f1 cos²θ + f2 sin²θ. Throws InvalidArgument unless r and D are > 0.
+  /// the sum channel is f1 cos²θ + f2 sin²θ. With dry friction of torque c at each wheel, θ_L ends in c, and Y in
+  /// [sgn ω_R + sgn ω_L; ℓ(sgn ω_R − sgn ω_L)]. Throws InvalidArgument unless r and D are > 0.
   [[nodiscard]] Model model() const;
 };
 

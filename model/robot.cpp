@@ -19,7 +19,7 @@ constexpr double widest_effort_constant = 1e3;
 Model full_model(const Robot& robot) {
   if (robot.model == "differential_drive") {
     return DifferentialDrive{robot.wheel_radius, robot.track_width, robot.lever_arm_is_track,
-                             robot.anisotropic_friction}
+                             robot.anisotropic_friction, true}
         .model();
   }
   if (robot.model == "single_axis") {
@@ -60,6 +60,17 @@ Model select(const Model& model, const std::vector<std::string>& keep) {
   return selected;
 }
 
+// What a model has unless more is asked for: no dry friction, no offset.
+std::vector<std::string> basic_parameters(const Model& full) {
+  std::vector<std::string> names;
+  for (const Parameter& parameter : full.parameters) {
+    if (parameter.physical != "coulomb" && parameter.physical != "offset") {
+      names.push_back(parameter.physical);
+    }
+  }
+  return names;
+}
+
 // Effort at the wheel per unit of torque, where the motor's constants tell: 1/(N k_t) for currents, R/(N k_t) for
 // voltages (the back-EMF then belongs to the viscous terms).
 std::optional<double> effort_per_torque(const Robot& robot) {
@@ -82,6 +93,14 @@ std::optional<double> effort_per_torque(const Robot& robot) {
 
 }  // namespace
 
+std::vector<std::string> possible_parameters(const Robot& robot) {
+  std::vector<std::string> names;
+  for (const Parameter& parameter : full_model(robot).parameters) {
+    names.push_back(parameter.physical);
+  }
+  return names;
+}
+
 Model make_model(const Robot& robot) {
   const Model full = full_model(robot);
   for (const auto& [name, value] : robot.nominal) {
@@ -92,7 +111,6 @@ Model make_model(const Robot& robot) {
     require_parameter(full, name, "prior");
     check::that(bounds.lower <= bounds.upper, "prior." + name, "lower <= upper");
   }
-  const std::vector<std::string> basic_axis = {"inertia", "viscous"};
   Model model = full;
   if (robot.parameters) {
     check::that(!robot.parameters->empty(), "parameters", "at least one name");
@@ -100,8 +118,8 @@ Model make_model(const Robot& robot) {
       require_parameter(full, name, "parameters");
     }
     model = select(full, *robot.parameters);
-  } else if (robot.model == "single_axis") {
-    model = select(full, basic_axis);
+  } else {
+    model = select(full, basic_parameters(full));
   }
   if (const std::optional<double> scale = effort_per_torque(robot)) {
     for (Parameter& parameter : model.parameters) {

@@ -88,6 +88,10 @@ struct Robot {
 /// basic set). Throws InvalidArgument when the robot's geometry or its requests make no sense.
 [[nodiscard]] Model make_model(const Robot& robot);
 
+/// Physical names of all parameters that a robot of this kind can have, the basic ones first: dry friction (`coulomb`)
+/// and, for a single axis, a constant `offset` are there on request. Throws InvalidArgument as make_model.
+[[nodiscard]] std::vector<std::string> possible_parameters(const Robot& robot);
+
 /// Prior box of θ_L in the order of `model.parameters`: the robot's own prior where it has one, else the model's wide
 /// physical default.
 struct PriorBox {

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// The commands. Each adds itself to the program and, when it was chosen, does its work and returns an exit code.
+#pragma once
+
+#include <functional>
+#include <string>
+
+namespace CLI {
+class App;
+}
+
+namespace wheelwright::app {
+
+/// A command that was added: `run` does its work.
+using Run = std::function<int(const std::string& command_line)>;
+
+/// wheelwright commission LOG... --robot robot.yaml
+[[nodiscard]] Run add_commission(CLI::App& program);
+/// wheelwright detect LOG --model model.json [--follow]
+[[nodiscard]] Run add_detect(CLI::App& program);
+/// wheelwright simulate SCENARIO.yaml --out LOG
+[[nodiscard]] Run add_simulate(CLI::App& program);
+
+}  // namespace wheelwright::app

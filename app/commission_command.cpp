@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cstdio>
+#include <memory>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <wheelwright/commission/commission.hpp>
+#include <wheelwright/commission/trace.hpp>
+#include <wheelwright/io/atomic_file.hpp>
+#include <wheelwright/io/model_file.hpp>
+#include <wheelwright/io/robot_file.hpp>
+#include <wheelwright/report/commission_report.hpp>
+
+#include "commands.hpp"
+#include "common.hpp"
+#include "progress.hpp"
+#include "summary.hpp"
+
+namespace wheelwright::app {
+namespace {
+
+struct Arguments {
+  std::vector<std::filesystem::path> logs;
+  std::filesystem::path robot;
+  bool statistical = false;
+  std::size_t outliers = 0;
+  std::size_t k = 1;
+  std::size_t n = 1;
+  CommonOptions common;
+};
+
+constexpr const char* kHelp =
+    "From a log of fault-free driving to a model that a detector can carry: best-guess parameters by least squares on "
+    "filtered torque, guaranteed bounds on them, thresholds, and a trial on driving that was held out.\n\n"
+    "Drive so that every parameter shows: speed up and brake, drive curves and change the yaw rate, in both "
+    "directions, for a minute or more.";
+
+constexpr const char* kExamples =
+    "Examples:\n"
+    "  wheelwright commission drive.csv --robot robot.yaml --out result\n"
+    "  wheelwright commission monday.csv tuesday.csv.gz --robot robot.yaml --out result\n"
+    "  wheelwright commission drive.csv --robot robot.yaml --map omega_r=wheel_2 --json > model.json\n\n"
+    "Exit code: 0 a model was made, 1 the log contradicts the model or shows no parameter, 2 bad input.";
+
+int run(const Arguments& a) {
+  make_directory(a.common);
+  const Robot robot = read_robot(a.robot);
+  CsvOptions reader = reader_options(a.common);
+  reader.only = useful_columns(robot);
+  CsvLog log(a.logs, reader);
+  ReportContext context = report_context(a.common, log.report(), log);
+  Progress progress(a.common.quiet);
+  CommissionOptions options;
+  options.noise_mode = a.statistical ? NoiseMode::statistical : NoiseMode::worst_case;
+  options.outliers = a.outliers;
+  options.persistence = {a.k, a.n};
+  options.progress = [&](std::string_view stage, double share) { progress.tell(stage, share); };
+  Commissioning result;
+  try {
+    result = commission(log, robot, options);
+    if (!result.model.facets.empty() && !a.common.out.empty()) {
+      context.own_log = detect(log, make_detector(result.model));
+    }
+  } catch (const Error& error) {
+    if (!a.common.out.empty()) {
+      atomic_write(a.common.out / "report.html", failure_report(error.what(), context));
+    }
+    throw;
+  }
+  publish(a.common, to_json(result, log.report(), software()), "model.json", commission_report(result, context));
+  const bool has_model = !result.model.facets.empty() && result.status != Commissioning::Status::nothing;
+  if (!a.common.quiet && !a.common.json) {
+    for (const std::string& sentence : context.warnings) {
+      fmt::print("log: {}\n", sentence);
+    }
+    fmt::print("{}", summary(result));
+    if (!a.common.out.empty()) {
+      fmt::print("wrote {} and {}\n", (a.common.out / "model.json").string(), (a.common.out / "report.html").string());
+    }
+  }
+  return has_model ? kDone : kNo;
+}
+
+}  // namespace
+
+Run add_commission(CLI::App& program) {
+  auto a = std::make_shared<Arguments>();
+  CLI::App& command = *program.add_subcommand("commission", kHelp);
+  command.add_option("LOG", a->logs, "CSV logs (also .gz, .zst); several are taken together")->required();
+  command.add_option("--robot", a->robot, "Robot file (YAML)")->required()->type_name("FILE");
+  command.add_flag("--statistical", a->statistical,
+                   "Propagate declared sensor noise at a confidence of 99.9 % instead of in the worst case");
+  command.add_option("--outliers", a->outliers, "Let the feasible set leave out at most N instants")
+      ->type_name("N")
+      ->capture_default_str();
+  command.add_option("--persistence", "Raise an alarm when K of the last N instants are outside (default 1/1)")
+      ->type_name("K/N")
+      ->each([a](const std::string& text) {
+        if (std::sscanf(text.c_str(), "%zu/%zu", &a->k, &a->n) != 2 || a->k < 1 || a->k > a->n || a->n > 64) {
+          throw CLI::ValidationError("--persistence", "'" + text + "': expected K/N with 1 <= K <= N <= 64, e.g. 3/5");
+        }
+      });
+  add_common(command, a->common);
+  add_map(command, a->common);
+  command.footer(kExamples);
+  return [a](const std::string& command_line) {
+    a->common.command_line = command_line;
+    return run(*a);
+  };
+}
+
+}  // namespace wheelwright::app

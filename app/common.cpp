@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "common.hpp"
+
+#include <cstdio>
+#include <system_error>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <wheelwright/io/atomic_file.hpp>
+#include <wheelwright/model/robot.hpp>
+
+#include "raw_signals.hpp"
+
+namespace wheelwright::app {
+
+void add_common(CLI::App& command, CommonOptions& options) {
+  command.add_option("--out", options.out, "Write results and report.html into this directory")->type_name("DIR");
+  command.add_flag("--json", options.json, "Print the result as JSON on standard output, and nothing else there");
+  command.add_option("--threads", options.threads, "Use at most N threads; results do not depend on it")
+      ->type_name("N")
+      ->check(CLI::Range(1, 1024))
+      ->capture_default_str();
+  command.add_option("--seed", options.seed, "Seed of everything random")->type_name("N")->capture_default_str();
+  command.add_flag("--quiet", options.quiet, "No progress and no summary; errors are still told");
+}
+
+void add_map(CLI::App& command, CommonOptions& options) {
+  command.add_option("--map", options.map,
+                     "Read the log column NAME from the file's column COLUMN (repeatable), e.g. --map omega_r=wheel_2")
+      ->type_name("NAME=COLUMN")
+      ->expected(1)
+      ->allow_extra_args(false)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+}
+
+std::string software() { return std::string("wheelwright ") + WHEELWRIGHT_VERSION; }
+
+CsvOptions reader_options(const CommonOptions& options) {
+  CsvOptions reader;
+  for (const std::string& entry : options.map) {
+    const std::size_t at = entry.find('=');
+    if (at == std::string::npos || at == 0 || at + 1 == entry.size()) {
+      throw InputError("--map '" + entry + "': expected NAME=COLUMN, e.g. --map omega_r=wheel_2");
+    }
+    reader.map[entry.substr(0, at)] = entry.substr(at + 1);
+  }
+  return reader;
+}
+
+std::vector<std::string> useful_columns(const Robot& robot) {
+  std::vector<std::string> names = {"t", "x", "y", "theta", "gyro_z", "command_r", "command_l"};
+  for (const Joint& joint : make_model(robot).joints) {
+    names.insert(names.end(), {joint.angle, joint.speed});
+    names.push_back(robot.effort == EffortKind::torque    ? joint.torque
+                    : robot.effort == EffortKind::current ? joint.current
+                                                          : joint.voltage);
+  }
+  return names;
+}
+
+void make_directory(const CommonOptions& options) {
+  if (options.out.empty()) {
+    return;
+  }
+  std::error_code error;
+  std::filesystem::create_directories(options.out, error);
+  if (error || !std::filesystem::is_directory(options.out)) {
+    throw InputError("--out " + options.out.string() + ": cannot make this directory" +
+                     (error ? " (" + error.message() + ")" : "") + ": expected a place where files can be written");
+  }
+}
+
+void publish(const CommonOptions& options, const Json& result, const std::string& name, const std::string& report) {
+  if (!options.out.empty()) {
+    atomic_write(options.out / "report.html", report);
+    write_json(options.out / name, result);
+  }
+  if (options.json) {
+    const std::string text = json_text(result);
+    std::fwrite(text.data(), 1, text.size(), stdout);
+    std::fputc('\n', stdout);
+  }
+}
+
+ReportContext report_context(const CommonOptions& options, const LogReport& data, LogSource& log) {
+  ReportContext context;
+  for (const LogFileReport& file : data.files) {
+    context.log_files.push_back(file.path);
+  }
+  context.software = software();
+  context.command_line = options.command_line;
+  context.warnings = sentences(data);
+  context.signals = raw_signals(log);
+  return context;
+}
+
+}  // namespace wheelwright::app

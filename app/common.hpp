@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// What all commands share: options, exit codes, where results go.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <wheelwright/io/csv.hpp>
+#include <wheelwright/io/json_file.hpp>
+#include <wheelwright/report/context.hpp>
+
+namespace CLI {
+class App;
+}
+
+namespace wheelwright::app {
+
+/// Exit codes of the program.
+enum ExitCode : int {
+  kDone = 0,      ///< done
+  kNo = 1,        ///< the answer to the question is no: a fault found, a model invalidated
+  kBadInput = 2,  ///< bad usage or input
+  kInternal = 3,  ///< internal failure
+};
+
+/// Options that every command has.
+struct CommonOptions {
+  std::filesystem::path out;      ///< directory of results; empty: none
+  bool json = false;              ///< the result on standard output, and nothing else there
+  bool quiet = false;             ///< no progress, no summary
+  int threads = 1;                ///< most threads
+  std::uint64_t seed = 1;         ///< of everything random
+  std::vector<std::string> map;   ///< name=column
+  std::string command_line;       ///< as the user gave it
+};
+
+/// Adds the common options to `command`.
+void add_common(CLI::App& command, CommonOptions& options);
+/// Adds --map to a command that reads logs.
+void add_map(CLI::App& command, CommonOptions& options);
+
+/// Name and version of the program.
+[[nodiscard]] std::string software();
+
+/// --map as reader options. Throws InputError where an entry is not name=column.
+[[nodiscard]] CsvOptions reader_options(const CommonOptions& options);
+
+/// Columns that a robot of this model can use, so that a defect elsewhere in a file does no harm.
+[[nodiscard]] std::vector<std::string> useful_columns(const Robot& robot);
+
+/// Makes the result directory `out` where it is wanted. Throws InputError when that is impossible.
+void make_directory(const CommonOptions& options);
+
+/// Writes `result` to out/name and report to out/report.html where a directory is wanted, and the result to standard
+/// output with --json.
+void publish(const CommonOptions& options, const Json& result, const std::string& name, const std::string& report);
+
+/// The context of a report: files, repairs, software, command line, raw signals of `log` (which is walked once).
+[[nodiscard]] ReportContext report_context(const CommonOptions& options, const LogReport& data, LogSource& log);
+
+}  // namespace wheelwright::app

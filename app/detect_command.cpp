@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <iostream>
+#include <map>
+#include <memory>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <wheelwright/commission/trace.hpp>
+#include <wheelwright/io/model_file.hpp>
+#include <wheelwright/report/detect_report.hpp>
+
+#include "commands.hpp"
+#include "common.hpp"
+#include "follow.hpp"
+#include "summary.hpp"
+
+namespace wheelwright::app {
+namespace {
+
+struct Arguments {
+  std::filesystem::path log;
+  std::filesystem::path model;
+  bool follow = false;
+  DetectorOptions detector;
+  CommonOptions common;
+};
+
+constexpr const char* kHelp =
+    "Looks for faults in a log with a commissioned model: the residual of filtered torque against the threshold that no "
+    "fault-free robot within its bounds can exceed.";
+
+constexpr const char* kExamples =
+    "Examples:\n"
+    "  wheelwright detect drive.csv --model result/model.json --out check\n"
+    "  robot_driver | wheelwright detect --follow --model result/model.json\n\n"
+    "Exit code: 0 no fault, 1 a fault was found, 2 bad input.";
+
+int run(const Arguments& a) {
+  const CommissionedModel model = read_model(a.model);
+  Detector detector = make_detector(model, a.detector);
+  CsvOptions reader = reader_options(a.common);
+  reader.only = useful_columns(model.robot);
+  if (a.follow) {
+    return follow(std::cin, std::cout, std::move(detector), model, reader, a.common.json) ? kNo : kDone;
+  }
+  if (a.log.empty()) {
+    throw InputError("detect: expected a LOG, or --follow to read rows from standard input");
+  }
+  make_directory(a.common);
+  CsvLog log({a.log}, reader);
+  require_columns(log, model.measurement.columns());
+  const Detection detection = detect(log, std::move(detector));
+  if (!a.common.out.empty() || a.common.json) {
+    publish(a.common, to_json(detection, model, a.model.string(), a.log.string()), "detection.json",
+            a.common.out.empty() ? std::string()
+                                 : detect_report(detection, model, report_context(a.common, log.report(), log)));
+  }
+  if (!a.common.quiet && !a.common.json) {
+    for (const std::string& sentence : sentences(log.report())) {
+      fmt::print("log: {}\n", sentence);
+    }
+    fmt::print("{}", summary(detection, model));
+    if (!a.common.out.empty()) {
+      fmt::print("wrote {} and {}\n", (a.common.out / "detection.json").string(),
+                 (a.common.out / "report.html").string());
+    }
+  }
+  return detection.events.empty() ? kDone : kNo;
+}
+
+}  // namespace
+
+Run add_detect(CLI::App& program) {
+  auto a = std::make_shared<Arguments>();
+  CLI::App& command = *program.add_subcommand("detect", kHelp);
+  command.add_option("LOG", a->log, "CSV log (also .gz, .zst)");
+  command.add_option("--model", a->model, "model.json of `wheelwright commission`")->required()->type_name("FILE");
+  command.add_flag("--follow", a->follow, "Read CSV rows from standard input as they come, tell events at once");
+  command
+      .add_option("--set", a->detector.set, "Threshold from the feasible set itself (polytope) or from its box")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, ParameterSetKind>{
+          {"polytope", ParameterSetKind::polytope}, {"box", ParameterSetKind::box}}))
+      ->type_name("SET");
+  command
+      .add_option("--test", a->detector.test, "Compare with [l, u] (two_sided) or with rho as the paper does (symmetric)")
+      ->transform(CLI::CheckedTransformer(
+          std::map<std::string, Test>{{"two_sided", Test::two_sided}, {"symmetric", Test::symmetric}}))
+      ->type_name("TEST");
+  command.add_option("--persistence", "Raise an alarm when K of the last N instants are outside (default: the model's)")
+      ->type_name("K/N")
+      ->each([a](const std::string& text) {
+        Persistence& p = a->detector.persistence;
+        if (std::sscanf(text.c_str(), "%zu/%zu", &p.k, &p.n) != 2 || p.k < 1 || p.k > p.n || p.n > 64) {
+          throw CLI::ValidationError("--persistence", "'" + text + "': expected K/N with 1 <= K <= N <= 64, e.g. 3/5");
+        }
+      });
+  add_common(command, a->common);
+  add_map(command, a->common);
+  command.footer(kExamples);
+  return [a](const std::string& command_line) {
+    a->common.command_line = command_line;
+    return run(*a);
+  };
+}
+
+}  // namespace wheelwright::app

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// detect --follow: rows from standard input as they come.
+#pragma once
+
+#include <istream>
+#include <ostream>
+
+#include <wheelwright/commission/commission.hpp>
+#include <wheelwright/io/csv_header.hpp>
+
+namespace wheelwright::app {
+
+/// Reads CSV rows from `in` until its end and writes an event to `out` at the instant its alarm is raised: a line of
+/// text, or with `json` one JSON object a line. A row that cannot be used is told on standard error and left out. Returns
+/// whether there was an event.
+bool follow(std::istream& in, std::ostream& out, Detector detector, const CommissionedModel& model,
+            const CsvOptions& reader, bool json);
+
+}  // namespace wheelwright::app

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <exception>
+#include <iostream>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include <wheelwright/core/error.hpp>
+
+#include "commands.hpp"
+#include "common.hpp"
+
+namespace {
+
+using namespace wheelwright::app;
+
+std::string joined(int count, char** words) {
+  std::string line = "wheelwright";
+  for (int k = 1; k < count; ++k) {
+    line += std::string(" ") + words[k];
+  }
+  return line;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App program(
+      "Wheelwright: model-based fault detection for wheeled robots, guaranteed and tight.\n"
+      "A robot and a log of fault-free driving go in; a model with thresholds that no healthy robot exceeds comes out.");
+  program.set_version_flag("--version", software());
+  program.require_subcommand(1);
+  program.footer(
+      "Start with:  wheelwright commission LOG --robot robot.yaml --out result\n"
+      "Each command has its own --help.");
+  const std::vector<std::pair<std::string, Run>> commands = {
+      {"commission", add_commission(program)}, {"detect", add_detect(program)}, {"simulate", add_simulate(program)}};
+  try {
+    program.parse(argc, argv);
+    for (const auto& [name, run] : commands) {
+      if (program.got_subcommand(name)) {
+        return run(joined(argc, argv));
+      }
+    }
+    return kBadInput;
+  } catch (const CLI::ParseError& error) {
+    return program.exit(error) == 0 ? kDone : kBadInput;
+  } catch (const wheelwright::Error& error) {
+    fmt::print(stderr, "wheelwright: {}\n", error.what());
+    return kBadInput;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "wheelwright: internal failure: {}\nThis is a bug; please report it with the input.\n", error.what());
+    return kInternal;
+  }
+}

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <memory>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <wheelwright/io/csv.hpp>
+#include <wheelwright/io/json_file.hpp>
+#include <wheelwright/io/scenario_file.hpp>
+#include <wheelwright/sim/simulation.hpp>
+
+#include "commands.hpp"
+#include "common.hpp"
+
+namespace wheelwright::app {
+namespace {
+
+struct Arguments {
+  std::filesystem::path scenario;
+  std::filesystem::path out;
+  std::optional<std::uint64_t> seed;
+  int threads = 1;
+  bool json = false;
+  bool quiet = false;
+};
+
+constexpr const char* kHelp =
+    "Drives the robot of the paper in closed loop, with bounded sensor noise and with faults that begin when you say, "
+    "and writes what its sensors would log.";
+
+constexpr const char* kExamples =
+    "Examples:\n"
+    "  wheelwright simulate examples/scenarios/commissioning.yaml --out healthy.csv\n"
+    "  wheelwright simulate examples/scenarios/wheel_radius_fault.yaml --out fault.csv.gz --seed 7";
+
+int run(const Arguments& a) {
+  Scenario scenario = read_scenario(a.scenario);
+  if (a.seed) {
+    scenario.seed = *a.seed;
+  }
+  Simulation simulation(scenario);
+  const LogTable log = read_all(simulation);
+  write_csv(a.out, log);
+  if (a.json) {
+    fmt::print("{}\n", json_text({{"schema", "wheelwright/simulation/1"},
+                                  {"software", software()},
+                                  {"scenario", a.scenario.string()},
+                                  {"log", a.out.string()},
+                                  {"rows", log.rows()},
+                                  {"seed", scenario.seed}}));
+  } else if (!a.quiet) {
+    fmt::print("wrote {}: {} rows, {:.1f} s, seed {}\n", a.out.string(), log.rows(), scenario.duration, scenario.seed);
+  }
+  return kDone;
+}
+
+}  // namespace
+
+Run add_simulate(CLI::App& program) {
+  auto a = std::make_shared<Arguments>();
+  CLI::App& command = *program.add_subcommand("simulate", kHelp);
+  command.add_option("SCENARIO", a->scenario, "Scenario file (YAML)")->required();
+  command.add_option("--out", a->out, "The log to write: .csv, .csv.gz or .csv.zst")->required()->type_name("LOG");
+  command.add_option("--seed", a->seed, "Seed of all noise, in place of the scenario's")->type_name("N");
+  command.add_option("--threads", a->threads, "Accepted for all commands; a drive is one thread")
+      ->type_name("N")
+      ->check(CLI::Range(1, 1024));
+  command.add_flag("--json", a->json, "Say what was written as JSON");
+  command.add_flag("--quiet", a->quiet, "Say nothing");
+  command.footer(kExamples);
+  return [a](const std::string&) { return run(*a); };
+}
+
+}  // namespace wheelwright::app

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "summary.hpp"
+
+#include <cmath>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <wheelwright/commission/physical.hpp>
+#include <wheelwright/identify/noise_level.hpp>
+
+#include "common.hpp"
+
+namespace wheelwright::app {
+namespace {
+
+// One line of the parameter table: name, estimate, guaranteed interval, statistical half-width, unit.
+std::string line(const std::string& name, const std::optional<double>& estimate, double lower, double upper,
+                 const std::optional<double>& half, const std::string& unit, bool lower_is_prior, bool upper_is_prior) {
+  const auto end = [](double value, bool prior) { return fmt::format("{:.5g}{}", value, prior ? " (prior)" : ""); };
+  return fmt::format("  {:<20} {:>11}   [{}, {}]{}  {}\n", name, estimate ? fmt::format("{:.5g}", *estimate) : "-",
+                     end(lower, lower_is_prior), end(upper, upper_is_prior),
+                     half ? fmt::format("   ± {:.2g}", *half) : "", unit);
+}
+
+std::string parameter_table(const Commissioning& r) {
+  const Robot& robot = r.model.robot;
+  const auto scales = physical_scales(robot, r.model.model);
+  const double t = student_quantile(0.95, std::max(r.residuals.freedom, 1.0));
+  std::string text = fmt::format("  {:<20} {:>11}   guaranteed interval   ± 95 % statistical\n", "parameter", "estimate");
+  for (std::size_t j = 0; j < r.parameters.size(); ++j) {
+    const ParameterResult& p = r.parameters[j];
+    const PhysicalScale s = scales ? (*scales)[j] : PhysicalScale{};
+    const auto value = [&](double theta) { return s.scale * theta - s.offset; };
+    const auto estimate = p.estimate ? std::optional(value(*p.estimate)) : std::nullopt;
+    const auto half = p.standard_error ? std::optional(t * std::abs(s.scale) * *p.standard_error) : std::nullopt;
+    text += line(scales ? p.parameter.physical : p.parameter.name, estimate, value(p.lower), value(p.upper), half,
+                 scales ? p.parameter.physical_unit : parameter_unit(robot, p.parameter), p.lower_is_prior,
+                 p.upper_is_prior);
+    if (!p.reason.empty()) {
+      text += fmt::format("  {:<20} {}\n", "", p.reason);
+    }
+  }
+  if (!scales) {
+    text += "  (physical values need the motor's constants in the robot file: motor: {torque_constant, gear_ratio, …})\n";
+  }
+  return text;
+}
+
+std::string contradiction_table(const Commissioning& r) {
+  std::string text = "  samples that contradict one another:\n";
+  for (const WeightedRow& row : r.feasible.contradiction) {
+    const RowOrigin& o = row.row.origin;
+    text += o.is_prior ? fmt::format("    prior bound of {}\n", r.model.model.parameters[o.parameter].physical)
+                       : fmt::format("    t = {:.3f} s, row {}, {} channel\n", o.t, o.sample, r.model.model.outputs[o.output]);
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string summary(const Commissioning& r) {
+  std::string text = fmt::format("{}: {}\n", r.model.robot.name, r.message);
+  text += fmt::format("  {} rows in {} segment{}, {:.1f} s; filter of order {}, beta {:g} 1/s (delay {:.2g} s)\n",
+                      r.survey.rows, r.survey.segments, r.survey.segments == 1 ? "" : "s", r.survey.seconds,
+                      r.model.filter.order, r.model.filter.beta, r.model.filter.delay());
+  if (r.status == Commissioning::Status::empty) {
+    return text + contradiction_table(r);
+  }
+  text += parameter_table(r);
+  for (std::size_t i = 0; i < r.validation.size(); ++i) {
+    const OutputValidation& v = r.validation[i];
+    if (v.instants == 0) {
+      text += fmt::format("  held out, {}: too little driving to hold any out\n", r.model.model.outputs[i]);
+      continue;
+    }
+    text += fmt::format("  held out, {}: {} false alarms in {} instants, residual {:.2g} % of the torque", r.model.model.outputs[i],
+                        v.outside, v.instants, 100.0 * v.nrmse);
+    text += std::isfinite(v.smallest_kappa)
+                ? fmt::format("; a change of the wheel radius by {:.2g} % is certainly seen\n",
+                              100.0 * (std::sqrt(1.0 + v.smallest_kappa) - 1.0))
+                : "; no change of the wheel radius is certainly seen\n";
+  }
+  for (const std::string& note : r.notes) {
+    text += "  note: " + note + "\n";
+  }
+  return text;
+}
+
+std::string event_line(const Event& e, const CommissionedModel& model) {
+  return fmt::format("t = {:.3f} s: fault in the {} channel (first outside at {:.3f} s, {:.2f} times the threshold)", e.alarm,
+                     model.model.outputs[e.output], e.start, e.peak_ratio);
+}
+
+std::string summary(const Detection& d, const CommissionedModel& model) {
+  std::string text;
+  if (d.instants == 0) {
+    return "no decision: the log is too short for the filter to settle\n";
+  }
+  if (d.events.empty()) {
+    text = fmt::format("no fault in {:.1f} s ({} instants)\n", d.seconds, d.instants);
+  } else {
+    text = fmt::format("{} fault event{} in {:.1f} s ({} instants)\n", d.events.size(), d.events.size() == 1 ? "" : "s",
+                       d.seconds, d.instants);
+    constexpr std::size_t most = 20;
+    for (std::size_t k = 0; k < std::min(d.events.size(), most); ++k) {
+      text += "  " + event_line(d.events[k], model) + "\n";
+    }
+    if (d.events.size() > most) {
+      text += fmt::format("  … and {} more (--json lists them all)\n", d.events.size() - most);
+    }
+  }
+  for (std::size_t i = 0; i < d.utilisation.size(); ++i) {
+    text += fmt::format("  {}: residual {:.2g} % of the torque, at most {:.0f} % of its threshold used\n", model.model.outputs[i],
+                        100.0 * d.nrmse[i], 100.0 * d.utilisation[i]);
+  }
+  return text;
+}
+
+Json to_json(const Event& e, const CommissionedModel& model) {
+  return {{"output", model.model.outputs[e.output]}, {"start", e.start},         {"alarm", e.alarm},
+          {"end", e.end},                            {"peak_time", e.peak_time}, {"peak_residual", e.peak_residual},
+          {"peak_ratio", e.peak_ratio},              {"instants", e.instants},   {"start_row", e.start_sample}};
+}
+
+Json to_json(const Detection& d, const CommissionedModel& model, const std::string& model_file, const std::string& log) {
+  Json json = {{"schema", "wheelwright/detection/1"},
+               {"software", software()},
+               {"model", model_file},
+               {"log", log},
+               {"fault", !d.events.empty()},
+               {"rows", d.rows},
+               {"instants", d.instants},
+               {"seconds", d.seconds},
+               {"outputs", Json::array()},
+               {"events", Json::array()}};
+  for (std::size_t i = 0; i < d.outside.size(); ++i) {
+    json["outputs"].push_back({{"output", model.model.outputs[i]},
+                               {"instants_outside", d.outside[i]},
+                               {"utilisation", d.utilisation[i]},
+                               {"nrmse", d.nrmse[i]}});
+  }
+  for (const Event& event : d.events) {
+    json["events"].push_back(to_json(event, model));
+  }
+  return json;
+}
+
+}  // namespace wheelwright::app

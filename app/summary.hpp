@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Results in a few lines for a terminal, and as JSON.
+#pragma once
+
+#include <string>
+
+#include <wheelwright/commission/commission.hpp>
+#include <wheelwright/commission/trace.hpp>
+#include <wheelwright/io/json_file.hpp>
+
+namespace wheelwright::app {
+
+/// What commissioning found, for a terminal.
+[[nodiscard]] std::string summary(const Commissioning& result);
+
+/// What a detector said of a log, for a terminal.
+[[nodiscard]] std::string summary(const Detection& detection, const CommissionedModel& model);
+
+/// One event in a line.
+[[nodiscard]] std::string event_line(const Event& event, const CommissionedModel& model);
+
+/// A detection as JSON (io/detection.schema.json). `model_file` and `log` say what was used.
+[[nodiscard]] Json to_json(const Detection& detection, const CommissionedModel& model, const std::string& model_file,
+                           const std::string& log);
+
+/// One event as JSON.
+[[nodiscard]] Json to_json(const Event& event, const CommissionedModel& model);
+
+}  // namespace wheelwright::app
