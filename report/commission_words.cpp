@@ -15,6 +15,9 @@ namespace {
 
 using Status = Commissioning::Status;
 
+// Above this κ (a change of the wheel radii by 22 %) thresholds are called coarse.
+constexpr double coarse_kappa = 0.5;
+
 // Below this utilisation a threshold is called one that can hardly fire.
 constexpr double idle_utilisation = 0.1;
 
@@ -48,17 +51,28 @@ std::vector<std::string> idle_outputs(const Commissioning& result) {
   return names;
 }
 
+std::string guaranteed(const ParameterView& v) {
+  const auto [lower, upper] = outward(v.lower, v.upper);
+  if (v.lower_is_prior && v.upper_is_prior) {
+    return "bounded by the prior alone";
+  }
+  if (v.lower_is_prior || v.upper_is_prior) {
+    return v.lower_is_prior ? "guaranteed at most " + upper : "guaranteed at least " + lower;
+  }
+  return "guaranteed " + lower + " to " + upper;
+}
+
 std::string estimates(const Commissioning& result) {
   std::vector<std::string> items;
   const std::vector<ParameterViews> views = parameter_views(result);
   for (std::size_t j = 0; j < views.size(); ++j) {
     const ParameterView& v = views[j].best();
-    if (!v.estimate || result.parameters[j].excitation == Excitation::not_excited) {
-      continue;
+    if (v.estimate && result.parameters[j].excitation != Excitation::not_excited) {
+      items.push_back(with_unit(v.name + " " + estimate_text(v), v.unit) + " (" + guaranteed(v) + ")");
     }
-    const auto [lower, upper] = outward(v.lower, v.upper);
-    items.push_back(with_unit(fmt::format("{} {}", words(v.name), beside(*v.estimate, v.lower, v.upper)), v.unit) +
-                    fmt::format(" (guaranteed {} to {})", lower, upper));
+  }
+  if (physical_values_unknown(result)) {
+    return "In units of the effort that was logged, since the motor’s constants are not given: " + list(items) + ".";
   }
   return capital(list(items)) + ".";
 }
@@ -111,14 +125,14 @@ std::string sees(const Commissioning& result) {
            "all "
            "that the robot did.";
   }
-  const std::string scale = fmt::format("ζ = κ·Yθ with κ = {}", number(*kappa));
   if (result.model.robot.model == "differential_drive") {
     return fmt::format(
-        "The smallest change of both wheel radii that is certain to be seen is {}: |δ1|/r = √(1+κ) − 1, {}.",
-        percent(radius_change(*kappa)), scale);
+        "The smallest change of both wheel radii that is certain to be seen is {} (|δ1|/r = √(1+κ) − 1 with κ = {}).",
+        percent(radius_change(*kappa)), number(*kappa));
   }
-  return fmt::format("The smallest change of all forces by one factor that is certain to be seen is {} ({}).",
-                     percent(*kappa), scale);
+  return fmt::format(
+      "The smallest change of all forces by one factor that is certain to be seen is {}: ζ = κ·Yθ with κ = {}.",
+      percent(*kappa), number(*kappa));
 }
 
 std::string unseen(const Commissioning& result) {
@@ -127,7 +141,7 @@ std::string unseen(const Commissioning& result) {
   for (std::size_t j = 0; j < views.size(); ++j) {
     const ParameterResult& r = result.parameters[j];
     if (r.excitation == Excitation::not_excited) {
-      names.push_back(words(views[j].best().name));
+      names.push_back(views[j].best().name);
       if (!r.parameter.excite.empty() && std::find(todo.begin(), todo.end(), r.parameter.excite) == todo.end()) {
         todo.push_back(r.parameter.excite);
       }
@@ -178,6 +192,10 @@ std::vector<std::string> words_with_model(const Commissioning& result) {
         fmt::format("The threshold of {} is much wider than its residual and can hardly fire: declared noise "
                     "bounds that are smaller, where the sensors allow it, would tighten it.",
                     list(idle)));
+  } else if (smallest_certain_kappa(result).value_or(coarse_kappa) >= coarse_kappa) {
+    out.emplace_back(
+        "Only coarse faults are certain to be seen: a longer log with stronger acceleration and tighter curves, or a "
+        "quieter effort signal, would narrow the thresholds.");
   }
   return out;
 }
@@ -201,7 +219,8 @@ Standing standing(const Commissioning& result) {
     return Standing::bad;
   }
   const bool clean = result.status == Status::done && held_out_instants(result) > 0 && false_alarms(result) == 0 &&
-                     smallest_certain_kappa(result) && idle_outputs(result).empty();
+                     smallest_certain_kappa(result).value_or(coarse_kappa) < coarse_kappa &&
+                     idle_outputs(result).empty();
   return clean ? Standing::good : Standing::caution;
 }
 

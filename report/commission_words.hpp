@@ -21,7 +21,8 @@ namespace wheelwright::report {
 enum class Standing { good, caution, bad };
 
 /// good: a model whose thresholds held and can fire. caution: a model with something to be read first (parameters that the
-/// log does not show, false alarms on held-out driving, thresholds that can hardly fire). bad: no model.
+/// log does not show, false alarms on held-out driving, thresholds that can hardly fire, or see
+/// coarse faults only). bad: no model.
 [[nodiscard]] Standing standing(const Commissioning& result);
 
 /// One short sentence. Text, not HTML.

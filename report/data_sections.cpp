@@ -16,8 +16,8 @@ namespace wheelwright::report {
 namespace {
 
 std::string unit_cell(const Commissioning& result, std::size_t i) {
-  return escape(output_name(result.model.model, i)) + " <span class=\"unit\">" +
-         escape(output_unit_of(result.model.robot, result.model.model, i)) + "</span>";
+  return escape(output_name(result.model.model, i)) + "<small>" +
+         escape(output_unit_of(result.model.robot, result.model.model, i)) + "</small>";
 }
 
 std::string ratio(double part, double whole) { return whole > 0.0 ? number(part / whole) : "–"; }
@@ -62,11 +62,11 @@ std::string validation_section(const Commissioning& result) {
                             : result.folds.hold_out_every == 3 ? "rd"
                                                                : "th",
                             number(result.folds.purge)));
-  out += table(
-      {"Output", numeric("instants"), numeric("false alarms"), numeric("coverage"), numeric("noise-free coverage"),
-       numeric("NRMSE"), numeric("utilisation"), numeric("width / torque,<br>polytope"),
-       numeric("width / torque,<br>box"), numeric("smallest<br>certain κ"), numeric("wheel radius<br>change")},
-      rows);
+  out += table({"Output", numeric("instants"), numeric("false<br>alarms"), numeric("coverage"),
+                numeric("noise-free<br>coverage"), numeric("NRMSE"), numeric("utilisation"),
+                numeric("width / torque,<br>polytope"), numeric("width / torque,<br>box"),
+                numeric("smallest<br>certain κ"), numeric("wheel radius<br>change")},
+               rows);
   out += bullets({
       "Coverage: share of instants with the residual inside [l, u]. Noise-free coverage: the same with the parameters’ "
       "uncertainty alone, no noise allowed.",
@@ -110,8 +110,8 @@ std::string noise_section(const Commissioning& result) {
              "The bound of the thresholds is for driving to come; the bound of the parameter set is for the rows of "
              "this "
              "log, which need no extrapolation.") +
-         table({"Output", numeric("bound of the thresholds"), numeric("bound of the parameter set"),
-                numeric("residual rms"), numeric("largest residual"), "where it comes from"},
+         table({"Output", numeric("bound of the<br>thresholds"), numeric("bound of the<br>parameter set"),
+                numeric("residual<br>rms"), numeric("largest<br>residual"), "where it comes from"},
                rows);
 }
 

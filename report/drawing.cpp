@@ -72,10 +72,11 @@ std::string interval_bar(const ParameterView& v) {
   if (v.nominal) {
     range.take(*v.nominal);
   }
-  const bool known = range.low < range.high;
-  if (!known) {
-    range.take(v.lower);
-    range.take(v.upper);
+  const double span = range.low < range.high ? range.high - range.low : std::numeric_limits<double>::infinity();
+  for (const double bound : {v.lower, v.upper}) {
+    if (bound >= range.low - span && bound <= range.high + span) {
+      range.take(bound);
+    }
   }
   range.pad(0.12);
   const Scale scale{range, left, right};
@@ -86,7 +87,7 @@ std::string interval_bar(const ParameterView& v) {
       "<svg viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\" role=\"img\" "
       "aria-label=\"intervals of {2}\"><line class=\"axis\" x1=\"{3}\" x2=\"{4}\" y1=\"{5}\" "
       "y2=\"{5}\"/>",
-      width, height, escape(words(v.name)), left, right, middle);
+      width, height, escape(v.name), left, right, middle);
   const bool open = v.lower_is_prior || v.upper_is_prior;
   out += fmt::format("<rect class=\"bar{}\" x=\"{:.1f}\" y=\"{}\" width=\"{:.1f}\" height=\"14\"/>",
                      open ? " open" : "", x0, middle - 7.0, std::max(x1 - x0, 1.0));
@@ -201,6 +202,7 @@ std::string driven_path(const LogTable& signals) {
       "aria-label=\"driven path\"><path class=\"path\" d=\"",
       width, height);
   const std::size_t step = std::max<std::size_t>(1, x->size() / 1500);
+  std::string start;
   bool pen = false;
   std::size_t next_segment = 0;
   for (std::size_t i = 0; i < x->size(); i += step) {
@@ -212,11 +214,14 @@ std::string driven_path(const LogTable& signals) {
       pen = false;
       continue;
     }
-    fmt::format_to(std::back_inserter(out), "{}{:.1f} {:.1f}", pen ? 'L' : 'M', margin + ((*x)[i] - across.low) * unit,
-                   margin + (up.high - (*y)[i]) * unit);
+    const double right = margin + ((*x)[i] - across.low) * unit, down = margin + (up.high - (*y)[i]) * unit;
+    fmt::format_to(std::back_inserter(out), "{}{:.1f} {:.1f}", pen ? 'L' : 'M', right, down);
+    if (start.empty()) {
+      start = fmt::format("<circle class=\"dot\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"4\"/>", right, down);
+    }
     pen = true;
   }
-  return out + "\"/></svg>";
+  return out + "\"/>" + start + "</svg>";
 }
 
 }  // namespace wheelwright::report

@@ -69,7 +69,8 @@ std::string table(const std::vector<Cell>& header, const std::vector<std::vector
   const auto append = [](std::string& out, std::string_view tag, std::string_view attributes, const Cell& cell) {
     out += fmt::format("<{0}{1}{2}>{3}</{0}>", tag, attributes, cell.is_number ? " class=\"n\"" : "", cell.html);
   };
-  std::string out = "<div class=\"wide\"><table><thead><tr>";
+  std::string out =
+      rows.size() > 14 ? "<div class=\"wide tall\"><table><thead><tr>" : "<div class=\"wide\"><table><thead><tr>";
   for (const Cell& cell : header) {
     append(out, "th", " scope=\"col\"", cell);
   }

@@ -2,7 +2,8 @@
 #include <wheelwright/report/parameter_table.hpp>
 
 #include <algorithm>
-#include <array>
+#include <cstddef>
+#include <map>
 #include <utility>
 #include <vector>
 
@@ -18,15 +19,19 @@ namespace {
 
 constexpr double binding_margin = 1.0;  // s, shown on either side of a binding sample
 
+// "12.3 s, 45.6 s sum, 7.8 s difference": each output once.
 std::string binding_samples(const std::vector<RowOrigin>& rows, const Model& model, const TimeAxis& axis) {
-  std::string out;
+  std::map<std::size_t, std::string> by_output;
   for (const RowOrigin& row : rows) {
-    if (row.is_prior) {
-      continue;
+    if (!row.is_prior) {
+      std::string& times = by_output[row.output];
+      times += times.empty() ? "" : ", ";
+      times += time_button(row.t - binding_margin, row.t + binding_margin, axis.text(row.t), axis);
     }
-    out += out.empty() ? "" : ", ";
-    out += time_button(row.t - binding_margin, row.t + binding_margin, axis.text(row.t), axis);
-    out += fmt::format(" {}", escape(output_name(model, row.output)));
+  }
+  std::string out;
+  for (const auto& [output, times] : by_output) {
+    out += fmt::format("{}{} {}", out.empty() ? "" : ", ", times, escape(output_name(model, output)));
   }
   return out;
 }
@@ -44,40 +49,38 @@ std::string set_by(const char* side, const std::vector<RowOrigin>& rows, bool is
   return fmt::format("<small>{}: {}</small>", side, text.empty() ? "–" : text);
 }
 
-std::string interval_cells(const ParameterView& v) {
+std::string interval_cells(const ParameterView& v, bool with_nominal) {
   const auto [lower, upper] = outward(v.lower, v.upper);
   const std::string statistical =
       v.estimate && v.spread
           ? fmt::format("{} to {}", beside(*v.estimate - *v.spread, *v.estimate - *v.spread, *v.estimate + *v.spread),
                         beside(*v.estimate + *v.spread, *v.estimate - *v.spread, *v.estimate + *v.spread))
           : "–";
-  const std::string nominal = v.nominal ? number(*v.nominal, 4) : "–";
-  // A prior bound is wide; the other numbers keep the digits that their own uncertainty leaves them.
-  const bool wide = v.lower_is_prior || v.upper_is_prior;
-  const double low = wide && v.estimate && v.spread ? *v.estimate - *v.spread : v.lower;
-  const double high = wide && v.estimate && v.spread ? *v.estimate + *v.spread : v.upper;
-  return fmt::format(
-      "<td class=\"n\">{}</td><td class=\"n\">{} to {}</td><td class=\"n\">{}</td><td class=\"n\">{}</td>"
-      "<td class=\"n\">{}</td>",
-      v.estimate ? beside(*v.estimate, low, high) : "–", lower, upper, statistical, beside(v.centre, low, high),
-      nominal);
+  std::string out =
+      fmt::format("<td class=\"n\">{}</td><td class=\"n\">{} to {}</td><td class=\"n\">{}</td><td class=\"n\">{}</td>",
+                  estimate_text(v), lower, upper, statistical, centre_text(v));
+  if (with_nominal) {
+    out += fmt::format("<td class=\"n\">{}</td>", v.nominal ? number(*v.nominal, 4) : "–");
+  }
+  return out;
 }
 
 std::string head_cell(const ParameterView& v) {
-  return fmt::format("<th scope=\"row\">{} <span class=\"unit\">{}</span></th>", escape(words(v.name)), escape(v.unit));
+  return fmt::format("<th scope=\"row\">{}</th><td class=\"unit\">{}</td>", escape(v.name), escape(v.unit));
 }
 
-std::string rows_of(const ParameterViews& views, const ParameterResult& r, const Commissioning& result,
-                    const TimeAxis& axis) {
+std::string rows_of(const ParameterViews& views, const ParameterResult& r, bool with_nominal,
+                    const Commissioning& result, const TimeAxis& axis) {
   const int span = views.physical ? 2 : 1;
   std::string out = fmt::format("<tr{}>", span == 2 ? " class=\"joined\"" : "");
-  out += head_cell(views.best()) + interval_cells(views.best());
+  out += head_cell(views.best()) + interval_cells(views.best(), with_nominal);
   out += fmt::format("<td rowspan=\"{}\">{}</td>", span, interval_bar(views.best()));
   out += fmt::format("<td rowspan=\"{}\" class=\"from\">{}{}</td></tr>\n", span,
                      set_by("lower", r.lower_binding, r.lower_is_prior, result, axis),
                      set_by("upper", r.upper_binding, r.upper_is_prior, result, axis));
   if (views.physical) {
-    out += fmt::format("<tr class=\"theta\">{}{}</tr>\n", head_cell(views.theta), interval_cells(views.theta));
+    out += fmt::format("<tr class=\"theta\">{}{}</tr>\n", head_cell(views.theta),
+                       interval_cells(views.theta, with_nominal));
   }
   return out;
 }
@@ -86,9 +89,9 @@ std::string remarks(const Commissioning& result, const std::vector<ParameterView
   std::vector<std::string> items;
   for (std::size_t j = 0; j < views.size(); ++j) {
     const ParameterResult& r = result.parameters[j];
-    const std::string name = words(views[j].best().name);
+    const std::string& name = views[j].best().name;
     if (r.excitation != Excitation::identified && !r.reason.empty()) {
-      items.push_back(capital(name) + ": " + r.reason + ".");
+      items.push_back(name + ": " + r.reason + ".");
     }
     if (!r.estimate_inside) {
       items.push_back("The least-squares estimate of " + name +
@@ -99,7 +102,7 @@ std::string remarks(const Commissioning& result, const std::vector<ParameterView
     items.push_back(
         "Physical values (kg, kg·m², N·s/m) are not identifiable: the effort is not a torque, and the robot file does "
         "not "
-        "give the motor's constants (motor: torque_constant, resistance, back_emf, gear_ratio).");
+        "give the motor’s constants (motor: torque_constant, resistance, back_emf, gear_ratio).");
   }
   return bullets(items);
 }
@@ -111,19 +114,23 @@ std::string parameter_table(const Commissioning& result, const TimeAxis& axis) {
     return {};
   }
   const std::vector<ParameterViews> views = parameter_views(result);
-  std::string out =
-      "<div class=\"wide\"><table class=\"parameters\"><thead><tr><th scope=\"col\">Parameter</th>"
-      "<th scope=\"col\" class=\"n\">estimate</th><th scope=\"col\" class=\"n\">guaranteed</th>"
-      "<th scope=\"col\" class=\"n\">95 % statistical</th><th scope=\"col\" class=\"n\">Chebyshev centre</th>"
-      "<th scope=\"col\" class=\"n\">nominal</th><th scope=\"col\">intervals</th><th scope=\"col\">bound set by</th>"
-      "</tr></thead><tbody>\n";
+  const bool with_nominal =
+      std::any_of(views.begin(), views.end(), [](const ParameterViews& v) { return v.theta.nominal.has_value(); });
+  std::string out = fmt::format(
+      "<div class=\"wide\"><table class=\"parameters\"><thead><tr><th scope=\"col\">Parameter</th><th "
+      "scope=\"col\">unit"
+      "</th><th scope=\"col\" class=\"n\">estimate</th><th scope=\"col\" class=\"n\">guaranteed</th>"
+      "<th scope=\"col\" class=\"n\">95 % statistical</th><th scope=\"col\" class=\"n\">centre</th>{}"
+      "<th scope=\"col\">intervals</th><th scope=\"col\">bound set by</th></tr></thead><tbody>\n",
+      with_nominal ? "<th scope=\"col\" class=\"n\">nominal</th>" : "");
   for (std::size_t j = 0; j < views.size(); ++j) {
-    out += rows_of(views[j], result.parameters[j], result, axis);
+    out += rows_of(views[j], result.parameters[j], with_nominal, result, axis);
   }
   out += "</tbody></table></div>\n";
   out +=
-      "<p class=\"note\">Box: guaranteed interval (a dashed side is the prior's; an arrow: it goes on beyond the "
-      "drawing). Black dot and whiskers: least-squares estimate with its 95 % interval. Ring: Chebyshev centre. Dashed "
+      "<p class=\"note\">Box: guaranteed interval (dashed: a side is the prior’s; arrow: it goes on beyond the "
+      "drawing). Black dot and whiskers: least-squares estimate with its 95 % interval. Ring: Chebyshev centre of the "
+      "feasible set. Dashed "
       "line: nominal value. “Bound set by” names the samples that prove each bound: those moments of the log decide. ";
   out += fmt::format("The regressor has rank {} of {} and condition number {}.</p>\n", result.rank,
                      result.parameters.size(), number(result.condition));

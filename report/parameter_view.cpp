@@ -19,8 +19,21 @@ Model model_of(const Commissioning& result) {
   return model;
 }
 
+// θ_L = r·m is told as such.
+std::string label(const Parameter& parameter) {
+  return parameter.name == "r_" + parameter.physical ? "r·" + words(parameter.physical) : words(parameter.name);
+}
+
+// Interval that decides on the digits of a number: a prior bound is wide, and says nothing of what is known.
+std::pair<double, double> uncertainty(const ParameterView& v) {
+  if ((v.lower_is_prior || v.upper_is_prior) && v.estimate && v.spread) {
+    return {*v.estimate - *v.spread, *v.estimate + *v.spread};
+  }
+  return {v.lower, v.upper};
+}
+
 ParameterView theta_view(const Commissioning& result, const ParameterResult& r) {
-  ParameterView view{.name = r.parameter.name,
+  ParameterView view{.name = label(r.parameter),
                      .unit = parameter_unit(result.model.robot, r.parameter),
                      .estimate = r.estimate,
                      .spread = {},
@@ -38,7 +51,7 @@ ParameterView theta_view(const Commissioning& result, const ParameterResult& r) 
 
 ParameterView physical_view(ParameterView view, const PhysicalScale& scale, const Parameter& parameter) {
   const auto physical = [&](double theta) { return scale.scale * theta - scale.offset; };
-  view.name = parameter.physical;
+  view.name = words(parameter.physical);
   view.unit = parameter.physical_unit;
   view.lower = physical(view.lower);
   view.upper = physical(view.upper);
@@ -57,6 +70,16 @@ ParameterView physical_view(ParameterView view, const PhysicalScale& scale, cons
 }
 
 }  // namespace
+
+std::string estimate_text(const ParameterView& view) {
+  const auto [low, high] = uncertainty(view);
+  return view.estimate ? beside(*view.estimate, low, high) : "–";
+}
+
+std::string centre_text(const ParameterView& view) {
+  const auto [low, high] = uncertainty(view);
+  return beside(view.centre, low, high);
+}
 
 bool physical_values_unknown(const Commissioning& result) {
   return !physical_scales(result.model.robot, model_of(result)).has_value();

@@ -35,6 +35,11 @@ struct ParameterViews {
   [[nodiscard]] const ParameterView& best() const { return physical ? *physical : theta; }
 };
 
+/// The estimate with the digits that its uncertainty leaves it; "–" where there is none.
+[[nodiscard]] std::string estimate_text(const ParameterView& view);
+/// The Chebyshev centre, in the same way.
+[[nodiscard]] std::string centre_text(const ParameterView& view);
+
 /// Views of all parameters, in their order.
 [[nodiscard]] std::vector<ParameterViews> parameter_views(const Commissioning& result);
 

@@ -140,8 +140,10 @@ std::string signal_charts(const LogTable& signals, const std::vector<ChartMark>&
                      " rows, drawn as the smallest and largest value of each short stretch: no peak is lost.</span>");
   }
   if (const std::string path = driven_path(table); !path.empty()) {
-    out += "<figure><figcaption>Driven path <span class=\"unit\">x to the right, y up, one scale</span></figcaption>" +
-           path + "</figure>\n";
+    out +=
+        "<figure><figcaption>Driven path <span class=\"unit\">x to the right, y up, one scale; the ring is the "
+        "start</span></figcaption>" +
+        path + "</figure>\n";
   }
   return out.empty() ? paragraph("The raw signals were not handed to this page.") : out;
 }

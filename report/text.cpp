@@ -69,11 +69,14 @@ Style style_for(int first, int last) {
   return {std::clamp(-last, 0, 12), 0};
 }
 
+// Position of the digit that resolves the width of an interval to two digits, and its larger end to three at least.
+int last_digit(double lower, double upper) {
+  const int first = magnitude(std::max(std::abs(lower), std::abs(upper)));
+  return std::clamp(magnitude(upper - lower) - 1, first - 7, first - 2);
+}
+
 Style interval_style(double lower, double upper) {
-  const double size = std::max(std::abs(lower), std::abs(upper));
-  const int first = magnitude(size);
-  const int last = std::clamp(magnitude(upper - lower) - 1, first - 7, first - 2);
-  return style_for(first, last);
+  return style_for(magnitude(std::max(std::abs(lower), std::abs(upper))), last_digit(lower, upper));
 }
 
 bool has_width(double lower, double upper) { return std::isfinite(lower) && std::isfinite(upper) && lower < upper; }
@@ -173,10 +176,13 @@ std::pair<std::string, std::string> outward(double lower, double upper) {
 }
 
 std::string beside(double x, double lower, double upper) {
-  if (!std::isfinite(x) || !has_width(lower, upper)) {
+  if (!std::isfinite(x) || x == 0.0 || !has_width(lower, upper)) {
     return number(x, 4);
   }
-  return interval_style(lower, upper).print(x);
+  constexpr int fewest = 3;
+  const int first = magnitude(x);
+  const int last = std::min(last_digit(lower, upper), first - fewest + 1);
+  return style_for(first, std::max(last, first - 7)).print(x);
 }
 
 std::string decimal(double x, int decimals) { return std::isfinite(x) ? with_sign(x, decimals) : std::string(missing); }

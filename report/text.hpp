@@ -43,7 +43,8 @@ namespace wheelwright::report {
 /// contains [lower, upper]. "–" for an end that is not finite.
 [[nodiscard]] std::pair<std::string, std::string> outward(double lower, double upper);
 
-/// `x` with as many decimals as outward(lower, upper) shows; as number() where that interval has no width.
+/// `x` with as many decimals as outward(lower, upper) shows, three significant digits at least; as number() where that
+/// interval has no width.
 [[nodiscard]] std::string beside(double x, double lower, double upper);
 
 /// "a", "a and b", "a, b and c".

@@ -112,10 +112,26 @@ TEST(CommissionWords, FalseAlarmsAndIdleThresholdsAreNotPraised) {
   EXPECT_EQ(standing(blind), Standing::caution);
   EXPECT_THAT(spoken(blind), HasSubstr("no change of scale"));
 
+  Commissioning coarse = example::done();
+  for (OutputValidation& v : coarse.validation) {
+    v.smallest_kappa = 0.97;
+  }
+  EXPECT_EQ(standing(coarse), Standing::caution);
+  EXPECT_THAT(spoken(coarse), HasSubstr("Only coarse faults"));
+
   Commissioning untried = example::done();
   untried.validation.clear();
   EXPECT_EQ(standing(untried), Standing::caution);
   EXPECT_THAT(spoken(untried), HasSubstr("no held-out driving"));
+}
+
+TEST(CommissionWords, DoNotCallABoundOfThePriorGuaranteedByTheLog) {
+  Commissioning c = example::done();
+  c.parameters[0].lower = 0.0;
+  c.parameters[0].lower_is_prior = true;
+  EXPECT_THAT(spoken(c), HasSubstr("(guaranteed at most 21.7)"));
+  c.parameters[0].upper_is_prior = true;
+  EXPECT_THAT(spoken(c), HasSubstr("(bounded by the prior alone)"));
 }
 
 TEST(CommissionReport, ShowsNoPhysicalValuesWithoutTheMotorsConstants) {
