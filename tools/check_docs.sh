@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 #
 # Lets clang read the documentation comments of every header: a \param that names no parameter, a comment that belongs
-# to nothing, a malformed command are errors (HTML is not read: <ul> in a comment is a word). Each header is compiled alone (syntax only); nothing has to be built.
+# to nothing, a malformed command are errors. HTML is not read: <ul> in a comment is a word. Each header is compiled
+# alone (syntax only); nothing has to be built.
 set -eu
 cd "$(dirname "$0")/.."
 clang=$(command -v clang++-14 || command -v clang++) || {
@@ -22,7 +23,7 @@ for header in */*.hpp; do
   count=$((count + 1))
   printf '#include <wheelwright/%s>\n' "$header" > "$scratch/one.cpp"
   # shellcheck disable=SC2046
-  "$clang" -std=c++20 -fsyntax-only -Wdocumentation -Wno-documentation-html -Werror=documentation -I "$scratch" \
+  "$clang" -std=c++20 -fsyntax-only -Wdocumentation -Werror=documentation -Wno-documentation-html -I "$scratch" \
     $(pkg-config --cflags-only-I eigen3 | sed 's/-I/-isystem /g') "$scratch/one.cpp" || {
     echo "docs: $header" >&2
     status=1
