@@ -136,13 +136,14 @@ std::string contradiction_section(const Commissioning& result, const TimeAxis& a
     return {};
   }
   std::vector<std::vector<Cell>> rows;
+  const std::vector<ParameterViews> views = parameter_views(result);
   for (const WeightedRow& w : result.feasible.contradiction) {
     const RowOrigin& o = w.row.origin;
     const std::string side = o.side == Side::upper ? "upper" : "lower";
     if (o.is_prior) {
-      const std::string name = o.parameter < result.parameters.size() ? result.parameters[o.parameter].parameter.name
-                                                                      : "parameter " + std::to_string(o.parameter + 1);
-      rows.push_back({side + " side of the prior", escape(words(name)), "–", numeric(number(w.multiplier))});
+      const std::string name =
+          o.parameter < views.size() ? views[o.parameter].theta.name : "parameter " + std::to_string(o.parameter + 1);
+      rows.push_back({side + " side of the prior", escape(name), numeric("–"), numeric(number(w.multiplier))});
     } else {
       rows.push_back({time_button(o.t - 1.0, o.t + 1.0, axis.text(o.t), axis),
                       escape(output_name(result.model.model, o.output)) + ", " + side + " bound",

@@ -58,10 +58,10 @@ std::string arrow(double x, double y, double direction) {
 std::string interval_bar(const ParameterView& v) {
   constexpr double width = 230.0, height = 34.0, middle = 15.0, left = 10.0, right = width - 10.0;
   Range range;
-  if (!v.lower_is_prior) {
+  if (v.has_set && !v.lower_is_prior) {
     range.take(v.lower);
   }
-  if (!v.upper_is_prior) {
+  if (v.has_set && !v.upper_is_prior) {
     range.take(v.upper);
   }
   if (v.estimate) {
@@ -74,7 +74,7 @@ std::string interval_bar(const ParameterView& v) {
   }
   const double span = range.low < range.high ? range.high - range.low : std::numeric_limits<double>::infinity();
   for (const double bound : {v.lower, v.upper}) {
-    if (bound >= range.low - span && bound <= range.high + span) {
+    if (v.has_set && bound >= range.low - span && bound <= range.high + span) {
       range.take(bound);
     }
   }
@@ -88,11 +88,13 @@ std::string interval_bar(const ParameterView& v) {
       "aria-label=\"intervals of {2}\"><line class=\"axis\" x1=\"{3}\" x2=\"{4}\" y1=\"{5}\" "
       "y2=\"{5}\"/>",
       width, height, escape(v.name), left, right, middle);
-  const bool open = v.lower_is_prior || v.upper_is_prior;
-  out += fmt::format("<rect class=\"bar{}\" x=\"{:.1f}\" y=\"{}\" width=\"{:.1f}\" height=\"14\"/>",
-                     open ? " open" : "", x0, middle - 7.0, std::max(x1 - x0, 1.0));
-  out += beyond_left ? arrow(left - 6.0, middle, -1.0) : "";
-  out += beyond_right ? arrow(right + 6.0, middle, 1.0) : "";
+  if (v.has_set) {
+    const bool open = v.lower_is_prior || v.upper_is_prior;
+    out += fmt::format("<rect class=\"bar{}\" x=\"{:.1f}\" y=\"{}\" width=\"{:.1f}\" height=\"14\"/>",
+                       open ? " open" : "", x0, middle - 7.0, std::max(x1 - x0, 1.0));
+    out += beyond_left ? arrow(left - 6.0, middle, -1.0) : "";
+    out += beyond_right ? arrow(right + 6.0, middle, 1.0) : "";
+  }
   if (v.nominal) {
     out += fmt::format("<line class=\"nominal\" x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"1\" y2=\"{1}\"/>", scale(*v.nominal),
                        middle + 13.0);
@@ -103,7 +105,7 @@ std::string interval_bar(const ParameterView& v) {
                        scale(*v.estimate - s), scale(*v.estimate + s), middle - 3.0, middle);
     out += fmt::format("<circle class=\"point\" cx=\"{:.1f}\" cy=\"{}\" r=\"2.6\"/>", scale(*v.estimate), middle);
   }
-  if (std::isfinite(v.centre) && v.centre >= range.low && v.centre <= range.high) {
+  if (v.has_set && !(v.lower_is_prior && v.upper_is_prior) && v.centre >= range.low && v.centre <= range.high) {
     out += fmt::format("<circle class=\"centre\" cx=\"{:.1f}\" cy=\"{}\" r=\"4.2\"/>", scale(v.centre), middle);
   }
   return out + "</svg>";

@@ -50,15 +50,19 @@ std::string set_by(const char* side, const std::vector<RowOrigin>& rows, bool is
 }
 
 std::string interval_cells(const ParameterView& v, bool with_nominal) {
-  const auto [lower, upper] = outward(v.lower, v.upper);
+  std::string guaranteed = "–";
+  if (v.has_set) {
+    const auto [lower, upper] = outward(v.lower, v.upper);
+    guaranteed = lower + " to " + upper;
+  }
   const std::string statistical =
       v.estimate && v.spread
           ? fmt::format("{} to {}", beside(*v.estimate - *v.spread, *v.estimate - *v.spread, *v.estimate + *v.spread),
                         beside(*v.estimate + *v.spread, *v.estimate - *v.spread, *v.estimate + *v.spread))
           : "–";
   std::string out =
-      fmt::format("<td class=\"n\">{}</td><td class=\"n\">{} to {}</td><td class=\"n\">{}</td><td class=\"n\">{}</td>",
-                  estimate_text(v), lower, upper, statistical, centre_text(v));
+      fmt::format("<td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td>",
+                  estimate_text(v), guaranteed, statistical, centre_text(v));
   if (with_nominal) {
     out += fmt::format("<td class=\"n\">{}</td>", v.nominal ? number(*v.nominal, 4) : "–");
   }
@@ -76,8 +80,8 @@ std::string rows_of(const ParameterViews& views, const ParameterResult& r, bool 
   out += head_cell(views.best()) + interval_cells(views.best(), with_nominal);
   out += fmt::format("<td rowspan=\"{}\">{}</td>", span, interval_bar(views.best()));
   out += fmt::format("<td rowspan=\"{}\" class=\"from\">{}{}</td></tr>\n", span,
-                     set_by("lower", r.lower_binding, r.lower_is_prior, result, axis),
-                     set_by("upper", r.upper_binding, r.upper_is_prior, result, axis));
+                     views.theta.has_set ? set_by("lower", r.lower_binding, r.lower_is_prior, result, axis) : "–",
+                     views.theta.has_set ? set_by("upper", r.upper_binding, r.upper_is_prior, result, axis) : "");
   if (views.physical) {
     out += fmt::format("<tr class=\"theta\">{}{}</tr>\n", head_cell(views.theta),
                        interval_cells(views.theta, with_nominal));
@@ -93,7 +97,7 @@ std::string remarks(const Commissioning& result, const std::vector<ParameterView
     if (r.excitation != Excitation::identified && !r.reason.empty()) {
       items.push_back(name + ": " + r.reason + ".");
     }
-    if (!r.estimate_inside) {
+    if (!r.estimate_inside && views[j].theta.has_set) {
       items.push_back("The least-squares estimate of " + name +
                       " lies outside the guaranteed interval; the Chebyshev centre lies inside.");
     }

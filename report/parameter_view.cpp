@@ -42,7 +42,8 @@ ParameterView theta_view(const Commissioning& result, const ParameterResult& r) 
                      .centre = r.chebyshev,
                      .nominal = {},
                      .lower_is_prior = r.lower_is_prior,
-                     .upper_is_prior = r.upper_is_prior};
+                     .upper_is_prior = r.upper_is_prior,
+                     .has_set = result.status != Commissioning::Status::empty};
   if (r.estimate && r.standard_error) {
     view.spread = student_quantile(0.95, std::max(result.residuals.freedom, 1.0)) * *r.standard_error;
   }
@@ -78,7 +79,8 @@ std::string estimate_text(const ParameterView& view) {
 
 std::string centre_text(const ParameterView& view) {
   const auto [low, high] = uncertainty(view);
-  return beside(view.centre, low, high);
+  const bool known = view.has_set && !(view.lower_is_prior && view.upper_is_prior);
+  return known ? beside(view.centre, low, high) : "–";
 }
 
 bool physical_values_unknown(const Commissioning& result) {

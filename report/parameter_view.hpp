@@ -24,6 +24,7 @@ struct ParameterView {
   std::optional<double> nominal;  ///< of the robot file
   bool lower_is_prior = false;
   bool upper_is_prior = false;
+  bool has_set = true;  ///< false: the feasible set is empty, and nothing is guaranteed
 };
 
 /// A parameter as θ_L,j, and as a physical quantity where the robot file tells the scale and the two differ.
@@ -37,7 +38,7 @@ struct ParameterViews {
 
 /// The estimate with the digits that its uncertainty leaves it; "–" where there is none.
 [[nodiscard]] std::string estimate_text(const ParameterView& view);
-/// The Chebyshev centre, in the same way.
+/// The Chebyshev centre, in the same way; "–" where the log says nothing of the parameter.
 [[nodiscard]] std::string centre_text(const ParameterView& view);
 
 /// Views of all parameters, in their order.

@@ -93,6 +93,19 @@ TEST_F(Browser, ReportsAScriptError) {
   EXPECT_TRUE(example::holds(drawn(page), {"data-errors"}));
 }
 
+TEST_F(Browser, DrawsAgainForPaperAndBack) {
+  std::string page = commission_report(example::done(), example::context(600));
+  page.replace(page.rfind("</body>"), 7,
+               "<script>dispatchEvent(new Event('beforeprint'));const root=document.documentElement;"
+               "root.dataset.paper=getComputedStyle(root).getPropertyValue('--paper').trim();"
+               "root.dataset.width=document.querySelector('.uplot').clientWidth;"
+               "dispatchEvent(new Event('afterprint'));</script></body>");
+  const std::string document = drawn(page);
+  EXPECT_TRUE(example::holds(document, {"data-paper=\"#ffffff\"", "data-width=\"680\""}));
+  EXPECT_TRUE(example::lacks(document, {"data-errors", "data-print"}));
+  EXPECT_EQ(times(document, "<canvas"), times(page, "<figure class=\"chart\">"));
+}
+
 TEST_F(Browser, ClickOnAnEventZoomsToIt) {
   std::string page = detect_report(example::detection(900, true), example::done().model,
                                    example::context(900));  // event from 6 s to 9 s

@@ -143,6 +143,12 @@ TEST(CommissionReport, ShowsNoPhysicalValuesWithoutTheMotorsConstants) {
   EXPECT_TRUE(example::lacks(commission_report(example::done(), example::context(300)), {"not identifiable"}));
 }
 
+TEST(CommissionReport, GuaranteesNothingOfAnEmptySet) {
+  const ReportContext context = example::context(300);
+  EXPECT_TRUE(example::holds(commission_report(example::done(), context), {"20.90 to 21.70", "class=\"bar\""}));
+  EXPECT_TRUE(example::lacks(commission_report(example::empty(), context), {"20.90 to 21.70", "class=\"bar"}));
+}
+
 TEST(CommissionReport, PhysicalValuesFollowFromTheta) {
   // θ_1 = r m: 2.13 kg·m at r = 0.1 m is 21.3 kg.
   const std::string page = commission_report(example::done(), example::context(300));
