@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/report/data_sections.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -137,7 +138,12 @@ std::string contradiction_section(const Commissioning& result, const TimeAxis& a
   }
   std::vector<std::vector<Cell>> rows;
   const std::vector<ParameterViews> views = parameter_views(result);
-  for (const WeightedRow& w : result.feasible.contradiction) {
+  std::vector<WeightedRow> in_time = result.feasible.contradiction;
+  std::stable_sort(in_time.begin(), in_time.end(), [](const WeightedRow& a, const WeightedRow& b) {
+    const RowOrigin &x = a.row.origin, &y = b.row.origin;
+    return x.is_prior != y.is_prior ? y.is_prior : x.t < y.t;
+  });
+  for (const WeightedRow& w : in_time) {
     const RowOrigin& o = w.row.origin;
     const std::string side = o.side == Side::upper ? "upper" : "lower";
     if (o.is_prior) {

@@ -42,6 +42,7 @@
   const value = (u, x) => x == null ? "–" : Number(x.toPrecision(4)).toString().replace("-", "−");
 
   const paintMarks = (data) => (u) => {
+    const marks = data.marks.slice().sort((a, b) => a[0] - b[0]);
     const {ctx} = u, box = u.bbox, ratio = devicePixelRatio;
     ctx.save();
     ctx.beginPath();
@@ -50,7 +51,7 @@
     ctx.font = 11 * ratio + "px sans-serif";
     ctx.textBaseline = "top";
     let free = -1e9;
-    for (const [from, to, label] of data.marks) {
+    for (const [from, to, label] of marks) {
       const left = u.valToPos(from, "x", true), width = Math.max(u.valToPos(to, "x", true) - left, 2 * ratio);
       if (left > box.left + box.width || left + width < box.left) continue;
       ctx.fillStyle = colour("mark");
