@@ -15,6 +15,8 @@ namespace {
 
 constexpr std::array kBetas{2.0, 3.0, 4.0, 5.0, 7.0, 10.0, 14.0, 20.0, 30.0, 40.0, 60.0, 80.0, 120.0, 200.0};
 constexpr double kMostBetaStep = 0.5;
+constexpr std::size_t kFewestInstants = 50;
+constexpr double kExplained = 0.5;     // of the torque: an output with more residual than this carries no information
 constexpr double kShareOfLog = 0.2;    // of the longest segment that a filter may take to settle or to answer
 
 // One candidate's filter with a fit for each output.
@@ -37,17 +39,18 @@ class Trial {
     }
     ++instants_;
   }
-  [[nodiscard]] double criterion() const {
-    if (instants_ < 50) {
-      return std::numeric_limits<double>::infinity();
-    }
-    double log_sum = 0.0;
+  // Residual rms over torque rms of each output.
+  [[nodiscard]] std::vector<double> noise() const {
+    std::vector<double> shares;
     for (const LeastSquares& fit : fits_) {
-      const LeastSquaresFit f = fit.solve();
-      const double share = f.weighted_tss > 0.0 ? f.weighted_rss / f.weighted_tss : 1.0;
-      log_sum += 0.5 * std::log(std::max(share, 1e-24));
+      double share = 1.0;
+      if (instants_ >= kFewestInstants) {
+        const LeastSquaresFit f = fit.solve();
+        share = f.weighted_tss > 0.0 ? std::sqrt(f.weighted_rss / f.weighted_tss) : 1.0;
+      }
+      shares.push_back(std::max(share, 1e-12));
     }
-    return std::exp(log_sum / static_cast<double>(fits_.size()));
+    return shares;
   }
   [[nodiscard]] const FilterDesign& design() const { return filter_.design(); }
 
@@ -105,9 +108,26 @@ FilterChoice choose_filter(LogSource& log, const Model& model, const Measurement
     }
   }
   log.rewind();
-  double best = std::numeric_limits<double>::infinity();
+  std::vector<std::vector<double>> noise;
+  std::vector<double> least(model.n(), 1.0);
   for (const Trial& trial : trials) {
-    choice.curve.push_back({trial.design(), trial.criterion()});
+    noise.push_back(trial.noise());
+    for (std::size_t i = 0; i < least.size(); ++i) {
+      least[i] = std::min(least[i], noise.back()[i]);
+    }
+  }
+  const bool any_explained = std::ranges::any_of(least, [](double share) { return share < kExplained; });
+  double best = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k < trials.size(); ++k) {
+    double log_sum = 0.0;
+    double outputs = 0.0;
+    for (std::size_t i = 0; i < least.size(); ++i) {
+      if (least[i] < kExplained || !any_explained) {
+        log_sum += std::log(noise[k][i]);
+        outputs += 1.0;
+      }
+    }
+    choice.curve.push_back({trials[k].design(), std::exp(log_sum / outputs)});
     best = std::min(best, choice.curve.back().criterion);
   }
   choice.design = trials.front().design();

@@ -16,13 +16,13 @@ namespace wheelwright {
 /// How the choice is made.
 struct FilterChoiceOptions {
   double longest_delay = 0.4;  ///< s: order/β is at most this
-  double tolerance = 1.3;      ///< the chosen filter's criterion is at most this times the best one's
+  double tolerance = 1.15;     ///< the chosen filter's criterion is at most this times the best one's
 };
 
 /// One candidate.
 struct FilterCandidate {
   FilterDesign design;
-  double criterion = 0.0;  ///< geometric mean over outputs of residual rms / torque rms
+  double criterion = 0.0;  ///< geometric mean of residual rms / torque rms over the outputs that the model explains
 };
 
 /// The choice and the curve behind it.

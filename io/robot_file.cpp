@@ -34,8 +34,8 @@ struct RobotReader {
       read_basics(key, place);
     }
     physical = !drive(robot)                ? Names{"inertia", "viscous", "coulomb", "offset"}
-               : robot.anisotropic_friction ? Names{"mass", "yaw_inertia", "viscous_x", "viscous_y", "viscous_yaw"}
-                                            : Names{"mass", "yaw_inertia", "viscous_linear", "viscous_yaw"};
+               : robot.anisotropic_friction ? Names{"mass", "yaw_inertia", "viscous_x", "viscous_y", "viscous_yaw", "coulomb"}
+                                            : Names{"mass", "yaw_inertia", "viscous_linear", "viscous_yaw", "coulomb"};
     for (const auto& [key, place] : members) {
       read_geometry(key, place);
       read_knowledge(key, place);

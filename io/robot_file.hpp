@@ -23,7 +23,7 @@ namespace wheelwright {
 ///     encoder_difference | measured, limits: {effort, speed, acceleration}, motor: {torque_constant, resistance,
 ///     back_emf, gear_ratio}
 ///
-/// Physical names: mass, yaw_inertia, viscous_linear, viscous_yaw (differential_drive; viscous_x and viscous_y instead
+/// Physical names: mass, yaw_inertia, viscous_linear, viscous_yaw, coulomb (differential_drive; viscous_x and viscous_y instead
 /// of viscous_linear where the friction is anisotropic); inertia, viscous, coulomb, offset (single_axis).
 /// Throws InputError, naming file, line, key, value and what was expected, for unknown or repeated keys, wrong types
 /// and impossible values.
