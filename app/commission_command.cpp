@@ -70,7 +70,6 @@ int run(const Arguments& a) {
     throw;
   }
   publish(a.common, to_json(result, log.report(), software()), "model.json", commission_report(result, context));
-  const bool has_model = !result.model.facets.empty() && result.status != Commissioning::Status::nothing;
   if (!a.common.quiet && !a.common.json) {
     for (const std::string& sentence : context.warnings) {
       fmt::print("log: {}\n", sentence);
@@ -80,7 +79,7 @@ int run(const Arguments& a) {
       fmt::print("wrote {} and {}\n", (a.common.out / "model.json").string(), (a.common.out / "report.html").string());
     }
   }
-  return has_model ? kDone : kNo;
+  return result.model.facets.empty() ? kNo : kDone;
 }
 
 }  // namespace

@@ -47,6 +47,17 @@ std::string parameter_table(const Commissioning& r) {
   return text;
 }
 
+// The smallest fault ζ = κ·Yθ that is certainly seen, in the words of the robot's kind.
+std::string smallest_fault(const Robot& robot, double kappa) {
+  constexpr double useless = 1.0;
+  if (!std::isfinite(kappa) || kappa > useless) {
+    return "no fault that scales the effort is certainly seen: the threshold is as wide as the effort itself";
+  }
+  return robot.model == "differential_drive"
+             ? fmt::format("a change of the wheel radius by {:.2g} % is certainly seen", 100.0 * (std::sqrt(1.0 + kappa) - 1.0))
+             : fmt::format("a change of the effort by {:.2g} % is certainly seen", 100.0 * kappa);
+}
+
 std::string contradiction_table(const Commissioning& r) {
   std::string text = "  samples that contradict one another:\n";
   for (const WeightedRow& row : r.feasible.contradiction) {
@@ -76,10 +87,7 @@ std::string summary(const Commissioning& r) {
     }
     text += fmt::format("  held out, {}: {} false alarms in {} instants, residual {:.2g} % of the torque", r.model.model.outputs[i],
                         v.outside, v.instants, 100.0 * v.nrmse);
-    text += std::isfinite(v.smallest_kappa)
-                ? fmt::format("; a change of the wheel radius by {:.2g} % is certainly seen\n",
-                              100.0 * (std::sqrt(1.0 + v.smallest_kappa) - 1.0))
-                : "; no change of the wheel radius is certainly seen\n";
+    text += "; " + smallest_fault(r.model.robot, v.smallest_kappa) + "\n";
   }
   for (const std::string& note : r.notes) {
     text += "  note: " + note + "\n";

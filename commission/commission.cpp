@@ -19,6 +19,7 @@ namespace {
 
 constexpr double kConfidence = 0.95;       // of the statistical intervals
 constexpr std::size_t kFewestInstants = 50;
+constexpr double kMuchUnexplained = 0.2;   // residual over effort, root mean square
 
 // What is known before anything is fitted.
 struct Setting {
@@ -375,7 +376,7 @@ void describe_assumptions(const Setting& s, Commissioning& result) {
   }
   if (s.measurement.effort_unsigned) {
     notes.push_back("the effort is unsigned: its sign was taken from the direction of motion, which is wrong while a "
-                    "motor brakes; what the log says of inertia then rests on accelerating only");
+                    "motor brakes");
   }
   for (std::size_t j = 0; j < s.model.p(); ++j) {
     if (!s.prior_declared[j] && (result.parameters[j].lower_is_prior || result.parameters[j].upper_is_prior)) {
@@ -385,20 +386,49 @@ void describe_assumptions(const Setting& s, Commissioning& result) {
   }
 }
 
-std::string status_message(const Commissioning& result) {
+// What the model fails to explain, and which numbers not to lean on.
+std::string reservations(const Setting& s, const Commissioning& result) {
+  std::string text;
+  for (std::size_t i = 0; i < s.model.n(); ++i) {
+    const OutputResidual& o = result.residuals.outputs[i];
+    const double share = o.torque_rms > 0.0 ? o.rms / o.torque_rms : 0.0;
+    if (share > kMuchUnexplained) {
+      text += fmt::format("; the model leaves {:.0f} % of the effort in the {} channel unexplained", 100.0 * share,
+                          s.model.outputs[i]);
+    }
+  }
+  std::string indistinct;
+  for (const ParameterResult& p : result.parameters) {
+    if (p.excitation == Excitation::indistinct) {
+      indistinct += (indistinct.empty() ? "" : ", ") + p.parameter.name;
+    }
+  }
+  if (!indistinct.empty()) {
+    text += "; not told from zero: " + indistinct;
+  }
+  if (s.measurement.effort_unsigned) {
+    text += "; the effort is unsigned, so that braking and driving cannot be told apart: take the friction terms as "
+            "approximate, and do not take the inertias at all";
+  }
+  return text;
+}
+
+std::string status_message(const Setting& s, const Commissioning& result) {
   std::string missing, todo;
   for (const ParameterResult& p : result.parameters) {
     if (p.excitation == Excitation::not_excited) {
       missing += (missing.empty() ? "" : ", ") + p.parameter.name;
-      todo += (todo.find(p.parameter.excite) == std::string::npos ? (todo.empty() ? "" : "; ") + p.parameter.excite : "");
+      if (todo.find(p.parameter.excite) == std::string::npos) {
+        todo += (todo.empty() ? "" : "; ") + p.parameter.excite;
+      }
     }
   }
   switch (result.status) {
     case Commissioning::Status::done:
-      return "commissioned";
+      return "commissioned" + reservations(s, result);
     case Commissioning::Status::partial:
       return "commissioned, but the log says nothing about " + missing + ": " + todo +
-             ", and commission again; until then their bounds are those of the prior";
+             ", and commission again; until then their bounds are those of the prior" + reservations(s, result);
     case Commissioning::Status::nothing:
       return "the log says nothing about any parameter: " + todo;
     case Commissioning::Status::empty:
@@ -442,7 +472,7 @@ Commissioning commission(LogSource& log, const Robot& robot, const CommissionOpt
     RegressionStream bare = make_rows(log, s, without_output);
     result.minimax = minimax_fit(bare, s.prior, minimax).upper;
     result.status = Commissioning::Status::empty;
-    result.message = status_message(result);
+    result.message = status_message(s, result);
     return result;
   }
 
@@ -451,7 +481,10 @@ Commissioning commission(LogSource& log, const Robot& robot, const CommissionOpt
   result.status = unexcited == 0                                             ? Commissioning::Status::done
                   : unexcited == static_cast<std::ptrdiff_t>(s.model.p()) ? Commissioning::Status::nothing
                                                                             : Commissioning::Status::partial;
-  result.message = status_message(result);
+  result.message = status_message(s, result);
+  if (result.status == Commissioning::Status::nothing) {
+    return result;
+  }
   finish_model(result.model, s, result.noise, fit, result.feasible);
 
   tell(options, "validating on held-out blocks", 0.7);

@@ -41,10 +41,10 @@ struct Joint {
 
 /// What an instantaneous term may look at, at one instant.
 struct MotionState {
-  std::span<const double> speed;        ///< speed of each motion coordinate (v1, v2), m/s, rad/s
-  std::span<const double> speed_error;  ///< bound on the error of each speed (0 where nothing is declared)
-  std::span<const double> joint_speed;  ///< speed of each joint, rad/s or m/s
-  std::span<const double> joint_error;  ///< bound on the error of each joint speed
+  std::span<const double> speed{};        ///< speed of each motion coordinate (v1, v2), m/s, rad/s
+  std::span<const double> speed_error{};  ///< bound on the error of each speed (0 where nothing is declared)
+  std::span<const double> joint_speed{};  ///< speed of each joint, rad/s or m/s
+  std::span<const double> joint_error{};  ///< bound on the error of each joint speed
   double heading = 0.0;                 ///< θ of the pose, rad: measured where the log has it, else odometry
   double heading_error = 0.0;           ///< bound on its error, rad
 };
