@@ -31,10 +31,9 @@ look() {
 }
 
 echo
-echo "== 1. A healthy robot drives: out/healthy.csv"
-make out/healthy.csv examples/scenarios/commissioning.yaml
+echo "== 1. A healthy robot drove: examples/healthy.csv.gz"
 echo "== 2. Commission it: parameters with bounds, thresholds, model.json"
-"$program" commission out/healthy.csv --robot examples/robot.yaml --out out/commission
+"$program" commission examples/healthy.csv.gz --robot examples/robot.yaml --out out/commission
 echo "== 3. Look at two drives with that model"
 make out/another.csv examples/scenarios/healthy.yaml
 make out/fault.csv examples/scenarios/fault.yaml
