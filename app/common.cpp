@@ -4,8 +4,8 @@
 #include <cstdio>
 #include <system_error>
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/io/atomic_file.hpp>
@@ -27,8 +27,9 @@ void add_common(CLI::App& command, CommonOptions& options) {
 }
 
 void add_map(CLI::App& command, CommonOptions& options) {
-  command.add_option("--map", options.map,
-                     "Read the log column NAME from the file's column COLUMN (repeatable), e.g. --map omega_r=wheel_2")
+  command
+      .add_option("--map", options.map,
+                  "Read the log column NAME from the file's column COLUMN (repeatable), e.g. --map omega_r=wheel_2")
       ->type_name("NAME=COLUMN")
       ->expected(1)
       ->allow_extra_args(false)

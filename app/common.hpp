@@ -28,13 +28,13 @@ enum ExitCode : int {
 
 /// Options that every command has.
 struct CommonOptions {
-  std::filesystem::path out;      ///< directory of results; empty: none
-  bool json = false;              ///< the result on standard output, and nothing else there
-  bool quiet = false;             ///< no progress, no summary
-  int threads = 1;                ///< most threads
-  std::uint64_t seed = 1;         ///< of everything random
-  std::vector<std::string> map;   ///< name=column
-  std::string command_line;       ///< as the user gave it
+  std::filesystem::path out;     ///< directory of results; empty: none
+  bool json = false;             ///< the result on standard output, and nothing else there
+  bool quiet = false;            ///< no progress, no summary
+  int threads = 1;               ///< most threads
+  std::uint64_t seed = 1;        ///< of everything random
+  std::vector<std::string> map;  ///< name=column
+  std::string command_line;      ///< as the user gave it
 };
 
 /// Adds the common options to `command`.

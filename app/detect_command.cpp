@@ -3,8 +3,8 @@
 #include <map>
 #include <memory>
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/commission/trace.hpp>
@@ -28,7 +28,8 @@ struct Arguments {
 };
 
 constexpr const char* kHelp =
-    "Looks for faults in a log with a commissioned model: the residual of filtered torque against the threshold that no "
+    "Looks for faults in a log with a commissioned model: the residual of filtered torque against the threshold that "
+    "no "
     "fault-free robot within its bounds can exceed.";
 
 constexpr const char* kExamples =
@@ -78,17 +79,18 @@ Run add_detect(CLI::App& program) {
   command.add_option("LOG", a->log, "CSV log (also .gz, .zst)");
   command.add_option("--model", a->model, "model.json of `wheelwright commission`")->required()->type_name("FILE");
   command.add_flag("--follow", a->follow, "Read CSV rows from standard input as they come, tell events at once");
-  command
-      .add_option("--set", a->detector.set, "Threshold from the feasible set itself (polytope) or from its box")
+  command.add_option("--set", a->detector.set, "Threshold from the feasible set itself (polytope) or from its box")
       ->transform(CLI::CheckedTransformer(std::map<std::string, ParameterSetKind>{
           {"polytope", ParameterSetKind::polytope}, {"box", ParameterSetKind::box}}))
       ->type_name("SET");
   command
-      .add_option("--test", a->detector.test, "Compare with [l, u] (two_sided) or with rho as the paper does (symmetric)")
+      .add_option("--test", a->detector.test,
+                  "Compare with [l, u] (two_sided) or with rho as the paper does (symmetric)")
       ->transform(CLI::CheckedTransformer(
           std::map<std::string, Test>{{"two_sided", Test::two_sided}, {"symmetric", Test::symmetric}}))
       ->type_name("TEST");
-  command.add_option("--persistence", "Raise an alarm when K of the last N instants are outside (default: the model's)")
+  command
+      .add_option("--persistence", "Raise an alarm when K of the last N instants are outside (default: the model's)")
       ->type_name("K/N")
       ->each([a](const std::string& text) {
         Persistence& p = a->detector.persistence;

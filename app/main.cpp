@@ -3,8 +3,8 @@
 #include <iostream>
 #include <vector>
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 
 #include <wheelwright/core/error.hpp>
 
@@ -28,7 +28,8 @@ std::string joined(int count, char** words) {
 int main(int argc, char** argv) {
   CLI::App program(
       "Wheelwright: model-based fault detection for wheeled robots, guaranteed and tight.\n"
-      "A robot and a log of fault-free driving go in; a model with thresholds that no healthy robot exceeds comes out.");
+      "A robot and a log of fault-free driving go in; a model with thresholds that no healthy robot exceeds comes "
+      "out.");
   program.set_version_flag("--version", software());
   program.require_subcommand(1);
   program.footer(
@@ -50,7 +51,8 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "wheelwright: {}\n", error.what());
     return kBadInput;
   } catch (const std::exception& error) {
-    fmt::print(stderr, "wheelwright: internal failure: {}\nThis is a bug; please report it with the input.\n", error.what());
+    fmt::print(stderr, "wheelwright: internal failure: {}\nThis is a bug; please report it with the input.\n",
+               error.what());
     return kInternal;
   }
 }

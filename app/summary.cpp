@@ -27,7 +27,8 @@ std::string parameter_table(const Commissioning& r) {
   const Robot& robot = r.model.robot;
   const auto scales = physical_scales(robot, r.model.model);
   const double t = student_quantile(0.95, std::max(r.residuals.freedom, 1.0));
-  std::string text = fmt::format("  {:<20} {:>11}   guaranteed interval   ± 95 % statistical\n", "parameter", "estimate");
+  std::string text =
+      fmt::format("  {:<20} {:>11}   guaranteed interval   ± 95 % statistical\n", "parameter", "estimate");
   for (std::size_t j = 0; j < r.parameters.size(); ++j) {
     const ParameterResult& p = r.parameters[j];
     const PhysicalScale s = scales ? (*scales)[j] : PhysicalScale{};
@@ -42,7 +43,8 @@ std::string parameter_table(const Commissioning& r) {
     }
   }
   if (!scales) {
-    text += "  (physical values need the motor's constants in the robot file: motor: {torque_constant, gear_ratio, …})\n";
+    text +=
+        "  (physical values need the motor's constants in the robot file: motor: {torque_constant, gear_ratio, …})\n";
   }
   return text;
 }
@@ -54,7 +56,8 @@ std::string smallest_fault(const Robot& robot, double kappa) {
     return "no fault that scales the effort is certainly seen: the threshold is as wide as the effort itself";
   }
   return robot.model == "differential_drive"
-             ? fmt::format("a change of the wheel radius by {:.2g} % is certainly seen", 100.0 * (std::sqrt(1.0 + kappa) - 1.0))
+             ? fmt::format("a change of the wheel radius by {:.2g} % is certainly seen",
+                           100.0 * (std::sqrt(1.0 + kappa) - 1.0))
              : fmt::format("a change of the effort by {:.2g} % is certainly seen", 100.0 * kappa);
 }
 
@@ -62,8 +65,9 @@ std::string contradiction_table(const Commissioning& r) {
   std::string text = "  samples that contradict one another:\n";
   for (const WeightedRow& row : r.feasible.contradiction) {
     const RowOrigin& o = row.row.origin;
-    text += o.is_prior ? fmt::format("    prior bound of {}\n", r.model.model.parameters[o.parameter].physical)
-                       : fmt::format("    t = {:.3f} s, row {}, {} channel\n", o.t, o.sample, r.model.model.outputs[o.output]);
+    text += o.is_prior
+                ? fmt::format("    prior bound of {}\n", r.model.model.parameters[o.parameter].physical)
+                : fmt::format("    t = {:.3f} s, row {}, {} channel\n", o.t, o.sample, r.model.model.outputs[o.output]);
   }
   return text;
 }
@@ -85,8 +89,8 @@ std::string summary(const Commissioning& r) {
       text += fmt::format("  held out, {}: too little driving to hold any out\n", r.model.model.outputs[i]);
       continue;
     }
-    text += fmt::format("  held out, {}: {} false alarms in {} instants, residual {:.2g} % of the torque", r.model.model.outputs[i],
-                        v.outside, v.instants, 100.0 * v.nrmse);
+    text += fmt::format("  held out, {}: {} false alarms in {} instants, residual {:.2g} % of the torque",
+                        r.model.model.outputs[i], v.outside, v.instants, 100.0 * v.nrmse);
     text += "; " + smallest_fault(r.model.robot, v.smallest_kappa) + "\n";
   }
   for (const std::string& note : r.notes) {
@@ -96,8 +100,8 @@ std::string summary(const Commissioning& r) {
 }
 
 std::string event_line(const Event& e, const CommissionedModel& model) {
-  return fmt::format("t = {:.3f} s: fault in the {} channel (first outside at {:.3f} s, {:.2f} times the threshold)", e.alarm,
-                     model.model.outputs[e.output], e.start, e.peak_ratio);
+  return fmt::format("t = {:.3f} s: fault in the {} channel (first outside at {:.3f} s, {:.2f} times the threshold)",
+                     e.alarm, model.model.outputs[e.output], e.start, e.peak_ratio);
 }
 
 std::string summary(const Detection& d, const CommissionedModel& model) {
@@ -119,19 +123,26 @@ std::string summary(const Detection& d, const CommissionedModel& model) {
     }
   }
   for (std::size_t i = 0; i < d.utilisation.size(); ++i) {
-    text += fmt::format("  {}: residual {:.2g} % of the torque, at most {:.0f} % of its threshold used\n", model.model.outputs[i],
-                        100.0 * d.nrmse[i], 100.0 * d.utilisation[i]);
+    text += fmt::format("  {}: residual {:.2g} % of the torque, at most {:.0f} % of its threshold used\n",
+                        model.model.outputs[i], 100.0 * d.nrmse[i], 100.0 * d.utilisation[i]);
   }
   return text;
 }
 
 Json to_json(const Event& e, const CommissionedModel& model) {
-  return {{"output", model.model.outputs[e.output]}, {"start", e.start},         {"alarm", e.alarm},
-          {"end", e.end},                            {"peak_time", e.peak_time}, {"peak_residual", e.peak_residual},
-          {"peak_ratio", e.peak_ratio},              {"instants", e.instants},   {"start_row", e.start_sample}};
+  return {{"output", model.model.outputs[e.output]},
+          {"start", e.start},
+          {"alarm", e.alarm},
+          {"end", e.end},
+          {"peak_time", e.peak_time},
+          {"peak_residual", e.peak_residual},
+          {"peak_ratio", e.peak_ratio},
+          {"instants", e.instants},
+          {"start_row", e.start_sample}};
 }
 
-Json to_json(const Detection& d, const CommissionedModel& model, const std::string& model_file, const std::string& log) {
+Json to_json(const Detection& d, const CommissionedModel& model, const std::string& model_file,
+             const std::string& log) {
   Json json = {{"schema", "wheelwright/detection/1"},
                {"software", software()},
                {"model", model_file},

@@ -17,9 +17,9 @@
 namespace wheelwright {
 namespace {
 
-constexpr double kConfidence = 0.95;       // of the statistical intervals
+constexpr double kConfidence = 0.95;  // of the statistical intervals
 constexpr std::size_t kFewestInstants = 50;
-constexpr double kMuchUnexplained = 0.2;   // residual over effort, root mean square
+constexpr double kMuchUnexplained = 0.2;  // residual over effort, root mean square
 
 // What is known before anything is fitted.
 struct Setting {
@@ -113,8 +113,7 @@ Fit fit_rows(RegressionSource& rows, const Setting& s, const Survey& log, double
     }
     fit.residuals = statistics.summary(fit.squares.inverse_gram);
     const double t = student_quantile(kConfidence, std::max(fit.residuals.freedom, 1.0));
-    fit.excitation =
-        judge_excitation(fit.squares, fit.residuals.standard_error, t, column_noise(s, log, fit.weights));
+    fit.excitation = judge_excitation(fit.squares, fit.residuals.standard_error, t, column_noise(s, log, fit.weights));
   };
   summarise();
   std::vector<bool> excluded;
@@ -193,9 +192,10 @@ FeasibleSet bounded_set(LogSource& log, const Setting& s, Part part, std::vector
     RegressionStream bare = make_rows(log, s, s.declared);
     FoldedSource bare_folded(bare, part, s.log_rows, s.folds);
     const double factor = kAboveMinimax * minimax_fit(bare_folded, s.prior, options).upper;
-    notes.push_back(fmt::format("the estimated noise bound was raised by {:.3g}: within the prior box no parameters "
-                                "explain the log with less",
-                                factor));
+    notes.push_back(
+        fmt::format("the estimated noise bound was raised by {:.3g}: within the prior box no parameters "
+                    "explain the log with less",
+                    factor));
     for (OutputNoise& o : noise) {
       o.learning *= factor;
       o.bound = std::max(o.bound, o.learning);
@@ -308,9 +308,10 @@ void settle_parameters(LogSource& log, Setting& s, std::vector<std::string>& not
     }
     s.robot.parameters = wide.robot.parameters;
     s.model = wide.model;
-    notes.push_back(fmt::format("the model was given {}: on held-out blocks the relative error falls from {:.3g} to "
-                                "{:.3g} (`parameters:` in the robot file decides otherwise)",
-                                fmt::join(added, " and "), choice.nrmse_basic, choice.nrmse_full));
+    notes.push_back(
+        fmt::format("the model was given {}: on held-out blocks the relative error falls from {:.3g} to "
+                    "{:.3g} (`parameters:` in the robot file decides otherwise)",
+                    fmt::join(added, " and "), choice.nrmse_basic, choice.nrmse_full));
   }
 }
 
@@ -362,21 +363,24 @@ Setting settle(LogSource& log, const Robot& robot, const CommissionOptions& opti
 void describe_assumptions(const Setting& s, Commissioning& result) {
   auto& notes = result.notes;
   if (s.measurement.motion == MotionKind::mean_speed) {
-    notes.push_back(s.measurement.count > 0.0
-                        ? fmt::format("wheel speeds are differenced encoder counts ({:.0f} counts per turn): angles were "
-                                      "rebuilt from them, each speed taken as the mean over the interval around its time",
-                                      2.0 * 3.14159265358979323846 / (s.measurement.count * s.measurement.nominal_step))
-                        : "wheel speeds were taken as means over the sampling interval, as the robot file says");
+    notes.push_back(
+        s.measurement.count > 0.0
+            ? fmt::format("wheel speeds are differenced encoder counts ({:.0f} counts per turn): angles were "
+                          "rebuilt from them, each speed taken as the mean over the interval around its time",
+                          2.0 * 3.14159265358979323846 / (s.measurement.count * s.measurement.nominal_step))
+            : "wheel speeds were taken as means over the sampling interval, as the robot file says");
   } else if (s.measurement.motion == MotionKind::speed && s.filter.order == 2) {
     notes.push_back("wheel speeds are not differenced encoder counts: they were taken as samples of the speed");
   }
   if (!s.noise_complete) {
-    notes.push_back("the noise bounds are extrapolated from the residuals of this log: they hold while the noise and "
-                    "the driving stay like it; declare `noise:` in the robot file for bounds that stand on the sensors");
+    notes.push_back(
+        "the noise bounds are extrapolated from the residuals of this log: they hold while the noise and "
+        "the driving stay like it; declare `noise:` in the robot file for bounds that stand on the sensors");
   }
   if (s.measurement.effort_unsigned) {
-    notes.push_back("the effort is unsigned: its sign was taken from the direction of motion, which is wrong while a "
-                    "motor brakes");
+    notes.push_back(
+        "the effort is unsigned: its sign was taken from the direction of motion, which is wrong while a "
+        "motor brakes");
   }
   for (std::size_t j = 0; j < s.model.p(); ++j) {
     if (!s.prior_declared[j] && (result.parameters[j].lower_is_prior || result.parameters[j].upper_is_prior)) {
@@ -407,8 +411,9 @@ std::string reservations(const Setting& s, const Commissioning& result) {
     text += "; not told from zero: " + indistinct;
   }
   if (s.measurement.effort_unsigned) {
-    text += "; the effort is unsigned, so that braking and driving cannot be told apart: take the friction terms as "
-            "approximate, and do not take the inertias at all";
+    text +=
+        "; the effort is unsigned, so that braking and driving cannot be told apart: take the friction terms as "
+        "approximate, and do not take the inertias at all";
   }
   return text;
 }
@@ -424,17 +429,16 @@ std::string status_message(const Setting& s, const Commissioning& result) {
     }
   }
   switch (result.status) {
-    case Commissioning::Status::done:
-      return "commissioned" + reservations(s, result);
+    case Commissioning::Status::done: return "commissioned" + reservations(s, result);
     case Commissioning::Status::partial:
       return "commissioned, but the log says nothing about " + missing + ": " + todo +
              ", and commission again; until then their bounds are those of the prior" + reservations(s, result);
-    case Commissioning::Status::nothing:
-      return "the log says nothing about any parameter: " + todo;
+    case Commissioning::Status::nothing: return "the log says nothing about any parameter: " + todo;
     case Commissioning::Status::empty:
-      return fmt::format("no parameters explain the log within the declared noise: it would have to be {:.3g} times as "
-                         "large; a fault, an effect that the model lacks, or noise bounds that are too small",
-                         result.minimax);
+      return fmt::format(
+          "no parameters explain the log within the declared noise: it would have to be {:.3g} times as "
+          "large; a fault, an effect that the model lacks, or noise bounds that are too small",
+          result.minimax);
   }
   return {};
 }
@@ -478,9 +482,9 @@ Commissioning commission(LogSource& log, const Robot& robot, const CommissionOpt
 
   const auto unexcited = std::ranges::count_if(
       result.parameters, [](const ParameterResult& p) { return p.excitation == Excitation::not_excited; });
-  result.status = unexcited == 0                                             ? Commissioning::Status::done
+  result.status = unexcited == 0                                          ? Commissioning::Status::done
                   : unexcited == static_cast<std::ptrdiff_t>(s.model.p()) ? Commissioning::Status::nothing
-                                                                            : Commissioning::Status::partial;
+                                                                          : Commissioning::Status::partial;
   result.message = status_message(s, result);
   if (result.status == Commissioning::Status::nothing) {
     return result;

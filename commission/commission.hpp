@@ -33,10 +33,10 @@ enum class NoiseOrigin {
 /// The bound on what τ_f − Y_f θ can be without a fault, in one output.
 struct OutputNoise {
   NoiseOrigin origin = NoiseOrigin::estimated;
-  double bound = 0.0;           ///< for driving to come: n̄ with ē, what a detector's rows have as dy
-  double learning = 0.0;        ///< for the rows of this log, from which the feasible set is made; what was seen needs
-                                ///< no extrapolation, so it is the smaller of the two
-  ExtrapolatedBound how;        ///< how `bound` came about, meaningful where estimated
+  double bound = 0.0;     ///< for driving to come: n̄ with ē, what a detector's rows have as dy
+  double learning = 0.0;  ///< for the rows of this log, from which the feasible set is made; what was seen needs
+                          ///< no extrapolation, so it is the smaller of the two
+  ExtrapolatedBound how;  ///< how `bound` came about, meaningful where estimated
 };
 
 /// Everything that a detector needs, and nothing else: the part of a commissioned model that is used on-line.
@@ -45,10 +45,10 @@ struct CommissionedModel {
   Model model;
   Measurement measurement;
   FilterDesign filter;
-  SignalErrors errors;              ///< dY and dy of the rows, ē included
-  Eigen::VectorXd estimate;         ///< θ̂_L; for a parameter that the log does not show, the Chebyshev centre's value
-  std::vector<HalfSpace> facets;    ///< of the feasible set, p coefficients each
-  Box box;                          ///< finite box that bounds the set (the certified hull)
+  SignalErrors errors;            ///< dY and dy of the rows, ē included
+  Eigen::VectorXd estimate;       ///< θ̂_L; for a parameter that the log does not show, the Chebyshev centre's value
+  std::vector<HalfSpace> facets;  ///< of the feasible set, p coefficients each
+  Box box;                        ///< finite box that bounds the set (the certified hull)
   Persistence persistence;
 };
 
@@ -56,16 +56,16 @@ struct CommissionedModel {
 struct ParameterResult {
   Parameter parameter;
   Excitation excitation = Excitation::identified;
-  std::string reason;                       ///< why it is not identified, for people
-  std::optional<double> estimate;           ///< nothing where the log does not show the parameter
-  std::optional<double> standard_error;     ///< honest under autocorrelated residuals
-  double lower = 0.0;                       ///< guaranteed bounds (certified hull)
+  std::string reason;                    ///< why it is not identified, for people
+  std::optional<double> estimate;        ///< nothing where the log does not show the parameter
+  std::optional<double> standard_error;  ///< honest under autocorrelated residuals
+  double lower = 0.0;                    ///< guaranteed bounds (certified hull)
   double upper = 0.0;
-  double chebyshev = 0.0;                   ///< centre of the feasible set
-  bool lower_is_prior = false;              ///< the bound is the prior box's: the log does not tighten it
+  double chebyshev = 0.0;       ///< centre of the feasible set
+  bool lower_is_prior = false;  ///< the bound is the prior box's: the log does not tighten it
   bool upper_is_prior = false;
-  bool estimate_inside = true;              ///< least squares may leave the hull
-  std::vector<RowOrigin> lower_binding;     ///< samples that set the lower bound
+  bool estimate_inside = true;           ///< least squares may leave the hull
+  std::vector<RowOrigin> lower_binding;  ///< samples that set the lower bound
   std::vector<RowOrigin> upper_binding;
 };
 
@@ -73,39 +73,39 @@ struct ParameterResult {
 struct Commissioning {
   /// What became of the log.
   enum class Status {
-    done,      ///< a model came out
-    partial,   ///< a model came out, but some parameters are not excited: their bounds are the prior's
-    empty,     ///< no θ explains the log within the declared noise: see contradiction; no model
-    nothing,   ///< no parameter is excited: no model
+    done,     ///< a model came out
+    partial,  ///< a model came out, but some parameters are not excited: their bounds are the prior's
+    empty,    ///< no θ explains the log within the declared noise: see contradiction; no model
+    nothing,  ///< no parameter is excited: no model
   };
   Status status = Status::done;
-  std::string message;                          ///< one sentence for people, with what to do next where that is needed
-  CommissionedModel model;                      ///< without estimate, facets and box where the status gives no model
+  std::string message;      ///< one sentence for people, with what to do next where that is needed
+  CommissionedModel model;  ///< without estimate, facets and box where the status gives no model
   std::vector<ParameterResult> parameters;
   Survey survey;
-  std::vector<OutputNoise> noise;               ///< one for each output
+  std::vector<OutputNoise> noise;  ///< one for each output
   NoiseMode noise_mode = NoiseMode::worst_case;
-  FilterChoice filter_choice;                   ///< the curve is empty where the filter was given
-  ResidualSummary residuals;                    ///< of θ̂ on the whole log
+  FilterChoice filter_choice;  ///< the curve is empty where the filter was given
+  ResidualSummary residuals;   ///< of θ̂ on the whole log
   int rank = 0;
   double condition = 0.0;
-  std::vector<OutputValidation> validation;     ///< on held-out blocks, of a model made from the other blocks
+  std::vector<OutputValidation> validation;  ///< on held-out blocks, of a model made from the other blocks
   FoldOptions folds;
-  double minimax = 0.0;                         ///< smallest factor on the rows' dy (and dY) for which the set is not
-                                                ///< empty; <= 1 unless status is empty
-  FeasibleSet feasible;                         ///< the set, its hull, certificates
-  double polytope_over_box = 1.0;               ///< median width of [l, u]: polytope over box, held out, worst output
-  std::vector<std::string> notes;               ///< what was assumed, repaired or chosen, for people
+  double minimax = 0.0;            ///< smallest factor on the rows' dy (and dY) for which the set is not
+                                   ///< empty; <= 1 unless status is empty
+  FeasibleSet feasible;            ///< the set, its hull, certificates
+  double polytope_over_box = 1.0;  ///< median width of [l, u]: polytope over box, held out, worst output
+  std::vector<std::string> notes;  ///< what was assumed, repaired or chosen, for people
 };
 
 /// Options of commission().
 struct CommissionOptions {
   FilterChoiceOptions filter_choice;
-  FoldOptions folds;                          ///< purge is set to the filter's memory
+  FoldOptions folds;  ///< purge is set to the filter's memory
   ExtrapolationOptions extrapolation;
   NoiseMode noise_mode = NoiseMode::worst_case;  ///< for declared noise
-  double confidence = 0.999;                  ///< statistical noise mode
-  std::size_t outliers = 0;                   ///< instants that the feasible set may leave out
+  double confidence = 0.999;                     ///< statistical noise mode
+  std::size_t outliers = 0;                      ///< instants that the feasible set may leave out
   Persistence persistence;
   std::function<void(std::string_view stage, double share)> progress;  ///< told of every stage; may be empty
 };

@@ -16,8 +16,8 @@ namespace {
 constexpr std::array kBetas{2.0, 3.0, 4.0, 5.0, 7.0, 10.0, 14.0, 20.0, 30.0, 40.0, 60.0, 80.0, 120.0, 200.0};
 constexpr double kMostBetaStep = 0.5;
 constexpr std::size_t kFewestInstants = 50;
-constexpr double kExplained = 0.5;     // of the torque: an output with more residual than this carries no information
-constexpr double kShareOfLog = 0.2;    // of the longest segment that a filter may take to settle or to answer
+constexpr double kExplained = 0.5;   // of the torque: an output with more residual than this carries no information
+constexpr double kShareOfLog = 0.2;  // of the longest segment that a filter may take to settle or to answer
 
 // One candidate's filter with a fit for each output.
 class Trial {

@@ -12,9 +12,9 @@ namespace wheelwright {
 /// How rows are divided. Samples of a filtered regression are autocorrelated: blocks are contiguous, and a held-out block
 /// begins with a purge as long as the filter remembers, so that it shares nothing with its neighbour.
 struct FoldOptions {
-  std::size_t blocks = 10;       ///< the log's rows in this many contiguous blocks
+  std::size_t blocks = 10;         ///< the log's rows in this many contiguous blocks
   std::size_t hold_out_every = 3;  ///< blocks 3, 6, 9, … are held out
-  double purge = 0.6;            ///< s dropped at the beginning of every block
+  double purge = 0.6;              ///< s dropped at the beginning of every block
 };
 
 /// Which part of a log.

@@ -20,8 +20,7 @@ std::optional<double> motion_error(const Robot& robot, const Measurement& measur
       }
       break;
     }
-    case MotionKind::speed:
-      return robot.noise.wheel_speed.value;
+    case MotionKind::speed: return robot.noise.wheel_speed.value;
   }
   if (robot.encoder_counts_per_turn) {
     return std::numbers::pi / *robot.encoder_counts_per_turn;

@@ -14,8 +14,8 @@ namespace wheelwright {
 
 /// The declared part of the noise.
 struct NoiseBudget {
-  bool complete = false;   ///< motion and effort are both declared: the rows' bounds need no estimate
-  SensorErrors sensors;    ///< all zero unless complete
+  bool complete = false;  ///< motion and effort are both declared: the rows' bounds need no estimate
+  SensorErrors sensors;   ///< all zero unless complete
 };
 
 /// For complete declarations: half a count for count-differenced speeds and encoder angles, else the declared bound of

@@ -29,8 +29,8 @@ std::string in_effort_unit(const Robot& robot, const std::string& unit) {
 std::optional<std::vector<PhysicalScale>> physical_scales(const Robot& robot, const Model& model) {
   const bool torque = robot.effort == EffortKind::torque;
   const bool voltage = robot.effort == EffortKind::voltage;
-  const bool known = robot.motor && robot.motor->torque_constant &&
-                     (!voltage || (robot.motor->resistance && robot.motor->back_emf));
+  const bool known =
+      robot.motor && robot.motor->torque_constant && (!voltage || (robot.motor->resistance && robot.motor->back_emf));
   if (!torque && !known) {
     return std::nullopt;
   }

@@ -15,10 +15,10 @@ namespace wheelwright {
 struct Survey {
   std::size_t rows = 0;
   std::size_t segments = 0;
-  double seconds = 0.0;          ///< driving time, gaps left out
-  double longest_segment = 0.0;  ///< s
-  double median_step = 0.0;      ///< s
-  double largest_step = 0.0;     ///< within a segment, s
+  double seconds = 0.0;                      ///< driving time, gaps left out
+  double longest_segment = 0.0;              ///< s
+  double median_step = 0.0;                  ///< s
+  double largest_step = 0.0;                 ///< within a segment, s
   std::vector<double> largest_speed;         ///< per joint, |speed|, rad/s or m/s
   std::vector<double> largest_acceleration;  ///< per joint, over windows of `smoothing` steps, rad/s² or m/s²
   std::vector<double> reversals;             ///< per joint: how often its speed changed sign

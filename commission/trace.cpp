@@ -54,8 +54,8 @@ class Binner {
     Bin bin{t, t, starts, std::vector<OutputBin>(outputs_)};
     for (std::size_t i = 0; i < outputs_; ++i) {
       const ChannelDecision& c = decision.channels[i];
-      bin.outputs[i] = {c.predicted + c.residual, c.predicted,         c.residual, c.residual,
-                        c.threshold.lower,        c.threshold.upper,   use_of(c)};
+      bin.outputs[i] = {c.predicted + c.residual, c.predicted,       c.residual, c.residual,
+                        c.threshold.lower,        c.threshold.upper, use_of(c)};
     }
     if (in_last_ == 0 || in_last_ == length_) {
       if (bins_.size() == most_) {

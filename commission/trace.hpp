@@ -23,20 +23,20 @@ struct OutputTrace {
 
 /// A thinned walk of a detector over a log. A bin in which ε leaves [l, u] shows that it does.
 struct Trace {
-  std::vector<double> t;             ///< time at the middle of each bin, s
+  std::vector<double> t;  ///< time at the middle of each bin, s
   std::vector<OutputTrace> outputs;
-  std::vector<std::size_t> breaks;   ///< indices of `t` at which a new segment starts
+  std::vector<std::size_t> breaks;  ///< indices of `t` at which a new segment starts
 };
 
 /// What a detector said of a whole log.
 struct Detection {
   std::vector<Event> events;
-  std::size_t rows = 0;                 ///< rows of the log
-  std::size_t instants = 0;             ///< instants with a decision
-  double seconds = 0.0;                 ///< time under watch, s
-  std::vector<std::size_t> outside;     ///< per output, instants outside
-  std::vector<double> utilisation;      ///< per output, max |ε − middle| / half width
-  std::vector<double> nrmse;            ///< per output, rms ε / rms τ_f
+  std::size_t rows = 0;              ///< rows of the log
+  std::size_t instants = 0;          ///< instants with a decision
+  double seconds = 0.0;              ///< time under watch, s
+  std::vector<std::size_t> outside;  ///< per output, instants outside
+  std::vector<double> utilisation;   ///< per output, max |ε − middle| / half width
+  std::vector<double> nrmse;         ///< per output, rms ε / rms τ_f
   Trace trace;
 };
 

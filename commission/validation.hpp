@@ -23,7 +23,7 @@ struct OutputValidation {
   double residual_rms = 0.0;         ///< unit of the output
   double median_width = 0.0;         ///< median of u − l, unit of the output
   double median_width_box = 0.0;     ///< the same with the interval hull in place of the set
-  double smallest_kappa = 0.0;       ///< smallest |κ| of ζ = κ·Yθ that some instant shows for certain, both directions
+  double smallest_kappa = 0.0;  ///< smallest |κ| of ζ = κ·Yθ that some instant shows for certain, both directions
 };
 
 /// Walks `rows` and compares every instant with its threshold. κ: an instant shows ζ = κ·Yθ for certain when

@@ -62,12 +62,10 @@ const Decision& Detector::decide(const FilteredRow& row) {
     } else {
       c.threshold = threshold_.at({row.Y.row(at).data(), p}, {row.dY.row(at).data(), p}, row.dy[at]);
     }
-    c.dead_zone = options_.test == Test::two_sided
-                      ? dead_zone(c.residual, c.threshold.lower, c.threshold.upper)
-                      : dead_zone(c.residual, c.threshold.rho());
-    c.outside = options_.test == Test::two_sided
-                    ? c.residual < c.threshold.lower || c.residual > c.threshold.upper
-                    : c.dead_zone > 0.0;
+    c.dead_zone = options_.test == Test::two_sided ? dead_zone(c.residual, c.threshold.lower, c.threshold.upper)
+                                                   : dead_zone(c.residual, c.threshold.rho());
+    c.outside = options_.test == Test::two_sided ? c.residual < c.threshold.lower || c.residual > c.threshold.upper
+                                                 : c.dead_zone > 0.0;
     c.alarm = counters_[i].step(c.outside);
     decision_.fault = decision_.fault || c.alarm;
   }

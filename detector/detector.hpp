@@ -26,25 +26,25 @@ enum class Test {
 struct DetectorOptions {
   ParameterSetKind set = ParameterSetKind::polytope;
   Test test = Test::two_sided;
-  Persistence persistence;                 ///< k of n; 1 of 1 keeps the certain detections of theory section 5
-  std::optional<Eigen::VectorXd> mu;       ///< μ_o of (39), one for each output: constant thresholds instead of ρ(t)
+  Persistence persistence;            ///< k of n; 1 of 1 keeps the certain detections of theory section 5
+  std::optional<Eigen::VectorXd> mu;  ///< μ_o of (39), one for each output: constant thresholds instead of ρ(t)
 };
 
 /// One output at one instant.
 struct ChannelDecision {
-  double residual = 0.0;    ///< ε = τ_f − Y_f θ̂ (29)
-  double predicted = 0.0;   ///< Y_f θ̂ (30)
-  Threshold threshold;      ///< [l, u] and ρ
-  double dead_zone = 0.0;   ///< D1 (35) or D2 (39): |ε| outside the threshold, else 0
-  bool outside = false;     ///< dead_zone > 0
-  bool alarm = false;       ///< persistence satisfied
+  double residual = 0.0;   ///< ε = τ_f − Y_f θ̂ (29)
+  double predicted = 0.0;  ///< Y_f θ̂ (30)
+  Threshold threshold;     ///< [l, u] and ρ
+  double dead_zone = 0.0;  ///< D1 (35) or D2 (39): |ε| outside the threshold, else 0
+  bool outside = false;    ///< dead_zone > 0
+  bool alarm = false;      ///< persistence satisfied
 };
 
 /// The decision at one instant.
 struct Decision {
-  bool valid = false;                       ///< false until the filter has settled: nothing is known yet
-  bool fault = false;                       ///< an alarm stands in some channel
-  std::vector<ChannelDecision> channels;    ///< one for each output, meaningful where valid
+  bool valid = false;                     ///< false until the filter has settled: nothing is known yet
+  bool fault = false;                     ///< an alarm stands in some channel
+  std::vector<ChannelDecision> channels;  ///< one for each output, meaningful where valid
 };
 
 /// Everything in one object that a robot carries: filter, threshold, decision. Not for several threads at once.

@@ -10,15 +10,15 @@ namespace wheelwright {
 
 /// One fault event in one channel.
 struct Event {
-  std::size_t output = 0;       ///< channel
-  double start = 0.0;           ///< time of the first instant outside the threshold, s
-  double alarm = 0.0;           ///< time at which the persistence rule was satisfied, s
-  double end = 0.0;             ///< time of the last instant outside the threshold, s
-  double peak_time = 0.0;       ///< where the residual was furthest outside, s
-  double peak_residual = 0.0;   ///< ε there
-  double peak_ratio = 0.0;      ///< distance of ε from the middle of [l, u] over half its width there, > 1
-  std::size_t instants = 0;     ///< number of instants outside
-  std::size_t start_sample = 0; ///< row of the log of the first one
+  std::size_t output = 0;        ///< channel
+  double start = 0.0;            ///< time of the first instant outside the threshold, s
+  double alarm = 0.0;            ///< time at which the persistence rule was satisfied, s
+  double end = 0.0;              ///< time of the last instant outside the threshold, s
+  double peak_time = 0.0;        ///< where the residual was furthest outside, s
+  double peak_residual = 0.0;    ///< ε there
+  double peak_ratio = 0.0;       ///< distance of ε from the middle of [l, u] over half its width there, > 1
+  std::size_t instants = 0;      ///< number of instants outside
+  std::size_t start_sample = 0;  ///< row of the log of the first one
 };
 
 /// Persistence: an alarm is raised when at least `k` of the last `n` instants lie outside the threshold.
@@ -57,8 +57,8 @@ class EventRecorder {
  private:
   struct Channel {
     Event candidate;
-    bool any = false;       // the candidate holds an instant
-    bool raised = false;    // it has become events_[index]
+    bool any = false;     // the candidate holds an instant
+    bool raised = false;  // it has become events_[index]
     std::size_t index = 0;
   };
   double merge_;

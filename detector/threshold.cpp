@@ -12,7 +12,8 @@ namespace wheelwright {
 
 ThresholdRule::ThresholdRule(Polytope set, Eigen::VectorXd estimate, ParameterSetKind kind)
     : set_(std::move(set)), estimate_(std::move(estimate)), kind_(kind), direction_(set_.dimension()) {
-  check::that(static_cast<std::size_t>(estimate_.size()) == set_.dimension(), "estimate", "one value for each parameter");
+  check::that(static_cast<std::size_t>(estimate_.size()) == set_.dimension(), "estimate",
+              "one value for each parameter");
   check::that(estimate_.allFinite(), "estimate", "finite values");
 }
 

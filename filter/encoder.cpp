@@ -11,9 +11,9 @@
 namespace wheelwright {
 namespace {
 
-constexpr double kMostRounding = 0.25;    // of a count: beyond it a multiple cannot be told from its neighbour
-constexpr std::size_t kFewest = 50;       // non-zero speeds below which nothing is claimed
-constexpr double kSharp = 0.01;           // with fewer distinct speeds, how near N must be to a whole number
+constexpr double kMostRounding = 0.25;     // of a count: beyond it a multiple cannot be told from its neighbour
+constexpr std::size_t kFewest = 50;        // non-zero speeds below which nothing is claimed
+constexpr double kSharp = 0.01;            // with fewer distinct speeds, how near N must be to a whole number
 constexpr double kMostCounts = 4194304.0;  // 2^22
 
 double turn_over(double quantum, double step) { return 2.0 * std::numbers::pi / (quantum * step); }

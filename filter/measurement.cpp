@@ -23,12 +23,9 @@ std::string join(const std::vector<std::string>& words) {
 
 std::string effort_column(const Joint& joint, EffortKind kind) {
   switch (kind) {
-    case EffortKind::torque:
-      return joint.torque;
-    case EffortKind::current:
-      return joint.current;
-    case EffortKind::voltage:
-      return joint.voltage;
+    case EffortKind::torque: return joint.torque;
+    case EffortKind::current: return joint.current;
+    case EffortKind::voltage: return joint.voltage;
   }
   return {};
 }

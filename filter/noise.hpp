@@ -30,9 +30,9 @@ struct SensorErrors {
 /// How the worst case is to be judged.
 struct PropagationOptions {
   NoiseMode mode = NoiseMode::worst_case;
-  double confidence = 0.999;   ///< statistical: probability that every row of the log obeys its bound
-  double rows = 1e6;           ///< statistical: number of instants of a log that the confidence is about
-  double largest_step = 0.0;   ///< statistical: largest sampling step, s (> 0)
+  double confidence = 0.999;  ///< statistical: probability that every row of the log obeys its bound
+  double rows = 1e6;          ///< statistical: number of instants of a log that the confidence is about
+  double largest_step = 0.0;  ///< statistical: largest sampling step, s (> 0)
 };
 
 /// Error bounds of filtered signals, ready to be written into rows.

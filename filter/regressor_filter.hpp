@@ -81,21 +81,21 @@ class RegressorFilter {
   SignalErrors errors_;
 
   StepWeights weights_;
-  bool started_ = false;   // a sample of this segment was seen
-  bool running_ = false;   // the recursion has its first instant
-  bool at_rest_ = false;   // the segment begins at standstill
-  double t0_ = 0.0;        // first instant of the recursion
-  double t_ = 0.0;         // last instant of the recursion
+  bool started_ = false;  // a sample of this segment was seen
+  bool running_ = false;  // the recursion has its first instant
+  bool at_rest_ = false;  // the segment begins at standstill
+  double t0_ = 0.0;       // first instant of the recursion
+  double t_ = 0.0;        // last instant of the recursion
   double sample_time_ = 0.0;
   double heading_ = 0.0;
   double heading_sample_ = 0.0;
-  Eigen::VectorXd joint_, joint_before_, joint_speed_;    // motion as measured
+  Eigen::VectorXd joint_, joint_before_, joint_speed_;  // motion as measured
   Eigen::VectorXd joint_effort_;
   Eigen::VectorXd speed_, speed_before_;                  // of coordinates
   Eigen::VectorXd effort_sample_, effort_sample_before_;  // of outputs, as measured
   Eigen::VectorXd effort_, effort_before_;                // of outputs, at the instants of the recursion
-  std::vector<Cascade> motion_;                         // driven by the coordinates' speeds
-  std::vector<Cascade> slope_;                          // driven by their derivatives
+  std::vector<Cascade> motion_;                           // driven by the coordinates' speeds
+  std::vector<Cascade> slope_;                            // driven by their derivatives
   std::vector<Cascade> torque_;
   std::vector<FunctionTerm> functions_;
   std::vector<double> state_speed_, state_joint_, joint_error_;

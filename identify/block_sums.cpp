@@ -46,8 +46,9 @@ LongRunCovariance long_run_covariance(const BlockSums& series, std::size_t most_
     return result;
   }
   const auto rule = static_cast<std::size_t>(0.4 * std::pow(static_cast<double>(blocks), 2.0 / 3.0));
-  const auto frequencies = std::min<std::size_t>(std::clamp<std::size_t>(rule, 4, std::max<std::size_t>(most_frequencies, 4)),
-                                                 static_cast<std::size_t>(blocks - 1));
+  const auto frequencies =
+      std::min<std::size_t>(std::clamp<std::size_t>(rule, 4, std::max<std::size_t>(most_frequencies, 4)),
+                            static_cast<std::size_t>(blocks - 1));
   for (std::size_t f = 1; f <= frequencies; ++f) {
     Eigen::VectorXd projection = Eigen::VectorXd::Zero(sums.rows());
     for (Eigen::Index k = 0; k < blocks; ++k) {

@@ -6,7 +6,7 @@
 namespace wheelwright {
 namespace {
 
-constexpr double kCollinear = 1e-7;       // of the column's own size
+constexpr double kCollinear = 1e-7;  // of the column's own size
 constexpr double kSignalOverNoise = 3.0;
 
 }  // namespace

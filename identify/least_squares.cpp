@@ -13,7 +13,7 @@
 namespace wheelwright {
 namespace {
 
-constexpr Eigen::Index kBatch = 256;     // rows folded at a time
+constexpr Eigen::Index kBatch = 256;      // rows folded at a time
 constexpr double kRankTolerance = 1e-10;  // of the largest singular value of unit columns
 
 }  // namespace

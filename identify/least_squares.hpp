@@ -14,17 +14,17 @@ namespace wheelwright {
 
 /// Solution of min Σ w_i² (y − Yθ)².
 struct LeastSquaresFit {
-  Eigen::VectorXd estimate;       ///< p; along directions that the data do not determine, the part of least norm in
-                                  ///< scaled columns
-  Eigen::VectorXd column_rms;     ///< p, root mean square of each weighted column (per instant)
-  Eigen::VectorXd partial_rms;    ///< p, the same after the part that the other columns explain is taken away: what
-                                  ///< the data say about θ_j alone
-  Eigen::MatrixXd inverse_gram;   ///< p × p, (Σ w² YᵀY)⁻¹ (pseudo-inverse where the rank is deficient)
-  int rank = 0;                   ///< numerical rank with columns scaled to unit length
-  double condition = 0.0;         ///< ratio of the largest to the smallest singular value of the scaled columns
-  double weighted_rss = 0.0;      ///< Σ w_i² (y − Yθ̂)²
-  double weighted_tss = 0.0;      ///< Σ w_i² y²
-  std::size_t instants = 0;       ///< number of instants
+  Eigen::VectorXd estimate;      ///< p; along directions that the data do not determine, the part of least norm in
+                                 ///< scaled columns
+  Eigen::VectorXd column_rms;    ///< p, root mean square of each weighted column (per instant)
+  Eigen::VectorXd partial_rms;   ///< p, the same after the part that the other columns explain is taken away: what
+                                 ///< the data say about θ_j alone
+  Eigen::MatrixXd inverse_gram;  ///< p × p, (Σ w² YᵀY)⁻¹ (pseudo-inverse where the rank is deficient)
+  int rank = 0;                  ///< numerical rank with columns scaled to unit length
+  double condition = 0.0;        ///< ratio of the largest to the smallest singular value of the scaled columns
+  double weighted_rss = 0.0;     ///< Σ w_i² (y − Yθ̂)²
+  double weighted_tss = 0.0;     ///< Σ w_i² y²
+  std::size_t instants = 0;      ///< number of instants
 };
 
 /// Ordinary least squares, or weighted with one weight for each output. Rows are folded into a (p+1) × (p+1)

@@ -29,8 +29,8 @@ ExtrapolatedBound extrapolate(const OutputResidual& residual, std::size_t instan
   result.bound = residual.rms * spread * z(seen * std::max(options.horizon, 1.0));
   result.heavy_tail = residual.largest > residual.rms * spread * z(seen);
   if (result.heavy_tail) {
-    result.bound =
-        std::max(result.bound, residual.largest + residual.rms * std::log(std::max(options.horizon, 1.0) / options.risk));
+    result.bound = std::max(result.bound,
+                            residual.largest + residual.rms * std::log(std::max(options.horizon, 1.0) / options.risk));
   }
   result.over_largest = residual.largest > 0.0 ? result.bound / residual.largest : 0.0;
   result.over_rms = residual.rms > 0.0 ? result.bound / residual.rms : 0.0;
@@ -41,8 +41,8 @@ Eigen::VectorXd largest_plausible_error(RegressionSource& rows, const Eigen::Vec
                                         const ResidualSummary& summary, double risk) {
   check::that(risk > 0.0 && risk < 1.0, "risk", "a number inside (0, 1)");
   const auto p = static_cast<double>(theta.size());
-  const double f = boost::math::quantile(boost::math::complement(
-      boost::math::fisher_f(p, std::max(summary.freedom, 1.0)), risk));
+  const double f =
+      boost::math::quantile(boost::math::complement(boost::math::fisher_f(p, std::max(summary.freedom, 1.0)), risk));
   const Eigen::MatrixXd scaled = p * f * summary.covariance;
   Eigen::VectorXd largest = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(rows.outputs()));
   RegressionBlock block;

@@ -9,17 +9,17 @@ namespace wheelwright {
 
 /// What the extrapolated bound promises.
 struct ExtrapolationOptions {
-  double risk = 1e-3;     ///< probability, per output, that a fault-free log of the horizon exceeds the bound
-  double horizon = 1.0;   ///< number of instants of the horizon, as a multiple of those that were seen
+  double risk = 1e-3;    ///< probability, per output, that a fault-free log of the horizon exceeds the bound
+  double horizon = 1.0;  ///< number of instants of the horizon, as a multiple of those that were seen
 };
 
 /// A bound and how it came about.
 struct ExtrapolatedBound {
-  double bound = 0.0;           ///< ē, unit of the output
-  double over_largest = 0.0;    ///< ē / max |ε|
-  double over_rms = 0.0;        ///< ē / rms
-  bool heavy_tail = false;      ///< the residual's tail is heavier than a Gaussian one: the bound stands on the largest
-                                ///< residual and an exponential tail instead
+  double bound = 0.0;         ///< ē, unit of the output
+  double over_largest = 0.0;  ///< ē / max |ε|
+  double over_rms = 0.0;      ///< ē / rms
+  bool heavy_tail = false;    ///< the residual's tail is heavier than a Gaussian one: the bound stands on the largest
+                              ///< residual and an exponential tail instead
 };
 
 /// ē = z·σ_u, where σ_u = rms·√(n/χ²_{n,risk}) is the upper confidence limit of the standard deviation for n effective

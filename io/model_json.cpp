@@ -36,12 +36,8 @@ Json origins_json(const std::vector<RowOrigin>& origins, const Model& model) {
 }
 
 Json filter_json(const FilterDesign& filter, const FilterChoice& choice) {
-  Json json = {{"order", filter.order},
-               {"alpha", filter.alpha},
-               {"beta", filter.beta},
-               {"settle", filter.settle},
-               {"delay", filter.delay()},
-               {"chosen", !choice.curve.empty()}};
+  Json json = {{"order", filter.order},   {"alpha", filter.alpha},   {"beta", filter.beta},
+               {"settle", filter.settle}, {"delay", filter.delay()}, {"chosen", !choice.curve.empty()}};
   for (const FilterCandidate& c : choice.curve) {
     json["curve"].push_back({{"beta", c.design.beta}, {"criterion", c.criterion}});
   }
@@ -176,7 +172,9 @@ Json validation_json(const Commissioning& r, const Model& model) {
                        {"box_width_over_torque_rms", share(v.median_width_box)},
                        {"smallest_certain_kappa", v.smallest_kappa}});
   }
-  return {{"blocks", r.folds.blocks}, {"held_out_every", r.folds.hold_out_every}, {"purge", r.folds.purge},
+  return {{"blocks", r.folds.blocks},
+          {"held_out_every", r.folds.hold_out_every},
+          {"purge", r.folds.purge},
           {"outputs", outputs}};
 }
 

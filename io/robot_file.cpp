@@ -33,9 +33,10 @@ struct RobotReader {
     for (const auto& [key, place] : members) {
       read_basics(key, place);
     }
-    physical = !drive(robot)                ? Names{"inertia", "viscous", "coulomb", "offset"}
-               : robot.anisotropic_friction ? Names{"mass", "yaw_inertia", "viscous_x", "viscous_y", "viscous_yaw", "coulomb"}
-                                            : Names{"mass", "yaw_inertia", "viscous_linear", "viscous_yaw", "coulomb"};
+    physical = !drive(robot) ? Names{"inertia", "viscous", "coulomb", "offset"}
+               : robot.anisotropic_friction
+                   ? Names{"mass", "yaw_inertia", "viscous_x", "viscous_y", "viscous_yaw", "coulomb"}
+                   : Names{"mass", "yaw_inertia", "viscous_linear", "viscous_yaw", "coulomb"};
     for (const auto& [key, place] : members) {
       read_geometry(key, place);
       read_knowledge(key, place);

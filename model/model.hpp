@@ -25,9 +25,10 @@ struct Parameter {
   std::string unit;           ///< unit with torque as effort, e.g. "kg·m"
   std::string physical;       ///< the physical quantity behind it, e.g. "mass"
   std::string physical_unit;  ///< e.g. "kg"
-  double per_physical = 1.0;  ///< θ_L,j = per_physical · physical quantity (the wheel radius r for the robot of the paper)
-  Interval prior;             ///< wide physical default of the physical quantity, in physical_unit
-  std::string excite;         ///< what to do when a log does not show it, e.g. "drive in curves"
+  double per_physical =
+      1.0;             ///< θ_L,j = per_physical · physical quantity (the wheel radius r for the robot of the paper)
+  Interval prior;      ///< wide physical default of the physical quantity, in physical_unit
+  std::string excite;  ///< what to do when a log does not show it, e.g. "drive in curves"
 };
 
 /// A measured joint: which columns of the log hold its angle, speed and effort.
@@ -45,8 +46,8 @@ struct MotionState {
   std::span<const double> speed_error{};  ///< bound on the error of each speed (0 where nothing is declared)
   std::span<const double> joint_speed{};  ///< speed of each joint, rad/s or m/s
   std::span<const double> joint_error{};  ///< bound on the error of each joint speed
-  double heading = 0.0;                 ///< θ of the pose, rad: measured where the log has it, else odometry
-  double heading_error = 0.0;           ///< bound on its error, rad
+  double heading = 0.0;                   ///< θ of the pose, rad: measured where the log has it, else odometry
+  double heading_error = 0.0;             ///< bound on its error, rad
 };
 
 /// A value of a term with a bound on its error.
@@ -66,7 +67,7 @@ struct Term {
   std::size_t output = 0;
   std::size_t parameter = 0;
   Kind kind = Kind::speed;
-  std::size_t coordinate = 0;                           ///< for acceleration and speed
+  std::size_t coordinate = 0;  ///< for acceleration and speed
   double scale = 1.0;
   TermValue (*function)(const MotionState&) = nullptr;  ///< for Kind::function
 };
@@ -74,16 +75,16 @@ struct Term {
 /// Linear-in-parameters dynamics of a robot.
 struct Model {
   std::string name;
-  std::vector<Parameter> parameters;     ///< p entries of θ_L
-  std::vector<std::string> outputs;      ///< n names of channels, e.g. "sum", "difference"
-  std::vector<std::string> output_units; ///< n units with torque as effort
-  std::vector<std::string> coordinates;  ///< names of the motion coordinates, e.g. "v1", "v2"
+  std::vector<Parameter> parameters;      ///< p entries of θ_L
+  std::vector<std::string> outputs;       ///< n names of channels, e.g. "sum", "difference"
+  std::vector<std::string> output_units;  ///< n units with torque as effort
+  std::vector<std::string> coordinates;   ///< names of the motion coordinates, e.g. "v1", "v2"
   std::vector<Joint> joints;
-  Eigen::MatrixXd motion;                ///< coordinates × joints: coordinate speeds = motion · joint speeds, (5)
-  Eigen::MatrixXd input;                 ///< outputs × joints: left side of (15) = input · joint efforts
-  std::vector<Term> terms;               ///< the non-zero entries of Y
-  int heading_coordinate = -1;           ///< coordinate whose integral is the heading, −1 where there is none
-  bool heading_used = false;             ///< whether a term looks at the heading
+  Eigen::MatrixXd motion;       ///< coordinates × joints: coordinate speeds = motion · joint speeds, (5)
+  Eigen::MatrixXd input;        ///< outputs × joints: left side of (15) = input · joint efforts
+  std::vector<Term> terms;      ///< the non-zero entries of Y
+  int heading_coordinate = -1;  ///< coordinate whose integral is the heading, −1 where there is none
+  bool heading_used = false;    ///< whether a term looks at the heading
 
   /// n.
   [[nodiscard]] std::size_t n() const { return outputs.size(); }

@@ -65,22 +65,22 @@ struct Motor {
 /// A robot as its file describes it. Names of parameters are those of Model::parameters' `physical` names.
 struct Robot {
   std::string name = "robot";
-  std::string model = "differential_drive";     ///< differential_drive | single_axis
-  double wheel_radius = 0.0;                    ///< r, m (differential drive)
-  double track_width = 0.0;                     ///< D, m (differential drive)
-  bool lever_arm_is_track = false;              ///< ℓ = D, the paper's convention, instead of D/2
-  bool anisotropic_friction = false;            ///< five parameters (f1 ≠ f2) instead of four
+  std::string model = "differential_drive";  ///< differential_drive | single_axis
+  double wheel_radius = 0.0;                 ///< r, m (differential drive)
+  double track_width = 0.0;                  ///< D, m (differential drive)
+  bool lever_arm_is_track = false;           ///< ℓ = D, the paper's convention, instead of D/2
+  bool anisotropic_friction = false;         ///< five parameters (f1 ≠ f2) instead of four
   EffortKind effort = EffortKind::torque;
   Hold hold = Hold::first_order;
-  bool effort_unsigned = false;                 ///< only |effort| was logged
-  std::map<std::string, double> nominal;        ///< physical parameter -> value as designed
-  std::map<std::string, Interval> prior;        ///< physical parameter -> bounds known beforehand
+  bool effort_unsigned = false;                        ///< only |effort| was logged
+  std::map<std::string, double> nominal;               ///< physical parameter -> value as designed
+  std::map<std::string, Interval> prior;               ///< physical parameter -> bounds known beforehand
   std::optional<std::vector<std::string>> parameters;  ///< requested parameters; nothing means the model's choice
   SensorNoise noise;
   FilterWish filter;
   std::optional<double> encoder_counts_per_turn;
   SpeedSource speed_source = SpeedSource::automatic;
-  std::map<std::string, double> limits;         ///< effort, speed, acceleration
+  std::map<std::string, double> limits;  ///< effort, speed, acceleration
   std::optional<Motor> motor;
 };
 
@@ -95,8 +95,8 @@ struct Robot {
 /// Prior box of θ_L in the order of `model.parameters`: the robot's own prior where it has one, else the model's wide
 /// physical default.
 struct PriorBox {
-  std::vector<Interval> bounds;   ///< p intervals, units of θ_L
-  std::vector<bool> declared;     ///< whether the bound came from the robot file
+  std::vector<Interval> bounds;  ///< p intervals, units of θ_L
+  std::vector<bool> declared;    ///< whether the bound came from the robot file
 };
 [[nodiscard]] PriorBox prior_box(const Robot& robot, const Model& model);
 

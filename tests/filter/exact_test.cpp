@@ -5,8 +5,8 @@
 #include <random>
 #include <vector>
 
-#include <boost/multiprecision/cpp_bin_float.hpp>
 #include <gtest/gtest.h>
+#include <boost/multiprecision/cpp_bin_float.hpp>
 
 namespace wheelwright {
 namespace {

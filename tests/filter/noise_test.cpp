@@ -61,7 +61,8 @@ TEST(WorstCaseNorms, CoverHostileNoiseAndAreNearlyReached) {
     Worst worst;
     // Square waves of many periods come close to the worst sign pattern of each kernel.
     for (int period = 2; period < 400; period = period * 5 / 4 + 1) {
-      const Worst w = noise_through(design, c.motion, [&](int k) { return (k / period) % 2 == 0 ? 1.0 : -1.0; }, 3000);
+      const Worst w = noise_through(
+          design, c.motion, [&](int k) { return (k / period) % 2 == 0 ? 1.0 : -1.0; }, 3000);
       worst.acceleration = std::max(worst.acceleration, w.acceleration);
       worst.speed = std::max(worst.speed, w.speed);
       worst.effort = std::max(worst.effort, w.effort);
@@ -80,7 +81,8 @@ TEST(StatisticalNorms, AreTheStandardDeviationOfFilteredWhiteNoise) {
     const FilterDesign design{.order = 2, .alpha = 8.0, .beta = 5.0};
     std::mt19937_64 rng(2);
     std::normal_distribution<double> gauss;
-    const Worst w = noise_through(design, motion, [&](int) { return gauss(rng); }, 400000);
+    const Worst w = noise_through(
+        design, motion, [&](int) { return gauss(rng); }, 400000);
     const double sd = std::sqrt(w.acceleration_square / static_cast<double>(w.rows));
     EXPECT_NEAR(sd / statistical_norms(design, motion, 0.01).acceleration, 1.0, 0.03);
   }

@@ -80,8 +80,8 @@ LogTable drive(MotionKind motion, double h, double seconds, Clock clock) {
 double worst_equation_error(MotionKind motion, int order, double h, Clock clock) {
   const LogTable log = drive(motion, h, 10.0, clock);
   TableSource source(log);
-  RegressionStream stream(source, RegressorFilter(kRobot.model(), {.order = order, .alpha = 6.0, .beta = 6.0},
-                                                  wheels(motion)));
+  RegressionStream stream(source,
+                          RegressorFilter(kRobot.model(), {.order = order, .alpha = 6.0, .beta = 6.0}, wheels(motion)));
   const RegressionBlock rows = read_all(stream);
   double worst = 0.0;
   for (std::size_t k = 0; k < rows.instants(); ++k) {
@@ -120,14 +120,12 @@ TEST_P(FilteredRegression, ErrorFallsByFourWhenTheStepHalves) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(AllKinds, FilteredRegression,
-                         testing::Values(Kind{MotionKind::speed, 1, Clock::even, 2.0},
-                                         Kind{MotionKind::speed, 2, Clock::even, 4.0},
-                                         Kind{MotionKind::angle, 2, Clock::even, 2.0},
-                                         Kind{MotionKind::mean_speed, 2, Clock::even, 2.0},
-                                         Kind{MotionKind::speed, 1, Clock::uneven, 2.0},
-                                         Kind{MotionKind::speed, 2, Clock::uneven, 2.0},
-                                         Kind{MotionKind::angle, 2, Clock::uneven, 2.0}));
+INSTANTIATE_TEST_SUITE_P(
+    AllKinds, FilteredRegression,
+    testing::Values(Kind{MotionKind::speed, 1, Clock::even, 2.0}, Kind{MotionKind::speed, 2, Clock::even, 4.0},
+                    Kind{MotionKind::angle, 2, Clock::even, 2.0}, Kind{MotionKind::mean_speed, 2, Clock::even, 2.0},
+                    Kind{MotionKind::speed, 1, Clock::uneven, 2.0}, Kind{MotionKind::speed, 2, Clock::uneven, 2.0},
+                    Kind{MotionKind::angle, 2, Clock::uneven, 2.0}));
 
 TEST(RegressionStream, BatchAndStreamingGiveTheSameBits) {
   for (const MotionKind motion : {MotionKind::angle, MotionKind::mean_speed, MotionKind::speed}) {
