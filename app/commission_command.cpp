@@ -26,8 +26,7 @@ struct Arguments {
   std::filesystem::path robot;
   bool statistical = false;
   std::size_t outliers = 0;
-  std::size_t k = 1;
-  std::size_t n = 1;
+  std::optional<Persistence> persistence;
   CommonOptions common;
 };
 
@@ -55,10 +54,11 @@ int run(const Arguments& a) {
   CommissionOptions options;
   options.noise_mode = a.statistical ? NoiseMode::statistical : NoiseMode::worst_case;
   options.outliers = a.outliers;
-  options.persistence = {a.k, a.n};
+  options.persistence = a.persistence.value_or(Persistence{});
   options.progress = [&](std::string_view stage, double share) { progress.tell(stage, share); };
   Commissioning result;
   try {
+    require_columns(log, needed_columns(robot));
     result = commission(log, robot, options);
     if (!result.model.facets.empty() && !a.common.out.empty()) {
       context.own_log = detect(log, make_detector(result.model));
@@ -94,13 +94,7 @@ Run add_commission(CLI::App& program) {
   command.add_option("--outliers", a->outliers, "Let the feasible set leave out at most N instants")
       ->type_name("N")
       ->capture_default_str();
-  command.add_option("--persistence", "Raise an alarm when K of the last N instants are outside (default 1/1)")
-      ->type_name("K/N")
-      ->each([a](const std::string& text) {
-        if (std::sscanf(text.c_str(), "%zu/%zu", &a->k, &a->n) != 2 || a->k < 1 || a->k > a->n || a->n > 64) {
-          throw CLI::ValidationError("--persistence", "'" + text + "': expected K/N with 1 <= K <= N <= 64, e.g. 3/5");
-        }
-      });
+  add_persistence(command, a->persistence, "1/1");
   add_common(command, a->common);
   add_map(command, a->common);
   command.footer(kExamples);

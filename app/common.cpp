@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "common.hpp"
 
+#include <charconv>
 #include <cstdio>
 #include <system_error>
 
@@ -9,6 +10,8 @@
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/io/atomic_file.hpp>
+#include <wheelwright/io/log_columns.hpp>
+#include <wheelwright/io/suggest.hpp>
 #include <wheelwright/model/robot.hpp>
 
 #include "raw_signals.hpp"
@@ -36,6 +39,26 @@ void add_map(CLI::App& command, CommonOptions& options) {
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
 }
 
+void add_persistence(CLI::App& command, std::optional<Persistence>& persistence, const std::string& otherwise) {
+  command
+      .add_option_function<std::string>(
+          "--persistence",
+          [&persistence](const std::string& text) {
+            Persistence rule;
+            const char* const end = text.data() + text.size();
+            const auto k = std::from_chars(text.data(), end, rule.k);
+            const bool slash = k.ec == std::errc() && k.ptr != end && *k.ptr == '/';
+            const auto n = std::from_chars(slash ? k.ptr + 1 : end, end, rule.n);
+            if (!slash || n.ec != std::errc() || n.ptr != end || rule.k < 1 || rule.k > rule.n || rule.n > 64) {
+              throw CLI::ValidationError("--persistence '" + text + "': expected K/N with 1 <= K <= N <= 64, e.g. 3/5",
+                                         CLI::ExitCodes::ValidationError);
+            }
+            persistence = rule;
+          },
+          "Raise an alarm when K of the last N instants are outside (default: " + otherwise + ")")
+      ->type_name("K/N");
+}
+
 std::string software() { return std::string("wheelwright ") + WHEELWRIGHT_VERSION; }
 
 CsvOptions reader_options(const CommonOptions& options) {
@@ -45,18 +68,42 @@ CsvOptions reader_options(const CommonOptions& options) {
     if (at == std::string::npos || at == 0 || at + 1 == entry.size()) {
       throw InputError("--map '" + entry + "': expected NAME=COLUMN, e.g. --map omega_r=wheel_2");
     }
-    reader.map[entry.substr(0, at)] = entry.substr(at + 1);
+    const std::string name = entry.substr(0, at);
+    if (find_log_column(name) == nullptr) {
+      std::vector<std::string> names;
+      for (const LogColumn& column : log_columns()) {
+        names.push_back(column.name);
+      }
+      throw InputError("--map '" + entry + "': " + shown(name) + " is no column of a log: expected one of " +
+                       listed(names) + did_you_mean(name, names));
+    }
+    reader.map[name] = entry.substr(at + 1);
   }
   return reader;
 }
 
+namespace {
+
+const std::string& effort_column(const Robot& robot, const Joint& joint) {
+  return robot.effort == EffortKind::torque    ? joint.torque
+         : robot.effort == EffortKind::current ? joint.current
+                                               : joint.voltage;
+}
+
+}  // namespace
+
 std::vector<std::string> useful_columns(const Robot& robot) {
   std::vector<std::string> names = {"t", "x", "y", "theta", "gyro_z", "command_r", "command_l"};
   for (const Joint& joint : make_model(robot).joints) {
-    names.insert(names.end(), {joint.angle, joint.speed});
-    names.push_back(robot.effort == EffortKind::torque    ? joint.torque
-                    : robot.effort == EffortKind::current ? joint.current
-                                                          : joint.voltage);
+    names.insert(names.end(), {joint.angle, joint.speed, effort_column(robot, joint)});
+  }
+  return names;
+}
+
+std::vector<std::string> needed_columns(const Robot& robot) {
+  std::vector<std::string> names;
+  for (const Joint& joint : make_model(robot).joints) {
+    names.insert(names.end(), {joint.speed + "|" + joint.angle, effort_column(robot, joint)});
   }
   return names;
 }

@@ -5,9 +5,11 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include <wheelwright/detector/events.hpp>
 #include <wheelwright/io/csv.hpp>
 #include <wheelwright/io/json_file.hpp>
 #include <wheelwright/report/context.hpp>
@@ -42,14 +44,20 @@ void add_common(CLI::App& command, CommonOptions& options);
 /// Adds --map to a command that reads logs.
 void add_map(CLI::App& command, CommonOptions& options);
 
+/// Adds --persistence K/N; `persistence` stays empty where it is not given. `otherwise` says what holds then.
+void add_persistence(CLI::App& command, std::optional<Persistence>& persistence, const std::string& otherwise);
+
 /// Name and version of the program.
 [[nodiscard]] std::string software();
 
-/// --map as reader options. Throws InputError where an entry is not name=column.
+/// --map as reader options. Throws InputError where an entry is not name=column, or its name none of the log contract.
 [[nodiscard]] CsvOptions reader_options(const CommonOptions& options);
 
 /// Columns that a robot of this model can use, so that a defect elsewhere in a file does no harm.
 [[nodiscard]] std::vector<std::string> useful_columns(const Robot& robot);
+
+/// Columns that commissioning needs, as require_columns() takes them: each joint's effort, and its speed or angle.
+[[nodiscard]] std::vector<std::string> needed_columns(const Robot& robot);
 
 /// Makes the result directory `out` where it is wanted. Throws InputError when that is impossible.
 void make_directory(const CommonOptions& options);

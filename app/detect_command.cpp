@@ -24,6 +24,7 @@ struct Arguments {
   std::filesystem::path model;
   bool follow = false;
   DetectorOptions detector;
+  std::optional<Persistence> persistence;
   CommonOptions common;
 };
 
@@ -39,7 +40,8 @@ constexpr const char* kExamples =
     "Exit code: 0 no fault, 1 a fault was found, 2 bad input.";
 
 int run(const Arguments& a) {
-  const CommissionedModel model = read_model(a.model);
+  CommissionedModel model = read_model(a.model);
+  model.persistence = a.persistence.value_or(model.persistence);
   Detector detector = make_detector(model, a.detector);
   CsvOptions reader = reader_options(a.common);
   reader.only = useful_columns(model.robot);
@@ -89,15 +91,7 @@ Run add_detect(CLI::App& program) {
       ->transform(CLI::CheckedTransformer(
           std::map<std::string, Test>{{"two_sided", Test::two_sided}, {"symmetric", Test::symmetric}}))
       ->type_name("TEST");
-  command
-      .add_option("--persistence", "Raise an alarm when K of the last N instants are outside (default: the model's)")
-      ->type_name("K/N")
-      ->each([a](const std::string& text) {
-        Persistence& p = a->detector.persistence;
-        if (std::sscanf(text.c_str(), "%zu/%zu", &p.k, &p.n) != 2 || p.k < 1 || p.k > p.n || p.n > 64) {
-          throw CLI::ValidationError("--persistence", "'" + text + "': expected K/N with 1 <= K <= N <= 64, e.g. 3/5");
-        }
-      });
+  add_persistence(command, a->persistence, "the model's");
   add_common(command, a->common);
   add_map(command, a->common);
   command.footer(kExamples);

@@ -20,7 +20,7 @@ std::string line(const std::string& name, const std::optional<double>& estimate,
   const auto end = [](double value, bool prior) { return fmt::format("{:.5g}{}", value, prior ? " (prior)" : ""); };
   return fmt::format("  {:<20} {:>11}   [{}, {}]{}  {}\n", name, estimate ? fmt::format("{:.5g}", *estimate) : "-",
                      end(lower, lower_is_prior), end(upper, upper_is_prior),
-                     half ? fmt::format("   ± {:.2g}", *half) : "", unit);
+                     half && std::isfinite(*half) ? fmt::format("   ± {:.2g}", *half) : "", unit);
 }
 
 std::string parameter_table(const Commissioning& r) {
@@ -34,7 +34,9 @@ std::string parameter_table(const Commissioning& r) {
     const PhysicalScale s = scales ? (*scales)[j] : PhysicalScale{};
     const auto value = [&](double theta) { return s.scale * theta - s.offset; };
     const auto estimate = p.estimate ? std::optional(value(*p.estimate)) : std::nullopt;
-    const auto half = p.standard_error ? std::optional(t * std::abs(s.scale) * *p.standard_error) : std::nullopt;
+    const auto half = p.standard_error && std::isfinite(*p.standard_error)
+                          ? std::optional(t * std::abs(s.scale) * *p.standard_error)
+                          : std::nullopt;
     text += line(scales ? p.parameter.physical : p.parameter.name, estimate, value(p.lower), value(p.upper), half,
                  scales ? p.parameter.physical_unit : parameter_unit(robot, p.parameter), p.lower_is_prior,
                  p.upper_is_prior);

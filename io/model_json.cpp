@@ -196,7 +196,7 @@ Json data_json(const Commissioning& r, const LogReport& data) {
 
 Json to_json(const Commissioning& r, const LogReport& data, const std::string& software) {
   const CommissionedModel& m = r.model;
-  const bool has_model = !m.facets.empty();
+  const bool has_model = !m.facets.empty() && r.status != Commissioning::Status::nothing;
   Json json = {{"schema", kModelSchema},
                {"software", software},
                {"status", word_of(kStatusWords, r.status)},
