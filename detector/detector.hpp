@@ -26,8 +26,8 @@ enum class Test {
 struct DetectorOptions {
   ParameterSetKind set = ParameterSetKind::polytope;
   Test test = Test::two_sided;
-  Persistence persistence;            ///< k of n; 1 of 1 keeps the certain detections of theory section 5
-  std::optional<Eigen::VectorXd> mu;  ///< μ_o of (39), one for each output: constant thresholds instead of ρ(t)
+  Persistence persistence{};            ///< k of n; 1 of 1 keeps the certain detections of theory section 5
+  std::optional<Eigen::VectorXd> mu{};  ///< μ_o of (39), one for each output: constant thresholds instead of ρ(t)
 };
 
 /// One output at one instant.
