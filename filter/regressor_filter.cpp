@@ -158,8 +158,11 @@ bool RegressorFilter::step(double t, std::span<const double> sample) {
     }
     joint_speed_ = (joint_ - joint_before_) / (t - before);
     speed_ = model_.motion.lazyProduct(joint_speed_);
-    effort_ =
-        measurement_.hold == Hold::zero_order ? effort_sample_before_ : 0.5 * (effort_sample_before_ + effort_sample_);
+    if (measurement_.hold == Hold::zero_order) {  // a conditional expression would allocate
+      effort_ = effort_sample_before_;
+    } else {
+      effort_ = 0.5 * (effort_sample_before_ + effort_sample_);
+    }
     heading_ = measured_heading ? 0.5 * (heading_before + heading_sample_) : heading_;
     return advance(0.5 * (before + t));
   }
