@@ -23,6 +23,7 @@ Threshold ThresholdRule::at(std::span<const double> y, std::span<const double> d
   double extra = dy_output;
   double predicted = 0.0;
   double magnitude = dy_output;
+  double reach = 0.0;
   const auto shifted = [&](double sign) {
     for (std::size_t j = 0; j < p; ++j) {
       const Interval& side = set_.hull().sides[j];
@@ -36,15 +37,18 @@ Threshold ThresholdRule::at(std::span<const double> y, std::span<const double> d
     predicted += term;
     magnitude += std::abs(term);
     const Interval& side = set_.hull().sides[j];
+    const double largest = std::max(std::abs(side.lower), std::abs(side.upper));
+    reach += (std::abs(y[j]) + dy_regressor[j]) * largest;
     if (dy_regressor[j] > 0.0 && side.lower < 0.0 && side.upper > 0.0) {
-      extra += dy_regressor[j] * std::max(-side.lower, side.upper);
+      extra += dy_regressor[j] * largest;
     }
   }
   const double above = shifted(1.0);
   const double below = shifted(-1.0);
   // Sums of p + 3 terms, and as many in the residual that is compared with the result: Higham 2002, section 3.1. The
-  // rounding of the direction itself is covered by the terms Δ|θ| inside `above` and `below`.
-  magnitude += extra + std::abs(above) + std::abs(below);
+  // rounding of the direction itself is covered by the terms Δ|θ|. |h(±y + Δ)| <= Σ (|y_j| + Δ_j) max|θ_j|: measured
+  // with the box, so that the same margin is added whichever set is used.
+  magnitude += extra + 2.0 * reach;
   const double rounding = 4.0 * static_cast<double>(p + 4) * std::numeric_limits<double>::epsilon() * magnitude;
   return {-below - predicted - extra - rounding, above - predicted + extra + rounding};
 }
