@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "support/allocations.hpp"
+
+#include <gtest/gtest.h>
+#include <Eigen/Core>
+
+#include <wheelwright/commission/commission.hpp>
+
+#include "support/drives.hpp"
+
+namespace wheelwright {
+namespace {
+
+#ifdef WHEELWRIGHT_COUNTS_ALLOCATIONS
+
+using testing_support::allocations;
+using testing_support::noisy_drive;
+
+TEST(Allocation, IsCountedForNewAndForEigen) {
+  const std::size_t before = allocations;
+  const Eigen::VectorXd vector = Eigen::VectorXd::Zero(100);
+  EXPECT_GT(allocations, before);
+  const std::size_t between = allocations;
+  const std::vector<double> numbers(100, vector[3]);
+  EXPECT_GT(allocations, between);
+  EXPECT_EQ(numbers.back(), 0.0);
+}
+
+void expect_no_allocation(const Scenario& drive, const Robot& robot, DetectorOptions options) {
+  Simulation learning(drive);
+  const Commissioning result = commission(learning, robot);
+  ASSERT_NE(result.model.facets.size(), 0u) << result.message;
+  Detector detector = make_detector(result.model, std::move(options));
+  Scenario other = drive;
+  other.seed = 99;
+  const LogTable table = simulate(other);
+  const auto names = result.model.measurement.columns();
+  std::vector<const std::vector<double>*> columns;
+  for (const auto& name : names) {
+    columns.push_back(&table.column(name));
+  }
+  std::vector<double> sample(columns.size());
+  std::size_t valid = 0;
+  const std::size_t before = allocations;
+  for (std::size_t k = 0; k < table.rows(); ++k) {
+    for (std::size_t c = 0; c < columns.size(); ++c) {
+      sample[c] = (*columns[c])[k];
+    }
+    const double gap = k > table.rows() / 2 ? 10.0 : 0.0;  // the filter restarts once
+    valid += detector.step(table.t[k] + gap, sample).valid ? 1 : 0;
+  }
+  EXPECT_EQ(allocations, before);
+  EXPECT_GT(valid, table.rows() / 4);
+}
+
+TEST(Allocation, ADetectorStepHasNone) {
+  const Scenario drive = noisy_drive(1);
+  expect_no_allocation(drive, drive.robot, {});
+  expect_no_allocation(drive, drive.robot, {.set = ParameterSetKind::box, .test = wheelwright::Test::symmetric});
+  expect_no_allocation(drive, drive.robot, {.persistence = {.k = 3, .n = 5}, .mu = Eigen::Vector2d(0.1, 0.1)});
+}
+
+// Dry friction couples both channels: a set of six parameters may have more vertices than are kept, and its support is
+// then a linear program. The box is on-line always.
+TEST(Allocation, NorWithFunctionTermsAndAHeading) {
+  Scenario drive = noisy_drive(1);
+  drive.robot.parameters = {{"mass", "yaw_inertia", "viscous_x", "viscous_y", "viscous_yaw", "coulomb"}};
+  drive.robot.anisotropic_friction = true;
+  drive.sensors.pose = true;
+  drive.robot.noise.heading.value = 0.0;
+  expect_no_allocation(drive, drive.robot, {.set = ParameterSetKind::box});
+}
+
+#else
+
+TEST(Allocation, IsNotCountedHere) { GTEST_SKIP() << "allocations are counted with the GNU C library alone"; }
+
+#endif
+
+}  // namespace
+}  // namespace wheelwright
