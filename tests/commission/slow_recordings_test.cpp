@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+// Recordings of other worlds and of real machines, read where they lie beside the project.
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include <wheelwright/commission/commission.hpp>
+#include <wheelwright/commission/trace.hpp>
+#include <wheelwright/core/error.hpp>
+#include <wheelwright/io/csv.hpp>
+#include <wheelwright/io/robot_file.hpp>
+
+namespace wheelwright {
+namespace {
+
+namespace fs = std::filesystem;
+
+class SlowRecordings : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (!fs::exists(root / "data") || !fs::exists(root / "withheld-dev")) {
+      GTEST_SKIP() << "no recordings in " << root;
+    }
+  }
+  const fs::path root = WHEELWRIGHT_SHARED_DIR;
+};
+
+const ParameterResult& parameter(const Commissioning& result, const std::string& physical) {
+  const auto found = std::ranges::find_if(result.parameters,
+                                          [&](const ParameterResult& p) { return p.parameter.physical == physical; });
+  if (found == result.parameters.end()) {
+    throw InvalidArgument("no parameter " + physical);
+  }
+  return *found;
+}
+
+// A healthy robot in another physics engine: commissioned on the first half, watched on the second.
+TEST_F(SlowRecordings, HealthyBaselinesRaiseNoEventInTheirSecondHalf) {
+  int cases = 0;
+  for (const auto& entry : fs::directory_iterator(root / "withheld-dev")) {
+    if (!fs::exists(entry.path() / "baseline.csv.gz")) {
+      continue;
+    }
+    ++cases;
+    const std::string name = entry.path().filename();
+    const Robot robot = read_robot(entry.path() / "robot.yaml");
+    CsvLog file({entry.path() / "baseline.csv.gz"});
+    const LogTable table = read_all(file);
+    const LogTable first = slice(table, 0, table.rows() / 2), second = slice(table, table.rows() / 2, table.rows());
+    TableSource learning(first), watching(second);
+    const Commissioning result = commission(learning, robot);
+    ASSERT_EQ(result.status, Commissioning::Status::done) << name << ": " << result.message;
+    const Detection detection = detect(watching, make_detector(result.model));
+    EXPECT_GT(detection.instants, second.rows() / 2) << name;
+    EXPECT_TRUE(detection.events.empty())
+        << name << ": " << detection.events.size() << " events, the first at " << detection.events[0].start << " s";
+  }
+  EXPECT_EQ(cases, 24);
+}
+
+TEST_F(SlowRecordings, LumpedMassAndInertiaOfTheBaselinesAreThoseOfTheRobotFile) {
+  for (const auto& entry : fs::directory_iterator(root / "withheld-dev")) {
+    if (!fs::exists(entry.path() / "baseline.csv.gz")) {
+      continue;
+    }
+    const std::string name = entry.path().filename();
+    const Robot robot = read_robot(entry.path() / "robot.yaml");
+    CsvLog log({entry.path() / "baseline.csv.gz"});
+    const Commissioning result = commission(log, robot);
+    ASSERT_EQ(result.status, Commissioning::Status::done) << name << ": " << result.message;
+    for (const char* physical : {"mass", "yaw_inertia"}) {
+      const ParameterResult& p = parameter(result, physical);
+      const double expected = p.parameter.per_physical * robot.nominal.at(physical);
+      EXPECT_NEAR(*p.estimate, expected, 0.01 * expected) << name << ", " << physical;
+      EXPECT_LE(p.lower, expected) << name << ", " << physical;
+      EXPECT_GE(p.upper, expected) << name << ", " << physical;
+    }
+  }
+}
+
+// Janot, Gautier and Brunot (2019) publish these values for the linear axis.
+TEST_F(SlowRecordings, TheElectroMechanicalAxisIsIdentifiedFromPositionsAlone) {
+  CsvLog log({root / "data/emps/emps.csv"});
+  const Commissioning result = commission(log, read_robot(root / "data/emps.yaml"));
+  ASSERT_EQ(result.status, Commissioning::Status::done) << result.message;
+  struct Published {
+    const char* name;
+    double value, tolerance;
+  };
+  for (const auto& [name, value, tolerance] :
+       {Published{"inertia", 95.1089, 0.01}, Published{"viscous", 203.5034, 0.03}, Published{"coulomb", 20.3935, 0.03},
+        Published{"offset", -3.1648, 1.0}}) {
+    const ParameterResult& p = parameter(result, name);
+    EXPECT_NEAR(*p.estimate, value, tolerance * std::abs(value)) << name;
+    EXPECT_LE(p.lower, value) << name;
+    EXPECT_GE(p.upper, value) << name;
+  }
+}
+
+TEST_F(SlowRecordings, EveryRobotOfTheFleetGivesAModel) {
+  const Robot robot = read_robot(root / "data/regbot.yaml");
+  int runs = 0;
+  for (const auto& entry : fs::directory_iterator(root / "data/regbot_fleet")) {
+    if (entry.path().extension() != ".csv") {
+      continue;
+    }
+    ++runs;
+    const std::string name = entry.path().filename();
+    CsvLog log({entry.path()});
+    const Commissioning result = commission(log, robot);
+    EXPECT_TRUE(result.status == Commissioning::Status::done || result.status == Commissioning::Status::partial)
+        << name << ": " << result.message;
+    EXPECT_NO_THROW(make_detector(result.model)) << name;
+  }
+  EXPECT_GT(runs, 0);
+}
+
+}  // namespace
+}  // namespace wheelwright
