@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: Apache-2.0
+// Results: the truth inside its bounds, the same digits each time, batch and stream of one mind, and files that fit
+// their schemas.
+#include "app/program.hpp"
+
+namespace wheelwright {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using testing::Outcome;
+
+class Results : public testing::ProgramTest {
+ protected:
+  std::string shipped() const { return fmt::format("'{}'", (examples() / "healthy.csv.gz").string()); }
+
+  /// What two detections of one log must agree on, event by event: only a finished event has an end and a peak.
+  static Json alarms_of(const Json& events) {
+    Json alarms = Json::array();
+    for (const Json& e : events) {
+      alarms.push_back({e.at("output"), e.at("start"), e.at("alarm"), e.at("start_row")});
+    }
+    return alarms;
+  }
+
+  /// Whether FILE fits io/SCHEMA, as an independent validator sees it; its complaints, or nothing where it fits.
+  std::string misfit(const std::string& schema, const std::string& file) const {
+    const std::string complaints = (directory_ / "complaints").string();
+    const std::string command = "/usr/bin/python3 '" WHEELWRIGHT_SOURCE_DIR "/tests/app/validate.py' '" +
+                                (std::filesystem::path(WHEELWRIGHT_SOURCE_DIR) / "io" / schema).string() + "' '" +
+                                path(file).string() + "' > '" + complaints + "' 2>&1";
+    return std::system(command.c_str()) == 0 ? "" : "does not fit: " + bytes(complaints);
+  }
+
+  static bool has_validator() { return std::system("/usr/bin/python3 -c 'import jsonschema' 2> /dev/null") == 0; }
+};
+
+TEST_F(Results, ShippedLogGivesTheTruthBetweenItsBounds) {
+  commission_shipped();
+  const Json physical = read_json(path("model/model.json")).at("physical");
+  const std::vector<std::pair<std::string, double>> truth = {
+      {"mass", 21.0}, {"yaw_inertia", 0.9}, {"viscous_linear", 4.0}, {"viscous_yaw", 0.5}};  // scenarios/shipped.yaml
+  for (const auto& [name, value] : truth) {
+    EXPECT_LE(physical.at(name).at("lower").get<double>(), value) << name;
+    EXPECT_GE(physical.at(name).at("upper").get<double>(), value) << name;
+  }
+  EXPECT_TRUE(std::filesystem::exists(path("model/report.html")));
+}
+
+TEST_F(Results, SameInputSameBytes) {
+  for (const std::string options : {"--out a", "--out b", "--out c --threads 2", "--out d --threads 1 --seed 9"}) {
+    ASSERT_EQ(run("commission " + shipped() + " --robot robot.yaml --quiet " + options).code, 0);
+  }
+  const std::string first = bytes(path("a/model.json"));
+  EXPECT_FALSE(first.empty());
+  for (const std::string other : {"b", "c", "d"}) {
+    EXPECT_EQ(bytes(path(other) / "model.json"), first) << other;
+  }
+}
+
+TEST_F(Results, PackingDoesNotMatter) {
+  put_lines("plain.csv", healthy_lines());
+  ASSERT_EQ(run("commission plain.csv --robot robot.yaml --quiet --out plain").code, 0);
+  commission_shipped();
+  Json plain = read_json(path("plain/model.json")), packed = read_json(path("model/model.json"));
+  EXPECT_NE(plain.at("data").at("files"), packed.at("data").at("files"));
+  plain.at("data").erase("files");
+  packed.at("data").erase("files");
+  EXPECT_EQ(plain, packed);
+}
+
+TEST_F(Results, ColumnNamesDoNotMatter) {
+  std::vector<std::string> lines = healthy_lines();
+  lines.front() = "t,angle_1,angle_2,omega_r,omega_l,tau_r,tau_l";
+  put_lines("renamed.csv", lines);
+  ASSERT_EQ(
+      run("commission renamed.csv --robot robot.yaml --quiet --out renamed --map phi_r=angle_1 --map phi_l=angle_2")
+          .code,
+      0);
+  commission_shipped();
+  EXPECT_EQ(read_json(path("renamed/model.json")).at("parameters"),
+            read_json(path("model/model.json")).at("parameters"));
+}
+
+TEST_F(Results, FollowTellsWhatBatchTells) {
+  commission_shipped();
+  simulate("fault.yaml", "fault.csv");
+  for (const std::string options : {"", " --persistence 3/5", " --set box --test symmetric"}) {
+    const Outcome batch = run("detect fault.csv --model model/model.json --json" + options);
+    const Outcome stream = run("detect --follow --model model/model.json --json" + options, path("fault.csv"));
+    EXPECT_EQ(batch.code, 1);
+    EXPECT_EQ(stream.code, 1);
+    Json events = Json::array();
+    for (const std::string& line : testing::lines_of(stream.out)) {
+      events.push_back(Json::parse(line));
+    }
+    EXPECT_FALSE(events.empty());
+    EXPECT_EQ(alarms_of(events), alarms_of(Json::parse(batch.out).at("events"))) << options;
+  }
+}
+
+TEST_F(Results, FollowTellsWhatBatchTellsOfADamagedLog) {
+  commission_shipped();
+  simulate("fault.yaml", "whole.csv");
+  std::vector<std::string> lines = testing::lines_of(bytes(path("whole.csv")));
+  lines.at(500) = lines.at(499);                             // a repeated row
+  lines.at(700).replace(0, lines.at(700).find(','), "nan");  // a missing time
+  lines.erase(lines.begin() + 3500, lines.begin() + 3600);   // a gap of a second
+  put_lines("fault.csv", lines);
+  put("fault.csv", bytes(path("fault.csv")) + lines.back().substr(0, lines.back().rfind(',')));  // a last line cut off
+  const Outcome batch = run("detect fault.csv --model model/model.json --json");
+  const Outcome stream = run("detect --follow --model model/model.json --json", path("fault.csv"));
+  Json events = Json::array();
+  for (const std::string& line : testing::lines_of(stream.out)) {
+    events.push_back(Json::parse(line));
+  }
+  EXPECT_EQ(batch.code, 1);
+  EXPECT_EQ(stream.code, 1);
+  EXPECT_EQ(alarms_of(events), alarms_of(Json::parse(batch.out).at("events")));
+}
+
+TEST_F(Results, PersistenceOnTheCommandLineGoesBeforeTheModels) {
+  simulate("fault.yaml", "fault.csv");
+  ASSERT_EQ(run("commission " + shipped() + " --robot robot.yaml --persistence 40/40 --out patient").code, 0);
+  commission_shipped();
+  const auto first_alarm = [&](const std::string& arguments) {
+    return Json::parse(run("detect fault.csv --json " + arguments).out).at("events").at(0).at("alarm").get<double>();
+  };
+  const double at_once = first_alarm("--model model/model.json");
+  EXPECT_DOUBLE_EQ(first_alarm("--model patient/model.json"), at_once + 0.39);  // 40 instants at 100 Hz
+  EXPECT_DOUBLE_EQ(first_alarm("--model patient/model.json --persistence 1/1"), at_once);
+  EXPECT_DOUBLE_EQ(first_alarm("--model model/model.json --persistence 40/40"), at_once + 0.39);
+}
+
+TEST_F(Results, SeveralLogsAreTakenTogether) {
+  simulate("healthy.yaml", "more.csv");
+  const Outcome outcome = run("commission " + shipped() + " more.csv --robot robot.yaml --json");
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  const Json data = Json::parse(outcome.out).at("data");
+  EXPECT_EQ(data.at("files").size(), 2u);
+  EXPECT_EQ(data.at("rows"), 12001 + 6001);
+  EXPECT_EQ(data.at("segments"), 2);
+}
+
+TEST_F(Results, FitTheirSchemas) {
+  if (!has_validator()) {
+    GTEST_SKIP() << "python3-jsonschema is not installed";
+  }
+  commission_shipped();
+  EXPECT_EQ(misfit("model.schema.json", "model/model.json"), "");
+
+  put("line.yaml",
+      "robot: robot.yaml\nparameters: {mass: 21.0, yaw_inertia: 0.9, viscous_linear: 4.0, viscous_yaw: 0.5}\n"
+      "trajectory: {kind: straight, speed: 0.6, period: 6}\nduration: 30\n"
+      "sensors: {wheel_speed: 0.02, effort: 0.02, encoder_counts_per_turn: 4096}\n");
+  ASSERT_EQ(run("simulate line.yaml --out line.csv").code, 0);
+  EXPECT_EQ(run("commission line.csv --robot robot.yaml --out partial").code, 0);
+  EXPECT_EQ(read_json(path("partial/model.json")).at("status"), "partial");
+  EXPECT_EQ(misfit("model.schema.json", "partial/model.json"), "");
+
+  put("estimated.yaml", "model: differential_drive\nwheel_radius: 0.0975\ntrack_width: 0.381\nnoise: estimate\n");
+  EXPECT_EQ(run("commission line.csv --robot estimated.yaml --out estimated").code, 0);
+  EXPECT_EQ(misfit("model.schema.json", "estimated/model.json"), "");
+
+  put("heavy.yaml", bytes(path("robot.yaml")) + "prior: {mass: [40, 60]}\n");
+  EXPECT_EQ(run("commission line.csv --robot heavy.yaml --out empty").code, 1);
+  EXPECT_EQ(read_json(path("empty/model.json")).at("status"), "empty");
+  EXPECT_EQ(misfit("model.schema.json", "empty/model.json"), "");
+
+  std::string still = "t,phi_r,phi_l,tau_r,tau_l\n";
+  for (int k = 0; k < 2000; ++k) {
+    still += std::to_string(0.01 * k) + ",0,0,0,0\n";
+  }
+  put("still.csv", still);
+  EXPECT_EQ(run("commission still.csv --robot robot.yaml --out nothing").code, 1);
+  EXPECT_EQ(read_json(path("nothing/model.json")).at("status"), "nothing");
+  EXPECT_EQ(misfit("model.schema.json", "nothing/model.json"), "");
+  EXPECT_THAT(run("detect line.csv --model nothing/model.json").err, HasSubstr("nothing/model.json: holds no model"));
+
+  simulate("fault.yaml", "fault.csv");
+  for (const std::string log : {"fault.csv", "line.csv", "still.csv"}) {
+    (void)run("detect " + log + " --model model/model.json --out " + log + ".result");
+    EXPECT_EQ(misfit("detection.schema.json", log + ".result/detection.json"), "") << log;
+  }
+}
+
+TEST_F(Results, SchemasRefuseWhatIsNotThere) {
+  if (!has_validator()) {
+    GTEST_SKIP() << "python3-jsonschema is not installed";
+  }
+  commission_shipped();
+  Json model = read_json(path("model/model.json"));
+  const auto refused = [&](const std::string& pointer, const Json& value) {
+    Json changed = model;
+    changed[Json::json_pointer(pointer)] = value;
+    write_json(path("changed.json"), changed);
+    return misfit("model.schema.json", "changed.json") != "";
+  };
+  EXPECT_TRUE(refused("/schema", "wheelwright/model/2"));
+  EXPECT_TRUE(refused("/unheard_of", 1));
+  EXPECT_TRUE(refused("/parameters/0/lower", "low"));
+  EXPECT_TRUE(refused("/parameters/0/excitation", "great"));
+  EXPECT_TRUE(refused("/robot/wheel_radius", -1));
+  EXPECT_TRUE(refused("/detector/persistence/n", 65));
+  EXPECT_TRUE(refused("/status", "empty")) << "a detector where there is no model";
+  model.erase("feasible_set");
+  EXPECT_TRUE(refused("/schema", "wheelwright/model/1")) << "a missing key";
+}
+
+}  // namespace
+}  // namespace wheelwright

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+// Help, exit codes, and what goes to which stream.
+#include "app/program.hpp"
+
+namespace wheelwright {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using testing::Outcome;
+
+class Usage : public testing::ProgramTest {};
+
+TEST_F(Usage, HelpOfTheProgramNamesItsCommands) {
+  const Outcome outcome = run("--help");
+  EXPECT_EQ(outcome.code, 0);
+  EXPECT_THAT(outcome.out, AllOf(HasSubstr("commission"), HasSubstr("detect"), HasSubstr("simulate"),
+                                 HasSubstr("wheelwright commission LOG --robot robot.yaml --out result")));
+  EXPECT_THAT(run("--version").out, HasSubstr("wheelwright "));
+}
+
+TEST_F(Usage, HelpOfEachCommandNamesOptionsAndExamples) {
+  const std::string commission = run("commission --help").out;
+  const std::string detect = run("detect --help").out;
+  const std::string simulate = run("simulate --help").out;
+  for (const std::string& help : {commission, detect, simulate}) {
+    for (const std::string option : {"--help", "--out", "--json", "--threads", "--seed", "--quiet", "Examples:\n"}) {
+      EXPECT_THAT(help, HasSubstr(option));
+    }
+  }
+  for (const std::string option : {"LOG", "--robot", "--map", "--statistical", "--outliers", "--persistence",
+                                   "Exit code:", "  wheelwright commission drive.csv"}) {
+    EXPECT_THAT(commission, HasSubstr(option));
+  }
+  for (const std::string option : {"LOG", "--model", "--map", "--follow", "--set", "--test", "--persistence",
+                                   "Exit code:", "  wheelwright detect drive.csv"}) {
+    EXPECT_THAT(detect, HasSubstr(option));
+  }
+  EXPECT_THAT(simulate, AllOf(HasSubstr("SCENARIO"), HasSubstr("  wheelwright simulate ")));
+}
+
+TEST_F(Usage, BadUsageIsTwo) {
+  for (const std::string words : {"", "frobnicate", "commission", "commission x.csv", "commission --robot robot.yaml",
+                                  "detect", "detect --model m.json", "simulate", "commission --out"}) {
+    const Outcome outcome = run(words);
+    EXPECT_EQ(outcome.code, 2) << words;
+    EXPECT_THAT(outcome.out, IsEmpty()) << words;
+    EXPECT_FALSE(outcome.err.empty()) << words;
+  }
+}
+
+TEST_F(Usage, ExitCodeAnswersTheQuestion) {
+  commission_shipped();
+  simulate("healthy.yaml", "healthy.csv");
+  simulate("fault.yaml", "fault.csv");
+  EXPECT_EQ(run("detect healthy.csv --model model/model.json").code, 0);
+  const Outcome fault = run("detect fault.csv --model model/model.json");
+  EXPECT_EQ(fault.code, 1);
+  EXPECT_THAT(fault.out, HasSubstr("fault event"));
+  // Bounds that exclude the robot: no model.
+  put("heavy.yaml", bytes(path("robot.yaml")) + "prior: {mass: [40, 60]}\n");
+  const Outcome none = run("commission healthy.csv --robot heavy.yaml --out heavy");
+  EXPECT_EQ(none.code, 1);
+  EXPECT_THAT(none.out, AllOf(HasSubstr("no parameters explain the log"), HasSubstr("contradict")));
+  const Outcome useless = run("detect fault.csv --model heavy/model.json");
+  EXPECT_EQ(useless.code, 2);
+  EXPECT_THAT(useless.err, HasSubstr("heavy/model.json: holds no model"));
+}
+
+TEST_F(Usage, JsonIsAllThatGoesToStandardOutput) {
+  const Outcome simulated =
+      run("simulate '" + (examples() / "scenarios/fault.yaml").string() + "' --out fault.csv --json");
+  EXPECT_EQ(Json::parse(simulated.out).at("rows"), 6001);
+  const std::string shipped = fmt::format("'{}'", (examples() / "healthy.csv.gz").string());
+  const Outcome commissioned = run("commission " + shipped + " --robot robot.yaml --json --out model");
+  EXPECT_EQ(Json::parse(commissioned.out), read_json(path("model/model.json")));
+  const Outcome detected = run("detect fault.csv --model model/model.json --json --out result");
+  EXPECT_EQ(Json::parse(detected.out), read_json(path("result/detection.json")));
+  const Outcome followed = run("detect --follow --model model/model.json --json", path("fault.csv"));
+  for (const std::string& line : testing::lines_of(followed.out)) {
+    EXPECT_TRUE(Json::parse(line).contains("alarm")) << line;
+  }
+  EXPECT_EQ(testing::lines_of(followed.out).size(), Json::parse(detected.out).at("events").size());
+}
+
+TEST_F(Usage, QuietIsSilent) {
+  const Outcome outcome =
+      run("commission '" + (examples() / "healthy.csv.gz").string() + "' --robot robot.yaml --quiet --out model");
+  EXPECT_EQ(outcome.code, 0);
+  EXPECT_THAT(outcome.out + outcome.err, IsEmpty());
+}
+
+}  // namespace
+}  // namespace wheelwright
