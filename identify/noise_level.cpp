@@ -27,7 +27,8 @@ ExtrapolatedBound extrapolate(const OutputResidual& residual, std::size_t instan
   const auto seen = static_cast<double>(instants);
   ExtrapolatedBound result;
   result.bound = residual.rms * spread * z(seen * std::max(options.horizon, 1.0));
-  result.heavy_tail = residual.largest > residual.rms * spread * z(seen);
+  const double most_kurtosis = 3.0 + z(0.5) * std::sqrt(24.0 / n);
+  result.heavy_tail = residual.largest > residual.rms * spread * z(seen) || residual.kurtosis > most_kurtosis;
   if (result.heavy_tail) {
     result.bound = std::max(result.bound,
                             residual.largest + residual.rms * std::log(std::max(options.horizon, 1.0) / options.risk));

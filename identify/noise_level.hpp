@@ -26,7 +26,7 @@ struct ExtrapolatedBound {
 /// instants (autocorrelated residuals know their own size less well than their number suggests), and z the Gaussian
 /// quantile of risk shared over both sides of all instants of the horizon (union bound: no independence needed).
 ///
-/// Where max |ε| is larger than Gaussian residuals would show with probability `risk`, the tail is taken to fall by e
+/// Where max |ε| or the kurtosis is larger than Gaussian residuals would show with probability `risk`, the tail is taken to fall by e
 /// over each further `rms`, from the largest residual on: ē = max|ε| + rms·ln(horizon/risk).
 ///
 /// The extrapolation assumes that future driving has the same noise and the same unmodelled rest as the log.
