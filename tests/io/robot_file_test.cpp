@@ -167,7 +167,7 @@ INSTANTIATE_TEST_SUITE_P(
         Bad{"motor: {resistance: 0}", "motor.resistance: '0': expected a number > 0"},
         Bad{"parameters: mass", "parameters: 'mass': expected a list of mass, yaw_inertia"},
         Bad{"parameters: [mass, mass]", "parameters: 'mass': expected each name once"},
-        Bad{"parameters: [coulomb]", "parameters: 'coulomb': expected one of mass"},
+        Bad{"parameters: [offset]", "parameters: 'offset': expected one of mass"},
         Bad{"parameters: []", "parameters: a list of 0: expected at least one of"},
         Bad{"name: {a: b}", "name: a mapping: expected a name"}, Bad{"[a, b]: c", "a list of 2: expected a key"}));
 

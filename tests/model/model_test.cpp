@@ -176,7 +176,7 @@ TEST(MakeModel, SaysWhatItDoesNotKnow) {
   robot.prior["viscous_x"] = {0.0, 1.0};  // of the anisotropic model
   EXPECT_THROW(static_cast<void>(make_model(robot)), InvalidArgument);
   robot.prior.clear();
-  robot.parameters = {"coulomb"};
+  robot.parameters = {"offset"};
   EXPECT_THROW(static_cast<void>(make_model(robot)), InvalidArgument);
 }
 
