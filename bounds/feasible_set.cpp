@@ -18,7 +18,7 @@ constexpr std::size_t kMostOpenSigns = 4;
 /// The independent blocks of parameters, each with its working set; takes instants one by one.
 class Cutter {
  public:
-  Cutter(const Survey& survey, const Box& prior) : rows_(prior), block_of_(prior.dimension()) {
+  Cutter(const RowSurvey& survey, const Box& prior) : rows_(prior), block_of_(prior.dimension()) {
     for (const std::vector<std::size_t>& parameters : survey.blocks) {
       const auto q = static_cast<Eigen::Index>(parameters.size());
       Part part;
@@ -149,7 +149,7 @@ class Cutter {
 };
 
 /// One cutting pass over a part of the prior box with the convex description of the rows.
-FeasibleSet cut(RegressionSource& source, const Survey& survey, const Box& prior,
+FeasibleSet cut(RegressionSource& source, const RowSurvey& survey, const Box& prior,
                 const std::vector<std::size_t>& excluded, const PolytopeOptions& options) {
   Cutter cutter(survey, prior);
   bool alive = true;
@@ -193,7 +193,7 @@ FeasibleSet cut(RegressionSource& source, const Survey& survey, const Box& prior
 }
 
 /// Parameters whose column is noisy and whose sign the box leaves open.
-std::vector<std::size_t> open_signs(const Survey& survey, const Box& box) {
+std::vector<std::size_t> open_signs(const RowSurvey& survey, const Box& box) {
   std::vector<std::size_t> open;
   for (std::size_t j = 0; j < box.dimension(); ++j) {
     if (survey.noisy[j] && box.sides[j].lower < 0.0 && box.sides[j].upper > 0.0) {
@@ -228,7 +228,7 @@ void merge(FeasibleSet& all, const FeasibleSet& part) {
 FeasibleSet feasible_set(RegressionSource& source, const Box& prior, const FeasibleSetOptions& options) {
   std::vector<std::size_t> excluded = options.excluded_samples;
   std::sort(excluded.begin(), excluded.end());
-  const Survey known = survey(source, prior, excluded);
+  const RowSurvey known = survey(source, prior, excluded);
   FeasibleSet convex = cut(source, known, prior, excluded, options.polytope);
   ++convex.passes;
   if (convex.status == FeasibleSet::Status::empty || open_signs(known, prior).empty()) {

@@ -38,7 +38,7 @@ Demand demand(const RegressionBlock& block, Eigen::Index row, const Eigen::Vecto
 /// The working set of the epigraph problem in (θ, γ): min γ.
 class Epigraph {
  public:
-  Epigraph(const Survey& survey, const Box& prior, const std::vector<double>& weights)
+  Epigraph(const RowSurvey& survey, const Box& prior, const std::vector<double>& weights)
       : prior_(prior), rows_(prior), weights_(weights), program_(static_cast<Eigen::Index>(prior.dimension()) + 1) {
     const auto p = static_cast<Eigen::Index>(prior.dimension());
     coordinates_ = whitened(prior, survey.information);
@@ -196,7 +196,7 @@ class Epigraph {
   double gamma_ = 0.0, scale_ = 0.0;
 };
 
-MinimaxFit fit(RegressionSource& source, const Survey& survey, const Box& prior, const std::vector<double>& weights,
+MinimaxFit fit(RegressionSource& source, const RowSurvey& survey, const Box& prior, const std::vector<double>& weights,
                const std::vector<std::size_t>& excluded, const MinimaxOptions& options) {
   Epigraph epigraph(survey, prior, weights);
   MinimaxFit result;
@@ -256,7 +256,7 @@ MinimaxFit minimax_fit(RegressionSource& source, const Box& prior, const Minimax
   check::that(options.pass_limit >= 1, "pass_limit", "at least 1");
   std::vector<std::size_t> excluded = options.excluded_samples;
   std::sort(excluded.begin(), excluded.end());
-  const Survey known = survey(source, prior, excluded);
+  const RowSurvey known = survey(source, prior, excluded);
 
   std::vector<std::size_t> open;
   for (std::size_t j = 0; j < prior.dimension(); ++j) {

@@ -90,13 +90,13 @@ class Groups {
 
 }  // namespace
 
-Survey survey(RegressionSource& source, const Box& prior, const std::vector<std::size_t>& excluded) {
+RowSurvey survey(RegressionSource& source, const Box& prior, const std::vector<std::size_t>& excluded) {
   const std::size_t p = prior.dimension();
   check::that(p > 0 && source.parameters() == p, "prior box", "one side per parameter of the regression");
   check_finite(prior, "prior box");
   check::that(source.outputs() > 0, "regression", "at least one output");
   const auto cols = static_cast<Eigen::Index>(p);
-  Survey result;
+  RowSurvey result;
   result.noisy.assign(p, false);
   result.information = Eigen::MatrixXd::Zero(cols, cols);
   result.moment = Eigen::VectorXd::Zero(cols);
@@ -160,7 +160,7 @@ Survey survey(RegressionSource& source, const Box& prior, const std::vector<std:
   return result;
 }
 
-Eigen::VectorXd weighted_estimate(const Survey& survey, const Box& prior) {
+Eigen::VectorXd weighted_estimate(const RowSurvey& survey, const Box& prior) {
   const Coordinates at = whitened(prior, survey.information);
   const Eigen::VectorXd pull = at.transform.transpose() * (survey.moment - survey.information * at.centre);
   return at.centre + at.transform * pull;

@@ -11,7 +11,7 @@
 namespace wheelwright {
 
 /// What one pass over all rows tells.
-struct Survey {
+struct RowSurvey {
   std::size_t instants = 0;                      ///< instants seen (excluded ones not counted)
   std::size_t rows = 0;                          ///< rows seen: outputs × instants
   std::vector<std::vector<std::size_t>> blocks;  ///< groups of parameters that no row couples; see independent_blocks()
@@ -24,10 +24,11 @@ struct Survey {
 /// Walks `source` once. Instants whose number is in `excluded` (ascending) are skipped. A row of half-width 0 (no error
 /// bounds) gets the weight of a half-width 1e-9 of its reach over the prior box. Throws InvalidArgument when shapes
 /// disagree, a number is not finite, or a bound is negative.
-[[nodiscard]] Survey survey(RegressionSource& source, const Box& prior, const std::vector<std::size_t>& excluded = {});
+[[nodiscard]] RowSurvey survey(RegressionSource& source, const Box& prior,
+                               const std::vector<std::size_t>& excluded = {});
 
 /// Least squares with the weights of the survey, drawn to the middle of the box by the weight of its half-widths (so
 /// that it exists for any rank). Uncertified; it need not lie in the box.
-[[nodiscard]] Eigen::VectorXd weighted_estimate(const Survey& survey, const Box& prior);
+[[nodiscard]] Eigen::VectorXd weighted_estimate(const RowSurvey& survey, const Box& prior);
 
 }  // namespace wheelwright

@@ -68,8 +68,8 @@ Eigen::VectorXd output_weights(RegressionSource& rows) {
     const LeastSquaresFit fit = fits[i].solve();
     const double rms = std::sqrt(fit.weighted_rss / static_cast<double>(fit.instants));
     const double scale = std::sqrt(fit.weighted_tss / static_cast<double>(fit.instants));
-    const double floor = std::max(1e-9 * scale, std::numeric_limits<double>::min());
-    weights[static_cast<Eigen::Index>(i)] = 1.0 / std::max(rms, floor);
+    // A perfect fit has no scale of its own; an output that is zero throughout has none at all.
+    weights[static_cast<Eigen::Index>(i)] = scale > 0.0 ? 1.0 / std::max(rms, 1e-9 * scale) : 1.0;
   }
   return weights;
 }
@@ -513,7 +513,7 @@ Commissioning commission(LogSource& log, const Robot& robot, const CommissionOpt
 }
 
 Detector make_detector(const CommissionedModel& model, DetectorOptions options) {
-  options.persistence = options.persistence.n > 1 ? options.persistence : model.persistence;
+  options.persistence = options.persistence.value_or(model.persistence);
   return Detector(RegressorFilter(model.model, model.filter, model.measurement, model.errors),
                   ThresholdRule(Polytope(model.facets, model.box), model.estimate, options.set), options);
 }

@@ -91,9 +91,9 @@ struct Commissioning {
   double condition = 0.0;
   std::vector<OutputValidation> validation;  ///< on held-out blocks, of a model made from the other blocks
   FoldOptions folds;
-  double minimax = 0.0;            ///< smallest factor on the rows' dy (and dY) for which the set is not
-                                   ///< empty; <= 1 unless status is empty
-  FeasibleSet feasible;            ///< the set, its hull, certificates
+  double minimax = 0.0;  ///< where the set is empty: by how much the bounds n̄ on the effort would have to be
+                         ///< raised for it not to be (those on the motion kept); else 0
+  FeasibleSet feasible;  ///< the set, its hull, certificates
   double polytope_over_box = 1.0;  ///< median width of [l, u]: polytope over box, held out, worst output
   std::vector<std::string> notes;  ///< what was assumed, repaired or chosen, for people
 };

@@ -21,7 +21,7 @@ Detector::Detector(RegressorFilter filter, ThresholdRule threshold, DetectorOpti
     check::that(static_cast<std::size_t>(options_.mu->size()) == n && (options_.mu->array() >= 0.0).all(), "mu",
                 "one value >= 0 for each output");
   }
-  counters_.assign(n, PersistenceCounter(options_.persistence));
+  counters_.assign(n, PersistenceCounter(options_.persistence.value_or(Persistence{})));
   decision_.channels.resize(n);
 }
 

@@ -26,7 +26,9 @@ enum class Test {
 struct DetectorOptions {
   ParameterSetKind set = ParameterSetKind::polytope;
   Test test = Test::two_sided;
-  Persistence persistence{};            ///< k of n; 1 of 1 keeps the certain detections of theory section 5
+  /// k of n; 1 of 1 (or what a commissioned model says) where it is not given, which keeps the certain detections of
+  /// theory section 5.
+  std::optional<Persistence> persistence{};
   std::optional<Eigen::VectorXd> mu{};  ///< μ_o of (39), one for each output: constant thresholds instead of ρ(t)
 };
 

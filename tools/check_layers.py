@@ -76,6 +76,8 @@ PRIVATE_PATHS = re.compile(r"(?<![\w.~-])/(?:" + "wor" + r"k(?![\w-])|" + "tmp/b
 CODE = {".hpp", ".cpp", ".cmake", ".py", ".sh", ".js", ".css"}
 TEXT = CODE | {".md", ".yaml", ".yml", ".json", ".txt", ".cff", ".bib", ".in", ""}
 SKIP = re.compile(r"^(?:\.git|\.cache|build.*|node_modules|out|__pycache__)$")
+# A type that is defined in two headers of one namespace is two types of one name to the linker, which keeps one of them.
+TYPE = re.compile(r"^(?:struct|class|enum class|enum)\s+(\w+)\b[^;]*$", re.M)
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]')
 
 
@@ -135,8 +137,18 @@ def check_links(room, relative, text, report):
             report(relative, number, f"{room}/ may not use {other}")
 
 
+def check_types(relative, text, types, report):
+    for match in TYPE.finditer(without_comments(text)):
+        name = match.group(1)
+        number = text[: match.start()].count("\n") + 1
+        if name in types:
+            report(relative, number, f"{name} is defined in {types[name]} too")
+        types.setdefault(name, relative)
+
+
 def check(root):
     findings = []
+    types = {}
     report = lambda path, line, message: findings.append(f"{path}:{line}: {message}")
     for path in files(root):
         relative = path.relative_to(root)
@@ -157,6 +169,8 @@ def check(root):
                 report(relative, number, f"names {named.group(0)}, a path of one machine")
         if path.suffix in (".hpp", ".cpp"):
             check_code(room, relative, text, report)
+        if path.suffix == ".hpp" and room in set(WALK) | {"sim", "io", "report"}:
+            check_types(relative, text, types, report)
         if path.name == "CMakeLists.txt" and room in MAY_INCLUDE:
             check_links(room, relative, text, report)
     return findings
@@ -166,8 +180,8 @@ def self_test():
     spdx = "// SPDX-License-Identifier: Apache-2.0\n"
     head = spdx + "#pragma once\n"
     clean = {
-        "core/a.hpp": head + "#include <vector>\n// a random comment on rand() and std::cout\n",
-        "bounds/b.hpp": head + "#include <wheelwright/core/a.hpp>\n",
+        "core/a.hpp": head + "#include <vector>\n// a random comment on rand() and std::cout\nstruct A {\n};\n",
+        "bounds/b.hpp": head + "#include <wheelwright/core/a.hpp>\nstruct A;\nstruct B {};\n",
         "io/c.cpp": spdx + "#include <fstream>\n#include <wheelwright/bounds/b.hpp>\n",
         "bounds/clp.cpp": spdx + "#include <ClpSimplex.hpp>\n",
         "detector/CMakeLists.txt": "# SPDX-License-Identifier: Apache-2.0\nwheelwright_room(detector\n  USES core filter\n  LINK x)\n",
@@ -188,6 +202,7 @@ def self_test():
         "solver elsewhere": ("detector/x.cpp", spdx + "#include <nlopt.hpp>\n"),
         "no licence": ("core/x.cpp", "int x;\n"),
         "no licence in a script": ("tools/x", "#!/bin/sh\ntrue\n"),
+        "one name, two types": ("detector/x.hpp", head + "class A final {\n};\n"),
         "no guard": ("core/x.hpp", spdx),
         "private path": ("docs/x.md", "see /" + "work/main\n"),
         "another private path": ("examples/x.yaml", "log: /" + "tmp/bash_jobs.0/x\n"),

@@ -57,7 +57,8 @@ TEST(Allocation, ADetectorStepHasNone) {
   const Scenario drive = noisy_drive(1);
   expect_no_allocation(drive, drive.robot, {});
   expect_no_allocation(drive, drive.robot, {.set = ParameterSetKind::box, .test = wheelwright::Test::symmetric});
-  expect_no_allocation(drive, drive.robot, {.persistence = {.k = 3, .n = 5}, .mu = Eigen::Vector2d(0.1, 0.1)});
+  expect_no_allocation(drive, drive.robot,
+                       {.persistence = Persistence{.k = 3, .n = 5}, .mu = Eigen::Vector2d(0.1, 0.1)});
 }
 
 // Dry friction couples both channels: a set of six parameters may have more vertices than are kept, and its support is

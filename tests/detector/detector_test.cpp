@@ -96,7 +96,7 @@ TEST(Detector, ConstantThresholdsAreThoseOfTheSecondResidualFunction) {
 TEST(Detector, AlarmsPersistInTheirChannel) {
   const Known known;
   Random random(3);
-  Detector detector = known.detector({.persistence = {.k = 2, .n = 3}});
+  Detector detector = known.detector({.persistence = Persistence{.k = 2, .n = 3}});
   std::array<std::deque<bool>, 2> windows;
   for (int k = 0; k < 2000; ++k) {
     const Decision& d = detector.decide(random_row(random));
@@ -164,7 +164,7 @@ TEST(Detector, RestartsWhereTimeGoesBackAndWhenItIsTold) {
 
 TEST(Detector, RestartForgetsThePersistence) {
   const Known known;
-  Detector detector = known.detector({.persistence = {.k = 2, .n = 2}});
+  Detector detector = known.detector({.persistence = Persistence{.k = 2, .n = 2}});
   FilteredRow row{RowMatrix::Zero(2, 4), RowMatrix::Zero(2, 4), Eigen::Vector2d(1.0, 0.0), Eigen::Vector2d::Zero()};
   EXPECT_FALSE(detector.decide(row).fault);
   detector.restart();
@@ -185,7 +185,7 @@ TEST(Detector, MisuseIsRefused) {
   EXPECT_THROW(known.detector({.mu = Eigen::Vector3d::Ones()}), InvalidArgument);
   EXPECT_THROW(known.detector({.mu = Eigen::Vector2d(1.0, -1.0)}), InvalidArgument);
   EXPECT_THROW(known.detector({.mu = Eigen::Vector2d(1.0, std::nan(""))}), InvalidArgument);
-  EXPECT_THROW(known.detector({.persistence = {.k = 2, .n = 1}}), InvalidArgument);
+  EXPECT_THROW(known.detector({.persistence = Persistence{.k = 2, .n = 1}}), InvalidArgument);
   Box box;
   box.sides = {{0.0, 1.0}};
   EXPECT_THROW(Detector(filter_of(known.scenario), ThresholdRule(Polytope({}, box), Eigen::VectorXd::Zero(1))),
