@@ -165,25 +165,24 @@ SignalErrors with_noise(const Setting& s, const std::vector<OutputNoise>& noise,
 
 // The feasible set; where an *estimated* bound is too small for the prior box (θ̂ may lie outside it), it is raised to
 // just above the minimax fit.
-FeasibleSet bounded_set(LogSource& log, const Setting& s, Part part, std::vector<OutputNoise>& noise,
-                        std::size_t outliers, std::vector<std::string>& notes) {
+OutlierResult bounded_set(LogSource& log, const Setting& s, Part part, std::vector<OutputNoise>& noise,
+                          std::size_t outliers, std::vector<std::string>& notes) {
   constexpr double kAboveMinimax = 1.05;
   for (int attempt = 0;; ++attempt) {
     RegressionStream rows = make_rows(log, s, with_noise(s, noise, For::learning));
     FoldedSource folded(rows, part, s.log_rows, s.folds);
-    FeasibleSet set;
+    OutlierResult relaxed;
     if (outliers > 0) {
-      OutlierResult relaxed = feasible_set_with_outliers(folded, s.prior, {.most = outliers, .set = {}});
+      relaxed = feasible_set_with_outliers(folded, s.prior, {.most = outliers, .set = {}});
       if (!relaxed.dropped.empty()) {
         notes.push_back(fmt::format("{} instants were left out of the feasible set as outliers (at rows {})",
                                     relaxed.dropped.size(), fmt::join(relaxed.dropped, ", ")));
       }
-      set = std::move(relaxed.set);
     } else {
-      set = feasible_set(folded, s.prior);
+      relaxed.set = feasible_set(folded, s.prior);
     }
-    if (set.status == FeasibleSet::Status::nonempty || s.noise_complete || attempt > 0) {
-      return set;
+    if (relaxed.set.status == FeasibleSet::Status::nonempty || s.noise_complete || attempt > 0) {
+      return relaxed;
     }
     MinimaxOptions options;
     for (const OutputNoise& o : noise) {
@@ -461,7 +460,11 @@ Commissioning commission(LogSource& log, const Robot& robot, const CommissionOpt
 
   tell(options, "bounding", 0.4);
   result.noise = output_noise(s, fit, options.extrapolation);
-  result.feasible = bounded_set(log, s, Part::everything, result.noise, options.outliers, result.notes);
+  OutlierResult bounded = bounded_set(log, s, Part::everything, result.noise, options.outliers, result.notes);
+  result.feasible = std::move(bounded.set);
+  result.dropped = std::move(bounded.dropped);
+  result.prior = s.prior;
+  result.row_errors = with_noise(s, result.noise, For::learning);
   result.parameters = parameter_results(s, fit, result.feasible);
   describe_assumptions(s, result);
 
@@ -496,7 +499,7 @@ Commissioning commission(LogSource& log, const Robot& robot, const CommissionOpt
   const Fit trained = fit_rows(training, s, result.survey, options.extrapolation.risk);
   std::vector<OutputNoise> noise = output_noise(s, trained, options.extrapolation);
   std::vector<std::string> unused;
-  const FeasibleSet set = bounded_set(log, s, Part::training, noise, options.outliers, unused);
+  const FeasibleSet set = bounded_set(log, s, Part::training, noise, options.outliers, unused).set;
   if (set.status == FeasibleSet::Status::nonempty) {
     RegressionStream unseen = make_rows(log, s, with_noise(s, noise, For::driving));
     FoldedSource held_out(unseen, Part::held_out, s.log_rows, s.folds);

@@ -91,11 +91,14 @@ struct Commissioning {
   double condition = 0.0;
   std::vector<OutputValidation> validation;  ///< on held-out blocks, of a model made from the other blocks
   FoldOptions folds;
-  double minimax = 0.0;  ///< where the set is empty: by how much the bounds n̄ on the effort would have to be
-                         ///< raised for it not to be (those on the motion kept); else 0
-  FeasibleSet feasible;  ///< the set, its hull, certificates
-  double polytope_over_box = 1.0;  ///< median width of [l, u]: polytope over box, held out, worst output
-  std::vector<std::string> notes;  ///< what was assumed, repaired or chosen, for people
+  double minimax = 0.0;     ///< where the set is empty: by how much the bounds n̄ on the effort would have to be
+                            ///< raised for it not to be (those on the motion kept); else 0
+  Box prior;                ///< in which the set was sought
+  SignalErrors row_errors;  ///< dY and dy of the rows that the set is made of: OutputNoise::learning in `output`
+  std::vector<std::size_t> dropped;  ///< rows of the log whose instants the set leaves out as outliers
+  FeasibleSet feasible;              ///< the set, its hull, certificates
+  double polytope_over_box = 1.0;    ///< median width of [l, u]: polytope over box, held out, worst output
+  std::vector<std::string> notes;    ///< what was assumed, repaired or chosen, for people
 };
 
 /// Options of commission().

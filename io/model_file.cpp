@@ -51,7 +51,8 @@ Measurement read_measurement(const JsonPlace& place, const Model& model) {
   return m;
 }
 
-SignalErrors read_errors(const JsonPlace& place, const Model& model) {
+/// Bounds on the motion, those on the effort left out.
+SignalErrors read_motion_errors(const JsonPlace& place, const Model& model) {
   const auto optional_vector = [&](std::string_view key) {
     const Eigen::VectorXd values = vector_at(place.at(key));
     return values.size() == 0 ? values : vector_at(place.at(key), model.coordinates.size());
@@ -60,9 +61,14 @@ SignalErrors read_errors(const JsonPlace& place, const Model& model) {
   errors.acceleration = optional_vector("acceleration");
   errors.speed = optional_vector("speed");
   errors.speed_sample = optional_vector("speed_sample");
-  errors.output = vector_at(place.at("output"), model.n());
   errors.joint_sample = place.at("joint_sample").number();
   errors.heading = place.at("heading").number();
+  return errors;
+}
+
+SignalErrors read_errors(const JsonPlace& place, const Model& model) {
+  SignalErrors errors = read_motion_errors(place, model);
+  errors.output = vector_at(place.at("output"), model.n());
   return errors;
 }
 
@@ -76,7 +82,7 @@ std::vector<HalfSpace> read_facets(const JsonPlace& place, std::size_t p) {
   return facets;
 }
 
-Box read_hull(const JsonPlace& place, std::size_t p) {
+Box read_box(const JsonPlace& place, std::size_t p) {
   if (place.size() != p) {
     place.fail("an array of " + std::to_string(p) + " intervals");
   }
@@ -91,14 +97,141 @@ Box read_hull(const JsonPlace& place, std::size_t p) {
   return box;
 }
 
-}  // namespace
+/// Position in `list` of an entry whose name (`name_of`) is the text at `place`.
+template <typename List, typename NameOf>
+std::size_t position(const List& list, NameOf name_of, const JsonPlace& place) {
+  const std::string name = place.text();
+  for (std::size_t k = 0; k < list.size(); ++k) {
+    if (name_of(list[k]) == name) {
+      return k;
+    }
+  }
+  place.fail("a name of the robot's model");
+}
 
-CommissionedModel model_from_json(const Json& json, const std::string& file) {
-  const JsonPlace root(json, file);
+RowOrigin read_origin(const JsonPlace& place, const Model& model) {
+  RowOrigin origin;
+  origin.side = value_of(kSideWords, place.at("side"));
+  origin.is_prior = place.has("prior");
+  if (origin.is_prior) {
+    origin.parameter = position(
+        model.parameters, [](const Parameter& p) { return p.name; }, place.at("prior"));
+  } else {
+    origin.sample = place.at("row").count();
+    origin.t = place.at("t").number();
+    origin.output = position(
+        model.outputs, [](const std::string& o) { return o; }, place.at("output"));
+  }
+  return origin;
+}
+
+std::vector<NamedRow> read_proof(const JsonPlace& place, const Model& model) {
+  std::vector<NamedRow> rows;
+  for (std::size_t k = 0; k < place.size(); ++k) {
+    rows.push_back({read_origin(place.at(k), model), place.at(k).at("multiplier").number()});
+  }
+  return rows;
+}
+
+void read_noise(const JsonPlace& noise, ModelClaims& claims) {
+  if (!noise.has("motion")) {
+    throw InputError(noise.where() +
+                     ": no member 'motion': this model was written before models carried certificates; commission "
+                     "again to have one that can be checked");
+  }
+  claims.errors = read_motion_errors(noise.at("motion"), claims.model);
+  const JsonPlace outputs = noise.at("outputs");
+  if (outputs.size() != claims.model.n()) {
+    outputs.fail("one entry for each of the " + std::to_string(claims.model.n()) + " outputs");
+  }
+  claims.errors.output.resize(static_cast<Eigen::Index>(outputs.size()));
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    claims.errors.output[static_cast<Eigen::Index>(i)] = outputs.at(i).at("learning").number();
+    claims.origin.push_back(value_of(kNoiseOriginWords, outputs.at(i).at("origin")));
+  }
+  const SignalErrors& e = claims.errors;
+  const auto bounds = {e.output,
+                       e.acceleration,
+                       e.speed,
+                       e.speed_sample,
+                       Eigen::VectorXd::Constant(1, e.joint_sample).eval(),
+                       Eigen::VectorXd::Constant(1, e.heading).eval()};
+  if (!std::ranges::all_of(bounds, [](const Eigen::VectorXd& v) { return (v.array() >= 0.0).all(); })) {
+    noise.fail("bounds >= 0");
+  }
+}
+
+void read_parameters(const JsonPlace& place, ModelClaims& claims) {
+  if (place.size() != claims.model.p()) {
+    place.fail("one entry for each of the " + std::to_string(claims.model.p()) + " parameters");
+  }
+  for (std::size_t j = 0; j < place.size(); ++j) {
+    const JsonPlace parameter = place.at(j), samples = parameter.at("binding_samples");
+    if (parameter.at("name").text() != claims.model.parameters[j].name) {
+      parameter.at("name").fail(claims.model.parameters[j].name + ", as the robot's model has it");
+    }
+    claims.lower.push_back({parameter.at("lower").number(), read_proof(samples.at("lower"), claims.model)});
+    claims.upper.push_back({parameter.at("upper").number(), read_proof(samples.at("upper"), claims.model)});
+  }
+}
+
+void read_set(const JsonPlace& place, ModelClaims& claims) {
+  const std::size_t p = claims.model.p();
+  const std::string status = place.at("status").text();
+  if (status != "nonempty" && status != "empty") {
+    place.at("status").fail("nonempty or empty");
+  }
+  claims.prior = read_box(place.at("prior"), p);
+  claims.sign_parts = place.at("sign_parts").count();
+  const JsonPlace dropped = place.at("dropped");
+  for (std::size_t k = 0; k < dropped.size(); ++k) {
+    claims.dropped.push_back(dropped.at(k).count());
+  }
+  if (status == "empty") {
+    claims.set = FeasibleSet::Status::empty;
+    claims.contradiction = read_proof(place.at("contradiction"), claims.model);
+    claims.hull = claims.prior;
+    return;
+  }
+  claims.hull = read_box(place.at("hull"), p);
+  claims.facets = read_facets(place, p);
+  const JsonPlace origin = place.at("origin");
+  if (origin.size() != claims.facets.size()) {
+    origin.fail("one entry for each of the " + std::to_string(claims.facets.size()) + " rows of A");
+  }
+  for (std::size_t k = 0; k < origin.size(); ++k) {
+    claims.facets[k].origin = read_origin(origin.at(k), claims.model);
+  }
+}
+
+void read_data(const JsonPlace& place, ModelClaims& claims) {
+  const JsonPlace files = place.at("files");
+  for (std::size_t k = 0; k < files.size(); ++k) {
+    LogFileReport file;
+    file.path = files.at(k).at("path").text();
+    file.hash = files.at(k).at("hash").text();
+    file.bytes = files.at(k).at("bytes").count();
+    file.rows = files.at(k).at("rows").count();
+    claims.files.push_back(std::move(file));
+  }
+  claims.rows = place.at("rows").count();
+  claims.segments = place.at("segments").count();
+}
+
+/// The document's root, after a look at its schema.
+JsonPlace root_of(const Json& json, const std::string& file) {
+  JsonPlace root(json, file);
   if (!root.has("schema") || root.at("schema").text() != kModelSchema) {
     throw InputError(file + ": expected a model written by `wheelwright commission`, with \"schema\": \"" +
                      kModelSchema + "\"");
   }
+  return root;
+}
+
+}  // namespace
+
+CommissionedModel model_from_json(const Json& json, const std::string& file) {
+  const JsonPlace root = root_of(json, file);
   if (!root.has("detector")) {
     throw InputError(file + ": holds no model: " + root.at("message").text());
   }
@@ -113,12 +246,34 @@ CommissionedModel model_from_json(const Json& json, const std::string& file) {
   model.errors = read_errors(detector.at("error_bounds"), model.model);
   model.persistence = {detector.at("persistence").at("k").count(), detector.at("persistence").at("n").count()};
   model.facets = read_facets(root.at("feasible_set"), p);
-  model.box = read_hull(root.at("feasible_set").at("hull"), p);
+  model.box = read_box(root.at("feasible_set").at("hull"), p);
   return model;
 }
 
 CommissionedModel read_model(const std::filesystem::path& path) {
   return model_from_json(read_json(path), path.string());
 }
+
+ModelClaims claims_from_json(const Json& json, const std::string& file) {
+  const JsonPlace root = root_of(json, file);
+  ModelClaims claims;
+  claims.robot = robot_from_json(root.at("robot").value(), root.at("robot").where());
+  claims.model = make_model(claims.robot);
+  claims.filter = read_filter(root.at("filter"));
+  claims.measurement = read_measurement(root.at("measurement"), claims.model);
+  read_noise(root.at("noise"), claims);
+  read_set(root.at("feasible_set"), claims);
+  read_parameters(root.at("parameters"), claims);
+  if (root.has("physical")) {
+    const JsonPlace physical = root.at("physical");
+    for (const std::string& name : physical.keys()) {
+      claims.physical[name] = {physical.at(name).at("lower").number(), physical.at(name).at("upper").number()};
+    }
+  }
+  read_data(root.at("data"), claims);
+  return claims;
+}
+
+ModelClaims read_claims(const std::filesystem::path& path) { return claims_from_json(read_json(path), path.string()); }
 
 }  // namespace wheelwright

@@ -4,7 +4,9 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <string>
+#include <vector>
 
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/io/csv_report.hpp>
@@ -24,5 +26,47 @@ inline constexpr const char* kModelSchema = "wheelwright/model/1";
 
 /// The same from JSON; `file` is for messages.
 [[nodiscard]] CommissionedModel model_from_json(const Json& json, const std::string& file);
+
+/// A row of a log, or a side of the prior box, and its multiplier in a proof, as model.json names them.
+struct NamedRow {
+  RowOrigin origin;
+  double multiplier = 0.0;
+};
+
+/// A published bound and its proof.
+struct PublishedBound {
+  double value = 0.0;
+  std::vector<NamedRow> proof;
+};
+
+/// What a model.json says of θ, and all that is needed to prove it again from the log: what `wheelwright check` verifies.
+struct ModelClaims {
+  Robot robot;
+  Model model;
+  Measurement measurement;
+  FilterDesign filter;
+  SignalErrors errors;              ///< of the rows of the log: Commissioning::row_errors
+  std::vector<NoiseOrigin> origin;  ///< of errors.output, one for each output
+  Box prior;                        ///< in which the set was sought
+  FeasibleSet::Status set = FeasibleSet::Status::nonempty;
+  std::vector<PublishedBound> lower, upper;  ///< of each parameter
+  std::vector<NamedRow> contradiction;       ///< where the set is empty
+  std::vector<HalfSpace> facets;             ///< of the set, with their origins; else none
+  Box hull;                                  ///< of the set; the prior where it is empty
+  std::map<std::string, Interval> physical;  ///< bounds by physical name; none where there is no scale
+  std::vector<std::size_t> dropped;          ///< rows left out as outliers
+  std::size_t sign_parts = 1;                ///< FeasibleSet::sign_parts
+  std::vector<LogFileReport> files;          ///< path, hash, bytes and rows of each file of the log
+  std::size_t rows = 0;                      ///< of the log
+  std::size_t segments = 0;                  ///< of the log
+};
+
+/// Reads the claims of a model.json, also of one that holds no model. Throws InputError, naming file and key, when it is
+/// no such file, when it has no certificates (it was written before there were any), or when a number is missing or
+/// impossible. Multipliers are read as they stand: to judge them is the checker's work.
+[[nodiscard]] ModelClaims read_claims(const std::filesystem::path& path);
+
+/// The same from JSON; `file` is for messages.
+[[nodiscard]] ModelClaims claims_from_json(const Json& json, const std::string& file);
 
 }  // namespace wheelwright

@@ -27,12 +27,26 @@ Json origin_json(const RowOrigin& origin, const Model& model) {
           {"side", word_of(kSideWords, origin.side)}};
 }
 
-Json origins_json(const std::vector<RowOrigin>& origins, const Model& model) {
+// The rows that prove a bound with their multipliers; the check needs no more.
+Json proof_json(const std::vector<WeightedRow>& rows, const Model& model) {
   Json list = Json::array();
-  for (const RowOrigin& origin : origins) {
-    list.push_back(origin_json(origin, model));
+  for (const WeightedRow& weighted : rows) {
+    if (weighted.multiplier > 0.0) {
+      Json row = origin_json(weighted.row.origin, model);
+      row["multiplier"] = weighted.multiplier;
+      list.push_back(row);
+    }
   }
   return list;
+}
+
+// What the motion in the rows can be wrong by; what the effort can is said elsewhere.
+Json motion_errors_json(const SignalErrors& errors) {
+  return {{"acceleration", numbers(errors.acceleration)},
+          {"speed", numbers(errors.speed)},
+          {"speed_sample", numbers(errors.speed_sample)},
+          {"joint_sample", errors.joint_sample},
+          {"heading", errors.heading}};
 }
 
 Json filter_json(const FilterDesign& filter, const FilterChoice& choice) {
@@ -71,10 +85,15 @@ Json noise_json(const Commissioning& r, const Model& model) {
     }
     json["outputs"].push_back(output);
   }
+  json["motion"] = motion_errors_json(r.row_errors);
   return json;
 }
 
-Json parameter_json(const ParameterResult& p, const Robot& robot, const Model& model) {
+Json parameter_json(const Commissioning& r, std::size_t j, const Robot& robot, const Model& model) {
+  const ParameterResult& p = r.parameters[j];
+  const auto proof = [&](const std::vector<CertifiedBound>& bounds) {
+    return j < bounds.size() ? proof_json(bounds[j].binding, model) : Json::array();
+  };
   return {{"name", p.parameter.name},
           {"unit", parameter_unit(robot, p.parameter)},
           {"estimate", optional_number(p.estimate)},
@@ -87,8 +106,7 @@ Json parameter_json(const ParameterResult& p, const Robot& robot, const Model& m
           {"lower_is_prior", p.lower_is_prior},
           {"upper_is_prior", p.upper_is_prior},
           {"estimate_inside", p.estimate_inside},
-          {"binding_samples",
-           {{"lower", origins_json(p.lower_binding, model)}, {"upper", origins_json(p.upper_binding, model)}}}};
+          {"binding_samples", {{"lower", proof(r.feasible.lower)}, {"upper", proof(r.feasible.upper)}}}};
 }
 
 Json physical_json(const Commissioning& r, const Robot& robot, const Model& model) {
@@ -118,13 +136,15 @@ Json physical_json(const Commissioning& r, const Robot& robot, const Model& mode
 Json set_json(const Commissioning& r, const Model& model) {
   Json json = {{"status", r.feasible.status == FeasibleSet::Status::nonempty ? "nonempty" : "empty"},
                {"rows", r.feasible.rows},
-               {"passes", r.feasible.passes}};
+               {"passes", r.feasible.passes},
+               {"sign_parts", r.feasible.sign_parts},
+               {"convexified", r.feasible.convexified},
+               {"dropped", r.dropped}};
+  for (const Interval& side : r.prior.sides) {
+    json["prior"].push_back({side.lower, side.upper});
+  }
   if (!r.feasible.polytope) {
-    for (const WeightedRow& w : r.feasible.contradiction) {
-      Json row = origin_json(w.row.origin, model);
-      row["multiplier"] = w.multiplier;
-      json["contradiction"].push_back(row);
-    }
+    json["contradiction"] = proof_json(r.feasible.contradiction, model);
     json["noise_factor_needed"] = r.minimax;
     return json;
   }
@@ -206,8 +226,8 @@ Json to_json(const Commissioning& r, const LogReport& data, const std::string& s
                {"measurement", measurement_json(m.measurement)},
                {"noise", noise_json(r, m.model)},
                {"parameters", Json::array()}};
-  for (const ParameterResult& p : r.parameters) {
-    json["parameters"].push_back(parameter_json(p, m.robot, m.model));
+  for (std::size_t j = 0; j < r.parameters.size(); ++j) {
+    json["parameters"].push_back(parameter_json(r, j, m.robot, m.model));
   }
   json["physical"] = physical_json(r, m.robot, m.model);
   json["identification"] = {{"rank", r.rank}, {"condition", r.condition}, {"freedom", r.residuals.freedom}};
