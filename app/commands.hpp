@@ -15,6 +15,8 @@ namespace wheelwright::app {
 /// A command that was added: `run` does its work.
 using Run = std::function<int(const std::string& command_line)>;
 
+/// wheelwright check model.json LOG...
+[[nodiscard]] Run add_check(CLI::App& program);
 /// wheelwright commission LOG... --robot robot.yaml
 [[nodiscard]] Run add_commission(CLI::App& program);
 /// wheelwright detect LOG --model model.json [--follow]

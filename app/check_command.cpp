@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <memory>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include <wheelwright/io/model_file.hpp>
+
+#include "check_words.hpp"
+#include "commands.hpp"
+#include "common.hpp"
+#include "model_check.hpp"
+
+namespace wheelwright::app {
+namespace {
+
+struct Arguments {
+  std::filesystem::path model;
+  std::vector<std::filesystem::path> logs;
+  CommonOptions common;
+};
+
+constexpr const char* kHelp =
+    "Proves the bounds of a model again, from the log that it was made from: filters the log, rebuilds the rows that "
+    "each "
+    "bound names, and verifies their multipliers in exact rational arithmetic. No solver takes part.\n\n"
+    "Checked are the bounds of every parameter (also in physical words), every facet of the feasible set, or, where "
+    "the "
+    "model says that nothing explains the log, that claim. Not checked: estimates, standard errors, validation, and "
+    "whether the noise and the prior that the model states are true; they are listed as given.";
+
+constexpr const char* kExamples =
+    "Examples:\n"
+    "  wheelwright check result/model.json drive.csv\n"
+    "  wheelwright check result/model.json monday.csv tuesday.csv.gz --json\n\n"
+    "Exit code: 0 everything is proved, 1 something is not (it is said what and by how much), 2 bad input.";
+
+int run(const Arguments& a) {
+  make_directory(a.common);
+  const ModelClaims claims = read_claims(a.model);
+  CsvOptions reader = reader_options(a.common);
+  reader.only = useful_columns(claims.robot);
+  CsvLog log(a.logs, reader);
+  require_columns(log, claims.measurement.columns());
+  const ModelCheck check = check_model(claims, log, log.report());
+  CheckedFiles files{a.model.string(), {}};
+  for (const std::filesystem::path& path : a.logs) {
+    files.logs.push_back(path.string());
+  }
+  if (!a.common.out.empty() || a.common.json) {
+    publish(a.common, to_json(check, claims, log.report(), files), "check.json", check_report(check, claims, files));
+  }
+  if (!a.common.quiet && !a.common.json) {
+    fmt::print("{}", summary(check, claims));
+    if (!a.common.out.empty()) {
+      fmt::print("wrote {} and {}\n", (a.common.out / "check.json").string(), (a.common.out / "report.html").string());
+    }
+  }
+  return check.proved() ? kDone : kNo;
+}
+
+}  // namespace
+
+Run add_check(CLI::App& program) {
+  auto a = std::make_shared<Arguments>();
+  CLI::App& command = *program.add_subcommand("check", kHelp);
+  command.add_option("MODEL", a->model, "model.json of `wheelwright commission`")->required();
+  command.add_option("LOG", a->logs, "The CSV logs it was commissioned on (also .gz, .zst), in the same order")
+      ->required();
+  add_common(command, a->common);
+  add_map(command, a->common);
+  command.footer(kExamples);
+  return [a](const std::string& command_line) {
+    a->common.command_line = command_line;
+    return run(*a);
+  };
+}
+
+}  // namespace wheelwright::app

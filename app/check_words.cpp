@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "check_words.hpp"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <wheelwright/commission/physical.hpp>
+#include <wheelwright/io/model_words.hpp>
+#include <wheelwright/report/page.hpp>
+#include <wheelwright/report/text.hpp>
+
+#include "common.hpp"
+
+namespace wheelwright::app {
+namespace {
+
+const PublishedBound& claim_of(const BoundVerdict& verdict, const ModelClaims& claims) {
+  return (verdict.side == Side::upper ? claims.upper : claims.lower)[verdict.parameter];
+}
+
+/// "rows 5017, 8211 and the prior"; "the prior" where there is no row.
+std::string stands_on(const BoundVerdict& verdict, const ModelClaims& claims) {
+  std::vector<std::size_t> rows;
+  bool prior = false;
+  for (const NamedRow& row : claim_of(verdict, claims).proof) {
+    prior = prior || row.origin.is_prior;
+    if (!row.origin.is_prior) {
+      rows.push_back(row.origin.sample);
+    }
+  }
+  if (rows.empty()) {
+    return "the prior";
+  }
+  return fmt::format("row{} {}{}", rows.size() == 1 ? "" : "s", fmt::join(rows, ", "), prior ? " and the prior" : "");
+}
+
+std::string statement(const BoundVerdict& verdict, const ModelClaims& claims) {
+  const Parameter& parameter = claims.model.parameters[verdict.parameter];
+  return fmt::format("{} {} {:.7g} {}", parameter.name, verdict.side == Side::upper ? "<=" : ">=", verdict.stated,
+                     parameter_unit(claims.robot, parameter));
+}
+
+std::string facet_sentence(const FacetVerdicts& facets) {
+  const std::size_t all = facets.rows + facets.sides + facets.implied + facets.wrong.size();
+  std::string text = fmt::format("{} of {} facets are what they name: {} rows of the log, {} sides of the prior",
+                                 all - facets.wrong.size(), all, facets.rows, facets.sides);
+  if (facets.implied > 0) {
+    text += fmt::format(", {} that follow from the row named", facets.implied);
+  }
+  return text;
+}
+
+Json number_or_null(double x) { return std::isfinite(x) ? Json(x) : Json(nullptr); }
+
+}  // namespace
+
+std::string verdict(const ModelCheck& check, const ModelClaims& claims) {
+  if (!check.proved()) {
+    return fmt::format("not proved: {} statement{} of the model {} not follow from the log", check.failures.size(),
+                       check.failures.size() == 1 ? "" : "s", check.failures.size() == 1 ? "does" : "do");
+  }
+  if (check.emptiness) {
+    return fmt::format("proved: no parameters explain {} rows of the log within the stated noise",
+                       claims.contradiction.size());
+  }
+  return fmt::format("proved: all {} bounds and {} facets follow from the rows of the log that they name",
+                     check.bounds.size(), claims.facets.size());
+}
+
+std::string summary(const ModelCheck& check, const ModelClaims& claims) {
+  constexpr std::size_t most = 12;
+  std::string text = fmt::format("{}: {}\n", claims.robot.name, verdict(check, claims));
+  if (check.emptiness) {
+    text += fmt::format("  contradiction of {} rows: {}\n", claims.contradiction.size(),
+                        check.emptiness->proved ? "proved" : "NOT PROVED");
+  } else {
+    constexpr int width = 44;
+    text += fmt::format("  {:<{}} {:<10}   stands on\n", "bound", width, "");
+    for (const BoundVerdict& each : check.bounds) {
+      text += fmt::format("  {:<{}} {:<10}   {}\n", statement(each, claims), width,
+                          each.proved ? "proved" : "NOT PROVED", stands_on(each, claims));
+    }
+    text += "  " + facet_sentence(check.facets) + "\n";
+  }
+  for (std::size_t k = 0; k < std::min(check.failures.size(), most); ++k) {
+    text += "  not proved: " + check.failures[k] + "\n";
+  }
+  if (check.failures.size() > most) {
+    text += fmt::format("  … and {} more (--json lists them all)\n", check.failures.size() - most);
+  }
+  for (const std::string& warning : check.warnings) {
+    text += "  warning: " + warning + "\n";
+  }
+  for (const std::string& premise : check.premises) {
+    text += "  given: " + premise + "\n";
+  }
+  return text;
+}
+
+Json to_json(const ModelCheck& check, const ModelClaims& claims, const LogReport& data, const CheckedFiles& files) {
+  Json log_files = Json::array(), bounds = Json::array();
+  for (const LogFileReport& file : data.files) {
+    log_files.push_back({{"path", file.path}, {"hash", file.hash}, {"bytes", file.bytes}, {"rows", file.rows}});
+  }
+  for (const BoundVerdict& each : check.bounds) {
+    const Parameter& parameter = claims.model.parameters[each.parameter];
+    bounds.push_back({{"parameter", parameter.name},
+                      {"unit", parameter_unit(claims.robot, parameter)},
+                      {"side", word_of(kSideWords, each.side)},
+                      {"stated", each.stated},
+                      {"shown", number_or_null(each.shown)},
+                      {"proved", each.proved},
+                      {"shortfall", number_or_null(each.shortfall)},
+                      {"rows", claim_of(each, claims).proof.size()},
+                      {"reason", each.reason}});
+  }
+  const FacetVerdicts& facets = check.facets;
+  Json json = {
+      {"schema", "wheelwright/check/1"},
+      {"software", software()},
+      {"model", files.model},
+      {"proved", check.proved()},
+      {"message", verdict(check, claims)},
+      {"data", {{"same", check.same_log}, {"rows", data.rows}, {"segments", data.segments}, {"files", log_files}}},
+      {"bounds", bounds},
+      {"facets",
+       {{"stated", claims.facets.size()},
+        {"rows", facets.rows},
+        {"sides", facets.sides},
+        {"implied", facets.implied},
+        {"wrong", facets.wrong.size()}}},
+      {"failures", check.failures},
+      {"warnings", check.warnings},
+      {"premises", check.premises}};
+  if (check.emptiness) {
+    json["contradiction"] = {{"rows", claims.contradiction.size()},
+                             {"proved", check.emptiness->proved},
+                             {"shortfall", number_or_null(check.emptiness->shortfall)}};
+  }
+  return json;
+}
+
+std::string check_report(const ModelCheck& check, const ModelClaims& claims, const CheckedFiles& files) {
+  using namespace report;
+  std::vector<std::vector<Cell>> rows;
+  for (const BoundVerdict& each : check.bounds) {
+    rows.push_back({escape(words(claims.model.parameters[each.parameter].name)),
+                    each.side == Side::upper ? "at most" : "at least",
+                    numeric(escape(with_unit(fmt::format("{:.7g}", each.stated),
+                                             parameter_unit(claims.robot, claims.model.parameters[each.parameter])))),
+                    each.proved ? "proved" : "not proved", escape(stands_on(each, claims))});
+  }
+  PageContent content;
+  content.title = "Check of the model of " + claims.robot.name;
+  content.status = check.proved() ? (check.warnings.empty() ? "good" : "caution") : "bad";
+  content.verdict = capital(verdict(check, claims)) + ".";
+  content.sentences = {
+      "Every proof was evaluated in exact rational arithmetic on rows that were filtered again from the log, without "
+      "the "
+      "solver that found them."};
+  content.sections = {{"bounds", "Bounds", table({"parameter", "", "bound", "", "stands on"}, rows)}};
+  if (!check.emptiness) {
+    content.sections.push_back(
+        {"facets", "Feasible set", paragraph(escape(capital(facet_sentence(check.facets)) + "."))});
+  }
+  if (!check.failures.empty()) {
+    content.sections.push_back({"failures", "Not proved", bullets(check.failures)});
+  }
+  if (!check.warnings.empty()) {
+    content.sections.push_back({"warnings", "Warnings", bullets(check.warnings)});
+  }
+  content.sections.push_back({"premises", "Given, not proved", bullets(check.premises)});
+  content.sections.push_back(
+      {"files", "Files",
+       definitions({{"model", files.model}, {"log", fmt::format("{}", fmt::join(files.logs, ", "))}})});
+  content.software = software();
+  return page(content);
+}
+
+}  // namespace wheelwright::app
