@@ -86,6 +86,7 @@ class Polytope {
   /// then does not depend on units). A member of the set wherever the set has an interior; a least-squares estimate
   /// need not be.
   [[nodiscard]] const std::vector<double>& chebyshev_centre() const noexcept { return data_->centre; }
+  [[nodiscard]] const std::vector<double>& centre() const noexcept { return data_->centre; }  ///< the Chebyshev centre
 
  private:
   struct Data {
