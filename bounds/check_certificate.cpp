@@ -16,6 +16,7 @@ using Rational = boost::multiprecision::cpp_rational;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr std::size_t kMostRounds = 16;
+constexpr double kNarrower = 1e-12;  // of its width: a side that gains less is not worth another round
 
 /// The finite double as the rational that it is.
 Rational rational(double x) {
@@ -233,7 +234,7 @@ HullCheck check_hull(std::span<const BoundClaim> lower, std::span<const BoundCla
   HullCheck result{
       .lower = std::vector<CertificateCheck>(p), .upper = std::vector<CertificateCheck>(p), .proved = prior};
   bool narrower = true;
-  while (narrower && !result.contradiction && result.rounds < kMostRounds) {
+  while (narrower && !result.contradiction && !result.all_proved() && result.rounds < kMostRounds) {
     narrower = false;
     ++result.rounds;
     for (std::size_t k = 0; k < 2 * p && !result.contradiction; ++k) {
@@ -248,8 +249,8 @@ HullCheck check_hull(std::span<const BoundClaim> lower, std::span<const BoundCla
       CertificateCheck& check = (is_upper ? result.upper : result.lower)[j];
       check = check_bound(axis, claim.rows, result.proved, sign * claim.value);
       if (check.bound < own) {
+        narrower = narrower || own - check.bound > kNarrower * side.width();
         (is_upper ? side.upper : side.lower) = sign * check.bound;
-        narrower = true;
       }
       check = with_side(std::move(check), own, sign * claim.value);
       result.contradiction = side.lower > side.upper;

@@ -2,9 +2,9 @@
 /// \file
 /// The checker of certificates: whether multipliers prove a bound, in exact rational arithmetic.
 ///
-/// Whoever doubts a bound need trust nothing but this file: it knows no solver, rounds nothing before the comparison, and
-/// takes every double for the rational number that it is. For any λ >= 0 and any θ in the box with row·θ <= b for every
-/// row (Neumaier and Shcherbina 2004; Farkas where a = 0),
+/// Whoever doubts a certificate need trust nothing but this file and Boost.Multiprecision: no solver takes part, nothing
+/// is rounded before the comparison, every double is the rational number that it is. For any λ >= 0 and any θ in the
+/// box with row·θ <= b for every row (Neumaier and Shcherbina 2004; Farkas where a = 0),
 ///
 ///     a·θ <= λ·b + Σ_j max { r_j θ_j : θ_j in side j },   r = a − Aᵀλ,
 ///
@@ -37,13 +37,13 @@ struct CertificateCheck {
 
 /// Whether `rows` prove that a·θ <= claimed for every θ of `box` that satisfies them.
 ///
-/// At most p + 1 rows, p the sides of the box, with finite multipliers >= 0 and p finite coefficients each. Rows that say
-/// of themselves that they are sides of the box (RowOrigin::is_prior) must hold in all of it.
+/// At most p + 1 rows, p the sides of the box, with finite multipliers >= 0 and p finite coefficients each. Rows that
+/// say of themselves that they are sides of the box (RowOrigin::is_prior) must hold in all of it.
 [[nodiscard]] CertificateCheck check_bound(std::span<const double> a, std::span<const WeightedRow> rows, const Box& box,
                                            double claimed);
 
-/// Whether `rows` prove that no θ of `box` satisfies them all: that 0·θ has an upper bound below zero (`bound`; strictly,
-/// so that a `shortfall` of zero is not proved).
+/// Whether `rows` prove that no θ of `box` satisfies them all: that 0·θ has an upper bound below zero (`bound`;
+/// strictly, so that a `shortfall` of zero is not proved).
 [[nodiscard]] CertificateCheck check_emptiness(std::span<const WeightedRow> rows, const Box& box);
 
 /// A claimed bound of one parameter, and the rows that are to prove it.
@@ -64,13 +64,14 @@ struct HullCheck {
   [[nodiscard]] bool all_proved() const;
 };
 
-/// Whether the claims, one lower and one upper bound for each side of `prior`, hold for every θ of `prior` that satisfies
-/// the rows of all of them.
+/// Whether the claims, one lower and one upper bound for each side of `prior`, hold for every θ of `prior` that
+/// satisfies the rows of all of them.
 ///
-/// A bound may stand on the others: what is proved narrows the box over which the next is evaluated, and so on until
-/// nothing gets narrower (at most 16 rounds). So the rounding of λ, which leaves r ≠ 0, meets a box as narrow as the set
-/// and not the prior's, however wide that is. Every step is a proof by check_bound(). Throws InvalidArgument unless there
-/// are as many claims as sides and the prior is finite.
+/// A bound may stand on the others: what is proved narrows the box over which the next is evaluated, round by round
+/// until every claim is proved or nothing gets narrower by more than 1e-12 of its width (at most 16 rounds). So the
+/// rounding of λ, which leaves r ≠ 0, meets a box as narrow as the set and not the prior's, however wide that is. Every
+/// step is a proof by check_bound(). Throws InvalidArgument unless there are as many claims as sides and the prior is
+/// finite.
 [[nodiscard]] HullCheck check_hull(std::span<const BoundClaim> lower, std::span<const BoundClaim> upper,
                                    const Box& prior);
 
