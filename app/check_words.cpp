@@ -85,7 +85,7 @@ std::string summary(const ModelCheck& check, const ModelClaims& claims) {
     text += "  " + facet_sentence(check.facets) + "\n";
   }
   for (std::size_t k = 0; k < std::min(check.failures.size(), most); ++k) {
-    text += "  not proved: " + check.failures[k] + "\n";
+    text += "  failure: " + check.failures[k] + "\n";
   }
   if (check.failures.size() > most) {
     text += fmt::format("  … and {} more (--json lists them all)\n", check.failures.size() - most);

@@ -172,10 +172,10 @@ std::string explain(const CertificateCheck& check, const std::string& missing, c
   if (std::isfinite(check.shortfall)) {
     text = fmt::format("what the certificate proves falls short of it by {:.3g}", check.shortfall);
     if (check.row) {
-      text += ", and it is better without " + name_of(proof[*check.row].origin, claims.model);
+      text += "; it proves more without " + name_of(proof[*check.row].origin, claims.model);
     }
     if (check.parameter) {
-      text += fmt::format(", and the rest in {} is not small", claims.model.parameters[*check.parameter].name);
+      text += fmt::format("; most is left over in {}", claims.model.parameters[*check.parameter].name);
     }
   } else {
     text = check.reason;
@@ -217,7 +217,9 @@ void judge_hull(const ModelClaims& claims, const Proof& proof, ModelCheck& resul
     const Interval& proved = proof.hull.proved.sides[j];
     const Interval& hull = claims.hull.sides[j];
     const Parameter& parameter = claims.model.parameters[j];
-    if (!(hull.lower <= proved.lower && proved.upper <= hull.upper)) {
+    // A hull that is the stated bounds was judged with them.
+    const bool other = hull.lower != claims.lower[j].value || hull.upper != claims.upper[j].value;
+    if (other && !(hull.lower <= proved.lower && proved.upper <= hull.upper)) {
       result.failures.push_back(
           fmt::format("feasible_set.hull of {}, [{}, {}], does not contain what is proved, [{}, {}]", parameter.name,
                       hull.lower, hull.upper, proved.lower, proved.upper));
@@ -300,7 +302,7 @@ void judge_log(const ModelClaims& claims, const LogReport& data, ModelCheck& res
   const std::string differs =
       fmt::format("{} is not the log that was commissioned, {}", names(data.files), names(claims.files));
   if (data.rows != claims.rows || data.segments != claims.segments) {
-    result.failures.push_back(fmt::format("{}: it has {} usable rows in {} segments, not {} in {}", differs, data.rows,
+    result.failures.push_back(fmt::format("{}: it has {} usable rows (segments: {}), not {} ({})", differs, data.rows,
                                           data.segments, claims.rows, claims.segments));
   } else {
     result.warnings.push_back(differs + ", byte by byte; it has as many rows, and what is proved here holds for it");
@@ -358,7 +360,9 @@ ModelCheck check_model(const ModelClaims& claims, LogSource& log, const LogRepor
   if (claims.set == FeasibleSet::Status::empty) {
     judge_emptiness(claims, rebuilt, result);
   } else {
-    judge_hull(claims, proof, result);
+    if (!proof.hull.contradiction) {
+      judge_hull(claims, proof, result);
+    }
     judge_facets(claims, rebuilt, proof, result);
   }
   tell_premises(claims, result);

@@ -46,9 +46,9 @@ struct ModelCheck {
   [[nodiscard]] bool proved() const { return failures.empty(); }
 };
 
-/// Filters `log` again as the claims say and verifies, exactly (check_certificate.hpp): that each facet is the log's row
-/// that it names, or follows from it; that each published bound is proved by the rows that it names; that the hull and
-/// the physical intervals contain the proved bounds; or, where the set is said to be empty, that it is. `data` says
+/// Filters `log` again as the claims say and verifies, exactly (check_certificate.hpp): that each facet is the log's
+/// row that it names, or follows from it; that each published bound is proved by the rows that it names; that the hull
+/// and the physical intervals contain the proved bounds; or, where the set is said to be empty, that it is. `data` says
 /// which files the log is. Rows of columns with noise whose sign the prior leaves open are rebuilt over the box that
 /// they prove. Throws InvalidArgument when the log lacks a column.
 [[nodiscard]] ModelCheck check_model(const ModelClaims& claims, LogSource& log, const LogReport& data);

@@ -20,8 +20,8 @@ inline constexpr const char* kModelSchema = "wheelwright/model/1";
 /// The whole result as JSON (io/model.schema.json). `data` says which log it came from, `software` is name and version.
 [[nodiscard]] Json to_json(const Commissioning& result, const LogReport& data, const std::string& software);
 
-/// Reads the on-line part of a model.json back. Throws InputError, naming file and key, when it is no such file, when it
-/// holds no model (its status says why), or when a number is missing or impossible.
+/// Reads the on-line part of a model.json back. Throws InputError, naming file and key, when it is no such file, when
+/// it holds no model (its status says why), or when a number is missing or impossible.
 [[nodiscard]] CommissionedModel read_model(const std::filesystem::path& path);
 
 /// The same from JSON; `file` is for messages.
@@ -39,7 +39,8 @@ struct PublishedBound {
   std::vector<NamedRow> proof;
 };
 
-/// What a model.json says of θ, and all that is needed to prove it again from the log: what `wheelwright check` verifies.
+/// What a model.json says of θ, and all that is needed to prove it again from the log: what `wheelwright check`
+/// verifies.
 struct ModelClaims {
   Robot robot;
   Model model;
@@ -61,8 +62,8 @@ struct ModelClaims {
   std::size_t segments = 0;                  ///< of the log
 };
 
-/// Reads the claims of a model.json, also of one that holds no model. Throws InputError, naming file and key, when it is
-/// no such file, when it has no certificates (it was written before there were any), or when a number is missing or
+/// Reads the claims of a model.json, also of one that holds no model. Throws InputError, naming file and key, when it
+/// is no such file, when it has no certificates (it was written before there were any), or when a number is missing or
 /// impossible. Multipliers are read as they stand: to judge them is the checker's work.
 [[nodiscard]] ModelClaims read_claims(const std::filesystem::path& path);
 

@@ -22,17 +22,6 @@ class Results : public testing::ProgramTest {
     }
     return alarms;
   }
-
-  /// Whether FILE fits io/SCHEMA, as an independent validator sees it; its complaints, or nothing where it fits.
-  std::string misfit(const std::string& schema, const std::string& file) const {
-    const std::string complaints = (directory_ / "complaints").string();
-    const std::string command = "/usr/bin/python3 '" WHEELWRIGHT_SOURCE_DIR "/tests/app/validate.py' '" +
-                                (std::filesystem::path(WHEELWRIGHT_SOURCE_DIR) / "io" / schema).string() + "' '" +
-                                path(file).string() + "' > '" + complaints + "' 2>&1";
-    return std::system(command.c_str()) == 0 ? "" : "does not fit: " + bytes(complaints);
-  }
-
-  static bool has_validator() { return std::system("/usr/bin/python3 -c 'import jsonschema' 2> /dev/null") == 0; }
 };
 
 TEST_F(Results, ShippedLogGivesTheTruthBetweenItsBounds) {

@@ -15,16 +15,18 @@ class Usage : public testing::ProgramTest {};
 TEST_F(Usage, HelpOfTheProgramNamesItsCommands) {
   const Outcome outcome = run("--help");
   EXPECT_EQ(outcome.code, 0);
-  EXPECT_THAT(outcome.out, AllOf(HasSubstr("commission"), HasSubstr("detect"), HasSubstr("simulate"),
-                                 HasSubstr("wheelwright commission LOG --robot robot.yaml --out result")));
+  EXPECT_THAT(outcome.out,
+              AllOf(HasSubstr("commission"), HasSubstr("detect"), HasSubstr("check"), HasSubstr("simulate"),
+                    HasSubstr("wheelwright commission LOG --robot robot.yaml --out result")));
   EXPECT_THAT(run("--version").out, HasSubstr("wheelwright "));
 }
 
 TEST_F(Usage, HelpOfEachCommandNamesOptionsAndExamples) {
   const std::string commission = run("commission --help").out;
   const std::string detect = run("detect --help").out;
+  const std::string check = run("check --help").out;
   const std::string simulate = run("simulate --help").out;
-  for (const std::string& help : {commission, detect, simulate}) {
+  for (const std::string& help : {commission, detect, check, simulate}) {
     for (const std::string option : {"--help", "--out", "--json", "--threads", "--seed", "--quiet", "Examples:\n"}) {
       EXPECT_THAT(help, HasSubstr(option));
     }
@@ -37,12 +39,16 @@ TEST_F(Usage, HelpOfEachCommandNamesOptionsAndExamples) {
                                    "Exit code:", "  wheelwright detect drive.csv"}) {
     EXPECT_THAT(detect, HasSubstr(option));
   }
+  for (const std::string option : {"MODEL", "LOG", "--map", "Exit code:", "  wheelwright check result/model.json"}) {
+    EXPECT_THAT(check, HasSubstr(option));
+  }
   EXPECT_THAT(simulate, AllOf(HasSubstr("SCENARIO"), HasSubstr("  wheelwright simulate ")));
 }
 
 TEST_F(Usage, BadUsageIsTwo) {
-  for (const std::string words : {"", "frobnicate", "commission", "commission x.csv", "commission --robot robot.yaml",
-                                  "detect", "detect --model m.json", "simulate", "commission --out"}) {
+  for (const std::string words :
+       {"", "frobnicate", "commission", "commission x.csv", "commission --robot robot.yaml", "detect",
+        "detect --model m.json", "check", "check m.json", "simulate", "commission --out"}) {
     const Outcome outcome = run(words);
     EXPECT_EQ(outcome.code, 2) << words;
     EXPECT_THAT(outcome.out, IsEmpty()) << words;

@@ -114,6 +114,44 @@ TEST(ModelFile, GivesBackTheDetectorWithFrictionOfTheWorldAxes) {
       scenario_of("commissioning", 60.0, std::string(kDeclared) + ", friction: anisotropic", kSensors));
 }
 
+// What is checked later is what was found: bounds, proofs, facets and premises, bit for bit.
+TEST(ModelFile, GivesBackTheClaimsWithTheirProofs) {
+  const Commissioning result = commissioned(scenario_of("commissioning", 40.0, kDeclared, kSensors));
+  const std::string text = json_text(to_json(result, LogReport{}, "test"));
+  const ModelClaims claims = claims_from_json(parse_json(text, "model.json"), "model.json");
+  const auto expect_bounds = [](const std::vector<PublishedBound>& read, const std::vector<CertifiedBound>& found) {
+    ASSERT_EQ(read.size(), found.size());
+    for (std::size_t j = 0; j < read.size(); ++j) {
+      EXPECT_EQ(read[j].value, found[j].value);
+      std::vector<WeightedRow> rows = found[j].binding;
+      std::erase_if(rows, [](const WeightedRow& row) { return !(row.multiplier > 0.0); });
+      ASSERT_EQ(read[j].proof.size(), rows.size());
+      for (std::size_t i = 0; i < rows.size(); ++i) {
+        EXPECT_EQ(read[j].proof[i].origin, rows[i].row.origin);
+        EXPECT_EQ(read[j].proof[i].multiplier, rows[i].multiplier);
+      }
+    }
+  };
+  expect_bounds(claims.lower, result.feasible.lower);
+  expect_bounds(claims.upper, result.feasible.upper);
+  ASSERT_EQ(claims.facets.size(), result.model.facets.size());
+  for (std::size_t k = 0; k < claims.facets.size(); ++k) {
+    EXPECT_EQ(claims.facets[k].a, result.model.facets[k].a);
+    EXPECT_EQ(claims.facets[k].b, result.model.facets[k].b);
+    EXPECT_EQ(claims.facets[k].origin, result.model.facets[k].origin);
+  }
+  EXPECT_EQ(claims.hull, result.feasible.hull);
+  EXPECT_EQ(claims.prior.sides, prior_box(result.model.robot, result.model.model).bounds);
+  EXPECT_EQ(claims.set, FeasibleSet::Status::nonempty);
+  for (std::size_t i = 0; i < result.noise.size(); ++i) {
+    EXPECT_EQ(claims.errors.output[static_cast<Eigen::Index>(i)], result.noise[i].learning);
+    EXPECT_EQ(claims.origin[i], NoiseOrigin::declared);
+  }
+  EXPECT_EQ(claims.errors.acceleration, result.model.errors.acceleration);
+  EXPECT_EQ(claims.errors.speed, result.model.errors.speed);
+  EXPECT_EQ(claims.rows, result.survey.rows);
+}
+
 class ModelFileErrors : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
