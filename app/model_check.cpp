@@ -324,7 +324,8 @@ void judge_prior(const ModelClaims& claims, ModelCheck& result) {
 }
 
 void tell_premises(const ModelClaims& claims, ModelCheck& result) {
-  result.premises.push_back("the prior box, the filter and the measurement that the model states");
+  result.premises.push_back(
+      "the prior box, the filter, the measurement and the errors of the motion that the model states");
   for (std::size_t i = 0; i < claims.model.n(); ++i) {
     result.premises.push_back(
         fmt::format("an error of at most {:.4g} {} in the filtered effort, {} channel ({})",
@@ -334,10 +335,9 @@ void tell_premises(const ModelClaims& claims, ModelCheck& result) {
                                                               : "estimated from the residuals of this log"));
   }
   if (!claims.dropped.empty()) {
-    result.premises.push_back(fmt::format(
-        "that the {} instants that were left out as outliers (rows {}) are wrong, and no others: this cannot "
-        "be checked",
-        claims.dropped.size(), fmt::join(claims.dropped, ", ")));
+    result.premises.push_back(
+        fmt::format("that the instants left out as outliers (rows {}) are the wrong ones: this cannot be checked",
+                    fmt::join(claims.dropped, ", ")));
   }
 }
 

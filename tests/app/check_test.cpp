@@ -182,9 +182,22 @@ TEST_F(Check, OutliersThatWereLeftOutAreNamedAndProveNothing) {
   commission_shipped();
   const Outcome outcome = changed([](Json& m) { m["feasible_set"]["dropped"] = {4711}; });
   EXPECT_EQ(outcome.code, 0);
-  EXPECT_THAT(outcome.out, AllOf(HasSubstr("given: that the 1 instants"), HasSubstr("4711")));
+  EXPECT_THAT(outcome.out, HasSubstr("given: that the instants left out as outliers (rows 4711)"));
   EXPECT_THAT(failures([](Json& m) { m["feasible_set"]["dropped"] = {proof(m, 0, "lower")[0]["row"]}; }),
               AllOf(HasSubstr("r_mass >= "), HasSubstr("left out as outliers")));
+}
+
+TEST_F(Check, ALogWithAnOutlierIsProvedWithoutIt) {
+  std::vector<std::string> lines = healthy_lines();
+  lines.resize(3001);
+  std::string& last = lines.back();
+  last.replace(last.find(',') + 1, 0, "9");  // the right wheel's angle
+  put_lines("spike.csv", lines);
+  ASSERT_EQ(run("commission spike.csv --robot robot.yaml --outliers 1 --out model --quiet").code, 0);
+  EXPECT_EQ(read_json(path("model/model.json")).at("feasible_set").at("dropped"), Json::array({2999}));
+  const Outcome outcome = run("check model/model.json spike.csv");
+  EXPECT_EQ(outcome.code, 0) << outcome.out;
+  EXPECT_THAT(outcome.out, HasSubstr("given: that the instants left out as outliers (rows 2999)"));
 }
 
 TEST_F(Check, AnotherLogIsNamed) {
