@@ -3,126 +3,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 #include <utility>
 
 #include <fmt/format.h>
 
-#include <wheelwright/bounds/slab_rows.hpp>
 #include <wheelwright/commission/physical.hpp>
-#include <wheelwright/filter/regression_stream.hpp>
+
+#include "rebuilt_rows.hpp"
 
 namespace wheelwright::app {
 namespace {
-
-/// The instants of the log's regression that the claims name.
-RegressionBlock named_instants(const ModelClaims& claims, LogSource& log) {
-  std::set<std::size_t> wanted;
-  const auto want = [&](const RowOrigin& origin) {
-    if (!origin.is_prior) {
-      wanted.insert(origin.sample);
-    }
-  };
-  for (const auto* bounds : {&claims.lower, &claims.upper}) {
-    for (const PublishedBound& bound : *bounds) {
-      std::ranges::for_each(bound.proof, [&](const NamedRow& row) { want(row.origin); });
-    }
-  }
-  std::ranges::for_each(claims.contradiction, [&](const NamedRow& row) { want(row.origin); });
-  std::ranges::for_each(claims.facets, [&](const HalfSpace& facet) { want(facet.origin); });
-
-  RegressionBlock kept, block;
-  kept.resize(wanted.size(), claims.model.n(), claims.model.p());
-  const auto n = static_cast<Eigen::Index>(claims.model.n());
-  std::size_t count = 0;
-  RegressionStream rows(log, RegressorFilter(claims.model, claims.filter, claims.measurement, claims.errors));
-  while (rows.next(block)) {
-    for (std::size_t k = 0; k < block.instants(); ++k) {
-      if (wanted.contains(block.sample[k])) {
-        const auto to = static_cast<Eigen::Index>(count) * n, from = static_cast<Eigen::Index>(k) * n;
-        kept.sample[count] = block.sample[k];
-        kept.t[count++] = block.t[k];
-        kept.Y.middleRows(to, n) = block.Y.middleRows(from, n);
-        kept.dY.middleRows(to, n) = block.dY.middleRows(from, n);
-        kept.y.segment(to, n) = block.y.segment(from, n);
-        kept.dy.segment(to, n) = block.dy.segment(from, n);
-      }
-    }
-  }
-  kept.sample.resize(count);  // fewer than the storage holds where a name is no instant of this log
-  kept.t.resize(count);
-  return kept;
-}
-
-/// The half-spaces behind names, built again from the log.
-class Rebuilt {
- public:
-  Rebuilt(const ModelClaims& claims, LogSource& log) : claims_(claims), instants_(named_instants(claims, log)) {}
-
-  /// Whether a column is noisy and `box` leaves the sign of its parameter open: the rows then depend on the box.
-  [[nodiscard]] bool depends_on(const Box& box) const {
-    const SlabRows slabs(box);
-    const Eigen::Index rows = instants_.rows();
-    for (std::size_t j = 0; j < box.dimension(); ++j) {
-      const auto column = instants_.dY.col(static_cast<Eigen::Index>(j)).head(rows);
-      if (slabs.sign_is_open(j) && (column.array() > 0.0).any()) {
-        return true;
-      }
-    }
-    return false;
-  }
-
-  /// The half-space that holds for every admissible θ of `box`; where there is none, `why` says why.
-  [[nodiscard]] std::optional<HalfSpace> row(const RowOrigin& origin, const Box& box, std::string& why) const {
-    HalfSpace upper, lower;
-    if (origin.is_prior) {
-      const Interval& side = claims_.prior.sides[origin.parameter];
-      const double sign = origin.side == Side::upper ? 1.0 : -1.0;
-      lower.a = sign * Eigen::VectorXd::Unit(static_cast<Eigen::Index>(box.dimension()),
-                                             static_cast<Eigen::Index>(origin.parameter));
-      lower.b = origin.side == Side::upper ? side.upper : -side.lower;
-      lower.origin = origin;
-      return lower;
-    }
-    if (std::ranges::find(claims_.dropped, origin.sample) != claims_.dropped.end()) {
-      why = fmt::format("row {} is one of those that were left out as outliers", origin.sample);
-      return std::nullopt;
-    }
-    const auto it = std::ranges::lower_bound(instants_.sample, origin.sample);
-    if (it == instants_.sample.end() || *it != origin.sample) {
-      why = fmt::format("row {} is no instant of the regression of this log", origin.sample);
-      return std::nullopt;
-    }
-    const auto k = static_cast<std::size_t>(it - instants_.sample.begin());
-    if (instants_.t[k] != origin.t) {
-      why = fmt::format("row {} is at t = {} s in this log, not at {} s", origin.sample, instants_.t[k], origin.t);
-      return std::nullopt;
-    }
-    SlabRows(box).half_spaces(instants_, static_cast<Eigen::Index>(k * instants_.outputs + origin.output), upper,
-                              lower);
-    return origin.side == Side::upper ? upper : lower;
-  }
-
-  /// The rows of a proof; one that cannot be built takes no part, and the first of them is told in `why`.
-  [[nodiscard]] std::vector<WeightedRow> proof(const std::vector<NamedRow>& named, const Box& box,
-                                               std::string& why) const {
-    std::vector<WeightedRow> rows;
-    for (const NamedRow& name : named) {
-      std::string missing;
-      if (auto half_space = row(name.origin, box, missing)) {
-        rows.push_back({*std::move(half_space), name.multiplier});
-      } else {
-        rows.push_back({{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(box.dimension())), 0.0, {}}, 0.0});
-        why = why.empty() ? missing : why;
-      }
-    }
-    return rows;
-  }
-
- private:
-  const ModelClaims& claims_;
-  RegressionBlock instants_;
-};
 
 /// The bounds proved, the boxes over which rows were built, and what could not be built.
 struct Proof {
@@ -132,7 +22,7 @@ struct Proof {
 };
 
 /// Claims over the prior; where rows depend on signs that this proves, again over what was proved.
-Proof prove_bounds(const ModelClaims& claims, const Rebuilt& rebuilt) {
+Proof prove_bounds(const ModelClaims& claims, const RebuiltRows& rebuilt) {
   const std::size_t p = claims.model.p();
   Proof proof;
   Box box = claims.prior;
@@ -238,8 +128,8 @@ void judge_hull(const ModelClaims& claims, const Proof& proof, ModelCheck& resul
 }
 
 /// Whether the facet is the row that it names or follows from it; otherwise a sentence.
-std::string judge_facet(const HalfSpace& facet, const Rebuilt& rebuilt, const Proof& proof, const ModelClaims& claims,
-                        FacetVerdicts& verdicts) {
+std::string judge_facet(const HalfSpace& facet, const RebuiltRows& rebuilt, const Proof& proof,
+                        const ModelClaims& claims, FacetVerdicts& verdicts) {
   const std::span<const double> a(facet.a.data(), static_cast<std::size_t>(facet.a.size()));
   const Box& within = proof.hull.contradiction ? claims.prior : proof.hull.proved;
   std::string why;
@@ -267,7 +157,7 @@ std::string judge_facet(const HalfSpace& facet, const Rebuilt& rebuilt, const Pr
   return why + sign_parts_remark(claims);
 }
 
-void judge_facets(const ModelClaims& claims, const Rebuilt& rebuilt, const Proof& proof, ModelCheck& result) {
+void judge_facets(const ModelClaims& claims, const RebuiltRows& rebuilt, const Proof& proof, ModelCheck& result) {
   for (std::size_t k = 0; k < claims.facets.size(); ++k) {
     if (const std::string why = judge_facet(claims.facets[k], rebuilt, proof, claims, result.facets); !why.empty()) {
       result.facets.wrong.push_back(fmt::format("row {} of feasible_set.A is not proved: {}", k, why));
@@ -276,7 +166,7 @@ void judge_facets(const ModelClaims& claims, const Rebuilt& rebuilt, const Proof
   result.failures.insert(result.failures.end(), result.facets.wrong.begin(), result.facets.wrong.end());
 }
 
-void judge_emptiness(const ModelClaims& claims, const Rebuilt& rebuilt, ModelCheck& result) {
+void judge_emptiness(const ModelClaims& claims, const RebuiltRows& rebuilt, ModelCheck& result) {
   std::string missing;
   const std::vector<WeightedRow> rows = rebuilt.proof(claims.contradiction, claims.prior, missing);
   result.emptiness = check_emptiness(rows, claims.prior);
@@ -354,7 +244,7 @@ ModelCheck check_model(const ModelClaims& claims, LogSource& log, const LogRepor
   ModelCheck result;
   judge_log(claims, data, result);
   judge_prior(claims, result);
-  const Rebuilt rebuilt(claims, log);
+  const RebuiltRows rebuilt(claims, log);
   const Proof proof = prove_bounds(claims, rebuilt);
   judge_bounds(claims, proof, result);
   if (claims.set == FeasibleSet::Status::empty) {
