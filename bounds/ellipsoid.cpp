@@ -4,37 +4,10 @@
 #include <cmath>
 #include <limits>
 
-#include <Eigen/LU>
-
 namespace wheelwright {
 namespace {
 
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
-
-Interval point(double x) { return {x, x}; }
-
-/// An upper bound of |I − W L| in the Frobenius norm; infinite where W is of no use.
-double distortion(const Eigen::MatrixXd& inverse, const Eigen::MatrixXd& shape) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  if (!inverse.allFinite()) {
-    return kInfinity;
-  }
-  double squares = 0.0;
-  for (Eigen::Index i = 0; i < shape.rows(); ++i) {
-    for (Eigen::Index k = 0; k < shape.rows(); ++k) {
-      Interval rest = point(i == k ? 1.0 : 0.0);
-      for (Eigen::Index j = 0; j < shape.rows(); ++j) {
-        rest = rest - point(inverse(i, j)) * point(shape(j, k));
-      }
-      if (!std::isfinite(rest.lower) || !std::isfinite(rest.upper)) {
-        return kInfinity;
-      }
-      const double largest = std::max(std::abs(rest.lower), std::abs(rest.upper));
-      squares = round_up(squares + round_up(largest * largest));
-    }
-  }
-  return round_up(std::sqrt(squares));
-}
 
 }  // namespace
 
@@ -59,8 +32,7 @@ Ellipsoid::Ellipsoid(std::vector<Block> blocks) : blocks_(std::move(blocks)) {
     check::that(block.centre.size() == q && block.shape.rows() == q && block.shape.cols() == q, "ellipsoid",
                 "q entries of centre and q × q of shape");
     check::that(block.centre.allFinite() && block.shape.allFinite(), "ellipsoid", "finite numbers");
-    Membership membership{block.shape.partialPivLu().inverse(), 0.0, Eigen::VectorXd(q)};
-    membership.distortion = distortion(membership.inverse, block.shape);
+    Membership membership{approximate_inverse(block.shape), Eigen::VectorXd(q)};
     for (Eigen::Index k = 0; k < q; ++k) {
       const std::size_t j = block.parameters[static_cast<std::size_t>(k)];
       check::that(j < p && !seen[j], "parameters of an ellipsoid", "0 to p - 1, each once");
@@ -159,23 +131,23 @@ bool Ellipsoid::contains(std::span<const double> theta) const noexcept {
         return false;
       }
     }
-    if (!(membership.distortion < 0.5)) {
+    if (!(membership.shape.defect < 0.5)) {
       continue;
     }
-    // W(θ − c) = (I − R)u with |R| <= distortion, so |W(θ − c)| <= (1 + distortion) |u|; subtracted: its own rounding.
+    // W(θ − c) = (I − R)u with |R| <= defect, so |W(θ − c)| <= (1 + defect) |u|; subtracted: its own rounding.
     const double gamma = 2.0 * (static_cast<double>(q) + 3.0) * kEpsilon;
     double squares = 0.0;
     for (Eigen::Index i = 0; i < q; ++i) {
       double y = 0.0, terms = std::numeric_limits<double>::min();
       for (Eigen::Index k = 0; k < q; ++k) {
-        const double term = membership.inverse(i, k) * offset(k);
+        const double term = membership.shape.inverse(i, k) * offset(k);
         y += term;
         terms += std::abs(term);
       }
       const double certain = std::max(0.0, std::abs(y) - gamma * terms);
       squares += certain * certain;
     }
-    const double limit = 1.0 + membership.distortion;
+    const double limit = 1.0 + membership.shape.defect;
     if (!(squares * (1.0 - gamma) <= limit * limit * (1.0 + gamma))) {
       return false;
     }

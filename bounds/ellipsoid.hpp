@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 
+#include <wheelwright/bounds/approximate_inverse.hpp>
 #include <wheelwright/bounds/parameter_set.hpp>
 #include <wheelwright/bounds/polytope.hpp>
 
@@ -51,8 +52,7 @@ class Ellipsoid {
 
  private:
   struct Membership {
-    Eigen::MatrixXd inverse;    ///< W ≈ shape⁻¹
-    double distortion = 0.0;    ///< |I − W shape| <= distortion
+    ApproximateInverse shape;   ///< of Block::shape
     Eigen::VectorXd half_side;  ///< half-widths of the bounding box, rounded up
   };
   std::vector<Block> blocks_;
@@ -68,22 +68,26 @@ struct OuterEllipsoidOptions {
     trace,   ///< Σ_j (half-width of parameter j / half-width of the polytope's hull)²: does not depend on units
   };
   Criterion criterion = Criterion::volume;
-  double tolerance = 1e-6;  ///< > 0: stops where no slab's optimality condition is violated by more (relative)
-  std::size_t cycles =
-      1000;  ///< most cycles over the slabs; what is found by then is used (and certified) all the same
+  double tolerance = 1e-6;    ///< > 0: stops where no optimality condition is violated by more (relative)
+  std::size_t cycles = 1000;  ///< most cycles over slabs or vertices; what is found by then is certified all the same
+  std::size_t vertex_limit = 32768;  ///< most vertices of a block enumerated for this, where the polytope holds none
 };
 
-/// An ellipsoid (a product of them, one per independent block) that contains the polytope.
+/// An ellipsoid (a product of them, one per independent block) that contains the polytope. Two are built, where they
+/// can be, and the better one by the criterion is kept:
 ///
-/// Every facet i with the support opposite to it gives a slab |a_i·θ − m_i| <= w_i, and for any weights λ >= 0
+/// - Where the vertices of a block are known: the ellipsoid of least volume around them (VertexEllipsoid).
+/// - Every facet i with the support opposite to it gives a slab |a_i·θ − m_i| <= w_i, and for any weights λ >= 0
 ///
-///     E(λ) = { θ : Σ_i λ_i ((a_i·θ − m_i)²/w_i² − 1) <= 0 }
+///       E(λ) = { θ : Σ_i λ_i ((a_i·θ − m_i)²/w_i² − 1) <= 0 }
 ///
-/// contains them all (Schweppe 1968; Fogel and Huang 1982). The weights that minimise the criterion are a convex
-/// problem in λ, solved by cyclic exact minimisation over one λ_i at a time, in closed form. Then inclusion is proved:
-/// the quadratic form of the published centre and shape is enclosed, and the shape scaled until |u| <= 1 holds for
-/// every θ in the slabs. A parallelotope gives √p times its half-widths, a simplex its Löwner ellipsoid. A block of one
-/// parameter is its interval; one that is too flat for doubles gets the ellipsoid of its interval hull.
+///   contains them all (Schweppe 1968; Fogel and Huang 1982). The weights that minimise the criterion are a convex
+///   problem in λ, solved by cyclic exact minimisation over one λ_i at a time, in closed form.
+///
+/// Then inclusion is proved: all vertices, or the quadratic form of the published centre and shape, are enclosed, and
+/// the shape is scaled until |u| <= 1 holds for every θ of the block. A parallelotope gives √p times its half-widths, a
+/// simplex its Löwner ellipsoid. A block of one parameter is its interval; one that is too flat for doubles gets the
+/// ellipsoid of its interval hull.
 [[nodiscard]] Ellipsoid outer_ellipsoid(const Polytope& polytope, const OuterEllipsoidOptions& options = {});
 
 }  // namespace wheelwright

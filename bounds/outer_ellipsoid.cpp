@@ -3,9 +3,11 @@
 #include <optional>
 
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 
 #include <wheelwright/bounds/ellipsoid.hpp>
 #include <wheelwright/bounds/facet_slabs.hpp>
+#include <wheelwright/bounds/vertex_ellipsoid.hpp>
 
 namespace wheelwright {
 namespace {
@@ -230,6 +232,34 @@ class WeightFit {
   double kappa_ = 1.0, trace_ = 0.0;
 };
 
+/// What the criterion makes small, up to a factor: of blocks with the same parameters the smaller is the better.
+double measure(const Ellipsoid::Block& block, const Eigen::VectorXd& half_sides, Criterion criterion) {
+  const Eigen::MatrixXd relative = half_sides.cwiseInverse().asDiagonal() * block.shape;
+  return criterion == Criterion::volume ? std::abs(relative.determinant()) : relative.squaredNorm();
+}
+
+/// The best ellipsoid from slabs; nothing where they are too flat for doubles.
+std::optional<Ellipsoid::Block> around_slabs(const Polytope& polytope, const Polytope::Block& block,
+                                             const Eigen::VectorXd& half_sides, const OuterEllipsoidOptions& options) {
+  for (const double resolution : {64.0, 4096.0, 262144.0}) {
+    const std::vector<FacetSlab> slabs = facet_slabs(polytope, block, resolution);
+    WeightFit fit(slabs, block.coordinates, half_sides);
+    if (!fit.minimise(options)) {
+      continue;
+    }
+    Ellipsoid::Block fitted{block.parameters, block.coordinates.centre + block.coordinates.transform * fit.centre(),
+                            block.coordinates.transform * fit.shape()};
+    Eigen::VectorXd weights = fit.weights();
+    for (std::size_t i = 0; i < slabs.size(); ++i) {
+      weights[static_cast<Eigen::Index>(i)] /= slabs[i].half * slabs[i].half;
+    }
+    if (enclose(slabs, weights, fitted)) {
+      return fitted;
+    }
+  }
+  return std::nullopt;
+}
+
 Ellipsoid::Block around(const Polytope& polytope, const Polytope::Block& block, const OuterEllipsoidOptions& options) {
   const auto q = static_cast<Eigen::Index>(block.parameters.size());
   Ellipsoid::Block result{block.parameters, Eigen::VectorXd(q), Eigen::MatrixXd::Zero(q, q)};
@@ -243,25 +273,24 @@ Ellipsoid::Block around(const Polytope& polytope, const Polytope::Block& block, 
     result.shape(0, 0) = half_sides[0];
     return result;
   }
-  for (const double resolution : {64.0, 4096.0, 262144.0}) {
-    const std::vector<FacetSlab> slabs = facet_slabs(polytope, block, resolution);
-    WeightFit fit(slabs, block.coordinates, half_sides.cwiseMax(1e-140));
-    if (fit.minimise(options)) {
-      Ellipsoid::Block fitted{block.parameters, block.coordinates.centre + block.coordinates.transform * fit.centre(),
-                              block.coordinates.transform * fit.shape()};
-      Eigen::VectorXd weights = fit.weights();
-      for (std::size_t i = 0; i < slabs.size(); ++i) {
-        weights[static_cast<Eigen::Index>(i)] /= slabs[i].half * slabs[i].half;
-      }
-      if (enclose(slabs, weights, fitted)) {
-        return fitted;
+  const Eigen::VectorXd units = half_sides.cwiseMax(1e-140);
+  std::optional<Ellipsoid::Block> best = around_slabs(polytope, block, units, options);
+  const std::optional<VertexSet> vertices =
+      block.vertices ? block.vertices : enumerate_vertices(block.facets, block.coordinates, options.vertex_limit);
+  if (vertices) {
+    if (auto fitted = vertex_ellipsoid(*vertices, block.coordinates, options.tolerance, options.cycles)) {
+      Ellipsoid::Block other{block.parameters, std::move(fitted->centre), std::move(fitted->shape)};
+      if (!best || measure(other, units, options.criterion) < measure(*best, units, options.criterion)) {
+        best = std::move(other);
       }
     }
   }
-  // The ellipsoid of the interval hull: Σ_j ((θ_j − c_j)/half_j)² <= q holds for every θ of the box, and twice the unit
-  // in the last place covers the rounding of √q and of the product.
+  if (best) {
+    return *best;
+  }
+  // The ellipsoid of the interval hull: Σ_j ((θ_j − c_j)/half_j)² <= q holds for every θ of the box.
   for (Eigen::Index k = 0; k < q; ++k) {
-    result.shape(k, k) = round_up(round_up(round_up(std::sqrt(static_cast<double>(q))) * half_sides[k]));
+    result.shape(k, k) = round_up(round_up(std::sqrt(static_cast<double>(q))) * half_sides[k]);
   }
   return result;
 }
