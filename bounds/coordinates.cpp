@@ -2,6 +2,7 @@
 #include <wheelwright/bounds/coordinates.hpp>
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 
 namespace wheelwright {
 
@@ -20,6 +21,17 @@ Coordinates whitened(const Box& box, const Eigen::MatrixXd& information) {
   const std::vector<double> centre = box.centre();
   return {Eigen::Map<const Eigen::VectorXd>(centre.data(), p),
           scale.asDiagonal() * eigen.eigenvectors() * roots.asDiagonal()};
+}
+
+Eigen::VectorXd extent(const Box& box, const Coordinates& coordinates) {
+  const auto p = static_cast<Eigen::Index>(box.dimension());
+  Eigen::VectorXd farthest(p);
+  for (Eigen::Index j = 0; j < p; ++j) {
+    const Interval& side = box.sides[static_cast<std::size_t>(j)];
+    const double centre = coordinates.centre[j];
+    farthest[j] = std::max(std::abs(side.upper - centre), std::abs(side.lower - centre));
+  }
+  return coordinates.transform.inverse().cwiseAbs() * farthest;
 }
 
 }  // namespace wheelwright

@@ -20,4 +20,7 @@ struct Coordinates {
 /// elsewhere.
 [[nodiscard]] Coordinates whitened(const Box& box, const Eigen::MatrixXd& information);
 
+/// Half-widths of a box about the origin of z that contains `box` (to rounding).
+[[nodiscard]] Eigen::VectorXd extent(const Box& box, const Coordinates& coordinates);
+
 }  // namespace wheelwright

@@ -3,45 +3,61 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
-
-#include <Eigen/LU>
+#include <tuple>
 
 #include <wheelwright/bounds/certificate.hpp>
 
 namespace wheelwright {
 namespace {
 
-constexpr double kCut = 1e-10;  // of the size of the set: what cuts less than that is left out
+constexpr double kCut = 1e-10;     // of the size of the set: a facet that cuts less than that is left out
+constexpr double kCorner = 1e-12;  // the same where the interval hull is set
 
 }  // namespace
 
 CuttingPlanes::CuttingPlanes(const Box& box, const Eigen::MatrixXd& information, std::vector<std::size_t> parameters)
-    : box_(box), program_(static_cast<Eigen::Index>(box.dimension())) {
+    : box_(box), corners_(4 * box.dimension()) {
   check_finite(box, "box of cutting planes");
-  const auto p = static_cast<Eigen::Index>(box.dimension());
   coordinates_ = whitened(box, information);
   rows_ = sides_as_rows(box, parameters);
   reduced_size_ = rows_.size();
-  // Half-widths of the box seen from z: |z| = |T⁻¹ (θ − centre)|.
-  Eigen::VectorXd half(p);
-  for (Eigen::Index j = 0; j < p; ++j) {
-    half[j] = 0.5 * box.sides[static_cast<std::size_t>(j)].width();
-  }
-  z_upper_ = coordinates_.transform.inverse().cwiseAbs() * half;
+  z_upper_ = extent(box, coordinates_);
   z_lower_ = -z_upper_;
-  vertices_ = Eigen::MatrixXd::Zero(p, 2 * p);
+  vertices_ = Eigen::MatrixXd::Zero(z_upper_.size(), 4 * z_upper_.size());
   recentre();
 }
 
-bool CuttingPlanes::implied(const Eigen::VectorXd& a, double b) const {
-  const Eigen::Index p = a.size();
-  double reach = 0.0;
-  for (Eigen::Index j = 0; j < p; ++j) {
-    const double g = coordinates_.transform.col(j).dot(a);
-    reach += g > 0.0 ? g * z_upper_[j] : g * z_lower_[j];
+void CuttingPlanes::keep_open(const RowBank& from, RowBank& to) const {
+  std::vector<std::size_t> everyone(from.size());
+  std::iota(everyone.begin(), everyone.end(), std::size_t{0});
+  for (const std::size_t i : open(from, everyone)) {
+    to.add(from.normal(i), from.b[i], from.origins[i]);
   }
-  return reach + a.dot(coordinates_.centre) <= b;
+}
+
+Box CuttingPlanes::outer_box() const {
+  const Eigen::Index p = z_lower_.size();
+  const Eigen::VectorXd half = coordinates_.transform.cwiseAbs() * (0.5 * (z_upper_ - z_lower_));
+  const Eigen::VectorXd centre = coordinates_.centre + coordinates_.transform * (0.5 * (z_upper_ + z_lower_));
+  Box around = box_;
+  for (Eigen::Index j = 0; j < p; ++j) {
+    double low = centre[j] - half[j], high = centre[j] + half[j];
+    if (!corners_[static_cast<std::size_t>(2 * (p + j))].empty() &&
+        !corners_[static_cast<std::size_t>(2 * (p + j) + 1)].empty()) {
+      const auto theta = [&](Eigen::Index k) {
+        return coordinates_.centre[j] + coordinates_.transform.row(j).dot(vertices_.col(k));
+      };
+      high = std::min(high, theta(2 * (p + j)));
+      low = std::max(low, theta(2 * (p + j) + 1));
+    }
+    // The prior side is exact, the other to rounding; a row more that is looked at does no harm.
+    Interval& side = around.sides[static_cast<std::size_t>(j)];
+    side.lower = std::min(std::max(side.lower, low), side.upper);
+    side.upper = std::max(std::min(side.upper, high), side.lower);
+  }
+  return around;
 }
 
 void CuttingPlanes::insert(std::span<const HalfSpace> rows) {
@@ -59,11 +75,13 @@ void CuttingPlanes::insert(std::span<const HalfSpace> rows) {
     a.col(i) = g / norm;
     b[i] = (row.b - row.a.dot(coordinates_.centre)) / norm;
   }
-  program_.add_rows(a, b);
+  program_->add_rows(a, b);
 }
 
 void CuttingPlanes::rebuild() {
-  program_ = LinearProgram(static_cast<Eigen::Index>(box_.dimension()));
+  // The box of the program contains the set with room to spare.
+  const Eigen::VectorXd room = (2.0 * (z_upper_ - z_lower_)).array() + 1.0;
+  program_.emplace(z_lower_ - room, z_upper_ + room);
   norms_.resize(0);
   insert(rows_);
 }
@@ -98,16 +116,22 @@ void CuttingPlanes::recentre() {
 
 void CuttingPlanes::update_box() {
   const Eigen::Index p = z_lower_.size();
-  for (Eigen::Index k = 0; k < 2 * p; ++k) {
-    const Eigen::Index j = k / 2;
+  for (Eigen::Index k = 0; k < 4 * p; ++k) {
+    const Eigen::Index j = k / 2 % p;
     const double sign = k % 2 == 0 ? 1.0 : -1.0;
-    const LpSolution solution = program_.maximise(sign * Eigen::VectorXd::Unit(p, j));
+    Eigen::VectorXd direction = sign * Eigen::VectorXd::Unit(p, j);
+    if (k >= 2 * p) {
+      direction = sign * coordinates_.transform.row(j).transpose();
+    }
+    const LpSolution solution = program_->maximise(direction, corners_[static_cast<std::size_t>(k)]);
     if (solution.status != LpSolution::Status::optimal) {
       continue;
     }
     vertices_.col(k) = solution.x;
-    double& side = sign > 0.0 ? z_upper_[j] : z_lower_[j];
-    side = solution.x[j];
+    if (k < 2 * p) {
+      double& side = sign > 0.0 ? z_upper_[j] : z_lower_[j];
+      side = solution.x[j];
+    }
   }
   for (Eigen::Index j = 0; j < p; ++j) {
     if (z_lower_[j] > z_upper_[j]) {
@@ -118,7 +142,7 @@ void CuttingPlanes::update_box() {
 
 bool CuttingPlanes::resolve_infeasibility(std::size_t first_new) {
   const auto p = static_cast<Eigen::Index>(box_.dimension());
-  const LpSolution probe = program_.maximise(Eigen::VectorXd::Unit(p, 0));
+  const LpSolution probe = program_->maximise(Eigen::VectorXd::Unit(p, 0));
   if (probe.status != LpSolution::Status::infeasible) {
     return false;
   }
@@ -137,87 +161,179 @@ bool CuttingPlanes::resolve_infeasibility(std::size_t first_new) {
   return true;
 }
 
-void CuttingPlanes::add(std::vector<HalfSpace> candidates) {
-  const auto p = static_cast<Eigen::Index>(box_.dimension());
-  if (is_empty() || candidates.empty()) {
-    return;
-  }
-  const auto still_open = [&](const HalfSpace& row) { return !implied(row.a, row.b); };
-  std::vector<HalfSpace> open;
-  for (HalfSpace& row : candidates) {
-    if (row.a.isZero(0.0)) {
-      if (row.b < 0.0) {
-        contradiction_ = std::vector<WeightedRow>{{std::move(row), 1.0}};
-        return;
-      }
-    } else if (still_open(row)) {
-      open.push_back(std::move(row));
-    }
-  }
+struct CuttingPlanes::Whitened {
+  std::vector<double> a, b;          ///< unit normals by columns and offsets, padded
+  std::vector<std::size_t> numbers;  ///< of the candidates
+  std::size_t stride = 0, p = 0;
 
-  // Cutting planes at the 2p vertices that span the box: the most violated row of each joins, until none is violated.
-  bool vertices_known = rows_.size() > static_cast<std::size_t>(2 * p);
-  if (!vertices_known && !open.empty()) {
-    update_box();
-    vertices_known = true;
+  [[nodiscard]] kernels::Rows view() const { return {a.data(), stride, stride, p, b.data()}; }
+  /// The candidate never matters again.
+  void drop(std::size_t i) { b[i] = std::numeric_limits<double>::infinity(); }
+  [[nodiscard]] bool dropped(std::size_t i) const { return b[i] == std::numeric_limits<double>::infinity(); }
+};
+
+std::vector<std::size_t> CuttingPlanes::open(const RowBank& candidates, std::span<const std::size_t> numbers) const {
+  const auto p = static_cast<Eigen::Index>(box_.dimension());
+  std::vector<std::size_t> left;
+  Eigen::VectorXd g(p);
+  const Eigen::VectorXd middle = 0.5 * (z_upper_ + z_lower_), half = 0.5 * (z_upper_ - z_lower_);
+  const Eigen::VectorXd centre = coordinates_.centre + coordinates_.transform * middle;
+  for (const std::size_t i : numbers) {
+    const Eigen::Map<const Eigen::VectorXd> a(candidates.a.data() + static_cast<Eigen::Index>(i) * p, p);
+    double reach = a.dot(centre) - candidates.b[i];
+    for (Eigen::Index j = 0; j < p && reach <= 0.0; ++j) {
+      reach += std::abs(coordinates_.transform.col(j).dot(a)) * half[j];
+    }
+    if (reach > 0.0) {
+      left.push_back(i);
+    }
   }
-  while (!open.empty()) {
-    std::vector<double> worst(static_cast<std::size_t>(2 * p), kCut);
-    std::vector<std::ptrdiff_t> which(static_cast<std::size_t>(2 * p), -1);
-    for (std::size_t i = 0; i < open.size(); ++i) {
-      const Eigen::VectorXd g = coordinates_.transform.transpose() * open[i].a;
-      const double offset = open[i].b - open[i].a.dot(coordinates_.centre), norm = std::max(g.norm(), 1e-300);
-      for (Eigen::Index k = 0; k < 2 * p; ++k) {
-        const double violation = (g.dot(vertices_.col(k)) - offset) / norm;
-        if (violation > worst[static_cast<std::size_t>(k)]) {
-          worst[static_cast<std::size_t>(k)] = violation;
-          which[static_cast<std::size_t>(k)] = static_cast<std::ptrdiff_t>(i);
-        }
+  return left;
+}
+
+CuttingPlanes::Whitened CuttingPlanes::whiten(const RowBank& candidates, std::vector<std::size_t> numbers) const {
+  const auto p = static_cast<Eigen::Index>(box_.dimension());
+  Whitened result;
+  result.p = box_.dimension();
+  result.stride = (numbers.size() + kernels::kLanes - 1) / kernels::kLanes * kernels::kLanes;
+  result.a.assign(result.stride * result.p, 0.0);
+  result.b.assign(result.stride, std::numeric_limits<double>::infinity());
+  Eigen::VectorXd g(p);
+  for (std::size_t k = 0; k < numbers.size(); ++k) {
+    const Eigen::Map<const Eigen::VectorXd> a(candidates.a.data() + static_cast<Eigen::Index>(numbers[k]) * p, p);
+    g.noalias() = coordinates_.transform.transpose() * a;
+    const double norm = std::max(g.norm(), 1e-300);
+    for (Eigen::Index j = 0; j < p; ++j) {
+      result.a[static_cast<std::size_t>(j) * result.stride + k] = g[j] / norm;
+    }
+    result.b[k] = (candidates.b[numbers[k]] - a.dot(coordinates_.centre)) / norm;
+  }
+  result.numbers = std::move(numbers);
+  return result;
+}
+
+std::vector<std::size_t> CuttingPlanes::cut_corners(const RowBank& candidates) {
+  const auto p = static_cast<Eigen::Index>(box_.dimension());
+  std::vector<std::size_t> numbers;
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    const auto normal = candidates.normal(i);
+    if (std::any_of(normal.begin(), normal.end(), [](double x) { return x != 0.0; })) {
+      numbers.push_back(i);
+    } else if (candidates.b[i] < 0.0) {
+      contradiction_ = std::vector<WeightedRow>{{candidates.at(i), 1.0}};
+      return {};
+    }
+  }
+  numbers = open(candidates, numbers);
+  if (numbers.empty()) {
+    return numbers;
+  }
+  if (rows_.size() <= static_cast<std::size_t>(2 * p)) {
+    update_box();
+  }
+  Whitened bank = whiten(candidates, std::move(numbers));
+  while (true) {
+    std::vector<std::size_t> worst;
+    for (Eigen::Index k = 0; k < vertices_.cols(); ++k) {
+      const kernels::Found found = kernels::best().most_violated(bank.view(), vertices_.col(k).data());
+      if (found.value > kCorner) {
+        worst.push_back(found.row);
       }
     }
-    std::sort(which.begin(), which.end(), std::greater<>());
-    which.erase(std::unique(which.begin(), which.end()), which.end());
-    while (!which.empty() && which.back() < 0) {
-      which.pop_back();
-    }
-    if (which.empty()) {
+    std::sort(worst.begin(), worst.end());
+    worst.erase(std::unique(worst.begin(), worst.end()), worst.end());
+    if (worst.empty()) {
       break;
     }
     const std::size_t first_new = rows_.size();
-    for (const std::ptrdiff_t i : which) {
-      rows_.push_back(std::move(open[static_cast<std::size_t>(i)]));
-      open.erase(open.begin() + i);
+    for (const std::size_t i : worst) {
+      rows_.push_back(candidates.at(bank.numbers[i]));
+      bank.drop(i);
     }
     insert(std::span(rows_).subspan(first_new));
-    if (resolve_infeasibility(first_new)) {
-      if (is_empty()) {
-        return;
-      }
+    if (resolve_infeasibility(first_new) && is_empty()) {
+      return {};
     }
     update_box();
     const Eigen::VectorXd half = (0.5 * (z_upper_ - z_lower_)).cwiseMax(resolution());
     if (half.minCoeff() < 0.05) {
       recentre();
+      std::vector<std::size_t> kept;
+      for (std::size_t i = 0; i < bank.numbers.size(); ++i) {
+        if (!bank.dropped(i)) {
+          kept.push_back(bank.numbers[i]);
+        }
+      }
+      bank = whiten(candidates, open(candidates, kept));
     }
-    std::erase_if(open, [&](const HalfSpace& row) { return !still_open(row); });
   }
+  std::vector<std::size_t> left;
+  for (std::size_t i = 0; i < bank.numbers.size(); ++i) {
+    if (!bank.dropped(i)) {
+      left.push_back(bank.numbers[i]);
+    }
+  }
+  return open(candidates, left);
+}
 
-  // What is left may cut between these vertices: one linear program each.
-  bool changed = false;
-  for (HalfSpace& row : open) {
-    const Eigen::VectorXd g = coordinates_.transform.transpose() * row.a;
-    const double offset = row.b - row.a.dot(coordinates_.centre), norm = std::max(g.norm(), 1e-300);
-    const LpSolution solution = program_.maximise(g / norm);
-    if (solution.status == LpSolution::Status::optimal && solution.value <= offset / norm + kCut) {
-      continue;
+std::size_t CuttingPlanes::add_to_hull(const RowBank& candidates) {
+  const std::size_t before = rows_.size();
+  if (!is_empty()) {
+    cut_corners(candidates);
+  }
+  return rows_.size() - before;
+}
+
+Eigen::MatrixXd CuttingPlanes::extreme_points() const {
+  const Eigen::Index p = z_lower_.size();
+  return (coordinates_.transform * vertices_.rightCols(2 * p)).colwise() + coordinates_.centre;
+}
+
+void CuttingPlanes::add(const RowBank& candidates) {
+  if (is_empty()) {
+    return;
+  }
+  std::vector<std::size_t> left = cut_corners(candidates);
+  if (is_empty() || left.empty()) {
+    return;
+  }
+  // Neighbours in time have nearly the same normal, so that one vertex serves many of them.
+  std::stable_sort(left.begin(), left.end(), [&](std::size_t i, std::size_t k) {
+    const RowOrigin &x = candidates.origins[i], &y = candidates.origins[k];
+    return std::tie(x.output, x.side) < std::tie(y.output, y.side);
+  });
+  Whitened bank = whiten(candidates, left);
+  const std::size_t p = bank.p;
+  // A ray from within meets a facet first, where a linear program only finds a row that cuts (Clarkson 1994).
+  const Eigen::VectorXd inner = vertices_.rowwise().mean();
+  std::vector<double> slack(bank.stride), along(bank.stride);
+  kernels::best().slack(bank.view(), inner.data(), slack.data());
+  Eigen::VectorXd g(static_cast<Eigen::Index>(p)), ray(g.size());
+  for (std::size_t i = 0; i < bank.numbers.size(); ++i) {
+    for (std::size_t j = 0; j < p; ++j) {
+      g[static_cast<Eigen::Index>(j)] = bank.a[j * bank.stride + i];
     }
-    rows_.push_back(std::move(row));
-    insert(std::span(rows_).last(1));
-    changed = true;
+    while (!bank.dropped(i)) {
+      const std::optional<double> reached = program_->reach(g.data(), bank.b[i] + 2.0 * kCut);
+      if (reached && *reached <= bank.b[i] + kCut) {
+        bank.drop(i);
+        break;
+      }
+      std::size_t facet = i;
+      if (reached) {
+        ray = Eigen::Map<const Eigen::VectorXd>(program_->vertex(), ray.size()) - inner;
+        const kernels::Found found =
+            kernels::best().first_blocking(bank.view(), slack.data(), ray.data(), 1e-12, along.data());
+        facet = found.value < 1.0 && !bank.dropped(found.row) ? found.row : i;
+      }
+      rows_.push_back(candidates.at(bank.numbers[facet]));
+      insert(std::span(rows_).last(1));
+      bank.drop(facet);
+      slack[facet] = std::numeric_limits<double>::infinity();
+    }
+    slack[i] = std::numeric_limits<double>::infinity();
   }
-  if (changed) {
-    update_box();
-  }
+  update_box();
   if (rows_.size() > 2 * reduced_size_ + 100) {
     reduce();
   }
@@ -230,29 +346,64 @@ void CuttingPlanes::reduce() {
   update_box();
   recentre();
   const auto p = static_cast<Eigen::Index>(box_.dimension());
-  std::vector<char> kept(rows_.size(), 1);
-  // Newest first: where rows coincide, the earliest stays.
-  for (std::size_t i = rows_.size(); i-- > 0;) {
-    const auto row = static_cast<Eigen::Index>(i);
-    const Eigen::VectorXd g = coordinates_.transform.transpose() * rows_[i].a / norms_[row];
-    const double offset = (rows_[i].b - rows_[i].a.dot(coordinates_.centre)) / norms_[row];
-    program_.disable(row);
-    const LpSolution solution = program_.maximise(g);
-    if (solution.status == LpSolution::Status::optimal && solution.value <= offset + kCut) {
-      kept[i] = 0;
-    } else {
-      program_.enable(row);
-    }
+  // Built up anew from nothing but the box of the program, so that every row is tried against facets only.
+  RowBank all;
+  all.parameters = box_.dimension();
+  for (const HalfSpace& row : rows_) {
+    all.add({row.a.data(), all.parameters}, row.b, row.origin);
   }
-  std::vector<HalfSpace> remaining;
-  for (std::size_t i = 0; i < rows_.size(); ++i) {
-    if (kept[i] != 0) {
-      remaining.push_back(std::move(rows_[i]));
+  std::vector<std::size_t> everyone(rows_.size());
+  std::iota(everyone.begin(), everyone.end(), std::size_t{0});
+  Whitened bank = whiten(all, std::move(everyone));
+  const Eigen::VectorXd inner = vertices_.rowwise().mean();
+  std::vector<double> slack(bank.stride), along(bank.stride);
+  kernels::best().slack(bank.view(), inner.data(), slack.data());
+  std::vector<std::size_t> facets;
+  std::vector<char> done(bank.numbers.size(), 0);
+  const auto keep = [&](std::size_t i) {
+    facets.push_back(i);
+    done[i] = 1;
+    Eigen::MatrixXd a(p, 1);
+    for (Eigen::Index j = 0; j < p; ++j) {
+      a(j, 0) = bank.a[static_cast<std::size_t>(j) * bank.stride + i];
     }
+    program_->add_rows(a, Eigen::VectorXd::Constant(1, bank.b[i]));
+    slack[i] = std::numeric_limits<double>::infinity();
+  };
+  const Eigen::VectorXd room = (2.0 * (z_upper_ - z_lower_)).array() + 1.0;
+  program_.emplace(z_lower_ - room, z_upper_ + room);
+  Eigen::VectorXd g(p), ray(p);
+  for (std::size_t i = 0; i < bank.numbers.size(); ++i) {
+    for (Eigen::Index j = 0; j < p; ++j) {
+      g[j] = bank.a[static_cast<std::size_t>(j) * bank.stride + i];
+    }
+    while (done[i] == 0) {
+      const std::optional<double> reached = program_->reach(g.data(), bank.b[i] + 2.0 * kCut);
+      if (reached && *reached <= bank.b[i] + kCut) {
+        break;
+      }
+      std::size_t facet = i;
+      if (reached) {
+        ray = Eigen::Map<const Eigen::VectorXd>(program_->vertex(), p) - inner;
+        const kernels::Found found =
+            kernels::best().first_blocking(bank.view(), slack.data(), ray.data(), 1e-12, along.data());
+        facet = found.value < 1.0 ? found.row : i;
+      }
+      keep(done[facet] == 0 ? facet : i);
+    }
+    done[i] = 1;
+    slack[i] = std::numeric_limits<double>::infinity();
+  }
+  std::sort(facets.begin(), facets.end());
+  std::vector<HalfSpace> remaining;
+  for (const std::size_t i : facets) {
+    remaining.push_back(std::move(rows_[i]));
   }
   rows_ = std::move(remaining);
   reduced_size_ = std::max(rows_.size(), static_cast<std::size_t>(2 * p));
+  std::fill(corners_.begin(), corners_.end(), LinearProgram::Basis{});
   rebuild();
+  update_box();
 }
 
 std::optional<LpSolution> CuttingPlanes::maximise(const Eigen::VectorXd& a) {
@@ -264,7 +415,7 @@ std::optional<LpSolution> CuttingPlanes::maximise(const Eigen::VectorXd& a) {
     zero.x = coordinates_.centre;
     return zero;
   }
-  LpSolution solution = program_.maximise(g / norm);
+  LpSolution solution = program_->maximise(g / norm);
   if (solution.status != LpSolution::Status::optimal) {
     return std::nullopt;
   }

@@ -9,6 +9,7 @@
 
 #include <wheelwright/bounds/infeasibility.hpp>
 #include <wheelwright/bounds/linear_program.hpp>
+#include <wheelwright/bounds/row_bank.hpp>
 
 namespace wheelwright {
 
@@ -30,11 +31,20 @@ class CuttingPlanes {
   /// the sides of the box carry as origins.
   CuttingPlanes(const Box& box, const Eigen::MatrixXd& information, std::vector<std::size_t> parameters = {});
 
-  /// Whether a closed form shows that the half-space does not cut: a box around the set in the whitened coordinates.
-  [[nodiscard]] bool implied(const Eigen::VectorXd& a, double b) const;
+  /// Appends to `to` those of `from` that no closed form shows to be implied: a box around the set in the whitened
+  /// coordinates.
+  void keep_open(const RowBank& from, RowBank& to) const;
+  /// The 2p points θ of the rows held where a parameter is largest or smallest, one per column.
+  [[nodiscard]] Eigen::MatrixXd extreme_points() const;
+  /// A box of θ around the set, to rounding.
+  [[nodiscard]] Box outer_box() const;
 
-  /// Adds those of `candidates` that cut.
-  void add(std::vector<HalfSpace> candidates);
+  /// Adds those of `candidates` that cut: first the rows most violated where one of the z or θ is largest or smallest, until
+  /// none is violated there; then, one linear program each, what cuts between these vertices.
+  void add(const RowBank& candidates);
+  /// Adds only rows that move a vertex where one of the z or θ is largest or smallest, until `candidates` move none:
+  /// enough for the interval hull of the set of `rows` and `candidates`, though not for the set. How many were added.
+  std::size_t add_to_hull(const RowBank& candidates);
   /// Drops every row that the others imply.
   void reduce();
 
@@ -59,10 +69,17 @@ class CuttingPlanes {
   [[nodiscard]] std::pair<std::vector<CertifiedBound>, std::vector<CertifiedBound>> certified_hull();
 
  private:
+  /// Candidates in z, by columns.
+  struct Whitened;
+
   void insert(std::span<const HalfSpace> rows);
   void rebuild();
   void update_box();
   void recentre();
+  [[nodiscard]] Whitened whiten(const RowBank& candidates, std::vector<std::size_t> numbers) const;
+  [[nodiscard]] std::vector<std::size_t> open(const RowBank& candidates, std::span<const std::size_t> numbers) const;
+  /// What add_to_hull() leaves open: numbers of candidates that no closed form shows to be implied.
+  std::vector<std::size_t> cut_corners(const RowBank& candidates);
   /// Half-widths below which an axis of z is as good as flat: a few units in the last place of θ.
   [[nodiscard]] Eigen::VectorXd resolution() const;
   bool resolve_infeasibility(std::size_t first_new);
@@ -71,7 +88,8 @@ class CuttingPlanes {
   Coordinates coordinates_;
   std::vector<HalfSpace> rows_;
   Eigen::VectorXd norms_;
-  LinearProgram program_;
+  std::optional<LinearProgram> program_;
+  std::vector<LinearProgram::Basis> corners_;
   Eigen::VectorXd z_lower_, z_upper_;
   Eigen::MatrixXd vertices_;
   std::size_t reduced_size_;

@@ -34,7 +34,11 @@ std::optional<std::vector<WeightedRow>> elastic_multipliers(std::span<const Half
   b /= scale;
   a.col(m) = -Eigen::VectorXd::Unit(p + 1, p);
   b[m] = 1.0;
-  LinearProgram program(p + 1);
+  // z may leave the box by as much as its sides may be exceeded.
+  Eigen::VectorXd limit(p + 1);
+  limit << extent(box, coordinates) / scale, 0.0;
+  limit.array() += 4.0 + 4.0 * b.cwiseAbs().maxCoeff();
+  LinearProgram program(-limit, limit);
   program.add_rows(a, b);
   const LpSolution solution = program.maximise(-Eigen::VectorXd::Unit(p + 1, p));
   if (solution.status != LpSolution::Status::optimal || !(solution.value < 0.0)) {

@@ -1,185 +1,514 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/bounds/linear_program.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include <Eigen/LU>
-
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wpedantic"
-#include <ClpSimplex.hpp>
-#pragma GCC diagnostic pop
 
 namespace wheelwright {
 namespace {
 
-constexpr double kTolerance = 1e-10;
+constexpr double kFeasible = 1e-12;    // violation of a row that is none
+constexpr double kPriced = 1e-12;      // multiplier that is not negative, for a direction of norm one
+constexpr double kPivot = 1e-10;       // smallest pivot
+constexpr double kGoodPivot = 1e-7;    // below this the inverse is made afresh before it is believed
+constexpr std::size_t kRefactor = 24;  // exchanges after which the inverse is made afresh
+constexpr double kAccurate = 1e-13;    // residual of the basis' equations that needs no fresh inverse
+constexpr double kOnBox = 1e-9;        // multiplier of a side of the box that matters
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
-struct LinearProgram::Engine {
-  explicit Engine(Eigen::Index p) : a(p, 0) {
-    model.setLogLevel(0);
-    model.resize(static_cast<int>(p), 0);
-    model.scaling(0);
-    model.setPerturbation(100);
-    model.setPrimalTolerance(kTolerance);
-    model.setDualTolerance(kTolerance);
-    model.setMaximumIterations(20000);
+LinearProgram::LinearProgram(Eigen::VectorXd lower, Eigen::VectorXd upper)
+    : p_(static_cast<std::size_t>(lower.size())),
+      lower_(lower.data(), lower.data() + lower.size()),
+      upper_(upper.data(), upper.data() + upper.size()),
+      basis_(p_),
+      inverse_(p_ * p_),
+      x_(p_),
+      lambda_(p_),
+      row_(p_),
+      alpha_(p_),
+      direction_(p_) {}
+
+double LinearProgram::coefficient(int row, std::size_t j) const {
+  if (row >= 0) {
+    return a_[j * stride_ + static_cast<std::size_t>(row)];
   }
+  const auto side = static_cast<std::size_t>(-1 - row);
+  return side / 2 != j ? 0.0 : side % 2 == 0 ? -1.0 : 1.0;
+}
 
-  ClpSimplex model;
-  Eigen::MatrixXd a;
-  Eigen::VectorXd b;
-  std::vector<char> enabled;
-  Eigen::Index count = 0;
-  bool columns_changed = true;
-
-  /// Largest violation of the enabled rows at x.
-  double violation(const Eigen::VectorXd& x) const {
-    double worst = 0.0;
-    for (Eigen::Index i = 0; i < count; ++i) {
-      if (enabled[static_cast<std::size_t>(i)] != 0) {
-        worst = std::max(worst, a.col(i).dot(x) - b[i]);
-      }
-    }
-    return worst;
+double LinearProgram::bound(int row) const {
+  if (row >= 0) {
+    return b_[static_cast<std::size_t>(row)];
   }
+  const auto side = static_cast<std::size_t>(-1 - row);
+  return side % 2 == 0 ? -lower_[side / 2] : upper_[side / 2];
+}
 
-  /// The answer of CLP's basis, computed anew: x = A_B⁻¹ b_B and λ = A_B⁻ᵀ c, or CLP's own numbers where the basis
-  /// holds fewer rows than variables.
-  LpSolution answer(const Eigen::VectorXd& c) {
-    const Eigen::Index p = a.rows();
-    std::vector<int> basic;
-    for (int i = 0; i < static_cast<int>(count); ++i) {
-      if (model.getColumnStatus(i) == ClpSimplex::basic) {
-        basic.push_back(i);
-      }
-    }
-    LpSolution result;
-    result.x = Eigen::Map<const Eigen::VectorXd>(model.dualRowSolution(), p);
-    Eigen::VectorXd lambda(static_cast<Eigen::Index>(basic.size()));
-    for (std::size_t k = 0; k < basic.size(); ++k) {
-      lambda[static_cast<Eigen::Index>(k)] = model.primalColumnSolution()[basic[k]];
-    }
-    if (static_cast<Eigen::Index>(basic.size()) == p) {
-      Eigen::MatrixXd columns(p, p);
-      Eigen::VectorXd rhs(p);
-      for (Eigen::Index k = 0; k < p; ++k) {
-        columns.col(k) = a.col(basic[static_cast<std::size_t>(k)]);
-        rhs[k] = b[basic[static_cast<std::size_t>(k)]];
-      }
-      const Eigen::PartialPivLU<Eigen::MatrixXd> lu(columns);
-      Eigen::VectorXd polished = lu.solve(c);
-      polished += lu.solve(c - columns * polished);
-      const Eigen::VectorXd vertex = lu.transpose().solve(rhs);
-      if (polished.allFinite() && (polished - lambda).norm() <= 1e-6 * (1.0 + lambda.norm())) {
-        lambda = polished;
-      }
-      if (vertex.allFinite() && (vertex - result.x).norm() <= 1e-6 * (1.0 + result.x.norm())) {
-        result.x = vertex;
-      }
-    }
-    std::vector<double> positive;
-    for (std::size_t k = 0; k < basic.size(); ++k) {
-      if (lambda[static_cast<Eigen::Index>(k)] > 0.0) {
-        result.rows.push_back(basic[k]);
-        positive.push_back(lambda[static_cast<Eigen::Index>(k)]);
-      }
-    }
-    result.multipliers = Eigen::Map<const Eigen::VectorXd>(positive.data(), static_cast<Eigen::Index>(positive.size()));
-    result.value = c.dot(result.x);
-    result.status = LpSolution::Status::optimal;
-    return result;
-  }
-
-  LpSolution solve(const Eigen::VectorXd& c, bool cold) {
-    if (cold) {
-      model.allSlackBasis();
-    }
-    if (columns_changed) {
-      model.primal(0);
-    } else {
-      model.dual(0);
-    }
-    columns_changed = false;
-    LpSolution result;
-    switch (model.status()) {
-      case 0:
-        result = answer(c);
-        if (!result.x.allFinite() || violation(result.x) > 1e-8 * (1.0 + result.x.norm())) {
-          result.status = LpSolution::Status::failed;
-        }
-        break;
-      case 2: result.status = LpSolution::Status::infeasible; break;
-      default: result.status = LpSolution::Status::failed; break;
-    }
-    return result;
-  }
-};
-
-LinearProgram::LinearProgram(Eigen::Index variables) : engine_(std::make_unique<Engine>(variables)) {}
-LinearProgram::~LinearProgram() = default;
-LinearProgram::LinearProgram(LinearProgram&&) noexcept = default;
-LinearProgram& LinearProgram::operator=(LinearProgram&&) noexcept = default;
-
-Eigen::Index LinearProgram::rows() const { return engine_->count; }
+kernels::Rows LinearProgram::view() const {
+  const std::size_t padded = (count_ + kernels::kLanes - 1) / kernels::kLanes * kernels::kLanes;
+  return {a_.data(), stride_, padded, p_, b_.data()};
+}
 
 void LinearProgram::add_rows(const Eigen::MatrixXd& a_columns, const Eigen::VectorXd& b) {
-  Engine& e = *engine_;
-  const Eigen::Index p = e.a.rows(), added = a_columns.cols();
-  if (added == 0) {
-    return;
+  const auto added = static_cast<std::size_t>(b.size());
+  if (count_ + added > stride_) {
+    const std::size_t wanted = std::max<std::size_t>(2 * stride_, count_ + added);
+    const std::size_t stride = (wanted + kernels::kTile - 1) / kernels::kTile * kernels::kTile;
+    std::vector<double> a(stride * p_, 0.0);
+    for (std::size_t j = 0; j < p_; ++j) {
+      std::copy_n(a_.begin() + static_cast<std::ptrdiff_t>(j * stride_), count_,
+                  a.begin() + static_cast<std::ptrdiff_t>(j * stride));
+    }
+    a_ = std::move(a);
+    b_.resize(stride, kInfinity);
+    slack_.resize(stride);
+    along_.resize(stride);
+    stride_ = stride;
   }
-  if (e.a.cols() < e.count + added) {
-    const Eigen::Index capacity = std::max<Eigen::Index>(2 * e.a.cols(), e.count + added);
-    e.a.conservativeResize(p, capacity);
-    e.b.conservativeResize(capacity);
+  for (std::size_t k = 0; k < added; ++k) {
+    for (std::size_t j = 0; j < p_; ++j) {
+      a_[j * stride_ + count_ + k] = a_columns(static_cast<Eigen::Index>(j), static_cast<Eigen::Index>(k));
+    }
+    b_[count_ + k] = b[static_cast<Eigen::Index>(k)];
   }
-  e.a.middleCols(e.count, added) = a_columns;
-  e.b.segment(e.count, added) = b;
-  e.enabled.resize(static_cast<std::size_t>(e.count + added), 1);
-  e.count += added;
+  count_ += added;
+  settled_ = false;
+}
 
-  std::vector<CoinBigIndex> starts(static_cast<std::size_t>(added) + 1);
-  std::vector<int> indices(static_cast<std::size_t>(added * p));
-  for (Eigen::Index k = 0; k <= added; ++k) {
-    starts[static_cast<std::size_t>(k)] = static_cast<CoinBigIndex>(k * p);
+void LinearProgram::corner(const double* c) {
+  for (std::size_t j = 0; j < p_; ++j) {
+    basis_[j] = -1 - static_cast<int>(2 * j + (c[j] > 0.0 ? 1 : 0));
   }
-  for (Eigen::Index k = 0; k < added * p; ++k) {
-    indices[static_cast<std::size_t>(k)] = static_cast<int>(k % p);
+  factored_ = false;
+}
+
+bool LinearProgram::refactor() {
+  const auto p = static_cast<Eigen::Index>(p_);
+  Eigen::MatrixXd rows(p, p);
+  for (std::size_t r = 0; r < p_; ++r) {
+    for (std::size_t j = 0; j < p_; ++j) {
+      rows(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(j)) = coefficient(basis_[r], j);
+    }
   }
-  const Eigen::MatrixXd packed = a_columns;
-  e.model.addColumns(static_cast<int>(added), nullptr, nullptr, b.data(), starts.data(), indices.data(), packed.data());
-  e.columns_changed = true;
+  Eigen::Map<Eigen::MatrixXd> inverse(inverse_.data(), p, p);
+  inverse = rows.partialPivLu().inverse();
+  // One step of Newton's iteration halves the digits that are missing.
+  inverse += inverse * (Eigen::MatrixXd::Identity(p, p) - rows * inverse);
+  factored_ = inverse.allFinite() && inverse.cwiseAbs().maxCoeff() < 1e13;
+  since_factored_ = 0;
+  return factored_;
+}
+
+void LinearProgram::place() {
+  std::fill(x_.begin(), x_.end(), 0.0);
+  for (std::size_t r = 0; r < p_; ++r) {
+    const double b = bound(basis_[r]);
+    for (std::size_t j = 0; j < p_; ++j) {
+      x_[j] += inverse_[r * p_ + j] * b;
+    }
+  }
+}
+
+void LinearProgram::price(const double* c) {
+  for (std::size_t r = 0; r < p_; ++r) {
+    double sum = 0.0;
+    for (std::size_t j = 0; j < p_; ++j) {
+      sum += inverse_[r * p_ + j] * c[j];
+    }
+    lambda_[r] = sum;
+  }
+}
+
+bool LinearProgram::priced() const {
+  return std::all_of(lambda_.begin(), lambda_.end(), [](double l) { return l >= -kPriced; });
+}
+
+/// Whether vertex and multipliers still satisfy the equations of the basis.
+bool LinearProgram::accurate(const double* c) const {
+  double worst = 0.0;
+  for (std::size_t j = 0; j < p_; ++j) {
+    double rest = c[j];
+    for (std::size_t r = 0; r < p_; ++r) {
+      rest -= lambda_[r] * coefficient(basis_[r], j);
+    }
+    worst = std::max(worst, std::abs(rest));
+  }
+  for (std::size_t r = 0; r < p_; ++r) {
+    double rest = bound(basis_[r]);
+    for (std::size_t j = 0; j < p_; ++j) {
+      rest -= coefficient(basis_[r], j) * x_[j];
+    }
+    worst = std::max(worst, std::abs(rest));
+  }
+  return worst < kAccurate;
+}
+
+bool LinearProgram::inside() {
+  kernels::best().slack(view(), x_.data(), slack_.data());
+  slack_known_ = true;
+  for (std::size_t i = 0; i < count_; ++i) {
+    if (slack_[i] < -1e-11) {
+      return false;
+    }
+  }
+  for (std::size_t j = 0; j < p_; ++j) {
+    if (x_[j] < lower_[j] - kFeasible || x_[j] > upper_[j] + kFeasible) {
+      return false;
+    }
+  }
+  return true;
+}
+
+/// Puts `entering` in the place of basis row `leaving`; alpha = Zᵀ a of the entering row.
+void LinearProgram::exchange(std::size_t leaving, int entering, const double* alpha) {
+  double* edge = inverse_.data() + leaving * p_;
+  const double pivot = 1.0 / alpha[leaving];
+  for (std::size_t j = 0; j < p_; ++j) {
+    edge[j] *= pivot;
+  }
+  for (std::size_t r = 0; r < p_; ++r) {
+    if (r != leaving) {
+      double* other = inverse_.data() + r * p_;
+      for (std::size_t j = 0; j < p_; ++j) {
+        other[j] -= alpha[r] * edge[j];
+      }
+    }
+  }
+  basis_[leaving] = entering;
+  ++since_factored_;
+  ++pivots_;
+}
+
+LinearProgram::Outcome LinearProgram::dual(const double* c) {
+  bool bland = careful_;
+  std::size_t still = 0;
+  slack_known_ = false;
+  for (std::size_t step = 0; step < 400 + 40 * p_; ++step) {
+    if (since_factored_ >= kRefactor) {
+      if (!refactor()) {
+        return Outcome::stuck;
+      }
+      place();
+      price(c);
+    }
+    int entering = 0;
+    double violation = kFeasible;
+    if (count_ > 0) {
+      if (bland) {
+        kernels::best().slack(view(), x_.data(), slack_.data());
+        for (std::size_t i = 0; i < count_; ++i) {
+          if (slack_[i] < -kFeasible) {
+            violation = -slack_[i];
+            entering = static_cast<int>(i);
+            break;
+          }
+        }
+      } else {
+        const kernels::Found worst = kernels::best().most_violated(view(), x_.data());
+        if (worst.value > violation) {
+          violation = worst.value;
+          entering = static_cast<int>(worst.row);
+        }
+      }
+    }
+    for (std::size_t j = 0; j < p_ && !(bland && violation > kFeasible); ++j) {
+      const double below = lower_[j] - x_[j], above = x_[j] - upper_[j];
+      if (std::max(below, above) > violation * (1.0 + 1e-12)) {
+        violation = std::max(below, above);
+        entering = -1 - static_cast<int>(2 * j + (above > below ? 1 : 0));
+      }
+    }
+    if (!(violation > kFeasible)) {
+      return Outcome::optimal;
+    }
+    for (std::size_t j = 0; j < p_; ++j) {
+      row_[j] = coefficient(entering, j);
+    }
+    double least = kInfinity;
+    for (std::size_t r = 0; r < p_; ++r) {
+      double sum = 0.0;
+      for (std::size_t j = 0; j < p_; ++j) {
+        sum += inverse_[r * p_ + j] * row_[j];
+      }
+      alpha_[r] = sum;
+      if (sum > kPivot) {
+        least = std::min(least, std::max(lambda_[r], 0.0) / sum);
+      }
+    }
+    if (least == kInfinity) {
+      if (since_factored_ > 0) {
+        since_factored_ = kRefactor;
+        continue;
+      }
+      return Outcome::infeasible;
+    }
+    std::size_t leaving = p_;
+    const double tie = least * (1.0 + 1e-14) + 1e-14;
+    for (std::size_t r = 0; r < p_; ++r) {
+      if (alpha_[r] > kPivot && std::max(lambda_[r], 0.0) <= tie * alpha_[r] &&
+          (leaving == p_ || (bland ? basis_[r] < basis_[leaving] : alpha_[r] > alpha_[leaving]))) {
+        leaving = r;
+      }
+    }
+    if (alpha_[leaving] < kGoodPivot && since_factored_ > 0) {
+      since_factored_ = kRefactor;
+      continue;
+    }
+    still = least * violation > 1e-15 ? 0 : still + 1;
+    bland = careful_ || still > 10 + 2 * p_;
+    exchange(leaving, entering, alpha_.data());
+    for (std::size_t r = 0; r < p_; ++r) {
+      lambda_[r] = r == leaving ? least : lambda_[r] - least * alpha_[r];
+    }
+    double gap = bound(entering);
+    for (std::size_t j = 0; j < p_; ++j) {
+      gap -= row_[j] * x_[j];
+    }
+    for (std::size_t j = 0; j < p_; ++j) {
+      x_[j] += inverse_[leaving * p_ + j] * gap;
+    }
+  }
+  return Outcome::stuck;
+}
+
+LinearProgram::Outcome LinearProgram::primal(const double* c) {
+  bool bland = careful_;
+  std::size_t still = 0;
+  for (std::size_t step = 0; step < 400 + 40 * p_; ++step) {
+    if (since_factored_ >= kRefactor) {
+      if (!refactor()) {
+        return Outcome::stuck;
+      }
+      place();
+      price(c);
+      kernels::best().slack(view(), x_.data(), slack_.data());
+    }
+    if (enough_ < kInfinity) {
+      double reached = 0.0;
+      for (std::size_t j = 0; j < p_; ++j) {
+        reached += c[j] * x_[j];
+      }
+      if (reached > enough_) {
+        return Outcome::optimal;
+      }
+    }
+    std::size_t leaving = p_;
+    double steepest = -kPriced;
+    for (std::size_t r = 0; r < p_; ++r) {
+      if (lambda_[r] < -kPriced) {
+        double norm = 0.0;
+        for (std::size_t j = 0; j < p_; ++j) {
+          norm += inverse_[r * p_ + j] * inverse_[r * p_ + j];
+        }
+        const double rate = lambda_[r] / std::sqrt(norm);
+        if (leaving == p_ || (bland ? basis_[r] < basis_[leaving] : rate < steepest)) {
+          steepest = rate;
+          leaving = r;
+        }
+      }
+    }
+    if (leaving == p_) {
+      return Outcome::optimal;
+    }
+    for (std::size_t j = 0; j < p_; ++j) {
+      direction_[j] = -inverse_[leaving * p_ + j];
+    }
+    double furthest = kInfinity, pivot = 0.0;
+    int entering = 0;
+    const auto offer = [&](int row, double ratio, double g) {
+      const bool tie = ratio <= furthest + 1e-14 && ratio >= furthest - 1e-14;
+      if (tie ? (bland ? row < entering : g > pivot) : ratio < furthest) {
+        furthest = std::min(furthest, ratio);
+        entering = row;
+        pivot = g;
+      }
+    };
+    if (count_ > 0) {
+      const kernels::Found first =
+          kernels::best().first_blocking(view(), slack_.data(), direction_.data(), kPivot, along_.data());
+      if (first.value < kInfinity) {
+        furthest = first.value;
+        entering = static_cast<int>(first.row);
+        pivot = along_[first.row];
+        if (bland || pivot < kGoodPivot || furthest == 0.0) {
+          for (std::size_t i = 0; i < count_; ++i) {
+            if (along_[i] > kPivot) {
+              offer(static_cast<int>(i), std::max(slack_[i], 0.0) / along_[i], along_[i]);
+            }
+          }
+        }
+      }
+    }
+    for (std::size_t j = 0; j < p_; ++j) {
+      const double d = direction_[j];
+      if (std::abs(d) > kPivot) {
+        const double room = d > 0.0 ? upper_[j] - x_[j] : x_[j] - lower_[j];
+        offer(-1 - static_cast<int>(2 * j + (d > 0.0 ? 1 : 0)), std::max(room, 0.0) / std::abs(d), std::abs(d));
+      }
+    }
+    if (furthest == kInfinity || (pivot < kGoodPivot && since_factored_ > 0)) {
+      if (since_factored_ == 0) {
+        return Outcome::stuck;
+      }
+      since_factored_ = kRefactor;
+      continue;
+    }
+    still = -lambda_[leaving] * furthest > 1e-15 ? 0 : still + 1;
+    bland = careful_ || still > 10 + 2 * p_;
+    for (std::size_t r = 0; r < p_; ++r) {
+      double sum = 0.0;
+      for (std::size_t j = 0; j < p_; ++j) {
+        sum += inverse_[r * p_ + j] * coefficient(entering, j);
+      }
+      alpha_[r] = sum;
+    }
+    if (!(std::abs(alpha_[leaving]) > 0.5 * kPivot)) {
+      return Outcome::stuck;
+    }
+    const double t = lambda_[leaving] / alpha_[leaving];
+    exchange(leaving, entering, alpha_.data());
+    for (std::size_t r = 0; r < p_; ++r) {
+      lambda_[r] = r == leaving ? t : lambda_[r] - t * alpha_[r];
+    }
+    for (std::size_t j = 0; j < p_; ++j) {
+      x_[j] += furthest * direction_[j];
+    }
+    for (std::size_t i = 0; i < count_; ++i) {
+      slack_[i] -= furthest * along_[i];
+    }
+  }
+  return Outcome::stuck;
+}
+
+LinearProgram::Outcome LinearProgram::solve(const double* c) {
+  for (int round = 0; round < 4; ++round) {
+    if (!factored_) {
+      settled_ = false;
+      if (!refactor()) {
+        return Outcome::stuck;
+      }
+    }
+    if (!settled_) {
+      place();
+      slack_known_ = false;
+    }
+    price(c);
+    Outcome outcome = Outcome::stuck;
+    if (priced()) {
+      outcome = settled_ ? Outcome::optimal : dual(c);
+    } else if ((settled_ && slack_known_) || inside()) {
+      outcome = primal(c);
+    }
+    settled_ = outcome == Outcome::optimal;
+    if (outcome != Outcome::optimal || since_factored_ == 0 || accurate(c)) {
+      return outcome;
+    }
+    // What a long walk has rounded is made afresh, and looked at once more.
+    settled_ = false;
+    if (!refactor()) {
+      return Outcome::stuck;
+    }
+  }
+  return Outcome::optimal;
+}
+
+LpSolution LinearProgram::report(const Eigen::VectorXd& c, double norm) {
+  LpSolution result;
+  const auto p = static_cast<Eigen::Index>(p_);
+  result.x = Eigen::Map<const Eigen::VectorXd>(x_.data(), p);
+  result.value = c.dot(result.x);
+  result.status = LpSolution::Status::optimal;
+  std::vector<double> positive;
+  for (std::size_t r = 0; r < p_; ++r) {
+    if (basis_[r] < 0) {
+      if (lambda_[r] > kOnBox) {
+        result.status = LpSolution::Status::failed;
+      }
+    } else if (lambda_[r] > 0.0) {
+      result.rows.push_back(basis_[r]);
+      positive.push_back(lambda_[r] * norm);
+    }
+  }
+  result.multipliers = Eigen::Map<const Eigen::VectorXd>(positive.data(), static_cast<Eigen::Index>(positive.size()));
+  return result;
+}
+
+LinearProgram::Outcome LinearProgram::solve_cold(const double* c) {
+  Outcome outcome = Outcome::stuck;
+  for (const bool careful : {false, true}) {
+    careful_ = careful;
+    corner(c);
+    outcome = solve(c);
+    if (outcome == Outcome::optimal) {
+      break;
+    }
+  }
+  careful_ = false;
+  factored_ = factored_ && outcome == Outcome::optimal;
+  settled_ = settled_ && factored_;
+  return outcome;
+}
+
+std::optional<double> LinearProgram::reach(const double* c, double enough) {
+  Outcome outcome = Outcome::stuck;
+  enough_ = enough;
+  if (factored_) {
+    if (settled_) {
+      price(c);
+    }
+    outcome = settled_ && priced() ? Outcome::optimal : solve(c);
+  }
+  if (outcome != Outcome::optimal) {
+    outcome = solve_cold(c);
+  }
+  enough_ = kInfinity;
+  if (outcome != Outcome::optimal) {
+    return std::nullopt;
+  }
+  double value = 0.0;
+  for (std::size_t j = 0; j < p_; ++j) {
+    value += c[j] * x_[j];
+  }
+  return value;
 }
 
 LpSolution LinearProgram::maximise(const Eigen::VectorXd& c) {
-  Engine& e = *engine_;
-  for (int j = 0; j < static_cast<int>(c.size()); ++j) {
-    e.model.setRowBounds(j, c[j], c[j]);
-  }
-  try {
-    LpSolution result = e.solve(c, false);
-    if (result.status != LpSolution::Status::optimal) {
-      e.columns_changed = true;
-      result = e.solve(c, true);
-    }
-    return result;
-  } catch (...) {
+  Basis last = factored_ ? basis_ : Basis{};
+  return maximise(c, last);
+}
+
+LpSolution LinearProgram::maximise(const Eigen::VectorXd& c, Basis& start) {
+  const double norm = c.norm();
+  if (!(norm > 0.0) || !std::isfinite(norm)) {
     return {};
   }
-}
-
-void LinearProgram::disable(Eigen::Index row) {
-  engine_->enabled[static_cast<std::size_t>(row)] = 0;
-  engine_->model.setColumnUpper(static_cast<int>(row), 0.0);
-}
-
-void LinearProgram::enable(Eigen::Index row) {
-  engine_->enabled[static_cast<std::size_t>(row)] = 1;
-  engine_->model.setColumnUpper(static_cast<int>(row), COIN_DBL_MAX);
+  const Eigen::VectorXd unit = c / norm;
+  const double* direction = unit.data();
+  Outcome outcome = Outcome::stuck;
+  if (!start.empty()) {
+    if (start != basis_ || !factored_) {
+      basis_ = start;
+      factored_ = false;
+    }
+    outcome = solve(direction);
+  }
+  if (outcome != Outcome::optimal) {
+    outcome = solve_cold(direction);
+  }
+  if (outcome != Outcome::optimal) {
+    LpSolution result;
+    result.status = outcome == Outcome::infeasible ? LpSolution::Status::infeasible : LpSolution::Status::failed;
+    return result;
+  }
+  start = basis_;
+  return report(c, norm);
 }
 
 }  // namespace wheelwright

@@ -3,10 +3,14 @@
 /// Small linear programs max c·x subject to A x <= b with many rows and few variables, solved again and again.
 #pragma once
 
-#include <memory>
+#include <cstddef>
+#include <limits>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
+
+#include <wheelwright/bounds/kernels.hpp>
 
 namespace wheelwright {
 
@@ -16,7 +20,7 @@ struct LpSolution {
   enum class Status {
     optimal,     ///< x, value, rows and multipliers hold
     infeasible,  ///< the solver found no x with A x <= b (unproved)
-    failed,      ///< no answer: unbounded, or numerical trouble
+    failed,      ///< no answer: the box of the program was reached, or numerical trouble
   };
   Status status = Status::failed;
   double value = 0.0;           ///< c·x
@@ -25,32 +29,76 @@ struct LpSolution {
   Eigen::VectorXd multipliers;  ///< λ > 0 of these rows: Aᵀλ ≈ c
 };
 
-/// max c·x subject to A x <= b; every solve starts from the basis of the last. Rows should be of norm about one and the
-/// feasible set of size about one: tolerances are absolute (1e-10).
+/// max c·x subject to A x <= b, for few variables (tens at most). Rows should be of norm about one and the feasible set
+/// of size about one: tolerances are absolute (1e-12).
 ///
-/// The engine is CLP on the dual program min b·λ, Aᵀλ = c, λ >= 0, whose basis is only variables × variables.
+/// A vertex is where p rows meet, the basis; its inverse p × p matrix is held. A dual simplex walk starts where the
+/// multipliers are >= 0 (after rows were added), a primal one where the vertex satisfies all rows (after c has turned).
+/// The largest violation or the steepest edge is taken; where that stands still, the smallest number (Bland 1977), which
+/// does not cycle. The variables have a box of their own that must contain the rows' set in its interior: its corner is
+/// where a cold start begins, and an optimum on its sides is reported as `failed`.
 class LinearProgram {
  public:
-  /// A program without rows.
-  explicit LinearProgram(Eigen::Index variables);
-  ~LinearProgram();
-  LinearProgram(LinearProgram&&) noexcept;
-  LinearProgram& operator=(LinearProgram&&) noexcept;
+  /// Rows of a vertex: numbers of rows, or negative ones for sides of the box. Empty: no start known.
+  using Basis = std::vector<int>;
+
+  /// A program without rows on lower <= x <= upper, both finite.
+  LinearProgram(Eigen::VectorXd lower, Eigen::VectorXd upper);
 
   /// Adds rows; column k of `a_columns` (variables × k) is row k of A.
   void add_rows(const Eigen::MatrixXd& a_columns, const Eigen::VectorXd& b);
   /// Number of rows.
-  [[nodiscard]] Eigen::Index rows() const;
-  /// Solves max c·x.
+  [[nodiscard]] Eigen::Index rows() const { return static_cast<Eigen::Index>(count_); }
+  /// The rows, padded, for the loops of kernels.hpp.
+  [[nodiscard]] kernels::Rows view() const;
+
+  /// Solves max c·x, starting from the vertex of the last solve.
   [[nodiscard]] LpSolution maximise(const Eigen::VectorXd& c);
-  /// The row takes no part any more (its number stays).
-  void disable(Eigen::Index row);
-  /// The row takes part again.
-  void enable(Eigen::Index row);
+  /// Solves max c·x, starting from the basis `start` where it is not empty; writes the optimal basis to it.
+  [[nodiscard]] LpSolution maximise(const Eigen::VectorXd& c, Basis& start);
+
+  /// max c·x for a direction of norm one (`c`: as many numbers as variables), starting from the vertex of the last
+  /// solve; the walk may end as soon as c·x exceeds `enough`. Nothing where the program fails. Where the last vertex is
+  /// still the best, this costs p² products; nothing is allocated.
+  [[nodiscard]] std::optional<double> reach(const double* c, double enough);
+  /// The vertex of the last solve, p numbers.
+  [[nodiscard]] const double* vertex() const { return x_.data(); }
+
+  /// Walks made since the beginning: for measurements.
+  [[nodiscard]] std::size_t pivots() const { return pivots_; }
 
  private:
-  struct Engine;
-  std::unique_ptr<Engine> engine_;
+  enum class Outcome { optimal, infeasible, stuck };
+
+  [[nodiscard]] double coefficient(int row, std::size_t j) const;
+  [[nodiscard]] double bound(int row) const;
+  void corner(const double* c);
+  bool refactor();
+  void place();
+  void price(const double* c);
+  void exchange(std::size_t leaving, int entering, const double* alpha);
+  [[nodiscard]] bool priced() const;
+  [[nodiscard]] bool accurate(const double* c) const;
+  [[nodiscard]] bool inside();
+  Outcome dual(const double* c);
+  Outcome primal(const double* c);
+  Outcome solve(const double* c);
+  Outcome solve_cold(const double* c);
+  LpSolution report(const Eigen::VectorXd& c, double norm);
+
+  std::size_t p_;
+  std::vector<double> lower_, upper_;
+  std::vector<double> a_, b_;
+  std::size_t count_ = 0, stride_ = 0;
+  std::vector<int> basis_;
+  std::vector<double> inverse_;  // column r is the edge along which only row r of the basis is left
+  std::vector<double> x_, lambda_, slack_, along_, row_, alpha_, direction_;
+  bool factored_ = false;
+  bool settled_ = false;      // x_ satisfies all rows
+  bool slack_known_ = false;  // slack_ is that of x_
+  bool careful_ = false;
+  double enough_ = std::numeric_limits<double>::infinity();  // for a direction of norm one
+  std::size_t since_factored_ = 0, pivots_ = 0;
 };
 
 }  // namespace wheelwright

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include <wheelwright/bounds/certificate.hpp>
 #include <wheelwright/bounds/infeasibility.hpp>
@@ -39,7 +40,7 @@ Demand demand(const RegressionBlock& block, Eigen::Index row, const Eigen::Vecto
 class Epigraph {
  public:
   Epigraph(const RowSurvey& survey, const Box& prior, const std::vector<double>& weights)
-      : prior_(prior), rows_(prior), weights_(weights), program_(static_cast<Eigen::Index>(prior.dimension()) + 1) {
+      : prior_(prior), rows_(prior), weights_(weights) {
     const auto p = static_cast<Eigen::Index>(prior.dimension());
     coordinates_ = whitened(prior, survey.information);
     const Eigen::MatrixXd& T = coordinates_.transform;
@@ -54,18 +55,19 @@ class Epigraph {
       if (std::isfinite(w)) {
         scale_ = std::max(scale_, demand(sample, r, theta_, w).residual);
         steepest = std::max(steepest, (T.transpose() * sample.Y.row(r).transpose()).norm() / w);
-        size = std::max(size, std::abs(sample.y[r]) / w);
+        size = std::max(size, (std::abs(sample.y[r]) + sample.dy[r]) / w);
       }
     }
     scale_ = std::max({scale_, 1e-13 * size, 1e-200});
     if (steepest > 0.0) {
       coordinates_.transform *= scale_ / steepest;
     }
-    HalfSpace floor{-Eigen::VectorXd::Unit(p + 1, p), 0.0, {}};
-    floor.origin.is_prior = true;
-    floor.origin.parameter = prior.dimension();
-    floor.origin.side = Side::lower;
-    std::vector<HalfSpace> first{floor};
+    Eigen::VectorXd limit(p + 1);
+    limit << 4.0 * extent(prior, coordinates_), 4.0 * size / scale_;
+    limit.array() += 4.0;
+    limit[p] += 4.0 * limit.head(p).sum();
+    program_.emplace(-limit, limit);
+    std::vector<HalfSpace> first;
     for (HalfSpace& side : sides_as_rows(prior)) {
       side.a.conservativeResize(p + 1);
       side.a[p] = 0.0;
@@ -143,7 +145,7 @@ class Epigraph {
 
   bool solve() {
     const Eigen::Index p = theta_.size();
-    const LpSolution solution = program_.maximise(-Eigen::VectorXd::Unit(p + 1, p));
+    const LpSolution solution = program_->maximise(-Eigen::VectorXd::Unit(p + 1, p));
     if (solution.status != LpSolution::Status::optimal) {
       return false;
     }
@@ -173,7 +175,7 @@ class Epigraph {
       norms_.push_back(norm);
       held_.push_back(std::move(row));
     }
-    program_.add_rows(a, b);
+    program_->add_rows(a, b);
   }
 
   void clamp() {
@@ -187,7 +189,7 @@ class Epigraph {
   SlabRows rows_;
   std::vector<double> weights_;
   Coordinates coordinates_;
-  LinearProgram program_;
+  std::optional<LinearProgram> program_;
   std::vector<HalfSpace> held_;
   std::vector<double> norms_;
   std::vector<WeightedRow> active_;

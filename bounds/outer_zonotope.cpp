@@ -4,9 +4,11 @@
 #include <optional>
 
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 
 #include <wheelwright/bounds/ellipsoid.hpp>
 #include <wheelwright/bounds/facet_slabs.hpp>
+#include <wheelwright/bounds/zonogon.hpp>
 #include <wheelwright/bounds/zonotope.hpp>
 
 namespace wheelwright {
@@ -166,6 +168,11 @@ bool enclose(const std::vector<FacetSlab>& slabs, const Eigen::MatrixXd& lambda,
   return block.generators.allFinite() && block.radius.allFinite();
 }
 
+/// The mean width, up to a factor, in the coordinates that make the ellipsoid round.
+double size(const Zonotope::Block& block, const Ellipsoid::Block& round) {
+  return round.shape.partialPivLu().solve(block.generators).colwise().norm().sum();
+}
+
 /// The interval hull of a block as a zonotope.
 Zonotope::Block as_zonotope(std::vector<std::size_t> parameters, const Box& within) {
   const auto q = static_cast<Eigen::Index>(parameters.size());
@@ -225,6 +232,11 @@ Zonotope outer_zonotope(const Polytope& polytope, const OuterZonotopeOptions& op
     for (const double resolution : {64.0, 4096.0, 262144.0}) {
       if (block.parameters.size() > 1 && !best) {
         best = around(facet_slabs(polytope, block, resolution), ellipsoid.blocks()[b], within, options);
+      }
+    }
+    if (auto zonogon = outer_zonogon(polytope, block, ellipsoid.blocks()[b], 2 * options.order)) {
+      if (!best || size(*zonogon, ellipsoid.blocks()[b]) < size(*best, ellipsoid.blocks()[b])) {
+        best = std::move(zonogon);
       }
     }
     blocks.push_back(best ? std::move(*best) : as_zonotope(block.parameters, within));

@@ -48,7 +48,9 @@ void find_chebyshev_centre(Polytope::Block& block, const Eigen::VectorXd& half, 
     a.col(i) << g / norm, (row.a.array() * half.array()).matrix().norm() / norm;
     b[i] = (row.b - row.a.dot(block.coordinates.centre)) / norm;
   }
-  LinearProgram program(p + 1);
+  // The block lies in about [-1, 1] in z, and its ball is smaller than its hull.
+  const Eigen::VectorXd limit = Eigen::VectorXd::Constant(p + 1, 8.0);
+  LinearProgram program(-limit, limit);
   program.add_rows(a, b);
   const LpSolution solution = program.maximise(Eigen::VectorXd::Unit(p + 1, p));
   block.chebyshev_centre = fallback;
@@ -78,7 +80,8 @@ double certified_support(const Polytope::Block& block, const Eigen::VectorXd& a,
     normals.col(i) = g / norms[i];
     b[i] = (row.b - row.a.dot(block.coordinates.centre)) / norms[i];
   }
-  LinearProgram program(a.size());
+  const Eigen::VectorXd limit = Eigen::VectorXd::Constant(a.size(), 8.0);
+  LinearProgram program(-limit, limit);
   program.add_rows(normals, b);
   const LpSolution solution = program.maximise(c / c.norm());
   if (solution.status != LpSolution::Status::optimal) {
@@ -151,19 +154,21 @@ std::variant<Polytope, std::vector<WeightedRow>> Polytope::intersect(const std::
     for (const std::size_t j : parameters) {
       part.sides.push_back(box.sides[j]);
     }
-    std::vector<HalfSpace> own;
+    RowBank own;
+    own.parameters = parameters.size();
     Eigen::MatrixXd information = Eigen::MatrixXd::Zero(q, q);
     for (const HalfSpace& row : rows) {
       if (row.a[static_cast<Eigen::Index>(parameters.front())] != 0.0 || !pick(row.a, parameters).isZero(0.0)) {
-        own.push_back({pick(row.a, parameters), row.b, row.origin});
-        const Eigen::VectorXd scaled = own.back().a.array() / part.support({own.back().a.data(), parameters.size()});
+        const Eigen::VectorXd a = pick(row.a, parameters);
+        own.add({a.data(), parameters.size()}, row.b, row.origin);
+        const Eigen::VectorXd scaled = a.array() / part.support({a.data(), parameters.size()});
         if (scaled.allFinite()) {
           information += scaled * scaled.transpose();
         }
       }
     }
     CuttingPlanes planes(part, information, parameters);
-    planes.add(std::move(own));
+    planes.add(own);
     planes.reduce();
     if (planes.is_empty()) {
       std::vector<WeightedRow> contradiction = planes.contradiction();

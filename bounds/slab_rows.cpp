@@ -44,39 +44,48 @@ SlabRows::SlabRows(const Box& prior) {
 }
 
 void SlabRows::half_spaces(const RegressionBlock& block, Eigen::Index row, HalfSpace& upper, HalfSpace& lower) const {
-  const auto p = static_cast<Eigen::Index>(open_.size());
+  const std::size_t p = open_.size();
   const auto n = static_cast<Eigen::Index>(block.outputs);
   const auto instant = static_cast<std::size_t>(row / n);
-  upper.origin = {false, 0, block.sample[instant], block.t[instant], static_cast<std::size_t>(row % n), Side::upper};
-  lower.origin = upper.origin;
+  const RowOrigin origin{false,      0, block.sample[instant], block.t[instant], static_cast<std::size_t>(row % n),
+                         Side::upper};
+  const auto first = row * static_cast<Eigen::Index>(p);
+  half_spaces({block.Y.data() + first, p}, {block.dY.data() + first, p}, block.y[row], block.dy[row], origin, upper,
+              lower);
+}
+
+void SlabRows::half_spaces(std::span<const double> Y, std::span<const double> dY, double y, double dy,
+                           const RowOrigin& origin, HalfSpace& upper, HalfSpace& lower) const {
+  const auto p = static_cast<Eigen::Index>(open_.size());
+  upper.origin = origin;
+  upper.origin.side = Side::upper;
+  lower.origin = origin;
   lower.origin.side = Side::lower;
   upper.a.resize(p);
   lower.a.resize(p);
-  upper.b = add_up(block.y[row], block.dy[row]);
-  lower.b = add_up(-block.y[row], block.dy[row]);
-  const double* Y = block.Y.data() + row * p;
-  const double* dY = block.dY.data() + row * p;
+  upper.b = add_up(y, dy);
+  lower.b = add_up(-y, dy);
   for (Eigen::Index j = 0; j < p; ++j) {
     const auto k = static_cast<std::size_t>(j);
-    if (dY[j] == 0.0) {
-      upper.a[j] = Y[j];
-      lower.a[j] = -Y[j];
+    if (dY[k] == 0.0) {
+      upper.a[j] = Y[k];
+      lower.a[j] = -Y[k];
     } else if (!open_[k]) {
       // A coefficient is rounded against the sign of θ_j, which makes its half-space larger.
-      upper.a[j] = sign_[k] > 0.0 ? add_down(Y[j], -dY[j]) : add_up(Y[j], dY[j]);
-      lower.a[j] = sign_[k] > 0.0 ? add_down(-Y[j], -dY[j]) : add_up(-Y[j], dY[j]);
+      upper.a[j] = sign_[k] > 0.0 ? add_down(Y[k], -dY[k]) : add_up(Y[k], dY[k]);
+      lower.a[j] = sign_[k] > 0.0 ? add_down(-Y[k], -dY[k]) : add_up(-Y[k], dY[k]);
     } else {
-      const Interval noise{dY[j], dY[j]};
+      const Interval noise{dY[k], dY[k]};
       const Interval shift = noise * slope_[k];
       const double room = (noise * intercept_[k]).upper;
-      const auto place = [&](double y, HalfSpace& half_space) {
-        const Interval coefficient = Interval{y, y} - shift;
+      const auto place = [&](double at, HalfSpace& half_space) {
+        const Interval coefficient = Interval{at, at} - shift;
         half_space.a[j] = coefficient.centre();
         half_space.b = add_up(half_space.b, room);
         half_space.b = add_up(half_space.b, round_up(coefficient.width() * magnitude_[k]));
       };
-      place(Y[j], upper);
-      place(-Y[j], lower);
+      place(Y[k], upper);
+      place(-Y[k], lower);
     }
   }
 }

@@ -3,6 +3,7 @@
 /// From rows of a regression with bounded errors to half-spaces of parameters (theory: errors in variables).
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include <wheelwright/bounds/box.hpp>
@@ -25,6 +26,10 @@ class SlabRows {
 
   /// Writes the half-spaces of row `row` of `block`, which has as many parameters as the box.
   void half_spaces(const RegressionBlock& block, Eigen::Index row, HalfSpace& upper, HalfSpace& lower) const;
+
+  /// The same for a row by itself; `upper.origin` says where it comes from.
+  void half_spaces(std::span<const double> Y, std::span<const double> dY, double y, double dy, const RowOrigin& origin,
+                   HalfSpace& upper, HalfSpace& lower) const;
 
   /// Whether the sign of θ_j is open.
   [[nodiscard]] bool sign_is_open(std::size_t j) const { return open_[j]; }

@@ -61,13 +61,13 @@ class Zonotope {
 
 /// Options of outer_zonotope().
 struct OuterZonotopeOptions {
-  std::size_t order = 4;    ///< most generators of a block, as a multiple of its parameters, >= 1; 1: parallelotopes
-  double tolerance = 1e-6;  ///< > 0: stops where no slab's optimality condition is violated by more (relative)
-  std::size_t cycles =
-      1000;  ///< most cycles over the slabs; what is found by then is used (and certified) all the same
+  std::size_t order = 4;      ///< most generators of a block, as a multiple of its parameters, >= 1; 1: parallelotopes
+  double tolerance = 1e-6;    ///< > 0: stops where no slab's optimality condition is violated by more (relative)
+  std::size_t cycles = 1000;  ///< most cycles over the slabs; what is found by then is certified all the same
 };
 
-/// A zonotope (a product of them, one per independent block) that contains the polytope.
+/// A zonotope (a product of them, one per independent block) that contains the polytope. A block of two parameters gets
+/// the smaller of outer_zonogon() and of what all others get:
 ///
 /// Each facet i with the support opposite to it gives a slab |a_i·θ − m_i| <= w_i, and so does each side of the
 /// interval hull. For any matrix Λ (q × slabs) with Σ_i Λ_i a_iᵀ = I the zonotope Σ_i Λ_i (m_i + w_i ξ_i) contains the block. A
@@ -80,7 +80,8 @@ struct OuterZonotopeOptions {
 /// nothing is boxed. Then Λ is fixed, and the rounding of Σ_i Λ_i a_iᵀ − I and of the centre goes, enclosed, into the
 /// radius.
 ///
-/// A box or a parallelotope is reproduced to rounding. A block that is too flat for doubles gets its interval hull.
+/// A box or a parallelotope is reproduced to rounding. The rule from θ to ξ is linear, so a zonotope of more generators
+/// than parameters is not reproduced but in the plane, and the excess grows with their number. A block that is too flat for doubles gets its interval hull.
 [[nodiscard]] Zonotope outer_zonotope(const Polytope& polytope, const OuterZonotopeOptions& options = {});
 
 }  // namespace wheelwright

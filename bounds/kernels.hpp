@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// The loops over many rows, for the vector units that the processor has.
+///
+/// Every row is computed by the same sequence of operations in its own lane, without fused multiply-add: all variants
+/// give the same digits. Matrices are stored by columns, `stride` apart; the number of rows is a multiple of kLanes,
+/// padded with rows that never matter (a = 0, b = +infinity).
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+namespace wheelwright::kernels {
+
+/// Rows are padded to a multiple of this.
+inline constexpr std::size_t kLanes = 8;
+/// Rows that scan() looks at together; its results are sized for whole tiles.
+inline constexpr std::size_t kTile = 64;
+
+/// Rows a·x <= b by columns: a(i, j) = a[j·stride + i].
+struct Rows {
+  const double* a = nullptr;
+  std::size_t stride = 0;
+  std::size_t m = 0;  ///< rows, padding included
+  std::size_t p = 0;  ///< columns
+  const double* b = nullptr;
+};
+
+/// A row and a number.
+struct Found {
+  std::size_t row = 0;
+  double value = 0.0;
+};
+
+/// Rows |y − Yθ| <= dy + Σ dY|θ|, unpadded.
+struct Slabs {
+  const double* const* Y = nullptr;   ///< p columns
+  const double* const* dY = nullptr;  ///< p columns, or null where all are zero
+  const double* y = nullptr;
+  const double* dy = nullptr;
+  std::size_t n = 0;  ///< rows
+  std::size_t p = 0;
+};
+
+/// One variant of all loops.
+struct Table {
+  const char* name;  ///< "baseline", "avx2" or "avx512"
+  /// out_i = b_i − a_i·x.
+  void (*slack)(const Rows& rows, const double* x, double* out);
+  /// The first row with the largest a_i·x − b_i; value −infinity without rows.
+  Found (*most_violated)(const Rows& rows, const double* x);
+  /// The first row with the smallest slack_i / (a_i·d) among those with a_i·d > pivot, slack taken as >= 0; `along`
+  /// receives a_i·d. value +infinity where there is none.
+  Found (*first_blocking)(const Rows& rows, const double* slack, const double* d, double pivot, double* along);
+  /// Numbers of the rows without |y − Y·centre| + Σ|Y_j| half_j <= floor + dy + Σ dY_j least_j, ascending; how many.
+  /// Rows that hold a NaN are among them. `found` has room for n.
+  std::size_t (*scan)(const Slabs& slabs, const double* centre, const double* half, const double* least, double floor,
+                      std::uint32_t* found);
+  /// Numbers of the rows with |y − Y·x| > dy + Σ dY_j |x_j| for one of the `count` points x (p numbers each, one point
+  /// after the other; p <= 32), ascending; how many. `found` has room for n.
+  std::size_t (*violated)(const Slabs& slabs, const double* points, std::size_t count, std::uint32_t* found);
+};
+
+/// The variants that this processor can run, slowest first; the first is always there.
+[[nodiscard]] std::span<const Table* const> available();
+/// The last of them.
+[[nodiscard]] const Table& best();
+
+}  // namespace wheelwright::kernels
