@@ -386,6 +386,32 @@ TEST(OuterSets, of_an_affinely_regular_polygon_are_its_circumscribed_ellipse) {
   }
 }
 
+// In the plane any zonotope is its own smallest outer zonotope, wherever its centre is.
+TEST(OuterSets, of_a_zonogon_are_itself) {
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    Random random(seed);
+    const Eigen::Vector2d centre = vector(random, 2);
+    Eigen::MatrixXd generators(2, 2 + static_cast<Eigen::Index>(seed) % 5);
+    for (Eigen::Index i = 0; i < generators.cols(); ++i) {
+      generators.col(i) = vector(random, 2);
+    }
+    const Zonotope zonogon(centre, generators);
+    std::vector<HalfSpace> rows;
+    for (Eigen::Index i = 0; i < generators.cols(); ++i) {
+      for (const double sign : {1.0, -1.0}) {
+        const Eigen::VectorXd normal = sign * Eigen::Vector2d(-generators(1, i), generators(0, i));
+        rows.push_back({normal, zonogon.support(span(normal)), {}});
+      }
+    }
+    const Zonotope outer = outer_zonotope(Polytope(rows, testing_rows::cube(2, 50.0)));
+    EXPECT_EQ(outer.generator_count(), static_cast<std::size_t>(generators.cols()));
+    for (int trial = 0; trial < 20; ++trial) {
+      const Eigen::VectorXd a = vector(random, 2);
+      EXPECT_NEAR(outer.support(span(a)), zonogon.support(span(a)), 1e-6 * width(zonogon, span(a))) << seed;
+    }
+  }
+}
+
 double relative_trace(const Ellipsoid& ellipsoid, const Box& hull) {
   double sum = 0.0;
   for (std::size_t j = 0; j < hull.dimension(); ++j) {
