@@ -11,7 +11,8 @@ cd "$(dirname "$0")/.."
 packages="g++ cmake ninja-build pkg-config python3
   libeigen3-dev libfmt-dev libyaml-cpp-dev nlohmann-json3-dev zlib1g-dev libzstd-dev coinor-libclp-dev libboost-dev
   libcli11-dev
-  libgtest-dev libgmock-dev librapidcheck-dev libbenchmark-dev python3-jsonschema"
+  libgtest-dev libgmock-dev librapidcheck-dev libbenchmark-dev python3-jsonschema
+  libglpk-dev libqsopt-ex-dev"
 case "${1:-}" in
   '') ;;
   --ci) packages="$packages clang clang-format clang-tidy" ;;
