@@ -13,7 +13,7 @@ using Points = std::vector<Eigen::Vector2d>;
 
 double cross(const Eigen::Vector2d& x, const Eigen::Vector2d& y) { return x[0] * y[1] - x[1] * y[0]; }
 
-/// Half the edges of conv{ ±(point − centre) }, one of each pair of parallel ones, by ascending angle in [0, π): Andrew's
+/// Half the edges of conv{ ±(point − centre) }, one of each pair of parallel ones, by ascending angle: Andrew's
 /// monotone chain, whose lower half is enough.
 Points half_edges(const Points& points, const Eigen::Vector2d& centre) {
   Points all;
@@ -50,7 +50,7 @@ double length(const Points& edges) {
 Eigen::Vector2d best_centre(const Points& points) {
   Eigen::Vector2d best = Eigen::Vector2d::Zero();
   double least = length(half_edges(points, best));
-  for (double step = 0.25; step > 1e-5;) {
+  for (double step = 0.25; step > 1e-9;) {
     bool moved = false;
     for (const Eigen::Vector2d& direction :
          {Eigen::Vector2d(1, 0), Eigen::Vector2d(-1, 0), Eigen::Vector2d(0, 1), Eigen::Vector2d(0, -1),
@@ -136,7 +136,7 @@ std::optional<Zonotope::Block> outer_zonogon(const Polytope& polytope, const Pol
   }
   const Eigen::Vector2d centre = best_centre(points);
   Points edges = half_edges(points, centre);
-  const double negligible = 1e-9 * length(edges);
+  const double negligible = 1e-8 * length(edges);
   std::erase_if(edges, [&](const Eigen::Vector2d& edge) { return edge.norm() <= negligible; });
   reduce(edges, limit);
 

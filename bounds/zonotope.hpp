@@ -70,18 +70,19 @@ struct OuterZonotopeOptions {
 /// the smaller of outer_zonogon() and of what all others get:
 ///
 /// Each facet i with the support opposite to it gives a slab |a_i·θ − m_i| <= w_i, and so does each side of the
-/// interval hull. For any matrix Λ (q × slabs) with Σ_i Λ_i a_iᵀ = I the zonotope Σ_i Λ_i (m_i + w_i ξ_i) contains the block. A
-/// parallelotope of q slabs that is intersected with the strips of others, in the way of Alamo, Bravo and Camacho 2005,
-/// is one such Λ whatever their λ is; so the best of all Λ is looked for at once: that with the least mean width,
-/// Σ_i w_i |Λ_i| in the coordinates that make the block's outer ellipsoid round, which does not depend on the
-/// coordinates of the parameters. Its columns are Λ_i w_i = s_i M⁻¹a_i/w_i, M = Σ_i s_i a_i a_iᵀ/w_i², where s >= 0
+/// interval hull. For any matrix Λ (q × slabs) with Σ_i Λ_i a_iᵀ = I the zonotope Σ_i Λ_i (m_i + w_i ξ_i) contains the
+/// block. A parallelotope of q slabs that is intersected with the strips of others, in the way of Alamo, Bravo and
+/// Camacho 2005, is one such Λ whatever their λ is; so the best of all Λ is looked for at once: that with the least
+/// mean width, Σ_i w_i |Λ_i| in the coordinates that make the block's outer ellipsoid round, which does not depend on
+/// the coordinates of the parameters. Its columns are Λ_i w_i = s_i M⁻¹a_i/w_i, M = Σ_i s_i a_i a_iᵀ/w_i², where s >= 0
 /// minimises trace M⁻¹ + Σ s: an A-optimal design of experiments (Fedorov 1972), found by exact minimisation over one
-/// s_i at a time. Slabs beyond the most that the order allows are dropped smallest first, and the rest is optimised again:
-/// nothing is boxed. Then Λ is fixed, and the rounding of Σ_i Λ_i a_iᵀ − I and of the centre goes, enclosed, into the
-/// radius.
+/// s_i at a time. Slabs beyond the most that the order allows are dropped smallest first, and the rest is optimised
+/// again: nothing is boxed. Then Λ is fixed, and the rounding of Σ_i Λ_i a_iᵀ − I and of the centre goes, enclosed,
+/// into the radius.
 ///
 /// A box or a parallelotope is reproduced to rounding. The rule from θ to ξ is linear, so a zonotope of more generators
-/// than parameters is not reproduced but in the plane, and the excess grows with their number. A block that is too flat for doubles gets its interval hull.
+/// than parameters is not reproduced but in the plane, and the excess grows with the number of parameters. A block that
+/// is too flat for doubles gets its interval hull.
 [[nodiscard]] Zonotope outer_zonotope(const Polytope& polytope, const OuterZonotopeOptions& options = {});
 
 }  // namespace wheelwright
