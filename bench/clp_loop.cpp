@@ -2,6 +2,13 @@
 #include <algorithm>
 #include <memory>
 
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wpedantic"
+#include <ClpSimplex.hpp>
+#pragma GCC diagnostic pop
+
+#include <wheelwright/core/error.hpp>
+
 #include "clp_columns.hpp"
 #include "lp_pass.hpp"
 #include "lp_peers.hpp"

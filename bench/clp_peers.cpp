@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <memory>
 
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wpedantic"
+#include <ClpSimplex.hpp>
+#pragma GCC diagnostic pop
+
 #include "clp_columns.hpp"
 #include "lp_peers.hpp"
 #include "scaled_rows.hpp"
