@@ -9,32 +9,46 @@ namespace {
 
 constexpr std::size_t tile = 256;  // rows that stay in the first-level cache while all points are tested
 
-/// Writes |c − a·x| of `count` rows to `out` and returns the largest.
-template <std::size_t P>
-double residuals(const double* __restrict a, std::size_t stride, const double* __restrict c, std::size_t count,
-                 const double* __restrict x, double* __restrict out) {
-  double coefficient[P];
-  for (std::size_t j = 0; j < P; ++j) {
-    coefficient[j] = x[j];
+/// Writes |c − a·x| of `count` rows for Q points to `out`, a tile for each, and the largest of each to `largest`. The
+/// points share the loads of a row.
+template <std::size_t P, std::size_t Q>
+void residuals(const double* __restrict a, std::size_t stride, const double* __restrict c, std::size_t count,
+               const double* __restrict x, double* __restrict out, double* __restrict largest) {
+  double coefficient[Q][P];
+  for (std::size_t q = 0; q < Q; ++q) {
+    for (std::size_t j = 0; j < P; ++j) {
+      coefficient[q][j] = x[q * P + j];
+    }
   }
   for (std::size_t i = 0; i < count; ++i) {
-    double rest = c[i];
+    double rest[Q];
+    for (std::size_t q = 0; q < Q; ++q) {
+      rest[q] = c[i];
+    }
     for (std::size_t j = 0; j < P; ++j) {
-      rest -= a[j * stride + i] * coefficient[j];
+      for (std::size_t q = 0; q < Q; ++q) {
+        rest[q] -= a[j * stride + i] * coefficient[q][j];
+      }
     }
-    out[i] = rest < 0.0 ? -rest : rest;
-  }
-  double largest[8] = {};
-  std::size_t i = 0;
-  for (; i + 8 <= count; i += 8) {
-    for (std::size_t k = 0; k < 8; ++k) {
-      largest[k] = out[i + k] > largest[k] ? out[i + k] : largest[k];
+    for (std::size_t q = 0; q < Q; ++q) {
+      out[q * tile + i] = rest[q] < 0.0 ? -rest[q] : rest[q];
     }
   }
-  for (; i < count; ++i) {
-    largest[0] = out[i] > largest[0] ? out[i] : largest[0];
+  for (std::size_t q = 0; q < Q; ++q) {
+    constexpr std::size_t lanes = 16;
+    double best[lanes] = {};
+    const double* from = out + q * tile;
+    std::size_t i = 0;
+    for (; i + lanes <= count; i += lanes) {
+      for (std::size_t k = 0; k < lanes; ++k) {
+        best[k] = from[i + k] > best[k] ? from[i + k] : best[k];
+      }
+    }
+    for (; i < count; ++i) {
+      best[0] = from[i] > best[0] ? from[i] : best[0];
+    }
+    largest[q] = *std::max_element(best, best + lanes);
   }
-  return *std::max_element(largest, largest + 8);
 }
 
 /// Keeps the `most` largest; returns the smallest amount that still counts.
@@ -51,21 +65,29 @@ void pass(const double* a, const double* c, std::size_t n, std::span<const doubl
           double tolerance, std::vector<std::vector<Violation>>& found) {
   const std::size_t count = points.size() / P;
   found.assign(count, {});
-  std::vector<double> least(count, tolerance), rest(tile);
+  std::vector<double> least(count, tolerance), rest(4 * tile), largest(4);
   for (std::size_t begin = 0; begin < n; begin += tile) {
     const std::size_t rows = std::min(tile, n - begin);
-    for (std::size_t v = 0; v < count; ++v) {
-      const double largest = residuals<P>(a + begin, n, c + begin, rows, points.data() + v * P, rest.data());
-      if (!(largest - 1.0 > least[v])) {
-        continue;
+    std::size_t together = 0;
+    for (std::size_t first = 0; first < count; first += together) {
+      const double* x = points.data() + first * P;
+      if (count - first >= 4) {
+        together = 4;
+        residuals<P, 4>(a + begin, n, c + begin, rows, x, rest.data(), largest.data());
+      } else {
+        together = 1;
+        residuals<P, 1>(a + begin, n, c + begin, rows, x, rest.data(), largest.data());
       }
-      for (std::size_t i = 0; i < rows; ++i) {
-        if (rest[i] - 1.0 > least[v]) {
-          found[v].push_back({begin + i, rest[i] - 1.0});
+      for (std::size_t q = 0; q < together; ++q) {
+        const std::size_t v = first + q;
+        for (std::size_t i = 0; i < rows && largest[q] - 1.0 > least[v]; ++i) {
+          if (rest[q * tile + i] - 1.0 > least[v]) {
+            found[v].push_back({begin + i, rest[q * tile + i] - 1.0});
+          }
         }
-      }
-      if (found[v].size() >= 4 * most) {
-        least[v] = prune(found[v], most);
+        if (found[v].size() >= 4 * most) {
+          least[v] = prune(found[v], most);
+        }
       }
     }
   }

@@ -42,9 +42,10 @@ enum class GlpkForm {
 /// The same by GLPK, with Harris' ratio test.
 [[nodiscard]] HullPeer glpk_hull(const DriveRows& rows, GlpkForm form);
 
-/// Options of clp_loop(), at their fastest for N = 1e6, p = 8 (0.3 to 3 times either changes the time by half at most).
+/// Options of clp_loop(), at their fastest for N = 1e6, p = 8 (half or twice of either changes the time by a third at
+/// most).
 struct LoopOptions {
-  std::size_t sample = 1000;     ///< rows of the first working set, evenly spaced
+  std::size_t sample = 500;      ///< rows of the first working set, evenly spaced
   std::size_t join = 100;        ///< most rows that join in a pass, per vertex
   double tolerance = 1e-9;       ///< of dy: a row that is violated by less does not count
   std::size_t pass_limit = 200;  ///< then it throws

@@ -122,10 +122,10 @@ void check_peers() {
 }
 
 void read_bare(const DriveRows& rows) {
-  double sum = 0.0;
-  for (const double value : rows.columns) sum += value;
-  for (const double value : rows.y) sum += value;
-  keep(sum);
+  const auto sum = [](const std::vector<double>& x) {
+    return Eigen::Map<const Eigen::VectorXd>(x.data(), static_cast<Eigen::Index>(x.size())).sum();
+  };
+  keep(sum(rows.columns) + sum(rows.y));
 }
 
 std::vector<Measurement> peers() {
