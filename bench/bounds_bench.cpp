@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Feasible set and minimax fit against a bare read of the same rows and against CLP on all rows at once.
+// Feasible set and minimax fit of a source that is walked block by block, against a bare read of the same rows.
 #include <cmath>
 #include <random>
 #include <vector>
@@ -7,7 +7,6 @@
 #include <fmt/format.h>
 
 #include <wheelwright/bounds/feasible_set.hpp>
-#include <wheelwright/bounds/linear_program.hpp>
 #include <wheelwright/bounds/minimax.hpp>
 
 #include "bench.hpp"
@@ -55,22 +54,6 @@ void read_bare(RegressionTable& table) {
   keep(block.Y.sum() + block.dY.sum() + block.y.sum() + block.dy.sum());
 }
 
-/// The 2p hull programs by CLP (dual form, warm starts) with every row in the program.
-void hull_by_clp(const RegressionBlock& block) {
-  const auto p = static_cast<Eigen::Index>(block.parameters);
-  const Eigen::Index m = block.rows();
-  Eigen::MatrixXd a(p, 2 * m + 2 * p);
-  Eigen::VectorXd b(2 * m + 2 * p);
-  a << block.Y.transpose(), -block.Y.transpose(), Eigen::MatrixXd::Identity(p, p), -Eigen::MatrixXd::Identity(p, p);
-  b << block.y + block.dy, block.dy - block.y, Eigen::VectorXd::Constant(p, 100.0), Eigen::VectorXd::Zero(p);
-  LinearProgram program(p);
-  program.add_rows(a, b);
-  for (Eigen::Index j = 0; j < p; ++j) {
-    keep(program.maximise(Eigen::VectorXd::Unit(p, j)).value);
-    keep(program.maximise(-Eigen::VectorXd::Unit(p, j)).value);
-  }
-}
-
 std::vector<Measurement> sets() {
   std::vector<Measurement> result;
   const auto measure = [&](const char* name, RegressionTable& table, const char* peer, const auto& ours,
@@ -84,20 +67,15 @@ std::vector<Measurement> sets() {
     RegressionTable table = rows_of(1000000, 2, 4, true);
     const auto bare = [&] { read_bare(table); };
     measure(
-        "bounds/feasible set", table, "bare read", [&] { keep(feasible_set(table, positive(4)).hull); }, bare, 3);
+        "bounds/source/feasible set", table, "bare read", [&] { keep(feasible_set(table, positive(4)).hull); }, bare,
+        3);
     measure(
-        "bounds/minimax", table, "bare read", [&] { keep(minimax_fit(table, positive(4)).upper); }, bare, 3);
-  }
-  {
-    RegressionTable table = rows_of(20000, 1, 8, false);
-    measure(
-        "bounds/hull", table, "clp, all rows", [&] { keep(feasible_set(table, positive(8)).hull); },
-        [&] { hull_by_clp(table.block()); }, 3);
+        "bounds/source/minimax", table, "bare read", [&] { keep(minimax_fit(table, positive(4)).upper); }, bare, 3);
   }
   return result;
 }
 
-const bool registered = register_bench("bounds", sets);
+const bool registered = register_bench("bounds/source", sets);
 
 }  // namespace
 }  // namespace wheelwright::bench

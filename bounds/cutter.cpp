@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <thread>
+#include <tuple>
 
 namespace wheelwright {
 namespace {
@@ -95,6 +96,7 @@ Cutter::Cutter(const Box& prior, const std::vector<std::vector<std::size_t>>& bl
 void Cutter::look(Part& part) const {
   const Box around = part.planes->outer_box();
   part.corners = part.planes->extreme_points();
+  std::tie(part.oblique_half, part.oblique_centre) = part.planes->oblique_box();
   part.centre.clear();
   part.half.clear();
   part.least.clear();
@@ -151,9 +153,12 @@ std::span<const std::uint32_t> Cutter::search(const Part& part, const SlabColumn
   }
   const kernels::Slabs slabs{Y.data(), dY.empty() ? nullptr : dY.data(), rows.y, rows.dy, rows.n, Y.size()};
   const kernels::Table& loops = kernels::best();
+  const kernels::Oblique oblique{part.oblique_centre.data(), part.oblique_half.data(),
+                                 part.planes->coordinates().transform.data()};
   const std::size_t count = split(slabs, options_.threads, found_, [&](const kernels::Slabs& own, std::uint32_t* to) {
-    return corners ? loops.violated(own, part.corners.data(), static_cast<std::size_t>(part.corners.cols()), to)
-                   : loops.scan(own, part.centre.data(), part.half.data(), part.least.data(), 0.0, to);
+    return corners
+               ? loops.violated(own, part.corners.data(), static_cast<std::size_t>(part.corners.cols()), to)
+               : loops.scan(own, part.centre.data(), part.half.data(), part.least.data(), &oblique, 0.0, to, nullptr);
   });
   return {found_.data(), count};
 }

@@ -65,10 +65,11 @@ class Cutter {
     std::vector<std::size_t> parameters;
     std::optional<CuttingPlanes> planes;
     RowBank fresh, kept;
-    std::vector<double> centre, half, least;  // a box around the set held, and the smallest |θ| in it
-    Eigen::MatrixXd corners;                  // where a parameter is largest or smallest
-    SlabStore aside;                          // without facets: rows that the box does not imply
-    std::size_t settled = 0;                  // how many of them there were when the corners satisfied them all
+    std::vector<double> centre, half, least;       // a box around the set held, and the smallest |θ| in it
+    Eigen::VectorXd oblique_half, oblique_centre;  // a box in the coordinates of `planes`
+    Eigen::MatrixXd corners;                       // where a parameter is largest or smallest
+    SlabStore aside;                               // without facets: rows that the box does not imply
+    std::size_t settled = 0;                       // how many of them there were when the corners satisfied them all
   };
 
   void look(Part& part) const;

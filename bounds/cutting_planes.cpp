@@ -12,7 +12,7 @@
 namespace wheelwright {
 namespace {
 
-constexpr double kCut = 1e-10;     // of the size of the set: a facet that cuts less than that is left out
+constexpr double kCut = 1e-11;     // of the size of the set: a facet that cuts less than that is left out
 constexpr double kCorner = 1e-12;  // the same where the interval hull is set
 
 }  // namespace
@@ -35,6 +35,10 @@ void CuttingPlanes::keep_open(const RowBank& from, RowBank& to) const {
   for (const std::size_t i : open(from, everyone)) {
     to.add(from.normal(i), from.b[i], from.origins[i]);
   }
+}
+
+std::pair<Eigen::VectorXd, Eigen::VectorXd> CuttingPlanes::oblique_box() const {
+  return {0.5 * (z_upper_ - z_lower_), coordinates_.centre + coordinates_.transform * (0.5 * (z_upper_ + z_lower_))};
 }
 
 Box CuttingPlanes::outer_box() const {
@@ -114,9 +118,10 @@ void CuttingPlanes::recentre() {
   rebuild();
 }
 
-void CuttingPlanes::update_box() {
+/// Solves for the corners along θ, and (`oblique`) for those along z, which set the box of z.
+void CuttingPlanes::update_box(bool oblique) {
   const Eigen::Index p = z_lower_.size();
-  for (Eigen::Index k = 0; k < 4 * p; ++k) {
+  for (Eigen::Index k = oblique ? 0 : 2 * p; k < 4 * p; ++k) {
     const Eigen::Index j = k / 2 % p;
     const double sign = k % 2 == 0 ? 1.0 : -1.0;
     Eigen::VectorXd direction = sign * Eigen::VectorXd::Unit(p, j);
@@ -212,7 +217,7 @@ CuttingPlanes::Whitened CuttingPlanes::whiten(const RowBank& candidates, std::ve
   return result;
 }
 
-std::vector<std::size_t> CuttingPlanes::cut_corners(const RowBank& candidates) {
+std::vector<std::size_t> CuttingPlanes::cut_corners(const RowBank& candidates, bool hull_only) {
   const auto p = static_cast<Eigen::Index>(box_.dimension());
   std::vector<std::size_t> numbers;
   for (std::size_t i = 0; i < candidates.size(); ++i) {
@@ -232,9 +237,11 @@ std::vector<std::size_t> CuttingPlanes::cut_corners(const RowBank& candidates) {
     update_box();
   }
   Whitened bank = whiten(candidates, std::move(numbers));
-  while (true) {
+  // The box of z is needed now and then only where no facets are looked for.
+  bool stale = false;
+  for (int round = 1;; ++round) {
     std::vector<std::size_t> worst;
-    for (Eigen::Index k = 0; k < vertices_.cols(); ++k) {
+    for (Eigen::Index k = hull_only ? 2 * p : 0; k < vertices_.cols(); ++k) {
       const kernels::Found found = kernels::best().most_violated(bank.view(), vertices_.col(k).data());
       if (found.value > kCorner) {
         worst.push_back(found.row);
@@ -254,7 +261,8 @@ std::vector<std::size_t> CuttingPlanes::cut_corners(const RowBank& candidates) {
     if (resolve_infeasibility(first_new) && is_empty()) {
       return {};
     }
-    update_box();
+    stale = hull_only && round % 4 != 0;
+    update_box(!stale);
     const Eigen::VectorXd half = (0.5 * (z_upper_ - z_lower_)).cwiseMax(resolution());
     if (half.minCoeff() < 0.05) {
       recentre();
@@ -266,6 +274,9 @@ std::vector<std::size_t> CuttingPlanes::cut_corners(const RowBank& candidates) {
       }
       bank = whiten(candidates, open(candidates, kept));
     }
+  }
+  if (stale) {
+    update_box();
   }
   std::vector<std::size_t> left;
   for (std::size_t i = 0; i < bank.numbers.size(); ++i) {
@@ -279,7 +290,7 @@ std::vector<std::size_t> CuttingPlanes::cut_corners(const RowBank& candidates) {
 std::size_t CuttingPlanes::add_to_hull(const RowBank& candidates) {
   const std::size_t before = rows_.size();
   if (!is_empty()) {
-    cut_corners(candidates);
+    cut_corners(candidates, true);
   }
   return rows_.size() - before;
 }
@@ -293,7 +304,7 @@ void CuttingPlanes::add(const RowBank& candidates) {
   if (is_empty()) {
     return;
   }
-  std::vector<std::size_t> left = cut_corners(candidates);
+  std::vector<std::size_t> left = cut_corners(candidates, false);
   if (is_empty() || left.empty()) {
     return;
   }

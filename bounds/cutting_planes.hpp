@@ -36,6 +36,8 @@ class CuttingPlanes {
   void keep_open(const RowBank& from, RowBank& to) const;
   /// The 2p points θ of the rows held where a parameter is largest or smallest, one per column.
   [[nodiscard]] Eigen::MatrixXd extreme_points() const;
+  /// The box of z that contains the set, to rounding: half-widths, and the θ of its middle.
+  [[nodiscard]] std::pair<Eigen::VectorXd, Eigen::VectorXd> oblique_box() const;
   /// A box of θ around the set, to rounding.
   [[nodiscard]] Box outer_box() const;
 
@@ -74,12 +76,12 @@ class CuttingPlanes {
 
   void insert(std::span<const HalfSpace> rows);
   void rebuild();
-  void update_box();
+  void update_box(bool oblique = true);
   void recentre();
   [[nodiscard]] Whitened whiten(const RowBank& candidates, std::vector<std::size_t> numbers) const;
   [[nodiscard]] std::vector<std::size_t> open(const RowBank& candidates, std::span<const std::size_t> numbers) const;
   /// What add_to_hull() leaves open: numbers of candidates that no closed form shows to be implied.
-  std::vector<std::size_t> cut_corners(const RowBank& candidates);
+  std::vector<std::size_t> cut_corners(const RowBank& candidates, bool hull_only);
   /// Half-widths below which an axis of z is as good as flat: a few units in the last place of θ.
   [[nodiscard]] Eigen::VectorXd resolution() const;
   bool resolve_infeasibility(std::size_t first_new);

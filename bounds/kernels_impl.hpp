@@ -36,6 +36,13 @@ struct Loops {
   }
   static void store(double* to, Vector v) { __builtin_memcpy(to, &v, sizeof v); }
   static Vector all(double x) { return x - Vector{}; }
+  static bool any(Mask mask) {
+    bool found = false;
+    for (int k = 0; k < W; ++k) {
+      found = found || mask[k] != 0;
+    }
+    return found;
+  }
   static Vector magnitude(Vector v) { return v < 0.0 ? -v : v; }
 
   static constexpr double kInfinity = __builtin_huge_val();
@@ -96,11 +103,8 @@ struct Loops {
         // Divisions only where a row can be nearer than all before: not (slack >= limit·g).
         nearer |= (g > pivot) & ~(load(slack + first + i) >= limit * g);
       }
-      bool any = false;
-      for (int k = 0; k < W; ++k) {
-        any = any || nearer[k] != 0;
-      }
-      for (std::size_t i = first; any && i < first + count; ++i) {
+      const bool wanted = any(nearer);
+      for (std::size_t i = first; wanted && i < first + count; ++i) {
         if (along[i] > pivot && !(slack[i] >= first_row.value * along[i])) {
           const double ratio = slack[i] > 0.0 ? slack[i] / along[i] : 0.0;
           if (ratio < first_row.value) {
@@ -126,10 +130,64 @@ struct Loops {
     return (residual < 0.0 ? -residual : residual) + reach - allowed;
   }
 
+  static double peak(const double* column, std::size_t n, double least) {
+    Vector largest = all(least);
+    std::size_t i = 0;
+    for (; i + W <= n; i += W) {
+      const Vector v = magnitude(load(column + i));
+      largest = v > largest ? v : largest;
+    }
+    for (int k = 0; k < W; ++k) {
+      least = largest[k] > least ? largest[k] : least;
+    }
+    for (; i < n; ++i) {
+      const double v = column[i] < 0.0 ? -column[i] : column[i];
+      least = v > least ? v : least;
+    }
+    return least;
+  }
+
+  /// Rows i … i + W − 1: |y − Y·c| + Σ|(YT)_k| half_k.
+  static Vector oblique_reach(const Slabs& slabs, std::size_t i, const Oblique& box) {
+    const std::size_t p = slabs.p;
+    Vector residual = load(slabs.y + i), reach{};
+    for (std::size_t j = 0; j < p; ++j) {
+      residual -= load(slabs.Y[j] + i) * box.centre[j];
+    }
+    for (std::size_t k = 0; k < p; ++k) {
+      const double* column = box.transform + k * p;
+      Vector g = load(slabs.Y[0] + i) * column[0];
+      for (std::size_t j = 1; j < p; ++j) {
+        g += load(slabs.Y[j] + i) * column[j];
+      }
+      reach += magnitude(g) * box.half[k];
+    }
+    return magnitude(residual) + reach;
+  }
+
+  static double oblique_reach_of_one(const Slabs& slabs, std::size_t i, const Oblique& box) {
+    double residual = slabs.y[i], reach = 0.0;
+    for (std::size_t j = 0; j < slabs.p; ++j) {
+      residual -= slabs.Y[j][i] * box.centre[j];
+    }
+    for (std::size_t k = 0; k < slabs.p; ++k) {
+      double g = slabs.Y[0][i] * box.transform[k * slabs.p];
+      for (std::size_t j = 1; j < slabs.p; ++j) {
+        g += slabs.Y[j][i] * box.transform[k * slabs.p + j];
+      }
+      reach += (g < 0.0 ? -g : g) * box.half[k];
+    }
+    return (residual < 0.0 ? -residual : residual) + reach;
+  }
+
   static std::size_t scan(const Slabs& slabs, const double* centre, const double* half, const double* least,
-                          double floor, std::uint32_t* found) {
+                          const Oblique* oblique, double floor, std::uint32_t* found, double* peaks) {
     std::size_t count = 0, first = 0;
-    double values[kTile];
+    if (peaks != nullptr) {
+      for (std::size_t j = 0; j <= slabs.p; ++j) {
+        peaks[j] = peak(j < slabs.p ? slabs.Y[j] : slabs.y, slabs.n, peaks[j]);
+      }
+    }
     for (; first + kTile <= slabs.n; first += kTile) {
       Vector residual[kVectors], reach[kVectors];
       for (std::size_t k = 0; k < kVectors; ++k) {
@@ -145,27 +203,34 @@ struct Loops {
           reach[k] += magnitude(Y) * h;
         }
       }
-      Mask flagged{};
       for (std::size_t k = 0; k < kVectors; ++k) {
         Vector allowed = load(slabs.dy + first + k * W);
         for (std::size_t j = 0; slabs.dY != nullptr && j < slabs.p; ++j) {
           allowed += load(slabs.dY[j] + first + k * W) * least[j];
         }
         const Vector e = magnitude(residual[k]) + reach[k] - allowed;
-        store(values + k * W, e);
-        flagged |= ~(e <= floor);
-      }
-      bool any = false;
-      for (int k = 0; k < W; ++k) {
-        any = any || flagged[k] != 0;
-      }
-      for (std::size_t i = 0; any && i < kTile; ++i) {
-        found[count] = static_cast<std::uint32_t>(first + i);
-        count += values[i] <= floor ? 0 : 1;
+        Mask over = ~(e <= floor);
+        if (oblique != nullptr && any(over)) {
+          over &= ~(oblique_reach(slabs, first + k * W, *oblique) - allowed <= floor);
+        }
+        if (any(over)) {
+          for (int i = 0; i < W; ++i) {
+            found[count] = static_cast<std::uint32_t>(first + k * W) + static_cast<std::uint32_t>(i);
+            count += over[i] != 0 ? 1 : 0;
+          }
+        }
       }
     }
     for (; first < slabs.n; ++first) {
-      if (!(excess(slabs, first, centre, half, least) <= floor)) {
+      bool over = !(excess(slabs, first, centre, half, least) <= floor);
+      if (over && oblique != nullptr) {
+        double allowed = slabs.dy[first];
+        for (std::size_t j = 0; slabs.dY != nullptr && j < slabs.p; ++j) {
+          allowed += slabs.dY[j][first] * least[j];
+        }
+        over = !(oblique_reach_of_one(slabs, first, *oblique) - allowed <= floor);
+      }
+      if (over) {
         found[count++] = static_cast<std::uint32_t>(first);
       }
     }
@@ -206,11 +271,7 @@ struct Loops {
     std::size_t total = 0, i = 0;
     const auto report = [&](std::size_t first, Vector worst) {
       const Mask over = ~(worst <= 0.0);
-      bool any = false;
-      for (int k = 0; k < W; ++k) {
-        any = any || over[k] != 0;
-      }
-      for (int k = 0; any && k < W; ++k) {
+      for (int k = 0; any(over) && k < W; ++k) {
         found[total] = static_cast<std::uint32_t>(first) + static_cast<std::uint32_t>(k);
         total += over[k] != 0 ? 1 : 0;
       }

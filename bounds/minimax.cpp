@@ -3,31 +3,35 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <optional>
+#include <span>
 
 #include <wheelwright/bounds/certificate.hpp>
 #include <wheelwright/bounds/infeasibility.hpp>
 #include <wheelwright/bounds/linear_program.hpp>
 #include <wheelwright/bounds/slab_rows.hpp>
+#include <wheelwright/bounds/spread_sample.hpp>
 #include <wheelwright/bounds/survey.hpp>
 
 namespace wheelwright {
 namespace {
 
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+constexpr double kAside = 1e-6;  // of γ: room for rounding below which a row is not put aside
 
 /// γ that row `row` asks for at θ, a bound on the rounding of it, and what it asks for without dy and dY.
 struct Demand {
   double value = 0.0, doubt = 0.0, residual = 0.0;
 };
 
-Demand demand(const RegressionBlock& block, Eigen::Index row, const Eigen::VectorXd& theta, double weight) {
+Demand demand(const SlabColumns& rows, std::size_t row, const Eigen::VectorXd& theta, double weight) {
   const Eigen::Index p = theta.size();
-  const double* Y = block.Y.data() + row * p;
-  const double* dY = block.dY.data() + row * p;
-  double residual = block.y[row], allowance = block.dy[row], magnitude = std::abs(block.y[row]) + block.dy[row];
+  double residual = rows.y[row], allowance = rows.dy[row], magnitude = std::abs(rows.y[row]) + rows.dy[row];
   for (Eigen::Index j = 0; j < p; ++j) {
-    const double term = Y[j] * theta[j], noise = dY[j] * std::abs(theta[j]);
+    const auto k = static_cast<std::size_t>(j);
+    const double term = rows.Y[k][row] * theta[j];
+    const double noise = rows.dY.empty() ? 0.0 : rows.dY[k][row] * std::abs(theta[j]);
     residual -= term;
     allowance += noise;
     magnitude += std::abs(term) + noise;
@@ -39,23 +43,27 @@ Demand demand(const RegressionBlock& block, Eigen::Index row, const Eigen::Vecto
 /// The working set of the epigraph problem in (θ, γ): min γ.
 class Epigraph {
  public:
-  Epigraph(const RowSurvey& survey, const Box& prior, const std::vector<double>& weights)
-      : prior_(prior), rows_(prior), weights_(weights) {
+  /// `information` as in whitened(); `guess` is a least-squares fit; `sample` has rows of every output.
+  Epigraph(const Box& prior, const std::vector<double>& weights, const Eigen::MatrixXd& information,
+           const Eigen::VectorXd& guess, const std::vector<SlabColumns>& sample)
+      : prior_(prior), rows_(prior), weights_(weights), theta_(guess) {
     const auto p = static_cast<Eigen::Index>(prior.dimension());
-    coordinates_ = whitened(prior, survey.information);
+    coordinates_ = whitened(prior, information);
     const Eigen::MatrixXd& T = coordinates_.transform;
-    theta_ = weighted_estimate(survey, prior);
     clamp();
     coordinates_.centre = theta_;
     // z and γ are scaled so that both take part in a row alike.
     double steepest = 0.0, size = 0.0;
-    const RegressionBlock& sample = survey.sample;
-    for (Eigen::Index r = 0; r < sample.rows(); ++r) {
-      const double w = weight(r, sample.outputs);
-      if (std::isfinite(w)) {
-        scale_ = std::max(scale_, demand(sample, r, theta_, w).residual);
-        steepest = std::max(steepest, (T.transpose() * sample.Y.row(r).transpose()).norm() / w);
-        size = std::max(size, (std::abs(sample.y[r]) + sample.dy[r]) / w);
+    Eigen::VectorXd Y(p);
+    for (const SlabColumns& rows : sample) {
+      const double w = weights_[rows.output];
+      for (std::size_t r = 0; std::isfinite(w) && r < rows.n; ++r) {
+        for (Eigen::Index j = 0; j < p; ++j) {
+          Y[j] = rows.Y[static_cast<std::size_t>(j)][r];
+        }
+        scale_ = std::max(scale_, demand(rows, r, theta_, w).residual);
+        steepest = std::max(steepest, (T.transpose() * Y).norm() / w);
+        size = std::max(size, (std::abs(rows.y[r]) + rows.dy[r]) / w);
       }
     }
     scale_ = std::max({scale_, 1e-13 * size, 1e-200});
@@ -76,47 +84,49 @@ class Epigraph {
     insert(std::move(first));
   }
 
-  [[nodiscard]] double weight(Eigen::Index row, std::size_t outputs) const {
-    return weights_[static_cast<std::size_t>(row) % outputs];
-  }
   [[nodiscard]] const Eigen::VectorXd& theta() const { return theta_; }
   [[nodiscard]] double gamma() const { return gamma_; }
   [[nodiscard]] double scale() const { return scale_; }
   [[nodiscard]] const std::vector<WeightedRow>& active() const { return active_; }
 
-  /// Adds the rows of the instants of `block` that the fit violates most, until it violates none by more than
-  /// `tolerance`; whether any was added.
-  bool absorb(const RegressionBlock& block, const std::vector<std::size_t>& excluded, double relative) {
+  /// Adds the rows that the fit violates most, until it violates none by more than the tolerance; whether any was added.
+  bool absorb(const SlabColumns& rows, double relative) {
+    const double w = weights_[rows.output];
     bool changed = false;
-    for (int round = 0; round < 64; ++round) {
+    for (int round = 0; round < kRounds && std::isfinite(w); ++round) {
       const double limit = gamma_ + tolerance(relative);
-      std::vector<double> worst(2 * block.outputs, limit);
-      std::vector<HalfSpace> chosen(2 * block.outputs);
-      for (Eigen::Index r = 0; r < block.rows(); ++r) {
-        const double w = weight(r, block.outputs);
-        const std::size_t i = static_cast<std::size_t>(r) % block.outputs;
-        if (!std::isfinite(w) || !(demand(block, r, theta_, w).value > std::min(worst[2 * i], worst[2 * i + 1])) ||
-            std::binary_search(excluded.begin(), excluded.end(),
-                               block.sample[static_cast<std::size_t>(r) / block.outputs])) {
-          continue;
-        }
-        rows_.half_spaces(block, r, upper_, lower_);
-        for (HalfSpace* row : {&upper_, &lower_}) {
-          const std::size_t k = 2 * i + (row == &lower_ ? 1 : 0);
-          const double asked = (row->a.dot(theta_) - row->b) / w;
-          if (asked > worst[k]) {
-            worst[k] = asked;
-            chosen[k] = *row;
+      const auto found = beyond(rows, theta_, Eigen::VectorXd::Zero(theta_.size()), limit * w, nullptr);
+      if (found.empty()) {
+        break;
+      }
+      // The row that is worst on either side, in each of several stretches of time.
+      const std::size_t stretches = std::min<std::size_t>(static_cast<std::size_t>(theta_.size()) + 1, found.size());
+      std::vector<HalfSpace> added;
+      for (std::size_t s = 0; s < stretches; ++s) {
+        double worst[2] = {limit, limit};
+        HalfSpace chosen[2];
+        for (std::size_t f = s * found.size() / stretches; f < (s + 1) * found.size() / stretches; ++f) {
+          const std::size_t r = found[f];
+          const double asked = demand(rows, r, theta_, w).value;
+          if (!(asked > std::min(worst[0], worst[1]))) {
+            continue;
+          }
+          half_spaces(rows, r);
+          for (HalfSpace* row : {&upper_, &lower_}) {
+            const std::size_t k = row == &lower_ ? 1 : 0;
+            const double at = (row->a.dot(theta_) - row->b) / w;
+            if (at > worst[k]) {
+              worst[k] = at;
+              chosen[k] = *row;
+            }
           }
         }
-      }
-      std::vector<HalfSpace> added;
-      for (std::size_t k = 0; k < chosen.size(); ++k) {
-        if (chosen[k].a.size() != 0) {
-          const Eigen::Index p = chosen[k].a.size();
-          chosen[k].a.conservativeResize(p + 1);
-          chosen[k].a[p] = -weights_[k / 2];
-          added.push_back(std::move(chosen[k]));
+        for (HalfSpace& row : chosen) {
+          if (row.a.size() != 0) {
+            row.a.conservativeResize(theta_.size() + 1);
+            row.a[theta_.size()] = -w;
+            added.push_back(std::move(row));
+          }
         }
       }
       if (added.empty()) {
@@ -125,11 +135,26 @@ class Epigraph {
       insert(std::move(added));
       changed = true;
       if (!solve()) {
+        failed_ = true;
         break;
       }
     }
     return changed;
   }
+
+  /// Rows without |y − Y·at| + Σ|Y_j| half_j <= floor + dy + Σ dY_j |θ_j|; `peaks` as in kernels::Table::scan.
+  std::span<const std::uint32_t> beyond(const SlabColumns& rows, const Eigen::VectorXd& at, const Eigen::VectorXd& half,
+                                        double floor, double* peaks) {
+    const Eigen::VectorXd least = (at.cwiseAbs() - half).cwiseMax(0.0);
+    const kernels::Slabs slabs{rows.Y.data(), rows.dY.empty() ? nullptr : rows.dY.data(), rows.y, rows.dy, rows.n,
+                               rows.Y.size()};
+    found_.resize(rows.n);
+    return {found_.data(),
+            kernels::best().scan(slabs, at.data(), half.data(), least.data(), nullptr, floor, found_.data(), peaks)};
+  }
+
+  /// Whether a linear program could not be solved: the fit is then what it was before.
+  [[nodiscard]] bool failed() const { return failed_; }
 
   /// Certified lower bound of γ*, given an upper one.
   [[nodiscard]] double certified_lower(double upper) const {
@@ -161,6 +186,18 @@ class Epigraph {
   }
 
  private:
+  static constexpr int kRounds = 256;
+
+  void half_spaces(const SlabColumns& rows, std::size_t r) {
+    Y_.clear();
+    dY_.clear();
+    for (std::size_t j = 0; j < rows.parameters(); ++j) {
+      Y_.push_back(rows.Y[j][r]);
+      dY_.push_back(rows.dY.empty() ? 0.0 : rows.dY[j][r]);
+    }
+    rows_.half_spaces(Y_, dY_, rows.y[r], rows.dy[r], rows.origin(r), upper_, lower_);
+  }
+
   void insert(std::vector<HalfSpace> rows) {
     const Eigen::Index p = theta_.size();
     const auto m = static_cast<Eigen::Index>(rows.size());
@@ -195,41 +232,57 @@ class Epigraph {
   std::vector<WeightedRow> active_;
   Eigen::VectorXd theta_;
   HalfSpace upper_, lower_;
+  std::vector<std::uint32_t> found_;
+  std::vector<double> Y_, dY_;
   double gamma_ = 0.0, scale_ = 0.0;
+  bool failed_ = false;
 };
+
+/// The largest demand of any row at `theta`, rounded outward.
+double largest_demand(const SlabColumns& rows, const Eigen::VectorXd& theta, double weight) {
+  double upper = 0.0;
+  for (std::size_t r = 0; r < rows.n; ++r) {
+    const Demand asked = demand(rows, r, theta, weight);
+    upper = std::max(upper, round_up(asked.value + asked.doubt));
+  }
+  return upper;
+}
+
+MinimaxFit finished(const Epigraph& epigraph, MinimaxFit result, double tolerance) {
+  result.lower = std::min(epigraph.certified_lower(result.upper), result.upper);
+  result.active = epigraph.active();
+  result.converged = result.upper - result.lower <= tolerance * result.upper + 1e-10 * epigraph.scale();
+  return result;
+}
 
 MinimaxFit fit(RegressionSource& source, const RowSurvey& survey, const Box& prior, const std::vector<double>& weights,
                const std::vector<std::size_t>& excluded, const MinimaxOptions& options) {
-  Epigraph epigraph(survey, prior, weights);
+  ColumnPacker packer(source.outputs(), prior.dimension()), sampled(source.outputs(), prior.dimension());
+  std::vector<SlabColumns> sample;
+  sampled.walk(survey.sample, [&](const SlabColumns& columns, const std::vector<char>&) {
+    sample.push_back(columns);
+    return true;
+  });
+  Epigraph epigraph(prior, weights, survey.information, weighted_estimate(survey, prior), sample);
+  for (const SlabColumns& columns : sample) {
+    epigraph.absorb(columns, options.tolerance);
+  }
   MinimaxFit result;
   result.upper = std::numeric_limits<double>::infinity();
-  bool solved = epigraph.solve();
-  epigraph.absorb(survey.sample, {}, options.tolerance);
-  RegressionBlock block;
   for (bool last = false; !last;) {
     bool changed = false;
     // The final pass only evaluates.
-    last = result.passes + 1 >= options.pass_limit || !solved;
+    last = result.passes + 1 >= options.pass_limit || epigraph.failed();
     double upper = 0.0;
-    Eigen::VectorXd at = epigraph.theta();
-    source.rewind();
-    while (source.next(block)) {
-      for (Eigen::Index r = 0; r < block.rows(); ++r) {
-        const double w = epigraph.weight(r, block.outputs);
-        if (!std::isfinite(w)) {
-          continue;
-        }
-        const Demand asked = demand(block, r, at, w);
-        if (asked.value + asked.doubt > upper &&
-            !std::binary_search(excluded.begin(), excluded.end(),
-                                block.sample[static_cast<std::size_t>(r) / block.outputs])) {
-          upper = round_up(asked.value + asked.doubt);
-        }
+    const Eigen::VectorXd at = epigraph.theta();
+    packer.walk(source, excluded, [&](const SlabColumns& columns, const std::vector<char>&) {
+      const double w = weights[columns.output];
+      if (std::isfinite(w)) {
+        upper = std::max(upper, largest_demand(columns, at, w));
+        changed = (!last && epigraph.absorb(columns, options.tolerance)) || changed;
       }
-      if (!last) {
-        changed = epigraph.absorb(block, excluded, options.tolerance) || changed;
-      }
-    }
+      return true;
+    });
     ++result.passes;
     // `at` is where the pass began, evaluated on every row: an upper bound even when the fit moved on.
     if (upper < result.upper) {
@@ -238,24 +291,76 @@ MinimaxFit fit(RegressionSource& source, const RowSurvey& survey, const Box& pri
     }
     last = last || !changed;
   }
-  result.lower = std::min(epigraph.certified_lower(result.upper), result.upper);
-  result.active = epigraph.active();
-  result.converged = result.upper - result.lower <= options.tolerance * result.upper + 1e-10 * epigraph.scale();
-  return result;
+  return finished(epigraph, std::move(result), options.tolerance);
+}
+
+MinimaxFit fit(const SlabColumns& rows, const Box& prior, const std::vector<double>& weights,
+               const MinimaxOptions& options) {
+  const double w = weights[rows.output];
+  const SpreadSample sample(rows);
+  const Eigen::MatrixXd information = sample.information(prior);
+  Epigraph epigraph(prior, weights, information, sample.estimate(prior), {sample.all()});
+  std::vector<Eigen::VectorXd> fits;
+  sample.each_level([&](const SlabColumns& level) {
+    epigraph.absorb(level, options.tolerance);
+    fits.push_back(epigraph.theta());
+    return true;
+  });
+  Eigen::VectorXd half = 2.0 * (fits[2] - fits[1]).cwiseAbs() + 0.5 * (fits[1] - fits[0]).cwiseAbs();
+  MinimaxFit result;
+  result.upper = std::numeric_limits<double>::infinity();
+  std::vector<double> peaks(rows.parameters() + 1);
+  while (result.passes < options.pass_limit && !epigraph.failed()) {
+    const Eigen::VectorXd centre = epigraph.theta();
+    const double floor = (1.0 - kAside) * epigraph.gamma();
+    SlabStore aside;
+    std::fill(peaks.begin(), peaks.end(), 0.0);
+    aside.append(rows, epigraph.beyond(rows, centre, half, floor * w, peaks.data()));
+    const SlabColumns near = aside.view();
+    ++result.passes;
+    epigraph.absorb(near, options.tolerance);
+    const Eigen::VectorXd theta = epigraph.theta();
+    if (!((theta - centre).cwiseAbs().array() <= half.array()).all()) {
+      half = half.cwiseMax(4.0 * (theta - centre).cwiseAbs());
+      continue;
+    }
+    // Rows that are not near ask for less than `floor` anywhere in the box, but for rounding.
+    double magnitude = peaks.back() + floor * w;
+    for (Eigen::Index j = 0; j < theta.size(); ++j) {
+      magnitude += 2.0 * peaks[static_cast<std::size_t>(j)] * (std::abs(centre[j]) + 2.0 * half[j]);
+    }
+    const double doubt = 8.0 * static_cast<double>(theta.size() + 4) * kEpsilon * magnitude / w;
+    result.upper = std::max(largest_demand(near, theta, w), round_up(floor + doubt));
+    result.theta.assign(theta.data(), theta.data() + theta.size());
+    break;
+  }
+  if (!std::isfinite(result.upper)) {
+    const Eigen::VectorXd theta = epigraph.theta();
+    result.upper = largest_demand(rows, theta, w);
+    result.theta.assign(theta.data(), theta.data() + theta.size());
+    ++result.passes;
+  }
+  return finished(epigraph, std::move(result), options.tolerance);
+}
+
+/// The weights of all outputs, checked.
+std::vector<double> checked_weights(const MinimaxOptions& options, std::size_t outputs) {
+  std::vector<double> weights = options.weights;
+  if (weights.empty()) {
+    weights.assign(outputs, 1.0);
+  }
+  check::that(weights.size() == outputs, "weights", "one per output");
+  check::that(std::all_of(weights.begin(), weights.end(), [](double w) { return w > 0.0; }), "weights", "numbers > 0");
+  check::that(std::any_of(weights.begin(), weights.end(), [](double w) { return std::isfinite(w); }), "weights",
+              "at least one that is finite");
+  check::that(options.pass_limit >= 1, "pass_limit", "at least 1");
+  return weights;
 }
 
 }  // namespace
 
 MinimaxFit minimax_fit(RegressionSource& source, const Box& prior, const MinimaxOptions& options) {
-  std::vector<double> weights = options.weights;
-  if (weights.empty()) {
-    weights.assign(source.outputs(), 1.0);
-  }
-  check::that(weights.size() == source.outputs(), "weights", "one per output");
-  check::that(std::all_of(weights.begin(), weights.end(), [](double w) { return w > 0.0; }), "weights", "numbers > 0");
-  check::that(std::any_of(weights.begin(), weights.end(), [](double w) { return std::isfinite(w); }), "weights",
-              "at least one that is finite");
-  check::that(options.pass_limit >= 1, "pass_limit", "at least 1");
+  const std::vector<double> weights = checked_weights(options, source.outputs());
   std::vector<std::size_t> excluded = options.excluded_samples;
   std::sort(excluded.begin(), excluded.end());
   const RowSurvey known = survey(source, prior, excluded);
@@ -289,6 +394,15 @@ MinimaxFit minimax_fit(RegressionSource& source, const Box& prior, const Minimax
   best.passes = passes;
   best.converged = best.converged && best.upper - lower <= options.tolerance * best.upper + (best.upper - best.lower);
   return best;
+}
+
+MinimaxFit minimax_fit(const SlabColumns& rows, const Box& prior, const MinimaxOptions& options) {
+  check::that(prior.dimension() > 0 && rows.parameters() == prior.dimension(), "prior box",
+              "one side per parameter of the regression");
+  check_finite(prior, "prior box");
+  check::that(rows.output == 0 && rows.outputs == nullptr, "rows", "of one output");
+  check::that(options.excluded_samples.empty(), "excluded_samples", "none for rows in memory");
+  return fit(rows, prior, checked_weights(options, 1), options);
 }
 
 }  // namespace wheelwright

@@ -7,6 +7,7 @@
 
 #include <wheelwright/bounds/box.hpp>
 #include <wheelwright/bounds/half_space.hpp>
+#include <wheelwright/bounds/slab_columns.hpp>
 #include <wheelwright/core/regression.hpp>
 
 namespace wheelwright {
@@ -37,5 +38,10 @@ struct MinimaxFit {
 /// time (up to four such parameters; beyond, `lower` stands on the convex description of SlabRows and the bracket may
 /// stay open). Throws InvalidArgument when shapes disagree, a number is not finite, or no output is left.
 [[nodiscard]] MinimaxFit minimax_fit(RegressionSource& source, const Box& prior, const MinimaxOptions& options = {});
+
+/// The same for rows of one output in memory (γ* in units of `weights`, one number, or of 1), usually in one pass: the
+/// fit of an evenly spread sample comes first; of all rows, those are put aside that can matter for any θ in a box around
+/// it, and the fit of these is the fit of all when it lies in the box (else the box is made wider).
+[[nodiscard]] MinimaxFit minimax_fit(const SlabColumns& rows, const Box& prior, const MinimaxOptions& options = {});
 
 }  // namespace wheelwright

@@ -97,7 +97,43 @@ double certified_support(const Polytope::Block& block, const Eigen::VectorXd& a,
   return std::min(outer, certified_upper_bound(direction, binding, within));
 }
 
+/// Bound of a·θ over the vertices of a block, and the vertex that is best.
+std::pair<double, Eigen::Index> over_vertices(const Polytope::Block& block, std::span<const double> a) noexcept {
+  const auto q = static_cast<Eigen::Index>(block.parameters.size());
+  const Eigen::MatrixXd& points = block.vertices->points;
+  double best = -std::numeric_limits<double>::infinity(), margin = 0.0;
+  Eigen::Index where = 0;
+  for (Eigen::Index v = 0; v < points.cols(); ++v) {
+    const double* point = points.data() + v * q;
+    double value = 0.0;
+    for (Eigen::Index k = 0; k < q; ++k) {
+      value += a[block.parameters[static_cast<std::size_t>(k)]] * point[k];
+    }
+    if (value > best) {
+      best = value;
+      where = v;
+    }
+  }
+  for (Eigen::Index k = 0; k < q; ++k) {
+    margin += std::abs(a[block.parameters[static_cast<std::size_t>(k)]]) * block.margin[k];
+  }
+  return {margin == 0.0 ? 0.0 : round_up(best + round_up(margin * (1.0 + 64.0 * kEpsilon))), where};
+}
+
 }  // namespace
+
+double support_of_vertices(const Polytope::Block& block, const Box& hull, std::span<const double> a) noexcept {
+  if (block.vertices) {
+    return over_vertices(block, a).first;
+  }
+  double sum = 0.0;
+  for (const std::size_t j : block.parameters) {
+    if (a[j] != 0.0) {
+      sum = round_up(sum + round_up(a[j] * (a[j] > 0.0 ? hull.sides[j].upper : hull.sides[j].lower)));
+    }
+  }
+  return sum;
+}
 
 std::vector<std::vector<std::size_t>> independent_blocks(std::span<const HalfSpace> rows, std::size_t p) {
   std::vector<std::size_t> leader(p);
@@ -228,26 +264,10 @@ double Polytope::support(std::span<const double> a, std::span<double> maximiser)
     const auto q = static_cast<Eigen::Index>(block.parameters.size());
     double bound = 0.0;
     if (block.vertices) {
-      const Eigen::MatrixXd& points = block.vertices->points;
-      double best = -std::numeric_limits<double>::infinity(), margin = 0.0;
-      Eigen::Index where = 0;
-      for (Eigen::Index v = 0; v < points.cols(); ++v) {
-        const double* point = points.data() + v * q;
-        double value = 0.0;
-        for (Eigen::Index k = 0; k < q; ++k) {
-          value += a[block.parameters[static_cast<std::size_t>(k)]] * point[k];
-        }
-        if (value > best) {
-          best = value;
-          where = v;
-        }
-      }
-      for (Eigen::Index k = 0; k < q; ++k) {
-        margin += std::abs(a[block.parameters[static_cast<std::size_t>(k)]]) * block.margin[k];
-      }
-      bound = margin == 0.0 ? 0.0 : round_up(best + round_up(margin * (1.0 + 64.0 * kEpsilon)));
+      const auto [value, where] = over_vertices(block, a);
+      bound = value;
       for (Eigen::Index k = 0; k < q && !maximiser.empty(); ++k) {
-        maximiser[block.parameters[static_cast<std::size_t>(k)]] = points(k, where);
+        maximiser[block.parameters[static_cast<std::size_t>(k)]] = block.vertices->points(k, where);
       }
     } else {
       Eigen::VectorXd direction(q);

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include <wheelwright/bounds/coordinates.hpp>
+
 namespace wheelwright {
 namespace {
 
@@ -73,7 +75,8 @@ SpreadSample::SpreadSample(const SlabColumns& rows) {
   }
 }
 
-Eigen::MatrixXd SpreadSample::information(const Box& prior) const {
+/// 1/w of every row.
+Eigen::VectorXd SpreadSample::weights(const Box& prior) const {
   const SlabColumns& rows = all();
   const auto p = static_cast<Eigen::Index>(rows.parameters());
   const auto n = static_cast<Eigen::Index>(rows.n);
@@ -83,14 +86,28 @@ Eigen::MatrixXd SpreadSample::information(const Box& prior) const {
     reach[j] = std::max(std::abs(side.lower), std::abs(side.upper));
   }
   const Eigen::Map<const Eigen::MatrixXd> Y(memory_.data(), n, p);
-  const Eigen::Map<const Eigen::VectorXd> dy(rows.dy, n);
-  Eigen::VectorXd width = dy;
+  Eigen::VectorXd width = Eigen::Map<const Eigen::VectorXd>(rows.dy, n);
   for (std::size_t j = 0; j < rows.dY.size(); ++j) {
     width += Eigen::Map<const Eigen::VectorXd>(rows.dY[j], n) * reach[static_cast<Eigen::Index>(j)];
   }
-  width = width.cwiseMax(1e-9 * (Y.cwiseAbs() * reach)).cwiseMax(1e-150);
-  const Eigen::MatrixXd weighted = width.cwiseInverse().asDiagonal() * Y;
+  return width.cwiseMax(1e-9 * (Y.cwiseAbs() * reach)).cwiseMax(1e-150).cwiseInverse();
+}
+
+Eigen::MatrixXd SpreadSample::information(const Box& prior) const {
+  const auto p = static_cast<Eigen::Index>(all().parameters());
+  const Eigen::Map<const Eigen::MatrixXd> Y(memory_.data(), static_cast<Eigen::Index>(all().n), p);
+  const Eigen::MatrixXd weighted = weights(prior).asDiagonal() * Y;
   return weighted.transpose() * weighted;
+}
+
+Eigen::VectorXd SpreadSample::estimate(const Box& prior) const {
+  const auto p = static_cast<Eigen::Index>(all().parameters());
+  const auto n = static_cast<Eigen::Index>(all().n);
+  const Eigen::Map<const Eigen::MatrixXd> Y(memory_.data(), n, p);
+  const Eigen::VectorXd weight = weights(prior).cwiseAbs2();
+  const Coordinates at = whitened(prior, information(prior));
+  const Eigen::VectorXd rest = Eigen::Map<const Eigen::VectorXd>(all().y, n) - Y * at.centre;
+  return at.centre + at.transform * (at.transform.transpose() * (Y.transpose() * weight.cwiseProduct(rest)));
 }
 
 bool SpreadSample::each_level(const std::function<bool(const SlabColumns&)>& take) const {

@@ -67,8 +67,8 @@ std::vector<OutputValidation> validate_on(RegressionSource& rows, const Threshol
       Running& r = running[i];
       const std::span<const double> y(block.Y.row(row).data(), p), dy(block.dY.row(row).data(), p);
       const double residual = block.y[row] - block.Y.row(row).dot(rule.estimate());
-      const Threshold t = rule.at(y, dy, block.dy[row]);
-      const Interval prediction = rule.prediction(y);
+      const Threshold t = rule.at(y, dy, block.dy[row], i);
+      const Interval prediction = rule.prediction(y, i);
       ++v.instants;
       v.outside += residual < t.lower || residual > t.upper ? 1 : 0;
       r.inside_noise_free += prediction.contains(block.y[row]) ? 1 : 0;
@@ -79,7 +79,7 @@ std::vector<OutputValidation> validate_on(RegressionSource& rows, const Threshol
       r.residual_square += residual * residual;
       r.torque_square += block.y[row] * block.y[row];
       r.width.add(t.width());
-      r.width_box.add(box.at(y, dy, block.dy[row]).width());
+      r.width_box.add(box.at(y, dy, block.dy[row], i).width());
       const double least = std::max(prediction.lower, -prediction.upper);
       if (least > 0.0) {
         v.smallest_kappa = std::min(v.smallest_kappa, t.width() / least);

@@ -60,7 +60,7 @@ const Decision& Detector::decide(const FilteredRow& row) {
     if (options_.mu) {
       c.threshold = {-(*options_.mu)[at], (*options_.mu)[at]};
     } else {
-      c.threshold = threshold_.at({row.Y.row(at).data(), p}, {row.dY.row(at).data(), p}, row.dy[at]);
+      c.threshold = threshold_.at({row.Y.row(at).data(), p}, {row.dY.row(at).data(), p}, row.dy[at], i);
     }
     c.dead_zone = options_.test == Test::two_sided ? dead_zone(c.residual, c.threshold.lower, c.threshold.upper)
                                                    : dead_zone(c.residual, c.threshold.rho());

@@ -15,22 +15,25 @@ ThresholdRule::ThresholdRule(Polytope set, Eigen::VectorXd estimate, ParameterSe
   check::that(static_cast<std::size_t>(estimate_.size()) == set_.dimension(), "estimate",
               "one value for each parameter");
   check::that(estimate_.allFinite(), "estimate", "finite values");
+  if (kind_ == ParameterSetKind::polytope) {
+    walk_.emplace(set_, SupportWalkOptions{.slots = kSlots});
+  }
 }
 
-Threshold ThresholdRule::at(std::span<const double> y, std::span<const double> dy_regressor,
-                            double dy_output) const noexcept {
+Threshold ThresholdRule::at(std::span<const double> y, std::span<const double> dy_regressor, double dy_output,
+                            std::size_t channel) const noexcept {
   const std::size_t p = direction_.size();
   double extra = dy_output;
   double predicted = 0.0;
   double magnitude = dy_output;
   double reach = 0.0;
-  const auto shifted = [&](double sign) {
+  const auto shifted = [&](double sign, std::size_t slot) {
     for (std::size_t j = 0; j < p; ++j) {
       const Interval& side = set_.hull().sides[j];
       const double shift = side.lower >= 0.0 ? dy_regressor[j] : side.upper <= 0.0 ? -dy_regressor[j] : 0.0;
       direction_[j] = sign * y[j] + shift;
     }
-    return support(direction_);
+    return support(direction_, slot);
   };
   for (std::size_t j = 0; j < p; ++j) {
     const double term = y[j] * estimate_[static_cast<Eigen::Index>(j)];
@@ -43,8 +46,8 @@ Threshold ThresholdRule::at(std::span<const double> y, std::span<const double> d
       extra += dy_regressor[j] * largest;
     }
   }
-  const double above = shifted(1.0);
-  const double below = shifted(-1.0);
+  const double above = shifted(1.0, 2 * channel);
+  const double below = shifted(-1.0, 2 * channel + 1);
   // Sums of p + 3 terms, and as many in the residual that is compared with the result: Higham 2002, section 3.1. The
   // rounding of the direction itself is covered by the terms Δ|θ|. |h(±y + Δ)| <= Σ (|y_j| + Δ_j) max|θ_j|: measured
   // with the box, so that the same margin is added whichever set is used.
@@ -53,10 +56,10 @@ Threshold ThresholdRule::at(std::span<const double> y, std::span<const double> d
   return {-below - predicted - extra - rounding, above - predicted + extra + rounding};
 }
 
-Interval ThresholdRule::prediction(std::span<const double> y) const noexcept {
+Interval ThresholdRule::prediction(std::span<const double> y, std::size_t channel) const noexcept {
   std::transform(y.begin(), y.end(), direction_.begin(), [](double v) { return -v; });
-  const double below = support(direction_);
-  return {-below, support(y)};
+  const double below = support(direction_, 2 * channel + 1);
+  return {-below, support(y, 2 * channel)};
 }
 
 }  // namespace wheelwright

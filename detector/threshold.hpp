@@ -3,6 +3,7 @@
 /// The tight threshold ρ(t) of (34): what the residual can be without a fault, for every θ in the feasible set.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -10,6 +11,7 @@
 
 #include <wheelwright/bounds/box.hpp>
 #include <wheelwright/bounds/polytope.hpp>
+#include <wheelwright/bounds/support_walk.hpp>
 
 namespace wheelwright {
 
@@ -35,33 +37,38 @@ struct Threshold {
 ///
 /// with h the support function of the feasible set, y a row of Y_f, Δ the bound on its error and n̄ that of τ_f. The
 /// shift by Δ holds for θ_j >= 0; it changes sign where θ_j <= 0 on the whole set, and where θ_j has either sign it is
-/// replaced by Δ_j max|θ_j|. All results are rounded outward.  One object serves one thread.
+/// replaced by Δ_j max|θ_j|. All results are rounded outward. h is followed from vertex to vertex (SupportWalk), with
+/// bounded work and without allocation: a budget that runs out makes a threshold wider, never wrong. One object serves
+/// one thread.
 class ThresholdRule {
  public:
   /// For the feasible set `set` and the best guess `estimate` (p), which need not lie in it.
   ThresholdRule(Polytope set, Eigen::VectorXd estimate, ParameterSetKind kind = ParameterSetKind::polytope);
 
   /// The threshold for the regressor row `y` (p) with error bound `dy_regressor` (p, Δ >= 0) and `dy_output` (n̄ >= 0).
-  /// Does not allocate where the set is_online() or its box is used.
-  [[nodiscard]] Threshold at(std::span<const double> y, std::span<const double> dy_regressor,
-                             double dy_output) const noexcept;
+  /// Rows of one `channel` should follow each other in time: the walk starts where its last row ended.
+  [[nodiscard]] Threshold at(std::span<const double> y, std::span<const double> dy_regressor, double dy_output,
+                             std::size_t channel = 0) const noexcept;
 
   /// min and max of yθ over the set, outward: the noise-free prediction interval.
-  [[nodiscard]] Interval prediction(std::span<const double> y) const noexcept;
+  [[nodiscard]] Interval prediction(std::span<const double> y, std::size_t channel = 0) const noexcept;
 
   [[nodiscard]] const Polytope& set() const noexcept { return set_; }
   [[nodiscard]] const Eigen::VectorXd& estimate() const noexcept { return estimate_; }
   [[nodiscard]] ParameterSetKind kind() const noexcept { return kind_; }
 
  private:
-  [[nodiscard]] double support(std::span<const double> a) const noexcept {
-    return kind_ == ParameterSetKind::box ? set_.hull().support(a) : set_.support(a);
+  [[nodiscard]] double support(std::span<const double> a, std::size_t slot) const noexcept {
+    return walk_ ? walk_->support(a, slot % kSlots) : set_.hull().support(a);
   }
+
+  static constexpr std::size_t kSlots = 8;  // two directions of four channels
 
   Polytope set_;
   Eigen::VectorXd estimate_;
   ParameterSetKind kind_;
   mutable std::vector<double> direction_;
+  mutable std::optional<SupportWalk> walk_;
 };
 
 }  // namespace wheelwright

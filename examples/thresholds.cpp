@@ -58,7 +58,8 @@ int main(int count, char** words) {
   std::vector<std::array<std::vector<double>, 4>> width(n);  // per output and kind, over time
   for (Eigen::Index row = 0; row < rows.rows(); ++row) {
     const std::span<const double> y(rows.Y.row(row).data(), p), dy(rows.dY.row(row).data(), p);
-    const Threshold tight = polytope.at(y, dy, rows.dy[row]), loose = box.at(y, dy, rows.dy[row]);
+    const std::size_t channel = static_cast<std::size_t>(row) % n;
+    const Threshold tight = polytope.at(y, dy, rows.dy[row], channel), loose = box.at(y, dy, rows.dy[row]);
     const std::array of_kind = {tight.width(), 2.0 * tight.rho(), loose.width(), 2.0 * loose.rho()};
     ordered = ordered && of_kind[0] <= of_kind[1] && of_kind[2] <= of_kind[3] && of_kind[0] <= of_kind[2] &&
               of_kind[1] <= of_kind[3];

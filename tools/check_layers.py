@@ -77,7 +77,7 @@ CODE = {".hpp", ".cpp", ".cmake", ".py", ".sh", ".js", ".css"}
 TEXT = CODE | {".md", ".yaml", ".yml", ".json", ".txt", ".cff", ".bib", ".in", ""}
 SKIP = re.compile(r"^(?:\.git|\.cache|build.*|node_modules|out|__pycache__)$")
 # A type that is defined in two headers of one namespace is two types of one name to the linker, which keeps one of them.
-TYPE = re.compile(r"^(?:struct|class|enum class|enum)\s+(\w+)\b[^;]*$", re.M)
+TYPE = re.compile(r"^(?:struct|class|enum class|enum)\s+(\w+)\b(?!\s*<)[^;]*$", re.M)
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]')
 
 
@@ -181,7 +181,7 @@ def self_test():
     head = spdx + "#pragma once\n"
     clean = {
         "core/a.hpp": head + "#include <vector>\n// a random comment on rand() and std::cout\nstruct A {\n};\n",
-        "bounds/b.hpp": head + "#include <wheelwright/core/a.hpp>\nstruct A;\nstruct B {};\n",
+        "bounds/b.hpp": head + "#include <wheelwright/core/a.hpp>\nstruct A;\nstruct B {};\nstruct B<2> {};\n",
         "io/c.cpp": spdx + "#include <fstream>\n#include <wheelwright/bounds/b.hpp>\n",
         "bounds/clp.cpp": spdx + "#include <ClpSimplex.hpp>\n",
         "detector/CMakeLists.txt": "# SPDX-License-Identifier: Apache-2.0\nwheelwright_room(detector\n  USES core filter\n  LINK x)\n",
