@@ -12,8 +12,7 @@
 namespace wheelwright {
 namespace {
 
-constexpr double kCut = 1e-11;     // of the size of the set: a facet that cuts less than that is left out
-constexpr double kCorner = 1e-12;  // the same where the interval hull is set
+constexpr double kCut = 1e-12;  // of the size of the set: a row that cuts less than that is left out
 
 }  // namespace
 
@@ -243,7 +242,7 @@ std::vector<std::size_t> CuttingPlanes::cut_corners(const RowBank& candidates, b
     std::vector<std::size_t> worst;
     for (Eigen::Index k = hull_only ? 2 * p : 0; k < vertices_.cols(); ++k) {
       const kernels::Found found = kernels::best().most_violated(bank.view(), vertices_.col(k).data());
-      if (found.value > kCorner) {
+      if (found.value > kCut) {
         worst.push_back(found.row);
       }
     }

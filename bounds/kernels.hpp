@@ -66,8 +66,8 @@ struct Table {
   /// the largest |Y_j| of all rows, and to the largest |y|.
   std::size_t (*scan)(const Slabs& slabs, const double* centre, const double* half, const double* least,
                       const Oblique* oblique, double floor, std::uint32_t* found, double* peaks);
-  /// Numbers of the rows with |y − Y·x| > dy + Σ dY_j |x_j| for one of the `count` points x (p numbers each, one point
-  /// after the other; p <= 32), ascending; how many. `found` has room for n.
+  /// Numbers of the rows without |y − Y·x| <= dy + Σ dY_j |x_j| for all of the `count` points x (p numbers each, one point
+  /// after the other; p <= 32), ascending; how many. Rows that hold a NaN are among them. `found` has room for n.
   std::size_t (*violated)(const Slabs& slabs, const double* points, std::size_t count, std::uint32_t* found);
 };
 

@@ -239,15 +239,15 @@ struct Loops {
 
   static constexpr std::size_t kMostColumns = 32;
 
-  /// Rows i … i + W − 1: how much the worst of the points exceeds what is allowed.
-  static Vector worst_excess(const Slabs& slabs, std::size_t i, const double* points, std::size_t count) {
+  /// Rows i … i + W − 1: whether one of the points exceeds what is allowed, or is not a number.
+  static Mask exceeded(const Slabs& slabs, std::size_t i, const double* points, std::size_t count) {
     const std::size_t p = slabs.p;
     Vector Y[kMostColumns];
     for (std::size_t j = 0; j < p; ++j) {
       Y[j] = load(slabs.Y[j] + i);
     }
     const Vector y = load(slabs.y + i), dy = load(slabs.dy + i);
-    Vector worst = all(-kInfinity);
+    Mask over{};
     for (std::size_t k = 0; k < count; ++k) {
       const double* x = points + k * p;
       Vector even = y - Y[0] * x[0], odd{};
@@ -262,22 +262,21 @@ struct Loops {
       for (std::size_t j = 0; slabs.dY != nullptr && j < p; ++j) {
         excess -= load(slabs.dY[j] + i) * (x[j] < 0.0 ? -x[j] : x[j]);
       }
-      worst = excess > worst ? excess : worst;
+      over |= ~(excess <= 0.0);
     }
-    return worst;
+    return over;
   }
 
   static std::size_t violated(const Slabs& slabs, const double* points, std::size_t count, std::uint32_t* found) {
     std::size_t total = 0, i = 0;
-    const auto report = [&](std::size_t first, Vector worst) {
-      const Mask over = ~(worst <= 0.0);
+    const auto report = [&](std::size_t first, Mask over) {
       for (int k = 0; any(over) && k < W; ++k) {
         found[total] = static_cast<std::uint32_t>(first) + static_cast<std::uint32_t>(k);
         total += over[k] != 0 ? 1 : 0;
       }
     };
     for (; i + W <= slabs.n; i += W) {
-      report(i, worst_excess(slabs, i, points, count));
+      report(i, exceeded(slabs, i, points, count));
     }
     for (; i < slabs.n; ++i) {
       double Y[kMostColumns], dY[kMostColumns];

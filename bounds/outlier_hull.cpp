@@ -8,8 +8,11 @@
 #include <set>
 #include <tuple>
 
+#include <wheelwright/bounds/certificate.hpp>
+#include <wheelwright/bounds/infeasibility.hpp>
 #include <wheelwright/bounds/interval_hull.hpp>
 #include <wheelwright/bounds/kernels.hpp>
+#include <wheelwright/bounds/linear_program.hpp>
 #include <wheelwright/bounds/slab_rows.hpp>
 #include <wheelwright/bounds/survey.hpp>
 
@@ -20,6 +23,7 @@ using Samples = std::vector<std::size_t>;  // ascending
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kSlack = 1e-12;     // of the width: what cutting a branch off may cost
+constexpr double kLoose = 1e-10;     // of the width: a certified bound that is worse is tried in another way
 constexpr double kViolated = 1e-11;  // of the reach of a row over the box
 constexpr std::size_t kWorst = 64;   // rows that a point adds in a round
 constexpr std::size_t kMostRounds = 40;
@@ -72,6 +76,7 @@ class WorkingRows {
     }
     return left;
   }
+  [[nodiscard]] const RowBank& bank() const { return bank_; }
   [[nodiscard]] std::size_t size() const { return bank_.size(); }
 
  private:
@@ -79,17 +84,107 @@ class WorkingRows {
   std::set<std::tuple<std::size_t, std::size_t, Side>> known_;
 };
 
-/// The set without some instants. Direction 2j is −θ_j, direction 2j + 1 is θ_j.
+/// A direction over the set without some instants: empty, or an upper bound and where it is reached.
 struct Node {
   bool empty = false;
-  std::vector<WeightedRow> contradiction;
-  std::vector<CertifiedBound> bounds;  // upper bounds of the 2p directions
-  std::vector<Eigen::VectorXd> points;
+  std::vector<WeightedRow> proof;  // contradiction, or binding rows
+  double value = -kInfinity;
+  Eigen::VectorXd point;
+};
 
-  [[nodiscard]] double value(std::size_t direction) const { return empty ? -kInfinity : bounds[direction].value; }
-  [[nodiscard]] const std::vector<WeightedRow>& proof(std::size_t direction) const {
-    return empty ? contradiction : bounds[direction].binding;
+/// The half-spaces held, in coordinates in which the sets searched have a size of about one.
+class Programs {
+ public:
+  /// `outermost`: instants without which the set is about as large as it gets.
+  Programs(const Box& prior, const Box& within, const Eigen::MatrixXd& information, const WorkingRows& rows,
+           const Samples& outermost)
+      : prior_(prior), within_(within), information_(information), rows_(rows) {
+    CuttingPlanes planes(prior, information);
+    planes.add_to_hull(rows.without(outermost));
+    coordinates_ = planes.coordinates();
+    reach_ = 4.0 * extent(within, coordinates_).array() + 4.0;
+    for (std::size_t i = 0; i < rows.bank().size(); ++i) {
+      all_.push_back(rows.bank().at(i));
+    }
+    for (HalfSpace& side : sides_as_rows(prior)) {
+      all_.push_back(std::move(side));
+    }
+    a_.resize(static_cast<Eigen::Index>(prior.dimension()), static_cast<Eigen::Index>(all_.size()));
+    b_.resize(a_.cols());
+    norms_.resize(a_.cols());
+    for (Eigen::Index i = 0; i < a_.cols(); ++i) {
+      const HalfSpace& row = all_[static_cast<std::size_t>(i)];
+      a_.col(i) = coordinates_.transform.transpose() * row.a;
+      norms_[i] = std::max(a_.col(i).norm(), 1e-300);
+      a_.col(i) /= norms_[i];
+      b_[i] = (row.b - row.a.dot(coordinates_.centre)) / norms_[i];
+    }
   }
+
+  /// Direction 2j is −θ_j, direction 2j + 1 is θ_j. Proofs are over `within` for bounds, over the prior for emptiness.
+  [[nodiscard]] Node solve(const Samples& dropped, std::size_t direction) const {
+    const Eigen::Index p = a_.rows();
+    const auto j = static_cast<Eigen::Index>(direction / 2);
+    Eigen::VectorXd axis = Eigen::VectorXd::Zero(p);
+    axis[j] = direction % 2 == 0 ? -1.0 : 1.0;
+    Node node;
+    if (!solve_one(dropped, axis, node)) {
+      CuttingPlanes planes(prior_, information_);
+      planes.add_to_hull(rows_.without(dropped));
+      if (planes.is_empty()) {
+        return {true, planes.contradiction(), -kInfinity, {}};
+      }
+      CertifiedBound bound = planes.certified_maximum(axis, within_);
+      const std::optional<LpSolution> solution = planes.maximise(axis);
+      node = {false, std::move(bound.binding), bound.value, solution ? solution->x : Eigen::VectorXd()};
+    }
+    const Interval& side = within_.sides[direction / 2];
+    node.value = std::min(node.value, direction % 2 == 0 ? -side.lower : side.upper);
+    return node;
+  }
+
+ private:
+  /// One program from the corner of a box. False where it has no certified, tight answer.
+  bool solve_one(const Samples& dropped, const Eigen::VectorXd& axis, Node& node) const {
+    std::vector<Eigen::Index> held;
+    for (std::size_t i = 0; i < all_.size(); ++i) {
+      if (all_[i].origin.is_prior || !holds(dropped, all_[i].origin.sample)) {
+        held.push_back(static_cast<Eigen::Index>(i));
+      }
+    }
+    LinearProgram program(-reach_, reach_);
+    program.add_rows(a_(Eigen::all, held), b_(held));
+    const Eigen::VectorXd c = coordinates_.transform.transpose() * axis;
+    const double norm = c.norm();
+    const LpSolution solution = program.maximise(c / norm);
+    if (solution.status != LpSolution::Status::optimal) {
+      return false;
+    }
+    for (std::size_t k = 0; k < solution.rows.size(); ++k) {
+      const Eigen::Index i = held[static_cast<std::size_t>(solution.rows[k])];
+      node.proof.push_back(
+          {all_[static_cast<std::size_t>(i)], solution.multipliers[static_cast<Eigen::Index>(k)] * norm / norms_[i]});
+    }
+    node.point = coordinates_.centre + coordinates_.transform * solution.x;
+    node.value = certified_upper_bound({axis.data(), within_.dimension()}, node.proof, within_);
+    const Eigen::VectorXd minus = -axis;
+    const double width =
+        within_.support({axis.data(), within_.dimension()}) + within_.support({minus.data(), within_.dimension()});
+    if (!(node.value - axis.dot(node.point) <= kLoose * width)) {
+      node = {};
+      return false;
+    }
+    return true;
+  }
+
+  const Box& prior_;
+  const Box& within_;
+  const Eigen::MatrixXd& information_;
+  const WorkingRows& rows_;
+  Coordinates coordinates_;
+  Eigen::VectorXd reach_, b_, norms_;
+  Eigen::MatrixXd a_;
+  std::vector<HalfSpace> all_;
 };
 
 /// What the search of one direction found.
@@ -97,70 +192,43 @@ struct Found {
   double value = -kInfinity;  // the largest of all choices; −infinity where all are empty
   bool complete = true;
   Samples dropped;
+  Node node;  // without `dropped`
   std::vector<OutlierContradiction> contradictions;
+  std::size_t sets = 0;
 };
 
 /// Branch and bound over the choices of instants, on the half-spaces held.
 class Search {
  public:
-  Search(const Box& prior, const Box& within, const Eigen::MatrixXd& information, const WorkingRows& rows,
-         const OutlierHullOptions& options)
-      : prior_(prior), within_(within), information_(information), rows_(rows), options_(options) {}
+  Search(const Programs& programs, std::size_t direction, double width, const OutlierHullOptions& options)
+      : programs_(programs), direction_(direction), options_(options), slack_(kSlack * width) {}
 
-  Found operator()(std::size_t direction) {
-    direction_ = direction;
-    found_ = {};
-    visited_.clear();
-    best_ = ceiling_ = -kInfinity;
-    slack_ = kSlack * within_.sides[direction / 2].width();
+  Found operator()() {
     Samples outermost;
     const double limit = layers({}, options_.most, kInfinity, outermost);
     visit({}, limit);
-    if (found_.complete) {
-      found_.value = std::max(best_, ceiling_);
-    } else {
-      found_.value = limit;
+    found_.value = found_.complete ? std::max(best_, ceiling_) : limit;
+    if (!found_.complete) {
       found_.dropped = outermost;
     }
-    return found_;
+    found_.node = at(found_.dropped);
+    found_.sets = nodes_.size();
+    return std::move(found_);
   }
 
+ private:
   /// The set without `dropped`, bounded once.
   const Node& at(const Samples& dropped) {
     const auto [entry, is_new] = nodes_.try_emplace(dropped);
     if (is_new) {
-      solve(entry->second, dropped);
+      entry->second = programs_.solve(dropped, direction_);
     }
     return entry->second;
   }
 
-  [[nodiscard]] std::size_t sets() const { return nodes_.size(); }
-
- private:
-  void solve(Node& node, const Samples& dropped) const {
-    CuttingPlanes planes(prior_, information_);
-    planes.add_to_hull(rows_.without(dropped));
-    node.empty = planes.is_empty();
-    if (node.empty) {
-      node.contradiction = planes.contradiction();
-      return;
-    }
-    const std::size_t p = prior_.dimension();
-    for (std::size_t direction = 0; direction < 2 * p; ++direction) {
-      Eigen::VectorXd a = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(p));
-      a[static_cast<Eigen::Index>(direction / 2)] = direction % 2 == 0 ? -1.0 : 1.0;
-      CertifiedBound bound = planes.certified_maximum(a, within_);
-      const Interval& side = within_.sides[direction / 2];
-      bound.value = std::min(bound.value, direction % 2 == 0 ? -side.lower : side.upper);
-      const std::optional<LpSolution> solution = planes.maximise(a);
-      node.points.push_back(solution ? solution->x : Eigen::VectorXd());
-      node.bounds.push_back(std::move(bound));
-    }
-  }
-
   void note(const Node& node, const Samples& dropped) {
     if (node.empty) {
-      found_.contradictions.push_back({dropped, node.contradiction});
+      found_.contradictions.push_back({dropped, node.proof});
     }
   }
 
@@ -170,11 +238,11 @@ class Search {
     for (std::size_t layer = 0; layer <= count && !(limit > enough); ++layer) {
       const Node& node = at(dropped);
       note(node, dropped);
-      if (node.value(direction_) > limit) {
-        limit = node.value(direction_);
+      if (node.value > limit) {
+        limit = node.value;
         outermost = dropped;
       }
-      Samples more = united(dropped, node.proof(direction_));
+      Samples more = united(dropped, node.proof);
       if (more.size() == dropped.size()) {
         break;
       }
@@ -197,15 +265,15 @@ class Search {
     }
     const Node& node = at(dropped);
     note(node, dropped);
-    if (node.value(direction_) > best_) {
-      best_ = node.value(direction_);
+    if (node.value > best_) {
+      best_ = node.value;
       found_.dropped = dropped;
     }
     const std::size_t left = options_.most - dropped.size();
     if (left == 0 || closed(limit)) {
       return;
     }
-    const Samples branches = united({}, node.proof(direction_));
+    const Samples branches = united({}, node.proof);
     if (branches.empty()) {
       return;
     }
@@ -215,11 +283,11 @@ class Search {
     }
     std::vector<std::pair<double, std::size_t>> order;
     for (const std::size_t sample : branches) {
-      if (sets() >= options_.budget) {
+      if (nodes_.size() >= options_.budget) {
         found_.complete = false;
         return;
       }
-      order.emplace_back(-at(with(dropped, sample)).value(direction_), sample);
+      order.emplace_back(-at(with(dropped, sample)).value, sample);
     }
     std::sort(order.begin(), order.end());
     for (const auto& [value, sample] : order) {
@@ -227,16 +295,14 @@ class Search {
     }
   }
 
-  const Box& prior_;
-  const Box& within_;
-  const Eigen::MatrixXd& information_;
-  const WorkingRows& rows_;
+  const Programs& programs_;
+  const std::size_t direction_;
   const OutlierHullOptions& options_;
+  const double slack_;
   std::map<Samples, Node> nodes_;
-  std::size_t direction_ = 0;
-  Found found_;
   std::set<Samples> visited_;
-  double best_ = -kInfinity, ceiling_ = -kInfinity, slack_ = 0.0;
+  Found found_;
+  double best_ = -kInfinity, ceiling_ = -kInfinity;
 };
 
 /// Rows not held that a point violates although its instants are dropped, the worst of them.
@@ -319,7 +385,7 @@ void find_violations(RegressionSource& source, const Samples& excluded, const Bo
 
 /// A box around all choices: q + 1 hulls whose proofs have no instant in common. Their rows go to `rows`.
 bool bound_by_layers(RegressionSource& source, const Box& prior, const OutlierHullOptions& options, WorkingRows& rows,
-                     OutlierHull& result) {
+                     OutlierHull& result, Samples& outermost) {
   Samples dropped;
   bool any = false;
   for (std::size_t layer = 0; layer <= options.most; ++layer) {
@@ -328,6 +394,7 @@ bool bound_by_layers(RegressionSource& source, const Box& prior, const OutlierHu
     IntervalHull set = interval_hull(source, prior, own);
     result.passes += set.passes;
     ++result.sets;
+    outermost = dropped;
     Samples more = united(dropped, set.contradiction);
     rows.add(set.contradiction);
     for (const std::vector<CertifiedBound>* bounds : {&set.lower, &set.upper}) {
@@ -357,7 +424,8 @@ OutlierHull hull_with_outliers(RegressionSource& source, const Box& prior, const
   OutlierHull result;
   result.hull = result.layers = prior;
   WorkingRows rows(p);
-  if (!bound_by_layers(source, prior, options, rows, result)) {
+  Samples outermost;
+  if (!bound_by_layers(source, prior, options, rows, result, outermost)) {
     result.empty = true;
     result.working = rows.size();
     return result;
@@ -371,28 +439,27 @@ OutlierHull hull_with_outliers(RegressionSource& source, const Box& prior, const
   std::vector<char> settled(2 * p, 0);
   bool more = true;
   while (more && result.rounds < kMostRounds) {
-    Search search(prior, result.layers, information, rows, options);
+    const Programs programs(prior, result.layers, information, rows, outermost);
+    ++result.rounds;
     std::vector<std::size_t> directions;
     std::vector<Violations> open;
     for (std::size_t d = 0; d < 2 * p; ++d) {
       if (settled[d] != 0) {
         continue;
       }
-      Found found = search(d);
+      Found found = Search(programs, d, result.layers.sides[d / 2].width(), options)();
+      result.sets += found.sets;
       if (found.complete && found.value == -kInfinity) {
-        result.sets += search.sets();
-        ++result.rounds;
         result.empty = true;
         result.contradictions = std::move(found.contradictions);
         result.layers = prior;
         result.working = rows.size();
         return result;
       }
-      const Node& node = search.at(found.dropped);
-      bounds[d] = {found.value, false, found.dropped, {}, {}};
-      if (!node.empty) {
-        bounds[d].binding = node.bounds[d].binding;
-        bounds[d].at = node.points[d];
+      bounds[d] = {found.value, false, std::move(found.dropped), {}, {}};
+      if (!found.node.empty) {
+        bounds[d].binding = std::move(found.node.proof);
+        bounds[d].at = std::move(found.node.point);
       } else {
         bounds[d].value = d % 2 == 0 ? -result.layers.sides[d / 2].lower : result.layers.sides[d / 2].upper;
       }
@@ -403,8 +470,6 @@ OutlierHull hull_with_outliers(RegressionSource& source, const Box& prior, const
         settled[d] = 1;
       }
     }
-    result.sets += search.sets();
-    ++result.rounds;
     more = false;
     if (!open.empty()) {
       find_violations(source, excluded, prior, result.layers, open);

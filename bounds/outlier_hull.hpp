@@ -13,8 +13,8 @@ namespace wheelwright {
 
 /// Options of hull_with_outliers().
 struct OutlierHullOptions {
-  std::size_t most = 1;                            ///< q, the most instants that may be violated
-  std::size_t budget = 5000;                       ///< most sets bounded in a round before the fallback takes over
+  std::size_t most = 1;       ///< q, the most instants that may be violated
+  std::size_t budget = 5000;  ///< most sets tried per bound (and round) before the fallback takes over
   std::vector<std::size_t> excluded_samples = {};  ///< row numbers left out beforehand, any order
 };
 
@@ -43,7 +43,7 @@ struct OutlierHull {
   std::vector<OutlierBound> upper;  ///< per parameter: maximum over all choices
   /// Where empty: contradictions of which any choice of q instants leaves at least one untouched.
   std::vector<OutlierContradiction> contradictions;
-  std::size_t sets = 0;     ///< sets bounded, each with 2p linear programs
+  std::size_t sets = 0;     ///< sets bounded in all, one linear program each
   std::size_t passes = 0;   ///< walks over all rows
   std::size_t rounds = 0;   ///< searches, each followed by a pass
   std::size_t working = 0;  ///< half-spaces held

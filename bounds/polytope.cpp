@@ -35,6 +35,21 @@ CertifiedBound spread(CertifiedBound bound, const std::vector<std::size_t>& para
   return bound;
 }
 
+/// The facets in z.
+void load(Polytope::Block& block) {
+  const auto m = static_cast<Eigen::Index>(block.facets.size());
+  block.normals.resize(block.coordinates.centre.size(), m);
+  block.offsets.resize(m);
+  block.norms.resize(m);
+  for (Eigen::Index i = 0; i < m; ++i) {
+    const HalfSpace& row = block.facets[static_cast<std::size_t>(i)];
+    const Eigen::VectorXd g = block.coordinates.transform.transpose() * row.a;
+    block.norms[i] = std::max(g.norm(), 1e-300);
+    block.normals.col(i) = g / block.norms[i];
+    block.offsets[i] = (row.b - row.a.dot(block.coordinates.centre)) / block.norms[i];
+  }
+}
+
 /// Largest ball inside the rows in θ / half: centre into `block`, radius >= 0.
 void find_chebyshev_centre(Polytope::Block& block, const Eigen::VectorXd& half, const Eigen::VectorXd& fallback) {
   const auto p = static_cast<Eigen::Index>(block.parameters.size());
@@ -70,19 +85,9 @@ double certified_support(const Polytope::Block& block, const Eigen::VectorXd& a,
   if (!(c.norm() > 0.0)) {
     return outer;
   }
-  const auto m = static_cast<Eigen::Index>(block.facets.size());
-  Eigen::MatrixXd normals(a.size(), m);
-  Eigen::VectorXd b(m), norms(m);
-  for (Eigen::Index i = 0; i < m; ++i) {
-    const HalfSpace& row = block.facets[static_cast<std::size_t>(i)];
-    const Eigen::VectorXd g = block.coordinates.transform.transpose() * row.a;
-    norms[i] = std::max(g.norm(), 1e-300);
-    normals.col(i) = g / norms[i];
-    b[i] = (row.b - row.a.dot(block.coordinates.centre)) / norms[i];
-  }
   const Eigen::VectorXd limit = Eigen::VectorXd::Constant(a.size(), 8.0);
   LinearProgram program(-limit, limit);
-  program.add_rows(normals, b);
+  program.add_rows(block.normals, block.offsets);
   const LpSolution solution = program.maximise(c / c.norm());
   if (solution.status != LpSolution::Status::optimal) {
     return outer;
@@ -92,39 +97,29 @@ double certified_support(const Polytope::Block& block, const Eigen::VectorXd& a,
   for (std::size_t k = 0; k < solution.rows.size(); ++k) {
     const int i = solution.rows[k];
     binding.push_back({block.facets[static_cast<std::size_t>(i)],
-                       solution.multipliers[static_cast<Eigen::Index>(k)] * c.norm() / norms[i]});
+                       solution.multipliers[static_cast<Eigen::Index>(k)] * c.norm() / block.norms[i]});
   }
   return std::min(outer, certified_upper_bound(direction, binding, within));
-}
-
-/// Bound of a·θ over the vertices of a block, and the vertex that is best.
-std::pair<double, Eigen::Index> over_vertices(const Polytope::Block& block, std::span<const double> a) noexcept {
-  const auto q = static_cast<Eigen::Index>(block.parameters.size());
-  const Eigen::MatrixXd& points = block.vertices->points;
-  double best = -std::numeric_limits<double>::infinity(), margin = 0.0;
-  Eigen::Index where = 0;
-  for (Eigen::Index v = 0; v < points.cols(); ++v) {
-    const double* point = points.data() + v * q;
-    double value = 0.0;
-    for (Eigen::Index k = 0; k < q; ++k) {
-      value += a[block.parameters[static_cast<std::size_t>(k)]] * point[k];
-    }
-    if (value > best) {
-      best = value;
-      where = v;
-    }
-  }
-  for (Eigen::Index k = 0; k < q; ++k) {
-    margin += std::abs(a[block.parameters[static_cast<std::size_t>(k)]]) * block.margin[k];
-  }
-  return {margin == 0.0 ? 0.0 : round_up(best + round_up(margin * (1.0 + 64.0 * kEpsilon))), where};
 }
 
 }  // namespace
 
 double support_of_vertices(const Polytope::Block& block, const Box& hull, std::span<const double> a) noexcept {
   if (block.vertices) {
-    return over_vertices(block, a).first;
+    const auto q = static_cast<Eigen::Index>(block.parameters.size());
+    const Eigen::MatrixXd& points = block.vertices->points;
+    double best = -std::numeric_limits<double>::infinity(), margin = 0.0;
+    for (Eigen::Index v = 0; v < points.cols(); ++v) {
+      double value = 0.0;
+      for (Eigen::Index k = 0; k < q; ++k) {
+        value += a[block.parameters[static_cast<std::size_t>(k)]] * points(k, v);
+      }
+      best = std::max(best, value);
+    }
+    for (Eigen::Index k = 0; k < q; ++k) {
+      margin += std::abs(a[block.parameters[static_cast<std::size_t>(k)]]) * block.margin[k];
+    }
+    return margin == 0.0 ? 0.0 : round_up(best + round_up(margin * (1.0 + 64.0 * kEpsilon)));
   }
   double sum = 0.0;
   for (const std::size_t j : block.parameters) {
@@ -219,6 +214,7 @@ std::variant<Polytope, std::vector<WeightedRow>> Polytope::intersect(const std::
     block.parameters = parameters;
     block.facets = planes.rows();
     block.coordinates = planes.coordinates();
+    load(block);
     block.vertices = enumerate_vertices(block.facets, block.coordinates, options.vertex_limit);
     Eigen::VectorXd half(q), middle(q);
     for (Eigen::Index k = 0; k < q; ++k) {
@@ -243,14 +239,14 @@ std::variant<Polytope, std::vector<WeightedRow>> Polytope::intersect(const std::
       data->looseness = std::max(data->looseness, block.vertices->looseness);
       data->vertex_count += static_cast<std::size_t>(block.vertices->points.cols());
     } else {
-      data->online = false;
+      data->has_vertices = false;
     }
     for (const HalfSpace& facet : block.facets) {
       data->facets.push_back(spread(facet, parameters, p));
     }
     data->blocks.push_back(std::move(block));
   }
-  if (!data->online) {
+  if (!data->has_vertices) {
     data->vertex_count = 0;
   }
   return Polytope(std::shared_ptr<const Data>(std::move(data)));
@@ -262,26 +258,17 @@ double Polytope::support(std::span<const double> a, std::span<double> maximiser)
   double total = 0.0;
   for (const Block& block : data_->blocks) {
     const auto q = static_cast<Eigen::Index>(block.parameters.size());
-    double bound = 0.0;
-    if (block.vertices) {
-      const auto [value, where] = over_vertices(block, a);
-      bound = value;
-      for (Eigen::Index k = 0; k < q && !maximiser.empty(); ++k) {
-        maximiser[block.parameters[static_cast<std::size_t>(k)]] = block.vertices->points(k, where);
-      }
-    } else {
-      Eigen::VectorXd direction(q);
-      Box within;
-      for (Eigen::Index k = 0; k < q; ++k) {
-        const std::size_t j = block.parameters[static_cast<std::size_t>(k)];
-        direction[k] = a[j];
-        within.sides.push_back(data_->hull.sides[j]);
-      }
-      Eigen::VectorXd at;
-      bound = certified_support(block, direction, within, at);
-      for (Eigen::Index k = 0; k < q && !maximiser.empty(); ++k) {
-        maximiser[block.parameters[static_cast<std::size_t>(k)]] = at[k];
-      }
+    Eigen::VectorXd direction(q);
+    Box within;
+    for (Eigen::Index k = 0; k < q; ++k) {
+      const std::size_t j = block.parameters[static_cast<std::size_t>(k)];
+      direction[k] = a[j];
+      within.sides.push_back(data_->hull.sides[j]);
+    }
+    Eigen::VectorXd at;
+    const double bound = certified_support(block, direction, within, at);
+    for (Eigen::Index k = 0; k < q && !maximiser.empty(); ++k) {
+      maximiser[block.parameters[static_cast<std::size_t>(k)]] = at[k];
     }
     total = bound == 0.0 ? total : round_up(total + bound);
   }

@@ -38,6 +38,9 @@ class Polytope {
     Eigen::VectorXd margin;            ///< support: h(a) <= max over points a·v + Σ|a_j| margin_j, roundings included
     Eigen::VectorXd chebyshev_centre;  ///< see Polytope::chebyshev_centre
     double chebyshev_radius = 0.0;     ///< relative to the hull
+    Eigen::MatrixXd normals;           ///< facets in z, of norm one, one per column
+    Eigen::VectorXd offsets;           ///< their right-hand sides in z
+    Eigen::VectorXd norms;             ///< what they were divided by
   };
 
   /// Takes the intersection of `rows` with a finite box. Throws InvalidArgument when shapes disagree, a number is not
@@ -62,19 +65,20 @@ class Polytope {
   /// Upper bound of each parameter with the rows that prove it.
   [[nodiscard]] const std::vector<CertifiedBound>& upper() const noexcept { return data_->upper; }
 
-  /// Whether all vertices are known: support() then allocates nothing and its work is bounded by their number.
-  [[nodiscard]] bool is_online() const noexcept { return data_->online; }
-  /// Number of vertices, summed over blocks (of a product: as many support() looks at); 0 unless is_online().
+  /// Whether all vertices are known.
+  [[nodiscard]] bool has_vertices() const noexcept { return data_->has_vertices; }
+  /// Number of vertices, summed over blocks; 0 unless has_vertices().
   [[nodiscard]] std::size_t vertex_count() const noexcept { return data_->vertex_count; }
+  /// Always false: support() is a linear program. SupportWalk is the form for a robot.
+  [[nodiscard]] bool is_online() const noexcept { return false; }
 
   /// How far, relative to its size in Block::coordinates, the facets were shifted outward to know the vertices (1e-10
-  /// or so, more where many facets meet in one vertex; 0 where support() is a linear program).
+  /// or so, more where many facets meet in one vertex; 0 where they are not known).
   [[nodiscard]] double looseness() const noexcept { return data_->looseness; }
 
-  /// Support function h(a) = max { a·θ : θ in set }, rounded outward, for p finite entries `a` (unchecked). Never above
-  /// the support of hull(). Where is_online(): maximum over vertices, summed over blocks, plus the margin; no
-  /// allocation. Otherwise: a linear program per block, certified by its multipliers; allocates (where memory runs out
-  /// the program terminates), and falls back to the hull where the program fails.
+  /// Support function h(a) = max { a·θ : θ in set }, rounded outward, for p finite entries `a` (unchecked): a linear
+  /// program per block, certified by its multipliers. Never above the support of hull(), which it falls back to where a
+  /// program fails. Allocates (where memory runs out the program terminates).
   [[nodiscard]] double support(std::span<const double> a) const noexcept;
   /// The same, and writes a maximiser (to rounding) to `maximiser` (p entries).
   double support(std::span<const double> a, std::span<double> maximiser) const noexcept;
@@ -95,7 +99,7 @@ class Polytope {
     Box hull;
     std::vector<CertifiedBound> lower, upper;
     std::vector<double> centre;
-    bool online = true;
+    bool has_vertices = true;
     std::size_t vertex_count = 0;
     double looseness = 0.0;
   };

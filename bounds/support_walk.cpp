@@ -15,6 +15,7 @@ constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 constexpr double kTiny = std::numeric_limits<double>::min();
 constexpr double kTight = 1e-13;  // share of the size of h that negative multipliers may cost
 constexpr double kPivot = 1e-10;  // smallest pivot
+constexpr double kLoose = 1e-9;   // of vertices that are looked through
 constexpr double kApart = 1e-13;  // facets are moved outward by up to this where edges are followed
 constexpr std::uint32_t kNone = 0xffffffff;
 constexpr std::uint32_t kFull = kNone - 1;
@@ -69,7 +70,8 @@ SupportWalk::SupportWalk(Polytope set, const SupportWalkOptions& options) : set_
     Walk walk;
     walk.q = block.parameters.size();
     walk.parameters = block.parameters;
-    const bool few = block.vertices && static_cast<std::size_t>(block.vertices->points.cols()) <= options.few;
+    const bool few = block.vertices && static_cast<std::size_t>(block.vertices->points.cols()) <= options.few &&
+                     block.vertices->looseness <= kLoose;
     walk.walked = !few && begin(walk, block, options);
     walks_.push_back(std::move(walk));
   }

@@ -160,7 +160,7 @@ Json set_json(const Commissioning& r, const Model& model) {
   for (const Interval& side : r.feasible.hull.sides) {
     json["hull"].push_back({side.lower, side.upper});
   }
-  if (r.feasible.polytope->is_online() && r.feasible.polytope->vertex_count() <= kMostVertices) {
+  if (r.feasible.polytope->has_vertices() && r.feasible.polytope->vertex_count() <= kMostVertices) {
     json["blocks"] = Json::array();
     for (const Polytope::Block& block : r.feasible.polytope->blocks()) {
       Json vertices = Json::array();

@@ -115,7 +115,7 @@ TEST(FeasibleSet, finds_independent_blocks_and_names_what_binds) {
   const FeasibleSet set = feasible_set(table, testing_rows::cube(4, 100.0));
   ASSERT_EQ(set.polytope->blocks().size(), 2U);
   EXPECT_EQ(set.polytope->blocks()[0].parameters, (std::vector<std::size_t>{0, 2}));
-  EXPECT_TRUE(set.polytope->is_online());
+  EXPECT_TRUE(set.polytope->has_vertices());
   for (std::size_t j = 0; j < 4; ++j) {
     EXPECT_LE(set.upper[j].binding.size(), 2U);
     // Only the binding rows: the same bound.

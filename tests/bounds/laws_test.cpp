@@ -241,8 +241,8 @@ TEST(Box, contains_its_sides_and_nothing_beyond) {
 TEST(Polytope, vertices_agree_with_linear_programs) {
   for (std::size_t p = 1; p <= 6; ++p) {
     const Polytope by_vertices = MakePolytope<4096>::make(p, p, 1.0), by_programs = MakePolytope<0>::make(p, p, 1.0);
-    ASSERT_TRUE(by_vertices.is_online()) << p;
-    ASSERT_FALSE(by_programs.is_online());
+    ASSERT_TRUE(by_vertices.has_vertices()) << p;
+    ASSERT_FALSE(by_programs.has_vertices());
     Random random(p);
     for (int trial = 0; trial < 50; ++trial) {
       const std::vector<double> a = random.vector(p);

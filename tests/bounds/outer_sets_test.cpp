@@ -353,7 +353,7 @@ TEST(OuterSets, of_known_vertices_are_loewner_ellipsoids) {
   for (std::size_t p = 2; p <= 5; ++p) {
     const auto n = static_cast<Eigen::Index>(p);
     const Polytope polytope = random_polytope(p, p, Eigen::VectorXd::Ones(n));
-    ASSERT_TRUE(polytope.is_online());
+    ASSERT_TRUE(polytope.has_vertices());
     const Ellipsoid outer = outer_ellipsoid(polytope);
     const Ellipsoid::Block& block = outer.blocks()[0];
     const Ellipsoid inner(block.centre, block.shape * ((1.0 - 1e-4) / static_cast<double>(p)));

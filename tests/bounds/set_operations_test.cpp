@@ -5,6 +5,7 @@
 #include <wheelwright/bounds/certificate.hpp>
 #include <wheelwright/bounds/ellipsoid.hpp>
 #include <wheelwright/bounds/set_operations.hpp>
+#include <wheelwright/bounds/support_walk.hpp>
 #include <wheelwright/bounds/zonotope.hpp>
 
 #include "bounds/exact.hpp"
@@ -125,7 +126,11 @@ TEST(OnlineSets, allocate_nothing) {
     return after - before;
   };
   EXPECT_EQ(count(polytope.hull()), 0U);
-  EXPECT_EQ(count(polytope), 0U);
+  SupportWalk walk(polytope, {.few = 0});
+  const std::size_t before = testing_support::allocations;
+  const double value = walk.support(a, 0) + walk.support(a, 1);
+  EXPECT_EQ(testing_support::allocations, before);
+  EXPECT_GT(value, 0.0);
   EXPECT_EQ(count(ellipsoid), 0U);
   EXPECT_EQ(count(zonotope), 0U);
 }

@@ -77,7 +77,7 @@ struct Watch {
 void watch(const CommissionedModel& model, const Scenario& drive, Watch& total) {
   Simulation log(drive);
   Detector detector = make_detector(model);
-  ASSERT_TRUE(detector.threshold().set().is_online());
+  ASSERT_TRUE(detector.threshold().set().has_vertices());
   std::vector<std::size_t> pick;
   for (const auto& name : model.measurement.columns()) {
     pick.push_back(log.find(name).value());

@@ -61,14 +61,14 @@ TEST(Allocation, ADetectorStepHasNone) {
                        {.persistence = Persistence{.k = 3, .n = 5}, .mu = Eigen::Vector2d(0.1, 0.1)});
 }
 
-// Dry friction couples both channels: a set of six parameters may have more vertices than are kept, and its support is
-// then a linear program. The box is on-line always.
+// Dry friction couples both channels: a set of six parameters with more vertices than are kept is walked.
 TEST(Allocation, NorWithFunctionTermsAndAHeading) {
   Scenario drive = noisy_drive(1);
   drive.robot.parameters = {{"mass", "yaw_inertia", "viscous_x", "viscous_y", "viscous_yaw", "coulomb"}};
   drive.robot.anisotropic_friction = true;
   drive.sensors.pose = true;
   drive.robot.noise.heading.value = 0.0;
+  expect_no_allocation(drive, drive.robot, {});
   expect_no_allocation(drive, drive.robot, {.set = ParameterSetKind::box});
 }
 
