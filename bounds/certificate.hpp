@@ -7,7 +7,8 @@
 ///
 ///     a·θ = λᵀAθ + (a − Aᵀλ)·θ <= λ·b + max { (a − Aᵀλ)·θ : θ in box }.
 ///
-/// Every product and sum is enclosed and rounded outward, Aᵀλ included: nothing depends on how λ was found.
+/// Every product and sum is enclosed (in 113 bits, with a bound on their rounding) and the result rounded outward, Aᵀλ
+/// included: nothing depends on how λ was found.
 #pragma once
 
 #include <span>

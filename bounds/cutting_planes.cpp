@@ -5,9 +5,9 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
-#include <tuple>
 
 #include <wheelwright/bounds/certificate.hpp>
+#include <wheelwright/bounds/refined_multipliers.hpp>
 
 namespace wheelwright {
 namespace {
@@ -307,10 +307,14 @@ void CuttingPlanes::add(const RowBank& candidates) {
   if (is_empty() || left.empty()) {
     return;
   }
-  // Neighbours in time have nearly the same normal, so that one vertex serves many of them.
-  std::stable_sort(left.begin(), left.end(), [&](std::size_t i, std::size_t k) {
-    const RowOrigin &x = candidates.origins[i], &y = candidates.origins[k];
-    return std::tie(x.output, x.side) < std::tie(y.output, y.side);
+  // Neighbours in time have nearly the same normal, or its opposite: one side after the other, so that one vertex serves
+  // many of them.
+  const Eigen::VectorXd one_side =
+      coordinates_.transform.transpose() *
+      Eigen::Map<const Eigen::VectorXd>(candidates.normal(left.front()).data(), z_lower_.size());
+  const Eigen::VectorXd towards = coordinates_.transform * one_side;
+  std::stable_partition(left.begin(), left.end(), [&](std::size_t i) {
+    return towards.dot(Eigen::Map<const Eigen::VectorXd>(candidates.normal(i).data(), towards.size())) >= 0.0;
   });
   Whitened bank = whiten(candidates, left);
   const std::size_t p = bank.p;
@@ -440,13 +444,25 @@ std::optional<LpSolution> CuttingPlanes::maximise(const Eigen::VectorXd& a) {
 CertifiedBound CuttingPlanes::certified_maximum(const Eigen::VectorXd& a, const Box& within) {
   const std::span<const double> direction(a.data(), static_cast<std::size_t>(a.size()));
   CertifiedBound bound{within.support(direction), {}};
-  if (const std::optional<LpSolution> solution = maximise(a)) {
-    for (std::size_t k = 0; k < solution->rows.size(); ++k) {
-      bound.binding.push_back(
-          {rows_[static_cast<std::size_t>(solution->rows[k])], solution->multipliers[static_cast<Eigen::Index>(k)]});
-    }
-    bound.value = std::min(bound.value, certified_upper_bound(direction, bound.binding, within));
+  LinearProgram::Basis basis;
+  const LpSolution solution = program_->maximise(coordinates_.transform.transpose() * a, basis);
+  if (solution.status != LpSolution::Status::optimal) {
+    return bound;
   }
+  std::vector<const HalfSpace*> vertex;
+  for (const int i : basis) {
+    if (i >= 0) {
+      vertex.push_back(&rows_[static_cast<std::size_t>(i)]);
+    }
+  }
+  bound.binding = refined_multipliers(vertex, direction, false);
+  if (bound.binding.empty()) {
+    for (std::size_t k = 0; k < solution.rows.size(); ++k) {
+      bound.binding.push_back({rows_[static_cast<std::size_t>(solution.rows[k])],
+                               solution.multipliers[static_cast<Eigen::Index>(k)] / norms_[solution.rows[k]]});
+    }
+  }
+  bound.value = std::min(bound.value, certified_upper_bound(direction, bound.binding, within));
   return bound;
 }
 

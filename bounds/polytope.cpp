@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include <wheelwright/bounds/certificate.hpp>
+#include <wheelwright/bounds/refined_multipliers.hpp>
 
 namespace wheelwright {
 namespace {
@@ -88,16 +89,25 @@ double certified_support(const Polytope::Block& block, const Eigen::VectorXd& a,
   const Eigen::VectorXd limit = Eigen::VectorXd::Constant(a.size(), 8.0);
   LinearProgram program(-limit, limit);
   program.add_rows(block.normals, block.offsets);
-  const LpSolution solution = program.maximise(c / c.norm());
+  LinearProgram::Basis basis;
+  const LpSolution solution = program.maximise(c / c.norm(), basis);
   if (solution.status != LpSolution::Status::optimal) {
     return outer;
   }
   at = block.coordinates.centre + block.coordinates.transform * solution.x;
-  std::vector<WeightedRow> binding;
-  for (std::size_t k = 0; k < solution.rows.size(); ++k) {
-    const int i = solution.rows[k];
-    binding.push_back({block.facets[static_cast<std::size_t>(i)],
-                       solution.multipliers[static_cast<Eigen::Index>(k)] * c.norm() / block.norms[i]});
+  std::vector<const HalfSpace*> vertex;
+  for (const int i : basis) {
+    if (i >= 0) {
+      vertex.push_back(&block.facets[static_cast<std::size_t>(i)]);
+    }
+  }
+  std::vector<WeightedRow> binding = refined_multipliers(vertex, direction, true);
+  if (binding.empty()) {
+    for (std::size_t k = 0; k < solution.rows.size(); ++k) {
+      const int i = solution.rows[k];
+      binding.push_back({block.facets[static_cast<std::size_t>(i)],
+                         solution.multipliers[static_cast<Eigen::Index>(k)] * c.norm() / block.norms[i]});
+    }
   }
   return std::min(outer, certified_upper_bound(direction, binding, within));
 }
