@@ -38,7 +38,7 @@ class Portion {
 template <class Loop>
 std::size_t split(const kernels::Slabs& slabs, std::size_t threads, std::vector<std::uint32_t>& found,
                   const Loop& loop) {
-  found.resize(slabs.n);
+  found.resize(std::max(found.size(), slabs.n));
   const std::size_t shares = std::min(threads, slabs.n / kWorthAThread);
   if (shares < 2) {
     return loop(slabs, found.data());

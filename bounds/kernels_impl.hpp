@@ -147,6 +147,15 @@ struct Loops {
     return least;
   }
 
+  /// Peaks are looked for in stretches that stay in the cache until they are scanned.
+  static constexpr std::size_t kStretch = 32 * kTile;
+
+  static void raise(const Slabs& slabs, std::size_t first, std::size_t count, double* peaks) {
+    for (std::size_t j = 0; j <= slabs.p; ++j) {
+      peaks[j] = peak((j < slabs.p ? slabs.Y[j] : slabs.y) + first, count, peaks[j]);
+    }
+  }
+
   /// Rows i … i + W − 1: |y − Y·c| + Σ|(YT)_k| half_k.
   static Vector oblique_reach(const Slabs& slabs, std::size_t i, const Oblique& box) {
     const std::size_t p = slabs.p;
@@ -183,12 +192,10 @@ struct Loops {
   static std::size_t scan(const Slabs& slabs, const double* centre, const double* half, const double* least,
                           const Oblique* oblique, double floor, std::uint32_t* found, double* peaks) {
     std::size_t count = 0, first = 0;
-    if (peaks != nullptr) {
-      for (std::size_t j = 0; j <= slabs.p; ++j) {
-        peaks[j] = peak(j < slabs.p ? slabs.Y[j] : slabs.y, slabs.n, peaks[j]);
-      }
-    }
     for (; first + kTile <= slabs.n; first += kTile) {
+      if (peaks != nullptr && first % kStretch == 0) {
+        raise(slabs, first, slabs.n - first < kStretch ? slabs.n - first : kStretch, peaks);
+      }
       Vector residual[kVectors], reach[kVectors];
       for (std::size_t k = 0; k < kVectors; ++k) {
         residual[k] = load(slabs.y + first + k * W);
@@ -220,6 +227,9 @@ struct Loops {
           }
         }
       }
+    }
+    if (peaks != nullptr && first < slabs.n && first % kStretch == 0) {
+      raise(slabs, first, slabs.n - first, peaks);
     }
     for (; first < slabs.n; ++first) {
       bool over = !(excess(slabs, first, centre, half, least) <= floor);

@@ -18,7 +18,9 @@ namespace wheelwright {
 namespace {
 
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
-constexpr double kAside = 1e-6;  // of γ: room for rounding below which a row is not put aside
+constexpr std::size_t kPortion = 1 << 14;
+constexpr std::size_t kSmall = 64;  // rows that are not worth a store of their own
+constexpr double kAside = 1e-6;     // of γ: room for rounding below which a row is not put aside
 
 /// γ that row `row` asks for at θ, a bound on the rounding of it, and what it asks for without dy and dY.
 struct Demand {
@@ -99,6 +101,16 @@ class Epigraph {
       if (found.empty()) {
         break;
       }
+      if (4 * found.size() < rows.n && rows.n > kSmall) {
+        // Few: settled among themselves first, so that the many are looked at again only once.
+        SlabStore few;
+        few.append(rows, found);
+        changed = absorb(few.view(), relative) || changed;
+        if (failed_) {
+          break;
+        }
+        continue;
+      }
       // The row that is worst on either side, in each of several stretches of time.
       const std::size_t stretches = std::min<std::size_t>(static_cast<std::size_t>(theta_.size()) + 1, found.size());
       std::vector<HalfSpace> added;
@@ -148,7 +160,7 @@ class Epigraph {
     const Eigen::VectorXd least = (at.cwiseAbs() - half).cwiseMax(0.0);
     const kernels::Slabs slabs{rows.Y.data(), rows.dY.empty() ? nullptr : rows.dY.data(), rows.y, rows.dy, rows.n,
                                rows.Y.size()};
-    found_.resize(rows.n);
+    found_.resize(std::max(found_.size(), rows.n));
     return {found_.data(),
             kernels::best().scan(slabs, at.data(), half.data(), least.data(), nullptr, floor, found_.data(), peaks)};
   }
@@ -315,7 +327,10 @@ MinimaxFit fit(const SlabColumns& rows, const Box& prior, const std::vector<doub
     const double floor = (1.0 - kAside) * epigraph.gamma();
     SlabStore aside;
     std::fill(peaks.begin(), peaks.end(), 0.0);
-    aside.append(rows, epigraph.beyond(rows, centre, half, floor * w, peaks.data()));
+    for (std::size_t first = 0; first < rows.n; first += kPortion) {
+      const SlabColumns portion = rows.part(first, std::min(kPortion, rows.n - first));
+      aside.append(portion, epigraph.beyond(portion, centre, half, floor * w, peaks.data()));
+    }
     const SlabColumns near = aside.view();
     ++result.passes;
     epigraph.absorb(near, options.tolerance);

@@ -17,34 +17,14 @@ constexpr double kTight = 1e-13;  // share of the size of h that negative multip
 constexpr double kPivot = 1e-10;  // smallest pivot
 constexpr double kLoose = 1e-9;   // of vertices that are looked through
 constexpr double kApart = 1e-13;  // facets are moved outward by up to this where edges are followed
+constexpr double kAsNew = 8.0;    // times rounding: an inverse that needs no refinement
 constexpr std::uint32_t kNone = 0xffffffff;
 constexpr std::uint32_t kFull = kNone - 1;
-
-/// Parts of a vertex' numbers.
-struct Vertex {
-  double* inverse;   // q × q: column r is the edge, in z, along which only facet r is left
-  double* place;     // q: z
-  double* multiply;  // q × q by columns: μ = M a
-  double* point;     // q: v
-  double* doubt;     // q: ε
-  double* penalty;   // q: of negative μ
-  double* weight;    // q: steepness of the edges
-};
 
 /// Twice the bound on the relative rounding of a sum of q products and a few terms more (Higham 2002, section 3.1).
 double rounding(std::size_t q) { return static_cast<double>(q + 6) * kEpsilon; }
 
 std::size_t numbers(std::size_t q) { return 2 * q * q + 5 * q; }
-
-Vertex parts(double* first, std::size_t q) {
-  return {first,
-          first + q * q,
-          first + q * q + q,
-          first + 2 * q * q + q,
-          first + 2 * q * q + 2 * q,
-          first + 2 * q * q + 3 * q,
-          first + 2 * q * q + 4 * q};
-}
 
 /// A number in [0, 1) that depends on i only.
 double scatter(std::uint64_t i) {
@@ -63,6 +43,27 @@ std::size_t hash(const std::int32_t* basis, std::size_t q) {
 }
 
 }  // namespace
+
+/// Parts of a vertex' numbers.
+struct SupportWalk::Vertex {
+  double* inverse;   // q × q: column r is the edge, in z, along which only facet r is left
+  double* place;     // q: z
+  double* multiply;  // q × q by columns: μ = M a
+  double* point;     // q: v
+  double* doubt;     // q: ε
+  double* penalty;   // q: of negative μ
+  double* weight;    // q: steepness of the edges
+};
+
+SupportWalk::Vertex SupportWalk::parts(double* first, std::size_t q) noexcept {
+  return {first,
+          first + q * q,
+          first + q * q + q,
+          first + 2 * q * q + q,
+          first + 2 * q * q + 2 * q,
+          first + 2 * q * q + 3 * q,
+          first + 2 * q * q + 4 * q};
+}
 
 SupportWalk::SupportWalk(Polytope set, const SupportWalkOptions& options) : set_(std::move(set)), options_(options) {
   check::that(options.slots > 0 && options.vertices >= 2, "support walk", "at least one slot and two vertices");
@@ -170,6 +171,90 @@ std::uint32_t SupportWalk::find(Walk& walk, const std::int32_t* basis) noexcept 
   }
 }
 
+/// Newton: Z ← Z + Z (I − A Z), with Z by columns; `rest` and `refined` have room for q × q.
+void SupportWalk::refine(const Vertex& v, std::size_t q, const double* facets, double* rest, double* refined) noexcept {
+  for (std::size_t c = 0; c < q; ++c) {
+    for (std::size_t r = 0; r < q; ++r) {
+      double sum = r == c ? 1.0 : 0.0;
+      for (std::size_t j = 0; j < q; ++j) {
+        sum -= facets[r * q + j] * v.inverse[c * q + j];
+      }
+      rest[c * q + r] = sum;
+    }
+  }
+  std::copy(v.inverse, v.inverse + q * q, refined);
+  for (std::size_t c = 0; c < q; ++c) {
+    for (std::size_t r = 0; r < q; ++r) {
+      const double factor = rest[c * q + r];
+      for (std::size_t j = 0; j < q; ++j) {
+        refined[c * q + j] += factor * v.inverse[r * q + j];
+      }
+    }
+  }
+  std::copy(refined, refined + q * q, v.inverse);
+}
+
+/// All that follows from the inverse: M, v, ε, …. How many times larger I − AᵀM is than rounding alone would make it; not
+/// finite where anything is not.
+double SupportWalk::enclose(Walk& walk, const Vertex& v, const std::int32_t* basis) noexcept {
+  const std::size_t q = walk.q;
+  const double gamma = rounding(q);
+  double* sum = walk.mu.data();
+  double* size = walk.direction.data();
+  std::fill(v.place, v.place + q, 0.0);
+  for (std::size_t r = 0; r < q; ++r) {
+    const auto facet = static_cast<std::size_t>(basis[r]);
+    const double* edge = v.inverse + r * q;
+    double norm = 0.0;
+    for (std::size_t j = 0; j < q; ++j) {
+      v.place[j] += edge[j] * walk.offsets[facet];
+      norm += edge[j] * edge[j];
+    }
+    v.weight[r] = walk.scale[facet] / std::sqrt(norm);
+    v.penalty[r] = walk.penalties[facet];
+    std::fill(sum, sum + q, 0.0);
+    for (std::size_t k = 0; k < q; ++k) {
+      for (std::size_t j = 0; j < q; ++j) {
+        sum[j] += walk.transform[k * q + j] * edge[k];
+      }
+    }
+    for (std::size_t j = 0; j < q; ++j) {
+      v.multiply[j * q + r] = sum[j] / walk.scale[facet];
+    }
+  }
+  double worse = 0.0;
+  for (std::size_t k = 0; k < q; ++k) {
+    const double* column = v.multiply + k * q;  // μ per unit of a_k
+    double point = walk.centre[k], sizes = std::abs(walk.centre[k]), negative = 0.0;
+    std::fill(sum, sum + q, 0.0);
+    std::fill(size, size + q, 0.0);
+    sum[k] = size[k] = 1.0;
+    for (std::size_t r = 0; r < q; ++r) {
+      const auto facet = static_cast<std::size_t>(basis[r]);
+      const double term = column[r] * walk.bounds[facet];
+      point += term;
+      sizes += std::abs(term);
+      negative += std::abs(column[r]) * v.penalty[r];
+      const double* row = walk.rows.data() + facet * q;
+      for (std::size_t j = 0; j < q; ++j) {
+        sum[j] -= row[j] * column[r];
+        size[j] += std::abs(row[j] * column[r]);
+      }
+    }
+    double left = 0.0, floor = 0.0;
+    for (std::size_t j = 0; j < q; ++j) {
+      left += std::abs(sum[j]) * walk.half[j];
+      floor += gamma * size[j] * walk.half[j];
+    }
+    v.point[k] = point;
+    v.doubt[k] = (left + floor + gamma * (2.0 * sizes + std::abs(point) + negative)) * (1.0 + gamma) + kTiny;
+    const double ratio = left / std::max(floor, kTiny);
+    worse = ratio <= worse ? worse : ratio;
+    worse = std::isfinite(v.doubt[k]) && std::isfinite(point) ? worse : std::numeric_limits<double>::quiet_NaN();
+  }
+  return worse;
+}
+
 /// Remembers the vertex of `basis` as the newest; `inverse` is nearly that of its facets, or null. False where the facets
 /// do not meet in a point.
 bool SupportWalk::make(Walk& walk, const std::int32_t* basis, const double* inverse) noexcept {
@@ -224,72 +309,14 @@ bool SupportWalk::make(Walk& walk, const std::int32_t* basis, const double* inve
       }
     }
   }
-  // Newton: Z ← Z + Z (I − A Z), with Z by columns.
-  for (std::size_t c = 0; c < q; ++c) {
-    for (std::size_t r = 0; r < q; ++r) {
-      double sum = r == c ? 1.0 : 0.0;
-      for (std::size_t j = 0; j < q; ++j) {
-        sum -= facets[r * q + j] * v.inverse[c * q + j];
-      }
-      rest[c * q + r] = sum;
-    }
+  // A neighbour's inverse with one facet exchanged is nearly always as good as a fresh one; where it is not, it is
+  // refined once.
+  double worse = enclose(walk, v, basis);
+  if (!(worse <= kAsNew)) {
+    refine(v, q, facets, rest, walk.scratch.data() + 2 * q * q);
+    worse = enclose(walk, v, basis);
   }
-  double* refined = walk.scratch.data() + 2 * q * q;
-  std::copy(v.inverse, v.inverse + q * q, refined);
-  for (std::size_t c = 0; c < q; ++c) {
-    for (std::size_t r = 0; r < q; ++r) {
-      const double factor = rest[c * q + r];
-      for (std::size_t j = 0; j < q; ++j) {
-        refined[c * q + j] += factor * v.inverse[r * q + j];
-      }
-    }
-  }
-  std::copy(refined, refined + q * q, v.inverse);
-
-  const double gamma = rounding(q);
-  std::fill(v.place, v.place + q, 0.0);
-  for (std::size_t r = 0; r < q; ++r) {
-    const auto facet = static_cast<std::size_t>(basis[r]);
-    const double* edge = v.inverse + r * q;
-    double norm = 0.0;
-    for (std::size_t j = 0; j < q; ++j) {
-      v.place[j] += edge[j] * walk.offsets[facet];
-      norm += edge[j] * edge[j];
-    }
-    v.weight[r] = walk.scale[facet] / std::sqrt(norm);
-    v.penalty[r] = walk.penalties[facet];
-    for (std::size_t j = 0; j < q; ++j) {
-      double sum = 0.0;
-      for (std::size_t k = 0; k < q; ++k) {
-        sum += walk.transform[k * q + j] * edge[k];
-      }
-      v.multiply[j * q + r] = sum / walk.scale[facet];
-    }
-  }
-  bool finite = true;
-  for (std::size_t k = 0; k < q; ++k) {
-    const double* column = v.multiply + k * q;  // μ per unit of a_k
-    double point = walk.centre[k], sizes = std::abs(walk.centre[k]), negative = 0.0;
-    for (std::size_t r = 0; r < q; ++r) {
-      const double term = column[r] * walk.bounds[static_cast<std::size_t>(basis[r])];
-      point += term;
-      sizes += std::abs(term);
-      negative += std::abs(column[r]) * v.penalty[r];
-    }
-    double left = 0.0;
-    for (std::size_t j = 0; j < q; ++j) {
-      double difference = j == k ? 1.0 : 0.0, magnitude = difference;
-      for (std::size_t r = 0; r < q; ++r) {
-        const double term = walk.rows[static_cast<std::size_t>(basis[r]) * q + j] * column[r];
-        difference -= term;
-        magnitude += std::abs(term);
-      }
-      left += (std::abs(difference) + gamma * magnitude) * walk.half[j];
-    }
-    v.point[k] = point;
-    v.doubt[k] = (left + gamma * (2.0 * sizes + std::abs(point) + negative)) * (1.0 + gamma) + kTiny;
-    finite = finite && std::isfinite(v.doubt[k]) && std::isfinite(point);
-  }
+  const bool finite = std::isfinite(worse);
   if (!finite) {
     return false;
   }
@@ -387,6 +414,7 @@ double SupportWalk::follow(Walk& walk, Place& place, double size) noexcept {
     place.vertex = find(walk, place.basis.data());
     if (place.vertex == kNone) {
       if (walk.vertices == walk.room ? !forget(walk, place.basis.data()) : !make(walk, place.basis.data(), nullptr)) {
+        ++count_.cut_short;
         return std::numeric_limits<double>::infinity();
       }
       place.vertex = static_cast<std::uint32_t>(walk.vertices - 1);
@@ -428,6 +456,7 @@ double SupportWalk::follow(Walk& walk, Place& place, double size) noexcept {
     std::uint32_t next = leaving < q ? step(walk, at, leaving) : kNone;
     if (next == kFull) {
       if (!forget(walk, walk.bases.data() + at * q)) {
+        ++count_.cut_short;
         return std::numeric_limits<double>::infinity();
       }
       at = 0;
@@ -451,12 +480,13 @@ double SupportWalk::follow(Walk& walk, Place& place, double size) noexcept {
     value += a[k] * v.point[k];
     doubt += std::abs(a[k]) * v.doubt[k];
   }
-  const double gamma = rounding(q);
-  return round_up(value + ((cost + doubt) * (1.0 + gamma) + kTiny));
+  // The last addition rounds by half an epsilon of the result at most.
+  return value + ((cost + doubt) * (1.0 + rounding(q)) + (2.0 * kEpsilon * std::abs(value) + kTiny));
 }
 
 double SupportWalk::support(std::span<const double> a, std::size_t slot) noexcept {
   double total = 0.0;
+  const std::size_t cut_short = count_.cut_short;
   for (std::size_t i = 0; i < walks_.size(); ++i) {
     Walk& walk = walks_[i];
     double bound = 0.0;
@@ -474,9 +504,9 @@ double SupportWalk::support(std::span<const double> a, std::size_t slot) noexcep
     } else {
       bound = support_of_vertices(set_.blocks()[i], set_.hull(), a);
     }
-    total = bound == 0.0 ? total : round_up(total + bound);
+    total = i == 0 || total == 0.0 ? bound : round_up(total + bound);
   }
-  return std::min(total, set_.hull().support(a));
+  return count_.cut_short == cut_short ? total : std::min(total, set_.hull().support(a));
 }
 
 }  // namespace wheelwright

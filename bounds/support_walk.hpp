@@ -5,7 +5,10 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
+#include <new>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include <wheelwright/bounds/polytope.hpp>
@@ -28,6 +31,26 @@ struct SupportWalkCount {
   std::size_t cut_short = 0;    ///< directions whose budget ran out: their bound holds, but may not be tight
 };
 
+/// Memory that is not touched before it is written: room for many vertices costs nothing until they come.
+template <class T>
+struct Uninitialised : std::allocator<T> {
+  /// The same for another type.
+  template <class U>
+  struct rebind {
+    using other = Uninitialised<U>;
+  };
+  /// Leaves `place` as it is.
+  template <class U>
+  void construct(U* place) noexcept {
+    static_cast<void>(place);
+  }
+  /// Makes a value at `place`.
+  template <class U, class... Arguments>
+  void construct(U* place, Arguments&&... arguments) {
+    ::new (static_cast<void*>(place)) U(std::forward<Arguments>(arguments)...);
+  }
+};
+
 /// h(a) = max { a·θ : θ in set } for one direction after the other.
 ///
 /// A vertex is where q facets A_B θ = b_B meet; it is the best for all directions a with μ = A_B⁻ᵀa >= 0. The walk starts
@@ -44,8 +67,8 @@ class SupportWalk {
   /// For `set`, whose data are shared.
   explicit SupportWalk(Polytope set, const SupportWalkOptions& options = {});
 
-  /// h(a), rounded outward, never above the support of the set's hull; `a` has p finite entries (unchecked), `slot` is
-  /// below options.slots.
+  /// h(a), rounded outward; where the walk was cut short not above the support of the set's hull. `a` has p finite entries
+  /// (unchecked), `slot` is below options.slots.
   [[nodiscard]] double support(std::span<const double> a, std::size_t slot = 0) noexcept;
 
   [[nodiscard]] const Polytope& set() const noexcept { return set_; }
@@ -60,14 +83,14 @@ class SupportWalk {
   struct Walk {
     std::size_t q = 0, facets = 0, stride = 0;
     std::vector<std::size_t> parameters;
-    bool walked = false;                          // else the block's hull (or its few vertices) must do
-    std::vector<double> normals, offsets;         // in z, by columns, padded: where edges end
-    std::vector<double> rows, bounds, penalties;  // in θ: facet × q; s_i; s_i + Σ|A|H
-    std::vector<double> scale;                    // norm of a facet in z
-    std::vector<double> centre, half, transform;  // θ = centre + transform z (by columns); H
-    std::vector<double> numbers;                  // of vertices, `size` each
-    std::vector<std::int32_t> bases, neighbours;  // vertices × q
-    std::vector<std::uint32_t> table;             // open hash of bases
+    bool walked = false;                                 // else the block's hull (or its few vertices) must do
+    std::vector<double> normals, offsets;                // in z, by columns, padded: where edges end
+    std::vector<double> rows, bounds, penalties;         // in θ: facet × q; s_i; s_i + Σ|A|H
+    std::vector<double> scale;                           // norm of a facet in z
+    std::vector<double> centre, half, transform;         // θ = centre + transform z (by columns); H
+    std::vector<double, Uninitialised<double>> numbers;  // of vertices, `size` each
+    std::vector<std::int32_t> bases, neighbours;         // vertices × q
+    std::vector<std::uint32_t> table;                    // open hash of bases
     std::size_t size = 0, vertices = 0, room = 0;
     std::uint32_t generation = 0;
     std::vector<Place> places;
@@ -76,6 +99,11 @@ class SupportWalk {
     std::vector<std::int32_t> sorted, wanted;
   };
 
+  struct Vertex;
+
+  [[nodiscard]] static Vertex parts(double* first, std::size_t q) noexcept;
+  static void refine(const Vertex& v, std::size_t q, const double* facets, double* rest, double* refined) noexcept;
+  [[nodiscard]] static double enclose(Walk& walk, const Vertex& v, const std::int32_t* basis) noexcept;
   bool begin(Walk& walk, const Polytope::Block& block, const SupportWalkOptions& options);
   [[nodiscard]] static std::uint32_t find(Walk& walk, const std::int32_t* basis) noexcept;
   [[nodiscard]] static bool make(Walk& walk, const std::int32_t* basis, const double* inverse) noexcept;
