@@ -3,6 +3,7 @@
 /// Boxes of parameters and their support function.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -24,23 +25,19 @@ struct Box {
   /// Support function h(a) = max { a·θ : θ in box } = Σ_j max(a_j lower_j, a_j upper_j), rounded outward: never below
   /// the exact value. `a` has p finite entries (unchecked). Allocates nothing.
   [[nodiscard]] double support(std::span<const double> a) const noexcept {
-    double sum = 0.0, magnitude = 0.0, terms = 0.0;
+    double sum = 0.0, magnitude = 0.0;
     for (std::size_t j = 0; j < sides.size(); ++j) {
-      if (a[j] != 0.0) {
-        const double term = a[j] * (a[j] > 0.0 ? sides[j].upper : sides[j].lower);
-        sum += term;
-        magnitude += std::abs(term);
-        terms += 1.0;
-      }
+      const double term = std::max(a[j] * sides[j].lower, a[j] * sides[j].upper);
+      sum += term;
+      magnitude += std::abs(term);
     }
-    if (terms == 0.0) {
-      return 0.0;
-    }
-    // Rounding of k products and k − 1 sums is at most 2k·2⁻⁵³·Σ|term| plus an underflow each (Higham 2002, section
-    // 3.1); four times that covers the rounding of the bound itself.
+    // Rounding of p products and p sums is at most (p + 1)·2⁻⁵³·Σ|term| plus an underflow each (Higham 2002, section 3.1);
+    // eight times that covers the rounding of the bound itself.
     constexpr double epsilon = std::numeric_limits<double>::epsilon();
-    return round_up(sum +
-                    (4.0 * (terms + 1.0) * epsilon * magnitude + terms * std::numeric_limits<double>::denorm_min()));
+    const double p = static_cast<double>(sides.size());
+    return magnitude == 0.0 && is_zero(a)
+               ? 0.0
+               : sum + (4.0 * (p + 1.0) * epsilon * magnitude + 2.0 * p * std::numeric_limits<double>::min());
   }
 
   /// The same, and writes a corner where the maximum is attained to `maximiser` (p entries).
@@ -75,6 +72,11 @@ struct Box {
   }
 
   friend bool operator==(const Box&, const Box&) = default;
+
+ private:
+  [[nodiscard]] static bool is_zero(std::span<const double> a) noexcept {
+    return std::all_of(a.begin(), a.end(), [](double x) { return x == 0.0; });
+  }
 };
 
 /// Throws InvalidArgument, naming `what`, unless every side is finite and lower <= upper.

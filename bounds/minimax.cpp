@@ -105,7 +105,9 @@ class Epigraph {
         // Few: settled among themselves first, so that the many are looked at again only once.
         SlabStore few;
         few.append(rows, found);
-        changed = absorb(few.view(), relative) || changed;
+        SlabColumns settled = few.view();
+        settled.output = rows.output;
+        changed = absorb(settled, relative) || changed;
         if (failed_) {
           break;
         }

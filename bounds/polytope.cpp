@@ -198,13 +198,19 @@ std::variant<Polytope, std::vector<WeightedRow>> Polytope::intersect(const std::
     RowBank own;
     own.parameters = parameters.size();
     Eigen::MatrixXd information = Eigen::MatrixXd::Zero(q, q);
+    Eigen::VectorXd farthest(q);
+    for (Eigen::Index k = 0; k < q; ++k) {
+      const Interval& side = part.sides[static_cast<std::size_t>(k)];
+      farthest[k] = std::max(std::abs(side.lower), std::abs(side.upper));
+    }
     for (const HalfSpace& row : rows) {
       if (row.a[static_cast<Eigen::Index>(parameters.front())] != 0.0 || !pick(row.a, parameters).isZero(0.0)) {
         const Eigen::VectorXd a = pick(row.a, parameters);
         own.add({a.data(), parameters.size()}, row.b, row.origin);
-        const Eigen::VectorXd scaled = a.array() / part.support({a.data(), parameters.size()});
-        if (scaled.allFinite()) {
-          information += scaled * scaled.transpose();
+        // A row that the sign of every parameter decides says nothing of the size of the set.
+        const double reach = part.support({a.data(), parameters.size()});
+        if (reach > 1e-12 * a.cwiseAbs().dot(farthest)) {
+          information += (a / reach) * (a / reach).transpose();
         }
       }
     }

@@ -486,7 +486,6 @@ double SupportWalk::follow(Walk& walk, Place& place, double size) noexcept {
 
 double SupportWalk::support(std::span<const double> a, std::size_t slot) noexcept {
   double total = 0.0;
-  const std::size_t cut_short = count_.cut_short;
   for (std::size_t i = 0; i < walks_.size(); ++i) {
     Walk& walk = walks_[i];
     double bound = 0.0;
@@ -506,7 +505,7 @@ double SupportWalk::support(std::span<const double> a, std::size_t slot) noexcep
     }
     total = i == 0 || total == 0.0 ? bound : round_up(total + bound);
   }
-  return count_.cut_short == cut_short ? total : std::min(total, set_.hull().support(a));
+  return std::min(total, set_.hull().support(a));
 }
 
 }  // namespace wheelwright

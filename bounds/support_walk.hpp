@@ -67,8 +67,8 @@ class SupportWalk {
   /// For `set`, whose data are shared.
   explicit SupportWalk(Polytope set, const SupportWalkOptions& options = {});
 
-  /// h(a), rounded outward; where the walk was cut short not above the support of the set's hull. `a` has p finite entries
-  /// (unchecked), `slot` is below options.slots.
+  /// h(a), rounded outward, never above the support of the set's hull; `a` has p finite entries (unchecked), `slot` is
+  /// below options.slots.
   [[nodiscard]] double support(std::span<const double> a, std::size_t slot = 0) noexcept;
 
   [[nodiscard]] const Polytope& set() const noexcept { return set_; }
