@@ -9,10 +9,11 @@ set -eu
 cd "$(dirname "$0")/.."
 
 packages="g++ cmake ninja-build pkg-config python3
-  libeigen3-dev libfmt-dev libyaml-cpp-dev nlohmann-json3-dev zlib1g-dev libzstd-dev coinor-libclp-dev libboost-dev
+  libeigen3-dev libfmt-dev libyaml-cpp-dev nlohmann-json3-dev zlib1g-dev libzstd-dev libboost-dev
+  libceres-dev libnlopt-cxx-dev libnlopt-dev
   libcli11-dev
   libgtest-dev libgmock-dev librapidcheck-dev libbenchmark-dev python3-jsonschema
-  libglpk-dev libqsopt-ex-dev"
+  coinor-libclp-dev libglpk-dev liblapack-dev libqsopt-ex-dev"
 case "${1:-}" in
   '') ;;
   --ci) packages="$packages clang clang-format clang-tidy" ;;
