@@ -27,8 +27,8 @@ struct RobotReader {
   static bool drive(const Robot& robot) { return robot.model == "differential_drive"; }
 
   void read() {
-    const auto members = root.members({"name", "model", "wheel_radius", "track_width", "lever_arm", "friction",
-                                       "parameters", "effort", "nominal", "prior", "noise", "filter",
+    const auto members = root.members({"name", "model", "wheel_radius", "track_width", "footprint", "lever_arm",
+                                       "friction", "parameters", "effort", "nominal", "prior", "noise", "filter",
                                        "encoder_counts_per_turn", "speed_source", "limits", "motor"});
     for (const auto& [key, place] : members) {
       read_basics(key, place);
@@ -57,7 +57,8 @@ struct RobotReader {
   }
 
   void read_geometry(const std::string& key, const YamlPlace& place) {
-    const bool geometry = key == "wheel_radius" || key == "track_width" || key == "lever_arm" || key == "friction";
+    const bool geometry =
+        key == "wheel_radius" || key == "track_width" || key == "footprint" || key == "lever_arm" || key == "friction";
     if (geometry && !drive(robot)) {
       place.say(key + ": the model single_axis has no " + key + ": expected it with differential_drive only");
     }
@@ -67,6 +68,14 @@ struct RobotReader {
     } else if (key == "track_width") {
       robot.track_width = place.number("metres, > 0 and at most 100",
                                        [](double value) { return value > 0.0 && value <= longest_track; });
+    } else if (key == "footprint") {
+      for (const auto& [name, value] : place.members({"radius"})) {
+        robot.footprint_radius = value.number("metres, > 0 and at most 100",
+                                              [](double number) { return number > 0.0 && number <= longest_track; });
+      }
+      if (!robot.footprint_radius) {
+        place.fail("the key radius");
+      }
     } else if (key == "lever_arm") {
       robot.lever_arm_is_track = place.choice({"half_track", "track"}) == 1;
     }

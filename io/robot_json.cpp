@@ -60,6 +60,9 @@ Json to_json(const Robot& robot) {
   if (robot.model == "differential_drive") {
     out["wheel_radius"] = robot.wheel_radius;
     out["track_width"] = robot.track_width;
+    if (robot.footprint_radius) {
+      out["footprint"] = {{"radius", *robot.footprint_radius}};
+    }
     out["lever_arm"] = robot.lever_arm_is_track ? "track" : "half_track";
     out["friction"] = robot.anisotropic_friction ? "anisotropic" : "isotropic";
   }

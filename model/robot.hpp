@@ -68,8 +68,11 @@ struct Robot {
   std::string model = "differential_drive";  ///< differential_drive | single_axis
   double wheel_radius = 0.0;                 ///< r, m (differential drive)
   double track_width = 0.0;                  ///< D, m (differential drive)
-  bool lever_arm_is_track = false;           ///< ℓ = D, the paper's convention, instead of D/2
-  bool anisotropic_friction = false;         ///< five parameters (f1 ≠ f2) instead of four
+  std::optional<double>
+      footprint_radius;               ///< m, of the circle about the wheels' midpoint that holds all of the robot's
+                                      ///< mass: I <= m R² (differential drive)
+  bool lever_arm_is_track = false;    ///< ℓ = D, the paper's convention, instead of D/2
+  bool anisotropic_friction = false;  ///< five parameters (f1 ≠ f2) instead of four
   EffortKind effort = EffortKind::torque;
   Hold hold = Hold::first_order;
   bool effort_unsigned = false;                        ///< only |effort| was logged

@@ -19,6 +19,7 @@ const std::string full = R"(name: my_robot
 model: differential_drive
 wheel_radius: 0.0975
 track_width: 0.381
+footprint: {radius: 0.4}
 lever_arm: track
 effort: {kind: voltage, hold: zero_order, unsigned: true}
 nominal: {mass: 21.0, yaw_inertia: 0.9, viscous_linear: 4.0, viscous_yaw: 0.5}
@@ -39,6 +40,7 @@ TEST(RobotFile, ReadsEveryKey) {
   EXPECT_EQ(robot.name, "my_robot");
   EXPECT_EQ(robot.wheel_radius, 0.0975);
   EXPECT_EQ(robot.track_width, 0.381);
+  EXPECT_EQ(robot.footprint_radius, 0.4);
   EXPECT_TRUE(robot.lever_arm_is_track);
   EXPECT_FALSE(robot.anisotropic_friction);
   EXPECT_EQ(robot.effort, EffortKind::voltage);
@@ -162,6 +164,11 @@ INSTANTIATE_TEST_SUITE_P(
         Bad{"encoder_counts_per_turn: 0", "encoder_counts_per_turn: '0': expected a number > 0"},
         Bad{"speed_source: encoder", "speed_source: 'encoder': expected one of auto, encoder_difference, measured"},
         Bad{"limits: {torque: 3}", "limits: unknown key 'torque': expected one of effort, speed, acceleration"},
+        Bad{"footprint: {radius: 0}", "footprint.radius: '0': expected metres, > 0 and at most 100"},
+        Bad{"footprint: {radius: 400}", "footprint.radius: '400': expected metres, > 0 and at most 100"},
+        Bad{"footprint: 0.4", "footprint: '0.4': expected keys with values, of radius"},
+        Bad{"footprint: {}", "footprint: a mapping: expected the key radius"},
+        Bad{"footprint: {diameter: 0.8}", "footprint: unknown key 'diameter': expected one of radius"},
         Bad{"limits: {effort: -3}", "limits.effort: '-3': expected a number > 0"},
         Bad{"motor: {kt: 3}", "motor: unknown key 'kt'"},
         Bad{"motor: {resistance: 0}", "motor.resistance: '0': expected a number > 0"},
@@ -185,6 +192,8 @@ TEST(RobotFile, BadValuesElsewhere) {
               HasSubstr("robot.yaml:2: model: 'skid_steer': expected one of differential_drive, single_axis"));
   EXPECT_THAT(error("model: single_axis\nwheel_radius: 1\n"),
               HasSubstr("robot.yaml:2: wheel_radius: the model single_axis has no wheel_radius"));
+  EXPECT_THAT(error("model: single_axis\nfootprint: {radius: 1}\n"),
+              HasSubstr("robot.yaml:2: footprint: the model single_axis has no footprint"));
   EXPECT_THAT(error("model: single_axis\nnominal: {mass: 1}\n"), HasSubstr("nominal: unknown key 'mass'"));
   EXPECT_THAT(error("name: a\nname: [\n"), AllOf(HasSubstr("robot.yaml:"), HasSubstr("expected YAML")));
   EXPECT_THAT(error("- a\n- b\n"), HasSubstr("robot.yaml: a list of 2: expected keys with values"));

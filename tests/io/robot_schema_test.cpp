@@ -33,6 +33,7 @@ TEST(RobotSchema, CoversWhatIsWritten) {
   Robot robot;
   robot.wheel_radius = 0.1;
   robot.track_width = 0.5;
+  robot.footprint_radius = 0.4;
   robot.parameters = {"mass", "yaw_inertia"};
   robot.nominal["mass"] = 3.0;
   robot.prior["mass"] = {1.0, 5.0};
