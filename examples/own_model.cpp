@@ -36,7 +36,7 @@ struct UnbalancedWheel {
     m.outputs = {"axle"};
     m.output_units = {"N·m"};
     m.coordinates = {"phi"};
-    m.joints = {{.angle = "phi", .speed = "omega", .torque = "tau", .current = "", .voltage = ""}};
+    m.joints = {{.angle = "phi", .speed = "omega", .torque = "tau", .current = "", .voltage = "", .command = ""}};
     m.motion = m.input = Eigen::MatrixXd::Identity(1, 1);
     // |sin φ − sin φ'| <= |φ − φ'|: the error of the angle bounds that of the term.
     const auto gravity = [](const MotionState& s) { return TermValue{std::sin(s.heading), s.heading_error}; };

@@ -17,6 +17,7 @@ struct Energies {
   double acceleration = 0.0;
   double speed = 0.0;
   double effort = 0.0;
+  double cross = 0.0;  // of acceleration and speed
 };
 
 Energies impulse_energies(const FilterDesign& d, MotionKind motion, Hold hold, double h) {
@@ -42,6 +43,7 @@ Energies impulse_energies(const FilterDesign& d, MotionKind motion, Hold hold, d
     e.acceleration += out(slope) * out(slope);
     e.speed += out(speed) * out(speed);
     e.effort += out(effort) * out(effort);
+    e.cross += out(slope) * out(speed);
     before = now;
     speed_before = speed_now;
   }
@@ -72,6 +74,33 @@ KernelNorms statistical_norms(const FilterDesign& design, MotionKind motion, dou
   const Energies linear = impulse_energies(design, motion, Hold::first_order, step);
   const Energies held = impulse_energies(design, motion, Hold::zero_order, step);
   return roots({linear.acceleration, linear.speed, std::max(linear.effort, held.effort)});
+}
+
+NoiseGram noise_gram(const Model& model, const FilterDesign& design, const Measurement& measurement, double step) {
+  validate(design);
+  check::positive(step, "noise_gram step");
+  const Energies e = impulse_energies(design, measurement.motion, measurement.hold, step);
+  const Eigen::MatrixXd joints = model.motion * model.motion.transpose();
+  const auto p = static_cast<Eigen::Index>(model.p());
+  NoiseGram gram;
+  gram.motion.assign(model.n(), Eigen::MatrixXd::Zero(p, p));
+  const auto energy = [&](Term::Kind a, Term::Kind b) {
+    if (a != b) {
+      return e.cross;
+    }
+    return a == Term::Kind::acceleration ? e.acceleration : e.speed;
+  };
+  for (const Term& a : model.terms) {
+    for (const Term& b : model.terms) {
+      if (a.output == b.output && a.kind != Term::Kind::function && b.kind != Term::Kind::function) {
+        gram.motion[a.output](static_cast<Eigen::Index>(a.parameter), static_cast<Eigen::Index>(b.parameter)) +=
+            a.scale * b.scale * energy(a.kind, b.kind) *
+            joints(static_cast<Eigen::Index>(a.coordinate), static_cast<Eigen::Index>(b.coordinate));
+      }
+    }
+  }
+  gram.effort = e.effort * model.input.rowwise().squaredNorm();
+  return gram;
 }
 
 SignalErrors propagate(const Model& model, const FilterDesign& design, const Measurement& measurement,

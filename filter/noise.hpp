@@ -3,6 +3,8 @@
 /// Sensor noise propagated through the filters: what the rows of the regression can be wrong by.
 #pragma once
 
+#include <vector>
+
 #include <Eigen/Core>
 
 #include <wheelwright/filter/design.hpp>
@@ -64,6 +66,20 @@ struct KernelNorms {
 /// a unit sample through the filter itself. For small βh: f*n: α√(h/(2β)), f*ṅ: about α, f₂*n: α²√(h/(4β³)),
 /// f₂*ṅ: α²√(h/(4β)), f₂*n̈: about α²/√2 (the newest two angles enter with half of α² each).
 [[nodiscard]] KernelNorms statistical_norms(const FilterDesign& design, MotionKind motion, double step);
+
+/// Second moments that independent sensor noise adds to the rows, for noise of variance 1.
+struct NoiseGram {
+  std::vector<Eigen::MatrixXd>
+      motion;              ///< per output p × p: E δYᵀδY at one instant, noise of each joint's motion column
+                           ///< (rad² for angles and the angles behind mean speeds, else (rad/s)²)
+  Eigen::VectorXd effort;  ///< per output: variance of τ_f, noise of each joint's effort
+};
+
+/// What noise that is independent from sample to sample and from joint to joint does to the rows of a settled filter at
+/// a constant step `step` (s): what bias-compensated and total least squares take away. Terms that are functions of the
+/// motion (dry friction) are taken as exact. Throws InvalidArgument unless `step` > 0.
+[[nodiscard]] NoiseGram noise_gram(const Model& model, const FilterDesign& design, const Measurement& measurement,
+                                   double step);
 
 /// Bounds on the filtered signals for sensors with the errors `sensors`. Throws InvalidArgument on negative bounds, a
 /// confidence outside (0, 1), or a missing largest step where it is needed.

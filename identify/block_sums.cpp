@@ -37,11 +37,10 @@ void BlockSums::add(const Eigen::Ref<const Eigen::VectorXd>& value) {
 
 Eigen::VectorXd BlockSums::total() const { return blocks().rowwise().sum() + current_; }
 
-LongRunCovariance long_run_covariance(const BlockSums& series, std::size_t most_frequencies) {
-  const Eigen::MatrixXd sums = series.blocks();
-  const auto blocks = sums.cols();
+LongRunCovariance long_run_covariance(const Eigen::MatrixXd& block_sums, std::size_t most_frequencies) {
+  const auto blocks = block_sums.cols();
   LongRunCovariance result;
-  result.matrix = Eigen::MatrixXd::Zero(sums.rows(), sums.rows());
+  result.matrix = Eigen::MatrixXd::Zero(block_sums.rows(), block_sums.rows());
   if (blocks < 2) {
     return result;
   }
@@ -50,18 +49,27 @@ LongRunCovariance long_run_covariance(const BlockSums& series, std::size_t most_
       std::min<std::size_t>(std::clamp<std::size_t>(rule, 4, std::max<std::size_t>(most_frequencies, 4)),
                             static_cast<std::size_t>(blocks - 1));
   for (std::size_t f = 1; f <= frequencies; ++f) {
-    Eigen::VectorXd projection = Eigen::VectorXd::Zero(sums.rows());
+    Eigen::VectorXd projection = Eigen::VectorXd::Zero(block_sums.rows());
     for (Eigen::Index k = 0; k < blocks; ++k) {
       const double phase =
           std::numbers::pi * static_cast<double>(f) * (static_cast<double>(k) + 0.5) / static_cast<double>(blocks);
-      projection += std::numbers::sqrt2 * std::cos(phase) * sums.col(k);
+      projection += std::numbers::sqrt2 * std::cos(phase) * block_sums.col(k);
     }
     result.matrix += projection * projection.transpose();
   }
-  // The projections have the variance of the sum over the full blocks; the values after them are allowed for in ratio.
-  const double covered = static_cast<double>(blocks) * static_cast<double>(series.block_length());
-  result.matrix *= static_cast<double>(series.count()) / covered / static_cast<double>(frequencies);
+  result.matrix /= static_cast<double>(frequencies);
   result.freedom = static_cast<double>(frequencies);
+  return result;
+}
+
+LongRunCovariance long_run_covariance(const BlockSums& series, std::size_t most_frequencies) {
+  const Eigen::MatrixXd sums = series.blocks();
+  LongRunCovariance result = long_run_covariance(sums, most_frequencies);
+  if (sums.cols() >= 2) {
+    // The full blocks' share of the series; the values after them are allowed for in ratio.
+    const double covered = static_cast<double>(sums.cols()) * static_cast<double>(series.block_length());
+    result.matrix *= static_cast<double>(series.count()) / covered;
+  }
   return result;
 }
 

@@ -48,4 +48,8 @@ struct LongRunCovariance {
 /// the price of heavier t tails.
 [[nodiscard]] LongRunCovariance long_run_covariance(const BlockSums& series, std::size_t most_frequencies = 24);
 
+/// The same from the sums of a mean-zero series over all its blocks of time, one a column; the series is taken whole.
+[[nodiscard]] LongRunCovariance long_run_covariance(const Eigen::MatrixXd& block_sums,
+                                                    std::size_t most_frequencies = 24);
+
 }  // namespace wheelwright

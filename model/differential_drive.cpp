@@ -78,8 +78,8 @@ Model DifferentialDrive::model() const {
   m.outputs = {"sum", "difference"};
   m.output_units = {"N·m", "N·m²"};
   m.coordinates = {"v1", "v2"};
-  m.joints = {{"phi_r", "omega_r", "tau_r", "current_r", "voltage_r"},
-              {"phi_l", "omega_l", "tau_l", "current_l", "voltage_l"}};
+  m.joints = {{"phi_r", "omega_r", "tau_r", "current_r", "voltage_r", "command_r"},
+              {"phi_l", "omega_l", "tau_l", "current_l", "voltage_l", "command_l"}};
   m.motion = (Eigen::Matrix2d() << r / 2.0, r / 2.0, r / d, -r / d).finished();
   m.input = (Eigen::Matrix2d() << 1.0, 1.0, l, -l).finished();
   m.heading_coordinate = 1;

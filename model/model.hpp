@@ -38,6 +38,7 @@ struct Joint {
   std::string torque;   ///< e.g. "tau_r"
   std::string current;  ///< e.g. "current_r"
   std::string voltage;  ///< e.g. "voltage_r"
+  std::string command;  ///< commanded speed, e.g. "command_r"; empty where no column is known for it
 };
 
 /// What an instantaneous term may look at, at one instant.

@@ -24,7 +24,7 @@ Model SingleAxis::model() const {
   m.outputs = {"effort"};
   m.output_units = {"N (rotary: N·m)"};
   m.coordinates = {"velocity"};
-  m.joints = {{"position", "velocity", "effort", "effort", "effort"}};
+  m.joints = {{"position", "velocity", "effort", "effort", "effort", ""}};
   m.motion = Eigen::MatrixXd::Ones(1, 1);
   m.input = Eigen::MatrixXd::Ones(1, 1);
 

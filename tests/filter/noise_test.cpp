@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include <wheelwright/filter/regressor_filter.hpp>
+#include <wheelwright/model/differential_drive.hpp>
 #include <wheelwright/model/single_axis.hpp>
 
 namespace wheelwright {
@@ -111,6 +112,46 @@ TEST(Propagate, StatisticalBoundsAreNeverWiderThanTheWorstCase) {
   EXPECT_LT(usual.speed[0], worst.speed[0]);
   EXPECT_LT(usual.output[0], worst.output[0]);
   EXPECT_LE(usual.acceleration[0], worst.acceleration[0]);
+}
+
+// Squares of what a unit error of one sample leaves in all later rows, errors of the joints adding up.
+TEST(NoiseGram, IsWhatUnitErrorsLeaveInTheRows) {
+  const Model model = DifferentialDrive{.wheel_radius = 0.1, .track_width = 0.5}.model();
+  const double h = 0.01;
+  for (const MotionKind motion : {MotionKind::speed, MotionKind::angle}) {
+    const FilterDesign design{.order = 2, .alpha = 8.0, .beta = 5.0};
+    Measurement m;
+    m.motion = motion;
+    m.motion_columns = {"r", "l"};
+    m.effort_columns = {"tr", "tl"};
+    m.nominal_step = h;
+    std::vector<Eigen::MatrixXd> of_motion(2, Eigen::MatrixXd::Zero(4, 4));
+    Eigen::Vector2d of_effort = Eigen::Vector2d::Zero();
+    for (std::size_t channel = 0; channel < 4; ++channel) {
+      RegressorFilter filter(model, design, m);
+      for (int k = 0; k < 3000; ++k) {
+        std::array<double, 4> sample{};
+        sample[channel] = k == 5 ? 1.0 : 0.0;
+        if (!filter.step(h * k, sample)) {
+          continue;
+        }
+        for (std::size_t i = 0; i < 2; ++i) {
+          const auto row = filter.row().Y.row(static_cast<Eigen::Index>(i));
+          const double y = filter.row().y[static_cast<Eigen::Index>(i)];
+          of_motion[i] += row.transpose() * row;
+          of_effort[static_cast<Eigen::Index>(i)] += y * y;
+        }
+      }
+    }
+    const NoiseGram gram = noise_gram(model, design, m, h);
+    for (std::size_t i = 0; i < 2; ++i) {
+      EXPECT_LE((gram.motion[i] - of_motion[i]).norm(), 1e-9 * of_motion[i].norm()) << "output " << i;
+      if (motion == MotionKind::speed) {
+        const auto at = static_cast<Eigen::Index>(i);
+        EXPECT_NEAR(gram.effort[at], of_effort[at], 1e-9 * of_effort[at]);
+      }
+    }
+  }
 }
 
 }  // namespace

@@ -1,0 +1,321 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/identify/estimate.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <Eigen/Dense>
+#include <boost/math/distributions/fisher_f.hpp>
+
+#include <wheelwright/core/check.hpp>
+#include <wheelwright/identify/block_sums.hpp>
+
+namespace wheelwright {
+namespace {
+
+constexpr double kSingular = 1e-12;      // reciprocal condition, columns scaled
+constexpr double kLeastShare = 0.1;      // of a direction's Σ YᵀY that must be signal
+constexpr double kLeastContrast = 1e-9;  // of the estimates: a smaller difference is rounding
+
+Eigen::VectorXd weights_of(const RegressionMoments& moments, const EstimatorOptions& options) {
+  return options.weights.size() > 0 ? options.weights
+                                    : Eigen::VectorXd::Ones(static_cast<Eigen::Index>(moments.outputs()));
+}
+
+std::vector<Eigen::Index> kept_columns(std::size_t p, const std::vector<bool>& excluded) {
+  check::that(excluded.empty() || excluded.size() == p, "excluded parameters", "one flag for each");
+  std::vector<Eigen::Index> kept;
+  for (std::size_t j = 0; j < p; ++j) {
+    if (excluded.empty() || !excluded[j]) {
+      kept.push_back(static_cast<Eigen::Index>(j));
+    }
+  }
+  return kept;
+}
+
+// A θ = b for the kept parameters, with A's columns and rows scaled. The inverse is kept for the influences.
+class Equations {
+ public:
+  Equations(const Eigen::MatrixXd& A, const Eigen::VectorXd& row_scale, const Eigen::VectorXd& column_scale,
+            const std::vector<Eigen::Index>& kept)
+      : kept_(&kept) {
+    const auto q = static_cast<Eigen::Index>(kept.size());
+    rows_ = row_scale(kept);
+    columns_ = column_scale(kept);
+    for (Eigen::VectorXd* scale : {&rows_, &columns_}) {
+      for (double& s : *scale) {
+        s = s > 0.0 ? 1.0 / s : 1.0;
+      }
+    }
+    const Eigen::MatrixXd scaled = rows_.asDiagonal() * A(kept, kept) * columns_.asDiagonal();
+    lu_.compute(q > 0 ? scaled : Eigen::MatrixXd::Identity(1, 1));
+    solvable_ = q > 0 && scaled.allFinite() && lu_.rcond() > kSingular;
+  }
+  [[nodiscard]] bool solvable() const { return solvable_; }
+  // Solution for the right-hand sides b (p × any), p × any with zeros for parameters that were left out.
+  [[nodiscard]] Eigen::MatrixXd solve(const Eigen::MatrixXd& b) const {
+    Eigen::MatrixXd x = Eigen::MatrixXd::Zero(b.rows(), b.cols());
+    const Eigen::MatrixXd right = rows_.asDiagonal() * b(*kept_, Eigen::all);
+    x(*kept_, Eigen::all) = columns_.asDiagonal() * lu_.solve(right);
+    return x;
+  }
+
+ private:
+  const std::vector<Eigen::Index>* kept_;
+  Eigen::VectorXd rows_, columns_;
+  Eigen::PartialPivLU<Eigen::MatrixXd> lu_;
+  bool solvable_ = false;
+};
+
+Eigen::VectorXd column_sizes(const Eigen::MatrixXd& gram) { return gram.diagonal().cwiseMax(0.0).cwiseSqrt(); }
+
+void finish(Estimate& e, const EstimatorOptions& options) {
+  const LongRunCovariance covariance = long_run_covariance(e.influence, options.most_frequencies);
+  e.covariance = covariance.matrix;
+  e.freedom = covariance.freedom;
+  e.standard_error = e.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+  e.usable = e.theta.allFinite() && e.covariance.allFinite();
+  if (!e.usable) {
+    e.reason = "its equations have no finite solution";
+  }
+}
+
+Estimate unusable(Estimator estimator, std::size_t p, std::string reason) {
+  Estimate e;
+  e.estimator = estimator;
+  e.reason = std::move(reason);
+  const auto size = static_cast<Eigen::Index>(p);
+  e.theta = e.standard_error = Eigen::VectorXd::Zero(size);
+  e.covariance = Eigen::MatrixXd::Zero(size, size);
+  return e;
+}
+
+// Σ w² of what noise adds, at one instant.
+struct NoiseSum {
+  Eigen::MatrixXd YY;
+  double yy = 0.0;
+};
+
+NoiseSum weighted(const RegressionMoments& moments, const RowNoise& noise, const Eigen::VectorXd& w) {
+  const auto p = static_cast<Eigen::Index>(moments.parameters());
+  check::that(noise.YY.size() == moments.outputs(), "row noise", "one matrix for each output");
+  NoiseSum sum{Eigen::MatrixXd::Zero(p, p), 0.0};
+  for (std::size_t i = 0; i < noise.YY.size(); ++i) {
+    const auto at = static_cast<Eigen::Index>(i);
+    check::that(noise.YY[i].rows() == p && noise.YY[i].cols() == p, "row noise", "a p × p matrix for each output");
+    sum.YY += w[at] * w[at] * noise.YY[i];
+    sum.yy += noise.yy.size() > 0 ? w[at] * w[at] * noise.yy[at] : 0.0;
+  }
+  return sum;
+}
+
+}  // namespace
+
+std::string_view to_string(Estimator estimator) {
+  switch (estimator) {
+    case Estimator::least_squares: return "least_squares";
+    case Estimator::instrumental_variables: return "instrumental_variables";
+    case Estimator::bias_compensated: return "bias_compensated";
+    case Estimator::total_least_squares: return "total_least_squares";
+  }
+  return {};
+}
+
+Estimate ordinary_least_squares(const RegressionMoments& moments, const EstimatorOptions& options) {
+  const Eigen::VectorXd w = weights_of(moments, options);
+  const auto kept = kept_columns(moments.parameters(), options.excluded);
+  const MomentSums total = moments.total(w);
+  const Equations equations(total.YY, column_sizes(total.YY), column_sizes(total.YY), kept);
+  if (!equations.solvable()) {
+    return unusable(Estimator::least_squares, moments.parameters(), "the log does not tell the parameters apart");
+  }
+  Estimate e;
+  e.estimator = Estimator::least_squares;
+  e.theta = equations.solve(total.Yy);
+  Eigen::MatrixXd scores(e.theta.size(), static_cast<Eigen::Index>(moments.blocks().size()));
+  for (Eigen::Index b = 0; b < scores.cols(); ++b) {
+    const MomentSums s = moments.block(static_cast<std::size_t>(b), w);
+    scores.col(b) = s.Yy - s.YY * e.theta;
+  }
+  e.influence = equations.solve(scores);
+  finish(e, options);
+  return e;
+}
+
+Estimate instrumental_variables(const RegressionMoments& moments, const EstimatorOptions& options) {
+  check::that(moments.has_instruments(), "instrumental variables", "moments with instruments");
+  const Eigen::VectorXd w = weights_of(moments, options);
+  const auto kept = kept_columns(moments.parameters(), options.excluded);
+  const MomentSums total = moments.total(w);
+  const Equations equations(total.ZY, column_sizes(total.ZZ), column_sizes(total.YY), kept);
+  if (!equations.solvable()) {
+    return unusable(Estimator::instrumental_variables, moments.parameters(),
+                    "the instruments do not tell the parameters apart");
+  }
+  Estimate e;
+  e.estimator = Estimator::instrumental_variables;
+  e.theta = equations.solve(total.Zy);
+  Eigen::MatrixXd scores(e.theta.size(), static_cast<Eigen::Index>(moments.blocks().size()));
+  for (Eigen::Index b = 0; b < scores.cols(); ++b) {
+    const MomentSums s = moments.block(static_cast<std::size_t>(b), w);
+    scores.col(b) = s.Zy - s.ZY * e.theta;
+  }
+  e.influence = equations.solve(scores);
+  finish(e, options);
+  return e;
+}
+
+Estimate bias_compensated(const RegressionMoments& moments, const RowNoise& noise, const EstimatorOptions& options) {
+  const Eigen::VectorXd w = weights_of(moments, options);
+  const auto kept = kept_columns(moments.parameters(), options.excluded);
+  const MomentSums total = moments.total(w);
+  const NoiseSum per_instant = weighted(moments, noise, w);
+  const auto instants = static_cast<double>(moments.instants());
+  const Eigen::MatrixXd signal = total.YY - instants * per_instant.YY;
+  const Eigen::VectorXd size = column_sizes(total.YY);
+  const Equations equations(signal, size, size, kept);
+  const auto q = static_cast<Eigen::Index>(kept.size());
+  bool enough = equations.solvable();
+  if (enough) {
+    // Share of signal in every direction: eigenvalues of the signal relative to the whole.
+    const Eigen::MatrixXd whole = total.YY(kept, kept);
+    const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> shares(signal(kept, kept), whole,
+                                                                           Eigen::EigenvaluesOnly);
+    enough = shares.info() == Eigen::Success && shares.eigenvalues().head(q).minCoeff() >= kLeastShare;
+  }
+  if (!enough) {
+    return unusable(Estimator::bias_compensated, moments.parameters(),
+                    "less than a tenth of the motion in some direction is signal, the rest noise");
+  }
+  Estimate e;
+  e.estimator = Estimator::bias_compensated;
+  e.theta = equations.solve(total.Yy);
+  Eigen::MatrixXd scores(e.theta.size(), static_cast<Eigen::Index>(moments.blocks().size()));
+  for (Eigen::Index b = 0; b < scores.cols(); ++b) {
+    const MomentSums s = moments.block(static_cast<std::size_t>(b), w);
+    const auto in_block = static_cast<double>(moments.blocks()[static_cast<std::size_t>(b)].instants);
+    scores.col(b) = s.Yy - (s.YY - in_block * per_instant.YY) * e.theta;
+  }
+  e.influence = equations.solve(scores);
+  finish(e, options);
+  const Eigen::VectorXd by_noise = equations.solve(instants * noise.relative_sd * per_instant.YY * e.theta);
+  e.covariance += by_noise * by_noise.transpose();
+  e.standard_error = e.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+  return e;
+}
+
+Estimate total_least_squares(const RegressionMoments& moments, const RowNoise& noise, const EstimatorOptions& options) {
+  check::that(noise.yy.size() == static_cast<Eigen::Index>(moments.outputs()), "row noise",
+              "the variance of y for each output");
+  const Eigen::VectorXd w = weights_of(moments, options);
+  const auto kept = kept_columns(moments.parameters(), options.excluded);
+  const auto q = static_cast<Eigen::Index>(kept.size());
+  const MomentSums total = moments.total(w);
+  const NoiseSum per_instant = weighted(moments, noise, w);
+  const auto instants = static_cast<double>(moments.instants());
+  // Largest μ = 1/λ of C v = μ A v with A the moments of [Y y] and C those of its noise.
+  Eigen::MatrixXd A(q + 1, q + 1), C = Eigen::MatrixXd::Zero(q + 1, q + 1);
+  A.topLeftCorner(q, q) = total.YY(kept, kept);
+  A.col(q).head(q) = total.Yy(kept);
+  A.row(q).head(q) = total.Yy(kept).transpose();
+  A(q, q) = total.yy;
+  C.topLeftCorner(q, q) = instants * per_instant.YY(kept, kept);
+  C(q, q) = instants * per_instant.yy;
+  const Eigen::VectorXd scale = column_sizes(A).unaryExpr([](double s) { return s > 0.0 ? 1.0 / s : 1.0; });
+  const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> solver(scale.asDiagonal() * C * scale.asDiagonal(),
+                                                                         scale.asDiagonal() * A * scale.asDiagonal());
+  const bool solved = q > 0 && solver.info() == Eigen::Success && solver.eigenvalues()[q] > 0.0;
+  const double lambda = solved ? 1.0 / solver.eigenvalues()[q] : 0.0;
+  const Eigen::MatrixXd corrected = total.YY - lambda * instants * per_instant.YY;
+  const Equations equations(corrected, column_sizes(total.YY), column_sizes(total.YY), kept);
+  if (!solved || !equations.solvable()) {
+    return unusable(Estimator::total_least_squares, moments.parameters(),
+                    "the log does not tell the parameters from the noise");
+  }
+  Estimate e;
+  e.estimator = Estimator::total_least_squares;
+  e.theta = equations.solve(total.Yy);
+  const double by_noise = instants * (e.theta.dot(per_instant.YY * e.theta) + per_instant.yy);
+  const Eigen::VectorXd pull = instants * per_instant.YY * e.theta;
+  Eigen::MatrixXd scores(e.theta.size(), static_cast<Eigen::Index>(moments.blocks().size()));
+  for (Eigen::Index b = 0; b < scores.cols(); ++b) {
+    const MomentSums s = moments.block(static_cast<std::size_t>(b), w);
+    const double share = static_cast<double>(moments.blocks()[static_cast<std::size_t>(b)].instants) / instants;
+    const double rss = s.yy - 2.0 * s.Yy.dot(e.theta) + e.theta.dot(s.YY * e.theta);
+    const double of_lambda = by_noise > 0.0 ? (rss - lambda * share * by_noise) / by_noise : 0.0;
+    scores.col(b) = s.Yy - s.YY * e.theta + lambda * share * pull + of_lambda * pull;
+  }
+  e.influence = equations.solve(scores);
+  finish(e, options);
+  return e;
+}
+
+Eigen::VectorXd instrument_strength(const RegressionMoments& moments, const EstimatorOptions& options) {
+  check::that(moments.has_instruments(), "instrument strength", "moments with instruments");
+  const auto kept = kept_columns(moments.parameters(), options.excluded);
+  const MomentSums total = moments.total(weights_of(moments, options));
+  Eigen::VectorXd strength = Eigen::VectorXd::Constant(total.Yy.size(), std::numeric_limits<double>::quiet_NaN());
+  const auto unit = [](const Eigen::MatrixXd& gram) -> Eigen::VectorXd {
+    return column_sizes(gram).unaryExpr([](double s) { return s > 0.0 ? 1.0 / s : 1.0; });
+  };
+  const Eigen::VectorXd of_Y = unit(total.YY)(kept), of_Z = unit(total.ZZ)(kept);
+  const Eigen::MatrixXd YY = of_Y.asDiagonal() * total.YY(kept, kept) * of_Y.asDiagonal();
+  const Eigen::MatrixXd ZY = of_Z.asDiagonal() * total.ZY(kept, kept) * of_Y.asDiagonal();
+  const Eigen::MatrixXd ZZ = of_Z.asDiagonal() * total.ZZ(kept, kept) * of_Z.asDiagonal();
+  const Eigen::LDLT<Eigen::MatrixXd> of_YY(YY), of_ZZ(ZZ);
+  if (kept.empty() || of_YY.info() != Eigen::Success || of_ZZ.info() != Eigen::Success || of_YY.rcond() < kSingular ||
+      of_ZZ.rcond() < kSingular) {
+    return strength;
+  }
+  const Eigen::MatrixXd explained = ZY.transpose() * of_ZZ.solve(ZY);
+  const Eigen::LDLT<Eigen::MatrixXd> of_explained(explained);
+  const auto identity = Eigen::MatrixXd::Identity(YY.rows(), YY.cols());
+  const Eigen::MatrixXd whole = of_YY.solve(identity);
+  if (of_explained.info() != Eigen::Success || of_explained.rcond() < kSingular) {
+    for (const Eigen::Index j : kept) {
+      strength[j] = 0.0;
+    }
+    return strength;
+  }
+  const Eigen::MatrixXd inverse = of_explained.solve(identity);
+  for (std::size_t k = 0; k < kept.size(); ++k) {
+    const auto at = static_cast<Eigen::Index>(k);
+    strength[kept[k]] = std::clamp(whole(at, at) / inverse(at, at), 0.0, 1.0);
+  }
+  return strength;
+}
+
+ContrastTest contrast_test(const Estimate& first, const Estimate& second, const EstimatorOptions& options) {
+  check::that(first.usable && second.usable && first.influence.cols() == second.influence.cols(), "contrast test",
+              "two usable estimates from the same moments");
+  ContrastTest test;
+  test.difference = second.theta - first.theta;
+  test.t = Eigen::VectorXd::Zero(test.difference.size());
+  const LongRunCovariance covariance =
+      long_run_covariance(second.influence - first.influence, options.most_frequencies);
+  std::vector<Eigen::Index> tested;
+  for (Eigen::Index j = 0; j < test.difference.size(); ++j) {
+    const double sd = std::sqrt(std::max(covariance.matrix(j, j), 0.0));
+    const double size = std::max({std::abs(first.theta[j]), std::abs(second.theta[j]), first.standard_error[j]});
+    if (sd > kLeastContrast * size && (options.excluded.empty() || !options.excluded[static_cast<std::size_t>(j)])) {
+      test.t[j] = test.difference[j] / sd;
+      tested.push_back(j);
+    }
+  }
+  const auto q = static_cast<double>(tested.size());
+  const double B = covariance.freedom;
+  if (tested.empty() || B < q + 1.0) {
+    return test;
+  }
+  const Eigen::VectorXd scale = covariance.matrix.diagonal()(tested).cwiseSqrt().cwiseInverse();
+  const Eigen::MatrixXd correlation = scale.asDiagonal() * covariance.matrix(tested, tested) * scale.asDiagonal();
+  const Eigen::VectorXd d = scale.asDiagonal() * test.difference(tested);
+  const Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver(correlation);
+  const double t2 = d.dot(solver.solve(d));
+  test.statistic = std::max(0.0, t2 * (B - q + 1.0) / (B * q));
+  test.p_value = boost::math::cdf(boost::math::complement(boost::math::fisher_f(q, B - q + 1.0), test.statistic));
+  return test;
+}
+
+}  // namespace wheelwright

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Estimators of θ_L on the moments of a log, each with the influence of every stretch of the log on it: from these come
+/// covariances that are honest under autocorrelation, and tests of one estimator against another.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include <wheelwright/identify/moments.hpp>
+
+namespace wheelwright {
+
+/// How θ̂_L was found.
+enum class Estimator {
+  least_squares,           ///< min Σ w²(y − Yθ)²: biased towards zero where Y is noisy
+  instrumental_variables,  ///< Σ w² Zᵀ(y − Yθ) = 0 with instruments Z that share nothing with the noise of Y and y
+  bias_compensated,        ///< least squares with the noise's share taken out of Σ YᵀY
+  total_least_squares,     ///< the same with the size of the noise found from the residuals, its shape known
+};
+
+/// Name for people and files: "least_squares", …
+[[nodiscard]] std::string_view to_string(Estimator estimator);
+
+/// θ̂_L and what is known about its error. Parameters that were left out are zero, in covariance and influence too.
+struct Estimate {
+  Estimator estimator = Estimator::least_squares;
+  bool usable = false;             ///< whether the equations could be solved; if not, `reason` says why
+  std::string reason;              ///< empty where usable
+  Eigen::VectorXd theta;           ///< p
+  Eigen::MatrixXd covariance;      ///< p × p, allows for autocorrelation (block_sums.hpp)
+  Eigen::VectorXd standard_error;  ///< p
+  double freedom = 0.0;            ///< of Student's t for intervals
+  Eigen::MatrixXd influence;  ///< p × blocks: θ̂ − θ is nearly the sum of its columns, each from one block of time
+};
+
+/// What the estimators share.
+struct EstimatorOptions {
+  Eigen::VectorXd weights;            ///< one for each output (moments.hpp, efficient_weights); empty: all one
+  std::vector<bool> excluded;         ///< parameters held at zero; empty: none
+  std::size_t most_frequencies = 24;  ///< of the long-run covariance
+};
+
+/// What noise adds to Σ YᵀY and Σ y² at one instant.
+struct RowNoise {
+  std::vector<Eigen::MatrixXd> YY;  ///< per output p × p: E δYᵀδY
+  Eigen::VectorXd yy;               ///< per output: E δy² (total least squares)
+  double relative_sd = 0.0;         ///< standard error of the noise's variance, relative to it, where it was estimated
+};
+
+/// Ordinary (weighted) least squares.
+[[nodiscard]] Estimate ordinary_least_squares(const RegressionMoments& moments, const EstimatorOptions& options = {});
+
+/// Instrumental variables, as many as parameters (Söderström and Stoica 1983): θ̂ = (Σ w²ZᵀY)⁻¹ Σ w²Zᵀy. Throws
+/// InvalidArgument for moments without instruments.
+[[nodiscard]] Estimate instrumental_variables(const RegressionMoments& moments, const EstimatorOptions& options = {});
+
+/// Bias-compensated least squares (Stoica and Söderström 1982): θ̂ = (Σ w²YᵀY − N)⁻¹ Σ w²Yᵀy with N the sum of
+/// `noise.YY`. Not usable where less than a tenth of a direction's Σ YᵀY would be left: what remains would be noise.
+[[nodiscard]] Estimate bias_compensated(const RegressionMoments& moments, const RowNoise& noise,
+                                        const EstimatorOptions& options = {});
+
+/// Total least squares for noise of known shape and unknown size (Golub and Van Loan 1980; Van Huffel and Vandewalle
+/// 1991): λ = min over θ of Σ w²(y − Yθ)² / (θᵀNθ + Σ w² E δy²), at which θ̂ = (Σ w²YᵀY − λN)⁻¹ Σ w²Yᵀy.
+[[nodiscard]] Estimate total_least_squares(const RegressionMoments& moments, const RowNoise& noise,
+                                           const EstimatorOptions& options = {});
+
+/// Share of the variation of each column of Y that the instruments explain beyond what they explain of the other columns
+/// (Shea 1997): 1 for instruments as good as Y, 0 for useless ones. NaN where it cannot be computed.
+[[nodiscard]] Eigen::VectorXd instrument_strength(const RegressionMoments& moments,
+                                                  const EstimatorOptions& options = {});
+
+/// A test whether two estimators of the same θ differ by more than chance.
+struct ContrastTest {
+  double statistic = 0.0;      ///< F
+  double p_value = 1.0;        ///< probability of a contrast as large by chance
+  Eigen::VectorXd difference;  ///< p, second minus first
+  Eigen::VectorXd t;           ///< p, difference over its standard error; 0 where both agree exactly
+};
+
+/// Durbin, Wu and Hausman's test with a covariance that allows for autocorrelation: the difference of two estimates is
+/// judged by the long-run covariance of the difference of their influences, which needs neither to be efficient
+/// (Hausman 1978). Hotelling's T² against F(q, B − q + 1) for q parameters and B frequencies.
+[[nodiscard]] ContrastTest contrast_test(const Estimate& first, const Estimate& second,
+                                         const EstimatorOptions& options = {});
+
+}  // namespace wheelwright

@@ -1,0 +1,254 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/identify/instruments.hpp>
+
+#include <cmath>
+#include <utility>
+
+#include <Eigen/LU>
+
+#include <wheelwright/core/check.hpp>
+
+namespace wheelwright {
+namespace {
+
+constexpr double kSingular = 1e-9;  // reciprocal condition
+constexpr int kSubsteps = 2;
+
+Eigen::MatrixXd inertia(const Model& model, const Eigen::VectorXd& theta) {
+  Eigen::MatrixXd m =
+      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(model.n()), static_cast<Eigen::Index>(model.coordinates.size()));
+  for (const Term& term : model.terms) {
+    if (term.kind == Term::Kind::acceleration) {
+      m(static_cast<Eigen::Index>(term.output), static_cast<Eigen::Index>(term.coordinate)) +=
+          term.scale * theta[static_cast<Eigen::Index>(term.parameter)];
+    }
+  }
+  return m;
+}
+
+bool invertible(const Eigen::MatrixXd& m) {
+  return m.rows() == m.cols() && m.allFinite() && m.fullPivLu().isInvertible() && m.fullPivLu().rcond() > kSingular;
+}
+
+Measurement of_instruments(const Measurement& rows, const std::vector<std::string>& motion) {
+  Measurement m = rows;
+  m.motion = MotionKind::speed;
+  m.count = 0.0;
+  m.motion_columns = motion;
+  m.heading_column.clear();
+  return m;
+}
+
+void append(const FilteredRow& row, std::size_t sample, double t, RegressionBlock& block) {
+  const auto n = row.Y.rows();
+  const auto at = static_cast<Eigen::Index>(block.t.size()) * n;
+  block.sample.push_back(sample);
+  block.t.push_back(t);
+  block.Y.middleRows(at, n) = row.Y;
+  block.dY.middleRows(at, n) = row.dY;
+  block.y.segment(at, n) = row.y;
+  block.dy.segment(at, n) = row.dy;
+}
+
+void shrink(RegressionBlock& block) {
+  const auto rows = block.rows();
+  block.Y.conservativeResize(rows, Eigen::NoChange);
+  block.dY.conservativeResize(rows, Eigen::NoChange);
+  block.y.conservativeResize(rows);
+  block.dy.conservativeResize(rows);
+}
+
+}  // namespace
+
+std::optional<InstrumentMotion> commanded_motion(const LogSource& log, const Model& model) {
+  InstrumentMotion motion;
+  for (const Joint& joint : model.joints) {
+    if (joint.command.empty() || !log.find(joint.command)) {
+      return std::nullopt;
+    }
+    motion.columns.push_back(joint.command);
+  }
+  return motion;
+}
+
+bool MotionSimulation::possible(const Model& model, const Eigen::VectorXd& theta) {
+  return static_cast<std::size_t>(theta.size()) == model.p() && theta.allFinite() &&
+         model.coordinates.size() == model.n() && invertible(inertia(model, theta)) && invertible(model.motion);
+}
+
+MotionSimulation::MotionSimulation(Model model, Eigen::VectorXd theta, Hold hold)
+    : model_(std::move(model)), theta_(std::move(theta)), hold_(hold) {
+  check::that(possible(model_, theta_), "motion simulation", "a model whose inertia can be inverted");
+  inverse_inertia_ = inertia(model_, theta_).inverse();
+  joints_from_coordinates_ = model_.motion.inverse();
+}
+
+void MotionSimulation::restart(double t, const Eigen::VectorXd& speed, const Eigen::VectorXd& effort) {
+  t_ = t;
+  joint_ = speed;
+  speed_ = model_.motion * speed;
+  effort_ = effort;
+}
+
+Eigen::VectorXd MotionSimulation::acceleration(const Eigen::VectorXd& speed, const Eigen::VectorXd& effort,
+                                               double heading) const {
+  const Eigen::VectorXd joints = joints_from_coordinates_ * speed;
+  const Eigen::VectorXd exact = Eigen::VectorXd::Zero(joints.size());
+  const auto span = [](const Eigen::VectorXd& v) {
+    return std::span<const double>(v.data(), static_cast<std::size_t>(v.size()));
+  };
+  const MotionState state{span(speed), span(exact), span(joints), span(exact), heading, 0.0};
+  Eigen::VectorXd force = model_.input * effort;
+  for (const Term& term : model_.terms) {
+    if (term.kind == Term::Kind::acceleration) {
+      continue;
+    }
+    const double value =
+        term.kind == Term::Kind::speed ? speed[static_cast<Eigen::Index>(term.coordinate)] : term.function(state).value;
+    force[static_cast<Eigen::Index>(term.output)] -=
+        term.scale * value * theta_[static_cast<Eigen::Index>(term.parameter)];
+  }
+  return inverse_inertia_ * force;
+}
+
+const Eigen::VectorXd& MotionSimulation::step(double t, const Eigen::VectorXd& effort, double heading) {
+  const double whole = t - t_;
+  const double h = whole / kSubsteps;
+  const auto effort_at = [&](double share) -> Eigen::VectorXd {
+    return hold_ == Hold::zero_order ? effort_ : Eigen::VectorXd(effort_ + share * (effort - effort_));
+  };
+  for (int k = 0; k < kSubsteps; ++k) {
+    const double begin = static_cast<double>(k) / kSubsteps;
+    const Eigen::VectorXd e0 = effort_at(begin), e1 = effort_at(begin + 0.5 / kSubsteps),
+                          e2 = effort_at(begin + 1.0 / kSubsteps);
+    const Eigen::VectorXd k1 = acceleration(speed_, e0, heading);
+    const Eigen::VectorXd k2 = acceleration(speed_ + 0.5 * h * k1, e1, heading);
+    const Eigen::VectorXd k3 = acceleration(speed_ + 0.5 * h * k2, e1, heading);
+    const Eigen::VectorXd k4 = acceleration(speed_ + h * k3, e2, heading);
+    speed_ += h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4);
+  }
+  t_ = t;
+  effort_ = effort;
+  joint_ = joints_from_coordinates_ * speed_;
+  return joint_;
+}
+
+InstrumentStream::InstrumentStream(LogSource& log, RegressorFilter rows, const InstrumentMotion& motion)
+    : log_(&log),
+      rows_(std::move(rows)),
+      instruments_(rows_.model(), rows_.design(),
+                   of_instruments(rows_.measurement(), motion.kind == InstrumentMotion::Kind::commanded
+                                                           ? motion.columns
+                                                           : rows_.measurement().motion_columns)) {
+  const auto find = [&](const std::string& name) {
+    const auto column = log.find(name);
+    check::that(column.has_value(), "log", "a column '" + name + "'");
+    return *column;
+  };
+  for (const auto& name : rows_.measurement().columns()) {
+    pick_.push_back(find(name));
+  }
+  if (motion.kind == InstrumentMotion::Kind::commanded) {
+    for (const auto& name : motion.columns) {
+      commands_.push_back(find(name));
+    }
+  } else {
+    check::that(!rows_.measurement().effort_unsigned, "motion simulation", "efforts with their signs");
+    simulation_.emplace(rows_.model(), motion.theta, rows_.measurement().hold);
+  }
+  sample_.resize(pick_.size());
+  instrument_sample_.resize(2 * rows_.model().joints.size());
+  rewind();
+}
+
+void InstrumentStream::begin_segment() {
+  rows_.restart();
+  instruments_.restart();
+  fresh_ = true;
+}
+
+void InstrumentStream::rewind() {
+  log_->rewind();
+  measured_squares_ = made_squares_ = 0.0;
+  begin_segment();
+}
+
+double InstrumentStream::speed_ratio() const {
+  return measured_squares_ > 0.0 ? std::sqrt(made_squares_ / measured_squares_) : 0.0;
+}
+
+void InstrumentStream::make_motion(double t, std::size_t k) {
+  const std::size_t joints = rows_.model().joints.size();
+  for (std::size_t j = 0; j < joints; ++j) {
+    instrument_sample_[joints + j] = sample_[joints + j];
+  }
+  if (simulation_) {
+    const auto size = static_cast<Eigen::Index>(joints);
+    const Eigen::Map<const Eigen::VectorXd> effort(sample_.data() + joints, size);
+    if (fresh_) {
+      const bool angles = rows_.measurement().motion == MotionKind::angle;
+      const Eigen::Map<const Eigen::VectorXd> speed(sample_.data(), size);
+      const Eigen::VectorXd start = angles ? Eigen::VectorXd(Eigen::VectorXd::Zero(size)) : Eigen::VectorXd(speed);
+      simulation_->restart(t, start, effort);
+      Eigen::Map<Eigen::VectorXd>(instrument_sample_.data(), size) = start;
+    } else {
+      Eigen::Map<Eigen::VectorXd>(instrument_sample_.data(), size) = simulation_->step(t, effort);
+    }
+  } else {
+    for (std::size_t j = 0; j < joints; ++j) {
+      instrument_sample_[j] = scratch_.columns[commands_[j]][k];
+    }
+  }
+  fresh_ = false;
+  if (rows_.measurement().motion != MotionKind::angle) {
+    for (std::size_t j = 0; j < joints; ++j) {
+      measured_squares_ += sample_[j] * sample_[j];
+      made_squares_ += instrument_sample_[j] * instrument_sample_[j];
+    }
+  }
+}
+
+bool InstrumentStream::next(RegressionBlock& rows, RegressionBlock& instruments) {
+  const bool more = log_->next(scratch_);
+  for (RegressionBlock* block : {&rows, &instruments}) {
+    block->resize(more ? scratch_.rows() : 0, outputs(), parameters());
+    block->sample.clear();
+    block->t.clear();
+  }
+  if (!more) {
+    return false;
+  }
+  std::size_t segment = 0;
+  for (std::size_t k = 0; k < scratch_.rows(); ++k) {
+    if (segment < scratch_.segment_starts.size() && scratch_.segment_starts[segment] == k) {
+      begin_segment();
+      ++segment;
+    }
+    for (std::size_t c = 0; c < pick_.size(); ++c) {
+      sample_[c] = scratch_.columns[pick_[c]][k];
+    }
+    const double t = scratch_.t[k];
+    make_motion(t, k);
+    const bool has_row = rows_.step(t, sample_);
+    const bool has_instrument = instruments_.step(t, instrument_sample_);
+    if (has_row && has_instrument) {
+      append(rows_.row(), scratch_.first_row + k, t, rows);
+      append(instruments_.row(), scratch_.first_row + k, t, instruments);
+    }
+  }
+  shrink(rows);
+  shrink(instruments);
+  return true;
+}
+
+RegressionMoments moments(InstrumentStream& rows) {
+  RegressionMoments sums(rows.outputs(), rows.parameters(), true);
+  RegressionBlock block, instruments;
+  rows.rewind();
+  while (rows.next(block, instruments)) {
+    sums.add(block, instruments);
+  }
+  return sums;
+}
+
+}  // namespace wheelwright

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Instruments: regressor columns made of a motion that shares nothing with the noise of the measured one.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include <wheelwright/core/log.hpp>
+#include <wheelwright/core/regression.hpp>
+#include <wheelwright/filter/regressor_filter.hpp>
+#include <wheelwright/identify/moments.hpp>
+
+namespace wheelwright {
+
+/// Where the motion behind the instruments comes from.
+struct InstrumentMotion {
+  /// The two kinds.
+  enum class Kind {
+    commanded,  ///< logged commands: free of the sensors' noise, also where they come from feedback of the pose
+    simulated,  ///< the model with parameters `theta`, driven by the logged efforts. Free of the noise of the motion; it
+                ///< holds that of measured efforts, which biases inertias by the noise's share of the effort's power
+                ///< (an effort that is a command has none)
+  };
+  Kind kind = Kind::commanded;
+  std::vector<std::string> columns;  ///< commanded: one column of joint speeds for each joint
+  Eigen::VectorXd theta;             ///< simulated: p
+};
+
+/// The commanded motion of `model`'s joints where `log` has all its columns (Joint::command).
+[[nodiscard]] std::optional<InstrumentMotion> commanded_motion(const LogSource& log, const Model& model);
+
+/// Open-loop motion of a model driven by efforts: M(θ) v̇ = input·effort − the other terms, by Runge-Kutta steps of
+/// fourth order, two a sample.
+class MotionSimulation {
+ public:
+  /// Whether `model` can be simulated with `theta`: as many outputs as coordinates and joints, M(θ) and the map from
+  /// joints to coordinates invertible.
+  [[nodiscard]] static bool possible(const Model& model, const Eigen::VectorXd& theta);
+  /// Throws InvalidArgument where it is not possible. `hold` of the efforts between samples.
+  MotionSimulation(Model model, Eigen::VectorXd theta, Hold hold);
+  /// Begins a segment at time `t` (s) with joint speeds `speed` and `effort` of each joint.
+  void restart(double t, const Eigen::VectorXd& speed, const Eigen::VectorXd& effort);
+  /// Advances to the sample at `t` with `effort`; returns the speeds of the joints there. `heading` is what the model's
+  /// terms are told.
+  const Eigen::VectorXd& step(double t, const Eigen::VectorXd& effort, double heading = 0.0);
+
+ private:
+  [[nodiscard]] Eigen::VectorXd acceleration(const Eigen::VectorXd& speed, const Eigen::VectorXd& effort,
+                                             double heading) const;
+
+  Model model_;
+  Eigen::VectorXd theta_;
+  Hold hold_;
+  Eigen::MatrixXd inverse_inertia_, joints_from_coordinates_;
+  double t_ = 0.0;
+  Eigen::VectorXd speed_, joint_, effort_;
+};
+
+/// Rows of a log and, beside each, its instruments: the same filter on another motion. Only instants that both filters
+/// give are handed out. The log must outlive the stream and is rewound by it.
+class InstrumentStream {
+ public:
+  /// Throws InvalidArgument when `log` lacks a column, or the motion cannot be made.
+  InstrumentStream(LogSource& log, RegressorFilter rows, const InstrumentMotion& motion);
+  /// Fills both blocks with the next instants and returns true; false at the end. Blocks may be empty.
+  bool next(RegressionBlock& rows, RegressionBlock& instruments);
+  /// Goes back to the first instant.
+  void rewind();
+  [[nodiscard]] std::size_t outputs() const { return rows_.model().n(); }
+  [[nodiscard]] std::size_t parameters() const { return rows_.model().p(); }
+  /// Root mean square of the instruments' joint speeds that were made so far over that of the measured ones
+  /// (0 before the first sample, and for logs of angles): far from 1 where a simulation ran away.
+  [[nodiscard]] double speed_ratio() const;
+
+ private:
+  void begin_segment();
+  void make_motion(double t, std::size_t k);
+
+  LogSource* log_;
+  RegressorFilter rows_, instruments_;
+  std::optional<MotionSimulation> simulation_;
+  std::vector<std::size_t> pick_, commands_;
+  std::vector<double> sample_, instrument_sample_;
+  bool fresh_ = true;
+  double measured_squares_ = 0.0, made_squares_ = 0.0;
+  LogBlock scratch_;
+};
+
+/// The moments of `rows` and instruments, one walk.
+[[nodiscard]] RegressionMoments moments(InstrumentStream& rows);
+
+}  // namespace wheelwright

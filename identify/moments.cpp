@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/identify/moments.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/QR>
+
+#include <wheelwright/core/check.hpp>
+#include <wheelwright/identify/gram_kernels.hpp>
+
+namespace wheelwright {
+namespace {
+
+constexpr std::size_t kTile = 256;  // rows packed at a time
+constexpr std::size_t kLanes = 8;   // of Σ y², so that every processor adds in the same order
+
+// Rows first, first + stride, … of `from` (p columns each) with columns padded by zeros.
+void pack(const RowMatrix& from, std::size_t first, std::size_t stride, std::size_t count, std::size_t columns,
+          std::vector<double>& to) {
+  const auto p = static_cast<std::size_t>(from.cols());
+  const double* source = from.data() + first * p;
+  for (std::size_t k = 0; k < count; ++k) {
+    std::copy_n(source + k * stride * p, p, to.data() + k * columns);
+  }
+}
+
+}  // namespace
+
+RegressionMoments::RegressionMoments(std::size_t outputs, std::size_t parameters, bool instruments, std::size_t kept)
+    : n_(outputs),
+      p_(parameters),
+      columns_((parameters + gram_kernels::kGroup - 1) / gram_kernels::kGroup * gram_kernels::kGroup),
+      instruments_(instruments),
+      capacity_(2 * kept),
+      size_(p_ * columns_ + columns_ + kLanes) {
+  check::that(outputs > 0, "outputs", "at least 1");
+  check::that(parameters > 0, "parameters", "at least 1");
+  check::that(kept >= 8, "RegressionMoments kept", "at least 8");
+  if (instruments) {
+    size_ += 2 * p_ * columns_ + columns_;
+  }
+  Y_.assign(kTile * columns_, 0.0);
+  Z_.assign(instruments ? kTile * columns_ : 0, 0.0);
+  y_.assign(kTile, 0.0);
+}
+
+void RegressionMoments::open_block(double t) {
+  if (blocks_.size() == capacity_) {
+    for (std::size_t b = 0; b < capacity_ / 2; ++b) {
+      const MomentBlock& left = blocks_[2 * b];
+      const MomentBlock& right = blocks_[2 * b + 1];
+      blocks_[b] = {left.first, right.last, left.instants + right.instants};
+      const double* from = sums(2 * b, 0);
+      double* to = sums(b, 0);
+      const std::size_t count = n_ * size_;
+      for (std::size_t k = 0; k < count; ++k) {
+        to[k] = from[k] + from[count + k];
+      }
+    }
+    blocks_.resize(capacity_ / 2);
+    data_.resize(blocks_.size() * n_ * size_);
+    length_ *= 2;
+  }
+  blocks_.push_back({t, t, 0});
+  data_.resize(blocks_.size() * n_ * size_, 0.0);
+}
+
+void RegressionMoments::add(const RegressionBlock& rows) {
+  check::that(!instruments_, "moments", "the instruments that were announced");
+  add_rows(rows, nullptr);
+}
+
+void RegressionMoments::add(const RegressionBlock& rows, const RegressionBlock& instruments) {
+  check::that(instruments_, "moments", "no instruments, since none were announced");
+  check::that(instruments.outputs == n_ && instruments.parameters == p_ && instruments.sample == rows.sample,
+              "instruments", "the shape and the instants of the rows");
+  add_rows(rows, &instruments);
+}
+
+void RegressionMoments::add_rows(const RegressionBlock& rows, const RegressionBlock* instruments) {
+  check::that(rows.outputs == n_ && rows.parameters == p_, "moments", "rows of the announced shape");
+  const gram_kernels::GramKernels& kernels = gram_kernels::best();
+  const std::size_t square = p_ * columns_;
+  for (std::size_t k = 0; k < rows.instants();) {
+    if (blocks_.empty() || blocks_.back().instants == length_) {
+      open_block(rows.t[k]);
+    }
+    MomentBlock& block = blocks_.back();
+    const std::size_t count = std::min({length_ - block.instants, rows.instants() - k, kTile});
+    for (std::size_t i = 0; i < n_; ++i) {
+      double* YY = sums(blocks_.size() - 1, i);
+      double* Yy = YY + square;
+      double* yy = Yy + columns_;
+      pack(rows.Y, k * n_ + i, n_, count, columns_, Y_);
+      for (std::size_t r = 0; r < count; ++r) {
+        y_[r] = rows.y[static_cast<Eigen::Index>((k + r) * n_ + i)];
+        yy[(block.instants + r) % kLanes] += y_[r] * y_[r];
+      }
+      kernels.products(Y_.data(), columns_, p_, Y_.data(), columns_, columns_, count, true, YY);
+      kernels.products(y_.data(), 1, 1, Y_.data(), columns_, columns_, count, false, Yy);
+      if (instruments != nullptr) {
+        double* ZY = yy + kLanes;
+        double* ZZ = ZY + square;
+        double* Zy = ZZ + square;
+        pack(instruments->Y, k * n_ + i, n_, count, columns_, Z_);
+        kernels.products(Z_.data(), columns_, p_, Y_.data(), columns_, columns_, count, false, ZY);
+        kernels.products(Z_.data(), columns_, p_, Z_.data(), columns_, columns_, count, true, ZZ);
+        kernels.products(y_.data(), 1, 1, Z_.data(), columns_, columns_, count, false, Zy);
+      }
+    }
+    block.instants += count;
+    k += count;
+    block.last = rows.t[k - 1];
+  }
+  instants_ += rows.instants();
+}
+
+MomentSums RegressionMoments::nothing() const {
+  const auto p = static_cast<Eigen::Index>(p_);
+  MomentSums s;
+  s.YY = Eigen::MatrixXd::Zero(p, p);
+  s.Yy = Eigen::VectorXd::Zero(p);
+  if (instruments_) {
+    s.ZY = s.ZZ = s.YY;
+    s.Zy = s.Yy;
+  }
+  return s;
+}
+
+void RegressionMoments::add_to(MomentSums& into, const double* sums, double factor) const {
+  const auto p = static_cast<Eigen::Index>(p_);
+  const Eigen::OuterStride<> stride(static_cast<Eigen::Index>(columns_));
+  using Square = Eigen::Map<const RowMatrix, 0, Eigen::OuterStride<>>;
+  using Column = Eigen::Map<const Eigen::VectorXd>;
+  const std::size_t square = p_ * columns_;
+  const auto symmetric = [&](const double* from) {
+    return RowMatrix(Square(from, p, p, stride).selfadjointView<Eigen::Upper>());
+  };
+  into.YY += factor * symmetric(sums);
+  into.Yy += factor * Column(sums + square, p);
+  const double* yy = sums + square + columns_;
+  into.yy += factor * Column(yy, static_cast<Eigen::Index>(kLanes)).sum();
+  if (instruments_) {
+    const double* ZY = yy + kLanes;
+    into.ZY += factor * Square(ZY, p, p, stride);
+    into.ZZ += factor * symmetric(ZY + square);
+    into.Zy += factor * Column(ZY + 2 * square, p);
+  }
+}
+
+MomentSums RegressionMoments::block(std::size_t b, const Eigen::VectorXd& weights) const {
+  check::that(b < blocks_.size(), "moment block", "one of those there are");
+  check::that(static_cast<std::size_t>(weights.size()) == n_, "weights", "one for each output");
+  MomentSums s = nothing();
+  for (std::size_t i = 0; i < n_; ++i) {
+    const double w = weights[static_cast<Eigen::Index>(i)];
+    add_to(s, sums(b, i), w * w);
+  }
+  return s;
+}
+
+MomentSums RegressionMoments::total(const Eigen::VectorXd& weights) const {
+  check::that(static_cast<std::size_t>(weights.size()) == n_, "weights", "one for each output");
+  MomentSums s = nothing();
+  for (std::size_t b = 0; b < blocks_.size(); ++b) {
+    for (std::size_t i = 0; i < n_; ++i) {
+      const double w = weights[static_cast<Eigen::Index>(i)];
+      add_to(s, sums(b, i), w * w);
+    }
+  }
+  return s;
+}
+
+MomentSums RegressionMoments::of_output(std::size_t i) const {
+  check::that(i < n_, "output", "one of those there are");
+  return total(Eigen::VectorXd::Unit(static_cast<Eigen::Index>(n_), static_cast<Eigen::Index>(i)));
+}
+
+RegressionMoments moments(RegressionSource& rows) {
+  RegressionMoments sums(rows.outputs(), rows.parameters());
+  RegressionBlock block;
+  rows.rewind();
+  while (rows.next(block)) {
+    sums.add(block);
+  }
+  return sums;
+}
+
+Eigen::VectorXd efficient_weights(const RegressionMoments& moments) {
+  Eigen::VectorXd weights(static_cast<Eigen::Index>(moments.outputs()));
+  const double instants = std::max(1.0, static_cast<double>(moments.instants()));
+  for (std::size_t i = 0; i < moments.outputs(); ++i) {
+    const MomentSums s = moments.of_output(i);
+    const Eigen::VectorXd theta = s.YY.completeOrthogonalDecomposition().solve(s.Yy);
+    const double rms = std::sqrt(std::max(0.0, s.yy - s.Yy.dot(theta)) / instants);
+    const double scale = std::sqrt(s.yy / instants);
+    // A perfect fit has no scale of its own.
+    weights[static_cast<Eigen::Index>(i)] = scale > 0.0 ? 1.0 / std::max(rms, 1e-7 * scale) : 1.0;
+  }
+  return weights;
+}
+
+}  // namespace wheelwright

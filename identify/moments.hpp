@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// A regression in one walk: its second moments, summed over blocks of time. Least squares, instrumental variables, their
+/// corrections for noise, their covariances under autocorrelation, bootstrap and sign-perturbed sums are all made of these.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include <wheelwright/core/regression.hpp>
+
+namespace wheelwright {
+
+/// Sums over instants, of one output or of several with weights.
+struct MomentSums {
+  Eigen::MatrixXd YY;  ///< p × p, Σ YᵀY
+  Eigen::VectorXd Yy;  ///< p, Σ Yᵀy
+  double yy = 0.0;     ///< Σ y²
+  Eigen::MatrixXd ZY;  ///< p × p, Σ ZᵀY with the instruments Z; empty without
+  Eigen::VectorXd Zy;  ///< p, Σ Zᵀy
+  Eigen::MatrixXd ZZ;  ///< p × p, Σ ZᵀZ
+};
+
+/// A stretch of time over which moments were summed.
+struct MomentBlock {
+  double first = 0.0;  ///< time of its first instant, s
+  double last = 0.0;   ///< time of its last instant, s
+  std::size_t instants = 0;
+};
+
+/// Moments of a regression by output and block of time. At most 2·`kept` blocks: whenever they are full, neighbours are
+/// added up and blocks become twice as long.
+class RegressionMoments {
+ public:
+  /// For `outputs` n and `parameters` p; with `instruments`, add() takes their rows too. `kept` >= 8.
+  RegressionMoments(std::size_t outputs, std::size_t parameters, bool instruments = false, std::size_t kept = 1024);
+
+  /// Adds all instants of `rows`. Throws InvalidArgument when shapes differ, or instruments are announced.
+  void add(const RegressionBlock& rows);
+  /// The same with the instruments Z of each row: the columns Y of `instruments`, which has the same instants.
+  void add(const RegressionBlock& rows, const RegressionBlock& instruments);
+
+  [[nodiscard]] std::size_t outputs() const { return n_; }
+  [[nodiscard]] std::size_t parameters() const { return p_; }
+  [[nodiscard]] bool has_instruments() const { return instruments_; }
+  /// Number of instants seen.
+  [[nodiscard]] std::size_t instants() const { return instants_; }
+  /// The blocks in the order of the log; the last may be shorter than the others.
+  [[nodiscard]] const std::vector<MomentBlock>& blocks() const { return blocks_; }
+
+  /// Sums Σ_i w_i² (…) over the outputs of block `b`, with a weight w_i for each output.
+  [[nodiscard]] MomentSums block(std::size_t b, const Eigen::VectorXd& weights) const;
+  /// The same over all blocks.
+  [[nodiscard]] MomentSums total(const Eigen::VectorXd& weights) const;
+  /// The sums of output `i` alone, over all blocks.
+  [[nodiscard]] MomentSums of_output(std::size_t i) const;
+
+ private:
+  void add_rows(const RegressionBlock& rows, const RegressionBlock* instruments);
+  void open_block(double t);
+  [[nodiscard]] const double* sums(std::size_t b, std::size_t output) const {
+    return data_.data() + (b * n_ + output) * size_;
+  }
+  double* sums(std::size_t b, std::size_t output) { return data_.data() + (b * n_ + output) * size_; }
+  void add_to(MomentSums& into, const double* sums, double factor) const;
+  [[nodiscard]] MomentSums nothing() const;
+
+  std::size_t n_, p_, columns_;  // columns_: p_ padded to whole groups
+  bool instruments_;
+  std::size_t capacity_, size_;  // size_: numbers for one block and output
+  std::size_t length_ = 4;       // instants of a full block
+  std::size_t instants_ = 0;
+  std::vector<MomentBlock> blocks_;
+  std::vector<double> data_;
+  std::vector<double> Y_, Z_, y_;  // a tile of packed rows
+};
+
+/// The moments of all of `rows`, one walk.
+[[nodiscard]] RegressionMoments moments(RegressionSource& rows);
+
+/// One over each output's own residual standard deviation by ordinary least squares: weights that are efficient for errors
+/// that are independent between outputs. 1 for an output that is zero throughout.
+[[nodiscard]] Eigen::VectorXd efficient_weights(const RegressionMoments& moments);
+
+}  // namespace wheelwright

@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/identify/moments.hpp>
+
+#include <cmath>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include <wheelwright/core/error.hpp>
+#include <wheelwright/identify/gram_kernels.hpp>
+
+#include "support/random.hpp"
+#include "support/rows.hpp"
+
+namespace wheelwright {
+namespace {
+
+using testing_support::block_of;
+using testing_support::Random;
+
+TEST(GramKernels, EveryVariantGivesTheSameDigits) {
+  Random random(1);
+  const auto variants = gram_kernels::available();
+  ASSERT_GE(variants.size(), 1U);
+  for (const std::size_t columns : {4U, 8U, 12U, 16U, 20U}) {
+    for (const std::size_t rows : {0U, 1U, 7U, 100U}) {
+      const RowMatrix b = random.matrix(static_cast<Eigen::Index>(rows), static_cast<Eigen::Index>(columns));
+      const std::size_t p = columns - 1;
+      const auto run = [&](const gram_kernels::GramKernels& kernels, bool upper) {
+        std::vector<double> sums(p * columns, 0.25);
+        kernels.products(b.data(), columns, p, b.data(), columns, columns, rows, upper, sums.data());
+        std::vector<double> kept;
+        for (std::size_t j = 0; j < p; ++j) {
+          for (std::size_t l = upper ? j : 0; l < columns; ++l) {
+            kept.push_back(sums[j * columns + l]);
+          }
+        }
+        std::vector<double> rest(rows);
+        const Eigen::VectorXd x = Eigen::VectorXd::LinSpaced(static_cast<Eigen::Index>(columns), -1.0, 2.0);
+        kernels.residuals(b.data(), columns, b.data(), columns, columns, rows, x.data(), rest.data());
+        kept.insert(kept.end(), rest.begin(), rest.end());
+        return kept;
+      };
+      for (const bool upper : {false, true}) {
+        const auto expected = run(*variants.front(), upper);
+        for (const auto* kernels : variants) {
+          EXPECT_EQ(run(*kernels, upper), expected) << kernels->name << ", " << columns << " columns";
+        }
+      }
+    }
+  }
+}
+
+struct Rows {
+  RegressionBlock block, instruments;
+};
+
+Rows rows(std::uint64_t seed, Eigen::Index instants, Eigen::Index p, std::size_t n) {
+  Random random(seed);
+  const auto count = instants * static_cast<Eigen::Index>(n);
+  const Eigen::MatrixXd Y = random.matrix(count, p), Z = random.matrix(count, p);
+  const Eigen::VectorXd y = random.matrix(count, 1);
+  return {block_of(Y, y, n), block_of(Z, y, n)};
+}
+
+void expect_near(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b, double scale) {
+  ASSERT_EQ(a.rows(), b.rows());
+  EXPECT_LE((a - b).cwiseAbs().maxCoeff(), 1e-14 * scale);
+}
+
+TEST(Moments, AreTheSumsTheyAreCalled) {
+  for (const Eigen::Index p : {1, 3, 4, 8, 13, 17}) {
+    const Rows r = rows(7, 3000, p, 2);
+    RegressionMoments sums(2, static_cast<std::size_t>(p), true, 64);
+    sums.add(r.block, r.instruments);
+    const Eigen::Vector2d weights(0.5, 3.0);
+    const Eigen::VectorXd w = Eigen::VectorXd::NullaryExpr(6000, [&](Eigen::Index i) { return weights[i % 2]; });
+    const Eigen::MatrixXd Y = w.asDiagonal() * r.block.Y, Z = w.asDiagonal() * r.instruments.Y;
+    const Eigen::VectorXd y = w.asDiagonal() * r.block.y;
+    const MomentSums total = sums.total(weights);
+    const double scale = 6000.0 * 9.0;  // the sum of as many products of at most 9
+    expect_near(total.YY, Y.transpose() * Y, scale);
+    expect_near(total.Yy, Y.transpose() * y, scale);
+    expect_near(total.ZY, Z.transpose() * Y, scale);
+    expect_near(total.ZZ, Z.transpose() * Z, scale);
+    expect_near(total.Zy, Z.transpose() * y, scale);
+    EXPECT_NEAR(total.yy, y.squaredNorm(), 1e-14 * scale);
+  }
+}
+
+TEST(Moments, OfBlocksAddUpAndCoverTheLogInOrder) {
+  const Rows r = rows(3, 1000, 4, 1);
+  RegressionMoments sums(1, 4, false, 16);
+  sums.add(r.block);
+  ASSERT_LE(sums.blocks().size(), 32U);
+  const Eigen::VectorXd one = Eigen::VectorXd::Ones(1);
+  Eigen::MatrixXd together = Eigen::MatrixXd::Zero(4, 4);
+  std::size_t instants = 0;
+  double before = -1.0;
+  for (std::size_t b = 0; b < sums.blocks().size(); ++b) {
+    together += sums.block(b, one).YY;
+    EXPECT_GT(sums.blocks()[b].first, before);
+    EXPECT_GE(sums.blocks()[b].last, sums.blocks()[b].first);
+    before = sums.blocks()[b].last;
+    instants += sums.blocks()[b].instants;
+  }
+  EXPECT_EQ(instants, 1000U);
+  expect_near(together, sums.total(one).YY, 1000.0);
+  EXPECT_EQ(before, r.block.t.back());
+}
+
+TEST(Moments, DoNotDependOnHowTheRowsAreHandedOver) {
+  const Rows r = rows(11, 2500, 5, 2);
+  RegressionMoments whole(2, 5, true, 32);
+  whole.add(r.block, r.instruments);
+  RegressionMoments pieces(2, 5, true, 32);
+  const auto piece = [](const RegressionBlock& from, std::size_t first, std::size_t count) {
+    RegressionBlock part =
+        block_of(from.Y.middleRows(static_cast<Eigen::Index>(2 * first), static_cast<Eigen::Index>(2 * count)),
+                 from.y.segment(static_cast<Eigen::Index>(2 * first), static_cast<Eigen::Index>(2 * count)), 2);
+    for (std::size_t k = 0; k < count; ++k) {
+      part.sample[k] = from.sample[first + k];
+      part.t[k] = from.t[first + k];
+    }
+    return part;
+  };
+  std::size_t first = 0;
+  for (std::size_t length = 1; first < 2500; length = length % 97 + 13) {
+    const std::size_t count = std::min(length, 2500 - first);
+    pieces.add(piece(r.block, first, count), piece(r.instruments, first, count));
+    first += count;
+  }
+  const Eigen::Vector2d w(1.0, 0.7);
+  ASSERT_EQ(pieces.instants(), whole.instants());
+  EXPECT_EQ(pieces.total(w).YY, whole.total(w).YY);
+  EXPECT_EQ(pieces.total(w).yy, whole.total(w).yy);
+  EXPECT_EQ(pieces.total(w).ZY, whole.total(w).ZY);
+}
+
+TEST(Moments, RefuseRowsOfAnotherShape) {
+  const Rows r = rows(5, 10, 3, 1);
+  RegressionMoments plain(1, 3), with(1, 3, true), wide(1, 4);
+  EXPECT_THROW(plain.add(r.block, r.instruments), InvalidArgument);
+  EXPECT_THROW(with.add(r.block), InvalidArgument);
+  EXPECT_THROW(wide.add(r.block), InvalidArgument);
+  Rows other = r;
+  other.instruments.sample[4] = 99;
+  EXPECT_THROW(with.add(r.block, other.instruments), InvalidArgument);
+}
+
+TEST(EfficientWeights, AreOneOverEachOutputsNoise) {
+  Random random(21);
+  const Eigen::MatrixXd Y = random.matrix(20000, 2);
+  Eigen::VectorXd y = Y * Eigen::Vector2d(2.0, -1.0);
+  for (Eigen::Index i = 0; i < y.size(); ++i) {
+    y[i] += (i % 2 == 0 ? 0.1 : 4.0) * random.normal();
+  }
+  RegressionTable table(block_of(Y, y, 2));
+  const Eigen::VectorXd w = efficient_weights(moments(table));
+  // The standard deviation of 10,000 normal values is known to 0.7 %: four times that.
+  EXPECT_NEAR(w[0], 10.0, 0.03 * 10.0);
+  EXPECT_NEAR(w[1], 0.25, 0.03 * 0.25);
+}
+
+}  // namespace
+}  // namespace wheelwright
