@@ -70,6 +70,11 @@ void LeastSquares::merge(const LeastSquares& other) {
   instants_ += other.instants_;
 }
 
+Eigen::MatrixXd LeastSquares::factor() const {
+  fold();
+  return stack_.topRows(stack_.cols()).triangularView<Eigen::Upper>();
+}
+
 LeastSquaresFit LeastSquares::solve(const std::vector<bool>& excluded) const {
   check::that(instants_ > 0, "least squares", "at least one instant");
   fold();
