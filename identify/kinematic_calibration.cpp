@@ -384,13 +384,27 @@ Spread spread_of(const Fit& fit, const Fit::Information& info) {
     return s;
   }
   BlockSums scores(static_cast<std::size_t>(m));
+  Eigen::MatrixXd apart = Eigen::MatrixXd::Zero(m, m);  // covariance of the sum if windows were independent
   for (std::size_t k = 0; k < info.score.size(); ++k) {
     const Eigen::MatrixXd without = H - Eigen::MatrixXd(info.window[k](pick, pick));
     const Eigen::LDLT<Eigen::MatrixXd> solver(without);
-    const Eigen::VectorXd score = info.score[k](pick);
-    scores.add(solver.isPositive() ? Eigen::VectorXd(H * solver.solve(score)) : score);
+    Eigen::VectorXd score = info.score[k](pick);
+    if (solver.isPositive()) {
+      score = H * solver.solve(score);
+    }
+    scores.add(score);
+    apart += score * score.transpose();
   }
-  const LongRunCovariance spread = long_run_covariance(scores);
+  LongRunCovariance spread = long_run_covariance(scores);
+  // The larger of the two in every direction, in units of the information.
+  const Eigen::VectorXd unit = H.diagonal().cwiseSqrt();
+  const Eigen::MatrixXd more =
+      unit.cwiseInverse().asDiagonal() * (apart - spread.matrix) * unit.cwiseInverse().asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(more);
+  spread.matrix +=
+      unit.asDiagonal() *
+      (eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).asDiagonal() * eigen.eigenvectors().transpose()) *
+      unit.asDiagonal();
   const Eigen::MatrixXd inverse = H.ldlt().solve(Eigen::MatrixXd::Identity(m, m));
   const Eigen::MatrixXd covariance = inverse * spread.matrix * inverse;
   for (Eigen::Index a = 0; a < m; ++a) {

@@ -73,8 +73,9 @@ struct KinematicCalibration {
 /// have bounded influence. Headings may be wrapped or not.
 ///
 /// Intervals: residuals are alike within a window (slip) and, in driving under one command, from window to window. The
-/// covariance is the sandwich of the windows' scores, each scored as if it had been left out (the jackknife), with the
-/// long-run covariance over windows in order of time and its Student's t (block_sums.hpp).
+/// covariance is the sandwich of the windows' scores, each scored as if it had been left out (the jackknife). Of their
+/// long-run covariance over windows in order of time (block_sums.hpp, with its Student's t) and the covariance that
+/// independent windows would have, the larger counts in every direction: neighbours may be alike or opposed.
 ///
 /// Errors in the wheel speeds count only through their integral over a window; noise of some 0.1 rad/s leaves windows
 /// that turn by 0.1 rad unbiased to 1 %. A skid-steer robot slips: its effective track is wider than the geometric one,
