@@ -39,25 +39,6 @@ Measurement of_instruments(const Measurement& rows, const std::vector<std::strin
   return m;
 }
 
-void append(const FilteredRow& row, std::size_t sample, double t, RegressionBlock& block) {
-  const auto n = row.Y.rows();
-  const auto at = static_cast<Eigen::Index>(block.t.size()) * n;
-  block.sample.push_back(sample);
-  block.t.push_back(t);
-  block.Y.middleRows(at, n) = row.Y;
-  block.dY.middleRows(at, n) = row.dY;
-  block.y.segment(at, n) = row.y;
-  block.dy.segment(at, n) = row.dy;
-}
-
-void shrink(RegressionBlock& block) {
-  const auto rows = block.rows();
-  block.Y.conservativeResize(rows, Eigen::NoChange);
-  block.dY.conservativeResize(rows, Eigen::NoChange);
-  block.y.conservativeResize(rows);
-  block.dy.conservativeResize(rows);
-}
-
 }  // namespace
 
 std::optional<InstrumentMotion> commanded_motion(const LogSource& log, const Model& model) {
@@ -208,16 +189,15 @@ void InstrumentStream::make_motion(double t, std::size_t k) {
   }
 }
 
-bool InstrumentStream::next(RegressionBlock& rows, RegressionBlock& instruments) {
-  const bool more = log_->next(scratch_);
-  for (RegressionBlock* block : {&rows, &instruments}) {
-    block->resize(more ? scratch_.rows() : 0, outputs(), parameters());
-    block->sample.clear();
-    block->t.clear();
-  }
-  if (!more) {
+bool InstrumentStream::next(RegressionBlock& block) {
+  if (!log_->next(scratch_)) {
+    block.resize(0, outputs(), parameters());
     return false;
   }
+  const auto n = static_cast<Eigen::Index>(outputs());
+  const auto p = static_cast<Eigen::Index>(rows_.model().p());
+  block.resize(scratch_.rows(), outputs(), parameters());
+  std::size_t kept = 0;
   std::size_t segment = 0;
   for (std::size_t k = 0; k < scratch_.rows(); ++k) {
     if (segment < scratch_.segment_starts.size() && scratch_.segment_starts[segment] == k) {
@@ -231,24 +211,28 @@ bool InstrumentStream::next(RegressionBlock& rows, RegressionBlock& instruments)
     make_motion(t, k);
     const bool has_row = rows_.step(t, sample_);
     const bool has_instrument = instruments_.step(t, instrument_sample_);
-    if (has_row && has_instrument) {
-      append(rows_.row(), scratch_.first_row + k, t, rows);
-      append(instruments_.row(), scratch_.first_row + k, t, instruments);
+    if (!has_row || !has_instrument) {
+      continue;
     }
+    const auto at = static_cast<Eigen::Index>(kept) * n;
+    block.sample[kept] = scratch_.first_row + k;
+    block.t[kept] = t;
+    block.Y.block(at, 0, n, p) = rows_.row().Y;
+    block.Y.block(at, p, n, p) = instruments_.row().Y;
+    block.dY.block(at, 0, n, p) = rows_.row().dY;
+    block.dY.block(at, p, n, p).setZero();
+    block.y.segment(at, n) = rows_.row().y;
+    block.dy.segment(at, n) = rows_.row().dy;
+    ++kept;
   }
-  shrink(rows);
-  shrink(instruments);
+  block.sample.resize(kept);
+  block.t.resize(kept);
+  const auto rows = block.rows();
+  block.Y.conservativeResize(rows, Eigen::NoChange);
+  block.dY.conservativeResize(rows, Eigen::NoChange);
+  block.y.conservativeResize(rows);
+  block.dy.conservativeResize(rows);
   return true;
-}
-
-RegressionMoments moments(InstrumentStream& rows) {
-  RegressionMoments sums(rows.outputs(), rows.parameters(), true);
-  RegressionBlock block, instruments;
-  rows.rewind();
-  while (rows.next(block, instruments)) {
-    sums.add(block, instruments);
-  }
-  return sums;
 }
 
 }  // namespace wheelwright

@@ -13,7 +13,6 @@
 #include <wheelwright/core/log.hpp>
 #include <wheelwright/core/regression.hpp>
 #include <wheelwright/filter/regressor_filter.hpp>
-#include <wheelwright/identify/moments.hpp>
 
 namespace wheelwright {
 
@@ -61,18 +60,18 @@ class MotionSimulation {
   Eigen::VectorXd speed_, joint_, effort_;
 };
 
-/// Rows of a log and, beside each, its instruments: the same filter on another motion. Only instants that both filters
-/// give are handed out. The log must outlive the stream and is rewound by it.
-class InstrumentStream {
+/// Rows of a log and, beside each, its instruments: p columns of Y_f and then p columns Z_f, which are the same filter's of
+/// another motion. Z has no error bounds. Only instants that both filters give are handed out. The log must outlive the
+/// stream and is rewound by it.
+class InstrumentStream final : public RegressionSource {
  public:
   /// Throws InvalidArgument when `log` lacks a column, or the motion cannot be made.
   InstrumentStream(LogSource& log, RegressorFilter rows, const InstrumentMotion& motion);
-  /// Fills both blocks with the next instants and returns true; false at the end. Blocks may be empty.
-  bool next(RegressionBlock& rows, RegressionBlock& instruments);
-  /// Goes back to the first instant.
-  void rewind();
-  [[nodiscard]] std::size_t outputs() const { return rows_.model().n(); }
-  [[nodiscard]] std::size_t parameters() const { return rows_.model().p(); }
+  [[nodiscard]] std::size_t outputs() const override { return rows_.model().n(); }
+  /// 2p.
+  [[nodiscard]] std::size_t parameters() const override { return 2 * rows_.model().p(); }
+  bool next(RegressionBlock& block) override;
+  void rewind() override;
   /// Root mean square of the instruments' joint speeds that were made so far over that of the measured ones
   /// (0 before the first sample, and for logs of angles): far from 1 where a simulation ran away.
   [[nodiscard]] double speed_ratio() const;
@@ -90,8 +89,5 @@ class InstrumentStream {
   double measured_squares_ = 0.0, made_squares_ = 0.0;
   LogBlock scratch_;
 };
-
-/// The moments of `rows` and instruments, one walk.
-[[nodiscard]] RegressionMoments moments(InstrumentStream& rows);
 
 }  // namespace wheelwright

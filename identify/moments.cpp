@@ -15,13 +15,13 @@ namespace {
 constexpr std::size_t kTile = 256;  // rows packed at a time
 constexpr std::size_t kLanes = 8;   // of Σ y², so that every processor adds in the same order
 
-// Rows first, first + stride, … of `from` (p columns each) with columns padded by zeros.
-void pack(const RowMatrix& from, std::size_t first, std::size_t stride, std::size_t count, std::size_t columns,
-          std::vector<double>& to) {
-  const auto p = static_cast<std::size_t>(from.cols());
-  const double* source = from.data() + first * p;
+// Columns [column, column + p) of rows first, first + stride, … of `from`, padded with zeros.
+void pack(const RowMatrix& from, std::size_t column, std::size_t p, std::size_t first, std::size_t stride,
+          std::size_t count, std::size_t columns, std::vector<double>& to) {
+  const auto width = static_cast<std::size_t>(from.cols());
+  const double* source = from.data() + first * width + column;
   for (std::size_t k = 0; k < count; ++k) {
-    std::copy_n(source + k * stride * p, p, to.data() + k * columns);
+    std::copy_n(source + k * stride * width, p, to.data() + k * columns);
   }
 }
 
@@ -67,19 +67,8 @@ void RegressionMoments::open_block(double t) {
 }
 
 void RegressionMoments::add(const RegressionBlock& rows) {
-  check::that(!instruments_, "moments", "the instruments that were announced");
-  add_rows(rows, nullptr);
-}
-
-void RegressionMoments::add(const RegressionBlock& rows, const RegressionBlock& instruments) {
-  check::that(instruments_, "moments", "no instruments, since none were announced");
-  check::that(instruments.outputs == n_ && instruments.parameters == p_ && instruments.sample == rows.sample,
-              "instruments", "the shape and the instants of the rows");
-  add_rows(rows, &instruments);
-}
-
-void RegressionMoments::add_rows(const RegressionBlock& rows, const RegressionBlock* instruments) {
-  check::that(rows.outputs == n_ && rows.parameters == p_, "moments", "rows of the announced shape");
+  check::that(rows.outputs == n_ && rows.parameters == (instruments_ ? 2 * p_ : p_), "moments",
+              "rows of the announced shape");
   const gram_kernels::GramKernels& kernels = gram_kernels::best();
   const std::size_t square = p_ * columns_;
   for (std::size_t k = 0; k < rows.instants();) {
@@ -92,18 +81,18 @@ void RegressionMoments::add_rows(const RegressionBlock& rows, const RegressionBl
       double* YY = sums(blocks_.size() - 1, i);
       double* Yy = YY + square;
       double* yy = Yy + columns_;
-      pack(rows.Y, k * n_ + i, n_, count, columns_, Y_);
+      pack(rows.Y, 0, p_, k * n_ + i, n_, count, columns_, Y_);
       for (std::size_t r = 0; r < count; ++r) {
         y_[r] = rows.y[static_cast<Eigen::Index>((k + r) * n_ + i)];
         yy[(block.instants + r) % kLanes] += y_[r] * y_[r];
       }
       kernels.products(Y_.data(), columns_, p_, Y_.data(), columns_, columns_, count, true, YY);
       kernels.products(y_.data(), 1, 1, Y_.data(), columns_, columns_, count, false, Yy);
-      if (instruments != nullptr) {
+      if (instruments_) {
         double* ZY = yy + kLanes;
         double* ZZ = ZY + square;
         double* Zy = ZZ + square;
-        pack(instruments->Y, k * n_ + i, n_, count, columns_, Z_);
+        pack(rows.Y, p_, p_, k * n_ + i, n_, count, columns_, Z_);
         kernels.products(Z_.data(), columns_, p_, Y_.data(), columns_, columns_, count, false, ZY);
         kernels.products(Z_.data(), columns_, p_, Z_.data(), columns_, columns_, count, true, ZZ);
         kernels.products(y_.data(), 1, 1, Z_.data(), columns_, columns_, count, false, Zy);
@@ -177,14 +166,26 @@ MomentSums RegressionMoments::of_output(std::size_t i) const {
   return total(Eigen::VectorXd::Unit(static_cast<Eigen::Index>(n_), static_cast<Eigen::Index>(i)));
 }
 
-RegressionMoments moments(RegressionSource& rows) {
-  RegressionMoments sums(rows.outputs(), rows.parameters());
+namespace {
+
+RegressionMoments walk(RegressionSource& rows, RegressionMoments sums) {
   RegressionBlock block;
   rows.rewind();
   while (rows.next(block)) {
     sums.add(block);
   }
   return sums;
+}
+
+}  // namespace
+
+RegressionMoments moments(RegressionSource& rows) {
+  return walk(rows, RegressionMoments(rows.outputs(), rows.parameters()));
+}
+
+RegressionMoments moments_with_instruments(RegressionSource& rows) {
+  check::that(rows.parameters() % 2 == 0, "rows with instruments", "as many columns of Z as of Y");
+  return walk(rows, RegressionMoments(rows.outputs(), rows.parameters() / 2, true));
 }
 
 Eigen::VectorXd efficient_weights(const RegressionMoments& moments) {

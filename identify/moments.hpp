@@ -34,13 +34,12 @@ struct MomentBlock {
 /// added up and blocks become twice as long.
 class RegressionMoments {
  public:
-  /// For `outputs` n and `parameters` p; with `instruments`, add() takes their rows too. `kept` >= 8.
+  /// For `outputs` n and `parameters` p; with `instruments`, rows have 2p columns, those of Y and then those of Z
+  /// (instruments.hpp makes such rows). `kept` >= 8.
   RegressionMoments(std::size_t outputs, std::size_t parameters, bool instruments = false, std::size_t kept = 1024);
 
-  /// Adds all instants of `rows`. Throws InvalidArgument when shapes differ, or instruments are announced.
+  /// Adds all instants of `rows`. Throws InvalidArgument when the shape is not the announced one.
   void add(const RegressionBlock& rows);
-  /// The same with the instruments Z of each row: the columns Y of `instruments`, which has the same instants.
-  void add(const RegressionBlock& rows, const RegressionBlock& instruments);
 
   [[nodiscard]] std::size_t outputs() const { return n_; }
   [[nodiscard]] std::size_t parameters() const { return p_; }
@@ -58,7 +57,6 @@ class RegressionMoments {
   [[nodiscard]] MomentSums of_output(std::size_t i) const;
 
  private:
-  void add_rows(const RegressionBlock& rows, const RegressionBlock* instruments);
   void open_block(double t);
   [[nodiscard]] const double* sums(std::size_t b, std::size_t output) const {
     return data_.data() + (b * n_ + output) * size_;
@@ -79,6 +77,8 @@ class RegressionMoments {
 
 /// The moments of all of `rows`, one walk.
 [[nodiscard]] RegressionMoments moments(RegressionSource& rows);
+/// The same for rows with columns Y and, as many again, Z.
+[[nodiscard]] RegressionMoments moments_with_instruments(RegressionSource& rows);
 
 /// One over each output's own residual standard deviation by ordinary least squares: weights that are efficient for errors
 /// that are independent between outputs. 1 for an output that is zero throughout.

@@ -26,7 +26,9 @@ struct World {
 
   [[nodiscard]] RegressionMoments moments(const Eigen::MatrixXd& instruments) const {
     RegressionMoments sums(1, static_cast<std::size_t>(Y.cols()), true, 128);
-    sums.add(block_of(Y, y, 1), block_of(instruments, y, 1));
+    Eigen::MatrixXd both(Y.rows(), 2 * Y.cols());
+    both << Y, instruments;
+    sums.add(block_of(both, y, 1));
     return sums;
   }
 };

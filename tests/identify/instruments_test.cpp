@@ -36,16 +36,14 @@ TEST(InstrumentStream, GivesTheRowsOfTheLogAndOfTheCommandedMotion) {
   const auto motion = commanded_motion(log, filter.model());
   ASSERT_TRUE(motion);
   InstrumentStream stream(log, filter, *motion);
-  RegressionBlock rows, instruments;
-  std::vector<double> y;
-  while (stream.next(rows, instruments)) {
-    EXPECT_EQ(rows.sample, instruments.sample);
-    EXPECT_EQ(rows.Y, instruments.Y);  // the commands are the speeds here
-    y.insert(y.end(), rows.y.begin(), rows.y.end());
-  }
+  const RegressionBlock both = read_all(stream);
   RegressionStream plain(log, filter);
-  const RegressionBlock expected = read_all(plain);
-  EXPECT_EQ(y, std::vector<double>(expected.y.begin(), expected.y.end()));
+  const RegressionBlock rows = read_all(plain);
+  EXPECT_EQ(both.sample, rows.sample);
+  EXPECT_EQ(both.Y.leftCols(4), rows.Y);
+  EXPECT_EQ(both.Y.rightCols(4), rows.Y);  // the commands are the speeds here
+  EXPECT_EQ(both.y, rows.y);
+  EXPECT_EQ(moments_with_instruments(stream).instants(), rows.instants());
   EXPECT_EQ(stream.speed_ratio(), 1.0);
 }
 
@@ -61,9 +59,9 @@ TEST(InstrumentStream, MatchesInstantsWhereTheFiltersSettleDifferently) {
   TableSource log(table);
   const RegressorFilter filter = filter_of(scenario);
   InstrumentStream stream(log, filter, *commanded_motion(log, filter.model()));
-  const RegressionMoments sums = moments(stream);
+  const std::size_t instants = read_all(stream).instants();
   RegressionStream plain(log, filter);
-  EXPECT_EQ(sums.instants(), read_all(plain).instants());
+  EXPECT_EQ(instants, read_all(plain).instants());
 }
 
 TEST(CommandedMotion, IsThereOnlyWithAllItsColumns) {

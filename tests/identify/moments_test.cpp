@@ -51,16 +51,11 @@ TEST(GramKernels, EveryVariantGivesTheSameDigits) {
   }
 }
 
-struct Rows {
-  RegressionBlock block, instruments;
-};
-
-Rows rows(std::uint64_t seed, Eigen::Index instants, Eigen::Index p, std::size_t n) {
+RegressionBlock rows(std::uint64_t seed, Eigen::Index instants, Eigen::Index columns, std::size_t n) {
   Random random(seed);
   const auto count = instants * static_cast<Eigen::Index>(n);
-  const Eigen::MatrixXd Y = random.matrix(count, p), Z = random.matrix(count, p);
-  const Eigen::VectorXd y = random.matrix(count, 1);
-  return {block_of(Y, y, n), block_of(Z, y, n)};
+  const Eigen::MatrixXd Y = random.matrix(count, columns);
+  return block_of(Y, random.matrix(count, 1), n);
 }
 
 void expect_near(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b, double scale) {
@@ -70,13 +65,13 @@ void expect_near(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b, double scal
 
 TEST(Moments, AreTheSumsTheyAreCalled) {
   for (const Eigen::Index p : {1, 3, 4, 8, 13, 17}) {
-    const Rows r = rows(7, 3000, p, 2);
+    const RegressionBlock r = rows(7, 3000, 2 * p, 2);
     RegressionMoments sums(2, static_cast<std::size_t>(p), true, 64);
-    sums.add(r.block, r.instruments);
+    sums.add(r);
     const Eigen::Vector2d weights(0.5, 3.0);
     const Eigen::VectorXd w = Eigen::VectorXd::NullaryExpr(6000, [&](Eigen::Index i) { return weights[i % 2]; });
-    const Eigen::MatrixXd Y = w.asDiagonal() * r.block.Y, Z = w.asDiagonal() * r.instruments.Y;
-    const Eigen::VectorXd y = w.asDiagonal() * r.block.y;
+    const Eigen::MatrixXd Y = w.asDiagonal() * r.Y.leftCols(p), Z = w.asDiagonal() * r.Y.rightCols(p);
+    const Eigen::VectorXd y = w.asDiagonal() * r.y;
     const MomentSums total = sums.total(weights);
     const double scale = 6000.0 * 9.0;  // the sum of as many products of at most 9
     expect_near(total.YY, Y.transpose() * Y, scale);
@@ -89,9 +84,9 @@ TEST(Moments, AreTheSumsTheyAreCalled) {
 }
 
 TEST(Moments, OfBlocksAddUpAndCoverTheLogInOrder) {
-  const Rows r = rows(3, 1000, 4, 1);
+  const RegressionBlock r = rows(3, 1000, 4, 1);
   RegressionMoments sums(1, 4, false, 16);
-  sums.add(r.block);
+  sums.add(r);
   ASSERT_LE(sums.blocks().size(), 32U);
   const Eigen::VectorXd one = Eigen::VectorXd::Ones(1);
   Eigen::MatrixXd together = Eigen::MatrixXd::Zero(4, 4);
@@ -106,28 +101,19 @@ TEST(Moments, OfBlocksAddUpAndCoverTheLogInOrder) {
   }
   EXPECT_EQ(instants, 1000U);
   expect_near(together, sums.total(one).YY, 1000.0);
-  EXPECT_EQ(before, r.block.t.back());
+  EXPECT_EQ(before, r.t.back());
 }
 
 TEST(Moments, DoNotDependOnHowTheRowsAreHandedOver) {
-  const Rows r = rows(11, 2500, 5, 2);
+  const RegressionBlock r = rows(11, 2500, 10, 2);
   RegressionMoments whole(2, 5, true, 32);
-  whole.add(r.block, r.instruments);
+  whole.add(r);
   RegressionMoments pieces(2, 5, true, 32);
-  const auto piece = [](const RegressionBlock& from, std::size_t first, std::size_t count) {
-    RegressionBlock part =
-        block_of(from.Y.middleRows(static_cast<Eigen::Index>(2 * first), static_cast<Eigen::Index>(2 * count)),
-                 from.y.segment(static_cast<Eigen::Index>(2 * first), static_cast<Eigen::Index>(2 * count)), 2);
-    for (std::size_t k = 0; k < count; ++k) {
-      part.sample[k] = from.sample[first + k];
-      part.t[k] = from.t[first + k];
-    }
-    return part;
-  };
   std::size_t first = 0;
   for (std::size_t length = 1; first < 2500; length = length % 97 + 13) {
     const std::size_t count = std::min(length, 2500 - first);
-    pieces.add(piece(r.block, first, count), piece(r.instruments, first, count));
+    const auto from = static_cast<Eigen::Index>(2 * first), number = static_cast<Eigen::Index>(2 * count);
+    pieces.add(block_of(r.Y.middleRows(from, number), r.y.segment(from, number), 2));
     first += count;
   }
   const Eigen::Vector2d w(1.0, 0.7);
@@ -138,14 +124,11 @@ TEST(Moments, DoNotDependOnHowTheRowsAreHandedOver) {
 }
 
 TEST(Moments, RefuseRowsOfAnotherShape) {
-  const Rows r = rows(5, 10, 3, 1);
-  RegressionMoments plain(1, 3), with(1, 3, true), wide(1, 4);
-  EXPECT_THROW(plain.add(r.block, r.instruments), InvalidArgument);
-  EXPECT_THROW(with.add(r.block), InvalidArgument);
-  EXPECT_THROW(wide.add(r.block), InvalidArgument);
-  Rows other = r;
-  other.instruments.sample[4] = 99;
-  EXPECT_THROW(with.add(r.block, other.instruments), InvalidArgument);
+  const RegressionBlock r = rows(5, 10, 4, 1);
+  RegressionMoments half(1, 4, true), wide(1, 5), two(2, 4);
+  EXPECT_THROW(half.add(r), InvalidArgument);
+  EXPECT_THROW(wide.add(r), InvalidArgument);
+  EXPECT_THROW(two.add(r), InvalidArgument);
 }
 
 TEST(EfficientWeights, AreOneOverEachOutputsNoise) {
