@@ -126,6 +126,16 @@ void LinearProgram::price(const double* c) {
   }
 }
 
+/// Inverse, vertex and multipliers from the basis alone; false where it is singular.
+bool LinearProgram::renew(const double* c) {
+  if (!refactor()) {
+    return false;
+  }
+  place();
+  price(c);
+  return true;
+}
+
 bool LinearProgram::priced() const {
   return std::all_of(lambda_.begin(), lambda_.end(), [](double l) { return l >= -kPriced; });
 }
@@ -183,7 +193,6 @@ void LinearProgram::exchange(std::size_t leaving, int entering, const double* al
   }
   basis_[leaving] = entering;
   ++since_factored_;
-  ++pivots_;
 }
 
 LinearProgram::Outcome LinearProgram::dual(const double* c) {
@@ -191,12 +200,8 @@ LinearProgram::Outcome LinearProgram::dual(const double* c) {
   std::size_t still = 0;
   slack_known_ = false;
   for (std::size_t step = 0; step < 400 + 40 * p_; ++step) {
-    if (since_factored_ >= kRefactor) {
-      if (!refactor()) {
-        return Outcome::stuck;
-      }
-      place();
-      price(c);
+    if (since_factored_ >= kRefactor && !renew(c)) {
+      return Outcome::stuck;
     }
     int entering = 0;
     double violation = kFeasible;
@@ -283,11 +288,9 @@ LinearProgram::Outcome LinearProgram::primal(const double* c) {
   std::size_t still = 0;
   for (std::size_t step = 0; step < 400 + 40 * p_; ++step) {
     if (since_factored_ >= kRefactor) {
-      if (!refactor()) {
+      if (!renew(c)) {
         return Outcome::stuck;
       }
-      place();
-      price(c);
       kernels::best().slack(view(), x_.data(), slack_.data());
     }
     if (enough_ < kInfinity) {

@@ -64,9 +64,6 @@ class LinearProgram {
   /// The vertex of the last solve, p numbers.
   [[nodiscard]] const double* vertex() const { return x_.data(); }
 
-  /// Walks made since the beginning: for measurements.
-  [[nodiscard]] std::size_t pivots() const { return pivots_; }
-
  private:
   enum class Outcome { optimal, infeasible, stuck };
 
@@ -76,6 +73,7 @@ class LinearProgram {
   bool refactor();
   void place();
   void price(const double* c);
+  bool renew(const double* c);
   void exchange(std::size_t leaving, int entering, const double* alpha);
   [[nodiscard]] bool priced() const;
   [[nodiscard]] bool accurate(const double* c) const;
@@ -98,7 +96,7 @@ class LinearProgram {
   bool slack_known_ = false;  // slack_ is that of x_
   bool careful_ = false;
   double enough_ = std::numeric_limits<double>::infinity();  // for a direction of norm one
-  std::size_t since_factored_ = 0, pivots_ = 0;
+  std::size_t since_factored_ = 0;
 };
 
 }  // namespace wheelwright
