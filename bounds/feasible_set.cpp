@@ -48,17 +48,6 @@ FeasibleSet cut(RegressionSource& source, const RowSurvey& survey, const Box& pr
   return result;
 }
 
-/// Parameters whose column is noisy and whose sign the box leaves open.
-std::vector<std::size_t> open_signs(const RowSurvey& survey, const Box& box) {
-  std::vector<std::size_t> open;
-  for (std::size_t j = 0; j < box.dimension(); ++j) {
-    if (survey.noisy[j] && box.sides[j].lower < 0.0 && box.sides[j].upper > 0.0) {
-      open.push_back(j);
-    }
-  }
-  return open;
-}
-
 /// Adds what it cost to get `part`.
 void account(FeasibleSet& total, const FeasibleSet& part) {
   total.passes += part.passes;

@@ -382,12 +382,7 @@ MinimaxFit minimax_fit(RegressionSource& source, const Box& prior, const Minimax
   std::sort(excluded.begin(), excluded.end());
   const RowSurvey known = survey(source, prior, excluded);
 
-  std::vector<std::size_t> open;
-  for (std::size_t j = 0; j < prior.dimension(); ++j) {
-    if (known.noisy[j] && prior.sides[j].lower < 0.0 && prior.sides[j].upper > 0.0) {
-      open.push_back(j);
-    }
-  }
+  std::vector<std::size_t> open = open_signs(known, prior);
   if (open.size() > 4) {
     open.clear();
   }
@@ -407,9 +402,12 @@ MinimaxFit minimax_fit(RegressionSource& source, const Box& prior, const Minimax
       best = std::move(part);
     }
   }
+  // Another pattern may hold the truth down to its own lower bound; what double precision allows is what it allowed the
+  // best one.
+  const double own_gap = best.upper - best.lower;
+  best.converged = best.converged && best.upper - lower <= std::max(options.tolerance * best.upper, own_gap);
   best.lower = lower;
   best.passes = passes;
-  best.converged = best.converged && best.upper - lower <= options.tolerance * best.upper + (best.upper - best.lower);
   return best;
 }
 

@@ -166,4 +166,14 @@ Eigen::VectorXd weighted_estimate(const RowSurvey& survey, const Box& prior) {
   return at.centre + at.transform * pull;
 }
 
+std::vector<std::size_t> open_signs(const RowSurvey& survey, const Box& box) {
+  std::vector<std::size_t> open;
+  for (std::size_t j = 0; j < box.dimension(); ++j) {
+    if (survey.noisy[j] && box.sides[j].lower < 0.0 && box.sides[j].upper > 0.0) {
+      open.push_back(j);
+    }
+  }
+  return open;
+}
+
 }  // namespace wheelwright

@@ -27,6 +27,9 @@ struct RowSurvey {
 [[nodiscard]] RowSurvey survey(RegressionSource& source, const Box& prior,
                                const std::vector<std::size_t>& excluded = {});
 
+/// Parameters whose column is noisy and whose sign the box leaves open.
+[[nodiscard]] std::vector<std::size_t> open_signs(const RowSurvey& survey, const Box& box);
+
 /// Least squares with the weights of the survey, drawn to the middle of the box by the weight of its half-widths (so
 /// that it exists for any rank). Uncertified; it need not lie in the box.
 [[nodiscard]] Eigen::VectorXd weighted_estimate(const RowSurvey& survey, const Box& prior);
