@@ -63,7 +63,7 @@ bool FeasibleSetTracker::add(const RegressionBlock& block) {
     last = t;
   }
   // What is known, faded to the end of the block, implies most new rows: they need not be looked at again.
-  const Box known = rows_.empty() ? prior_ : at(last).hull();
+  const Box known = rows_.empty() ? prior_ : Polytope(faded(rows_, last), prior_, {.vertex_limit = 0}).hull();
   std::vector<HalfSpace> all = rows_;
   HalfSpace upper, lower;
   for (Eigen::Index r = 0; r < block.rows(); ++r) {
