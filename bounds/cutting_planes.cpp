@@ -36,14 +36,18 @@ void CuttingPlanes::keep_open(const RowBank& from, RowBank& to) const {
   }
 }
 
+Eigen::VectorXd CuttingPlanes::middle() const {
+  return coordinates_.centre + coordinates_.transform * (0.5 * (z_upper_ + z_lower_));
+}
+
 std::pair<Eigen::VectorXd, Eigen::VectorXd> CuttingPlanes::oblique_box() const {
-  return {0.5 * (z_upper_ - z_lower_), coordinates_.centre + coordinates_.transform * (0.5 * (z_upper_ + z_lower_))};
+  return {0.5 * (z_upper_ - z_lower_), middle()};
 }
 
 Box CuttingPlanes::outer_box() const {
   const Eigen::Index p = z_lower_.size();
   const Eigen::VectorXd half = coordinates_.transform.cwiseAbs() * (0.5 * (z_upper_ - z_lower_));
-  const Eigen::VectorXd centre = coordinates_.centre + coordinates_.transform * (0.5 * (z_upper_ + z_lower_));
+  const Eigen::VectorXd centre = middle();
   Box around = box_;
   for (Eigen::Index j = 0; j < p; ++j) {
     double low = centre[j] - half[j], high = centre[j] + half[j];
@@ -81,11 +85,15 @@ void CuttingPlanes::insert(std::span<const HalfSpace> rows) {
   program_->add_rows(a, b);
 }
 
-void CuttingPlanes::rebuild() {
-  // The box of the program contains the set with room to spare.
+/// A program without rows, whose box contains the set with room to spare.
+void CuttingPlanes::clear_program() {
   const Eigen::VectorXd room = (2.0 * (z_upper_ - z_lower_)).array() + 1.0;
   program_.emplace(z_lower_ - room, z_upper_ + room);
   norms_.resize(0);
+}
+
+void CuttingPlanes::rebuild() {
+  clear_program();
   insert(rows_);
 }
 
@@ -180,8 +188,7 @@ std::vector<std::size_t> CuttingPlanes::open(const RowBank& candidates, std::spa
   const auto p = static_cast<Eigen::Index>(box_.dimension());
   std::vector<std::size_t> left;
   Eigen::VectorXd g(p);
-  const Eigen::VectorXd middle = 0.5 * (z_upper_ + z_lower_), half = 0.5 * (z_upper_ - z_lower_);
-  const Eigen::VectorXd centre = coordinates_.centre + coordinates_.transform * middle;
+  const Eigen::VectorXd half = 0.5 * (z_upper_ - z_lower_), centre = middle();
   for (const std::size_t i : numbers) {
     const Eigen::Map<const Eigen::VectorXd> a(candidates.a.data() + static_cast<Eigen::Index>(i) * p, p);
     double reach = a.dot(centre) - candidates.b[i];
@@ -299,6 +306,40 @@ Eigen::MatrixXd CuttingPlanes::extreme_points() const {
   return (coordinates_.transform * vertices_.rightCols(2 * p)).colwise() + coordinates_.centre;
 }
 
+/// Hands to `keep`, which adds them to the program, the rows of `bank` that cut what the program holds: facets of the
+/// set, each once. A ray from within meets a facet first, where a linear program only finds a row that cuts
+/// (Clarkson 1994).
+template <class Keep>
+void CuttingPlanes::take_facets(Whitened& bank, Keep keep) {
+  const Eigen::VectorXd inner = vertices_.rowwise().mean();
+  std::vector<double> slack(bank.stride), along(bank.stride);
+  kernels::best().slack(bank.view(), inner.data(), slack.data());
+  Eigen::VectorXd g(inner.size()), ray(inner.size());
+  for (std::size_t i = 0; i < bank.numbers.size(); ++i) {
+    for (std::size_t j = 0; j < bank.p; ++j) {
+      g[static_cast<Eigen::Index>(j)] = bank.a[j * bank.stride + i];
+    }
+    while (!bank.dropped(i)) {
+      const std::optional<double> reached = program_->reach(g.data(), bank.b[i] + 2.0 * kCut);
+      if (reached && *reached <= bank.b[i] + kCut) {
+        bank.drop(i);
+        break;
+      }
+      std::size_t facet = i;
+      if (reached) {
+        ray = Eigen::Map<const Eigen::VectorXd>(program_->vertex(), ray.size()) - inner;
+        const kernels::Found found =
+            kernels::best().first_blocking(bank.view(), slack.data(), ray.data(), 1e-12, along.data());
+        facet = found.value < 1.0 && !bank.dropped(found.row) ? found.row : i;
+      }
+      keep(facet);
+      bank.drop(facet);
+      slack[facet] = std::numeric_limits<double>::infinity();
+    }
+    slack[i] = std::numeric_limits<double>::infinity();
+  }
+}
+
 void CuttingPlanes::add(const RowBank& candidates) {
   if (is_empty()) {
     return;
@@ -317,36 +358,10 @@ void CuttingPlanes::add(const RowBank& candidates) {
     return towards.dot(Eigen::Map<const Eigen::VectorXd>(candidates.normal(i).data(), towards.size())) >= 0.0;
   });
   Whitened bank = whiten(candidates, left);
-  const std::size_t p = bank.p;
-  // A ray from within meets a facet first, where a linear program only finds a row that cuts (Clarkson 1994).
-  const Eigen::VectorXd inner = vertices_.rowwise().mean();
-  std::vector<double> slack(bank.stride), along(bank.stride);
-  kernels::best().slack(bank.view(), inner.data(), slack.data());
-  Eigen::VectorXd g(static_cast<Eigen::Index>(p)), ray(g.size());
-  for (std::size_t i = 0; i < bank.numbers.size(); ++i) {
-    for (std::size_t j = 0; j < p; ++j) {
-      g[static_cast<Eigen::Index>(j)] = bank.a[j * bank.stride + i];
-    }
-    while (!bank.dropped(i)) {
-      const std::optional<double> reached = program_->reach(g.data(), bank.b[i] + 2.0 * kCut);
-      if (reached && *reached <= bank.b[i] + kCut) {
-        bank.drop(i);
-        break;
-      }
-      std::size_t facet = i;
-      if (reached) {
-        ray = Eigen::Map<const Eigen::VectorXd>(program_->vertex(), ray.size()) - inner;
-        const kernels::Found found =
-            kernels::best().first_blocking(bank.view(), slack.data(), ray.data(), 1e-12, along.data());
-        facet = found.value < 1.0 && !bank.dropped(found.row) ? found.row : i;
-      }
-      rows_.push_back(candidates.at(bank.numbers[facet]));
-      insert(std::span(rows_).last(1));
-      bank.drop(facet);
-      slack[facet] = std::numeric_limits<double>::infinity();
-    }
-    slack[i] = std::numeric_limits<double>::infinity();
-  }
+  take_facets(bank, [&](std::size_t facet) {
+    rows_.push_back(candidates.at(bank.numbers[facet]));
+    insert(std::span(rows_).last(1));
+  });
   update_box();
   if (rows_.size() > 2 * reduced_size_ + 100) {
     reduce();
@@ -369,45 +384,12 @@ void CuttingPlanes::reduce() {
   std::vector<std::size_t> everyone(rows_.size());
   std::iota(everyone.begin(), everyone.end(), std::size_t{0});
   Whitened bank = whiten(all, std::move(everyone));
-  const Eigen::VectorXd inner = vertices_.rowwise().mean();
-  std::vector<double> slack(bank.stride), along(bank.stride);
-  kernels::best().slack(bank.view(), inner.data(), slack.data());
+  clear_program();
   std::vector<std::size_t> facets;
-  std::vector<char> done(bank.numbers.size(), 0);
-  const auto keep = [&](std::size_t i) {
-    facets.push_back(i);
-    done[i] = 1;
-    Eigen::MatrixXd a(p, 1);
-    for (Eigen::Index j = 0; j < p; ++j) {
-      a(j, 0) = bank.a[static_cast<std::size_t>(j) * bank.stride + i];
-    }
-    program_->add_rows(a, Eigen::VectorXd::Constant(1, bank.b[i]));
-    slack[i] = std::numeric_limits<double>::infinity();
-  };
-  const Eigen::VectorXd room = (2.0 * (z_upper_ - z_lower_)).array() + 1.0;
-  program_.emplace(z_lower_ - room, z_upper_ + room);
-  Eigen::VectorXd g(p), ray(p);
-  for (std::size_t i = 0; i < bank.numbers.size(); ++i) {
-    for (Eigen::Index j = 0; j < p; ++j) {
-      g[j] = bank.a[static_cast<std::size_t>(j) * bank.stride + i];
-    }
-    while (done[i] == 0) {
-      const std::optional<double> reached = program_->reach(g.data(), bank.b[i] + 2.0 * kCut);
-      if (reached && *reached <= bank.b[i] + kCut) {
-        break;
-      }
-      std::size_t facet = i;
-      if (reached) {
-        ray = Eigen::Map<const Eigen::VectorXd>(program_->vertex(), p) - inner;
-        const kernels::Found found =
-            kernels::best().first_blocking(bank.view(), slack.data(), ray.data(), 1e-12, along.data());
-        facet = found.value < 1.0 ? found.row : i;
-      }
-      keep(done[facet] == 0 ? facet : i);
-    }
-    done[i] = 1;
-    slack[i] = std::numeric_limits<double>::infinity();
-  }
+  take_facets(bank, [&](std::size_t facet) {
+    facets.push_back(facet);
+    insert(std::span(rows_).subspan(facet, 1));
+  });
   std::sort(facets.begin(), facets.end());
   std::vector<HalfSpace> remaining;
   for (const std::size_t i : facets) {

@@ -75,7 +75,11 @@ class CuttingPlanes {
   struct Whitened;
 
   void insert(std::span<const HalfSpace> rows);
+  void clear_program();
   void rebuild();
+  template <class Keep>
+  void take_facets(Whitened& bank, Keep keep);
+  [[nodiscard]] Eigen::VectorXd middle() const;
   void update_box(bool oblique = true);
   void recentre();
   [[nodiscard]] Whitened whiten(const RowBank& candidates, std::vector<std::size_t> numbers) const;
