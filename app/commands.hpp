@@ -19,6 +19,8 @@ using Run = std::function<int(const std::string& command_line)>;
 [[nodiscard]] Run add_check(CLI::App& program);
 /// wheelwright commission LOG... --robot robot.yaml
 [[nodiscard]] Run add_commission(CLI::App& program);
+/// wheelwright design --model model.json --for bounds
+[[nodiscard]] Run add_design(CLI::App& program);
 /// wheelwright detect LOG --model model.json [--follow]
 [[nodiscard]] Run add_detect(CLI::App& program);
 /// wheelwright simulate SCENARIO.yaml --out LOG

@@ -38,6 +38,7 @@ int main(int argc, char** argv) {
   const std::vector<std::pair<std::string, Run>> commands = {{"commission", add_commission(program)},
                                                              {"detect", add_detect(program)},
                                                              {"check", add_check(program)},
+                                                             {"design", add_design(program)},
                                                              {"simulate", add_simulate(program)}};
   try {
     program.parse(argc, argv);

@@ -12,6 +12,7 @@
 
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/io/byte_source.hpp>
+#include <wheelwright/io/csv.hpp>
 #include <wheelwright/io/robot_file.hpp>
 #include <wheelwright/io/yaml_place.hpp>
 
@@ -74,11 +75,33 @@ std::string robot_text(std::string_view text, const YamlPlace& place) {
   return out;
 }
 
+// Wheel-speed commands of a CSV file as body speeds; the table begins at time 0.
+SpeedTable read_commands(const std::filesystem::path& path, const DifferentialDrive& drive) {
+  const std::vector<std::string> names = {"command_r", "command_l"};
+  CsvOptions options;
+  options.only = names;
+  options.min_rows = 2;
+  CsvLog log({path}, options);
+  require_columns(log, names);
+  const LogTable table = read_all(log);
+  if (table.segment_starts.size() > 1) {
+    throw InputError(path.string() + ": time has a gap or goes back before the row at " +
+                     std::to_string(table.t[table.segment_starts[1]]) + " s: expected one drive, evenly sampled");
+  }
+  SpeedTable speeds;
+  for (std::size_t k = 0; k < table.rows(); ++k) {
+    speeds.t.push_back(table.t[k] - table.t.front());
+    speeds.speed.push_back(drive.body_speed({table.column("command_r")[k], table.column("command_l")[k]}));
+  }
+  return speeds;
+}
+
 struct ScenarioReader {
   std::string_view text;
   const std::string& file;
   const std::filesystem::path& folder;
   Scenario scenario;
+  std::optional<std::filesystem::path> commands = {};
 
   void read() {
     const YamlPlace root = YamlPlace::parse(text, file);
@@ -91,6 +114,17 @@ struct ScenarioReader {
     for (const char* needed : {"robot", "parameters"}) {
       if (!seen.contains(needed)) {
         throw InputError(file + ": no key " + needed + ": expected it in a scenario");
+      }
+    }
+    if (commands) {
+      if (!(scenario.robot.wheel_radius > 0.0 && scenario.robot.track_width > 0.0)) {
+        throw InputError(file +
+                         ": trajectory of kind table: expected a robot of two wheels, with wheel_radius and "
+                         "track_width");
+      }
+      scenario.trajectory.table = read_commands(*commands, drive_of(scenario.robot));
+      if (!seen.contains("duration")) {
+        scenario.duration = scenario.trajectory.table.t.back();
       }
     }
     try {
@@ -180,15 +214,20 @@ struct ScenarioReader {
 
   void read_trajectory(const YamlPlace& place) {
     Trajectory& trajectory = scenario.trajectory;
-    for (const auto& [name, value] : place.members({"kind", "speed", "yaw_rate", "period"})) {
-      if (name == "kind") {
-        trajectory.kind = static_cast<Trajectory::Kind>(
-            value.choice({"straight", "circle", "figure_eight", "multi_sine", "spin", "stops", "commissioning"}));
+    for (const auto& [name, value] : place.members({"kind", "speed", "yaw_rate", "period", "file"})) {
+      if (name == "file") {
+        commands = folder / value.text("a CSV file with t, command_r, command_l");
+      } else if (name == "kind") {
+        trajectory.kind = static_cast<Trajectory::Kind>(value.choice(
+            {"straight", "circle", "figure_eight", "multi_sine", "spin", "stops", "commissioning", "table"}));
       } else if (name == "period") {
         trajectory.period = value.positive();
       } else {
         (name == "speed" ? trajectory.speed : trajectory.yaw_rate) = not_negative(value);
       }
+    }
+    if (commands.has_value() != (trajectory.kind == Trajectory::Kind::table)) {
+      place.fail(commands ? "kind: table beside a file" : "a key file beside kind: table");
     }
   }
 
@@ -276,7 +315,7 @@ struct ScenarioReader {
 }  // namespace
 
 Scenario parse_scenario(std::string_view text, const std::string& file, const std::filesystem::path& folder) {
-  ScenarioReader reader{text, file, folder, {}};
+  ScenarioReader reader{text, file, folder, {}, {}};
   reader.read();
   return reader.scenario;
 }

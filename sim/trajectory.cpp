@@ -12,8 +12,8 @@ namespace wheelwright {
 namespace {
 
 using std::numbers::pi;
-constexpr std::array<std::string_view, 7> kind_names = {"straight", "circle", "figure_eight", "multi_sine",
-                                                        "spin",     "stops",  "commissioning"};
+constexpr std::array<std::string_view, 8> kind_names = {"straight", "circle", "figure_eight",  "multi_sine",
+                                                        "spin",     "stops",  "commissioning", "table"};
 constexpr double first_zero_of_j0 = 2.404825557695773;
 constexpr double soft_start = 1.0;  // s
 
@@ -66,7 +66,8 @@ Pair steady(const Trajectory& r, Trajectory::Kind kind, double t) {
       const Signal go = go_and_stop(w, t);
       return {r.speed * go, r.yaw_rate * (go * sine(0.43 * w, t))};
     }
-    case Trajectory::Kind::commissioning: break;
+    case Trajectory::Kind::commissioning:
+    case Trajectory::Kind::table: break;
   }
   // One stage after the other, each from standstill to standstill.
   constexpr std::array stages = {Trajectory::Kind::straight, Trajectory::Kind::figure_eight,
@@ -80,6 +81,18 @@ Pair steady(const Trajectory& r, Trajectory::Kind kind, double t) {
   return {window * pair.v1, window * pair.v2};
 }
 
+ReferenceSpeed looked_up(const SpeedTable& table, double t) {
+  const auto next = std::upper_bound(table.t.begin(), table.t.end(), t);
+  if (next == table.t.begin() || next == table.t.end()) {
+    const bool at_end = next == table.t.end() && !table.t.empty() && t == table.t.back();
+    return {at_end ? table.speed.back() : Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero()};
+  }
+  const auto k = static_cast<std::size_t>(next - table.t.begin());
+  const double length = table.t[k] - table.t[k - 1];
+  const Eigen::Vector2d slope = (table.speed[k] - table.speed[k - 1]) / length;
+  return {table.speed[k - 1] + (t - table.t[k - 1]) * slope, slope};
+}
+
 }  // namespace
 
 std::string_view to_string(Trajectory::Kind kind) { return kind_names.at(static_cast<std::size_t>(kind)); }
@@ -88,9 +101,22 @@ void validate(const Trajectory& trajectory) {
   check::non_negative(trajectory.speed, "trajectory.speed");
   check::non_negative(trajectory.yaw_rate, "trajectory.yaw_rate");
   check::positive(trajectory.period, "trajectory.period");
+  if (trajectory.kind != Trajectory::Kind::table) {
+    return;
+  }
+  const SpeedTable& table = trajectory.table;
+  check::that(table.t.size() >= 2 && table.speed.size() == table.t.size(), "trajectory.table",
+              "two rows or more, each with a time and two speeds");
+  for (std::size_t k = 0; k < table.t.size(); ++k) {
+    check::that(std::isfinite(table.t[k]) && table.speed[k].allFinite(), "trajectory.table", "finite numbers");
+    check::that(k == 0 || table.t[k] > table.t[k - 1], "trajectory.table", "increasing times");
+  }
 }
 
 ReferenceSpeed reference_speed(const Trajectory& trajectory, double t) {
+  if (trajectory.kind == Trajectory::Kind::table) {
+    return looked_up(trajectory.table, t);
+  }
   const Pair pair = steady(trajectory, trajectory.kind, t);
   const Signal start = smooth_step(t, soft_start);
   const Signal v1 = start * pair.v1, v2 = start * pair.v2;

@@ -4,12 +4,20 @@
 #pragma once
 
 #include <string_view>
+#include <vector>
 
 #include <Eigen/Core>
 
 namespace wheelwright {
 
-/// What the reference robot does. Speeds start from 0 over one second, and are continuously differentiable.
+/// Speeds over time, linear between the rows; at rest before the first row and after the last one.
+struct SpeedTable {
+  std::vector<double> t;               ///< s, increasing
+  std::vector<Eigen::Vector2d> speed;  ///< [v1, v2] at these times, m/s, rad/s
+};
+
+/// What the reference robot does. Speeds start from 0 over one second, and are continuously differentiable; those of a
+/// table are as the table says.
 struct Trajectory {
   enum class Kind {
     straight,       ///< v1 = speed·(0.6 + 0.4 sin), no turning
@@ -19,17 +27,20 @@ struct Trajectory {
     spin,           ///< turning on the spot, to and fro
     stops,          ///< drives in curves, and stands still half of the time
     commissioning,  ///< straight, figure eight, multi-sine, spin, and driving in curves, one period each, with stops
+    table,          ///< the speeds of `table`
   };
   Kind kind = Kind::commissioning;
   double speed = 0.5;     ///< largest |v1|, m/s
   double yaw_rate = 0.8;  ///< largest |v2|, rad/s; the figure eight's own is 2.405·2π/period
   double period = 10.0;   ///< s
+  SpeedTable table = {};  ///< of Kind::table
 };
 
 /// Name of a kind as scenario files write it, e.g. "figure_eight".
 [[nodiscard]] std::string_view to_string(Trajectory::Kind kind);
 
-/// Throws InvalidArgument, naming the field, unless speed and yaw rate are >= 0 and the period is > 0.
+/// Throws InvalidArgument, naming the field, unless speed and yaw rate are >= 0, the period is > 0 and, for
+/// Kind::table, the table has two rows or more of finite numbers with increasing times.
 void validate(const Trajectory& trajectory);
 
 /// Reference speeds at one instant.

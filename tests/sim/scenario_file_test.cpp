@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,6 +9,8 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/io/scenario_file.hpp>
 #include <wheelwright/sim/simulation.hpp>
+
+#include "io/scratch.hpp"
 
 namespace wheelwright {
 namespace {
@@ -99,9 +102,45 @@ TEST(ScenarioFile, FaultKindsAreCalledAsInTheLibrary) {
   }
 }
 
+class ScenarioTable : public testing::ScratchTest {};
+
+TEST_F(ScenarioTable, CommandsOfATableAreDriven) {
+  put("commands.csv", "t,command_r,command_l,v1\n5,0,0,9\n6,2,1,9\n7,2,-2,9\n8,0,0,9\n");
+  put("s.yaml", head + "trajectory: {kind: table, file: commands.csv}\n");
+  const Scenario s = read_scenario(path("s.yaml"));
+  EXPECT_EQ(s.trajectory.kind, Trajectory::Kind::table);
+  EXPECT_EQ(s.duration, 3.0);
+  EXPECT_EQ(s.trajectory.table.t, (std::vector<double>{0.0, 1.0, 2.0, 3.0}));
+  // (5): v1 = r(ω_R + ω_L)/2, v2 = r(ω_R − ω_L)/D.
+  EXPECT_NEAR(s.trajectory.table.speed[1][0], 0.0975 * 1.5, 1e-15);
+  EXPECT_NEAR(s.trajectory.table.speed[1][1], 0.0975 / 0.381, 1e-15);
+  const LogTable log = simulate(s);
+  // The controller adds to the table's commands what the tracking error asks for, which is little.
+  EXPECT_NEAR(log.column("command_r")[100], 2.0, 0.05);
+  EXPECT_NEAR(log.column("command_l")[100], 1.0, 0.05);
+  EXPECT_NEAR(log.column("command_l")[200], -2.0, 0.05);
+}
+
+TEST_F(ScenarioTable, TablesThatCannotBeDrivenAreInputErrors) {
+  using ::testing::AllOf;
+  using ::testing::HasSubstr;
+  const auto said = [&](const std::string& trajectory) {
+    put("s.yaml", head + "trajectory: " + trajectory + "\n");
+    return testing::input_error([&] { static_cast<void>(read_scenario(path("s.yaml"))); });
+  };
+  EXPECT_THAT(said("{kind: table}"), AllOf(HasSubstr("s.yaml:6"), HasSubstr("file")));
+  put("commands.csv", "t,command_r,command_l\n0,0,0\n1,1,1\n2,0,0\n");
+  EXPECT_THAT(said("{kind: circle, file: commands.csv}"), AllOf(HasSubstr("s.yaml:6"), HasSubstr("kind: table")));
+  EXPECT_THAT(said("{kind: table, file: nowhere.csv}"), HasSubstr("nowhere.csv"));
+  put("half.csv", "t,command_r\n0,0\n1,1\n2,0\n");
+  EXPECT_THAT(said("{kind: table, file: half.csv}"), AllOf(HasSubstr("half.csv"), HasSubstr("command_l")));
+  put("back.csv", "t,command_r,command_l\n0,0,0\n1,1,1\n2,0,0\n0,1,1\n1,1,1\n");
+  EXPECT_THAT(said("{kind: table, file: back.csv}"), AllOf(HasSubstr("back.csv"), HasSubstr("one drive")));
+}
+
 TEST(ScenarioFile, MessagesNameFileLineKeyValueAndExpectation) {
-  using testing::AllOf;
-  using testing::HasSubstr;
+  using ::testing::AllOf;
+  using ::testing::HasSubstr;
   EXPECT_EQ(message(head), "accepted");
   EXPECT_THAT(message(head + "duration: soon\n"), AllOf(HasSubstr("s.yaml:6: duration"), HasSubstr("'soon'")));
   EXPECT_THAT(message(head + "\ndurations: 3\n"), AllOf(HasSubstr("s.yaml:7"), HasSubstr("durations")));
@@ -119,8 +158,8 @@ TEST(ScenarioFile, MessagesNameFileLineKeyValueAndExpectation) {
 }
 
 TEST(ScenarioFile, TheRobotsOwnMessagesNameItsOwnLines) {
-  using testing::AllOf;
-  using testing::HasSubstr;
+  using ::testing::AllOf;
+  using ::testing::HasSubstr;
   std::string bad = head;
   bad.replace(bad.find("0.381"), 5, "wide!");
   EXPECT_THAT(message(bad), AllOf(HasSubstr("s.yaml:3: track_width"), HasSubstr("wide!")));
@@ -134,7 +173,7 @@ TEST(ScenarioFile, TheRobotsOwnMessagesNameItsOwnLines) {
 }
 
 TEST(ScenarioFile, WhatDoesNotGoTogetherIsAnInputError) {
-  using testing::HasSubstr;
+  using ::testing::HasSubstr;
   EXPECT_THAT(message(head + "faults: [{kind: wheel_radius, magnitude: -0.1}]\n"), HasSubstr("r + δ1 > 0"));
   EXPECT_THAT(message(head + "faults: [{kind: slip_x, magnitude: 0.1, shape: ramp}]\n"), HasSubstr("rise_time"));
   EXPECT_THAT(message("duration: 3\n"), HasSubstr("robot"));

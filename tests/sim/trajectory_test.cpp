@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <array>
 #include <cmath>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -64,6 +66,33 @@ TEST(Trajectory, FigureEightCloses) {
     pose = advance_reference(trajectory, pose, 10.0 + 10.0 * i / steps, 10.0 / steps);
   }
   EXPECT_LT((pose - start).norm(), 1e-8);
+}
+
+Trajectory table(std::vector<double> t, std::vector<Eigen::Vector2d> speed) {
+  return {.kind = Kind::table, .table = {std::move(t), std::move(speed)}};
+}
+
+TEST(Trajectory, TableIsLinearBetweenItsRowsAndAtRestOutside) {
+  const Trajectory trajectory = table({1.0, 2.0, 4.0}, {{0.0, 1.0}, {0.5, -1.0}, {0.1, 0.0}});
+  EXPECT_NO_THROW(validate(trajectory));
+  const auto speed = [&](double t) { return reference_speed(trajectory, t).speed; };
+  const auto acceleration = [&](double t) { return reference_speed(trajectory, t).acceleration; };
+  EXPECT_EQ(speed(0.5), Eigen::Vector2d(0.0, 0.0));
+  EXPECT_EQ(speed(1.0), Eigen::Vector2d(0.0, 1.0));
+  EXPECT_EQ(speed(1.5), Eigen::Vector2d(0.25, 0.0));
+  EXPECT_EQ(acceleration(1.5), Eigen::Vector2d(0.5, -2.0));
+  EXPECT_NEAR((speed(3.0) - Eigen::Vector2d(0.3, -0.5)).norm(), 0.0, 1e-15);
+  EXPECT_EQ(speed(4.0), Eigen::Vector2d(0.1, 0.0));
+  EXPECT_EQ(speed(4.1), Eigen::Vector2d(0.0, 0.0));
+  EXPECT_EQ(acceleration(4.1), Eigen::Vector2d(0.0, 0.0));
+}
+
+TEST(Trajectory, RefusesTablesThatAreNone) {
+  EXPECT_THROW(validate(table({}, {})), InvalidArgument);
+  EXPECT_THROW(validate(table({0.0}, {{0.0, 0.0}})), InvalidArgument);
+  EXPECT_THROW(validate(table({0.0, 1.0}, {{0.0, 0.0}})), InvalidArgument);
+  EXPECT_THROW(validate(table({0.0, 0.0}, {{0.0, 0.0}, {1.0, 0.0}})), InvalidArgument);
+  EXPECT_THROW(validate(table({0.0, 1.0}, {{0.0, 0.0}, {std::nan(""), 0.0}})), InvalidArgument);
 }
 
 TEST(Trajectory, RefusesWhatIsNone) {

@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include <wheelwright/design/manoeuvre.hpp>
+#include <wheelwright/io/csv.hpp>
+#include <wheelwright/io/model_file.hpp>
+#include <wheelwright/io/robot_file.hpp>
+#include <wheelwright/report/design_report.hpp>
+
+#include "commands.hpp"
+#include "common.hpp"
+#include "design_result.hpp"
+#include "progress.hpp"
+
+namespace wheelwright::app {
+namespace {
+
+struct Arguments {
+  std::filesystem::path model, robot;
+  std::string aim;
+  double duration = 20.0;
+  std::optional<double> speed, acceleration, effort, radius;
+  std::vector<double> box;
+  double rate = 100.0;
+  WidthCriterion criterion = WidthCriterion::geometric_mean;
+  std::size_t stages = DesignOptions{}.stages;
+  CommonOptions common;
+};
+
+constexpr const char* kHelp =
+    "Designs a drive whose log will give the narrowest guaranteed bounds on the parameters, within limits of speed, "
+    "acceleration, effort, space and time, and writes it as a table of wheel-speed commands.";
+
+constexpr const char* kExamples =
+    "Limits of a wheel may stand in the robot file, limits: {speed: rad/s, acceleration: rad/s², effort: N·m (or A, "
+    "V)}; "
+    "options go before them. A speed limit is needed, and one on acceleration or effort. Leave a reserve of effort for "
+    "the robot's controller.\n\n"
+    "Examples:\n"
+    "  wheelwright design --model result/model.json --for bounds --speed 8 --acceleration 20 --radius 1.5 --out plan\n"
+    "  wheelwright design --robot robot.yaml --for bounds --duration 30 --box -1 3 -1 1 --out plan\n"
+    "  then drive plan/manoeuvre.csv, or simulate it with trajectory: {kind: table, file: plan/manoeuvre.csv}";
+
+MotionLimits limits_from(const Arguments& a, const Robot& robot) {
+  MotionLimits limits = limits_of(robot);
+  limits.duration = a.duration;
+  limits.joint_speed = a.speed.value_or(limits.joint_speed);
+  limits.joint_acceleration = a.acceleration ? a.acceleration : limits.joint_acceleration;
+  limits.effort = a.effort ? a.effort : limits.effort;
+  limits.radius = a.radius;
+  if (!a.box.empty()) {
+    limits.box = {Interval{a.box[0], a.box[1]}, Interval{a.box[2], a.box[3]}};
+  }
+  if (limits.joint_speed <= 0.0) {
+    throw InputError("no limit on the speed: expected --speed, or limits: {speed: …} in the robot file (rad/s)");
+  }
+  if (!limits.joint_acceleration && !limits.effort) {
+    throw InputError(
+        "no limit on acceleration or effort: expected --acceleration or --effort, or limits: {acceleration: …, effort: "
+        "…} in the robot file");
+  }
+  return limits;
+}
+
+int run(const Arguments& a) {
+  if (a.model.empty() == a.robot.empty()) {
+    throw InputError("expected either --model model.json or --robot robot.yaml");
+  }
+  make_directory(a.common);
+  const DesignSubject subject =
+      a.model.empty() ? subject_of(read_robot(a.robot), 1.0 / a.rate) : subject_of(read_model(a.model));
+  const MotionLimits limits = limits_from(a, subject.robot);
+  Progress progress(a.common.quiet);
+  DesignOptions options;
+  options.stages = a.stages;
+  options.seed = a.common.seed;
+  options.threads = static_cast<std::size_t>(a.common.threads);
+  options.progress = [&](std::string_view stage, double share) { progress.tell(stage, share); };
+  const BoundsDesign design = design_for_bounds(subject, limits, a.criterion, options);
+
+  Json result = to_json(design, subject, limits);
+  result["software"] = software();
+  result["seed"] = a.common.seed;
+  ReportContext context;
+  context.software = software();
+  context.command_line = a.common.command_line;
+  context.seeds = {{"search", a.common.seed}};
+  if (!a.common.out.empty()) {
+    write_csv(a.common.out / "manoeuvre.csv", command_table(design.manoeuvre.plan, subject.model));
+    if (design.figure_eight_plan) {
+      write_csv(a.common.out / "figure_eight.csv", command_table(*design.figure_eight_plan, subject.model));
+    }
+  }
+  publish(a.common, result, "design.json", design_report(design, subject, limits, context));
+  if (!a.common.quiet && !a.common.json) {
+    fmt::print("{}", summary(design, subject));
+    if (!a.common.out.empty()) {
+      fmt::print("wrote {} (commands to drive), design.json and report.html beside it\n",
+                 (a.common.out / "manoeuvre.csv").string());
+    }
+  }
+  return kDone;
+}
+
+}  // namespace
+
+Run add_design(CLI::App& program) {
+  auto a = std::make_shared<Arguments>();
+  CLI::App& command = *program.add_subcommand("design", kHelp);
+  command.add_option("--for", a->aim, "What the drive is for: bounds")->required()->check(CLI::IsMember({"bounds"}));
+  command.add_option("--model", a->model, "model.json of a commissioning: parameters, noise and filter")
+      ->type_name("FILE");
+  command
+      .add_option("--robot", a->robot,
+                  "Robot file, before there is a model: nominal values, declared noise; a filter that "
+                  "it leaves open has β = 10 1/s")
+      ->type_name("FILE");
+  command.add_option("--duration", a->duration, "Length of the drive, s")
+      ->type_name("S")
+      ->check(CLI::Range(0.5, 3600.0))
+      ->capture_default_str();
+  command.add_option("--speed", a->speed, "Largest wheel speed, rad/s (single axis: its own unit)")
+      ->type_name("X")
+      ->check(CLI::PositiveNumber);
+  command.add_option("--acceleration", a->acceleration, "Largest wheel acceleration, rad/s²")
+      ->type_name("X")
+      ->check(CLI::PositiveNumber);
+  command.add_option("--effort", a->effort, "Largest effort of a wheel, N·m (or A, V, as in the robot file)")
+      ->type_name("X")
+      ->check(CLI::PositiveNumber);
+  command.add_option("--radius", a->radius, "Largest distance from the start, m")
+      ->type_name("M")
+      ->check(CLI::PositiveNumber);
+  command.add_option("--box", a->box, "Room seen from the start, m: x ahead, y to the left")
+      ->type_name("XMIN XMAX YMIN YMAX")
+      ->expected(4);
+  command.add_option("--rate", a->rate, "Samples per second of the log to come, Hz (with --robot; a model knows)")
+      ->type_name("HZ")
+      ->check(CLI::Range(5.0, 5000.0))
+      ->capture_default_str();
+  command
+      .add_option("--criterion", a->criterion,
+                  "Relative widths are judged by their geometric_mean, their mean, or the largest")
+      ->transform(CLI::CheckedTransformer(
+          std::map<std::string, WidthCriterion>{{"geometric_mean", WidthCriterion::geometric_mean},
+                                                {"mean", WidthCriterion::mean},
+                                                {"largest", WidthCriterion::largest}}))
+      ->default_str("geometric_mean");
+  command.add_option("--stages", a->stages, "Stages of constant speed in each half of the drive")
+      ->type_name("N")
+      ->check(CLI::Range(1, 20))
+      ->capture_default_str();
+  add_common(command, a->common);
+  command.footer(kExamples);
+  return [a](const std::string& command_line) {
+    a->common.command_line = command_line;
+    return run(*a);
+  };
+}
+
+}  // namespace wheelwright::app

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// A designed manoeuvre as JSON and as a few lines of text.
+#pragma once
+
+#include <string>
+
+#include <wheelwright/design/manoeuvre.hpp>
+#include <wheelwright/io/json_file.hpp>
+
+namespace wheelwright::app {
+
+/// The result as JSON, schema "wheelwright/design/1": limits and their use, θ as believed, and bounds in the units of θ_L
+/// (promised; of the model, where there is one; of the figure eight, where there is one), with the physical half widths.
+[[nodiscard]] Json to_json(const BoundsDesign& design, const DesignSubject& subject, const MotionLimits& limits);
+
+/// The result for a terminal.
+[[nodiscard]] std::string summary(const BoundsDesign& design, const DesignSubject& subject);
+
+}  // namespace wheelwright::app

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// The design of a manoeuvre: the best member of a family for a stated objective.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string_view>
+
+#include <wheelwright/design/figure_eight.hpp>
+#include <wheelwright/design/limits.hpp>
+#include <wheelwright/design/objective.hpp>
+#include <wheelwright/design/plan.hpp>
+#include <wheelwright/design/subject.hpp>
+
+namespace wheelwright {
+
+/// Options of design_manoeuvre().
+struct DesignOptions {
+  std::size_t stages = 4;     ///< of constant speed in each half (stages.hpp)
+  std::size_t samples = 400;  ///< random manoeuvres looked at
+  std::size_t descents = 6;   ///< improved by local search
+  std::size_t steps = 500;    ///< evaluations each
+  double coarse_step = 0.02;  ///< s: sampling while searching, unless the log's own step is larger
+  std::uint64_t seed = 1;
+  std::size_t threads = 1;                                                  ///< the result does not depend on it
+  std::function<void(std::string_view stage, double share)> progress = {};  ///< may be empty
+};
+
+/// A designed manoeuvre.
+struct Manoeuvre {
+  Plan plan;                    ///< sampled every DesignSubject::step
+  LimitUse use;                 ///< of the limits: all <= 1
+  double objective = 0.0;       ///< of the plan
+  std::size_t evaluations = 0;  ///< plans looked at
+};
+
+/// The plan within `limits` with the smallest `objective` that was found: a search from many starts (search.hpp) over
+/// StageFamily, then a last local search at the log's own sampling. Deterministic for a seed; a global minimum is not
+/// promised. Throws InvalidArgument as StageFamily does.
+[[nodiscard]] Manoeuvre design_manoeuvre(const DesignSubject& subject, const MotionLimits& limits,
+                                         const RowObjective& objective, const DesignOptions& options = {});
+
+/// A manoeuvre for narrow bounds, and what it promises.
+struct BoundsDesign {
+  Manoeuvre manoeuvre;
+  WidthCriterion criterion = WidthCriterion::geometric_mean;
+  Box promised;                             ///< by the manoeuvre
+  std::optional<FigureEight> figure_eight;  ///< the best one within the same limits (differential drive)
+  std::optional<Plan> figure_eight_plan;    ///< its motion
+  Box promised_eight;                       ///< by the figure eight; meaningful where there is one
+};
+
+/// design_manoeuvre() for narrow bounds, and the best figure eight within the same limits beside it.
+[[nodiscard]] BoundsDesign design_for_bounds(const DesignSubject& subject, const MotionLimits& limits,
+                                             WidthCriterion criterion = WidthCriterion::geometric_mean,
+                                             const DesignOptions& options = {});
+
+}  // namespace wheelwright

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Manoeuvres made of stages: from one constant speed to the next as fast as the limits allow, out and back.
+///
+/// Bounds that hold for every noise are set by the extreme rows of a log, not by their number: what they need is speed
+/// held for as long as the filter remembers, and acceleration as hard as is allowed. Hence stages of constant joint
+/// speeds u_1 … u_K with ramps between them, in place of sines or splines, whose peaks are short. The second half runs
+/// the first one backwards,
+///
+///     v(T/2 + s) = −v(T/2 − s),    v̇(T/2 + s) = v̇(T/2 − s),
+///
+/// so that the robot retraces its path and ends where it began, and each row (v̇, v) has its mirror image (v̇, −v):
+/// inertia and friction, which add up in one, are told apart by the other.
+#pragma once
+
+#include <cstddef>
+#include <span>
+
+#include <wheelwright/design/limits.hpp>
+#include <wheelwright/design/plan.hpp>
+#include <wheelwright/design/subject.hpp>
+
+namespace wheelwright {
+
+/// The family of manoeuvres with K stages a half. A member is named by a point x of the cube [0, 1]^dimension(): of each
+/// stage the joints' speeds (0: full speed backwards, 1: full speed forwards) and the share of the time that its speed is
+/// held. Every point of the cube is a manoeuvre within the limits, so that a search needs no constraints:
+///
+/// - ramps are as short as acceleration and effort allow (the acceleration rises over a quarter of the ramp, holds, and
+///   falls over a quarter); the effort is a sum of friction F and inertia G/T, the ramp's duration T >= G/(limit − |F|);
+/// - speeds whose friction leaves no effort to accelerate with, or whose ramps do not fit into the duration, are scaled
+///   down;
+/// - a path that leaves the space is scaled as a whole, by scaling v1 alone (the robot turns as planned; wheel speeds,
+///   accelerations and, where they are linear in v and v̇, efforts can only fall, being largest at the ends of a segment);
+/// - what is still beyond a limit at a sample (friction that depends on the heading) is scaled down with the whole motion.
+///
+/// A motion rests for 0.1 s at both ends: a filter that begins at standstill needs no time to settle.
+class StageFamily {
+ public:
+  /// Keeps a reference to `subject`. Throws InvalidArgument when `limits` does not pass its `validate`, `stages` is 0,
+  /// or no motion is within the limits (dry friction above the effort limit, a duration of less than half a second).
+  StageFamily(const DesignSubject& subject, const MotionLimits& limits, std::size_t stages);
+
+  /// Number of coordinates of x: stages · (joints + 1).
+  [[nodiscard]] std::size_t dimension() const { return stages_ * (joints_ + 1); }
+  /// The manoeuvre `x`, sampled every `step` s. Coordinates beyond [0, 1] are clamped.
+  [[nodiscard]] Plan plan(std::span<const double> x, double step) const;
+
+ private:
+  [[nodiscard]] double ramp_time(const Eigen::VectorXd& from, const Eigen::VectorXd& to) const;
+  void limit_friction(Eigen::VectorXd& joint_speed) const;
+  void keep_within(Plan& plan) const;
+
+  const DesignSubject* subject_;
+  MotionLimits limits_;
+  std::size_t stages_;
+  std::size_t joints_;
+  Eigen::MatrixXd motion_;
+};
+
+}  // namespace wheelwright

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/design/subject.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <wheelwright/commission/noise_budget.hpp>
+#include <wheelwright/commission/physical.hpp>
+#include <wheelwright/core/check.hpp>
+#include <wheelwright/core/error.hpp>
+#include <wheelwright/design/plan.hpp>
+#include <wheelwright/filter/regression_stream.hpp>
+
+namespace wheelwright {
+namespace {
+
+// θ_L,j of the robot's nominal value, where it has one that can be expressed in the effort's unit.
+std::optional<double> nominal_parameter(const Robot& robot, const Model& model, std::size_t j) {
+  const auto found = robot.nominal.find(model.parameters[j].physical);
+  const auto scales = physical_scales(robot, model);
+  if (found == robot.nominal.end() || !scales) {
+    return std::nullopt;
+  }
+  return (found->second + (*scales)[j].offset) / (*scales)[j].scale;
+}
+
+[[noreturn]] void nothing_known(const Parameter& parameter) {
+  throw InvalidArgument("nothing is known of " + parameter.physical + ": expected nominal: {" + parameter.physical +
+                        ": VALUE} in the robot file (" + parameter.physical_unit + "; a rough value will do)");
+}
+
+SignalErrors worst_case_errors(const DesignSubject& subject, const NoiseBudget& budget) {
+  return propagate(subject.model, subject.filter, subject.measurement, budget.sensors);
+}
+
+Survey still(const DesignSubject& subject) {
+  Survey survey;
+  survey.largest_step = survey.median_step = subject.step;
+  survey.largest_acceleration.assign(subject.model.joints.size(), 0.0);
+  return survey;
+}
+
+// The planned log: motion as the sensors see it without noise, efforts left at zero.
+LogTable planned_log(const Plan& plan, const DesignSubject& subject) {
+  const Measurement& m = subject.measurement;
+  const Eigen::MatrixXd joint = joint_speeds(plan, subject.model);
+  const auto joints = static_cast<std::size_t>(joint.rows());
+  const auto samples = static_cast<std::size_t>(plan.samples());
+  const bool mean = m.motion == MotionKind::mean_speed;
+  const std::size_t rows = mean ? samples - 1 : samples;
+  LogTable log;
+  log.names = m.columns();
+  log.t.resize(rows);
+  log.columns.assign(log.names.size(), std::vector<double>(rows, 0.0));
+  log.segment_starts = {0};
+  for (std::size_t k = 0; k < rows; ++k) {
+    log.t[k] = plan.t(static_cast<Eigen::Index>(k)) + (mean ? 0.5 * plan.step : 0.0);
+  }
+  for (std::size_t i = 0; i < joints; ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    double angle = 0.0;
+    for (std::size_t k = 0; k < rows; ++k) {
+      const auto at = static_cast<Eigen::Index>(k);
+      const double now = joint(row, at);
+      const double between = at + 1 < joint.cols() ? 0.5 * (now + joint(row, at + 1)) : now;
+      log.columns[i][k] = m.motion == MotionKind::angle ? angle : mean ? between : now;
+      angle += plan.step * between;
+    }
+  }
+  if (!m.heading_column.empty()) {
+    for (std::size_t k = 0; k < rows; ++k) {
+      log.columns.back()[k] = plan.pose(2, static_cast<Eigen::Index>(k));
+    }
+  }
+  return log;
+}
+
+}  // namespace
+
+DesignSubject subject_of(const CommissionedModel& model) {
+  DesignSubject subject;
+  subject.robot = model.robot;
+  subject.model = model.model;
+  subject.measurement = model.measurement;
+  subject.filter = model.filter;
+  subject.theta = model.estimate;
+  subject.effort_box = model.box;
+  subject.known = model.box;
+  subject.step = check::positive(model.measurement.nominal_step, "model: measurement.nominal_step");
+  subject.prior.sides = prior_box(model.robot, model.model).bounds;
+  for (std::size_t j = 0; j < model.model.p(); ++j) {
+    const Interval &side = model.box.sides[j], &prior = subject.prior.sides[j];
+    if (side.upper - side.lower > 0.5 * (prior.upper - prior.lower)) {
+      const auto nominal = nominal_parameter(model.robot, model.model, j);
+      if (!nominal) {
+        nothing_known(model.model.parameters[j]);
+      }
+      subject.theta[static_cast<Eigen::Index>(j)] = *nominal;
+      subject.effort_box.sides[j] = {*nominal, *nominal};
+    }
+  }
+  // A model from the statistical mode has smaller bounds than the worst case.
+  const NoiseBudget budget = noise_budget(subject.robot, subject.measurement, still(subject));
+  const bool worst_case =
+      budget.complete &&
+      (worst_case_errors(subject, budget).output.array() <= model.errors.output.array() * (1.0 + 1e-9)).all();
+  if (!worst_case) {
+    subject.errors = model.errors;
+  }
+  return subject;
+}
+
+DesignSubject subject_of(const Robot& robot, double step, const FilterDesign& filter) {
+  DesignSubject subject;
+  subject.robot = robot;
+  subject.model = make_model(robot);
+  subject.step = check::positive(step, "step");
+  subject.filter = filter;
+  subject.filter.order = robot.filter.order.value_or(filter.order);
+  if (robot.filter.beta) {
+    subject.filter.beta = subject.filter.alpha = *robot.filter.beta;
+  }
+  subject.filter.alpha = robot.filter.alpha.value_or(subject.filter.alpha);
+  validate(subject.filter);
+  subject.prior.sides = prior_box(robot, subject.model).bounds;
+  subject.theta.resize(static_cast<Eigen::Index>(subject.model.p()));
+  for (std::size_t j = 0; j < subject.model.p(); ++j) {
+    const auto nominal = nominal_parameter(robot, subject.model, j);
+    if (!nominal) {
+      nothing_known(subject.model.parameters[j]);
+    }
+    subject.theta[static_cast<Eigen::Index>(j)] = *nominal;
+    subject.effort_box.sides.push_back({*nominal, *nominal});
+  }
+
+  Measurement& m = subject.measurement;
+  m.hold = robot.hold;
+  m.nominal_step = step;
+  const NoiseBound& angle_noise = robot.model == "single_axis" ? robot.noise.position : robot.noise.wheel_angle;
+  const bool angles = subject.filter.order == 2 && robot.speed_source != SpeedSource::measured &&
+                      (angle_noise.value || robot.encoder_counts_per_turn);
+  m.motion = angles ? MotionKind::angle : MotionKind::speed;
+  for (const Joint& joint : subject.model.joints) {
+    m.motion_columns.push_back(angles ? joint.angle : joint.speed);
+    m.effort_columns.push_back("effort of " + joint.speed);
+  }
+  if (!noise_budget(robot, m, still(subject)).complete) {
+    throw InvalidArgument(
+        "the noise is not declared: expected noise: {wheel_speed: …, effort: …} in the robot file (bounds, rad/s and "
+        "the unit of the effort), or a commissioned model, which has found it");
+  }
+  return subject;
+}
+
+RegressionBlock planned_rows(const Plan& plan, const DesignSubject& subject) {
+  const LogTable log = planned_log(plan, subject);
+  TableSource source(log);
+  SignalErrors errors;
+  if (subject.errors) {
+    errors = *subject.errors;
+  } else {
+    const Survey seen = survey(source, subject.measurement);
+    errors = worst_case_errors(subject, noise_budget(subject.robot, subject.measurement, seen));
+  }
+  RegressionStream stream(source, RegressorFilter(subject.model, subject.filter, subject.measurement, errors));
+  RegressionBlock rows = read_all(stream);
+  rows.y = rows.Y * subject.theta;
+  return rows;
+}
+
+}  // namespace wheelwright

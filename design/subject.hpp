@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// The robot that a manoeuvre is designed for: what is believed of it, and what its log will be wrong by.
+#pragma once
+
+#include <optional>
+
+#include <Eigen/Core>
+
+#include <wheelwright/bounds/box.hpp>
+#include <wheelwright/commission/commission.hpp>
+#include <wheelwright/core/regression.hpp>
+#include <wheelwright/model/robot.hpp>
+
+namespace wheelwright {
+
+struct Plan;
+
+/// What planning needs to know. θ is used where it must be known beforehand: for the effort of a motion, and in the
+/// terms dY|θ| of the rows' errors.
+struct DesignSubject {
+  Robot robot;
+  Model model;
+  Measurement measurement;
+  FilterDesign filter;
+  Eigen::VectorXd theta;               ///< θ°, θ_L as believed
+  Box effort_box;                      ///< θ_L for which effort limits must hold
+  Box prior;                           ///< in which bounds are sought, as commission() does
+  std::optional<SignalErrors> errors;  ///< of the rows; nothing: from the declared noise and the planned acceleration
+  double step = 0.01;                  ///< sampling step of the log to come, s
+
+  /// The commissioned bounds, where there are any: what the manoeuvre is to improve on.
+  std::optional<Box> known;
+};
+
+/// From a commissioned model. A parameter that its log did not show (its bounds are the prior's) takes the robot's
+/// nominal value. Errors of the rows are worked out anew from declared noise, with the acceleration of the plan, where
+/// the model stands on declared noise in the worst case; else they are the model's.
+/// Throws InvalidArgument where a parameter is neither shown nor nominal.
+[[nodiscard]] DesignSubject subject_of(const CommissionedModel& model);
+
+/// Before any log: nominal values and declared noise; effort limits hold at the nominal values. A log is expected to be
+/// sampled every `step` seconds, with wheel angles where their noise or the encoder is known, else with speeds; a filter
+/// that the robot file leaves open is taken as `filter`.
+/// Throws InvalidArgument, naming what the robot file lacks, unless every parameter has a nominal value and the noise
+/// of motion and effort is declared.
+[[nodiscard]] DesignSubject subject_of(const Robot& robot, double step, const FilterDesign& filter = {2, 10.0, 10.0});
+
+/// The rows that commissioning would make of a log driven exactly along `plan`, without noise: Y_f of the planned
+/// motion, y = Y_f θ°, and the error bounds dY, dy that the sensors' noise gives.
+[[nodiscard]] RegressionBlock planned_rows(const Plan& plan, const DesignSubject& subject);
+
+}  // namespace wheelwright

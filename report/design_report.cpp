@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/report/design_report.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include <wheelwright/commission/physical.hpp>
+#include <wheelwright/report/chart.hpp>
+#include <wheelwright/report/drawing.hpp>
+#include <wheelwright/report/page.hpp>
+#include <wheelwright/report/text.hpp>
+
+namespace wheelwright {
+
+using namespace report;
+
+namespace {
+
+const char* criterion_words(WidthCriterion criterion) {
+  switch (criterion) {
+    case WidthCriterion::geometric_mean: return "the geometric mean of the relative widths of the bounds";
+    case WidthCriterion::mean: return "the mean relative width of the bounds";
+    case WidthCriterion::largest: break;
+  }
+  return "the largest relative width of the bounds";
+}
+
+std::string half_width(const Interval& side, double scale, double centre) {
+  const double half = 0.5 * (side.upper - side.lower) * scale;
+  std::string text = "± " + number(half);
+  return centre != 0.0 ? text + fmt::format(" ({})", percent(half / std::abs(centre), 2)) : text;
+}
+
+// Bounds of each parameter, in the words of a data sheet where they can be had.
+std::string bounds_table(const BoundsDesign& design, const DesignSubject& subject) {
+  const auto scales = physical_scales(subject.robot, subject.model);
+  std::vector<Cell> header = {"Parameter", "unit", numeric("believed"), numeric("promised")};
+  if (subject.known) {
+    header.push_back(numeric("model now"));
+  }
+  if (design.figure_eight) {
+    header.push_back(numeric("figure eight"));
+    header.push_back(numeric("promised / figure eight"));
+  }
+  std::vector<std::vector<Cell>> rows;
+  for (std::size_t j = 0; j < subject.model.p(); ++j) {
+    const Parameter& parameter = subject.model.parameters[j];
+    const double scale = scales ? (*scales)[j].scale : 1.0;
+    const double centre = subject.theta[static_cast<Eigen::Index>(j)] * scale - (scales ? (*scales)[j].offset : 0.0);
+    std::vector<Cell> row = {escape(words(scales ? parameter.physical : parameter.name)),
+                             escape(scales ? parameter.physical_unit : parameter_unit(subject.robot, parameter)),
+                             numeric(number(centre)), numeric(half_width(design.promised.sides[j], scale, centre))};
+    if (subject.known) {
+      row.push_back(numeric(half_width(subject.known->sides[j], scale, centre)));
+    }
+    if (design.figure_eight) {
+      const Interval &mine = design.promised.sides[j], &eight = design.promised_eight.sides[j];
+      row.push_back(numeric(half_width(eight, scale, centre)));
+      row.push_back(numeric(number((mine.upper - mine.lower) / (eight.upper - eight.lower), 2)));
+    }
+    rows.push_back(std::move(row));
+  }
+  return table(header, rows) +
+         paragraph(
+             "Half widths of guaranteed bounds. Promised: what a log driven along the plan gives at least, whatever "
+             "the "
+             "noise within its declared bounds, as far as the robot follows its commands: the widest bounds come from "
+             "a "
+             "log without noise, and those are what is computed.") +
+         (design.figure_eight
+              ? paragraph(fmt::format("Figure eight: the best one for the same aim within the same limits, {} with a "
+                                      "period of {}, promised in the same way.",
+                                      with_unit(number(design.figure_eight->speed), "m/s"),
+                                      with_unit(number(design.figure_eight->period), "s")))
+              : "");
+}
+
+std::string limits_table(const BoundsDesign& design, const MotionLimits& limits, const DesignSubject& subject) {
+  const bool axis = subject.model.joints.size() == 1;
+  const LimitUse& use = design.manoeuvre.use;
+  std::vector<std::vector<Cell>> rows;
+  const auto add = [&rows](const char* what, const std::string& limit, double share) {
+    rows.push_back({what, numeric(limit), numeric(percent(share))});
+  };
+  add(axis ? "Speed" : "Wheel speed", with_unit(number(limits.joint_speed), axis ? "rad/s or m/s" : "rad/s"),
+      use.speed);
+  if (limits.joint_acceleration) {
+    add(axis ? "Acceleration" : "Wheel acceleration",
+        with_unit(number(*limits.joint_acceleration), axis ? "rad/s² or m/s²" : "rad/s²"), use.acceleration);
+  }
+  if (limits.effort) {
+    add("Effort", with_unit(number(*limits.effort), output_unit(subject.robot, "N·m")), use.effort);
+  }
+  if (limits.radius) {
+    add("Distance from the start", with_unit(number(*limits.radius), "m"), use.space);
+  }
+  if (limits.box) {
+    const auto& [x, y] = *limits.box;
+    add("Box around the start",
+        fmt::format("{} to {} m ahead, {} to {} m to the left", number(x.lower), number(x.upper), number(y.lower),
+                    number(y.upper)),
+        use.space);
+  }
+  return table({"Limit", numeric("value"), numeric("used")}, rows);
+}
+
+std::string speed_charts(const Plan& plan, const Model& model, const TimeAxis& axis) {
+  const LogTable commands = command_table(plan, model);
+  const auto chart = [&](const char* title, const char* unit, const std::vector<const char*>& names) {
+    Chart c;
+    c.title = title;
+    c.unit = unit;
+    c.t = commands.t;
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      c.series.push_back({names[i], commands.column(names[i]), i == 0 ? Line::first : Line::second});
+    }
+    return figure(c, axis);
+  };
+  if (model.joints.size() == 1) {
+    return chart("Command", "per s", {"command"}) + chart("Position", "", {"position"});
+  }
+  return chart("Wheel-speed commands", "rad/s", {"command_r", "command_l"}) + chart("Forward speed v1", "m/s", {"v1"}) +
+         chart("Yaw rate v2", "rad/s", {"v2"});
+}
+
+std::vector<std::string> design_words(const BoundsDesign& design, const DesignSubject& subject,
+                                      const MotionLimits& limits) {
+  const Plan& plan = design.manoeuvre.plan;
+  std::vector<std::string> sentences;
+  sentences.push_back(
+      fmt::format("Drive the table of commands once, from standstill: it takes {}, keeps within {} of "
+                  "the start and ends where it began.",
+                  with_unit(number(limits.duration), "s"),
+                  with_unit(number(std::sqrt(plan.pose.topRows<2>().colwise().squaredNorm().maxCoeff())), "m")));
+  sentences.push_back(fmt::format("It was chosen to minimise {}, out of {} manoeuvres within the limits.",
+                                  criterion_words(design.criterion), count(design.manoeuvre.evaluations)));
+  sentences.push_back(
+      "Record the log, then commission with it; the second half of the drive repeats the first backwards, "
+      "which tells inertia from friction.");
+  sentences.push_back(
+      subject.errors ? "What the noise may do was taken from the commissioned model."
+                     : "What the noise may do follows from the declared bounds of the sensors, in the worst case.");
+  return sentences;
+}
+
+}  // namespace
+
+std::string design_report(const BoundsDesign& design, const DesignSubject& subject, const MotionLimits& limits,
+                          const ReportContext& context) {
+  const Plan& plan = design.manoeuvre.plan;
+  const LogTable commands = command_table(plan, subject.model);
+  const TimeAxis axis(commands.t);
+  PageContent content;
+  content.title = context.title.empty() ? "Manoeuvre for " + subject.robot.name : context.title;
+  content.status = "good";
+  content.verdict = "A manoeuvre for narrow guaranteed bounds.";
+  if (design.figure_eight) {
+    const double mine = combined(relative_widths(design.promised, subject), WidthCriterion::geometric_mean);
+    const double eight = combined(relative_widths(design.promised_eight, subject), WidthCriterion::geometric_mean);
+    content.verdict = fmt::format(
+        "A manoeuvre whose guaranteed bounds are, in the geometric mean, {} as wide as those of the best figure eight.",
+        percent(mine / eight, 2));
+  }
+  content.sentences = design_words(design, subject, limits);
+  content.software = context.software;
+  content.sections.push_back({"bounds", "Promised bounds", bounds_table(design, subject)});
+  if (std::string path = driven_path(commands); !path.empty()) {
+    content.sections.push_back(
+        {"path", "Path",
+         path + paragraph("Seen from above; the dot is the start, and the end, the robot facing right.")});
+  }
+  content.sections.push_back({"speeds", "Commands", speed_charts(plan, subject.model, axis)});
+  content.sections.push_back({"limits", "Limits", limits_table(design, limits, subject)});
+  content.sections.push_back({"data", "Data", provenance(context, axis)});
+  return page(content);
+}
+
+}  // namespace wheelwright

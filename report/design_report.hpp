@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// The page of a designed manoeuvre.
+#pragma once
+
+#include <string>
+
+#include <wheelwright/design/manoeuvre.hpp>
+#include <wheelwright/report/context.hpp>
+
+namespace wheelwright {
+
+/// One self-contained HTML page: what was designed in words, the promised bounds beside those of the model and of a figure
+/// eight, the path, the commands over time, how much of each limit is used. `context.signals` and `own_log` are not used.
+[[nodiscard]] std::string design_report(const BoundsDesign& design, const DesignSubject& subject,
+                                        const MotionLimits& limits, const ReportContext& context);
+
+}  // namespace wheelwright

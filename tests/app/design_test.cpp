@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+// Design a manoeuvre, drive it in simulation, commission its log: three commands in a row.
+#include "app/program.hpp"
+
+namespace wheelwright {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using testing::Outcome;
+
+class Design : public testing::ProgramTest {
+ protected:
+  // A scenario that drives `table`, with the noise that robot.yaml declares.
+  void scenario(const std::string& name, const std::string& table) const {
+    put(name,
+        "robot: robot.yaml\n"
+        "parameters: {mass: 21.0, yaw_inertia: 0.9, viscous_linear: 4.0, viscous_yaw: 0.5}\n"
+        "trajectory: {kind: table, file: " +
+            table +
+            "}\n"
+            "sensors: {effort: 0.02, encoder_counts_per_turn: 4096, log: [angles]}\n"
+            "seed: 4\n");
+  }
+
+  static double width(const Json& model, const std::string& name) {
+    const Json& side = model.at("physical").at(name);
+    return side.at("upper").get<double>() - side.at("lower").get<double>();
+  }
+};
+
+class SlowDesign : public Design {};
+
+constexpr const char* kLimits = " --for bounds --speed 8 --acceleration 20 --effort 6 --radius 1 --quiet";
+
+TEST_F(SlowDesign, DesignSimulateCommissionInARow) {
+  // A fixed filter, so that both logs are looked at alike.
+  put("robot.yaml", bytes(path("robot.yaml")) + "filter: {order: 2, alpha: 10, beta: 10}\n");
+  const Outcome designed = run(std::string("design --robot robot.yaml --out plan") + kLimits);
+  ASSERT_EQ(designed.code, 0) << designed.err;
+  EXPECT_THAT(names_in("plan"),
+              ::testing::ElementsAre("design.json", "figure_eight.csv", "manoeuvre.csv", "report.html"));
+  EXPECT_EQ(lines_of(bytes(path("plan/manoeuvre.csv"))).front(), "t,command_r,command_l,v1,v2,x,y,theta");
+  const Json design = read_json(path("plan/design.json"));
+  for (const auto& [limit, share] : design.at("use").items()) {
+    EXPECT_LE(share.get<double>(), 1.0) << limit;
+  }
+
+  std::vector<Json> models;
+  for (const std::string name : {"manoeuvre", "figure_eight"}) {
+    scenario(name + ".yaml", "plan/" + name + ".csv");
+    ASSERT_EQ(run("simulate " + name + ".yaml --out " + name + ".csv --quiet").code, 0);
+    const Outcome done = run("commission " + name + ".csv --robot robot.yaml --quiet --out " + name);
+    ASSERT_EQ(done.code, 0) << done.err;
+    models.push_back(read_json(path(name) / "model.json"));
+  }
+  double product = 1.0;
+  for (const std::string name : {"mass", "yaw_inertia", "viscous_linear", "viscous_yaw"}) {
+    product *= width(models[0], name) / width(models[1], name);
+  }
+  EXPECT_LE(product, 1.0 / 16.0);  // geometric mean of four: a half
+
+  // From the model that came out, the next drive can be designed.
+  const Outcome next = run(std::string("design --model manoeuvre/model.json --json --duration 6 --stages 1") + kLimits);
+  ASSERT_EQ(next.code, 0) << next.err;
+  const Json second = Json::parse(next.out);
+  EXPECT_EQ(second.at("schema"), "wheelwright/design/1");
+  for (const Json& parameter : second.at("parameters")) {
+    EXPECT_FALSE(parameter.at("model").is_null());
+  }
+}
+
+TEST_F(Design, WhatIsMissingIsAskedFor) {
+  EXPECT_EQ(run("design").code, 2);
+  EXPECT_EQ(run("design --for bounds").code, 2);
+  EXPECT_EQ(run("design --for tea --robot robot.yaml").code, 2);
+  const Outcome no_speed = run("design --for bounds --robot robot.yaml");
+  EXPECT_EQ(no_speed.code, 2);
+  EXPECT_THAT(no_speed.err, AllOf(HasSubstr("--speed"), HasSubstr("limits:")));
+  EXPECT_THAT(no_speed.out, IsEmpty());
+  const Outcome no_acceleration = run("design --for bounds --robot robot.yaml --speed 8");
+  EXPECT_EQ(no_acceleration.code, 2);
+  EXPECT_THAT(no_acceleration.err, HasSubstr("--acceleration"));
+  put("bare.yaml", "wheel_radius: 0.1\ntrack_width: 0.4\n");
+  const Outcome bare = run("design --for bounds --robot bare.yaml --speed 8 --acceleration 10");
+  EXPECT_EQ(bare.code, 2);
+  EXPECT_THAT(bare.err, HasSubstr("nominal"));
+  EXPECT_EQ(run("design --for bounds --robot robot.yaml --model model.json --speed 8 --acceleration 10").code, 2);
+  const Outcome outside = run("design --for bounds --robot robot.yaml --speed 8 --acceleration 10 --box 1 2 -1 1");
+  EXPECT_EQ(outside.code, 2);
+  EXPECT_THAT(outside.err, HasSubstr("box"));
+}
+
+}  // namespace
+}  // namespace wheelwright
