@@ -41,7 +41,7 @@ TEST_F(SlowDesign, DesignSimulateCommissionInARow) {
   ASSERT_EQ(designed.code, 0) << designed.err;
   EXPECT_THAT(names_in("plan"),
               ::testing::ElementsAre("design.json", "figure_eight.csv", "manoeuvre.csv", "report.html"));
-  EXPECT_EQ(lines_of(bytes(path("plan/manoeuvre.csv"))).front(), "t,command_r,command_l,v1,v2,x,y,theta");
+  EXPECT_EQ(testing::lines_of(bytes(path("plan/manoeuvre.csv"))).front(), "t,command_r,command_l,v1,v2,x,y,theta");
   const Json design = read_json(path("plan/design.json"));
   for (const auto& [limit, share] : design.at("use").items()) {
     EXPECT_LE(share.get<double>(), 1.0) << limit;
