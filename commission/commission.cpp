@@ -9,132 +9,15 @@
 #include <fmt/format.h>
 
 #include <wheelwright/bounds/outliers.hpp>
-#include <wheelwright/commission/noise_budget.hpp>
-#include <wheelwright/commission/parameter_choice.hpp>
+#include <wheelwright/commission/fit.hpp>
+#include <wheelwright/commission/setting.hpp>
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/filter/regression_stream.hpp>
 
 namespace wheelwright {
 namespace {
 
-constexpr double kConfidence = 0.95;  // of the statistical intervals
-constexpr std::size_t kFewestInstants = 50;
 constexpr double kMuchUnexplained = 0.2;  // residual over effort, root mean square
-
-// What is known before anything is fitted.
-struct Setting {
-  Robot robot;
-  Model model;
-  Measurement measurement;
-  FilterDesign filter;
-  SignalErrors declared;  // of the rows, from declared noise only
-  bool noise_complete = false;
-  Box prior;
-  std::vector<bool> prior_declared;
-  std::size_t log_rows = 0;
-  FoldOptions folds;
-};
-
-// θ̂, what it leaves, and what the log shows.
-struct Fit {
-  Eigen::VectorXd weights;
-  LeastSquaresFit squares;
-  ResidualSummary residuals;
-  std::vector<ExcitationFinding> excitation;
-  Eigen::VectorXd plausible;  // per output, largest_plausible_error
-};
-
-RegressionStream make_rows(LogSource& log, const Setting& s, const SignalErrors& errors) {
-  return RegressionStream(log, RegressorFilter(s.model, s.filter, s.measurement, errors));
-}
-
-Eigen::VectorXd output_weights(RegressionSource& rows) {
-  const std::size_t n = rows.outputs();
-  std::vector<LeastSquares> fits(n, LeastSquares(rows.parameters()));
-  RegressionBlock block, one;
-  rows.rewind();
-  while (rows.next(block)) {
-    one.resize(block.instants(), 1, block.parameters);
-    for (std::size_t i = 0; i < n; ++i) {
-      const auto pick = Eigen::seqN(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(block.instants()),
-                                    static_cast<Eigen::Index>(n));
-      one.Y = block.Y(pick, Eigen::all);
-      one.y = block.y(pick);
-      fits[i].add(one);
-    }
-  }
-  Eigen::VectorXd weights(static_cast<Eigen::Index>(n));
-  for (std::size_t i = 0; i < n; ++i) {
-    const LeastSquaresFit fit = fits[i].solve();
-    const double rms = std::sqrt(fit.weighted_rss / static_cast<double>(fit.instants));
-    const double scale = std::sqrt(fit.weighted_tss / static_cast<double>(fit.instants));
-    // A perfect fit has no scale of its own; an output that is zero throughout has none at all.
-    weights[static_cast<Eigen::Index>(i)] = scale > 0.0 ? 1.0 / std::max(rms, 1e-9 * scale) : 1.0;
-  }
-  return weights;
-}
-
-// Root mean square of what sensor noise alone puts into each weighted column; zero where the sensor is not known.
-Eigen::VectorXd column_noise(const Setting& s, const Survey& log, const Eigen::VectorXd& weights) {
-  Eigen::VectorXd squares = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(s.model.p()));
-  const auto bound = motion_error(s.robot, s.measurement);
-  if (!bound) {
-    return squares;
-  }
-  const KernelNorms norms = statistical_norms(s.filter, s.measurement.motion, log.median_step);
-  const Eigen::VectorXd sd = *bound / std::sqrt(3.0) * s.model.motion.rowwise().norm();
-  for (const Term& term : s.model.terms) {
-    if (term.kind == Term::Kind::function) {
-      continue;
-    }
-    const double norm = term.kind == Term::Kind::acceleration ? norms.acceleration : norms.speed;
-    const double weighted = weights[static_cast<Eigen::Index>(term.output)] * term.scale * norm *
-                            sd[static_cast<Eigen::Index>(term.coordinate)];
-    squares[static_cast<Eigen::Index>(term.parameter)] += weighted * weighted;
-  }
-  return squares.cwiseSqrt();
-}
-
-Fit fit_rows(RegressionSource& rows, const Setting& s, const Survey& log, double risk) {
-  Fit fit;
-  fit.weights = output_weights(rows);
-  LeastSquares squares(rows.parameters(), fit.weights);
-  RegressionBlock block;
-  rows.rewind();
-  while (rows.next(block)) {
-    squares.add(block);
-  }
-  fit.squares = squares.solve();
-  const auto summarise = [&] {
-    ResidualStatistics statistics(fit.squares.estimate, fit.weights);
-    rows.rewind();
-    while (rows.next(block)) {
-      statistics.add(block);
-    }
-    fit.residuals = statistics.summary(fit.squares.inverse_gram);
-    const double t = student_quantile(kConfidence, std::max(fit.residuals.freedom, 1.0));
-    fit.excitation = judge_excitation(fit.squares, fit.residuals.standard_error, t, column_noise(s, log, fit.weights));
-  };
-  summarise();
-  std::vector<bool> excluded;
-  for (const ExcitationFinding& finding : fit.excitation) {
-    excluded.push_back(finding.state == Excitation::not_excited);
-  }
-  if (std::ranges::any_of(excluded, [](bool e) { return e; })) {
-    const auto findings = fit.excitation;
-    fit.squares = squares.solve(excluded);
-    summarise();
-    for (std::size_t j = 0; j < excluded.size(); ++j) {
-      if (excluded[j]) {
-        fit.excitation[j] = findings[j];
-      }
-    }
-  }
-  if (!s.noise_complete) {
-    fit.plausible = largest_plausible_error(rows, fit.squares.estimate, fit.residuals, risk);
-  }
-  return fit;
-}
 
 std::vector<OutputNoise> output_noise(const Setting& s, const Fit& fit, const ExtrapolationOptions& options) {
   std::vector<OutputNoise> noise(s.model.n());
@@ -170,7 +53,7 @@ OutlierResult bounded_set(LogSource& log, const Setting& s, Part part, std::vect
   constexpr double kAboveMinimax = 1.05;
   for (int attempt = 0;; ++attempt) {
     RegressionStream rows = make_rows(log, s, with_noise(s, noise, For::learning));
-    FoldedSource folded(rows, part, s.log_rows, s.folds);
+    FoldedSource folded(rows, part, s.survey.rows, s.folds);
     OutlierResult relaxed;
     if (outliers > 0) {
       relaxed = feasible_set_with_outliers(folded, s.prior, {.most = outliers, .set = {}});
@@ -189,7 +72,7 @@ OutlierResult bounded_set(LogSource& log, const Setting& s, Part part, std::vect
       options.weights.push_back(std::max(o.learning, std::numeric_limits<double>::min()));
     }
     RegressionStream bare = make_rows(log, s, s.declared);
-    FoldedSource bare_folded(bare, part, s.log_rows, s.folds);
+    FoldedSource bare_folded(bare, part, s.survey.rows, s.folds);
     const double factor = kAboveMinimax * minimax_fit(bare_folded, s.prior, options).upper;
     notes.push_back(
         fmt::format("the estimated noise bound was raised by {:.3g}: within the prior box no parameters "
@@ -203,7 +86,7 @@ OutlierResult bounded_set(LogSource& log, const Setting& s, Part part, std::vect
 }
 
 Eigen::VectorXd best_guess(const Fit& fit, const Polytope& set) {
-  Eigen::VectorXd guess = fit.squares.estimate;
+  Eigen::VectorXd guess = fit.estimate;
   for (std::size_t j = 0; j < fit.excitation.size(); ++j) {
     if (fit.excitation[j].state == Excitation::not_excited) {
       guess[static_cast<Eigen::Index>(j)] = set.chebyshev_centre()[j];
@@ -239,7 +122,7 @@ std::vector<ParameterResult> parameter_results(const Setting& s, const Fit& fit,
     if (r.excitation == Excitation::not_excited) {
       r.reason += ": " + r.parameter.excite;
     } else {
-      r.estimate = fit.squares.estimate[at];
+      r.estimate = fit.estimate[at];
       r.standard_error = fit.residuals.standard_error[at];
     }
     r.lower = set.hull.sides[j].lower;
@@ -279,84 +162,6 @@ void tell(const CommissionOptions& options, std::string_view stage, double share
   if (options.progress) {
     options.progress(stage, share);
   }
-}
-
-// The widest model that the robot may have, where its file leaves the parameters open.
-Setting widened(const Setting& s) {
-  Setting wide = s;
-  if (!s.robot.parameters) {
-    wide.robot.parameters = possible_parameters(s.robot);
-    wide.model = make_model(wide.robot);
-  }
-  return wide;
-}
-
-// Dry friction (and an offset) are taken in where the robot file leaves it open and they are worth it.
-void settle_parameters(LogSource& log, Setting& s, std::vector<std::string>& notes) {
-  const std::size_t basic = s.model.p();
-  const Setting wide = widened(s);
-  if (wide.model.p() == basic) {
-    return;
-  }
-  RegressionStream rows = make_rows(log, wide, {});
-  const ParameterChoice choice = choose_parameters(rows, basic, s.log_rows, s.folds);
-  if (choice.full) {
-    std::vector<std::string> added;
-    for (std::size_t j = basic; j < wide.model.p(); ++j) {
-      added.push_back(wide.model.parameters[j].physical);
-    }
-    s.robot.parameters = wide.robot.parameters;
-    s.model = wide.model;
-    notes.push_back(
-        fmt::format("the model was given {}: on held-out blocks the relative error falls from {:.3g} to "
-                    "{:.3g} (`parameters:` in the robot file decides otherwise)",
-                    fmt::join(added, " and "), choice.nrmse_basic, choice.nrmse_full));
-  }
-}
-
-Setting settle(LogSource& log, const Robot& robot, const CommissionOptions& options, Commissioning& result) {
-  Setting s;
-  s.robot = robot;
-  s.model = make_model(robot);
-  const int order = robot.filter.order.value_or(2);
-  s.measurement = find_measurement(log, robot, s.model, order);
-  tell(options, "looking at the log", 0.05);
-  result.survey = survey(log, s.measurement);
-  s.log_rows = result.survey.rows;
-  check::that(result.survey.rows >= kFewestInstants, "log",
-              fmt::format("at least {} rows (it has {})", kFewestInstants, result.survey.rows));
-  if (robot.filter.beta) {
-    const double beta = *robot.filter.beta;
-    s.filter = {.order = order, .alpha = robot.filter.alpha.value_or(beta), .beta = beta};
-  } else {
-    tell(options, "choosing the filter", 0.1);
-    result.filter_choice =
-        choose_filter(log, widened(s).model, s.measurement, order, result.survey, options.filter_choice);
-    s.filter = result.filter_choice.design;
-    if (robot.filter.alpha) {
-      s.filter.alpha = *robot.filter.alpha;
-    }
-  }
-  validate(s.filter);
-  s.folds = options.folds;
-  // As long as the filter remembers, but never the better part of a block.
-  const double block = result.survey.seconds / static_cast<double>(s.folds.blocks);
-  s.folds.purge = std::min(0.5 * s.filter.settle / s.filter.beta, 0.3 * block);
-  settle_parameters(log, s, result.notes);
-
-  const PriorBox prior = prior_box(s.robot, s.model);
-  s.prior.sides = prior.bounds;
-  s.prior_declared = prior.declared;
-  const NoiseBudget budget = noise_budget(s.robot, s.measurement, result.survey);
-  s.noise_complete = budget.complete;
-  if (budget.complete) {
-    s.declared = propagate(s.model, s.filter, s.measurement, budget.sensors,
-                           {.mode = options.noise_mode,
-                            .confidence = options.confidence,
-                            .rows = static_cast<double>(s.log_rows),
-                            .largest_step = result.survey.largest_step});
-  }
-  return s;
 }
 
 void describe_assumptions(const Setting& s, Commissioning& result) {
@@ -447,13 +252,21 @@ std::string status_message(const Setting& s, const Commissioning& result) {
 Commissioning commission(LogSource& log, const Robot& robot, const CommissionOptions& options) {
   Commissioning result;
   result.noise_mode = options.noise_mode;
-  const Setting s = settle(log, robot, options, result);
+  const Setting s = settle(log, robot,
+                           {.filter_choice = options.filter_choice,
+                            .folds = options.folds,
+                            .noise_mode = options.noise_mode,
+                            .confidence = options.confidence,
+                            .progress = options.progress});
+  result.survey = s.survey;
+  result.filter_choice = s.filter_choice;
+  result.notes = s.notes;
   result.folds = s.folds;
   result.model = described_model(s, options.persistence);
 
   tell(options, "identifying", 0.2);
-  RegressionStream rows = make_rows(log, s, s.declared);
-  const Fit fit = fit_rows(rows, s, result.survey, options.extrapolation.risk);
+  const Fit fit = fit_log(log, s, Part::everything, options.extrapolation.risk);
+  result.estimators = fit.choice;
   result.residuals = fit.residuals;
   result.rank = fit.squares.rank;
   result.condition = fit.squares.condition;
@@ -495,14 +308,13 @@ Commissioning commission(LogSource& log, const Robot& robot, const CommissionOpt
   finish_model(result.model, s, result.noise, fit, result.feasible);
 
   tell(options, "validating on held-out blocks", 0.7);
-  FoldedSource training(rows, Part::training, s.log_rows, s.folds);
-  const Fit trained = fit_rows(training, s, result.survey, options.extrapolation.risk);
+  const Fit trained = fit_log(log, s, Part::training, options.extrapolation.risk);
   std::vector<OutputNoise> noise = output_noise(s, trained, options.extrapolation);
   std::vector<std::string> unused;
   const FeasibleSet set = bounded_set(log, s, Part::training, noise, options.outliers, unused).set;
   if (set.status == FeasibleSet::Status::nonempty) {
     RegressionStream unseen = make_rows(log, s, with_noise(s, noise, For::driving));
-    FoldedSource held_out(unseen, Part::held_out, s.log_rows, s.folds);
+    FoldedSource held_out(unseen, Part::held_out, s.survey.rows, s.folds);
     result.validation = validate_on(held_out, ThresholdRule(*set.polytope, best_guess(trained, *set.polytope)));
     result.polytope_over_box = 0.0;
     for (const OutputValidation& v : result.validation) {

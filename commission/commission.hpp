@@ -17,6 +17,7 @@
 #include <wheelwright/commission/validation.hpp>
 #include <wheelwright/core/log.hpp>
 #include <wheelwright/detector/detector.hpp>
+#include <wheelwright/identify/estimator_choice.hpp>
 #include <wheelwright/identify/excitation.hpp>
 #include <wheelwright/identify/noise_level.hpp>
 #include <wheelwright/identify/residual_statistics.hpp>
@@ -86,6 +87,7 @@ struct Commissioning {
   std::vector<OutputNoise> noise;  ///< one for each output
   NoiseMode noise_mode = NoiseMode::worst_case;
   FilterChoice filter_choice;  ///< the curve is empty where the filter was given
+  EstimatorChoice estimators;  ///< candidates for θ̂, the one chosen and why; none where no parameter is excited
   ResidualSummary residuals;   ///< of θ̂ on the whole log
   int rank = 0;
   double condition = 0.0;

@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/commission/fit.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include <wheelwright/identify/instruments.hpp>
+#include <wheelwright/identify/noise_level.hpp>
+
+namespace wheelwright {
+namespace {
+
+constexpr double kConfidence = 0.95;  // of the statistical intervals
+constexpr double kRunAway = 3.0;  // ratio of simulated to measured speeds beyond which a simulation is no instrument
+
+// Root mean square of what the noise of the motion alone puts into each weighted column; zero where it is not known.
+Eigen::VectorXd column_noise(const Setting& s, const Eigen::VectorXd& weights) {
+  Eigen::VectorXd squares = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(s.model.p()));
+  if (const auto noise = row_noise(s)) {
+    for (std::size_t i = 0; i < noise->YY.size(); ++i) {
+      const double w = weights[static_cast<Eigen::Index>(i)];
+      squares += w * w * noise->YY[i].diagonal();
+    }
+  }
+  return squares.cwiseSqrt();
+}
+
+std::optional<RegressionMoments> simulated_moments(LogSource& log, const Setting& s, Part part,
+                                                   const Eigen::VectorXd& theta) {
+  if (s.measurement.effort_unsigned || !MotionSimulation::possible(s.model, theta)) {
+    return std::nullopt;
+  }
+  InstrumentMotion motion;
+  motion.kind = InstrumentMotion::Kind::simulated;
+  motion.theta = theta;
+  InstrumentStream stream(log, RegressorFilter(s.model, s.filter, s.measurement), motion);
+  FoldedSource rows(stream, part, s.survey.rows, s.folds);
+  std::optional<RegressionMoments> sums = moments_with_instruments(rows);
+  const double ratio = stream.speed_ratio();
+  const bool known = s.measurement.motion != MotionKind::angle;
+  if (known && !(ratio < kRunAway && ratio > 1.0 / kRunAway)) {
+    return std::nullopt;
+  }
+  return sums;
+}
+
+std::vector<bool> flags(const std::vector<ExcitationFinding>& findings) {
+  std::vector<bool> excluded;
+  for (const ExcitationFinding& finding : findings) {
+    excluded.push_back(finding.state == Excitation::not_excited);
+  }
+  return excluded;
+}
+
+bool all(const std::vector<bool>& flags) {
+  return std::ranges::all_of(flags, [](bool flag) { return flag; });
+}
+
+ResidualSummary summarise(RegressionSource& rows, const Fit& fit) {
+  ResidualStatistics statistics(fit.estimate, fit.weights);
+  RegressionBlock block;
+  rows.rewind();
+  while (rows.next(block)) {
+    statistics.add(block);
+  }
+  ResidualSummary summary = statistics.summary(fit.squares.inverse_gram);
+  if (!fit.choice.candidates.empty() && fit.choice.chosen > 0) {
+    const Estimate& best = fit.choice.best();
+    summary.covariance = best.covariance;
+    summary.standard_error = best.standard_error;
+    summary.freedom = best.freedom;
+  }
+  return summary;
+}
+
+double t_quantile(const ResidualSummary& summary) {
+  return student_quantile(kConfidence, std::max(summary.freedom, 1.0));
+}
+
+}  // namespace
+
+RegressionMoments log_moments(LogSource& log, const Setting& s, Part part) {
+  const RegressorFilter filter(s.model, s.filter, s.measurement);
+  if (const auto commands = commanded_motion(log, s.model)) {
+    InstrumentStream stream(log, filter, *commands);
+    FoldedSource rows(stream, part, s.survey.rows, s.folds);
+    return moments_with_instruments(rows);
+  }
+  RegressionStream stream(log, filter);
+  FoldedSource rows(stream, part, s.survey.rows, s.folds);
+  return moments(rows);
+}
+
+Fit fit_log(LogSource& log, const Setting& s, Part part, double risk) {
+  EstimatorEvidence evidence{
+      .rows = log_moments(log, s, part),
+      .simulate = [&](const Eigen::VectorXd& theta) { return simulated_moments(log, s, part, theta); },
+      .noise = row_noise(s),
+      .noise_origin = s.motion_noise ? s.motion_noise->origin : "",
+      .effort_is_exact = s.measurement.hold == Hold::zero_order};
+  Fit fit;
+  fit.weights = efficient_weights(evidence.rows);
+  fit.factor = LeastSquares(s.model.p(), fit.weights);
+  RegressionStream stream = make_rows(log, s, s.declared);
+  FoldedSource rows(stream, part, s.survey.rows, s.folds);
+  RegressionBlock block;
+  rows.rewind();
+  while (rows.next(block)) {
+    fit.factor.add(block);
+  }
+
+  // Columns that never move or always move together are out at once; those that may be made of noise only where no
+  // estimator is to be had that noise does not bias.
+  EstimatorChoiceOptions options;
+  options.estimator.weights = fit.weights;
+  const auto fit_with = [&](const std::vector<bool>& excluded) {
+    fit.squares = fit.factor.solve(excluded);
+    fit.estimate = fit.squares.estimate;
+    fit.choice = {};
+    if (!all(excluded)) {
+      options.estimator.excluded = excluded;
+      fit.choice = choose_estimator(evidence, options);
+      fit.estimate = fit.choice.chosen > 0 ? fit.choice.best().theta : fit.estimate;
+    }
+    fit.residuals = summarise(rows, fit);
+  };
+  const auto judge = [&](const Eigen::VectorXd& noise) {
+    LeastSquaresFit judged = fit.squares;
+    judged.estimate = fit.estimate;
+    return judge_excitation(judged, fit.residuals.standard_error, t_quantile(fit.residuals), noise);
+  };
+  const auto judge_further = [&](const Eigen::VectorXd& noise) {
+    const std::vector<ExcitationFinding> before = fit.excitation;
+    fit.excitation = judge(noise);
+    for (std::size_t j = 0; j < before.size(); ++j) {
+      if (before[j].state == Excitation::not_excited) {
+        fit.excitation[j] = before[j];
+      }
+    }
+  };
+  fit.squares = fit.factor.solve();
+  fit.estimate = fit.squares.estimate;
+  fit.residuals = summarise(rows, fit);
+  fit.excitation = judge({});
+  std::vector<bool> excluded = flags(fit.excitation);
+  fit_with(excluded);
+  const bool corrected = !fit.choice.candidates.empty() && fit.choice.chosen > 0;
+  judge_further(corrected ? Eigen::VectorXd() : column_noise(s, fit.weights));
+  if (flags(fit.excitation) != excluded) {
+    excluded = flags(fit.excitation);
+    fit_with(excluded);
+    judge_further({});
+  }
+  if (!s.noise_complete) {
+    fit.plausible = largest_plausible_error(rows, fit.estimate, fit.residuals, risk);
+  }
+  return fit;
+}
+
+}  // namespace wheelwright

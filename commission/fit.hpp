@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// θ̂ on a part of a log: the estimator that the log calls for, what it leaves, and what the log shows.
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include <wheelwright/commission/folds.hpp>
+#include <wheelwright/commission/setting.hpp>
+#include <wheelwright/identify/estimator_choice.hpp>
+#include <wheelwright/identify/excitation.hpp>
+#include <wheelwright/identify/least_squares.hpp>
+#include <wheelwright/identify/residual_statistics.hpp>
+
+namespace wheelwright {
+
+/// A fit with everything that later stages ask of it.
+struct Fit {
+  Eigen::VectorXd weights;                    ///< one for each output, 1/residual
+  LeastSquares factor{1};                     ///< the rows, folded
+  LeastSquaresFit squares;                    ///< weighted least squares, parameters that are not excited held at zero
+  EstimatorChoice choice;                     ///< no candidates where no parameter is excited
+  Eigen::VectorXd estimate;                   ///< p, θ̂ of the chosen estimator
+  ResidualSummary residuals;                  ///< at θ̂, with θ̂'s covariance
+  std::vector<ExcitationFinding> excitation;  ///< one for each parameter
+  Eigen::VectorXd plausible;                  ///< per output, largest_plausible_error; empty where noise is declared
+};
+
+/// Fits `part` of `log`. `risk` is for Fit::plausible.
+[[nodiscard]] Fit fit_log(LogSource& log, const Setting& setting, Part part, double risk);
+
+/// Moments of `part` of `log`: with the commanded motion as instruments where it is logged.
+[[nodiscard]] RegressionMoments log_moments(LogSource& log, const Setting& setting, Part part);
+
+}  // namespace wheelwright

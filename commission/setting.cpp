@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/commission/setting.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include <wheelwright/commission/noise_budget.hpp>
+#include <wheelwright/commission/parameter_choice.hpp>
+#include <wheelwright/core/check.hpp>
+#include <wheelwright/identify/difference_noise.hpp>
+
+namespace wheelwright {
+namespace {
+
+constexpr std::size_t kFewestInstants = 50;
+
+void tell(const SettingOptions& options, std::string_view stage, double share) {
+  if (options.progress) {
+    options.progress(stage, share);
+  }
+}
+
+// The widest model that the robot may have, where its file leaves the parameters open.
+Setting widened(const Setting& s) {
+  Setting wide = s;
+  if (!s.robot.parameters) {
+    wide.robot.parameters = possible_parameters(s.robot);
+    wide.model = make_model(wide.robot);
+  }
+  return wide;
+}
+
+// Dry friction (and an offset) are taken in where the robot file leaves it open and they are worth it.
+void settle_parameters(LogSource& log, Setting& s) {
+  const std::size_t basic = s.model.p();
+  const Setting wide = widened(s);
+  if (wide.model.p() == basic) {
+    return;
+  }
+  RegressionStream rows = make_rows(log, wide, {});
+  const ParameterChoice choice = choose_parameters(rows, basic, s.survey.rows, s.folds);
+  if (choice.full) {
+    std::vector<std::string> added;
+    for (std::size_t j = basic; j < wide.model.p(); ++j) {
+      added.push_back(wide.model.parameters[j].physical);
+    }
+    s.robot.parameters = wide.robot.parameters;
+    s.model = wide.model;
+    s.notes.push_back(
+        fmt::format("the model was given {}: on held-out blocks the relative error falls from {:.3g} to "
+                    "{:.3g} (`parameters:` in the robot file decides otherwise)",
+                    fmt::join(added, " and "), choice.nrmse_basic, choice.nrmse_full));
+  }
+}
+
+// What is declared or follows from the encoder comes first; samples of a signal show their noise in differences.
+std::optional<MotionNoise> find_motion_noise(LogSource& log, const Setting& s) {
+  const auto bound = motion_error(s.robot, s.measurement);
+  if (s.measurement.motion == MotionKind::mean_speed || (bound && s.measurement.motion == MotionKind::angle)) {
+    if (!bound) {
+      return std::nullopt;
+    }
+    return MotionNoise{
+        *bound / std::sqrt(3.0), 0.0,
+        s.measurement.count > 0.0 || s.robot.encoder_counts_per_turn ? "half an encoder count" : "as declared"};
+  }
+  double squares = 0.0, relative = 0.0;
+  bool white = true;
+  const auto noises = difference_noise(log, s.measurement.motion_columns);
+  for (const DifferenceNoise& noise : noises) {
+    white = white && (noise.kind == DifferenceNoise::Kind::white || noise.kind == DifferenceNoise::Kind::none);
+    squares += noise.sd * noise.sd / static_cast<double>(noises.size());
+    relative = std::max(relative, noise.relative_sd);
+  }
+  if (white) {
+    const double sd = std::sqrt(squares);
+    const char* unit = s.measurement.motion == MotionKind::angle ? "rad" : "rad/s";
+    return MotionNoise{sd, relative, fmt::format("{:.2g} {} by differences", sd, unit)};
+  }
+  if (bound) {
+    return MotionNoise{*bound / std::sqrt(3.0), 0.0, "as declared"};
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+RegressionStream make_rows(LogSource& log, const Setting& s, const SignalErrors& errors) {
+  return RegressionStream(log, RegressorFilter(s.model, s.filter, s.measurement, errors));
+}
+
+Setting settle(LogSource& log, const Robot& robot, const SettingOptions& options) {
+  Setting s;
+  s.robot = robot;
+  s.model = make_model(robot);
+  const int order = robot.filter.order.value_or(2);
+  s.measurement = find_measurement(log, robot, s.model, order);
+  tell(options, "looking at the log", 0.05);
+  s.survey = survey(log, s.measurement);
+  check::that(s.survey.rows >= kFewestInstants, "log",
+              fmt::format("at least {} rows (it has {})", kFewestInstants, s.survey.rows));
+  if (robot.filter.beta) {
+    const double beta = *robot.filter.beta;
+    s.filter = {.order = order, .alpha = robot.filter.alpha.value_or(beta), .beta = beta};
+  } else {
+    tell(options, "choosing the filter", 0.1);
+    s.filter_choice = choose_filter(log, widened(s).model, s.measurement, order, s.survey, options.filter_choice);
+    s.filter = s.filter_choice.design;
+    if (robot.filter.alpha) {
+      s.filter.alpha = *robot.filter.alpha;
+    }
+  }
+  validate(s.filter);
+  s.folds = options.folds;
+  // As long as the filter remembers, but never the better part of a block.
+  const double block = s.survey.seconds / static_cast<double>(s.folds.blocks);
+  s.folds.purge = std::min(0.5 * s.filter.settle / s.filter.beta, 0.3 * block);
+  settle_parameters(log, s);
+
+  const PriorBox prior = prior_box(s.robot, s.model);
+  s.prior.sides = prior.bounds;
+  s.prior_declared = prior.declared;
+  s.motion_noise = find_motion_noise(log, s);
+  const NoiseBudget budget = noise_budget(s.robot, s.measurement, s.survey);
+  s.noise_complete = budget.complete;
+  if (budget.complete) {
+    s.declared = propagate(s.model, s.filter, s.measurement, budget.sensors,
+                           {.mode = options.noise_mode,
+                            .confidence = options.confidence,
+                            .rows = static_cast<double>(s.survey.rows),
+                            .largest_step = s.survey.largest_step});
+  }
+  return s;
+}
+
+std::optional<RowNoise> row_noise(const Setting& s) {
+  if (!s.motion_noise) {
+    return std::nullopt;
+  }
+  const double variance = s.motion_noise->sd * s.motion_noise->sd;
+  const NoiseGram gram = noise_gram(s.model, s.filter, s.measurement, s.survey.median_step);
+  RowNoise noise;
+  noise.relative_sd = s.motion_noise->relative_sd;
+  for (const Eigen::MatrixXd& motion : gram.motion) {
+    noise.YY.push_back(variance * motion);
+  }
+  if (s.robot.noise.effort.value) {
+    noise.yy = gram.effort * (*s.robot.noise.effort.value * *s.robot.noise.effort.value / 3.0);
+  }
+  return noise;
+}
+
+}  // namespace wheelwright

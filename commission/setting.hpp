@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// What is settled about a log before anything is fitted: model, filter, how it was measured, the noise that is declared.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <wheelwright/bounds/box.hpp>
+#include <wheelwright/commission/filter_choice.hpp>
+#include <wheelwright/commission/folds.hpp>
+#include <wheelwright/commission/survey.hpp>
+#include <wheelwright/core/log.hpp>
+#include <wheelwright/filter/measurement.hpp>
+#include <wheelwright/filter/noise.hpp>
+#include <wheelwright/filter/regression_stream.hpp>
+#include <wheelwright/identify/estimate.hpp>
+#include <wheelwright/model/robot.hpp>
+
+namespace wheelwright {
+
+/// Noise of the motion column, independent from sample to sample, the same in all joints.
+struct MotionNoise {
+  double sd = 0.0;           ///< rad for angles and the angles behind mean speeds, else rad/s (linear axes: m, m/s)
+  double relative_sd = 0.0;  ///< standard error of sd², relative to it; 0 where it was not estimated
+  std::string origin;        ///< in words
+};
+
+/// Everything that is known before a fit.
+struct Setting {
+  Robot robot;  ///< with the parameters that the model was given
+  Model model;
+  Measurement measurement;
+  FilterDesign filter;
+  FilterChoice filter_choice;  ///< the curve is empty where the filter was given
+  Survey survey;
+  SignalErrors declared;        ///< of the rows, from declared noise only; all zero where that is incomplete
+  bool noise_complete = false;  ///< motion and effort are declared
+  std::optional<MotionNoise> motion_noise;  ///< declared, from the encoder, or found by differences
+  Box prior;
+  std::vector<bool> prior_declared;  ///< p: the robot file's, not the tool's default
+  FoldOptions folds;                 ///< purge is the filter's memory
+  std::vector<std::string> notes;    ///< what was chosen, for people
+};
+
+/// Options of settle().
+struct SettingOptions {
+  FilterChoiceOptions filter_choice;
+  FoldOptions folds;
+  NoiseMode noise_mode = NoiseMode::worst_case;                        ///< for declared noise
+  double confidence = 0.999;                                           ///< statistical noise mode
+  std::function<void(std::string_view stage, double share)> progress;  ///< may be empty
+};
+
+/// Looks at `log` (several walks) and settles all of it. Throws InputError or InvalidArgument for a log or robot that
+/// cannot be used at all.
+[[nodiscard]] Setting settle(LogSource& log, const Robot& robot, const SettingOptions& options = {});
+
+/// The rows of `log` in this setting, with the error bounds `errors`.
+[[nodiscard]] RegressionStream make_rows(LogSource& log, const Setting& setting, const SignalErrors& errors = {});
+
+/// What the noise of the motion adds to the rows' moments (estimate.hpp), and the efforts' variance for total least
+/// squares where their noise is declared; nothing where the noise is not known.
+[[nodiscard]] std::optional<RowNoise> row_noise(const Setting& setting);
+
+}  // namespace wheelwright
