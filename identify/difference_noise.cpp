@@ -14,6 +14,7 @@ constexpr std::size_t kFewestWindows = 50;
 constexpr double kEvenStep = 0.1;   // of the median step
 constexpr double kNothing = 1e-12;  // of the signal's size: rounding
 constexpr double kStandardErrors = 4.0;
+constexpr double kSmallBias = 0.1;  // of sd²
 
 constexpr double binomial(unsigned n, unsigned k) {
   double c = 1.0;
@@ -23,11 +24,24 @@ constexpr double binomial(unsigned n, unsigned k) {
   return c;
 }
 
-// Variance of the mean square of order-d differences of N white samples, relative: 2/N · Σ ρ² over all lags, with
-// Σ ρ² = C(4d, 2d)/C(2d, d)².
-double relative_variance(unsigned d, std::size_t windows) {
-  const double c = binomial(2 * d, d);
-  return 2.0 * binomial(4 * d, 2 * d) / (c * c) / static_cast<double>(windows);
+// Σ over lags of the squared cross-correlations of order-d and order-e differences of white noise, each of unit
+// variance.
+double shared(unsigned d, unsigned e) {
+  return binomial(2 * (d + e), d + e) / (binomial(2 * d, d) * binomial(2 * e, e));
+}
+
+// Standard error of log(v_d/v_e) for mean squares v of N windows of white noise.
+double ratio_error(unsigned d, unsigned e, std::size_t windows) {
+  return std::sqrt(2.0 * (shared(d, d) + shared(e, e) - 2.0 * shared(d, e)) / static_cast<double>(windows));
+}
+
+// −∂ log v_d/∂ρ for a correlation ρ at lag one.
+double sensitivity(unsigned d) { return 2.0 * d / (d + 1.0); }
+
+// What log(v_last/v_d) may be off zero in white noise: chance, or a correlation too small to matter.
+double allowed(unsigned d, std::size_t windows) {
+  const double small = kSmallBias * (sensitivity(kOrders) - sensitivity(d)) / sensitivity(kOrders);
+  return std::max(kStandardErrors * ratio_error(kOrders, d, windows), small);
 }
 
 struct Sums {
@@ -45,21 +59,30 @@ DifferenceNoise judge(const Sums& sums, std::size_t windows) {
     noise.by_order[d - 1] = std::sqrt(sums.squares[d - 1] / static_cast<double>(windows) / binomial(2 * d, d));
   }
   noise.sd = noise.by_order.back();
-  noise.relative_sd = std::sqrt(relative_variance(kOrders, windows));
+  noise.relative_sd = std::sqrt(2.0 * shared(kOrders, kOrders) / static_cast<double>(windows));
   if (noise.sd <= kNothing * sums.largest) {
     noise.kind = DifferenceNoise::Kind::none;
     return noise;
   }
-  // The last two steps between orders, in standard errors of the ratio. Differences of neighbouring orders share most of
-  // their noise, so that the larger of both errors is generous.
-  const double allowed = 1.0 + kStandardErrors * noise.relative_sd;
-  const auto ratio = [&](std::size_t d) { return std::pow(noise.by_order[d - 1] / noise.by_order[d - 2], 2.0); };
-  const double last = ratio(kOrders), before = ratio(kOrders - 1);
-  if (last <= allowed && before <= allowed && last >= 1.0 / allowed && before >= 1.0 / allowed) {
-    noise.kind = DifferenceNoise::Kind::white;
-  } else {
-    noise.kind = last < 1.0 ? DifferenceNoise::Kind::smooth : DifferenceNoise::Kind::rough;
+  noise.kind = DifferenceNoise::Kind::white;
+  bool level = true;
+  for (unsigned d = kOrders - 1; d >= 1; --d) {
+    const double step = 2.0 * std::log(noise.sd / noise.by_order[d - 1]);
+    const double most = allowed(d, windows);
+    if (step > most) {
+      noise.kind = DifferenceNoise::Kind::rough;
+    } else if (d == kOrders - 1 && step < -most) {
+      noise.kind = DifferenceNoise::Kind::smooth;
+    }
+    level = level && std::abs(step) <= most;
+    noise.level_from = level ? d : noise.level_from;
   }
+  if (noise.kind != DifferenceNoise::Kind::white) {
+    noise.level_from = 0;
+    return noise;
+  }
+  const auto from = static_cast<unsigned>(noise.level_from);
+  noise.hidden = allowed(from, windows) * sensitivity(kOrders) / (sensitivity(kOrders) - sensitivity(from));
   return noise;
 }
 
