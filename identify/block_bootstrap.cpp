@@ -70,11 +70,8 @@ BlockBootstrap block_bootstrap(const RegressionMoments& moments, const BlockBoot
     return result;
   }
   const Eigen::MatrixXd influence = blocks.inverse * blocks.scores(blocks.psi);
-  std::size_t length =
-      options.seconds > 0.0
-          ? static_cast<std::size_t>(std::max(1.0, std::ceil(options.seconds / blocks.block_seconds - 1e-6)))
-          : bootstrap_block_length(influence);
-  length = std::min(length, blocks.blocks());
+  const std::size_t length =
+      options.seconds > 0.0 ? blocks.lasting(options.seconds) : bootstrap_block_length(influence);
   const auto l = static_cast<Eigen::Index>(length);
   result.seconds = static_cast<double>(length) * blocks.block_seconds;
   result.stretches = (blocks.blocks() + length - 1) / length;

@@ -2,6 +2,7 @@
 #include <wheelwright/identify/score_blocks.hpp>
 
 #include <algorithm>
+#include <cmath>
 
 #include <Eigen/LU>
 
@@ -10,7 +11,8 @@
 namespace wheelwright {
 namespace {
 
-constexpr double kSingular = 1e-12;  // reciprocal condition, columns scaled
+constexpr double kSingular = 1e-12;   // reciprocal condition, columns scaled
+constexpr double kWholeBlock = 1e-6;  // times are rounded: so much more than whole blocks is none
 
 double typical_seconds(const std::vector<MomentBlock>& blocks) {
   if (blocks.size() < 2) {
@@ -34,6 +36,12 @@ Eigen::VectorXd column_lengths(const Eigen::MatrixXd& gram) {
 }
 
 }  // namespace
+
+std::size_t ScoreBlocks::lasting(double seconds) const {
+  const double most = std::max(1.0, static_cast<double>(blocks()));
+  const double length = block_seconds > 0.0 ? std::ceil(seconds / block_seconds - kWholeBlock) : 1.0;
+  return static_cast<std::size_t>(std::clamp(length, 1.0, most));
+}
 
 Eigen::MatrixXd ScoreBlocks::scores(const Eigen::VectorXd& at) const {
   const Eigen::Index q = c.rows();

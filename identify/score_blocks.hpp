@@ -34,6 +34,8 @@ struct ScoreBlocks {
 
   /// B.
   [[nodiscard]] std::size_t blocks() const { return static_cast<std::size_t>(c.cols()); }
+  /// Number of neighbouring blocks that last `seconds` or a little more; at least 1 and at most B.
+  [[nodiscard]] std::size_t lasting(double seconds) const;
   /// Scores at ψ, q × B.
   [[nodiscard]] Eigen::MatrixXd scores(const Eigen::VectorXd& at) const;
   /// p values of θ from q of ψ; `other` for parameters that were left out.

@@ -92,13 +92,8 @@ SignPerturbedSums::SignPerturbedSums(const RegressionMoments& moments, const Sig
     return;
   }
   const Eigen::MatrixXd influence = blocks.inverse * blocks.scores(blocks.psi);
-  std::size_t length = 1;
-  if (options.seconds > 0.0) {
-    length = static_cast<std::size_t>(std::max(1.0, std::ceil(options.seconds / blocks.block_seconds - 1e-6)));
-  } else {
-    length = sign_group_length(influence, kLostVariance, options.groups);
-  }
-  length = std::min(length, blocks.blocks());
+  const std::size_t length = options.seconds > 0.0 ? blocks.lasting(options.seconds)
+                                                   : sign_group_length(influence, kLostVariance, options.groups);
   edge_share_ = wheelwright::edge_share(influence, length);
   const ScoreBlocks groups = grouped(blocks, length);
   groups_ = groups.blocks();
