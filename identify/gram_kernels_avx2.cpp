@@ -8,6 +8,6 @@ struct Variant {};
 }  // namespace
 
 extern const GramKernels k_avx2;
-const GramKernels k_avx2{"avx2", GramLoops<4, Variant>::products, GramLoops<4, Variant>::residuals};
+const GramKernels k_avx2{"avx2", GramLoops<4, Variant>::products, GramLoops<4, Variant>::gradient};
 
 }  // namespace wheelwright::gram_kernels

@@ -6,15 +6,21 @@ namespace {
 
 struct Variant {};
 
-void products(const double* a, std::size_t a_stride, std::size_t a_columns, const double* b, std::size_t b_stride,
-              std::size_t columns, std::size_t rows, bool upper, double* out) {
-  (columns % 8 == 0 ? GramLoops<8, Variant>::products : GramLoops<4, Variant>::products)(
-      a, a_stride, a_columns, b, b_stride, columns, rows, upper, out);
+void products(Matrix a, std::size_t a_columns, Matrix b, std::size_t columns, Matrix y, std::size_t rows, bool upper,
+              double* out) {
+  (columns % 8 == 0 ? GramLoops<8, Variant>::products : GramLoops<4, Variant>::products)(a, a_columns, b, columns, y,
+                                                                                         rows, upper, out);
+}
+
+void gradient(Matrix y, Matrix b, std::size_t columns, std::size_t rows, const double* x, double* gradient,
+              double* squares) {
+  (columns % 8 == 0 ? GramLoops<8, Variant>::gradient : GramLoops<4, Variant>::gradient)(y, b, columns, rows, x,
+                                                                                         gradient, squares);
 }
 
 }  // namespace
 
 extern const GramKernels k_avx512;
-const GramKernels k_avx512{"avx512", products, GramLoops<4, Variant>::residuals};
+const GramKernels k_avx512{"avx512", products, gradient};
 
 }  // namespace wheelwright::gram_kernels

@@ -8,6 +8,6 @@ struct Variant {};
 }  // namespace
 
 extern const GramKernels k_baseline;
-const GramKernels k_baseline{"baseline", GramLoops<2, Variant>::products, GramLoops<2, Variant>::residuals};
+const GramKernels k_baseline{"baseline", GramLoops<2, Variant>::products, GramLoops<2, Variant>::gradient};
 
 }  // namespace wheelwright::gram_kernels

@@ -25,75 +25,158 @@ struct GramLoops {
   }
   static void store(double* to, Vector v) { __builtin_memcpy(to, &v, sizeof v); }
 
-  // C columns of a by N vectors of columns of b, sums in registers.
-  template <int C, int N>
-  static void panel(const double* a, std::size_t a_stride, const double* b, std::size_t b_stride, std::size_t rows,
-                    double* out, std::size_t out_stride) {
-    Vector sum[C][N];
-    for (int c = 0; c < C; ++c) {
-      for (int v = 0; v < N; ++v) {
+  // C columns of a, and y where Y says so, by N vectors of columns of b; sums in registers.
+  template <int C, int N, bool Y>
+  static void panel(Matrix a, Matrix b, Matrix y, std::size_t rows, double* out, double* out_y,
+                    std::size_t out_stride) {
+    Vector sum[C][N], sum_y[N] = {};
+    for (int v = 0; v < N; ++v) {
+      for (int c = 0; c < C; ++c) {
         sum[c][v] = load(out + static_cast<std::size_t>(c) * out_stride + static_cast<std::size_t>(v * W));
+      }
+      if (Y) {
+        sum_y[v] = load(out_y + static_cast<std::size_t>(v * W));
       }
     }
     for (std::size_t k = 0; k < rows; ++k) {
       Vector row[N];
       for (int v = 0; v < N; ++v) {
-        row[v] = load(b + k * b_stride + static_cast<std::size_t>(v * W));
+        row[v] = load(b.data + k * b.stride + static_cast<std::size_t>(v * W));
       }
       for (int c = 0; c < C; ++c) {
-        const double left = a[k * a_stride + static_cast<std::size_t>(c)];
+        const double left = a.data[k * a.stride + static_cast<std::size_t>(c)];
         for (int v = 0; v < N; ++v) {
           sum[c][v] += row[v] * left;
         }
       }
+      for (int v = 0; Y && v < N; ++v) {
+        sum_y[v] += row[v] * y.data[k * y.stride];
+      }
     }
-    for (int c = 0; c < C; ++c) {
-      for (int v = 0; v < N; ++v) {
+    for (int v = 0; v < N; ++v) {
+      for (int c = 0; c < C; ++c) {
         store(out + static_cast<std::size_t>(c) * out_stride + static_cast<std::size_t>(v * W), sum[c][v]);
       }
+      if (Y) {
+        store(out_y + static_cast<std::size_t>(v * W), sum_y[v]);
+      }
     }
   }
 
-  template <int N>
-  static void columns_of_a(const double* a, std::size_t a_stride, std::size_t count, const double* b,
-                           std::size_t b_stride, std::size_t rows, double* out, std::size_t out_stride) {
+  template <int N, bool Y>
+  static void columns_of_a(Matrix a, std::size_t count, Matrix b, Matrix y, std::size_t rows, double* out,
+                           double* out_y, std::size_t out_stride) {
     switch (count) {
-      case 1: panel<1, N>(a, a_stride, b, b_stride, rows, out, out_stride); break;
-      case 2: panel<2, N>(a, a_stride, b, b_stride, rows, out, out_stride); break;
-      case 3: panel<3, N>(a, a_stride, b, b_stride, rows, out, out_stride); break;
-      default: panel<4, N>(a, a_stride, b, b_stride, rows, out, out_stride); break;
+      case 1: panel<1, N, Y>(a, b, y, rows, out, out_y, out_stride); break;
+      case 2: panel<2, N, Y>(a, b, y, rows, out, out_y, out_stride); break;
+      case 3: panel<3, N, Y>(a, b, y, rows, out, out_y, out_stride); break;
+      default: panel<4, N, Y>(a, b, y, rows, out, out_y, out_stride); break;
     }
   }
 
-  static void products(const double* a, std::size_t a_stride, std::size_t a_columns, const double* b,
-                       std::size_t b_stride, std::size_t columns, std::size_t rows, bool upper, double* out) {
+  static void products(Matrix a, std::size_t a_columns, Matrix b, std::size_t columns, Matrix y, std::size_t rows,
+                       bool upper, double* out) {
     constexpr std::size_t kColumnsOfA = 4;
-    for (std::size_t j = 0; j < a_columns; j += kColumnsOfA) {
-      const std::size_t count = a_columns - j < kColumnsOfA ? a_columns - j : kColumnsOfA;
-      std::size_t l = upper ? j / W * W : 0;
-      while (l + 2 * W <= columns) {
-        columns_of_a<2>(a + j, a_stride, count, b + l, b_stride, rows, out + j * columns + l, columns);
-        l += 2 * W;
+    double* out_y = out + a_columns * columns;
+    for (std::size_t l = 0; l < columns;) {
+      const bool two = l + 2 * W <= columns;
+      const std::size_t width = two ? 2 * W : W;
+      // y goes with the last columns of a that meet these columns of b.
+      const std::size_t end = upper && l + width < a_columns ? l + width : a_columns;
+      for (std::size_t j = 0; j < end; j += kColumnsOfA) {
+        const std::size_t count = end - j < kColumnsOfA ? end - j : kColumnsOfA;
+        const bool with_y = y.data != nullptr && j + kColumnsOfA >= end;
+        const Matrix left{a.data + j, a.stride}, right{b.data + l, b.stride};
+        double* to = out + j * columns + l;
+        if (two && with_y) {
+          columns_of_a<2, true>(left, count, right, y, rows, to, out_y + l, columns);
+        } else if (two) {
+          columns_of_a<2, false>(left, count, right, y, rows, to, out_y + l, columns);
+        } else if (with_y) {
+          columns_of_a<1, true>(left, count, right, y, rows, to, out_y + l, columns);
+        } else {
+          columns_of_a<1, false>(left, count, right, y, rows, to, out_y + l, columns);
+        }
       }
-      if (l < columns) {
-        columns_of_a<1>(a + j, a_stride, count, b + l, b_stride, rows, out + j * columns + l, columns);
-      }
+      l += width;
     }
   }
 
-  static void residuals(const double* y, std::size_t y_stride, const double* b, std::size_t b_stride,
-                        std::size_t columns, std::size_t rows, const double* x, double* out) {
-    typedef double Group __attribute__((vector_size(kGroup * sizeof(double))));
-    for (std::size_t k = 0; k < rows; ++k) {
-      Group sum{};
-      for (std::size_t l = 0; l < columns; l += kGroup) {
-        Group left, right;
-        __builtin_memcpy(&left, b + k * b_stride + l, sizeof left);
-        __builtin_memcpy(&right, x + l, sizeof right);
-        sum += left * right;
-      }
-      out[k] = y[k * y_stride] - ((sum[0] + sum[2]) + (sum[1] + sum[3]));
+  typedef double Group __attribute__((vector_size(kGroup * sizeof(double))));
+
+  // Products of one row with x, added up over the groups of columns.
+  static void product(const double* row, const double* x, std::size_t columns, Group& sum) {
+    sum = Group{};
+    for (std::size_t l = 0; l < columns; l += kGroup) {
+      Group left, right;
+      __builtin_memcpy(&left, row + l, sizeof left);
+      __builtin_memcpy(&right, x + l, sizeof right);
+      sum += left * right;
     }
+  }
+
+  // N vectors of columns from `first` on; the residuals are those of `residual`.
+  template <int N>
+  static void add_rows(const double* residual, Matrix b, std::size_t rows, double* gradient) {
+    Vector sum[N];
+    for (int v = 0; v < N; ++v) {
+      sum[v] = load(gradient + v * W);
+    }
+    for (std::size_t k = 0; k < rows; ++k) {
+      for (int v = 0; v < N; ++v) {
+        sum[v] += load(b.data + k * b.stride + v * W) * residual[k];
+      }
+    }
+    for (int v = 0; v < N; ++v) {
+      store(gradient + v * W, sum[v]);
+    }
+  }
+
+  static void gradient(Matrix y, Matrix b, std::size_t columns, std::size_t rows, const double* x, double* gradient,
+                       double* squares) {
+    constexpr std::size_t kRows = 4;
+    Group square;
+    __builtin_memcpy(&square, squares, sizeof square);
+    for (std::size_t k = 0; k < rows; k += kRows) {
+      const std::size_t count = rows - k < kRows ? rows - k : kRows;
+      double residual[kRows] = {};
+      if (count == kRows) {
+        const double* row = b.data + k * b.stride;
+        Group p0, p1, p2, p3;
+        product(row, x, columns, p0);
+        product(row + b.stride, x, columns, p1);
+        product(row + 2 * b.stride, x, columns, p2);
+        product(row + 3 * b.stride, x, columns, p3);
+        const Group low01 = __builtin_shufflevector(p0, p1, 0, 4, 2, 6),
+                    high01 = __builtin_shufflevector(p0, p1, 1, 5, 3, 7);
+        const Group low23 = __builtin_shufflevector(p2, p3, 0, 4, 2, 6),
+                    high23 = __builtin_shufflevector(p2, p3, 1, 5, 3, 7);
+        const Group of0 = __builtin_shufflevector(low01, low23, 0, 1, 4, 5),
+                    of2 = __builtin_shufflevector(low01, low23, 2, 3, 6, 7);
+        const Group of1 = __builtin_shufflevector(high01, high23, 0, 1, 4, 5),
+                    of3 = __builtin_shufflevector(high01, high23, 2, 3, 6, 7);
+        const double* from = y.data + k * y.stride;
+        const Group left{from[0], from[y.stride], from[2 * y.stride], from[3 * y.stride]};
+        const Group r = left - ((of0 + of2) + (of1 + of3));
+        square += r * r;
+        __builtin_memcpy(residual, &r, sizeof r);
+      } else {
+        for (std::size_t i = 0; i < count; ++i) {
+          Group p;
+          product(b.data + (k + i) * b.stride, x, columns, p);
+          residual[i] = y.data[(k + i) * y.stride] - ((p[0] + p[2]) + (p[1] + p[3]));
+          square[i] += residual[i] * residual[i];
+        }
+      }
+      std::size_t l = 0;
+      for (; l + 2 * W <= columns; l += 2 * W) {
+        add_rows<2>(residual, {b.data + k * b.stride + l, b.stride}, count, gradient + l);
+      }
+      for (; l < columns; l += W) {
+        add_rows<1>(residual, {b.data + k * b.stride + l, b.stride}, count, gradient + l);
+      }
+    }
+    __builtin_memcpy(squares, &square, sizeof square);
   }
 };
 

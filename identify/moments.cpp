@@ -7,23 +7,12 @@
 #include <Eigen/QR>
 
 #include <wheelwright/core/check.hpp>
-#include <wheelwright/identify/gram_kernels.hpp>
 
 namespace wheelwright {
 namespace {
 
 constexpr std::size_t kTile = 256;  // rows packed at a time
 constexpr std::size_t kLanes = 8;   // of Σ y², so that every processor adds in the same order
-
-// Columns [column, column + p) of rows first, first + stride, … of `from`, padded with zeros.
-void pack(const RowMatrix& from, std::size_t column, std::size_t p, std::size_t first, std::size_t stride,
-          std::size_t count, std::size_t columns, std::vector<double>& to) {
-  const auto width = static_cast<std::size_t>(from.cols());
-  const double* source = from.data() + first * width + column;
-  for (std::size_t k = 0; k < count; ++k) {
-    std::copy_n(source + k * stride * width, p, to.data() + k * columns);
-  }
-}
 
 }  // namespace
 
@@ -42,7 +31,19 @@ RegressionMoments::RegressionMoments(std::size_t outputs, std::size_t parameters
   }
   Y_.assign(kTile * columns_, 0.0);
   Z_.assign(instruments ? kTile * columns_ : 0, 0.0);
-  y_.assign(kTile, 0.0);
+}
+
+gram_kernels::Matrix RegressionMoments::packed(const RowMatrix& from, std::size_t column, std::size_t first,
+                                               std::size_t count, std::vector<double>& tile) const {
+  const auto width = static_cast<std::size_t>(from.cols());
+  const double* source = from.data() + first * width + column;
+  if (p_ == columns_) {
+    return {source, n_ * width};
+  }
+  for (std::size_t k = 0; k < count; ++k) {
+    std::copy_n(source + k * n_ * width, p_, tile.data() + k * columns_);
+  }
+  return {tile.data(), columns_};
 }
 
 void RegressionMoments::open_block(double t) {
@@ -79,23 +80,18 @@ void RegressionMoments::add(const RegressionBlock& rows) {
     const std::size_t count = std::min({length_ - block.instants, rows.instants() - k, kTile});
     for (std::size_t i = 0; i < n_; ++i) {
       double* YY = sums(blocks_.size() - 1, i);
-      double* Yy = YY + square;
-      double* yy = Yy + columns_;
-      pack(rows.Y, 0, p_, k * n_ + i, n_, count, columns_, Y_);
+      double* yy = YY + square + columns_;
+      const gram_kernels::Matrix y{rows.y.data() + k * n_ + i, n_};
+      const gram_kernels::Matrix Y = packed(rows.Y, 0, k * n_ + i, count, Y_);
       for (std::size_t r = 0; r < count; ++r) {
-        y_[r] = rows.y[static_cast<Eigen::Index>((k + r) * n_ + i)];
-        yy[(block.instants + r) % kLanes] += y_[r] * y_[r];
+        yy[(block.instants + r) % kLanes] += y.data[r * n_] * y.data[r * n_];
       }
-      kernels.products(Y_.data(), columns_, p_, Y_.data(), columns_, columns_, count, true, YY);
-      kernels.products(y_.data(), 1, 1, Y_.data(), columns_, columns_, count, false, Yy);
+      kernels.products(Y, p_, Y, columns_, y, count, true, YY);
       if (instruments_) {
         double* ZY = yy + kLanes;
-        double* ZZ = ZY + square;
-        double* Zy = ZZ + square;
-        pack(rows.Y, p_, p_, k * n_ + i, n_, count, columns_, Z_);
-        kernels.products(Z_.data(), columns_, p_, Y_.data(), columns_, columns_, count, false, ZY);
-        kernels.products(Z_.data(), columns_, p_, Z_.data(), columns_, columns_, count, true, ZZ);
-        kernels.products(y_.data(), 1, 1, Z_.data(), columns_, columns_, count, false, Zy);
+        const gram_kernels::Matrix Z = packed(rows.Y, p_, k * n_ + i, count, Z_);
+        kernels.products(Z, p_, Y, columns_, {}, count, false, ZY);
+        kernels.products(Z, p_, Z, columns_, y, count, true, ZY + square);
       }
     }
     block.instants += count;

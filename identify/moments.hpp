@@ -10,6 +10,7 @@
 #include <Eigen/Core>
 
 #include <wheelwright/core/regression.hpp>
+#include <wheelwright/identify/gram_kernels.hpp>
 
 namespace wheelwright {
 
@@ -57,6 +58,9 @@ class RegressionMoments {
   [[nodiscard]] MomentSums of_output(std::size_t i) const;
 
  private:
+  // Columns [column, column + p) of `count` instants of one output from row `first` on; where they lie, or in `tile`.
+  gram_kernels::Matrix packed(const RowMatrix& from, std::size_t column, std::size_t first, std::size_t count,
+                              std::vector<double>& tile) const;
   void open_block(double t);
   [[nodiscard]] const double* sums(std::size_t b, std::size_t output) const {
     return data_.data() + (b * n_ + output) * size_;
@@ -72,7 +76,7 @@ class RegressionMoments {
   std::size_t instants_ = 0;
   std::vector<MomentBlock> blocks_;
   std::vector<double> data_;
-  std::vector<double> Y_, Z_, y_;  // a tile of packed rows
+  std::vector<double> Y_, Z_;  // tiles of packed rows
 };
 
 /// The moments of all of `rows`, one walk.

@@ -25,20 +25,23 @@ TEST(GramKernels, EveryVariantGivesTheSameDigits) {
   for (const std::size_t columns : {4U, 8U, 12U, 16U, 20U}) {
     for (const std::size_t rows : {0U, 1U, 7U, 100U}) {
       const RowMatrix b = random.matrix(static_cast<Eigen::Index>(rows), static_cast<Eigen::Index>(columns));
+      const RowMatrix y = random.matrix(static_cast<Eigen::Index>(rows), 1);
       const std::size_t p = columns - 1;
+      const gram_kernels::Matrix of_b{b.data(), columns}, of_y{y.data(), 1};
       const auto run = [&](const gram_kernels::GramKernels& kernels, bool upper) {
-        std::vector<double> sums(p * columns, 0.25);
-        kernels.products(b.data(), columns, p, b.data(), columns, columns, rows, upper, sums.data());
+        std::vector<double> sums((p + 1) * columns, 0.25);
+        kernels.products(of_b, p, of_b, columns, of_y, rows, upper, sums.data());
         std::vector<double> kept;
-        for (std::size_t j = 0; j < p; ++j) {
-          for (std::size_t l = upper ? j : 0; l < columns; ++l) {
+        for (std::size_t j = 0; j <= p; ++j) {
+          for (std::size_t l = upper && j < p ? j : 0; l < columns; ++l) {
             kept.push_back(sums[j * columns + l]);
           }
         }
-        std::vector<double> rest(rows);
+        std::vector<double> gradient(columns, 0.5), squares(gram_kernels::kGroup, 0.0);
         const Eigen::VectorXd x = Eigen::VectorXd::LinSpaced(static_cast<Eigen::Index>(columns), -1.0, 2.0);
-        kernels.residuals(b.data(), columns, b.data(), columns, columns, rows, x.data(), rest.data());
-        kept.insert(kept.end(), rest.begin(), rest.end());
+        kernels.gradient(of_y, of_b, columns, rows, x.data(), gradient.data(), squares.data());
+        kept.insert(kept.end(), gradient.begin(), gradient.end());
+        kept.insert(kept.end(), squares.begin(), squares.end());
         return kept;
       };
       for (const bool upper : {false, true}) {
