@@ -85,6 +85,9 @@ std::string summary(const Commissioning& r) {
     return text + contradiction_table(r);
   }
   text += parameter_table(r);
+  if (!r.estimators.reason.empty()) {
+    text += fmt::format("  estimated by {}\n", r.estimators.reason);
+  }
   for (std::size_t i = 0; i < r.validation.size(); ++i) {
     const OutputValidation& v = r.validation[i];
     if (v.instants == 0) {

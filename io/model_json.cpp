@@ -133,6 +133,37 @@ Json physical_json(const Commissioning& r, const Robot& robot, const Model& mode
   return json;
 }
 
+Json identification_json(const Commissioning& r) {
+  Json json = {{"rank", r.rank}, {"condition", r.condition}, {"freedom", r.residuals.freedom}};
+  const EstimatorChoice& choice = r.estimators;
+  if (choice.candidates.empty()) {
+    return json;
+  }
+  json["estimator"] = to_string(choice.best().estimator);
+  json["reason"] = choice.reason;
+  json["in_doubt"] = choice.in_doubt;
+  if (choice.tested_against) {
+    json["endogeneity_test"] = {{"against", to_string(choice.candidates[*choice.tested_against].estimate.estimator)},
+                                {"F", choice.test.statistic},
+                                {"p_value", choice.test.p_value}};
+  }
+  json["candidates"] = Json::array();
+  for (const EstimatorCandidate& c : choice.candidates) {
+    Json candidate = {{"estimator", to_string(c.estimate.estimator)},
+                      {"origin", c.origin},
+                      {"usable", c.estimate.usable},
+                      {"reason", c.estimate.reason},
+                      {"estimate", numbers(c.estimate.theta)},
+                      {"standard_error", numbers(c.estimate.standard_error)},
+                      {"freedom", c.estimate.freedom}};
+    if (c.strength.size() > 0) {
+      candidate["instrument_strength"] = numbers(c.strength);
+    }
+    json["candidates"].push_back(candidate);
+  }
+  return json;
+}
+
 Json set_json(const Commissioning& r, const Model& model) {
   Json json = {{"status", r.feasible.status == FeasibleSet::Status::nonempty ? "nonempty" : "empty"},
                {"rows", r.feasible.rows},
@@ -230,7 +261,7 @@ Json to_json(const Commissioning& r, const LogReport& data, const std::string& s
     json["parameters"].push_back(parameter_json(r, j, m.robot, m.model));
   }
   json["physical"] = physical_json(r, m.robot, m.model);
-  json["identification"] = {{"rank", r.rank}, {"condition", r.condition}, {"freedom", r.residuals.freedom}};
+  json["identification"] = identification_json(r);
   json["feasible_set"] = set_json(r, m.model);
   if (has_model) {
     json["detector"] = {{"estimate", numbers(m.estimate)},

@@ -8,6 +8,7 @@
 
 #include <wheelwright/report/commission_words.hpp>
 #include <wheelwright/report/data_sections.hpp>
+#include <wheelwright/report/estimator_table.hpp>
 #include <wheelwright/report/page.hpp>
 #include <wheelwright/report/parameter_table.hpp>
 #include <wheelwright/report/parameter_view.hpp>
@@ -78,6 +79,7 @@ std::string commission_report(const Commissioning& result, const ReportContext& 
   };
   add("contradiction", "Contradiction", contradiction_section(result, axis));
   add("parameters", "Parameters", parameter_table(result, axis));
+  add("estimators", "Estimators", estimator_table(result));
   if (context.own_log && !context.own_log->trace.t.empty()) {
     add("residual", "Residual and threshold", residual_section(result, *context.own_log, axis));
   }

@@ -98,7 +98,7 @@ std::string remarks(const Commissioning& result, const std::vector<ParameterView
       items.push_back(name + ": " + r.reason + ".");
     }
     if (!r.estimate_inside && views[j].theta.has_set) {
-      items.push_back("The least-squares estimate of " + name +
+      items.push_back("The estimate of " + name +
                       " lies outside the guaranteed interval; the Chebyshev centre lies inside.");
     }
   }
@@ -133,7 +133,7 @@ std::string parameter_table(const Commissioning& result, const TimeAxis& axis) {
   out += "</tbody></table></div>\n";
   out +=
       "<p class=\"note\">Box: guaranteed interval (dashed: a side is the prior’s; arrow: it goes on beyond the "
-      "drawing). Black dot and whiskers: least-squares estimate with its 95 % interval. Ring: Chebyshev centre of the "
+      "drawing). Black dot and whiskers: estimate with its 95 % interval. Ring: Chebyshev centre of the "
       "feasible set. Dashed "
       "line: nominal value. “Bound set by” names the samples that prove each bound: those moments of the log decide. ";
   out += fmt::format("The regressor has rank {} of {} and condition number {}.</p>\n", result.rank,
