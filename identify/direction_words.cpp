@@ -71,7 +71,7 @@ std::string combination_in_words(const Eigen::VectorXd& c, const std::vector<Par
   return fmt::format("{} ({})", words, fmt::join(units, ", "));
 }
 
-std::string listed(const std::vector<std::string>& names) {
+std::string names_in_words(const std::vector<std::string>& names) {
   std::string words;
   for (std::size_t i = 0; i < names.size(); ++i) {
     words += i == 0 ? "" : i + 1 == names.size() ? " and " : ", ";
@@ -101,7 +101,7 @@ std::vector<std::string> missing_manoeuvres(const std::vector<Eigen::Index>& mem
     return own;
   }
   if (only(TermKind::inertia)) {
-    advice.push_back("no motion may tell " + listed(names) +
+    advice.push_back("no motion may tell " + names_in_words(names) +
                      " apart: state one of them, or drive once more with a load of known mass");
   }
   if (has(TermKind::viscous) && has(TermKind::coulomb)) {

@@ -42,7 +42,7 @@ struct ParameterWords {
                                                double least = 0.1);
 
 /// Names joined for a sentence: "a", "a and b", "a, b and c".
-[[nodiscard]] std::string listed(const std::vector<std::string>& names);
+[[nodiscard]] std::string names_in_words(const std::vector<std::string>& names);
 
 /// The driving that would tell the parameters `members` (indices) apart, or show it where it is only one. Follows from
 /// their kinds (two friction laws: both directions and many speeds; inertia and friction: changes of speed and constant
