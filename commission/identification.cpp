@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/commission/identification.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include <wheelwright/core/error.hpp>
+#include <wheelwright/identify/noise_level.hpp>
+#include <wheelwright/identify/physical_consistency.hpp>
+#include <wheelwright/identify/stribeck.hpp>
+#include <wheelwright/identify/time_shift.hpp>
+
+namespace wheelwright {
+namespace {
+
+constexpr double kRisk = 1e-3;                                     // of Fit::plausible, which is not looked at here
+constexpr double kSlowestStribeck = 0.01, kFastestStribeck = 0.5;  // of the largest joint speed
+
+std::vector<ColumnNoise> find_noise(LogSource& log, const Setting& s) {
+  std::vector<std::string> columns = s.measurement.motion_columns;
+  columns.insert(columns.end(), s.measurement.effort_columns.begin(), s.measurement.effort_columns.end());
+  const std::vector<DifferenceNoise> differences = difference_noise(log, columns);
+  const Standstill standstill = standstill_noise(log, standstill_signs(log, s.model), columns);
+  std::vector<ColumnNoise> noise;
+  for (std::size_t c = 0; c < columns.size(); ++c) {
+    ColumnNoise of_column;
+    of_column.column = columns[c];
+    of_column.evidence.differences = differences[c];
+    of_column.evidence.standstill = standstill.columns[c];
+    of_column.choice = choose_noise(of_column.evidence);
+    noise.push_back(std::move(of_column));
+  }
+  return noise;
+}
+
+std::vector<PhysicalQuantity> quantities(const Model& model) {
+  std::vector<PhysicalQuantity> list;
+  for (const Parameter& p : model.parameters) {
+    list.push_back({p.physical, p.per_physical, p.physical_unit});
+  }
+  return list;
+}
+
+std::vector<ParameterWords> parameter_words(const Model& model) {
+  std::vector<ParameterWords> list;
+  for (const Parameter& p : model.parameters) {
+    list.push_back({p.name, p.unit, p.excite, kind_of(p.physical)});
+  }
+  return list;
+}
+
+Identifiability judge(const Setting& s, const Fit& fit, const RegressionMoments& moments) {
+  IdentifiabilityInput input = identifiability_input(fit.factor, parameter_words(s.model));
+  const auto p = static_cast<Eigen::Index>(s.model.p());
+  if (const auto noise = row_noise(s)) {
+    input.noise = Eigen::MatrixXd::Zero(p, p);
+    for (std::size_t i = 0; i < noise->YY.size(); ++i) {
+      const double w = fit.weights[static_cast<Eigen::Index>(i)];
+      input.noise += static_cast<double>(moments.instants()) * w * w * noise->YY[i];
+    }
+  }
+  input.covariance = fit.residuals.covariance;
+  input.size = fit.estimate.cwiseAbs();
+  for (Eigen::Index j = 0; j < p; ++j) {
+    const Interval& prior = s.prior.sides[static_cast<std::size_t>(j)];
+    const bool known = s.prior_declared[static_cast<std::size_t>(j)] || !(input.size[j] > 0.0);
+    input.size[j] = known ? 0.5 * (prior.upper - prior.lower) : input.size[j];
+    if (!(input.size[j] > 0.0)) {
+      input.size[j] = 1.0;
+    }
+  }
+  return identifiability(input);
+}
+
+ShapeFinding finding(std::string name, std::string unit, const SeparableModel& model, VariableProjectionOptions options,
+                     const Fit& fit, double reference) {
+  options.weights = fit.weights;
+  const SeparableFit found = variable_projection(model, options);
+  ShapeFinding f;
+  f.name = std::move(name);
+  f.unit = std::move(unit);
+  f.converged = found.end == SearchEnd::converged;
+  if (found.end != SearchEnd::failed) {
+    f.state = found.state[0];
+    f.estimate = found.shape[0];
+    f.standard_error = found.standard_error[0];
+    f.freedom = found.freedom;
+    f.residual_ratio = reference > 0.0 ? std::sqrt(found.weighted_rss / reference) : 1.0;
+  }
+  return f;
+}
+
+// Weighted residual sum of squares of `model` with its shape held at `shape`.
+double rss_at(const SeparableModel& model, double shape, const Fit& fit) {
+  const Eigen::VectorXd at = Eigen::VectorXd::Constant(1, shape);
+  return cost_curve(model, at, 0, shape, shape + 1e-9, 2, fit.weights).front().weighted_rss;
+}
+
+void find_shapes(LogSource& log, const Setting& s, const Fit& fit, const IdentificationOptions& options,
+                 Identification& result) {
+  RegressionStream stream = make_rows(log, s);
+  const RegressionBlock rows = read_all(stream);
+  const auto look = [&](const char* name, TimeEffect effect, double lower) {
+    try {
+      const TimeShiftedRows model(rows, effect, lower, options.longest_delay);
+      result.shapes.push_back(finding(name, "s", model, model.options(), fit, rss_at(model, 0.0, fit)));
+    } catch (const InvalidArgument& error) {
+      result.notes.push_back(fmt::format("{} was not looked for: {}", name, error.what()));
+    }
+  };
+  look("delay", TimeEffect::delay, -options.longest_delay);
+  look("effort_lag", TimeEffect::effort_lag, 0.0);
+  look("actuator_lag", TimeEffect::actuator_lag, 0.0);
+  const double fastest = *std::ranges::max_element(s.survey.largest_speed);
+  if (fastest > 0.0) {
+    const StribeckRows model(log, RegressorFilter(s.model, s.filter, s.measurement));
+    VariableProjectionOptions search;
+    search.lower = Eigen::VectorXd::Constant(1, kSlowestStribeck * fastest);
+    search.upper = Eigen::VectorXd::Constant(1, kFastestStribeck * fastest);
+    const char* unit = s.robot.model == "single_axis" ? "m/s (rotary: rad/s)" : "rad/s";
+    result.shapes.push_back(finding("stribeck_speed", unit, model, search, fit, fit.squares.weighted_rss));
+  }
+}
+
+void calibrate(LogSource& log, const Setting& s, Identification& result) {
+  const bool has_pose = log.find("theta").has_value() && log.find("omega_r") && log.find("omega_l");
+  if (s.robot.model == "single_axis" || !has_pose) {
+    return;
+  }
+  KinematicOptions options;
+  options.wheel_radius = s.robot.wheel_radius;
+  options.track_width = s.robot.track_width;
+  const bool position = log.find("x").has_value() && log.find("y").has_value();
+  options.radius = options.axle_offset = position;
+  try {
+    result.kinematics = calibrate_kinematics(read_all(log), options);
+  } catch (const InvalidArgument& error) {
+    result.notes.push_back(fmt::format("the kinematics were not calibrated: {}", error.what()));
+  }
+  log.rewind();
+}
+
+}  // namespace
+
+Identification identify(LogSource& log, const Robot& robot, const IdentificationOptions& options) {
+  Identification result;
+  const auto tell = [&](std::string_view stage, double share) {
+    if (options.progress) {
+      options.progress(stage, share);
+    }
+  };
+  SettingOptions settle_options = options.setting;
+  settle_options.progress = options.progress;
+  result.setting = settle(log, robot, settle_options);
+  const Setting& s = result.setting;
+  result.notes = s.notes;
+
+  tell("identifying", 0.25);
+  result.fit = fit_log(log, s, Part::everything, kRisk);
+  tell("noise of the sensors", 0.4);
+  result.noise = find_noise(log, s);
+
+  tell("robust and constrained fits", 0.5);
+  const std::vector<LinearConstraint> constraints = physical_consistency(quantities(s.model), s.robot.footprint_radius);
+  result.constrained = constrained_least_squares(result.fit.factor, constraints, result.fit.residuals.covariance);
+  RegressionStream rows = make_rows(log, s);
+  RobustOptions robust;
+  robust.constraints = constraints;
+  result.robust = robust_fit(rows, robust);
+
+  tell("confidence regions", 0.65);
+  const RegressionMoments moments = log_moments(log, s, Part::everything);
+  if (!result.fit.choice.candidates.empty() && result.fit.choice.best().usable) {
+    RegionOptions regions;
+    regions.confidence = options.confidence;
+    regions.bootstrap.seed = regions.sign_perturbed.seed = options.seed;
+    regions.bootstrap.estimator.weights = regions.sign_perturbed.estimator.weights = result.fit.weights;
+    std::vector<bool> excluded;
+    for (const ExcitationFinding& finding : result.fit.excitation) {
+      excluded.push_back(finding.state == Excitation::not_excited);
+    }
+    regions.bootstrap.estimator.excluded = regions.sign_perturbed.estimator.excluded = excluded;
+    result.regions = compare_regions(moments, result.fit.choice.best(), regions);
+  }
+  tell("what the log can tell", 0.75);
+  result.identifiability = judge(s, result.fit, moments);
+  InformationOptions information;
+  information.weights = result.fit.weights;
+  result.information = information_over_time(moments, information);
+
+  if (options.shapes && s.survey.rows <= options.most_rows) {
+    tell("delays and lags", 0.85);
+    find_shapes(log, s, result.fit, options, result);
+  } else if (options.shapes) {
+    result.notes.push_back(
+        fmt::format("delay, lags and Stribeck speed were not looked for: the log has {} rows, more than {}",
+                    s.survey.rows, options.most_rows));
+  }
+  tell("kinematics", 0.95);
+  calibrate(log, s, result);
+  log.rewind();
+  tell("done", 1.0);
+  return result;
+}
+
+}  // namespace wheelwright

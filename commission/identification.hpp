@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Everything that a log of fault-free driving says about the parameters, without bounds and thresholds: how they are
+/// best estimated, how sure that is, what the log cannot tell, and what the model leaves out.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <wheelwright/commission/fit.hpp>
+#include <wheelwright/commission/setting.hpp>
+#include <wheelwright/identify/identifiability.hpp>
+#include <wheelwright/identify/information_over_time.hpp>
+#include <wheelwright/identify/kinematic_calibration.hpp>
+#include <wheelwright/identify/noise_choice.hpp>
+#include <wheelwright/identify/regions.hpp>
+#include <wheelwright/identify/robust.hpp>
+#include <wheelwright/identify/variable_projection.hpp>
+
+namespace wheelwright {
+
+/// Noise of one column of the log.
+struct ColumnNoise {
+  std::string column;
+  NoiseEvidence evidence;
+  NoiseChoice choice;
+};
+
+/// One more quantity that enters nonlinearly, added alone to the model.
+struct ShapeFinding {
+  std::string name;  ///< delay, effort_lag, actuator_lag or stribeck_speed
+  std::string unit;
+  ShapeState state = ShapeState::flat;
+  bool converged = false;
+  double estimate = 0.0;
+  double standard_error = 0.0;
+  double freedom = 0.0;         ///< of Student's t
+  double residual_ratio = 1.0;  ///< residual rms with it over that without, same rows: 1 where it explains nothing
+};
+
+/// What is done, and how far.
+struct IdentificationOptions {
+  SettingOptions setting;
+  double confidence = 0.95;        ///< of the regions
+  std::uint64_t seed = 1;          ///< of bootstrap and signs
+  bool shapes = true;              ///< whether delay, lags and Stribeck speed are looked for
+  std::size_t most_rows = 200000;  ///< instants above which they are not: the rows are held in memory
+  double longest_delay = 0.2;      ///< s, searched to both sides for delays, upwards for lags
+  std::function<void(std::string_view stage, double share)> progress;  ///< may be empty
+};
+
+/// The result.
+struct Identification {
+  Setting setting;
+  Fit fit;
+  std::vector<ColumnNoise> noise;  ///< motion columns, then effort columns
+  RobustFit robust;                ///< Huber's loss, physically consistent
+  ConstrainedFit constrained;      ///< least squares, physically consistent
+  RegionComparison regions;        ///< of the chosen estimate; empty where no parameter is excited
+  Identifiability identifiability;
+  InformationOverTime information;
+  std::vector<ShapeFinding> shapes;                ///< empty where they were not looked for
+  std::optional<KinematicCalibration> kinematics;  ///< where the log has a pose
+  std::vector<std::string> notes;                  ///< what was assumed, left out or could not be done
+};
+
+/// Identifies on the whole of `log`, in several walks. Throws InputError or InvalidArgument for a log or robot that cannot
+/// be used at all.
+[[nodiscard]] Identification identify(LogSource& log, const Robot& robot, const IdentificationOptions& options = {});
+
+}  // namespace wheelwright
