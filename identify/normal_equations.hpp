@@ -27,7 +27,7 @@ struct NormalEquationsFit {
 };
 
 /// Two walks over the rows: G = Σ w²YᵀY and g = Σ w²Yᵀy, θ by Cholesky in unit columns; then θ += G⁻¹ Σ w²Yᵀ(y − Yθ)
-/// (Björck 1996, section 6.6.5: normal equations with fixed-precision refinement lose the square of the condition number once,
+/// (Björck 1996: normal equations with fixed-precision refinement lose the square of the condition number once,
 /// and gain it back at each step while κ² ε < 1). `weights` has one for each output; empty: all one. Throws
 /// InvalidArgument for rows without instants or weights of another number.
 [[nodiscard]] NormalEquationsFit normal_equations(RegressionSource& rows, const Eigen::VectorXd& weights = {});
