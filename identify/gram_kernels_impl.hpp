@@ -5,6 +5,8 @@
 /// linker keeps for all; for the same reason each variant brings a type of its own.
 #pragma once
 
+#include <cstdint>
+
 #include <wheelwright/identify/gram_kernels.hpp>
 
 namespace wheelwright::gram_kernels {
@@ -22,6 +24,10 @@ struct GramLoops {
     Vector v;
     __builtin_memcpy(&v, from, sizeof v);
     return v;
+  }
+  // Asks for a cache line that will be wanted; it may lie beyond the end of the rows.
+  static void fetch(const double* from, std::size_t offset) {
+    __builtin_prefetch(reinterpret_cast<const void*>(reinterpret_cast<std::uintptr_t>(from) + offset * sizeof(double)));
   }
   static void store(double* to, Vector v) { __builtin_memcpy(to, &v, sizeof v); }
 
@@ -51,6 +57,9 @@ struct GramLoops {
       }
       for (int v = 0; Y && v < N; ++v) {
         sum_y[v] += row[v] * y.data[k * y.stride];
+      }
+      if (Y) {
+        fetch(b.data, (k + rows) * b.stride);
       }
     }
     for (int v = 0; v < N; ++v) {
