@@ -7,6 +7,9 @@
 
 #include <fmt/format.h>
 
+#include <wheelwright/commission/noise_budget.hpp>
+#include <wheelwright/commission/physical.hpp>
+#include <wheelwright/core/check.hpp>
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/identify/noise_level.hpp>
 #include <wheelwright/identify/physical_consistency.hpp>
@@ -19,6 +22,24 @@ namespace {
 constexpr double kRisk = 1e-3;                                     // of Fit::plausible, which is not looked at here
 constexpr double kSlowestStribeck = 0.01, kFastestStribeck = 0.5;  // of the largest joint speed
 
+std::string motion_unit(const Setting& s) {
+  const bool linear = s.robot.model == "single_axis";  // its own unit: m or rad
+  return s.measurement.motion == MotionKind::angle ? (linear ? "m or rad" : "rad") : (linear ? "per s" : "rad/s");
+}
+
+// What the robot file or the encoder says of a motion column.
+std::optional<KnownNoise> known_motion_noise(const Setting& s) {
+  const auto bound = motion_error(s.robot, s.measurement);
+  if (!bound) {
+    return std::nullopt;
+  }
+  const bool counts = s.measurement.count > 0.0 || s.robot.encoder_counts_per_turn;
+  const bool of_angles = s.measurement.motion != MotionKind::speed;
+  const bool linear = s.robot.model == "single_axis";
+  return KnownNoise{*bound, of_angles ? (linear ? "m or rad" : "rad") : motion_unit(s),
+                    of_angles && counts ? "half an encoder count" : "as declared"};
+}
+
 std::vector<ColumnNoise> find_noise(LogSource& log, const Setting& s) {
   std::vector<std::string> columns = s.measurement.motion_columns;
   columns.insert(columns.end(), s.measurement.effort_columns.begin(), s.measurement.effort_columns.end());
@@ -28,6 +49,14 @@ std::vector<ColumnNoise> find_noise(LogSource& log, const Setting& s) {
   for (std::size_t c = 0; c < columns.size(); ++c) {
     ColumnNoise of_column;
     of_column.column = columns[c];
+    const bool motion = c < s.measurement.motion_columns.size();
+    const bool axis = s.robot.model == "single_axis";
+    of_column.unit = motion ? motion_unit(s) : output_unit(s.robot, axis ? s.model.output_units.front() : "N·m");
+    if (motion) {
+      of_column.known = known_motion_noise(s);
+    } else if (s.robot.noise.effort.value) {
+      of_column.known = KnownNoise{*s.robot.noise.effort.value, of_column.unit, "as declared"};
+    }
     of_column.evidence.differences = differences[c];
     of_column.evidence.standstill = standstill.columns[c];
     of_column.choice = choose_noise(of_column.evidence);
@@ -44,16 +73,35 @@ std::vector<PhysicalQuantity> quantities(const Model& model) {
   return list;
 }
 
-std::vector<ParameterWords> parameter_words(const Model& model) {
+std::vector<ParameterWords> parameter_words(const Setting& s, bool physical) {
   std::vector<ParameterWords> list;
-  for (const Parameter& p : model.parameters) {
-    list.push_back({p.name, p.unit, p.excite, kind_of(p.physical)});
+  for (const Parameter& p : s.model.parameters) {
+    list.push_back({physical ? p.physical : p.name, physical ? p.physical_unit : parameter_unit(s.robot, p), p.excite,
+                    kind_of(p.physical)});
   }
   return list;
 }
 
+// From θ_L to physical quantities: θ_L,j = (physical quantity + offset)/scale.
+void to_physical(IdentifiabilityInput& input, const std::vector<PhysicalScale>& scales) {
+  Eigen::VectorXd scale(static_cast<Eigen::Index>(scales.size()));
+  for (std::size_t j = 0; j < scales.size(); ++j) {
+    scale[static_cast<Eigen::Index>(j)] = scales[j].scale;
+  }
+  const Eigen::VectorXd per = scale.cwiseInverse();
+  input.factor = input.factor * per.asDiagonal();
+  if (input.noise.size() > 0) {
+    input.noise = per.asDiagonal() * input.noise * per.asDiagonal();
+  }
+  if (input.covariance.size() > 0) {
+    input.covariance = scale.asDiagonal() * input.covariance * scale.asDiagonal();
+  }
+  input.size = input.size.cwiseProduct(scale.cwiseAbs());
+}
+
 Identifiability judge(const Setting& s, const Fit& fit, const RegressionMoments& moments) {
-  IdentifiabilityInput input = identifiability_input(fit.factor, parameter_words(s.model));
+  const auto scales = physical_scales(s.robot, s.model);
+  IdentifiabilityInput input = identifiability_input(fit.factor, parameter_words(s, scales.has_value()));
   const auto p = static_cast<Eigen::Index>(s.model.p());
   if (const auto noise = row_noise(s)) {
     input.noise = Eigen::MatrixXd::Zero(p, p);
@@ -72,24 +120,36 @@ Identifiability judge(const Setting& s, const Fit& fit, const RegressionMoments&
       input.size[j] = 1.0;
     }
   }
+  if (scales) {
+    to_physical(input, *scales);
+  }
   return identifiability(input);
 }
 
+// The shape at its best and along all that was searched; `reference` is the weighted rss without it.
 ShapeFinding finding(std::string name, std::string unit, const SeparableModel& model, VariableProjectionOptions options,
-                     const Fit& fit, double reference) {
+                     const Fit& fit, double reference, std::size_t points) {
   options.weights = fit.weights;
   const SeparableFit found = variable_projection(model, options);
+  const auto ratio = [&](double rss) { return reference > 0.0 ? std::sqrt(rss / reference) : 1.0; };
   ShapeFinding f;
   f.name = std::move(name);
   f.unit = std::move(unit);
+  f.searched = {options.lower[0], options.upper[0]};
   f.converged = found.end == SearchEnd::converged;
   if (found.end != SearchEnd::failed) {
     f.state = found.state[0];
     f.estimate = found.shape[0];
     f.standard_error = found.standard_error[0];
     f.freedom = found.freedom;
-    f.residual_ratio = reference > 0.0 ? std::sqrt(found.weighted_rss / reference) : 1.0;
+    f.residual_ratio = ratio(found.weighted_rss);
+    f.curve.push_back({f.estimate, f.residual_ratio});
   }
+  for (const CostPoint& point : cost_curve(model, Eigen::VectorXd::Constant(1, f.searched.lower), 0, f.searched.lower,
+                                           f.searched.upper, points, fit.weights)) {
+    f.curve.push_back({point.shape, ratio(point.weighted_rss)});
+  }
+  std::ranges::stable_sort(f.curve, {}, &ShapePoint::shape);
   return f;
 }
 
@@ -106,7 +166,8 @@ void find_shapes(LogSource& log, const Setting& s, const Fit& fit, const Identif
   const auto look = [&](const char* name, TimeEffect effect, double lower) {
     try {
       const TimeShiftedRows model(rows, effect, lower, options.longest_delay);
-      result.shapes.push_back(finding(name, "s", model, model.options(), fit, rss_at(model, 0.0, fit)));
+      result.shapes.push_back(
+          finding(name, "s", model, model.options(), fit, rss_at(model, 0.0, fit), options.curve_points));
     } catch (const InvalidArgument& error) {
       result.notes.push_back(fmt::format("{} was not looked for: {}", name, error.what()));
     }
@@ -120,19 +181,33 @@ void find_shapes(LogSource& log, const Setting& s, const Fit& fit, const Identif
     VariableProjectionOptions search;
     search.lower = Eigen::VectorXd::Constant(1, kSlowestStribeck * fastest);
     search.upper = Eigen::VectorXd::Constant(1, kFastestStribeck * fastest);
-    const char* unit = s.robot.model == "single_axis" ? "m/s (rotary: rad/s)" : "rad/s";
-    result.shapes.push_back(finding("stribeck_speed", unit, model, search, fit, fit.squares.weighted_rss));
+    const char* unit = s.robot.model == "single_axis" ? "m/s or rad/s" : "rad/s";
+    result.shapes.push_back(
+        finding("stribeck_speed", unit, model, search, fit, fit.squares.weighted_rss, options.curve_points));
   }
 }
 
-void calibrate(LogSource& log, const Setting& s, Identification& result) {
-  const bool has_pose = log.find("theta").has_value() && log.find("omega_r") && log.find("omega_l");
-  if (s.robot.model == "single_axis" || !has_pose) {
+bool shows_kinematics(const LogSource& log, const Robot& robot) {
+  return robot.model != "single_axis" && log.find("theta") && log.find("omega_r") && log.find("omega_l");
+}
+
+bool has_effort(const LogSource& log, const Robot& robot, const Model& model) {
+  return std::ranges::any_of(model.joints, [&](const Joint& joint) {
+    return log
+        .find(robot.effort == EffortKind::torque    ? joint.torque
+              : robot.effort == EffortKind::current ? joint.current
+                                                    : joint.voltage)
+        .has_value();
+  });
+}
+
+void calibrate(LogSource& log, const Robot& robot, Identification& result) {
+  if (!shows_kinematics(log, robot)) {
     return;
   }
   KinematicOptions options;
-  options.wheel_radius = s.robot.wheel_radius;
-  options.track_width = s.robot.track_width;
+  options.wheel_radius = robot.wheel_radius;
+  options.track_width = robot.track_width;
   const bool position = log.find("x").has_value() && log.find("y").has_value();
   options.radius = options.axle_offset = position;
   try {
@@ -146,12 +221,23 @@ void calibrate(LogSource& log, const Setting& s, Identification& result) {
 }  // namespace
 
 Identification identify(LogSource& log, const Robot& robot, const IdentificationOptions& options) {
+  check::that(options.curve_points >= 2, "curve_points", "at least 2");
   Identification result;
+  result.confidence = options.confidence;
   const auto tell = [&](std::string_view stage, double share) {
     if (options.progress) {
       options.progress(stage, share);
     }
   };
+  if (const Model model = make_model(robot); !has_effort(log, robot, model) && shows_kinematics(log, robot)) {
+    tell("kinematics", 0.1);
+    result.effort = false;
+    result.setting.robot = robot;
+    result.setting.model = model;
+    result.notes.emplace_back("the log has no efforts: mass, inertia and friction were not looked for");
+    calibrate(log, robot, result);
+    return result;
+  }
   SettingOptions settle_options = options.setting;
   settle_options.progress = options.progress;
   result.setting = settle(log, robot, settle_options);
@@ -200,7 +286,7 @@ Identification identify(LogSource& log, const Robot& robot, const Identification
                     s.survey.rows, options.most_rows));
   }
   tell("kinematics", 0.95);
-  calibrate(log, s, result);
+  calibrate(log, robot, result);
   log.rewind();
   tell("done", 1.0);
   return result;

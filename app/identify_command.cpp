@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <memory>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include <wheelwright/commission/identification.hpp>
+#include <wheelwright/commission/identification_words.hpp>
+#include <wheelwright/core/error.hpp>
+#include <wheelwright/io/identification_json.hpp>
+#include <wheelwright/io/robot_file.hpp>
+#include <wheelwright/report/identify_report.hpp>
+
+#include "commands.hpp"
+#include "common.hpp"
+#include "identify_summary.hpp"
+#include "progress.hpp"
+
+namespace wheelwright::app {
+namespace {
+
+struct Arguments {
+  std::vector<std::filesystem::path> logs;
+  std::filesystem::path robot;
+  bool no_shapes = false;
+  CommonOptions common;
+};
+
+constexpr const char* kHelp =
+    "What a log of fault-free driving says about the robot's parameters, how sure that is, and what to drive next. No "
+    "thresholds are made: that is what commission does.\n\n"
+    "Noise in the measured speed biases least squares, so the estimator is chosen for the log and the reason told. "
+    "Intervals are made by several methods that assume different things; where they agree, they can be believed. A "
+    "parameter that the log does not show is named with the manoeuvre that would show it. Delay, lags and a Stribeck "
+    "bend are looked for beside the model. A log with a pose (x, y, theta) also gives wheel radii and track width; "
+    "without efforts, these only.";
+
+constexpr const char* kExamples =
+    "How to drive: speed up and brake, drive curves and change the yaw rate, in both directions, slow and fast, for a "
+    "minute or more.\n\n"
+    "Examples:\n"
+    "  wheelwright identify drive.csv --robot robot.yaml\n"
+    "  wheelwright identify drive.csv --robot robot.yaml --out result    # identification.json, report.html\n"
+    "  wheelwright identify monday.csv tuesday.csv.gz --robot robot.yaml --json > identification.json\n\n"
+    "Exit code: 0 the log shows parameters (or kinematics), 1 it shows none, 2 bad input.";
+
+// Wheel speeds and a pose, and no effort at all.
+bool for_kinematics_only(const CsvLog& log, const Robot& robot) {
+  const std::vector<std::string> needed = needed_columns(robot);
+  const bool effort = std::ranges::any_of(needed, [&](const std::string& name) { return log.find(name).has_value(); });
+  return !effort && robot.model != "single_axis" && log.find("theta") && log.find("omega_r") && log.find("omega_l");
+}
+
+int run(const Arguments& a) {
+  make_directory(a.common);
+  const Robot robot = read_robot(a.robot);
+  CsvOptions reader = reader_options(a.common);
+  reader.only = useful_columns(robot);
+  CsvLog log(a.logs, reader);
+  if (!for_kinematics_only(log, robot)) {
+    require_columns(log, needed_columns(robot));
+  }
+  ReportContext context = report_context(a.common, log.report(), log);
+  context.seeds = {{"bootstrap and signs", a.common.seed}};
+  Progress progress(a.common.quiet);
+  IdentificationOptions options;
+  options.seed = a.common.seed;
+  options.shapes = !a.no_shapes;
+  options.progress = [&](std::string_view stage, double share) { progress.tell(stage, share); };
+  const Identification result = identify(log, robot, options);
+  publish(a.common, to_json(result, log.report(), software(), a.common.seed), "identification.json",
+          identify_report(result, context));
+  if (!a.common.quiet && !a.common.json) {
+    for (const std::string& sentence : context.warnings) {
+      fmt::print("log: {}\n", sentence);
+    }
+    fmt::print("{}", summary(result));
+    if (!a.common.out.empty()) {
+      fmt::print("wrote {} and {}\n", (a.common.out / "identification.json").string(),
+                 (a.common.out / "report.html").string());
+    }
+  }
+  return standing(result) == IdentificationStanding::bad ? kNo : kDone;
+}
+
+}  // namespace
+
+Run add_identify(CLI::App& program) {
+  auto a = std::make_shared<Arguments>();
+  CLI::App& command = *program.add_subcommand("identify", kHelp);
+  command.add_option("LOG", a->logs, "CSV logs (also .gz, .zst); several are taken together")->required();
+  command.add_option("--robot", a->robot, "Robot file (YAML)")->required()->type_name("FILE");
+  command.add_flag("--no-shapes", a->no_shapes, "Do not look for delay, lags and Stribeck speed");
+  add_common(command, a->common);
+  add_map(command, a->common);
+  command.footer(kExamples);
+  return [a](const std::string& command_line) {
+    a->common.command_line = command_line;
+    return run(*a);
+  };
+}
+
+}  // namespace wheelwright::app
