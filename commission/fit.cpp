@@ -82,7 +82,8 @@ double t_quantile(const ResidualSummary& summary) {
 
 RegressionMoments log_moments(LogSource& log, const Setting& s, Part part) {
   const RegressorFilter filter(s.model, s.filter, s.measurement);
-  if (const auto commands = commanded_motion(log, s.model)) {
+  const auto commands = commanded_motion(log, s.model);
+  if (commands && !s.commands_are_noisy) {
     InstrumentStream stream(log, filter, *commands);
     FoldedSource rows(stream, part, s.survey.rows, s.folds);
     return moments_with_instruments(rows);
@@ -98,7 +99,7 @@ Fit fit_log(LogSource& log, const Setting& s, Part part, double risk) {
       .simulate = [&](const Eigen::VectorXd& theta) { return simulated_moments(log, s, part, theta); },
       .noise = row_noise(s),
       .noise_origin = s.motion_noise ? s.motion_noise->origin : "",
-      .effort_is_exact = s.measurement.hold == Hold::zero_order};
+      .effort_is_exact = s.measurement.hold == Hold::zero_order && !(s.robot.noise.effort.value.value_or(0.0) > 0.0)};
   Fit fit;
   fit.weights = efficient_weights(evidence.rows);
   fit.factor = LeastSquares(s.model.p(), fit.weights);

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <Eigen/Eigenvalues>
 
 #include <wheelwright/commission/noise_budget.hpp>
 #include <wheelwright/commission/physical.hpp>
@@ -19,7 +20,8 @@
 namespace wheelwright {
 namespace {
 
-constexpr double kRisk = 1e-3;                                     // of Fit::plausible, which is not looked at here
+constexpr double kMostBias = 0.5;  // standard errors, by noise of the motion: more could pass for a lag
+constexpr double kRisk = 1e-3;     // of Fit::plausible, which is not looked at here
 constexpr double kSlowestStribeck = 0.01, kFastestStribeck = 0.5;  // of the largest joint speed
 
 std::string motion_unit(const Setting& s) {
@@ -159,6 +161,34 @@ double rss_at(const SeparableModel& model, double shape, const Fit& fit) {
   return cost_curve(model, at, 0, shape, shape + 1e-9, 2, fit.weights).front().weighted_rss;
 }
 
+// The physically consistent θ nearest to the chosen estimate, in the metric of its covariance. Parameters that are not
+// excited stay at zero.
+ConstrainedFit nearest_consistent(const Fit& fit, const std::vector<LinearConstraint>& constraints) {
+  const auto p = fit.estimate.size();
+  Eigen::MatrixXd precision = Eigen::MatrixXd::Identity(p, p);
+  std::vector<Eigen::Index> in;
+  for (Eigen::Index j = 0; j < p; ++j) {
+    if (fit.residuals.standard_error[j] > 0.0 && std::isfinite(fit.residuals.standard_error[j])) {
+      in.push_back(j);
+    }
+  }
+  const Eigen::MatrixXd covariance = fit.residuals.covariance(in, in);
+  const Eigen::VectorXd scale = covariance.diagonal().cwiseSqrt();
+  const Eigen::MatrixXd correlation =
+      scale.cwiseInverse().asDiagonal() * covariance * scale.cwiseInverse().asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(correlation);
+  const Eigen::VectorXd lengths = eigen.eigenvalues().cwiseMax(1e-12).cwiseSqrt().cwiseInverse();
+  precision(in, in) =
+      lengths.asDiagonal() * eigen.eigenvectors().transpose() * Eigen::MatrixXd(scale.cwiseInverse().asDiagonal());
+  RegressionBlock rows;
+  rows.resize(static_cast<std::size_t>(p), 1, static_cast<std::size_t>(p));
+  rows.Y = precision;
+  rows.y = precision * fit.estimate;
+  LeastSquares metric(static_cast<std::size_t>(p));
+  metric.add(rows);
+  return constrained_least_squares(metric, constraints, fit.residuals.covariance);
+}
+
 void find_shapes(LogSource& log, const Setting& s, const Fit& fit, const IdentificationOptions& options,
                  Identification& result) {
   RegressionStream stream = make_rows(log, s);
@@ -251,7 +281,7 @@ Identification identify(LogSource& log, const Robot& robot, const Identification
 
   tell("robust and constrained fits", 0.5);
   const std::vector<LinearConstraint> constraints = physical_consistency(quantities(s.model), s.robot.footprint_radius);
-  result.constrained = constrained_least_squares(result.fit.factor, constraints, result.fit.residuals.covariance);
+  result.constrained = nearest_consistent(result.fit, constraints);
   RegressionStream rows = make_rows(log, s);
   RobustOptions robust;
   robust.constraints = constraints;
@@ -277,7 +307,17 @@ Identification identify(LogSource& log, const Robot& robot, const Identification
   information.weights = result.fit.weights;
   result.information = information_over_time(moments, information);
 
-  if (options.shapes && s.survey.rows <= options.most_rows) {
+  const EstimatorChoice& choice = result.fit.choice;
+  const bool noisy =
+      choice.in_doubt || choice.predicted_bias.size() == 0 || choice.predicted_bias.cwiseAbs().maxCoeff() > kMostBias;
+  if (noisy) {
+    result.notes.push_back(
+        "the robust fit does without instruments and shares the bias of least squares by noise of the motion");
+  }
+  if (options.shapes && noisy) {
+    result.notes.push_back(
+        "delay, lags and Stribeck speed were not looked for: noise of the motion would pass for a lag");
+  } else if (options.shapes && s.survey.rows <= options.most_rows) {
     tell("delays and lags", 0.85);
     find_shapes(log, s, result.fit, options, result);
   } else if (options.shapes) {

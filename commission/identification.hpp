@@ -82,11 +82,11 @@ struct Identification {
   Fit fit;
   std::vector<ColumnNoise> noise;   ///< motion columns, then effort columns
   RobustFit robust;                 ///< Huber's loss, physically consistent
-  ConstrainedFit constrained;       ///< least squares, physically consistent
+  ConstrainedFit constrained;       ///< physically consistent θ nearest to the chosen estimate, by its covariance
   RegionComparison regions;         ///< of the chosen estimate; empty where no parameter is excited
   Identifiability identifiability;  ///< of the physical quantities where physical_scales() has them, else of θ_L
   InformationOverTime information;
-  std::vector<ShapeFinding> shapes;                ///< empty where they were not looked for
+  std::vector<ShapeFinding> shapes;  ///< empty where they were not looked for: least squares must be unbiased for that
   std::optional<KinematicCalibration> kinematics;  ///< where the log has a pose
   std::vector<std::string> notes;                  ///< what was assumed, left out or could not be done
 };

@@ -10,6 +10,8 @@
 #include <wheelwright/commission/parameter_choice.hpp>
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/identify/difference_noise.hpp>
+#include <wheelwright/identify/instruments.hpp>
+#include <wheelwright/identify/shared_noise.hpp>
 
 namespace wheelwright {
 namespace {
@@ -55,32 +57,26 @@ void settle_parameters(LogSource& log, Setting& s) {
   }
 }
 
-// What is declared or follows from the encoder comes first; samples of a signal show their noise in differences.
+// Samples of a signal show their noise in differences; a bound is only a limit.
 std::optional<MotionNoise> find_motion_noise(LogSource& log, const Setting& s) {
-  const auto bound = motion_error(s.robot, s.measurement);
-  if (s.measurement.motion == MotionKind::mean_speed || (bound && s.measurement.motion == MotionKind::angle)) {
-    if (!bound) {
-      return std::nullopt;
+  if (s.measurement.motion != MotionKind::mean_speed) {
+    double squares = 0.0, relative = 0.0;
+    bool white = true;
+    const auto noises = difference_noise(log, s.measurement.motion_columns);
+    for (const DifferenceNoise& noise : noises) {
+      white = white && (noise.kind == DifferenceNoise::Kind::white || noise.kind == DifferenceNoise::Kind::none);
+      squares += noise.sd * noise.sd / static_cast<double>(noises.size());
+      relative = std::max(relative, std::hypot(noise.relative_sd, noise.hidden));
     }
-    return MotionNoise{
-        *bound / std::sqrt(3.0), 0.0,
-        s.measurement.count > 0.0 || s.robot.encoder_counts_per_turn ? "half an encoder count" : "as declared"};
+    if (white) {
+      const double sd = std::sqrt(squares);
+      const char* unit = s.measurement.motion == MotionKind::angle ? "rad" : "rad/s";
+      return MotionNoise{sd, relative, false, fmt::format("{:.2g} {} by differences", sd, unit)};
+    }
   }
-  double squares = 0.0, relative = 0.0;
-  bool white = true;
-  const auto noises = difference_noise(log, s.measurement.motion_columns);
-  for (const DifferenceNoise& noise : noises) {
-    white = white && (noise.kind == DifferenceNoise::Kind::white || noise.kind == DifferenceNoise::Kind::none);
-    squares += noise.sd * noise.sd / static_cast<double>(noises.size());
-    relative = std::max(relative, noise.relative_sd);
-  }
-  if (white) {
-    const double sd = std::sqrt(squares);
-    const char* unit = s.measurement.motion == MotionKind::angle ? "rad" : "rad/s";
-    return MotionNoise{sd, relative, fmt::format("{:.2g} {} by differences", sd, unit)};
-  }
-  if (bound) {
-    return MotionNoise{*bound / std::sqrt(3.0), 0.0, "as declared"};
+  if (const auto bound = motion_error(s.robot, s.measurement)) {
+    const bool encoder = s.measurement.count > 0.0 || s.robot.encoder_counts_per_turn;
+    return MotionNoise{*bound / std::sqrt(3.0), 0.0, true, encoder ? "half an encoder count" : "as declared"};
   }
   return std::nullopt;
 }
@@ -123,6 +119,14 @@ Setting settle(LogSource& log, const Robot& robot, const SettingOptions& options
   s.prior.sides = prior.bounds;
   s.prior_declared = prior.declared;
   s.motion_noise = find_motion_noise(log, s);
+  if (const auto commands = commanded_motion(log, s.model)) {
+    s.commands_are_noisy = share_noise(log, commands->columns, s.measurement.motion_columns);
+    if (s.commands_are_noisy) {
+      s.notes.push_back(
+          "the commanded speeds carry the noise of the measured motion (they were made from it): they are not used as "
+          "instruments");
+    }
+  }
   const NoiseBudget budget = noise_budget(s.robot, s.measurement, s.survey);
   s.noise_complete = budget.complete;
   if (budget.complete) {

@@ -26,7 +26,9 @@ namespace wheelwright {
 /// Noise of the motion column, independent from sample to sample, the same in all joints.
 struct MotionNoise {
   double sd = 0.0;           ///< rad for angles and the angles behind mean speeds, else rad/s (linear axes: m, m/s)
-  double relative_sd = 0.0;  ///< standard error of sd², relative to it; 0 where it was not estimated
+  double relative_sd = 0.0;  ///< error of sd², relative to it: its standard error, and what a correlation of
+                             ///< neighbouring errors could hide (difference_noise.hpp); 0 for an upper limit
+  bool upper_limit = false;  ///< from a bound (declared, or half a count): the noise may be smaller
   std::string origin;        ///< in words
 };
 
@@ -40,7 +42,8 @@ struct Setting {
   Survey survey;
   SignalErrors declared;        ///< of the rows, from declared noise only; all zero where that is incomplete
   bool noise_complete = false;  ///< motion and effort are declared
-  std::optional<MotionNoise> motion_noise;  ///< declared, from the encoder, or found by differences
+  std::optional<MotionNoise> motion_noise;  ///< found by differences; else a limit, declared or from the encoder
+  bool commands_are_noisy = false;          ///< logged commands share the noise of the motion: they are no instruments
   Box prior;
   std::vector<bool> prior_declared;  ///< p: the robot file's, not the tool's default
   FoldOptions folds;                 ///< purge is the filter's memory
@@ -63,8 +66,8 @@ struct SettingOptions {
 /// The rows of `log` in this setting, with the error bounds `errors`.
 [[nodiscard]] RegressionStream make_rows(LogSource& log, const Setting& setting, const SignalErrors& errors = {});
 
-/// What the noise of the motion adds to the rows' moments (estimate.hpp), and the efforts' variance for total least
-/// squares where their noise is declared; nothing where the noise is not known.
+/// What the noise of the motion (at its limit, where only that is known) adds to the rows' moments (estimate.hpp), and
+/// the efforts' variance for total least squares where their noise is declared; nothing where it is not known at all.
 [[nodiscard]] std::optional<RowNoise> row_noise(const Setting& setting);
 
 }  // namespace wheelwright

@@ -286,6 +286,32 @@ Eigen::VectorXd instrument_strength(const RegressionMoments& moments, const Esti
   return strength;
 }
 
+Eigen::VectorXd instrument_relevance(const RegressionMoments& moments, const EstimatorOptions& options) {
+  check::that(moments.has_instruments(), "instrument relevance", "moments with instruments");
+  const Eigen::VectorXd w = weights_of(moments, options);
+  const auto kept = kept_columns(moments.parameters(), options.excluded);
+  const MomentSums total = moments.total(w);
+  const auto p = total.Yy.size();
+  Eigen::VectorXd relevance = Eigen::VectorXd::Constant(p, std::numeric_limits<double>::quiet_NaN());
+  const Equations transposed(total.ZY.transpose(), column_sizes(total.YY), column_sizes(total.ZZ), kept);
+  if (!transposed.solvable()) {
+    return relevance;
+  }
+  for (const Eigen::Index j : kept) {
+    const Eigen::VectorXd h = transposed.solve(Eigen::VectorXd::Unit(p, j));  // hᵀ Σ ZᵀY = e_j
+    const double squares = h.dot(total.ZZ * h);
+    const double pi = squares > 0.0 ? 1.0 / squares : 0.0;
+    Eigen::MatrixXd scores(1, static_cast<Eigen::Index>(moments.blocks().size()));
+    for (Eigen::Index b = 0; b < scores.cols(); ++b) {
+      const MomentSums s = moments.block(static_cast<std::size_t>(b), w);
+      scores(0, b) = h.dot(s.ZY.col(j)) - pi * h.dot(s.ZZ * h);
+    }
+    const double variance = long_run_covariance(scores, options.most_frequencies).matrix(0, 0);
+    relevance[j] = variance > 0.0 ? 1.0 / variance : std::numeric_limits<double>::infinity();
+  }
+  return relevance;
+}
+
 ContrastTest contrast_test(const Estimate& first, const Estimate& second, const EstimatorOptions& options) {
   check::that(first.usable && second.usable && first.influence.cols() == second.influence.cols(), "contrast test",
               "two usable estimates from the same moments");
@@ -305,7 +331,8 @@ ContrastTest contrast_test(const Estimate& first, const Estimate& second, const 
   }
   const auto q = static_cast<double>(tested.size());
   const double B = covariance.freedom;
-  if (tested.empty() || B < q + 1.0) {
+  test.made = B >= q;
+  if (tested.empty() || !test.made) {
     return test;
   }
   const Eigen::VectorXd scale = covariance.matrix.diagonal()(tested).cwiseSqrt().cwiseInverse();

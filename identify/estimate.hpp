@@ -74,8 +74,17 @@ struct RowNoise {
 [[nodiscard]] Eigen::VectorXd instrument_strength(const RegressionMoments& moments,
                                                   const EstimatorOptions& options = {});
 
+/// How surely the instruments move with each parameter's column: F of the first stage, robust to autocorrelation. With z =
+/// Zh the combination of instruments that is orthogonal to all other columns of Y (the one that estimates θ_j) and π =
+/// Σ zY_j / Σ z², F_j = (Σ zY_j)² over the long-run variance of Σ z(Y_j − πz). Below about 10 instruments are weak, and
+/// intervals are not to be trusted (Staiger and Stock 1997); noise in Y alone does not make them weak. NaN where it cannot
+/// be computed, infinite for instruments that are the columns themselves.
+[[nodiscard]] Eigen::VectorXd instrument_relevance(const RegressionMoments& moments,
+                                                   const EstimatorOptions& options = {});
+
 /// A test whether two estimators of the same θ differ by more than chance.
 struct ContrastTest {
+  bool made = false;           ///< false: the log is too short for it, p_value is 1 and means nothing
   double statistic = 0.0;      ///< F
   double p_value = 1.0;        ///< probability of a contrast as large by chance
   Eigen::VectorXd difference;  ///< p, second minus first

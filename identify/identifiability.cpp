@@ -115,8 +115,8 @@ void find_base(const IdentifiabilityInput& input, const Scaled& scaled, Identifi
       unseen.words = input.parameters[static_cast<std::size_t>(d)].name + ": its motion never occurs in the log";
     } else {
       unseen.words = fmt::format("{} cannot be told apart here: only {} {} seen",
-                                 names_in_words(names_of(unseen.members, input.parameters)), names_in_words(combinations),
-                                 combinations.size() == 1 ? "is" : "are");
+                                 names_in_words(names_of(unseen.members, input.parameters)),
+                                 names_in_words(combinations), combinations.size() == 1 ? "is" : "are");
     }
     unseen.manoeuvres = missing_manoeuvres(unseen.members, input.parameters);
     result.unseen.push_back(std::move(unseen));

@@ -66,6 +66,7 @@ MotionSimulation::MotionSimulation(Model model, Eigen::VectorXd theta, Hold hold
 
 void MotionSimulation::restart(double t, const Eigen::VectorXd& speed, const Eigen::VectorXd& effort) {
   t_ = t;
+  heading_ = 0.0;
   joint_ = speed;
   speed_ = model_.motion * speed;
   effort_ = effort;
@@ -92,7 +93,7 @@ Eigen::VectorXd MotionSimulation::acceleration(const Eigen::VectorXd& speed, con
   return inverse_inertia_ * force;
 }
 
-const Eigen::VectorXd& MotionSimulation::step(double t, const Eigen::VectorXd& effort, double heading) {
+const Eigen::VectorXd& MotionSimulation::step(double t, const Eigen::VectorXd& effort) {
   const double whole = t - t_;
   const double h = whole / kSubsteps;
   const auto effort_at = [&](double share) -> Eigen::VectorXd {
@@ -102,11 +103,15 @@ const Eigen::VectorXd& MotionSimulation::step(double t, const Eigen::VectorXd& e
     const double begin = static_cast<double>(k) / kSubsteps;
     const Eigen::VectorXd e0 = effort_at(begin), e1 = effort_at(begin + 0.5 / kSubsteps),
                           e2 = effort_at(begin + 1.0 / kSubsteps);
-    const Eigen::VectorXd k1 = acceleration(speed_, e0, heading);
-    const Eigen::VectorXd k2 = acceleration(speed_ + 0.5 * h * k1, e1, heading);
-    const Eigen::VectorXd k3 = acceleration(speed_ + 0.5 * h * k2, e1, heading);
-    const Eigen::VectorXd k4 = acceleration(speed_ + h * k3, e2, heading);
+    const Eigen::VectorXd k1 = acceleration(speed_, e0, heading_);
+    const Eigen::VectorXd k2 = acceleration(speed_ + 0.5 * h * k1, e1, heading_);
+    const Eigen::VectorXd k3 = acceleration(speed_ + 0.5 * h * k2, e1, heading_);
+    const Eigen::VectorXd k4 = acceleration(speed_ + h * k3, e2, heading_);
+    const Eigen::VectorXd before = speed_;
     speed_ += h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4);
+    if (model_.heading_coordinate >= 0) {
+      heading_ += 0.5 * h * (before[model_.heading_coordinate] + speed_[model_.heading_coordinate]);
+    }
   }
   t_ = t;
   effort_ = effort;

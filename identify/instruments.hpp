@@ -20,10 +20,11 @@ namespace wheelwright {
 struct InstrumentMotion {
   /// The two kinds.
   enum class Kind {
-    commanded,  ///< logged commands: free of the sensors' noise, also where they come from feedback of the pose
-    simulated,  ///< the model with parameters `theta`, driven by the logged efforts. Free of the noise of the motion; it
-                ///< holds that of measured efforts, which biases inertias by the noise's share of the effort's power
-                ///< (an effort that is a command has none)
+    commanded,  ///< logged commands: free of the sensors' noise unless they are feedback of the noisy motion itself, or of
+                ///< a pose made from it (shared_noise.hpp looks for the first)
+    simulated,  ///< the model with parameters `theta`, driven by the logged efforts. It does not see the noise of the
+                ///< motion, except through a controller that answers to it; it holds that of measured efforts, which
+                ///< biases inertias by the noise's share of the effort's power (an effort that is a command has none)
   };
   Kind kind = Kind::commanded;
   std::vector<std::string> columns;  ///< commanded: one column of joint speeds for each joint
@@ -42,11 +43,11 @@ class MotionSimulation {
   [[nodiscard]] static bool possible(const Model& model, const Eigen::VectorXd& theta);
   /// Throws InvalidArgument where it is not possible. `hold` of the efforts between samples.
   MotionSimulation(Model model, Eigen::VectorXd theta, Hold hold);
-  /// Begins a segment at time `t` (s) with joint speeds `speed` and `effort` of each joint.
+  /// Begins a segment at time `t` (s) with joint speeds `speed` and `effort` of each joint, heading 0.
   void restart(double t, const Eigen::VectorXd& speed, const Eigen::VectorXd& effort);
-  /// Advances to the sample at `t` with `effort`; returns the speeds of the joints there. `heading` is what the model's
-  /// terms are told.
-  const Eigen::VectorXd& step(double t, const Eigen::VectorXd& effort, double heading = 0.0);
+  /// Advances to the sample at `t` with `effort`; returns the speeds of the joints there. The heading that the model's terms
+  /// see is the simulated one.
+  const Eigen::VectorXd& step(double t, const Eigen::VectorXd& effort);
 
  private:
   [[nodiscard]] Eigen::VectorXd acceleration(const Eigen::VectorXd& speed, const Eigen::VectorXd& effort,
@@ -57,6 +58,7 @@ class MotionSimulation {
   Hold hold_;
   Eigen::MatrixXd inverse_inertia_, joints_from_coordinates_;
   double t_ = 0.0;
+  double heading_ = 0.0;
   Eigen::VectorXd speed_, joint_, effort_;
 };
 
@@ -73,7 +75,8 @@ class InstrumentStream final : public RegressionSource {
   bool next(RegressionBlock& block) override;
   void rewind() override;
   /// Root mean square of the instruments' joint speeds that were made so far over that of the measured ones
-  /// (0 before the first sample, and for logs of angles): far from 1 where a simulation ran away.
+  /// (0 before the first sample, and for logs of angles, whose simulation starts at rest): far from 1 where a simulation
+  /// ran away.
   [[nodiscard]] double speed_ratio() const;
 
  private:

@@ -142,7 +142,7 @@ Json identification_json(const Commissioning& r) {
   json["estimator"] = to_string(choice.best().estimator);
   json["reason"] = choice.reason;
   json["in_doubt"] = choice.in_doubt;
-  if (choice.tested_against) {
+  if (choice.tested_against && choice.test.made) {
     json["endogeneity_test"] = {{"against", to_string(choice.candidates[*choice.tested_against].estimate.estimator)},
                                 {"F", choice.test.statistic},
                                 {"p_value", choice.test.p_value}};
@@ -158,6 +158,7 @@ Json identification_json(const Commissioning& r) {
                       {"freedom", c.estimate.freedom}};
     if (c.strength.size() > 0) {
       candidate["instrument_strength"] = numbers(c.strength);
+      candidate["instrument_relevance"] = numbers(c.relevance);
     }
     json["candidates"].push_back(candidate);
   }
