@@ -14,20 +14,29 @@ scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 ln -s "$PWD" "$scratch/wheelwright"
 
-status=0
+# One header for each call, as many at a time as there are processors.
+check() {
+  header=$1
+  source=$scratch/$(printf '%s' "$header" | tr / _).cpp
+  printf '#include <wheelwright/%s>\n' "$header" > "$source"
+  # shellcheck disable=SC2046
+  "$clang" -std=c++20 -fsyntax-only -Wdocumentation -Werror=documentation -Wno-documentation-html -I "$scratch" \
+    $(pkg-config --cflags-only-I eigen3 | sed 's/-I/-isystem /g') "$source" || {
+    echo "docs: $header" >&2
+    : > "$scratch/failed"
+  }
+}
+
+jobs=$(nproc 2>/dev/null || echo 2)
 count=0
 for header in */*.hpp; do
   case $header in
     build*/* | tests/* | node_modules/*) continue ;;
   esac
   count=$((count + 1))
-  printf '#include <wheelwright/%s>\n' "$header" > "$scratch/one.cpp"
-  # shellcheck disable=SC2046
-  "$clang" -std=c++20 -fsyntax-only -Wdocumentation -Werror=documentation -Wno-documentation-html -I "$scratch" \
-    $(pkg-config --cflags-only-I eigen3 | sed 's/-I/-isystem /g') "$scratch/one.cpp" || {
-    echo "docs: $header" >&2
-    status=1
-  }
+  check "$header" &
+  [ $((count % jobs)) -ne 0 ] || wait
 done
-[ $status -eq 0 ] && echo "docs: $count headers, nothing to report"
-exit $status
+wait
+[ ! -e "$scratch/failed" ] || exit 1
+echo "docs: $count headers, nothing to report"
