@@ -114,7 +114,7 @@ std::string comparison(const Identification& r) {
     }
   }
   line("robust", r.robust.estimate);
-  if (!r.constrained.active.empty()) {
+  if (!binding(r.constrained).empty()) {
     line("physically consistent", r.constrained.estimate);
   }
   for (const RegionRow& region : r.regions.rows) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <utility>
 
@@ -351,6 +352,13 @@ std::vector<ShownParameter> shown_parameters(const Identification& r) {
   return shown;
 }
 
+std::vector<ActiveConstraint> binding(const ConstrainedFit& fit) {
+  std::vector<ActiveConstraint> list;
+  std::ranges::copy_if(fit.active, std::back_inserter(list),
+                       [](const ActiveConstraint& a) { return a.multiplier > 0.0; });
+  return list;
+}
+
 bool matters(const ShapeFinding& shape) {
   if (shape.state != ShapeState::identified || !(shape.residual_ratio < kShapeMatters)) {
     return false;
@@ -453,7 +461,7 @@ std::vector<std::string> findings(const Identification& r) {
     add("Estimated by " + r.fit.choice.reason + ".");
     add(regions_sentence(r));
     add(robust_sentence(r));
-    for (const ActiveConstraint& a : r.constrained.active) {
+    for (const ActiveConstraint& a : binding(r.constrained)) {
       add(sentence(a.words));
     }
     const auto matter = std::ranges::count_if(r.shapes, matters);
@@ -490,7 +498,11 @@ std::vector<std::string> next_steps(const Identification& r) {
   }
   if (steps.empty()) {
     steps.emplace_back(
-        "Nothing is missing. `wheelwright commission` makes guaranteed bounds and thresholds of the same log.");
+        standing(r) == IdentificationStanding::bad
+            ? "Drive so that every parameter shows: speed up and brake, drive curves, in both directions, for a minute "
+              "or "
+              "more."
+            : "Nothing is missing. `wheelwright commission` makes guaranteed bounds and thresholds of the same log.");
   }
   return steps;
 }

@@ -35,6 +35,9 @@ enum class IdentificationStanding {
 /// The standing of `result`.
 [[nodiscard]] IdentificationStanding standing(const Identification& result);
 
+/// The constraints that hold `fit` back; a parameter that is left out touches zero and is not among them.
+[[nodiscard]] std::vector<ActiveConstraint> binding(const ConstrainedFit& fit);
+
 /// A shape matters where it is identified and the residual with it is below this share of that without.
 inline constexpr double kShapeMatters = 0.95;
 

@@ -53,7 +53,7 @@ std::vector<Cell> region_row(const Identification& r, const RegionRow& region) {
       row.push_back(numeric("–"));
       continue;
     }
-    const auto [low, high] = std::minmax(shown[j].value(region.lower[at]), shown[j].value(region.upper[at]));
+    const auto [low, high] = std::minmax({shown[j].value(region.lower[at]), shown[j].value(region.upper[at])});
     const auto [a, b] = outward(low, high);
     row.push_back(numeric(a + " to " + b));
   }
@@ -107,9 +107,8 @@ std::string comparison_section(const Identification& r) {
   }
   rows.push_back(estimate_row(r, "Robust<small>Huber’s loss, physically consistent</small>", r.robust.estimate,
                               r.robust.standard_error, r.robust.freedom));
-  if (!r.constrained.active.empty()) {
-    rows.push_back(
-        estimate_row(r, "Physically consistent<small>least squares</small>", r.constrained.estimate, {}, 1.0));
+  if (!binding(r.constrained).empty()) {
+    rows.push_back(estimate_row(r, "Physically consistent", r.constrained.estimate, {}, 1.0));
   }
   for (const RegionRow& region : r.regions.rows) {
     if (region.available) {
@@ -200,7 +199,7 @@ std::string robust_section(const Identification& r, const TimeAxis& axis) {
                         numeric(number(e.worst)), numeric(count(e.instants)), numeric(std::to_string(e.worst_sample))});
   }
   std::vector<std::string> bound;
-  for (const ActiveConstraint& a : r.constrained.active) {
+  for (const ActiveConstraint& a : binding(r.constrained)) {
     bound.push_back(capital(a.words));
   }
   return paragraph(
@@ -271,7 +270,7 @@ std::string column_noise_section(const Identification& r) {
                             : std::string("–"),
                     counts || !found ? numeric("–") : numeric(number(n.choice.sd, 2) + " " + escape(n.unit)),
                     counts || !found ? "–" : escape(std::string(to_string(n.choice.method))),
-                    escape(counts ? "what rounding does is known; what a log shows at rest or in differences is motion"
+                    escape(counts ? "what rounding does is known; at rest and in differences it does not show"
                                   : n.choice.assumption),
                     counts ? "" : escape(n.choice.reason)});
   }

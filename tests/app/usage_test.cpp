@@ -15,9 +15,9 @@ class Usage : public testing::ProgramTest {};
 TEST_F(Usage, HelpOfTheProgramNamesItsCommands) {
   const Outcome outcome = run("--help");
   EXPECT_EQ(outcome.code, 0);
-  EXPECT_THAT(outcome.out,
-              AllOf(HasSubstr("commission"), HasSubstr("detect"), HasSubstr("check"), HasSubstr("simulate"),
-                    HasSubstr("wheelwright commission LOG --robot robot.yaml --out result")));
+  EXPECT_THAT(outcome.out, AllOf(HasSubstr("commission"), HasSubstr("detect"), HasSubstr("check"),
+                                 HasSubstr("simulate"), HasSubstr("identify"), HasSubstr("design"),
+                                 HasSubstr("wheelwright commission LOG --robot robot.yaml --out result")));
   EXPECT_THAT(run("--version").out, HasSubstr("wheelwright "));
 }
 
@@ -26,7 +26,9 @@ TEST_F(Usage, HelpOfEachCommandNamesOptionsAndExamples) {
   const std::string detect = run("detect --help").out;
   const std::string check = run("check --help").out;
   const std::string simulate = run("simulate --help").out;
-  for (const std::string& help : {commission, detect, check, simulate}) {
+  const std::string identify = run("identify --help").out;
+  const std::string design = run("design --help").out;
+  for (const std::string& help : {commission, detect, check, simulate, identify, design}) {
     for (const std::string option : {"--help", "--out", "--json", "--threads", "--seed", "--quiet", "Examples:\n"}) {
       EXPECT_THAT(help, HasSubstr(option));
     }
@@ -42,13 +44,21 @@ TEST_F(Usage, HelpOfEachCommandNamesOptionsAndExamples) {
   for (const std::string option : {"MODEL", "LOG", "--map", "Exit code:", "  wheelwright check result/model.json"}) {
     EXPECT_THAT(check, HasSubstr(option));
   }
+  for (const std::string option :
+       {"LOG", "--robot", "--map", "--no-shapes", "Exit code:", "  wheelwright identify drive.csv"}) {
+    EXPECT_THAT(identify, HasSubstr(option));
+  }
+  for (const std::string option : {"--for", "--model", "--robot", "--speed", "--acceleration", "--effort", "--radius",
+                                   "--box", "--duration", "  wheelwright design --model"}) {
+    EXPECT_THAT(design, HasSubstr(option));
+  }
   EXPECT_THAT(simulate, AllOf(HasSubstr("SCENARIO"), HasSubstr("  wheelwright simulate ")));
 }
 
 TEST_F(Usage, BadUsageIsTwo) {
-  for (const std::string words :
-       {"", "frobnicate", "commission", "commission x.csv", "commission --robot robot.yaml", "detect",
-        "detect --model m.json", "check", "check m.json", "simulate", "commission --out"}) {
+  for (const std::string words : {"", "frobnicate", "commission", "commission x.csv", "commission --robot robot.yaml",
+                                  "detect", "detect --model m.json", "check", "check m.json", "simulate",
+                                  "commission --out", "identify", "identify x.csv", "design"}) {
     const Outcome outcome = run(words);
     EXPECT_EQ(outcome.code, 2) << words;
     EXPECT_THAT(outcome.out, IsEmpty()) << words;

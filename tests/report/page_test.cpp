@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// What must hold of every page, whatever it says.
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <regex>
@@ -10,19 +11,63 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include <wheelwright/commission/identification_words.hpp>
 #include <wheelwright/report/chart.hpp>
 #include <wheelwright/report/commission_report.hpp>
+#include <wheelwright/report/design_report.hpp>
 #include <wheelwright/report/detect_report.hpp>
+#include <wheelwright/report/identify_report.hpp>
 #include <wheelwright/report/signals.hpp>
 
 #include "report/example.hpp"
+#include "support/drives.hpp"
 
 namespace wheelwright {
 namespace {
 
 namespace example = report_example;
 
+// A drive with a pose, whose efforts are late by two samples; without turning where `straight`.
+Identification identified(bool straight) {
+  Scenario s = testing_support::exact_drive(testing_support::Shown::speeds, Hold::first_order);
+  s.sensors.pose = true;
+  s.sensors.effort = 0.02;
+  s.robot.noise.wheel_speed.value = 1e-4;
+  s.trajectory.kind = straight ? Trajectory::Kind::straight : s.trajectory.kind;
+  LogTable table = simulate(s);
+  for (std::size_t c = 0; c < table.names.size(); ++c) {
+    if (table.names[c].starts_with("tau")) {
+      std::rotate(table.columns[c].begin(), table.columns[c].end() - 2, table.columns[c].end());
+    }
+  }
+  TableSource log(table);
+  return identify(log, s.robot);
+}
+
+struct Designed {
+  DesignSubject subject;
+  MotionLimits limits;
+  BoundsDesign design;
+};
+
+Designed designed() {
+  Robot robot = example::robot();
+  robot.parameters = testing_support::kFour;
+  robot.nominal = {{"mass", 19.0}, {"yaw_inertia", 1.0}, {"viscous_linear", 3.0}, {"viscous_yaw", 0.4}};
+  robot.noise.wheel_speed.value = robot.noise.effort.value = 0.02;
+  robot.filter.beta = 10.0;
+  robot.limits = {{"speed", 8.0}, {"acceleration", 20.0}, {"effort", 6.0}};
+  Designed d{subject_of(robot, 0.02), limits_of(robot), {}};
+  d.limits.duration = 6.0;
+  d.limits.radius = 1.0;
+  d.design = design_for_bounds(d.subject, d.limits, WidthCriterion::geometric_mean,
+                               {.stages = 1, .samples = 8, .descents = 1, .steps = 10});
+  return d;
+}
+
 std::vector<std::pair<std::string, std::string>> all_pages() {
+  static const Identification whole = identified(false), straight = identified(true);
+  static const Designed plan = designed();
   const ReportContext context = example::context(900);
   return {{"done", commission_report(example::done(), context)},
           {"partial", commission_report(example::partial(), context)},
@@ -31,6 +76,10 @@ std::vector<std::pair<std::string, std::string>> all_pages() {
           {"failure", failure_report("no column tau_r", context)},
           {"fault", detect_report(example::detection(900, true), example::done().model, context)},
           {"healthy", detect_report(example::detection(900, false), example::done().model, context)},
+          {"identified", identify_report(whole, context)},
+          {"identified in part", identify_report(straight, context)},
+          {"designed", design_report(plan.design, plan.subject, plan.limits, context)},
+          {"default identification", identify_report({}, {})},
           {"default result", commission_report({}, {})},
           {"default detection", detect_report({}, {}, {})}};
 }
@@ -103,8 +152,22 @@ TEST(EveryPage, EscapesEveryName) {
   Commissioning contradicted = example::empty();
   contradicted.model.model.outputs[0] = contradicted.parameters[0].parameter.name = evil;
   const Detection fault = example::detection(300, true);
-  for (const std::string& page : {commission_report(result, context), commission_report(contradicted, context),
-                                  detect_report(fault, result.model, context), failure_report(evil, context)}) {
+  Identification identification = identified(true);
+  for (std::string* text :
+       {&identification.setting.robot.name, &identification.setting.model.outputs[0],
+        &identification.setting.model.parameters[0].physical, &identification.setting.model.parameters[0].physical_unit,
+        &identification.noise[0].column, &identification.noise[0].choice.reason, &identification.shapes[0].unit,
+        &identification.fit.choice.reason, &identification.regions.rows[0].promise,
+        &identification.identifiability.unseen[0].words}) {
+    *text = evil;
+  }
+  identification.notes = {evil};
+  Designed plan = designed();
+  plan.subject.robot.name = plan.subject.model.parameters[0].physical = evil;
+  for (const std::string& page :
+       {commission_report(result, context), commission_report(contradicted, context),
+        identify_report(identification, context), design_report(plan.design, plan.subject, plan.limits, context),
+        detect_report(fault, result.model, context), failure_report(evil, context)}) {
     EXPECT_TRUE(example::lacks(page, {"<script>alert"}));
     EXPECT_TRUE(example::lacks(page, {"<b onclick"}));
     EXPECT_TRUE(example::holds(page, {"&lt;script&gt;alert"}));
@@ -123,6 +186,18 @@ TEST(EveryPage, ClosesWhatItOpens) {
       EXPECT_EQ(times("<" + tag + "[ >]"), times("</" + tag + ">")) << name << ": " << tag;
     }
   }
+}
+
+TEST(IdentifyPage, SaysWhatWasFoundAndDrawsIt) {
+  const std::string page = identify_report(identified(false), example::context(900));
+  for (const char* heading :
+       {"What to do next", "Estimates and intervals", "What the log can tell", "Which seconds tell it",
+        "Beside the model", "Kinematics", "Outliers and physical sense", "Noise", "Raw signals"}) {
+    EXPECT_TRUE(example::holds(page, {heading}));
+  }
+  EXPECT_TRUE(example::holds(page, {"aria-label=\"information over time\"", "aria-label=\"residual over delay\""}));
+  EXPECT_TRUE(example::holds(page, {"late"}));
+  EXPECT_TRUE(example::lacks(identify_report({}, {}), {"aria-label=\"information over time\""}));
 }
 
 TEST(Page, OfSixThousandBinsIsBelowTwoMegabytes) {
