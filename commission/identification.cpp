@@ -78,8 +78,12 @@ std::vector<PhysicalQuantity> quantities(const Model& model) {
 std::vector<ParameterWords> parameter_words(const Setting& s, bool physical) {
   std::vector<ParameterWords> list;
   for (const Parameter& p : s.model.parameters) {
-    list.push_back({physical ? p.physical : p.name, physical ? p.physical_unit : parameter_unit(s.robot, p), p.excite,
-                    kind_of(p.physical)});
+    std::string name = physical ? p.physical : p.name;
+    if (physical) {
+      std::ranges::replace(name, '_', ' ');
+    }
+    list.push_back(
+        {std::move(name), physical ? p.physical_unit : parameter_unit(s.robot, p), p.excite, kind_of(p.physical)});
   }
   return list;
 }
@@ -172,14 +176,16 @@ ConstrainedFit nearest_consistent(const Fit& fit, const std::vector<LinearConstr
       in.push_back(j);
     }
   }
-  const Eigen::MatrixXd covariance = fit.residuals.covariance(in, in);
-  const Eigen::VectorXd scale = covariance.diagonal().cwiseSqrt();
-  const Eigen::MatrixXd correlation =
-      scale.cwiseInverse().asDiagonal() * covariance * scale.cwiseInverse().asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(correlation);
-  const Eigen::VectorXd lengths = eigen.eigenvalues().cwiseMax(1e-12).cwiseSqrt().cwiseInverse();
-  precision(in, in) =
-      lengths.asDiagonal() * eigen.eigenvectors().transpose() * Eigen::MatrixXd(scale.cwiseInverse().asDiagonal());
+  if (!in.empty()) {
+    const Eigen::MatrixXd covariance = fit.residuals.covariance(in, in);
+    const Eigen::VectorXd scale = covariance.diagonal().cwiseSqrt();
+    const Eigen::MatrixXd correlation =
+        scale.cwiseInverse().asDiagonal() * covariance * scale.cwiseInverse().asDiagonal();
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(correlation);
+    const Eigen::VectorXd lengths = eigen.eigenvalues().cwiseMax(1e-12).cwiseSqrt().cwiseInverse();
+    precision(in, in) =
+        lengths.asDiagonal() * eigen.eigenvectors().transpose() * Eigen::MatrixXd(scale.cwiseInverse().asDiagonal());
+  }
   RegressionBlock rows;
   rows.resize(static_cast<std::size_t>(p), 1, static_cast<std::size_t>(p));
   rows.Y = precision;
