@@ -97,7 +97,7 @@ Json estimators_json(const EstimatorChoice& choice) {
   if (choice.predicted_bias.size() > 0) {
     json["predicted_bias"] = numbers(choice.predicted_bias);
   }
-  if (choice.tested_against) {
+  if (choice.tested_against && choice.test.made) {
     json["endogeneity_test"] = {{"against", to_string(choice.candidates[*choice.tested_against].estimate.estimator)},
                                 {"F", choice.test.statistic},
                                 {"p_value", choice.test.p_value}};
@@ -112,6 +112,7 @@ Json estimators_json(const EstimatorChoice& choice) {
                       {"freedom", c.estimate.freedom}};
     if (c.strength.size() > 0) {
       candidate["instrument_strength"] = numbers(c.strength);
+      candidate["instrument_relevance"] = numbers(c.relevance);
     }
     json["candidates"].push_back(candidate);
   }

@@ -61,7 +61,7 @@ std::vector<Cell> region_row(const Identification& r, const RegionRow& region) {
 }
 
 std::string test_words(const EstimatorChoice& choice) {
-  if (!choice.tested_against) {
+  if (!choice.tested_against || !choice.test.made) {
     return {};
   }
   const std::string other = words(to_string(choice.candidates[*choice.tested_against].estimate.estimator));
