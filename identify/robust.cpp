@@ -366,6 +366,12 @@ RobustFit robust_fit(RegressionSource& rows, const RobustOptions& options) {
   check::non_negative(options.tuning, "tuning constant");
   check::that(options.most_instants >= 8, "most_instants", "at least 8");
   check::that(options.most_passes >= 1, "most_passes", "at least 1");
+  for (const LinearConstraint& constraint : options.constraints) {
+    check::that(static_cast<std::size_t>(constraint.a.size()) == rows.parameters(),
+                "constraint '" + constraint.name + "'", "a coefficient for each parameter");
+    check::that(constraint.a.allFinite() && std::isfinite(constraint.b) && !constraint.a.isZero(0.0),
+                "constraint '" + constraint.name + "'", "finite numbers, and a coefficient other than 0");
+  }
   return Fitting(rows, options).run();
 }
 
