@@ -7,6 +7,7 @@
 
 #include <wheelwright/commission/identification_words.hpp>
 #include <wheelwright/commission/physical.hpp>
+#include <wheelwright/io/estimators_json.hpp>
 #include <wheelwright/io/model_words.hpp>
 #include <wheelwright/io/robot_file.hpp>
 #include <wheelwright/io/words.hpp>
@@ -38,8 +39,6 @@ constexpr Words<ShapeState, 4> kShapeWords{{{ShapeState::identified, "identified
 constexpr Words<KinematicState, 3> kKinematicWords{{{KinematicState::identified, "identified"},
                                                     {KinematicState::not_identified, "not_identified"},
                                                     {KinematicState::fixed, "fixed"}}};
-
-Json numbers(const Eigen::VectorXd& v) { return std::vector<double>(v.begin(), v.end()); }
 
 using Scales = std::optional<std::vector<PhysicalScale>>;
 
@@ -92,29 +91,10 @@ Json estimators_json(const EstimatorChoice& choice) {
                {"reason", choice.reason},
                {"in_doubt", choice.in_doubt},
                {"predicted_bias", nullptr},
-               {"endogeneity_test", nullptr},
-               {"candidates", Json::array()}};
+               {"endogeneity_test", endogeneity_json(choice)},
+               {"candidates", candidates_json(choice)}};
   if (choice.predicted_bias.size() > 0) {
     json["predicted_bias"] = numbers(choice.predicted_bias);
-  }
-  if (choice.tested_against && choice.test.made) {
-    json["endogeneity_test"] = {{"against", to_string(choice.candidates[*choice.tested_against].estimate.estimator)},
-                                {"F", choice.test.statistic},
-                                {"p_value", choice.test.p_value}};
-  }
-  for (const EstimatorCandidate& c : choice.candidates) {
-    Json candidate = {{"estimator", to_string(c.estimate.estimator)},
-                      {"origin", c.origin},
-                      {"usable", c.estimate.usable},
-                      {"reason", c.estimate.reason},
-                      {"estimate", numbers(c.estimate.theta)},
-                      {"standard_error", numbers(c.estimate.standard_error)},
-                      {"freedom", c.estimate.freedom}};
-    if (c.strength.size() > 0) {
-      candidate["instrument_strength"] = numbers(c.strength);
-      candidate["instrument_relevance"] = numbers(c.relevance);
-    }
-    json["candidates"].push_back(candidate);
   }
   return json;
 }

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/commission/physical.hpp>
+#include <wheelwright/io/estimators_json.hpp>
 #include <wheelwright/io/model_file.hpp>
 #include <wheelwright/io/model_words.hpp>
 #include <wheelwright/io/robot_file.hpp>
@@ -12,8 +13,6 @@ namespace wheelwright {
 namespace {
 
 constexpr std::size_t kMostVertices = 256;
-
-Json numbers(const Eigen::VectorXd& v) { return std::vector<double>(v.begin(), v.end()); }
 
 Json optional_number(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
 
@@ -142,26 +141,10 @@ Json identification_json(const Commissioning& r) {
   json["estimator"] = to_string(choice.best().estimator);
   json["reason"] = choice.reason;
   json["in_doubt"] = choice.in_doubt;
-  if (choice.tested_against && choice.test.made) {
-    json["endogeneity_test"] = {{"against", to_string(choice.candidates[*choice.tested_against].estimate.estimator)},
-                                {"F", choice.test.statistic},
-                                {"p_value", choice.test.p_value}};
+  if (const Json test = endogeneity_json(choice); !test.is_null()) {
+    json["endogeneity_test"] = test;
   }
-  json["candidates"] = Json::array();
-  for (const EstimatorCandidate& c : choice.candidates) {
-    Json candidate = {{"estimator", to_string(c.estimate.estimator)},
-                      {"origin", c.origin},
-                      {"usable", c.estimate.usable},
-                      {"reason", c.estimate.reason},
-                      {"estimate", numbers(c.estimate.theta)},
-                      {"standard_error", numbers(c.estimate.standard_error)},
-                      {"freedom", c.estimate.freedom}};
-    if (c.strength.size() > 0) {
-      candidate["instrument_strength"] = numbers(c.strength);
-      candidate["instrument_relevance"] = numbers(c.relevance);
-    }
-    json["candidates"].push_back(candidate);
-  }
+  json["candidates"] = candidates_json(choice);
   return json;
 }
 
