@@ -121,6 +121,10 @@ double OdometryFilter::turned(const Wheel& now, const Wheel& before) const {
   return measurement_.motion == MotionKind::angle ? now.measured - before.measured : now.angle.since(before.angle);
 }
 
+double OdometryFilter::rounding(const Wheel& now, const Wheel& before) const {
+  return kRounding * (std::abs(now.measured) + std::abs(before.measured) + std::abs(turned(now, before)));
+}
+
 // Takes a sample into now_; returns whether its pose counts.
 bool OdometryFilter::read(double t, std::span<const double> sample) {
   const double h = t - sample_time_;
@@ -238,7 +242,8 @@ void OdometryFilter::write_position(const Sample& begin, const Sample& end) {
   const auto turn_back = [&](double x, double y) { return std::array{c * x + s * y, c * y - s * x}; };
   const double dx = end.x - begin.x, dy = end.y - begin.y;
   const auto displacement = turn_back(dx, dy);
-  const double seen = 2.0 * errors_.position * (std::abs(c) + std::abs(s)) + kRounding * (std::abs(dx) + std::abs(dy));
+  const double seen = 2.0 * errors_.position * (std::abs(c) + std::abs(s)) +
+                      kRounding * (std::abs(begin.x) + std::abs(begin.y) + std::abs(end.x) + std::abs(end.y));
   const Sample& second = at(tail_ + 1);
   const auto first_mean = turn_back(second.mean[0], second.mean[1]), last_mean = turn_back(end.mean[0], end.mean[1]);
   const double variation = end.variation.since(second.variation);
@@ -249,12 +254,13 @@ void OdometryFilter::write_position(const Sample& begin, const Sample& end) {
     row_.y[i] = displacement[component];
     row_.dy[i] = seen;
     const double ends = std::abs(first_mean[component]) + std::abs(last_mean[component]);
-    const double rolled =
-        measurement_.motion == MotionKind::speed ? errors_.motion * length : errors_.motion * (ends + variation);
     for (Eigen::Index j = 0; j < 2; ++j) {
       const Wheel &now = end.wheels[static_cast<std::size_t>(j)], &then = begin.wheels[static_cast<std::size_t>(j)];
       const auto along = turn_back(now.along[0].since(then.along[0]), now.along[1].since(then.along[1]));
       const double size = now.size.since(then.size);
+      const double rolled = measurement_.motion == MotionKind::speed
+                                ? errors_.motion * length
+                                : (errors_.motion + rounding(now, then)) * (ends + variation);
       row_.Y(i, j) = 0.5 * along[component];
       row_.dY(i, j) = 0.5 * (rolled + errors_.heading * size + now.within.since(then.within) + angular * size);
     }
@@ -263,15 +269,17 @@ void OdometryFilter::write_position(const Sample& begin, const Sample& end) {
 
 void OdometryFilter::write_turn(const Sample& begin, const Sample& end) {
   const double length = end.t - begin.t;
+  const Wheel &now_right = end.wheels[0], &now_left = end.wheels[1];
+  const Wheel &then_right = begin.wheels[0], &then_left = begin.wheels[1];
+  const double right = turned(now_right, then_right), left = turned(now_left, then_left);
   const double rolled = measurement_.motion == MotionKind::speed ? errors_.motion * length : 2.0 * errors_.motion;
-  const double right = turned(end.wheels[0], begin.wheels[0]), left = turned(end.wheels[1], begin.wheels[1]);
   Eigen::Index i = measurement_.position ? 2 : 0;
   const Eigen::Index column = measurement_.position ? 2 : 0;
   const auto write = [&](double value, double error) {
     row_.Y(i, column) = right;
     row_.Y(i, column + 1) = -left;
-    row_.dY(i, column) = rolled + kRounding * std::abs(right);
-    row_.dY(i, column + 1) = rolled + kRounding * std::abs(left);
+    row_.dY(i, column) = rolled + rounding(now_right, then_right);
+    row_.dY(i, column + 1) = rolled + rounding(now_left, then_left);
     row_.y[i] = value;
     row_.dy[i] = error + kRounding * (std::abs(begin.heading) + std::abs(end.heading) + std::abs(value));
     ++i;

@@ -47,7 +47,7 @@ struct OdometryErrors {
   double yaw_gain = 0.0;      ///< both yaw gains are at most this: |θ̈| <= 2·yaw_gain·acceleration
   /// For each output, or empty: a value > 0 is ē, which holds everything that the row may be wrong by and stands in the
   /// place of all bounds above: dy = ē, dY = 0.
-  Eigen::VectorXd estimated;
+  Eigen::VectorXd estimated{};
 };
 
 /// A window of wheel odometry against what a pose or a gyro saw of it, for every sample k; k0 is the sample of the same
@@ -132,6 +132,7 @@ class OdometryFilter {
 
   [[nodiscard]] const Sample& at(std::size_t k) const { return ring_[(first_ + k) % ring_.size()]; }
   [[nodiscard]] double turned(const Wheel& now, const Wheel& before) const;
+  [[nodiscard]] double rounding(const Wheel& now, const Wheel& before) const;
   bool read(double t, std::span<const double> sample);
   void follow_pose(const Sample& before);
   void push();
