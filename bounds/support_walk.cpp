@@ -484,6 +484,37 @@ double SupportWalk::follow(Walk& walk, Place& place, double size) noexcept {
   return value + ((cost + doubt) * (1.0 + rounding(q)) + (2.0 * kEpsilon * std::abs(value) + kTiny));
 }
 
+std::optional<VertexGraph> SupportWalk::graph(std::size_t block) {
+  Walk& walk = walks_[block];
+  const std::size_t q = walk.q;
+  if (!walk.walked) {
+    return std::nullopt;
+  }
+  for (std::size_t v = 0; v < walk.vertices; ++v) {
+    for (std::size_t r = 0; r < q; ++r) {
+      const std::uint32_t to = step(walk, static_cast<std::uint32_t>(v), r);
+      if (to == kNone || to == kFull) {
+        return std::nullopt;
+      }
+    }
+  }
+  VertexGraph graph{walk.parameters, walk.half, {}, {}};
+  graph.numbers.reserve(walk.vertices * (q * q + 4 * q));
+  for (std::size_t v = 0; v < walk.vertices; ++v) {
+    const Vertex parts_of = parts(walk.numbers.data() + v * walk.size, q);
+    const auto append = [&](const double* first, std::size_t count) {
+      graph.numbers.insert(graph.numbers.end(), first, first + count);
+    };
+    append(parts_of.multiply, q * q);
+    for (const double* part : {parts_of.point, parts_of.doubt, parts_of.penalty, parts_of.weight}) {
+      append(part, q);
+    }
+  }
+  const auto known = static_cast<std::ptrdiff_t>(walk.vertices * q);
+  graph.neighbours.assign(walk.neighbours.begin(), walk.neighbours.begin() + known);
+  return graph;
+}
+
 double SupportWalk::support(std::span<const double> a, std::size_t slot) noexcept {
   double total = 0.0;
   for (std::size_t i = 0; i < walks_.size(); ++i) {

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <memory>
 #include <new>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -29,6 +30,18 @@ struct SupportWalkCount {
   std::size_t edges = 0;        ///< edges walked
   std::size_t ratio_tests = 0;  ///< edges that had to be found by a look at all facets
   std::size_t cut_short = 0;    ///< directions whose budget ran out: their bound holds, but may not be tight
+};
+
+/// All vertices of one block of a set, and the edges between them: what a walk can ever come to know.
+struct VertexGraph {
+  std::vector<std::size_t> parameters;  ///< q of them, ascending
+  std::vector<double> half;             ///< H, q numbers
+  std::vector<double> numbers;  ///< for each vertex M (q × q, by columns), then v, ε, penalties s_i + Σ|A_ij|H_j
+                                ///< and the steepness of its edges (q each): q² + 4q
+  std::vector<std::uint32_t> neighbours;  ///< for each vertex q: where the edge ends on which its facet r is left
+
+  /// How many vertices there are.
+  [[nodiscard]] std::size_t vertices() const noexcept { return neighbours.size() / parameters.size(); }
 };
 
 /// Memory that is not touched before it is written: room for many vertices costs nothing until they come.
@@ -70,6 +83,10 @@ class SupportWalk {
   /// h(a), rounded outward, never above the support of the set's hull; `a` has p finite entries (unchecked), `slot` is
   /// below options.slots.
   [[nodiscard]] double support(std::span<const double> a, std::size_t slot = 0) noexcept;
+
+  /// Follows every edge of the block `block` of the set, breadth first. Nothing where the block has more vertices than
+  /// options.vertices, or is not walked (options.few), or an edge has no end. Allocates.
+  [[nodiscard]] std::optional<VertexGraph> graph(std::size_t block);
 
   [[nodiscard]] const Polytope& set() const noexcept { return set_; }
   [[nodiscard]] const SupportWalkCount& count() const noexcept { return count_; }
