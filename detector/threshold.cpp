@@ -16,7 +16,10 @@ ThresholdRule::ThresholdRule(Polytope set, Eigen::VectorXd estimate, ParameterSe
               "one value for each parameter");
   check::that(estimate_.allFinite(), "estimate", "finite values");
   if (kind_ == ParameterSetKind::polytope) {
-    walk_.emplace(set_, SupportWalkOptions{.slots = kSlots});
+    table_ = SupportTable::make(set_, {.slots = kSlots});
+    if (!table_) {
+      walk_.emplace(set_, SupportWalkOptions{.slots = kSlots});
+    }
   }
 }
 

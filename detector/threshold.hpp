@@ -11,6 +11,7 @@
 
 #include <wheelwright/bounds/box.hpp>
 #include <wheelwright/bounds/polytope.hpp>
+#include <wheelwright/bounds/support_table.hpp>
 #include <wheelwright/bounds/support_walk.hpp>
 
 namespace wheelwright {
@@ -37,9 +38,9 @@ struct Threshold {
 ///
 /// with h the support function of the feasible set, y a row of Y_f, Δ the bound on its error and n̄ that of τ_f. The
 /// shift by Δ holds for θ_j >= 0; it changes sign where θ_j <= 0 on the whole set, and where θ_j has either sign it is
-/// replaced by Δ_j max|θ_j|. All results are rounded outward. h is followed from vertex to vertex (SupportWalk), with
-/// bounded work and without allocation: a budget that runs out makes a threshold wider, never wrong. One object serves
-/// one thread.
+/// replaced by Δ_j max|θ_j|. All results are rounded outward. h is followed from vertex to vertex, in a table of all
+/// vertices (SupportTable) where they are few enough, else as they are found (SupportWalk): with bounded work and without
+/// allocation. A budget that runs out makes a threshold wider, never wrong. One object serves one thread.
 class ThresholdRule {
  public:
   /// For the feasible set `set` and the best guess `estimate` (p), which need not lie in it.
@@ -56,19 +57,25 @@ class ThresholdRule {
   [[nodiscard]] const Polytope& set() const noexcept { return set_; }
   [[nodiscard]] const Eigen::VectorXd& estimate() const noexcept { return estimate_; }
   [[nodiscard]] ParameterSetKind kind() const noexcept { return kind_; }
+  /// The table that h is read from; nothing for the box and for sets of more vertices than a table takes.
+  [[nodiscard]] const std::optional<SupportTable>& table() const noexcept { return table_; }
+
+  /// Directions that are followed from one row to the next: two for each of four channels; further channels share them.
+  static constexpr std::size_t kSlots = 8;
 
  private:
   [[nodiscard]] double support(std::span<const double> a, std::size_t slot) const noexcept {
-    return walk_ ? walk_->support(a, slot % kSlots) : set_.hull().support(a);
+    return table_  ? table_->support(a, slot % kSlots)
+           : walk_ ? walk_->support(a, slot % kSlots)
+                   : set_.hull().support(a);
   }
-
-  static constexpr std::size_t kSlots = 8;  // two directions of four channels
 
   Polytope set_;
   Eigen::VectorXd estimate_;
   ParameterSetKind kind_;
   mutable std::vector<double> direction_;
-  mutable std::optional<SupportWalk> walk_;
+  mutable std::optional<SupportTable> table_;
+  mutable std::optional<SupportWalk> walk_;  // where there is no table
 };
 
 }  // namespace wheelwright

@@ -11,6 +11,17 @@ namespace {
 
 double sign(double x) { return static_cast<double>(x > 0.0) - static_cast<double>(x < 0.0); }
 
+// result = matrix · x, each sum from the first column to the last: the same digits in every language and build.
+void multiply(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& x, Eigen::VectorXd& result) {
+  for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
+    double sum = matrix(i, 0) * x[0];
+    for (Eigen::Index j = 1; j < matrix.cols(); ++j) {
+      sum += matrix(i, j) * x[j];
+    }
+    result[i] = sum;
+  }
+}
+
 }  // namespace
 
 RegressorFilter::RegressorFilter(Model model, FilterDesign design, Measurement measurement, SignalErrors errors)
@@ -81,7 +92,7 @@ void RegressorFilter::read_efforts(std::span<const double> sample) {
     }
   }
   effort_sample_.swap(effort_sample_before_);
-  effort_sample_ = model_.input.lazyProduct(joint_effort_);
+  multiply(model_.input, joint_effort_, effort_sample_);
 }
 
 void RegressorFilter::evaluate_functions(const Eigen::VectorXd& speed) {
@@ -157,7 +168,7 @@ bool RegressorFilter::step(double t, std::span<const double> sample) {
       return false;
     }
     joint_speed_ = (joint_ - joint_before_) / (t - before);
-    speed_ = model_.motion.lazyProduct(joint_speed_);
+    multiply(model_.motion, joint_speed_, speed_);
     if (measurement_.hold == Hold::zero_order) {  // a conditional expression would allocate
       effort_ = effort_sample_before_;
     } else {
@@ -166,7 +177,7 @@ bool RegressorFilter::step(double t, std::span<const double> sample) {
     heading_ = measured_heading ? 0.5 * (heading_before + heading_sample_) : heading_;
     return advance(0.5 * (before + t));
   }
-  speed_ = model_.motion.lazyProduct(joint_);
+  multiply(model_.motion, joint_, speed_);
   effort_ = effort_sample_;
   heading_ = measured_heading ? heading_sample_ : heading_;
   return advance(t);

@@ -53,6 +53,20 @@ class RegressorFilter {
   [[nodiscard]] const Model& model() const { return model_; }
   [[nodiscard]] const FilterDesign& design() const { return design_; }
   [[nodiscard]] const Measurement& measurement() const { return measurement_; }
+  /// What dY and dy are made of; zeros where nothing was given.
+  [[nodiscard]] const SignalErrors& errors() const { return errors_; }
+
+  /// Time of the instant that the row belongs to, s: the sample's, or for angles the middle of the last sampling
+  /// interval.
+  [[nodiscard]] double instant() const { return t_; }
+  /// Speeds of the model's coordinates at that instant, as the filter takes them.
+  [[nodiscard]] const Eigen::VectorXd& speed() const { return speed_; }
+  /// Speeds of the joints at that instant.
+  [[nodiscard]] const Eigen::VectorXd& joint_speed() const {
+    return measurement_.motion == MotionKind::angle ? joint_speed_ : joint_;
+  }
+  /// Heading at that instant, rad: measured where there is a column for it, else odometry from the segment's start.
+  [[nodiscard]] double heading() const { return heading_; }
 
  private:
   // One FOH sample of all signals, at time `t`.
