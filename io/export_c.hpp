@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// A detector as one self-contained C99 header.
+#pragma once
+
+#include <string>
+
+#include <wheelwright/detector/detector.hpp>
+
+namespace wheelwright {
+
+/// How an exported detector is called, and what its header says of its origin.
+struct CExportOptions {
+  std::string name = "wheelwright";  ///< prefix of all its names: a C identifier, at most 40 characters
+  std::string robot{};               ///< name of the robot, for the header's comment
+  std::string source{};              ///< file of the model, for the same
+  std::string software{};            ///< what wrote it, for the same
+};
+
+/// `detector` as C99 (also C++17) with all its numbers inside: state, init, restart and step as static inline functions.
+/// No heap, no mutable static data, no recursion; of libm exp, fabs, and round, cos or sin where the model needs them.
+/// Each operation of RegressorFilter, ThresholdRule and Detector is there in the same order: with -ffp-contract=off and
+/// the same libm every decision, residual and threshold has the same bits, for finite samples.
+///
+/// The detector counts as new: what it has seen is not exported. Throws InputError where `name` cannot be a prefix, where
+/// a term of the model is a function that this file does not know as C, or where the set has more vertices than a table
+/// takes (SupportTable).
+[[nodiscard]] std::string c_header(const Detector& detector, const CExportOptions& options = {});
+
+}  // namespace wheelwright
