@@ -23,6 +23,8 @@ using Run = std::function<int(const std::string& command_line)>;
 [[nodiscard]] Run add_design(CLI::App& program);
 /// wheelwright detect LOG --model model.json [--follow]
 [[nodiscard]] Run add_detect(CLI::App& program);
+/// wheelwright export model.json --language c
+[[nodiscard]] Run add_export(CLI::App& program);
 /// wheelwright identify LOG... --robot robot.yaml
 [[nodiscard]] Run add_identify(CLI::App& program);
 /// wheelwright simulate SCENARIO.yaml --out LOG

@@ -37,7 +37,8 @@ int main(int argc, char** argv) {
       "Each command has its own --help.");
   const std::vector<std::pair<std::string, Run>> commands = {
       {"commission", add_commission(program)}, {"detect", add_detect(program)}, {"check", add_check(program)},
-      {"identify", add_identify(program)},     {"design", add_design(program)}, {"simulate", add_simulate(program)}};
+      {"identify", add_identify(program)},     {"export", add_export(program)}, {"design", add_design(program)},
+      {"simulate", add_simulate(program)}};
   try {
     program.parse(argc, argv);
     for (const auto& [name, run] : commands) {

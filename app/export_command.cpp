@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <map>
+#include <memory>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include <wheelwright/io/atomic_file.hpp>
+#include <wheelwright/io/export_c.hpp>
+#include <wheelwright/io/model_file.hpp>
+
+#include "commands.hpp"
+#include "common.hpp"
+
+namespace wheelwright::app {
+namespace {
+
+struct Arguments {
+  std::filesystem::path model;
+  std::string language;
+  std::string name = CExportOptions{}.name;
+  DetectorOptions detector;
+  std::optional<Persistence> persistence;
+  CommonOptions common;
+};
+
+constexpr const char* kHelp =
+    "Writes the detector of a commissioned model as one self-contained source file, with the model's numbers inside, "
+    "for "
+    "a controller that has neither this program nor its library.";
+
+constexpr const char* kExamples =
+    "Examples:\n"
+    "  wheelwright export result/model.json --language c --out firmware\n"
+    "  wheelwright export result/model.json --language c --set box --name left_robot > left_robot.h\n\n"
+    "The file says how it is used. It decides as `wheelwright detect` does.";
+
+Json to_json(const Arguments& a, const CommissionedModel& model, const Detector& detector, const std::string& file,
+             const std::string& text) {
+  Json result;
+  result["schema"] = "wheelwright/export/1";
+  result["software"] = software();
+  result["command"] = a.common.command_line;
+  result["model"] = a.model.string();
+  result["language"] = a.language;
+  result["name"] = a.name;
+  result["set"] = a.detector.set == ParameterSetKind::box ? "box" : "polytope";
+  result["test"] = a.detector.test == Test::two_sided ? "two_sided" : "symmetric";
+  const Persistence persistence = detector.options().persistence.value_or(Persistence{});
+  result["persistence"] = {{"k", persistence.k}, {"n", persistence.n}};
+  result["sample"] = model.measurement.columns();
+  result["outputs"] = model.model.outputs;
+  std::size_t vertices = 0;
+  if (const auto& table = detector.threshold().table()) {
+    for (const VertexGraph& graph : table->graphs()) {
+      vertices += graph.vertices();
+    }
+  }
+  result["vertices"] = vertices;
+  if (file.empty()) {
+    result["text"] = text;
+  } else {
+    result["file"] = file;
+    result["bytes"] = text.size();
+  }
+  return result;
+}
+
+int run(const Arguments& a) {
+  CommissionedModel model = read_model(a.model);
+  model.persistence = a.persistence.value_or(model.persistence);
+  const Detector detector = make_detector(model, a.detector);
+  const std::string text = c_header(
+      detector,
+      {.name = a.name, .robot = model.robot.name, .source = a.model.filename().string(), .software = software()});
+  std::string file;
+  if (!a.common.out.empty()) {
+    make_directory(a.common);
+    file = (a.common.out / (a.name + ".h")).string();
+    atomic_write(file, text);
+  }
+  if (a.common.json) {
+    fmt::print("{}\n", json_text(to_json(a, model, detector, file, text)));
+  } else if (file.empty()) {
+    fmt::print("{}", text);
+  } else if (!a.common.quiet) {
+    fmt::print("wrote {} ({:.0f} kB)\n", file, static_cast<double>(text.size()) / 1000.0);
+  }
+  return kDone;
+}
+
+}  // namespace
+
+Run add_export(CLI::App& program) {
+  auto a = std::make_shared<Arguments>();
+  CLI::App& command = *program.add_subcommand("export", kHelp);
+  command.add_option("MODEL", a->model, "model.json of `wheelwright commission`")->required();
+  command.add_option("--language", a->language, "Language of the file: c (C99, a header)")
+      ->required()
+      ->check(CLI::IsMember({"c"}));
+  command.add_option("--name", a->name, "Prefix of all names in the file, and the file's name")
+      ->type_name("PREFIX")
+      ->capture_default_str();
+  command.add_option("--set", a->detector.set, "Threshold from the feasible set itself (polytope) or from its box")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, ParameterSetKind>{
+          {"polytope", ParameterSetKind::polytope}, {"box", ParameterSetKind::box}}))
+      ->type_name("SET");
+  command
+      .add_option("--test", a->detector.test,
+                  "Compare with [l, u] (two_sided) or with rho as the paper does (symmetric)")
+      ->transform(CLI::CheckedTransformer(
+          std::map<std::string, Test>{{"two_sided", Test::two_sided}, {"symmetric", Test::symmetric}}))
+      ->type_name("TEST");
+  add_persistence(command, a->persistence, "the model's");
+  add_common(command, a->common);
+  command.footer(kExamples);
+  return [a](const std::string& command_line) {
+    a->common.command_line = command_line;
+    return run(*a);
+  };
+}
+
+}  // namespace wheelwright::app
