@@ -164,6 +164,15 @@ void tell(const CommissionOptions& options, std::string_view stage, double share
   }
 }
 
+KinematicCommissioning kinematics(LogSource& log, const Setting& s, const CommissionOptions& options) {
+  KinematicCommissionOptions kinematic = options.kinematic;
+  kinematic.folds = options.folds;
+  kinematic.extrapolation = options.extrapolation;
+  kinematic.persistence = options.persistence;
+  kinematic.window = s.robot.kinematic_window.value_or(kinematic.window);
+  return commission_kinematics(log, s.robot, find_odometry(log, s.robot, s.model, s.measurement), s.survey, kinematic);
+}
+
 void describe_assumptions(const Setting& s, Commissioning& result) {
   auto& notes = result.notes;
   if (s.measurement.motion == MotionKind::mean_speed) {
@@ -264,6 +273,10 @@ Commissioning commission(LogSource& log, const Robot& robot, const CommissionOpt
   result.folds = s.folds;
   result.model = described_model(s, options.persistence);
 
+  tell(options, "comparing pose and wheels", 0.15);
+  result.kinematic = kinematics(log, s, options);
+  result.model.kinematic = result.kinematic.model;
+
   tell(options, "identifying", 0.2);
   const Fit fit = fit_log(log, s, Part::everything, options.extrapolation.risk);
   result.estimators = fit.choice;
@@ -280,6 +293,9 @@ Commissioning commission(LogSource& log, const Robot& robot, const CommissionOpt
   result.row_errors = with_noise(s, result.noise, For::learning);
   result.parameters = parameter_results(s, fit, result.feasible);
   describe_assumptions(s, result);
+  if (!result.kinematic.message.empty()) {
+    result.notes.push_back(result.kinematic.message);
+  }
 
   if (result.feasible.status == FeasibleSet::Status::empty) {
     tell(options, "measuring the contradiction", 0.7);

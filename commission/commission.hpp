@@ -13,32 +13,18 @@
 #include <wheelwright/bounds/minimax.hpp>
 #include <wheelwright/commission/filter_choice.hpp>
 #include <wheelwright/commission/folds.hpp>
+#include <wheelwright/commission/kinematic.hpp>
+#include <wheelwright/commission/output_noise.hpp>
 #include <wheelwright/commission/survey.hpp>
 #include <wheelwright/commission/validation.hpp>
 #include <wheelwright/core/log.hpp>
 #include <wheelwright/detector/detector.hpp>
 #include <wheelwright/identify/estimator_choice.hpp>
 #include <wheelwright/identify/excitation.hpp>
-#include <wheelwright/identify/noise_level.hpp>
 #include <wheelwright/identify/residual_statistics.hpp>
 #include <wheelwright/model/robot.hpp>
 
 namespace wheelwright {
-
-/// Where the noise bound ē of an output comes from.
-enum class NoiseOrigin {
-  declared,   ///< the sensors' declared bounds, propagated through the filter
-  estimated,  ///< extrapolated from the residuals of this log (noise_level.hpp), on top of what is declared
-};
-
-/// The bound on what τ_f − Y_f θ can be without a fault, in one output.
-struct OutputNoise {
-  NoiseOrigin origin = NoiseOrigin::estimated;
-  double bound = 0.0;     ///< for driving to come: n̄ with ē, what a detector's rows have as dy
-  double learning = 0.0;  ///< for the rows of this log, from which the feasible set is made; what was seen needs
-                          ///< no extrapolation, so it is the smaller of the two
-  ExtrapolatedBound how;  ///< how `bound` came about, meaningful where estimated
-};
 
 /// Everything that a detector needs, and nothing else: the part of a commissioned model that is used on-line.
 struct CommissionedModel {
@@ -51,6 +37,7 @@ struct CommissionedModel {
   std::vector<HalfSpace> facets;  ///< of the feasible set, p coefficients each
   Box box;                        ///< finite box that bounds the set (the certified hull)
   Persistence persistence;
+  std::optional<KinematicModel> kinematic{};  ///< of the kinematic residual, where the log had a pose or a gyro
 };
 
 /// What commissioning found about one parameter.
@@ -99,6 +86,7 @@ struct Commissioning {
   SignalErrors row_errors;  ///< dY and dy of the rows that the set is made of: OutputNoise::learning in `output`
   std::vector<std::size_t> dropped;  ///< rows of the log whose instants the set leaves out as outliers
   FeasibleSet feasible;              ///< the set, its hull, certificates
+  KinematicCommissioning kinematic;  ///< of the kinematic residual; its model is also CommissionedModel::kinematic
   double polytope_over_box = 1.0;    ///< median width of [l, u]: polytope over box, held out, worst output
   std::vector<std::string> notes;    ///< what was assumed, repaired or chosen, for people
 };
@@ -110,7 +98,9 @@ struct CommissionOptions {
   ExtrapolationOptions extrapolation;
   NoiseMode noise_mode = NoiseMode::worst_case;  ///< for declared noise
   double confidence = 0.999;                     ///< statistical noise mode
-  std::size_t outliers = 0;                      ///< instants that the feasible set may leave out
+  KinematicCommissionOptions kinematic;  ///< of the kinematic residual; folds, extrapolation and persistence are
+                                         ///< those of these options
+  std::size_t outliers = 0;              ///< instants that the feasible set may leave out
   Persistence persistence;
   std::function<void(std::string_view stage, double share)> progress;  ///< told of every stage; may be empty
 };

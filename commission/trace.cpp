@@ -114,10 +114,9 @@ class Binner {
   std::vector<Bin> bins_;
 };
 
-}  // namespace
-
-Detection detect(LogSource& log, Detector detector, const DetectionOptions& options) {
-  const std::size_t n = detector.filter().model().n();
+// Walks the log through a detector of either residual, with `n` outputs.
+template <typename AnyDetector>
+Detection walk(LogSource& log, AnyDetector& detector, std::size_t n, const DetectionOptions& options) {
   std::vector<std::size_t> pick;
   for (const auto& name : detector.filter().measurement().columns()) {
     const auto column = log.find(name);
@@ -175,6 +174,16 @@ Detection detect(LogSource& log, Detector detector, const DetectionOptions& opti
   d.events = recorder.events();
   d.trace = binner.trace();
   return d;
+}
+
+}  // namespace
+
+Detection detect(LogSource& log, Detector detector, const DetectionOptions& options) {
+  return walk(log, detector, detector.filter().model().n(), options);
+}
+
+Detection detect(LogSource& log, KinematicDetector detector, const DetectionOptions& options) {
+  return walk(log, detector, static_cast<std::size_t>(detector.filter().row().y.size()), options);
 }
 
 }  // namespace wheelwright

@@ -8,6 +8,7 @@
 
 #include <wheelwright/core/log.hpp>
 #include <wheelwright/detector/detector.hpp>
+#include <wheelwright/detector/kinematic_detector.hpp>
 
 namespace wheelwright {
 
@@ -48,5 +49,9 @@ struct DetectionOptions {
 
 /// Walks `log` through `detector` from its beginning. Throws InvalidArgument when the log lacks a column.
 [[nodiscard]] Detection detect(LogSource& log, Detector detector, const DetectionOptions& options = {});
+
+/// The same for the kinematic residual: OutputTrace::torque and predicted are then what the pose or gyro saw and what
+/// the wheels predict.
+[[nodiscard]] Detection detect(LogSource& log, KinematicDetector detector, const DetectionOptions& options = {});
 
 }  // namespace wheelwright

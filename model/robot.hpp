@@ -83,7 +83,8 @@ struct Robot {
   FilterWish filter;
   std::optional<double> encoder_counts_per_turn;
   SpeedSource speed_source = SpeedSource::automatic;
-  std::map<std::string, double> limits;  ///< effort, speed, acceleration
+  std::map<std::string, double> limits;    ///< effort, speed, acceleration
+  std::optional<double> kinematic_window;  ///< s, of the kinematic residual (odometry_filter.hpp)
   std::optional<Motor> motor;
 };
 

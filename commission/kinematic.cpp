@@ -1,0 +1,383 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/commission/kinematic.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include <wheelwright/bounds/minimax.hpp>
+#include <wheelwright/commission/noise_budget.hpp>
+#include <wheelwright/core/check.hpp>
+#include <wheelwright/identify/least_squares.hpp>
+#include <wheelwright/identify/residual_statistics.hpp>
+
+namespace wheelwright {
+namespace {
+
+using Status = KinematicCommissioning::Status;
+
+constexpr double kConfidence = 0.95;    // of the statistical intervals
+constexpr double kAboveMinimax = 1.05;  // a raised bound over the smallest that explains the log
+constexpr std::size_t kFewestWindows = 8;
+
+// What is settled before a fit.
+struct Frame {
+  LogSource* log = nullptr;
+  OdometryMeasurement measurement;
+  double window = 1.0;
+  OdometryErrors declared;  // without ē
+  std::vector<bool> is_declared;
+  Box prior;
+  Eigen::VectorXd nominal;
+  FoldOptions folds;
+  ExtrapolationOptions extrapolation;
+  std::size_t log_rows = 0;
+};
+
+struct Fit {
+  LeastSquaresFit squares;
+  ResidualSummary residuals;
+  std::vector<ExcitationFinding> excitation;
+  Eigen::VectorXd plausible;
+};
+
+struct BoundedSet {
+  FeasibleSet set;
+  double raise = 1.0;
+};
+
+Frame settle(LogSource& log, const Robot& robot, const OdometryMeasurement& m, const Survey& survey,
+             const KinematicCommissionOptions& options) {
+  check::that(options.radius_share > 0.0 && options.radius_share < 1.0, "radius share", "a number inside (0, 1)");
+  Frame s;
+  s.log = &log;
+  s.measurement = m;
+  s.window = check::positive(options.window, "window");
+  s.folds = options.folds;
+  s.folds.purge = s.window;
+  s.extrapolation = options.extrapolation;
+  s.log_rows = survey.rows;
+  const double radius = robot.wheel_radius, gain = robot.wheel_radius / robot.track_width;
+  std::vector<double> nominal;
+  const auto side = [&](double value) {
+    nominal.push_back(value);
+    s.prior.sides.push_back({(1.0 - options.radius_share) * value, (1.0 + options.radius_share) * value});
+  };
+  for (int wheel = 0; m.position && wheel < 2; ++wheel) {
+    side(radius);
+  }
+  side(gain);
+  side(gain);
+  if (m.gyro) {
+    nominal.push_back(0.0);
+    s.prior.sides.push_back({-options.bias, options.bias});
+  }
+  s.nominal = Eigen::Map<const Eigen::VectorXd>(nominal.data(), static_cast<Eigen::Index>(nominal.size()));
+
+  Measurement wheels;
+  wheels.motion = m.motion;
+  wheels.count = m.count;
+  wheels.nominal_step = m.nominal_step;
+  const auto motion = motion_error(robot, wheels);
+  const bool declared_motion = motion && (m.motion == MotionKind::angle || robot.noise.wheel_speed.value ||
+                                          robot.noise.wheel_angle.value || robot.encoder_counts_per_turn);
+  const bool heading = declared_motion && robot.noise.heading.value;
+  const bool position = heading && robot.noise.position.value;
+  for (const std::string& output : m.outputs()) {
+    s.is_declared.push_back(output == "yaw" ? heading : output == "gyro_yaw" ? false : position);
+  }
+  if (heading) {
+    s.declared.motion = *motion + (m.motion == MotionKind::angle ? 0.0 : interpolation_error(survey, m.motion));
+    s.declared.heading = *robot.noise.heading.value;
+    s.declared.position = robot.noise.position.value.value_or(0.0);
+    for (const double a : survey.largest_acceleration) {
+      s.declared.acceleration = std::max(s.declared.acceleration, a);
+    }
+    s.declared.yaw_gain = (1.0 + options.radius_share) * gain;
+  }
+  return s;
+}
+
+OdometryStream make_rows(const Frame& s, const OdometryErrors& errors) {
+  return {*s.log, OdometryFilter(s.measurement, s.window, errors)};
+}
+
+enum class For { learning, driving };
+
+OdometryErrors with_noise(const Frame& s, const std::vector<OutputNoise>& noise, For use) {
+  Eigen::VectorXd estimated = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(noise.size()));
+  for (std::size_t i = 0; i < noise.size(); ++i) {
+    if (noise[i].origin == NoiseOrigin::estimated) {
+      estimated[static_cast<Eigen::Index>(i)] =
+          std::max(use == For::learning ? noise[i].learning : noise[i].bound, std::numeric_limits<double>::min());
+    }
+  }
+  OdometryErrors errors = s.declared;
+  errors.estimated = std::move(estimated);
+  return errors;
+}
+
+Eigen::VectorXd weights_of(const ResidualSummary& residuals) {
+  Eigen::VectorXd weights(static_cast<Eigen::Index>(residuals.outputs.size()));
+  for (std::size_t i = 0; i < residuals.outputs.size(); ++i) {
+    const double floor = 1e-9 * residuals.outputs[i].torque_rms + std::numeric_limits<double>::min();
+    weights[static_cast<Eigen::Index>(i)] = 1.0 / std::max(residuals.outputs[i].rms, floor);
+  }
+  return weights;
+}
+
+// Least squares, weighted once more by its own residuals; parameters that the log does not show are held at their nominal
+// values, which the rows are measured from.
+std::optional<Fit> fit_rows(const Frame& s, Part part, double risk) {
+  OdometryStream stream = make_rows(s, s.declared);
+  FoldedSource rows(stream, part, s.log_rows, s.folds);
+  Fit fit;
+  Eigen::VectorXd weights = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(rows.outputs()));
+  for (int pass = 0; pass < 2; ++pass) {
+    LeastSquares squares(rows.parameters(), weights);
+    RegressionBlock block;
+    rows.rewind();
+    while (rows.next(block)) {
+      block.y -= block.Y * s.nominal;
+      squares.add(block);
+    }
+    if (squares.instants() < kFewestWindows * rows.parameters()) {
+      return std::nullopt;
+    }
+    std::vector<bool> excluded;
+    const auto solve = [&] {
+      fit.squares = squares.solve(excluded);
+      fit.squares.estimate += s.nominal;
+      ResidualStatistics statistics(fit.squares.estimate, weights);
+      rows.rewind();
+      while (rows.next(block)) {
+        statistics.add(block);
+      }
+      fit.residuals = statistics.summary(fit.squares.inverse_gram);
+    };
+    solve();
+    fit.excitation = judge_excitation(fit.squares, fit.residuals.standard_error,
+                                      student_quantile(kConfidence, std::max(fit.residuals.freedom, 1.0)));
+    for (const ExcitationFinding& finding : fit.excitation) {
+      excluded.push_back(finding.state == Excitation::not_excited);
+    }
+    if (std::ranges::find(excluded, true) != excluded.end()) {
+      solve();
+    }
+    weights = weights_of(fit.residuals);
+  }
+  fit.plausible = largest_plausible_error(rows, fit.squares.estimate, fit.residuals, risk);
+  return fit;
+}
+
+std::vector<OutputNoise> output_noise(const Frame& s, const Fit& fit) {
+  std::vector<OutputNoise> noise(s.is_declared.size());
+  for (std::size_t i = 0; i < noise.size(); ++i) {
+    OutputNoise& o = noise[i];
+    if (s.is_declared[i]) {
+      o.origin = NoiseOrigin::declared;
+      continue;
+    }
+    o.how = extrapolate(fit.residuals.outputs[i], fit.residuals.instants, s.extrapolation);
+    o.learning = fit.plausible[static_cast<Eigen::Index>(i)];
+    o.bound = std::max(o.how.bound, o.learning);
+  }
+  return noise;
+}
+
+// The feasible set; an estimated bound that is too small for the prior box is raised to just above the minimax fit.
+BoundedSet bounded_set(const Frame& s, Part part, std::vector<OutputNoise>& noise) {
+  const bool all_estimated =
+      std::ranges::all_of(noise, [](const OutputNoise& o) { return o.origin == NoiseOrigin::estimated; });
+  BoundedSet result;
+  for (int attempt = 0;; ++attempt) {
+    OdometryStream stream = make_rows(s, with_noise(s, noise, For::learning));
+    FoldedSource rows(stream, part, s.log_rows, s.folds);
+    result.set = feasible_set(rows, s.prior);
+    if (result.set.status == FeasibleSet::Status::nonempty || !all_estimated || attempt > 0) {
+      return result;
+    }
+    MinimaxOptions options;
+    for (const OutputNoise& o : noise) {
+      options.weights.push_back(std::max(o.learning, std::numeric_limits<double>::min()));
+    }
+    OdometryStream bare = make_rows(s, {});
+    FoldedSource bare_rows(bare, part, s.log_rows, s.folds);
+    result.raise = kAboveMinimax * minimax_fit(bare_rows, s.prior, options).upper;
+    for (OutputNoise& o : noise) {
+      o.learning *= result.raise;
+      o.bound = std::max(o.bound, o.learning);
+    }
+  }
+}
+
+Eigen::VectorXd best_guess(const Fit& fit, const Polytope& set) {
+  Eigen::VectorXd guess = fit.squares.estimate;
+  for (std::size_t j = 0; j < fit.excitation.size(); ++j) {
+    if (fit.excitation[j].state == Excitation::not_excited) {
+      guess[static_cast<Eigen::Index>(j)] = set.chebyshev_centre()[j];
+    }
+  }
+  return guess;
+}
+
+// A declared bound differs from row to row: the largest is told.
+void tell_declared(const Frame& s, const Eigen::VectorXd& theta, std::vector<OutputNoise>& noise) {
+  OdometryStream rows = make_rows(s, s.declared);
+  RegressionBlock block;
+  rows.rewind();
+  const auto n = static_cast<Eigen::Index>(noise.size());
+  while (rows.next(block)) {
+    for (Eigen::Index r = 0; r < block.rows(); ++r) {
+      OutputNoise& o = noise[static_cast<std::size_t>(r % n)];
+      if (o.origin == NoiseOrigin::declared) {
+        o.bound = std::max(o.bound, block.dy[r] + block.dY.row(r).dot(theta.cwiseAbs()));
+        o.learning = o.bound;
+      }
+    }
+  }
+}
+
+std::vector<KinematicParameter> parameters_of(const Frame& s, const Fit& fit, const Box& hull) {
+  const auto names = s.measurement.parameters(), units = s.measurement.parameter_units();
+  std::vector<KinematicParameter> all;
+  for (std::size_t j = 0; j < names.size(); ++j) {
+    const auto at = static_cast<Eigen::Index>(j);
+    KinematicParameter p;
+    p.name = names[j];
+    p.unit = units[j];
+    p.excitation = fit.excitation[j].state;
+    p.reason = fit.excitation[j].reason;
+    if (p.excitation != Excitation::not_excited) {
+      p.estimate = fit.squares.estimate[at];
+      p.standard_error = fit.residuals.standard_error[at];
+    }
+    p.lower = hull.sides[j].lower;
+    p.upper = hull.sides[j].upper;
+    p.nominal = s.nominal[at];
+    all.push_back(std::move(p));
+  }
+  return all;
+}
+
+std::string message_of(const Frame& s, const KinematicCommissioning& r) {
+  if (r.status == Status::nothing) {
+    return "no kinematic residual: no wheel radii and track width within the prior explain the pose";
+  }
+  std::string text = fmt::format("wheel odometry is compared with {} over windows of {:.3g} s",
+                                 s.measurement.position  ? "the pose"
+                                 : s.measurement.heading ? "the heading"
+                                                         : "the gyro",
+                                 s.window);
+  const auto estimated = std::ranges::count(r.noise, NoiseOrigin::estimated, &OutputNoise::origin);
+  if (r.declared_too_small) {
+    text +=
+        "; no wheel radii explain the pose within the declared noise (wheels that slip in turns, a pose beside the "
+        "axle or late would do that), so the bounds are extrapolated from the residuals of this log";
+  } else if (estimated == 0) {
+    text += "; the bounds stand on the declared noise";
+  } else if (estimated == static_cast<std::ptrdiff_t>(r.noise.size())) {
+    text += "; the bounds are extrapolated from the residuals of this log";
+  } else {
+    text += "; the bounds stand on the declared noise, those of the other outputs are extrapolated from the residuals";
+  }
+  if (s.measurement.held_pose) {
+    text += "; the pose comes at a lower rate than the wheels, and only new ones count";
+  }
+  std::string missing;
+  for (const KinematicParameter& p : r.parameters) {
+    if (p.excitation == Excitation::not_excited) {
+      missing += (missing.empty() ? "" : ", ") + p.name;
+    }
+  }
+  return missing.empty() ? text : text + "; the log says nothing about " + missing + ": drive straight and in curves";
+}
+
+void validate_held_out(const Frame& s, KinematicCommissioning& result) {
+  const auto fit = fit_rows(s, Part::training, s.extrapolation.risk);
+  if (!fit) {
+    return;
+  }
+  std::vector<OutputNoise> noise = output_noise(s, *fit);
+  const FeasibleSet set = bounded_set(s, Part::training, noise).set;
+  if (set.status != FeasibleSet::Status::nonempty) {
+    return;
+  }
+  OdometryStream unseen = make_rows(s, with_noise(s, noise, For::driving));
+  FoldedSource held_out(unseen, Part::held_out, s.log_rows, s.folds);
+  result.validation = validate_on(held_out, ThresholdRule(*set.polytope, best_guess(*fit, *set.polytope)));
+}
+
+}  // namespace
+
+KinematicCommissioning commission_kinematics(LogSource& log, const Robot& robot,
+                                             const std::optional<OdometryMeasurement>& measurement,
+                                             const Survey& survey, const KinematicCommissionOptions& options) {
+  KinematicCommissioning result;
+  if (!measurement) {
+    result.message = robot.model == "differential_drive"
+                         ? "no kinematic residual: the log has neither a pose (x, y, theta) nor gyro_z, so that slip "
+                           "across the heading cannot be seen"
+                         : "no kinematic residual: the robot is no differential drive";
+    return result;
+  }
+  if (options.window < 2.0 * measurement->nominal_step) {
+    result.status = Status::nothing;
+    result.message = fmt::format("no kinematic residual: its window of {:.3g} s is shorter than two steps of the log",
+                                 options.window);
+    return result;
+  }
+  Frame s = settle(log, robot, *measurement, survey, options);
+  result.prior = s.prior;
+  const auto fit = fit_rows(s, Part::everything, s.extrapolation.risk);
+  if (!fit) {
+    result.status = Status::nothing;
+    result.message = fmt::format("no kinematic residual: too few windows of {:.3g} s in the log", s.window);
+    return result;
+  }
+  result.noise = output_noise(s, *fit);
+  BoundedSet bounded = bounded_set(s, Part::everything, result.noise);
+  const bool any_declared = std::ranges::find(s.is_declared, true) != s.is_declared.end();
+  if (bounded.set.status == FeasibleSet::Status::empty && any_declared) {
+    result.declared_too_small = true;
+    s.declared = {};
+    s.is_declared.assign(s.is_declared.size(), false);
+    result.noise = output_noise(s, *fit);
+    bounded = bounded_set(s, Part::everything, result.noise);
+  }
+  result.raise = bounded.raise;
+  result.rows = bounded.set.rows;
+  result.parameters = parameters_of(s, *fit, bounded.set.hull);
+  if (bounded.set.status == FeasibleSet::Status::empty) {
+    result.status = Status::nothing;
+    result.message = message_of(s, result);
+    return result;
+  }
+  const bool partial = std::ranges::any_of(
+      result.parameters, [](const KinematicParameter& p) { return p.excitation == Excitation::not_excited; });
+  result.status = partial ? Status::partial : Status::done;
+  const Polytope& set = *bounded.set.polytope;
+  result.model = KinematicModel{.measurement = s.measurement,
+                                .window = s.window,
+                                .errors = with_noise(s, result.noise, For::driving),
+                                .estimate = best_guess(*fit, set),
+                                .facets = set.facets(),
+                                .box = bounded.set.hull,
+                                .persistence = options.persistence};
+  tell_declared(s, result.model->estimate, result.noise);
+  validate_held_out(s, result);
+  result.message = message_of(s, result);
+  log.rewind();
+  return result;
+}
+
+KinematicDetector make_detector(const KinematicModel& model, DetectorOptions options) {
+  options.persistence = options.persistence.value_or(model.persistence);
+  return KinematicDetector(OdometryFilter(model.measurement, model.window, model.errors),
+                           ThresholdRule(Polytope(model.facets, model.box), model.estimate, options.set), options);
+}
+
+}  // namespace wheelwright

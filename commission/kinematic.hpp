@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// The kinematic residual commissioned: effective wheel radii and yaw gains with guaranteed bounds, from the pose or gyro
+/// of a fault-free log.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include <wheelwright/bounds/feasible_set.hpp>
+#include <wheelwright/commission/folds.hpp>
+#include <wheelwright/commission/output_noise.hpp>
+#include <wheelwright/commission/survey.hpp>
+#include <wheelwright/commission/validation.hpp>
+#include <wheelwright/core/log.hpp>
+#include <wheelwright/detector/kinematic_detector.hpp>
+#include <wheelwright/filter/odometry_stream.hpp>
+#include <wheelwright/identify/excitation.hpp>
+#include <wheelwright/model/robot.hpp>
+
+namespace wheelwright {
+
+/// Everything that a detector of the kinematic residual needs.
+struct KinematicModel {
+  OdometryMeasurement measurement;
+  double window = 1.0;            ///< W, s
+  OdometryErrors errors;          ///< of the rows of driving to come
+  Eigen::VectorXd estimate;       ///< of OdometryMeasurement::parameters()
+  std::vector<HalfSpace> facets;  ///< of the feasible set
+  Box box;                        ///< its certified hull
+  Persistence persistence;
+};
+
+/// What commissioning found about one kinematic parameter.
+struct KinematicParameter {
+  std::string name;
+  std::string unit;
+  Excitation excitation = Excitation::identified;
+  std::string reason;              ///< why it is not identified, for people
+  std::optional<double> estimate;  ///< least squares; nothing where the log does not show the parameter
+  std::optional<double> standard_error;
+  double lower = 0.0;  ///< guaranteed bounds (certified hull)
+  double upper = 0.0;
+  double nominal = 0.0;  ///< of the robot file's geometry; 0 for a bias
+};
+
+/// Result of commission_kinematics().
+struct KinematicCommissioning {
+  /// What became of it.
+  enum class Status {
+    done,     ///< a model came out
+    partial,  ///< a model came out; the bounds of some parameters are those of the prior
+    absent,   ///< the log or the robot has nothing to compare wheel odometry with: no model
+    nothing,  ///< too little driving, or no parameters in the prior box explain it: no model
+  };
+  Status status = Status::absent;
+  std::string message;                  ///< one sentence for people
+  std::optional<KinematicModel> model;  ///< where the status gives one
+  std::vector<KinematicParameter> parameters;
+  std::vector<OutputNoise> noise;            ///< one for each output; a declared bound is the largest of the log's rows
+  std::vector<OutputValidation> validation;  ///< on held-out blocks, of a model made from the other blocks
+  Box prior;
+  std::size_t rows = 0;             ///< that the set is made of
+  bool declared_too_small = false;  ///< no parameters explain the log within the declared noise: it was estimated
+  double raise = 1.0;               ///< an estimated bound was raised by this, so that the prior box explains the log
+};
+
+/// Options of commission_kinematics().
+struct KinematicCommissionOptions {
+  double window = 1.0;  ///< W, s, > 0; a robot's own stands above it
+  FoldOptions folds;    ///< purge is set to the window
+  ExtrapolationOptions extrapolation;
+  Persistence persistence;
+  double radius_share = 0.3;  ///< prior box of radii and yaw gains: nominal ± this share, inside (0, 1)
+  double bias = 0.2;          ///< prior box of the gyro's bias: ± this, rad/s
+};
+
+/// Log → rows of OdometryFilter → least squares, feasible set, validation, as commission() does it for the torque.
+/// `measurement` (nothing: absent) is what find_odometry says, `survey` is that of the log.
+///
+/// Noise: where position and heading (the latter suffices for the output yaw) and the motion (noise_budget.hpp) are
+/// declared, bounds are the sensors', derived as OdometryFilter states, with the largest acceleration that the log shows
+/// for what happens between samples. Elsewhere, and for the gyro, ē is extrapolated from the residuals. Where nothing
+/// explains the log within the declared noise (wheels slip a little in every turn, the pose's point is off the axle, its
+/// clock is late), all outputs fall back to the extrapolated bound, and the message says so. Throws InvalidArgument for
+/// options out of range.
+[[nodiscard]] KinematicCommissioning commission_kinematics(LogSource& log, const Robot& robot,
+                                                           const std::optional<OdometryMeasurement>& measurement,
+                                                           const Survey& survey,
+                                                           const KinematicCommissionOptions& options = {});
+
+/// The detector of a commissioned kinematic model.
+[[nodiscard]] KinematicDetector make_detector(const KinematicModel& model, DetectorOptions options = {});
+
+}  // namespace wheelwright
