@@ -7,6 +7,7 @@
 #include <wheelwright/commission/commission.hpp>
 
 #include "support/drives.hpp"
+#include "support/kinematic_drives.hpp"
 
 namespace wheelwright {
 namespace {
@@ -70,6 +71,32 @@ TEST(Allocation, NorWithFunctionTermsAndAHeading) {
   drive.robot.noise.heading.value = 0.0;
   expect_no_allocation(drive, drive.robot, {});
   expect_no_allocation(drive, drive.robot, {.set = ParameterSetKind::box});
+}
+
+TEST(Allocation, NorHasAStepOfTheKinematicDetector) {
+  const Scenario drive = testing_support::posed_drive(1, 12.0);
+  Simulation learning(drive);
+  const Commissioning result = commission(learning, drive.robot);
+  ASSERT_TRUE(result.model.kinematic.has_value()) << result.kinematic.message;
+  KinematicDetector detector = make_detector(*result.model.kinematic);
+  const LogTable table = simulate(drive);
+  const std::vector<std::string> names = result.model.kinematic->measurement.columns();
+  std::vector<const std::vector<double>*> columns;
+  for (const auto& name : names) {
+    columns.push_back(&table.column(name));
+  }
+  std::vector<double> sample(columns.size());
+  std::size_t valid = 0;
+  const std::size_t before = allocations;
+  for (std::size_t k = 0; k < table.rows(); ++k) {
+    for (std::size_t c = 0; c < columns.size(); ++c) {
+      sample[c] = (*columns[c])[k];
+    }
+    const double gap = k > table.rows() / 2 ? 10.0 : 0.0;  // the window restarts once
+    valid += detector.step(table.t[k] + gap, sample).valid ? 1 : 0;
+  }
+  EXPECT_EQ(allocations, before);
+  EXPECT_GT(valid, table.rows() / 2);
 }
 
 #else

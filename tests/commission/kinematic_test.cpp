@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: Apache-2.0
+// The kinematic residual from log to decision, on simulated drives whose truth is known.
+#include <wheelwright/commission/kinematic.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include <wheelwright/commission/commission.hpp>
+#include <wheelwright/commission/trace.hpp>
+
+#include "support/kinematic_drives.hpp"
+
+namespace wheelwright {
+namespace {
+
+using testing_support::posed_drive;
+using testing_support::straight_drive;
+using testing_support::true_kinematics;
+using Status = KinematicCommissioning::Status;
+
+KinematicCommissioning commissioned(const Scenario& s) {
+  Simulation log(s);
+  return commission(log, s.robot).kinematic;
+}
+
+TEST(Kinematic, TheTruthIsInTheSetUnderDeclaredNoise) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    const Scenario s = posed_drive(seed);
+    const KinematicCommissioning result = commissioned(s);
+    ASSERT_EQ(result.status, Status::done) << result.message;
+    ASSERT_FALSE(result.declared_too_small);
+    for (const OutputNoise& o : result.noise) {
+      ASSERT_EQ(o.origin, NoiseOrigin::declared);
+    }
+    const Eigen::VectorXd truth = true_kinematics(s.robot);
+    for (std::size_t j = 0; j < 4; ++j) {
+      const KinematicParameter& p = result.parameters[j];
+      const double value = truth[static_cast<Eigen::Index>(j)];
+      EXPECT_LE(p.lower, value) << p.name;
+      EXPECT_GE(p.upper, value) << p.name;
+      EXPECT_LT(p.upper - p.lower, 0.2 * value) << p.name;  // the prior alone is three times as wide
+      ASSERT_TRUE(p.estimate.has_value());
+      EXPECT_NEAR(*p.estimate, value, 0.01 * value) << p.name;
+    }
+    for (const HalfSpace& facet : result.model->facets) {
+      EXPECT_LE(facet.a.dot(truth), facet.b);
+    }
+    ASSERT_EQ(result.validation.size(), 3u);
+    for (const OutputValidation& v : result.validation) {
+      EXPECT_GT(v.instants, 100u);
+      EXPECT_EQ(v.outside, 0u);
+    }
+  }
+}
+
+TEST(Kinematic, BoundsAreEstimatedWhereNoiseIsNotDeclared) {
+  Scenario s = posed_drive(4);
+  s.robot.noise.position.value.reset();
+  const KinematicCommissioning heading_only = commissioned(s);
+  ASSERT_EQ(heading_only.status, Status::done) << heading_only.message;
+  EXPECT_EQ(heading_only.noise[0].origin, NoiseOrigin::estimated);
+  EXPECT_EQ(heading_only.noise[1].origin, NoiseOrigin::estimated);
+  EXPECT_EQ(heading_only.noise[2].origin, NoiseOrigin::declared);
+  s.robot.noise.heading.value.reset();
+  const KinematicCommissioning none = commissioned(s);
+  ASSERT_EQ(none.status, Status::done) << none.message;
+  const Eigen::VectorXd truth = true_kinematics(s.robot);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(none.noise[i].origin, NoiseOrigin::estimated);
+    EXPECT_GE(none.noise[i].bound, none.noise[i].learning);
+  }
+  for (std::size_t j = 0; j < 4; ++j) {
+    EXPECT_LE(none.parameters[j].lower, truth[static_cast<Eigen::Index>(j)]);
+    EXPECT_GE(none.parameters[j].upper, truth[static_cast<Eigen::Index>(j)]);
+  }
+}
+
+// A heading that comes late, which no yaw gain explains.
+TEST(Kinematic, SaysWhenTheDeclaredNoiseIsTooSmall) {
+  Scenario s = posed_drive(5);
+  LogTable log = simulate(s);
+  double late = 0.0;
+  for (double& heading : log.column("theta")) {  // by 0.3 s
+    late += 0.03 * (heading - late);
+    heading = late;
+  }
+  TableSource source(log);
+  const KinematicCommissioning result = commission(source, s.robot).kinematic;
+  ASSERT_EQ(result.status, Status::done) << result.message;
+  EXPECT_TRUE(result.declared_too_small);
+  EXPECT_NE(result.message.find("declared noise"), std::string::npos);
+  for (const OutputNoise& o : result.noise) {
+    EXPECT_EQ(o.origin, NoiseOrigin::estimated);
+    EXPECT_GT(o.bound, 0.0);
+  }
+}
+
+TEST(Kinematic, IsAbsentWithoutAPose) {
+  Scenario s = posed_drive(6);
+  s.sensors.pose = false;
+  Simulation log(s);
+  const Commissioning result = commission(log, s.robot);
+  EXPECT_EQ(result.kinematic.status, Status::absent);
+  EXPECT_FALSE(result.model.kinematic.has_value());
+  EXPECT_NE(result.kinematic.message.find("gyro_z"), std::string::npos);
+  EXPECT_NE(std::ranges::find(result.notes, result.kinematic.message), result.notes.end());
+}
+
+TEST(Kinematic, StraightDrivingLeavesTheTurnToThePrior) {
+  const KinematicCommissioning result = commissioned(straight_drive(7, 20.0));
+  ASSERT_TRUE(result.model.has_value()) << result.message;
+  const Eigen::VectorXd truth = true_kinematics(straight_drive(7, 20.0).robot);
+  for (std::size_t j = 0; j < 4; ++j) {
+    EXPECT_LE(result.parameters[j].lower, truth[static_cast<Eigen::Index>(j)]);
+    EXPECT_GE(result.parameters[j].upper, truth[static_cast<Eigen::Index>(j)]);
+  }
+  EXPECT_GT(result.parameters[2].upper - result.parameters[2].lower, 0.2 * truth[2]);
+}
+
+TEST(Kinematic, AHealthyRobotRaisesNoAlarm) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    Scenario s = posed_drive(seed);
+    const KinematicCommissioning result = commissioned(s);
+    s.seed = 100 + seed;
+    s.trajectory.kind = Trajectory::Kind::multi_sine;
+    Simulation drive(s);
+    const Detection d = detect(drive, make_detector(*result.model));
+    EXPECT_GT(d.instants, 500u);
+    EXPECT_TRUE(d.events.empty());
+  }
+}
+
+// An unmatched slip reaches the torque equation through m ρ_U θ̇ alone: on a straight line it is invisible there.
+TEST(Kinematic, SeesLateralSlipThatTheTorqueCannot) {
+  Scenario learn = posed_drive(8);
+  Simulation learning(learn);
+  const Commissioning result = commission(learning, learn.robot);
+  ASSERT_TRUE(result.model.kinematic.has_value());
+
+  Scenario slip = straight_drive(9, 20.0);
+  const double onset = 10.0, window = result.model.kinematic->window;
+  slip.faults = {{.kind = Fault::Kind::unmatched, .magnitude = 0.05, .profile = {.onset = onset}}};
+  Simulation log(slip);
+  const Detection torque = detect(log, make_detector(result.model));
+  EXPECT_TRUE(torque.events.empty());
+  const Detection kinematic = detect(log, make_detector(*result.model.kinematic));
+  ASSERT_FALSE(kinematic.events.empty());
+  const Event& first = kinematic.events.front();
+  EXPECT_EQ(first.output, 1u);  // lateral
+  EXPECT_GT(first.start, onset);
+  // |ρ_U| W = 5 cm exceeds the width of the threshold.
+  const OutputTrace& lateral = kinematic.trace.outputs[1];
+  double widest = 0.0;
+  for (std::size_t k = 0; k < lateral.upper.size(); ++k) {
+    widest = std::max(widest, lateral.upper[k] - lateral.lower[k]);
+  }
+  ASSERT_LT(widest, 0.05 * window);
+  EXPECT_LE(first.alarm, onset + window + 0.02);
+}
+
+TEST(Kinematic, SaysHowLongTheWindowIs) {
+  Scenario s = posed_drive(10);
+  s.robot.kinematic_window = 0.5;
+  const KinematicCommissioning result = commissioned(s);
+  ASSERT_TRUE(result.model.has_value());
+  EXPECT_EQ(result.model->window, 0.5);
+  s.robot.kinematic_window = 100.0;
+  EXPECT_EQ(commissioned(s).status, Status::nothing);
+}
+
+}  // namespace
+}  // namespace wheelwright
