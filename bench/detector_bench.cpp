@@ -1,0 +1,245 @@
+// SPDX-License-Identifier: Apache-2.0
+// The on-line detector: a whole step in C++ and as exported C, with the box and with the polytope, next to the same filter
+// with constant thresholds; the support function from the table next to the walk, and a threshold made of it.
+#include <dlfcn.h>
+
+#include <bit>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <optional>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include <wheelwright/bounds/feasible_set.hpp>
+#include <wheelwright/bounds/support_table.hpp>
+#include <wheelwright/core/error.hpp>
+#include <wheelwright/detector/detector.hpp>
+#include <wheelwright/filter/measurement.hpp>
+#include <wheelwright/filter/regression_stream.hpp>
+#include <wheelwright/io/export_c.hpp>
+#include <wheelwright/sim/simulation.hpp>
+
+#include "bench.hpp"
+#include "drive_rows.hpp"
+
+namespace wheelwright::bench {
+namespace {
+
+constexpr int kRepetitions = 5;
+
+std::string each(double seconds, std::size_t count, const std::string& more = "") {
+  return fmt::format("{:.0f} ns each{}", 1e9 * seconds / static_cast<double>(count), more);
+}
+
+/// A drive of the robot of the examples with declared noise, and the set that it leaves.
+struct World {
+  static constexpr std::size_t rows = 200000;
+  Scenario scenario;
+  std::vector<double> t, samples;  // samples: rows × inputs
+  std::size_t inputs = 0;
+  std::optional<RegressorFilter> filter;
+  std::optional<Polytope> set;
+  Eigen::VectorXd estimate;
+
+  explicit World(bool dry_friction) {
+    scenario.robot.wheel_radius = 0.0975;
+    scenario.robot.track_width = 0.381;
+    scenario.robot.hold = Hold::zero_order;
+    scenario.robot.encoder_counts_per_turn = 4096.0;
+    if (dry_friction) {
+      scenario.robot.parameters = {{"mass", "yaw_inertia", "viscous_linear", "viscous_yaw", "coulomb"}};
+    }
+    scenario.parameters = {.mass = 21.0, .yaw_inertia = 0.9, .viscous_x = 4.0, .viscous_y = 4.0, .viscous_yaw = 0.5};
+    scenario.trajectory = {.kind = Trajectory::Kind::commissioning, .speed = 0.6, .yaw_rate = 1.2, .period = 12.0};
+    scenario.rate = 100.0;
+    scenario.duration = static_cast<double>(rows - 1) / scenario.rate;
+    scenario.sensors.encoder_counts_per_turn = 4096.0;
+    scenario.sensors.effort = 0.02;
+    scenario.sensors.speeds = scenario.sensors.pose = scenario.sensors.commands = false;
+    const LogTable table = simulate(scenario);
+    TableSource log(table);
+    const Model model = make_model(scenario.robot);
+    const FilterDesign design{.order = 2, .alpha = 10.0, .beta = 10.0};
+    const wheelwright::Measurement measurement = find_measurement(log, scenario.robot, model, design.order);
+    const SensorErrors sensors{.motion = 3.1415927 / 4096.0, .effort = 0.02};
+    filter.emplace(model, design, measurement, propagate(model, design, measurement, sensors));
+    RegressionStream stream(log, *filter);
+    Box prior;
+    prior.sides = prior_box(scenario.robot, model).bounds;
+    set = feasible_set(stream, prior).polytope.value();
+    estimate = Eigen::Map<const Eigen::VectorXd>(set->chebyshev_centre().data(), static_cast<Eigen::Index>(model.p()));
+    const auto names = measurement.columns();
+    inputs = names.size();
+    t = table.t;
+    for (std::size_t k = 0; k < rows; ++k) {
+      for (const std::string& name : names) {
+        samples.push_back(table.column(name)[k]);
+      }
+    }
+  }
+
+  [[nodiscard]] Detector detector(DetectorOptions options) const {
+    return {*filter, ThresholdRule(*set, estimate, options.set), options};
+  }
+  void run(Detector& detector) const {
+    detector.restart();
+    for (std::size_t k = 0; k < rows; ++k) {
+      keep(detector.step(t[k], {samples.data() + k * inputs, inputs}).fault);
+    }
+  }
+};
+
+/// The exported detector, compiled by `cc -O2` where there is one.
+class Exported {
+ public:
+  Exported(const Detector& detector, std::size_t inputs) {
+    const auto folder =
+        std::filesystem::temp_directory_path() / fmt::format("wheelwright-bench-{}", std::random_device{}());
+    std::filesystem::create_directories(folder);
+    std::ofstream(folder / "robot.h") << c_header(detector, {.name = "robot"});
+    std::ofstream(folder / "robot.c") << fmt::format(
+        "#include \"robot.h\"\n"
+        "int robot_run(long rows, const double *t, const double *samples) {{\n"
+        "  robot_state s; robot_decision d; long k; int faults = 0;\n"
+        "  robot_init(&s);\n"
+        "  for (k = 0; k < rows; ++k) {{ robot_step(&s, t[k], samples + k * {}, &d); faults += d.fault; }}\n"
+        "  return faults;\n}}\n",
+        inputs);
+    const std::string command =
+        fmt::format("cc -std=c99 -O2 -ffp-contract=off -shared -fPIC -o '{0}/robot.so' '{0}/robot.c' -lm 2> /dev/null",
+                    folder.string());
+    if (std::system(command.c_str()) == 0) {
+      library_ = dlopen((folder / "robot.so").c_str(), RTLD_NOW | RTLD_LOCAL);
+    }
+    if (library_ != nullptr) {
+      run_ = std::bit_cast<int (*)(long, const double*, const double*)>(dlsym(library_, "robot_run"));
+    }
+    std::error_code ignored;
+    std::filesystem::remove_all(folder, ignored);
+  }
+  ~Exported() {
+    if (library_ != nullptr) {
+      dlclose(library_);
+    }
+  }
+  Exported(const Exported&) = delete;
+  Exported& operator=(const Exported&) = delete;
+  explicit operator bool() const { return run_ != nullptr; }
+  void run(const World& w) const { keep(run_(static_cast<long>(World::rows), w.t.data(), w.samples.data())); }
+
+ private:
+  void* library_ = nullptr;
+  int (*run_)(long, const double*, const double*) = nullptr;
+};
+
+std::vector<Measurement> steps() {
+  std::vector<Measurement> result;
+  for (const bool dry_friction : {false, true}) {
+    const World w(dry_friction);
+    const int p = static_cast<int>(w.estimate.size());
+    Detector constant = w.detector({.mu = Eigen::Vector2d(1.0, 1.0)});
+    for (const ParameterSetKind kind : {ParameterSetKind::box, ParameterSetKind::polytope}) {
+      const std::string name = kind == ParameterSetKind::box ? "box" : "polytope";
+      Detector detector = w.detector({.set = kind});
+      const auto measure = [&](const std::string& what, const std::function<void()>& ours) {
+        const auto [seconds, peer_seconds] = interleaved_medians(
+            ours, [&] { w.run(constant); }, kRepetitions);
+        result.push_back({"detector/step " + what + name, World::rows, p, 1, seconds, "constant thresholds",
+                          peer_seconds,
+                          each(seconds, World::rows,
+                               kind == ParameterSetKind::polytope
+                                   ? fmt::format(", {} facets{}", w.set->facets().size(),
+                                                 detector.threshold().table() ? "" : ", walked without a table")
+                                   : "")});
+      };
+      measure("", [&] { w.run(detector); });
+      if (kind == ParameterSetKind::box || detector.threshold().table()) {
+        if (const Exported exported(detector, w.inputs); exported) {
+          measure("exported C ", [&] { exported.run(w); });
+        }
+      }
+    }
+  }
+  return result;
+}
+
+/// Thresholds of both channels of slowly turning rows, next to constant ones.
+std::vector<Measurement> thresholds() {
+  std::vector<Measurement> result;
+  const std::size_t n = 100000;
+  for (const std::size_t p : {4, 6, 8}) {
+    const DriveRows rows = drive_rows(n, p, RowNoise::uniform);
+    RegressionTable table(as_block(rows));
+    const Polytope set = feasible_set(table, rows.prior).polytope.value();
+    const Eigen::VectorXd estimate = Eigen::Map<const Eigen::VectorXd>(rows.truth.data(), static_cast<Eigen::Index>(p));
+    const std::vector<double> along = directions(rows, n), none(p, 0.0);
+    for (const ParameterSetKind kind : {ParameterSetKind::box, ParameterSetKind::polytope}) {
+      const ThresholdRule rule(set, estimate, kind);
+      const auto ours = [&] {
+        for (std::size_t k = 0; k < n; ++k) {
+          keep(rule.at({along.data() + k * p, p}, none, 0.01, k < n / 2 ? 0 : 1));
+        }
+      };
+      const auto constant = [&] {
+        for (std::size_t k = 0; k < n; ++k) {
+          double predicted = 0.0;
+          for (std::size_t j = 0; j < p; ++j) {
+            predicted += along[k * p + j] * estimate[static_cast<Eigen::Index>(j)];
+          }
+          keep(predicted);
+        }
+      };
+      const auto [seconds, peer_seconds] = interleaved_medians(ours, constant, kRepetitions);
+      result.push_back({std::string("detector/threshold ") + (kind == ParameterSetKind::box ? "box" : "polytope"), n,
+                        static_cast<int>(p), 1, seconds, "prediction alone", peer_seconds,
+                        each(seconds, n,
+                             kind == ParameterSetKind::box ? ""
+                             : rule.table()                ? ", table"
+                                                           : ", walk")});
+    }
+  }
+  return result;
+}
+
+/// The support function from the table, next to the walk that finds its vertices as it goes.
+std::vector<Measurement> supports() {
+  std::vector<Measurement> result;
+  const std::size_t n = 100000;
+  for (const std::size_t p : {4, 6, 8}) {
+    const DriveRows rows = drive_rows(n, p, RowNoise::uniform);
+    RegressionTable source(as_block(rows));
+    const Polytope set = feasible_set(source, rows.prior).polytope.value();
+    std::optional<SupportTable> table = SupportTable::make(set, {.vertices = 1 << 14});
+    if (!table) {
+      continue;
+    }
+    std::size_t vertices = 0;
+    for (const VertexGraph& graph : table->graphs()) {
+      vertices += graph.vertices();
+    }
+    SupportWalk walk(set);
+    const std::vector<double> along = directions(rows, n);
+    const auto [seconds, peer_seconds] = interleaved_medians(
+        [&] {
+          for (std::size_t k = 0; k < n; ++k) keep(table->support({along.data() + k * p, p}, 2 * k / n));
+        },
+        [&] {
+          for (std::size_t k = 0; k < n; ++k) keep(walk.support({along.data() + k * p, p}, 2 * k / n));
+        },
+        kRepetitions);
+    result.push_back({"detector/support table", n, static_cast<int>(p), 1, seconds, "walk, warm", peer_seconds,
+                      each(seconds, n, fmt::format(", {} facets, {} vertices", set.facets().size(), vertices))});
+  }
+  return result;
+}
+
+const bool registered = register_bench("detector/step", steps) && register_bench("detector/threshold", thresholds) &&
+                        register_bench("detector/support", supports);
+
+}  // namespace
+}  // namespace wheelwright::bench
