@@ -11,10 +11,22 @@
 namespace wheelwright {
 
 ThresholdRule::ThresholdRule(Polytope set, Eigen::VectorXd estimate, ParameterSetKind kind)
-    : set_(std::move(set)), estimate_(std::move(estimate)), kind_(kind), direction_(set_.dimension()) {
+    : set_(std::move(set)),
+      estimate_(std::move(estimate)),
+      kind_(kind),
+      direction_(set_.dimension()),
+      opposite_(set_.dimension()) {
   check::that(static_cast<std::size_t>(estimate_.size()) == set_.dimension(), "estimate",
               "one value for each parameter");
   check::that(estimate_.allFinite(), "estimate", "finite values");
+  for (std::size_t j = 0; j < set_.dimension(); ++j) {
+    const Interval& side = set_.hull().sides[j];
+    parameters_.push_back({estimate_[static_cast<Eigen::Index>(j)],
+                           std::max(std::abs(side.lower), std::abs(side.upper)),
+                           side.lower >= 0.0   ? 1.0
+                           : side.upper <= 0.0 ? -1.0
+                                               : 0.0});
+  }
   if (kind_ == ParameterSetKind::polytope) {
     table_ = SupportTable::make(set_, {.slots = kSlots});
     if (!table_) {
@@ -30,27 +42,24 @@ Threshold ThresholdRule::at(std::span<const double> y, std::span<const double> d
   double predicted = 0.0;
   double magnitude = dy_output;
   double reach = 0.0;
-  const auto shifted = [&](double sign, std::size_t slot) {
-    for (std::size_t j = 0; j < p; ++j) {
-      const Interval& side = set_.hull().sides[j];
-      const double shift = side.lower >= 0.0 ? dy_regressor[j] : side.upper <= 0.0 ? -dy_regressor[j] : 0.0;
-      direction_[j] = sign * y[j] + shift;
-    }
-    return support(direction_, slot);
-  };
+  double* const up = direction_.data();
+  double* const down = opposite_.data();
   for (std::size_t j = 0; j < p; ++j) {
-    const double term = y[j] * estimate_[static_cast<Eigen::Index>(j)];
+    const Parameter& theta = parameters_[j];
+    const double error = dy_regressor[j];
+    const double term = y[j] * theta.estimate;
     predicted += term;
     magnitude += std::abs(term);
-    const Interval& side = set_.hull().sides[j];
-    const double largest = std::max(std::abs(side.lower), std::abs(side.upper));
-    reach += (std::abs(y[j]) + dy_regressor[j]) * largest;
-    if (dy_regressor[j] > 0.0 && side.lower < 0.0 && side.upper > 0.0) {
-      extra += dy_regressor[j] * largest;
+    reach += (std::abs(y[j]) + error) * theta.largest;
+    if (error > 0.0 && theta.sign == 0.0) {
+      extra += error * theta.largest;
     }
+    const double shift = theta.sign * error;
+    up[j] = y[j] + shift;
+    down[j] = -y[j] + shift;
   }
-  const double above = shifted(1.0, 2 * channel);
-  const double below = shifted(-1.0, 2 * channel + 1);
+  const double above = support({up, p}, 2 * channel);
+  const double below = support({down, p}, 2 * channel + 1);
   // Sums of p + 3 terms, and as many in the residual that is compared with the result: Higham 2002, section 3.1. The
   // rounding of the direction itself is covered by the terms Δ|θ|. |h(±y + Δ)| <= Σ (|y_j| + Δ_j) max|θ_j|: measured
   // with the box, so that the same margin is added whichever set is used.

@@ -73,7 +73,13 @@ class ThresholdRule {
   Polytope set_;
   Eigen::VectorXd estimate_;
   ParameterSetKind kind_;
-  mutable std::vector<double> direction_;
+  struct Parameter {
+    double estimate = 0.0;  // θ̂_j
+    double largest = 0.0;   // max |θ_j|
+    double sign = 0.0;      // of θ_j, 0 where it is open
+  };
+  std::vector<Parameter> parameters_;
+  mutable std::vector<double> direction_, opposite_;
   mutable std::optional<SupportTable> table_;
   mutable std::optional<SupportWalk> walk_;  // where there is no table
 };

@@ -273,7 +273,7 @@ class Writer {
     line(
         " * fuses multiplications and additions where the processor can) and with the same libm, all numbers have the "
         "same");
-    line(" * bits. With another libm, residuals differ by rounding, which the thresholds allow for.");
+    line(" * bits. With another libm they differ by the rounding of its functions.");
     line(" */");
   }
 
