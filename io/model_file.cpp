@@ -3,6 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include <wheelwright/io/kinematic_json.hpp>
 #include <wheelwright/io/model_words.hpp>
 #include <wheelwright/io/robot_file.hpp>
 
@@ -247,6 +248,9 @@ CommissionedModel model_from_json(const Json& json, const std::string& file) {
   model.persistence = {detector.at("persistence").at("k").count(), detector.at("persistence").at("n").count()};
   model.facets = read_facets(root.at("feasible_set"), p);
   model.box = read_box(root.at("feasible_set").at("hull"), p);
+  if (root.has("kinematic")) {
+    model.kinematic = kinematic_from_json(root.at("kinematic"));
+  }
   return model;
 }
 

@@ -5,6 +5,7 @@
 
 #include <wheelwright/commission/physical.hpp>
 #include <wheelwright/io/estimators_json.hpp>
+#include <wheelwright/io/kinematic_json.hpp>
 #include <wheelwright/io/model_file.hpp>
 #include <wheelwright/io/model_words.hpp>
 #include <wheelwright/io/robot_file.hpp>
@@ -259,6 +260,9 @@ Json to_json(const Commissioning& r, const LogReport& data, const std::string& s
                         {"persistence", {{"k", m.persistence.k}, {"n", m.persistence.n}}}};
   }
   json["validation"] = validation_json(r, m.model);
+  if (auto kinematic = kinematic_json(r.kinematic, r.folds)) {
+    json["kinematic"] = std::move(*kinematic);
+  }
   json["data"] = data_json(r, data);
   json["notes"] = r.notes;
   return json;

@@ -29,7 +29,7 @@ struct RobotReader {
   void read() {
     const auto members = root.members({"name", "model", "wheel_radius", "track_width", "footprint", "lever_arm",
                                        "friction", "parameters", "effort", "nominal", "prior", "noise", "filter",
-                                       "encoder_counts_per_turn", "speed_source", "limits", "motor"});
+                                       "encoder_counts_per_turn", "speed_source", "limits", "kinematic", "motor"});
     for (const auto& [key, place] : members) {
       read_basics(key, place);
     }
@@ -117,6 +117,10 @@ struct RobotReader {
       }
       if (robot.parameters->empty()) {
         place.fail("at least one of " + listed(physical));
+      }
+    } else if (key == "kinematic") {
+      for (const auto& [name, value] : place.members({"window"})) {
+        robot.kinematic_window = value.positive();
       }
     } else if (key == "limits") {
       for (const auto& [name, value] : place.members({"effort", "speed", "acceleration"})) {

@@ -87,6 +87,9 @@ Json to_json(const Robot& robot) {
   for (const auto& [name, value] : robot.limits) {
     out["limits"][name] = value;
   }
+  if (robot.kinematic_window) {
+    out["kinematic"] = {{"window", *robot.kinematic_window}};
+  }
   if (robot.motor) {
     out["motor"] = motor_of(*robot.motor);
   }
