@@ -215,6 +215,7 @@ class Writer {
     line(" * Robot: {} ({}).", plain(options_.robot.empty() ? "unnamed" : options_.robot), plain(model_.name));
     line(" * Filter: order {}, alpha = {} 1/s, beta = {} 1/s.", filter_.design().order, filter_.design().alpha,
          filter_.design().beta);
+    line(" * Residual: filtered effort minus what the model expects (a kinematic residual is not part of this file).");
     const Persistence persistence = detector_.options().persistence.value_or(Persistence{});
     line(" * Decision: {}, alarm at {} of {} instants outside.",
          !thresholds() ? "constant thresholds"
