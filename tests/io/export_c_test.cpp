@@ -34,6 +34,7 @@ struct Case {
   bool noisy = true;     // bounds on the errors of the rows
   double jitter = 0.0;   // share of the step
   DetectorOptions options{};
+  Eigen::Index half_spaces = 4;  // for each parameter
 };
 
 Model drive(bool anisotropic, bool coulomb) {
@@ -60,7 +61,7 @@ Polytope set_of(const Case& c) {
     box.sides.push_back({x < 0.1 ? -0.2 : 0.7 * x, x < 0.1 ? 0.2 : 1.4 * x});
   }
   std::vector<HalfSpace> rows;
-  for (Eigen::Index k = 0; k < 4 * theta.size(); ++k) {
+  for (Eigen::Index k = 0; k < c.half_spaces * theta.size(); ++k) {
     const Eigen::VectorXd a = random.matrix(theta.size(), 1);
     rows.push_back({a, a.dot(theta) + 0.02 + 0.03 * random.unit(), {}});
   }
@@ -312,6 +313,11 @@ TEST_F(ExportC, SaysWhatItCannotWrite) {
   own.model.terms.back().function = [](const MotionState& state) { return TermValue{state.speed[0], 0.0}; };
   const Detector other = detector_of(own);
   EXPECT_THAT(testing::input_error([&] { static_cast<void>(c_header(other)); }), HasSubstr("offset"));
+  // Too many vertices for a table: the box still goes.
+  Case many{.model = drive(true, true), .half_spaces = 80};
+  EXPECT_THAT(testing::input_error([&] { static_cast<void>(c_header(detector_of(many))); }), HasSubstr("--set box"));
+  many.options.set = kBox;
+  EXPECT_THAT(c_header(detector_of(many)), HasSubstr("threshold from the box of parameters"));
 }
 
 TEST_F(ExportC, KeepsItsCommentClosed) {
