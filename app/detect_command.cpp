@@ -31,7 +31,7 @@ struct Arguments {
 constexpr const char* kHelp =
     "Looks for faults in a log with a commissioned model: the residual of filtered torque against the threshold that "
     "no "
-    "fault-free robot within its bounds can exceed.";
+    "fault-free robot within its bounds can exceed, and where the log has a pose or a gyro, wheel odometry against it.";
 
 constexpr const char* kExamples =
     "Examples:\n"
@@ -39,14 +39,34 @@ constexpr const char* kExamples =
     "  robot_driver | wheelwright detect --follow --model result/model.json\n\n"
     "Exit code: 0 no fault, 1 a fault was found, 2 bad input.";
 
+// The kinematic residual, where model and log have it; else why not.
+KinematicWatch watch_kinematics(LogSource& log, const CommissionedModel& model, const DetectorOptions& options) {
+  if (!model.kinematic) {
+    return {std::nullopt, "the log that the model was commissioned on had neither a usable pose nor a gyro"};
+  }
+  std::string missing;
+  for (const std::string& name : model.kinematic->measurement.columns()) {
+    if (!log.find(name)) {
+      missing += (missing.empty() ? "" : ", ") + name;
+    }
+  }
+  if (!missing.empty()) {
+    return {std::nullopt, "the log has no " + missing};
+  }
+  return {detect(log, make_detector(*model.kinematic, options)), {}};
+}
+
 int run(const Arguments& a) {
   CommissionedModel model = read_model(a.model);
   model.persistence = a.persistence.value_or(model.persistence);
+  if (model.kinematic) {
+    model.kinematic->persistence = a.persistence.value_or(model.kinematic->persistence);
+  }
   Detector detector = make_detector(model, a.detector);
   CsvOptions reader = reader_options(a.common);
   reader.only = useful_columns(model.robot);
   if (a.follow) {
-    return follow(std::cin, std::cout, std::move(detector), model, reader, a.common.json) ? kNo : kDone;
+    return follow(std::cin, std::cout, std::move(detector), model, a.detector, reader, a.common.json) ? kNo : kDone;
   }
   if (a.log.empty()) {
     throw InputError("detect: expected a LOG, or --follow to read rows from standard input");
@@ -55,22 +75,29 @@ int run(const Arguments& a) {
   CsvLog log({a.log}, reader);
   require_columns(log, model.measurement.columns());
   const Detection detection = detect(log, std::move(detector));
+  const KinematicWatch kinematic = watch_kinematics(log, model, a.detector);
+  const bool fault = !detection.events.empty() || (kinematic.detection && !kinematic.detection->events.empty());
   if (!a.common.out.empty() || a.common.json) {
-    publish(a.common, to_json(detection, model, a.model.string(), a.log.string()), "detection.json",
-            a.common.out.empty() ? std::string()
-                                 : detect_report(detection, model, report_context(a.common, log.report(), log)));
+    Json json = to_json(detection, model, a.model.string(), a.log.string());
+    add_kinematic(json, kinematic, model);
+    std::string page;
+    if (!a.common.out.empty()) {
+      page = detect_report(detection, model, report_context(a.common, log.report(), log),
+                           {.detection = kinematic.detection, .message = kinematic.message});
+    }
+    publish(a.common, json, "detection.json", page);
   }
   if (!a.common.quiet && !a.common.json) {
     for (const std::string& sentence : sentences(log.report())) {
       fmt::print("log: {}\n", sentence);
     }
-    fmt::print("{}", summary(detection, model));
+    fmt::print("{}{}", summary(detection, model), summary(kinematic, model));
     if (!a.common.out.empty()) {
       fmt::print("wrote {} and {}\n", (a.common.out / "detection.json").string(),
                  (a.common.out / "report.html").string());
     }
   }
-  return detection.events.empty() ? kDone : kNo;
+  return fault ? kNo : kDone;
 }
 
 }  // namespace

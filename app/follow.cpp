@@ -3,7 +3,10 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -17,23 +20,63 @@ namespace {
 
 constexpr double kMerge = 0.5;  // s, as detect() on a whole log
 
-std::vector<std::size_t> pick_columns(const CsvRowParser& parser, const Measurement& measurement) {
+// Positions of the columns `names`; nothing, and `missing` says which, where there are not all of them.
+std::optional<std::vector<std::size_t>> pick_columns(const CsvRowParser& parser, const std::vector<std::string>& names,
+                                                     std::string& missing) {
   std::vector<std::size_t> pick;
-  for (const std::string& name : measurement.columns()) {
+  for (const std::string& name : names) {
     const auto& columns = parser.columns();
     const auto it = std::find(columns.begin(), columns.end(), name);
     if (it == columns.end()) {
-      throw InputError("standard input: no column '" + name + "', which the model was commissioned on");
+      missing = name;
+      return std::nullopt;
     }
     pick.push_back(static_cast<std::size_t>(it - columns.begin()));
   }
   return pick;
 }
 
+// One residual: its detector, its columns, its events, and the model that names its outputs.
+template <typename AnyDetector>
+class Watch {
+ public:
+  Watch(AnyDetector detector, std::vector<std::size_t> pick, const CommissionedModel& model)
+      : detector_(std::move(detector)),
+        pick_(std::move(pick)),
+        model_(model),
+        sample_(pick_.size()),
+        recorder_(model.model.n(), kMerge) {}
+
+  void take(const LogBlock& row, std::size_t number, std::ostream& out, bool json) {
+    if (!row.segment_starts.empty()) {
+      detector_.restart();
+    }
+    for (std::size_t c = 0; c < pick_.size(); ++c) {
+      sample_[c] = row.columns[pick_[c]][0];
+    }
+    const Decision& decision = detector_.step(row.t[0], sample_);
+    for (std::size_t i = 0; decision.valid && i < decision.channels.size(); ++i) {
+      const ChannelDecision& c = decision.channels[i];
+      if (recorder_.add(i, number, row.t[0], c.residual, c.threshold.lower, c.threshold.upper, c.outside, c.alarm)) {
+        const Event& event = recorder_.events().back();
+        out << (json ? json_text(to_json(event, model_), -1) : event_line(event, model_)) << std::endl;
+      }
+    }
+  }
+  [[nodiscard]] bool any() const { return !recorder_.events().empty(); }
+
+ private:
+  AnyDetector detector_;
+  std::vector<std::size_t> pick_;
+  CommissionedModel model_;
+  std::vector<double> sample_;
+  EventRecorder recorder_;
+};
+
 }  // namespace
 
 bool follow(std::istream& in, std::ostream& out, Detector detector, const CommissionedModel& model,
-            const CsvOptions& reader, bool json) {
+            const DetectorOptions& options, const CsvOptions& reader, bool json) {
   std::string line;
   do {
     if (!std::getline(in, line)) {
@@ -41,9 +84,20 @@ bool follow(std::istream& in, std::ostream& out, Detector detector, const Commis
     }
   } while (!is_csv_content(line));
   CsvRowParser parser(line, reader, model.measurement.nominal_step);
-  const std::vector<std::size_t> pick = pick_columns(parser, model.measurement);
-  std::vector<double> sample(pick.size());
-  EventRecorder recorder(model.model.n(), kMerge);
+  std::string missing;
+  const auto pick = pick_columns(parser, model.measurement.columns(), missing);
+  if (!pick) {
+    throw InputError("standard input: no column '" + missing + "', which the model was commissioned on");
+  }
+  Watch torque(std::move(detector), *pick, model);
+  std::optional<Watch<KinematicDetector>> kinematic;
+  if (model.kinematic) {
+    if (const auto pose = pick_columns(parser, model.kinematic->measurement.columns(), missing)) {
+      kinematic.emplace(make_detector(*model.kinematic, options), *pose, with_kinematic_outputs(model));
+    } else {
+      fmt::print(stderr, "wheelwright detect: no column '{}': the kinematic residual is not watched\n", missing);
+    }
+  }
   LogBlock row;
   std::size_t number = 0;
   while (std::getline(in, line)) {
@@ -55,23 +109,13 @@ bool follow(std::istream& in, std::ostream& out, Detector detector, const Commis
       fmt::print(stderr, "wheelwright detect: {} (row left out)\n", error.what());
       continue;
     }
-    if (!row.segment_starts.empty()) {
-      detector.restart();
-    }
-    for (std::size_t c = 0; c < pick.size(); ++c) {
-      sample[c] = row.columns[pick[c]][0];
-    }
-    const Decision& decision = detector.step(row.t[0], sample);
-    for (std::size_t i = 0; decision.valid && i < decision.channels.size(); ++i) {
-      const ChannelDecision& c = decision.channels[i];
-      if (recorder.add(i, number, row.t[0], c.residual, c.threshold.lower, c.threshold.upper, c.outside, c.alarm)) {
-        const Event& event = recorder.events().back();
-        out << (json ? json_text(to_json(event, model), -1) : event_line(event, model)) << std::endl;
-      }
+    torque.take(row, number, out, json);
+    if (kinematic) {
+      kinematic->take(row, number, out, json);
     }
     ++number;
   }
-  return !recorder.events().empty();
+  return torque.any() || (kinematic && kinematic->any());
 }
 
 }  // namespace wheelwright::app

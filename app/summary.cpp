@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "summary.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -63,6 +64,21 @@ std::string smallest_fault(const Robot& robot, double kappa) {
              : fmt::format("a change of the effort by {:.2g} % is certainly seen", 100.0 * kappa);
 }
 
+std::string kinematic_table(const KinematicCommissioning& k) {
+  std::string text;
+  for (const KinematicParameter& p : k.parameters) {
+    text += line(p.name, p.estimate, p.lower, p.upper, std::nullopt, p.unit == "1" ? "" : p.unit, false, false);
+  }
+  const auto outputs = k.model ? k.model->measurement.outputs() : std::vector<std::string>();
+  const auto units = k.model ? k.model->measurement.output_units() : std::vector<std::string>();
+  for (std::size_t i = 0; i < k.validation.size(); ++i) {
+    const OutputValidation& v = k.validation[i];
+    text += fmt::format("  held out, {}: {} false alarms in {} instants, median width of the threshold {:.3g} {}\n",
+                        outputs[i], v.outside, v.instants, v.median_width, units[i]);
+  }
+  return text;
+}
+
 std::string contradiction_table(const Commissioning& r) {
   std::string text = "  samples that contradict one another:\n";
   for (const WeightedRow& row : r.feasible.contradiction) {
@@ -98,6 +114,7 @@ std::string summary(const Commissioning& r) {
                         r.model.model.outputs[i], v.outside, v.instants, 100.0 * v.nrmse);
     text += "; " + smallest_fault(r.model.robot, v.smallest_kappa) + "\n";
   }
+  text += kinematic_table(r.kinematic);
   for (const std::string& note : r.notes) {
     text += "  note: " + note + "\n";
   }
@@ -168,6 +185,60 @@ Json to_json(const Detection& d, const CommissionedModel& model, const std::stri
     json["events"].push_back(to_json(event, model));
   }
   return json;
+}
+
+CommissionedModel with_kinematic_outputs(const CommissionedModel& model) {
+  CommissionedModel view = model;
+  view.robot.effort = EffortKind::torque;  // units are those of the pose
+  view.model = model.kinematic ? kinematic_outputs(*model.kinematic) : Model{};
+  view.persistence = model.kinematic ? model.kinematic->persistence : model.persistence;
+  return view;
+}
+
+std::string summary(const KinematicWatch& watch, const CommissionedModel& model) {
+  if (!watch.detection) {
+    return "kinematic residual: not watched, " + watch.message + "\n";
+  }
+  const Detection& d = *watch.detection;
+  if (d.instants == 0) {
+    return "kinematic residual: no decision, the log is shorter than its window\n";
+  }
+  const CommissionedModel view = with_kinematic_outputs(model);
+  std::string text = fmt::format(
+      "kinematic residual: {} in {:.1f} s ({} instants)\n",
+      d.events.empty() ? "no fault" : fmt::format("{} fault event{}", d.events.size(), d.events.size() == 1 ? "" : "s"),
+      d.seconds, d.instants);
+  constexpr std::size_t most = 20;
+  for (std::size_t k = 0; k < std::min(d.events.size(), most); ++k) {
+    text += "  " + event_line(d.events[k], view) + "\n";
+  }
+  if (d.events.size() > most) {
+    text += fmt::format("  … and {} more (--json lists them all)\n", d.events.size() - most);
+  }
+  for (std::size_t i = 0; i < d.utilisation.size(); ++i) {
+    text +=
+        fmt::format("  {}: at most {:.0f} % of its threshold used\n", view.model.outputs[i], 100.0 * d.utilisation[i]);
+  }
+  return text;
+}
+
+void add_kinematic(Json& json, const KinematicWatch& watch, const CommissionedModel& model) {
+  const Detection none;
+  const Detection& d = watch.detection ? *watch.detection : none;
+  const CommissionedModel view = with_kinematic_outputs(model);
+  const Json own = to_json(d, view, {}, {});
+  for (const Json& output : own.at("outputs")) {
+    json["outputs"].push_back(output);
+  }
+  std::vector<Json> events = json.at("events").get<std::vector<Json>>();
+  events.insert(events.end(), own.at("events").begin(), own.at("events").end());
+  std::ranges::stable_sort(events, {}, [](const Json& event) { return event.at("alarm").get<double>(); });
+  json["events"] = events;
+  json["fault"] = !events.empty();
+  json["kinematic"] = {{"watched", watch.detection.has_value()},
+                       {"message", watch.message},
+                       {"instants", d.instants},
+                       {"seconds", d.seconds}};
 }
 
 }  // namespace wheelwright::app

@@ -3,6 +3,7 @@
 /// Results in a few lines for a terminal, and as JSON.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include <wheelwright/commission/commission.hpp>
@@ -16,6 +17,21 @@ namespace wheelwright::app {
 
 /// What a detector said of a log, for a terminal.
 [[nodiscard]] std::string summary(const Detection& detection, const CommissionedModel& model);
+
+/// What was said of the kinematic residual, beside what was said of the torque residual.
+struct KinematicWatch {
+  std::optional<Detection> detection;  ///< nothing where it was not watched
+  std::string message;                 ///< why not, for people
+};
+
+/// `model` with the outputs of its kinematic model in the place of its own, for summary, event_line, to_json and reports.
+[[nodiscard]] CommissionedModel with_kinematic_outputs(const CommissionedModel& model);
+
+/// What the kinematic residual showed, for a terminal.
+[[nodiscard]] std::string summary(const KinematicWatch& watch, const CommissionedModel& model);
+
+/// Adds outputs and events of the kinematic residual to a detection as JSON; events stay in the order of their alarms.
+void add_kinematic(Json& detection, const KinematicWatch& watch, const CommissionedModel& model);
 
 /// One event in a line.
 [[nodiscard]] std::string event_line(const Event& event, const CommissionedModel& model);

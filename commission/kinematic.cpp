@@ -173,6 +173,26 @@ std::optional<Fit> fit_rows(const Frame& s, Part part, double risk) {
   return fit;
 }
 
+// A robot whose wheels slip in every turn (skid steer) is far from its geometry: sides of the prior box that least squares
+// leaves are moved outward until they hold it, with the same share to spare. Returns the names of these parameters.
+std::vector<std::string> widen(Frame& s, const Fit& fit, double share) {
+  std::vector<std::string> widened;
+  const auto names = s.measurement.parameters();
+  for (std::size_t j = 0; j < names.size(); ++j) {
+    const double value = fit.squares.estimate[static_cast<Eigen::Index>(j)];
+    const bool certain = fit.excitation[j].state == Excitation::identified && value > 0.0;
+    if (certain && names[j] != "gyro_bias" && !s.prior.sides[j].contains(value)) {
+      Interval& side = s.prior.sides[j];
+      side = {std::min(side.lower, (1.0 - share) * value), std::max(side.upper, (1.0 + share) * value)};
+      widened.push_back(names[j]);
+      if (names[j].starts_with("yaw_gain")) {
+        s.declared.yaw_gain = std::max(s.declared.yaw_gain, side.upper);
+      }
+    }
+  }
+  return widened;
+}
+
 std::vector<OutputNoise> output_noise(const Frame& s, const Fit& fit) {
   std::vector<OutputNoise> noise(s.is_declared.size());
   for (std::size_t i = 0; i < noise.size(); ++i) {
@@ -284,6 +304,10 @@ std::string message_of(const Frame& s, const KinematicCommissioning& r) {
   } else {
     text += "; the bounds stand on the declared noise, those of the other outputs are extrapolated from the residuals";
   }
+  if (!r.far_from_nominal.empty()) {
+    text += fmt::format("; {} {} far from the geometry in the robot file, as with wheels that slip in every turn",
+                        fmt::join(r.far_from_nominal, ", "), r.far_from_nominal.size() == 1 ? "is" : "are");
+  }
   if (s.measurement.held_pose) {
     text += "; the pose comes at a lower rate than the wheels, and only new ones count";
   }
@@ -338,6 +362,8 @@ KinematicCommissioning commission_kinematics(LogSource& log, const Robot& robot,
     result.message = fmt::format("no kinematic residual: too few windows of {:.3g} s in the log", s.window);
     return result;
   }
+  result.far_from_nominal = widen(s, *fit, options.radius_share);
+  result.prior = s.prior;
   result.noise = output_noise(s, *fit);
   BoundedSet bounded = bounded_set(s, Part::everything, result.noise);
   const bool any_declared = std::ranges::find(s.is_declared, true) != s.is_declared.end();
@@ -378,6 +404,13 @@ KinematicDetector make_detector(const KinematicModel& model, DetectorOptions opt
   options.persistence = options.persistence.value_or(model.persistence);
   return KinematicDetector(OdometryFilter(model.measurement, model.window, model.errors),
                            ThresholdRule(Polytope(model.facets, model.box), model.estimate, options.set), options);
+}
+
+Model kinematic_outputs(const KinematicModel& model) {
+  Model names;
+  names.outputs = model.measurement.outputs();
+  names.output_units = model.measurement.output_units();
+  return names;
 }
 
 }  // namespace wheelwright

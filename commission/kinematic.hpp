@@ -63,7 +63,8 @@ struct KinematicCommissioning {
   std::vector<OutputNoise> noise;            ///< one for each output; a declared bound is the largest of the log's rows
   std::vector<OutputValidation> validation;  ///< on held-out blocks, of a model made from the other blocks
   Box prior;
-  std::size_t rows = 0;             ///< that the set is made of
+  std::vector<std::string> far_from_nominal;  ///< parameters whose side of the prior box was moved outward to hold θ̂
+  std::size_t rows = 0;                       ///< that the set is made of
   bool declared_too_small = false;  ///< no parameters explain the log within the declared noise: it was estimated
   double raise = 1.0;               ///< an estimated bound was raised by this, so that the prior box explains the log
 };
@@ -74,7 +75,8 @@ struct KinematicCommissionOptions {
   FoldOptions folds;    ///< purge is set to the window
   ExtrapolationOptions extrapolation;
   Persistence persistence;
-  double radius_share = 0.3;  ///< prior box of radii and yaw gains: nominal ± this share, inside (0, 1)
+  double radius_share = 0.3;  ///< prior box of radii and yaw gains: nominal ± this share, inside (0, 1); moved outward
+                              ///< where least squares leaves it, which the message says
   double bias = 0.2;          ///< prior box of the gyro's bias: ± this, rad/s
 };
 
@@ -94,5 +96,8 @@ struct KinematicCommissionOptions {
 
 /// The detector of a commissioned kinematic model.
 [[nodiscard]] KinematicDetector make_detector(const KinematicModel& model, DetectorOptions options = {});
+
+/// Names and units of the outputs as a Model that has nothing else, for tables and charts.
+[[nodiscard]] Model kinematic_outputs(const KinematicModel& model);
 
 }  // namespace wheelwright

@@ -57,6 +57,33 @@ std::string residual_section(const Commissioning& result, const Detection& own, 
          residual_charts(own.trace, m.robot, m.model, {}, axis) + torque_charts(own.trace, m.robot, m.model, axis);
 }
 
+std::string kinematic_section(const KinematicCommissioning& k) {
+  std::string out = k.message.empty() ? std::string() : paragraph(escape(capital(k.message)) + ".");
+  if (!k.model) {
+    return out;
+  }
+  std::vector<std::vector<Cell>> rows;
+  for (const KinematicParameter& p : k.parameters) {
+    const std::string unit = p.unit == "1" ? "" : p.unit;
+    rows.push_back({escape(p.name), numeric(p.estimate ? number(*p.estimate, 5) : "–"), numeric(number(p.lower, 5)),
+                    numeric(number(p.upper, 5)), numeric(number(p.nominal, 5)), escape(unit)});
+  }
+  out +=
+      table({"Parameter", numeric("estimate"), numeric("lower"), numeric("upper"), numeric("nominal"), "unit"}, rows);
+  const auto names = k.model->measurement.outputs(), units = k.model->measurement.output_units();
+  rows.clear();
+  for (std::size_t i = 0; i < k.noise.size(); ++i) {
+    const OutputValidation v = i < k.validation.size() ? k.validation[i] : OutputValidation{};
+    rows.push_back({escape(names[i]), escape(units[i]),
+                    k.noise[i].origin == NoiseOrigin::declared ? "declared" : "estimated",
+                    numeric(number(k.noise[i].bound)), numeric(count(v.instants)), numeric(count(v.outside)),
+                    numeric(number(v.residual_rms)), numeric(number(v.median_width))});
+  }
+  return out + table({"Output", "unit", "noise", numeric("bound"), numeric("held-out<br>instants"),
+                      numeric("false<br>alarms"), numeric("residual<br>rms"), numeric("median width<br>of [l, u]")},
+                     rows);
+}
+
 std::string signals_section(const ReportContext& context, const std::vector<ChartMark>& marks, const TimeAxis& axis) {
   return context.signals ? signal_charts(*context.signals, marks, axis)
                          : paragraph("The raw signals were not handed to this page.");
@@ -83,6 +110,7 @@ std::string commission_report(const Commissioning& result, const ReportContext& 
   if (context.own_log && !context.own_log->trace.t.empty()) {
     add("residual", "Residual and threshold", residual_section(result, *context.own_log, axis));
   }
+  add("kinematic", "Wheel odometry against pose or gyro", kinematic_section(result.kinematic));
   add("signals", "Raw signals", signals_section(context, contradiction_marks(result), axis));
   if (result.status != Commissioning::Status::empty) {
     add("validation", "Validation on held-out driving", validation_section(result));

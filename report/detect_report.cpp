@@ -26,13 +26,13 @@ double largest(const std::vector<double>& values) {
   return values.empty() ? 0.0 : *std::max_element(values.begin(), values.end());
 }
 
-std::string verdict(const Detection& detection) {
-  if (detection.instants == 0) {
+std::string verdict(const Detection& detection, std::size_t kinematic_events) {
+  if (detection.instants == 0 && kinematic_events == 0) {
     return "Nothing was watched: the log has no instant with a decision.";
   }
-  return detection.events.empty() ? "No fault was seen."
-                                  : fmt::format("{}: the robot did not behave like its model.",
-                                                capital(plural(detection.events.size(), "event")));
+  const std::size_t events = detection.events.size() + kinematic_events;
+  return events == 0 ? "No fault was seen."
+                     : fmt::format("{}: the robot did not behave like its model.", capital(plural(events, "event")));
 }
 
 std::vector<std::string> sentences(const Detection& detection, const CommissionedModel& model, const TimeAxis& axis) {
@@ -110,9 +110,36 @@ std::string output_table(const Detection& detection, const CommissionedModel& mo
              "the threshold. NRMSE: rms of the residual over rms of the filtered effort.</span>");
 }
 
+std::string kinematic_section(const KinematicFindings& kinematic, const CommissionedModel& model,
+                              const TimeAxis& axis) {
+  if (!kinematic.detection || !model.kinematic) {
+    return paragraph("The kinematic residual was not watched: " +
+                     escape(kinematic.message.empty() ? "the model has none" : kinematic.message) +
+                     ". Slip across the heading, among others, does not show without it.");
+  }
+  const Detection& d = *kinematic.detection;
+  CommissionedModel names = model;
+  names.robot.effort = EffortKind::torque;
+  names.model = kinematic_outputs(*model.kinematic);
+  std::vector<std::vector<ChartMark>> marks(d.trace.outputs.size());
+  for (std::size_t k = 0; k < d.events.size(); ++k) {
+    if (d.events[k].output < marks.size()) {
+      marks[d.events[k].output].push_back({d.events[k].start, d.events[k].end, "K" + std::to_string(k + 1)});
+    }
+  }
+  return paragraph(
+             fmt::format("What pose or gyro saw over the last {} against what the wheels rolled: {} instants over "
+                         "{} of driving. Without a fault the residual stays inside the grey band.",
+                         with_unit(number(model.kinematic->window), "s"), count(d.instants),
+                         with_unit(number(d.seconds, 4), "s"))) +
+         event_table(d, names, axis) + output_table(d, names) +
+         (d.trace.t.empty() ? std::string() : residual_charts(d.trace, names.robot, names.model, marks, axis));
+}
+
 }  // namespace
 
-std::string detect_report(const Detection& detection, const CommissionedModel& model, const ReportContext& context) {
+std::string detect_report(const Detection& detection, const CommissionedModel& model, const ReportContext& context,
+                          const KinematicFindings& kinematic) {
   const TimeAxis axis = axis_for(detection, context);
   std::vector<std::vector<ChartMark>> marks(detection.trace.outputs.size());
   std::vector<ChartMark> all_marks;
@@ -127,9 +154,17 @@ std::string detect_report(const Detection& detection, const CommissionedModel& m
 
   PageContent content;
   content.title = context.title.empty() ? "Detection on " + model.robot.name : context.title;
-  content.status = detection.instants == 0 ? "caution" : detection.events.empty() ? "good" : "bad";
-  content.verdict = verdict(detection);
+  const std::size_t kinematic_events = kinematic.detection ? kinematic.detection->events.size() : 0;
+  const bool fault = !detection.events.empty() || kinematic_events > 0;
+  content.status = fault ? "bad" : detection.instants == 0 ? "caution" : "good";
+  content.verdict = verdict(detection, kinematic_events);
   content.sentences = sentences(detection, model, axis);
+  if (kinematic_events > 0) {
+    const Event& first = kinematic.detection->events.front();
+    content.sentences.push_back(fmt::format(
+        "{} of these in the kinematic residual, the first alarm at {}: pose or gyro did not move as the wheels rolled.",
+        capital(plural(kinematic_events, "event")), axis.text(first.alarm)));
+  }
   content.software = context.software;
   content.sections.push_back({"events", "Events", event_table(detection, model, axis)});
   if (!detection.trace.t.empty()) {
@@ -141,6 +176,7 @@ std::string detect_report(const Detection& detection, const CommissionedModel& m
              residual_charts(detection.trace, model.robot, model.model, marks, axis) +
              torque_charts(detection.trace, model.robot, model.model, axis)});
   }
+  content.sections.push_back({"kinematic", "Kinematic residual", kinematic_section(kinematic, model, axis)});
   content.sections.push_back({"signals", "Raw signals",
                               context.signals ? signal_charts(*context.signals, all_marks, axis)
                                               : paragraph("The raw signals were not handed to this page.")});

@@ -3,6 +3,7 @@
 /// The page of a detection.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include <wheelwright/commission/commission.hpp>
@@ -11,10 +12,17 @@
 
 namespace wheelwright {
 
+/// What the kinematic residual showed.
+struct KinematicFindings {
+  std::optional<Detection> detection{};  ///< nothing where it was not watched
+  std::string message{};                 ///< why not
+};
+
 /// One self-contained HTML page: what the detector says in words, its events (a click zooms all charts to one), the residual
-/// inside [l, u] with the events shaded, prediction, raw signals, data. It loads nothing when opened; every name is escaped,
+/// inside [l, u] with the events shaded, prediction, raw signals, data, and the same of
+/// the kinematic residual. It loads nothing when opened; every name is escaped,
 /// every number is finite. `context.own_log` is not used.
 [[nodiscard]] std::string detect_report(const Detection& detection, const CommissionedModel& model,
-                                        const ReportContext& context);
+                                        const ReportContext& context, const KinematicFindings& kinematic = {});
 
 }  // namespace wheelwright
