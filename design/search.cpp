@@ -2,18 +2,16 @@
 #include <wheelwright/design/search.hpp>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <exception>
 #include <limits>
 #include <numeric>
 #include <random>
-#include <thread>
 
 #include <nlopt.hpp>
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/error.hpp>
+#include <wheelwright/core/for_all.hpp>
 
 namespace wheelwright {
 namespace {
@@ -28,38 +26,6 @@ double value_at(const Function& f, std::span<const double> x) {
     return std::isfinite(value) ? value : kNowhere;
   } catch (const InvalidArgument&) {
     return kNowhere;
-  }
-}
-
-// Calls work(i) for i < count on several threads; the calling thread works too and tells of the progress.
-template <typename Work>
-void for_all(std::size_t count, std::size_t threads, const Work& work, const std::function<void(std::size_t)>& done) {
-  std::atomic<std::size_t> next = 0;
-  std::exception_ptr failure;
-  std::atomic<bool> failed = false;
-  const auto run = [&](bool tells) {
-    for (std::size_t i = next++; i < count && !failed; i = next++) {
-      try {
-        work(i);
-        if (tells && done) {
-          done(std::min(next.load(), count));
-        }
-      } catch (...) {
-        if (!failed.exchange(true)) {
-          failure = std::current_exception();
-        }
-      }
-    }
-  };
-  {
-    std::vector<std::jthread> helpers;
-    for (std::size_t k = 1; k < std::min(threads, count); ++k) {
-      helpers.emplace_back([&run] { run(false); });
-    }
-    run(true);
-  }
-  if (failure) {
-    std::rethrow_exception(failure);
   }
 }
 

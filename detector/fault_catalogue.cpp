@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/detector/fault_type.hpp>
+
+#include <algorithm>
+#include <numbers>
+
+#include <Eigen/QR>
+
+#include <wheelwright/core/check.hpp>
+
+namespace wheelwright {
+namespace {
+
+using std::numbers::pi;
+
+constexpr double kDrift = 20.0;              // s, of a slow change of radius
+constexpr double kDropout = 0.1;             // s
+constexpr double kBump = 30.0 * pi / 180.0;  // rad of the wheel's turn
+constexpr double kMostRadius = 0.5;          // share of the radius
+constexpr double kMostLost = 0.95;           // share of an effort or of counts
+
+// What acts on one joint alone, seen in coordinates or outputs: A E_j A⁻¹.
+Eigen::MatrixXd of_joint(const Eigen::MatrixXd& map, std::size_t joint) {
+  const Eigen::MatrixXd inverse = map.completeOrthogonalDecomposition().pseudoInverse();
+  const auto j = static_cast<Eigen::Index>(joint);
+  return map.col(j) * inverse.row(j);
+}
+
+struct Side {
+  std::size_t joint;
+  std::string suffix, words;
+};
+
+std::vector<Side> sides_of(const Model& model) {
+  if (model.joints.size() == 2) {
+    return {{0, "_right", "the right wheel's"}, {1, "_left", "the left wheel's"}};
+  }
+  std::vector<Side> sides;
+  for (std::size_t j = 0; j < model.joints.size(); ++j) {
+    sides.push_back(
+        {j, model.joints.size() == 1 ? std::string() : std::string("_").append(std::to_string(j + 1)), "the joint's"});
+  }
+  return sides;
+}
+
+void add_efforts(std::vector<FaultType>& all, const Model& model, const Side& side, const std::string& unit) {
+  const Eigen::MatrixXd own = of_joint(model.input, side.joint);
+  FaultType loss{.name = "effort_loss" + side.suffix,
+                 .sentence = side.words + " actuator delivers less than its effort says, by the share",
+                 .unit = "1",
+                 .range = {0.0, kMostLost},
+                 .share_lost = true,
+                 .effort = own};
+  all.push_back(loss);
+  all.push_back({.name = "effort_bias" + side.suffix,
+                 .sentence = side.words + " effort reads too much (negative: too little) by",
+                 .unit = unit,
+                 .range = {-1e4, 1e4},
+                 .offset = model.input.col(static_cast<Eigen::Index>(side.joint))});
+  all.push_back({.name = "effort_stuck" + side.suffix,
+                 .sentence = side.words + " effort stays at its value",
+                 .unit = "1",
+                 .range = {0.0, 1.0},
+                 .whole = true,
+                 .effort = -own,
+                 .held_effort = true});
+  all.push_back({.name = "effort_dead" + side.suffix,
+                 .sentence = side.words + " effort reads zero",
+                 .unit = "1",
+                 .range = {0.0, 1.0},
+                 .whole = true,
+                 .effort = -own});
+}
+
+void add_encoders(std::vector<FaultType>& all, const Model& model, const Side& side) {
+  const Eigen::MatrixXd own = of_joint(model.motion, side.joint);
+  all.push_back({.name = "encoder_scale" + side.suffix,
+                 .sentence = side.words + " encoder counts too much (negative: too little) by the share",
+                 .unit = "1",
+                 .range = {-kMostLost, 1.0},
+                 .seen = own});
+  all.push_back({.name = "encoder_frozen" + side.suffix,
+                 .sentence = side.words + " encoder stands still",
+                 .unit = "1",
+                 .range = {0.0, 1.0},
+                 .whole = true,
+                 .seen = -own});
+  all.push_back({.name = "encoder_dropout" + side.suffix,
+                 .sentence = side.words + " encoder stands still for a tenth of a second and goes on from there",
+                 .unit = "1",
+                 .range = {0.0, 1.0},
+                 .whole = true,
+                 .seen = -own,
+                 .profile = {.kind = FaultProfile::Kind::pulse, .rise = kDropout}});
+}
+
+void add_radii(std::vector<FaultType>& all, const Model& model, const Side& side) {
+  const Eigen::MatrixXd own = of_joint(model.motion, side.joint), ground = of_joint(model.input, side.joint);
+  const Interval range{-kMostRadius, kMostRadius};
+  all.push_back({.name = "wheel_radius" + side.suffix,
+                 .sentence = side.words + " radius changes by the share",
+                 .unit = "1",
+                 .range = range,
+                 .motion = own,
+                 .ground = ground});
+  all.push_back({.name = "wheel_radius_bump" + side.suffix,
+                 .sentence = side.words + " radius is larger once a turn, over 30°, by the share",
+                 .unit = "1",
+                 .range = range,
+                 .motion = own,
+                 .ground = ground,
+                 .profile = {.kind = FaultProfile::Kind::bump, .arc = kBump, .joint = side.joint}});
+  all.push_back({.name = "wheel_slip" + side.suffix,
+                 .sentence = "the share of " + side.words + " way that slip takes",
+                 .unit = "1",
+                 .range = {-1.0, 1.0},
+                 .motion = -own});
+}
+
+}  // namespace
+
+std::vector<FaultType> fault_catalogue(const Model& model, const Eigen::VectorXd& theta, EffortKind effort) {
+  check::that(static_cast<std::size_t>(theta.size()) == model.p(), "theta", "one value for each parameter");
+  std::vector<FaultType> all;
+  const auto c = static_cast<Eigen::Index>(model.coordinates.size());
+  const bool drive = model.name == "differential_drive";
+  if (drive) {
+    FaultType both{.name = "wheel_radius",
+                   .sentence = "both wheels' radii change by the share",
+                   .unit = "1",
+                   .range = {-kMostRadius, kMostRadius},
+                   .motion = Eigen::MatrixXd::Identity(c, c),
+                   .ground = Eigen::MatrixXd::Identity(c, c)};
+    all.push_back(both);
+    both.name = "wheel_radius_drift";
+    both.sentence = "both wheels' radii change slowly, over 20 s, by the share";
+    both.profile = {.kind = FaultProfile::Kind::drift, .rise = kDrift};
+    all.push_back(both);
+    for (const Side& side : sides_of(model)) {
+      add_radii(all, model, side);
+    }
+    all.push_back({.name = "matched",
+                   .sentence = "the robot slips along its heading (10) at",
+                   .unit = "m/s",
+                   .range = {-10.0, 10.0},
+                   .slip = Eigen::Vector2d(1.0, 0.0)});
+    if (!model.heading_used) {
+      all.push_back({.name = "unmatched",
+                     .sentence = "the robot slips across its heading, to the right (11), at",
+                     .unit = "m/s",
+                     .range = {-10.0, 10.0},
+                     .lateral = -1.0});
+    }
+    all.push_back({.name = "slip_yaw",
+                   .sentence = "the robot slips about the vertical at",
+                   .unit = "rad/s",
+                   .range = {-10.0, 10.0},
+                   .slip = Eigen::Vector2d(0.0, 1.0)});
+  }
+  const std::string torque = model.output_units.empty() ? "" : model.output_units.front();
+  const std::string unit = effort == EffortKind::torque ? torque : effort == EffortKind::current ? "A" : "V";
+  for (const Side& side : sides_of(model)) {
+    add_efforts(all, model, side, unit);
+    add_encoders(all, model, side);
+  }
+  const auto mass = std::find_if(model.parameters.begin(), model.parameters.end(),
+                                 [](const Parameter& parameter) { return parameter.physical == "mass"; });
+  if (mass != model.parameters.end()) {
+    const auto at = mass - model.parameters.begin();
+    Eigen::VectorXd lost = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(model.p()));
+    lost[at] = -mass->per_physical;
+    const double whole = std::max(theta[at] / mass->per_physical, 1e-3);
+    all.push_back({.name = "payload_lost",
+                   .sentence = "mass is lost (negative: gained), in line with the axle,",
+                   .unit = mass->physical_unit,
+                   .range = {-10.0 * whole, whole},
+                   .theta = lost});
+  }
+  return all;
+}
+
+}  // namespace wheelwright

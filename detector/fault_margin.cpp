@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/detector/fault_margin.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <span>
+
+namespace wheelwright {
+namespace {
+
+constexpr double kPrecise = 1e-9;     // of a certain size, relative
+constexpr double kHidden = 1e-3;      // of a hidden size, relative
+constexpr double kNegligible = 1e-9;  // share of the largest size that is as good as 0
+
+double largest_size(const Interval& side) { return std::max(std::abs(side.lower), std::abs(side.upper)); }
+
+}  // namespace
+
+// The regressor that acts, the one that is seen, and its error bound times `errors`.
+FaultMargin::Sums FaultMargin::at(const FaultRow& row, double kappa, double side, double errors) {
+  const std::size_t p = row.y.size();
+  acting_.resize(p);
+  seen_.resize(p);
+  error_.resize(p);
+  double predicted = 0.0, reach = 2.0 * row.dy + std::abs(kappa * row.c);
+  for (std::size_t j = 0; j < p; ++j) {
+    acting_[j] = row.y[j] + side * kappa * row.g1[j] + kappa * kappa * row.g2[j];
+    seen_[j] = row.y[j] + side * kappa * row.s[j];
+    error_[j] = errors * row.dY[j];
+    const double term = seen_[j] * rule_.estimate()[static_cast<Eigen::Index>(j)];
+    predicted += term;
+    reach += std::abs(term) +
+             (std::abs(acting_[j]) + std::abs(seen_[j]) + error_[j]) * largest_size(rule_.set().hull().sides[j]);
+  }
+  // Ten sums of p + 4 terms, here and in the detector: Higham 2002, section 3.1.
+  return {predicted, 10.0 * static_cast<double>(p + 4) * std::numeric_limits<double>::epsilon() * reach};
+}
+
+double FaultMargin::certain_excess(const FaultRow& row, double kappa, double side, std::size_t channel,
+                                   Direction direction) {
+  const Sums sums = at(row, kappa, side, 2.0);
+  const Interval acting = rule_.prediction(acting_, 2 * channel);
+  const Threshold allowed = rule_.at(seen_, error_, row.dy, 2 * channel + 1);
+  const double added = side * kappa * row.c;
+  return direction == Direction::up ? acting.lower + added - row.dy - (allowed.upper + sums.predicted) - sums.rounding
+                                    : allowed.lower + sums.predicted - (acting.upper + added + row.dy) - sums.rounding;
+}
+
+double FaultMargin::possible_excess(const FaultRow& row, double kappa, double side, double share, std::size_t channel,
+                                    Direction direction) {
+  const Sums sums = at(row, kappa, side, 1.0 - share);
+  const Interval acting = rule_.prediction(acting_, 2 * channel);
+  const Threshold allowed = rule_.at(seen_, error_, row.dy, 2 * channel + 1);
+  const double added = side * kappa * row.c;
+  return direction == Direction::up
+             ? acting.upper + added + share * row.dy - (allowed.upper + sums.predicted) + sums.rounding
+             : allowed.lower + sums.predicted - (acting.lower + added - share * row.dy) + sums.rounding;
+}
+
+bool FaultMargin::certain(const FaultRow& row, double kappa, double side, std::size_t channel) {
+  return certain_excess(row, kappa, side, channel, Direction::up) > 0.0 ||
+         certain_excess(row, kappa, side, channel, Direction::down) > 0.0;
+}
+
+bool FaultMargin::possible(const FaultRow& row, double kappa, double side, double share, std::size_t channel) {
+  return possible_excess(row, kappa, side, share, channel, Direction::up) > 0.0 ||
+         possible_excess(row, kappa, side, share, channel, Direction::down) > 0.0;
+}
+
+std::optional<double> FaultMargin::smallest_certain(const FaultRow& row, double largest, double side,
+                                                    std::size_t channel) {
+  std::optional<double> best;
+  for (const Direction direction : {Direction::up, Direction::down}) {
+    double above = best.value_or(largest);
+    double excess_above = certain_excess(row, above, side, channel, direction);
+    if (!(excess_above > 0.0)) {
+      continue;
+    }
+    double below = 0.0;
+    double excess_below = std::min(certain_excess(row, 0.0, side, channel, direction), 0.0);
+    // Regula falsi that halves the weight of an end that stands still (Illinois), with bisection now and then.
+    for (int step = 0, stood = 0; above - below > kPrecise * above && step < 200; ++step) {
+      double middle = above - excess_above * (above - below) / (excess_above - excess_below);
+      if (step % 4 == 3 || !(middle > below && middle < above)) {
+        middle = 0.5 * (below + above);
+      }
+      const double excess = certain_excess(row, middle, side, channel, direction);
+      if (excess > 0.0) {
+        above = middle;
+        excess_above = excess;
+        excess_below *= stood == 1 ? 0.5 : 1.0;
+        stood = 1;
+      } else {
+        below = middle;
+        excess_below = excess;
+        excess_above *= stood == -1 ? 0.5 : 1.0;
+        stood = -1;
+      }
+    }
+    best = above;
+  }
+  return best;
+}
+
+double FaultMargin::largest_hidden(const FaultRow& row, double largest, double side, double share,
+                                   std::size_t channel) {
+  double slope = 0.0;  // of the threshold, per unit of κ, at most
+  std::vector<double> inward(row.y.size());
+  for (std::size_t j = 0; j < inward.size(); ++j) {
+    slope += std::abs(row.s[j]) * largest_size(rule_.set().hull().sides[j]);
+    inward[j] = std::abs(row.g2[j]);
+  }
+  const double curvature = rule_.set().hull().support(inward);
+  double hidden = largest;
+  for (const Direction direction : {Direction::up, Direction::down}) {
+    const auto excess = [&](double kappa) { return possible_excess(row, kappa, side, share, channel, direction); };
+    // From the left, pieces on which no size can be seen are passed over; a quadratic rises above its chord by no more
+    // than a fourth of its second coefficient times the squared width.
+    double from = 0.0, at_from = excess(0.0), width = hidden;
+    while (from < hidden && at_from <= 0.0) {
+      width = std::min(width, hidden - from);
+      const double to = from + width, at_to = excess(to);
+      const double most = std::max(at_from, at_to) + 0.25 * width * width * curvature + 0.5 * width * slope;
+      if (most <= 0.0) {
+        from = to;
+        at_from = at_to;
+        width *= 2.0;
+      } else if (width <= std::max(kHidden * from, kNegligible * largest)) {
+        break;
+      } else {
+        width *= 0.5;
+      }
+    }
+    hidden = std::min(hidden, from);
+  }
+  return hidden;
+}
+
+}  // namespace wheelwright

@@ -1,0 +1,277 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/detector/fault_rows.hpp>
+
+#include <algorithm>
+#include <utility>
+
+#include <Eigen/QR>
+
+#include <wheelwright/core/check.hpp>
+
+namespace wheelwright {
+namespace {
+
+// What an instantaneous part of the signature is made of.
+struct Instant {
+  double profile = 0.0;
+  const Eigen::VectorXd& v;            // coordinate speeds
+  const Eigen::VectorXd& joint_speed;  // of all joints
+  double heading = 0.0;
+  const Eigen::VectorXd& acceleration;  // v̇
+  const Eigen::VectorXd& moved;         // s u, u = K v + a: motion beyond v
+  const Eigen::VectorXd& moved_rate;    // its derivative
+  const Eigen::VectorXd& seen;          // s S v
+  const Eigen::VectorXd& seen_rate;
+  const Eigen::VectorXd& joint_seen;  // joint speeds that a reading of `seen` shows, 0 where it stands still
+};
+
+// Joint speeds of coordinate speeds; what is rounding beside the others is 0.
+Eigen::VectorXd joints_of(const Model& model, const Eigen::VectorXd& v) {
+  const Eigen::MatrixXd inverse = model.motion.completeOrthogonalDecomposition().pseudoInverse();
+  const double floor = 1e-12 * (inverse.cwiseAbs() * v.cwiseAbs()).maxCoeff();
+  return (inverse * v).unaryExpr([floor](double x) { return std::abs(x) <= floor ? 0.0 : x; });
+}
+
+double evaluate(const Term& term, const Eigen::VectorXd& v, const Eigen::VectorXd& joints, double heading) {
+  const Eigen::VectorXd none = Eigen::VectorXd::Zero(std::max(v.size(), joints.size()));
+  const auto span = [](const Eigen::VectorXd& x, Eigen::Index size) {
+    return std::span<const double>(x.data(), static_cast<std::size_t>(size));
+  };
+  return term
+      .function({span(v, v.size()), span(none, v.size()), span(joints, joints.size()), span(none, joints.size()),
+                 heading, 0.0})
+      .value;
+}
+
+// A term of Y: healthy, without what dry friction in the wheels has, of the motion beyond v, of the motion seen.
+struct Parts {
+  double healthy = 0.0, ground = 0.0, moved = 0.0, seen = 0.0;
+};
+
+Parts parts_of(const Term& term, const FaultType& fault, const Instant& at) {
+  const auto c = static_cast<Eigen::Index>(term.coordinate);
+  Parts parts;
+  switch (term.kind) {
+    case Term::Kind::acceleration:
+      parts.healthy = parts.ground = at.acceleration[c];
+      // Motion across the heading, d to the left, takes w2 d from the forward acceleration.
+      parts.moved = at.moved_rate[c] - (c == 0 && fault.lateral != 0.0 ? at.profile * fault.lateral * at.v[1] : 0.0);
+      parts.seen = at.seen_rate[c];
+      break;
+    case Term::Kind::speed:
+      parts.healthy = parts.ground = at.v[c];
+      parts.moved = at.moved[c];
+      parts.seen = at.seen[c];
+      break;
+    case Term::Kind::function: {
+      const Eigen::VectorXd rest = Eigen::VectorXd::Zero(at.v.size());
+      parts.healthy = evaluate(term, at.v, at.joint_speed, at.heading);
+      parts.ground = parts.healthy - evaluate(term, rest, at.joint_speed, at.heading);
+      parts.moved = evaluate(term, at.v + at.moved, at.joint_speed, at.heading) - parts.healthy;
+      if (fault.seen.size() > 0) {
+        parts.seen = evaluate(term, at.v + at.seen, at.joint_seen, at.heading) - parts.healthy;
+      }
+      break;
+    }
+  }
+  parts.healthy *= term.scale;
+  parts.ground *= term.scale;
+  parts.moved *= term.scale;
+  parts.seen *= term.scale;
+  return parts;
+}
+
+FaultSignals zeros(const Model& model) {
+  const auto n = static_cast<Eigen::Index>(model.n()), p = static_cast<Eigen::Index>(model.p());
+  return {RowMatrix::Zero(n, p), RowMatrix::Zero(n, p), RowMatrix::Zero(n, p), Eigen::VectorXd::Zero(n)};
+}
+
+// Signature at one instant; `held` is what a reading that stands still shows.
+FaultSignals signature(const FaultType& fault, const Model& model, const Instant& at, const RowMatrix& held) {
+  FaultSignals out = zeros(model);
+  const auto n = static_cast<Eigen::Index>(model.n());
+  const double s = at.profile;
+  for (const Term& term : model.terms) {
+    const Parts parts = parts_of(term, fault, at);
+    const auto k = static_cast<Eigen::Index>(term.output), j = static_cast<Eigen::Index>(term.parameter);
+    out.g1(k, j) += parts.moved;
+    out.s(k, j) += parts.seen;
+    for (Eigen::Index i = 0; i < n; ++i) {
+      if (fault.effort.size() > 0) {
+        out.g1(i, j) += s * fault.effort(i, k) * parts.healthy;
+        out.g2(i, j) += s * fault.effort(i, k) * parts.moved;
+      }
+      if (fault.ground.size() > 0) {
+        out.g1(i, j) += s * fault.ground(i, k) * parts.ground;
+        out.g2(i, j) += s * fault.ground(i, k) * parts.moved;
+      }
+    }
+    if (fault.theta.size() > 0) {
+      out.c[k] += s * fault.theta[j] * parts.healthy;
+    }
+  }
+  if (fault.held_effort) {
+    out.g1 -= s * fault.effort * held;
+  }
+  if (fault.offset.size() > 0) {
+    out.c += s * fault.offset;
+  }
+  return out;
+}
+
+}  // namespace
+
+FaultFilter::FaultFilter(FaultType fault, const Model& model, const FilterDesign& design, const ReferenceMotion& motion)
+    : fault_(std::move(fault)),
+      model_(&model),
+      design_(design),
+      motion_(&motion),
+      held_(RowMatrix::Zero(static_cast<Eigen::Index>(model.n()), static_cast<Eigen::Index>(model.p()))),
+      filtered_(zeros(model)) {
+  validate(fault_, model);
+  validate(design_);
+  cascades_.resize(model.n() * (3 * model.p() + 1));
+}
+
+FaultFilter::Point FaultFilter::point(std::size_t k) const {
+  const auto i = static_cast<Eigen::Index>(k), joint = static_cast<Eigen::Index>(fault_.profile.joint);
+  const double s =
+      fault_.profile.at(motion_->instant[k] - motion_->instant[onset_],
+                        motion_->joint_angle(joint, i) - motion_->joint_angle(joint, static_cast<Eigen::Index>(onset_)),
+                        motion_->joint_speed(joint, i));
+  const Eigen::VectorXd v = motion_->speed.col(i);
+  Point point{s, Eigen::VectorXd::Zero(v.size()), Eigen::VectorXd::Zero(v.size()), {}};
+  if (fault_.motion.size() > 0) {
+    point.moved += s * fault_.motion * v;
+  }
+  if (fault_.slip.size() > 0) {
+    point.moved += s * fault_.slip;
+  }
+  point.joint_seen = motion_->joint_speed.col(i);
+  if (fault_.seen.size() > 0) {
+    point.seen += s * fault_.seen * v;
+    // Dry friction looks at signs, which a scale leaves as they are; an encoder that stands still shows none.
+    if (fault_.whole) {
+      point.joint_seen = joints_of(*model_, v + point.seen);
+    }
+  }
+  return point;
+}
+
+void FaultFilter::begin(std::size_t onset) {
+  check::that(onset < motion_->instants(), "onset", "an instant of the motion");
+  const auto next = std::upper_bound(motion_->segment_starts.begin(), motion_->segment_starts.end(), onset);
+  end_ = next == motion_->segment_starts.end() ? motion_->instants() : *next;
+  onset_ = k_ = onset;
+  std::fill(cascades_.begin(), cascades_.end(), Cascade{});
+  filtered_ = zeros(*model_);
+  before_ = point(onset);
+  const auto n = static_cast<Eigen::Index>(model_->n());
+  if (fault_.held_effort) {
+    held_ = motion_->rows.Y.middleRows(static_cast<Eigen::Index>(onset) * n, n) / design_.static_gain();
+  }
+  if (fault_.profile.jumps()) {
+    // Motion beyond v, and what is seen, are there at once: their derivatives have an impulse.
+    const std::size_t p = model_->p(), size = model_->n() * p;
+    for (const Term& term : model_->terms) {
+      if (term.kind == Term::Kind::acceleration) {
+        const std::size_t at = term.output * p + term.parameter;
+        cascades_[at].z1 += term.scale * before_.moved[static_cast<Eigen::Index>(term.coordinate)];
+        cascades_[2 * size + at].z1 += term.scale * before_.seen[static_cast<Eigen::Index>(term.coordinate)];
+      }
+    }
+  }
+}
+
+void FaultFilter::filter(const FaultSignals& begin, const FaultSignals& end, double h) {
+  if (h != weights_.step()) {
+    weights_ = StepWeights(design_.beta, h);
+  }
+  const double gain = design_.order == 1 ? design_.alpha : design_.alpha * design_.alpha;
+  std::size_t at = 0;
+  const auto advance = [&](const auto& from, const auto& to, auto& out) {
+    for (Eigen::Index e = 0; e < from.size(); ++e, ++at) {
+      cascades_[at].linear(weights_, from.data()[e], to.data()[e]);
+      out.data()[e] = gain * (design_.order == 1 ? cascades_[at].z1 : cascades_[at].z2);
+    }
+  };
+  advance(begin.g1, end.g1, filtered_.g1);
+  advance(begin.g2, end.g2, filtered_.g2);
+  advance(begin.s, end.s, filtered_.s);
+  advance(begin.c, end.c, filtered_.c);
+}
+
+bool FaultFilter::next() {
+  if (k_ + 1 >= end_) {
+    return false;
+  }
+  const auto a = static_cast<Eigen::Index>(k_), b = a + 1;
+  const double h = motion_->instant[k_ + 1] - motion_->instant[k_];
+  const Point after = point(k_ + 1);
+  const Eigen::VectorXd v0 = motion_->speed.col(a), v1 = motion_->speed.col(b);
+  const Eigen::VectorXd joints0 = motion_->joint_speed.col(a), joints1 = motion_->joint_speed.col(b);
+  const Eigen::VectorXd acceleration = (v1 - v0) / h, moved_rate = (after.moved - before_.moved) / h,
+                        seen_rate = (after.seen - before_.seen) / h;
+  const FaultSignals begin = signature(fault_, *model_,
+                                       {before_.profile, v0, joints0, motion_->heading[k_], acceleration, before_.moved,
+                                        moved_rate, before_.seen, seen_rate, before_.joint_seen},
+                                       held_);
+  const FaultSignals end = signature(fault_, *model_,
+                                     {after.profile, v1, joints1, motion_->heading[k_ + 1], acceleration, after.moved,
+                                      moved_rate, after.seen, seen_rate, after.joint_seen},
+                                     held_);
+  filter(begin, end, h);
+  before_ = after;
+  ++k_;
+  return true;
+}
+
+FaultRow FaultFilter::row(std::size_t i) const {
+  const std::size_t p = model_->p();
+  const auto at = static_cast<Eigen::Index>(k_ * model_->n() + i), r = static_cast<Eigen::Index>(i);
+  return {{motion_->rows.Y.row(at).data(), p},
+          {filtered_.g1.row(r).data(), p},
+          {filtered_.g2.row(r).data(), p},
+          {filtered_.s.row(r).data(), p},
+          {motion_->rows.dY.row(at).data(), p},
+          filtered_.c[r],
+          motion_->rows.dy[at]};
+}
+
+SettledRows settled_rows(const FaultType& fault, const Model& model, const FilterDesign& design,
+                         const Eigen::VectorXd& v, const Eigen::VectorXd& a) {
+  validate(fault, model);
+  const auto c = static_cast<Eigen::Index>(model.coordinates.size());
+  check::that(v.size() == c && a.size() == c, "operating point", "one speed and one acceleration for each coordinate");
+  const Eigen::VectorXd joints = joints_of(model, v);
+  Eigen::VectorXd moved = Eigen::VectorXd::Zero(c), moved_rate = moved, seen = moved, seen_rate = moved;
+  if (fault.motion.size() > 0) {
+    moved += fault.motion * v;
+    moved_rate += fault.motion * a;
+  }
+  if (fault.slip.size() > 0) {
+    moved += fault.slip;
+  }
+  if (fault.seen.size() > 0) {
+    seen += fault.seen * v;
+    seen_rate += fault.seen * a;
+  }
+  SettledRows rows;
+  const std::vector<double> joint_list(joints.data(), joints.data() + joints.size()),
+      speed_list(v.data(), v.data() + v.size()), none(std::max(joint_list.size(), speed_list.size()), 0.0);
+  rows.Y =
+      design.static_gain() *
+      regressor(model, {speed_list, {none.data(), speed_list.size()}, joint_list, {none.data(), joint_list.size()}},
+                {a.data(), static_cast<std::size_t>(a.size())});
+  rows.signature = signature(
+      fault, model,
+      {1.0, v, joints, 0.0, a, moved, moved_rate, seen, seen_rate, fault.whole ? joints_of(model, v + seen) : joints},
+      rows.Y / design.static_gain());
+  rows.signature.g1 *= design.static_gain();
+  rows.signature.g2 *= design.static_gain();
+  rows.signature.s *= design.static_gain();
+  rows.signature.c *= design.static_gain();
+  return rows;
+}
+
+}  // namespace wheelwright

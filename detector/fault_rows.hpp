@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// The rows that a detector sees once a fault has set in, as polynomials of its size.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include <wheelwright/detector/fault_type.hpp>
+#include <wheelwright/detector/reference_motion.hpp>
+#include <wheelwright/filter/exact.hpp>
+
+namespace wheelwright {
+
+/// One output at one instant of a faulty drive. With the fault's size κ,
+///
+///     τ_f = (y + κ g1 + κ² g2) θ + κ c + e,     regressor as seen: y + κ s + δ,
+///
+/// |e| <= n̄ = dy, |δ| <= Δ = dY entry by entry. All spans have p entries.
+struct FaultRow {
+  std::span<const double> y;  ///< of the healthy motion, exact
+  std::span<const double> g1;
+  std::span<const double> g2;
+  std::span<const double> s;
+  std::span<const double> dY;  ///< Δ
+  double c = 0.0;
+  double dy = 0.0;  ///< n̄
+};
+
+/// What a fault adds to the unfiltered equation at one instant, matrices n × p.
+struct FaultSignals {
+  RowMatrix g1, g2, s;
+  Eigen::VectorXd c;
+};
+
+/// Rows of a faulty drive from a fault's onset on, whichever residual they belong to.
+class FaultRows {
+ public:
+  virtual ~FaultRows() = default;
+  /// Number of outputs.
+  [[nodiscard]] virtual std::size_t outputs() const = 0;
+  /// Sets the fault in at instant `onset` of the motion.
+  virtual void begin(std::size_t onset) = 0;
+  /// Goes on to the next instant; false at the end of the segment.
+  virtual bool next() = 0;
+  /// The instant that row() is of.
+  [[nodiscard]] virtual std::size_t instant() const = 0;
+  /// Row of output `i` at this instant. Its spans hold until the next call of next() or begin().
+  [[nodiscard]] virtual FaultRow row(std::size_t i) const = 0;
+};
+
+/// Rows of the torque residual: filters a fault's signature along a reference motion. Between instants speeds are linear, as the
+/// filter has them, so accelerations are constant and products with the fault's profile need no derivative of noise. At
+/// the onset of a step the robot's own speed goes on (its mass sees to that) and what the encoders show jumps; the
+/// reading of an effort changes with no more than its gain.
+class FaultFilter final : public FaultRows {
+ public:
+  /// Throws InvalidArgument where `fault` does not fit `model`. `model` and `motion` are kept by reference.
+  FaultFilter(FaultType fault, const Model& model, const FilterDesign& design, const ReferenceMotion& motion);
+
+  [[nodiscard]] std::size_t outputs() const override { return model_->n(); }
+  void begin(std::size_t onset) override;
+  bool next() override;
+  [[nodiscard]] std::size_t instant() const override { return k_; }
+  [[nodiscard]] FaultRow row(std::size_t i) const override;
+  /// The fault.
+  [[nodiscard]] const FaultType& fault() const { return fault_; }
+
+ private:
+  // The fault and the motion at one instant: s(t), what moves (s u) and what is seen (s S v) beyond v.
+  struct Point {
+    double profile = 0.0;
+    Eigen::VectorXd moved, seen, joint_seen;
+  };
+  [[nodiscard]] Point point(std::size_t k) const;
+  void filter(const FaultSignals& begin, const FaultSignals& end, double h);
+
+  FaultType fault_;
+  const Model* model_;
+  FilterDesign design_;
+  const ReferenceMotion* motion_;
+  RowMatrix held_;  // filtered rows at the onset over the static gain
+  StepWeights weights_;
+  Point before_;
+  std::vector<Cascade> cascades_;  // g1, g2, s, c one after the other
+  FaultSignals filtered_;
+  std::size_t onset_ = 0, k_ = 0, end_ = 0;
+};
+
+/// The same at an operating point: coordinate speeds `v` and accelerations `a` that stay for as long as the filter
+/// remembers, a fault that is fully there. Its `Y` is the filtered regressor.
+struct SettledRows {
+  RowMatrix Y;             ///< n × p
+  FaultSignals signature;  ///< filtered
+};
+[[nodiscard]] SettledRows settled_rows(const FaultType& fault, const Model& model, const FilterDesign& design,
+                                       const Eigen::VectorXd& v, const Eigen::VectorXd& a);
+
+}  // namespace wheelwright

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// What a fault does to a robot and to its sensors, as data: a signature with one unknown size.
+///
+/// A fault has a size κ, 0 without it. With the profile s(t) in [0, 1] of its coming, v the coordinate speeds that the
+/// encoders of a healthy robot would show, and Y the model's regressor, a faulty robot
+///
+///     moves at        w = (I + κ s K) v + κ s a, and at κ s d across its heading, to the left,
+///     reads efforts   u = (I + κ s (H + G)) Y(w, ẇ) (θ + κ s ϑ) + κ s o,
+///     reads speeds    (I + κ s S) v.
+///
+/// G acts on what passes through the ground only, not on dry friction in the wheels: it is the torque that another
+/// wheel radius takes. This is (16) of the paper and its relatives: for both radii K = G = I and κ = δ1/r, so that
+/// ζ = ((1 + κ)² − 1) Yθ. Motion across the heading adds −w2 κ d to the forward acceleration (theory section 1).
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include <wheelwright/core/interval.hpp>
+#include <wheelwright/model/model.hpp>
+#include <wheelwright/model/robot.hpp>
+
+namespace wheelwright {
+
+/// How a fault comes: s(t) of its signature.
+struct FaultProfile {
+  /// Shape.
+  enum class Kind {
+    step,   ///< 0, then 1 from the onset on
+    drift,  ///< linear from 0 to 1 over `rise`
+    pulse,  ///< 1 for the time `rise` after the onset, then 0 again
+    bump,  ///< once per turn of joint `joint`: (1 + cos(2π ψ/arc))/2 where |ψ| <= arc/2, ψ the joint's angle from the
+           ///< middle of the bump, which lies half an arc ahead at the onset
+  };
+  Kind kind = Kind::step;
+  double rise = 0.0;      ///< s, > 0 for drift and pulse
+  double arc = 0.0;       ///< rad, in (0, 2π], for a bump
+  std::size_t joint = 0;  ///< for a bump
+
+  /// s at `since` >= 0 s after the onset, when the joint has turned by `angle` (rad) since then at `speed` (rad/s).
+  [[nodiscard]] double at(double since, double angle, double speed) const;
+  /// Whether s jumps to 1 at the onset.
+  [[nodiscard]] bool jumps() const { return kind == Kind::step || kind == Kind::pulse; }
+};
+
+/// A kind of fault. Matrices and vectors may be left empty where they are zero.
+struct FaultType {
+  std::string name;          ///< as in results, e.g. "wheel_radius_right"
+  std::string sentence{};    ///< for people, e.g. "the right wheel's radius changes"
+  std::string unit{};        ///< of the magnitude; "1" for a share
+  Interval range{};          ///< magnitudes that are looked at, in it 0: one side or both
+  double per_kappa = 1.0;    ///< κ = magnitude/per_kappa (where `share_lost`: see there)
+  bool share_lost = false;   ///< the magnitude is the share m in [0, 1) of an effort that is lost: κ = m/(1 − m)
+  bool whole = false;        ///< it is there or not, κ = range.upper: its magnitude is not asked for
+  Eigen::MatrixXd motion{};  ///< K, coordinates × coordinates
+  Eigen::VectorXd slip{};    ///< a, m/s, rad/s per unit of κ
+  double lateral = 0.0;      ///< d, m/s per unit of κ
+  Eigen::MatrixXd effort{};  ///< H, outputs × outputs
+  Eigen::MatrixXd ground{};  ///< G, outputs × outputs
+  Eigen::VectorXd offset{};  ///< o, units of the outputs per unit of κ
+  Eigen::VectorXd theta{};   ///< ϑ, θ_L's units per unit of κ
+  Eigen::MatrixXd seen{};    ///< S, coordinates × coordinates
+  bool held_effort = false;  ///< a reading that stands still: H Y is taken away and H times its filtered value at the
+                             ///< onset over the filter's static gain put in its place
+  FaultProfile profile{};
+
+  /// κ of a magnitude.
+  [[nodiscard]] double kappa(double magnitude) const;
+  /// The magnitude of κ.
+  [[nodiscard]] double magnitude(double kappa) const;
+};
+
+/// Throws InvalidArgument, naming fault and field, unless shapes fit `model`, numbers are finite, the range holds 0 and
+/// κ of its ends is finite, profiles are as FaultProfile says, and no fault changes both the efforts' gain and the
+/// speeds that are seen (which margins could not be solved exactly for).
+void validate(const FaultType& fault, const Model& model);
+
+/// The faults of a robot that can be told from its model alone: of every joint's effort (`effort_loss`, `effort_bias`,
+/// `effort_stuck`, `effort_dead`) and encoder (`encoder_scale`, `encoder_frozen`, `encoder_dropout`), named after the
+/// joint where there are several ("_right", "_left"); of the mass (`payload_lost`); for a differential drive of its wheel
+/// radii (`wheel_radius`, with `_right`, `_left`, `_drift`, `_bump_right`, `_bump_left`), and slip (`wheel_slip_right`,
+/// `wheel_slip_left`: a share of the wheel's way is lost; `matched`, `unmatched`, `slip_yaw`: (10), (11), δ4 of (1)).
+///
+/// `unmatched` is left out for anisotropic friction, whose part along the heading it would change.
+///
+/// `theta` (p), a best guess of θ_L, bounds the mass that can be lost or gained; `effort` names the unit of a bias.
+[[nodiscard]] std::vector<FaultType> fault_catalogue(const Model& model, const Eigen::VectorXd& theta,
+                                                     EffortKind effort = EffortKind::torque);
+
+}  // namespace wheelwright

@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/detector/margins.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <wheelwright/core/check.hpp>
+#include <wheelwright/core/for_all.hpp>
+
+namespace wheelwright {
+namespace {
+
+constexpr double kNone = std::numeric_limits<double>::infinity();
+
+// The instants at which faults set in: settled ones, evenly in time.
+std::vector<std::size_t> choose_onsets(const ReferenceMotion& motion, const MarginOptions& options) {
+  std::vector<std::size_t> onsets;
+  const auto settled = static_cast<double>(std::count(motion.settled.begin(), motion.settled.end(), true));
+  if (settled == 0.0) {
+    return onsets;
+  }
+  const double step =
+      std::max(options.onset_step, settled * median_step(motion.t) / static_cast<double>(options.most_onsets));
+  double next = -kNone;
+  for (std::size_t k = 0; k < motion.instants(); ++k) {
+    const bool begins = std::binary_search(motion.segment_starts.begin(), motion.segment_starts.end(), k);
+    next = begins ? -kNone : next;
+    if (motion.settled[k] && motion.t[k] >= next) {
+      onsets.push_back(k);
+      next = motion.t[k] + step;
+    }
+  }
+  return onsets;
+}
+
+// The smallest certain size of one channel since the onset, under a rule "k of the last n".
+class ChannelBest {
+ public:
+  ChannelBest(Persistence persistence, double largest, bool whole)
+      : persistence_(persistence), largest_(largest), whole_(whole) {}
+
+  [[nodiscard]] double best() const { return best_; }
+
+  void add(FaultMargin& margin, const FaultRow& row, double side, std::size_t channel) {
+    if (whole_ && best_ < kNone) {
+      return;
+    }
+    if (persistence_.n == 1) {
+      // Only a row that shows a smaller size for certain is worth a search.
+      const double limit = best_ < kNone ? best_ * (1.0 - 1e-9) : largest_;
+      best_ = smallest(margin, row, limit, side, channel).value_or(best_);
+      return;
+    }
+    last_.push_back(smallest(margin, row, largest_, side, channel).value_or(kNone));
+    if (last_.size() > persistence_.n) {
+      last_.erase(last_.begin());
+    }
+    if (last_.size() >= persistence_.k) {
+      std::vector<double> sorted = last_;
+      const auto at = sorted.begin() + static_cast<std::ptrdiff_t>(persistence_.k - 1);
+      std::nth_element(sorted.begin(), at, sorted.end());
+      best_ = std::min(best_, *at);
+    }
+  }
+
+ private:
+  [[nodiscard]] std::optional<double> smallest(FaultMargin& margin, const FaultRow& row, double limit, double side,
+                                               std::size_t channel) const {
+    if (!whole_) {
+      return margin.smallest_certain(row, limit, side, channel);
+    }
+    return margin.certain(row, largest_, side, channel) ? std::optional(largest_) : std::nullopt;
+  }
+
+  Persistence persistence_;
+  double largest_;
+  bool whole_;
+  double best_ = kNone;
+  std::vector<double> last_;
+};
+
+OnsetMargin margin_at(const ReferenceMotion& motion, const FaultMargins& margins, std::size_t onset, FaultRows& rows,
+                      FaultMargin& margin, const MarginOptions& options) {
+  const FaultType& fault = margins.fault;
+  const std::size_t n = rows.outputs();
+  const double largest = std::abs(fault.kappa(margins.side * margins.largest()));
+  OnsetMargin result;
+  result.instant = onset;
+  result.t = motion.t[onset];
+  result.by_channel.resize(n);
+  std::vector<ChannelBest> channels(n, ChannelBest(options.persistence, largest, fault.whole));
+  double hidden = largest, window_hidden = largest;
+  std::size_t window = 0, named = onset + 1;
+  const auto size_of = [&](double kappa) {
+    return kappa < kNone ? std::abs(fault.magnitude(margins.side * kappa)) : kNone;
+  };
+  const auto close_windows = [&](double since) {
+    for (; window < options.windows.size() && since > options.windows[window]; ++window) {
+      double best = kNone;
+      for (std::size_t i = 0; i < n; ++i) {
+        result.by_channel[i].push_back(size_of(channels[i].best()));
+        best = std::min(best, result.by_channel[i].back());
+      }
+      result.certain.push_back(best);
+      window_hidden = hidden;
+    }
+  };
+  rows.begin(onset);
+  while (window < options.windows.size() && rows.next()) {
+    const std::size_t k = rows.instant();
+    const double since = motion.t[k] - result.t;
+    close_windows(since);
+    if (since <= options.kind_window) {
+      named = k;
+    }
+    if (window == options.windows.size()) {
+      break;
+    }
+    for (std::size_t i = 0; i < n; ++i) {
+      const FaultRow row = rows.row(i);
+      channels[i].add(margin, row, margins.side, i);
+      if (!fault.whole) {
+        hidden = margin.largest_hidden(row, hidden, margins.side, options.noise_share, i);
+      } else if (hidden > 0.0 && margin.possible(row, largest, margins.side, options.noise_share, i)) {
+        hidden = 0.0;
+      }
+    }
+  }
+  result.hidden = size_of(window_hidden);
+  result.kind = kind_of(motion, onset, std::min(named + 1, motion.instants()));
+  return result;
+}
+
+}  // namespace
+
+MarginSummary summarise(const FaultMargins& margins, std::size_t window, std::optional<ManoeuvreKind> kind,
+                        std::optional<std::size_t> channel) {
+  std::vector<double> sizes;
+  for (const OnsetMargin& onset : margins.onsets) {
+    if (onset.certain.size() > window && (!kind || onset.kind == *kind)) {
+      sizes.push_back(channel ? onset.by_channel.at(*channel)[window] : onset.certain[window]);
+    }
+  }
+  MarginSummary summary;
+  summary.onsets = sizes.size();
+  summary.best = summary.median = summary.worst = kNone;
+  if (!sizes.empty()) {
+    std::sort(sizes.begin(), sizes.end());
+    summary.certain =
+        static_cast<std::size_t>(std::count_if(sizes.begin(), sizes.end(), [](double x) { return x < kNone; }));
+    summary.best = sizes.front();
+    summary.median = sizes[sizes.size() / 2];
+    summary.worst = sizes.back();
+  }
+  return summary;
+}
+
+std::vector<FaultMargins> margins_along(const ReferenceMotion& motion, const std::vector<FaultType>& faults,
+                                        const ThresholdRule& rule, const FaultRowsFactory& rows,
+                                        const MarginOptions& options) {
+  check::that(!options.windows.empty() && options.windows.front() > 0.0 &&
+                  std::is_sorted(options.windows.begin(), options.windows.end()),
+              "windows", "positive lengths in ascending order");
+  const std::vector<std::size_t> onsets = choose_onsets(motion, options);
+  std::vector<FaultMargins> all;
+  for (const FaultType& fault : faults) {
+    for (const double side : {1.0, -1.0}) {
+      if ((side > 0.0 ? fault.range.upper : -fault.range.lower) > 0.0) {
+        all.push_back({fault, side, std::vector<OnsetMargin>(onsets.size())});
+      }
+    }
+  }
+  for_all(
+      all.size(), options.threads,
+      [&](std::size_t i) {
+        FaultMargins& each = all[i];
+        const std::unique_ptr<FaultRows> source = rows(each.fault);
+        FaultMargin margin(rule);
+        for (std::size_t k = 0; k < onsets.size(); ++k) {
+          each.onsets[k] = margin_at(motion, each, onsets[k], *source, margin, options);
+        }
+      },
+      [&](std::size_t begun) {
+        if (options.progress) {
+          options.progress("margins of faults", static_cast<double>(begun) / static_cast<double>(all.size()));
+        }
+      });
+  return all;
+}
+
+}  // namespace wheelwright

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Detectability along a drive: which faults will certainly be seen, how soon, and in which manoeuvre.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <wheelwright/detector/events.hpp>
+#include <wheelwright/detector/fault_margin.hpp>
+#include <wheelwright/detector/fault_rows.hpp>
+#include <wheelwright/detector/fault_type.hpp>
+#include <wheelwright/detector/manoeuvre_kind.hpp>
+#include <wheelwright/detector/reference_motion.hpp>
+
+namespace wheelwright {
+
+/// How a drive is asked about. Sizes of faults are magnitudes, in the unit of their type.
+struct MarginOptions {
+  std::vector<double> windows = {0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 5.0};  ///< s, ascending
+  double onset_step = 0.5;        ///< s between the onsets that are tried
+  std::size_t most_onsets = 120;  ///< onsets are further apart where there would be more
+  double kind_window = 1.0;       ///< s after an onset by which its manoeuvre is named
+  Persistence persistence{};      ///< of the detector
+  double noise_share = 0.0;       ///< of its bounds, that noise may use where a fault is only possibly seen
+  std::size_t threads = 1;        ///< the result does not depend on it
+  std::function<void(std::string_view stage, double share)> progress = {};  ///< may be empty
+};
+
+/// One fault on one side (growing or shrinking) from one onset on. Sizes are absolute; infinite where none is certain in
+/// the fault's range. A window that runs past the end of the segment has no value.
+struct OnsetMargin {
+  std::size_t instant = 0;  ///< of the motion
+  double t = 0.0;           ///< s
+  ManoeuvreKind kind = ManoeuvreKind::standstill;
+  std::vector<double> certain;                  ///< per window that fits: every size from here up to the range's end
+                                                ///< raises an alarm within it, whatever θ in P and noise
+  std::vector<std::vector<double>> by_channel;  ///< the same, output by output
+  double hidden = 0.0;                          ///< no size up to this one raises an alarm within the last window that
+                                                ///< fits, whatever θ in P and noise of MarginOptions::noise_share
+};
+
+/// What a drive is worth for one fault on one side.
+struct FaultMargins {
+  FaultType fault;
+  double side = 1.0;  ///< 1: positive magnitudes, −1: negative ones
+  std::vector<OnsetMargin> onsets;
+
+  /// The largest size that was looked at.
+  [[nodiscard]] double largest() const { return side > 0.0 ? fault.range.upper : -fault.range.lower; }
+};
+
+/// Order statistics of the smallest certain size over onsets.
+struct MarginSummary {
+  std::size_t onsets = 0;   ///< with a value
+  std::size_t certain = 0;  ///< of these, with a size that is certain
+  double best = 0.0;        ///< smallest; infinite where none is certain
+  double median = 0.0;      ///< infinite where fewer than half are certain
+  double worst = 0.0;       ///< certain at every onset; infinite where there is one without
+};
+
+/// Summary over the onsets of one kind of manoeuvre (or all of them) in window number `window`, of one channel or all.
+[[nodiscard]] MarginSummary summarise(const FaultMargins& margins, std::size_t window,
+                                      std::optional<ManoeuvreKind> kind = std::nullopt,
+                                      std::optional<std::size_t> channel = std::nullopt);
+
+/// Makes the rows of a fault for one thread.
+using FaultRowsFactory = std::function<std::unique_ptr<FaultRows>(const FaultType&)>;
+
+/// Margins of `faults`, both sides where their range has two, for a detector with thresholds `rule` on the rows that
+/// `rows` makes, along `motion`. Every number is exact over the feasible set (fault_margin.hpp) for the motion as it
+/// stands; it is a promise for a robot that drives it, with the encoders seeing what a fault leaves of it.
+/// Throws InvalidArgument for windows that do not ascend.
+[[nodiscard]] std::vector<FaultMargins> margins_along(const ReferenceMotion& motion,
+                                                      const std::vector<FaultType>& faults, const ThresholdRule& rule,
+                                                      const FaultRowsFactory& rows, const MarginOptions& options = {});
+
+}  // namespace wheelwright

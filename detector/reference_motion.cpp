@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/detector/reference_motion.hpp>
+
+#include <algorithm>
+
+#include <wheelwright/core/check.hpp>
+
+namespace wheelwright {
+
+ReferenceMotion read_reference(LogSource& log, RegressorFilter filter) {
+  std::vector<std::size_t> pick;
+  for (const auto& name : filter.measurement().columns()) {
+    const auto column = log.find(name);
+    check::that(column.has_value(), "log", "a column '" + name + "'");
+    pick.push_back(*column);
+  }
+  const std::size_t n = filter.model().n(), p = filter.model().p();
+  const auto coordinates = static_cast<Eigen::Index>(filter.model().coordinates.size());
+  const auto joints = static_cast<Eigen::Index>(filter.model().joints.size());
+  ReferenceMotion motion;
+  motion.rows.outputs = n;
+  motion.rows.parameters = p;
+  std::vector<double> sample(pick.size()), speed, joint_speed, joint_angle, y, dy, regressor, regressor_error;
+  Eigen::VectorXd angle = Eigen::VectorXd::Zero(joints), before = angle;
+  const auto append = [](std::vector<double>& to, const auto& from) {
+    to.insert(to.end(), from.data(), from.data() + from.size());
+  };
+  log.rewind();
+  LogBlock block;
+  double last = 0.0;
+  std::size_t since = 0;  // samples of this segment
+  while (log.next(block)) {
+    for (std::size_t k = 0; k < block.rows(); ++k) {
+      if (std::binary_search(block.segment_starts.begin(), block.segment_starts.end(), k)) {
+        filter.restart();
+        since = 0;
+      }
+      for (std::size_t c = 0; c < pick.size(); ++c) {
+        sample[c] = block.columns[pick[c]][k];
+      }
+      const bool settled = filter.step(block.t[k], sample);
+      ++since;
+      // The recursion begins with the second sample where angles are differenced.
+      if (since == 1 && filter.measurement().motion == MotionKind::angle) {
+        continue;
+      }
+      const bool begins = since == (filter.measurement().motion == MotionKind::angle ? 2u : 1u);
+      if (begins) {
+        motion.segment_starts.push_back(motion.t.size());
+        angle.setZero();
+      } else {
+        angle += 0.5 * (filter.instant() - last) * (before + filter.joint_speed());
+      }
+      before = filter.joint_speed();
+      last = filter.instant();
+      motion.sample.push_back(block.first_row + k);
+      motion.t.push_back(block.t[k]);
+      motion.instant.push_back(last);
+      motion.heading.push_back(filter.heading());
+      motion.settled.push_back(settled);
+      append(speed, filter.speed());
+      append(joint_speed, before);
+      append(joint_angle, angle);
+      append(regressor, filter.row().Y);
+      append(regressor_error, filter.row().dY);
+      append(y, filter.row().y);
+      append(dy, filter.row().dy);
+    }
+  }
+  log.rewind();
+  const auto k = static_cast<Eigen::Index>(motion.t.size());
+  motion.speed = Eigen::Map<const Eigen::MatrixXd>(speed.data(), coordinates, k);
+  motion.joint_speed = Eigen::Map<const Eigen::MatrixXd>(joint_speed.data(), joints, k);
+  motion.joint_angle = Eigen::Map<const Eigen::MatrixXd>(joint_angle.data(), joints, k);
+  motion.rows.sample = motion.sample;
+  motion.rows.t = motion.t;
+  const Eigen::Index rows = k * static_cast<Eigen::Index>(n), columns = static_cast<Eigen::Index>(p);
+  motion.rows.Y = Eigen::Map<const RowMatrix>(regressor.data(), rows, columns);
+  motion.rows.dY = Eigen::Map<const RowMatrix>(regressor_error.data(), rows, columns);
+  motion.rows.y = Eigen::Map<const Eigen::VectorXd>(y.data(), rows);
+  motion.rows.dy = Eigen::Map<const Eigen::VectorXd>(dy.data(), rows);
+  return motion;
+}
+
+}  // namespace wheelwright

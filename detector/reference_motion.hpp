@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// A drive that margins are asked for: its motion, instant by instant, and the rows that a healthy robot would show.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include <wheelwright/core/log.hpp>
+#include <wheelwright/core/regression.hpp>
+#include <wheelwright/filter/regressor_filter.hpp>
+
+namespace wheelwright {
+
+/// The motion of a drive at the instants of the filter (the samples, or for angles the middles of the sampling
+/// intervals). What follows from it is about a robot that drives just so; efforts of the log it was read from play no
+/// part.
+struct ReferenceMotion {
+  std::vector<std::size_t> sample;          ///< K rows of the log
+  std::vector<double> t;                    ///< K times of these rows, s
+  std::vector<double> instant;              ///< K times of the instants, s
+  Eigen::MatrixXd speed;                    ///< coordinates × K, v
+  Eigen::MatrixXd joint_speed;              ///< joints × K
+  Eigen::MatrixXd joint_angle;              ///< joints × K, integral of joint_speed over the segment
+  std::vector<double> heading;              ///< K, rad
+  std::vector<bool> settled;                ///< K: whether a detector decides at this instant
+  std::vector<std::size_t> segment_starts;  ///< ascending instants at which a segment begins
+  RegressionBlock rows;                     ///< K instants: Y_f of the motion, with the bounds dY, dy of the sensors
+
+  /// Number of instants K.
+  [[nodiscard]] std::size_t instants() const { return t.size(); }
+};
+
+/// The motion of `log` as `filter` reads it, whose error bounds the rows get. Walks the log once and holds it. Throws
+/// InvalidArgument when the log lacks a column of the filter's measurement.
+[[nodiscard]] ReferenceMotion read_reference(LogSource& log, RegressorFilter filter);
+
+}  // namespace wheelwright

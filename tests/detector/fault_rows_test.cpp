@@ -1,0 +1,260 @@
+// SPDX-License-Identifier: Apache-2.0
+// Filtered signatures against the simulator, which integrates the faulty robot itself, and against logs whose columns were
+// falsified as a broken sensor would.
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include <gtest/gtest.h>
+
+#include <wheelwright/detector/fault_rows.hpp>
+
+#include "support/drives.hpp"
+
+namespace wheelwright {
+namespace {
+
+using testing_support::exact_drive;
+using testing_support::filter_of;
+using testing_support::Shown;
+
+constexpr double kOnset = 7.0;  // s, a sample of all rates that are used
+
+FaultType find_fault(const Model& model, const std::string& name) {
+  for (const FaultType& fault : fault_catalogue(model, Eigen::VectorXd::Ones(static_cast<Eigen::Index>(model.p())))) {
+    if (fault.name == name) {
+      return fault;
+    }
+  }
+  throw InvalidArgument("no fault '" + name + "'");
+}
+
+// The first instant that the fault has reached.
+std::size_t onset_of(const ReferenceMotion& motion, double t) {
+  return static_cast<std::size_t>(std::lower_bound(motion.instant.begin(), motion.instant.end(), t - 1e-9) -
+                                  motion.instant.begin());
+}
+
+// τ_f − (y + κ g1 + κ² g2) θ − κ c over two seconds from the onset, and its regressor as seen against y + κ s; both over the
+// largest size of what the fault adds. `motion` is what encoders of a healthy robot would show, `log` what was logged.
+struct Mismatch {
+  double torque = 0.0, seen = 0.0;
+};
+
+Mismatch mismatch(const FaultType& fault, double kappa, const ReferenceMotion& motion, const ReferenceMotion& log,
+                  const Model& model, const FilterDesign& design, const Eigen::VectorXd& theta, double skip) {
+  FaultFilter rows(fault, model, design, motion);
+  const std::size_t onset = onset_of(motion, kOnset);
+  rows.begin(onset);
+  double torque = 0.0, torque_size = 0.0, seen = 0.0, seen_size = 0.0;
+  while (rows.next() && motion.t[rows.instant()] < kOnset + 2.0) {
+    if (motion.t[rows.instant()] < kOnset + skip) {
+      continue;
+    }
+    for (std::size_t i = 0; i < model.n(); ++i) {
+      const FaultRow row = rows.row(i);
+      const auto at = static_cast<Eigen::Index>(rows.instant() * model.n() + i);
+      double left = log.rows.y[at] - kappa * row.c, added = kappa * row.c;
+      for (std::size_t j = 0; j < model.p(); ++j) {
+        const auto k = static_cast<Eigen::Index>(j);
+        const double signature = kappa * row.g1[j] + kappa * kappa * row.g2[j];
+        left -= (row.y[j] + signature) * theta[k];
+        added += signature * theta[k];
+        seen = std::max(seen, std::abs(log.rows.Y(at, k) - row.y[j] - kappa * row.s[j]));
+        seen_size = std::max(seen_size, std::abs(kappa * row.s[j]));
+      }
+      torque = std::max(torque, std::abs(left));
+      torque_size = std::max(torque_size, std::abs(added));
+    }
+  }
+  return {torque_size > 0.0 ? torque / torque_size : torque, seen_size > 0.0 ? seen / seen_size : seen};
+}
+
+struct Prepared {
+  Scenario scenario;
+  Model model;
+  FilterDesign design;
+  Eigen::VectorXd theta;
+};
+
+Prepared prepared(Shown shown, double rate, Hold hold = Hold::zero_order) {
+  Prepared s;
+  s.scenario = exact_drive(shown, hold);
+  s.scenario.rate = rate;
+  s.scenario.duration = 10.0;
+  s.model = make_model(s.scenario.robot);
+  s.design = filter_of(s.scenario).design();
+  s.theta = true_parameters(s.scenario, s.model);
+  return s;
+}
+
+struct Simulated {
+  const char* name;
+  Fault::Kind kind;
+  double magnitude;  // of the simulator: m, m/s, rad/s
+  double kappa;
+};
+
+std::vector<Simulated> simulated(double radius) {
+  return {{"wheel_radius", Fault::Kind::wheel_radius, 0.1 * radius, 0.1},
+          {"wheel_radius", Fault::Kind::wheel_radius, -0.1 * radius, -0.1},
+          {"wheel_radius_right", Fault::Kind::wheel_radius_right, 0.08 * radius, 0.08},
+          {"wheel_radius_left", Fault::Kind::wheel_radius_left, -0.08 * radius, -0.08},
+          {"matched", Fault::Kind::matched, 0.05, 0.05},
+          {"unmatched", Fault::Kind::unmatched, -0.1, -0.1},
+          {"slip_yaw", Fault::Kind::slip_yaw, 0.1, 0.1}};
+}
+
+double simulated_error(const Simulated& each, Shown shown, double rate, bool drift) {
+  Prepared s = prepared(shown, rate);
+  FaultType fault = find_fault(s.model, each.name);
+  Fault simulated{.kind = each.kind, .magnitude = each.magnitude, .profile = {.onset = kOnset}};
+  if (drift) {
+    fault.profile = {.kind = FaultProfile::Kind::drift, .rise = 1.0};
+    simulated.profile.shape = TimeProfile::Shape::ramp;
+    simulated.profile.rise_time = 1.0;
+  }
+  s.scenario.faults = {simulated};
+  Simulation log(s.scenario);
+  const ReferenceMotion motion = read_reference(log, filter_of(s.scenario));
+  return mismatch(fault, each.kappa, motion, motion, s.model, s.design, s.theta, 0.0).torque;
+}
+
+TEST(FaultRows, OfFaultsThatComeSlowlyAreTheSimulators) {
+  for (const Shown shown : {Shown::angles, Shown::speeds}) {
+    for (const Simulated& each : simulated(0.0975)) {
+      const double coarse = simulated_error(each, shown, 100.0, true);
+      EXPECT_LT(coarse, 0.05) << each.name;
+      // What is left is discretisation. Angles tell of the middle of an interval: the fault comes half a step late.
+      EXPECT_LT(simulated_error(each, shown, 400.0, true), coarse / (shown == Shown::angles ? 3.5 : 8.0)) << each.name;
+    }
+  }
+}
+
+// A step jumps somewhere in a sampling interval: an error of the first order, largest at once.
+TEST(FaultRows, OfStepsAreTheSimulators) {
+  for (const Simulated& each : simulated(0.0975)) {
+    const double coarse = simulated_error(each, Shown::angles, 200.0, false);
+    EXPECT_LT(coarse, 0.08) << each.name;
+    EXPECT_LT(simulated_error(each, Shown::angles, 800.0, false), coarse / 3.0) << each.name;
+  }
+}
+
+// What a broken sensor or actuator makes of the columns of a healthy log, from the onset on.
+struct Falsified {
+  std::string name;
+  double kappa;
+  std::function<void(LogTable&, std::size_t onset)> change;
+};
+
+double falsified_error(const Falsified& each, double rate) {
+  const Prepared s = prepared(Shown::angles, rate);
+  Simulation healthy(s.scenario);
+  LogTable table = read_all(healthy);
+  const ReferenceMotion motion = read_reference(healthy, filter_of(s.scenario));
+  const auto onset =
+      static_cast<std::size_t>(std::lower_bound(table.t.begin(), table.t.end(), kOnset - 1e-9) - table.t.begin());
+  each.change(table, onset);
+  TableSource source(table);
+  const ReferenceMotion log = read_reference(source, filter_of(s.scenario));
+  const Mismatch m = mismatch(find_fault(s.model, each.name), each.kappa, motion, log, s.model, s.design, s.theta, 0.0);
+  return std::max(m.torque, m.seen);
+}
+
+std::function<void(LogTable&, std::size_t)> scale(const char* column, double factor) {
+  return [=](LogTable& table, std::size_t onset) {
+    std::vector<double>& values = table.column(column);
+    for (std::size_t k = onset; k < values.size(); ++k) {
+      values[k] *= factor;
+    }
+  };
+}
+
+std::function<void(LogTable&, std::size_t)> count(const char* column, double factor, double seconds) {
+  return [=](LogTable& table, std::size_t onset) {
+    std::vector<double>& values = table.column(column);
+    std::vector<double> changed = values;
+    for (std::size_t k = onset + 1; k < values.size(); ++k) {
+      const bool broken = table.t[k - 1] < table.t[onset] + seconds - 1e-9;
+      changed[k] = changed[k - 1] + (broken ? factor : 1.0) * (values[k] - values[k - 1]);
+    }
+    values = changed;
+  };
+}
+
+TEST(FaultRows, OfBrokenSensorsAreThoseOfFalsifiedLogs) {
+  const std::vector<Falsified> all = {{"effort_loss_right", 0.25, scale("tau_r", 1.25)},
+                                      {"effort_dead_left", 1.0, scale("tau_l", 0.0)},
+                                      {"effort_bias_left", 0.3,
+                                       [](LogTable& table, std::size_t onset) {
+                                         std::vector<double>& values = table.column("tau_l");
+                                         for (std::size_t k = onset; k < values.size(); ++k) {
+                                           values[k] += 0.3;
+                                         }
+                                       }},
+                                      {"encoder_scale_right", 0.1, count("phi_r", 1.1, 1e9)},
+                                      {"encoder_scale_left", -0.2, count("phi_l", 0.8, 1e9)},
+                                      {"encoder_frozen_right", 1.0, count("phi_r", 0.0, 1e9)},
+                                      {"encoder_dropout_left", 1.0, count("phi_l", 0.0, 0.1)}};
+  for (const Falsified& each : all) {
+    const double coarse = falsified_error(each, 200.0);
+    EXPECT_LT(coarse, 0.1) << each.name;
+    EXPECT_LT(falsified_error(each, 800.0), coarse / 3.0) << each.name;
+  }
+}
+
+// A reading that stands still, and mass that is lost, by closed forms at a constant speed: torque f·v·r on both wheels.
+TEST(FaultRows, SettleToClosedForms) {
+  const Prepared s = prepared(Shown::angles, 100.0);
+  const double v1 = 0.5, v2 = 0.3, a1 = 0.2;
+  const SettledRows mass = settled_rows(find_fault(s.model, "payload_lost"), s.model, s.design, Eigen::Vector2d(v1, v2),
+                                        Eigen::Vector2d(a1, 0.0));
+  EXPECT_NEAR(mass.signature.c[0], -0.0975 * a1 * s.design.static_gain(), 1e-12);
+  EXPECT_EQ(mass.signature.c[1], 0.0);
+  const SettledRows lateral = settled_rows(find_fault(s.model, "unmatched"), s.model, s.design, Eigen::Vector2d(v1, v2),
+                                           Eigen::Vector2d::Zero());
+  // (16): an unmatched slip ρ_U gives m ρ_U θ̇ in the sum channel.
+  EXPECT_NEAR(lateral.signature.g1(0, 0), v2 * s.design.static_gain(), 1e-12);
+  EXPECT_EQ(lateral.signature.g1.row(1).norm(), 0.0);
+  const SettledRows radius = settled_rows(find_fault(s.model, "wheel_radius"), s.model, s.design,
+                                          Eigen::Vector2d(v1, v2), Eigen::Vector2d(a1, 0.1));
+  // ζ = ((1 + κ)² − 1) Yθ.
+  EXPECT_LT((radius.signature.g1 - 2.0 * radius.Y).norm(), 1e-12 * radius.Y.norm());
+  EXPECT_LT((radius.signature.g2 - radius.Y).norm(), 1e-12 * radius.Y.norm());
+}
+
+// ζ of (16) for every combination of speed, acceleration and radii, from model/faults.
+TEST(FaultRows, SettleToZetaOfThePaper) {
+  const Prepared s = prepared(Shown::angles, 100.0);
+  const DifferentialDrive drive = drive_of(s.scenario.robot);
+  const Eigen::Vector2d v(0.4, -0.7), a(0.3, 0.9);
+  for (const char* name : {"wheel_radius", "wheel_radius_right", "wheel_radius_left"}) {
+    const std::string right = "wheel_radius_right", left = "wheel_radius_left";
+    const double x = 0.07;
+    FaultState state;
+    state.radius = x * drive.wheel_radius * Eigen::Vector2d(name != left ? 1.0 : 0.0, name != right ? 1.0 : 0.0);
+    const Eigen::Vector2d expected = zeta(drive, s.scenario.parameters, state, {0.0, v, a});
+    const SettledRows rows = settled_rows(find_fault(s.model, name), s.model, s.design, v, a);
+    const Eigen::Vector2d found = (x * rows.signature.g1 + x * x * rows.signature.g2) * s.theta;
+    EXPECT_LT((found - expected * s.design.static_gain()).norm(), 1e-12 * expected.norm()) << name;
+  }
+}
+
+TEST(FaultRows, RefuseFaultsThatMakeNoSense) {
+  const Prepared s = prepared(Shown::angles, 100.0);
+  FaultType fault = find_fault(s.model, "wheel_radius");
+  fault.motion = Eigen::MatrixXd::Identity(3, 3);
+  EXPECT_THROW(validate(fault, s.model), InvalidArgument);
+  fault = find_fault(s.model, "wheel_radius");
+  fault.range = {0.1, 0.2};
+  EXPECT_THROW(validate(fault, s.model), InvalidArgument);
+  fault = find_fault(s.model, "wheel_radius");
+  fault.seen = Eigen::MatrixXd::Identity(2, 2);
+  EXPECT_THROW(validate(fault, s.model), InvalidArgument);
+  fault = find_fault(s.model, "wheel_radius_drift");
+  fault.profile.rise = 0.0;
+  EXPECT_THROW(validate(fault, s.model), InvalidArgument);
+}
+
+}  // namespace
+}  // namespace wheelwright

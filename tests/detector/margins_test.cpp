@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+// Margins along drives, and that they are kept: a certain fault is seen in time, a hidden one is not.
+#include <cmath>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include <wheelwright/detector/margins.hpp>
+
+#include "detector/detectability.hpp"
+
+namespace wheelwright {
+namespace {
+
+using testing_support::Breakage;
+using testing_support::breakages;
+using testing_support::Commissioned;
+using testing_support::commissioned_robot;
+using testing_support::FaultyRun;
+using testing_support::Outcome;
+using testing_support::Promise;
+using testing_support::promise;
+using testing_support::random_run;
+using testing_support::watch;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kShare = 0.75;  // of the declared noise: half of it is there, and what interpolation adds
+
+struct Tally {
+  int certain = 0, hidden = 0;
+};
+
+// A fault of the smallest certain size for the motion that it leaves the robot: found by turns, since the size changes the
+// motion and the motion the size.
+std::optional<double> certain_on_its_own_motion(const FaultyRun& run, double window) {
+  double size = promise(run, 0.0, window, kShare).certain;
+  for (int turn = 0; turn < 12 && size < kInfinity; ++turn) {
+    const double needed = promise(run, run.side * size, window, kShare).certain;
+    if (needed <= size) {
+      return size;
+    }
+    size = needed * 1.001;
+    if (size > (run.side > 0.0 ? run.fault.range.upper : -run.fault.range.lower)) {
+      break;
+    }
+  }
+  return std::nullopt;
+}
+
+void try_runs(std::uint64_t robot_seed, int runs, Tally& tally) {
+  const Commissioned robot = commissioned_robot(robot_seed);
+  for (int k = 0; k < runs; ++k) {
+    const std::uint64_t seed = 1000 * robot_seed + static_cast<std::uint64_t>(k);
+    const Breakage& breakage = breakages()[static_cast<std::size_t>(k) % breakages().size()];
+    const FaultyRun run = random_run(robot, seed, breakage);
+    const double window = std::vector<double>{0.3, 1.0, 2.0}[seed % 3];
+    if (const auto size = certain_on_its_own_motion(run, window)) {
+      const Outcome outcome = watch(run, run.side * *size);
+      ++tally.certain;
+      ASSERT_FALSE(outcome.early) << breakage.fault << ", seed " << seed;
+      // The fault is between two samples: it is promised from the second of them on.
+      ASSERT_LE(outcome.first, window + 1.0 / run.drive.rate)
+          << breakage.fault << " of " << run.side * *size << ", seed " << seed;
+    }
+    // Half of the smallest possible size, again for the motion that it leaves the robot.
+    double small = 0.5 * promise(run, 0.0, window, kShare).hidden;
+    for (int turn = 0; turn < 60 && run.simulated; ++turn) {
+      const double half = 0.5 * promise(run, run.side * small, window, kShare).hidden;
+      if (small <= half) {
+        break;
+      }
+      small = std::min(0.7 * small, half);
+    }
+    const Outcome outcome = watch(run, run.side * small);
+    ++tally.hidden;
+    ASSERT_FALSE(outcome.early) << breakage.fault << ", seed " << seed;
+    ASSERT_GT(outcome.first, window) << breakage.fault << " of " << run.side * small << ", seed " << seed;
+  }
+}
+
+TEST(Margins, AreKept) {
+  Tally tally;
+  for (std::uint64_t robot = 1; robot <= 3; ++robot) {
+    try_runs(robot, 10, tally);
+  }
+  EXPECT_GE(tally.certain, 20);
+  EXPECT_EQ(tally.hidden, 30);
+}
+
+class SlowMarginsPart : public ::testing::TestWithParam<std::uint64_t> {};
+
+TEST_P(SlowMarginsPart, AreKeptInFiveHundredRuns) {
+  Tally tally;
+  for (std::uint64_t robot = 1; robot <= 50; ++robot) {
+    try_runs(100 + 50 * GetParam() + robot, 10, tally);
+  }
+  RecordProperty("certain", tally.certain);
+  EXPECT_GE(tally.certain, 350);
+  EXPECT_EQ(tally.hidden, 500);
+}
+
+INSTANTIATE_TEST_SUITE_P(Quarters, SlowMarginsPart, ::testing::Range<std::uint64_t>(0, 4));
+
+}  // namespace
+}  // namespace wheelwright
