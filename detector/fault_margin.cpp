@@ -42,9 +42,9 @@ double FaultMargin::certain_excess(const FaultRow& row, double kappa, double sid
   const Sums sums = at(row, kappa, side, 2.0);
   const Interval acting = rule_.prediction(acting_, 2 * channel);
   const Threshold allowed = rule_.at(seen_, error_, row.dy, 2 * channel + 1);
-  const double added = side * kappa * row.c;
-  return direction == Direction::up ? acting.lower + added - row.dy - (allowed.upper + sums.predicted) - sums.rounding
-                                    : allowed.lower + sums.predicted - (acting.upper + added + row.dy) - sums.rounding;
+  const double added = side * kappa * row.c, doubt = 2.0 * kappa * row.doubt + sums.rounding;
+  return direction == Direction::up ? acting.lower + added - row.dy - (allowed.upper + sums.predicted) - doubt
+                                    : allowed.lower + sums.predicted - (acting.upper + added + row.dy) - doubt;
 }
 
 double FaultMargin::possible_excess(const FaultRow& row, double kappa, double side, double share, std::size_t channel,
@@ -52,10 +52,9 @@ double FaultMargin::possible_excess(const FaultRow& row, double kappa, double si
   const Sums sums = at(row, kappa, side, 1.0 - share);
   const Interval acting = rule_.prediction(acting_, 2 * channel);
   const Threshold allowed = rule_.at(seen_, error_, row.dy, 2 * channel + 1);
-  const double added = side * kappa * row.c;
-  return direction == Direction::up
-             ? acting.upper + added + share * row.dy - (allowed.upper + sums.predicted) + sums.rounding
-             : allowed.lower + sums.predicted - (acting.lower + added - share * row.dy) + sums.rounding;
+  const double added = side * kappa * row.c, doubt = 2.0 * kappa * row.doubt + sums.rounding;
+  return direction == Direction::up ? acting.upper + added + share * row.dy - (allowed.upper + sums.predicted) + doubt
+                                    : allowed.lower + sums.predicted - (acting.lower + added - share * row.dy) + doubt;
 }
 
 bool FaultMargin::certain(const FaultRow& row, double kappa, double side, std::size_t channel) {
@@ -105,7 +104,7 @@ std::optional<double> FaultMargin::smallest_certain(const FaultRow& row, double 
 
 double FaultMargin::largest_hidden(const FaultRow& row, double largest, double side, double share,
                                    std::size_t channel) {
-  double slope = 0.0;  // of the threshold, per unit of κ, at most
+  double slope = 2.0 * row.doubt;  // of the threshold and of doubt, per unit of κ, at most
   std::vector<double> inward(row.y.size());
   for (std::size_t j = 0; j < inward.size(); ++j) {
     slope += std::abs(row.s[j]) * largest_size(rule_.set().hull().sides[j]);

@@ -12,7 +12,7 @@
 /// single θ and fixed regressor the difference f of both sides is a quadratic in κ with f(0) <= 0 (no false alarm). If
 /// g2 θ >= 0 it is convex and crosses zero once, upwards. If not it is concave, and {f > 0} is an interval, which holds κ̄
 /// or is of no interest. The certain sizes are the intersection over θ; where s is not 0 the threshold's h is convex in κ
-/// and g2 is 0 (validate(FaultType)), so f is concave.
+/// and g2 is 0 (validate(FaultType)), so f is concave. A row's doubt takes 2κ·doubt from f, which changes none of this.
 ///
 /// An instant shows a fault **possibly** when some θ in P and some noise of at most q times the bounds carry it over the
 /// threshold. With q = 1 every fault does: the threshold is tight, fault-free residuals reach it. With q = 0 it is the

@@ -17,7 +17,8 @@ namespace wheelwright {
 ///
 ///     τ_f = (y + κ g1 + κ² g2) θ + κ c + e,     regressor as seen: y + κ s + δ,
 ///
-/// |e| <= n̄ = dy, |δ| <= Δ = dY entry by entry. All spans have p entries.
+/// |e| <= n̄ = dy, |δ| <= Δ = dY entry by entry. All spans have p entries. Where this is not all, `doubt` bounds, per
+/// unit of |κ|, by how much τ_f, and the threshold, may be elsewhere for every θ in the set.
 struct FaultRow {
   std::span<const double> y;  ///< of the healthy motion, exact
   std::span<const double> g1;
@@ -26,6 +27,7 @@ struct FaultRow {
   std::span<const double> dY;  ///< Δ
   double c = 0.0;
   double dy = 0.0;  ///< n̄
+  double doubt = 0.0;
 };
 
 /// What a fault adds to the unfiltered equation at one instant, matrices n × p.

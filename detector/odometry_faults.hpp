@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Faults in the kinematic residual: what a pose or a gyro sees of them beyond wheel odometry.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include <wheelwright/bounds/box.hpp>
+#include <wheelwright/core/log.hpp>
+#include <wheelwright/detector/fault_rows.hpp>
+#include <wheelwright/detector/reference_motion.hpp>
+#include <wheelwright/filter/odometry_filter.hpp>
+
+namespace wheelwright {
+
+/// A drive as the kinematic residual sees it: ReferenceMotion whose rows are windows of odometry (OdometryFilter), at
+/// the samples with a new pose; an instant is settled where it has a row.
+struct OdometryReference {
+  ReferenceMotion motion;
+  std::vector<std::size_t> window;  ///< per instant, the instant at which its window begins (itself where no row is)
+};
+
+/// The motion of `log` as `filter` reads it; `model` is the differential drive's. Walks the log once and holds it.
+/// Throws InvalidArgument when the log lacks a column of the filter's measurement.
+[[nodiscard]] OdometryReference read_odometry(LogSource& log, OdometryFilter filter, const Model& model);
+
+/// Rows of the kinematic residual after a fault's onset. With q_j what a wheel truly rolls beyond what its encoder would
+/// show without a fault in step j (s K in joints, times its way) and σ_j what the encoder shows beyond it (s S), the
+/// displacement is Σ E_j (Δφ + κ q) r/2 + κ Σ (E_j s a_1 + E_j⊥ s d) h, seen as Σ E_j (Δφ + κ σ) r/2, and alike for the
+/// turn. Efforts play no part. E_j are the directions of the healthy drive: where a fault turns the robot by up to κ η
+/// within a window, rows are in doubt by κ η times the way driven.
+class OdometryFaultRows final : public FaultRows {
+ public:
+  /// `hull` bounds the parameters (OdometryMeasurement::parameters()). Throws InvalidArgument where `fault` does not fit
+  /// `model`. `reference` is kept by reference.
+  OdometryFaultRows(const FaultType& fault, const Model& model, const OdometryMeasurement& measurement,
+                    const OdometryReference& reference, const Box& hull);
+
+  [[nodiscard]] std::size_t outputs() const override { return n_; }
+  void begin(std::size_t onset) override;
+  bool next() override;
+  [[nodiscard]] std::size_t instant() const override { return k_; }
+  [[nodiscard]] FaultRow row(std::size_t i) const override;
+
+ private:
+  // Sums from the onset on.
+  struct Sums {
+    std::array<Eigen::Vector2d, 2> rolled{Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero()};  // E q of each wheel
+    std::array<Eigen::Vector2d, 2> shown{Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero()};   // E σ
+    Eigen::Vector2d slipped = Eigen::Vector2d::Zero();                                        // E s a_1 h + E⊥ s d h
+    Eigen::Vector2d turned = Eigen::Vector2d::Zero(), turn_shown = Eigen::Vector2d::Zero();   // q, σ of each wheel
+    double slipped_turn = 0.0;                                                                // s a_2 h
+    double turn_size = 0.0;         // of κ's part of the heading
+    double way = 0.0, moved = 0.0;  // |Δφ| r/2, and of κ's part
+  };
+  void write();
+
+  FaultType fault_;
+  const OdometryReference* reference_;
+  OdometryMeasurement measurement_;
+  Eigen::Matrix2d joint_motion_ = Eigen::Matrix2d::Zero(), joint_seen_ = Eigen::Matrix2d::Zero();  // K, S in joints
+  double along_ = 0.0, turning_ = 0.0;                                                             // a_1, a_2
+  double most_kappa_ = 0.0;
+  std::array<double, 2> radius_{};  // at most
+  std::array<Interval, 2> yaw_gain_{};
+  std::size_t n_ = 0, p_ = 0;
+  std::vector<Sums> sums_;  // from the onset to instant k_
+  std::size_t onset_ = 0, k_ = 0, end_ = 0;
+  FaultSignals rows_;
+  Eigen::VectorXd doubt_;
+};
+
+}  // namespace wheelwright
