@@ -1,0 +1,258 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/detector/onset_rows.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+#include <wheelwright/core/check.hpp>
+
+namespace wheelwright {
+namespace {
+
+FaultSignals zeros(const Model& model) {
+  const auto n = static_cast<Eigen::Index>(model.n()), p = static_cast<Eigen::Index>(model.p());
+  return {RowMatrix::Zero(n, p), RowMatrix::Zero(n, p), RowMatrix::Zero(n, p), Eigen::VectorXd::Zero(n)};
+}
+
+// x + f y, part by part.
+FaultSignals sum(const FaultSignals& x, double f, const FaultSignals& y) {
+  return {x.g1 + f * y.g1, x.g2 + f * y.g2, x.s, x.c + f * y.c};
+}
+
+void raise(FaultSignals& to, const FaultSignals& from) {
+  to.g1 = to.g1.cwiseMax(from.g1.cwiseAbs());
+  to.g2 = to.g2.cwiseMax(from.g2.cwiseAbs());
+  to.c = to.c.cwiseMax(from.c.cwiseAbs());
+}
+
+bool drifts(const FaultType& fault) { return fault.profile.kind == FaultProfile::Kind::drift; }
+
+Eigen::MatrixXd or_zero(const Eigen::MatrixXd& matrix, std::size_t size) {
+  const auto n = static_cast<Eigen::Index>(size);
+  return matrix.size() > 0 ? matrix : Eigen::MatrixXd::Zero(n, n);
+}
+
+}  // namespace
+
+bool OnsetRows::knows(const FaultType& fault) {
+  if (fault.profile.kind != FaultProfile::Kind::step && !drifts(fault)) {
+    return false;
+  }
+  if (fault.seen.size() == 0) {
+    return true;
+  }
+  const bool alone = fault.motion.size() == 0 && fault.slip.size() == 0 && fault.lateral == 0.0 &&
+                     fault.effort.size() == 0 && fault.ground.size() == 0 && fault.offset.size() == 0 &&
+                     fault.theta.size() == 0 && !fault.whole && !drifts(fault);
+  return alone &&
+         (fault.seen * fault.seen - fault.seen).cwiseAbs().maxCoeff() <= 1e-12 * fault.seen.cwiseAbs().maxCoeff();
+}
+
+OnsetRows::OnsetRows(const FaultType& fault, const Model& model, const FilterDesign& design, MotionKind kind,
+                     const SignalErrors& errors, const ReferenceMotion& motion, std::size_t first, std::size_t end)
+    : fault_(fault),
+      model_(&model),
+      design_(design),
+      angles_(kind != MotionKind::speed),
+      encoder_(fault.seen.size() > 0),
+      errors_(&errors),
+      motion_(&motion),
+      first_(first),
+      end_(end),
+      gain_(std::pow(design.alpha, design.order)),
+      bound_{zeros(model), zeros(model)} {
+  check::that(knows(fault), "fault '" + fault.name + "'", "a step or a drift");
+  check::that(first < end && end <= motion.instants(), "instants", "a range of the motion");
+  if (encoder_) {
+    fault_.motion = -fault_.seen;
+    fault_.seen.resize(0, 0);
+  }
+  fault_.held_effort = false;
+  step_ = fault_;
+  step_.profile = {};
+  state_.assign(end - first, {zeros(model), zeros(model)});
+  state_[0].z1.g1 = jump(first);
+  take(step_, false);
+  if (design.order == 2) {
+    take(step_, true);
+  }
+}
+
+void OnsetRows::take(const FaultType& fault, bool second) {
+  FaultFilter filter(fault, *model_, {second ? 2 : 1, design_.alpha, design_.beta, design_.settle}, *motion_);
+  const double gain = second ? design_.alpha * design_.alpha : design_.alpha;
+  filter.begin(first_);
+  while (filter.instant() + 1 < end_ && filter.next()) {
+    State& state = state_[filter.instant() - first_];
+    FaultSignals& z = second ? state.z2 : state.z1;
+    for (std::size_t i = 0; i < model_->n(); ++i) {
+      const FaultRow row = filter.row(i);
+      const auto at = static_cast<Eigen::Index>(i);
+      for (std::size_t j = 0; j < model_->p(); ++j) {
+        z.g1(at, static_cast<Eigen::Index>(j)) = row.g1[j] / gain;
+        z.g2(at, static_cast<Eigen::Index>(j)) = row.g2[j] / gain;
+      }
+      z.c[at] = row.c / gain;
+    }
+  }
+}
+
+// The impulse that motion beyond v has where a step sets in.
+RowMatrix OnsetRows::jump(std::size_t k) const {
+  Eigen::VectorXd moved = Eigen::VectorXd::Zero(motion_->speed.rows());
+  if (fault_.motion.size() > 0) {
+    moved += fault_.motion * motion_->speed.col(static_cast<Eigen::Index>(k));
+  }
+  if (fault_.slip.size() > 0) {
+    moved += fault_.slip;
+  }
+  RowMatrix out = zeros(*model_).g1;
+  for (const Term& term : model_->terms) {
+    if (term.kind == Term::Kind::acceleration) {
+      out(static_cast<Eigen::Index>(term.output), static_cast<Eigen::Index>(term.parameter)) +=
+          term.scale * moved[static_cast<Eigen::Index>(term.coordinate)];
+    }
+  }
+  return out;
+}
+
+// The state at instant `at` of a step that set in at `from`.
+OnsetRows::State OnsetRows::left(std::size_t from, std::size_t at) const {
+  const double x = motion_->instant[at] - motion_->instant[from], decay = std::exp(-design_.beta * x);
+  const State& now = state_[at - first_];
+  State before = state_[from - first_];
+  before.z1.g1 -= jump(from);
+  return {sum(now.z1, -decay, before.z1), sum(sum(now.z2, -decay, before.z2), -decay * x, before.z1)};
+}
+
+void OnsetRows::between(std::size_t a, std::size_t b) {
+  check::that(a >= first_ && a < b && b + 1 < end_, "onset", "instants of the motion");
+  s_ = b + 1;
+  bound_ = {zeros(*model_), zeros(*model_)};
+  const std::size_t from = a > first_ ? a - 1 : a;
+  const RowMatrix counted = jump(s_);
+  for (std::size_t k = from; k <= s_; ++k) {
+    State state = left(k, s_);
+    state.z1.g1 -= counted;
+    raise(bound_.z1, state.z1);
+    raise(bound_.z2, state.z2);
+  }
+  // The speed's own error in the impulse.
+  const Eigen::VectorXd error = or_zero(fault_.motion, model_->coordinates.size()).cwiseAbs() * errors_->speed_sample;
+  for (const Term& term : model_->terms) {
+    if (term.kind == Term::Kind::acceleration) {
+      const auto i = static_cast<Eigen::Index>(term.output), j = static_cast<Eigen::Index>(term.parameter);
+      bound_.z1.g1(i, j) += std::abs(term.scale) * error[static_cast<Eigen::Index>(term.coordinate)];
+    }
+  }
+  if (drifts(fault_)) {
+    uncertain_ = std::min(1.0, (motion_->instant[s_] - motion_->instant[from]) / fault_.profile.rise);
+    for (FaultSignals* part : {&bound_.z1, &bound_.z2}) {
+      part->g1 *= uncertain_;
+      part->g2 *= uncertain_;
+      part->c *= uncertain_;
+    }
+    drifting_.assign(end_ - s_, zeros(*model_));
+    FaultFilter filter(fault_, *model_, design_, *motion_);
+    filter.begin(s_);
+    while (filter.instant() + 1 < end_ && filter.next()) {
+      FaultSignals& out = drifting_[filter.instant() - s_];
+      for (std::size_t i = 0; i < model_->n(); ++i) {
+        const FaultRow row = filter.row(i);
+        const auto at = static_cast<Eigen::Index>(i), p = static_cast<Eigen::Index>(row.g1.size());
+        out.g1.row(at) = Eigen::Map<const Eigen::RowVectorXd>(row.g1.data(), p);
+        out.g2.row(at) = Eigen::Map<const Eigen::RowVectorXd>(row.g2.data(), p);
+        out.c[at] = row.c;
+      }
+    }
+  }
+}
+
+// Filtered, of a step that sets in at s_.
+FaultSignals OnsetRows::filtered(std::size_t k) const {
+  const State state = left(s_, k);
+  const FaultSignals& z = design_.order == 1 ? state.z1 : state.z2;
+  return {gain_ * z.g1, gain_ * z.g2, z.s, gain_ * z.c};
+}
+
+OnsetRow OnsetRows::row(std::size_t k, std::size_t i) const {
+  check::that(k > s_ && k < end_, "instant", "one after the onset");
+  const auto at = static_cast<Eigen::Index>(i), p = static_cast<Eigen::Index>(model_->p());
+  const FaultSignals step = filtered(k);
+  const FaultSignals& signals = drifts(fault_) ? drifting_[k - s_] : step;
+  const double x = motion_->instant[k] - motion_->instant[s_], decay = std::exp(-design_.beta * x);
+  const double newest = angles_ ? design_.alpha * design_.alpha * x * decay : 0.0;
+  const double onset_error = drifts(fault_) ? newest + design_.static_gain() / fault_.profile.rise : newest;
+
+  OnsetRow out{signals.g1.row(at),
+               signals.g2.row(at),
+               Eigen::RowVectorXd::Zero(p),
+               Eigen::RowVectorXd::Zero(p),
+               signals.c[at],
+               0.0,
+               gain_ * decay,
+               0.0};
+  out.ramp = design_.order == 2 ? out.level * x : 0.0;
+
+  const Eigen::MatrixXd K = or_zero(fault_.motion, model_->coordinates.size()).cwiseAbs();
+  const Eigen::MatrixXd H =
+      or_zero(fault_.effort, model_->n()).cwiseAbs() + or_zero(fault_.ground, model_->n()).cwiseAbs();
+  const Eigen::VectorXd acceleration = K * errors_->acceleration, speed = K * errors_->speed,
+                        sample = K * errors_->speed_sample;
+  for (const Term& term : model_->terms) {
+    const auto o = static_cast<Eigen::Index>(term.output), j = static_cast<Eigen::Index>(term.parameter),
+               c = static_cast<Eigen::Index>(term.coordinate);
+    const double scale = std::abs(term.scale);
+    // Errors of this entry, and of its motion part: filtered, and what the cut at t_s adds.
+    double own = 0.0, moved = 0.0, own_cut = 0.0, moved_cut = 0.0;
+    switch (term.kind) {
+      case Term::Kind::acceleration:
+        own = scale * errors_->acceleration[c];
+        moved = scale * (acceleration[c] +
+                         (c == 0 && fault_.lateral != 0.0 ? std::abs(fault_.lateral) * errors_->speed[1] : 0.0));
+        own_cut = scale * onset_error * errors_->speed_sample[c];
+        moved_cut = scale * onset_error * sample[c];
+        break;
+      case Term::Kind::speed:
+        own = scale * errors_->speed[c];
+        moved = scale * speed[c];
+        break;
+      case Term::Kind::function:
+        // Functions of the motion are at most proportional to it, or do not depend on it but by signs.
+        own = 2.0 * motion_->rows.dY(static_cast<Eigen::Index>(k * model_->n()) + o, j);
+        moved = fault_.motion.size() > 0 || fault_.slip.size() > 0
+                    ? scale * design_.static_gain() * (sample.maxCoeff() + errors_->heading * (1.0 + K.maxCoeff()))
+                    : 0.0;
+        break;
+    }
+    if (o == at) {
+      out.e1[j] += moved;
+    }
+    out.e1[j] += H(at, o) * (own + own_cut);
+    out.e2[j] += H(at, o) * (moved + moved_cut);
+    if (o == at && fault_.theta.size() > 0) {
+      out.ec += std::abs(fault_.theta[j]) * (own + own_cut);
+    }
+  }
+  if (drifts(fault_)) {
+    out.e1 += uncertain_ * step.g1.row(at).cwiseAbs();
+    out.e2 += 2.0 * uncertain_ * step.g2.row(at).cwiseAbs();
+    out.ec += uncertain_ * std::abs(step.c[at]);
+  }
+  return out;
+}
+
+double OnsetRows::level_bound(std::size_t i, double kappa, const Eigen::VectorXd& largest) const {
+  const auto at = static_cast<Eigen::Index>(i);
+  const FaultSignals& z = design_.order == 1 ? bound_.z1 : bound_.z2;
+  return kTransition * (kappa * (z.g1.row(at).dot(largest) + z.c[at]) + kappa * kappa * z.g2.row(at).dot(largest));
+}
+
+double OnsetRows::ramp_bound(std::size_t i, double kappa, const Eigen::VectorXd& largest) const {
+  const auto at = static_cast<Eigen::Index>(i);
+  return design_.order == 1 ? 0.0
+                            : kTransition * (kappa * (bound_.z1.g1.row(at).dot(largest) + bound_.z1.c[at]) +
+                                             kappa * kappa * bound_.z1.g2.row(at).dot(largest));
+}
+
+}  // namespace wheelwright

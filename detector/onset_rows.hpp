@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// What a log's own motion says of a fault that set in somewhere in an interval of time.
+///
+/// A log's motion is the healthy encoders', measured: v + n. With the signature filtered from it, from the instant t_s
+/// on (fault_rows.hpp), a row at t > t_s reads, for a fault that set in at any T in [t_a, t_b], t_b < t_s,
+///
+///     τ_f = (y + κ g1 + κ² g2) θ + κ c + w(t) A + (t − t_s) w(t) B + e,     w(t) = α² e^{−β(t − t_s)}  (order 1: α …, B = 0):
+///
+/// the filter is linear, so what happened in [T, t_s] lives on in its state at t_s alone. A and B, for each output, are that
+/// state beyond the one of an onset at t_s itself. They are bounded by what onsets at the instants of [t_a, t_s] leave
+/// there, times kTransition: that is what covers a step between two samples, whose interval mixes both sides.
+///
+/// Errors. Let |ĝ1 − g1| <= e1, |ĝ2 − g2| <= e2, |ĉ − c| <= e_c. The kernel of f₂*(s n̈) for a step s is that of f₂*n̈ cut off
+/// at t − t_s: its derivatives' total variations do not grow by that, but for the error n_v(t_s) of the speed itself, with
+/// weight f₂(t − t_s), as at the start of a segment (noise.hpp). So with Δ the bounds of the healthy columns
+///
+///     gains H, G:  e1 = |H + G| (Δ + |scale| f₂(t − t_s) n_v)           (n_v for angles only)
+///     motion K:    e1 = |K| Δ of acceleration and speed: f * d/dt(s K n) has no term at t_s
+///     both:        e2 = |H + G| (|K| Δ + |scale| f₂(t − t_s) |K| n_v)
+///     across d:    e1 = |d| Δ of the yaw rate           θ-change ϑ:  e_c = (Δ + …) |ϑ|.
+///
+/// A drift s = (t − T)/rise is a mixture of steps; that T is known to t_s − t_a only adds (t_s − t_a)/rise of the step's
+/// signature to e1 and e_c, and twice that to e2.
+///
+/// A fault of the encoders shows (I + κ s S) v: then v = (I − κ' s S) v_seen, κ' = κ/(1 + κ), where S² = S. It is a fault
+/// of motion with K = −S in κ'.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include <wheelwright/detector/fault_rows.hpp>
+#include <wheelwright/filter/measurement.hpp>
+#include <wheelwright/filter/noise.hpp>
+
+namespace wheelwright {
+
+/// One output at one instant under a hypothesis.
+struct OnsetRow {
+  Eigen::RowVectorXd g1, g2, e1, e2;  ///< p entries; 0 before the onset
+  double c = 0.0, ec = 0.0;
+  double level = 0.0;  ///< w(t)
+  double ramp = 0.0;   ///< (t − t_s) w(t); 0 for order 1
+};
+
+/// Rows of one fault for one onset interval after the other.
+class OnsetRows {
+ public:
+  /// Times the states that onsets between two samples may leave.
+  static constexpr double kTransition = 2.0;
+
+  /// Whether the fault's rows are known: a step or a drift whose S, if any, has S² = S and comes alone, and that does not
+  /// stand for a reading that stands still.
+  [[nodiscard]] static bool knows(const FaultType& fault);
+
+  /// For the instants [first, end) of `motion`, of one segment. References are kept. `errors` are those of the rows.
+  OnsetRows(const FaultType& fault, const Model& model, const FilterDesign& design, MotionKind kind,
+            const SignalErrors& errors, const ReferenceMotion& motion, std::size_t first, std::size_t end);
+
+  /// The onset lies between instants `a` and `b` > a, b + 1 < end. Rows before `a` are healthy, rows of instants in
+  /// [a, b + 1] are not spoken of.
+  void between(std::size_t a, std::size_t b);
+  /// The instant of t_s, b + 1.
+  [[nodiscard]] std::size_t start() const { return s_; }
+  /// Row of output `i` at instant k > start().
+  [[nodiscard]] OnsetRow row(std::size_t k, std::size_t i) const;
+  /// |A| and |B| of output `i` are at most this for |θ_j| <= largest_j and |κ| <= `kappa`.
+  [[nodiscard]] double level_bound(std::size_t i, double kappa, const Eigen::VectorXd& largest) const;
+  [[nodiscard]] double ramp_bound(std::size_t i, double kappa, const Eigen::VectorXd& largest) const;
+
+  /// Whether κ of the rows is κ' of a fault of the encoders.
+  [[nodiscard]] bool encoder() const { return encoder_; }
+
+ private:
+  struct State {
+    FaultSignals z1, z2;
+  };
+  [[nodiscard]] RowMatrix jump(std::size_t k) const;
+  [[nodiscard]] State left(std::size_t from, std::size_t at) const;
+  [[nodiscard]] FaultSignals filtered(std::size_t k) const;
+  void take(const FaultType& fault, bool second);
+
+  FaultType fault_, step_;
+  const Model* model_;
+  FilterDesign design_;
+  bool angles_, encoder_;
+  const SignalErrors* errors_;
+  const ReferenceMotion* motion_;
+  std::size_t first_, end_, s_ = 0;
+  double gain_, uncertain_ = 0.0;       // α^order; share of a drift that the onset leaves open
+  std::vector<State> state_;            // of an onset at first_, per instant
+  std::vector<FaultSignals> drifting_;  // filtered, of a drift from s_ on
+  State bound_;                         // entry by entry
+};
+
+}  // namespace wheelwright
