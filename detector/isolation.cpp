@@ -20,6 +20,7 @@ namespace wheelwright {
 namespace {
 
 constexpr double kMemory = 12.0;      // of the filter, in units of 1/β
+constexpr double kFresh = 2.0;        // of this, in the same units, an onset is still to be seen
 constexpr double kNarrower = 0.9;     // a turn that leaves more than this of an interval is the last
 constexpr double kRounding = 1e-12;   // of a row's coefficients, relative to all that is added in it
 constexpr int kTurns = 12;            // of narrowing
@@ -53,15 +54,20 @@ Window window_of(const ReferenceMotion& motion, double beta, double outside, dou
   w.from_start = w.begin <= segment + 2;
   w.begin = w.from_start ? segment : w.begin;
   w.end = std::min(stop, std::max(at(alarm + options.after), last + 1));
-  // Evenly spread; half of them from the first instant outside on, which is among them, as is the alarm's.
+  // Evenly spread in each of three stretches: before the alarm, while the filter still holds the onset, and after that.
   const auto spread = [&](std::size_t from, std::size_t to, std::size_t most) {
-    const std::size_t count = std::min(most, to - from);
+    const std::size_t count = std::min(most, std::max(to, from) - from);
     for (std::size_t k = 0; k < count; ++k) {
       w.rows.push_back(from + k * (to - from) / count);
     }
   };
-  spread(w.begin, w.outside, options.most_instants / 2);
-  spread(w.outside, w.end, options.most_instants - options.most_instants / 2);
+  const std::size_t third = options.most_instants / 3;
+  const std::size_t fresh = std::clamp(at(outside - kFresh / beta), w.begin, w.outside);
+  const std::size_t stale = std::clamp(at(outside + 2.0 * kFresh / beta), w.outside, w.end);
+  spread(w.begin, fresh, third);
+  spread(fresh, stale, third);
+  spread(stale, w.end, third);
+  w.rows.push_back(w.outside);
   w.rows.push_back(last);
   std::sort(w.rows.begin(), w.rows.end());
   w.rows.erase(std::unique(w.rows.begin(), w.rows.end()), w.rows.end());
