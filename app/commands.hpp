@@ -27,6 +27,8 @@ using Run = std::function<int(const std::string& command_line)>;
 [[nodiscard]] Run add_export(CLI::App& program);
 /// wheelwright identify LOG... --robot robot.yaml
 [[nodiscard]] Run add_identify(CLI::App& program);
+/// wheelwright margins LOG --model model.json
+[[nodiscard]] Run add_margins(CLI::App& program);
 /// wheelwright simulate SCENARIO.yaml --out LOG
 [[nodiscard]] Run add_simulate(CLI::App& program);
 

@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kNone = std::numeric_limits<double>::infinity();
 
-// The instants at which faults set in: settled ones, evenly in time.
+// The instants at which faults set in: settled ones, evenly in time, that leave room for a window.
 std::vector<std::size_t> choose_onsets(const ReferenceMotion& motion, const MarginOptions& options) {
   std::vector<std::size_t> onsets;
   const auto settled = static_cast<double>(std::count(motion.settled.begin(), motion.settled.end(), true));
@@ -26,7 +26,10 @@ std::vector<std::size_t> choose_onsets(const ReferenceMotion& motion, const Marg
   for (std::size_t k = 0; k < motion.instants(); ++k) {
     const bool begins = std::binary_search(motion.segment_starts.begin(), motion.segment_starts.end(), k);
     next = begins ? -kNone : next;
-    if (motion.settled[k] && motion.t[k] >= next) {
+    const auto after = std::upper_bound(motion.segment_starts.begin(), motion.segment_starts.end(), k);
+    const std::size_t last = (after == motion.segment_starts.end() ? motion.instants() : *after) - 1;
+    const bool room = k + 2 <= last && motion.t[last] - motion.t[k] > options.windows.front();
+    if (motion.settled[k] && room && motion.t[k] >= next) {
       onsets.push_back(k);
       next = motion.t[k] + step;
     }
@@ -144,12 +147,13 @@ MarginSummary summarise(const FaultMargins& margins, std::size_t window, std::op
   }
   MarginSummary summary;
   summary.onsets = sizes.size();
-  summary.best = summary.median = summary.worst = kNone;
+  summary.best = summary.most = summary.median = summary.worst = kNone;
   if (!sizes.empty()) {
     std::sort(sizes.begin(), sizes.end());
     summary.certain =
         static_cast<std::size_t>(std::count_if(sizes.begin(), sizes.end(), [](double x) { return x < kNone; }));
     summary.best = sizes.front();
+    summary.most = summary.certain > 0 ? sizes[summary.certain - 1] : kNone;
     summary.median = sizes[sizes.size() / 2];
     summary.worst = sizes.back();
   }
@@ -163,6 +167,7 @@ std::vector<FaultMargins> margins_along(const ReferenceMotion& motion, const std
                   std::is_sorted(options.windows.begin(), options.windows.end()),
               "windows", "positive lengths in ascending order");
   const std::vector<std::size_t> onsets = choose_onsets(motion, options);
+  check::that(!onsets.empty(), "drive", "a stretch in which the filter has settled and that is longer than a window");
   std::vector<FaultMargins> all;
   for (const FaultType& fault : faults) {
     for (const double side : {1.0, -1.0}) {

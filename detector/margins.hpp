@@ -60,6 +60,7 @@ struct MarginSummary {
   std::size_t onsets = 0;   ///< with a value
   std::size_t certain = 0;  ///< of these, with a size that is certain
   double best = 0.0;        ///< smallest; infinite where none is certain
+  double most = 0.0;        ///< certain at every onset that has a certain size; infinite where there is none
   double median = 0.0;      ///< infinite where fewer than half are certain
   double worst = 0.0;       ///< certain at every onset; infinite where there is one without
 };
@@ -75,7 +76,7 @@ using FaultRowsFactory = std::function<std::unique_ptr<FaultRows>(const FaultTyp
 /// Margins of `faults`, both sides where their range has two, for a detector with thresholds `rule` on the rows that
 /// `rows` makes, along `motion`. Every number is exact over the feasible set (fault_margin.hpp) for the motion as it
 /// stands; it is a promise for a robot that drives it, with the encoders seeing what a fault leaves of it.
-/// Throws InvalidArgument for windows that do not ascend.
+/// Throws InvalidArgument for windows that do not ascend, and for a motion without a settled stretch longer than a window.
 [[nodiscard]] std::vector<FaultMargins> margins_along(const ReferenceMotion& motion,
                                                       const std::vector<FaultType>& faults, const ThresholdRule& rule,
                                                       const FaultRowsFactory& rows, const MarginOptions& options = {});

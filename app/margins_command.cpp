@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <map>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include <wheelwright/commission/margin_survey.hpp>
+#include <wheelwright/commission/margin_words.hpp>
+#include <wheelwright/io/csv.hpp>
+#include <wheelwright/io/margins_json.hpp>
+#include <wheelwright/io/model_file.hpp>
+#include <wheelwright/report/margins_report.hpp>
+
+#include "commands.hpp"
+#include "common.hpp"
+#include "progress.hpp"
+
+namespace wheelwright::app {
+namespace {
+
+struct Arguments {
+  std::filesystem::path log, model;
+  std::vector<std::string> faults;
+  std::vector<double> windows;
+  std::optional<Persistence> persistence;
+  MarginSurveyOptions survey;
+  CommonOptions common;
+};
+
+constexpr const char* kHelp =
+    "Says beforehand which faults a commissioned robot's detector is certain to see, from what size on, how soon, and "
+    "in "
+    "which manoeuvre: for the motion of LOG, whatever the parameters within their bounds and the noise within its own.";
+
+constexpr const char* kExamples =
+    "LOG is a drive to be judged: the one that was commissioned with, another, or a simulated one. A row of the table "
+    "is\n"
+    "a fault on one side (growing or shrinking), a column what the robot does when it sets in; an entry is the size "
+    "from\n"
+    "which on it is certainly seen within the window, whenever it sets in during such driving, or at so many of "
+    "the moments that were tried.\n\n"
+    "Examples:\n"
+    "  wheelwright margins drive.csv --model result/model.json --out margins\n"
+    "  wheelwright margins drive.csv --model result/model.json --fault wheel_radius --fault payload_lost --window 0.5";
+
+std::string table(const MarginSurvey& survey, const ResidualMargins& residual) {
+  const std::size_t window = shown_window(survey);
+  constexpr std::size_t name_width = 28, width = 19;
+  // Widths count what is seen: the dash and the minus sign are one column and three bytes.
+  const auto pad = [](std::string text, std::size_t to) {
+    std::size_t columns = 0;
+    for (const char c : text) {
+      columns += (static_cast<unsigned char>(c) & 0xC0U) != 0x80U ? 1 : 0;
+    }
+    return columns < to ? std::string(to - columns, ' ').insert(0, text) : text + " ";
+  };
+  std::string out = fmt::format("{} residual, seen for certain within {:g} s, when it sets in while\n", residual.name,
+                                survey.windows[window]);
+  out += pad("", name_width);
+  for (const auto& [kind, count] : survey.manoeuvres) {
+    const std::string_view name = words(kind);
+    out += pad(std::string(name.substr(0, name.find(' '))), width);
+  }
+  out += "\n";
+  for (const FaultMargins& margins : residual.margins) {
+    const bool sides = !margins.fault.whole && margins.fault.range.lower < 0.0;
+    out += pad("  " + margins.fault.name + (sides ? margins.side > 0.0 ? " +" : " −" : ""), name_width);
+    for (const auto& [kind, count] : survey.manoeuvres) {
+      out += pad(certain_words(margins, window, kind), width);
+    }
+    out += "\n";
+  }
+  return out;
+}
+
+int run(const Arguments& a) {
+  const CommissionedModel model = read_model(a.model);
+  make_directory(a.common);
+  CsvOptions reader = reader_options(a.common);
+  reader.only = useful_columns(model.robot);
+  CsvLog log({a.log}, reader);
+  require_columns(log, model.measurement.columns());
+  Progress progress(a.common.quiet);
+  MarginSurveyOptions options = a.survey;
+  options.faults = a.faults;
+  options.persistence = a.persistence;
+  if (!a.windows.empty()) {
+    options.margins.windows = a.windows;
+    std::sort(options.margins.windows.begin(), options.margins.windows.end());
+  }
+  options.margins.threads = static_cast<std::size_t>(a.common.threads);
+  options.margins.progress = [&](std::string_view stage, double share) { progress.tell(stage, share); };
+  const MarginSurvey survey = survey_margins(log, model, options);
+  if (!a.common.out.empty() || a.common.json) {
+    publish(a.common, to_json(survey, a.model.string(), a.log.string(), software()), "margins.json",
+            a.common.out.empty() ? std::string()
+                                 : margins_report(survey, model, report_context(a.common, log.report(), log)));
+  }
+  if (!a.common.quiet && !a.common.json) {
+    for (const std::string& sentence : sentences(log.report())) {
+      fmt::print("log: {}\n", sentence);
+    }
+    for (const ResidualMargins& residual : survey.residuals) {
+      fmt::print("{}", table(survey, residual));
+    }
+    if (!survey.without_kinematic.empty()) {
+      fmt::print("no kinematic residual: {}\n", survey.without_kinematic);
+    }
+    if (!a.common.out.empty()) {
+      fmt::print("wrote {} and {}\n", (a.common.out / "margins.json").string(),
+                 (a.common.out / "report.html").string());
+    }
+  }
+  return kDone;
+}
+
+}  // namespace
+
+Run add_margins(CLI::App& program) {
+  auto a = std::make_shared<Arguments>();
+  CLI::App& command = *program.add_subcommand("margins", kHelp);
+  command.add_option("LOG", a->log, "CSV log (also .gz, .zst)")->required();
+  command.add_option("--model", a->model, "model.json of `wheelwright commission`")->required()->type_name("FILE");
+  command.add_option("--fault", a->faults, "Only this fault of the catalogue (may be repeated)")->type_name("NAME");
+  command
+      .add_option("--window", a->windows, "Time after the onset by which a fault is to be seen, s (may be repeated)")
+      ->type_name("S")
+      ->check(CLI::Range(1e-3, 3600.0));
+  command.add_option("--onset-step", a->survey.margins.onset_step, "Time between the onsets that are tried, s")
+      ->type_name("S")
+      ->check(CLI::Range(1e-3, 3600.0))
+      ->capture_default_str();
+  command
+      .add_option("--noise-share", a->survey.margins.noise_share,
+                  "Share of the noise bounds that noise uses, for the size below which a fault stays hidden")
+      ->type_name("Q")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  command.add_option("--set", a->survey.set, "Threshold from the feasible set itself (polytope) or from its box")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, ParameterSetKind>{
+          {"polytope", ParameterSetKind::polytope}, {"box", ParameterSetKind::box}}))
+      ->type_name("SET");
+  add_persistence(command, a->persistence, "the model's");
+  add_common(command, a->common);
+  add_map(command, a->common);
+  command.footer(kExamples);
+  return [a](const std::string& command_line) {
+    a->common.command_line = command_line;
+    return run(*a);
+  };
+}
+
+}  // namespace wheelwright::app

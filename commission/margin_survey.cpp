@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/commission/margin_survey.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+
+#include <wheelwright/core/check.hpp>
+#include <wheelwright/core/for_all.hpp>
+#include <wheelwright/detector/odometry_faults.hpp>
+
+namespace wheelwright {
+namespace {
+
+constexpr std::array kKinds = {ManoeuvreKind::standstill, ManoeuvreKind::cruising, ManoeuvreKind::accelerating,
+                               ManoeuvreKind::turning, ManoeuvreKind::spinning};
+
+std::vector<FaultType> chosen(const std::vector<FaultType>& catalogue, const std::vector<std::string>& names) {
+  if (names.empty()) {
+    return catalogue;
+  }
+  std::vector<FaultType> faults;
+  for (const std::string& name : names) {
+    const auto at =
+        std::find_if(catalogue.begin(), catalogue.end(), [&](const FaultType& fault) { return fault.name == name; });
+    std::string known;
+    for (const FaultType& fault : catalogue) {
+      known += (known.empty() ? "" : ", ") + fault.name;
+    }
+    check::that(at != catalogue.end(), "fault '" + name + "'", "one of " + known);
+    faults.push_back(*at);
+  }
+  return faults;
+}
+
+// Whether efforts, or motion, take part in a fault's signature.
+bool moves(const FaultType& f) { return f.motion.size() > 0 || f.slip.size() > 0 || f.lateral != 0.0; }
+
+std::vector<double> axis(double largest, std::size_t points) {
+  std::vector<double> values;
+  for (std::size_t k = 0; k < points; ++k) {
+    values.push_back(largest * (2.0 * static_cast<double>(k) / static_cast<double>(points - 1) - 1.0));
+  }
+  return values;
+}
+
+// Largest acceleration of each coordinate over tenths of a second: single differences would show the encoder.
+Eigen::VectorXd largest_accelerations(const ReferenceMotion& motion) {
+  const double step = median_step(motion.instant);
+  const auto gap = std::max<Eigen::Index>(1, static_cast<Eigen::Index>(std::lround(0.1 / step)));
+  Eigen::VectorXd largest = Eigen::VectorXd::Zero(motion.speed.rows());
+  for (Eigen::Index k = gap; k < motion.speed.cols(); ++k) {
+    const double h = motion.instant[static_cast<std::size_t>(k)] - motion.instant[static_cast<std::size_t>(k - gap)];
+    const bool together =
+        std::upper_bound(motion.segment_starts.begin(), motion.segment_starts.end(),
+                         static_cast<std::size_t>(k - gap)) ==
+        std::upper_bound(motion.segment_starts.begin(), motion.segment_starts.end(), static_cast<std::size_t>(k));
+    if (together) {
+      largest = largest.cwiseMax((motion.speed.col(k) - motion.speed.col(k - gap)).cwiseAbs() / h);
+    }
+  }
+  return largest;
+}
+
+std::vector<FaultMaps> maps_of(const std::vector<FaultMargins>& margins, const ReferenceMotion& motion,
+                               const CommissionedModel& model, const ThresholdRule& rule,
+                               const MarginSurveyOptions& options) {
+  std::vector<FaultMaps> maps(options.map_points > 1 ? margins.size() : 0);
+  const Eigen::VectorXd speed = motion.speed.cwiseAbs().rowwise().maxCoeff();
+  const Eigen::VectorXd acceleration = largest_accelerations(motion);
+  const Eigen::VectorXd typical = (motion.speed.array().square().rowwise().mean()).sqrt();
+  const bool plane = speed.size() > 1;
+  const auto values = [&](const Eigen::VectorXd& most, Eigen::Index c) {
+    return c > 0 && !plane ? std::vector<double>{0.0} : axis(std::max(most[c], 1e-6), options.map_points);
+  };
+  for_all(maps.size(), options.margins.threads, [&](std::size_t i) {
+    const FaultMargins& each = margins[i];
+    const auto map = [&](const OperatingPlane& on) {
+      return operating_map(each.fault, each.side, model.model, model.filter, model.errors, rule, on);
+    };
+    maps[i] = {each.fault.name, each.side, map({false, values(speed, 0), values(speed, 1)}),
+               map({true, values(acceleration, 0), values(acceleration, 1), typical})};
+  });
+  return maps;
+}
+
+}  // namespace
+
+MarginSurvey survey_margins(LogSource& log, const CommissionedModel& model, const MarginSurveyOptions& options) {
+  MarginSurvey survey;
+  MarginOptions margins = options.margins;
+  margins.persistence = options.persistence.value_or(model.persistence);
+  survey.windows = margins.windows;
+  survey.persistence = margins.persistence;
+  survey.noise_share = margins.noise_share;
+  const std::vector<FaultType> faults =
+      chosen(fault_catalogue(model.model, model.estimate, model.robot.effort), options.faults);
+
+  const ReferenceMotion motion =
+      read_reference(log, RegressorFilter(model.model, model.filter, model.measurement, model.errors));
+  check::that(std::find(motion.settled.begin(), motion.settled.end(), true) != motion.settled.end(), "log",
+              "a stretch that is long enough for the filter to settle");
+  for (std::size_t k = 1; k < motion.instants(); ++k) {
+    survey.seconds += std::binary_search(motion.segment_starts.begin(), motion.segment_starts.end(), k)
+                          ? 0.0
+                          : motion.t[k] - motion.t[k - 1];
+  }
+  ResidualMargins torque{.name = "torque", .outputs = model.model.outputs, .margins = {}, .blind = {}, .maps = {}};
+  const ThresholdRule rule(Polytope(model.facets, model.box), model.estimate, options.set);
+  torque.margins = margins_along(
+      motion, faults, rule,
+      [&](const FaultType& fault) { return std::make_unique<FaultFilter>(fault, model.model, model.filter, motion); },
+      margins);
+  torque.maps = maps_of(torque.margins, motion, model, rule, options);
+  for (const ManoeuvreKind kind : kKinds) {
+    const auto& onsets = torque.margins.front().onsets;
+    const auto count =
+        std::count_if(onsets.begin(), onsets.end(), [&](const OnsetMargin& onset) { return onset.kind == kind; });
+    if (count > 0) {
+      survey.manoeuvres.emplace_back(kind, static_cast<std::size_t>(count));
+    }
+  }
+  survey.residuals.push_back(std::move(torque));
+
+  if (!model.kinematic) {
+    survey.without_kinematic = "the model has no kinematic residual: its log had neither a pose nor a gyro";
+    return survey;
+  }
+  const KinematicModel& k = *model.kinematic;
+  for (const std::string& column : k.measurement.columns()) {
+    if (!log.find(column)) {
+      survey.without_kinematic = "the log has no column '" + column + "'";
+      return survey;
+    }
+  }
+  ResidualMargins kinematic{
+      .name = "kinematic", .outputs = k.measurement.outputs(), .margins = {}, .blind = {}, .maps = {}};
+  std::vector<FaultType> visible;
+  for (const FaultType& fault : faults) {
+    if (moves(fault) || fault.seen.size() > 0) {
+      visible.push_back(fault);
+    } else {
+      kinematic.blind.push_back(fault.name);
+    }
+  }
+  const OdometryReference seen = read_odometry(log, OdometryFilter(k.measurement, k.window, k.errors), model.model);
+  margins.persistence = options.persistence.value_or(k.persistence);
+  kinematic.margins = margins_along(
+      seen.motion, visible, ThresholdRule(Polytope(k.facets, k.box), k.estimate, options.set),
+      [&](const FaultType& fault) {
+        return std::make_unique<OdometryFaultRows>(fault, model.model, k.measurement, seen, k.box);
+      },
+      margins);
+  survey.residuals.push_back(std::move(kinematic));
+  return survey;
+}
+
+}  // namespace wheelwright

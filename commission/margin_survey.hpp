@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Detectability of a commissioned robot along a drive: both residuals, all faults.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <wheelwright/commission/commission.hpp>
+#include <wheelwright/core/log.hpp>
+#include <wheelwright/detector/margins.hpp>
+#include <wheelwright/detector/operating_map.hpp>
+
+namespace wheelwright {
+
+/// Options of survey_margins().
+struct MarginSurveyOptions {
+  MarginOptions margins;  ///< persistence is the model's where `persistence` below is not given
+  std::optional<Persistence> persistence{};
+  ParameterSetKind set = ParameterSetKind::polytope;
+  std::vector<std::string> faults{};  ///< names; empty: the whole catalogue
+  std::size_t map_points = 15;        ///< on each axis of the maps; 0: none
+};
+
+/// Maps of one fault on one side.
+struct FaultMaps {
+  std::string fault;
+  double side = 1.0;
+  OperatingMap speeds;         ///< at no acceleration
+  OperatingMap accelerations;  ///< at the drive's typical speeds (root mean square)
+};
+
+/// Margins in one residual.
+struct ResidualMargins {
+  std::string name;                   ///< "torque" or "kinematic"
+  std::vector<std::string> outputs;   ///< channels
+  std::vector<FaultMargins> margins;  ///< of the faults that this residual can see at all
+  std::vector<std::string> blind;     ///< faults that leave no trace in it, whatever their size
+  std::vector<FaultMaps> maps;        ///< torque only
+};
+
+/// Everything that `wheelwright margins` says.
+struct MarginSurvey {
+  std::vector<double> windows;  ///< s
+  Persistence persistence;
+  double noise_share = 0.0;
+  double seconds = 0.0;                                           ///< of driving
+  std::vector<std::pair<ManoeuvreKind, std::size_t>> manoeuvres;  ///< onsets of each kind in the drive
+  std::vector<ResidualMargins> residuals;                         ///< torque; kinematic where model and log have it
+  std::string without_kinematic;  ///< why there is no kinematic residual; empty where there is one
+};
+
+/// Walks `log`, a drive whose motion is taken as a reference, and asks of every fault of the catalogue what is certain to
+/// be seen. Throws InvalidArgument when the log lacks a column of the model's measurement, has no settled instant, or a
+/// name is none of the catalogue's.
+[[nodiscard]] MarginSurvey survey_margins(LogSource& log, const CommissionedModel& model,
+                                          const MarginSurveyOptions& options = {});
+
+}  // namespace wheelwright
