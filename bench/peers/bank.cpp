@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "peers/bank.hpp"
+
+#include <cmath>
+
+#include "peers/confidence_threshold.hpp"
+#include "peers/constant_threshold.hpp"
+#include "peers/cusum.hpp"
+#include "peers/innovations.hpp"
+#include "peers/tight_threshold.hpp"
+
+namespace wheelwright::peers {
+namespace {
+
+constexpr double kChiWindow = 0.5;  // s
+constexpr std::size_t kUnsettled = 50;
+
+// Rows of the calibration as the Kalman filter of one coordinate sees them.
+struct AxisLog {
+  std::vector<double> t, position, effort;
+};
+
+// Noise of largest likelihood on a grid of multiples of what the sensors have.
+AxisModel most_likely(const AxisModel& start, Hold hold, const std::vector<AxisLog>& logs) {
+  AxisModel best = start;
+  double least = std::numeric_limits<double>::infinity();
+  for (const double position : {0.5, 1.0, 2.0, 4.0, 10.0}) {
+    for (int half_decades = 0; half_decades <= 16; ++half_decades) {
+      AxisModel trial = start;
+      trial.position_variance *= position;
+      trial.effort_variance *= std::pow(10.0, 0.5 * half_decades);
+      Likelihood likelihood(trial, hold, kUnsettled);
+      for (const AxisLog& log : logs) {
+        likelihood.restart();
+        for (std::size_t k = 0; k < log.t.size(); ++k) {
+          likelihood.add(log.t[k], log.position[k], log.effort[k]);
+        }
+      }
+      if (likelihood.deviance() < least) {
+        least = likelihood.deviance();
+        best = trial;
+      }
+    }
+  }
+  return best;
+}
+
+}  // namespace
+
+const std::vector<Column>& columns() {
+  using enum Column::Limit;
+  static const std::vector<Column> all = {{"tight, polytope", 0, given, 0.5},
+                                          {"tight, box", 1, given, 0.5},
+                                          {"tight, ρ", 2, given, 0.5},
+                                          {"tight, statistical noise", 3, given, 0.5},
+                                          {"constant", kConstant, own_driving},
+                                          {"constant, all driving", kConstant, every_driving},
+                                          {"CUSUM 0.5", 5, own_driving},
+                                          {"CUSUM 2", 6, own_driving},
+                                          {"χ²", 7, own_driving},
+                                          {"χ², 0.5 s", 8, own_driving},
+                                          {"LS, tuned", 9, own_driving},
+                                          {"LS, z = 4", 9, given, 4.0}};
+  return all;
+}
+
+Bank::Bank(const Subject& subject, const std::vector<LogTable>& calibration)
+    : subject_(&subject),
+      filter_(subject.model.model, subject.model.filter, subject.model.measurement, subject.model.errors),
+      statistical_filter_(subject.model.model, subject.model.filter, subject.model.measurement,
+                          subject.statistical.errors) {
+  std::array<double, kOutputs> mean{}, square{}, sd{};
+  std::array<std::vector<AxisLog>, kOutputs> logs;
+  double count = 0.0;
+  for (const LogTable& table : calibration) {
+    TableSource log(table);
+    restart();
+    pick(log);
+    for (auto& each : logs) {
+      each.emplace_back();
+    }
+    LogBlock block;
+    while (log.next(block)) {
+      for (std::size_t k = 0; k < block.rows(); ++k) {
+        const bool valid = observe(block, k);
+        count += valid ? 1.0 : 0.0;
+        for (std::size_t i = 0; i < kOutputs; ++i) {
+          mean[i] += valid ? now_.residual[i] : 0.0;
+          square[i] += valid ? now_.residual[i] * now_.residual[i] : 0.0;
+          AxisLog& axis = logs[i].back();
+          axis.t.push_back(now_.t);
+          axis.position.push_back(now_.position[i]);
+          axis.effort.push_back(now_.effort[i]);
+        }
+      }
+    }
+  }
+  const CommissionedModel& m = subject.model;
+  std::array<AxisModel, kOutputs> axes;
+  for (std::size_t i = 0; i < kOutputs; ++i) {
+    mean[i] /= count;
+    sd[i] = std::sqrt(square[i] / count - mean[i] * mean[i]);
+    const auto row = static_cast<Eigen::Index>(i);
+    // θ_L = r·[m, I, f1, f3].
+    axes[i] = {m.estimate[row], m.estimate[row + 2],
+               m.model.input.row(row).squaredNorm() * subject.torque_sd * subject.torque_sd,
+               m.model.motion.row(row).squaredNorm() * subject.angle_sd * subject.angle_sd};
+    axes[i] = most_likely(axes[i], m.measurement.hold, logs[i]);
+  }
+  const auto window = static_cast<std::size_t>(std::lround(kChiWindow * subject.scenario.rate));
+  using Kind = TightThreshold::Kind;
+  statistics_.push_back(std::make_unique<TightThreshold>(subject.rule(), Kind::two_sided));
+  statistics_.push_back(std::make_unique<TightThreshold>(subject.rule(ParameterSetKind::box), Kind::two_sided));
+  statistics_.push_back(std::make_unique<TightThreshold>(subject.rule(), Kind::symmetric));
+  statistics_.push_back(std::make_unique<TightThreshold>(subject.statistical_rule(), Kind::statistical));
+  statistics_.push_back(std::make_unique<ConstantThreshold>());
+  statistics_.push_back(std::make_unique<Cusum>(mean, sd, 0.5));
+  statistics_.push_back(std::make_unique<Cusum>(mean, sd, 2.0));
+  statistics_.push_back(std::make_unique<Innovations>(axes, m.measurement.hold, 1));
+  statistics_.push_back(std::make_unique<Innovations>(axes, m.measurement.hold, window));
+  statistics_.push_back(std::make_unique<ConfidenceThreshold>(subject.covariance, subject.variance));
+  std::size_t total = 0;
+  for (const auto& statistic : statistics_) {
+    first_.push_back(total);
+    total += statistic->size();
+  }
+  first_.push_back(total);
+  values_.resize(total);
+}
+
+void Bank::restart() {
+  filter_.restart();
+  statistical_filter_.restart();
+  for (const auto& statistic : statistics_) {
+    statistic->restart();
+  }
+}
+
+void Bank::pick(const LogSource& log) {
+  pick_.clear();
+  for (const std::string& name : subject_->model.measurement.columns()) {
+    pick_.push_back(log.find(name).value());
+  }
+  sample_.resize(pick_.size());
+}
+
+bool Bank::observe(const LogBlock& block, std::size_t k) {
+  for (std::size_t c = 0; c < pick_.size(); ++c) {
+    sample_[c] = block.columns[pick_[c]][k];
+  }
+  const CommissionedModel& m = subject_->model;
+  now_.t = block.t[k];
+  now_.valid = filter_.step(now_.t, sample_);
+  statistical_filter_.step(now_.t, sample_);
+  now_.row = &filter_.row();
+  now_.statistical = &statistical_filter_.row();
+  for (std::size_t i = 0; i < kOutputs; ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    now_.position[i] = m.model.motion(row, 0) * sample_[0] + m.model.motion(row, 1) * sample_[1];
+    now_.effort[i] = m.model.input(row, 0) * sample_[2] + m.model.input(row, 1) * sample_[3];
+    if (now_.valid) {
+      now_.residual[i] = now_.row->y[row] - now_.row->Y.row(row).dot(m.estimate);
+    }
+  }
+  return now_.valid;
+}
+
+bool Bank::step(const LogBlock& block, std::size_t k) {
+  observe(block, k);
+  for (std::size_t s = 0; s < statistics_.size(); ++s) {
+    statistics_[s]->step(now_, std::span(values_).subspan(first_[s], statistics_[s]->size()));
+  }
+  return now_.valid;
+}
+
+}  // namespace wheelwright::peers

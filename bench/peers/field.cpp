@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "peers/field.hpp"
+
+#include <cmath>
+#include <numbers>
+#include <string>
+
+#include <wheelwright/detector/margins.hpp>
+#include <wheelwright/filter/regression_stream.hpp>
+#include <wheelwright/identify/least_squares.hpp>
+
+namespace wheelwright::peers {
+namespace {
+
+using testing_support::Random;
+
+constexpr double kUncertainty = 0.2;  // of θ, as in the paper
+constexpr double kFirstOnset = 3.0;   // s
+constexpr double kLastOnset = 1.5;    // s before the end of a drive
+
+Trajectory trajectory(Driving driving, Random& random) {
+  const auto between = [&](double low, double high) { return low + (high - low) * random.unit(); };
+  Trajectory r;
+  r.kind = random.unit() < 0.5 ? Trajectory::Kind::figure_eight : Trajectory::Kind::multi_sine;
+  switch (driving) {
+    case Driving::gentle:
+      r.speed = between(0.25, 0.35);
+      r.yaw_rate = between(0.3, 0.5);
+      r.period = between(18.0, 26.0);
+      break;
+    case Driving::varied:
+      r.speed = between(0.6, 0.9);
+      r.yaw_rate = between(1.0, 1.4);
+      r.period = between(8.0, 12.0);
+      break;
+    case Driving::hard:
+      r.kind = Trajectory::Kind::multi_sine;
+      r.speed = between(0.8, 1.0);
+      r.yaw_rate = between(1.6, 2.2);
+      r.period = between(3.5, 5.0);
+      break;
+  }
+  return r;
+}
+
+// Variance of what a least-squares fit leaves of each output of `log`.
+std::array<double, kOutputs> residual_variance(LogSource& log, const CommissionedModel& m) {
+  RegressionStream stream(log, RegressorFilter(m.model, m.filter, m.measurement, m.errors));
+  const RegressionBlock rows = read_all(stream);
+  LeastSquares squares(m.model.p());
+  squares.add(rows);
+  const Eigen::VectorXd e = rows.y - rows.Y * squares.solve().estimate;
+  std::array<double, kOutputs> variance{};
+  for (Eigen::Index k = 0; k < e.size(); ++k) {
+    variance[static_cast<std::size_t>(k) % kOutputs] += e[k] * e[k] / static_cast<double>(rows.instants());
+  }
+  return variance;
+}
+
+}  // namespace
+
+std::string_view to_string(Driving driving) {
+  constexpr std::array<std::string_view, 3> names = {"gentle", "varied", "hard"};
+  return names.at(static_cast<std::size_t>(driving));
+}
+
+Subject make_subject(std::uint64_t seed, Regime regime) {
+  Subject s;
+  s.regime = regime;
+  s.scenario = testing_support::random_robot(seed);
+  s.scenario.sensors.encoder_counts_per_turn = s.scenario.robot.encoder_counts_per_turn;
+  s.scenario.sensors.effort = *s.scenario.robot.noise.effort.value;
+  const bool uniform = s.scenario.sensors.noise == NoiseShape::uniform;
+  s.torque_sd = s.scenario.sensors.effort / (uniform ? std::numbers::sqrt3 : 3.0);
+  s.angle_sd = 2.0 * std::numbers::pi / *s.scenario.sensors.encoder_counts_per_turn / std::sqrt(12.0);
+
+  Scenario learning = s.scenario;
+  learning.seed = seed + 1'000'000;
+  learning.duration = 60.0;
+  learning.trajectory = {.kind = Trajectory::Kind::commissioning, .speed = 1.0, .yaw_rate = 2.0, .period = 6.0};
+  Simulation log(learning);
+  const Commissioning result = commission(log, learning.robot);
+  if (result.status != Commissioning::Status::done) {
+    throw InvalidArgument("robot " + std::to_string(seed) + ": " + result.message);
+  }
+  s.model = result.model;
+  CommissionOptions options;
+  options.noise_mode = NoiseMode::statistical;
+  const Commissioning statistical = commission(log, learning.robot, options);
+  if (statistical.status != Commissioning::Status::done) {
+    throw InvalidArgument("robot " + std::to_string(seed) + ", statistical bounds: " + statistical.message);
+  }
+  s.statistical = statistical.model;
+  // As confident over all samples of the study as the set is over those of its log.
+  s.statistical.errors = propagate(
+      s.model.model, s.model.filter, s.model.measurement,
+      {.motion = std::numbers::pi / *s.scenario.sensors.encoder_counts_per_turn, .effort = s.scenario.sensors.effort},
+      {.mode = NoiseMode::statistical,
+       .confidence = options.confidence,
+       .rows = 1e7,
+       .largest_step = 1.0 / s.scenario.rate});
+  s.variance = residual_variance(log, s.model);
+  s.covariance = result.estimators.best().covariance;
+  if (regime == Regime::identified) {
+    return s;
+  }
+  Random random(seed + 2'000'000);
+  const Eigen::VectorXd nominal = true_parameters(s.scenario, s.model.model);
+  s.model.facets.clear();
+  s.model.box.sides.clear();
+  s.covariance = Eigen::MatrixXd::Zero(nominal.size(), nominal.size());
+  for (Eigen::Index j = 0; j < nominal.size(); ++j) {
+    s.model.box.sides.push_back({(1.0 - kUncertainty) * nominal[j], (1.0 + kUncertainty) * nominal[j]});
+    s.model.estimate[j] = nominal[j] * (1.0 + kUncertainty * random.symmetric());
+    s.covariance(j, j) = std::pow(kUncertainty * nominal[j], 2) / 3.0;
+  }
+  s.statistical.facets.clear();
+  s.statistical.box = s.model.box;
+  return s;
+}
+
+Scenario make_drive(const Subject& subject, Driving driving, std::uint64_t seed, double duration) {
+  Random random(seed);
+  Scenario s = subject.scenario;
+  s.seed = seed;
+  s.trajectory = trajectory(driving, random);
+  s.duration = duration;
+  s.sensors.speeds = s.sensors.pose = s.sensors.commands = false;
+  if (subject.regime == Regime::uncertain) {
+    const auto change = [&](double& value) { value *= 1.0 + kUncertainty * random.symmetric(); };
+    change(s.parameters.mass);
+    change(s.parameters.yaw_inertia);
+    change(s.parameters.viscous_x);
+    s.parameters.viscous_y = s.parameters.viscous_x;
+    change(s.parameters.viscous_yaw);
+  }
+  return s;
+}
+
+std::vector<TriedFault> tried_faults(const Subject& subject, Driving driving, std::uint64_t seed) {
+  const CommissionedModel& m = subject.model;
+  const std::vector<FaultType> catalogue = fault_catalogue(m.model, m.estimate);
+  std::vector<TriedFault> tried;
+  std::vector<FaultType> types;
+  for (const char* name : {"wheel_radius", "wheel_radius_right", "matched", "unmatched", "slip_yaw",
+                           "effort_loss_right", "effort_bias_left", "encoder_scale_right"}) {
+    for (const FaultType& type : catalogue) {
+      if (type.name == name) {
+        types.push_back(type);
+      }
+    }
+    for (const auto& breakage : testing_support::breakages()) {
+      if (breakage.fault == name) {
+        tried.push_back({types.back(), breakage.simulated, {}});
+      }
+    }
+  }
+  std::vector<FaultMargins> pooled;
+  for (std::uint64_t k = 0; k < 3; ++k) {
+    Scenario drive = make_drive(subject, driving, seed + k, 30.0);
+    drive.parameters = subject.scenario.parameters;
+    drive.sensors.encoder_counts_per_turn.reset();
+    drive.sensors.effort = 0.0;
+    Simulation log(drive);
+    ReferenceMotion motion = read_reference(log, RegressorFilter(m.model, m.filter, m.measurement, m.errors));
+    for (std::size_t i = 0; i < motion.instants(); ++i) {
+      motion.settled[i] = motion.settled[i] && motion.t[i] >= kFirstOnset && motion.t[i] <= drive.duration - kLastOnset;
+    }
+    std::vector<FaultMargins> each = margins_along(
+        motion, types, subject.rule(),
+        [&](const FaultType& fault) { return std::make_unique<FaultFilter>(fault, m.model, m.filter, motion); },
+        {.windows = {1.0}, .onset_step = 1.0});
+    if (k == 0) {
+      pooled = std::move(each);
+      continue;
+    }
+    for (std::size_t i = 0; i < pooled.size(); ++i) {
+      pooled[i].onsets.insert(pooled[i].onsets.end(), each[i].onsets.begin(), each[i].onsets.end());
+    }
+  }
+  for (TriedFault& fault : tried) {
+    for (const FaultMargins& margins : pooled) {
+      if (margins.fault.name == fault.type.name) {
+        fault.certain[margins.side > 0.0 ? 0 : 1] = summarise(margins, 0).median;
+      }
+    }
+  }
+  return tried;
+}
+
+}  // namespace wheelwright::peers
