@@ -1,18 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
 #
-# wheelwright_room(NAME HEADERS h... [SOURCES s...] [USES room...] [LINK lib...] [LINK_PRIVATE lib...])
+# wheelwright_room(NAME [FOLDER room] HEADERS h... [SOURCES s...] [USES room...] [LINK lib...] [LINK_PRIVATE lib...])
 #
 # One target per room: wheelwright_NAME, alias Wheelwright::NAME. Headers are seen as <wheelwright/NAME/x.hpp>
-# through one symbolic link per room in the build tree, which is also the base of the installed FILE_SET.
+# through one symbolic link per room in the build tree, which is also the base of the installed FILE_SET. FOLDER is for a
+# part of a room that has a target of its own, since it links what the rest should not: its headers are the room's.
 
 set(WHEELWRIGHT_INCLUDE_TREE ${CMAKE_BINARY_DIR}/include)
 set(WHEELWRIGHT_WARNINGS -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual -Werror)
 
 function(wheelwright_room name)
-  cmake_parse_arguments(ROOM "" "" "HEADERS;SOURCES;USES;LINK;LINK_PRIVATE" ${ARGN})
+  cmake_parse_arguments(ROOM "" "FOLDER" "HEADERS;SOURCES;USES;LINK;LINK_PRIVATE" ${ARGN})
+  if(NOT ROOM_FOLDER)
+    set(ROOM_FOLDER ${name})
+  endif()
   file(MAKE_DIRECTORY ${WHEELWRIGHT_INCLUDE_TREE}/wheelwright)
-  file(CREATE_LINK ${CMAKE_CURRENT_SOURCE_DIR} ${WHEELWRIGHT_INCLUDE_TREE}/wheelwright/${name} SYMBOLIC)
-  list(TRANSFORM ROOM_HEADERS PREPEND ${WHEELWRIGHT_INCLUDE_TREE}/wheelwright/${name}/)
+  file(CREATE_LINK ${CMAKE_CURRENT_SOURCE_DIR} ${WHEELWRIGHT_INCLUDE_TREE}/wheelwright/${ROOM_FOLDER} SYMBOLIC)
+  list(TRANSFORM ROOM_HEADERS PREPEND ${WHEELWRIGHT_INCLUDE_TREE}/wheelwright/${ROOM_FOLDER}/)
   list(TRANSFORM ROOM_USES PREPEND Wheelwright::)
 
   set(target wheelwright_${name})

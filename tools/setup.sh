@@ -10,10 +10,10 @@ cd "$(dirname "$0")/.."
 
 packages="g++ cmake ninja-build pkg-config python3
   libeigen3-dev libfmt-dev libyaml-cpp-dev nlohmann-json3-dev zlib1g-dev libzstd-dev libboost-dev
-  libceres-dev libnlopt-cxx-dev libnlopt-dev
+  libceres-dev libnlopt-cxx-dev libnlopt-dev coinor-libclp-dev
   libcli11-dev
   libgtest-dev libgmock-dev librapidcheck-dev libbenchmark-dev python3-jsonschema
-  coinor-libclp-dev libglpk-dev liblapack-dev libqsopt-ex-dev"
+  libglpk-dev liblapack-dev libqsopt-ex-dev"
 case "${1:-}" in
   '') ;;
   --ci) packages="$packages clang clang-format clang-tidy" ;;
