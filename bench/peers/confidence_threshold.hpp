@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "peers/statistic.hpp"
+#include "statistic.hpp"
 
 namespace wheelwright::peers {
 

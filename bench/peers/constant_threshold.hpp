@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "peers/statistic.hpp"
+#include "statistic.hpp"
 
 namespace wheelwright::peers {
 

@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "peers/statistic.hpp"
+#include "statistic.hpp"
 
 namespace wheelwright::peers {
 

@@ -11,7 +11,7 @@
 
 #include <wheelwright/model/robot.hpp>
 
-#include "peers/statistic.hpp"
+#include "statistic.hpp"
 
 namespace wheelwright::peers {
 

@@ -8,7 +8,7 @@
 
 #include <wheelwright/detector/threshold.hpp>
 
-#include "peers/statistic.hpp"
+#include "statistic.hpp"
 
 namespace wheelwright::peers {
 
