@@ -348,13 +348,14 @@ void print(const Study& study) {
 
 void acceptance(const Study& study) {
   const Cell& cell = study.cells[1].at("wheel_radius");
+  const auto precise = [](double x) { return x == kNever ? delay(x) : fmt::format("{:.4f} s", x); };
   const double tight = median(cell.delays[kDouble][0]);
   fmt::print(
       "\nRadius of both wheels, varied driving, twice the certain size, {} runs: median delay {} of the tight "
       "threshold",
-      cell.delays[kDouble][0].size(), delay(tight));
+      cell.delays[kDouble][0].size(), precise(tight));
   const auto against = [&](const char* what, double peer) {
-    fmt::print("; {} of {}: ratio {}", delay(peer), what, peer == kNever ? "0" : fmt::format("{:.2f}", tight / peer));
+    fmt::print("; {} of {}: ratio {}", precise(peer), what, peer == kNever ? "0" : fmt::format("{:.2f}", tight / peer));
   };
   against("the best constant threshold in hindsight", median(cell.delays[kDouble][kConstant]));
   against("the best for all driving", median(cell.delays[kDouble][kConstant + 1]));
