@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <iostream>
 #include <map>
 #include <memory>
@@ -76,14 +77,18 @@ int run(const Arguments& a) {
   require_columns(log, model.measurement.columns());
   const Detection detection = detect(log, std::move(detector));
   const KinematicWatch kinematic = watch_kinematics(log, model, a.detector);
+  EventIsolationOptions isolation;
+  isolation.isolation.threads = static_cast<std::size_t>(std::max(a.common.threads, 1));
+  const std::vector<Isolation> isolations = isolate_events(log, model, detection, isolation);
   const bool fault = !detection.events.empty() || (kinematic.detection && !kinematic.detection->events.empty());
   if (!a.common.out.empty() || a.common.json) {
     Json json = to_json(detection, model, a.model.string(), a.log.string());
+    add_isolation(json, isolations);
     add_kinematic(json, kinematic, model);
     std::string page;
     if (!a.common.out.empty()) {
       page = detect_report(detection, model, report_context(a.common, log.report(), log),
-                           {.detection = kinematic.detection, .message = kinematic.message});
+                           {.detection = kinematic.detection, .message = kinematic.message}, isolations);
     }
     publish(a.common, json, "detection.json", page);
   }
@@ -91,7 +96,7 @@ int run(const Arguments& a) {
     for (const std::string& sentence : sentences(log.report())) {
       fmt::print("log: {}\n", sentence);
     }
-    fmt::print("{}{}", summary(detection, model), summary(kinematic, model));
+    fmt::print("{}{}{}", summary(detection, model), summary(isolations, detection), summary(kinematic, model));
     if (!a.common.out.empty()) {
       fmt::print("wrote {} and {}\n", (a.common.out / "detection.json").string(),
                  (a.common.out / "report.html").string());

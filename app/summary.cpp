@@ -187,6 +187,39 @@ Json to_json(const Detection& d, const CommissionedModel& model, const std::stri
   return json;
 }
 
+std::string summary(const std::vector<Isolation>& isolations, const Detection& detection) {
+  std::string text;
+  for (std::size_t k = 0; k < isolations.size(); ++k) {
+    text += fmt::format("alarm at {:.3f} s: {}\n", detection.events[k].alarm, sentence(isolations[k]));
+  }
+  return text;
+}
+
+void add_isolation(Json& json, const std::vector<Isolation>& isolations) {
+  using Verdict = FaultFinding::Verdict;
+  for (std::size_t k = 0; k < isolations.size(); ++k) {
+    Json &event = json["events"][k], consistent = Json::array(), excluded = Json::array(), open = Json::array();
+    for (const FaultFinding& f : isolations[k].findings) {
+      if (f.verdict == Verdict::excluded) {
+        excluded.push_back(f.fault.name);
+      } else if (f.verdict == Verdict::not_examined) {
+        open.push_back(f.fault.name);
+      } else {
+        Json entry = {{"fault", f.fault.name}, {"magnitude", nullptr}, {"onset", {f.onset.lower, f.onset.upper}},
+                      {"unit", f.fault.unit},  {"earlier", f.earlier}, {"complete", f.complete}};
+        if (f.magnitude) {
+          entry["magnitude"] = {f.magnitude->lower, f.magnitude->upper};
+        }
+        consistent.push_back(std::move(entry));
+      }
+    }
+    event["isolation"] = std::move(consistent);
+    event["excluded"] = std::move(excluded);
+    event["not_examined"] = std::move(open);
+    event["explanation"] = sentence(isolations[k]);
+  }
+}
+
 CommissionedModel with_kinematic_outputs(const CommissionedModel& model) {
   CommissionedModel view = model;
   view.robot.effort = EffortKind::torque;  // units are those of the pose

@@ -7,6 +7,7 @@
 #include <string>
 
 #include <wheelwright/commission/commission.hpp>
+#include <wheelwright/commission/event_isolation.hpp>
 #include <wheelwright/commission/trace.hpp>
 #include <wheelwright/io/json_file.hpp>
 
@@ -32,6 +33,12 @@ struct KinematicWatch {
 
 /// Adds outputs and events of the kinematic residual to a detection as JSON; events stay in the order of their alarms.
 void add_kinematic(Json& detection, const KinematicWatch& watch, const CommissionedModel& model);
+
+/// What the first events are isolated to, for a terminal.
+[[nodiscard]] std::string summary(const std::vector<Isolation>& isolations, const Detection& detection);
+
+/// Adds what its first events are isolated to to a detection as JSON, before add_kinematic().
+void add_isolation(Json& detection, const std::vector<Isolation>& isolations);
 
 /// One event in a line.
 [[nodiscard]] std::string event_line(const Event& event, const CommissionedModel& model);

@@ -136,10 +136,24 @@ std::string kinematic_section(const KinematicFindings& kinematic, const Commissi
          (d.trace.t.empty() ? std::string() : residual_charts(d.trace, names.robot, names.model, marks, axis));
 }
 
+std::string isolation_section(const std::vector<Isolation>& isolations, const Detection& detection,
+                              const TimeAxis& axis) {
+  std::string out = paragraph(
+      "Which faults of the catalogue the data around each alarm leave possible. What is excluded is proved to explain "
+      "them with no size, no onset, no parameters of the feasible set and no admissible noise; the true size and onset "
+      "of "
+      "a fault of the catalogue lie in the intervals.");
+  for (std::size_t k = 0; k < isolations.size() && k < detection.events.size(); ++k) {
+    const std::string alarm = axis.text(detection.events[k].alarm);
+    out += paragraph(fmt::format("<b>Event {}</b>, alarm at {}: {}", k + 1, alarm, escape(sentence(isolations[k]))));
+  }
+  return out;
+}
+
 }  // namespace
 
 std::string detect_report(const Detection& detection, const CommissionedModel& model, const ReportContext& context,
-                          const KinematicFindings& kinematic) {
+                          const KinematicFindings& kinematic, const std::vector<Isolation>& isolations) {
   const TimeAxis axis = axis_for(detection, context);
   std::vector<std::vector<ChartMark>> marks(detection.trace.outputs.size());
   std::vector<ChartMark> all_marks;
@@ -167,6 +181,9 @@ std::string detect_report(const Detection& detection, const CommissionedModel& m
   }
   content.software = context.software;
   content.sections.push_back({"events", "Events", event_table(detection, model, axis)});
+  if (!isolations.empty()) {
+    content.sections.push_back({"isolation", "What it can be", isolation_section(isolations, detection, axis)});
+  }
   if (!detection.trace.t.empty()) {
     content.sections.push_back(
         {"residual", "Residual and threshold",

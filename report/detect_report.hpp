@@ -5,8 +5,10 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <wheelwright/commission/commission.hpp>
+#include <wheelwright/commission/event_isolation.hpp>
 #include <wheelwright/commission/trace.hpp>
 #include <wheelwright/report/context.hpp>
 
@@ -20,9 +22,10 @@ struct KinematicFindings {
 
 /// One self-contained HTML page: what the detector says in words, its events (a click zooms all charts to one), the residual
 /// inside [l, u] with the events shaded, prediction, raw signals, data, and the same of
-/// the kinematic residual. It loads nothing when opened; every name is escaped,
+/// the kinematic residual. `isolations` belong to the first events, in their order. It loads nothing when opened; every name is escaped,
 /// every number is finite. `context.own_log` is not used.
 [[nodiscard]] std::string detect_report(const Detection& detection, const CommissionedModel& model,
-                                        const ReportContext& context, const KinematicFindings& kinematic = {});
+                                        const ReportContext& context, const KinematicFindings& kinematic = {},
+                                        const std::vector<Isolation>& isolations = {});
 
 }  // namespace wheelwright
