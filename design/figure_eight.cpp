@@ -53,6 +53,11 @@ Plan plan_of(const FigureEight& eight, const DesignSubject& subject, double dura
 }
 
 FigureEight best_figure_eight(const DesignSubject& subject, const MotionLimits& limits, const RowObjective& objective) {
+  return best_figure_eight(subject, limits, of_rows(objective, subject));
+}
+
+FigureEight best_figure_eight(const DesignSubject& subject, const MotionLimits& limits,
+                              const PlanObjective& objective) {
   validate(limits);
   const auto within = [&](const FigureEight& eight) {
     return limit_use(plan_of(eight, subject, limits.duration, kStep), subject, limits).largest() <= 1.0;
@@ -71,7 +76,7 @@ FigureEight best_figure_eight(const DesignSubject& subject, const MotionLimits& 
     }
     for (const double share : {1.0, 0.85, 0.7, 0.5, 0.3}) {
       const FigureEight eight{share * low, period};
-      const double value = objective(planned_rows(plan_of(eight, subject, limits.duration, kStep), subject));
+      const double value = objective(plan_of(eight, subject, limits.duration, kStep));
       if (value < least) {
         least = value;
         best = eight;

@@ -23,6 +23,9 @@ struct FigureEight {
 /// duration in steps of an eighth, speeds of 0.3 to 1 times the largest that is possible with that period.
 /// Throws InvalidArgument where none is within the limits.
 [[nodiscard]] FigureEight best_figure_eight(const DesignSubject& subject, const MotionLimits& limits,
+                                            const PlanObjective& objective);
+/// The same for an objective of the planned rows.
+[[nodiscard]] FigureEight best_figure_eight(const DesignSubject& subject, const MotionLimits& limits,
                                             const RowObjective& objective);
 
 }  // namespace wheelwright

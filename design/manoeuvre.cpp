@@ -29,9 +29,14 @@ std::vector<double> by_turns(std::size_t stages, std::size_t joints) {
 
 Manoeuvre design_manoeuvre(const DesignSubject& subject, const MotionLimits& limits, const RowObjective& objective,
                            const DesignOptions& options) {
+  return design_manoeuvre(subject, limits, of_rows(objective, subject), options);
+}
+
+Manoeuvre design_manoeuvre(const DesignSubject& subject, const MotionLimits& limits, const PlanObjective& objective,
+                           const DesignOptions& options) {
   const StageFamily family(subject, limits, options.stages);
   const auto value_with = [&](double step) {
-    return [&, step](std::span<const double> x) { return objective(planned_rows(family.plan(x, step), subject)); };
+    return [&, step](std::span<const double> x) { return objective(family.plan(x, step)); };
   };
   const auto tell = [&options](const char* stage, double from, double length) {
     return [&options, stage, from, length](double share) {

@@ -41,6 +41,9 @@ struct Manoeuvre {
 /// StageFamily, then a last local search at the log's own sampling. Deterministic for a seed; a global minimum is not
 /// promised. Throws InvalidArgument as StageFamily does.
 [[nodiscard]] Manoeuvre design_manoeuvre(const DesignSubject& subject, const MotionLimits& limits,
+                                         const PlanObjective& objective, const DesignOptions& options = {});
+/// The same for an objective of the planned rows.
+[[nodiscard]] Manoeuvre design_manoeuvre(const DesignSubject& subject, const MotionLimits& limits,
                                          const RowObjective& objective, const DesignOptions& options = {});
 
 /// A manoeuvre for narrow bounds, and what it promises.

@@ -32,6 +32,11 @@ double combined(const Eigen::VectorXd& widths, WidthCriterion criterion) {
   return widths.maxCoeff();
 }
 
+PlanObjective of_rows(RowObjective objective, const DesignSubject& subject) {
+  return
+      [objective = std::move(objective), &subject](const Plan& plan) { return objective(planned_rows(plan, subject)); };
+}
+
 RowObjective narrow_bounds(const DesignSubject& subject, WidthCriterion criterion) {
   return [&subject, criterion](const RegressionBlock& rows) {
     return combined(relative_widths(promised_bounds(rows, subject), subject), criterion);

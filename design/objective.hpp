@@ -24,6 +24,7 @@
 
 #include <wheelwright/bounds/box.hpp>
 #include <wheelwright/core/regression.hpp>
+#include <wheelwright/design/plan.hpp>
 #include <wheelwright/design/subject.hpp>
 
 namespace wheelwright {
@@ -31,6 +32,12 @@ namespace wheelwright {
 /// A number to be minimised, of the planned rows (planned_rows()). It must be a pure function: searches call it from
 /// several threads. Other aims (certain detection of a fault, telling two effects apart) are other functions of the rows.
 using RowObjective = std::function<double(const RegressionBlock&)>;
+
+/// The same of the plan itself, for aims that need more than its rows.
+using PlanObjective = std::function<double(const Plan&)>;
+
+/// An objective of the planned rows as one of the plan. Keeps a reference to `subject`.
+[[nodiscard]] PlanObjective of_rows(RowObjective objective, const DesignSubject& subject);
 
 /// How widths of several parameters become one number. Relative width: (upper − lower)/|θ°|.
 enum class WidthCriterion {

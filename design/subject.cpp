@@ -78,6 +78,18 @@ LogTable planned_log(const Plan& plan, const DesignSubject& subject) {
   return log;
 }
 
+// The filter of a planned log, with the errors that its sensors will make.
+RegressorFilter planned_filter(LogSource& log, const DesignSubject& subject) {
+  SignalErrors errors;
+  if (subject.errors) {
+    errors = *subject.errors;
+  } else {
+    const Survey seen = survey(log, subject.measurement);
+    errors = worst_case_errors(subject, noise_budget(subject.robot, subject.measurement, seen));
+  }
+  return RegressorFilter(subject.model, subject.filter, subject.measurement, errors);
+}
+
 }  // namespace
 
 DesignSubject subject_of(const CommissionedModel& model) {
@@ -158,17 +170,16 @@ DesignSubject subject_of(const Robot& robot, double step, const FilterDesign& fi
 RegressionBlock planned_rows(const Plan& plan, const DesignSubject& subject) {
   const LogTable log = planned_log(plan, subject);
   TableSource source(log);
-  SignalErrors errors;
-  if (subject.errors) {
-    errors = *subject.errors;
-  } else {
-    const Survey seen = survey(source, subject.measurement);
-    errors = worst_case_errors(subject, noise_budget(subject.robot, subject.measurement, seen));
-  }
-  RegressionStream stream(source, RegressorFilter(subject.model, subject.filter, subject.measurement, errors));
+  RegressionStream stream(source, planned_filter(source, subject));
   RegressionBlock rows = read_all(stream);
   rows.y = rows.Y * subject.theta;
   return rows;
+}
+
+ReferenceMotion planned_motion(const Plan& plan, const DesignSubject& subject) {
+  const LogTable log = planned_log(plan, subject);
+  TableSource source(log);
+  return read_reference(source, planned_filter(source, subject));
 }
 
 }  // namespace wheelwright

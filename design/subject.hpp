@@ -10,6 +10,7 @@
 #include <wheelwright/bounds/box.hpp>
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/core/regression.hpp>
+#include <wheelwright/detector/reference_motion.hpp>
 #include <wheelwright/model/robot.hpp>
 
 namespace wheelwright {
@@ -49,5 +50,8 @@ struct DesignSubject {
 /// The rows that commissioning would make of a log driven exactly along `plan`, without noise: Y_f of the planned
 /// motion, y = Y_f θ°, and the error bounds dY, dy that the sensors' noise gives.
 [[nodiscard]] RegressionBlock planned_rows(const Plan& plan, const DesignSubject& subject);
+
+/// The same drive as a reference motion for faults, with the error bounds of its rows.
+[[nodiscard]] ReferenceMotion planned_motion(const Plan& plan, const DesignSubject& subject);
 
 }  // namespace wheelwright

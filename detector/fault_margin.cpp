@@ -62,6 +62,13 @@ bool FaultMargin::certain(const FaultRow& row, double kappa, double side, std::s
          certain_excess(row, kappa, side, channel, Direction::down) > 0.0;
 }
 
+double FaultMargin::missing(const FaultRow& row, double kappa, double side, std::size_t channel) {
+  const double excess = std::max(certain_excess(row, kappa, side, channel, Direction::up),
+                                 certain_excess(row, kappa, side, channel, Direction::down));
+  const double width = rule_.at(seen_, error_, row.dy, 2 * channel + 1).width();
+  return excess >= 0.0 ? 0.0 : -excess / std::max(width, std::numeric_limits<double>::min());
+}
+
 bool FaultMargin::possible(const FaultRow& row, double kappa, double side, double share, std::size_t channel) {
   return possible_excess(row, kappa, side, share, channel, Direction::up) > 0.0 ||
          possible_excess(row, kappa, side, share, channel, Direction::down) > 0.0;

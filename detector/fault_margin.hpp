@@ -36,6 +36,9 @@ class FaultMargin {
   /// is on the safe side: true is a proof.
   [[nodiscard]] bool certain(const FaultRow& row, double kappa, double side, std::size_t channel = 0);
 
+  /// By how much a fault of that size misses being certain, as a share of the threshold's width: 0 where it is certain.
+  [[nodiscard]] double missing(const FaultRow& row, double kappa, double side, std::size_t channel = 0);
+
   /// κ° of the header's text: the fault is certain for all sizes in [κ°, largest]; nothing where `largest` is not
   /// certain. Of the size found, certain() is true; relative error 1e-9, upwards.
   [[nodiscard]] std::optional<double> smallest_certain(const FaultRow& row, double largest, double side,

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Inspection: a drive after which a robot has either been seen to be broken or is not broken by more than was promised.
+///
+/// The fault is there from the first instant on (the robot broke before the inspection), the motion is planned, so the
+/// smallest size that is certainly seen at some instant follows exactly for every fault (fault_margin.hpp), whatever θ in
+/// the feasible set and whatever the noise. The plan is chosen to make the largest of these sizes small, each relative to
+/// a size that is asked for.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include <wheelwright/commission/commission.hpp>
+#include <wheelwright/design/manoeuvre.hpp>
+#include <wheelwright/detector/fault_type.hpp>
+
+namespace wheelwright {
+
+/// A fault that an inspection is to find, with the size that would be good.
+struct InspectedFault {
+  FaultType fault;
+  double asked = 0.05;  ///< magnitude, > 0; both sides where the fault's range has two
+};
+
+/// What a plan is certain to find.
+struct PromisedFault {
+  FaultType fault;
+  double side = 1.0;
+  double asked = 0.0;
+  double smallest = 0.0;   ///< every size from here up to the range's end is seen for certain; infinite where none is
+  double t = 0.0;          ///< time from the plan's start at which it is, s
+  std::size_t output = 0;  ///< and the channel
+};
+
+/// Promises of `plan`, fault by fault, side by side. Throws InvalidArgument where `faults` is empty.
+[[nodiscard]] std::vector<PromisedFault> promised_faults(const Plan& plan, const DesignSubject& subject,
+                                                         const ThresholdRule& rule,
+                                                         const std::vector<InspectedFault>& faults);
+
+/// The largest of smallest/asked; where a fault is never certain, a number above every such ratio that falls as the fault
+/// comes nearer to being certain at its largest size, so that a search has a slope to follow.
+[[nodiscard]] PlanObjective certain_detection(const DesignSubject& subject, const ThresholdRule& rule,
+                                              const std::vector<InspectedFault>& faults);
+
+/// A manoeuvre for certain detection, and what it promises.
+struct DetectionDesign {
+  Manoeuvre manoeuvre;
+  std::vector<PromisedFault> promised;
+  std::optional<FigureEight> figure_eight;  ///< the best one within the same limits (differential drive)
+  std::optional<Plan> figure_eight_plan;
+  std::vector<PromisedFault> promised_eight;
+};
+
+/// design_manoeuvre() for certain detection of `faults` with the detector of `model`, and the best figure eight beside it.
+[[nodiscard]] DetectionDesign design_for_detection(const CommissionedModel& model, const DesignSubject& subject,
+                                                   const MotionLimits& limits,
+                                                   const std::vector<InspectedFault>& faults,
+                                                   const DesignOptions& options = {});
+
+/// What is inspected where nothing is asked for: wheel radii by 5 %, efforts lost by 20 %, encoders' scale by 5 %; for
+/// other models what there is of these.
+[[nodiscard]] std::vector<InspectedFault> usual_inspection(const CommissionedModel& model);
+
+}  // namespace wheelwright

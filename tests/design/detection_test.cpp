@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+// An inspection drive: better than the figure eight, and its promise is kept when a broken robot drives it.
+#include <cmath>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include <wheelwright/design/detection.hpp>
+#include <wheelwright/sim/simulation.hpp>
+
+#include "design/robots.hpp"
+#include "support/drives.hpp"
+
+namespace wheelwright {
+namespace {
+
+using testing_support::noisy_drive;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+struct Prepared {
+  Scenario scenario;
+  CommissionedModel model;
+};
+
+Prepared prepared() {
+  Scenario s = noisy_drive(4, 20.0);
+  s.robot.limits = {{"speed", 8.0}, {"acceleration", 20.0}, {"effort", 6.0}};
+  Simulation log(s);
+  return {s, commission(log, s.robot).model};
+}
+
+MotionLimits limits(const Robot& robot) {
+  MotionLimits limits = limits_of(robot);
+  limits.duration = 6.0;
+  limits.radius = 1.0;
+  return limits;
+}
+
+// The robot drives `plan`, broken from the beginning on; time of the first alarm.
+double first_alarm(const Prepared& p, const Plan& plan, const PromisedFault& fault, double size) {
+  Scenario s = p.scenario;
+  s.trajectory = {};
+  s.trajectory.kind = Trajectory::Kind::table;
+  for (Eigen::Index k = 0; k < plan.samples(); ++k) {
+    s.trajectory.table.t.push_back(plan.t(k));
+    s.trajectory.table.speed.push_back(plan.speed.col(k));
+  }
+  s.duration = plan.t(plan.samples() - 1);
+  s.seed = 91;
+  const Fault::Kind kind =
+      fault.fault.name == "wheel_radius" ? Fault::Kind::wheel_radius : Fault::Kind::wheel_radius_right;
+  if (size > 0.0) {
+    s.faults = {{.kind = kind, .magnitude = fault.side * size * s.robot.wheel_radius, .profile = {.onset = -1.0}}};
+  }
+  Simulation log(s);
+  Detector detector = make_detector(p.model);
+  std::vector<std::size_t> pick;
+  for (const auto& name : p.model.measurement.columns()) {
+    pick.push_back(log.find(name).value());
+  }
+  std::vector<double> sample(pick.size());
+  double first = kInfinity;
+  LogBlock block;
+  while (log.next(block)) {
+    for (std::size_t k = 0; k < block.rows(); ++k) {
+      for (std::size_t c = 0; c < pick.size(); ++c) {
+        sample[c] = block.columns[pick[c]][k];
+      }
+      first = detector.step(block.t[k], sample).fault ? std::min(first, block.t[k]) : first;
+    }
+  }
+  return first;
+}
+
+std::vector<InspectedFault> radii(const CommissionedModel& model) {
+  std::vector<InspectedFault> faults;
+  for (const InspectedFault& each : usual_inspection(model)) {
+    if (each.fault.name == "wheel_radius" || each.fault.name == "wheel_radius_right") {
+      faults.push_back(each);
+    }
+  }
+  return faults;
+}
+
+TEST(Detection, AnInspectionBeatsTheFigureEightAndKeepsItsPromise) {
+  const Prepared p = prepared();
+  const DesignSubject subject = subject_of(p.model);
+  const std::vector<InspectedFault> faults = radii(p.model);
+  ASSERT_EQ(faults.size(), 2u);
+  const DetectionDesign design = design_for_detection(p.model, subject, limits(p.scenario.robot), faults,
+                                                      {.stages = 2, .samples = 24, .descents = 1, .steps = 60});
+  EXPECT_LE(design.manoeuvre.use.largest(), 1.0);
+  ASSERT_EQ(design.promised.size(), 4u);
+  ASSERT_EQ(design.promised_eight.size(), 4u);
+  double mine = 0.0, eight = 0.0;
+  for (std::size_t k = 0; k < 4; ++k) {
+    mine = std::max(mine, design.promised[k].smallest);
+    eight = std::max(eight, design.promised_eight[k].smallest);
+  }
+  EXPECT_LT(mine, 0.9 * eight);
+  EXPECT_NEAR(design.manoeuvre.objective, mine / 0.05, 1e-6 * mine / 0.05);
+  for (const PromisedFault& fault : design.promised) {
+    ASSERT_LT(fault.smallest, 0.3) << fault.fault.name;
+    // A robot follows its commands with a little lag: a tenth more than what is promised for exact following.
+    EXPECT_LT(first_alarm(p, design.manoeuvre.plan, fault, 1.1 * fault.smallest),
+              design.manoeuvre.plan.t(design.manoeuvre.plan.samples() - 1))
+        << fault.fault.name << " " << fault.side * fault.smallest;
+  }
+  EXPECT_EQ(first_alarm(p, design.manoeuvre.plan, design.promised[0], 0.0), kInfinity);
+}
+
+TEST(Detection, WhatCannotBeCertainHasASlope) {
+  const Prepared p = prepared();
+  const DesignSubject subject = subject_of(p.model);
+  std::vector<InspectedFault> faults = radii(p.model);
+  faults.resize(1);
+  // Too slow for any radius of this range to be certain: the faster plan is nearer to it.
+  faults[0].fault.range = {0.0, 0.02};
+  const ThresholdRule rule(Polytope(p.model.facets, p.model.box), p.model.estimate);
+  const PlanObjective objective = certain_detection(subject, rule, faults);
+  const Plan slow = plan_of(FigureEight{0.05, 6.0}, subject, 6.0, 0.02),
+             fast = plan_of(FigureEight{0.2, 6.0}, subject, 6.0, 0.02);
+  EXPECT_EQ(promised_faults(slow, subject, rule, faults)[0].smallest, kInfinity);
+  EXPECT_GT(objective(slow), 1e6);
+  EXPECT_LT(objective(fast), objective(slow));
+  EXPECT_THROW(static_cast<void>(promised_faults(slow, subject, rule, {})), InvalidArgument);
+}
+
+}  // namespace
+}  // namespace wheelwright
