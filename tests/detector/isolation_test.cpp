@@ -101,7 +101,7 @@ class SlowIsolationPart : public ::testing::TestWithParam<std::uint64_t> {};
 
 TEST_P(SlowIsolationPart, KeepsTheTrueFaultInManyRuns) {
   Tally tally;
-  for (std::uint64_t robot = 1; robot <= 12; ++robot) {
+  for (std::uint64_t robot = 1; robot <= 14; ++robot) {
     try_runs(300 + 20 * GetParam() + robot, 0, 10, tally);
   }
   RecordProperty("runs", tally.runs);
