@@ -7,9 +7,11 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include <wheelwright/design/detection.hpp>
 #include <wheelwright/design/manoeuvre.hpp>
 #include <wheelwright/io/csv.hpp>
 #include <wheelwright/io/model_file.hpp>
+#include <wheelwright/io/number.hpp>
 #include <wheelwright/io/robot_file.hpp>
 #include <wheelwright/report/design_report.hpp>
 
@@ -29,13 +31,15 @@ struct Arguments {
   std::vector<double> box;
   double rate = 100.0;
   WidthCriterion criterion = WidthCriterion::geometric_mean;
+  std::vector<std::string> faults;
   std::size_t stages = DesignOptions{}.stages;
   CommonOptions common;
 };
 
 constexpr const char* kHelp =
-    "Designs a drive whose log will give the narrowest guaranteed bounds on the parameters, within limits of speed, "
-    "acceleration, effort, space and time, and writes it as a table of wheel-speed commands.";
+    "Designs a drive within limits of speed, acceleration, effort, space and time, and writes it as a table of "
+    "wheel-speed commands: for the narrowest guaranteed bounds on the parameters (bounds), or as an inspection that is "
+    "certain to find faults that are as small as possible (detection).";
 
 constexpr const char* kExamples =
     "Limits of a wheel may stand in the robot file, limits: {speed: rad/s, acceleration: rad/s², effort: N·m (or A, "
@@ -45,6 +49,8 @@ constexpr const char* kExamples =
     "Examples:\n"
     "  wheelwright design --model result/model.json --for bounds --speed 8 --acceleration 20 --radius 1.5 --out plan\n"
     "  wheelwright design --robot robot.yaml --for bounds --duration 30 --box -1 3 -1 1 --out plan\n"
+    "  wheelwright design --model result/model.json --for detection --fault wheel_radius=0.03 --speed 8 --acceleration "
+    "20\n"
     "  then drive plan/manoeuvre.csv, or simulate it with trajectory: {kind: table, file: plan/manoeuvre.csv}";
 
 MotionLimits limits_from(const Arguments& a, const Robot& robot) {
@@ -68,13 +74,63 @@ MotionLimits limits_from(const Arguments& a, const Robot& robot) {
   return limits;
 }
 
+// NAME or NAME=SIZE of the catalogue; without any, the usual ones.
+std::vector<InspectedFault> inspected(const Arguments& a, const CommissionedModel& model) {
+  std::vector<InspectedFault> faults;
+  const std::vector<InspectedFault> usual = usual_inspection(model);
+  const std::vector<FaultType> catalogue = fault_catalogue(model.model, model.estimate, model.robot.effort);
+  for (const std::string& text : a.faults) {
+    const std::size_t equals = text.find('=');
+    const std::string name = text.substr(0, equals);
+    InspectedFault fault{find_fault(catalogue, name), 0.05};
+    for (const InspectedFault& each : usual) {
+      fault.asked = each.fault.name == name ? each.asked : fault.asked;
+    }
+    if (equals != std::string::npos) {
+      const auto size = to_number(text.substr(equals + 1));
+      if (!size || !(*size > 0.0)) {
+        throw InputError("--fault " + text + ": expected NAME=SIZE with a size > 0");
+      }
+      fault.asked = *size;
+    }
+    faults.push_back(std::move(fault));
+  }
+  return faults.empty() ? usual : faults;
+}
+
+void write_plans(const Arguments& a, const Model& model, const Plan& plan, const std::optional<Plan>& eight) {
+  if (!a.common.out.empty()) {
+    write_csv(a.common.out / "manoeuvre.csv", command_table(plan, model));
+    if (eight) {
+      write_csv(a.common.out / "figure_eight.csv", command_table(*eight, model));
+    }
+  }
+}
+
+void tell(const Arguments& a, const std::string& summary) {
+  if (!a.common.quiet && !a.common.json) {
+    fmt::print("{}", summary);
+    if (!a.common.out.empty()) {
+      fmt::print("wrote {} (commands to drive), design.json and report.html beside it\n",
+                 (a.common.out / "manoeuvre.csv").string());
+    }
+  }
+}
+
 int run(const Arguments& a) {
+  const bool detection = a.aim == "detection";
   if (a.model.empty() == a.robot.empty()) {
     throw InputError("expected either --model model.json or --robot robot.yaml");
   }
+  if (detection && a.model.empty()) {
+    throw InputError("--for detection: expected --model model.json, since what is certain depends on its feasible set");
+  }
+  if (!detection && !a.faults.empty()) {
+    throw InputError("--fault: expected --for detection");
+  }
   make_directory(a.common);
-  const DesignSubject subject =
-      a.model.empty() ? subject_of(read_robot(a.robot), 1.0 / a.rate) : subject_of(read_model(a.model));
+  const std::optional<CommissionedModel> model = a.model.empty() ? std::nullopt : std::optional(read_model(a.model));
+  const DesignSubject subject = model ? subject_of(*model) : subject_of(read_robot(a.robot), 1.0 / a.rate);
   const MotionLimits limits = limits_from(a, subject.robot);
   Progress progress(a.common.quiet);
   DesignOptions options;
@@ -82,28 +138,27 @@ int run(const Arguments& a) {
   options.seed = a.common.seed;
   options.threads = static_cast<std::size_t>(a.common.threads);
   options.progress = [&](std::string_view stage, double share) { progress.tell(stage, share); };
-  const BoundsDesign design = design_for_bounds(subject, limits, a.criterion, options);
-
-  Json result = to_json(design, subject, limits);
-  result["software"] = software();
-  result["seed"] = a.common.seed;
   ReportContext context;
   context.software = software();
   context.command_line = a.common.command_line;
   context.seeds = {{"search", a.common.seed}};
-  if (!a.common.out.empty()) {
-    write_csv(a.common.out / "manoeuvre.csv", command_table(design.manoeuvre.plan, subject.model));
-    if (design.figure_eight_plan) {
-      write_csv(a.common.out / "figure_eight.csv", command_table(*design.figure_eight_plan, subject.model));
-    }
-  }
-  publish(a.common, result, "design.json", design_report(design, subject, limits, context));
-  if (!a.common.quiet && !a.common.json) {
-    fmt::print("{}", summary(design, subject));
-    if (!a.common.out.empty()) {
-      fmt::print("wrote {} (commands to drive), design.json and report.html beside it\n",
-                 (a.common.out / "manoeuvre.csv").string());
-    }
+  const auto finish = [&](Json result, const auto& design, const std::string& words) {
+    result["software"] = software();
+    result["seed"] = a.common.seed;
+    write_plans(a, subject.model, design.manoeuvre.plan, design.figure_eight_plan);
+    publish(a.common, result, "design.json", design_report(design, subject, limits, context));
+    tell(a, words);
+  };
+  if (detection) {
+    // An evaluation walks the plan once for each fault: fewer of them than for bounds.
+    options.samples = 150;
+    options.descents = 3;
+    options.steps = 250;
+    const DetectionDesign design = design_for_detection(*model, subject, limits, inspected(a, *model), options);
+    finish(to_json(design, limits), design, summary(design));
+  } else {
+    const BoundsDesign design = design_for_bounds(subject, limits, a.criterion, options);
+    finish(to_json(design, subject, limits), design, summary(design, subject));
   }
   return kDone;
 }
@@ -113,7 +168,9 @@ int run(const Arguments& a) {
 Run add_design(CLI::App& program) {
   auto a = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("design", kHelp);
-  command.add_option("--for", a->aim, "What the drive is for: bounds")->required()->check(CLI::IsMember({"bounds"}));
+  command.add_option("--for", a->aim, "What the drive is for: bounds or detection")
+      ->required()
+      ->check(CLI::IsMember({"bounds", "detection"}));
   command.add_option("--model", a->model, "model.json of a commissioning: parameters, noise and filter")
       ->type_name("FILE");
   command
@@ -152,6 +209,11 @@ Run add_design(CLI::App& program) {
                                                 {"mean", WidthCriterion::mean},
                                                 {"largest", WidthCriterion::largest}}))
       ->default_str("geometric_mean");
+  command
+      .add_option("--fault", a->faults,
+                  "With --for detection: a fault of the catalogue and the size asked for (may be repeated); without it "
+                  "wheel radii, efforts lost, encoders' scale")
+      ->type_name("NAME[=SIZE]");
   command.add_option("--stages", a->stages, "Stages of constant speed in each half of the drive")
       ->type_name("N")
       ->check(CLI::Range(1, 20))

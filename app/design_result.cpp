@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include <wheelwright/commission/margin_words.hpp>
 #include <wheelwright/commission/physical.hpp>
 
 namespace wheelwright::app {
@@ -26,11 +27,9 @@ double largest_distance(const Plan& plan) {
   return std::sqrt(plan.pose.topRows<2>().colwise().squaredNorm().maxCoeff());
 }
 
-}  // namespace
-
-Json to_json(const BoundsDesign& design, const DesignSubject& subject, const MotionLimits& limits) {
-  const auto scales = physical_scales(subject.robot, subject.model);
-  Json out = {{"schema", "wheelwright/design/1"}, {"for", "bounds"}, {"criterion", name(design.criterion)}};
+// What all designs have.
+Json frame(const Manoeuvre& manoeuvre, const std::optional<FigureEight>& eight, const MotionLimits& limits) {
+  Json out = {{"schema", "wheelwright/design/1"}};
   out["limits"] = {{"duration", limits.duration},
                    {"speed", limits.joint_speed},
                    {"acceleration", optional(limits.joint_acceleration)},
@@ -41,15 +40,25 @@ Json to_json(const BoundsDesign& design, const DesignSubject& subject, const Mot
     const auto& [x, y] = *limits.box;
     out["limits"]["box"] = {x.lower, x.upper, y.lower, y.upper};
   }
-  const LimitUse& use = design.manoeuvre.use;
+  const LimitUse& use = manoeuvre.use;
   out["use"] = {{"speed", use.speed}, {"acceleration", use.acceleration}, {"effort", use.effort}, {"space", use.space}};
-  out["largest_distance"] = largest_distance(design.manoeuvre.plan);
-  out["objective"] = design.manoeuvre.objective;
-  out["evaluations"] = design.manoeuvre.evaluations;
+  out["largest_distance"] = largest_distance(manoeuvre.plan);
+  out["objective"] = manoeuvre.objective;
+  out["evaluations"] = manoeuvre.evaluations;
   out["figure_eight"] = nullptr;
-  if (design.figure_eight) {
-    out["figure_eight"] = {{"speed", design.figure_eight->speed}, {"period", design.figure_eight->period}};
+  if (eight) {
+    out["figure_eight"] = {{"speed", eight->speed}, {"period", eight->period}};
   }
+  return out;
+}
+
+}  // namespace
+
+Json to_json(const BoundsDesign& design, const DesignSubject& subject, const MotionLimits& limits) {
+  const auto scales = physical_scales(subject.robot, subject.model);
+  Json out = frame(design.manoeuvre, design.figure_eight, limits);
+  out["for"] = "bounds";
+  out["criterion"] = name(design.criterion);
   out["parameters"] = Json::array();
   for (std::size_t j = 0; j < subject.model.p(); ++j) {
     const Parameter& parameter = subject.model.parameters[j];
@@ -93,6 +102,46 @@ std::string summary(const BoundsDesign& design, const DesignSubject& subject) {
       out += fmt::format(" {:>14.4g}", half(design.promised_eight));
     }
     out += "  " + (scales ? parameter.physical_unit : parameter_unit(subject.robot, parameter)) + "\n";
+  }
+  return out;
+}
+
+Json to_json(const DetectionDesign& design, const MotionLimits& limits) {
+  Json out = frame(design.manoeuvre, design.figure_eight, limits);
+  out["for"] = "detection";
+  out["faults"] = Json::array();
+  for (std::size_t k = 0; k < design.promised.size(); ++k) {
+    const PromisedFault& p = design.promised[k];
+    const auto size = [](const PromisedFault& of) {
+      return std::isfinite(of.smallest) ? Json{{"smallest", of.smallest}, {"t", of.t}} : Json(nullptr);
+    };
+    out["faults"].push_back({{"fault", p.fault.name},
+                             {"side", p.side > 0.0 ? "positive" : "negative"},
+                             {"unit", p.fault.unit},
+                             {"asked", p.asked},
+                             {"promised", size(p)},
+                             {"figure_eight", design.figure_eight ? size(design.promised_eight[k]) : Json(nullptr)}});
+  }
+  return out;
+}
+
+std::string summary(const DetectionDesign& design) {
+  const Plan& plan = design.manoeuvre.plan;
+  std::string out = fmt::format("{:.1f} s, within {:.2f} m of the start; {} manoeuvres were looked at\n",
+                                plan.t(plan.samples() - 1), largest_distance(plan), design.manoeuvre.evaluations);
+  out += fmt::format("  {:<26} {:>10} {:>12} {:>8}{}\n", "certainly found from", "asked", "promised", "after",
+                     design.figure_eight ? fmt::format(" {:>14}", "figure eight") : "");
+  for (std::size_t k = 0; k < design.promised.size(); ++k) {
+    const PromisedFault& p = design.promised[k];
+    out += fmt::format("  {:<26} {:>10} {:>12} {:>8}", p.fault.name + (p.side > 0.0 ? " +" : " -"),
+                       magnitude_words(p.fault, p.asked),
+                       std::isfinite(p.smallest) ? magnitude_words(p.fault, p.smallest) : "none",
+                       std::isfinite(p.smallest) ? fmt::format("{:.2f} s", p.t) : "");
+    if (design.figure_eight) {
+      const double eight = design.promised_eight[k].smallest;
+      out += fmt::format(" {:>14}", std::isfinite(eight) ? magnitude_words(p.fault, eight) : "none");
+    }
+    out += "\n";
   }
   return out;
 }

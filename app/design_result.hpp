@@ -5,6 +5,7 @@
 
 #include <string>
 
+#include <wheelwright/design/detection.hpp>
 #include <wheelwright/design/manoeuvre.hpp>
 #include <wheelwright/io/json_file.hpp>
 
@@ -16,5 +17,11 @@ namespace wheelwright::app {
 
 /// The result for a terminal.
 [[nodiscard]] std::string summary(const BoundsDesign& design, const DesignSubject& subject);
+
+/// The same for an inspection: smallest sizes that are certainly found, by the plan and by the figure eight.
+[[nodiscard]] Json to_json(const DetectionDesign& design, const MotionLimits& limits);
+
+/// The result for a terminal.
+[[nodiscard]] std::string summary(const DetectionDesign& design);
 
 }  // namespace wheelwright::app

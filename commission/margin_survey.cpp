@@ -22,14 +22,7 @@ std::vector<FaultType> chosen(const std::vector<FaultType>& catalogue, const std
   }
   std::vector<FaultType> faults;
   for (const std::string& name : names) {
-    const auto at =
-        std::find_if(catalogue.begin(), catalogue.end(), [&](const FaultType& fault) { return fault.name == name; });
-    std::string known;
-    for (const FaultType& fault : catalogue) {
-      known += (known.empty() ? "" : ", ") + fault.name;
-    }
-    check::that(at != catalogue.end(), "fault '" + name + "'", "one of " + known);
-    faults.push_back(*at);
+    faults.push_back(find_fault(catalogue, name));
   }
   return faults;
 }

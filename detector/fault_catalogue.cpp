@@ -179,4 +179,15 @@ std::vector<FaultType> fault_catalogue(const Model& model, const Eigen::VectorXd
   return all;
 }
 
+const FaultType& find_fault(const std::vector<FaultType>& catalogue, const std::string& name) {
+  const auto at =
+      std::find_if(catalogue.begin(), catalogue.end(), [&](const FaultType& fault) { return fault.name == name; });
+  std::string known;
+  for (const FaultType& fault : catalogue) {
+    known += (known.empty() ? "" : ", ") + fault.name;
+  }
+  check::that(at != catalogue.end(), "fault '" + name + "'", "one of " + known);
+  return *at;
+}
+
 }  // namespace wheelwright

@@ -90,4 +90,7 @@ void validate(const FaultType& fault, const Model& model);
 [[nodiscard]] std::vector<FaultType> fault_catalogue(const Model& model, const Eigen::VectorXd& theta,
                                                      EffortKind effort = EffortKind::torque);
 
+/// The fault called `name`. Throws InvalidArgument, naming those that there are, where there is none.
+[[nodiscard]] const FaultType& find_fault(const std::vector<FaultType>& catalogue, const std::string& name);
+
 }  // namespace wheelwright

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include <wheelwright/commission/margin_words.hpp>
 #include <wheelwright/commission/physical.hpp>
 #include <wheelwright/report/chart.hpp>
 #include <wheelwright/report/drawing.hpp>
@@ -79,9 +80,8 @@ std::string bounds_table(const BoundsDesign& design, const DesignSubject& subjec
               : "");
 }
 
-std::string limits_table(const BoundsDesign& design, const MotionLimits& limits, const DesignSubject& subject) {
+std::string limits_table(const LimitUse& use, const MotionLimits& limits, const DesignSubject& subject) {
   const bool axis = subject.model.joints.size() == 1;
-  const LimitUse& use = design.manoeuvre.use;
   std::vector<std::vector<Cell>> rows;
   const auto add = [&rows](const char* what, const std::string& limit, double share) {
     rows.push_back({what, numeric(limit), numeric(percent(share))});
@@ -147,13 +147,73 @@ std::vector<std::string> design_words(const BoundsDesign& design, const DesignSu
   return sentences;
 }
 
+std::string faults_table(const DetectionDesign& design, const DesignSubject& subject) {
+  std::vector<Cell> header = {"Fault", numeric("asked"), numeric("certain from"), numeric("after"), "channel"};
+  if (design.figure_eight) {
+    header.push_back(numeric("figure eight"));
+  }
+  std::vector<std::vector<Cell>> rows;
+  for (std::size_t k = 0; k < design.promised.size(); ++k) {
+    const PromisedFault& p = design.promised[k];
+    const bool found = std::isfinite(p.smallest);
+    const bool sides = p.fault.range.lower < 0.0 && !p.fault.whole;
+    std::vector<Cell> row = {
+        escape(capital(words(p.fault.name)) + (sides ? p.side > 0.0 ? ", growing" : ", shrinking" : "")),
+        numeric(escape(magnitude_words(p.fault, p.asked))), numeric(escape(magnitude_words(p.fault, p.smallest))),
+        numeric(found ? with_unit(number(p.t), "s") : "–"),
+        found ? escape(words(subject.model.outputs[p.output])) : "–"};
+    if (design.figure_eight) {
+      row.push_back(numeric(escape(magnitude_words(p.fault, design.promised_eight[k].smallest))));
+    }
+    rows.push_back(std::move(row));
+  }
+  return table(header, rows) +
+         paragraph(
+             "<span class=\"note\">A robot that is broken by that much before the drive begins raises an alarm within "
+             "the time given, whatever its parameters within the model's bounds and the noise within its own, as far "
+             "as "
+             "its wheels follow the commands.</span>");
+}
+
+// Path, commands, limits and data: what every design shows.
+void add_plan(PageContent& content, const Manoeuvre& manoeuvre, const DesignSubject& subject,
+              const MotionLimits& limits, const ReportContext& context) {
+  const LogTable commands = command_table(manoeuvre.plan, subject.model);
+  const TimeAxis axis(commands.t);
+  if (std::string path = driven_path(commands); !path.empty()) {
+    content.sections.push_back(
+        {"path", "Path",
+         path + paragraph("Seen from above; the dot is the start, and the end, the robot facing right.")});
+  }
+  content.sections.push_back({"speeds", "Commands", speed_charts(manoeuvre.plan, subject.model, axis)});
+  content.sections.push_back({"limits", "Limits", limits_table(manoeuvre.use, limits, subject)});
+  content.sections.push_back({"data", "Data", provenance(context, axis)});
+}
+
 }  // namespace
+
+std::string design_report(const DetectionDesign& design, const DesignSubject& subject, const MotionLimits& limits,
+                          const ReportContext& context) {
+  PageContent content;
+  content.title = context.title.empty() ? "Inspection of " + subject.robot.name : context.title;
+  content.status = "good";
+  content.verdict =
+      fmt::format("An inspection drive of {}: what it is certain to find.", with_unit(number(limits.duration), "s"));
+  content.sentences = {
+      "Drive the table of commands once, from standstill, and let `wheelwright detect` look at the log: no alarm means "
+      "that no fault below is there in the size given.",
+      fmt::format(
+          "It was chosen to make the largest of these sizes small, each relative to the one asked for, out of {} "
+          "manoeuvres within the limits.",
+          count(design.manoeuvre.evaluations))};
+  content.software = context.software;
+  content.sections.push_back({"faults", "What is certainly found", faults_table(design, subject)});
+  add_plan(content, design.manoeuvre, subject, limits, context);
+  return page(content);
+}
 
 std::string design_report(const BoundsDesign& design, const DesignSubject& subject, const MotionLimits& limits,
                           const ReportContext& context) {
-  const Plan& plan = design.manoeuvre.plan;
-  const LogTable commands = command_table(plan, subject.model);
-  const TimeAxis axis(commands.t);
   PageContent content;
   content.title = context.title.empty() ? "Manoeuvre for " + subject.robot.name : context.title;
   content.status = "good";
@@ -168,14 +228,7 @@ std::string design_report(const BoundsDesign& design, const DesignSubject& subje
   content.sentences = design_words(design, subject, limits);
   content.software = context.software;
   content.sections.push_back({"bounds", "Promised bounds", bounds_table(design, subject)});
-  if (std::string path = driven_path(commands); !path.empty()) {
-    content.sections.push_back(
-        {"path", "Path",
-         path + paragraph("Seen from above; the dot is the start, and the end, the robot facing right.")});
-  }
-  content.sections.push_back({"speeds", "Commands", speed_charts(plan, subject.model, axis)});
-  content.sections.push_back({"limits", "Limits", limits_table(design, limits, subject)});
-  content.sections.push_back({"data", "Data", provenance(context, axis)});
+  add_plan(content, design.manoeuvre, subject, limits, context);
   return page(content);
 }
 

@@ -5,6 +5,7 @@
 
 #include <string>
 
+#include <wheelwright/design/detection.hpp>
 #include <wheelwright/design/manoeuvre.hpp>
 #include <wheelwright/report/context.hpp>
 
@@ -13,6 +14,10 @@ namespace wheelwright {
 /// One self-contained HTML page: what was designed in words, the promised bounds beside those of the model and of a figure
 /// eight, the path, the commands over time, how much of each limit is used. `context.signals` and `own_log` are not used.
 [[nodiscard]] std::string design_report(const BoundsDesign& design, const DesignSubject& subject,
+                                        const MotionLimits& limits, const ReportContext& context);
+
+/// The same for an inspection: from which size on each fault is certainly found, beside what a figure eight would find.
+[[nodiscard]] std::string design_report(const DetectionDesign& design, const DesignSubject& subject,
                                         const MotionLimits& limits, const ReportContext& context);
 
 }  // namespace wheelwright
