@@ -1,0 +1,311 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/commission/detector_choice.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include <wheelwright/commission/survey.hpp>
+#include <wheelwright/core/check.hpp>
+#include <wheelwright/core/error.hpp>
+#include <wheelwright/core/for_all.hpp>
+#include <wheelwright/filter/measurement.hpp>
+#include <wheelwright/identify/minimise_scalar.hpp>
+
+namespace wheelwright {
+namespace {
+
+constexpr double kNone = std::numeric_limits<double>::infinity();
+constexpr double kMostBetaStep = 0.5;    // βh
+constexpr double kShareOfLog = 0.2;      // of the longest segment that a filter may take to settle
+constexpr double kSpeedMemory = 3.0;     // time constants of a filter on speeds
+constexpr double kBetaTolerance = 0.01;  // of log β
+
+struct Wish {
+  FilterDesign filter;
+  std::string origin;
+};
+
+FilterDesign design_of(int order, double beta) { return {.order = order, .alpha = beta, .beta = beta}; }
+
+std::vector<StatedFault> faults_for(const Robot& robot, const std::vector<StatedFault>& stated) {
+  if (!stated.empty()) {
+    return stated;
+  }
+  if (robot.model == "single_axis") {
+    return {{"effort_loss"}};
+  }
+  return {{"wheel_radius"}, {"wheel_radius_right"}};
+}
+
+// The β worth trying for one order, slowest first.
+std::vector<double> grid(int order, const Measurement& measurement, const Survey& seen,
+                         const DetectorChoiceOptions& options) {
+  const double memory = measurement.motion == MotionKind::speed ? kSpeedMemory : FilterDesign{}.settle;
+  const double fastest = kMostBetaStep / seen.median_step;
+  const double slowest =
+      std::min(std::max(order / options.trial.window, memory / (kShareOfLog * seen.longest_segment)), fastest);
+  const double steps = std::max(1.0, std::ceil(std::log(fastest / slowest) / std::log(options.beta_factor)));
+  std::vector<double> betas;
+  for (double k = 0.0; k <= steps; k += 1.0) {
+    betas.push_back(slowest * std::pow(fastest / slowest, k / steps));
+  }
+  return betas;
+}
+
+std::vector<Wish> wishes(const LogTable& log, const Robot& robot, const DetectorChoiceOptions& options,
+                         std::vector<std::string>& notes) {
+  std::vector<Wish> all;
+  const Model model = make_model(robot);
+  for (const int order : {1, 2}) {
+    TableSource source(log);
+    Measurement measurement;
+    try {
+      measurement = find_measurement(source, robot, model, order);
+    } catch (const InvalidArgument& error) {
+      notes.push_back(fmt::format("order {} is left out: {}", order, error.what()));
+      continue;
+    }
+    const Survey seen = survey(source, measurement);
+    for (const double beta : grid(order, measurement, seen, options)) {
+      all.push_back({design_of(order, beta), "grid"});
+    }
+    if (order == 1) {
+      all.push_back({design_of(1, 20.0), "the paper's"});
+    }
+    if (order != robot.filter.order.value_or(2)) {
+      continue;
+    }
+    if (robot.filter.beta) {
+      all.push_back({design_of(order, *robot.filter.beta), "the robot file's"});
+    } else {
+      all.push_back({choose_filter(source, model, measurement, order, seen).design, "what commissioning takes"});
+    }
+  }
+  return all;
+}
+
+std::string named(const StatedMargin& margin) { return margin.fault + (margin.side > 0.0 ? " +" : " −"); }
+
+void rate(DetectorCandidate& candidate, const std::vector<std::string>& hopeless) {
+  candidate.size = candidate.delay = candidate.faults.size() > hopeless.size() ? 0.0 : kNone;
+  for (const StatedMargin& margin : candidate.faults) {
+    if (std::ranges::find(hopeless, named(margin)) == hopeless.end()) {
+      candidate.size = std::max(candidate.size, margin.median / margin.asked);
+      candidate.delay = std::max(candidate.delay, margin.delay);
+    }
+  }
+}
+
+std::vector<std::string> hopeless_among(const std::vector<DetectorCandidate>& candidates) {
+  std::vector<std::string> seen, hopeless;
+  for (const DetectorCandidate& candidate : candidates) {
+    for (const StatedMargin& margin : candidate.faults) {
+      if (margin.median < kNone) {
+        seen.push_back(named(margin));
+      }
+    }
+  }
+  for (const DetectorCandidate& candidate : candidates) {
+    for (const StatedMargin& margin : candidate.faults) {
+      if (std::ranges::find(seen, named(margin)) == seen.end() &&
+          std::ranges::find(hopeless, named(margin)) == hopeless.end()) {
+        hopeless.push_back(named(margin));
+      }
+    }
+  }
+  return hopeless;
+}
+
+double least_size(const std::vector<DetectorCandidate>& candidates) {
+  double least = kNone;
+  for (const DetectorCandidate& candidate : candidates) {
+    least = std::min(least, candidate.size);
+  }
+  return least;
+}
+
+void put_in_order(std::vector<DetectorCandidate>& candidates, double tie) {
+  const double least = least_size(candidates);
+  const auto best = std::min_element(candidates.begin(), candidates.end(),
+                                     [&](const auto& a, const auto& b) { return better(a, b, least, tie); });
+  std::rotate(candidates.begin(), best, best + 1);
+  std::stable_sort(candidates.begin() + 1, candidates.end(), [](const auto& a, const auto& b) {
+    return std::pair(!a.failure.empty(), a.size) < std::pair(!b.failure.empty(), b.size);
+  });
+}
+
+std::string assumption(Guarantee guarantee, double false_alarms) {
+  switch (guarantee) {
+    case Guarantee::never:
+      return "no false alarm, ever, while the robot is the model's and noise stays inside its declared bounds, "
+             "whatever "
+             "it does there";
+    case Guarantee::hourly:
+      return fmt::format(
+          "a false alarm in an hour of driving has a probability of at most {:g}, learning counted in, while the robot "
+          "is the model's and noise is independent from sample to sample, of zero mean and inside its declared bounds "
+          "(an encoder's rounding is that only while wheels turn by several counts a sample)",
+          false_alarms);
+    case Guarantee::extrapolated:
+      return "noise is not declared: its bounds are extrapolated from the residuals of this log, and the guarantee "
+             "holds as far as driving to come is like it; declare `noise:` in the robot file for one that stands on "
+             "the sensors";
+  }
+  return {};
+}
+
+class Search {
+ public:
+  Search(LogTable log, const Robot& robot, const DetectorChoiceOptions& options)
+      : log_(std::move(log)), robot_(&robot), options_(options) {
+    options_.trial.faults = faults_for(robot, options.trial.faults);
+    validate(options_.trial, robot);
+    check::that(options.beta_factor > 1.0, "beta_factor", "a number > 1");
+    check::that(options.tie >= 0.0, "tie", "a number >= 0");
+    choice_.faults = options_.trial.faults;
+    choice_.window = options.trial.window;
+    choice_.false_alarms = options.trial.false_alarms;
+  }
+
+  [[nodiscard]] DetectorChoice operator()() {
+    try_grid();
+    refine();
+    put_in_order(choice_.candidates, options_.tie);
+    if (!(choice_.candidates.front().size < kNone)) {
+      choice_.notes.push_back("no filter is certain to see a stated fault within the window, whenever it sets in");
+      return std::move(choice_);
+    }
+    vary();
+    put_in_order(choice_.candidates, options_.tie);
+    const FilterDesign filter = choice_.candidates.front().filter;
+    const Guarantee guarantee = choice_.candidates.front().guarantee;
+    TrialOptions trial = options_.trial;
+    trial.false_alarms = guarantee == Guarantee::never ? 0.0 : trial.false_alarms;
+    choice_.chosen = try_detector(log_, *robot_, filter, {{}}, "", trial).commissioning;
+    choice_.notes.push_back(assumption(guarantee, trial.false_alarms));
+    tell("done", 1.0);
+    return std::move(choice_);
+  }
+
+ private:
+  void tell(std::string_view stage, double share) const {
+    if (options_.progress) {
+      options_.progress(stage, share);
+    }
+  }
+
+  void try_grid() {
+    const std::vector<Wish> all = wishes(log_, *robot_, options_, choice_.notes);
+    check::that(!all.empty(), "log", "columns for a filter of order 1 or 2");
+    choice_.candidates.resize(all.size());
+    TrialOptions trial = options_.trial;
+    trial.threads = 1;
+    for_all(
+        all.size(), options_.trial.threads,
+        [&](std::size_t i) {
+          choice_.candidates[i] =
+              try_detector(log_, *robot_, all[i].filter, {{}}, all[i].origin, trial).candidates.front();
+        },
+        [&](std::size_t begun) {
+          tell("trying filters", 0.7 * static_cast<double>(begun) / static_cast<double>(all.size()));
+        });
+    choice_.hopeless = hopeless_among(choice_.candidates);
+    for (DetectorCandidate& candidate : choice_.candidates) {
+      rate(candidate, choice_.hopeless);
+    }
+  }
+
+  // log β between the neighbours of the best candidate.
+  void refine() {
+    const double least = least_size(choice_.candidates);
+    const auto best = std::ranges::find(choice_.candidates, least, &DetectorCandidate::size);
+    if (!(least < kNone) || options_.most_refinements == 0) {
+      return;
+    }
+    const FilterDesign start = best->filter;
+    double lower = start.beta, upper = start.beta, below = 0.0, above = kNone;
+    for (const DetectorCandidate& candidate : choice_.candidates) {
+      const double beta = candidate.filter.beta;
+      if (candidate.filter.order == start.order && candidate.origin == "grid") {
+        below = beta < start.beta ? std::max(below, beta) : below;
+        above = beta > start.beta ? std::min(above, beta) : above;
+      }
+    }
+    lower = below > 0.0 ? below : lower;
+    upper = above < kNone ? above : upper;
+    if (!(std::log(upper / lower) > kBetaTolerance)) {
+      return;
+    }
+    std::size_t done = 0;
+    const double centre = std::clamp(std::log(start.beta), std::log(lower), std::log(upper));
+    static_cast<void>(minimise_scalar(
+        [&](double log_beta) {
+          if (log_beta == centre) {
+            return least;
+          }
+          const FilterDesign design = design_of(start.order, std::exp(log_beta));
+          for (const DetectorCandidate& known : choice_.candidates) {
+            if (known.filter.order == design.order && known.filter.beta == design.beta) {
+              return known.size;
+            }
+          }
+          tell("refining", 0.7 + 0.2 * static_cast<double>(++done) / static_cast<double>(options_.most_refinements));
+          return add(design, {{}}, "refined", options_.trial);
+        },
+        std::log(lower), std::log(upper), centre,
+        {.most_evaluations = options_.most_refinements + 1, .tolerance = kBetaTolerance}));
+  }
+
+  // The chosen filter under other rules, and under the strict guarantee where that was not asked for.
+  void vary() {
+    tell("comparing rules", 0.9);
+    const FilterDesign filter = choice_.candidates.front().filter;
+    const bool declared = choice_.candidates.front().guarantee == Guarantee::hourly;
+    add(filter, options_.persistences, "the chosen filter", options_.trial);
+    if (declared) {
+      TrialOptions strict = options_.trial;
+      strict.false_alarms = 0.0;
+      add(filter, {{}}, "the chosen filter", strict);
+    }
+  }
+
+  double add(const FilterDesign& filter, const std::vector<Persistence>& persistences, const std::string& origin,
+             const TrialOptions& trial) {
+    if (persistences.empty()) {
+      return kNone;
+    }
+    double least = kNone;
+    for (DetectorCandidate& candidate : try_detector(log_, *robot_, filter, persistences, origin, trial).candidates) {
+      rate(candidate, choice_.hopeless);
+      least = std::min(least, candidate.size);
+      choice_.candidates.push_back(std::move(candidate));
+    }
+    return least;
+  }
+
+  LogTable log_;
+  const Robot* robot_;
+  DetectorChoiceOptions options_;
+  DetectorChoice choice_;
+};
+
+}  // namespace
+
+bool better(const DetectorCandidate& a, const DetectorCandidate& b, double least, double tie) {
+  const auto key = [&](const DetectorCandidate& candidate) {
+    const bool tied = candidate.size <= least * (1.0 + tie);
+    // k of n has the same bounds as 1 of 1, and no earlier alarm: it never comes first.
+    return std::tuple(!candidate.failure.empty(), !tied, tied ? candidate.delay : candidate.size, candidate.size,
+                      candidate.persistence.n);
+  };
+  return key(a) < key(b);
+}
+
+DetectorChoice choose_detector(LogSource& log, const Robot& robot, const DetectorChoiceOptions& options) {
+  return Search(read_all(log), robot, options)();
+}
+
+}  // namespace wheelwright

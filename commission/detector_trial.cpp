@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/commission/detector_trial.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include <wheelwright/core/check.hpp>
+#include <wheelwright/core/error.hpp>
+#include <wheelwright/detector/margins.hpp>
+
+namespace wheelwright {
+namespace {
+
+constexpr double kNone = std::numeric_limits<double>::infinity();
+constexpr double kHour = 3600.0;          // s
+constexpr double kShare = 0.2;            // stated size of a share where none is given
+constexpr std::size_t kDelaySteps = 40;   // of the window
+constexpr double kLeastOnsetStep = 1e-9;  // s: onsets are where `settled` says
+
+double rows_of_an_hour(double step) { return kHour / check::positive(step, "sampling step"); }
+
+double stated_size(const StatedFault& stated, const FaultType& fault) {
+  const double most = std::max(fault.range.upper, -fault.range.lower);
+  if (fault.whole) {
+    return most;
+  }
+  check::that(stated.size || fault.unit == "1", "size of " + stated.name, "a size in " + fault.unit);
+  const double size = check::positive(stated.size.value_or(kShare), "size of " + stated.name);
+  check::that(size <= most, "size of " + stated.name, fmt::format("at most {:g}", most));
+  return size;
+}
+
+// The bounds' promise, as commission() takes it.
+CommissionOptions promise(const TrialOptions& options, const LogTable& log, std::size_t outputs) {
+  CommissionOptions commissioning = options.commission;
+  commissioning.persistence = {};
+  commissioning.noise_mode = NoiseMode::worst_case;
+  if (options.false_alarms > 0.0) {
+    const auto rows = static_cast<double>(log.rows());
+    const double step = median_step(log.t);
+    commissioning.noise_mode = NoiseMode::statistical;
+    commissioning.confidence = hourly_confidence(options.false_alarms, rows, step);
+    commissioning.extrapolation.risk = options.false_alarms / static_cast<double>(outputs);
+    commissioning.extrapolation.horizon = std::max(1.0, rows_of_an_hour(step) / rows);
+  }
+  return commissioning;
+}
+
+// Leaves as onsets the first settled instants from evenly spaced rows of the log on, whatever the filter.
+void set_onsets(ReferenceMotion& motion, const LogTable& log, const TrialOptions& options) {
+  const double seconds = static_cast<double>(log.rows()) * median_step(log.t);
+  const double wanted = std::clamp(std::floor(seconds / options.onset_step), 1.0,
+                                   static_cast<double>(std::max<std::size_t>(options.most_onsets, 1)));
+  std::vector<bool> onsets(motion.instants(), false);
+  for (double i = 0.5; i < wanted; i += 1.0) {
+    const auto row = static_cast<std::size_t>(i / wanted * static_cast<double>(log.rows()));
+    const auto at = static_cast<std::size_t>(std::lower_bound(motion.sample.begin(), motion.sample.end(), row) -
+                                             motion.sample.begin());
+    if (at < motion.instants() && motion.settled[at]) {
+      onsets[at] = true;
+    }
+  }
+  motion.settled = std::move(onsets);
+}
+
+double median_of(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+StatedMargin margin_of(const FaultMargins& margins, double asked, const std::vector<double>& windows) {
+  StatedMargin result{.fault = margins.fault.name, .unit = margins.fault.unit, .side = margins.side, .asked = asked};
+  std::vector<double> sizes, delays;
+  for (const OnsetMargin& onset : margins.onsets) {
+    if (onset.kind == ManoeuvreKind::standstill || onset.certain.size() < windows.size()) {
+      continue;
+    }
+    sizes.push_back(onset.certain.back());
+    const auto seen = std::find_if(onset.certain.begin(), onset.certain.end(), [&](double x) { return x <= asked; });
+    delays.push_back(seen == onset.certain.end() ? kNone
+                                                 : windows[static_cast<std::size_t>(seen - onset.certain.begin())]);
+  }
+  check::that(!sizes.empty(), "log", "driving that is longer than the window, after the filter has settled");
+  result.onsets = sizes.size();
+  result.worst = *std::max_element(sizes.begin(), sizes.end());
+  result.median = median_of(std::move(sizes));
+  result.delay = median_of(std::move(delays));
+  return result;
+}
+
+class Margins {
+ public:
+  Margins(const LogTable& log, const CommissionedModel& model, const TrialOptions& options)
+      : model_(&model),
+        options_(&options),
+        catalogue_(fault_catalogue(model.model, model.estimate, model.robot.effort)),
+        rule_(Polytope(model.facets, model.box), model.estimate) {
+    TableSource source(log);
+    motion_ = read_reference(source, RegressorFilter(model.model, model.filter, model.measurement, model.errors));
+    set_onsets(motion_, log, options);
+    for (std::size_t k = 1; k <= kDelaySteps; ++k) {
+      windows_.push_back(options.window * static_cast<double>(k) / static_cast<double>(kDelaySteps));
+    }
+  }
+
+  [[nodiscard]] std::vector<StatedMargin> operator()(Persistence persistence) const {
+    std::vector<FaultType> faults;
+    std::vector<double> asked;
+    for (const StatedFault& stated : options_->faults) {
+      faults.push_back(find_fault(catalogue_, stated.name));
+      asked.push_back(stated_size(stated, faults.back()));
+    }
+    const auto all =
+        margins_along(motion_, faults, rule_,
+                      [this](const FaultType& fault) {
+                        return std::make_unique<FaultFilter>(fault, model_->model, model_->filter, motion_);
+                      },
+                      {.windows = windows_,
+                       .onset_step = kLeastOnsetStep,
+                       .most_onsets = motion_.instants(),
+                       .persistence = persistence,
+                       .threads = options_->threads});
+    std::vector<StatedMargin> result;
+    std::size_t of = 0;
+    for (const FaultMargins& margins : all) {
+      while (faults[of].name != margins.fault.name) {
+        ++of;
+      }
+      if (margins.largest() >= asked[of]) {
+        result.push_back(margin_of(margins, asked[of], windows_));
+      }
+    }
+    return result;
+  }
+
+ private:
+  const CommissionedModel* model_;
+  const TrialOptions* options_;
+  std::vector<FaultType> catalogue_;
+  ThresholdRule rule_;
+  ReferenceMotion motion_;
+  std::vector<double> windows_;
+};
+
+Guarantee guarantee_of(const Commissioning& result) {
+  const bool declared =
+      std::ranges::all_of(result.noise, [](const OutputNoise& noise) { return noise.origin == NoiseOrigin::declared; });
+  return !declared                                    ? Guarantee::extrapolated
+         : result.noise_mode == NoiseMode::worst_case ? Guarantee::never
+                                                      : Guarantee::hourly;
+}
+
+}  // namespace
+
+double hourly_confidence(double false_alarms, double rows, double step) {
+  check::that(false_alarms > 0.0 && false_alarms < 1.0, "false alarms an hour", "a probability inside (0, 1)");
+  check::that(rows >= 1.0, "rows", "at least 1");
+  return 1.0 - false_alarms * rows / (rows + rows_of_an_hour(step));
+}
+
+void validate(const TrialOptions& options, const Robot& robot) {
+  check::positive(options.window, "window");
+  check::positive(options.onset_step, "onset_step");
+  check::that(options.false_alarms >= 0.0 && options.false_alarms < 1.0, "false alarms an hour",
+              "a probability in [0, 1); 0 stands for never");
+  check::that(!options.faults.empty(), "faults", "at least one");
+  const Model model = make_model(robot);
+  Eigen::VectorXd middle(static_cast<Eigen::Index>(model.p()));
+  const PriorBox prior = prior_box(robot, model);
+  for (std::size_t j = 0; j < model.p(); ++j) {
+    middle[static_cast<Eigen::Index>(j)] = 0.5 * (prior.bounds[j].lower + prior.bounds[j].upper);
+  }
+  const auto catalogue = fault_catalogue(model, middle, robot.effort);
+  for (const StatedFault& stated : options.faults) {
+    const FaultType& fault = find_fault(catalogue, stated.name);
+    if (fault.theta.size() == 0) {  // the range of a lost mass depends on the robot that is found
+      static_cast<void>(stated_size(stated, fault));
+    }
+    check::that(std::ranges::count(options.faults, stated.name, &StatedFault::name) == 1, "faults",
+                stated.name + " once");
+  }
+}
+
+Trial try_detector(const LogTable& log, const Robot& robot, const FilterDesign& filter,
+                   const std::vector<Persistence>& persistences, const std::string& origin,
+                   const TrialOptions& options) {
+  validate(options, robot);
+  Robot wished = robot;
+  wished.filter = {.order = filter.order, .alpha = filter.alpha, .beta = filter.beta};
+  Trial trial;
+  DetectorCandidate candidate{.filter = filter, .persistence = {}, .origin = origin};
+  candidate.guarantee = options.false_alarms > 0.0 ? Guarantee::hourly : Guarantee::never;
+  try {
+    TableSource source(log);
+    trial.commissioning = commission(source, wished, promise(options, log, make_model(robot).n()));
+    candidate.guarantee = guarantee_of(*trial.commissioning);
+    candidate.failure = trial.commissioning->model.facets.empty() ? trial.commissioning->message : std::string();
+    if (candidate.failure.empty()) {
+      const Margins margins(log, trial.commissioning->model, options);
+      for (const Persistence& persistence : persistences) {
+        trial.candidates.push_back(candidate);
+        trial.candidates.back().persistence = persistence;
+        trial.candidates.back().faults = margins(persistence);
+      }
+      return trial;
+    }
+  } catch (const Error& error) {
+    candidate.failure = error.what();
+  }
+  trial.candidates.assign(1, candidate);
+  return trial;
+}
+
+}  // namespace wheelwright

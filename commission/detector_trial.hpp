@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// What one detector is worth on a log: commissioned with a filter and a guarantee, then asked for its margins.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <wheelwright/commission/commission.hpp>
+#include <wheelwright/core/log.hpp>
+#include <wheelwright/detector/events.hpp>
+#include <wheelwright/filter/design.hpp>
+#include <wheelwright/filter/noise.hpp>
+#include <wheelwright/model/robot.hpp>
+
+namespace wheelwright {
+
+/// A fault that a detector is chosen for.
+struct StatedFault {
+  std::string name;              ///< of fault_catalogue()
+  std::optional<double> size{};  ///< its magnitude, > 0, on both sides where the fault's range has it on both; nothing:
+                                 ///< 0.2 of a share, 1 of a fault that is there or not
+};
+
+/// What a detector promises about false alarms.
+enum class Guarantee {
+  never,         ///< none while noise stays inside its declared bounds, whatever it does there
+  hourly,        ///< one in an hour with at most the stated probability, for independent zero-mean noise inside its
+                 ///< declared bounds; learning from the log is counted in
+  extrapolated,  ///< noise is not declared: its bounds are extrapolated from the log's residuals (noise_level.hpp)
+};
+
+/// What a detector is asked for.
+struct TrialOptions {
+  std::vector<StatedFault> faults;
+  double window = 1.0;           ///< s, in which a fault is to be seen
+  double false_alarms = 0.0;     ///< probability of one in an hour, in [0, 1); 0: never
+  double onset_step = 0.5;       ///< s between the onsets that are tried, at least
+  std::size_t most_onsets = 60;  ///< over the log; the same for every detector, as far as its filter has settled there
+  CommissionOptions commission{};  ///< guarantee and persistence apart
+  std::size_t threads = 1;
+};
+
+/// One stated fault on one side. Order statistics are over the onsets while the robot moves whose window fits.
+struct StatedMargin {
+  std::string fault;
+  std::string unit;
+  double side = 1.0;   ///< 1: positive magnitudes, −1: negative ones
+  double asked = 0.0;  ///< its stated size
+  std::size_t onsets = 0;
+  double median = 0.0;  ///< smallest size that is certain within the window; infinite where fewer than half have one
+  double worst = 0.0;   ///< the same, at every onset
+  double delay = 0.0;   ///< s until a fault of the stated size is certain to be seen, median, a fortieth of the window
+                        ///< too long at most; infinite where it is not, at half of the onsets
+};
+
+/// A detector and what it is worth.
+struct DetectorCandidate {
+  FilterDesign filter;
+  Guarantee guarantee = Guarantee::never;
+  Persistence persistence;
+  std::string origin;                  ///< how it became a candidate
+  std::string failure{};               ///< why there is no such detector; empty where there is one
+  std::vector<StatedMargin> faults{};  ///< in the order of TrialOptions::faults, the positive side first
+  /// Largest of median/asked, and of the delays, over the faults that count (choose_detector).
+  double size = std::numeric_limits<double>::infinity();
+  double delay = std::numeric_limits<double>::infinity();
+};
+
+/// Confidence at which noise is propagated (PropagationOptions::confidence, for the log's `rows`) so that, with
+/// probability at least 1 − `false_alarms`, every row of the log *and* of an hour of driving at `step` obeys its bound.
+/// Both use the same bounds, which the log's rows earn as many of the failures as they are rows:
+/// 1 − confidence = P·rows/(rows + rows of an hour). Throws InvalidArgument unless 0 < false_alarms < 1, rows >= 1, step > 0.
+[[nodiscard]] double hourly_confidence(double false_alarms, double rows, double step);
+
+/// A model and its candidates, one for each persistence.
+struct Trial {
+  std::optional<Commissioning> commissioning;  ///< nothing where commissioning threw
+  std::vector<DetectorCandidate> candidates;
+};
+
+/// Commissions `robot` on `log` with `filter`, under a guarantee of options.false_alarms, and asks for the margins of the
+/// stated faults along the same log under each of `persistences`. Commissioning that fails, for what the data say or
+/// because the filter does not fit the log, is in DetectorCandidate::failure. Throws InvalidArgument for a fault that is
+/// none of the catalogue's, or a size that is outside its range.
+[[nodiscard]] Trial try_detector(const LogTable& log, const Robot& robot, const FilterDesign& filter,
+                                 const std::vector<Persistence>& persistences, const std::string& origin,
+                                 const TrialOptions& options);
+
+/// The same, throwing only: checks options, names of faults and sizes (as far as the robot file tells the ranges).
+void validate(const TrialOptions& options, const Robot& robot);
+
+}  // namespace wheelwright
