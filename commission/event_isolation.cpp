@@ -95,7 +95,10 @@ std::vector<Isolation> isolate_events(LogSource& log, const CommissionedModel& m
 std::string sentence(const FaultFinding& finding) {
   const FaultType& fault = finding.fault;
   std::string text = fault.sentence.empty() ? fault.name : fault.sentence;
-  if (finding.magnitude) {
+  if (finding.magnitude && finding.magnitude->lower <= fault.range.lower &&
+      finding.magnitude->upper >= fault.range.upper) {
+    text += " by any amount";
+  } else if (finding.magnitude) {
     const bool share = fault.unit == "1";
     const double factor = share ? 100.0 : 1.0;
     // Outward, to three digits of the larger end.
@@ -103,7 +106,7 @@ std::string sentence(const FaultFinding& finding) {
     const double size = std::max({std::abs(low), std::abs(high), 1e-12});
     const int decimals = std::clamp(2 - static_cast<int>(std::floor(std::log10(size))), 0, 9);
     const double unit = std::pow(10.0, -decimals);
-    text += fmt::format(" {:.{}f} to {:.{}f} {}", std::floor(low / unit) * unit, decimals,
+    text += fmt::format(" by {:.{}f} to {:.{}f} {}", std::floor(low / unit) * unit, decimals,
                         std::ceil(high / unit) * unit, decimals, share ? "%" : fault.unit);
   }
   text += fmt::format(", since {}{:.2f} to {:.2f} s", finding.earlier ? "before " : "",

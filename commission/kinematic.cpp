@@ -122,8 +122,12 @@ OdometryErrors with_noise(const Frame& s, const std::vector<OutputNoise>& noise,
 
 Eigen::VectorXd weights_of(const ResidualSummary& residuals) {
   Eigen::VectorXd weights(static_cast<Eigen::Index>(residuals.outputs.size()));
+  double size = 0.0;  // of the largest output, in m or rad: one that shows nothing at all has no scale of its own
+  for (const OutputResidual& output : residuals.outputs) {
+    size = std::max(size, output.torque_rms);
+  }
+  const double floor = size > 0.0 ? 1e-9 * size : 1.0;
   for (std::size_t i = 0; i < residuals.outputs.size(); ++i) {
-    const double floor = 1e-9 * residuals.outputs[i].torque_rms + std::numeric_limits<double>::min();
     weights[static_cast<Eigen::Index>(i)] = 1.0 / std::max(residuals.outputs[i].rms, floor);
   }
   return weights;

@@ -46,14 +46,14 @@ std::vector<Side> sides_of(const Model& model) {
 void add_efforts(std::vector<FaultType>& all, const Model& model, const Side& side, const std::string& unit) {
   const Eigen::MatrixXd own = of_joint(model.input, side.joint);
   FaultType loss{.name = "effort_loss" + side.suffix,
-                 .sentence = side.words + " actuator delivers less than its effort says, by the share",
+                 .sentence = side.words + " actuator delivers less than its effort says",
                  .unit = "1",
                  .range = {0.0, kMostLost},
                  .share_lost = true,
                  .effort = own};
   all.push_back(loss);
   all.push_back({.name = "effort_bias" + side.suffix,
-                 .sentence = side.words + " effort reads too much (negative: too little) by",
+                 .sentence = side.words + " effort reads too much (negative: too little)",
                  .unit = unit,
                  .range = {-1e4, 1e4},
                  .offset = model.input.col(static_cast<Eigen::Index>(side.joint))});
@@ -75,7 +75,7 @@ void add_efforts(std::vector<FaultType>& all, const Model& model, const Side& si
 void add_encoders(std::vector<FaultType>& all, const Model& model, const Side& side) {
   const Eigen::MatrixXd own = of_joint(model.motion, side.joint);
   all.push_back({.name = "encoder_scale" + side.suffix,
-                 .sentence = side.words + " encoder counts too much (negative: too little) by the share",
+                 .sentence = side.words + " encoder counts too much (negative: too little)",
                  .unit = "1",
                  .range = {-kMostLost, 1.0},
                  .seen = own});
@@ -98,20 +98,20 @@ void add_radii(std::vector<FaultType>& all, const Model& model, const Side& side
   const Eigen::MatrixXd own = of_joint(model.motion, side.joint), ground = of_joint(model.input, side.joint);
   const Interval range{-kMostRadius, kMostRadius};
   all.push_back({.name = "wheel_radius" + side.suffix,
-                 .sentence = side.words + " radius changes by the share",
+                 .sentence = side.words + " radius changes",
                  .unit = "1",
                  .range = range,
                  .motion = own,
                  .ground = ground});
   all.push_back({.name = "wheel_radius_bump" + side.suffix,
-                 .sentence = side.words + " radius is larger once a turn, over 30°, by the share",
+                 .sentence = side.words + " radius is larger once a turn, over 30°",
                  .unit = "1",
                  .range = range,
                  .motion = own,
                  .ground = ground,
                  .profile = {.kind = FaultProfile::Kind::bump, .arc = kBump, .joint = side.joint}});
   all.push_back({.name = "wheel_slip" + side.suffix,
-                 .sentence = "the share of " + side.words + " way that slip takes",
+                 .sentence = "slip takes a share of " + side.words + " way",
                  .unit = "1",
                  .range = {-1.0, 1.0},
                  .motion = -own});
@@ -126,33 +126,33 @@ std::vector<FaultType> fault_catalogue(const Model& model, const Eigen::VectorXd
   const bool drive = model.name == "differential_drive";
   if (drive) {
     FaultType both{.name = "wheel_radius",
-                   .sentence = "both wheels' radii change by the share",
+                   .sentence = "both wheels' radii change",
                    .unit = "1",
                    .range = {-kMostRadius, kMostRadius},
                    .motion = Eigen::MatrixXd::Identity(c, c),
                    .ground = Eigen::MatrixXd::Identity(c, c)};
     all.push_back(both);
     both.name = "wheel_radius_drift";
-    both.sentence = "both wheels' radii change slowly, over 20 s, by the share";
+    both.sentence = "both wheels' radii change slowly, over 20 s";
     both.profile = {.kind = FaultProfile::Kind::drift, .rise = kDrift};
     all.push_back(both);
     for (const Side& side : sides_of(model)) {
       add_radii(all, model, side);
     }
     all.push_back({.name = "matched",
-                   .sentence = "the robot slips along its heading (10) at",
+                   .sentence = "the robot slips along its heading (10)",
                    .unit = "m/s",
                    .range = {-10.0, 10.0},
                    .slip = Eigen::Vector2d(1.0, 0.0)});
     if (!model.heading_used) {
       all.push_back({.name = "unmatched",
-                     .sentence = "the robot slips across its heading, to the right (11), at",
+                     .sentence = "the robot slips across its heading, to the right (11)",
                      .unit = "m/s",
                      .range = {-10.0, 10.0},
                      .lateral = -1.0});
     }
     all.push_back({.name = "slip_yaw",
-                   .sentence = "the robot slips about the vertical at",
+                   .sentence = "the robot slips about the vertical",
                    .unit = "rad/s",
                    .range = {-10.0, 10.0},
                    .slip = Eigen::Vector2d(0.0, 1.0)});
@@ -171,7 +171,7 @@ std::vector<FaultType> fault_catalogue(const Model& model, const Eigen::VectorXd
     lost[at] = -mass->per_physical;
     const double whole = std::max(theta[at] / mass->per_physical, 1e-3);
     all.push_back({.name = "payload_lost",
-                   .sentence = "mass is lost (negative: gained), in line with the axle,",
+                   .sentence = "mass is lost (negative: gained), in line with the axle",
                    .unit = mass->physical_unit,
                    .range = {-10.0 * whole, whole},
                    .theta = lost});

@@ -41,6 +41,7 @@ TEST(RobotSchema, CoversWhatIsWritten) {
   robot.encoder_counts_per_turn = 4096.0;
   robot.limits["effort"] = 1.0;
   robot.motor.emplace();
+  robot.kinematic_window = 0.5;
   const Json document = schema();
   const Json written = to_json(robot);
   for (const auto& member : written.items()) {
