@@ -17,6 +17,8 @@ using Run = std::function<int(const std::string& command_line)>;
 
 /// wheelwright check model.json LOG...
 [[nodiscard]] Run add_check(CLI::App& program);
+/// wheelwright choose LOG... --robot robot.yaml
+[[nodiscard]] Run add_choose(CLI::App& program);
 /// wheelwright commission LOG... --robot robot.yaml
 [[nodiscard]] Run add_commission(CLI::App& program);
 /// wheelwright design --model model.json --for bounds

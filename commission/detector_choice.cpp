@@ -22,6 +22,7 @@ constexpr double kMostBetaStep = 0.5;    // βh
 constexpr double kShareOfLog = 0.2;      // of the longest segment that a filter may take to settle
 constexpr double kSpeedMemory = 3.0;     // time constants of a filter on speeds
 constexpr double kBetaTolerance = 0.01;  // of log β
+constexpr double kSameBeta = 1e-9;       // relative
 
 struct Wish {
   FilterDesign filter;
@@ -248,7 +249,7 @@ class Search {
           }
           const FilterDesign design = design_of(start.order, std::exp(log_beta));
           for (const DetectorCandidate& known : choice_.candidates) {
-            if (known.filter.order == design.order && known.filter.beta == design.beta) {
+            if (known.filter.order == design.order && std::abs(known.filter.beta / design.beta - 1.0) < kSameBeta) {
               return known.size;
             }
           }

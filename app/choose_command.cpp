@@ -1,0 +1,201 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <charconv>
+#include <cmath>
+#include <memory>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include <wheelwright/commission/detector_choice.hpp>
+#include <wheelwright/core/error.hpp>
+#include <wheelwright/io/choice_json.hpp>
+#include <wheelwright/io/csv.hpp>
+#include <wheelwright/io/model_file.hpp>
+#include <wheelwright/io/robot_file.hpp>
+#include <wheelwright/report/commission_report.hpp>
+
+#include "commands.hpp"
+#include "common.hpp"
+#include "progress.hpp"
+
+namespace wheelwright::app {
+namespace {
+
+struct Arguments {
+  std::vector<std::filesystem::path> logs;
+  std::filesystem::path robot;
+  std::vector<std::string> faults;
+  DetectorChoiceOptions choice;
+  CommonOptions common;
+};
+
+constexpr const char* kHelp =
+    "Chooses the filter's order, α and β and the decision rule for the faults that are to be seen, under a stated "
+    "guarantee against false alarms, and says what every other choice costs.";
+
+constexpr const char* kExamples =
+    "Every candidate is commissioned on LOG and asked, for the motion of LOG, from what size on a fault is certain to "
+    "be\n"
+    "seen within the window (median over onsets while moving) and how soon a fault of the stated SIZE is. With --out,\n"
+    "model.json is the chosen detector, ready for `wheelwright detect`; choice.json has all candidates.\n\n"
+    "Examples:\n"
+    "  wheelwright choose drive.csv --robot robot.yaml --out choice\n"
+    "  wheelwright choose drive.csv --robot robot.yaml --fault wheel_radius=0.05 --fault payload_lost=2 --window 0.5\n"
+    "  wheelwright choose drive.csv --robot robot.yaml --false-alarms 1e-3\n\n"
+    "Exit code: 0 a detector was chosen, 1 no candidate is certain to see a stated fault, 2 bad input.";
+
+StatedFault stated(const std::string& text) {
+  const std::size_t at = text.find('=');
+  StatedFault fault{text.substr(0, at)};
+  if (at != std::string::npos) {
+    double size = 0.0;
+    const char* const end = text.data() + text.size();
+    const auto read = std::from_chars(text.data() + at + 1, end, size);
+    if (read.ec != std::errc() || read.ptr != end || !(size > 0.0) || !std::isfinite(size)) {
+      throw InputError("--fault '" + text + "': expected NAME or NAME=SIZE with a SIZE > 0, e.g. wheel_radius=0.05");
+    }
+    fault.size = size;
+  }
+  return fault;
+}
+
+std::string shown(double value, const char* form) {
+  return std::isfinite(value) ? fmt::format(fmt::runtime(form), value) : "-";
+}
+
+const char* words(Guarantee guarantee) {
+  switch (guarantee) {
+    case Guarantee::never: return "never";
+    case Guarantee::hourly: return "hourly";
+    case Guarantee::extrapolated: return "extrapol.";
+  }
+  return "";
+}
+
+std::string cost(const DetectorCandidate& candidate, const DetectorCandidate& chosen) {
+  if (!std::isfinite(candidate.size)) {
+    return "not certain";
+  }
+  std::string text = fmt::format("size {:+.1f} %", 100.0 * (candidate.size / chosen.size - 1.0));
+  if (std::isfinite(candidate.delay) && std::isfinite(chosen.delay)) {
+    text += fmt::format(", delay {:+.3f} s", candidate.delay - chosen.delay);
+  }
+  return text;
+}
+
+std::string table(const DetectorChoice& choice) {
+  std::string out = fmt::format(
+      "smallest certain size over the stated one, within {:g} s, and delay of the stated size: medians, worst fault\n"
+      "{:>5} {:>8} {:>10} {:>7} {:>8} {:>8}  {}\n",
+      choice.window, "order", "beta", "alarms", "k of n", "size", "delay", "against the chosen one");
+  const DetectorCandidate& chosen = choice.candidates.front();
+  for (const DetectorCandidate& candidate : choice.candidates) {
+    out +=
+        fmt::format("{:>5} {:>8.4g} {:>10} {:>7} ", candidate.filter.order, candidate.filter.beta,
+                    words(candidate.guarantee), fmt::format("{}/{}", candidate.persistence.k, candidate.persistence.n));
+    if (!candidate.failure.empty()) {
+      out += fmt::format("no detector: {}\n", candidate.failure);
+      continue;
+    }
+    const std::string note =
+        candidate.origin == "grid" || candidate.origin == "refined" ? "" : " (" + candidate.origin + ")";
+    out += fmt::format("{:>8} {:>8}  {}{}\n", shown(candidate.size, "{:.3f}"), shown(candidate.delay, "{:.3f}"),
+                       &candidate == &chosen && choice.chosen ? "chosen" : cost(candidate, chosen), note);
+  }
+  return out;
+}
+
+std::string faults(const DetectorChoice& choice) {
+  std::string out;
+  for (const StatedMargin& m : choice.candidates.front().faults) {
+    out +=
+        fmt::format("{} {}: certain from {} on at half of {} onsets, from {} at all; one of {:g} after {}\n", m.fault,
+                    m.side > 0.0 ? "growing" : "shrinking", shown(m.median, "{:.3g}"), m.onsets,
+                    shown(m.worst, "{:.3g}"), m.asked, std::isfinite(m.delay) ? fmt::format("{:g} s", m.delay) : "-");
+  }
+  return out;
+}
+
+int run(const Arguments& a) {
+  DetectorChoiceOptions options = a.choice;
+  for (const std::string& text : a.faults) {
+    options.trial.faults.push_back(stated(text));
+  }
+  make_directory(a.common);
+  const Robot robot = read_robot(a.robot);
+  CsvOptions reader = reader_options(a.common);
+  reader.only = useful_columns(robot);
+  CsvLog log(a.logs, reader);
+  require_columns(log, needed_columns(robot));
+  Progress progress(a.common.quiet);
+  options.trial.threads = static_cast<std::size_t>(a.common.threads);
+  options.progress = [&](std::string_view stage, double share) { progress.tell(stage, share); };
+  const DetectorChoice choice = choose_detector(log, robot, options);
+
+  std::vector<std::string> logs;
+  for (const auto& path : a.logs) {
+    logs.push_back(path.string());
+  }
+  const Json json = to_json(choice, a.robot.string(), logs, software());
+  if (!a.common.out.empty()) {
+    if (choice.chosen) {
+      CommonOptions files = a.common;
+      files.json = false;
+      publish(files, to_json(*choice.chosen, log.report(), software()), "model.json",
+              commission_report(*choice.chosen, report_context(a.common, log.report(), log)));
+    }
+    write_json(a.common.out / "choice.json", json);
+  }
+  if (a.common.json) {
+    fmt::print("{}\n", json_text(json));
+  } else if (!a.common.quiet) {
+    fmt::print("{}", table(choice));
+    fmt::print("{}", faults(choice));
+    for (const std::string& name : choice.hopeless) {
+      fmt::print("does not count: no candidate is certain to see {} at half of the onsets\n", name);
+    }
+    for (const std::string& note : choice.notes) {
+      fmt::print("{}\n", note);
+    }
+    if (choice.chosen) {
+      fmt::print("for the robot file:\n{}\n", robot_file_line(choice.candidates.front().filter));
+    }
+  }
+  return choice.chosen ? kDone : kNo;
+}
+
+}  // namespace
+
+Run add_choose(CLI::App& program) {
+  auto a = std::make_shared<Arguments>();
+  CLI::App& command = *program.add_subcommand("choose", kHelp);
+  command.add_option("LOG", a->logs, "CSV logs (also .gz, .zst) of fault-free driving; several are taken together")
+      ->required();
+  command.add_option("--robot", a->robot, "Robot file (YAML)")->required()->type_name("FILE");
+  command
+      .add_option(
+          "--fault", a->faults,
+          "A fault of the catalogue that is to be seen, and its size (may be repeated; default: wheel_radius and "
+          "wheel_radius_right of 20 %)")
+      ->type_name("NAME=SIZE");
+  command.add_option("--window", a->choice.trial.window, "Time after the onset in which it is to be seen, s")
+      ->type_name("S")
+      ->check(CLI::Range(1e-3, 3600.0))
+      ->capture_default_str();
+  command
+      .add_option("--false-alarms", a->choice.trial.false_alarms,
+                  "Probability of a false alarm in an hour that is allowed; 0: never within the declared noise")
+      ->type_name("P")
+      ->check(CLI::Range(0.0, 0.5))
+      ->capture_default_str();
+  add_common(command, a->common);
+  add_map(command, a->common);
+  command.footer(kExamples);
+  return [a](const std::string& command_line) {
+    a->common.command_line = command_line;
+    return run(*a);
+  };
+}
+
+}  // namespace wheelwright::app

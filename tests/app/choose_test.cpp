@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+// `wheelwright choose`, as a user runs it.
+#include "app/program.hpp"
+
+namespace wheelwright {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using testing::Outcome;
+
+class Choose : public testing::ProgramTest {
+ protected:
+  void prepare() const {
+    put("learn.yaml",
+        "robot: robot.yaml\nparameters: {mass: 21.0, yaw_inertia: 0.9, viscous_linear: 4.0, viscous_yaw: 0.5}\n"
+        "trajectory: {kind: commissioning, speed: 0.6, yaw_rate: 1.2, period: 2}\nduration: 10\n"
+        "sensors: {effort: 0.02, encoder_counts_per_turn: 4096, log: [angles]}\n");
+    ASSERT_EQ(run("simulate learn.yaml --out learn.csv --quiet").code, 0);
+  }
+};
+
+TEST_F(Choose, GivesADetectorAndWhatTheOthersCost) {
+  prepare();
+  const Outcome told =
+      run("choose learn.csv --robot robot.yaml --fault wheel_radius=0.2 --window 0.5 --out choice --quiet");
+  ASSERT_EQ(told.code, 0) << told.err;
+  EXPECT_THAT(told.out, IsEmpty());
+  EXPECT_THAT(names_in("choice"), ElementsAre("choice.json", "model.json", "report.html"));
+  const Json json = read_json(path("choice/choice.json"));
+  if (has_validator()) {
+    EXPECT_EQ(misfit("choice.schema.json", "choice/choice.json"), "");
+    EXPECT_EQ(misfit("model.schema.json", "choice/model.json"), "");
+  }
+  // The model is the chosen filter's; its line in a robot file gives commissioning the same thresholds.
+  const Json model = read_json(path("choice/model.json"));
+  EXPECT_EQ(model.at("filter").at("beta"), json.at("chosen").at("beta"));
+  const std::string line = json.at("robot_file").get<std::string>();
+  put("chosen.yaml", bytes(path("robot.yaml")) + line + "\n");
+  ASSERT_EQ(run("commission learn.csv --robot chosen.yaml --out again --quiet").code, 0);
+  EXPECT_EQ(read_json(path("again/model.json")).at("parameters"), model.at("parameters"));
+}
+
+TEST_F(Choose, TellsWhatIsWrongWithAQuestion) {
+  prepare();
+  const std::string choose = "choose learn.csv --robot robot.yaml ";
+  const Outcome name = run(choose + "--fault wheel_radios=0.1");
+  EXPECT_EQ(name.code, 2);
+  EXPECT_THAT(name.err, AllOf(HasSubstr("wheel_radios"), HasSubstr("wheel_radius_right")));
+  for (const std::string wrong : {"--fault wheel_radius=much", "--fault wheel_radius=-0.1", "--fault wheel_radius=3",
+                                  "--false-alarms 1.5", "--window 0"}) {
+    const Outcome outcome = run(choose + wrong);
+    EXPECT_EQ(outcome.code, 2) << wrong;
+    EXPECT_THAT(outcome.err, ::testing::Not(IsEmpty())) << wrong;
+  }
+}
+
+}  // namespace
+}  // namespace wheelwright
