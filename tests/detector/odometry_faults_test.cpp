@@ -11,7 +11,9 @@
 #include <wheelwright/detector/margins.hpp>
 #include <wheelwright/detector/odometry_faults.hpp>
 
+#include "detector/detectability.hpp"
 #include "support/drives.hpp"
+#include "support/random.hpp"
 
 namespace wheelwright {
 namespace {
@@ -180,6 +182,116 @@ TEST(OdometryFaults, LateralSlipOnAStraightLineIsForThePose) {
     EXPECT_GT(first, 6.0);
     EXPECT_LE(first, 7.0 + 0.02);
   }
+}
+
+// Robots of all kinds with a pose, faults that a pose can see: what their own motion promises is kept.
+void keep_promises(std::uint64_t first, std::uint64_t last, int& certain) {
+  const std::vector<Simulated> kinds = {{"wheel_radius", Fault::Kind::wheel_radius, 0.0, 0.0},
+                                        {"wheel_radius_right", Fault::Kind::wheel_radius_right, 0.0, 0.0},
+                                        {"wheel_radius_left", Fault::Kind::wheel_radius_left, 0.0, 0.0},
+                                        {"matched", Fault::Kind::matched, 0.0, 0.0},
+                                        {"unmatched", Fault::Kind::unmatched, 0.0, 0.0},
+                                        {"slip_yaw", Fault::Kind::slip_yaw, 0.0, 0.0}};
+  for (std::uint64_t seed = first; seed < last; ++seed) {
+    testing_support::Random random(seed);
+    Scenario learning = testing_support::random_robot(seed);
+    learning.duration = 20.0;
+    learning.sensors.pose = true;
+    learning.robot.noise.position.value = 0.001 + 0.004 * random.unit();
+    learning.robot.noise.heading.value = 0.001 + 0.004 * random.unit();
+    learning.sensors.position = *learning.robot.noise.position.value;
+    learning.sensors.heading = *learning.robot.noise.heading.value;
+    Simulation log(learning);
+    const Commissioning result = commission(log, learning.robot);
+    ASSERT_TRUE(result.model.kinematic) << "seed " << seed << ": " << result.kinematic.message;
+    const CommissionedModel& m = result.model;
+    const KinematicModel& k = *m.kinematic;
+    for (const Simulated& kind : kinds) {
+      const FaultType fault = find_fault(m.model, kind.name);
+      const double side = random.unit() < 0.5 ? 1.0 : -1.0,
+                   onset = 5.0 + std::floor(2.0 * learning.rate * random.unit()) / learning.rate + 0.01 / learning.rate;
+      Scenario drive = learning;
+      drive.seed = 7000 + seed;
+      drive.duration = 9.0;
+      drive.trajectory = {.kind = random.unit() < 0.5 ? Trajectory::Kind::multi_sine : Trajectory::Kind::figure_eight,
+                          .speed = 0.5,
+                          .yaw_rate = 0.8,
+                          .period = 6.0};
+      const bool radius = kind.kind <= Fault::Kind::wheel_radius_left;
+      const auto with = [&](double size, bool noisy) {
+        Scenario s = drive;
+        s.faults = {{.kind = kind.kind,
+                     .magnitude = side * size * (radius ? s.robot.wheel_radius : 1.0),
+                     .profile = {.onset = onset}}};
+        if (!noisy) {
+          s.sensors.position = s.sensors.heading = s.sensors.effort = 0.0;
+          s.sensors.encoder_counts_per_turn.reset();
+        }
+        return s;
+      };
+      const auto promised = [&](double size) {
+        Simulation own(with(size, false));
+        OdometryReference reference = read_odometry(own, OdometryFilter(k.measurement, k.window, k.errors), m.model);
+        const auto& t = reference.motion.t;
+        const auto at = static_cast<std::size_t>(std::lower_bound(t.begin(), t.end(), onset) - t.begin());
+        for (std::size_t i = 0; i < t.size(); ++i) {
+          reference.motion.settled[i] = i == at;
+        }
+        const auto margins =
+            margins_along(reference.motion, {fault}, ThresholdRule(Polytope(k.facets, k.box), k.estimate),
+                          [&](const FaultType& f) {
+                            return std::make_unique<OdometryFaultRows>(f, m.model, k.measurement, reference, k.box);
+                          },
+                          {.windows = {1.5}});
+        return margins[side > 0.0 ? 0 : 1].onsets.at(0).certain.at(0);
+      };
+      double size = promised(0.0);
+      bool found = false;
+      for (int turn = 0; turn < 12 && size < 0.5; ++turn) {
+        const double needed = promised(size);
+        found = needed <= size;
+        if (found) {
+          break;
+        }
+        size = 1.001 * needed;
+      }
+      if (!found) {
+        continue;
+      }
+      ++certain;
+      Simulation broken(with(size, true));
+      KinematicDetector detector = make_detector(k);
+      std::vector<std::size_t> pick;
+      for (const auto& name : k.measurement.columns()) {
+        pick.push_back(broken.find(name).value());
+      }
+      std::vector<double> sample(pick.size());
+      double alarm = kInfinity;
+      LogBlock block;
+      while (broken.next(block)) {
+        for (std::size_t row = 0; row < block.rows(); ++row) {
+          for (std::size_t c = 0; c < pick.size(); ++c) {
+            sample[c] = block.columns[pick[c]][row];
+          }
+          alarm = detector.step(block.t[row], sample).fault ? std::min(alarm, block.t[row]) : alarm;
+        }
+      }
+      ASSERT_GE(alarm, onset) << kind.name << ", seed " << seed;
+      ASSERT_LE(alarm, onset + 1.5 + 1.0 / drive.rate) << kind.name << " of " << side * size << ", seed " << seed;
+    }
+  }
+}
+
+TEST(OdometryFaults, PromisesAreKept) {
+  int certain = 0;
+  keep_promises(1, 3, certain);
+  EXPECT_GE(certain, 8);
+}
+
+TEST(SlowOdometryFaults, PromisesAreKeptInThreeHundredRuns) {
+  int certain = 0;
+  keep_promises(10, 60, certain);
+  EXPECT_GE(certain, 200);
 }
 
 }  // namespace
