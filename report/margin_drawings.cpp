@@ -77,7 +77,8 @@ std::string delay_curves(const FaultMargins& margins, const MarginSurvey& survey
     }
     curves.push_back(std::move(curve));
   }
-  if (!(high > 0.0) || survey.windows.size() < 2) {
+  const bool drawn = std::any_of(curves.begin(), curves.end(), [](const Curve& c) { return c.median.size() > 1; });
+  if (!drawn) {
     return {};
   }
   constexpr double width = 520.0, height = 260.0, left = 70.0, right = 170.0, top = 10.0, bottom = 40.0;
