@@ -45,10 +45,13 @@ std::vector<StatedFault> faults_for(const Robot& robot, const std::vector<Stated
 std::vector<double> grid(int order, const Measurement& measurement, const Survey& seen,
                          const DetectorChoiceOptions& options) {
   const double memory = measurement.motion == MotionKind::speed ? kSpeedMemory : FilterDesign{}.settle;
-  const double fastest = kMostBetaStep / seen.median_step;
+  const double fastest = kMostBetaStep / check::positive(seen.median_step, "sampling step of the log");
   const double slowest =
       std::min(std::max(order / options.trial.window, memory / (kShareOfLog * seen.longest_segment)), fastest);
-  const double steps = std::max(1.0, std::ceil(std::log(fastest / slowest) / std::log(options.beta_factor)));
+  if (!(slowest < fastest)) {
+    return {fastest};
+  }
+  const double steps = std::ceil(std::log(fastest / slowest) / std::log(options.beta_factor));
   std::vector<double> betas;
   for (double k = 0.0; k <= steps; k += 1.0) {
     betas.push_back(slowest * std::pow(fastest / slowest, k / steps));
@@ -82,7 +85,12 @@ std::vector<Wish> wishes(const LogTable& log, const Robot& robot, const Detector
     if (robot.filter.beta) {
       all.push_back({design_of(order, *robot.filter.beta), "the robot file's"});
     } else {
-      all.push_back({choose_filter(source, model, measurement, order, seen).design, "what commissioning takes"});
+      // As settle() asks: for the widest model that the robot may have.
+      Robot wide = robot;
+      wide.parameters = robot.parameters.value_or(possible_parameters(robot));
+      const FilterChoice taken =
+          choose_filter(source, make_model(wide), measurement, order, seen, options.trial.commission.filter_choice);
+      all.push_back({taken.design, "what commissioning takes"});
     }
   }
   return all;
