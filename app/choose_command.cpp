@@ -178,6 +178,7 @@ Run add_choose(CLI::App& program) {
           "--fault", a->faults,
           "A fault of the catalogue that is to be seen, and its size (may be repeated; default: wheel_radius and "
           "wheel_radius_right of 20 %)")
+      ->allow_extra_args(false)
       ->type_name("NAME=SIZE");
   command.add_option("--window", a->choice.trial.window, "Time after the onset in which it is to be seen, s")
       ->type_name("S")

@@ -154,7 +154,8 @@ std::string assumption(Guarantee guarantee, double false_alarms) {
              "it does there";
     case Guarantee::hourly:
       return fmt::format(
-          "a false alarm in an hour of driving has a probability of at most {:g}, learning counted in, while the robot "
+          "a false alarm in an hour of driving has a probability of at most {:g}, learning and choosing from this log "
+          "counted in, while the robot "
           "is the model's and noise is independent from sample to sample, of zero mean and inside its declared bounds "
           "(an encoder's rounding is that only while wheels turn by several counts a sample)",
           false_alarms);
@@ -210,6 +211,7 @@ class Search {
     const std::vector<Wish> all = wishes(log_, *robot_, options_, choice_.notes);
     check::that(!all.empty(), "log", "columns for a filter of order 1 or 2");
     choice_.candidates.resize(all.size());
+    options_.trial.tried = all.size() + options_.most_refinements;
     TrialOptions trial = options_.trial;
     trial.threads = 1;
     for_all(

@@ -8,9 +8,9 @@
 /// - **[l, u] or ρ**: [l, u] lies inside [−ρ, ρ], so it is never less sensitive, at the same guarantee.
 /// - **k of n**, under bounds that no healthy instant exceeds: an alarm of k of n needs an instant outside, which is
 ///   an alarm of 1 of 1 that is no later. It only loses; candidates show how much. (It would pay against noise beyond
-///   its bounds, which is what the guarantee rules out. Under an hourly guarantee k exceedances are needed for a false
-///   alarm, so by Markov's inequality each instant may err k times as often; the bounds grow with the root of a logarithm, so that is worth
-///   few per cent, and learning has no part in it.)
+///   its bounds, which is what the guarantee rules out. Under an hourly guarantee a false alarm takes k exceedances, so
+///   that by Markov's inequality each instant may err k times as often; bounds grow with the root of the logarithm of
+///   that, which is worth few per cent, and learning gains nothing.)
 /// - **a window**, over which decisions are averaged: the filter is one, of length about order/β.
 #pragma once
 
@@ -50,13 +50,15 @@ struct DetectorChoice {
 };
 
 /// Tries filters of order 1 (where speeds are measured) and 2 on a logarithmic grid over β, beside those that the robot
-/// file or commission() would take and the paper's (order 1, β = 20), and takes the one with the least `size`: the largest,
-/// over the stated faults and sides, of the smallest size that is certain within the window (median over onsets while
-/// moving) over the stated size. Sizes within `tie` of the least are ties: the shortest delay wins. log β is refined between
-/// the best one's neighbours. β spans from order/β = window, as far as the log's length allows, to βh = 0.5.
+/// file or commission() would take and the paper's (order 1, β = 20), and takes the one with the least `size`: the
+/// largest, over the stated faults and sides, of the smallest size that is certain within the window (median over
+/// onsets while moving) over the stated size. Sizes within `tie` of the least are ties: the shortest delay wins. log β is
+/// refined between the best one's neighbours. β spans from order/β = window, as far as the log's length allows, to
+/// βh = 0.5.
 ///
-/// It looks at the torque residual only. Commissioning and margins are from the same log: a choice among some twenty
-/// filters by order statistics of margins, which are proofs for each of them, whatever was chosen.
+/// It looks at the torque residual only. All candidates learn from the log that they are judged on: margins are proofs
+/// for each of them, whichever is chosen, and an hourly guarantee counts all of them in (hourly_confidence; trial.tried
+/// is set to their number).
 ///
 /// Deterministic, whatever the number of threads. Throws as try_detector, and InputError as find_measurement.
 [[nodiscard]] DetectorChoice choose_detector(LogSource& log, const Robot& robot,

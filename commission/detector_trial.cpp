@@ -43,7 +43,7 @@ CommissionOptions promise(const TrialOptions& options, const LogTable& log, std:
     const auto rows = static_cast<double>(log.rows());
     const double step = median_step(log.t);
     commissioning.noise_mode = NoiseMode::statistical;
-    commissioning.confidence = hourly_confidence(options.false_alarms, rows, step);
+    commissioning.confidence = hourly_confidence(options.false_alarms, rows, step, options.tried);
     commissioning.extrapolation.risk = options.false_alarms / static_cast<double>(outputs);
     commissioning.extrapolation.horizon = std::max(1.0, rows_of_an_hour(step) / rows);
   }
@@ -157,10 +157,11 @@ Guarantee guarantee_of(const Commissioning& result) {
 
 }  // namespace
 
-double hourly_confidence(double false_alarms, double rows, double step) {
+double hourly_confidence(double false_alarms, double rows, double step, std::size_t tried) {
   check::that(false_alarms > 0.0 && false_alarms < 1.0, "false alarms an hour", "a probability inside (0, 1)");
   check::that(rows >= 1.0, "rows", "at least 1");
-  return 1.0 - false_alarms * rows / (rows + rows_of_an_hour(step));
+  check::that(tried >= 1, "tried", "at least 1");
+  return 1.0 - false_alarms * rows / (static_cast<double>(tried) * rows + rows_of_an_hour(step));
 }
 
 void validate(const TrialOptions& options, const Robot& robot) {

@@ -42,6 +42,7 @@ struct TrialOptions {
   double false_alarms = 0.0;     ///< probability of one in an hour, in [0, 1); 0: never
   double onset_step = 0.5;       ///< s between the onsets that are tried, at least
   std::size_t most_onsets = 60;  ///< over the log; the same for every detector, as far as its filter has settled there
+  std::size_t tried = 1;         ///< detectors that are tried on this log, of which one is chosen (hourly_confidence)
   CommissionOptions commission{};  ///< guarantee and persistence apart
   std::size_t threads = 1;
 };
@@ -73,10 +74,12 @@ struct DetectorCandidate {
 };
 
 /// Confidence at which noise is propagated (PropagationOptions::confidence, for the log's `rows`) so that, with
-/// probability at least 1 − `false_alarms`, every row of the log *and* of an hour of driving at `step` obeys its bound.
-/// Both use the same bounds, which the log's rows earn as many of the failures as they are rows:
-/// 1 − confidence = P·rows/(rows + rows of an hour). Throws InvalidArgument unless 0 < false_alarms < 1, rows >= 1, step > 0.
-[[nodiscard]] double hourly_confidence(double false_alarms, double rows, double step);
+/// probability at least 1 − `false_alarms`, every row of an hour of driving at `step` (s) *and* of the log, under each
+/// of `tried` filters of which one is chosen, obeys its bound: the true θ lies in the set that was learned, and no alarm
+/// follows. All have the same bounds, so the union bound shares P out by rows: 1 − confidence =
+/// P·rows/(tried·rows + rows of an hour). Throws InvalidArgument unless 0 < false_alarms < 1, rows >= 1, step > 0 and
+/// tried >= 1.
+[[nodiscard]] double hourly_confidence(double false_alarms, double rows, double step, std::size_t tried = 1);
 
 /// A model and its candidates, one for each persistence.
 struct Trial {
@@ -84,15 +87,15 @@ struct Trial {
   std::vector<DetectorCandidate> candidates;
 };
 
-/// Commissions `robot` on `log` with `filter`, under a guarantee of options.false_alarms, and asks for the margins of the
-/// stated faults along the same log under each of `persistences`. Commissioning that fails, for what the data say or
-/// because the filter does not fit the log, is in DetectorCandidate::failure. Throws InvalidArgument for a fault that is
-/// none of the catalogue's, or a size that is outside its range.
+/// Commissions `robot` on `log` with `filter`, under a guarantee of options.false_alarms, and asks for the margins of
+/// the stated faults along the same log under each of `persistences`. Commissioning that fails, for what the data say
+/// or because the filter does not fit the log, is in DetectorCandidate::failure. Throws as validate().
 [[nodiscard]] Trial try_detector(const LogTable& log, const Robot& robot, const FilterDesign& filter,
                                  const std::vector<Persistence>& persistences, const std::string& origin,
                                  const TrialOptions& options);
 
-/// The same, throwing only: checks options, names of faults and sizes (as far as the robot file tells the ranges).
+/// Throws InvalidArgument unless lengths are positive, the probability is in [0, 1), and every fault is one of the
+/// catalogue's, stated once, with a size inside its range (of a mass: when it is found).
 void validate(const TrialOptions& options, const Robot& robot);
 
 }  // namespace wheelwright

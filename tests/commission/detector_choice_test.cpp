@@ -89,7 +89,8 @@ TEST(DetectorChoice, SeveralOfSeveralNeverGainUnderTheSameBounds) {
 
 // The confidence leaves P for the rows of the log and of an hour together, at equal bounds.
 TEST(DetectorChoice, AnHourOfFalseAlarmsAsAConfidence) {
-  EXPECT_DOUBLE_EQ(1.0 - hourly_confidence(0.25, 360000.0, 0.01), 0.125);  // a log of one hour
+  EXPECT_DOUBLE_EQ(1.0 - hourly_confidence(0.25, 360000.0, 0.01), 0.125);    // a log of one hour
+  EXPECT_DOUBLE_EQ(1.0 - hourly_confidence(0.5, 360000.0, 0.01, 3), 0.125);  // three learn from it, one drives
   for (const double rows : {1200.0, 1e7}) {
     const double failures = 1.0 - hourly_confidence(1e-3, rows, 0.01);
     EXPECT_NEAR(failures / rows * (rows + 360000.0), 1e-3, 1e-9);
