@@ -52,8 +52,8 @@ struct DetectorChoice {
 /// Tries filters of order 1 (where speeds are measured) and 2 on a logarithmic grid over β, beside those that the robot
 /// file or commission() would take and the paper's (order 1, β = 20), and takes the one with the least `size`: the
 /// largest, over the stated faults and sides, of the smallest size that is certain within the window (median over
-/// onsets while moving) over the stated size. Sizes within `tie` of the least are ties: the shortest delay wins. log β is
-/// refined between the best one's neighbours. β spans from order/β = window, as far as the log's length allows, to
+/// onsets while moving) over the stated size. Sizes within `tie` of the least are ties: the shortest delay wins. log β
+/// is refined between the best one's neighbours. β spans from order/β = window, as far as the log's length allows, to
 /// βh = 0.5.
 ///
 /// It looks at the torque residual only. All candidates learn from the log that they are judged on: margins are proofs

@@ -75,8 +75,8 @@ struct DetectorCandidate {
 
 /// Confidence at which noise is propagated (PropagationOptions::confidence, for the log's `rows`) so that, with
 /// probability at least 1 − `false_alarms`, every row of an hour of driving at `step` (s) *and* of the log, under each
-/// of `tried` filters of which one is chosen, obeys its bound: the true θ lies in the set that was learned, and no alarm
-/// follows. All have the same bounds, so the union bound shares P out by rows: 1 − confidence =
+/// of `tried` filters of which one is chosen, obeys its bound: the true θ lies in the set that was learned, and no
+/// alarm follows. All have the same bounds, so the union bound shares P out by rows: 1 − confidence =
 /// P·rows/(tried·rows + rows of an hour). Throws InvalidArgument unless 0 < false_alarms < 1, rows >= 1, step > 0 and
 /// tried >= 1.
 [[nodiscard]] double hourly_confidence(double false_alarms, double rows, double step, std::size_t tried = 1);
