@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/filter/exact.hpp>
@@ -108,31 +109,28 @@ SignalErrors propagate(const Model& model, const FilterDesign& design, const Mea
   check::non_negative(sensors.motion, "motion error bound");
   check::non_negative(sensors.effort, "effort error bound");
   check::non_negative(sensors.heading, "heading error bound");
-  KernelNorms norms = worst_case_norms(design, measurement.motion);
-  double factor = 1.0;
+  const KernelNorms norms = worst_case_norms(design, measurement.motion);
+  std::optional<KernelNorms> statistical;
   if (options.mode == NoiseMode::statistical) {
     check::that(options.confidence > 0.0 && options.confidence < 1.0, "confidence", "a number inside (0, 1)");
     check::that(options.rows >= 1.0, "rows", "at least 1");
     const KernelNorms energy = statistical_norms(design, measurement.motion, options.largest_step);
     // Hoeffding (1963): P(|Σ w_k n_k| > s) <= 2 exp(−s²/(2 n̄² Σ w_k²)), and as many events as rows have entries.
     const double entries = options.rows * static_cast<double>(2 * model.coordinates.size() + model.n());
-    factor = std::sqrt(2.0 * std::log(2.0 * entries / (1.0 - options.confidence)));
-    norms.acceleration = std::min(norms.acceleration, factor * energy.acceleration);
-    norms.speed = std::min(norms.speed, factor * energy.speed);
-    norms.effort = std::min(norms.effort, factor * energy.effort);
+    const double factor = std::sqrt(2.0 * std::log(2.0 * entries / (1.0 - options.confidence)));
+    statistical = KernelNorms{factor * energy.acceleration, factor * energy.speed, factor * energy.effort};
   }
-  // Independent noise of several joints adds up in squares, the worst case in absolute values.
-  const auto across = [&](const Eigen::MatrixXd& map) -> Eigen::VectorXd {
-    if (options.mode == NoiseMode::statistical) {
-      return map.rowwise().norm();
-    }
-    return map.cwiseAbs().rowwise().sum();
+  // Independent noise of several joints adds up in squares, the worst case in absolute values: each bound holds as a
+  // whole, so the smaller one is taken last.
+  const auto across = [&](const Eigen::MatrixXd& map, double worst, double likely) -> Eigen::VectorXd {
+    const Eigen::VectorXd sum = worst * map.cwiseAbs().rowwise().sum();
+    return statistical ? sum.cwiseMin(likely * map.rowwise().norm()) : sum;
   };
-  const Eigen::VectorXd motion = across(model.motion) * sensors.motion;
+  const KernelNorms likely = statistical.value_or(norms);
   SignalErrors errors;
-  errors.acceleration = norms.acceleration * motion;
-  errors.speed = norms.speed * motion;
-  errors.output = norms.effort * sensors.effort * across(model.input);
+  errors.acceleration = sensors.motion * across(model.motion, norms.acceleration, likely.acceleration);
+  errors.speed = sensors.motion * across(model.motion, norms.speed, likely.speed);
+  errors.output = sensors.effort * across(model.input, norms.effort, likely.effort);
   errors.heading = sensors.heading;
   errors.joint_sample = sensors.motion;
   if (measurement.motion != MotionKind::speed && sensors.motion > 0.0) {
