@@ -112,12 +112,12 @@ std::optional<double> FaultMargin::smallest_certain(const FaultRow& row, double 
 double FaultMargin::largest_hidden(const FaultRow& row, double largest, double side, double share,
                                    std::size_t channel) {
   double slope = 2.0 * row.doubt;  // of the threshold and of doubt, per unit of κ, at most
-  std::vector<double> inward(row.y.size());
-  for (std::size_t j = 0; j < inward.size(); ++j) {
-    slope += std::abs(row.s[j]) * largest_size(rule_.set().hull().sides[j]);
-    inward[j] = std::abs(row.g2[j]);
+  double curvature = 0.0;          // |g2 θ|, at most
+  for (std::size_t j = 0; j < row.y.size(); ++j) {
+    const double size = largest_size(rule_.set().hull().sides[j]);
+    slope += std::abs(row.s[j]) * size;
+    curvature += std::abs(row.g2[j]) * size;
   }
-  const double curvature = rule_.set().hull().support(inward);
   double hidden = largest;
   for (const Direction direction : {Direction::up, Direction::down}) {
     const auto excess = [&](double kappa) { return possible_excess(row, kappa, side, share, channel, direction); };

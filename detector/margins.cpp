@@ -166,6 +166,8 @@ std::vector<FaultMargins> margins_along(const ReferenceMotion& motion, const std
   check::that(!options.windows.empty() && options.windows.front() > 0.0 &&
                   std::is_sorted(options.windows.begin(), options.windows.end()),
               "windows", "positive lengths in ascending order");
+  check::positive(options.onset_step, "onset step");
+  check::that(options.noise_share >= 0.0 && options.noise_share <= 1.0, "noise share", "a number from 0 to 1");
   const std::vector<std::size_t> onsets = choose_onsets(motion, options);
   check::that(!onsets.empty(), "drive", "a stretch in which the filter has settled and that is longer than a window");
   std::vector<FaultMargins> all;

@@ -76,7 +76,8 @@ using FaultRowsFactory = std::function<std::unique_ptr<FaultRows>(const FaultTyp
 /// Margins of `faults`, both sides where their range has two, for a detector with thresholds `rule` on the rows that
 /// `rows` makes, along `motion`. Every number is exact over the feasible set (fault_margin.hpp) for the motion as it
 /// stands; it is a promise for a robot that drives it, with the encoders seeing what a fault leaves of it.
-/// Throws InvalidArgument for windows that do not ascend, and for a motion without a settled stretch longer than a window.
+/// Throws InvalidArgument for windows that do not ascend, an onset step that is not positive, a share of noise outside
+/// [0, 1], and a motion without a settled stretch longer than a window.
 [[nodiscard]] std::vector<FaultMargins> margins_along(const ReferenceMotion& motion,
                                                       const std::vector<FaultType>& faults, const ThresholdRule& rule,
                                                       const FaultRowsFactory& rows, const MarginOptions& options = {});

@@ -92,6 +92,18 @@ TEST(FaultMargin, OfAFaultThatDoesNothingIsNone) {
   EXPECT_EQ(margin.largest_hidden(row.view(), 1e6, 1.0, 0.5), 1e6);
 }
 
+// A parameter of either sign: for θ = −5 the fault adds 10κ − 5κ², over the noise of 4.9 from κ = 1 − √0.02 on, though
+// not at κ = 2 and though θ is at most 1.
+TEST(FaultMargin, HidesNothingBehindTheSignOfAParameter) {
+  FaultMargin margin(ThresholdRule(interval(-5.0, 1.0), Eigen::VectorXd::Constant(1, 0.0)));
+  const OwnRow row{.y = {0.0}, .g1 = {-2.0}, .g2 = {1.0}, .s = {0.0}, .dY = {0.0}, .dy = 4.9};
+  const double smallest = 1.0 - std::sqrt(0.02);
+  ASSERT_TRUE(margin.possible(row.view(), 1.0001 * smallest, 1.0, 0.0));
+  const double hidden = margin.largest_hidden(row.view(), 2.0, 1.0, 0.0);
+  EXPECT_LE(hidden, smallest);
+  EXPECT_GT(hidden, (1.0 - 2e-3) * smallest);
+}
+
 Polytope random_set(Random& random, Eigen::Index p) {
   std::vector<HalfSpace> rows;
   const Eigen::VectorXd inside = Eigen::VectorXd::Constant(p, 1.0);

@@ -87,6 +87,22 @@ TEST(Margins, AreKept) {
   EXPECT_EQ(tally.hidden, 30);
 }
 
+TEST(Margins, RefuseWhatMakesNoSense) {
+  Box box;
+  box.sides = {{1.0, 2.0}};
+  const ThresholdRule rule(Polytope({}, box), Eigen::VectorXd::Ones(1));
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  std::vector<MarginOptions> bad(5);
+  bad[0].windows = {1.0, 0.5};
+  bad[1].windows = {};
+  bad[2].onset_step = nan;
+  bad[3].noise_share = nan;
+  bad[4].noise_share = 1.5;
+  for (const MarginOptions& options : bad) {
+    EXPECT_THROW(static_cast<void>(margins_along({}, {}, rule, {}, options)), InvalidArgument);
+  }
+}
+
 class SlowMarginsPart : public ::testing::TestWithParam<std::uint64_t> {};
 
 TEST_P(SlowMarginsPart, AreKeptInFiveHundredRuns) {
