@@ -22,14 +22,40 @@ struct Judged {
   double missing = kNone;
 };
 
+// The k-th smallest of the last n values, once there are as many: the size that k of n instants show.
+class Lasting {
+ public:
+  explicit Lasting(Persistence persistence) : persistence_(persistence) {}
+
+  double add(double size) {
+    last_.push_back(size);
+    if (last_.size() > persistence_.n) {
+      last_.erase(last_.begin());
+    }
+    if (last_.size() < persistence_.k) {
+      return kNone;
+    }
+    std::vector<double> sorted = last_;
+    const auto at = sorted.begin() + static_cast<std::ptrdiff_t>(persistence_.k - 1);
+    std::nth_element(sorted.begin(), at, sorted.end());
+    return *at;
+  }
+
+ private:
+  Persistence persistence_;
+  std::vector<double> last_;
+};
+
 std::vector<Judged> judge(const Plan& plan, const DesignSubject& subject, const ThresholdRule& rule,
-                          const std::vector<InspectedFault>& faults) {
+                          const std::vector<InspectedFault>& faults, Persistence persistence) {
   check::that(!faults.empty(), "faults", "one or more");
   const ReferenceMotion motion = planned_motion(plan, subject);
   FaultMargin margin(rule);
   std::vector<Judged> all;
   for (const InspectedFault& inspected : faults) {
     const FaultType& fault = inspected.fault;
+    check::that(fault.profile.kind == FaultProfile::Kind::step && !fault.held_effort, "fault '" + fault.name + "'",
+                "one that is there in full from the beginning on (a step, no reading that stays at its value)");
     const std::size_t first = all.size();
     for (const double side : {1.0, -1.0}) {
       if ((side > 0.0 ? fault.range.upper : -fault.range.lower) > 0.0) {
@@ -37,6 +63,7 @@ std::vector<Judged> judge(const Plan& plan, const DesignSubject& subject, const 
       }
     }
     FaultFilter rows(fault, subject.model, subject.filter, motion);
+    std::vector<Lasting> lasting((all.size() - first) * rows.outputs(), Lasting(persistence));
     rows.begin(0);
     while (rows.next()) {
       if (!motion.settled[rows.instant()]) {
@@ -47,12 +74,21 @@ std::vector<Judged> judge(const Plan& plan, const DesignSubject& subject, const 
         for (std::size_t k = first; k < all.size(); ++k) {
           PromisedFault& p = all[k].promise;
           const double most = std::abs(fault.kappa(p.side > 0.0 ? fault.range.upper : fault.range.lower));
-          const double limit = p.smallest < kNone ? std::abs(fault.kappa(p.side * p.smallest)) * (1.0 - 1e-6) : most;
+          // One instant is enough where persistence is 1 of 1: then only smaller sizes are worth a search.
+          const bool once = persistence.n == 1;
+          const double limit =
+              once && p.smallest < kNone ? std::abs(fault.kappa(p.side * p.smallest)) * (1.0 - 1e-6) : most;
           std::optional<double> kappa;
           if (fault.whole) {
-            kappa = p.smallest == kNone && margin.certain(row, most, p.side, i) ? std::optional(most) : std::nullopt;
+            kappa = (!once || p.smallest == kNone) && margin.certain(row, most, p.side, i) ? std::optional(most)
+                                                                                           : std::nullopt;
           } else {
             kappa = margin.smallest_certain(row, limit, p.side, i);
+          }
+          if (!once) {
+            const double size = lasting[(k - first) * rows.outputs() + i].add(kappa.value_or(kNone));
+            const bool smaller = size < kNone && std::abs(fault.magnitude(p.side * size)) < p.smallest;
+            kappa = smaller ? std::optional(size) : std::nullopt;
           }
           if (kappa) {
             p.smallest = std::abs(fault.magnitude(p.side * *kappa));
@@ -71,19 +107,19 @@ std::vector<Judged> judge(const Plan& plan, const DesignSubject& subject, const 
 }  // namespace
 
 std::vector<PromisedFault> promised_faults(const Plan& plan, const DesignSubject& subject, const ThresholdRule& rule,
-                                           const std::vector<InspectedFault>& faults) {
+                                           const std::vector<InspectedFault>& faults, Persistence persistence) {
   std::vector<PromisedFault> promises;
-  for (Judged& judged : judge(plan, subject, rule, faults)) {
+  for (Judged& judged : judge(plan, subject, rule, faults, persistence)) {
     promises.push_back(std::move(judged.promise));
   }
   return promises;
 }
 
 PlanObjective certain_detection(const DesignSubject& subject, const ThresholdRule& rule,
-                                const std::vector<InspectedFault>& faults) {
-  return [&subject, rule, faults](const Plan& plan) {
+                                const std::vector<InspectedFault>& faults, Persistence persistence) {
+  return [&subject, rule, faults, persistence](const Plan& plan) {
     double worst = 0.0;
-    for (const Judged& judged : judge(plan, subject, rule, faults)) {
+    for (const Judged& judged : judge(plan, subject, rule, faults, persistence)) {
       const PromisedFault& p = judged.promise;
       worst =
           std::max(worst, p.smallest < kNone ? p.smallest / p.asked : kNever * (1.0 + std::min(judged.missing, 1e6)));
@@ -96,14 +132,20 @@ DetectionDesign design_for_detection(const CommissionedModel& model, const Desig
                                      const MotionLimits& limits, const std::vector<InspectedFault>& faults,
                                      const DesignOptions& options) {
   const ThresholdRule rule(Polytope(model.facets, model.box), model.estimate);
-  const PlanObjective objective = certain_detection(subject, rule, faults);
+  // What decides is the detector as it was commissioned: its thresholds allow for the errors of the model.
+  DesignSubject watched = subject;
+  watched.errors = model.errors;
+  const PlanObjective objective = certain_detection(watched, rule, faults, model.persistence);
+  const auto promises = [&](const Plan& plan) {
+    return promised_faults(plan, watched, rule, faults, model.persistence);
+  };
   DetectionDesign design;
-  design.manoeuvre = design_manoeuvre(subject, limits, objective, options);
-  design.promised = promised_faults(design.manoeuvre.plan, subject, rule, faults);
-  if (subject.model.name == "differential_drive") {
-    design.figure_eight = best_figure_eight(subject, limits, objective);
-    design.figure_eight_plan = plan_of(*design.figure_eight, subject, limits.duration, subject.step);
-    design.promised_eight = promised_faults(*design.figure_eight_plan, subject, rule, faults);
+  design.manoeuvre = design_manoeuvre(watched, limits, objective, options);
+  design.promised = promises(design.manoeuvre.plan);
+  if (watched.model.name == "differential_drive") {
+    design.figure_eight = best_figure_eight(watched, limits, objective);
+    design.figure_eight_plan = plan_of(*design.figure_eight, watched, limits.duration, watched.step);
+    design.promised_eight = promises(*design.figure_eight_plan);
   }
   return design;
 }

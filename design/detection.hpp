@@ -34,15 +34,18 @@ struct PromisedFault {
   std::size_t output = 0;  ///< and the channel
 };
 
-/// Promises of `plan`, fault by fault, side by side. Throws InvalidArgument where `faults` is empty.
+/// Promises of `plan`, fault by fault, side by side, for a detector with this persistence. Throws InvalidArgument where
+/// `faults` is empty, or one is not there in full from the beginning on: it drifts, pulses, comes once a turn (its phase
+/// is not known), or holds a reading (its value is not known).
 [[nodiscard]] std::vector<PromisedFault> promised_faults(const Plan& plan, const DesignSubject& subject,
                                                          const ThresholdRule& rule,
-                                                         const std::vector<InspectedFault>& faults);
+                                                         const std::vector<InspectedFault>& faults,
+                                                         Persistence persistence = {});
 
 /// The largest of smallest/asked; where a fault is never certain, a number above every such ratio that falls as the fault
 /// comes nearer to being certain at its largest size, so that a search has a slope to follow.
 [[nodiscard]] PlanObjective certain_detection(const DesignSubject& subject, const ThresholdRule& rule,
-                                              const std::vector<InspectedFault>& faults);
+                                              const std::vector<InspectedFault>& faults, Persistence persistence = {});
 
 /// A manoeuvre for certain detection, and what it promises.
 struct DetectionDesign {
@@ -53,7 +56,8 @@ struct DetectionDesign {
   std::vector<PromisedFault> promised_eight;
 };
 
-/// design_manoeuvre() for certain detection of `faults` with the detector of `model`, and the best figure eight beside it.
+/// design_manoeuvre() for certain detection of `faults` with the detector of `model` (its errors and its persistence), and
+/// the best figure eight beside it.
 [[nodiscard]] DetectionDesign design_for_detection(const CommissionedModel& model, const DesignSubject& subject,
                                                    const MotionLimits& limits,
                                                    const std::vector<InspectedFault>& faults,

@@ -37,6 +37,14 @@ MotionLimits limits(const Robot& robot) {
   return limits;
 }
 
+// Of the model's detector for `plan`.
+double promised(const Prepared& p, const Plan& plan, Persistence persistence, const InspectedFault& fault) {
+  DesignSubject subject = subject_of(p.model);
+  subject.errors = p.model.errors;
+  const ThresholdRule rule(Polytope(p.model.facets, p.model.box), p.model.estimate);
+  return promised_faults(plan, subject, rule, {fault}, persistence).front().smallest;
+}
+
 // The robot drives `plan`, broken from the beginning on; time of the first alarm.
 double first_alarm(const Prepared& p, const Plan& plan, const PromisedFault& fault, double size) {
   Scenario s = p.scenario;
@@ -125,6 +133,39 @@ TEST(Detection, WhatCannotBeCertainHasASlope) {
   EXPECT_GT(objective(slow), 1e6);
   EXPECT_LT(objective(fast), objective(slow));
   EXPECT_THROW(static_cast<void>(promised_faults(slow, subject, rule, {})), InvalidArgument);
+}
+
+// More instants of a larger window never show smaller sizes, and a rule that one instant cannot satisfy promises less.
+TEST(Detection, PersistenceCosts) {
+  const Prepared p = prepared();
+  const InspectedFault fault = radii(p.model).front();
+  const Plan plan = plan_of(FigureEight{0.2, 4.0}, subject_of(p.model), 6.0, 0.02);
+  const double once = promised(p, plan, {1, 1}, fault), some = promised(p, plan, {3, 5}, fault),
+               many = promised(p, plan, {60, 64}, fault);
+  ASSERT_LT(many, kInfinity);
+  EXPECT_NEAR(promised(p, plan, {1, 5}, fault), once, 1e-5 * once);
+  EXPECT_GT(some, once);
+  EXPECT_GT(many, 1.01 * some);
+
+  // The design asks for the persistence and the errors that the model's detector has.
+  Prepared strict = p;
+  strict.model.persistence = {60, 64};
+  strict.model.errors.acceleration *= 2.0;
+  const DetectionDesign design = design_for_detection(strict.model, subject_of(strict.model), limits(p.scenario.robot),
+                                                      {fault}, {.stages = 1, .samples = 4, .descents = 1, .steps = 4});
+  EXPECT_DOUBLE_EQ(design.promised.front().smallest,
+                   promised(strict, design.manoeuvre.plan, strict.model.persistence, fault));
+}
+
+TEST(Detection, OnlyFaultsThatAreThereInFullAreInspected) {
+  const Prepared p = prepared();
+  const Plan plan = plan_of(FigureEight{0.2, 4.0}, subject_of(p.model), 6.0, 0.02);
+  const auto catalogue = fault_catalogue(p.model.model, p.model.estimate);
+  for (const char* name :
+       {"wheel_radius_bump_right", "wheel_radius_drift", "encoder_dropout_left", "effort_stuck_left"}) {
+    EXPECT_THROW(promised(p, plan, {}, {find_fault(catalogue, name), 0.05}), InvalidArgument) << name;
+  }
+  EXPECT_LT(promised(p, plan, {}, {find_fault(catalogue, "encoder_frozen_left"), 1.0}), kInfinity);
 }
 
 }  // namespace
