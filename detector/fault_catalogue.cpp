@@ -166,13 +166,16 @@ std::vector<FaultType> fault_catalogue(const Model& model, const Eigen::VectorXd
   const auto mass = std::find_if(model.parameters.begin(), model.parameters.end(),
                                  [](const Parameter& parameter) { return parameter.physical == "mass"; });
   if (mass != model.parameters.end()) {
+    // Where efforts are currents or voltages the mass is known in their unit only: its share is what can be said.
+    const bool physical = effort == EffortKind::torque;
     const auto at = mass - model.parameters.begin();
+    const double known = std::max(theta[at] / mass->per_physical, 1e-3), whole = physical ? known : 1.0;
     Eigen::VectorXd lost = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(model.p()));
-    lost[at] = -mass->per_physical;
-    const double whole = std::max(theta[at] / mass->per_physical, 1e-3);
+    lost[at] = -mass->per_physical * known / whole;
     all.push_back({.name = "payload_lost",
-                   .sentence = "mass is lost (negative: gained), in line with the axle",
-                   .unit = mass->physical_unit,
+                   .sentence = std::string(physical ? "mass" : "a share of the mass") +
+                               " is lost (negative: gained), in line with the axle",
+                   .unit = physical ? mass->physical_unit : "1",
                    .range = {-10.0 * whole, whole},
                    .theta = lost});
   }

@@ -86,7 +86,8 @@ void validate(const FaultType& fault, const Model& model);
 ///
 /// `unmatched` is left out for anisotropic friction, whose part along the heading it would change.
 ///
-/// `theta` (p), a best guess of θ_L, bounds the mass that can be lost or gained; `effort` names the unit of a bias.
+/// `theta` (p), a best guess of θ_L, bounds the mass that can be lost or gained; `effort` names the unit of a bias. The
+/// mass is in kg where efforts are torques, else a share of what `theta` says.
 [[nodiscard]] std::vector<FaultType> fault_catalogue(const Model& model, const Eigen::VectorXd& theta,
                                                      EffortKind effort = EffortKind::torque);
 

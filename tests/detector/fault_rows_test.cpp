@@ -119,6 +119,20 @@ double simulated_error(const Simulated& each, Shown shown, double rate, bool dri
   const ReferenceMotion motion = read_reference(log, filter_of(s.scenario));
   return mismatch(fault, each.kappa, motion, motion, s.model, s.design, s.theta, 0.0).torque;
 }
+// Without the motor's constants nothing in kg follows from a current.
+TEST(FaultCatalogue, HasTheMassAsAShareWhereEffortsAreNoTorques) {
+  const Model model = DifferentialDrive{.wheel_radius = 0.1, .track_width = 0.4}.model();
+  const Eigen::VectorXd theta = Eigen::VectorXd::LinSpaced(static_cast<Eigen::Index>(model.p()), 2.0, 3.0);
+  const auto in_torque = fault_catalogue(model, theta), in_current = fault_catalogue(model, theta, EffortKind::current);
+  const FaultType &mass = find_fault(in_torque, "payload_lost"), &share = find_fault(in_current, "payload_lost");
+  EXPECT_EQ(mass.unit, "kg");
+  EXPECT_EQ(share.unit, "1");
+  EXPECT_EQ(share.range.upper, 1.0);
+  // All of it, either way.
+  EXPECT_TRUE(
+      (share.theta * share.kappa(share.range.upper)).isApprox(mass.theta * mass.kappa(mass.range.upper), 1e-12));
+  EXPECT_NEAR(share.theta[0], -theta[0], 1e-12);
+}
 
 TEST(FaultRows, OfFaultsThatComeSlowlyAreTheSimulators) {
   for (const Shown shown : {Shown::angles, Shown::speeds}) {
