@@ -117,7 +117,9 @@ MarginSurvey survey_margins(LogSource& log, const CommissionedModel& model, cons
   survey.residuals.push_back(std::move(torque));
 
   if (!model.kinematic) {
-    survey.without_kinematic = "the model has no kinematic residual: its log had neither a pose nor a gyro";
+    survey.without_kinematic = model.model.coordinates.size() < 2
+                                   ? "only a robot with two driven wheels has one"
+                                   : "the log that was commissioned with had neither a pose nor a gyro";
     return survey;
   }
   const KinematicModel& k = *model.kinematic;
@@ -138,6 +140,12 @@ MarginSurvey survey_margins(LogSource& log, const CommissionedModel& model, cons
     }
   }
   const OdometryReference seen = read_odometry(log, OdometryFilter(k.measurement, k.window, k.errors), model.model);
+  const bool settled =
+      std::find(seen.motion.settled.begin(), seen.motion.settled.end(), true) != seen.motion.settled.end();
+  if (!settled) {
+    survey.without_kinematic = "no stretch of the log is as long as its window";
+    return survey;
+  }
   margins.persistence = options.persistence.value_or(k.persistence);
   kinematic.margins = margins_along(
       seen.motion, visible, ThresholdRule(Polytope(k.facets, k.box), k.estimate, options.set),

@@ -98,7 +98,7 @@ std::string magnitude_words(const FaultType& fault, double magnitude) {
   const double scale = fault.unit == "1" ? 100.0 : 1.0, value = magnitude * scale;
   const double step = value > 0.0 ? std::pow(10.0, std::floor(std::log10(value)) - 1.0) : 1.0;
   const double shown = std::ceil(value / step * (1.0 - 1e-12)) * step;
-  return fmt::format("{:.2g} {}", shown, fault.unit == "1" ? "%" : fault.unit);
+  return fmt::format("{:.6g} {}", shown, fault.unit == "1" ? "%" : fault.unit);
 }
 
 std::string certain_words(const FaultMargins& margins, std::size_t window, ManoeuvreKind kind) {
