@@ -37,6 +37,23 @@ std::vector<std::size_t> choose_onsets(const ReferenceMotion& motion, const Marg
   return onsets;
 }
 
+// What the robot does when a fault sets in at each of `onsets`: the same for every fault.
+std::vector<ManoeuvreKind> kinds_of(const ReferenceMotion& motion, const std::vector<std::size_t>& onsets,
+                                    const MarginOptions& options) {
+  const double length = std::min(options.kind_window, options.windows.back());
+  std::vector<ManoeuvreKind> kinds;
+  for (const std::size_t onset : onsets) {
+    const auto after = std::upper_bound(motion.segment_starts.begin(), motion.segment_starts.end(), onset);
+    const std::size_t end = after == motion.segment_starts.end() ? motion.instants() : *after;
+    std::size_t last = onset + 1;
+    while (last + 1 < end && motion.t[last + 1] - motion.t[onset] <= length) {
+      ++last;
+    }
+    kinds.push_back(kind_of(motion, onset, last + 1));
+  }
+  return kinds;
+}
+
 // The smallest certain size of one channel since the onset, under a rule "k of the last n".
 class ChannelBest {
  public:
@@ -94,7 +111,7 @@ OnsetMargin margin_at(const ReferenceMotion& motion, const FaultMargins& margins
   result.by_channel.resize(n);
   std::vector<ChannelBest> channels(n, ChannelBest(options.persistence, largest, fault.whole));
   double hidden = largest, window_hidden = largest;
-  std::size_t window = 0, named = onset + 1;
+  std::size_t window = 0;
   const auto size_of = [&](double kappa) {
     return kappa < kNone ? std::abs(fault.magnitude(margins.side * kappa)) : kNone;
   };
@@ -114,9 +131,6 @@ OnsetMargin margin_at(const ReferenceMotion& motion, const FaultMargins& margins
     const std::size_t k = rows.instant();
     const double since = motion.t[k] - result.t;
     close_windows(since);
-    if (since <= options.kind_window) {
-      named = k;
-    }
     if (window == options.windows.size()) {
       break;
     }
@@ -131,7 +145,6 @@ OnsetMargin margin_at(const ReferenceMotion& motion, const FaultMargins& margins
     }
   }
   result.hidden = size_of(window_hidden);
-  result.kind = kind_of(motion, onset, std::min(named + 1, motion.instants()));
   return result;
 }
 
@@ -170,6 +183,7 @@ std::vector<FaultMargins> margins_along(const ReferenceMotion& motion, const std
   check::that(options.noise_share >= 0.0 && options.noise_share <= 1.0, "noise share", "a number from 0 to 1");
   const std::vector<std::size_t> onsets = choose_onsets(motion, options);
   check::that(!onsets.empty(), "drive", "a stretch in which the filter has settled and that is longer than a window");
+  const std::vector<ManoeuvreKind> kinds = kinds_of(motion, onsets, options);
   std::vector<FaultMargins> all;
   for (const FaultType& fault : faults) {
     for (const double side : {1.0, -1.0}) {
@@ -186,6 +200,7 @@ std::vector<FaultMargins> margins_along(const ReferenceMotion& motion, const std
         FaultMargin margin(rule);
         for (std::size_t k = 0; k < onsets.size(); ++k) {
           each.onsets[k] = margin_at(motion, each, onsets[k], *source, margin, options);
+          each.onsets[k].kind = kinds[k];
         }
       },
       [&](std::size_t begun) {
