@@ -46,16 +46,23 @@ class Lasting {
   std::vector<double> last_;
 };
 
+void check_inspected(const std::vector<InspectedFault>& faults) {
+  check::that(!faults.empty(), "faults", "one or more");
+  for (const InspectedFault& each : faults) {
+    const FaultType& fault = each.fault;
+    check::that(fault.profile.kind == FaultProfile::Kind::step && !fault.held_effort, "fault '" + fault.name + "'",
+                "one that is there in full from the beginning on (a step, no reading that stays at its value)");
+  }
+}
+
 std::vector<Judged> judge(const Plan& plan, const DesignSubject& subject, const ThresholdRule& rule,
                           const std::vector<InspectedFault>& faults, Persistence persistence) {
-  check::that(!faults.empty(), "faults", "one or more");
+  check_inspected(faults);
   const ReferenceMotion motion = planned_motion(plan, subject);
   FaultMargin margin(rule);
   std::vector<Judged> all;
   for (const InspectedFault& inspected : faults) {
     const FaultType& fault = inspected.fault;
-    check::that(fault.profile.kind == FaultProfile::Kind::step && !fault.held_effort, "fault '" + fault.name + "'",
-                "one that is there in full from the beginning on (a step, no reading that stays at its value)");
     const std::size_t first = all.size();
     for (const double side : {1.0, -1.0}) {
       if ((side > 0.0 ? fault.range.upper : -fault.range.lower) > 0.0) {
@@ -64,7 +71,7 @@ std::vector<Judged> judge(const Plan& plan, const DesignSubject& subject, const 
     }
     FaultFilter rows(fault, subject.model, subject.filter, motion);
     std::vector<Lasting> lasting((all.size() - first) * rows.outputs(), Lasting(persistence));
-    rows.begin(0);
+    rows.begin_broken(0);
     while (rows.next()) {
       if (!motion.settled[rows.instant()]) {
         continue;
@@ -131,6 +138,7 @@ PlanObjective certain_detection(const DesignSubject& subject, const ThresholdRul
 DetectionDesign design_for_detection(const CommissionedModel& model, const DesignSubject& subject,
                                      const MotionLimits& limits, const std::vector<InspectedFault>& faults,
                                      const DesignOptions& options) {
+  check_inspected(faults);
   const ThresholdRule rule(Polytope(model.facets, model.box), model.estimate);
   // What decides is the detector as it was commissioned: its thresholds allow for the errors of the model.
   DesignSubject watched = subject;

@@ -183,6 +183,11 @@ void FaultFilter::begin(std::size_t onset) {
   }
 }
 
+void FaultFilter::begin_broken(std::size_t first) {
+  begin(first);
+  std::fill(cascades_.begin(), cascades_.end(), Cascade{});
+}
+
 void FaultFilter::filter(const FaultSignals& begin, const FaultSignals& end, double h) {
   if (h != weights_.step()) {
     weights_ = StepWeights(design_.beta, h);

@@ -63,6 +63,8 @@ class FaultFilter final : public FaultRows {
 
   [[nodiscard]] std::size_t outputs() const override { return model_->n(); }
   void begin(std::size_t onset) override;
+  /// The same for a fault that was there before instant `first`, at which the filter begins: nothing jumps.
+  void begin_broken(std::size_t first);
   bool next() override;
   [[nodiscard]] std::size_t instant() const override { return k_; }
   [[nodiscard]] FaultRow row(std::size_t i) const override;

@@ -2,10 +2,12 @@
 // An inspection drive: better than the figure eight, and its promise is kept when a broken robot drives it.
 #include <cmath>
 #include <limits>
+#include <string>
 
 #include <gtest/gtest.h>
 
 #include <wheelwright/design/detection.hpp>
+#include <wheelwright/detector/fault_rows.hpp>
 #include <wheelwright/sim/simulation.hpp>
 
 #include "design/robots.hpp"
@@ -166,6 +168,34 @@ TEST(Detection, OnlyFaultsThatAreThereInFullAreInspected) {
     EXPECT_THROW(promised(p, plan, {}, {find_fault(catalogue, name), 0.05}), InvalidArgument) << name;
   }
   EXPECT_LT(promised(p, plan, {}, {find_fault(catalogue, "encoder_frozen_left"), 1.0}), kInfinity);
+}
+
+// Slip that was there before the drive adds its friction, and no impulse of the mass: c(1 − e^{−βt}(1 + βt)) for order 2.
+TEST(Detection, AFaultThatWasThereBeforeDoesNotJump) {
+  const Prepared p = prepared();
+  const DesignSubject subject = subject_of(p.model);
+  const FilterDesign& f = subject.filter;
+  const ReferenceMotion motion = planned_motion(plan_of(FigureEight{0.2, 4.0}, subject, 6.0, 0.02), subject);
+  FaultFilter rows(find_fault(fault_catalogue(p.model.model, p.model.estimate), "matched"), subject.model, f, motion);
+  rows.begin_broken(0);
+  ASSERT_EQ(f.order, 2);
+  while (rows.next()) {
+    const double x = f.beta * (motion.instant[rows.instant()] - motion.instant.front());
+    const FaultRow row = rows.row(0);
+    EXPECT_EQ(row.g1[0], 0.0);
+    EXPECT_NEAR(row.g1[2], f.static_gain() * (1.0 - std::exp(-x) * (1.0 + x)), 1e-9);
+  }
+}
+
+TEST(Detection, SaysWhichFaultCannotBeInspected) {
+  const Prepared p = prepared();
+  const FaultType stuck = find_fault(fault_catalogue(p.model.model, p.model.estimate), "effort_stuck_left");
+  try {
+    static_cast<void>(design_for_detection(p.model, subject_of(p.model), limits(p.scenario.robot), {{stuck, 1.0}}));
+    FAIL();
+  } catch (const InvalidArgument& error) {
+    EXPECT_NE(std::string(error.what()).find("effort_stuck_left"), std::string::npos) << error.what();
+  }
 }
 
 }  // namespace
