@@ -213,7 +213,8 @@ Run add_design(CLI::App& program) {
       .add_option("--fault", a->faults,
                   "With --for detection: a fault of the catalogue and the size asked for (may be repeated); without it "
                   "wheel radii, efforts lost, encoders' scale")
-      ->type_name("NAME[=SIZE]");
+      ->type_name("NAME[=SIZE]")
+      ->allow_extra_args(false);
   command.add_option("--stages", a->stages, "Stages of constant speed in each half of the drive")
       ->type_name("N")
       ->check(CLI::Range(1, 20))

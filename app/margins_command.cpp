@@ -126,10 +126,13 @@ Run add_margins(CLI::App& program) {
   CLI::App& command = *program.add_subcommand("margins", kHelp);
   command.add_option("LOG", a->log, "CSV log (also .gz, .zst)")->required();
   command.add_option("--model", a->model, "model.json of `wheelwright commission`")->required()->type_name("FILE");
-  command.add_option("--fault", a->faults, "Only this fault of the catalogue (may be repeated)")->type_name("NAME");
+  command.add_option("--fault", a->faults, "Only this fault of the catalogue (may be repeated)")
+      ->type_name("NAME")
+      ->allow_extra_args(false);
   command
       .add_option("--window", a->windows, "Time after the onset by which a fault is to be seen, s (may be repeated)")
       ->type_name("S")
+      ->allow_extra_args(false)
       ->check(CLI::Range(1e-3, 3600.0));
   command.add_option("--onset-step", a->survey.margins.onset_step, "Time between the onsets that are tried, s")
       ->type_name("S")

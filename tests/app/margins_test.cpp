@@ -42,7 +42,7 @@ class Margins : public testing::ProgramTest {
 TEST_F(Margins, SayBeforehandWhatWillBeSeen) {
   prepare();
   const Outcome told =
-      run("margins straight.csv --model model/model.json --fault unmatched --fault wheel_radius --out margins --quiet");
+      run("margins --model model/model.json --fault unmatched --fault wheel_radius straight.csv --out margins --quiet");
   ASSERT_EQ(told.code, 0) << told.err;
   EXPECT_THAT(told.out, IsEmpty());
   EXPECT_THAT(names_in("margins"), ::testing::ElementsAre("margins.json", "report.html"));
