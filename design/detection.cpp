@@ -151,7 +151,9 @@ DetectionDesign design_for_detection(const CommissionedModel& model, const Desig
   design.manoeuvre = design_manoeuvre(watched, limits, objective, options);
   design.promised = promises(design.manoeuvre.plan);
   if (watched.model.name == "differential_drive") {
-    design.figure_eight = best_figure_eight(watched, limits, objective);
+    design.figure_eight = find_figure_eight(watched, limits, objective);
+  }
+  if (design.figure_eight) {
     design.figure_eight_plan = plan_of(*design.figure_eight, watched, limits.duration, watched.step);
     design.promised_eight = promises(*design.figure_eight_plan);
   }

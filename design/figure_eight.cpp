@@ -56,8 +56,8 @@ FigureEight best_figure_eight(const DesignSubject& subject, const MotionLimits& 
   return best_figure_eight(subject, limits, of_rows(objective, subject));
 }
 
-FigureEight best_figure_eight(const DesignSubject& subject, const MotionLimits& limits,
-                              const PlanObjective& objective) {
+std::optional<FigureEight> find_figure_eight(const DesignSubject& subject, const MotionLimits& limits,
+                                             const PlanObjective& objective) {
   validate(limits);
   const auto within = [&](const FigureEight& eight) {
     return limit_use(plan_of(eight, subject, limits.duration, kStep), subject, limits).largest() <= 1.0;
@@ -83,10 +83,16 @@ FigureEight best_figure_eight(const DesignSubject& subject, const MotionLimits& 
       }
     }
   }
-  if (!std::isfinite(least)) {
+  return std::isfinite(least) ? std::optional(best) : std::nullopt;
+}
+
+FigureEight best_figure_eight(const DesignSubject& subject, const MotionLimits& limits,
+                              const PlanObjective& objective) {
+  const std::optional<FigureEight> best = find_figure_eight(subject, limits, objective);
+  if (!best) {
     throw InvalidArgument("limits: no figure eight is within them: expected a higher limit or more time");
   }
-  return best;
+  return *best;
 }
 
 }  // namespace wheelwright

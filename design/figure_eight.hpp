@@ -3,6 +3,8 @@
 /// The figure eight that a designed manoeuvre is compared with.
 #pragma once
 
+#include <optional>
+
 #include <wheelwright/design/limits.hpp>
 #include <wheelwright/design/objective.hpp>
 #include <wheelwright/design/plan.hpp>
@@ -27,5 +29,9 @@ struct FigureEight {
 /// The same for an objective of the planned rows.
 [[nodiscard]] FigureEight best_figure_eight(const DesignSubject& subject, const MotionLimits& limits,
                                             const RowObjective& objective);
+
+/// The same where there is one within the limits; else nothing.
+[[nodiscard]] std::optional<FigureEight> find_figure_eight(const DesignSubject& subject, const MotionLimits& limits,
+                                                           const PlanObjective& objective);
 
 }  // namespace wheelwright

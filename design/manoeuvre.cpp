@@ -76,7 +76,9 @@ BoundsDesign design_for_bounds(const DesignSubject& subject, const MotionLimits&
   design.manoeuvre = design_manoeuvre(subject, limits, objective, options);
   design.promised = promised_bounds(planned_rows(design.manoeuvre.plan, subject), subject);
   if (subject.model.name == "differential_drive") {
-    design.figure_eight = best_figure_eight(subject, limits, objective);
+    design.figure_eight = find_figure_eight(subject, limits, of_rows(objective, subject));
+  }
+  if (design.figure_eight) {
     design.figure_eight_plan = plan_of(*design.figure_eight, subject, limits.duration, subject.step);
     design.promised_eight = promised_bounds(planned_rows(*design.figure_eight_plan, subject), subject);
   }

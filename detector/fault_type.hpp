@@ -64,7 +64,8 @@ struct FaultType {
   Eigen::VectorXd theta{};   ///< ϑ, θ_L's units per unit of κ
   Eigen::MatrixXd seen{};    ///< S, coordinates × coordinates
   bool held_effort = false;  ///< a reading that stands still: H Y is taken away and H times its filtered value at the
-                             ///< onset over the filter's static gain put in its place
+                             ///< onset over the filter's static gain put in its place: a picture of it, no promise
+                             ///< (margins.hpp)
   FaultProfile profile{};
 
   /// κ of a magnitude.

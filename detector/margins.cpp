@@ -136,6 +136,10 @@ OnsetMargin margin_at(const ReferenceMotion& motion, const FaultMargins& margins
     }
     for (std::size_t i = 0; i < n; ++i) {
       const FaultRow row = rows.row(i);
+      if (fault.held_effort) {  // at which value nobody knows beforehand
+        hidden = 0.0;
+        continue;
+      }
       channels[i].add(margin, row, margins.side, i);
       if (!fault.whole) {
         hidden = margin.largest_hidden(row, hidden, margins.side, options.noise_share, i);

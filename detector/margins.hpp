@@ -32,7 +32,9 @@ struct MarginOptions {
   std::function<void(std::string_view stage, double share)> progress = {};  ///< may be empty
 };
 
-/// One fault on one side (growing or shrinking) from one onset on. Sizes are absolute; infinite where none is certain in
+/// One fault on one side (growing or shrinking) from one onset on. Of a reading that stands still nothing is certain and
+/// nothing hidden: the value it holds is that of one sample, and not known beforehand. The time until an alarm counts from
+/// the sample of the first instant that the fault has reached, at most a sampling step after the fault. Sizes are absolute; infinite where none is certain in
 /// the fault's range. A window that runs past the end of the segment has no value.
 struct OnsetMargin {
   std::size_t instant = 0;  ///< of the motion
