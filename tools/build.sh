@@ -17,8 +17,7 @@ if command -v ccache >/dev/null; then
   export CMAKE_CXX_COMPILER_LAUNCHER="${CMAKE_CXX_COMPILER_LAUNCHER-ccache}"
 fi
 if [ ! -f "$directory/build.ninja" ]; then
-  # Where everything is built once, the largest headers are compiled once.
-  cmake --preset "$preset" ${CI:+-DWHEELWRIGHT_PRECOMPILED=ON}
+  cmake --preset "$preset"
 fi
 jobs=$(nproc 2>/dev/null || echo 2)
 if [ $# -gt 0 ]; then
