@@ -3,6 +3,7 @@
 
 #include <charconv>
 #include <cstdio>
+#include <map>
 #include <system_error>
 
 #include <fmt/format.h>
@@ -57,6 +58,20 @@ void add_persistence(CLI::App& command, std::optional<Persistence>& persistence,
           },
           "Raise an alarm when K of the last N instants are outside (default: " + otherwise + ")")
       ->type_name("K/N");
+}
+
+void add_set(CLI::App& command, ParameterSetKind& set) {
+  command.add_option("--set", set, "Threshold from the feasible set itself (polytope) or from its box")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, ParameterSetKind>{
+          {"polytope", ParameterSetKind::polytope}, {"box", ParameterSetKind::box}}))
+      ->type_name("SET");
+}
+
+void add_test(CLI::App& command, Test& test) {
+  command.add_option("--test", test, "Compare with [l, u] (two_sided) or with rho as the paper does (symmetric)")
+      ->transform(CLI::CheckedTransformer(
+          std::map<std::string, Test>{{"two_sided", Test::two_sided}, {"symmetric", Test::symmetric}}))
+      ->type_name("TEST");
 }
 
 std::string software() { return std::string("wheelwright ") + WHEELWRIGHT_VERSION; }

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/detector/events.hpp>
+#include <wheelwright/detector/row_detector.hpp>
 #include <wheelwright/io/csv.hpp>
 #include <wheelwright/io/json_file.hpp>
 #include <wheelwright/report/context.hpp>
@@ -46,6 +46,11 @@ void add_map(CLI::App& command, CommonOptions& options);
 
 /// Adds --persistence K/N; `persistence` stays empty where it is not given. `otherwise` says what holds then.
 void add_persistence(CLI::App& command, std::optional<Persistence>& persistence, const std::string& otherwise);
+
+/// Adds --set polytope|box.
+void add_set(CLI::App& command, ParameterSetKind& set);
+/// Adds --test two_sided|symmetric.
+void add_test(CLI::App& command, Test& test);
 
 /// Name and version of the program.
 [[nodiscard]] std::string software();

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <iostream>
-#include <map>
 #include <memory>
 
 #include <fmt/format.h>
@@ -113,16 +112,8 @@ Run add_detect(CLI::App& program) {
   command.add_option("LOG", a->log, "CSV log (also .gz, .zst)");
   command.add_option("--model", a->model, "model.json of `wheelwright commission`")->required()->type_name("FILE");
   command.add_flag("--follow", a->follow, "Read CSV rows from standard input as they come, tell events at once");
-  command.add_option("--set", a->detector.set, "Threshold from the feasible set itself (polytope) or from its box")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, ParameterSetKind>{
-          {"polytope", ParameterSetKind::polytope}, {"box", ParameterSetKind::box}}))
-      ->type_name("SET");
-  command
-      .add_option("--test", a->detector.test,
-                  "Compare with [l, u] (two_sided) or with rho as the paper does (symmetric)")
-      ->transform(CLI::CheckedTransformer(
-          std::map<std::string, Test>{{"two_sided", Test::two_sided}, {"symmetric", Test::symmetric}}))
-      ->type_name("TEST");
+  add_set(command, a->detector.set);
+  add_test(command, a->detector.test);
   add_persistence(command, a->persistence, "the model's");
   add_common(command, a->common);
   add_map(command, a->common);

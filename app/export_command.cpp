@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <map>
 #include <memory>
 
 #include <fmt/format.h>
@@ -102,16 +101,8 @@ Run add_export(CLI::App& program) {
   command.add_option("--name", a->name, "Prefix of all names in the file, and the file's name")
       ->type_name("PREFIX")
       ->capture_default_str();
-  command.add_option("--set", a->detector.set, "Threshold from the feasible set itself (polytope) or from its box")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, ParameterSetKind>{
-          {"polytope", ParameterSetKind::polytope}, {"box", ParameterSetKind::box}}))
-      ->type_name("SET");
-  command
-      .add_option("--test", a->detector.test,
-                  "Compare with [l, u] (two_sided) or with rho as the paper does (symmetric)")
-      ->transform(CLI::CheckedTransformer(
-          std::map<std::string, Test>{{"two_sided", Test::two_sided}, {"symmetric", Test::symmetric}}))
-      ->type_name("TEST");
+  add_set(command, a->detector.set);
+  add_test(command, a->detector.test);
   add_persistence(command, a->persistence, "the model's");
   add_common(command, a->common);
   command.footer(kExamples);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <map>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -144,10 +143,7 @@ Run add_margins(CLI::App& program) {
       ->type_name("Q")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
-  command.add_option("--set", a->survey.set, "Threshold from the feasible set itself (polytope) or from its box")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, ParameterSetKind>{
-          {"polytope", ParameterSetKind::polytope}, {"box", ParameterSetKind::box}}))
-      ->type_name("SET");
+  add_set(command, a->survey.set);
   add_persistence(command, a->persistence, "the model's");
   add_common(command, a->common);
   add_map(command, a->common);
