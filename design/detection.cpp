@@ -9,6 +9,7 @@
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/detector/fault_margin.hpp>
+#include <wheelwright/detector/lasting.hpp>
 
 namespace wheelwright {
 namespace {
@@ -20,30 +21,6 @@ constexpr double kNever = 1e6;  // objective where a fault is never certain, tim
 struct Judged {
   PromisedFault promise;
   double missing = kNone;
-};
-
-// The k-th smallest of the last n values, once there are as many: the size that k of n instants show.
-class Lasting {
- public:
-  explicit Lasting(Persistence persistence) : persistence_(persistence) {}
-
-  double add(double size) {
-    last_.push_back(size);
-    if (last_.size() > persistence_.n) {
-      last_.erase(last_.begin());
-    }
-    if (last_.size() < persistence_.k) {
-      return kNone;
-    }
-    std::vector<double> sorted = last_;
-    const auto at = sorted.begin() + static_cast<std::ptrdiff_t>(persistence_.k - 1);
-    std::nth_element(sorted.begin(), at, sorted.end());
-    return *at;
-  }
-
- private:
-  Persistence persistence_;
-  std::vector<double> last_;
 };
 
 void check_inspected(const std::vector<InspectedFault>& faults) {

@@ -7,6 +7,7 @@
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/for_all.hpp>
+#include <wheelwright/detector/lasting.hpp>
 
 namespace wheelwright {
 namespace {
@@ -58,7 +59,7 @@ std::vector<ManoeuvreKind> kinds_of(const ReferenceMotion& motion, const std::ve
 class ChannelBest {
  public:
   ChannelBest(Persistence persistence, double largest, bool whole)
-      : persistence_(persistence), largest_(largest), whole_(whole) {}
+      : persistence_(persistence), lasting_(persistence), largest_(largest), whole_(whole) {}
 
   [[nodiscard]] double best() const { return best_; }
 
@@ -72,16 +73,7 @@ class ChannelBest {
       best_ = smallest(margin, row, limit, side, channel).value_or(best_);
       return;
     }
-    last_.push_back(smallest(margin, row, largest_, side, channel).value_or(kNone));
-    if (last_.size() > persistence_.n) {
-      last_.erase(last_.begin());
-    }
-    if (last_.size() >= persistence_.k) {
-      std::vector<double> sorted = last_;
-      const auto at = sorted.begin() + static_cast<std::ptrdiff_t>(persistence_.k - 1);
-      std::nth_element(sorted.begin(), at, sorted.end());
-      best_ = std::min(best_, *at);
-    }
+    best_ = std::min(best_, lasting_.add(smallest(margin, row, largest_, side, channel).value_or(kNone)));
   }
 
  private:
@@ -94,10 +86,10 @@ class ChannelBest {
   }
 
   Persistence persistence_;
+  Lasting lasting_;
   double largest_;
   bool whole_;
   double best_ = kNone;
-  std::vector<double> last_;
 };
 
 OnsetMargin margin_at(const ReferenceMotion& motion, const FaultMargins& margins, std::size_t onset, FaultRows& rows,
