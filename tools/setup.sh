@@ -13,7 +13,7 @@ packages="g++ cmake ninja-build pkg-config python3
   libceres-dev libnlopt-cxx-dev libnlopt-dev coinor-libclp-dev
   libcli11-dev
   libgtest-dev libgmock-dev librapidcheck-dev libbenchmark-dev python3-jsonschema
-  libglpk-dev liblapack-dev libqsopt-ex-dev"
+  libglpk-dev liblapack-dev libqsopt-ex-dev libmujoco-dev"
 case "${1:-}" in
   '') ;;
   --ci) packages="$packages clang clang-format clang-tidy" ;;

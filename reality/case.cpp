@@ -1,0 +1,201 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include <fmt/format.h>
+
+#include <wheelwright/core/error.hpp>
+#include <wheelwright/reality/case.hpp>
+
+namespace wheelwright::reality {
+namespace {
+
+/// Streams of draws of a case.
+enum Stream : std::uint64_t { of_robot = 1, of_baseline, of_real, of_fresh, of_kind, of_noise = 10, of_effect = 100 };
+
+constexpr double short_drive = 45.0;  // s, to find severities
+
+Drive first_part(const Drive& drive, double duration) {
+  const auto count = std::min(drive.v1.size(), static_cast<std::size_t>(duration / Drive::step));
+  Drive part;
+  part.v1.assign(drive.v1.begin(), drive.v1.begin() + static_cast<std::ptrdiff_t>(count));
+  part.v2.assign(drive.v2.begin(), drive.v2.begin() + static_cast<std::ptrdiff_t>(count));
+  return part;
+}
+
+Kind draw_kind(Random& random) {
+  const double u = random.uniform(0.0, 1.0);
+  return u < 0.55 ? Kind::single : u < 0.75 ? Kind::pair : u < 0.85 ? Kind::none : Kind::outside;
+}
+
+const Entry& draw_entry(Random& random, Kind kind) {
+  std::vector<const Entry*> able;
+  for (const Entry& entry : catalogue()) {
+    const bool wanted = kind == Kind::outside ? entry.kind == Class::outside
+                        : kind == Kind::pair  ? entry.kind == Class::structural
+                                              : entry.kind != Class::outside;
+    if (wanted) {
+      able.push_back(&entry);
+    }
+  }
+  return *able[random.below(able.size())];
+}
+
+/// Pairs of which one would hide the other.
+bool alike(std::string_view a, std::string_view b) {
+  const auto family = [](std::string_view name) {
+    if (name == "delay" || name == "sensor_time_offset") {
+      return std::string_view("actuator_lag");
+    }
+    return name == "coulomb_asymmetric" ? std::string_view("coulomb") : name;
+  };
+  return family(a) == family(b);
+}
+
+/// Makes the effect of a cause as its stream has it; a case uses the same one in every drive.
+struct Source {
+  const Request& request;
+  std::uint64_t index;
+  const RobotDesign& robot;
+
+  [[nodiscard]] Effect make(const Entry& entry, std::uint64_t stream, double severity) const {
+    return entry.make(robot, Random(request.seed, index, stream), severity);
+  }
+};
+
+double gap_of(const Source& source, const Entry& entry, std::uint64_t stream, double severity, const Drive& drive,
+              double beta) {
+  std::vector<Effect> effects;
+  effects.push_back(source.make(entry, stream, severity));
+  const Record record = run_world(source.robot, effects, drive);
+  const Gap gap = measure_gap(source.robot, signals_of(source.robot, record), beta);
+  return entry.kind == Class::parametric ? gap.before : gap.after;
+}
+
+/// The severity at which the gap is `target` per cent, within a tenth; none where the effect cannot reach `least`.
+std::optional<double> find_severity(const Source& source, const Entry& entry, std::uint64_t stream, const Drive& drive,
+                                    double beta, double target, double least) {
+  const Drive part = entry.slow ? drive : first_part(drive, short_drive);
+  double severity = std::min(target / 15.0, entry.largest);
+  double gap = 0.0;
+  for (int k = 0; k < 6; ++k) {
+    try {
+      gap = gap_of(source, entry, stream, severity, part, beta);
+    } catch (const Error&) {
+      severity *= 0.5;
+      continue;
+    }
+    const double factor = target / std::max(gap, 1e-3);
+    if (std::abs(std::log(factor)) < 0.1 || (factor > 1.0 && severity >= entry.largest)) {
+      break;
+    }
+    severity = std::min(severity * std::clamp(factor, 0.2, 4.0), entry.largest);
+  }
+  return gap >= least ? std::optional(severity) : std::nullopt;
+}
+
+/// Chooses the filter that the gap is measured with, and better sensors where noise would hide everything.
+double settle_sensors(RobotDesign& robot, const Record& record, Random random, double largest, double& floor) {
+  const Signals clean = signals_of(robot, record);
+  for (;;) {
+    const Signals log = signals_of(robot, sense(robot, record, random));
+    for (const double beta : {20.0, 10.0, 5.0}) {
+      floor = noise_floor(robot, clean, log, beta);
+      if (floor <= largest) {
+        return beta;
+      }
+    }
+    if (robot.counts < 65536.0) {
+      robot.counts *= 2.0;
+    } else {
+      robot.torque_noise *= 0.7;
+    }
+  }
+}
+
+}  // namespace
+
+Case make_case(const Request& request, std::uint64_t index) {
+  const auto stream = [&](std::uint64_t number) { return Random(request.seed, index, number); };
+  Case result;
+  Random robot_draws = stream(of_robot);
+  result.robot = draw_robot(robot_draws, request.hard);
+  RobotDesign& robot = result.robot;
+  const auto drive_of = [&](std::uint64_t number) {
+    Random draws = stream(number);
+    return draw_drive(robot, draws, request.duration);
+  };
+  const Drive real_drive = drive_of(of_real);
+
+  std::vector<Effect> nothing;
+  const Record baseline = run_world(robot, nothing, drive_of(of_baseline));
+  double floor = 0.0;
+  const double beta = settle_sensors(robot, baseline, stream(of_noise), request.hard ? 2.5 : 4.0, floor);
+  result.healthy = measure_gap(robot, signals_of(robot, baseline), beta);
+
+  Random draws = stream(of_kind);
+  const Kind drawn = draw_kind(draws);
+  Kind kind = request.kind == Kind::mixed ? drawn : request.kind;
+  if (!request.effect.empty()) {
+    kind = Kind::single;
+  }
+  const std::size_t wanted = kind == Kind::none ? 0 : kind == Kind::pair ? 2 : 1;
+  const Source source{request, index, robot};
+  std::vector<std::uint64_t> streams;
+  for (std::uint64_t attempt = 0; result.causes.size() < wanted; ++attempt) {
+    if (attempt == 40) {
+      throw Error(fmt::format("reality: no effect is large enough in case {}", index));
+    }
+    const Entry& entry = request.effect.empty() ? draw_entry(draws, kind) : find_entry(request.effect);
+    const double share = request.hard ? 1.0 / 3.0 : 1.0;
+    const double least = std::max(3.0 * floor, 5.0 * share);
+    const double target = draws.log_uniform(least, std::max(35.0 * share, 1.2 * least));
+    const double free = draws.log_uniform(0.4, 1.6) * share;
+    if (!result.causes.empty() && alike(result.causes[0].entry->name, entry.name)) {
+      continue;
+    }
+    const auto severity =
+        entry.kinematic ? std::optional(std::min(free, entry.largest))
+                        : find_severity(source, entry, of_effect + attempt, real_drive, beta, target, 0.9 * least);
+    if (severity) {
+      result.causes.push_back({&entry, *severity, source.make(entry, of_effect + attempt, *severity).parameters});
+      streams.push_back(of_effect + attempt);
+    }
+  }
+
+  const auto run = [&](const Drive& drive) {
+    std::vector<Effect> effects;
+    for (std::size_t k = 0; k < wanted; ++k) {
+      effects.push_back(source.make(*result.causes[k].entry, streams[k], result.causes[k].severity));
+    }
+    return run_world(robot, effects, drive);
+  };
+  const Record real = run(real_drive);
+  const Record fresh = run(drive_of(of_fresh));
+  const Signals clean = signals_of(robot, real);
+  result.baseline = sense(robot, baseline, stream(of_noise));
+  result.real = sense(robot, real, stream(of_noise + 1));
+  result.fresh = sense(robot, fresh, stream(of_noise + 2));
+  result.gap = measure_gap(robot, clean, beta);
+
+  std::vector<std::string> truth;
+  bool parametric = wanted > 0;
+  for (const Cause& cause : result.causes) {
+    truth.emplace_back(cause.entry->name);
+    parametric = parametric && cause.entry->kind == Class::parametric;
+  }
+  const double real_floor = noise_floor(robot, clean, signals_of(robot, result.real), beta);
+  result.oracle = ask_oracle(robot, clean, truth, parametric, std::max(real_floor, 0.05), beta);
+  return result;
+}
+
+std::string robot_yaml(const RobotDesign& robot, const std::string& name) {
+  return fmt::format(
+      "name: {}\nmodel: differential_drive\nwheel_radius: {:.6g}\ntrack_width: {:.6g}\nlever_arm: half_track\n"
+      "effort: {{kind: torque, hold: first_order}}\nnominal: {{mass: {:.6g}, yaw_inertia: {:.6g}}}\nnoise: estimate\n"
+      "filter: auto\nencoder_counts_per_turn: {:.0f}\nlimits: {{effort: {:.4g}}}\n",
+      name, robot.radius, 2.0 * robot.half_track, robot.mass, robot.yaw_inertia, robot.counts, robot.effort_limit);
+}
+
+}  // namespace wheelwright::reality

@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0
+// wheelwright-reality: logs of robots in another physics engine, with an effect that is withheld.
+#include <atomic>
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <map>
+#include <mutex>
+#include <thread>
+
+#include <fmt/format.h>
+#include <mujoco/mujoco.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include <wheelwright/core/error.hpp>
+#include <wheelwright/io/atomic_file.hpp>
+#include <wheelwright/io/csv.hpp>
+#include <wheelwright/io/json_file.hpp>
+#include <wheelwright/reality/case.hpp>
+
+namespace {
+
+using namespace wheelwright;
+using namespace wheelwright::reality;
+namespace fs = std::filesystem;
+
+double digits(double value) { return std::stod(fmt::format("{:.6g}", value)); }
+
+Json answer(const Case& c) {
+  Json effects = Json::array();
+  bool known = true;
+  for (const Cause& cause : c.causes) {
+    Json parameters = Json::object();
+    for (const auto& [name, value] : cause.parameters) {
+      parameters[name] = digits(value);
+    }
+    effects.push_back(
+        {{"effect", cause.entry->name}, {"severity", digits(cause.severity)}, {"parameters", parameters}});
+    known = known && cause.entry->kind != Class::outside;
+  }
+  const Oracle& o = c.oracle;
+  Json oracle{{"floor_percent", digits(o.floor_percent)}, {"beta", o.beta}};
+  if (!c.causes.empty() && known) {
+    oracle["separable"] = o.separable;
+    oracle["closest_rival"] = o.closest_rival;
+    oracle["excess"] = digits(o.excess);
+    oracle["own_form_leaves"] = digits(o.own_form);
+  }
+  return {
+      {"in_catalogue", known},
+      {"effects", effects},
+      {"gap_percent", digits(c.gap.before)},
+      {"gap_percent_after_refit", digits(c.gap.after)},
+      {"healthy", {{"gap_percent_after_refit", digits(c.healthy.after)}, {"r_squared", digits(c.healthy.r_squared)}}},
+      {"oracle", oracle}};
+}
+
+Json write_case(const Request& request, std::uint64_t index, const fs::path& out) {
+  const std::string name = fmt::format("case_{:03}", index);
+  const Case c = make_case(request, index);
+  fs::create_directories(out / "logs" / name);
+  fs::create_directories(out / "fresh" / name);
+  write_csv(out / "logs" / name / "baseline.csv.gz", c.baseline);
+  write_csv(out / "logs" / name / "real.csv.gz", c.real);
+  write_csv(out / "fresh" / name / "real.csv.gz", c.fresh);
+  atomic_write(out / "logs" / name / "robot.yaml", robot_yaml(c.robot, name));
+  return answer(c);
+}
+
+int generate(const Request& request, std::uint64_t first, std::uint64_t cases, unsigned threads, const fs::path& out) {
+  std::atomic<std::uint64_t> next{first};
+  std::map<std::uint64_t, Json> answers;
+  std::exception_ptr failure;
+  std::mutex lock;
+  const auto work = [&] {
+    for (std::uint64_t index = next++; index < first + cases; index = next++) {
+      try {
+        Json json = write_case(request, index, out);
+        const std::lock_guard guard(lock);
+        answers.emplace(index, std::move(json));
+        fmt::print(stderr, "\r{} of {}", answers.size(), cases);
+      } catch (...) {
+        const std::lock_guard guard(lock);
+        failure = std::current_exception();
+        return;
+      }
+    }
+  };
+  std::vector<std::thread> crew;
+  for (unsigned k = 0; k < threads; ++k) {
+    crew.emplace_back(work);
+  }
+  for (std::thread& one : crew) {
+    one.join();
+  }
+  fmt::print(stderr, "\n");
+  if (failure) {
+    std::rethrow_exception(failure);
+  }
+  Json all = Json::object();
+  for (const auto& [index, json] : answers) {
+    all[fmt::format("case_{:03}", index)] = json;
+  }
+  write_json(out / "answers.json", all);
+  return 0;
+}
+
+}  // namespace
+
+int main(int count, char** arguments) try {
+  CLI::App app("Logs of robots in another physics engine, with an effect that is withheld", "wheelwright-reality");
+  app.require_subcommand(1);
+  CLI::App& make = *app.add_subcommand("generate",
+                                       "A set of cases: logs and robot files in DIR/logs, a second drive of "
+                                       "each in DIR/fresh, answers in DIR/answers.json");
+  Request request;
+  std::uint64_t cases = 10;
+  std::uint64_t first = 0;
+  unsigned threads = 2;
+  std::string profile = "standard";
+  std::string out;
+  const std::map<std::string, Kind> kinds{{"mixed", Kind::mixed},
+                                          {"single", Kind::single},
+                                          {"pair", Kind::pair},
+                                          {"none", Kind::none},
+                                          {"outside", Kind::outside}};
+  make.add_option("--seed", request.seed, "of all draws")->capture_default_str();
+  make.add_option("--cases", cases, "how many")->capture_default_str();
+  make.add_option("--first", first, "number of the first")->capture_default_str();
+  make.add_option("--profile", profile, "hard: a third of the severity, three times the noise, imperfect robots")
+      ->check(CLI::IsMember({"standard", "hard"}))
+      ->capture_default_str();
+  make.add_option("--kind", request.kind, "what is withheld")->transform(CLI::CheckedTransformer(kinds));
+  make.add_option("--effect", request.effect, "this effect in every case");
+  make.add_option("--duration", request.duration, "of each drive, s")
+      ->check(CLI::Range(50.0, 3600.0))
+      ->capture_default_str();
+  make.add_option("--out", out, "directory")->required();
+  make.add_option("--threads", threads, "cases at a time")->check(CLI::Range(1, 256))->capture_default_str();
+  try {
+    app.parse(count, arguments);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  request.hard = profile == "hard";
+  if (!request.effect.empty()) {
+    static_cast<void>(find_entry(request.effect));
+  }
+  // The engine writes its warnings into a file of its own in the working directory: the world looks at them itself.
+  mju_user_warning = [](const char*) {};
+  return generate(request, first, cases, threads, out);
+} catch (const InvalidArgument& error) {
+  fmt::print(stderr, "wheelwright-reality: {}\n", error.what());
+  return 2;
+} catch (const InputError& error) {
+  fmt::print(stderr, "wheelwright-reality: {}\n", error.what());
+  return 2;
+} catch (const std::exception& error) {
+  fmt::print(stderr, "wheelwright-reality: {}\n", error.what());
+  return 3;
+}

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// A robot of this world: what it is built of, and what its designer says of it.
+#pragma once
+
+#include <array>
+#include <string>
+
+#include <Eigen/Core>
+
+#include <wheelwright/reality/random.hpp>
+
+namespace wheelwright::reality {
+
+/// Index of a wheel.
+enum Side : std::size_t { right = 0, left = 1 };
+
+/// Two values, right wheel first.
+using Pair = std::array<double, 2>;
+
+/// Bodies, joints and shapes: what the engine is told.
+struct Body {
+  Pair radius{0.1, 0.1};                     ///< of the wheels, m
+  double half_track = 0.25;                  ///< m
+  double chassis_mass = 20.0;                ///< kg
+  Eigen::Vector3d chassis_inertia{1, 1, 1};  ///< about its own centre of mass, kg m²
+  Eigen::Vector3d centre{0, 0, 0};           ///< of the chassis' mass, from the middle of the axle, m
+  double wheel_mass = 1.0;                   ///< each, kg
+  double wheel_width = 0.02;                 ///< half, m
+  Pair armature{0, 0};                       ///< of rotors, at the wheel, kg m²
+  Pair damping{0, 0};                        ///< viscous, N m s/rad
+  Pair friction{0, 0};                       ///< dry, N m
+  double caster = 0.2;                       ///< distance of the balls from the axle, m
+  Eigen::Vector3d gravity{0, 0, -9.81};      ///< m/s²
+  std::string attached;                      ///< bodies hung into the chassis, in the engine's XML
+};
+
+/// A robot, its sensors and its controller.
+struct RobotDesign {
+  Body body;                     ///< as built
+  double radius = 0.1;           ///< by its data sheet, m
+  double half_track = 0.25;      ///< by its data sheet, m
+  double mass = 20.0;            ///< lumped with 2J/r² of wheels and rotors, kg
+  double yaw_inertia = 1.0;      ///< likewise with 2Jℓ²/r², kg m²
+  double damping = 0.1;          ///< of each wheel, N m s/rad
+  Pair gain{1, 1};               ///< of the drives, imperfect robots only
+  Pair bias{0, 0};               ///< N m, imperfect robots only
+  double rate = 100.0;           ///< Hz
+  double counts = 8192.0;        ///< of the encoder in a turn
+  double torque_noise = 0.02;    ///< standard deviation, N m
+  double position_noise = 1e-3;  ///< standard deviation, m
+  double heading_noise = 1e-3;   ///< standard deviation, rad
+  double wheel_speed = 8.0;      ///< fastest, rad/s
+  double acceleration = 1.5;     ///< largest of the drive, m/s²
+  double bandwidth = 10.0;       ///< of the speed controller, rad/s
+  double effort_limit = 10.0;    ///< of each wheel, N m
+
+  /// Torque of a wheel in ordinary driving, N m: the unit of severities.
+  [[nodiscard]] double typical_torque() const { return 0.5 * radius * mass * 0.5 * acceleration; }
+};
+
+/// A healthy robot of 5 to 150 kg. `hard` has three times the noise and small imperfections: radii, track, gains,
+/// a bias and dry friction, of a per cent or less.
+[[nodiscard]] RobotDesign draw_robot(Random& random, bool hard);
+
+/// Moment of inertia of a wheel about its axle, kg m².
+[[nodiscard]] double wheel_spin(const Body& body);
+
+/// The engine's description of `body`.
+[[nodiscard]] std::string engine_xml(const Body& body, double step);
+
+}  // namespace wheelwright::reality

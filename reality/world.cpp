@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <mujoco/mujoco.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <memory>
+#include <mutex>
+#include <numbers>
+
+#include <fmt/format.h>
+
+#include <wheelwright/core/error.hpp>
+#include <wheelwright/reality/world.hpp>
+
+namespace wheelwright::reality {
+namespace {
+
+struct FreeModel {
+  void operator()(mjModel* model) const { mj_deleteModel(model); }
+};
+struct FreeData {
+  void operator()(mjData* data) const { mj_deleteData(data); }
+};
+using Model = std::unique_ptr<mjModel, FreeModel>;
+using Data = std::unique_ptr<mjData, FreeData>;
+
+Model compile(const std::string& xml) {
+  // The engine's parser keeps its last document in a global.
+  static std::mutex parser;
+  const std::lock_guard lock(parser);
+  const auto files = std::make_unique<mjVFS>();
+  mj_defaultVFS(files.get());
+  const int index = mj_makeEmptyFileVFS(files.get(), "robot.xml", static_cast<int>(xml.size()));
+  if (index < 0) {
+    throw Error("reality: the engine takes no document");
+  }
+  std::memcpy(files->filedata[index], xml.data(), xml.size());
+  std::array<char, 1000> message{};
+  Model model(mj_loadXML("robot.xml", files.get(), message.data(), static_cast<int>(message.size())));
+  mj_deleteVFS(files.get());
+  if (!model) {
+    throw Error(fmt::format("reality: the engine rejects the robot: {}", message.data()));
+  }
+  return model;
+}
+
+/// Speed control with integrator and feed-forward, for sum and difference.
+class SpeedControl {
+ public:
+  explicit SpeedControl(const RobotDesign& robot) : robot_(robot) {}
+
+  Pair step(const Drive& drive, double t, const Pair& speed, double h) {
+    const double place = std::min(t / Drive::step, static_cast<double>(drive.v1.size()) - 1.001);
+    const auto k = static_cast<std::size_t>(place);
+    const double part = place - static_cast<double>(k);
+    const double r = robot_.radius;
+    const double arm = robot_.half_track;
+    const std::array<double, 2> actual{0.5 * r * (speed[right] + speed[left]),
+                                       0.5 * r * (speed[right] - speed[left]) / arm};
+    const std::array<double, 2> inertia{r * robot_.mass, r * robot_.yaw_inertia};
+    const std::array<const std::vector<double>*, 2> wanted{&drive.v1, &drive.v2};
+    std::array<double, 2> effort{};
+    for (std::size_t c = 0; c < 2; ++c) {
+      const double low = (*wanted[c])[k];
+      const double high = (*wanted[c])[k + 1];
+      const double error = low + part * (high - low) - actual[c];
+      if (!clipped_) {
+        integral_[c] += h * error;
+      }
+      const double gain = robot_.bandwidth;
+      effort[c] = inertia[c] * (0.8 * (high - low) / Drive::step + gain * error + 0.3 * gain * gain * integral_[c]);
+    }
+    const Pair torque{0.5 * (effort[0] + effort[1] / arm), 0.5 * (effort[0] - effort[1] / arm)};
+    const double limit = robot_.effort_limit;
+    clipped_ = std::abs(torque[0]) > limit || std::abs(torque[1]) > limit;
+    return {std::clamp(torque[0], -limit, limit), std::clamp(torque[1], -limit, limit)};
+  }
+
+ private:
+  const RobotDesign& robot_;
+  std::array<double, 2> integral_{};
+  bool clipped_ = false;
+};
+
+/// Everything at every step, before it is cut into sampling intervals.
+struct History {
+  std::array<std::vector<double>, 2> angle, speed, torque;
+  std::vector<double> x, y, heading;
+};
+
+double between(const std::vector<double>& values, double place) {
+  const double inside = std::clamp(place, 0.0, static_cast<double>(values.size()) - 1.001);
+  const auto k = static_cast<std::size_t>(inside);
+  const double part = inside - static_cast<double>(k);
+  return values[k] + part * (values[k + 1] - values[k]);
+}
+
+Record sample(const History& history, double rate, double step, double late) {
+  Record record;
+  record.period = 1.0 / rate;
+  const double stride = record.period / step;
+  const auto rows = static_cast<std::size_t>(static_cast<double>(history.x.size() - 1) / stride);
+  const double shift = late / step;
+  for (std::size_t k = 0; k < rows; ++k) {
+    const double begin = stride * static_cast<double>(k);
+    const double middle = begin + 0.5 * stride;
+    record.t.push_back(middle * step);
+    for (std::size_t i = 0; i < 2; ++i) {
+      const double from = between(history.angle[i], begin - shift);
+      const double to = between(history.angle[i], begin + stride - shift);
+      if (k == 0) {
+        record.angle[i].push_back(from);
+      }
+      record.angle[i].push_back(to);
+      record.speed[i].push_back((to - from) / record.period);
+      record.acceleration[i].push_back(
+          (between(history.speed[i], begin + stride - shift) - between(history.speed[i], begin - shift)) /
+          record.period);
+      double sum = 0.0;
+      const auto first = static_cast<std::size_t>(std::lround(begin));
+      const auto last = static_cast<std::size_t>(std::lround(begin + stride));
+      for (std::size_t j = first; j < last; ++j) {
+        sum += history.torque[i][j];
+      }
+      record.torque[i].push_back(sum / static_cast<double>(last - first));
+    }
+    record.x.push_back(between(history.x, middle));
+    record.y.push_back(between(history.y, middle));
+    record.heading.push_back(between(history.heading, middle));
+  }
+  return record;
+}
+
+}  // namespace
+
+Record run_world(const RobotDesign& robot, std::vector<Effect>& effects, const Drive& drive, double step) {
+  Body body = robot.body;
+  for (Effect& effect : effects) {
+    if (effect.build) {
+      effect.build(body);
+    }
+  }
+  const Model model = compile(engine_xml(body, step));
+  const Data data(mj_makeData(model.get()));
+  std::array<int, 2> dof{}, joint{};
+  for (std::size_t i = 0; i < 2; ++i) {
+    const int id = mj_name2id(model.get(), mjOBJ_JOINT, i == right ? "right" : "left");
+    dof[i] = model->jnt_dofadr[id];
+    joint[i] = model->jnt_qposadr[id];
+  }
+  double late = 0.0;
+  for (const Effect& effect : effects) {
+    late += effect.late;
+  }
+
+  SpeedControl control(robot);
+  History history;
+  State state;
+  state.step = step;
+  Pair encoder{};
+  double heading = 0.0;
+  const auto steps = static_cast<std::size_t>(drive.duration() / step);
+  for (std::size_t n = 0; n <= steps; ++n) {
+    const double* q = data->qpos;
+    const double* v = data->qvel;
+    const double raw = std::atan2(2.0 * (q[3] * q[6] + q[4] * q[5]), 1.0 - 2.0 * (q[5] * q[5] + q[6] * q[6]));
+    heading += std::remainder(raw - heading, 2.0 * std::numbers::pi);
+    const double c = std::cos(heading);
+    const double s = std::sin(heading);
+    state.t = step * static_cast<double>(n);
+    state.x = q[0];
+    state.y = q[1];
+    state.heading = heading;
+    state.v1 = c * v[0] + s * v[1];
+    state.v2 = v[5];
+    for (std::size_t i = 0; i < 2; ++i) {
+      state.angle[i] = q[joint[i]];
+      state.speed[i] = v[dof[i]];
+    }
+    Pair seen = state.speed;
+    for (Effect& effect : effects) {
+      if (effect.measure) {
+        effect.measure(state, seen);
+      }
+    }
+    for (std::size_t i = 0; i < 2; ++i) {
+      // Semi-implicit steps: the angle moves with the speed at the end of the step.
+      encoder[i] += n > 0 ? step * seen[i] : 0.0;
+    }
+
+    const Pair command = control.step(drive, state.t, seen, step);
+    Pair torque = command;
+    for (std::size_t i = 0; i < 2; ++i) {
+      torque[i] = robot.gain[i] * torque[i] + robot.bias[i];
+    }
+    for (Effect& effect : effects) {
+      if (effect.actuate) {
+        effect.actuate(state, torque);
+      }
+    }
+    state.torque = torque;
+    Push push;
+    for (Effect& effect : effects) {
+      if (effect.push) {
+        effect.push(state, push);
+      }
+    }
+    for (std::size_t i = 0; i < 2; ++i) {
+      history.angle[i].push_back(encoder[i]);
+      history.speed[i].push_back(seen[i]);
+      history.torque[i].push_back(command[i]);
+      data->qfrc_applied[dof[i]] = torque[i] + push.wheel[i];
+    }
+    history.x.push_back(q[0]);
+    history.y.push_back(q[1]);
+    history.heading.push_back(heading);
+    data->qfrc_applied[0] = c * push.forward - s * push.sideways;
+    data->qfrc_applied[1] = s * push.forward + c * push.sideways;
+    data->qfrc_applied[5] = push.yaw;
+    mj_step(model.get(), data.get());
+  }
+  if (data->warning[mjWARN_BADQACC].number + data->warning[mjWARN_BADQPOS].number +
+          data->warning[mjWARN_BADQVEL].number >
+      0) {
+    throw Error("reality: the world became unstable");
+  }
+  return sample(history, robot.rate, step, late);
+}
+
+}  // namespace wheelwright::reality
