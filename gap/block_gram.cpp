@@ -1,0 +1,397 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/gap/block_gram.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <wheelwright/core/check.hpp>
+#include <wheelwright/core/for_all.hpp>
+#include <wheelwright/gap/signed_least_squares.hpp>
+
+namespace wheelwright {
+namespace {
+
+constexpr Eigen::Index kChunk = 128;   // rows at a time: what is multiplied stays in the cache
+constexpr double kDetermined = 1e-10;  // share of a squared column that the ones before it must leave
+
+// Half-open rows of one space.
+struct Range {
+  Eigen::Index first = 0;
+  Eigen::Index last = 0;
+};
+
+Eigen::Index first_at(const Eigen::VectorXd& t, double from) {
+  return std::lower_bound(t.data(), t.data() + t.size(), from) - t.data();
+}
+
+void check_spaces(const std::vector<RowSpace>& spaces) {
+  check::that(!spaces.empty(), "BlockGram spaces", "at least one");
+  for (const RowSpace& space : spaces) {
+    const std::string what = "RowSpace " + space.name;
+    check::positive(space.floor, what + " floor");
+    check::that(space.columns.size() == spaces.front().columns.size(), what, "the columns of the first space");
+    check::that(space.response.size() == space.t.size(), what + " response", "one value per row");
+    check::that(space.response.allFinite() && space.t.allFinite(), what, "finite values");
+    check::that(std::is_sorted(space.t.data(), space.t.data() + space.t.size()), what + " t", "ascending times");
+    for (const Eigen::VectorXd& column : space.columns) {
+      check::that(column.size() == 0 || column.size() == space.t.size(), what + " column",
+                  "one value per row, or none");
+      check::that(column.allFinite(), what + " column", "finite values");
+    }
+  }
+}
+
+// Adds the products of the rows of `space` to the lower triangle of `gram`.
+void accumulate(const RowSpace& space, Range rows, Eigen::MatrixXd& gram) {
+  std::vector<const Eigen::VectorXd*> used;
+  std::vector<Eigen::Index> index;
+  for (std::size_t c = 0; c < space.columns.size(); ++c) {
+    if (space.columns[c].size() > 0) {
+      used.push_back(&space.columns[c]);
+      index.push_back(static_cast<Eigen::Index>(c));
+    }
+  }
+  used.push_back(&space.response);
+  index.push_back(static_cast<Eigen::Index>(space.columns.size()));
+  const auto n = static_cast<Eigen::Index>(used.size());
+  Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(n, n);
+  Eigen::MatrixXd chunk(kChunk, n);
+  for (Eigen::Index k = rows.first; k < rows.last; k += kChunk) {
+    const Eigen::Index m = std::min(kChunk, rows.last - k);
+    for (Eigen::Index c = 0; c < n; ++c) {
+      chunk.col(c).head(m) = used[static_cast<std::size_t>(c)]->segment(k, m) / space.floor;
+    }
+    sum.selfadjointView<Eigen::Lower>().rankUpdate(chunk.topRows(m).transpose());
+  }
+  for (Eigen::Index j = 0; j < n; ++j) {
+    for (Eigen::Index i = j; i < n; ++i) {
+      gram(index[static_cast<std::size_t>(i)], index[static_cast<std::size_t>(j)]) += sum(i, j);
+    }
+  }
+}
+
+}  // namespace
+
+// One subset's normal equations, in units of the columns' norms; index [(i, j)][block], i >= j.
+struct BlockGram::Problem {
+  std::size_t k = 0;
+  std::size_t blocks = 0;
+  std::vector<double> unit;          // 1/norm of each column
+  std::vector<double> ridge;         // of each column, scaled
+  std::vector<double> all_A, all_b;  // all inner rows
+  std::vector<double> A, b, e;       // of each block
+  std::vector<double> x;             // [column][block]: fitted to the other blocks
+
+  [[nodiscard]] static std::size_t pair(std::size_t i, std::size_t j) { return i * (i + 1) / 2 + j; }
+  // Fits each block's complement by Cholesky, all blocks abreast.
+  void solve_without_signs();
+  // Fits the complements anew in which a coefficient has the wrong sign.
+  void mend_signs(const std::vector<int>& sign);
+  [[nodiscard]] Eigen::VectorXd losses() const;
+};
+
+void BlockGram::Problem::solve_without_signs() {
+  const std::size_t B = blocks;
+  std::vector<double> L((k * (k + 1)) / 2 * B), inverse(k * B);
+  for (std::size_t j = 0; j < k; ++j) {
+    for (std::size_t i = j; i < k; ++i) {
+      double* const l = &L[pair(i, j) * B];
+      const double* const own = &A[pair(i, j) * B];
+      const double total = all_A[pair(i, j)] + (i == j ? ridge[i] : 0.0);
+      for (std::size_t c = 0; c < B; ++c) {
+        l[c] = total - own[c];
+      }
+      for (std::size_t m = 0; m < j; ++m) {
+        const double* const li = &L[pair(i, m) * B];
+        const double* const lj = &L[pair(j, m) * B];
+        for (std::size_t c = 0; c < B; ++c) {
+          l[c] -= li[c] * lj[c];
+        }
+      }
+      double* const inv = &inverse[j * B];
+      if (i == j) {
+        for (std::size_t c = 0; c < B; ++c) {
+          inv[c] = l[c] > kDetermined ? 1.0 / std::sqrt(l[c]) : 0.0;
+        }
+      } else {
+        for (std::size_t c = 0; c < B; ++c) {
+          l[c] *= inv[c];
+        }
+      }
+    }
+  }
+  x.assign(k * B, 0.0);
+  for (std::size_t i = 0; i < k; ++i) {
+    double* const xi = &x[i * B];
+    for (std::size_t c = 0; c < B; ++c) {
+      xi[c] = all_b[i] - b[i * B + c];
+    }
+    for (std::size_t m = 0; m < i; ++m) {
+      for (std::size_t c = 0; c < B; ++c) {
+        xi[c] -= L[pair(i, m) * B + c] * x[m * B + c];
+      }
+    }
+    for (std::size_t c = 0; c < B; ++c) {
+      xi[c] *= inverse[i * B + c];
+    }
+  }
+  for (std::size_t i = k; i-- > 0;) {
+    double* const xi = &x[i * B];
+    for (std::size_t m = i + 1; m < k; ++m) {
+      for (std::size_t c = 0; c < B; ++c) {
+        xi[c] -= L[pair(m, i) * B + c] * x[m * B + c];
+      }
+    }
+    for (std::size_t c = 0; c < B; ++c) {
+      xi[c] *= inverse[i * B + c];
+    }
+  }
+}
+
+void BlockGram::Problem::mend_signs(const std::vector<int>& sign) {
+  if (sign.empty()) {
+    return;
+  }
+  const auto n = static_cast<Eigen::Index>(k);
+  for (std::size_t c = 0; c < blocks; ++c) {
+    bool wrong = false;
+    for (std::size_t i = 0; i < k; ++i) {
+      wrong = wrong || sign[i] * x[i * blocks + c] < 0.0;
+    }
+    if (!wrong) {
+      continue;
+    }
+    Eigen::MatrixXd rest(n, n);
+    Eigen::VectorXd right(n);
+    for (std::size_t i = 0; i < k; ++i) {
+      const auto r = static_cast<Eigen::Index>(i);
+      right[r] = all_b[i] - b[i * blocks + c];
+      for (std::size_t j = 0; j <= i; ++j) {
+        const double value = all_A[pair(i, j)] + (i == j ? ridge[i] : 0.0) - A[pair(i, j) * blocks + c];
+        rest(r, static_cast<Eigen::Index>(j)) = rest(static_cast<Eigen::Index>(j), r) = value;
+      }
+    }
+    const SignedSolution mended = signed_least_squares(rest, right, sign);
+    for (std::size_t i = 0; i < k; ++i) {
+      x[i * blocks + c] = mended.x[static_cast<Eigen::Index>(i)];
+    }
+  }
+}
+
+Eigen::VectorXd BlockGram::Problem::losses() const {
+  Eigen::VectorXd loss = Eigen::Map<const Eigen::VectorXd>(e.data(), static_cast<Eigen::Index>(blocks));
+  for (std::size_t i = 0; i < k; ++i) {
+    const double* const xi = &x[i * blocks];
+    for (std::size_t c = 0; c < blocks; ++c) {
+      loss[static_cast<Eigen::Index>(c)] -= 2.0 * xi[c] * b[i * blocks + c];
+    }
+    for (std::size_t j = 0; j <= i; ++j) {
+      const double twice = i == j ? 1.0 : 2.0;
+      for (std::size_t c = 0; c < blocks; ++c) {
+        loss[static_cast<Eigen::Index>(c)] += twice * xi[c] * x[j * blocks + c] * A[pair(i, j) * blocks + c];
+      }
+    }
+  }
+  return loss.cwiseMax(0.0);
+}
+
+BlockGram::BlockGram(const std::vector<RowSpace>& spaces, const BlockOptions& options) : blocks_(options.blocks) {
+  check_spaces(spaces);
+  check::that(blocks_ >= 2, "BlockOptions::blocks", "at least two");
+  check::non_negative(options.purge, "BlockOptions::purge");
+  columns_ = spaces.front().columns.size();
+  double begin = std::numeric_limits<double>::infinity(), end = -begin;
+  for (const RowSpace& space : spaces) {
+    if (space.t.size() > 0) {
+      begin = std::min(begin, space.t[0]);
+      end = std::max(end, space.t[space.t.size() - 1]);
+      all_rows_ += static_cast<double>(space.t.size());
+    }
+  }
+  check::that(all_rows_ > 0, "BlockGram spaces", "at least one row");
+  const double length = (end - begin) / static_cast<double>(blocks_);
+  const std::size_t pairs = (columns_ + 1) * (columns_ + 2) / 2;
+  gram_.assign(pairs * lanes(), 0.0);
+  rows_ = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(blocks_));
+  const double infinity = std::numeric_limits<double>::infinity();
+  for_all(blocks_, options.threads, [&](std::size_t b) {
+    const auto place = static_cast<double>(b);
+    const double from = b == 0 ? -infinity : begin + place * length;
+    const double to = b + 1 == blocks_ ? infinity : begin + (place + 1.0) * length;
+    const auto size = static_cast<Eigen::Index>(columns_ + 1);
+    Eigen::MatrixXd within = Eigen::MatrixXd::Zero(size, size), near = within;
+    for (const RowSpace& space : spaces) {
+      const Range block{first_at(space.t, from), first_at(space.t, to)};
+      Range core{std::min(first_at(space.t, from + options.purge), block.last), block.last};
+      core.last = std::max(core.first, std::min(first_at(space.t, to - options.purge), block.last));
+      accumulate(space, core, within);
+      accumulate(space, {block.first, core.first}, near);
+      accumulate(space, {core.last, block.last}, near);
+      rows_[static_cast<Eigen::Index>(b)] += static_cast<double>(core.last - core.first);
+    }
+    std::size_t p = 0;
+    for (Eigen::Index i = 0; i < size; ++i) {
+      for (Eigen::Index j = 0; j <= i; ++j, ++p) {
+        gram_[p * lanes() + b] = within(i, j);
+        gram_[p * lanes() + blocks_ + b] = near(i, j);
+      }
+    }
+  });
+  check::that(rows_.sum() > 0.0, "BlockOptions", "blocks longer than twice the purge");
+  for (std::size_t p = 0; p < pairs; ++p) {
+    double* const lane = &gram_[p * lanes()];
+    double near = 0.0;
+    for (std::size_t b = 0; b < blocks_; ++b) {
+      lane[inner()] += lane[b];
+      near += lane[blocks_ + b];
+    }
+    lane[all()] = lane[inner()] + near;
+  }
+}
+
+void BlockGram::check_subset(const Subset& subset) const {
+  const auto inside = [this](std::size_t c) { return c < columns_; };
+  check::that(std::ranges::all_of(subset.columns, inside) && std::ranges::all_of(subset.fixed, inside), "Subset",
+              "indices of columns");
+  check::that(subset.sign.empty() || subset.sign.size() == subset.columns.size(), "Subset::sign",
+              "one for each column, or none");
+  check::that(subset.precision.empty() || subset.precision.size() == subset.columns.size(), "Subset::precision",
+              "one for each column, or none");
+  check::that(std::ranges::all_of(subset.precision, [](double p) { return p >= 0.0; }), "Subset::precision",
+              "numbers >= 0");
+}
+
+BlockGram::Problem BlockGram::gather(const Subset& subset) const {
+  check_subset(subset);
+  Problem q;
+  const std::size_t B = blocks_;
+  q.k = subset.columns.size();
+  q.blocks = B;
+  q.unit.resize(q.k);
+  q.ridge.assign(q.k, 0.0);
+  q.all_A.resize(q.k * (q.k + 1) / 2);
+  q.all_b.resize(q.k);
+  q.A.resize(q.all_A.size() * B);
+  q.b.resize(q.k * B);
+  for (std::size_t i = 0; i < q.k; ++i) {
+    const double square = at(subset.columns[i], subset.columns[i])[inner()];
+    const double prior = subset.precision.empty() ? 0.0 : subset.precision[i];
+    q.unit[i] = square + prior > 0.0 ? 1.0 / std::sqrt(square + prior) : 0.0;
+    q.ridge[i] = prior * q.unit[i] * q.unit[i];
+  }
+  for (std::size_t i = 0; i < q.k; ++i) {
+    for (std::size_t j = 0; j <= i; ++j) {
+      const double* const lane = at(subset.columns[i], subset.columns[j]);
+      const double unit = q.unit[i] * q.unit[j];
+      const std::size_t p = Problem::pair(i, j);
+      q.all_A[p] = unit * lane[inner()];
+      for (std::size_t c = 0; c < B; ++c) {
+        q.A[p * B + c] = unit * lane[c];
+      }
+    }
+    const double* const response = at(subset.columns[i], columns_);
+    q.all_b[i] = q.unit[i] * response[inner()];
+    for (std::size_t c = 0; c < B; ++c) {
+      q.b[i * B + c] = q.unit[i] * response[c];
+    }
+    for (const std::size_t f : subset.fixed) {
+      const double* const lane = at(subset.columns[i], f);
+      q.all_b[i] -= q.unit[i] * lane[inner()];
+      for (std::size_t c = 0; c < B; ++c) {
+        q.b[i * B + c] -= q.unit[i] * lane[c];
+      }
+    }
+  }
+  q.e.assign(at(columns_, columns_), at(columns_, columns_) + B);
+  for (const std::size_t f : subset.fixed) {
+    const double* const response = at(columns_, f);
+    for (std::size_t c = 0; c < B; ++c) {
+      q.e[c] -= 2.0 * response[c];
+    }
+    for (const std::size_t g : subset.fixed) {
+      const double* const lane = at(f, g);
+      for (std::size_t c = 0; c < B; ++c) {
+        q.e[c] += lane[c];
+      }
+    }
+  }
+  return q;
+}
+
+Eigen::VectorXd BlockGram::held_out_loss(const Subset& subset) const {
+  Problem problem = gather(subset);
+  problem.solve_without_signs();
+  problem.mend_signs(subset.sign);
+  return problem.losses();
+}
+
+double BlockGram::held_out_error(const Subset& subset) const { return held_out_loss(subset).sum() / rows_.sum(); }
+
+BlockFit BlockGram::fit(const Subset& subset) const {
+  check_subset(subset);
+  const auto n = static_cast<Eigen::Index>(subset.columns.size());
+  Eigen::VectorXd unit(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const std::size_t c = subset.columns[static_cast<std::size_t>(i)];
+    const double prior = subset.precision.empty() ? 0.0 : subset.precision[static_cast<std::size_t>(i)];
+    unit[i] = square(c) + prior > 0.0 ? 1.0 / std::sqrt(square(c) + prior) : 0.0;
+  }
+  const auto entry = [this](std::size_t i, std::size_t j, std::size_t block) {
+    const double* const lane = at(i, j);
+    return block == blocks_ ? lane[all()] : lane[block] + lane[blocks_ + block];
+  };
+  const auto equations = [&](std::size_t block, Eigen::MatrixXd& A, Eigen::VectorXd& b) {
+    A.resize(n, n);
+    b.resize(n);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const std::size_t c = subset.columns[static_cast<std::size_t>(i)];
+      b[i] = entry(c, columns_, block);
+      for (const std::size_t f : subset.fixed) {
+        b[i] -= entry(c, f, block);
+      }
+      b[i] *= unit[i];
+      for (Eigen::Index j = 0; j <= i; ++j) {
+        A(i, j) = A(j, i) = unit[i] * unit[j] * entry(c, subset.columns[static_cast<std::size_t>(j)], block);
+      }
+    }
+  };
+  Eigen::MatrixXd A, own;
+  Eigen::VectorXd b, score;
+  equations(blocks_, A, b);
+  Eigen::VectorXd ridge = Eigen::VectorXd::Zero(n);
+  for (Eigen::Index i = 0; i < n && !subset.precision.empty(); ++i) {
+    ridge[i] = subset.precision[static_cast<std::size_t>(i)] * unit[i] * unit[i];
+  }
+  const Eigen::MatrixXd H = A + Eigen::MatrixXd(ridge.asDiagonal());
+  const SignedSolution solution = signed_least_squares(H, b, subset.sign);
+  BlockFit fit;
+  fit.at_bound = solution.zero;
+  fit.coefficients = unit.cwiseProduct(solution.x);
+
+  const Eigen::MatrixXd inverse = restricted_inverse(H, solution.zero);
+  Eigen::MatrixXd covariance = inverse * ridge.asDiagonal() * inverse;
+  const auto blocks = static_cast<double>(blocks_);
+  for (std::size_t c = 0; c < blocks_; ++c) {
+    equations(c, own, score);
+    score -= own * solution.x;
+    const Eigen::VectorXd change = restricted_inverse(H - own, solution.zero) * score;
+    covariance += (blocks - 1.0) / blocks * change * change.transpose();
+  }
+  fit.covariance = unit.asDiagonal() * covariance * unit.asDiagonal();
+
+  double sum = square(columns_);
+  for (const std::size_t f : subset.fixed) {
+    sum -= 2.0 * product(columns_, f);
+    for (const std::size_t g : subset.fixed) {
+      sum += product(f, g);
+    }
+  }
+  sum += solution.x.dot(A * solution.x) - 2.0 * solution.x.dot(b);
+  fit.mean_square = std::max(0.0, sum) / all_rows_;
+  fit.held_out_loss = held_out_loss(subset);
+  fit.held_out_error = fit.held_out_loss.sum() / rows_.sum();
+  return fit;
+}
+
+}  // namespace wheelwright

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Least squares on any subset of many columns, held out block of time by block of time, from Gram matrices alone.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace wheelwright {
+
+/// The rows of one output of one residual space, over all candidate columns.
+struct RowSpace {
+  std::string name;                      ///< e.g. "sum", "yaw"
+  Eigen::VectorXd t;                     ///< time of each row, s, ascending
+  Eigen::VectorXd response;              ///< what is to be explained
+  std::vector<Eigen::VectorXd> columns;  ///< the same columns in every space; an empty one stands for zeros
+  double floor = 1.0;                    ///< standard deviation of the noise: all is divided by it
+};
+
+/// How rows are cut into blocks.
+struct BlockOptions {
+  std::size_t blocks = 24;  ///< of equal duration, from the first time of all spaces to the last
+  double purge = 0.5;       ///< s: rows nearer than this to a border between two blocks are in no held-out block and
+                            ///< train none
+  std::size_t threads = 1;  ///< results do not depend on it
+};
+
+/// A least-squares problem on some of the columns.
+struct Subset {
+  std::vector<std::size_t> columns{};  ///< whose coefficients are estimated
+  std::vector<std::size_t> fixed{};    ///< whose coefficient is 1: subtracted from the response
+  std::vector<int> sign{};          ///< of each estimated coefficient: +1 for >= 0, −1 for <= 0, 0 for either; may be
+                                    ///< empty (all either)
+  std::vector<double> precision{};  ///< of each one's Gaussian prior about 0: its inverse variance; may be empty (none)
+};
+
+/// A subset fitted to all rows.
+struct BlockFit {
+  Eigen::VectorXd coefficients;
+  Eigen::MatrixXd covariance;     ///< zero for coefficients that are held at 0 by their sign
+  std::vector<bool> at_bound;     ///< held at 0 by its sign, or not determined by the rows
+  double mean_square = 0.0;       ///< of the residual over all rows
+  double held_out_error = 0.0;    ///< as BlockGram::held_out_error
+  Eigen::VectorXd held_out_loss;  ///< of each block: sum of squares of its held-out rows
+};
+
+/// Gram matrices of columns and response over the inner rows of each block, and over the rows near borders.
+///
+/// Everything is in units of the floors: a residual that is nothing but noise has the mean square 1.
+class BlockGram {
+ public:
+  /// One pass over the rows. Throws InvalidArgument when sizes disagree, times descend, a floor is not > 0, a value is
+  /// not finite, there are fewer than two blocks, or no row lies inside a block.
+  explicit BlockGram(const std::vector<RowSpace>& spaces, const BlockOptions& options = {});
+
+  [[nodiscard]] std::size_t columns() const { return columns_; }
+  [[nodiscard]] std::size_t blocks() const { return blocks_; }
+  /// Number of held-out rows of each block.
+  [[nodiscard]] const Eigen::VectorXd& rows() const { return rows_; }
+  /// Number of all rows, those near borders included.
+  [[nodiscard]] double all_rows() const { return all_rows_; }
+  /// Sum of squares of the whitened column over all rows; the response has the index columns().
+  [[nodiscard]] double square(std::size_t column) const { return at(column, column)[all()]; }
+  /// Σ a b over all rows, a and b whitened columns or (index columns()) the response.
+  [[nodiscard]] double product(std::size_t a, std::size_t b) const { return at(a, b)[all()]; }
+
+  /// Mean over all held-out rows of the squared error, each block predicted by the fit to the inner rows of all others.
+  /// Coefficients that the other blocks do not determine are 0. Throws InvalidArgument for an index out of range or
+  /// sizes that disagree.
+  [[nodiscard]] double held_out_error(const Subset& subset) const;
+
+  /// Its sums over each block, for paired comparisons.
+  [[nodiscard]] Eigen::VectorXd held_out_loss(const Subset& subset) const;
+
+  /// Fit to all rows. The covariance is the sandwich of the blocks' scores s_b, each freed of its block's leverage,
+  /// (B−1)/B Σ d_b d_bᵀ with d_b = (XᵀX + Λ − X_bᵀX_b)⁻¹ s_b, which is the jackknife over blocks (Bell and McCaffrey
+  /// 2002), plus what the prior of precision Λ leaves, H⁻¹ΛH⁻¹ with H = XᵀX + Λ. It holds for residuals that are
+  /// correlated within blocks and of unequal variance.
+  [[nodiscard]] BlockFit fit(const Subset& subset) const;
+
+ private:
+  struct Problem;
+
+  // Per pair of columns (the response is the last one): inner rows of each block, border rows of each block, all inner
+  // rows, all rows.
+  [[nodiscard]] const double* at(std::size_t i, std::size_t j) const {
+    return gram_.data() + (i >= j ? i * (i + 1) / 2 + j : j * (j + 1) / 2 + i) * lanes();
+  }
+  [[nodiscard]] std::size_t lanes() const { return 2 * blocks_ + 2; }
+  [[nodiscard]] std::size_t inner() const { return 2 * blocks_; }
+  [[nodiscard]] std::size_t all() const { return 2 * blocks_ + 1; }
+
+  void check_subset(const Subset& subset) const;
+  [[nodiscard]] Problem gather(const Subset& subset) const;
+
+  std::size_t columns_ = 0;
+  std::size_t blocks_ = 0;
+  std::vector<double> gram_;
+  Eigen::VectorXd rows_;
+  double all_rows_ = 0.0;
+};
+
+}  // namespace wheelwright

@@ -1,0 +1,286 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+
+#include <wheelwright/filter/exact.hpp>
+#include <wheelwright/gap/catalogue.hpp>
+#include <wheelwright/gap/catalogue_parts.hpp>
+
+namespace wheelwright {
+namespace {
+
+using namespace catalogue;
+using Signal = Eigen::VectorXd;
+using Shape = std::span<const double>;
+
+template <typename Function>
+std::vector<Signal> each_joint(const Drive& drive, const Function& function) {
+  std::vector<Signal> signals;
+  for (std::size_t j = 0; j < drive.joints.size(); ++j) {
+    signals.push_back(function(j));
+  }
+  return signals;
+}
+
+// u through T y' = u − y, from y = u at each segment's start.
+Signal lagged(const Drive& drive, const Signal& u, double T) {
+  const StepWeights w(1.0 / T, drive.step);
+  Signal y(u.size());
+  for (std::size_t s = 0; s < drive.segment_starts.size(); ++s) {
+    const auto [first, last] = drive.segment(s);
+    y[first] = u[first];
+    for (Eigen::Index k = first + 1; k < last; ++k) {
+      y[k] = w.decay() * y[k - 1] + (w.begin1() * u[k - 1] + w.end1() * u[k]) / T;
+    }
+  }
+  return y;
+}
+
+// u(t − delay), linear between instants, held at a segment's ends.
+Signal shifted(const Drive& drive, const Signal& u, double delay) {
+  Signal y(u.size());
+  const double steps = delay / drive.step;
+  for (std::size_t s = 0; s < drive.segment_starts.size(); ++s) {
+    const auto [first, last] = drive.segment(s);
+    for (Eigen::Index k = first; k < last; ++k) {
+      const double at = std::clamp(static_cast<double>(k - first) - steps, 0.0, static_cast<double>(last - 1 - first));
+      const auto before = std::min(first + static_cast<Eigen::Index>(at), last - 2);
+      const double share = at - static_cast<double>(before - first);
+      y[k] = u[before] + share * (u[before + 1] - u[before]);
+    }
+  }
+  return y;
+}
+
+double typical_effort(const Drive& drive) { return std::max(deviation(drive.joints[0].smooth_effort), 1e-12); }
+
+double largest_effort(const Drive& drive) {
+  double largest = 1e-12;
+  for (const JointSignals& joint : drive.joints) {
+    largest = std::max(largest, joint.effort.cwiseAbs().maxCoeff());
+  }
+  return largest;
+}
+
+ShapeParameter duration(const char* name) {
+  return {.name = name, .unit = "s", .lower = 0.004, .upper = 0.25, .scan = 40, .logarithmic = true};
+}
+
+std::vector<PhysicalValue> gain_of_excess(std::span<const double> c, Shape) {
+  return {{"gain", "1", 1.0 / (1.0 + c[0])}};
+}
+
+Effect actuator_lag() {
+  return {.name = "actuator_lag",
+          .sentence = "The actuator follows its command with a first-order lag.",
+          .family = "late_torque",
+          .shapes = {duration("time_constant_s")},
+          .unit_coefficient = true,
+          .excite = "change the torque fast: steps and high frequencies",
+          .columns = [](const Drive& drive, Shape shape) {
+            return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
+                                           const Signal& u = drive.joints[j].effort;
+                                           return u - lagged(drive, u, shape[0]);
+                                         }))};
+          }};
+}
+
+Effect delay() {
+  return {.name = "delay",
+          .sentence = "The torque arrives later than it was commanded.",
+          .family = "late_torque",
+          .shapes = {duration("delay_s")},
+          .unit_coefficient = true,
+          .excite = "change the torque fast: steps and high frequencies",
+          .columns = [](const Drive& drive, Shape shape) {
+            return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
+                                           const Signal& u = drive.joints[j].effort;
+                                           return u - shifted(drive, u, shape[0]);
+                                         }))};
+          }};
+}
+
+Effect sensor_time_offset() {
+  ShapeParameter late = duration("late_s");
+  late.both_signs = true;
+  return {.name = "sensor_time_offset",
+          .sentence = "The speeds' time stamps are late (or early) against torque and pose.",
+          .family = "late_torque",
+          .shapes = {late},
+          .unit_coefficient = true,
+          .excite = "change speed and torque fast, with the pose logged",
+          .columns = [](const Drive& drive, Shape shape) {
+            Column column = at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
+                                        const Signal& u = drive.joints[j].effort;
+                                        return u - shifted(drive, u, shape[0]);
+                                      }));
+            if (drive.two_wheels()) {
+              const Signal& v1 = drive.coordinates[0].smooth_speed;
+              const Signal& v2 = drive.coordinates[1].smooth_speed;
+              column.forward = shifted(drive, v1, -shape[0]) - v1;
+              column.yaw = shifted(drive, v2, -shape[0]) - v2;
+            }
+            return std::vector{column};
+          }};
+}
+
+Effect torque_gain() {
+  return {.name = "torque_gain",
+          .sentence = "The actuators' torque constant is not as designed: all of the commands are too large or small.",
+          .parametric = true,
+          .parameters = {{"command_excess", "1", 0}},
+          .excite = "drive a known load",
+          .columns =
+              [](const Drive& drive, Shape) {
+                return std::vector{at_joints(
+                    drive, each_joint(drive, [&](std::size_t j) { return drive.joints[j].predicted_effort; }))};
+              },
+          .physical = gain_of_excess};
+}
+
+Effect torque_gain_asymmetric() {
+  return {.name = "torque_gain_asymmetric",
+          .sentence = "One actuator gives more or less torque than it is told.",
+          .parameters = {{"command_excess", "1", 0}},
+          .shapes = {side()},
+          .excite = "accelerate and brake on a straight line, with the pose logged",
+          .applies = needs_two_wheels,
+          .columns =
+              [](const Drive& drive, Shape shape) {
+                const std::size_t j = shape[0] < 0.5 ? 0 : 1;
+                return std::vector{at_joints(drive, only(drive, j, drive.joints[j].predicted_effort))};
+              },
+          .physical = gain_of_excess};
+}
+
+Effect torque_bias(std::size_t joints) {
+  Effect effect{.name = "torque_bias",
+                .sentence = "A constant torque: the offset of a sensor or an amplifier.",
+                .family = "constant_force",
+                .parameters = {{"bias", "N·m", 0}},
+                .excite = "drive in all directions, forwards and backwards",
+                .applies = [](const Drive& drive) { return needs_no(drive, "offset"); }};
+  if (joints == 2) {
+    effect.parameters = {{"bias_right", "N·m", 0}, {"bias_left", "N·m", 0}};
+  }
+  effect.columns = [](const Drive& drive, Shape) {
+    std::vector<Column> columns;
+    for (std::size_t j = 0; j < drive.joints.size(); ++j) {
+      columns.push_back(at_joints(drive, only(drive, j, Signal::Ones(drive.rows()))));
+    }
+    return columns;
+  };
+  return effect;
+}
+
+Effect torque_deadzone() {
+  return {.name = "torque_deadzone",
+          .sentence = "The actuator answers only to what exceeds a dead zone.",
+          .parameters = {{"deadzone", "N·m", 1}},
+          .excite = "brake with the motors: torque against the motion",
+          .columns = [](const Drive& drive, Shape) {
+            const double width = 0.04 * typical_effort(drive);
+            return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) {
+                                           return soft_sign(drive.joints[j].smooth_effort, width);
+                                         }))};
+          }};
+}
+
+Effect saturation() {
+  return {
+      .name = "saturation",
+      .sentence = "The actuator's torque is limited below what is commanded.",
+      .shapes = {{.name = "limit", .unit = "N·m", .lower = 0.3, .upper = 0.98, .scan = 18, .scale = largest_effort}},
+      .unit_coefficient = true,
+      .excite = "accelerate as hard as it goes",
+      .columns = [](const Drive& drive, Shape shape) {
+        return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
+                                       const Signal& u = drive.joints[j].effort;
+                                       return u - u.cwiseMax(-shape[0]).cwiseMin(shape[0]);
+                                     }))};
+      }};
+}
+
+// Sign of the effort for `duration` after each of its reversals, 0 elsewhere. A reversal goes from one side of ±`level` to
+// the other, and begins at the last change of sign between.
+Signal after_reversals(const Drive& drive, const Signal& effort, double duration, double level) {
+  Signal pulse = Signal::Zero(effort.size());
+  const auto length = std::max<Eigen::Index>(1, std::lround(duration / drive.step));
+  for (std::size_t s = 0; s < drive.segment_starts.size(); ++s) {
+    const auto [first, last] = drive.segment(s);
+    double side = 0.0;
+    Eigen::Index changed = first;
+    for (Eigen::Index k = first; k < last; ++k) {
+      if (k > first && (effort[k] > 0.0) != (effort[k - 1] > 0.0)) {
+        changed = k;
+      }
+      if (std::abs(effort[k]) <= level) {
+        continue;
+      }
+      const double now = effort[k] > 0.0 ? 1.0 : -1.0;
+      if (side != 0.0 && now != side) {
+        pulse.segment(changed, std::min(length, last - changed)).setConstant(now);
+      }
+      side = now;
+    }
+  }
+  return pulse;
+}
+
+// While a gear crosses its gap nothing is passed on: the command is lost, and then an impact.
+Effect backlash() {
+  return {
+      .name = "backlash",
+      .sentence = "Play in the gears: after a torque reversal the gap is crossed first.",
+      .parameters = {{"lost_share", "1", 1}, {"impact", "N·m", 0}},
+      .shapes = {{.name = "crossing_s", .unit = "s", .lower = 0.015, .upper = 0.15, .scan = 6, .logarithmic = true}},
+      .excite = "reverse the torque often, gently and hard",
+      .columns = [](const Drive& drive, Shape shape) {
+        const double level = 0.05 * typical_effort(drive);
+        const std::vector<Signal> pulse = each_joint(drive, [&](std::size_t j) {
+          return after_reversals(drive, drive.joints[j].smooth_effort, shape[0], level);
+        });
+        return std::vector{
+            at_joints(drive, each_joint(drive,
+                                        [&](std::size_t j) -> Signal {
+                                          return pulse[j].cwiseAbs().cwiseProduct(drive.joints[j].smooth_effort);
+                                        })),
+            at_joints(drive, pulse)};
+      }};
+}
+
+Effect battery_sag() {
+  return {.name = "battery_sag",
+          .sentence = "The torque falls short as the battery empties, and under load.",
+          .parameters = {{"per_time", "1/s", 1}, {"per_load", "1/(N·m)", 1}},
+          .excite = "drive for long, and with heavy loads now and then",
+          .columns = [](const Drive& drive, Shape) {
+            Signal load = Signal::Zero(drive.rows());
+            for (const JointSignals& joint : drive.joints) {
+              load += joint.smooth_effort.cwiseAbs();
+            }
+            const Signal time = drive.t.array() - drive.t[0];
+            const auto times = [&drive](const Signal& factor) {
+              return at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
+                                 return factor.cwiseProduct(drive.joints[j].predicted_effort);
+                               }));
+            };
+            return std::vector{times(time), times(load)};
+          }};
+}
+
+}  // namespace
+
+std::vector<Effect> actuator_effects(std::size_t joints) {
+  std::vector<Effect> effects{torque_bias(joints)};
+  for (auto* make : {&actuator_lag, &delay, &sensor_time_offset, &torque_gain, &torque_deadzone, &saturation, &backlash,
+                     &battery_sag}) {
+    effects.push_back(make());
+  }
+  if (joints == 2) {
+    effects.push_back(torque_gain_asymmetric());
+  }
+  return effects;
+}
+
+}  // namespace wheelwright

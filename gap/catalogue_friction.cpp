@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+
+#include <wheelwright/gap/catalogue.hpp>
+#include <wheelwright/gap/catalogue_parts.hpp>
+
+namespace wheelwright {
+namespace {
+
+using namespace catalogue;
+using Signal = Eigen::VectorXd;
+using Shape = std::span<const double>;
+
+// One signal per joint.
+template <typename Function>
+std::vector<Signal> each_joint(const Drive& drive, const Function& function) {
+  std::vector<Signal> signals;
+  for (std::size_t j = 0; j < drive.joints.size(); ++j) {
+    signals.push_back(function(j));
+  }
+  return signals;
+}
+
+std::vector<Signal> speed_signs(const Drive& drive) {
+  return each_joint(drive, [&drive](std::size_t j) { return speed_sign(drive, j); });
+}
+
+Effect coulomb() {
+  return {.name = "coulomb",
+          .sentence = "Dry friction at every joint: a torque of constant size against the motion.",
+          .family = "dry_friction",
+          .parameters = {{"coulomb", "N·m", 1}},
+          .excite = "reverse often, turn on the spot, drive at several speeds",
+          .applies = [](const Drive& drive) { return needs_no(drive, "coulomb"); },
+          .columns = [](const Drive& drive, Shape) { return std::vector{at_joints(drive, speed_signs(drive))}; }};
+}
+
+Effect coulomb_asymmetric() {
+  return {.name = "coulomb_asymmetric",
+          .sentence = "Dry friction that differs between the wheels.",
+          .parameters = {{"coulomb_right", "N·m", 1}, {"coulomb_left", "N·m", 1}},
+          .excite = "reverse each wheel often",
+          .applies = needs_two_wheels,
+          .columns = [](const Drive& drive, Shape) {
+            return std::vector{at_joints(drive, only(drive, 0, speed_sign(drive, 0))),
+                               at_joints(drive, only(drive, 1, speed_sign(drive, 1)))};
+          }};
+}
+
+Effect stribeck() {
+  return {.name = "stribeck",
+          .sentence = "Dry friction that fades as the joint gets faster (Stribeck).",
+          .parameters = {{"stribeck", "N·m", 1}},
+          .shapes = {{.name = "stribeck_speed",
+                      .unit = "rad/s",
+                      .lower = 0.05,
+                      .upper = 1.0,
+                      .scan = 6,
+                      .logarithmic = true,
+                      .scale = typical_speed}},
+          .excite = "creep, and reverse slowly",
+          .columns = [](const Drive& drive, Shape shape) {
+            return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
+                                           const auto w = drive.joints[j].smooth_speed.array() / shape[0];
+                                           return (-w.square()).exp() * speed_sign(drive, j).array();
+                                         }))};
+          }};
+}
+
+Effect viscous() {
+  return {
+      .name = "viscous",
+      .sentence = "Viscous friction of the joints other than in the base model.",
+      .parametric = true,
+      .parameters = {{"damping", "N·m·s/rad", 0}},
+      .excite = "drive at different steady speeds",
+      .columns = [](const Drive& drive, Shape) {
+        return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) { return drive.joints[j].speed; }))};
+      }};
+}
+
+Effect viscous_asymmetric() {
+  return {.name = "viscous_asymmetric",
+          .sentence = "More viscous friction at one wheel than at the other.",
+          .parameters = {{"damping", "N·m·s/rad", 1}},
+          .shapes = {side()},
+          .excite = "drive straight at different steady speeds, with the pose logged",
+          .applies = needs_two_wheels,
+          .columns = [](const Drive& drive, Shape shape) {
+            const std::size_t j = shape[0] < 0.5 ? 0 : 1;
+            return std::vector{at_joints(drive, only(drive, j, drive.joints[j].smooth_speed))};
+          }};
+}
+
+Effect quadratic_drag(std::size_t joints) {
+  Effect effect{.name = "quadratic_drag",
+                .sentence = "Drag that grows with the square of the speed.",
+                .parameters = {{"drag", "N·s²/m²", 1}},
+                .excite = "drive from slow to as fast as it goes, straight and turning"};
+  if (joints == 1) {
+    effect.columns = [](const Drive& drive, Shape) {
+      const auto v = drive.joints[0].smooth_speed.array();
+      return std::vector{at_joints(drive, {Signal(v * v.abs())})};
+    };
+    return effect;
+  }
+  effect.parameters.push_back({"yaw_drag", "N·m·s²/rad²", 1});
+  effect.applies = needs_two_wheels;
+  effect.columns = [](const Drive& drive, Shape) {
+    const auto v1 = drive.coordinates[0].smooth_speed.array();
+    const auto v2 = drive.coordinates[1].smooth_speed.array();
+    Column along, about;
+    along.effort = {drive.wheel_radius * v1 * v1.abs(), {}};
+    about.effort = {{}, drive.wheel_radius * v2 * v2.abs()};
+    return std::vector{along, about};
+  };
+  return effect;
+}
+
+Effect load_friction() {
+  return {.name = "load_friction",
+          .sentence = "Friction in proportion to the torque that is passed on, as in a worm or harmonic drive.",
+          .parameters = {{"load_friction", "1", 1}},
+          .excite = "accelerate and brake hard, and drive at constant speed",
+          .columns = [](const Drive& drive, Shape) {
+            return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
+                                           return drive.joints[j].smooth_effort.array().abs() *
+                                                  speed_sign(drive, j).array();
+                                         }))};
+          }};
+}
+
+Effect friction_drift() {
+  return {
+      .name = "friction_drift",
+      .sentence = "Friction that falls as the drive warms up: viscous (kind 0) or dry (kind 1).",
+      .parameters = {{"loss", "N·m·s/rad (dry: N·m)", 1}},
+      .shapes = {{.name = "kind_viscous0_dry1", .unit = "1", .lower = 0.0, .upper = 1.0, .scan = 2, .discrete = true},
+                 {.name = "warm_up_s", .unit = "s", .lower = 10.0, .upper = 100.0, .scan = 3, .logarithmic = true}},
+      .excite = "drive for several minutes from cold, the same manoeuvre again and again",
+      .columns = [](const Drive& drive, Shape shape) {
+        const Signal warmth = 1.0 - (-(drive.t.array() - drive.t[0]) / shape[1]).exp();
+        return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
+                                       return shape[0] < 0.5 ? -warmth.cwiseProduct(drive.joints[j].smooth_speed)
+                                                             : -warmth.cwiseProduct(speed_sign(drive, j));
+                                     }))};
+      }};
+}
+
+// A castor at the distance p from the axle's middle slides with V² = v1² + p² v2².
+Effect caster_drag() {
+  return {.name = "caster_drag",
+          .sentence = "A castor or skid that drags: a force of constant size against the motion of its contact.",
+          .parameters = {{"drag", "N", 1}},
+          .shapes = {{.name = "caster_distance",
+                      .unit = "m",
+                      .lower = 0.1,
+                      .upper = 2.0,
+                      .scan = 6,
+                      .logarithmic = true,
+                      .scale = [](const Drive& drive) { return drive.track_width; }}},
+          .excite = "mix straight driving and turning in all ratios",
+          .applies = needs_two_wheels,
+          .columns = [](const Drive& drive, Shape shape) {
+            const double r = drive.wheel_radius, p = shape[0];
+            const auto v1 = drive.coordinates[0].smooth_speed.array();
+            const auto v2 = drive.coordinates[1].smooth_speed.array();
+            const Eigen::ArrayXd v = (v1.square() + (p * v2).square()).sqrt() + r * sign_width(drive);
+            Column column;
+            column.effort = {r * v1 / v, r * p * p * v2 / v};
+            return std::vector{column};
+          }};
+}
+
+Effect lateral_scrub() {
+  return {.name = "lateral_scrub",
+          .sentence = "Tyres that scrub when the robot turns: a yaw moment of constant size against the turn.",
+          .parameters = {{"moment", "N·m", 1}},
+          .excite = "turn on the spot and in curves, both ways",
+          .applies = needs_two_wheels,
+          .columns = [](const Drive& drive, Shape) {
+            const double width = 2.0 * drive.wheel_radius * sign_width(drive) / drive.track_width;
+            Column column;
+            column.effort = {{}, drive.wheel_radius * soft_sign(drive.coordinates[1].smooth_speed, width)};
+            return std::vector{column};
+          }};
+}
+
+}  // namespace
+
+std::vector<Effect> friction_effects(std::size_t joints) {
+  std::vector<Effect> effects{coulomb(),       stribeck(),      viscous(), quadratic_drag(joints),
+                              load_friction(), friction_drift()};
+  if (joints == 2) {
+    for (auto* make : {&coulomb_asymmetric, &viscous_asymmetric, &caster_drag, &lateral_scrub}) {
+      effects.push_back(make());
+    }
+  }
+  return effects;
+}
+
+}  // namespace wheelwright

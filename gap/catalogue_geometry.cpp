@@ -1,0 +1,243 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+
+#include <wheelwright/gap/catalogue.hpp>
+#include <wheelwright/gap/catalogue_parts.hpp>
+
+namespace wheelwright {
+namespace {
+
+using namespace catalogue;
+using Signal = Eigen::VectorXd;
+using Shape = std::span<const double>;
+
+constexpr double kGravity = 9.80665;  // m/s²
+
+std::size_t chosen(Shape shape) { return shape[0] < 0.5 ? 0 : 1; }
+
+Signal rim_speed(const Drive& drive, std::size_t joint) {
+  return drive.wheel_radius * drive.joints[joint].smooth_speed;
+}
+
+// The rim of one wheel moves faster by `speed` than its joint shows.
+Column unseen_rim_speed(const Drive& drive, std::size_t joint, const Signal& speed) {
+  return joint == 0 ? unseen_rim_speeds(drive, speed, {}) : unseen_rim_speeds(drive, {}, speed);
+}
+
+// A wheel whose radius is larger by the share `growth` (a number, or one per instant): its rim is faster, and the same
+// force takes more torque.
+Column larger_wheel(const Drive& drive, std::size_t joint, const Signal& growth) {
+  Column column = unseen_rim_speed(drive, joint, rim_speed(drive, joint).cwiseProduct(growth));
+  add(column, at_joints(drive, only(drive, joint, drive.joints[joint].predicted_effort.cwiseProduct(growth))));
+  return column;
+}
+
+Effect com_longitudinal() {
+  return {.name = "com_longitudinal",
+          .sentence = "The centre of mass lies before or behind the axle.",
+          .parameters = {{"com_x_m", "m", 0}, {"inertia_change", "1", 0}},
+          .excite = "drive fast curves of changing radius",
+          .applies = needs_two_wheels,
+          .columns = [](const Drive& drive, Shape) {
+            const double rm = drive.wheel_radius * drive.physical("mass");
+            const Signal& v1 = drive.coordinates[0].smooth_speed;
+            const Signal& v2 = drive.coordinates[1].smooth_speed;
+            Column offset, inertia;
+            offset.effort = {-rm * v2.cwiseAbs2(), rm * v1.cwiseProduct(v2)};
+            inertia.effort_rate = {{}, drive.wheel_radius * drive.physical("yaw_inertia") * drive.coordinates[1].speed};
+            return std::vector{offset, inertia};
+          }};
+}
+
+Effect com_lateral() {
+  return {.name = "com_lateral",
+          .sentence = "The centre of mass lies to the left or right of the middle.",
+          .parameters = {{"com_y_m", "m", 0}},
+          .excite = "accelerate and brake hard on a straight line",
+          .applies = needs_two_wheels,
+          .columns = [](const Drive& drive, Shape) {
+            const double rm = drive.wheel_radius * drive.physical("mass");
+            Column column;
+            column.effort_rate = {-rm * drive.coordinates[1].speed, -rm * drive.coordinates[0].speed};
+            return std::vector{column};
+          }};
+}
+
+Effect slope() {
+  return {.name = "slope",
+          .sentence = "The ground slopes.",
+          .family = "constant_force",
+          .parameters = {{"slope_x", "rad", 0}, {"slope_y", "rad", 0}},
+          .excite = "drive slowly in all directions",
+          .applies = needs_heading,
+          .columns =
+              [](const Drive& drive, Shape) {
+                const double weight = drive.wheel_radius * drive.physical("mass") * kGravity;
+                Column x, y;
+                x.effort = {weight * drive.heading.array().cos().matrix(), {}};
+                y.effort = {weight * drive.heading.array().sin().matrix(), {}};
+                return std::vector{x, y};
+              },
+          .physical =
+              [](std::span<const double> c, Shape) {
+                return std::vector<PhysicalValue>{{"angle_rad", "rad", std::hypot(c[0], c[1])},
+                                                  {"uphill_heading_rad", "rad", std::atan2(c[1], c[0])}};
+              }};
+}
+
+// Eccentricity e: the radius grows by e cos(φ + φ0), and the weight on the wheel, which is lifted, asks for torque alike.
+Effect wheel_out_of_round() {
+  return {.name = "wheel_out_of_round",
+          .sentence = "A wheel that is eccentric or out of round.",
+          .parameters = {{"torque_cos", "N·m", 0},
+                         {"radius_cos", "m", 0},
+                         {"torque_sin", "N·m", 0},
+                         {"radius_sin", "m", 0},
+                         {"torque_cos2", "N·m", 0},
+                         {"torque_sin2", "N·m", 0}},
+          .shapes = {side()},
+          .excite = "drive straight for many turns of the wheels at several speeds",
+          .applies =
+              [](const Drive& drive) {
+                const bool known = drive.angles_measured || drive.segment_starts.size() == 1;
+                return known ? needs_two_wheels(drive)
+                             : Applicability{false, "the wheels' angles are lost between the log's segments"};
+              },
+          .columns =
+              [](const Drive& drive, Shape shape) {
+                const std::size_t j = chosen(shape);
+                const auto angle = drive.joints[j].angle.array();
+                std::vector<Column> columns;
+                for (const Signal& wave : {Signal(angle.cos()), Signal(angle.sin())}) {
+                  columns.push_back(at_joints(drive, only(drive, j, wave)));
+                  columns.push_back(larger_wheel(drive, j, wave / drive.wheel_radius));
+                }
+                columns.push_back(at_joints(drive, only(drive, j, (2.0 * angle).cos().matrix())));
+                columns.push_back(at_joints(drive, only(drive, j, (2.0 * angle).sin().matrix())));
+                return columns;
+              },
+          .physical =
+              [](std::span<const double> c, Shape) {
+                return std::vector<PhysicalValue>{{"offset_m", "m", std::hypot(c[1], c[3])},
+                                                  {"torque_amplitude", "N·m", std::hypot(c[0], c[2])}};
+              }};
+}
+
+Effect wheel_radius() {
+  return {.name = "wheel_radius",
+          .sentence = "Both wheels are larger or smaller than designed.",
+          .parametric = true,
+          .parameters = {{"radius_rel", "1", 0}},
+          .excite = "drive straight with the pose logged",
+          .applies = needs_two_wheels,
+          .columns = [](const Drive& drive, Shape) {
+            const Signal one = Signal::Ones(drive.rows());
+            Column column = larger_wheel(drive, 0, one);
+            add(column, larger_wheel(drive, 1, one));
+            return std::vector{column};
+          }};
+}
+
+Effect wheel_radius_asymmetric() {
+  return {.name = "wheel_radius_asymmetric",
+          .sentence = "One wheel is larger or smaller than the other.",
+          .parameters = {{"radius_rel", "1", 0}},
+          .shapes = {side()},
+          .excite = "drive straight with the pose logged",
+          .applies = needs_two_wheels,
+          .columns = [](const Drive& drive, Shape shape) {
+            return std::vector{larger_wheel(drive, chosen(shape), Signal::Ones(drive.rows()))};
+          }};
+}
+
+Effect encoder_scale() {
+  return {.name = "encoder_scale",
+          .sentence = "One wheel's encoder has another scale than the robot file says.",
+          .parametric = true,
+          .parameters = {{"scale_rel", "1", 0}},
+          .shapes = {side()},
+          .excite = "drive straight with the pose logged",
+          .applies = needs_two_wheels,
+          .columns = [](const Drive& drive, Shape shape) {
+            const std::size_t j = chosen(shape);
+            return std::vector{unseen_rim_speed(drive, j, rim_speed(drive, j))};
+          }};
+}
+
+// D grows by ε: the robot turns slower by ε, and the same yaw moment takes less torque by ε.
+Effect track_width() {
+  return {.name = "track_width",
+          .sentence = "The wheels stand further apart or closer together than designed.",
+          .parametric = true,
+          .parameters = {{"track_rel", "1", 0}},
+          .excite = "turn on the spot, both ways, with the heading logged",
+          .applies = needs_two_wheels,
+          .columns = [](const Drive& drive, Shape) {
+            Column column = unseen_motion(drive, {{}, -drive.coordinates[1].smooth_speed});
+            const Signal moment =
+                drive.lever_arm * (drive.joints[0].predicted_effort - drive.joints[1].predicted_effort);
+            Column lever;
+            lever.effort = {{}, -moment};
+            add(column, lever);
+            return std::vector{column};
+          }};
+}
+
+Effect longitudinal_slip() {
+  return {.name = "longitudinal_slip",
+          .sentence = "The wheels slip in proportion to the force they pass on.",
+          .parameters = {{"slip_per_torque", "1/(N·m)", 1}},
+          .excite = "accelerate and brake as hard as it goes, with the pose logged",
+          .applies = needs_two_wheels,
+          .columns = [](const Drive& drive, Shape) {
+            const auto lost = [&drive](std::size_t j) -> Signal {
+              return -rim_speed(drive, j).cwiseAbs().cwiseProduct(drive.joints[j].smooth_effort);
+            };
+            return std::vector{unseen_rim_speeds(drive, lost(0), lost(1))};
+          }};
+}
+
+Effect payload(std::size_t joints) {
+  Effect effect{.name = "payload",
+                .sentence = "Mass was added or taken away; friction stayed.",
+                .parametric = true,
+                .parameters = {{"mass_kg", "kg", 0}},
+                .excite = "accelerate and brake, straight and turning"};
+  if (joints == 1) {
+    effect.columns = [](const Drive& drive, Shape) { return std::vector{base_column(drive, "inertia")}; };
+    return effect;
+  }
+  effect.parameters.push_back({"yaw_inertia", "kg·m²", 0});
+  effect.applies = needs_two_wheels;
+  effect.columns = [](const Drive& drive, Shape) {
+    return std::vector{base_column(drive, "mass"), base_column(drive, "yaw_inertia")};
+  };
+  return effect;
+}
+
+Effect armature() {
+  return {.name = "armature",
+          .sentence = "The joints' own turning parts (rotors, gears) have more inertia.",
+          .parametric = true,
+          .parameters = {{"armature", "kg·m²", 1}},
+          .excite = "accelerate and brake, straight and turning",
+          .applies = needs_two_wheels,
+          .columns = [](const Drive& drive, Shape) {
+            return std::vector{rate_at_joints(drive, {drive.joints[0].speed, drive.joints[1].speed})};
+          }};
+}
+
+}  // namespace
+
+std::vector<Effect> geometry_effects(std::size_t joints) {
+  std::vector<Effect> effects{payload(joints)};
+  if (joints == 2) {
+    for (auto* make : {&com_longitudinal, &com_lateral, &slope, &wheel_out_of_round, &wheel_radius_asymmetric,
+                       &longitudinal_slip, &wheel_radius, &track_width, &encoder_scale, &armature}) {
+      effects.push_back(make());
+    }
+  }
+  return effects;
+}
+
+}  // namespace wheelwright

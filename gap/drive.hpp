@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// A whole log in memory as the effects of the catalogue look at it: evenly sampled, raw and smoothed.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include <wheelwright/core/log.hpp>
+#include <wheelwright/filter/measurement.hpp>
+#include <wheelwright/model/model.hpp>
+#include <wheelwright/model/robot.hpp>
+
+namespace wheelwright {
+
+/// Which rows of a Drive have a property.
+using Mask = Eigen::Array<bool, Eigen::Dynamic, 1>;
+
+/// One joint (a wheel, or the axis of a single_axis robot); for a linear axis read m for rad. All have one value per
+/// instant of the drive.
+struct JointSignals {
+  Eigen::VectorXd speed;                ///< as measured, whole counts where the encoder is known, rad/s
+  Eigen::VectorXd smooth_speed;         ///< rad/s
+  Eigen::VectorXd smooth_acceleration;  ///< rad/s²
+  Eigen::VectorXd angle;                ///< measured, or the integral of the speed from 0 at each segment's start, rad
+  Eigen::VectorXd effort;               ///< at the instants; a held command: mean of what was held before and after
+  Eigen::VectorXd held_effort;          ///< held from its instant to the next one; empty where efforts are not held
+  Eigen::VectorXd smooth_effort;        ///< smoothed `effort`
+  Eigen::VectorXd predicted_effort;     ///< of the base model on the smooth motion; empty before predict_efforts()
+  Mask resting;                         ///< stands still
+};
+
+/// One motion coordinate of the model (v1, v2).
+struct CoordinateSignals {
+  Eigen::VectorXd speed;                ///< from the joints' measured speeds
+  Eigen::VectorXd smooth_speed;         ///< from the joints' smooth speeds
+  Eigen::VectorXd smooth_acceleration;  ///< from the joints' smooth accelerations
+};
+
+/// One log off-line. Instants are evenly spaced inside a segment.
+struct Drive {
+  Model model;
+  double wheel_radius = 0.0;                ///< r, m (0 for other than wheeled robots)
+  double track_width = 0.0;                 ///< D, m (likewise)
+  double lever_arm = 0.0;                   ///< ℓ of the difference channel, m (likewise)
+  double step = 0.0;                        ///< h, s
+  double count = 0.0;                       ///< quantum of the speeds, rad/s (0: none known)
+  bool angles_measured = false;             ///< else a joint's angle begins anew, at 0, in each segment
+  std::size_t window = 0;                   ///< samples of the smoothing window, odd
+  Eigen::VectorXd t;                        ///< s, the log's own, ascending
+  std::vector<std::size_t> segment_starts;  ///< ascending, begins with 0
+  std::vector<JointSignals> joints;
+  std::vector<CoordinateSignals> coordinates;
+  Eigen::VectorXd heading;         ///< of the pose, rad, unwrapped; empty where the log has none
+  Eigen::VectorXd x, y;            ///< of the pose, m; empty where the log has none
+  Eigen::VectorXd gyro;            ///< yaw rate, rad/s; empty where the log has none
+  Eigen::VectorXd theta;           ///< θ_L of the base model that predict_efforts() was given; empty before
+  std::size_t resampled = 0;       ///< rows of segments whose steps differed from the median by more than 1 %
+  std::size_t moved_segments = 0;  ///< segments that began before the one before ended, moved to follow it
+  std::size_t dropped = 0;         ///< rows of segments with fewer than three samples
+
+  /// Number of instants.
+  [[nodiscard]] Eigen::Index rows() const { return t.size(); }
+  /// Whether the log has a position and a heading.
+  [[nodiscard]] bool has_pose() const { return heading.size() > 0 && x.size() > 0; }
+  /// Whether the log has a heading.
+  [[nodiscard]] bool has_heading() const { return heading.size() > 0; }
+  /// Whether it is a robot on two driven wheels, with torques (in whatever unit) of both.
+  [[nodiscard]] bool two_wheels() const { return wheel_radius > 0.0 && track_width > 0.0 && joints.size() == 2; }
+  /// Half-open rows [first, last) of segment `k`.
+  [[nodiscard]] std::pair<Eigen::Index, Eigen::Index> segment(std::size_t k) const;
+  /// The physical parameter `name` (Parameter::physical) of the base model `theta`; 0 where the model has none of this
+  /// name or `theta` is not known yet.
+  [[nodiscard]] double physical(std::string_view name) const;
+};
+
+/// Options of make_drive().
+struct DriveOptions {
+  double smoothing_window = 0.06;  ///< s; at least five samples are taken
+  double shortest_rest = 0.1;      ///< s a joint must stand still to be `resting`
+};
+
+/// The drive of `log`, as `measurement` says that it measures `robot`; the model is make_model(robot).
+///
+/// - Mean speeds are rounded to whole counts (Measurement::count). Angles become mean speeds between neighbouring
+///   samples, at the middle of the interval, where all other columns are then means too: one instant less per segment.
+/// - A segment whose steps differ by more than 1 % from the log's median step is resampled linearly at that step.
+/// - Smooth signals are those of a local quadratic over `smoothing_window` (Savitzky and Golay 1964), fitted one-sidedly
+///   at the ends of a segment and never across them.
+/// - Unsigned efforts take the sign of their joint's motion.
+/// - A joint stands still where its smooth speed stays below `count`, four standard deviations of its noise or
+///   1 % of its root mean square, whichever is largest, for `shortest_rest`.
+///
+/// Throws InvalidArgument when `log` lacks a column of `measurement` or has no segment of three samples.
+[[nodiscard]] Drive make_drive(const LogTable& log, const Robot& robot, const Measurement& measurement,
+                               const DriveOptions& options = {});
+
+/// Sets `theta` and the joints' predicted efforts: Y(v, v̇) θ of the smooth motion (20), mapped back to the joints by
+/// the inverse of Model::input. Throws InvalidArgument unless θ has p entries and the input matrix is square and
+/// regular.
+void predict_efforts(Drive& drive, const Eigen::VectorXd& theta);
+
+/// The measured heading where there is one; else that of odometry, from 0 at each segment's start (trapezoidal, as
+/// RegressorFilter's); zeros for a model without a heading.
+[[nodiscard]] Eigen::VectorXd heading_or_odometry(const Drive& drive);
+
+/// Value and first derivative (per step) of the quadratic fitted to `window` samples about each sample, one-sidedly at
+/// the ends, in place of `value` and `slope`. `window` must be odd; signals shorter than it take the largest odd window
+/// that fits, and fewer than three samples are returned as they are with slope 0. Savitzky and Golay (1964).
+void smooth_quadratic(std::span<const double> signal, std::size_t window, std::span<double> value,
+                      std::span<double> slope);
+
+}  // namespace wheelwright

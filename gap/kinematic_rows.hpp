@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// What the pose saw of a robot's motion against what its wheels say, window by window.
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include <wheelwright/gap/effect.hpp>
+
+namespace wheelwright {
+
+/// Consecutive windows, none across segments.
+struct Windows {
+  std::vector<Eigen::Index> first;   ///< rows at which windows begin
+  std::vector<Eigen::Index> middle;  ///< rows whose heading is the direction of `forward`
+  std::vector<Eigen::Index> last;    ///< rows at which they end, each the next one's first
+  Eigen::VectorXd t;                 ///< time of their middles, s
+
+  [[nodiscard]] std::size_t size() const { return first.size(); }
+};
+
+/// One value per window; a vector is empty where the log cannot tell.
+struct Increments {
+  Eigen::VectorXd forward;  ///< m, along the heading at the window's middle
+  Eigen::VectorXd lateral;  ///< m, to its left
+  Eigen::VectorXd yaw;      ///< rad
+};
+
+/// Standard deviation of the increments' noise; 0 where there is none to be had.
+struct IncrementNoise {
+  double forward = 0.0;  ///< m
+  double lateral = 0.0;  ///< m
+  double yaw = 0.0;      ///< rad
+};
+
+/// Windows of `length` (s; at least two steps), the remainder of each segment left out. A segment without a whole window
+/// has none. Throws InvalidArgument unless `length` is > 0.
+[[nodiscard]] Windows make_windows(const Drive& drive, double length = 0.5);
+
+/// Pose minus odometry over each window: with the measured p and θ and the wheels' smooth v1 and v2,
+///
+///     [forward, lateral] = R(−θ_middle) (p_last − p_first − ∫ v1 [cos θ, sin θ] dt)
+///     yaw                = θ_last − θ_first − ∫ v2 dt
+///
+/// Only yaw for a log with a heading but no position, or with a gyro only (whose ∫ gyro dt stands for the heading);
+/// nothing for a log with neither, or a robot without two wheels.
+[[nodiscard]] Increments pose_gap(const Drive& drive, const Windows& windows);
+
+/// What a column's body velocity (Column::forward, lateral, yaw) adds to the same: ∫ R(θ) [forward, lateral] dt, turned
+/// alike, and ∫ yaw dt. The vectors are empty where those of pose_gap are, and where the column has no such part.
+[[nodiscard]] Increments increments_of(const Drive& drive, const Windows& windows, const Column& column);
+
+/// What the noise of the pose makes of the increments, by third differences of the pose (a smooth motion leaves none of
+/// itself), never below what the pose's resolution makes. Errors of the wheels are not in it.
+[[nodiscard]] IncrementNoise pose_noise(const Drive& drive);
+
+/// Root mean square of a healthy drive's pose_gap: noise of pose and wheels together.
+[[nodiscard]] IncrementNoise root_mean_square(const Increments& gap);
+
+}  // namespace wheelwright
