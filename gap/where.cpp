@@ -1,0 +1,301 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/gap/where.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <random>
+#include <string>
+#include <utility>
+
+#include <fmt/format.h>
+#include <boost/math/distributions/chi_squared.hpp>
+#include <boost/math/distributions/students_t.hpp>
+
+#include <wheelwright/core/check.hpp>
+#include <wheelwright/gap/drive_filter.hpp>
+#include <wheelwright/gap/permutation.hpp>
+#include <wheelwright/gap/spectrum.hpp>
+#include <wheelwright/identify/block_sums.hpp>
+
+namespace wheelwright {
+namespace {
+
+constexpr Eigen::Index kFewestRows = 64;
+constexpr int kNoises = 24;  // of each kind
+constexpr double kNever = std::numeric_limits<double>::infinity();
+constexpr std::array kEdges = {0.0, 0.2, 0.5, 1.0, 2.0, 5.0, kNever};  // Hz
+constexpr std::size_t kBands = kEdges.size() - 1;
+using Bands = std::array<double, kBands>;
+
+std::string band_name(std::size_t b) {
+  return b == 0            ? fmt::format("below {:g} Hz", kEdges[1])
+         : b + 1 == kBands ? fmt::format("above {:g} Hz", kEdges[b])
+                           : fmt::format("{:g} to {:g} Hz", kEdges[b], kEdges[b + 1]);
+}
+
+// Row of the drive that holds at each of the times `t` − `delay`.
+std::vector<Eigen::Index> rows_at(const Drive& drive, const Eigen::VectorXd& t, double delay) {
+  std::vector<Eigen::Index> rows;
+  rows.reserve(static_cast<std::size_t>(t.size()));
+  const double* first = drive.t.data();
+  for (Eigen::Index k = 0; k < t.size(); ++k) {
+    const double* next = std::upper_bound(first, first + drive.rows(), t[k] - delay + 0.5 * drive.step);
+    rows.push_back(std::max<Eigen::Index>(0, next - first - 1));
+  }
+  return rows;
+}
+
+Bands powers(const Spectrum& s) {
+  Bands out{};
+  for (std::size_t b = 0; b < kBands; ++b) {
+    out[b] = s.power(kEdges[b], kEdges[b + 1]);
+  }
+  return out;
+}
+
+// Band powers of noise of unit variance, for each kind of noise.
+struct BandNoise {
+  std::vector<Bands> mean, variance;
+};
+
+// Signals of one noise on the rows of a series. kind: 0 white, each further one differentiated once more.
+Eigen::VectorXd noise(const Drive& drive, const ResidualSeries& series, const std::vector<Eigen::Index>& rows,
+                      double beta, int kind, std::mt19937_64& generator) {
+  std::normal_distribution<double> normal;
+  const bool dynamic = series.space == GapSpace::dynamic;
+  Eigen::VectorXd white(dynamic ? drive.rows() : series.t.size() + 1);
+  for (double& x : white) {
+    x = normal(generator);
+  }
+  if (!dynamic) {
+    const Eigen::Index n = series.t.size();
+    return kind == 0 ? Eigen::VectorXd(white.head(n)) : Eigen::VectorXd(white.tail(n) - white.head(n));
+  }
+  if (kind == 2) {
+    const Eigen::VectorXd before = white;
+    white.tail(white.size() - 1) -= before.head(white.size() - 1);
+  }
+  const Eigen::VectorXd passed = kind == 0 ? filtered(drive, beta, white) : filtered_rate(drive, beta, white);
+  Eigen::VectorXd out(series.t.size());
+  for (Eigen::Index k = 0; k < out.size(); ++k) {
+    out[k] = passed[rows[static_cast<std::size_t>(k)]];
+  }
+  return out;
+}
+
+BandNoise band_noise(const Drive& drive, const ResidualSeries& series, const WhereOptions& options) {
+  std::mt19937_64 generator(options.seed);
+  const std::vector<Eigen::Index> rows = rows_at(drive, series.t, 0.0);
+  BandNoise out;
+  for (int kind = 0; kind < (series.space == GapSpace::dynamic ? 3 : 2); ++kind) {
+    Bands sum{}, squares{};
+    double variance = 0.0;
+    for (int k = 0; k < kNoises; ++k) {
+      const Eigen::VectorXd signal = noise(drive, series, rows, options.beta, kind, generator);
+      const Bands p = powers(spectrum(series.t, signal));
+      variance += signal.squaredNorm() / static_cast<double>(signal.size()) / kNoises;
+      for (std::size_t b = 0; b < kBands; ++b) {
+        sum[b] += p[b];
+        squares[b] += p[b] * p[b];
+      }
+    }
+    Bands mean{}, spread{};
+    for (std::size_t b = 0; b < kBands; ++b) {
+      mean[b] = sum[b] / kNoises / variance;
+      spread[b] =
+          std::max(0.0, squares[b] / kNoises / (variance * variance) - mean[b] * mean[b]) * kNoises / (kNoises - 1.0);
+    }
+    out.mean.push_back(mean);
+    out.variance.push_back(spread);
+  }
+  return out;
+}
+
+// Probability that noise of these moments has at least `power`: a scaled χ² of the same mean and variance.
+double band_p_value(double power, double mean, double variance) {
+  if (!(mean > 0.0) || !(variance > 0.0)) {
+    return 1.0;
+  }
+  const double freedom = 2.0 * mean * mean / variance;
+  return boost::math::cdf(
+      boost::math::complement(boost::math::chi_squared(freedom), std::max(0.0, freedom * power / mean)));
+}
+
+std::vector<double> holm(const std::vector<double>& p) {
+  std::vector<std::size_t> order(p.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return p[a] < p[b]; });
+  std::vector<double> out(p.size());
+  double running = 0.0;
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    running = std::max(running, std::min(1.0, p[order[i]] * static_cast<double>(p.size() - i)));
+    out[order[i]] = running;
+  }
+  return out;
+}
+
+double share_of(double part, double whole) {
+  return whole > 0.0 ? std::round(100.0 * std::clamp(part / whole, 0.0, 1.0)) / 100.0 : 0.0;
+}
+
+GapShare entry(const ResidualSeries& series, std::string kind, std::string regime) {
+  GapShare out;
+  out.space = series.space;
+  out.channel = series.channel;
+  out.kind = std::move(kind);
+  out.regime = std::move(regime);
+  return out;
+}
+
+// p-value that the mean of `excess` is above 0 by chance, with a floor (its square) of relative error `error`.
+double mean_p_value(const Eigen::VectorXd& excess, double floor_square, double error) {
+  BlockSums sums(1);
+  const double mean = excess.mean();
+  for (const double e : excess) {
+    sums.add(Eigen::VectorXd::Constant(1, e - mean));
+  }
+  const LongRunCovariance covariance = long_run_covariance(sums, 12);
+  const double n = static_cast<double>(excess.size());
+  const double variance = covariance.matrix(0, 0) / (n * n) + std::pow(2.0 * error * floor_square, 2);
+  if (!(variance > 0.0) || !(covariance.freedom >= 1.0)) {
+    return mean > 0.0 ? 0.0 : 1.0;
+  }
+  return boost::math::cdf(
+      boost::math::complement(boost::math::students_t(covariance.freedom), mean / std::sqrt(variance)));
+}
+
+void add_regimes(std::vector<GapShare>& out, const Drive& drive, const std::vector<Regime>& all,
+                 const ResidualSeries& series, const Eigen::VectorXd& excess, const WhereOptions& options,
+                 double families) {
+  const double delay = series.space == GapSpace::dynamic ? 2.0 / options.beta : 0.0;
+  const std::vector<Eigen::Index> rows = rows_at(drive, series.t, delay);
+  std::vector<Mask> masks;
+  for (const Regime& regime : all) {
+    Mask mask(excess.size());
+    for (Eigen::Index k = 0; k < mask.size(); ++k) {
+      mask[k] = regime.instants[rows[static_cast<std::size_t>(k)]];
+    }
+    masks.push_back(std::move(mask));
+  }
+  // Logarithms temper bursts, which would make any arrangement of the blocks look extreme.
+  const double floor =
+      series.floor > 0.0 ? series.floor : series.refitted.norm() / std::sqrt(static_cast<double>(excess.size()));
+  const Eigen::VectorXd size = (series.refitted.array() / std::max(floor, 1e-300)).square().log1p();
+  const std::vector<double> p =
+      block_permutation_p_values(size, masks, memory_of_squares(series.refitted), options.permutations, options.seed);
+  const double whole = excess.sum(), n = static_cast<double>(excess.size());
+  for (std::size_t r = 0; r < all.size(); ++r) {
+    GapShare share = entry(series, all[r].kind, all[r].name);
+    share.presence = static_cast<double>(masks[r].count()) / n;
+    if (share.presence < options.regimes.smallest_share) {
+      continue;
+    }
+    share.share = share_of(masks[r].select(excess.array(), 0.0).sum(), whole);
+    share.p_value = std::min(1.0, families * p[r]);
+    out.push_back(std::move(share));
+  }
+}
+
+void add_bands(std::vector<GapShare>& out, const ResidualSeries& series, const BandNoise& noise,
+               const WhereOptions& options, double families) {
+  const Bands measured = powers(spectrum(series.t, series.refitted));
+  const double floor = series.floor * series.floor;
+  Bands excess{}, room{};
+  std::vector<double> p;
+  for (std::size_t b = 0; b < kBands; ++b) {
+    double worst = 0.0;
+    for (std::size_t kind = 0; kind < noise.mean.size(); ++kind) {
+      const double mean = floor * noise.mean[kind][b], error = 2.0 * options.floor_error * mean;
+      room[b] = std::max(room[b], mean);
+      // The mean itself is known from as many noises only.
+      const double variance = floor * floor * noise.variance[kind][b] * (1.0 + 1.0 / kNoises) + error * error;
+      worst = std::max(worst, floor > 0.0 ? band_p_value(measured[b], mean, variance) : 0.0);
+    }
+    excess[b] = std::max(0.0, measured[b] - room[b]);
+    p.push_back(worst);
+  }
+  p = holm(p);
+  const double whole = std::accumulate(excess.begin(), excess.end(), 0.0);
+  const double rooms = std::accumulate(room.begin(), room.end(), 0.0);
+  for (std::size_t b = 0; b < kBands; ++b) {
+    if (room[b] > 0.0) {
+      GapShare share = entry(series, "frequency", band_name(b));
+      share.share = share_of(excess[b], whole);
+      share.presence = room[b] / rooms;
+      share.p_value = std::min(1.0, families * p[b]);
+      out.push_back(std::move(share));
+    }
+  }
+}
+
+void check_input(const std::vector<ResidualSeries>& series, const WhereOptions& options) {
+  check::positive(options.beta, "locate_gap: beta");
+  check::non_negative(options.floor_error, "locate_gap: floor_error");
+  check::that(options.permutations >= 19, "locate_gap: permutations", "at least 19");
+  for (const ResidualSeries& s : series) {
+    check::that(s.t.size() == s.refitted.size(), "locate_gap: " + s.channel, "one residual for each time");
+    check::non_negative(s.floor, "locate_gap: floor of " + s.channel);
+    check::that(s.refitted.allFinite() && s.t.allFinite(), "locate_gap: " + s.channel, "finite values");
+  }
+}
+
+bool same_rows(const ResidualSeries& a, const ResidualSeries& b) {
+  return a.space == b.space && a.t.size() == b.t.size() && a.t == b.t;
+}
+
+}  // namespace
+
+std::vector<GapShare> locate_gap(const Drive& drive, const std::vector<ResidualSeries>& series,
+                                 const WhereOptions& options) {
+  check_input(series, options);
+  std::vector<const ResidualSeries*> used;
+  for (const ResidualSeries& s : series) {
+    if (s.t.size() >= kFewestRows && drive.rows() > 1) {
+      used.push_back(&s);
+    }
+  }
+  const std::vector<Regime> all = used.empty() ? std::vector<Regime>{} : regimes(drive, options.regimes);
+  const double families = 3.0 * static_cast<double>(used.size());
+  std::vector<GapShare> out;
+  std::vector<double> sizes;
+  double total = 0.0;
+  BandNoise noise;
+  const ResidualSeries* noise_of = nullptr;
+  for (const ResidualSeries* s : used) {
+    const double floor = s->floor * s->floor;
+    const Eigen::VectorXd excess = s->refitted.array().square() - floor;
+    const double unit =
+        floor > 0.0 ? floor : std::max(s->refitted.squaredNorm() / static_cast<double>(excess.size()), 1e-300);
+    sizes.push_back(std::max(0.0, excess.mean()) / unit);
+    total += sizes.back();
+    GapShare channel = entry(*s, "channel", "all");
+    channel.presence = 1.0;
+    channel.p_value = std::min(1.0, families * mean_p_value(excess, floor, options.floor_error));
+    out.push_back(std::move(channel));
+    add_regimes(out, drive, all, *s, excess, options, families);
+    if (noise_of == nullptr || !same_rows(*noise_of, *s)) {
+      noise = band_noise(drive, *s, options);
+      noise_of = s;
+    }
+    add_bands(out, *s, noise, options, families);
+  }
+  std::size_t next = 0;
+  for (GapShare& share : out) {
+    if (share.kind == "channel") {
+      share.share = share_of(sizes[next++], total);
+    }
+  }
+  std::stable_sort(out.begin(), out.end(), [](const GapShare& a, const GapShare& b) {
+    return std::make_pair(-a.share, a.presence) < std::make_pair(-b.share, b.presence);
+  });
+  return out;
+}
+
+bool is_finding(const GapShare& share) {
+  return share.p_value < 0.05 && (share.kind == "channel" || share.share > share.presence);
+}
+
+}  // namespace wheelwright
