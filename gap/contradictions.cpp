@@ -97,9 +97,9 @@ Contradictions find_contradictions(const Drive& drive, double beta, const Mask& 
   }
   std::stable_sort(out.rows.begin(), out.rows.end(),
                    [](const Contradiction& a, const Contradiction& b) { return a.weight > b.weight; });
-  out.statement = fmt::format(
-      "No parameters of the model explain every row {}: {} contradict {}.", within,
-      out.rows.size() == 1 ? "one row and the prior bounds" : fmt::format("{} rows", out.rows.size()), "each other");
+  out.statement =
+      fmt::format("No parameters of the model explain every row {}: {} contradict each other.", within,
+                  out.rows.size() == 1 ? "one row and the prior bounds" : fmt::format("{} rows", out.rows.size()));
   return out;
 }
 

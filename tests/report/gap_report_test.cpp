@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include <wheelwright/report/gap_drawings.hpp>
+#include <wheelwright/report/gap_report.hpp>
+#include <wheelwright/report/gap_words.hpp>
+
+#include "report/example.hpp"
+#include "report/gap_example.hpp"
+
+namespace wheelwright {
+namespace {
+
+using namespace report;
+namespace example = report_example;
+
+std::size_t times(const std::string& text, const std::string& what) {
+  std::size_t n = 0;
+  for (std::size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + 1)) {
+    ++n;
+  }
+  return n;
+}
+
+std::string all_sentences(const Diagnosis& d, const std::string& next = {}) {
+  std::string out = gap_verdict(d);
+  for (const std::string& sentence : gap_sentences(d, next)) {
+    out += "\n" + sentence;
+  }
+  return out;
+}
+
+TEST(GapWords, AnExplainedGapSaysCauseShareSizeAndWhatItFallsTo) {
+  const std::string words = all_sentences(gap_example::explained());
+  EXPECT_TRUE(example::holds(
+      words, {"Dry friction, which the model lacks, explains 93\u00a0% of the gap: 0.312\u00a0N·m [0.290, 0.330].",
+              // the signal's root mean square is 1/√2
+              "from 12\u00a0% to 1.1\u00a0%", "noise floor is 1.0\u00a0%", "reversal of the right wheel"}));
+  EXPECT_EQ(times(words, "Dry friction"), 1U);
+}
+
+TEST(GapWords, EachVerdictHasItsOwnWords) {
+  EXPECT_TRUE(example::holds(all_sentences(gap_example::no_gap()), {"No gap", "noise alone leaves"}));
+  EXPECT_TRUE(example::lacks(all_sentences(gap_example::no_gap()), {"cause", "adding"}));
+  EXPECT_TRUE(example::holds(all_sentences(gap_example::ambiguous(), "Turn on the spot."),
+                             {"one of 2 causes", "dry friction, or a dragging castor", "Turn on the spot."}));
+  EXPECT_TRUE(example::holds(all_sentences(gap_example::unexplained()), {"not explained", "60\u00a0% of it stays"}));
+  const std::string two = all_sentences(gap_example::two_causes());
+  EXPECT_TRUE(example::holds(two, {"Dry friction and a slope of the ground together explain 95\u00a0% of the gap.",
+                                   "accounts for 60\u00a0%", "accounts for 35\u00a0%", "After adding them"}));
+  Diagnosis nothing = gap_example::unexplained();
+  nothing.causes.clear();
+  EXPECT_TRUE(example::holds(all_sentences(nothing), {"no effect of the catalogue explains it"}));
+}
+
+TEST(GapWords, AnUnknownEffectIsCalledByItsName) {
+  EXPECT_EQ(effect_noun("my_own_effect"), "my own effect");
+  EXPECT_EQ(effect_nouns({}), "none");
+}
+
+TEST(GapReport, HoldsEverySectionOfWhatIsKnown) {
+  const std::string page =
+      gap_report(gap_example::ambiguous(), "example robot", example::context(3000), "Turn on the spot for 20 s.");
+  for (const char* id :
+       {"causes", "residual", "shrink", "apart", "where", "place", "parameters", "contradiction", "data"}) {
+    EXPECT_TRUE(example::holds(page, {std::string("<section id=\"") + id + "\""}));
+  }
+  EXPECT_TRUE(example::holds(page, {"Sim-to-real gap of example robot", "Turn on the spot for 20 s.",
+                                    "class=\"result caution\"", "\"contradiction\"", "12.500\u00a0s"}));
+  EXPECT_EQ(times(page, "<figure class=\"chart\">"), 2U);  // one for each channel
+  EXPECT_TRUE(example::lacks(page, {">nan<", ">inf<", "nan &", "−nan", "nan %", "inf %"}));
+}
+
+TEST(GapReport, ADiagnosisOfNothingIsAPage) {
+  const std::string page = gap_report(Diagnosis{}, "r", {});
+  EXPECT_TRUE(example::holds(page, {"No gap", "</html>"}));
+}
+
+TEST(GapReport, TextsAreEscaped) {
+  Diagnosis d = gap_example::explained();
+  d.causes[0].effect = "<script>alert(1)</script>";
+  d.causes[0].sentence = d.notes[0] = d.confusable[0].reason = d.where[3].regime = d.series[0].unit = "<b>&";
+  d.confusable[0].first = d.causes[0].parameters[0].name = d.shrink.rollout[0].name = "<b>";
+  const std::string page = gap_report(d, "<i>robot", example::context(600), "<u>next");
+  EXPECT_TRUE(example::lacks(page, {"<script>alert", "<b>", "<i>robot", "<u>next"}));
+}
+
+TEST(GapDrawings, AFindingLooksOtherThanChance) {
+  GapShare finding{GapSpace::dynamic, "sum", "reversals", "reversal", 0.5, 0.1, 0.001}, chance = finding;
+  chance.p_value = 0.5;
+  EXPECT_TRUE(example::holds(share_bars({finding}), {"class=\"full\"", "50 % in 10 %"}));
+  EXPECT_TRUE(example::lacks(share_bars({chance}), {"class=\"full\""}));
+  EXPECT_TRUE(share_bars({}).empty());
+}
+
+TEST(GapDrawings, AMatrixHasACellForEachPairAndPrintsItsNumber) {
+  const std::string drawing = confusability_matrix(gap_example::explained().confusable);
+  EXPECT_TRUE(example::holds(drawing, {">82</text>", ">100</text>", "stroke-width:2"}));
+  EXPECT_EQ(times(drawing, "<rect"), 21U);  // seven causes
+  EXPECT_TRUE(confusability_matrix({}).empty());
+}
+
+TEST(GapDrawings, AMapNeedsAPlace) {
+  const ResidualSeries s = gap_example::explained().series[0];
+  EXPECT_FALSE(position_map(s, example::signals(3000), 0.2).empty());
+  LogTable still = example::signals(3000);
+  for (auto& column : still.columns) {
+    std::fill(column.begin(), column.end(), 1.0);
+  }
+  EXPECT_TRUE(position_map(s, still, 0.2).empty());
+  EXPECT_TRUE(position_map(s, {}, 0.2).empty());
+}
+
+TEST(GapDrawings, ASpectrumNeedsALog) {
+  EXPECT_TRUE(
+      example::holds(spectrum_drawing(gap_example::explained().series[0], 10.0), {"noise floor", "frequency, Hz"}));
+  EXPECT_TRUE(spectrum_drawing(ResidualSeries{}, 10.0).empty());
+}
+
+}  // namespace
+}  // namespace wheelwright
