@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: Apache-2.0
+// Oracle: QR on the rows themselves, block by block.
+#include <wheelwright/gap/block_gram.hpp>
+
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <Eigen/QR>
+
+#include <wheelwright/core/error.hpp>
+#include <wheelwright/gap/signed_least_squares.hpp>
+
+namespace wheelwright {
+namespace {
+
+constexpr double kDuration = 40.0;
+constexpr std::size_t kBlocks = 8;
+constexpr double kPurge = 0.5;
+
+// Two spaces of different rates; the second one lacks column 1.
+std::vector<RowSpace> random_spaces(unsigned seed, std::size_t columns = 5) {
+  std::mt19937_64 rng(seed);
+  std::normal_distribution<double> normal;
+  std::vector<RowSpace> spaces;
+  for (const double step : {0.05, 0.5}) {
+    RowSpace space;
+    const auto n = static_cast<Eigen::Index>(kDuration / step);
+    space.t = Eigen::VectorXd::LinSpaced(n, 0.0, kDuration);
+    space.floor = step < 0.1 ? 0.3 : 2.0;
+    space.response = Eigen::VectorXd::NullaryExpr(n, [&] { return normal(rng); });
+    for (std::size_t c = 0; c < columns; ++c) {
+      space.columns.push_back(Eigen::VectorXd::NullaryExpr(n, [&] { return normal(rng); }));
+      space.response += 0.7 * (static_cast<double>(c) - 1.5) * space.columns[c];
+    }
+    spaces.push_back(space);
+  }
+  spaces[1].columns[1].resize(0);
+  return spaces;
+}
+
+struct Rows {
+  Eigen::MatrixXd X;
+  Eigen::VectorXd y;
+};
+
+// Whitened rows of those of `spaces` that `take(block, inner)` wants.
+template <typename Take>
+Rows rows_of(const std::vector<RowSpace>& spaces, const Subset& subset, const Take& take) {
+  std::vector<std::vector<double>> lines;
+  for (const RowSpace& space : spaces) {
+    for (Eigen::Index k = 0; k < space.t.size(); ++k) {
+      const double length = kDuration / static_cast<double>(kBlocks);
+      const auto block = std::min<std::size_t>(kBlocks - 1, static_cast<std::size_t>(space.t[k] / length));
+      const double from = static_cast<double>(block) * length;
+      const bool inner =
+          (block == 0 || space.t[k] >= from + kPurge) && (block + 1 == kBlocks || space.t[k] < from + length - kPurge);
+      if (!take(block, inner)) {
+        continue;
+      }
+      const auto value = [&](std::size_t c) { return space.columns[c].size() > 0 ? space.columns[c][k] : 0.0; };
+      std::vector<double> line{space.response[k]};
+      for (const std::size_t f : subset.fixed) line[0] -= value(f);
+      for (const std::size_t c : subset.columns) line.push_back(value(c));
+      for (double& v : line) v /= space.floor;
+      lines.push_back(line);
+    }
+  }
+  Rows rows;
+  rows.X.resize(static_cast<Eigen::Index>(lines.size()), static_cast<Eigen::Index>(subset.columns.size()));
+  rows.y.resize(rows.X.rows());
+  for (Eigen::Index i = 0; i < rows.X.rows(); ++i) {
+    const auto& line = lines[static_cast<std::size_t>(i)];
+    rows.y[i] = line[0];
+    for (Eigen::Index j = 0; j < rows.X.cols(); ++j) rows.X(i, j) = line[static_cast<std::size_t>(j) + 1];
+  }
+  return rows;
+}
+
+// The prior as rows of its own.
+Eigen::VectorXd solve(Rows rows, const Subset& subset) {
+  const Eigen::Index n = rows.X.rows(), k = rows.X.cols();
+  if (k == 0) {
+    return Eigen::VectorXd(0);
+  }
+  rows.X.conservativeResize(n + k, k);
+  rows.y.conservativeResize(n + k);
+  rows.y.tail(k).setZero();
+  rows.X.bottomRows(k).setZero();
+  for (Eigen::Index j = 0; j < k && !subset.precision.empty(); ++j) {
+    rows.X(n + j, j) = std::sqrt(subset.precision[static_cast<std::size_t>(j)]);
+  }
+  return rows.X.colPivHouseholderQr().solve(rows.y);
+}
+
+BlockOptions options(std::size_t threads = 1) { return {.blocks = kBlocks, .purge = kPurge, .threads = threads}; }
+
+TEST(BlockGram, HeldOutErrorIsThatOfQrOnTheRows) {
+  const std::vector<RowSpace> spaces = random_spaces(1);
+  const BlockGram gram(spaces, options());
+  for (const Subset& subset : {Subset{{0, 2, 3}}, Subset{{1}, {0, 4}}, Subset{{4, 1, 0}, {2}, {}, {30.0, 0.0, 5.0}},
+                               Subset{{}, {3}}, Subset{}}) {
+    double sum = 0.0;
+    const Eigen::VectorXd loss = gram.held_out_loss(subset);
+    for (std::size_t b = 0; b < kBlocks; ++b) {
+      const Rows train = rows_of(spaces, subset, [b](std::size_t block, bool inner) { return inner && block != b; });
+      const Rows test = rows_of(spaces, subset, [b](std::size_t block, bool inner) { return inner && block == b; });
+      const double expected = (test.y - test.X * solve(train, subset)).squaredNorm();
+      EXPECT_NEAR(loss[static_cast<Eigen::Index>(b)], expected, 1e-9 * expected);
+      EXPECT_EQ(gram.rows()[static_cast<Eigen::Index>(b)], static_cast<double>(test.y.size()));
+      sum += expected;
+    }
+    EXPECT_NEAR(gram.held_out_error(subset), sum / gram.rows().sum(), 1e-9 * sum / gram.rows().sum());
+  }
+}
+
+TEST(BlockGram, FitIsThatOfQrOnAllRowsAndItsCovarianceTheJackknife) {
+  const std::vector<RowSpace> spaces = random_spaces(2);
+  const BlockGram gram(spaces, options());
+  const Subset subset{{0, 1, 4}, {2}};
+  const BlockFit fit = gram.fit(subset);
+  const Rows all = rows_of(spaces, subset, [](std::size_t, bool) { return true; });
+  const Eigen::VectorXd x = solve(all, subset);
+  EXPECT_LE((fit.coefficients - x).norm(), 1e-9 * x.norm());
+  EXPECT_NEAR(fit.mean_square, (all.y - all.X * x).squaredNorm() / gram.all_rows(), 1e-9 * fit.mean_square);
+  Eigen::MatrixXd jackknife = Eigen::MatrixXd::Zero(3, 3);
+  for (std::size_t b = 0; b < kBlocks; ++b) {
+    const Eigen::VectorXd without =
+        solve(rows_of(spaces, subset, [b](std::size_t block, bool) { return block != b; }), subset) - x;
+    jackknife += (kBlocks - 1.0) / kBlocks * without * without.transpose();
+  }
+  EXPECT_LE((fit.covariance - jackknife).norm(), 1e-7 * jackknife.norm());
+}
+
+TEST(BlockGram, SignsHoldAndLeaveTheBestOfTheRest) {
+  const std::vector<RowSpace> spaces = random_spaces(3);
+  const BlockGram gram(spaces, options());
+  // The response has −1.05 of column 0 and +1.75 of column 4.
+  const BlockFit signed_fit = gram.fit({{0, 4, 2}, {}, {1, 1, 0}});
+  const BlockFit without = gram.fit({{4, 2}});
+  EXPECT_EQ(signed_fit.coefficients[0], 0.0);
+  EXPECT_TRUE(signed_fit.at_bound[0]);
+  EXPECT_FALSE(signed_fit.at_bound[1]);
+  EXPECT_NEAR(signed_fit.coefficients[1], without.coefficients[0], 1e-9);
+  EXPECT_NEAR(signed_fit.held_out_error, without.held_out_error, 1e-9);
+  EXPECT_NEAR(gram.held_out_error({{0, 4}, {}, {-1, 1}}), gram.held_out_error({{0, 4}}), 1e-12);
+}
+
+TEST(BlockGram, CollinearColumnsCountOnce) {
+  std::vector<RowSpace> spaces = random_spaces(4);
+  for (RowSpace& space : spaces) {
+    space.columns[3] = 2.0 * space.columns[2];
+  }
+  const BlockGram gram(spaces, options());
+  EXPECT_NEAR(gram.held_out_error({{2, 3}}), gram.held_out_error({{2}}), 1e-9);
+  EXPECT_TRUE(gram.fit({{2, 3}}).coefficients.allFinite());
+}
+
+TEST(BlockGram, ThreadsDoNotChangeABit) {
+  const std::vector<RowSpace> spaces = random_spaces(5);
+  const BlockGram one(spaces, options(1)), three(spaces, options(3));
+  for (std::size_t i = 0; i <= one.columns(); ++i) {
+    for (std::size_t j = 0; j <= i; ++j) {
+      EXPECT_EQ(one.product(i, j), three.product(i, j));
+    }
+  }
+  EXPECT_EQ(one.held_out_error({{0, 3}}), three.held_out_error({{0, 3}}));
+}
+
+TEST(BlockGram, MisuseIsRefused) {
+  std::vector<RowSpace> spaces = random_spaces(6);
+  const BlockGram gram(spaces, options());
+  EXPECT_THROW((void)gram.held_out_error({{5}}), InvalidArgument);
+  EXPECT_THROW((void)gram.held_out_error({{0}, {}, {1, 1}}), InvalidArgument);
+  EXPECT_THROW(BlockGram(spaces, {.blocks = 40, .purge = 2.0}), InvalidArgument);
+  spaces[0].columns[2][3] = std::nan("");
+  EXPECT_THROW(BlockGram(spaces, options()), InvalidArgument);
+}
+
+// Oracle: all 2^k choices of unknowns held at zero.
+TEST(SignedLeastSquares, IsTheBestOfAllActiveSets) {
+  std::mt19937_64 rng(7);
+  std::normal_distribution<double> normal;
+  for (int run = 0; run < 200; ++run) {
+    const Eigen::MatrixXd X = Eigen::MatrixXd::NullaryExpr(12, 5, [&] { return normal(rng); });
+    const Eigen::VectorXd y = Eigen::VectorXd::NullaryExpr(12, [&] { return normal(rng); });
+    const std::vector<int> sign{1, -1, 0, 1, 1};
+    const SignedSolution solution = signed_least_squares(X.transpose() * X, X.transpose() * y, sign);
+    double best = y.squaredNorm();
+    for (unsigned set = 1; set < 32; ++set) {
+      std::vector<Eigen::Index> in;
+      for (Eigen::Index j = 0; j < 5; ++j) {
+        if ((set >> j) & 1U) in.push_back(j);
+      }
+      Eigen::MatrixXd part(12, static_cast<Eigen::Index>(in.size()));
+      for (std::size_t j = 0; j < in.size(); ++j) part.col(static_cast<Eigen::Index>(j)) = X.col(in[j]);
+      const Eigen::VectorXd x = part.colPivHouseholderQr().solve(y);
+      bool allowed = true;
+      for (std::size_t j = 0; j < in.size(); ++j) {
+        allowed = allowed && sign[static_cast<std::size_t>(in[j])] * x[static_cast<Eigen::Index>(j)] >= 0.0;
+      }
+      best = allowed ? std::min(best, (y - part * x).squaredNorm()) : best;
+    }
+    EXPECT_NEAR((y - X * solution.x).squaredNorm(), best, 1e-10 * best);
+    for (std::size_t j = 0; j < 5; ++j) {
+      EXPECT_GE(sign[j] * solution.x[static_cast<Eigen::Index>(j)], 0.0);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace wheelwright
