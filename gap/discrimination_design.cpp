@@ -18,7 +18,7 @@ namespace {
 
 constexpr int kProbes = 12;          // random manoeuvres on which pairs are looked at first
 constexpr double kContained = 1e-4;  // share of a signature that counts as imitated
-constexpr double kAbsorbed = 1e-10;  // excess below which a signature is nothing, in units of the noise
+constexpr double kAbsorbed = 3e-4;   // share of a signature below which θ takes it up but for errors of sampling
 constexpr double kNotTold = 1.64;    // standard deviations: one chance in twenty of going wrong
 constexpr double kWanted = 3.0;      // deviations worth driving for
 
