@@ -20,17 +20,20 @@ Signal rim_speed(const Drive& drive, std::size_t joint) {
 }
 
 // The rim of one wheel moves faster by `speed` than its joint shows.
-Column unseen_rim_speed(const Drive& drive, std::size_t joint, const Signal& speed) {
-  return joint == 0 ? unseen_rim_speeds(drive, speed, {}) : unseen_rim_speeds(drive, {}, speed);
+Column unseen_rim_speed(const Drive& drive, std::size_t joint, const Signal& speed, bool friction) {
+  return joint == 0 ? unseen_rim_speeds(drive, speed, {}, friction) : unseen_rim_speeds(drive, {}, speed, friction);
 }
 
 // A wheel whose radius is larger by the share `growth` (a number, or one per instant): its rim is faster, and the same
-// force takes more torque.
+// force takes more torque. Friction is in the joints and stays as it is.
 Column larger_wheel(const Drive& drive, std::size_t joint, const Signal& growth) {
-  Column column = unseen_rim_speed(drive, joint, rim_speed(drive, joint).cwiseProduct(growth));
-  add(column, at_joints(drive, only(drive, joint, drive.joints[joint].predicted_effort.cwiseProduct(growth))));
+  Column column = unseen_rim_speed(drive, joint, rim_speed(drive, joint).cwiseProduct(growth), false);
+  add(column, at_joints(drive, only(drive, joint, inertial_efforts(drive)[joint].cwiseProduct(growth))));
   return column;
 }
+
+// The joints' own inertia is a part of the base model's that does not grow with a wheel or a scale.
+EffectParameter armature_change() { return {"armature_change", "kg·m²", 0}; }
 
 Effect com_longitudinal() {
   return {.name = "com_longitudinal",
@@ -92,9 +95,7 @@ Effect wheel_out_of_round() {
           .parameters = {{"torque_cos", "N·m", 0},
                          {"radius_cos", "m", 0},
                          {"torque_sin", "N·m", 0},
-                         {"radius_sin", "m", 0},
-                         {"torque_cos2", "N·m", 0},
-                         {"torque_sin2", "N·m", 0}},
+                         {"radius_sin", "m", 0}},
           .shapes = {side()},
           .excite = "drive straight for many turns of the wheels at several speeds",
           .applies =
@@ -112,8 +113,6 @@ Effect wheel_out_of_round() {
                   columns.push_back(at_joints(drive, only(drive, j, wave)));
                   columns.push_back(larger_wheel(drive, j, wave / drive.wheel_radius));
                 }
-                columns.push_back(at_joints(drive, only(drive, j, (2.0 * angle).cos().matrix())));
-                columns.push_back(at_joints(drive, only(drive, j, (2.0 * angle).sin().matrix())));
                 return columns;
               },
           .physical =
@@ -127,26 +126,28 @@ Effect wheel_radius() {
   return {.name = "wheel_radius",
           .sentence = "Both wheels are larger or smaller than designed.",
           .parametric = true,
-          .parameters = {{"radius_rel", "1", 0}},
+          .parameters = {{"radius_rel", "1", 0}, armature_change()},
           .excite = "drive straight with the pose logged",
           .applies = needs_two_wheels,
           .columns = [](const Drive& drive, Shape) {
             const Signal one = Signal::Ones(drive.rows());
             Column column = larger_wheel(drive, 0, one);
             add(column, larger_wheel(drive, 1, one));
-            return std::vector{column};
+            return std::vector{column, rate_at_joints(drive, {drive.joints[0].speed, drive.joints[1].speed})};
           }};
 }
 
 Effect wheel_radius_asymmetric() {
   return {.name = "wheel_radius_asymmetric",
           .sentence = "One wheel is larger or smaller than the other.",
-          .parameters = {{"radius_rel", "1", 0}},
+          .parameters = {{"radius_rel", "1", 0}, armature_change()},
           .shapes = {side()},
           .excite = "drive straight with the pose logged",
           .applies = needs_two_wheels,
           .columns = [](const Drive& drive, Shape shape) {
-            return std::vector{larger_wheel(drive, chosen(shape), Signal::Ones(drive.rows()))};
+            const std::size_t j = chosen(shape);
+            return std::vector{larger_wheel(drive, j, Signal::Ones(drive.rows())),
+                               rate_at_joints(drive, only(drive, j, drive.joints[j].speed))};
           }};
 }
 
@@ -154,13 +155,14 @@ Effect encoder_scale() {
   return {.name = "encoder_scale",
           .sentence = "One wheel's encoder has another scale than the robot file says.",
           .parametric = true,
-          .parameters = {{"scale_rel", "1", 0}},
+          .parameters = {{"scale_rel", "1", 0}, armature_change()},
           .shapes = {side()},
           .excite = "drive straight with the pose logged",
           .applies = needs_two_wheels,
           .columns = [](const Drive& drive, Shape shape) {
             const std::size_t j = chosen(shape);
-            return std::vector{unseen_rim_speed(drive, j, rim_speed(drive, j))};
+            return std::vector{unseen_rim_speed(drive, j, rim_speed(drive, j), true),
+                               rate_at_joints(drive, only(drive, j, drive.joints[j].speed))};
           }};
 }
 
@@ -169,17 +171,18 @@ Effect track_width() {
   return {.name = "track_width",
           .sentence = "The wheels stand further apart or closer together than designed.",
           .parametric = true,
-          .parameters = {{"track_rel", "1", 0}},
+          .parameters = {{"track_rel", "1", 0}, {"inertia_change", "1", 0}},
           .excite = "turn on the spot, both ways, with the heading logged",
           .applies = needs_two_wheels,
           .columns = [](const Drive& drive, Shape) {
-            Column column = unseen_motion(drive, {{}, -drive.coordinates[1].smooth_speed});
-            const Signal moment =
-                drive.lever_arm * (drive.joints[0].predicted_effort - drive.joints[1].predicted_effort);
+            Column column = unseen_motion(drive, {{}, -drive.coordinates[1].smooth_speed}, false);
+            const std::vector<Signal> effort = inertial_efforts(drive);
             Column lever;
-            lever.effort = {{}, -moment};
+            lever.effort = {{}, -drive.lever_arm * (effort[0] - effort[1])};
             add(column, lever);
-            return std::vector{column};
+            Column inertia;
+            inertia.effort_rate = {{}, drive.wheel_radius * drive.physical("yaw_inertia") * drive.coordinates[1].speed};
+            return std::vector{column, inertia};
           }};
 }
 
@@ -193,7 +196,7 @@ Effect longitudinal_slip() {
             const auto lost = [&drive](std::size_t j) -> Signal {
               return -rim_speed(drive, j).cwiseAbs().cwiseProduct(drive.joints[j].smooth_effort);
             };
-            return std::vector{unseen_rim_speeds(drive, lost(0), lost(1))};
+            return std::vector{unseen_rim_speeds(drive, lost(0), lost(1), false)};
           }};
 }
 

@@ -6,6 +6,8 @@
 #include <string>
 #include <utility>
 
+#include <Eigen/LU>
+
 namespace wheelwright::catalogue {
 namespace {
 
@@ -73,12 +75,12 @@ std::vector<Eigen::VectorXd> only(const Drive& drive, std::size_t joint, Eigen::
   return signals;
 }
 
-Column unseen_motion(const Drive& drive, const std::vector<Eigen::VectorXd>& speed) {
+Column unseen_motion(const Drive& drive, const std::vector<Eigen::VectorXd>& speed, bool friction) {
   Column column;
   column.effort.resize(drive.model.n());
   column.effort_rate.resize(drive.model.n());
   for (const Term& term : drive.model.terms) {
-    if (term.kind == Term::Kind::function) {
+    if (term.kind == Term::Kind::function || (term.kind == Term::Kind::speed && !friction)) {
       continue;
     }
     auto& group = term.kind == Term::Kind::acceleration ? column.effort_rate : column.effort;
@@ -92,13 +94,31 @@ Column unseen_motion(const Drive& drive, const std::vector<Eigen::VectorXd>& spe
   return column;
 }
 
-Column unseen_rim_speeds(const Drive& drive, const Eigen::VectorXd& right, const Eigen::VectorXd& left) {
+Column unseen_rim_speeds(const Drive& drive, const Eigen::VectorXd& right, const Eigen::VectorXd& left, bool friction) {
   Eigen::VectorXd forward, yaw;
   add_to(forward, 0.5, right);
   add_to(forward, 0.5, left);
   add_to(yaw, 1.0 / drive.track_width, right);
   add_to(yaw, -1.0 / drive.track_width, left);
-  return unseen_motion(drive, {forward, yaw});
+  return unseen_motion(drive, {forward, yaw}, friction);
+}
+
+std::vector<Eigen::VectorXd> inertial_efforts(const Drive& drive) {
+  const auto n = static_cast<Eigen::Index>(drive.model.n());
+  Eigen::MatrixXd outputs = Eigen::MatrixXd::Zero(drive.rows(), n);
+  for (const Term& term : drive.model.terms) {
+    if (term.kind == Term::Kind::acceleration) {
+      outputs.col(static_cast<Eigen::Index>(term.output)) += drive.theta[static_cast<Eigen::Index>(term.parameter)] *
+                                                             term.scale *
+                                                             drive.coordinates[term.coordinate].smooth_acceleration;
+    }
+  }
+  const Eigen::MatrixXd inverse = drive.model.input.inverse();
+  std::vector<Eigen::VectorXd> joints;
+  for (Eigen::Index j = 0; j < inverse.rows(); ++j) {
+    joints.push_back(outputs * inverse.row(j).transpose());
+  }
+  return joints;
 }
 
 Column base_column(const Drive& drive, std::string_view name) {

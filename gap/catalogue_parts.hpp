@@ -38,12 +38,17 @@ namespace wheelwright::catalogue {
 [[nodiscard]] std::vector<Eigen::VectorXd> only(const Drive& drive, std::size_t joint, Eigen::VectorXd signal);
 
 /// The column of a robot whose coordinates move faster than its joints show, by `speed` (one signal per coordinate, empty
-/// for zeros): the base model's effort for that motion; for a robot on wheels also its body velocity. Terms of the base
-/// model that are functions of the motion are taken as they are.
-[[nodiscard]] Column unseen_motion(const Drive& drive, const std::vector<Eigen::VectorXd>& speed);
+/// for zeros): the base model's effort for that motion; for a robot on wheels also its body velocity. Without `friction` only
+/// its inertia: friction in the joints knows nothing of what they do not show. Terms of the base model that are functions
+/// of the motion are taken as they are.
+[[nodiscard]] Column unseen_motion(const Drive& drive, const std::vector<Eigen::VectorXd>& speed, bool friction);
 
 /// The same for wheels whose rims move faster by `right` and `left`, m/s.
-[[nodiscard]] Column unseen_rim_speeds(const Drive& drive, const Eigen::VectorXd& right, const Eigen::VectorXd& left);
+[[nodiscard]] Column unseen_rim_speeds(const Drive& drive, const Eigen::VectorXd& right, const Eigen::VectorXd& left,
+                                       bool friction);
+
+/// The joints' efforts of the base model's inertial terms on the smooth motion.
+[[nodiscard]] std::vector<Eigen::VectorXd> inertial_efforts(const Drive& drive);
 
 /// Base regressor column of the parameter with the physical name `name`, per physical unit; zeros where the model has
 /// none of this name. Terms that are functions of the motion are left out.

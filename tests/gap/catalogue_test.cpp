@@ -55,10 +55,13 @@ Instant instant(const World& world, double t, double heading) {
     return (world.radius_r * wheel(0, s) - world.radius_l * wheel(1, s)) / world.track;
   };
   const double v1 = v1_at(t), v2 = v2_at(t), a1 = derivative(v1_at, t), a2 = derivative(v2_at, t);
-  const double force = kM * a1 + kF1 * v1 + world.force(t, v1, v2, heading) + world.inertial_force(t, v1, v2, a1, a2);
-  const double moment = kI * a2 + kF3 * v2 + world.moment(t, v1, v2, a1, a2);
-  const double right = world.radius_r * (0.5 * force + moment / world.track);
-  const double left = world.radius_l * (0.5 * force - moment / world.track);
+  const double force = kM * a1 + world.force(t, v1, v2, heading) + world.inertial_force(t, v1, v2, a1, a2);
+  const double moment = kI * a2 + world.moment(t, v1, v2, a1, a2);
+  // Friction is in the joints: it goes with their speeds.
+  const double drag = 0.25 * kR * kR * kF1 * (wheel(0, t) + wheel(1, t));
+  const double turn = kR * kR * kF3 * (wheel(0, t) - wheel(1, t)) / (kD * kD);
+  const double right = world.radius_r * (0.5 * force + moment / world.track) + drag + turn;
+  const double left = world.radius_l * (0.5 * force - moment / world.track) + drag - turn;
   const auto turned = [&](int j) { return derivative([j](double s) { return wheel(j, s); }, t); };
   return {v1, v2, world.at_wheel(0, t, wheel(0, t), turned(0), right),
           world.at_wheel(1, t, wheel(1, t), turned(1), left)};
@@ -287,14 +290,14 @@ TEST(Catalogue, LagIsExplainedByItsColumn) {
 TEST(Catalogue, GeometryIsExplainedInTorqueAndPose) {
   World large;
   large.radius_r = 1.01 * kR;
-  expect_explained({"wheel_radius_asymmetric", drive_of(large), {0.0}, {0.01}, 0.03});
+  expect_explained({"wheel_radius_asymmetric", drive_of(large), {0.0}, {0.01, 0.0}, 0.03});
   World both;
   both.radius_r = both.radius_l = 0.98 * kR;
-  expect_explained({"wheel_radius", drive_of(both), {}, {-0.02}, 0.03});
+  expect_explained({"wheel_radius", drive_of(both), {}, {-0.02, 0.0}, 0.03});
   World wide;
   wide.track = 1.02 * kD;
-  expect_explained({"track_width", drive_of(wide), {}, {0.02}, 0.04});
-  expect_explained({"encoder_scale", drive_of({}, 0.0, 0.0, 1.02), {0.0}, {0.02}, 0.04});
+  expect_explained({"track_width", drive_of(wide), {}, {0.02, 0.0}, 0.04});
+  expect_explained({"encoder_scale", drive_of({}, 0.0, 0.0, 1.02), {0.0}, {0.02, 0.0}, 0.04});
 }
 
 TEST(Catalogue, EveryEffectGivesAsManyColumnsAsParametersOnItsWholeGrid) {
