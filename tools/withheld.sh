@@ -1,0 +1,55 @@
+#!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
+#
+# Withheld effects: has `wheelwright gap` name what another physics engine hid in logs, and scores the answers.
+#
+#   tools/withheld.sh [--seed S] [--cases N] [--profile standard|hard] [--kind KIND] [--out DIR] [--only naive] [SET]
+#
+# SET is a directory of cases that is there already: case_*/ (or logs/case_*/) beside answers.json. Without it a set is
+# made in DIR/set. The tool sees logs and robot file of a case and nothing else; its results are in DIR/results.
+#   --only WORD  passes --WORD to `wheelwright gap` and keeps the results in DIR/results-WORD
+# The table is Markdown on standard output. BUILD (default build) is the build directory, JOBS (2) the cases at a time.
+set -eu
+root=$(cd "$(dirname "$0")/.." && pwd)
+bin=${BUILD:-$root/build}/bin
+jobs=${JOBS:-2}
+seed=1 cases=60 profile=standard kind=mixed out=out/withheld only='' set=''
+while [ $# -gt 0 ]; do
+  case $1 in
+    --seed | --cases | --profile | --kind | --out | --only)
+      [ $# -ge 2 ] || { echo "withheld: $1 wants a value" >&2; exit 2; }
+      case $1 in
+        --seed) seed=$2 ;;
+        --cases) cases=$2 ;;
+        --profile) profile=$2 ;;
+        --kind) kind=$2 ;;
+        --out) out=$2 ;;
+        --only) only=$2 ;;
+      esac
+      shift 2 ;;
+    -*) echo "withheld: unknown option $1" >&2; exit 2 ;;
+    *) set=$1; shift ;;
+  esac
+done
+
+mkdir -p "$out"
+if [ -z "$set" ]; then
+  set=$out/set
+  "$bin/wheelwright-reality" generate --seed "$seed" --cases "$cases" --profile "$profile" --kind "$kind" \
+    --out "$set" --threads "$jobs"
+fi
+logs=$set
+[ ! -d "$set/logs" ] || logs=$set/logs
+results=$out/results${only:+-$only}
+mkdir -p "$results"
+
+# Exit code 1 is an answer ("there is a gap"); anything above is a failure, which the score counts.
+export bin logs results only
+find "$logs" -maxdepth 1 -name 'case_*' -type d -exec basename {} \; | sort | xargs -P "$jobs" -I '{}' sh -c '
+  case={}
+  rm -rf "$results/$case"
+  "$bin/wheelwright" gap "$logs/$case/real.csv.gz" --robot "$logs/$case/robot.yaml" \
+    --baseline "$logs/$case/baseline.csv.gz" --out "$results/$case" ${only:+--$only} --threads 1 --quiet \
+    >"$results/$case.log" 2>&1 || [ $? -eq 1 ] || echo "withheld: $case failed, see $results/$case.log" >&2'
+
+python3 "$root/tools/score_withheld.py" "$set/answers.json" "$results"
