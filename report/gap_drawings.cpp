@@ -97,22 +97,23 @@ std::string shrink_bars(const std::vector<ShrinkFigure>& figures) {
                                      std::isfinite(f.upper) ? f.upper : 0.0, f.floor, 1e-300});
     const char* known = figure_words(f.name);
     out += text(left - 10.0, y + 18.0, "end", known != nullptr ? known : words(f.name), true);
-    const std::string unit = f.unit == "1" ? "" : f.unit;
+    const auto size = [&](double value) { return f.unit == "1" ? percent(value) : with_unit(number(value), f.unit); };
     const auto bar = [&](double value, const char* name, const char* style, const std::string& note) {
       if (!std::isfinite(value)) {
         out += text(left + 4.0, y + 9.5, "start", fmt::format("{}: none", name));
       } else {
         const double length = longest * std::max(0.0, value) / largest;
         out += rectangle(left, y, std::max(length, 0.8), height, style);
-        out += text(left + longest + 12.0, y + 9.5, "start",
-                    fmt::format("{} {}{}", name, with_unit(number(value), unit), note));
+        out += text(left + longest + 12.0, y + 9.5, "start", fmt::format("{} {}{}", name, size(value), note));
       }
     };
     bar(f.before, "before", "class=\"bar\" style=\"stroke-dasharray:3 2\"", "");
     y += height + 2.0;
     const bool interval = std::isfinite(f.lower) && std::isfinite(f.upper) && f.upper > f.lower;
     bar(f.after, "after", "class=\"full\"",
-        interval ? fmt::format(" [{}, {}]", number(f.lower), number(f.upper)) : std::string());
+        interval ? fmt::format(" [{}, {}]", f.unit == "1" ? percent(f.lower) : number(f.lower),
+                               f.unit == "1" ? percent(f.upper) : number(f.upper))
+                 : std::string());
     if (interval) {
       const double a = left + longest * std::max(0.0, f.lower) / largest, b = left + longest * f.upper / largest;
       out += fmt::format("<path class=\"whisker\" d=\"M{0:.1f} {2:.1f}v6M{1:.1f} {2:.1f}v6M{0:.1f} {3:.1f}H{1:.1f}\"/>",
@@ -136,10 +137,10 @@ std::string share_bars(const std::vector<GapShare>& shares, std::size_t most) {
   for (std::size_t k = 0; k < n; ++k) {
     longest_name = std::max(longest_name, shares[k].regime.size());
   }
-  const double left = std::clamp(6.3 * static_cast<double>(longest_name) + 14.0, 120.0, 320.0), longest = 250.0,
+  const double left = std::clamp(5.8 * static_cast<double>(longest_name) + 12.0, 110.0, 240.0), longest = 150.0,
                row = 20.0;
   std::string out =
-      open_svg(left + longest + 150.0, row * static_cast<double>(n) + 8.0, "share of the structural part");
+      open_svg(left + longest + 145.0, row * static_cast<double>(n) + 8.0, "share of the structural part");
   for (std::size_t k = 0; k < n; ++k) {
     const GapShare& s = shares[k];
     const double y = 4.0 + row * static_cast<double>(k);
@@ -154,7 +155,7 @@ std::string share_bars(const std::vector<GapShare>& shares, std::size_t most) {
     out += text(
         left + longest + 12.0, y + 11.5, "start",
         fmt::format("{:.0f} %{}, p {}", 100.0 * s.share, part ? fmt::format(" in {:.0f} %", 100.0 * s.presence) : "",
-                    s.p_value < 0.001 ? "< 0.001" : fmt::format("= {:.3f}", s.p_value)),
+                    s.p_value < 0.001 ? "< 0.001" : "= " + decimal(s.p_value, 3)),
         finding);
   }
   return out + line(left, 0.0, left, row * static_cast<double>(n) + 6.0, "class=\"axis\"") + "</svg>";
@@ -191,7 +192,7 @@ std::string spectrum_drawing(const ResidualSeries& series, double beta) {
     return {};
   }
   low = std::max(low, high * 1e-9);
-  constexpr double width = 560.0, height = 270.0, left = 78.0, right = 130.0, top = 10.0, bottom = 42.0;
+  constexpr double width = 525.0, height = 270.0, left = 78.0, right = 130.0, top = 10.0, bottom = 42.0;
   const LogAxis x{first, last, left, width - right}, y{low / 1.5, high * 1.5, height - bottom, top};
   std::string out = open_svg(width, height, "spectrum before, re-fitted, after, and of the floor");
   for (const double tick : x.ticks()) {

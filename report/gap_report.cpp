@@ -94,7 +94,7 @@ std::string apart_section(const Diagnosis& d, const std::string& next_manoeuvre)
     std::vector<std::vector<Cell>> rows;
     for (const ConfusablePair& pair : d.confusable) {
       if (!pair.reason.empty() && pair.similarity >= 0.5) {
-        rows.push_back({escape(effect_noun(pair.first)) + " · " + escape(effect_noun(pair.second)),
+        rows.push_back({escape(capital(effect_noun(pair.first))) + " · " + escape(effect_noun(pair.second)),
                         numeric(percent(pair.similarity, 2)), escape(pair.reason)});
       }
     }
@@ -298,9 +298,11 @@ std::string contradiction_section(const Diagnosis& d, const TimeAxis& axis) {
     rows.push_back({time_button(c.t - 1.0, c.t + 1.0, axis.text(c.t), axis), escape(words(c.channel)),
                     numeric(percent(c.weight, 2))});
   }
+  const bool one = d.contradictions.size() == 1;
   return paragraph(
-             "No parameters of the base model explain these rows together within the noise: a proof in outward "
-             "arithmetic (Farkas). They are marked in the charts.") +
+             fmt::format("No parameters of the base model, within their prior, explain {} within the noise: a proof in "
+                         "outward arithmetic (Farkas). {} marked in the charts.",
+                         one ? "this row" : "these rows together", one ? "It is" : "They are")) +
          table({"Time", "channel", numeric("weight in<br>the proof")}, rows);
 }
 

@@ -12,8 +12,10 @@
 
 #include <wheelwright/report/commission_report.hpp>
 #include <wheelwright/report/detect_report.hpp>
+#include <wheelwright/report/gap_report.hpp>
 
 #include "report/example.hpp"
+#include "report/gap_example.hpp"
 
 namespace wheelwright {
 namespace {
@@ -75,7 +77,8 @@ TEST_F(Browser, DrawsEveryChartWithoutAScriptError) {
   const ReportContext context = example::context(600);
   for (const std::string& page :
        {commission_report(example::done(), context), commission_report(example::empty(), context),
-        detect_report(example::detection(600, true), example::done().model, context), failure_report("broken", {})}) {
+        detect_report(example::detection(600, true), example::done().model, context), failure_report("broken", {}),
+        gap_report(gap_example::explained(), "example robot", context)}) {
     const std::string document = drawn(page);
     const std::size_t charts = times(page, "<figure class=\"chart\">");
     EXPECT_TRUE(example::holds(document, {"data-ready=\"1\""}));

@@ -16,10 +16,12 @@
 #include <wheelwright/report/commission_report.hpp>
 #include <wheelwright/report/design_report.hpp>
 #include <wheelwright/report/detect_report.hpp>
+#include <wheelwright/report/gap_report.hpp>
 #include <wheelwright/report/identify_report.hpp>
 #include <wheelwright/report/signals.hpp>
 
 #include "report/example.hpp"
+#include "report/gap_example.hpp"
 #include "support/drives.hpp"
 
 namespace wheelwright {
@@ -79,6 +81,11 @@ std::vector<std::pair<std::string, std::string>> all_pages() {
           {"identified", identify_report(whole, context)},
           {"identified in part", identify_report(straight, context)},
           {"designed", design_report(plan.design, plan.subject, plan.limits, context)},
+          {"gap explained", gap_report(gap_example::explained(), "example robot", context)},
+          {"gap ambiguous", gap_report(gap_example::ambiguous(), "example robot", context, "Turn on the spot.")},
+          {"gap unexplained", gap_report(gap_example::unexplained(), "example robot", context)},
+          {"no gap", gap_report(gap_example::no_gap(), "example robot", context)},
+          {"default gap", gap_report({}, {}, {})},
           {"default identification", identify_report({}, {})},
           {"default result", commission_report({}, {})},
           {"default detection", detect_report({}, {}, {})}};
