@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include <fmt/format.h>
@@ -78,21 +79,32 @@ std::optional<double> find_severity(const Source& source, const Entry& entry, st
                                     double beta, double target, double least) {
   const Drive part = entry.slow ? drive : first_part(drive, short_drive);
   double severity = std::min(target / 15.0, entry.largest);
-  double gap = 0.0;
-  for (int k = 0; k < 6; ++k) {
+  double low = 0.0;
+  double high = entry.largest;
+  double best = 0.0;
+  double nearest = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < 7; ++k) {
+    double factor = 0.2;
     try {
-      gap = gap_of(source, entry, stream, severity, part, beta);
+      const double gap = gap_of(source, entry, stream, severity, part, beta);
+      factor = target / std::max(gap, 1e-3);
+      if (gap >= least && std::abs(std::log(factor)) < nearest) {
+        nearest = std::abs(std::log(factor));
+        best = severity;
+      }
     } catch (const Error&) {
-      severity *= 0.5;
-      continue;
+      // Beyond what the robot stands.
     }
-    const double factor = target / std::max(gap, 1e-3);
-    if (std::abs(std::log(factor)) < 0.1 || (factor > 1.0 && severity >= entry.largest)) {
+    (factor > 1.0 ? low : high) = severity;
+    if (nearest < 0.12 || low >= entry.largest) {
       break;
     }
-    severity = std::min(severity * std::clamp(factor, 0.2, 4.0), entry.largest);
+    // In proportion, but no further than the middle towards what was too large or too small.
+    const double next = severity * std::clamp(factor, 0.2, 4.0);
+    severity = next > low && next < high ? next : low > 0.0 ? std::sqrt(low * high) : 0.3 * high;
+    severity = std::min(severity, entry.largest);
   }
-  return gap >= least ? std::optional(severity) : std::nullopt;
+  return best > 0.0 ? std::optional(best) : std::nullopt;
 }
 
 /// Chooses the filter that the gap is measured with, and better sensors where noise would hide everything.

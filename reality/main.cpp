@@ -95,14 +95,14 @@ int generate(const Request& request, std::uint64_t first, std::uint64_t cases, u
     one.join();
   }
   fmt::print(stderr, "\n");
-  if (failure) {
-    std::rethrow_exception(failure);
-  }
   Json all = Json::object();
   for (const auto& [index, json] : answers) {
     all[fmt::format("case_{:03}", index)] = json;
   }
   write_json(out / "answers.json", all);
+  if (failure) {
+    std::rethrow_exception(failure);
+  }
   return 0;
 }
 

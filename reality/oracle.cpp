@@ -323,8 +323,10 @@ Oracle ask_oracle(const RobotDesign& robot, const Signals& clean, const std::vec
     }
   } else {
     for (const Rival& rival : all) {
-      // With the nominal parameters free their changes explain nothing; only their kinematics could.
-      const bool comparable = !parametric || rival.parametric || rival.name == "wheel_radius_asymmetric";
+      // With the nominal parameters free, changes of them explain nothing but by their kinematics.
+      const bool kinematic = rival.name == "wheel_radius" || rival.name == "track_width" ||
+                             rival.name == "encoder_scale" || rival.name == "wheel_radius_asymmetric";
+      const bool comparable = kinematic || rival.parametric == parametric;
       if (!names(truth, rival.name) && comparable) {
         consider(rival, nullptr, 0.0, std::string(rival.name));
       }

@@ -7,6 +7,7 @@
 namespace wheelwright::reality {
 namespace {
 
+using Eigen::Index;
 using Eigen::VectorXd;
 
 Column zero(const Signals& g) {
@@ -23,6 +24,13 @@ Column torque_column(VectorXd s, VectorXd d) {
 Column wheel_column(const VectorXd& r, const VectorXd& l) { return torque_column(r + l, r - l); }
 
 VectorXd sign(const VectorXd& u, double width = 0.02) { return (u / width).array().tanh(); }
+
+VectorXd rate_of(const VectorXd& u, double period) {
+  VectorXd out = VectorXd::Zero(u.size());
+  const Index n = u.size() - 2;
+  out.segment(1, n) = (u.tail(n) - u.head(n)) / (2.0 * period);
+  return out;
+}
 
 Guess one(Column column) { return {{std::move(column)}, {}, 0.0}; }
 
@@ -226,6 +234,11 @@ std::vector<Rival> kinematic_rivals(const RobotDesign& robot) {
                             const VectorXd l = g.speed[left].cwiseAbs().cwiseProduct(g.torque[left]);
                             column.v1 = 0.5 * design.radius * (r + l);
                             column.v2 = 0.5 * design.radius / arm * (r - l);
+                            // The body, which lags behind its wheels, is what has the mass.
+                            const double f1 = 2.0 * design.damping / (design.radius * design.radius);
+                            column.s = design.radius * (design.mass * rate_of(column.v1, g.period) + f1 * column.v1);
+                            column.d = design.radius / arm *
+                                       (design.yaw_inertia * rate_of(column.v2, g.period) + f1 * arm * arm * column.v2);
                             return one(column);
                           }},
                          {"wheel_radius",
