@@ -12,6 +12,7 @@
 #include <wheelwright/identify/difference_noise.hpp>
 #include <wheelwright/identify/instruments.hpp>
 #include <wheelwright/identify/shared_noise.hpp>
+#include <wheelwright/model/effect_law.hpp>
 
 namespace wheelwright {
 namespace {
@@ -81,6 +82,16 @@ std::optional<MotionNoise> find_motion_noise(LogSource& log, const Setting& s) {
   return std::nullopt;
 }
 
+// What a simulator can have, but a log cannot be corrected for.
+void refuse_simulated(const Robot& robot) {
+  for (const RobotEffect& effect : robot.effects) {
+    const EffectLaw& law = effect_law(effect.name);
+    if (law.mechanism == EffectMechanism::simulation) {
+      throw InvalidArgument(fmt::format("effects.{} is for `simulate` only: from a log {}", effect.name, law.remedy));
+    }
+  }
+}
+
 }  // namespace
 
 RegressionStream make_rows(LogSource& log, const Setting& s, const SignalErrors& errors) {
@@ -88,6 +99,7 @@ RegressionStream make_rows(LogSource& log, const Setting& s, const SignalErrors&
 }
 
 Setting settle(LogSource& log, const Robot& robot, const SettingOptions& options) {
+  refuse_simulated(robot);
   Setting s;
   s.robot = robot;
   s.model = make_model(robot);

@@ -82,6 +82,7 @@ Measurement find_measurement(LogSource& log, const Robot& robot, const Model& mo
   m.hold = robot.hold;
   m.effort_unsigned = robot.effort_unsigned;
   m.nominal_step = log.median_step();
+  m.correction = effort_correction(robot);
 
   std::vector<std::string> angles, speeds;
   for (const Joint& joint : model.joints) {

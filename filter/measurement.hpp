@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <wheelwright/core/log.hpp>
+#include <wheelwright/filter/effort_correction.hpp>
 #include <wheelwright/model/model.hpp>
 #include <wheelwright/model/robot.hpp>
 
@@ -32,12 +33,14 @@ struct Measurement {
   double count = 0.0;                       ///< mean_speed: speeds are whole multiples of this, rad/s (0: not rounded)
   double nominal_step = 0.0;                ///< median step of the log it was found on, s
 
+  EffortCorrection correction{};  ///< of the efforts, before anything else is made of them
+
   /// Columns in the order in which RegressorFilter wants a sample: motion, effort, heading where there is one.
   [[nodiscard]] std::vector<std::string> columns() const;
 };
 
 /// Finds how `log` measures `robot`: angles where the log has them, else speeds; for order 2 and speed_source automatic
-/// the log is searched for count-differenced speeds (encoder.hpp). Walks the log once. Throws InputError when a joint
+/// the log is searched for count-differenced speeds (encoder.hpp); efforts are corrected for the robot's effects. Walks the log once. Throws InputError when a joint
 /// has no usable motion or effort column (naming the columns that were looked for), InvalidArgument when order 1 is
 /// asked of a log that has angles only.
 [[nodiscard]] Measurement find_measurement(LogSource& log, const Robot& robot, const Model& model, int order);

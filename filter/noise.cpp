@@ -51,6 +51,15 @@ Energies impulse_energies(const FilterDesign& d, MotionKind motion, Hold hold, d
   return e;
 }
 
+// The input matrix from the errors of logged efforts to those of the outputs.
+Eigen::MatrixXd corrected_input(const Model& model, const Measurement& measurement) {
+  Eigen::MatrixXd input = model.input;
+  for (Eigen::Index j = 0; j < input.cols(); ++j) {
+    input.col(j) *= measurement.correction.gain_of(static_cast<std::size_t>(j));
+  }
+  return input;
+}
+
 KernelNorms roots(const Energies& e) { return {std::sqrt(e.acceleration), std::sqrt(e.speed), std::sqrt(e.effort)}; }
 
 }  // namespace
@@ -100,7 +109,7 @@ NoiseGram noise_gram(const Model& model, const FilterDesign& design, const Measu
       }
     }
   }
-  gram.effort = e.effort * model.input.rowwise().squaredNorm();
+  gram.effort = e.effort * corrected_input(model, measurement).rowwise().squaredNorm();
   return gram;
 }
 
@@ -130,7 +139,11 @@ SignalErrors propagate(const Model& model, const FilterDesign& design, const Mea
   SignalErrors errors;
   errors.acceleration = sensors.motion * across(model.motion, norms.acceleration, likely.acceleration);
   errors.speed = sensors.motion * across(model.motion, norms.speed, likely.speed);
-  errors.output = sensors.effort * across(model.input, norms.effort, likely.effort);
+  // Clipped noise has a mean: only its bound is left.
+  const Eigen::MatrixXd input = corrected_input(model, measurement);
+  errors.output = measurement.correction.linear()
+                      ? (sensors.effort * across(input, norms.effort, likely.effort)).eval()
+                      : (sensors.effort * norms.effort * input.cwiseAbs().rowwise().sum()).eval();
   errors.heading = sensors.heading;
   errors.joint_sample = sensors.motion;
   if (measurement.motion != MotionKind::speed && sensors.motion > 0.0) {

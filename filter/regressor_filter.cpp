@@ -57,6 +57,10 @@ RegressorFilter::RegressorFilter(Model model, FilterDesign design, Measurement m
       functions_.push_back(FunctionTerm{k, {}, {}});
     }
   }
+  if (!measurement_.correction.empty()) {
+    corrector_ =
+        EffortCorrector(measurement_.correction, model_.joints.size(), measurement_.hold, measurement_.nominal_step);
+  }
   row_.Y = RowMatrix::Zero(n, p);
   row_.dY = RowMatrix::Zero(n, p);
   row_.y = Eigen::VectorXd::Zero(n);
@@ -66,6 +70,7 @@ RegressorFilter::RegressorFilter(Model model, FilterDesign design, Measurement m
 void RegressorFilter::restart() {
   started_ = false;
   running_ = false;
+  corrector_.restart();
 }
 
 double RegressorFilter::filtered(const Cascade& c) const {
@@ -79,7 +84,7 @@ void RegressorFilter::read_motion(std::span<const double> sample) {
   }
 }
 
-void RegressorFilter::read_efforts(std::span<const double> sample) {
+void RegressorFilter::read_efforts(double t, std::span<const double> sample) {
   const auto joints = static_cast<std::size_t>(joint_.size());
   for (std::size_t j = 0; j < joints; ++j) {
     const auto i = static_cast<Eigen::Index>(j);
@@ -92,6 +97,18 @@ void RegressorFilter::read_efforts(std::span<const double> sample) {
     }
   }
   effort_sample_.swap(effort_sample_before_);
+  if (!corrector_.empty()) {
+    corrector_.step(t, joint_effort_.data());
+    if (measurement_.hold == Hold::zero_order) {  // what acted since the last sample is known now
+      for (std::size_t j = 0; j < joints; ++j) {
+        joint_effort_[static_cast<Eigen::Index>(j)] = corrector_.mean(j);
+      }
+      multiply(model_.input, joint_effort_, effort_sample_before_);
+    }
+    for (std::size_t j = 0; j < joints; ++j) {
+      joint_effort_[static_cast<Eigen::Index>(j)] = corrector_.now(j);
+    }
+  }
   multiply(model_.input, joint_effort_, effort_sample_);
 }
 
@@ -156,7 +173,7 @@ bool RegressorFilter::step(double t, std::span<const double> sample) {
   if (first) {
     joint_before_ = joint_;
   }
-  read_efforts(sample);
+  read_efforts(t, sample);
   const bool measured_heading = !measurement_.heading_column.empty();
   const double heading_before = heading_sample_;
   heading_sample_ = measured_heading ? sample.back() : 0.0;
@@ -178,6 +195,9 @@ bool RegressorFilter::step(double t, std::span<const double> sample) {
     return advance(0.5 * (before + t));
   }
   multiply(model_.motion, joint_, speed_);
+  if (!corrector_.empty() && measurement_.hold == Hold::zero_order) {
+    effort_before_ = effort_sample_before_;
+  }
   effort_ = effort_sample_;
   heading_ = measured_heading ? heading_sample_ : heading_;
   return advance(t);
@@ -186,7 +206,7 @@ bool RegressorFilter::step(double t, std::span<const double> sample) {
 void RegressorFilter::begin(double t) {
   running_ = true;
   t0_ = t_ = t;
-  at_rest_ = speed_.isZero(0.0);
+  at_rest_ = speed_.isZero(0.0) && (corrector_.empty() || effort_.isZero(0.0));
   heading_ = measurement_.heading_column.empty() ? 0.0 : heading_;
   for (Cascade& c : motion_) c = {};
   for (Cascade& c : slope_) c = {};
@@ -214,7 +234,15 @@ bool RegressorFilter::advance(double t) {
   advance_motion(weights_);
   advance_efforts(weights_);
   write_row();
-  return measurement_.motion == MotionKind::speed || at_rest_ || (t_ - t0_) * design_.beta >= design_.settle;
+  return settled();
+}
+
+bool RegressorFilter::settled() const {
+  const double since = t_ - t0_;
+  if (!corrector_.empty() && !at_rest_ && since < corrector_.memory(std::exp(-design_.settle))) {
+    return false;
+  }
+  return measurement_.motion == MotionKind::speed || at_rest_ || since * design_.beta >= design_.settle;
 }
 
 void RegressorFilter::write_row() {

@@ -10,6 +10,7 @@
 
 #include <wheelwright/core/regression.hpp>
 #include <wheelwright/filter/design.hpp>
+#include <wheelwright/filter/effort_correction.hpp>
 #include <wheelwright/filter/exact.hpp>
 #include <wheelwright/filter/measurement.hpp>
 #include <wheelwright/filter/noise.hpp>
@@ -32,6 +33,8 @@ struct FilteredRow {
 /// are first reduced to mean speeds over their intervals, and efforts to means alike, both at the intervals' mid-points:
 /// a moving average of both sides of (20), which leaves the equation as it is. Where both sides are interpolated alike the
 /// errors of second order in the step cancel; a filter of the angles themselves would keep (βh)²/12 of the inertia.
+/// Efforts pass Measurement::correction first; where that has a memory, rows begin when it has forgotten the segment's start
+/// too, unless the segment begins at rest without effort.
 ///
 /// step() does not allocate. Batch filtering is this class in a loop, so that both give the same bits.
 class RegressorFilter {
@@ -82,7 +85,8 @@ class RegressorFilter {
   };
 
   void read_motion(std::span<const double> sample);
-  void read_efforts(std::span<const double> sample);
+  void read_efforts(double t, std::span<const double> sample);
+  [[nodiscard]] bool settled() const;
   void evaluate_functions(const Eigen::VectorXd& speed);
   void advance_motion(const StepWeights& w);
   void advance_efforts(const StepWeights& w);
@@ -93,6 +97,7 @@ class RegressorFilter {
   FilterDesign design_;
   Measurement measurement_;
   SignalErrors errors_;
+  EffortCorrector corrector_;
 
   StepWeights weights_;
   bool started_ = false;  // a sample of this segment was seen

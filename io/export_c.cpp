@@ -113,6 +113,11 @@ class Writer {
         errors_(filter_.errors()),
         rule_(detector.threshold()) {
     check_name(options.name);
+    if (!measurement_.correction.empty()) {
+      throw InputError(
+          "export: the robot's effects correct the measured efforts (lag, delay, gain, dead zone or saturation), which "
+          "has no C form; expected a model without such effects");
+    }
     for (std::size_t k = 0; k < model_.terms.size(); ++k) {
       if (model_.terms[k].kind == Term::Kind::function) {
         functions_.push_back({k, function_of(model_, model_.terms[k])});

@@ -36,7 +36,7 @@ FilterDesign read_filter(const JsonPlace& place) {
   return filter;
 }
 
-Measurement read_measurement(const JsonPlace& place, const Model& model) {
+Measurement read_measurement(const JsonPlace& place, const Model& model, const Robot& robot) {
   Measurement m;
   m.motion = value_of(kMotionWords, place.at("motion"));
   m.motion_columns = place.at("motion_columns").texts();
@@ -46,6 +46,7 @@ Measurement read_measurement(const JsonPlace& place, const Model& model) {
   m.effort_unsigned = place.at("effort_unsigned").boolean();
   m.count = place.at("count").number();
   m.nominal_step = place.at("nominal_step").number();
+  m.correction = effort_correction(robot);
   if (m.motion_columns.size() != model.joints.size() || m.effort_columns.size() != model.joints.size()) {
     place.fail("one motion column and one effort column for each joint of the model");
   }
@@ -241,7 +242,7 @@ CommissionedModel model_from_json(const Json& json, const std::string& file) {
   model.model = make_model(model.robot);
   const std::size_t p = model.model.p();
   model.filter = read_filter(root.at("filter"));
-  model.measurement = read_measurement(root.at("measurement"), model.model);
+  model.measurement = read_measurement(root.at("measurement"), model.model, model.robot);
   const JsonPlace detector = root.at("detector");
   model.estimate = vector_at(detector.at("estimate"), p);
   model.errors = read_errors(detector.at("error_bounds"), model.model);
@@ -264,7 +265,7 @@ ModelClaims claims_from_json(const Json& json, const std::string& file) {
   claims.robot = robot_from_json(root.at("robot").value(), root.at("robot").where());
   claims.model = make_model(claims.robot);
   claims.filter = read_filter(root.at("filter"));
-  claims.measurement = read_measurement(root.at("measurement"), claims.model);
+  claims.measurement = read_measurement(root.at("measurement"), claims.model, claims.robot);
   read_noise(root.at("noise"), claims);
   read_set(root.at("feasible_set"), claims);
   read_parameters(root.at("parameters"), claims);

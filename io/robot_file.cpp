@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/io/byte_source.hpp>
+#include <wheelwright/io/effects_file.hpp>
 #include <wheelwright/io/suggest.hpp>
 #include <wheelwright/io/yaml_place.hpp>
 
@@ -27,9 +28,10 @@ struct RobotReader {
   static bool drive(const Robot& robot) { return robot.model == "differential_drive"; }
 
   void read() {
-    const auto members = root.members({"name", "model", "wheel_radius", "track_width", "footprint", "lever_arm",
-                                       "friction", "parameters", "effort", "nominal", "prior", "noise", "filter",
-                                       "encoder_counts_per_turn", "speed_source", "limits", "kinematic", "motor"});
+    const auto members =
+        root.members({"name", "model", "wheel_radius", "track_width", "footprint", "lever_arm", "friction",
+                      "parameters", "effort", "nominal", "prior", "noise", "filter", "encoder_counts_per_turn",
+                      "speed_source", "limits", "kinematic", "motor", "effects"});
     for (const auto& [key, place] : members) {
       read_basics(key, place);
     }
@@ -128,6 +130,8 @@ struct RobotReader {
       }
     } else if (key == "motor") {
       read_motor(place);
+    } else if (key == "effects") {
+      read_effects(place, robot);
     }
   }
 

@@ -21,7 +21,7 @@ namespace wheelwright {
 ///     hi]}, noise: estimate | {wheel_speed, wheel_angle, effort, position, heading: bound | estimate},
 ///     filter: auto | {order: 1 | 2, alpha, beta: 1/s}, encoder_counts_per_turn, speed_source: auto |
 ///     encoder_difference | measured, limits: {effort, speed, acceleration}, motor: {torque_constant, resistance,
-///     back_emf, gear_ratio}
+///     back_emf, gear_ratio}, effects: [{effect: name, parameter: value | [lo, hi], ...}] (model/effect_law.hpp)
 ///
 /// Physical names: mass, yaw_inertia, viscous_linear, viscous_yaw, coulomb (differential_drive; viscous_x and viscous_y instead
 /// of viscous_linear where the friction is anisotropic); inertia, viscous, coulomb, offset (single_axis).
@@ -31,6 +31,9 @@ namespace wheelwright {
 
 /// The same from text; `file` is for messages.
 [[nodiscard]] Robot parse_robot(std::string_view text, const std::string& file);
+
+/// The text of a robot file from which parse_robot makes the same Robot.
+[[nodiscard]] std::string robot_yaml(const Robot& robot);
 
 /// Writes a robot file from which read_robot makes the same Robot; whole or not at all.
 void write_robot(const std::filesystem::path& path, const Robot& robot);

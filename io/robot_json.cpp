@@ -47,6 +47,18 @@ Json motor_of(const Motor& motor) {
   return out;
 }
 
+Json effects_of(const std::vector<RobotEffect>& effects) {
+  Json out = Json::array();
+  for (const RobotEffect& effect : effects) {
+    Json entry = {{"effect", effect.name}};
+    for (const auto& [name, known] : effect.parameters) {
+      entry[name] = known.lower == known.upper ? Json(known.lower) : Json::array({known.lower, known.upper});
+    }
+    out.push_back(std::move(entry));
+  }
+  return out;
+}
+
 /// A key of a YAML file and its value: JSON on one line is YAML's flow style.
 std::string yaml_line(const std::string& key, const Json& value) { return key + ": " + json_text(value, -1) + "\n"; }
 
@@ -93,16 +105,21 @@ Json to_json(const Robot& robot) {
   if (robot.motor) {
     out["motor"] = motor_of(*robot.motor);
   }
+  if (!robot.effects.empty()) {
+    out["effects"] = effects_of(robot.effects);
+  }
   return out;
 }
 
-void write_robot(const std::filesystem::path& path, const Robot& robot) {
+std::string robot_yaml(const Robot& robot) {
   std::string text;
   const Json object = to_json(robot);
   for (const auto& member : object.items()) {
     text += yaml_line(member.key(), member.value());
   }
-  atomic_write(path, text);
+  return text;
 }
+
+void write_robot(const std::filesystem::path& path, const Robot& robot) { atomic_write(path, robot_yaml(robot)); }
 
 }  // namespace wheelwright

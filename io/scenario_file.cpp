@@ -13,6 +13,7 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/io/byte_source.hpp>
 #include <wheelwright/io/csv.hpp>
+#include <wheelwright/io/effects_file.hpp>
 #include <wheelwright/io/robot_file.hpp>
 #include <wheelwright/io/yaml_place.hpp>
 
@@ -102,19 +103,28 @@ struct ScenarioReader {
   const std::filesystem::path& folder;
   Scenario scenario;
   std::optional<std::filesystem::path> commands = {};
+  std::optional<YamlPlace> effects = {};
 
   void read() {
     const YamlPlace root = YamlPlace::parse(text, file);
     std::set<std::string> seen;
-    for (const auto& [key, place] : root.members({"robot", "parameters", "trajectory", "controller", "start", "faults",
-                                                  "sensors", "duration", "rate", "time_jitter", "gaps", "seed"})) {
+    for (const auto& [key, place] :
+         root.members({"robot", "parameters", "trajectory", "controller", "start", "faults", "sensors", "duration",
+                       "rate", "time_jitter", "gaps", "seed", "effects"})) {
       seen.insert(key);
-      read_part(key, place);
+      if (key == "effects") {
+        effects = place;
+      } else {
+        read_part(key, place);
+      }
     }
     for (const char* needed : {"robot", "parameters"}) {
       if (!seen.contains(needed)) {
         throw InputError(file + ": no key " + needed + ": expected it in a scenario");
       }
+    }
+    if (effects) {
+      read_effects(*effects, scenario.robot);
     }
     if (commands) {
       if (!(scenario.robot.wheel_radius > 0.0 && scenario.robot.track_width > 0.0)) {
@@ -315,7 +325,7 @@ struct ScenarioReader {
 }  // namespace
 
 Scenario parse_scenario(std::string_view text, const std::string& file, const std::filesystem::path& folder) {
-  ScenarioReader reader{text, file, folder, {}, {}};
+  ScenarioReader reader{text, file, folder, {}, {}, {}};
   reader.read();
   return reader.scenario;
 }

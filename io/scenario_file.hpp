@@ -25,6 +25,7 @@ namespace wheelwright {
 ///               unmatched, magnitude (m, m/s, rad/s), onset (s), shape: step | ramp | smooth, rise_time (s), end (s)}]
 ///     sensors: {sampling: instant | interval, noise: uniform | truncated_gaussian, wheel_speed, wheel_angle, effort,
 ///               position, heading (bounds), encoder_counts_per_turn, log: [angles, speeds, pose, commands]}
+///     effects: [{effect: name, parameter: value, ...}]      as in a robot file; beside those that the robot brings
 ///     duration (s; by default 60, or that of the table), rate (Hz), time_jitter (share of the period), gaps: [[from, to], ...] (s), seed
 ///
 /// Throws InputError, naming file, line, key, value and what was expected, for unknown or repeated keys, wrong types and

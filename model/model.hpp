@@ -8,9 +8,12 @@
 /// function or small type that fills this struct; see examples/own_model.cpp.
 #pragma once
 
+#include <array>
+#include <concepts>
 #include <cstddef>
 #include <span>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include <Eigen/Core>
@@ -57,6 +60,34 @@ struct TermValue {
   double error = 0.0;  ///< >= 0: the exact value is within `error` of `value`
 };
 
+/// An instantaneous function of the motion, with up to two constants of its own (a joint's number, a shape parameter).
+/// Two are equal when they are the same function with the same constants.
+class TermFunction {
+ public:
+  using Plain = TermValue (*)(const MotionState&);
+  using Shaped = TermValue (*)(const MotionState&, const std::array<double, 2>& constants);
+
+  TermFunction() = default;
+  /// A function without constants (a function, or a lambda without capture; nullptr for none).
+  template <typename F>
+  requires(std::convertible_to<F, Plain> && !std::same_as<std::remove_cvref_t<F>, TermFunction>)
+      TermFunction(F&& function)
+      : plain_(static_cast<Plain>(function)) {}
+  /// `function` with `constants`.
+  TermFunction(Shaped function, const std::array<double, 2>& constants) : shaped_(function), constants_(constants) {}
+
+  /// The value at one instant. There must be a function.
+  TermValue operator()(const MotionState& state) const {
+    return shaped_ != nullptr ? shaped_(state, constants_) : plain_(state);
+  }
+  friend bool operator==(const TermFunction&, const TermFunction&) = default;
+
+ private:
+  Plain plain_ = nullptr;
+  Shaped shaped_ = nullptr;
+  std::array<double, 2> constants_{};
+};
+
 /// One non-zero entry of Y: what stands at (output, parameter).
 struct Term {
   /// What the entry is made of.
@@ -70,7 +101,7 @@ struct Term {
   Kind kind = Kind::speed;
   std::size_t coordinate = 0;  ///< for acceleration and speed
   double scale = 1.0;
-  TermValue (*function)(const MotionState&) = nullptr;  ///< for Kind::function
+  TermFunction function{};  ///< for Kind::function
 };
 
 /// Linear-in-parameters dynamics of a robot.

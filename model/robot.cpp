@@ -7,6 +7,9 @@
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/model/differential_drive.hpp>
+#include <wheelwright/model/effect_geometry.hpp>
+#include <wheelwright/model/effect_law.hpp>
+#include <wheelwright/model/effect_terms.hpp>
 #include <wheelwright/model/single_axis.hpp>
 
 namespace wheelwright {
@@ -15,12 +18,14 @@ namespace {
 // An unknown effort constant (A or V per N·m) is taken to lie below this in a default prior.
 constexpr double widest_effort_constant = 1e3;
 
-// Everything the robot's kind of model can have, before the robot's own choice of parameters.
+// Everything the robot's kind of model can have, before the robot's own choice of parameters and its effects' terms.
 Model full_model(const Robot& robot) {
   if (robot.model == "differential_drive") {
-    return DifferentialDrive{robot.wheel_radius, robot.track_width, robot.lever_arm_is_track,
-                             robot.anisotropic_friction, true}
-        .model();
+    Model model = DifferentialDrive{robot.wheel_radius, drive_geometry(robot).track_width, robot.lever_arm_is_track,
+                                    robot.anisotropic_friction, !has_effect(robot, "coulomb_asymmetric")}
+                      .model();
+    apply_geometry(model, robot);
+    return model;
   }
   if (robot.model == "single_axis") {
     return SingleAxis{.coulomb = true, .offset = true}.model();
@@ -60,15 +65,33 @@ Model select(const Model& model, const std::vector<std::string>& keep) {
   return selected;
 }
 
-// What a model has unless more is asked for: no dry friction, no offset.
-std::vector<std::string> basic_parameters(const Model& full) {
-  std::vector<std::string> names;
-  for (const Parameter& parameter : full.parameters) {
-    if (parameter.physical != "coulomb" && parameter.physical != "offset") {
-      names.push_back(parameter.physical);
-    }
+// Dry friction and an offset are there on request only, or where an effect is that.
+bool is_optional(const Robot& robot, const std::string& physical) {
+  return (physical == "coulomb" || physical == "offset") && !effect_prior(robot, physical);
+}
+
+// The model with the parameters of `more` after its own.
+void append(Model& model, const Model& more) {
+  for (Term term : more.terms) {
+    term.parameter += model.p();
+    model.terms.push_back(term);
   }
-  return names;
+  model.parameters.insert(model.parameters.end(), more.parameters.begin(), more.parameters.end());
+}
+
+}  // namespace
+
+double RobotEffect::value(const std::string& parameter) const {
+  const auto found = parameters.find(parameter);
+  check::that(found != parameters.end(), "effects." + name, "the parameter " + parameter);
+  return 0.5 * (found->second.lower + found->second.upper);
+}
+
+bool operator==(const RobotEffect& a, const RobotEffect& b) {
+  const auto same = [](const auto& x, const auto& y) {
+    return x.first == y.first && x.second.lower == y.second.lower && x.second.upper == y.second.upper;
+  };
+  return a.name == b.name && std::ranges::equal(a.parameters, b.parameters, same);
 }
 
 // Effort at the wheel per unit of torque, where the motor's constants tell: 1/(N k_t) for currents, R/(N k_t) for
@@ -91,8 +114,6 @@ std::optional<double> effort_per_torque(const Robot& robot) {
   return check::positive(*robot.motor->resistance, "motor.resistance") / torque_per_current;
 }
 
-}  // namespace
-
 std::vector<std::string> possible_parameters(const Robot& robot) {
   std::vector<std::string> names;
   for (const Parameter& parameter : full_model(robot).parameters) {
@@ -102,6 +123,7 @@ std::vector<std::string> possible_parameters(const Robot& robot) {
 }
 
 Model make_model(const Robot& robot) {
+  validate_effects(robot);
   const Model full = full_model(robot);
   for (const auto& [name, value] : robot.nominal) {
     require_parameter(full, name, "nominal");
@@ -111,16 +133,27 @@ Model make_model(const Robot& robot) {
     require_parameter(full, name, "prior");
     check::that(bounds.lower <= bounds.upper, "prior." + name, "lower <= upper");
   }
-  Model model = full;
   if (robot.parameters) {
     check::that(!robot.parameters->empty(), "parameters", "at least one name");
     for (const std::string& name : *robot.parameters) {
       require_parameter(full, name, "parameters");
     }
-    model = select(full, *robot.parameters);
-  } else {
-    model = select(full, basic_parameters(full));
   }
+  std::vector<std::string> first, last;
+  for (const Parameter& parameter : full.parameters) {
+    const std::string& name = parameter.physical;
+    const bool wanted = robot.parameters && std::ranges::find(*robot.parameters, name) != robot.parameters->end();
+    if (is_optional(robot, name)) {
+      if (wanted) {
+        last.push_back(name);
+      }
+    } else if (wanted || !robot.parameters || effect_prior(robot, name)) {
+      first.push_back(name);
+    }
+  }
+  Model model = select(full, first);
+  add_effect_terms(model, robot);
+  append(model, select(full, last));
   if (const std::optional<double> scale = effort_per_torque(robot)) {
     for (Parameter& parameter : model.parameters) {
       parameter.per_physical *= *scale;
@@ -135,11 +168,12 @@ PriorBox prior_box(const Robot& robot, const Model& model) {
   PriorBox box;
   for (const Parameter& parameter : model.parameters) {
     const auto found = robot.prior.find(parameter.physical);
-    const bool declared = found != robot.prior.end();
-    Interval physical = declared ? found->second : parameter.prior;
+    const std::optional<Interval> of_effect = effect_prior(robot, parameter.physical);
+    const bool own = found != robot.prior.end(), declared = own || of_effect.has_value();
+    Interval physical = own ? found->second : of_effect.value_or(parameter.prior);
     if (declared) {
-      check::that(physical.lower <= physical.upper, "prior." + found->first, "lower <= upper");
-      check::that(scale_known, "prior." + found->first,
+      check::that(physical.lower <= physical.upper, "prior." + parameter.physical, "lower <= upper");
+      check::that(scale_known, "prior." + parameter.physical,
                   "effort as torque, or the motor's constants, to make effort of " + parameter.physical_unit);
     } else if (!scale_known) {
       physical = {physical.lower * widest_effort_constant, physical.upper * widest_effort_constant};

@@ -62,6 +62,16 @@ struct Motor {
   double gear_ratio = 1.0;                ///< –
 };
 
+/// An effect beyond the basic model that the robot is known to have (effect_law.hpp says which there are).
+struct RobotEffect {
+  std::string name;                            ///< e.g. "stribeck"
+  std::map<std::string, Interval> parameters;  ///< what is known of each; lower = upper for a single value
+
+  /// The value that a simulator takes: the mid-point. Throws InvalidArgument where there is no such parameter.
+  [[nodiscard]] double value(const std::string& parameter) const;
+  friend bool operator==(const RobotEffect& a, const RobotEffect& b);
+};
+
 /// A robot as its file describes it. Names of parameters are those of Model::parameters' `physical` names.
 struct Robot {
   std::string name = "robot";
@@ -86,18 +96,26 @@ struct Robot {
   std::map<std::string, double> limits;    ///< effort, speed, acceleration
   std::optional<double> kinematic_window;  ///< s, of the kinematic residual (odometry_filter.hpp)
   std::optional<Motor> motor;
+  std::vector<RobotEffect> effects;  ///< beyond the basic model, each name once
 };
 
 /// The model of `robot` with the parameters that it requests (those it names in `parameters`, else the model's
-/// basic set). Throws InvalidArgument when the robot's geometry or its requests make no sense.
+/// basic set) and those of its effects; geometry and effort map are those of the effects too (effect_terms.hpp,
+/// effect_geometry.hpp). The order: basic parameters, those of effects, optional ones. Throws InvalidArgument when the
+/// robot's geometry, its requests or its effects make no sense.
 [[nodiscard]] Model make_model(const Robot& robot);
 
 /// Physical names of all parameters that a robot of this kind can have, the basic ones first: dry friction (`coulomb`)
-/// and, for a single axis, a constant `offset` are there on request. Throws InvalidArgument as make_model.
+/// and, for a single axis, a constant `offset` are there on request. What its effects bring comes beside these; dry
+/// friction is none of them where an effect has it for each wheel. Throws InvalidArgument as make_model.
 [[nodiscard]] std::vector<std::string> possible_parameters(const Robot& robot);
 
-/// Prior box of θ_L in the order of `model.parameters`: the robot's own prior where it has one, else the model's wide
-/// physical default.
+/// Effort at the wheel per unit of torque: 1 where efforts are torques, 1/(N k_t) for currents, R/(N k_t) for voltages;
+/// nothing where the motor's constants are not known. Throws InvalidArgument for constants that are not > 0.
+[[nodiscard]] std::optional<double> effort_per_torque(const Robot& robot);
+
+/// Prior box of θ_L in the order of `model.parameters`: the robot's own prior where it has one (for a parameter of an
+/// effect, effect_prior), else the model's wide physical default.
 struct PriorBox {
   std::vector<Interval> bounds;  ///< p intervals, units of θ_L
   std::vector<bool> declared;    ///< whether the bound came from the robot file

@@ -11,7 +11,8 @@
 namespace wheelwright {
 namespace {
 
-constexpr double longest_runge_kutta_step = 2e-3;  // s
+constexpr double longest_runge_kutta_step = 2e-3;    // s
+constexpr double longest_step_of_effects = 0.25e-3;  // s
 // Gauss-Legendre on [0, 1]: nodes ½ ∓ √15/10, ½; weights 5/18, 4/9, 5/18.
 constexpr std::array<double, 3> nodes = {0.1127016653792583, 0.5, 0.8872983346207417};
 constexpr std::array<double, 3> weights = {5.0 / 18.0, 4.0 / 9.0, 5.0 / 18.0};
@@ -30,10 +31,16 @@ double phi3(double z) {
 
 }  // namespace
 
-Plant::Plant(const DifferentialDrive& drive, const DriveParameters& parameters, std::vector<Fault> faults)
-    : drive_(drive), parameters_(parameters), faults_(std::move(faults)) {
+Plant::Plant(const DifferentialDrive& drive, const DriveParameters& parameters, std::vector<Fault> faults,
+             const DriveEffects& effects)
+    : drive_(drive),
+      parameters_(parameters),
+      faults_(std::move(faults)),
+      effects_(effects),
+      half_track_(0.5 * (drive.track_width + effects.track)) {
   validate(parameters_);
   validate(faults_, drive_);
+  threshold_ = dry_threshold(effects_, drive_, parameters_, longest_step_of_effects);
   for (const Fault& fault : faults_) {
     const TimeProfile& p = fault.profile;
     const double rise = p.shape == TimeProfile::Shape::step ? 0.0 : p.rise_time;
@@ -51,6 +58,7 @@ Plant::Plant(const DifferentialDrive& drive, const DriveParameters& parameters, 
 void Plant::reset(const DriveState& state, double t) {
   state_ = state;
   t_ = t;
+  torque_.setZero();
   enter_interval();
 }
 
@@ -71,36 +79,59 @@ void Plant::enter_interval() {
     const double last = interval_ == breaks_.size() ? breaks_.back() + 2.0 : breaks_[interval_];
     middle = 0.5 * (first + last);
   }
-  fault_ = fault_state(faults_, middle);
+  fault_ = fault_at(middle);
   moving_ = !fault_.radius_rate.isZero(0.0) || !fault_.slip_rate.isZero(0.0) || fault_.matched_rate != 0.0 ||
             fault_.unmatched_rate != 0.0;
-  exact_ = !moving_ && fault_.slip.isZero(0.0) && fault_.matched == 0.0 && fault_.unmatched == 0.0 &&
-           parameters_.viscous_x == parameters_.viscous_y;
+  exact_ = !effects_.forces && !moving_ && fault_.slip.isZero(0.0) && fault_.matched == 0.0 &&
+           fault_.unmatched == 0.0 && parameters_.viscous_x == parameters_.viscous_y;
 }
 
-Eigen::Vector2d Plant::wheel_speed() const { return wheel_speed(state_, moving_ ? fault_state(faults_, t_) : fault_); }
+FaultState Plant::fault_at(double t) const {
+  FaultState fault = fault_state(faults_, t);
+  fault.radius += effects_.radius;
+  return fault;
+}
 
-Eigen::Vector2d Plant::wheel_speed(const DriveState& state, const FaultState& fault) const {
+Eigen::Vector2d Plant::wheel_speed() const { return wheel_speed(state_, moving_ ? fault_at(t_) : fault_, torque_); }
+
+Eigen::Vector2d Plant::wheel_speed(const DriveState& state, const FaultState& fault,
+                                   const Eigen::Vector2d& torque) const {
   const double c = std::cos(state.pose[2]), s = std::sin(state.pose[2]);
   const double rolling = state.forward_speed - (c * fault.slip[0] + s * fault.slip[1] + fault.matched);
-  const double turning = 0.5 * drive_.track_width * (state.yaw_rate - fault.slip[2]);
-  return {(rolling + turning) / (drive_.wheel_radius + fault.radius[0]),
-          (rolling - turning) / (drive_.wheel_radius + fault.radius[1])};
+  const double turning = half_track_ * (state.yaw_rate - fault.slip[2]);
+  const double right = drive_.wheel_radius + fault.radius[0], left = drive_.wheel_radius + fault.radius[1];
+  Eigen::Vector2d speed((rolling + turning) / right, (rolling - turning) / left);
+  if (effects_.stiffness > 0.0) {
+    const Eigen::Vector2d slip = slip_share(effects_, {torque[0] / right, torque[1] / left}, speed);
+    speed = speed.cwiseProduct(Eigen::Vector2d::Ones() + slip);
+  }
+  return speed;
 }
 
-Plant::Derivative Plant::derivative(const DriveState& state, const FaultState& fault,
-                                    const Eigen::Vector2d& torque) const {
+Plant::Derivative Plant::derivative(const DriveState& state, const FaultState& fault, const Eigen::Vector2d& torque,
+                                    double t) const {
   const double c = std::cos(state.pose[2]), s = std::sin(state.pose[2]);
   const double across = -s * fault.slip[0] + c * fault.slip[1] - fault.unmatched;
   const double x_rate = state.forward_speed * c - across * s, y_rate = state.forward_speed * s + across * c;
-  const double right = torque[0] / (drive_.wheel_radius + fault.radius[0]);
-  const double left = torque[1] / (drive_.wheel_radius + fault.radius[1]);
+  const Eigen::Vector2d wheels = wheel_speed(state, fault, torque);
+  EffectLoad load;
+  if (effects_.forces) {
+    load = effect_load(effects_, drive_, parameters_, threshold_,
+                       {t, state.forward_speed, state.yaw_rate, state.pose[2], wheels, state.wheel_angle, torque});
+  }
+  const double right = (torque[0] - load.torque[0]) / (drive_.wheel_radius + fault.radius[0]);
+  const double left = (torque[1] - load.torque[1]) / (drive_.wheel_radius + fault.radius[1]);
   const double friction = c * parameters_.viscous_x * x_rate + s * parameters_.viscous_y * y_rate;
-  return {
-      state.yaw_rate * across + (right + left - friction) / parameters_.mass,
-      (0.5 * drive_.track_width * (right - left) - parameters_.viscous_yaw * state.yaw_rate) / parameters_.yaw_inertia,
-      {x_rate, y_rate, state.yaw_rate},
-      wheel_speed(state, fault)};
+  const double force = right + left - friction - load.force;
+  const double moment = half_track_ * (right - left) - parameters_.viscous_yaw * state.yaw_rate - load.moment;
+  double forward = force / parameters_.mass, yaw = moment / parameters_.yaw_inertia;
+  if (effects_.com_lateral != 0.0) {  // [m −mb; −mb I] [u̇; θ̈] = [force; moment]
+    const double m = parameters_.mass, inertia = parameters_.yaw_inertia, coupling = m * effects_.com_lateral;
+    const double determinant = m * inertia - coupling * coupling;
+    forward = (inertia * force + coupling * moment) / determinant;
+    yaw = (coupling * force + m * moment) / determinant;
+  }
+  return {state.yaw_rate * across + forward, yaw, {x_rate, y_rate, state.yaw_rate}, wheels};
 }
 
 void Plant::advance(const Eigen::Vector2d& torque, const Eigen::Vector2d& torque_end, double h) {
@@ -123,6 +154,7 @@ void Plant::advance(const Eigen::Vector2d& torque, const Eigen::Vector2d& torque
       enter_interval();
     }
   }
+  torque_ = torque_end;
 }
 
 Plant::Response Plant::response(double a, double time) {
@@ -147,7 +179,7 @@ void Plant::prepare(double h) {
 void Plant::exact_step(const Eigen::Vector2d& torque, const Eigen::Vector2d& slope, double h) {
   prepare(h);
   const double right = drive_.wheel_radius + fault_.radius[0], left = drive_.wheel_radius + fault_.radius[1];
-  const double half_track = 0.5 * drive_.track_width;
+  const double half_track = half_track_;
   const double f0 = (torque[0] / right + torque[1] / left) / parameters_.mass;
   const double f1 = (slope[0] / right + slope[1] / left) / parameters_.mass;
   const double g0 = half_track * (torque[0] / right - torque[1] / left) / parameters_.yaw_inertia;
@@ -172,7 +204,8 @@ void Plant::exact_step(const Eigen::Vector2d& torque, const Eigen::Vector2d& slo
 }
 
 void Plant::runge_kutta(const Eigen::Vector2d& torque, const Eigen::Vector2d& slope, double h) {
-  const int steps = std::max(1, static_cast<int>(std::ceil(h / longest_runge_kutta_step)));
+  const double longest = effects_.forces ? longest_step_of_effects : longest_runge_kutta_step;
+  const int steps = std::max(1, static_cast<int>(std::ceil(h / longest)));
   const double step = h / steps;
   const auto moved = [](const DriveState& from, const Derivative& d, double by) {
     return DriveState{from.forward_speed + by * d.forward, from.yaw_rate + by * d.yaw, from.pose + by * d.pose,
@@ -180,12 +213,15 @@ void Plant::runge_kutta(const Eigen::Vector2d& torque, const Eigen::Vector2d& sl
   };
   for (int i = 0; i < steps; ++i) {
     const double s = i * step;
-    const auto fault_at = [&](double by) { return moving_ ? fault_state(faults_, t_ + s + by) : fault_; };
-    const FaultState middle = fault_at(0.5 * step);
-    const Derivative k1 = derivative(state_, fault_at(0.0), torque + s * slope);
-    const Derivative k2 = derivative(moved(state_, k1, 0.5 * step), middle, torque + (s + 0.5 * step) * slope);
-    const Derivative k3 = derivative(moved(state_, k2, 0.5 * step), middle, torque + (s + 0.5 * step) * slope);
-    const Derivative k4 = derivative(moved(state_, k3, step), fault_at(step), torque + (s + step) * slope);
+    const auto at = [&](double by) { return moving_ ? fault_at(t_ + s + by) : fault_; };
+    const auto rate = [&](const DriveState& state, const FaultState& fault, double by) {
+      return derivative(state, fault, torque + (s + by) * slope, t_ + s + by);
+    };
+    const FaultState middle = at(0.5 * step);
+    const Derivative k1 = rate(state_, at(0.0), 0.0);
+    const Derivative k2 = rate(moved(state_, k1, 0.5 * step), middle, 0.5 * step);
+    const Derivative k3 = rate(moved(state_, k2, 0.5 * step), middle, 0.5 * step);
+    const Derivative k4 = rate(moved(state_, k3, step), at(step), step);
     state_ = moved(state_,
                    {(k1.forward + 2.0 * k2.forward + 2.0 * k3.forward + k4.forward) / 6.0,
                     (k1.yaw + 2.0 * k2.yaw + 2.0 * k3.yaw + k4.yaw) / 6.0,

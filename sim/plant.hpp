@@ -11,6 +11,7 @@
 
 #include <wheelwright/model/differential_drive.hpp>
 #include <wheelwright/model/faults.hpp>
+#include <wheelwright/sim/drive_effects.hpp>
 
 namespace wheelwright {
 
@@ -29,11 +30,14 @@ struct DriveState {
 ///
 /// Where friction is isotropic, radii are constant and nothing slips the speeds and wheel angles follow in closed form,
 /// and the position by three-point Gauss quadrature of the closed form; elsewhere by classical Runge-Kutta steps of at
-/// most 2 ms that end where a fault begins, ends or changes its course.
+/// most 2 ms that end where a fault begins, ends or changes its course; with effects (drive_effects.hpp) of at most
+/// ¼ ms. Forces of effects come beside those above: the wheel torques less what is lost at the wheels, the forces on the
+/// body, and with the centre of mass b beside the axis m (u̇ − b θ̈) and I θ̈ − m b u̇ on the left.
 class Plant {
  public:
   /// Throws InvalidArgument when parameters or faults do not pass their `validate`.
-  Plant(const DifferentialDrive& drive, const DriveParameters& parameters, std::vector<Fault> faults);
+  Plant(const DifferentialDrive& drive, const DriveParameters& parameters, std::vector<Fault> faults,
+        const DriveEffects& effects = {});
 
   /// Sets the state and the time (s) it holds at.
   void reset(const DriveState& state, double t);
@@ -64,9 +68,11 @@ class Plant {
     Eigen::Vector2d angle;
   };
   [[nodiscard]] static Response response(double a, double time);
-  [[nodiscard]] Eigen::Vector2d wheel_speed(const DriveState& state, const FaultState& fault) const;
-  [[nodiscard]] Derivative derivative(const DriveState& state, const FaultState& fault,
-                                      const Eigen::Vector2d& torque) const;
+  [[nodiscard]] FaultState fault_at(double t) const;
+  [[nodiscard]] Eigen::Vector2d wheel_speed(const DriveState& state, const FaultState& fault,
+                                            const Eigen::Vector2d& torque) const;
+  [[nodiscard]] Derivative derivative(const DriveState& state, const FaultState& fault, const Eigen::Vector2d& torque,
+                                      double t) const;
   void prepare(double h);
   void exact_step(const Eigen::Vector2d& torque, const Eigen::Vector2d& slope, double h);
   void runge_kutta(const Eigen::Vector2d& torque, const Eigen::Vector2d& slope, double h);
@@ -75,6 +81,9 @@ class Plant {
   DifferentialDrive drive_;
   DriveParameters parameters_;
   std::vector<Fault> faults_;
+  DriveEffects effects_;
+  DryThreshold threshold_;
+  double half_track_ = 0.0;     // with the effects' track width
   std::vector<double> breaks_;  // times at which a fault changes its course, ascending
   std::size_t interval_ = 0;    // breaks_[interval_ − 1] <= t_ < breaks_[interval_]
   bool moving_ = false;         // whether a fault changes with time inside the interval
@@ -83,6 +92,7 @@ class Plant {
 
   DriveState state_;
   double t_ = 0.0;
+  Eigen::Vector2d torque_ = Eigen::Vector2d::Zero();  // at t_
 
   double prepared_step_ = -1.0;
   std::array<Response, 4> forward_{}, yaw_{};  // at the three Gauss nodes and at the end of the step

@@ -4,6 +4,8 @@
 #include <string>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/model/effect_law.hpp>
+#include <wheelwright/model/effect_terms.hpp>
 
 namespace wheelwright {
 namespace {
@@ -45,6 +47,9 @@ void validate(const Scenario& scenario) {
               "a number > 0 where the effort is a current");
   validate(scenario.parameters);
   validate(nominal_parameters(scenario));
+  const double b = effect_value(scenario.robot, "com_lateral", "b");
+  check::that(scenario.parameters.mass * b * b < scenario.parameters.yaw_inertia, "effects.com_lateral.b",
+              "a centre of mass with m b² below the yaw inertia about the axle");
   validate(scenario.trajectory);
   validate_gains(scenario.controller);
   validate(scenario.faults, drive_of(scenario.robot));
@@ -106,6 +111,8 @@ Eigen::VectorXd true_parameters(const Scenario& scenario, const Model& model) {
       physical = truth.viscous_y;
     } else if (parameter.physical == "viscous_yaw") {
       physical = yaw_convention * truth.viscous_yaw;
+    } else if (const auto of_effect = effect_truth(scenario.robot, parameter.physical, truth.mass)) {
+      physical = *of_effect;
     } else {
       throw InvalidArgument("model: a differential drive has no parameter '" + parameter.physical + "'");
     }

@@ -70,7 +70,7 @@ void validate(const Scenario& scenario);
 [[nodiscard]] DriveParameters nominal_parameters(const Scenario& scenario);
 
 /// θ_L of the scenario's truth in the order of `model.parameters`, units of θ_L; in the model's own lever-arm
-/// convention (with ℓ = D inertia and friction of yaw come out doubled). Throws InvalidArgument when the model has a
+/// convention (with ℓ = D inertia and friction of yaw come out doubled); those of effects are the mid-points of the robot's. Throws InvalidArgument when the model has a
 /// parameter that a differential drive does not, or has one viscous_linear while the truth is anisotropic.
 [[nodiscard]] Eigen::VectorXd true_parameters(const Scenario& scenario, const Model& model);
 

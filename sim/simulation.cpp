@@ -6,6 +6,8 @@
 #include <utility>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/model/effect_geometry.hpp>
+#include <wheelwright/model/effect_law.hpp>
 
 namespace wheelwright {
 namespace {
@@ -23,7 +25,11 @@ Simulation::Simulation(Scenario scenario, std::size_t block_rows)
     : scenario_(std::move(scenario)),
       block_rows_(block_rows),
       drive_(drive_of(validated(scenario_).robot)),
-      plant_(drive_, scenario_.parameters, scenario_.faults),
+      late_(effect_value(scenario_.robot, "sensor_time_offset", "dt")),
+      encoder_scale_(drive_geometry(scenario_.robot).encoder_scale),
+      plant_(drive_, scenario_.parameters, scenario_.faults, DriveEffects(scenario_.robot)),
+      drivetrain_(scenario_.robot, scenario_.parameters, late_ > 0.0),
+      memory_(late_ + 1.0 / scenario_.rate),
       controller_(drive_, nominal_parameters(scenario_), scenario_.controller, scenario_.torque_limit) {
   check::that(block_rows_ > 0, "block_rows", "at least 1");
   // Rows at 0, 1/rate, … up to the duration; intervals between them.
@@ -72,6 +78,9 @@ void Simulation::rewind() {
   DriveState start;
   start.pose = scenario_.initial_pose + scenario_.initial_pose_error;
   plant_.reset(start, 0.0);
+  drivetrain_.reset();
+  memory_.reset();
+  memory_.record(plant_);
   reference_ = scenario_.initial_pose;
   torque_.setZero();
   k_ = 0;
@@ -98,6 +107,23 @@ double Simulation::quantised(double angle) const {
   return angle_step_ > 0.0 ? angle_step_ * std::nearbyint(angle / angle_step_) : angle;
 }
 
+WheelMemory::Wheels Simulation::sensed() const {
+  WheelMemory::Wheels wheels =
+      late_ > 0.0 ? memory_.at(plant_.time() - late_)
+                  : WheelMemory::Wheels{plant_.time(), plant_.state().wheel_angle, plant_.wheel_speed()};
+  wheels.angle = wheels.angle.cwiseProduct(encoder_scale_);
+  wheels.speed = wheels.speed.cwiseProduct(encoder_scale_);
+  return wheels;
+}
+
+void Simulation::advance(const Eigen::Vector2d& first, const Eigen::Vector2d& last, double h) {
+  if (late_ > 0.0) {
+    drivetrain_.advance(plant_, first, last, h, [this] { memory_.record(plant_); });
+  } else {
+    drivetrain_.advance(plant_, first, last, h);
+  }
+}
+
 Simulation::Row Simulation::drive() {
   const bool held = scenario_.robot.hold == Hold::zero_order;
   const double t = t_, t_next = stamp(k_ + 1);
@@ -113,19 +139,20 @@ Simulation::Row Simulation::drive() {
   row.command = drive_.wheel_speed(command.speed);
   if (scenario_.sensors.sampling == Sampling::instant) {
     row.t = t;
-    row.angle = plant_.state().wheel_angle;
-    row.speed = plant_.wheel_speed();
+    const WheelMemory::Wheels wheels = sensed();
+    row.angle = wheels.angle;
+    row.speed = wheels.speed;
     row.torque = first;
     row.pose = plant_.state().pose;
-    plant_.advance(first, last, h);
+    advance(first, last, h);
   } else {
-    const Eigen::Vector2d before = plant_.state().wheel_angle, middle = 0.5 * (first + last);
-    plant_.advance(first, middle, 0.5 * h);
+    const Eigen::Vector2d before = sensed().angle, middle = 0.5 * (first + last);
+    advance(first, middle, 0.5 * h);
     row.t = t + 0.5 * h;
-    row.angle = plant_.state().wheel_angle;
+    row.angle = sensed().angle;
     row.pose = plant_.state().pose;
-    plant_.advance(middle, last, 0.5 * h);
-    const Eigen::Vector2d after = plant_.state().wheel_angle;
+    advance(middle, last, 0.5 * h);
+    const Eigen::Vector2d after = sensed().angle;
     row.speed = {(quantised(after[0]) - quantised(before[0])) / h, (quantised(after[1]) - quantised(before[1])) / h};
     row.torque = middle;
   }

@@ -12,6 +12,7 @@
 #include <Eigen/Core>
 
 #include <wheelwright/core/log.hpp>
+#include <wheelwright/sim/drivetrain.hpp>
 #include <wheelwright/sim/plant.hpp>
 #include <wheelwright/sim/scenario.hpp>
 
@@ -24,6 +25,9 @@ namespace wheelwright {
 /// With Hold::zero_order a row's effort acts from its stamp to the next one, and with Hold::first_order efforts are
 /// linear between stamps, in the simulated world too: a noise-free log of Sampling::instant satisfies the model exactly. The
 /// feedback uses true angles and pose, so sensors do not change the motion.
+///
+/// Effects of the scenario's robot act in the simulated world (drive_effects.hpp, drivetrain.hpp); the log has the commanded
+/// efforts. With `sensor_time_offset` wheel angles and speeds are those of dt before, and `encoder_scale` multiplies them.
 class Simulation final : public LogSource {
  public:
   /// Throws InvalidArgument when `scenario` does not pass its `validate`, or `block_rows` is 0.
@@ -50,6 +54,9 @@ class Simulation final : public LogSource {
   };
   void make_names();
   void make_sensors();
+  // What the encoders show now.
+  [[nodiscard]] WheelMemory::Wheels sensed() const;
+  void advance(const Eigen::Vector2d& first, const Eigen::Vector2d& last, double h);
   // Drives one period and returns its row.
   Row drive();
   void write(const Row& row, std::size_t at, LogBlock& block);
@@ -61,7 +68,11 @@ class Simulation final : public LogSource {
   std::size_t block_rows_;
   std::vector<std::string> names_;
   DifferentialDrive drive_;
+  double late_;  // s
+  Eigen::Vector2d encoder_scale_;
   Plant plant_;
+  Drivetrain drivetrain_;
+  WheelMemory memory_;
   TrackingController controller_;
   std::uint64_t periods_ = 0;
   double effort_per_torque_ = 1.0;
