@@ -9,6 +9,10 @@
 
 #include <wheelwright/design/detection.hpp>
 #include <wheelwright/design/manoeuvre.hpp>
+#include <wheelwright/design/stages.hpp>
+#include <wheelwright/gap/catalogue.hpp>
+#include <wheelwright/gap/discrimination_design.hpp>
+#include <wheelwright/gap/planned_drive.hpp>
 #include <wheelwright/io/csv.hpp>
 #include <wheelwright/io/model_file.hpp>
 #include <wheelwright/io/number.hpp>
@@ -19,6 +23,7 @@
 #include "common.hpp"
 #include "design_result.hpp"
 #include "progress.hpp"
+#include "rivals.hpp"
 
 namespace wheelwright::app {
 namespace {
@@ -32,6 +37,8 @@ struct Arguments {
   double rate = 100.0;
   WidthCriterion criterion = WidthCriterion::geometric_mean;
   std::vector<std::string> faults;
+  std::filesystem::path gap;
+  std::vector<std::string> between, sizes;
   std::size_t stages = DesignOptions{}.stages;
   CommonOptions common;
 };
@@ -39,7 +46,8 @@ struct Arguments {
 constexpr const char* kHelp =
     "Designs a drive within limits of speed, acceleration, effort, space and time, and writes it as a table of "
     "wheel-speed commands: for the narrowest guaranteed bounds on the parameters (bounds), or as an inspection that is "
-    "certain to find faults that are as small as possible (detection).";
+    "certain to find faults that are as small as possible (detection), or to tell apart causes of a sim-to-real gap "
+    "(discrimination).";
 
 constexpr const char* kExamples =
     "Limits of a wheel may stand in the robot file, limits: {speed: rad/s, acceleration: rad/s², effort: N·m (or A, "
@@ -51,6 +59,9 @@ constexpr const char* kExamples =
     "  wheelwright design --robot robot.yaml --for bounds --duration 30 --box -1 3 -1 1 --out plan\n"
     "  wheelwright design --model result/model.json --for detection --fault wheel_radius=0.03 --speed 8 --acceleration "
     "20\n"
+    "  wheelwright design --robot robot.yaml --for discrimination --gap gap/gap.json --out plan\n"
+    "  wheelwright design --robot robot.yaml --for discrimination --between coulomb --between caster_drag --size "
+    "coulomb=0.2\n"
     "  then drive plan/manoeuvre.csv, or simulate it with trajectory: {kind: table, file: plan/manoeuvre.csv}";
 
 MotionLimits limits_from(const Arguments& a, const Robot& robot) {
@@ -117,6 +128,39 @@ void tell(const Arguments& a, const std::string& summary) {
   }
 }
 
+void check_rivals(const Arguments& a) {
+  if (a.aim != "discrimination") {
+    if (!a.gap.empty() || !a.between.empty() || !a.sizes.empty()) {
+      throw InputError("--gap, --between, --size: expected --for discrimination");
+    }
+  } else if (a.gap.empty() == a.between.empty() || a.between.size() == 1) {
+    throw InputError("--for discrimination: expected --gap gap.json, or --between at least twice");
+  } else if (!a.gap.empty() && !a.sizes.empty()) {
+    throw InputError("--size: expected --between, since gap.json has the sizes");
+  }
+}
+
+// A drive with a bit of everything, on which sizes that nobody gave are found.
+Drive ordinary_drive(const DesignSubject& subject, const MotionLimits& limits) {
+  const StageFamily family(subject, limits, 2);
+  std::vector<double> x(family.dimension(), 0.5);
+  x[0] = 1.0;
+  x[1] = x.size() > 4 ? 1.0 : 0.5;
+  x[family.dimension() / 2] = x.size() > 4 ? 1.0 : 0.0;
+  x[family.dimension() / 2 + 1] = x.size() > 4 ? 0.0 : 0.5;
+  return planned_drive(family.plan(x, subject.step), subject);
+}
+
+DiscriminationDesign discriminate(const Arguments& a, const DesignSubject& subject, const MotionLimits& limits,
+                                  const DesignOptions& options) {
+  const std::vector<Effect> catalogue = effect_catalogue(subject.model);
+  const Drive drive = ordinary_drive(subject, limits);
+  PlannedNoise noise = expected_noise(subject);
+  const std::vector<Rival> rivals = a.gap.empty() ? rivals_named(a.between, a.sizes, catalogue, drive)
+                                                  : rivals_of_gap(a.gap, catalogue, drive, noise);
+  return design_for_discrimination(subject, limits, rivals, catalogue, noise, options);
+}
+
 int run(const Arguments& a) {
   const bool detection = a.aim == "detection";
   if (a.model.empty() == a.robot.empty()) {
@@ -128,6 +172,7 @@ int run(const Arguments& a) {
   if (!detection && !a.faults.empty()) {
     throw InputError("--fault: expected --for detection");
   }
+  check_rivals(a);
   make_directory(a.common);
   const std::optional<CommissionedModel> model = a.model.empty() ? std::nullopt : std::optional(read_model(a.model));
   const DesignSubject subject = model ? subject_of(*model) : subject_of(read_robot(a.robot), 1.0 / a.rate);
@@ -156,6 +201,12 @@ int run(const Arguments& a) {
     options.steps = 250;
     const DetectionDesign design = design_for_detection(*model, subject, limits, inspected(a, *model), options);
     finish(to_json(design, limits), design, summary(design));
+  } else if (a.aim == "discrimination") {
+    options.samples = 150;
+    options.descents = 3;
+    options.steps = 250;
+    const DiscriminationDesign design = discriminate(a, subject, limits, options);
+    finish(to_json(design, limits), design, summary(design));
   } else {
     const BoundsDesign design = design_for_bounds(subject, limits, a.criterion, options);
     finish(to_json(design, subject, limits), design, summary(design, subject));
@@ -168,9 +219,9 @@ int run(const Arguments& a) {
 Run add_design(CLI::App& program) {
   auto a = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("design", kHelp);
-  command.add_option("--for", a->aim, "What the drive is for: bounds or detection")
+  command.add_option("--for", a->aim, "What the drive is for: bounds, detection or discrimination")
       ->required()
-      ->check(CLI::IsMember({"bounds", "detection"}));
+      ->check(CLI::IsMember({"bounds", "detection", "discrimination"}));
   command.add_option("--model", a->model, "model.json of a commissioning: parameters, noise and filter")
       ->type_name("FILE");
   command
@@ -214,6 +265,20 @@ Run add_design(CLI::App& program) {
                   "With --for detection: a fault of the catalogue and the size asked for (may be repeated); without it "
                   "wheel radii, efforts lost, encoders' scale")
       ->type_name("NAME[=SIZE]")
+      ->allow_extra_args(false);
+  command.add_option("--gap", a->gap, "With --for discrimination: gap.json, whose credible set is to be told apart")
+      ->type_name("FILE");
+  command
+      .add_option(
+          "--between", a->between,
+          "With --for discrimination: a cause, or several joined by +, to be told from the others (twice or more)")
+      ->type_name("EFFECT")
+      ->allow_extra_args(false);
+  command
+      .add_option(
+          "--size", a->sizes,
+          "Size of a cause named with --between; without it a twentieth of the drive's efforts (may be repeated)")
+      ->type_name("EFFECT[.PARAMETER]=VALUE")
       ->allow_extra_args(false);
   command.add_option("--stages", a->stages, "Stages of constant speed in each half of the drive")
       ->type_name("N")

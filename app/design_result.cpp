@@ -146,4 +146,66 @@ std::string summary(const DetectionDesign& design) {
   return out;
 }
 
+Json to_json(const DiscriminationDesign& design, const MotionLimits& limits) {
+  Json out = frame(design.manoeuvre, design.figure_eight, limits);
+  out["for"] = "discrimination";
+  out["rivals"] = Json::array();
+  for (const Rival& rival : design.rivals) {
+    Json causes = Json::array();
+    for (const RivalCause& cause : rival.causes) {
+      causes.push_back({{"effect", cause.effect}, {"coefficients", cause.coefficients}, {"shape", cause.shape}});
+    }
+    out["rivals"].push_back({{"name", rival.name()}, {"causes", std::move(causes)}});
+  }
+  const auto promise = [](const std::vector<RivalSeparation>& of, std::size_t k) {
+    return of.empty() ? Json(nullptr)
+                      : Json{{"delta", of[k].delta},
+                             {"deviations", of[k].deviations()},
+                             {"probability", of[k].probability()},
+                             {"residual_ratio", of[k].ratio()}};
+  };
+  out["pairs"] = Json::array();
+  for (std::size_t k = 0; k < design.promised.size(); ++k) {
+    const RivalSeparation& pair = design.promised[k];
+    out["pairs"].push_back({{"true", design.rivals[pair.truth].name()},
+                            {"other", design.rivals[pair.other].name()},
+                            {"decidable", static_cast<bool>(design.decidable[k])},
+                            {"promised", promise(design.promised, k)},
+                            {"figure_eight", promise(design.promised_eight, k)},
+                            {"analysed", promise(design.analysed, k)}});
+  }
+  out["inseparable"] = Json::array();
+  for (const InseparablePair& pair : design.inseparable) {
+    out["inseparable"].push_back({{"rivals", {design.rivals[pair.first].name(), design.rivals[pair.second].name()}},
+                                  {"by_any_motion", pair.by_any_motion},
+                                  {"special_case", pair.special_case},
+                                  {"measurement", pair.measurement}});
+  }
+  out["stages"] = design.stages;
+  out["sentences"] = design.sentences;
+  return out;
+}
+
+std::string summary(const DiscriminationDesign& design) {
+  const Plan& plan = design.manoeuvre.plan;
+  std::string out = fmt::format("{:.1f} s, within {:.2f} m of the start; {} manoeuvres were looked at\n",
+                                plan.t(plan.samples() - 1), largest_distance(plan), design.manoeuvre.evaluations);
+  for (const std::string& stage : design.stages) {
+    out += "  " + stage + "\n";
+  }
+  out += fmt::format("  {:<52} {:>12}{}\n", "standard deviations from going wrong", "promised",
+                     design.figure_eight ? fmt::format(" {:>14}", "figure eight") : "");
+  for (std::size_t k = 0; k < design.promised.size(); ++k) {
+    const RivalSeparation& pair = design.promised[k];
+    out +=
+        fmt::format("  {:<52} {:>12.2f}",
+                    design.rivals[pair.truth].name() + ", not " + design.rivals[pair.other].name(), pair.deviations());
+    out += design.figure_eight ? fmt::format(" {:>14.2f}\n", design.promised_eight[k].deviations()) : "\n";
+  }
+  for (const std::string& sentence : design.sentences) {
+    out += sentence + "\n";
+  }
+  return out;
+}
+
 }  // namespace wheelwright::app

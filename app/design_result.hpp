@@ -7,6 +7,7 @@
 
 #include <wheelwright/design/detection.hpp>
 #include <wheelwright/design/manoeuvre.hpp>
+#include <wheelwright/gap/discrimination_design.hpp>
 #include <wheelwright/io/json_file.hpp>
 
 namespace wheelwright::app {
@@ -23,5 +24,11 @@ namespace wheelwright::app {
 
 /// The result for a terminal.
 [[nodiscard]] std::string summary(const DetectionDesign& design);
+
+/// The same for telling causes apart: how well each rival, being true, is told from each other one.
+[[nodiscard]] Json to_json(const DiscriminationDesign& design, const MotionLimits& limits);
+
+/// The result for a terminal.
+[[nodiscard]] std::string summary(const DiscriminationDesign& design);
 
 }  // namespace wheelwright::app

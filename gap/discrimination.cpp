@@ -406,25 +406,25 @@ PlannedNoise expected_noise(const DesignSubject& subject) {
   return noise;
 }
 
-double Separation::deviations() const {
+double RivalSeparation::deviations() const {
   const double cosine = std::sqrt(std::max(0.0, 1.0 - share));
   return std::sqrt(delta / (2.0 * (1.0 + cosine)));
 }
 
-double Separation::probability() const { return 0.5 * std::erfc(-deviations() / std::numbers::sqrt2); }
+double RivalSeparation::probability() const { return 0.5 * std::erfc(-deviations() / std::numbers::sqrt2); }
 
-double Separation::ratio() const { return rows > 0.0 ? std::sqrt(1.0 + excess / rows) : 1.0; }
+double RivalSeparation::ratio() const { return rows > 0.0 ? std::sqrt(1.0 + excess / rows) : 1.0; }
 
-std::vector<Separation> discrimination(const Drive& drive, const std::vector<Rival>& rivals,
-                                       const std::vector<Effect>& catalogue, const PlannedNoise& noise,
-                                       DriveKind kind) {
+std::vector<RivalSeparation> discrimination(const Drive& drive, const std::vector<Rival>& rivals,
+                                            const std::vector<Effect>& catalogue, const PlannedNoise& noise,
+                                            DriveKind kind) {
   check::that(rivals.size() >= 2, "rivals", "at least two");
   check::positive(noise.beta, "noise.beta");
   check::that(noise.output.size() == drive.model.n(), "noise.output", "one for each output of the model");
   for (const double floor : noise.output) {
     check::positive(floor, "noise.output");
   }
-  std::vector<Separation> separations;
+  std::vector<RivalSeparation> separations;
   for (const Rival& rival : rivals) {
     validate(rival, catalogue, drive);
   }
@@ -446,7 +446,7 @@ std::vector<Separation> discrimination(const Drive& drive, const std::vector<Riv
         continue;
       }
       const Imitator imitator(truth, rows, rivals[b], catalogue, response);
-      Separation separation{.truth = a, .other = b, .rows = rows.count()};
+      RivalSeparation separation{.truth = a, .other = b, .rows = rows.count()};
       separation.excess = imitator.left().squaredNorm();
       // Rounding is no difference: of the part that θ does not take, and of the whole.
       const bool none = separation.excess <= 1e-20 * raw.squaredNorm();

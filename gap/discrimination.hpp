@@ -73,7 +73,7 @@ struct PlannedNoise {
 [[nodiscard]] PlannedNoise expected_noise(const DesignSubject& subject);
 
 /// How well rival `truth` can be told from rival `other` when it is true.
-struct Separation {
+struct RivalSeparation {
   std::size_t truth = 0;  ///< index of A
   std::size_t other = 0;  ///< index of B
   double excess = 0.0;    ///< S: what B leaves above the noise, sum of squares in units of the noise
@@ -101,8 +101,9 @@ enum class DriveKind {
 /// Every ordered pair of `rivals` on `drive`, A after A. Shapes of B are searched on their grid, then between its points
 /// (golden section), each beside the others. Rows where a joint rests are left out. Throws InvalidArgument for fewer than
 /// two rivals, one that does not pass validate(), or noise that is not > 0.
-[[nodiscard]] std::vector<Separation> discrimination(const Drive& drive, const std::vector<Rival>& rivals,
-                                                     const std::vector<Effect>& catalogue, const PlannedNoise& noise,
-                                                     DriveKind kind = DriveKind::planned);
+[[nodiscard]] std::vector<RivalSeparation> discrimination(const Drive& drive, const std::vector<Rival>& rivals,
+                                                          const std::vector<Effect>& catalogue,
+                                                          const PlannedNoise& noise,
+                                                          DriveKind kind = DriveKind::planned);
 
 }  // namespace wheelwright

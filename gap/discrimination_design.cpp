@@ -32,7 +32,7 @@ std::vector<bool> find_decidable(const DesignSubject& subject, const MotionLimit
   for (int k = 0; k < kProbes; ++k) {
     std::vector<double> x(family.dimension());
     std::ranges::generate(x, [&] { return static_cast<double>(generator() >> 11) * 0x1p-53; });
-    const std::vector<Separation> pairs =
+    const std::vector<RivalSeparation> pairs =
         discrimination(planned_drive(family.plan(x, subject.step), subject), rivals, catalogue, noise);
     for (std::size_t i = 0; i < pairs.size(); ++i) {
       decidable[i] = decidable[i] || (pairs[i].share > kContained && pairs[i].kept > kAbsorbed);
@@ -41,7 +41,7 @@ std::vector<bool> find_decidable(const DesignSubject& subject, const MotionLimit
   return decidable;
 }
 
-double least(const std::vector<Separation>& pairs, const std::vector<bool>& decidable) {
+double least(const std::vector<RivalSeparation>& pairs, const std::vector<bool>& decidable) {
   double value = INFINITY;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     if (decidable.empty() || decidable[i]) {
@@ -61,23 +61,34 @@ std::string stage_of(double v, double w, double time) {
   return fmt::format("{:.1f} s {}", time, drives || turns ? what : "at rest");
 }
 
+std::size_t coefficients(const Rival& rival) {
+  std::size_t count = 0;
+  for (const RivalCause& cause : rival.causes) {
+    count += cause.coefficients.size() + cause.shape.size();
+  }
+  return count;
+}
+
 std::vector<InseparablePair> find_inseparable(const DiscriminationDesign& design,
                                               const std::vector<Effect>& catalogue) {
   std::vector<InseparablePair> found;
   const std::size_t n = design.rivals.size();
   for (std::size_t a = 0; a < n; ++a) {
     for (std::size_t b = a + 1; b < n; ++b) {
-      bool decidable = false;
+      bool decidable = false, absorbed = false;
       double worst = INFINITY;
       for (std::size_t i = 0; i < design.promised.size(); ++i) {
-        const Separation& pair = design.promised[i];
+        const RivalSeparation& pair = design.promised[i];
         if (std::minmax(pair.truth, pair.other) == std::minmax(a, b) && design.decidable[i]) {
           decidable = true;
           worst = std::min(worst, pair.deviations());
         }
+        absorbed = absorbed || ((pair.truth == a || pair.truth == b) && pair.kept <= kAbsorbed);
       }
       if (!decidable || worst < kNotTold) {
-        found.push_back({a, b, !decidable, splitting_measurement(design.rivals[a], design.rivals[b], catalogue)});
+        const Rival &first = design.rivals[a], &second = design.rivals[b];
+        const bool special = !decidable && !absorbed && coefficients(first) != coefficients(second);
+        found.push_back({a, b, !decidable, special, splitting_measurement(first, second, catalogue)});
       }
     }
   }
@@ -86,11 +97,11 @@ std::vector<InseparablePair> find_inseparable(const DiscriminationDesign& design
 
 std::vector<std::string> words(const DiscriminationDesign& design) {
   std::vector<std::string> sentences;
-  const auto pair_words = [&](const Separation& pair) {
+  const auto pair_words = [&](const RivalSeparation& pair) {
     return fmt::format("{} from {}", design.rivals[pair.truth].name(), design.rivals[pair.other].name());
   };
   if (const auto worst = design.worst()) {
-    const Separation& pair = design.promised[*worst];
+    const RivalSeparation& pair = design.promised[*worst];
     sentences.push_back(fmt::format(
         "It tells {} by {:.1f} standard deviations: if the first is true, the held-out comparison finds it with a "
         "probability of {}, and the residual that the second leaves is {:.3g} times as large.",
@@ -116,11 +127,19 @@ std::vector<std::string> words(const DiscriminationDesign& design) {
     }
   }
   for (const InseparablePair& pair : design.inseparable) {
-    sentences.push_back(fmt::format(
-        "{} and {} {}; what would split them: {}.", design.rivals[pair.first].name(), design.rivals[pair.second].name(),
-        pair.by_any_motion ? "cannot be told apart by a log of this kind, however the robot is driven"
-                           : "are not told apart by one drive within these limits",
-        pair.measurement));
+    const Rival &first = design.rivals[pair.first], &second = design.rivals[pair.second];
+    if (pair.special_case) {
+      const bool less = coefficients(first) < coefficients(second);
+      sentences.push_back(
+          fmt::format("At these sizes {} is {} with more parameters than are needed: the simpler one will do.",
+                      (less ? second : first).name(), (less ? first : second).name()));
+      continue;
+    }
+    sentences.push_back(fmt::format("{} and {} {}; what would split them: {}.", first.name(), second.name(),
+                                    pair.by_any_motion
+                                        ? "cannot be told apart by a log of this kind, however the robot is driven"
+                                        : "are not told apart by one drive within these limits",
+                                    pair.measurement));
   }
   return sentences;
 }

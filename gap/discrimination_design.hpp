@@ -19,10 +19,12 @@ struct InseparablePair {
   std::size_t second = 0;
   bool by_any_motion = false;  ///< by every motion that was looked at; else the designed one leaves them within 1.64
                                ///< standard deviations of each other
-  std::string measurement;     ///< what would split them
+  bool special_case =
+      false;  ///< the one is the other with some coefficients that are not needed: the simpler one will do
+  std::string measurement;  ///< what would split them
 };
 
-/// The objective: minus the least number of deviations (Separation::deviations) over the ordered pairs that `decidable`
+/// The objective: minus the least number of deviations (RivalSeparation::deviations) over the ordered pairs that `decidable`
 /// lists (as discrimination() does; empty: all). Keeps a reference to `subject`.
 [[nodiscard]] PlanObjective tell_apart(const DesignSubject& subject, const std::vector<Rival>& rivals,
                                        const std::vector<Effect>& catalogue, const PlannedNoise& noise,
@@ -32,13 +34,13 @@ struct InseparablePair {
 struct DiscriminationDesign {
   Manoeuvre manoeuvre;
   std::vector<Rival> rivals;
-  std::vector<Separation> promised;          ///< every ordered pair
+  std::vector<RivalSeparation> promised;     ///< every ordered pair
   std::vector<bool> decidable;               ///< of each: whether some motion shows A as what B cannot be
   std::vector<InseparablePair> inseparable;  ///< unordered
-  std::vector<Separation> analysed;          ///< of the drive that was analysed; empty where there is none
+  std::vector<RivalSeparation> analysed;     ///< of the drive that was analysed; empty where there is none
   std::optional<FigureEight> figure_eight;   ///< the best one within the same limits (differential drive)
   std::optional<Plan> figure_eight_plan;
-  std::vector<Separation> promised_eight;
+  std::vector<RivalSeparation> promised_eight;
 
   /// The decidable pair that is told apart worst, or nothing where none is decidable.
   [[nodiscard]] std::optional<std::size_t> worst() const;

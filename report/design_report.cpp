@@ -175,6 +175,38 @@ std::string faults_table(const DetectionDesign& design, const DesignSubject& sub
              "its wheels follow the commands.</span>");
 }
 
+std::string separations_table(const DiscriminationDesign& design) {
+  std::vector<Cell> header = {"True cause", "told from", numeric("standard deviations"), numeric("found with"),
+                              numeric("residual ratio")};
+  if (!design.analysed.empty()) {
+    header.push_back(numeric("analysed log"));
+  }
+  if (design.figure_eight) {
+    header.push_back(numeric("figure eight"));
+  }
+  std::vector<std::vector<Cell>> rows;
+  for (std::size_t k = 0; k < design.promised.size(); ++k) {
+    const RivalSeparation& pair = design.promised[k];
+    const double chance = pair.probability();
+    std::vector<Cell> row = {escape(words(design.rivals[pair.truth].name())),
+                             escape(words(design.rivals[pair.other].name())), numeric(number(pair.deviations())),
+                             numeric(chance > 0.999 ? "> 99.9 %" : percent(chance)), numeric(number(pair.ratio()))};
+    if (!design.analysed.empty()) {
+      row.push_back(numeric(number(design.analysed[k].deviations())));
+    }
+    if (design.figure_eight) {
+      row.push_back(numeric(number(design.promised_eight[k].deviations())));
+    }
+    rows.push_back(std::move(row));
+  }
+  return table(header, rows) +
+         paragraph(
+             "<span class=\"note\">If the cause on the left is true with its estimated size, the comparison of "
+             "residuals is so many standard deviations from preferring the other one, whose parameters, and those of "
+             "the "
+             "base model, are fitted as well as they can be.</span>");
+}
+
 // Path, commands, limits and data: what every design shows.
 void add_plan(PageContent& content, const Manoeuvre& manoeuvre, const DesignSubject& subject,
               const MotionLimits& limits, const ReportContext& context) {
@@ -208,6 +240,28 @@ std::string design_report(const DetectionDesign& design, const DesignSubject& su
           count(design.manoeuvre.evaluations))};
   content.software = context.software;
   content.sections.push_back({"faults", "What is certainly found", faults_table(design, subject)});
+  add_plan(content, design.manoeuvre, subject, limits, context);
+  return page(content);
+}
+
+std::string design_report(const DiscriminationDesign& design, const DesignSubject& subject, const MotionLimits& limits,
+                          const ReportContext& context) {
+  PageContent content;
+  content.title = context.title.empty() ? "Manoeuvre to tell causes apart for " + subject.robot.name : context.title;
+  const bool told = design.inseparable.empty();
+  content.status = told ? "good" : "warning";
+  content.verdict =
+      fmt::format("A manoeuvre of {} that tells {} causes apart{}.", with_unit(number(limits.duration), "s"),
+                  count(design.rivals.size()), told ? "" : ", as far as a log of this kind can");
+  std::string stages = "Stages: ";
+  for (std::size_t k = 0; k < design.stages.size(); ++k) {
+    stages += (k > 0 ? "; " : "") + design.stages[k];
+  }
+  content.sentences = {"Drive the table of commands once, from standstill, and let `wheelwright gap` look at the log.",
+                       stages + "."};
+  content.sentences.insert(content.sentences.end(), design.sentences.begin(), design.sentences.end());
+  content.software = context.software;
+  content.sections.push_back({"pairs", "How well causes are told apart", separations_table(design)});
   add_plan(content, design.manoeuvre, subject, limits, context);
   return page(content);
 }

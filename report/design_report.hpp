@@ -7,6 +7,7 @@
 
 #include <wheelwright/design/detection.hpp>
 #include <wheelwright/design/manoeuvre.hpp>
+#include <wheelwright/gap/discrimination_design.hpp>
 #include <wheelwright/report/context.hpp>
 
 namespace wheelwright {
@@ -18,6 +19,10 @@ namespace wheelwright {
 
 /// The same for an inspection: from which size on each fault is certainly found, beside what a figure eight would find.
 [[nodiscard]] std::string design_report(const DetectionDesign& design, const DesignSubject& subject,
+                                        const MotionLimits& limits, const ReportContext& context);
+
+/// The same for telling causes apart: how well each rival is told from each other one, beside a figure eight.
+[[nodiscard]] std::string design_report(const DiscriminationDesign& design, const DesignSubject& subject,
                                         const MotionLimits& limits, const ReportContext& context);
 
 }  // namespace wheelwright

@@ -122,7 +122,7 @@ TEST(Discrimination, NothingTellsARivalFromItself) {
   const std::vector<Effect> catalogue = effect_catalogue();
   for (const char* name : {"coulomb", "delay", "torque_deadzone", "wheel_radius_asymmetric"}) {
     const Rival same = typical_rival({name}, catalogue, drive);
-    for (const Separation& pair : discrimination(drive, {same, same}, catalogue, expected_noise(s))) {
+    for (const RivalSeparation& pair : discrimination(drive, {same, same}, catalogue, expected_noise(s))) {
       EXPECT_LT(pair.share, 1e-12) << name;
       EXPECT_LT(pair.deviations(), 1e-6) << name;
     }
@@ -158,7 +158,7 @@ TEST(Discrimination, DecidesAtThePromisedRate) {
   ASSERT_GT(deviations, 0.0);
   const double size = 0.1 / deviations;  // so that it is one deviation
   rivals[0].causes[0].coefficients[0] = size;
-  const Separation promise = discrimination(drive, rivals, catalogue, noise)[0];
+  const RivalSeparation promise = discrimination(drive, rivals, catalogue, noise)[0];
   EXPECT_NEAR(promise.deviations(), 1.0, 1e-6);
   RecordProperty("d", 1);
 
@@ -236,6 +236,29 @@ TEST(DiscriminationDesign, WhatNoMotionSeparatesIsNamed) {
   EXPECT_TRUE(design.inseparable[0].by_any_motion);
   EXPECT_NE(design.inseparable[0].measurement.find("scales"), std::string::npos);
   EXPECT_FALSE(design.worst());
+}
+
+TEST(DiscriminationDesign, ASpecialCaseIsNoRival) {
+  const DesignSubject s = subject();
+  const DiscriminationDesign design =
+      design_for_discrimination(s, limits(), {rival("coulomb", {0.1}), rival("coulomb_asymmetric", {0.1, 0.1})},
+                                effect_catalogue(), torque_only(s), quick());
+  ASSERT_EQ(design.inseparable.size(), 1U);
+  EXPECT_TRUE(design.inseparable[0].special_case);
+}
+
+TEST(DiscriminationDesign, GainsOnTheDriveThatWasAnalysed) {
+  const DesignSubject s = subject();
+  const std::vector<Rival> rivals{rival("actuator_lag", {}, {0.03}), rival("delay", {}, {0.03})};
+  // A gentle drive of the same length.
+  Drive gentle = planned_drive(
+      plan_of_speeds(s, 8.0, [](double t) { return Eigen::Vector2d(0.3 * std::sin(t), 0.4 * std::sin(1.7 * t)); }), s);
+  const DiscriminationDesign design =
+      design_for_discrimination(s, limits(), rivals, effect_catalogue(), torque_only(s), quick(), &gentle);
+  ASSERT_EQ(design.analysed.size(), design.promised.size());
+  for (std::size_t k = 0; k < design.analysed.size(); ++k) {
+    EXPECT_GT(design.promised[k].deviations(), design.analysed[k].deviations());
+  }
 }
 
 TEST(SlowDiscriminationDesign, BeatsTheFigureEightAndRandomManoeuvres) {
