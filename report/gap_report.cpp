@@ -207,16 +207,16 @@ std::string shrink_section(const Diagnosis& d) {
 }
 
 std::string where_section(const Diagnosis& d) {
-  std::string out, channels;
-  std::vector<GapShare> all;
+  std::string out;
+  std::vector<GapShare> channels;
   for (const GapShare& s : d.where) {
     if (s.kind == "channel") {
-      all.push_back(s);
-      all.back().regime = (s.space == GapSpace::dynamic ? "torque, " : "pose, ") + words(s.channel);
+      channels.push_back(s);
+      channels.back().regime = (s.space == GapSpace::dynamic ? "torque, " : "pose, ") + words(s.channel);
     }
   }
-  if (all.size() > 1) {
-    out += "<div><h3>By channel</h3>" + share_bars(all) + "</div>";
+  if (channels.size() > 1) {
+    out += "<h3>By channel</h3>" + share_bars(channels);
   }
   for (const ResidualSeries& s : d.series) {
     std::vector<GapShare> regimes, bands;
@@ -227,28 +227,24 @@ std::string where_section(const Diagnosis& d) {
     }
     // Findings first: what is large only because it is always there tells nothing.
     std::stable_partition(regimes.begin(), regimes.end(), [](const GapShare& share) { return is_finding(share); });
-    std::sort(bands.begin(), bands.end(), [](const GapShare& a, const GapShare& b) { return a.share > b.share; });
-    if (!regimes.empty()) {
-      out += fmt::format("<div><h3>{}, by regime</h3>{}</div>", escape(channel_title(s)), share_bars(regimes, 14));
-    }
-    const std::string drawing = spectrum_drawing(s, d.beta);
-    if (!bands.empty() || !drawing.empty()) {
-      out +=
-          fmt::format("<div><h3>{}, by frequency</h3>{}{}</div>", escape(channel_title(s)), share_bars(bands), drawing);
+    const std::string by_regime = share_bars(regimes, 14), by_band = share_bars(bands) + spectrum_drawing(s, d.beta);
+    if (!by_regime.empty() || !by_band.empty()) {
+      out += fmt::format("<h3>{}</h3><div class=\"pairs\"><div>{}</div><div>{}</div></div>", escape(channel_title(s)),
+                         by_regime, by_band);
     }
   }
   return out.empty()
              ? out
-             : paragraph(
-                   "Shares of the structural part: what is left above the noise floor after θ is fitted "
-                   "again.") +
-                   "<div class=\"pairs\">" + out + "</div>" +
+             : paragraph("Shares of the structural part: what is left above the noise floor after θ is fitted again.") +
+                   out +
                    note(
                        "Bar: share of the structural part; upright tick: share of the time (of the noise, for "
-                       "frequencies), where the bar would end if nothing were special; full bars: concentrated "
-                       "there by more than chance (p < 0.05, corrected for all that was looked at and valid for "
-                       "residuals that remember). A filter delays what passes it by about 2/β: regimes are those "
-                       "of that much earlier.");
+                       "frequencies), "
+                       "where the bar would end if nothing were special; full bars: concentrated there by more than "
+                       "chance "
+                       "(p < 0.05, corrected for all that was looked at and valid for residuals that remember). A "
+                       "filter "
+                       "delays what passes it by about 2/β: regimes are those of that much earlier.");
 }
 
 std::string place_section(const Diagnosis& d, const ReportContext& context) {
