@@ -19,7 +19,9 @@
 /// estimated along: with a and b the unit vectors along y_A and its imitation, of cosine ρ, A leaves less than B just where
 /// (a + b)ᵀy and (a − b)ᵀy have one sign, and the second one is √(Δ/(2(1 + ρ))) standard deviations from zero, where R acts
 /// alike on a − b and d. Increments of the pose over windows are taken as independent of each other. The noise of encoders in the inertia's columns has less power at low frequencies than f₂
-/// of white noise, so that the number errs on the safe side.
+/// of white noise, so that the number errs on the safe side. The promise is for residuals of one fit to the whole log: held out by
+/// blocks, a difference of one deviation is found less often (70 to 74 % in place of 84 %, measured for four to eight
+/// blocks of 16 s), since each fit sees less.
 #pragma once
 
 #include <cstddef>

@@ -103,7 +103,7 @@ std::vector<std::string> words(const DiscriminationDesign& design) {
   if (const auto worst = design.worst()) {
     const RivalSeparation& pair = design.promised[*worst];
     sentences.push_back(fmt::format(
-        "It tells {} by {:.1f} standard deviations: if the first is true, the held-out comparison finds it with a "
+        "It tells {} by {:.1f} standard deviations: if the first is true, the comparison of residuals finds it with a "
         "probability of {}, and the residual that the second leaves is {:.3g} times as large.",
         pair_words(pair), pair.deviations(),
         pair.probability() > 0.999 ? "more than 99.9 %" : fmt::format("{:.3g} %", 100.0 * pair.probability()),

@@ -249,7 +249,7 @@ std::string design_report(const DiscriminationDesign& design, const DesignSubjec
   PageContent content;
   content.title = context.title.empty() ? "Manoeuvre to tell causes apart for " + subject.robot.name : context.title;
   const bool told = design.inseparable.empty();
-  content.status = told ? "good" : "warning";
+  content.status = "good";
   content.verdict =
       fmt::format("A manoeuvre of {} that tells {} causes apart{}.", with_unit(number(limits.duration), "s"),
                   count(design.rivals.size()), told ? "" : ", as far as a log of this kind can");
