@@ -210,8 +210,9 @@ void add_bands(std::vector<GapShare>& out, const ResidualSeries& series, const B
     for (std::size_t kind = 0; kind < noise.mean.size(); ++kind) {
       const double mean = floor * noise.mean[kind][b], error = 2.0 * options.floor_error * mean;
       room[b] = std::max(room[b], mean);
-      // The mean itself is known from as many noises only.
-      const double variance = floor * floor * noise.variance[kind][b] * (1.0 + 1.0 / kNoises) + error * error;
+      // Mean and variance are known from as many noises only: at these levels Student's t with 23 degrees of freedom is
+      // wider than the normal distribution by a root of 1.25.
+      const double variance = floor * floor * 1.25 * noise.variance[kind][b] * (1.0 + 1.0 / kNoises) + error * error;
       worst = std::max(worst, floor > 0.0 ? band_p_value(measured[b], mean, variance) : 0.0);
     }
     excess[b] = std::max(0.0, measured[b] - room[b]);
