@@ -29,7 +29,7 @@ MAY_INCLUDE = {
     "detector": {"core", "model", "filter", "bounds"},
     "commission": before("commission"),
     "design": before("design"),
-    "gap": before("gap"),
+    "gap": before("gap") | {"sim"},
     "sensitivity": before("sensitivity"),
     "sim": {"core", "model"},
     "io": set(WALK) | {"sim"},  # its scenario is a struct that comes from a file (docs/decisions.md, 14)
