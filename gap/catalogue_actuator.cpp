@@ -74,7 +74,7 @@ Effect actuator_lag() {
   return {.name = "actuator_lag",
           .sentence = "The actuator follows its command with a first-order lag.",
           .family = "late_torque",
-          .shapes = {duration("time_constant_s")},
+          .shapes = {duration("T")},
           .unit_coefficient = true,
           .excite = "change the torque fast: steps and high frequencies",
           .columns = [](const Drive& drive, Shape shape) {
@@ -89,7 +89,7 @@ Effect delay() {
   return {.name = "delay",
           .sentence = "The torque arrives later than it was commanded.",
           .family = "late_torque",
-          .shapes = {duration("delay_s")},
+          .shapes = {duration("T_d")},
           .unit_coefficient = true,
           .excite = "change the torque fast: steps and high frequencies",
           .columns = [](const Drive& drive, Shape shape) {
@@ -101,7 +101,7 @@ Effect delay() {
 }
 
 Effect sensor_time_offset() {
-  ShapeParameter late = duration("late_s");
+  ShapeParameter late = duration("dt");
   late.both_signs = true;
   return {.name = "sensor_time_offset",
           .sentence = "The speeds' time stamps are late (or early) against torque and pose.",
@@ -142,26 +142,31 @@ Effect torque_gain_asymmetric() {
   return {.name = "torque_gain_asymmetric",
           .sentence = "One actuator gives more or less torque than it is told.",
           .parameters = {{"command_excess", "1", 0}},
-          .shapes = {side()},
+          .shapes = {side_or_opposite()},
           .excite = "accelerate and brake on a straight line, with the pose logged",
           .applies = needs_two_wheels,
           .columns =
               [](const Drive& drive, Shape shape) {
-                const std::size_t j = shape[0] < 0.5 ? 0 : 1;
-                return std::vector{at_joints(drive, only(drive, j, drive.joints[j].predicted_effort))};
+                return std::vector{at_joints(
+                    drive, on_side(shape[0], drive.joints[0].predicted_effort, drive.joints[1].predicted_effort))};
               },
-          .physical = gain_of_excess};
+          .physical =
+              [](std::span<const double> c, Shape shape) {
+                return std::vector<PhysicalValue>{
+                    {"g", "1", (shape[0] > 1.5 ? -1.0 : shape[0] < 0.5 ? -0.5 : 0.5) * c[0]},
+                    {"gain", "1", 1.0 / (1.0 + c[0])}};
+              }};
 }
 
 Effect torque_bias(std::size_t joints) {
   Effect effect{.name = "torque_bias",
                 .sentence = "A constant torque: the offset of a sensor or an amplifier.",
                 .family = "constant_force",
-                .parameters = {{"bias", "N·m", 0}},
+                .parameters = {{"b", "N·m", 0}},
                 .excite = "drive in all directions, forwards and backwards",
                 .applies = [](const Drive& drive) { return needs_no(drive, "offset"); }};
   if (joints == 2) {
-    effect.parameters = {{"bias_right", "N·m", 0}, {"bias_left", "N·m", 0}};
+    effect.parameters = {{"b_R", "N·m", 0}, {"b_L", "N·m", 0}};
   }
   effect.columns = [](const Drive& drive, Shape) {
     std::vector<Column> columns;
@@ -176,7 +181,7 @@ Effect torque_bias(std::size_t joints) {
 Effect torque_deadzone() {
   return {.name = "torque_deadzone",
           .sentence = "The actuator answers only to what exceeds a dead zone.",
-          .parameters = {{"deadzone", "N·m", 1}},
+          .parameters = {{"b", "N·m", 1}},
           .excite = "brake with the motors: torque against the motion",
           .columns = [](const Drive& drive, Shape) {
             const double width = 0.04 * typical_effort(drive);
@@ -190,7 +195,7 @@ Effect saturation() {
   return {
       .name = "saturation",
       .sentence = "The actuator's torque is limited below what is commanded.",
-      .shapes = {{.name = "limit", .unit = "N·m", .lower = 0.3, .upper = 0.98, .scan = 18, .scale = largest_effort}},
+      .shapes = {{.name = "tau_max", .unit = "N·m", .lower = 0.3, .upper = 0.98, .scan = 18, .scale = largest_effort}},
       .unit_coefficient = true,
       .excite = "accelerate as hard as it goes",
       .columns = [](const Drive& drive, Shape shape) {
@@ -252,7 +257,7 @@ Effect backlash() {
 Effect battery_sag() {
   return {.name = "battery_sag",
           .sentence = "The torque falls short as the battery empties, and under load.",
-          .parameters = {{"per_time", "1/s", 1}, {"per_load", "1/(N·m)", 1}},
+          .parameters = {{"k", "1/s", 1}, {"R_b", "1/(N·m)", 1}},
           .excite = "drive for long, and with heavy loads now and then",
           .columns = [](const Drive& drive, Shape) {
             Signal load = Signal::Zero(drive.rows());
@@ -262,7 +267,7 @@ Effect battery_sag() {
             const Signal time = drive.t.array() - drive.t[0];
             const auto times = [&drive](const Signal& factor) {
               return at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
-                                 return factor.cwiseProduct(drive.joints[j].predicted_effort);
+                                 return factor.cwiseProduct(drive.joints[j].smooth_effort);
                                }));
             };
             return std::vector{times(time), times(load)};

@@ -29,7 +29,7 @@ Effect coulomb() {
   return {.name = "coulomb",
           .sentence = "Dry friction at every joint: a torque of constant size against the motion.",
           .family = "dry_friction",
-          .parameters = {{"coulomb", "N·m", 1}},
+          .parameters = {{"c", "N·m", 1}},
           .excite = "reverse often, turn on the spot, drive at several speeds",
           .applies = [](const Drive& drive) { return needs_no(drive, "coulomb"); },
           .columns = [](const Drive& drive, Shape) { return std::vector{at_joints(drive, speed_signs(drive))}; }};
@@ -38,7 +38,7 @@ Effect coulomb() {
 Effect coulomb_asymmetric() {
   return {.name = "coulomb_asymmetric",
           .sentence = "Dry friction that differs between the wheels.",
-          .parameters = {{"coulomb_right", "N·m", 1}, {"coulomb_left", "N·m", 1}},
+          .parameters = {{"c_R", "N·m", 1}, {"c_L", "N·m", 1}},
           .excite = "reverse each wheel often",
           .applies = needs_two_wheels,
           .columns = [](const Drive& drive, Shape) {
@@ -50,8 +50,8 @@ Effect coulomb_asymmetric() {
 Effect stribeck() {
   return {.name = "stribeck",
           .sentence = "Dry friction that fades as the joint gets faster (Stribeck).",
-          .parameters = {{"stribeck", "N·m", 1}},
-          .shapes = {{.name = "stribeck_speed",
+          .parameters = {{"c_s", "N·m", 1}},
+          .shapes = {{.name = "omega_s",
                       .unit = "rad/s",
                       .lower = 0.05,
                       .upper = 1.0,
@@ -67,35 +67,44 @@ Effect stribeck() {
           }};
 }
 
-Effect viscous() {
-  return {
-      .name = "viscous",
-      .sentence = "Viscous friction of the joints other than in the base model.",
-      .parametric = true,
-      .parameters = {{"damping", "N·m·s/rad", 0}},
-      .excite = "drive at different steady speeds",
-      .columns = [](const Drive& drive, Shape) {
-        return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) { return drive.joints[j].speed; }))};
-      }};
+Effect viscous(std::size_t joints) {
+  Effect effect{.name = "viscous",
+                .sentence = "Viscous friction other than in the base model.",
+                .parametric = true,
+                .parameters = {{"viscous_linear", "N·s/m", 0}, {"viscous_yaw", "N·m·s/rad", 0}},
+                .excite = "drive at different steady speeds, straight and turning"};
+  if (joints == 1) {
+    effect.parameters = {{"viscous", "N·s/m or N·m·s/rad", 0}};
+    effect.columns = [](const Drive& drive, Shape) { return std::vector{base_column(drive, "viscous")}; };
+    return effect;
+  }
+  effect.applies = needs_two_wheels;
+  effect.columns = [](const Drive& drive, Shape) {
+    return std::vector{base_column(drive, "viscous_linear"), base_column(drive, "viscous_yaw")};
+  };
+  return effect;
 }
 
 Effect viscous_asymmetric() {
   return {.name = "viscous_asymmetric",
           .sentence = "More viscous friction at one wheel than at the other.",
-          .parameters = {{"damping", "N·m·s/rad", 1}},
-          .shapes = {side()},
+          .parameters = {{"damping", "N·m·s/rad", 0}},
+          .shapes = {side_or_opposite()},
           .excite = "drive straight at different steady speeds, with the pose logged",
           .applies = needs_two_wheels,
           .columns = [](const Drive& drive, Shape shape) {
-            const std::size_t j = shape[0] < 0.5 ? 0 : 1;
-            return std::vector{at_joints(drive, only(drive, j, drive.joints[j].smooth_speed))};
+            return std::vector{
+                at_joints(drive, on_side(shape[0], drive.joints[0].smooth_speed, drive.joints[1].smooth_speed))};
+          },
+          .physical = [](std::span<const double> c, Shape shape) {
+            return std::vector<PhysicalValue>{{"b", "N·m·s/rad", shape[0] > 1.5 ? 2.0 * c[0] : shape[0] < 0.5 ? c[0] : -c[0]}};
           }};
 }
 
 Effect quadratic_drag(std::size_t joints) {
   Effect effect{.name = "quadratic_drag",
                 .sentence = "Drag that grows with the square of the speed.",
-                .parameters = {{"drag", "N·s²/m²", 1}},
+                .parameters = {{"c", "N·s²/m", 1}},
                 .excite = "drive from slow to as fast as it goes, straight and turning"};
   if (joints == 1) {
     effect.columns = [](const Drive& drive, Shape) {
@@ -104,14 +113,14 @@ Effect quadratic_drag(std::size_t joints) {
     };
     return effect;
   }
-  effect.parameters.push_back({"yaw_drag", "N·m·s²/rad²", 1});
+  effect.parameters.push_back({"c2", "N·m²·s²/rad²", 1});
   effect.applies = needs_two_wheels;
   effect.columns = [](const Drive& drive, Shape) {
     const auto v1 = drive.coordinates[0].smooth_speed.array();
     const auto v2 = drive.coordinates[1].smooth_speed.array();
     Column along, about;
-    along.effort = {drive.wheel_radius * v1 * v1.abs(), {}};
-    about.effort = {{}, drive.wheel_radius * v2 * v2.abs()};
+    along.effort = {v1 * v1.abs(), {}};
+    about.effort = {{}, v2 * v2.abs()};
     return std::vector{along, about};
   };
   return effect;
@@ -120,7 +129,7 @@ Effect quadratic_drag(std::size_t joints) {
 Effect load_friction() {
   return {.name = "load_friction",
           .sentence = "Friction in proportion to the torque that is passed on, as in a worm or harmonic drive.",
-          .parameters = {{"load_friction", "1", 1}},
+          .parameters = {{"k", "1", 1}},
           .excite = "accelerate and brake hard, and drive at constant speed",
           .columns = [](const Drive& drive, Shape) {
             return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
@@ -133,10 +142,10 @@ Effect load_friction() {
 Effect friction_drift() {
   return {
       .name = "friction_drift",
-      .sentence = "Friction that falls as the drive warms up: viscous (kind 0) or dry (kind 1).",
-      .parameters = {{"loss", "N·m·s/rad (dry: N·m)", 1}},
+      .sentence = "Friction that changes as the drive warms up: viscous (kind 0) or dry (kind 1).",
+      .parameters = {{"loss", "N·m·s/rad (dry: N·m)", 0}},
       .shapes = {{.name = "kind_viscous0_dry1", .unit = "1", .lower = 0.0, .upper = 1.0, .scan = 2, .discrete = true},
-                 {.name = "warm_up_s", .unit = "s", .lower = 10.0, .upper = 100.0, .scan = 3, .logarithmic = true}},
+                 {.name = "T", .unit = "s", .lower = 10.0, .upper = 200.0, .scan = 8, .logarithmic = true}},
       .excite = "drive for several minutes from cold, the same manoeuvre again and again",
       .columns = [](const Drive& drive, Shape shape) {
         const Signal warmth = 1.0 - (-(drive.t.array() - drive.t[0]) / shape[1]).exp();
@@ -151,8 +160,8 @@ Effect friction_drift() {
 Effect caster_drag() {
   return {.name = "caster_drag",
           .sentence = "A castor or skid that drags: a force of constant size against the motion of its contact.",
-          .parameters = {{"drag", "N", 1}},
-          .shapes = {{.name = "caster_distance",
+          .parameters = {{"c", "N·m", 1}},
+          .shapes = {{.name = "p",
                       .unit = "m",
                       .lower = 0.1,
                       .upper = 2.0,
@@ -167,7 +176,7 @@ Effect caster_drag() {
             const auto v2 = drive.coordinates[1].smooth_speed.array();
             const Eigen::ArrayXd v = (v1.square() + (p * v2).square()).sqrt() + r * sign_width(drive);
             Column column;
-            column.effort = {r * v1 / v, r * p * p * v2 / v};
+            column.effort = {v1 / v, p * p * v2 / v};
             return std::vector{column};
           }};
 }
@@ -175,13 +184,13 @@ Effect caster_drag() {
 Effect lateral_scrub() {
   return {.name = "lateral_scrub",
           .sentence = "Tyres that scrub when the robot turns: a yaw moment of constant size against the turn.",
-          .parameters = {{"moment", "N·m", 1}},
+          .parameters = {{"mu", "N·m²", 1}},
           .excite = "turn on the spot and in curves, both ways",
           .applies = needs_two_wheels,
           .columns = [](const Drive& drive, Shape) {
             const double width = 2.0 * drive.wheel_radius * sign_width(drive) / drive.track_width;
             Column column;
-            column.effort = {{}, drive.wheel_radius * soft_sign(drive.coordinates[1].smooth_speed, width)};
+            column.effort = {{}, soft_sign(drive.coordinates[1].smooth_speed, width)};
             return std::vector{column};
           }};
 }
@@ -189,7 +198,7 @@ Effect lateral_scrub() {
 }  // namespace
 
 std::vector<Effect> friction_effects(std::size_t joints) {
-  std::vector<Effect> effects{coulomb(),       stribeck(),      viscous(), quadratic_drag(joints),
+  std::vector<Effect> effects{coulomb(),       stribeck(), viscous(joints), quadratic_drag(joints),
                               load_friction(), friction_drift()};
   if (joints == 2) {
     for (auto* make : {&coulomb_asymmetric, &viscous_asymmetric, &caster_drag, &lateral_scrub}) {

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cmath>
 
 #include <wheelwright/gap/catalogue.hpp>
@@ -33,12 +34,12 @@ Column larger_wheel(const Drive& drive, std::size_t joint, const Signal& growth)
 }
 
 // The joints' own inertia is a part of the base model's that does not grow with a wheel or a scale.
-EffectParameter armature_change() { return {"armature_change", "kg·m²", 0}; }
+EffectParameter armature_change() { return {"armature_change", "kg·m²", 0, true}; }
 
 Effect com_longitudinal() {
   return {.name = "com_longitudinal",
           .sentence = "The centre of mass lies before or behind the axle.",
-          .parameters = {{"com_x_m", "m", 0}, {"inertia_change", "1", 0}},
+          .parameters = {{"a", "m", 0}, {"inertia_change", "1", 0, true}},
           .excite = "drive fast curves of changing radius",
           .applies = needs_two_wheels,
           .columns = [](const Drive& drive, Shape) {
@@ -55,7 +56,7 @@ Effect com_longitudinal() {
 Effect com_lateral() {
   return {.name = "com_lateral",
           .sentence = "The centre of mass lies to the left or right of the middle.",
-          .parameters = {{"com_y_m", "m", 0}},
+          .parameters = {{"b", "m", 0}},
           .excite = "accelerate and brake hard on a straight line",
           .applies = needs_two_wheels,
           .columns = [](const Drive& drive, Shape) {
@@ -70,20 +71,22 @@ Effect slope() {
   return {.name = "slope",
           .sentence = "The ground slopes.",
           .family = "constant_force",
-          .parameters = {{"slope_x", "rad", 0}, {"slope_y", "rad", 0}},
+          .parameters = {{"g_x", "m/s²", 0}, {"g_y", "m/s²", 0}},
           .excite = "drive slowly in all directions",
           .applies = needs_heading,
           .columns =
               [](const Drive& drive, Shape) {
-                const double weight = drive.wheel_radius * drive.physical("mass") * kGravity;
+                const double mass = drive.wheel_radius * drive.physical("mass");
                 Column x, y;
-                x.effort = {weight * drive.heading.array().cos().matrix(), {}};
-                y.effort = {weight * drive.heading.array().sin().matrix(), {}};
+                x.effort = {mass * drive.heading.array().cos().matrix(), {}};
+                y.effort = {mass * drive.heading.array().sin().matrix(), {}};
                 return std::vector{x, y};
               },
           .physical =
               [](std::span<const double> c, Shape) {
-                return std::vector<PhysicalValue>{{"angle_rad", "rad", std::hypot(c[0], c[1])},
+                return std::vector<PhysicalValue>{{"g_x", "m/s²", c[0]},
+                                                  {"g_y", "m/s²", c[1]},
+                                                  {"angle_rad", "rad", std::asin(std::min(1.0, std::hypot(c[0], c[1]) / kGravity))},
                                                   {"uphill_heading_rad", "rad", std::atan2(c[1], c[0])}};
               }};
 }
@@ -91,12 +94,15 @@ Effect slope() {
 // Eccentricity e: the radius grows by e cos(φ + φ0), and the weight on the wheel, which is lifted, asks for torque alike.
 Effect wheel_out_of_round() {
   return {.name = "wheel_out_of_round",
-          .sentence = "A wheel that is eccentric or out of round.",
-          .parameters = {{"torque_cos", "N·m", 0},
-                         {"radius_cos", "m", 0},
-                         {"torque_sin", "N·m", 0},
-                         {"radius_sin", "m", 0}},
-          .shapes = {side()},
+          .sentence = "Wheels that are eccentric or out of round.",
+          .parameters = {{"A_R", "N·m", 0},
+                         {"radius_cos_R", "m", 0, true},
+                         {"B_R", "N·m", 0},
+                         {"radius_sin_R", "m", 0, true},
+                         {"A_L", "N·m", 0},
+                         {"radius_cos_L", "m", 0, true},
+                         {"B_L", "N·m", 0},
+                         {"radius_sin_L", "m", 0, true}},
           .excite = "drive straight for many turns of the wheels at several speeds",
           .applies =
               [](const Drive& drive) {
@@ -105,20 +111,25 @@ Effect wheel_out_of_round() {
                              : Applicability{false, "the wheels' angles are lost between the log's segments"};
               },
           .columns =
-              [](const Drive& drive, Shape shape) {
-                const std::size_t j = chosen(shape);
-                const auto angle = drive.joints[j].angle.array();
+              [](const Drive& drive, Shape) {
                 std::vector<Column> columns;
-                for (const Signal& wave : {Signal(angle.cos()), Signal(angle.sin())}) {
-                  columns.push_back(at_joints(drive, only(drive, j, wave)));
-                  columns.push_back(larger_wheel(drive, j, wave / drive.wheel_radius));
+                for (std::size_t j = 0; j < 2; ++j) {
+                  const auto angle = drive.joints[j].angle.array();
+                  for (const Signal& wave : {Signal(angle.cos()), Signal(angle.sin())}) {
+                    columns.push_back(at_joints(drive, only(drive, j, wave)));
+                    columns.push_back(larger_wheel(drive, j, wave / drive.wheel_radius));
+                  }
                 }
                 return columns;
               },
           .physical =
               [](std::span<const double> c, Shape) {
-                return std::vector<PhysicalValue>{{"offset_m", "m", std::hypot(c[1], c[3])},
-                                                  {"torque_amplitude", "N·m", std::hypot(c[0], c[2])}};
+                return std::vector<PhysicalValue>{{"A_R", "N·m", c[0]},
+                                                  {"B_R", "N·m", c[2]},
+                                                  {"A_L", "N·m", c[4]},
+                                                  {"B_L", "N·m", c[6]},
+                                                  {"offset_R", "m", std::hypot(c[1], c[3])},
+                                                  {"offset_L", "m", std::hypot(c[5], c[7])}};
               }};
 }
 
@@ -126,7 +137,7 @@ Effect wheel_radius() {
   return {.name = "wheel_radius",
           .sentence = "Both wheels are larger or smaller than designed.",
           .parametric = true,
-          .parameters = {{"radius_rel", "1", 0}, armature_change()},
+          .parameters = {{"epsilon", "1", 0}, armature_change()},
           .excite = "drive straight with the pose logged",
           .applies = needs_two_wheels,
           .columns = [](const Drive& drive, Shape) {
@@ -140,14 +151,21 @@ Effect wheel_radius() {
 Effect wheel_radius_asymmetric() {
   return {.name = "wheel_radius_asymmetric",
           .sentence = "One wheel is larger or smaller than the other.",
-          .parameters = {{"radius_rel", "1", 0}, armature_change()},
-          .shapes = {side()},
+          .parameters = {{"epsilon", "1", 0}, armature_change()},
+          .shapes = {side_or_opposite()},
           .excite = "drive straight with the pose logged",
           .applies = needs_two_wheels,
           .columns = [](const Drive& drive, Shape shape) {
-            const std::size_t j = chosen(shape);
-            return std::vector{larger_wheel(drive, j, Signal::Ones(drive.rows())),
-                               rate_at_joints(drive, only(drive, j, drive.joints[j].speed))};
+            const Signal one = Signal::Ones(drive.rows());
+            const std::vector<Signal> growth = on_side(shape[0], one, one);
+            Column larger;
+            for (std::size_t j = 0; j < growth.size(); ++j) {
+              if (growth[j].size() > 0) {
+                add(larger, larger_wheel(drive, j, growth[j]));
+              }
+            }
+            return std::vector{
+                larger, rate_at_joints(drive, on_side(shape[0], drive.joints[0].speed, drive.joints[1].speed))};
           }};
 }
 
@@ -155,7 +173,7 @@ Effect encoder_scale() {
   return {.name = "encoder_scale",
           .sentence = "One wheel's encoder has another scale than the robot file says.",
           .parametric = true,
-          .parameters = {{"scale_rel", "1", 0}, armature_change()},
+          .parameters = {{"epsilon", "1", 0}, armature_change()},
           .shapes = {side()},
           .excite = "drive straight with the pose logged",
           .applies = needs_two_wheels,
@@ -171,7 +189,7 @@ Effect track_width() {
   return {.name = "track_width",
           .sentence = "The wheels stand further apart or closer together than designed.",
           .parametric = true,
-          .parameters = {{"track_rel", "1", 0}, {"inertia_change", "1", 0}},
+          .parameters = {{"epsilon", "1", 0}, {"inertia_change", "1", 0, true}},
           .excite = "turn on the spot, both ways, with the heading logged",
           .applies = needs_two_wheels,
           .columns = [](const Drive& drive, Shape) {
@@ -189,14 +207,17 @@ Effect track_width() {
 Effect longitudinal_slip() {
   return {.name = "longitudinal_slip",
           .sentence = "The wheels slip in proportion to the force they pass on.",
-          .parameters = {{"slip_per_torque", "1/(N·m)", 1}},
+          .parameters = {{"compliance", "1/N", 1}},
           .excite = "accelerate and brake as hard as it goes, with the pose logged",
           .applies = needs_two_wheels,
           .columns = [](const Drive& drive, Shape) {
             const auto lost = [&drive](std::size_t j) -> Signal {
-              return -rim_speed(drive, j).cwiseAbs().cwiseProduct(drive.joints[j].smooth_effort);
+              return -rim_speed(drive, j).cwiseAbs().cwiseProduct(drive.joints[j].smooth_effort) / drive.wheel_radius;
             };
             return std::vector{unseen_rim_speeds(drive, lost(0), lost(1), false)};
+          },
+          .physical = [](std::span<const double> c, Shape) {
+            return std::vector<PhysicalValue>{{"stiffness", "N", 1.0 / c[0]}};
           }};
 }
 

@@ -148,6 +148,17 @@ ShapeParameter side() {
   return {.name = "side_right0_left1", .unit = "1", .lower = 0.0, .upper = 1.0, .scan = 2, .discrete = true};
 }
 
+ShapeParameter side_or_opposite() {
+  return {
+      .name = "right0_left1_opposite2", .unit = "1", .lower = 0.0, .upper = 2.0, .scan = 3, .discrete = true};
+}
+
+std::vector<Eigen::VectorXd> on_side(double side, const Eigen::VectorXd& right, const Eigen::VectorXd& left) {
+  const bool opposite = side > 1.5;
+  return {opposite || side < 0.5 ? right : Eigen::VectorXd(),
+          opposite ? Eigen::VectorXd(-left) : side < 0.5 ? Eigen::VectorXd() : left};
+}
+
 Applicability needs_two_wheels(const Drive& drive) {
   return drive.two_wheels() ? Applicability{} : Applicability{false, "the robot is not on two driven wheels"};
 }

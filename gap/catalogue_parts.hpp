@@ -60,6 +60,13 @@ void add(Column& a, const Column& b);
 /// The shape that chooses one of two joints: 0 or 1 (right, left).
 [[nodiscard]] ShapeParameter side();
 
+/// The shape of an effect of one wheel (0 right, 1 left) or of both with opposite signs (2).
+[[nodiscard]] ShapeParameter side_or_opposite();
+
+/// The signals of that shape: `right`, `left` or [right, −left]; empty where a wheel has none.
+[[nodiscard]] std::vector<Eigen::VectorXd> on_side(double side, const Eigen::VectorXd& right,
+                                                   const Eigen::VectorXd& left);
+
 /// Applies where a robot has two driven wheels.
 [[nodiscard]] Applicability needs_two_wheels(const Drive& drive);
 /// Applies where a robot has two driven wheels and the log a heading.

@@ -20,7 +20,8 @@ namespace wheelwright {
 struct EffectParameter {
   std::string name{};
   std::string unit{};
-  int sign = 0;  ///< +1: physics wants >= 0; −1: <= 0; 0: either
+  int sign = 0;          ///< +1: physics wants >= 0; −1: <= 0; 0: either
+  bool beside = false;   ///< comes along with the effect and is no measure of it (a changed inertia): not reported
 };
 
 /// A parameter on which an effect's columns depend nonlinearly.

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// From a log to a diagnosis of its sim-to-real gap, front to back.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <wheelwright/core/log.hpp>
+#include <wheelwright/gap/diagnosis.hpp>
+#include <wheelwright/gap/effect.hpp>
+#include <wheelwright/gap/gap_rows.hpp>
+#include <wheelwright/gap/selection.hpp>
+
+namespace wheelwright {
+
+/// Options of diagnose().
+struct DiagnoseOptions {
+  std::optional<std::vector<Effect>> catalogue;  ///< nothing: effect_catalogue() of the robot's model
+  std::vector<std::string> without;              ///< names of effects that are not looked for
+  std::optional<double> beta;  ///< of the filter, 1/s; nothing: at most 10, lower where the motion is noisy
+  double window = 0.5;         ///< s, of pose increments
+  BlockOptions blocks;         ///< of time, for held-out errors
+  SelectionOptions selection;
+  std::uint64_t seed = 1;
+  std::size_t threads = 1;                                             ///< the result does not depend on it
+  std::function<void(std::string_view stage, double share)> progress;  ///< may be empty
+};
+
+/// Diagnoses `log` against the model of `robot`. With `baseline`, a log of the healthy robot, its θ is the nominal one and
+/// what it leaves is the noise floor; effects that the healthy robot has already are taken as known. Without, θ is nominal
+/// as far as the robot file says, and the floor is made of the sensors' noise. Throws InputError or InvalidArgument for a
+/// log or robot that cannot be used at all; what the data say is in the result.
+[[nodiscard]] Diagnosis diagnose(LogSource& log, LogSource* baseline, const Robot& robot,
+                                 const DiagnoseOptions& options = {});
+
+}  // namespace wheelwright

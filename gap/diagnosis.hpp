@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// The sim-to-real gap of a robot: where it lies, which unmodelled effect causes it, how far it shrinks once the effect is
+/// in the model. Theory section 6; the result is the contract's gap.json.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <wheelwright/core/log.hpp>
+#include <wheelwright/gap/effect.hpp>
+#include <wheelwright/gap/residual_series.hpp>
+#include <wheelwright/model/robot.hpp>
+
+namespace wheelwright {
+
+/// What the log says about the model.
+enum class GapVerdict {
+  no_gap,       ///< the model, re-fitted at most within its prior, explains the log to the noise floor
+  explained,    ///< one cause (which may be a combination) beats every other, and reaches the floor
+  ambiguous,    ///< the causes in the credible set cannot be told apart on this log
+  unexplained,  ///< what the best cause leaves is above the floor
+};
+
+/// A number with its 95 % interval.
+struct GapEstimate {
+  std::string name;
+  std::string unit;
+  double estimate = 0.0;
+  double lower = 0.0;
+  double upper = 0.0;
+  bool shape = false;  ///< enters the effect's columns nonlinearly
+};
+
+/// One cause of the best combination.
+struct GapCause {
+  std::string effect;
+  std::string sentence;
+  bool parametric = false;
+  std::vector<GapEstimate> parameters;
+  double share = 0.0;  ///< of the gap, Shapley value over the combination; the shares add up to what is explained
+};
+
+/// A member of the model confidence set.
+struct CredibleCauses {
+  std::vector<std::string> effects;
+  double held_out_error = 0.0;  ///< mean square, in units of the noise floor's
+  double p_value = 0.0;         ///< that it is as good as the best member
+};
+
+/// Two sets of causes that look alike on this log, whatever came out.
+struct ConfusablePair {
+  std::string first, second;
+  double similarity = 0.0;  ///< share of the one's signature (after θ is fitted again) that the other makes up, 0 … 1
+  bool inseparable = false;  ///< by any log without further sensors, not by this one alone
+  std::string reason;        ///< "not excited", or what measurement would split them
+};
+
+/// Share of the structural part (mean square above the floor) by where it lies.
+struct GapShare {
+  GapSpace space = GapSpace::dynamic;
+  std::string channel;
+  std::string regime;  ///< e.g. "reversal of the right wheel", "0.5 to 1 Hz", "t = 20 to 25 s"
+  std::string kind;    ///< what the regime is a part of: "speed", "frequency", "time", …
+  double share = 0.0;
+  double presence = 0.0;  ///< share of the rows
+  double p_value = 1.0;   ///< that the excess is there by chance, under autocorrelation
+};
+
+/// One figure before and after the causes are added to the model, on held-out data.
+struct ShrinkFigure {
+  std::string name;  ///< "sum", "velocity_1s", …
+  std::string unit;
+  double before = 0.0;  ///< of the nominal model
+  double after = 0.0;   ///< of the model with the causes
+  double floor = 0.0;   ///< of noise alone; 0 where none is known
+  double lower = 0.0;   ///< 95 % interval of `after`
+  double upper = 0.0;
+};
+
+/// How far the gap shrinks.
+struct GapShrink {
+  std::vector<ShrinkFigure> torque_rms;       ///< per channel
+  std::vector<ShrinkFigure> rollout;          ///< open loop
+  std::vector<ShrinkFigure> threshold_width;  ///< per channel, median of u − l
+  std::vector<ShrinkFigure> smallest_fault;   ///< per channel, share of the wheel radius
+};
+
+/// A parameter of θ: as designed, as the log has it without the causes (poisoned by them), and with them.
+struct ParameterShift {
+  std::string parameter;
+  std::string unit;
+  std::optional<double> nominal;
+  double without_causes = 0.0;
+  double estimate = 0.0;
+  double lower = 0.0;
+  double upper = 0.0;
+};
+
+/// Rows that no θ explains together within the noise (Farkas certificate of an empty feasible set).
+struct Contradiction {
+  double t = 0.0;  ///< s
+  std::string channel;
+  double weight = 0.0;  ///< its share of the certificate
+};
+
+/// Result of diagnose().
+struct Diagnosis {
+  GapVerdict verdict = GapVerdict::no_gap;
+  std::string summary;                   ///< a few sentences for people
+  std::vector<GapCause> causes;          ///< best combination, largest share first
+  std::vector<CredibleCauses> credible;  ///< model confidence set at 90 %
+  std::vector<CredibleCauses> looked_at;  ///< best sets of every size, the empty one first: what was tried
+  std::vector<ConfusablePair> confusable;
+  std::vector<GapShare> where;  ///< largest share first
+  GapShrink shrink;
+  std::vector<ParameterShift> parametric;
+  std::vector<Contradiction> contradictions;
+  double gap = 0.0;          ///< what the nominal model leaves above the floor, share of the efforts' mean square
+  double structural = 0.0;   ///< the part of it that stays after θ is fitted again
+  double remaining = 0.0;    ///< share of the gap that the causes leave
+  double floor_error = 0.0;  ///< relative error of the floor
+  std::string floor_origin;  ///< where the floor is from, in words
+  double beta = 0.0;         ///< of the filter, 1/s
+  std::vector<std::string> not_excited;  ///< effects that this log could not show, with what to drive
+  std::vector<std::string> notes;
+  std::vector<ResidualSeries> series;  ///< for pictures
+  std::optional<Robot> improved;       ///< the robot with its causes, where the robot file can carry them
+};
+
+}  // namespace wheelwright

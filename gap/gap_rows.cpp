@@ -1,0 +1,297 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/gap/gap_rows.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <set>
+#include <utility>
+
+#include <wheelwright/core/check.hpp>
+#include <wheelwright/core/error.hpp>
+#include <wheelwright/core/for_all.hpp>
+#include <wheelwright/gap/drive_filter.hpp>
+
+namespace wheelwright {
+namespace {
+
+Eigen::VectorXd picked(const Eigen::VectorXd& signal, const std::vector<Eigen::Index>& rows) {
+  Eigen::VectorXd values(static_cast<Eigen::Index>(rows.size()));
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    values[static_cast<Eigen::Index>(k)] = signal[rows[k]];
+  }
+  return values;
+}
+
+// Rows of efforts that are used: settled, moving, `step` apart.
+std::vector<Eigen::Index> effort_rows(const Drive& drive, const GapRowOptions& options) {
+  Mask use = settled(drive, options.beta);
+  if (options.skip_rest) {
+    use = use && moving(drive, options.beta);
+  }
+  const auto apart =
+      std::max<Eigen::Index>(1, static_cast<Eigen::Index>(std::lround(options.row_step / (options.beta * drive.step))));
+  std::vector<Eigen::Index> rows;
+  for (Eigen::Index k = 0; k < drive.rows(); k += apart) {
+    if (use[k]) {
+      rows.push_back(k);
+    }
+  }
+  return rows;
+}
+
+RowSpace pose_space(std::string name, const Eigen::VectorXd& t, const Eigen::VectorXd& values, double floor) {
+  RowSpace space;
+  space.name = std::move(name);
+  space.t = t;
+  space.response = values;
+  space.floor = floor;
+  return space;
+}
+
+void subtract(GapRows& rows, const std::vector<Eigen::VectorXd>& part) {
+  for (std::size_t s = 0; s < rows.spaces.size(); ++s) {
+    if (part[s].size() > 0) {
+      rows.spaces[s].response -= part[s];
+    }
+  }
+}
+
+void append(GapRows& rows, std::vector<Eigen::VectorXd> part) {
+  for (std::size_t s = 0; s < rows.spaces.size(); ++s) {
+    rows.spaces[s].columns.push_back(std::move(part[s]));
+  }
+}
+
+// `centre`, with each continuous coordinate moved towards its neighbours on `grid` in `points` steps each way, one
+// coordinate at a time.
+std::vector<std::vector<double>> shapes_about(const Effect& effect, const std::vector<std::vector<double>>& grid,
+                                              const std::vector<double>& centre, int points) {
+  std::vector<std::vector<double>> shapes{centre};
+  for (std::size_t k = 0; k < centre.size(); ++k) {
+    const ShapeParameter& parameter = effect.shapes[k];
+    if (parameter.discrete) {
+      continue;
+    }
+    std::set<double> values;
+    for (const std::vector<double>& point : grid) {
+      if (!parameter.both_signs || point[k] * centre[k] > 0.0) {
+        values.insert(point[k]);
+      }
+    }
+    const auto at = values.find(centre[k]);
+    if (at == values.end()) {
+      continue;
+    }
+    const auto towards = [&](double neighbour) {
+      for (int step = 1; step <= points; ++step) {
+        const double share = static_cast<double>(step) / (points + 1);
+        std::vector<double> shape = centre;
+        shape[k] = parameter.logarithmic ? centre[k] * std::pow(neighbour / centre[k], share)
+                                         : centre[k] + share * (neighbour - centre[k]);
+        shapes.push_back(std::move(shape));
+      }
+    };
+    if (at != values.begin()) {
+      towards(*std::prev(at));
+    }
+    if (std::next(at) != values.end()) {
+      towards(*std::next(at));
+    }
+  }
+  return shapes;
+}
+
+// `centres`, and what they are with every other value of the discrete coordinates.
+std::set<std::vector<double>> with_all_kinds(const Effect& effect, const std::vector<std::vector<double>>& grid,
+                                             std::set<std::vector<double>> centres) {
+  for (std::size_t k = 0; k < effect.shapes.size(); ++k) {
+    if (!effect.shapes[k].discrete) {
+      continue;
+    }
+    const std::set<std::vector<double>> before = centres;
+    for (std::vector<double> shape : before) {
+      for (const std::vector<double>& point : grid) {
+        shape[k] = point[k];
+        centres.insert(shape);
+      }
+    }
+  }
+  return centres;
+}
+
+}  // namespace
+
+GapRows make_gap_rows(const Drive& drive, const NoiseFloor& floor, const std::vector<FittedEffect>& healthy,
+                      const GapRowOptions& options) {
+  const auto n = drive.model.n();
+  check::that(static_cast<std::size_t>(floor.efforts.size()) == n, "NoiseFloor::efforts", "one per output");
+  check::that(drive.theta.size() == static_cast<Eigen::Index>(drive.model.p()), "Drive::theta",
+              "predict_efforts first");
+  GapRows rows;
+  rows.parameters = drive.model.p();
+  rows.instants = effort_rows(drive, options);
+  if (rows.instants.size() < 50) {
+    throw InputError("the log has " + std::to_string(rows.instants.size()) +
+                     " usable instants: at least 50 in motion are needed; drive longer");
+  }
+  const Eigen::VectorXd t = picked(drive.t, rows.instants);
+  const std::vector<Eigen::VectorXd> y = filtered_outputs(drive, options.beta);
+  const std::vector<std::vector<Eigen::VectorXd>> Y = filtered_regressor(drive, options.beta);
+  for (std::size_t i = 0; i < n; ++i) {
+    RowSpace space;
+    space.name = drive.model.outputs[i];
+    space.t = t;
+    space.floor = floor.efforts[static_cast<Eigen::Index>(i)];
+    space.response = picked(y[i], rows.instants);
+    rows.signal.push_back(space.response);
+    for (std::size_t j = 0; j < rows.parameters; ++j) {
+      space.columns.push_back(Y[j][i].size() > 0 ? picked(Y[j][i], rows.instants) : Eigen::VectorXd());
+      if (space.columns.back().size() > 0) {
+        space.response -= drive.theta[static_cast<Eigen::Index>(j)] * space.columns.back();
+      }
+    }
+    rows.spaces.push_back(std::move(space));
+    rows.kinds.push_back(GapSpace::dynamic);
+  }
+  rows.windows = make_windows(drive, options.window);
+  const Increments gap = pose_gap(drive, rows.windows);
+  const auto add = [&](const char* name, const Eigen::VectorXd& values, double noise) {
+    if (values.size() == 0 || !(noise > 0.0)) {
+      return;
+    }
+    rows.spaces.push_back(pose_space(name, rows.windows.t, values, noise));
+    rows.spaces.back().columns.resize(rows.parameters);
+    rows.signal.push_back(values);
+    rows.kinds.push_back(GapSpace::kinematic);
+  };
+  add("forward", gap.forward, floor.increments.forward);
+  add("lateral", gap.lateral, floor.increments.lateral);
+  add("yaw", gap.yaw, floor.increments.yaw);
+  for (const FittedEffect& effect : healthy) {
+    subtract(rows, rows_of(drive, rows, effect, options));
+  }
+  return rows;
+}
+
+std::vector<Eigen::VectorXd> rows_of(const Drive& drive, const GapRows& rows, const Column& column,
+                                     const GapRowOptions& options) {
+  std::vector<Eigen::VectorXd> parts(rows.spaces.size());
+  const std::size_t n = drive.model.n();
+  for (std::size_t i = 0; i < n; ++i) {
+    Eigen::VectorXd sum;
+    if (i < column.effort.size() && column.effort[i].size() > 0) {
+      sum = filtered(drive, options.beta, column.effort[i]);
+    }
+    if (i < column.effort_rate.size() && column.effort_rate[i].size() > 0) {
+      const Eigen::VectorXd rate = filtered_rate(drive, options.beta, column.effort_rate[i]);
+      sum = sum.size() > 0 ? Eigen::VectorXd(sum + rate) : rate;
+    }
+    if (sum.size() > 0) {
+      parts[i] = picked(sum, rows.instants);
+    }
+  }
+  if (rows.spaces.size() > n) {
+    const Increments moved = increments_of(drive, rows.windows, column);
+    for (std::size_t s = n; s < rows.spaces.size(); ++s) {
+      const std::string& name = rows.spaces[s].name;
+      parts[s] = name == "forward" ? moved.forward : name == "lateral" ? moved.lateral : moved.yaw;
+    }
+  }
+  return parts;
+}
+
+std::vector<Eigen::VectorXd> rows_of(const Drive& drive, const GapRows& rows, const FittedEffect& fitted,
+                                     const GapRowOptions& options) {
+  std::vector<Eigen::VectorXd> sum(rows.spaces.size());
+  const std::vector<Column> columns = fitted.effect.columns(drive, fitted.shape);
+  for (std::size_t c = 0; c < columns.size(); ++c) {
+    const double factor = fitted.effect.unit_coefficient ? 1.0 : fitted.coefficients[static_cast<Eigen::Index>(c)];
+    const std::vector<Eigen::VectorXd> part = rows_of(drive, rows, columns[c], options);
+    for (std::size_t s = 0; s < sum.size(); ++s) {
+      if (part[s].size() > 0) {
+        sum[s] = sum[s].size() > 0 ? Eigen::VectorXd(sum[s] + factor * part[s]) : Eigen::VectorXd(factor * part[s]);
+      }
+    }
+  }
+  return sum;
+}
+
+ShapeGrids all_shapes(const std::vector<Effect>& catalogue, const Drive& drive) {
+  ShapeGrids grids;
+  for (const Effect& effect : catalogue) {
+    grids.push_back(applicability(effect, drive).applies ? shape_grid(effect, drive)
+                                                         : std::vector<std::vector<double>>());
+  }
+  return grids;
+}
+
+ShapeGrids finer_shapes(const std::vector<Effect>& catalogue, const Drive& drive, const ShapeGrids& grids,
+                        const CandidateTable& table, const std::vector<std::vector<CauseSet>>& levels, std::size_t sets,
+                        int points) {
+  // Shapes to look closer at, by effect.
+  std::vector<std::set<std::vector<double>>> centres(catalogue.size());
+  for (std::size_t size = 1; size < levels.size(); ++size) {
+    for (std::size_t k = 0; k < (size == 1 ? levels[size].size() : std::min(sets, levels[size].size())); ++k) {
+      for (const std::size_t c : levels[size][k].members) {
+        centres[table.candidates[c].effect].insert(table.candidates[c].shape);
+      }
+    }
+  }
+  ShapeGrids finer(catalogue.size());
+  for (std::size_t e = 0; e < catalogue.size(); ++e) {
+    std::set<std::vector<double>> found;
+    for (const std::vector<double>& centre : with_all_kinds(catalogue[e], grids[e], centres[e])) {
+      for (std::vector<double>& shape : shapes_about(catalogue[e], grids[e], centre, points)) {
+        found.insert(std::move(shape));
+      }
+    }
+    if (found.empty() && !grids[e].empty()) {
+      found.insert(grids[e].begin(), grids[e].end());
+    }
+    finer[e].assign(found.begin(), found.end());
+  }
+  (void)drive;
+  return finer;
+}
+
+CandidateTable add_catalogue(GapRows& rows, const Drive& drive, const std::vector<Effect>& catalogue,
+                             const ShapeGrids& shapes, const GapRowOptions& options) {
+  CandidateTable table;
+  for (std::size_t j = 0; j < rows.parameters; ++j) {
+    table.base.push_back(j);
+  }
+  struct Task {
+    std::size_t effect;
+    std::vector<double> shape;
+    std::vector<std::vector<Eigen::VectorXd>> parts;  // [column][space]
+  };
+  std::vector<Task> tasks;
+  for (std::size_t e = 0; e < catalogue.size(); ++e) {
+    table.names.push_back(catalogue[e].name);
+    for (const std::vector<double>& shape : shapes[e]) {
+      tasks.push_back({e, shape, {}});
+    }
+  }
+  for_all(tasks.size(), options.threads, [&](std::size_t k) {
+    for (const Column& column : catalogue[tasks[k].effect].columns(drive, tasks[k].shape)) {
+      tasks[k].parts.push_back(rows_of(drive, rows, column, options));
+    }
+  });
+  for (Task& task : tasks) {
+    const Effect& effect = catalogue[task.effect];
+    Candidate candidate;
+    candidate.effect = task.effect;
+    candidate.shape = std::move(task.shape);
+    candidate.unit_coefficient = effect.unit_coefficient;
+    for (std::size_t c = 0; c < task.parts.size(); ++c) {
+      candidate.columns.push_back(rows.spaces.front().columns.size());
+      candidate.sign.push_back(c < effect.parameters.size() ? effect.parameters[c].sign : 0);
+      append(rows, std::move(task.parts[c]));
+    }
+    table.candidates.push_back(std::move(candidate));
+  }
+  return table;
+}
+
+}  // namespace wheelwright

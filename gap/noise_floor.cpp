@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/gap/noise_floor.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include <wheelwright/gap/drive_filter.hpp>
+
+namespace wheelwright {
+namespace {
+
+// Robust standard deviation of white noise in `signal`, by third differences (1, −3, 3, −1: variance 20 σ²).
+double by_third_differences(const Drive& drive, const Eigen::VectorXd& signal) {
+  std::vector<double> sizes;
+  for (std::size_t s = 0; s < drive.segment_starts.size(); ++s) {
+    const auto [first, last] = drive.segment(s);
+    for (Eigen::Index k = first + 3; k < last; ++k) {
+      sizes.push_back(std::abs(signal[k] - 3.0 * signal[k - 1] + 3.0 * signal[k - 2] - signal[k - 3]));
+    }
+  }
+  if (sizes.empty()) {
+    return 0.0;
+  }
+  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+  std::nth_element(sizes.begin(), middle, sizes.end());
+  constexpr double kMedianOfNormal = 0.6744897501960817;
+  return *middle / kMedianOfNormal / std::sqrt(20.0);
+}
+
+// Energies of impulse responses: what unit white noise becomes.
+struct Energies {
+  double effort;        // of f₂ * u
+  double speed;         // of f₂ * u for the noise of a speed
+  double acceleration;  // of f₂ * u̇ for the noise of a speed
+};
+
+Energies energies(double step, double beta, bool counted) {
+  Drive impulse;
+  impulse.step = step;
+  const auto n = static_cast<Eigen::Index>(std::ceil(40.0 / (beta * step))) + 8;
+  impulse.t = Eigen::VectorXd::LinSpaced(n, 0.0, step * static_cast<double>(n - 1));
+  impulse.segment_starts = {0};
+  Eigen::VectorXd one = Eigen::VectorXd::Zero(n);
+  one[3] = 1.0;
+  Eigen::VectorXd speed = one;
+  if (counted) {
+    // An error of one angle is in two speeds, with opposite signs; a speed's variance is that of two angles.
+    speed[3] = std::sqrt(0.5);
+    speed[4] = -std::sqrt(0.5);
+  }
+  return {filtered(impulse, beta, one).squaredNorm(), filtered(impulse, beta, speed).squaredNorm(),
+          filtered_rate(impulse, beta, speed).squaredNorm()};
+}
+
+}  // namespace
+
+SignalNoise signal_noise(const Drive& drive) {
+  SignalNoise noise;
+  const auto joints = static_cast<Eigen::Index>(drive.joints.size());
+  noise.effort.resize(joints);
+  noise.speed.resize(joints);
+  noise.counted = drive.count > 0.0;
+  for (Eigen::Index j = 0; j < joints; ++j) {
+    const JointSignals& joint = drive.joints[static_cast<std::size_t>(j)];
+    noise.effort[j] = by_third_differences(drive, joint.effort);
+    noise.speed[j] = noise.counted ? drive.count * std::sqrt(2.0 / 12.0) : by_third_differences(drive, joint.speed);
+  }
+  return noise;
+}
+
+NoiseFloor noise_floor(const Drive& drive, const SignalNoise& noise, double beta) {
+  const Energies energy = energies(drive.step, beta, noise.counted);
+  NoiseFloor floor;
+  const auto n = static_cast<Eigen::Index>(drive.model.n());
+  Eigen::VectorXd variance = Eigen::VectorXd::Zero(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index j = 0; j < noise.effort.size(); ++j) {
+      variance[i] += std::pow(drive.model.input(i, j) * noise.effort[j], 2) * energy.effort;
+      double rate = 0.0, speed = 0.0;
+      for (const Term& term : drive.model.terms) {
+        if (static_cast<Eigen::Index>(term.output) != i || term.kind == Term::Kind::function) {
+          continue;
+        }
+        const double weight = term.scale * drive.theta[static_cast<Eigen::Index>(term.parameter)] *
+                              drive.model.motion(static_cast<Eigen::Index>(term.coordinate), j);
+        (term.kind == Term::Kind::acceleration ? rate : speed) += weight;
+      }
+      variance[i] += std::pow(noise.speed[j], 2) * (rate * rate * energy.acceleration + speed * speed * energy.speed);
+    }
+  }
+  floor.efforts = variance.cwiseSqrt();
+  floor.increments = pose_noise(drive);
+  if (noise.counted && drive.two_wheels()) {
+    // Errors of two wheels' angles at both ends of a window.
+    const double rim = drive.wheel_radius * drive.count * drive.step / std::sqrt(12.0);
+    const double forward = rim;  // √(4·(rim/2)²)
+    const double yaw = 2.0 * rim / drive.track_width;
+    floor.increments.forward = std::hypot(floor.increments.forward, forward);
+    floor.increments.yaw = std::hypot(floor.increments.yaw, yaw);
+  }
+  return floor;
+}
+
+double attenuation(const Drive& drive, const SignalNoise& noise, double beta) {
+  const Energies energy = energies(drive.step, beta, noise.counted);
+  const Mask use = settled(drive, beta);
+  double largest = 0.0;
+  for (std::size_t c = 0; c < drive.coordinates.size(); ++c) {
+    const Eigen::VectorXd rate = filtered_rate(drive, beta, drive.coordinates[c].speed);
+    double sum = 0.0, count = 0.0, variance = 0.0;
+    for (Eigen::Index k = 0; k < rate.size(); ++k) {
+      if (use[k]) {
+        sum += rate[k] * rate[k];
+        count += 1.0;
+      }
+    }
+    for (Eigen::Index j = 0; j < noise.speed.size(); ++j) {
+      variance +=
+          std::pow(drive.model.motion(static_cast<Eigen::Index>(c), j) * noise.speed[j], 2) * energy.acceleration;
+    }
+    if (sum > 0.0) {
+      largest = std::max(largest, variance * count / sum);
+    }
+  }
+  return largest;
+}
+
+double choose_gap_beta(const Drive& drive, const SignalNoise& noise, double wish, double tolerated) {
+  for (const double beta : {20.0, 14.0, 10.0, 7.0, 5.0, 3.0}) {
+    if (beta <= wish && attenuation(drive, noise, beta) < tolerated) {
+      return beta;
+    }
+  }
+  return 2.0;
+}
+
+}  // namespace wheelwright

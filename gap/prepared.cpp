@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/gap/prepared.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <Eigen/QR>
+
+#include <wheelwright/core/error.hpp>
+#include <wheelwright/filter/measurement.hpp>
+#include <wheelwright/gap/catalogue.hpp>
+#include <wheelwright/gap/drive_filter.hpp>
+#include <wheelwright/gap/noise_floor.hpp>
+#include <wheelwright/gap/selection.hpp>
+
+namespace wheelwright {
+namespace {
+
+constexpr double kUsualBeta = 10.0;  // 1/s
+
+Drive read_drive(LogSource& source, const Robot& robot) {
+  const Model model = make_model(robot);
+  const Measurement measurement = find_measurement(source, robot, model, 2);
+  source.rewind();
+  return make_drive(read_all(source), robot, measurement);
+}
+
+std::vector<Effect> chosen_catalogue(const Model& model, const DiagnoseOptions& options) {
+  std::vector<Effect> all = options.catalogue ? *options.catalogue : effect_catalogue(model);
+  for (const Effect& effect : all) {
+    validate(effect);
+  }
+  for (const std::string& name : options.without) {
+    const auto gone = std::remove_if(all.begin(), all.end(), [&](const Effect& e) { return e.name == name; });
+    if (gone == all.end()) {
+      throw InvalidArgument("DiagnoseOptions::without: there is no effect called " + name);
+    }
+    all.erase(gone, all.end());
+  }
+  return all;
+}
+
+NoiseFloor floor_of(const std::vector<Eigen::VectorXd>& left, const GapRows& rows) {
+  NoiseFloor floor;
+  std::vector<double> efforts;
+  for (std::size_t s = 0; s < left.size(); ++s) {
+    const double rms = std::sqrt(left[s].squaredNorm() / static_cast<double>(left[s].size()));
+    const std::string& name = rows.spaces[s].name;
+    if (rows.kinds[s] == GapSpace::dynamic) {
+      efforts.push_back(rms);
+    } else {
+      (name == "forward"   ? floor.increments.forward
+       : name == "lateral" ? floor.increments.lateral
+                           : floor.increments.yaw) = rms;
+    }
+  }
+  floor.efforts = Eigen::Map<const Eigen::VectorXd>(efforts.data(), static_cast<Eigen::Index>(efforts.size()));
+  return floor;
+}
+
+// The effects of `set` with the coefficients of `fit`.
+std::vector<FittedEffect> fitted_effects(const CandidateTable& table, const CauseSet& set, const BlockFit& fit,
+                                         const std::vector<Effect>& catalogue) {
+  std::vector<FittedEffect> effects;
+  auto next = static_cast<Eigen::Index>(table.base.size());
+  for (const std::size_t c : set.members) {
+    const Candidate& candidate = table.candidates[c];
+    FittedEffect effect{catalogue[candidate.effect], candidate.shape, {}};
+    if (!candidate.unit_coefficient) {
+      effect.coefficients = fit.coefficients.segment(next, static_cast<Eigen::Index>(candidate.columns.size()));
+      next += effect.coefficients.size();
+    }
+    effects.push_back(std::move(effect));
+  }
+  return effects;
+}
+
+// θ, floor and effects of the healthy robot.
+void learn_healthy(PreparedGap& prepared, const DiagnoseOptions& options) {
+  Drive& drive = *prepared.healthy_drive;
+  const double beta = prepared.row_options.beta;
+  prepared.theta = fit_base(drive, beta);
+  predict_efforts(drive, prepared.theta);
+  const NoiseFloor sensors = noise_floor(drive, signal_noise(drive), beta);
+  GapProblem problem = make_problem(drive, sensors, {}, std::vector<bool>(drive.model.p(), false), prepared.catalogue,
+                                    all_shapes(prepared.catalogue, drive), prepared.row_options);
+  BlockOptions blocks = options.blocks;
+  blocks.threads = options.threads;
+  const BlockGram gram(problem.rows.spaces, blocks);
+  problem.table.gram = &gram;
+  SelectionOptions selection = options.selection;
+  selection.threads = options.threads;
+  const Selection found = select_causes(problem.table, problem.kinds, false, 1.0, selection);
+  const Subset subset = subset_of(problem.table, found.structural.members, BaseModel::refitted);
+  const BlockFit fit = gram.fit(subset);
+  prepared.theta += fit.coefficients.head(prepared.theta.size());
+  prepared.healthy = fitted_effects(problem.table, found.structural, fit, prepared.catalogue);
+  prepared.floor = floor_of(residuals(problem.rows, subset, fit.coefficients), problem.rows);
+  prepared.floor_origin = "what the model leaves of the healthy log";
+  for (const FittedEffect& effect : prepared.healthy) {
+    prepared.notes.push_back("the healthy log shows " + effect.effect.name +
+                             " already: what is reported is in addition to it");
+  }
+}
+
+}  // namespace
+
+Eigen::VectorXd fit_base(const Drive& drive, double beta) {
+  const std::vector<Eigen::VectorXd> y = filtered_outputs(drive, beta);
+  const std::vector<std::vector<Eigen::VectorXd>> Y = filtered_regressor(drive, beta);
+  const Mask use = settled(drive, beta) && moving(drive, beta);
+  const auto n = static_cast<Eigen::Index>(drive.model.n());
+  const auto p = static_cast<Eigen::Index>(drive.model.p());
+  const Eigen::Index instants = use.count();
+  if (instants < 10 * p) {
+    throw InputError("the log has " + std::to_string(instants) + " instants in motion after the filter has settled: " +
+                     std::to_string(10 * p) + " are needed; drive longer");
+  }
+  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(instants * n, p);
+  Eigen::VectorXd b(instants * n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    Eigen::Index row = i * instants;
+    for (Eigen::Index k = 0; k < drive.rows(); ++k) {
+      if (!use[k]) {
+        continue;
+      }
+      b[row] = y[static_cast<std::size_t>(i)][k];
+      for (Eigen::Index j = 0; j < p; ++j) {
+        const Eigen::VectorXd& column = Y[static_cast<std::size_t>(j)][static_cast<std::size_t>(i)];
+        if (column.size() > 0) {
+          A(row, j) = column[k];
+        }
+      }
+      ++row;
+    }
+  }
+  Eigen::VectorXd theta = A.colPivHouseholderQr().solve(b);
+  const Eigen::VectorXd left = b - A * theta;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const double weight =
+        1.0 / std::max(left.segment(i * instants, instants).norm(), 1e-12 * b.segment(i * instants, instants).norm());
+    if (std::isfinite(weight)) {
+      A.middleRows(i * instants, instants) *= weight;
+      b.segment(i * instants, instants) *= weight;
+    }
+  }
+  theta = A.colPivHouseholderQr().solve(b);
+  return theta;
+}
+
+GapProblem make_problem(const Drive& drive, const NoiseFloor& floor, const std::vector<FittedEffect>& healthy,
+                        const std::vector<bool>& trusted, const std::vector<Effect>& catalogue, const ShapeGrids& shapes,
+                        const GapRowOptions& options) {
+  GapProblem problem;
+  problem.rows = make_gap_rows(drive, floor, healthy, options);
+  problem.table = add_catalogue(problem.rows, drive, catalogue, shapes, options);
+  for (std::size_t j = 0; j < trusted.size(); ++j) {
+    if (!trusted[j]) {
+      problem.table.unknown.push_back(j);
+    }
+  }
+  for (const Effect& effect : catalogue) {
+    problem.kinds.push_back({effect.parametric, effect.family});
+  }
+  return problem;
+}
+
+std::vector<Eigen::VectorXd> residuals(const GapRows& rows, const Subset& subset, const Eigen::VectorXd& coefficients) {
+  std::vector<Eigen::VectorXd> left;
+  for (const RowSpace& space : rows.spaces) {
+    Eigen::VectorXd r = space.response;
+    for (std::size_t k = 0; k < subset.columns.size(); ++k) {
+      const Eigen::VectorXd& column = space.columns[subset.columns[k]];
+      if (column.size() > 0) {
+        r -= coefficients[static_cast<Eigen::Index>(k)] * column;
+      }
+    }
+    for (const std::size_t c : subset.fixed) {
+      if (space.columns[c].size() > 0) {
+        r -= space.columns[c];
+      }
+    }
+    left.push_back(std::move(r));
+  }
+  return left;
+}
+
+PreparedGap prepare_gap(LogSource& log, LogSource* baseline, const Robot& robot, const DiagnoseOptions& options) {
+  PreparedGap prepared;
+  prepared.drive = read_drive(log, robot);
+  const Model& model = prepared.drive.model;
+  prepared.catalogue = chosen_catalogue(model, options);
+  prepared.row_options.window = options.window;
+  prepared.row_options.threads = options.threads;
+  if (baseline != nullptr) {
+    prepared.healthy_drive = read_drive(*baseline, robot);
+  }
+  const Drive& reference = prepared.healthy_drive ? *prepared.healthy_drive : prepared.drive;
+  const double wish = options.beta ? *options.beta : kUsualBeta;
+  prepared.row_options.beta = options.beta ? *options.beta : choose_gap_beta(reference, signal_noise(reference), wish);
+  if (prepared.healthy_drive) {
+    learn_healthy(prepared, options);
+    prepared.trusted.assign(model.p(), true);
+    predict_efforts(prepared.drive, prepared.theta);
+    return prepared;
+  }
+  prepared.theta = fit_base(prepared.drive, prepared.row_options.beta);
+  prepared.trusted.assign(model.p(), false);
+  for (std::size_t j = 0; j < model.p(); ++j) {
+    const auto nominal = robot.nominal.find(model.parameters[j].physical);
+    if (nominal != robot.nominal.end()) {
+      prepared.theta[static_cast<Eigen::Index>(j)] = nominal->second * model.parameters[j].per_physical;
+      prepared.trusted[j] = true;
+    }
+  }
+  predict_efforts(prepared.drive, prepared.theta);
+  prepared.floor = noise_floor(prepared.drive, signal_noise(prepared.drive), prepared.row_options.beta);
+  prepared.floor_origin = "the noise of the sensors, found from the log's own differences";
+  return prepared;
+}
+
+}  // namespace wheelwright

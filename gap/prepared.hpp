@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// What is settled before causes are sought: the drive, the nominal θ, the noise floor, what the healthy robot has already.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include <wheelwright/core/log.hpp>
+#include <wheelwright/gap/diagnose.hpp>
+#include <wheelwright/gap/gap_rows.hpp>
+
+namespace wheelwright {
+
+/// A log ready for the search.
+struct PreparedGap {
+  std::vector<Effect> catalogue;  ///< that is looked for
+  Drive drive;                    ///< of the log, with its nominal θ
+  std::optional<Drive> healthy_drive;
+  Eigen::VectorXd theta;              ///< p, nominal where `trusted`, else as fitted to the log
+  std::vector<bool> trusted;          ///< p
+  std::vector<FittedEffect> healthy;  ///< of the baseline's robot
+  NoiseFloor floor;
+  std::string floor_origin;  ///< in words
+  GapRowOptions row_options;
+  std::vector<std::string> notes;
+};
+
+/// θ by least squares on the filtered rows of `drive`, outputs weighted by their own residuals; instants at rest and before
+/// the filter has settled left out. Throws InputError where too few instants are left.
+[[nodiscard]] Eigen::VectorXd fit_base(const Drive& drive, double beta);
+
+/// Reads the logs and settles all of this.
+[[nodiscard]] PreparedGap prepare_gap(LogSource& log, LogSource* baseline, const Robot& robot,
+                                      const DiagnoseOptions& options);
+
+/// The rows of `prepared` with the columns of its catalogue; `table` without its `gram`.
+struct GapProblem {
+  GapRows rows;
+  CandidateTable table;
+  std::vector<EffectKind> kinds;
+};
+[[nodiscard]] GapProblem make_problem(const Drive& drive, const NoiseFloor& floor,
+                                      const std::vector<FittedEffect>& healthy, const std::vector<bool>& trusted,
+                                      const std::vector<Effect>& catalogue, const ShapeGrids& shapes,
+                                      const GapRowOptions& options);
+
+/// What `fit` of `subset` leaves in each space, in its own unit.
+[[nodiscard]] std::vector<Eigen::VectorXd> residuals(const GapRows& rows, const Subset& subset,
+                                                     const Eigen::VectorXd& coefficients);
+
+}  // namespace wheelwright
