@@ -358,6 +358,7 @@ class Improvement {
     return true;
   }
 
+  // The simulator's motor crosses the gap under the whole torque: for as long as the lost share of the pulse would be whole.
   bool convert_backlash() {
     if (find("mass") == nullptr) {
       return refuse("backlash needs a model with the mass in it");
@@ -368,7 +369,8 @@ class Improvement {
     }
     const double motor =
         kMotorShare * 0.5 * improved_.nominal.at("mass") * improved_.wheel_radius * improved_.wheel_radius;
-    const double gap = 0.5 * std::sqrt(square) / unit_ / motor * shape(0) * shape(0);
+    const double crossing = std::max(coefficient(0), 0.0) * shape(0);
+    const double gap = 0.5 * std::sqrt(square) / unit_ / motor * crossing * crossing;
     if (!(gap > 0.0)) {
       return true;
     }

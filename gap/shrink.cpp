@@ -328,20 +328,31 @@ Commissioned commissioned(const LogTable& log, const Robot& robot) {
   return result;
 }
 
+// Commissioning chooses parameters of its own where the robot file leaves them open: the model is to stay the one at hand.
+Robot with_parameters_of(Robot robot, const Model& model) {
+  const std::vector<std::string> possible = possible_parameters(robot);
+  robot.parameters.emplace();
+  for (const Parameter& parameter : model.parameters) {
+    if (std::ranges::find(possible, parameter.physical) != possible.end()) {
+      robot.parameters->push_back(parameter.physical);
+    }
+  }
+  return robot;
+}
+
 double share_of_radius(double kappa) { return std::sqrt(1.0 + kappa) - 1.0; }
 
-void threshold_figures(GapShrink& shrink, const LogTable& log, const LogTable* baseline, const Robot& robot,
-                       const PreparedGap& prepared, const ShrinkCauses& found, const ShrinkOptions& options,
-                       std::vector<std::string>& notes) {
+void threshold_figures(GapShrink& shrink, const Robot& robot, const PreparedGap& prepared, const ShrinkCauses& found,
+                       const ShrinkOptions& options, std::vector<std::string>& notes) {
+  const Model& model = prepared.drive.model;
   std::string why_not;
   const std::optional<Robot> nominal =
       improved_robot(robot, prepared.drive, prepared.drive.theta, prepared.healthy, {}, why_not);
-  const bool with_floor = baseline != nullptr && nominal.has_value();
+  const bool with_floor = prepared.baseline_log.has_value() && nominal.has_value();
   std::vector<Commissioned> runs(with_floor ? 3 : 2);
   for_all(runs.size(), options.threads, [&](std::size_t k) {
-    runs[k] = k == 0   ? commissioned(log, *found.improved)
-              : k == 1 ? commissioned(log, robot)
-                       : commissioned(*baseline, *nominal);
+    const LogTable& log = k == 2 ? *prepared.baseline_log : prepared.log;
+    runs[k] = commissioned(log, with_parameters_of(k == 0 ? *found.improved : k == 1 ? robot : *nominal, model));
   });
   for (std::size_t k = 0; k < 2; ++k) {
     if (!runs[k].why_not.empty()) {
@@ -350,7 +361,6 @@ void threshold_figures(GapShrink& shrink, const LogTable& log, const LogTable* b
       return;
     }
   }
-  const Model& model = prepared.drive.model;
   for (std::size_t i = 0; i < model.n(); ++i) {
     const OutputValidation &after = runs[0].outputs[i], &before = runs[1].outputs[i];
     const OutputValidation* const floor = with_floor && !runs[2].outputs.empty() ? &runs[2].outputs[i] : nullptr;
@@ -372,14 +382,14 @@ void threshold_figures(GapShrink& shrink, const LogTable& log, const LogTable* b
 
 }  // namespace
 
-GapShrink measure_shrink(const LogTable& log, const LogTable* baseline, const Robot& robot, const PreparedGap& prepared,
-                         const ShrinkCauses& found, const ShrinkOptions& options, std::vector<std::string>& notes) {
+GapShrink measure_shrink(const Robot& robot, const PreparedGap& prepared, const ShrinkCauses& found,
+                         const ShrinkOptions& options, std::vector<std::string>& notes) {
   const CauseProblem problem = make_cause_problem(prepared, found);
   GapShrink shrink;
   shrink.torque_rms = torque_figures(prepared, problem, options);
   shrink.rollout = rollout_figures(robot, prepared, found, problem, options, notes);
   if (options.commissioning && found.improved) {
-    threshold_figures(shrink, log, baseline, robot, prepared, found, options, notes);
+    threshold_figures(shrink, robot, prepared, found, options, notes);
   }
   return shrink;
 }

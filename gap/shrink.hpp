@@ -10,7 +10,6 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/core/log.hpp>
 #include <wheelwright/gap/candidate.hpp>
 #include <wheelwright/gap/diagnosis.hpp>
 #include <wheelwright/gap/prepared.hpp>
@@ -43,13 +42,13 @@ struct ShrinkCauses {
 /// - rollout: velocity (m/s), yaw_rate (rad/s), position (m), heading (rad), each at every horizon ("velocity_1s"), of
 ///   robots fitted on the other parts of the log; rollout.hpp. The floor is what the sensors' noise makes of them.
 /// - threshold_width, per output: median of u − l on held-out blocks, of the log commissioned with `robot` and with
-///   `improved`; the floor is that of `baseline`, commissioned with the nominal robot, and 0 without one.
+///   `improved`, both with the parameters of the base model; the floor is that of the baseline, commissioned with the nominal
+///   robot, and 0 without one.
 /// - smallest_fault, per output: the smallest certain change of both wheels' radius there, √(1 + κ) − 1, likewise.
 ///
 /// The last two have no interval of their own (lower = after = upper). What cannot be measured is left out, and `notes` says
-/// why. `log` is the table that `prepared.drive` was made of. Throws InvalidArgument as make_gap_rows.
-[[nodiscard]] GapShrink measure_shrink(const LogTable& log, const LogTable* baseline, const Robot& robot,
-                                       const PreparedGap& prepared, const ShrinkCauses& found,
+/// why. Throws InvalidArgument as make_gap_rows.
+[[nodiscard]] GapShrink measure_shrink(const Robot& robot, const PreparedGap& prepared, const ShrinkCauses& found,
                                        const ShrinkOptions& options, std::vector<std::string>& notes);
 
 /// θ as `robot` has it, as `gram`'s rows have it without causes, and with the causes `structural` (indices of candidates of

@@ -41,10 +41,10 @@ inline Scenario simulated_drive(const Robot& robot, double duration = 24.0, doub
 }
 
 /// The log of `scenario` read by `robot`.
-inline Drive drive_of_log(const LogTable& log, const Robot& robot) {
+inline Drive drive_of_log(const LogTable& log, const Robot& robot, const DriveOptions& options = {}) {
   TableSource source(log);
   const Model model = make_model(robot);
-  Drive drive = make_drive(log, robot, find_measurement(source, robot, model, 2));
+  Drive drive = make_drive(log, robot, find_measurement(source, robot, model, 2), options);
   Eigen::VectorXd theta(static_cast<Eigen::Index>(model.p()));
   for (std::size_t j = 0; j < model.p(); ++j) {
     theta[static_cast<Eigen::Index>(j)] =
