@@ -121,7 +121,10 @@ class Improvement {
     if (!convert()) {
       return false;
     }
-    return effect_.parameters.empty() || no_linear_left() || put();
+    if (!effect_.parameters.empty() && !no_linear_left() && !put()) {
+      return false;
+    }
+    return name != "wheel_radius_asymmetric" || keep_joint_friction();
   }
 
   [[nodiscard]] const Robot& robot() const { return improved_; }
@@ -307,6 +310,20 @@ class Improvement {
       return refuse("there is no rule yet by which " + name + " becomes an effect of a robot file");
     }
     return true;
+  }
+
+  // Equal friction in the joints of unequal wheels turns the robot: Σ b ω_j/r_j has the cross term −2 b (e_R − e_L) D/2 /r²
+  // between forward and yaw, which is what viscous_asymmetric has; b = r θ_f1/2.
+  bool keep_joint_friction() {
+    const double* const viscous = find("viscous_linear");
+    const Eigen::Vector2d e = coefficient(0) * sides(*cause_);
+    const double b = viscous != nullptr ? -drive_.wheel_radius * *viscous * (e[0] - e[1]) / unit_ : 0.0;
+    if (!(std::abs(b) > 0.0)) {
+      return true;
+    }
+    effect_ = {"viscous_asymmetric", {{"b", {b, b}}}};
+    law_ = &effect_law(effect_.name);
+    return put();
   }
 
   // k and R_b of the file's law, u (k t + R_b Σ|u|) at each joint for the command u, that come nearest to what was fitted.

@@ -20,8 +20,8 @@ namespace wheelwright {
 
 /// Options of measure_shrink().
 struct ShrinkOptions {
-  BlockOptions blocks;            ///< of time: each is predicted by the fit to the others
-  RolloutOptions rollout;         ///< its threads are those of these options
+  BlockOptions blocks{};          ///< of time: each is predicted by the fit to the others
+  RolloutOptions rollout{};       ///< its threads are those of these options
   std::size_t rollout_folds = 4;  ///< parts of the log that are rolled out with the parameters of the others
   bool commissioning = true;      ///< whether widths of thresholds and smallest faults are measured (most of the time)
   std::uint64_t seed = 1;

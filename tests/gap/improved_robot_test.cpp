@@ -120,6 +120,8 @@ TEST(ImprovedRobot, OneLargerWheelIsThatWheelOnly) {
   const DriveGeometry geometry = drive_geometry(right);
   EXPECT_NEAR(geometry.radius[0], 0.0975 * 1.05, 1e-12);
   EXPECT_NEAR(geometry.radius[1], 0.0975, 1e-12);
+  // b = r² f1/2 at each joint, through unequal radii: the cross term of Σ b ω_j/r_j to first order.
+  EXPECT_NEAR(effect_value(right, "viscous_asymmetric", "b"), -0.0975 * 0.0975 * 4.0 * 0.05, 0.06 * 0.0019);
   const Robot both = improved({fitted("wheel_radius", {0.05, 0.0})});
   EXPECT_NEAR(both.wheel_radius, 0.0975 * 1.05, 1e-12);
   EXPECT_TRUE(both.effects.empty());
