@@ -124,7 +124,7 @@ class Improvement {
     if (!effect_.parameters.empty() && !no_linear_left() && !put()) {
       return false;
     }
-    return name != "wheel_radius_asymmetric" || keep_joint_friction();
+    return name != "wheel_radius_asymmetric" || keep_joints();
   }
 
   [[nodiscard]] const Robot& robot() const { return improved_; }
@@ -314,15 +314,24 @@ class Improvement {
 
   // Equal friction in the joints of unequal wheels turns the robot: Σ b ω_j/r_j has the cross term −2 b (e_R − e_L) D/2 /r²
   // between forward and yaw, which is what viscous_asymmetric has; b = r θ_f1/2.
-  bool keep_joint_friction() {
+  bool keep_joints() {
     const double* const viscous = find("viscous_linear");
     const Eigen::Vector2d e = coefficient(0) * sides(*cause_);
     const double b = viscous != nullptr ? -drive_.wheel_radius * *viscous * (e[0] - e[1]) / unit_ : 0.0;
-    if (!(std::abs(b) > 0.0)) {
+    // Inertia of the joints, J_R − J_L more at the right: −r m b = (J_R − J_L) D/(2 r), as of a centre of mass at b.
+    const Eigen::Vector2d inertia = coefficient(1) * sides(*cause_);
+    const double offset = find("mass") == nullptr
+                              ? 0.0
+                              : -(inertia[0] - inertia[1]) / unit_ * drive_.track_width /
+                                    (2.0 * std::pow(drive_.wheel_radius, 2) * improved_.nominal.at("mass"));
+    return put_also("viscous_asymmetric", b) && put_also("com_lateral", offset);
+  }
+  bool put_also(const std::string& name, double b) {
+    if (b == 0.0) {
       return true;
     }
-    effect_ = {"viscous_asymmetric", {{"b", {b, b}}}};
-    law_ = &effect_law(effect_.name);
+    effect_ = {name, {{"b", {b, b}}}};
+    law_ = &effect_law(name);
     return put();
   }
 

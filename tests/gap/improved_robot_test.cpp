@@ -122,6 +122,11 @@ TEST(ImprovedRobot, OneLargerWheelIsThatWheelOnly) {
   EXPECT_NEAR(geometry.radius[1], 0.0975, 1e-12);
   // b = r² f1/2 at each joint, through unequal radii: the cross term of Σ b ω_j/r_j to first order.
   EXPECT_NEAR(effect_value(right, "viscous_asymmetric", "b"), -0.0975 * 0.0975 * 4.0 * 0.05, 0.06 * 0.0019);
+  // J at the right joint asks for J/r² (D/2) v̇1 about the yaw axis: as −m b v̇1 does.
+  const Robot geared = improved({fitted("wheel_radius_asymmetric", {0.0, 0.002}, {0.0})});
+  EXPECT_NEAR(-geared.nominal.at("mass") * effect_value(geared, "com_lateral", "b"), 0.002 / (0.0975 * 0.0975) * 0.1905,
+              1e-9);
+  EXPECT_NEAR(geared.nominal.at("mass"), 21.0 + 0.002 / (0.0975 * 0.0975), 1e-9);
   const Robot both = improved({fitted("wheel_radius", {0.05, 0.0})});
   EXPECT_NEAR(both.wheel_radius, 0.0975 * 1.05, 1e-12);
   EXPECT_TRUE(both.effects.empty());
