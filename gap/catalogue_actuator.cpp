@@ -141,6 +141,7 @@ Effect torque_gain() {
 Effect torque_gain_asymmetric() {
   return {.name = "torque_gain_asymmetric",
           .sentence = "One actuator gives more or less torque than it is told.",
+          .common = "torque_gain",
           .parameters = {{"command_excess", "1", 0}},
           .shapes = {side_or_opposite()},
           .excite = "accelerate and brake on a straight line, with the pose logged",
@@ -153,7 +154,7 @@ Effect torque_gain_asymmetric() {
           .physical =
               [](std::span<const double> c, Shape shape) {
                 return std::vector<PhysicalValue>{
-                    {"g", "1", (shape[0] > 1.5 ? -1.0 : shape[0] < 0.5 ? -0.5 : 0.5) * c[0]},
+                    {"g", "1", shape[0] > 1.5 ? -c[0] : (shape[0] < 0.5 ? -1.0 : 1.0) * c[0] / (2.0 + c[0])},
                     {"gain", "1", 1.0 / (1.0 + c[0])}};
               }};
 }
@@ -184,7 +185,7 @@ Effect torque_deadzone() {
           .parameters = {{"b", "N·m", 1}},
           .excite = "brake with the motors: torque against the motion",
           .columns = [](const Drive& drive, Shape) {
-            const double width = 0.04 * typical_effort(drive);
+            const double width = 0.015 * typical_effort(drive);
             return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) {
                                            return soft_sign(drive.joints[j].smooth_effort, width);
                                          }))};
@@ -206,52 +207,51 @@ Effect saturation() {
       }};
 }
 
-// Sign of the effort for `duration` after each of its reversals, 0 elsewhere. A reversal goes from one side of ±`level` to
-// the other, and begins at the last change of sign between.
-Signal after_reversals(const Drive& drive, const Signal& effort, double duration, double level) {
-  Signal pulse = Signal::Zero(effort.size());
-  const auto length = std::max<Eigen::Index>(1, std::lround(duration / drive.step));
+// Momentum that the rotor of a gear with play has against its wheel: while the play is crossed the torque turns the rotor
+// alone, ṗ = τ, and x, the rotor's inertia times the angle it is ahead by, goes from one side to the other, ẋ = p; at a
+// side p is handed over at once. `width` is the rotor's inertia times the play.
+Signal rotor_momentum(const Drive& drive, const Signal& effort, double width) {
+  constexpr int kSubsteps = 8;
+  Signal momentum = Signal::Zero(effort.size());
   for (std::size_t s = 0; s < drive.segment_starts.size(); ++s) {
     const auto [first, last] = drive.segment(s);
-    double side = 0.0;
-    Eigen::Index changed = first;
-    for (Eigen::Index k = first; k < last; ++k) {
-      if (k > first && (effort[k] > 0.0) != (effort[k - 1] > 0.0)) {
-        changed = k;
+    double x = effort[first] < 0.0 ? -0.5 * width : 0.5 * width;
+    double p = 0.0;
+    for (Eigen::Index k = first; k + 1 < last; ++k) {
+      const double h = drive.step / kSubsteps;
+      for (int i = 0; i < kSubsteps; ++i) {
+        const double torque = effort[k] + (effort[k + 1] - effort[k]) * (i + 0.5) / kSubsteps;
+        p += h * torque;
+        x += h * p;
+        if (std::abs(x) >= 0.5 * width) {
+          x = std::copysign(0.5 * width, x);
+          p = 0.0;
+        }
       }
-      if (std::abs(effort[k]) <= level) {
-        continue;
-      }
-      const double now = effort[k] > 0.0 ? 1.0 : -1.0;
-      if (side != 0.0 && now != side) {
-        pulse.segment(changed, std::min(length, last - changed)).setConstant(now);
-      }
-      side = now;
+      momentum[k + 1] = p;
     }
   }
-  return pulse;
+  return momentum;
 }
 
-// While a gear crosses its gap nothing is passed on: the command is lost, and then an impact.
+// The torque that the wheel misses is the rotor's own ṗ: none in the mean, a loss and then an impact.
 Effect backlash() {
-  return {
-      .name = "backlash",
-      .sentence = "Play in the gears: after a torque reversal the gap is crossed first.",
-      .parameters = {{"lost_share", "1", 1}, {"impact", "N·m", 0}},
-      .shapes = {{.name = "crossing_s", .unit = "s", .lower = 0.015, .upper = 0.15, .scan = 6, .logarithmic = true}},
-      .excite = "reverse the torque often, gently and hard",
-      .columns = [](const Drive& drive, Shape shape) {
-        const double level = 0.05 * typical_effort(drive);
-        const std::vector<Signal> pulse = each_joint(drive, [&](std::size_t j) {
-          return after_reversals(drive, drive.joints[j].smooth_effort, shape[0], level);
-        });
-        return std::vector{
-            at_joints(drive, each_joint(drive,
-                                        [&](std::size_t j) -> Signal {
-                                          return pulse[j].cwiseAbs().cwiseProduct(drive.joints[j].smooth_effort);
-                                        })),
-            at_joints(drive, pulse)};
-      }};
+  return {.name = "backlash",
+          .sentence = "Play in the gears: after a torque reversal the gap is crossed first.",
+          .shapes = {{.name = "inertia_gap",
+                      .unit = "kg·m²·rad",
+                      .lower = 1e-5,
+                      .upper = 2e-2,
+                      .scan = 14,
+                      .logarithmic = true,
+                      .scale = typical_effort}},
+          .unit_coefficient = true,
+          .excite = "reverse the torque often, gently and hard",
+          .columns = [](const Drive& drive, Shape shape) {
+            return std::vector{rate_at_joints(drive, each_joint(drive, [&](std::size_t j) {
+                                                return rotor_momentum(drive, drive.joints[j].smooth_effort, shape[0]);
+                                              }))};
+          }};
 }
 
 Effect battery_sag() {
@@ -267,7 +267,7 @@ Effect battery_sag() {
             const Signal time = drive.t.array() - drive.t[0];
             const auto times = [&drive](const Signal& factor) {
               return at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
-                                 return factor.cwiseProduct(drive.joints[j].smooth_effort);
+                                 return factor.cwiseProduct(drive.joints[j].expected_effort);
                                }));
             };
             return std::vector{times(time), times(load)};

@@ -88,17 +88,23 @@ Effect viscous(std::size_t joints) {
 Effect viscous_asymmetric() {
   return {.name = "viscous_asymmetric",
           .sentence = "More viscous friction at one wheel than at the other.",
+          .common = "viscous",
           .parameters = {{"damping", "N·m·s/rad", 0}},
           .shapes = {side_or_opposite()},
           .excite = "drive straight at different steady speeds, with the pose logged",
           .applies = needs_two_wheels,
-          .columns = [](const Drive& drive, Shape shape) {
-            return std::vector{
-                at_joints(drive, on_side(shape[0], drive.joints[0].smooth_speed, drive.joints[1].smooth_speed))};
-          },
-          .physical = [](std::span<const double> c, Shape shape) {
-            return std::vector<PhysicalValue>{{"b", "N·m·s/rad", shape[0] > 1.5 ? 2.0 * c[0] : shape[0] < 0.5 ? c[0] : -c[0]}};
-          }};
+          .columns =
+              [](const Drive& drive, Shape shape) {
+                return std::vector{
+                    at_joints(drive, on_side(shape[0], drive.joints[0].smooth_speed, drive.joints[1].smooth_speed))};
+              },
+          .physical =
+              [](std::span<const double> c, Shape shape) {
+                return std::vector<PhysicalValue>{{"b", "N·m·s/rad",
+                                                   shape[0] > 1.5   ? 2.0 * c[0]
+                                                   : shape[0] < 0.5 ? c[0]
+                                                                    : -c[0]}};
+              }};
 }
 
 Effect quadratic_drag(std::size_t joints) {
@@ -167,14 +173,21 @@ Effect caster_drag() {
                       .upper = 2.0,
                       .scan = 6,
                       .logarithmic = true,
-                      .scale = [](const Drive& drive) { return drive.track_width; }}},
+                      .scale = [](const Drive& drive) { return drive.track_width; }},
+                     {.name = "softness",
+                      .unit = "m/s",
+                      .lower = 0.004,
+                      .upper = 0.1,
+                      .scan = 3,
+                      .logarithmic = true,
+                      .scale = [](const Drive& drive) { return drive.wheel_radius * typical_speed(drive); }}},
           .excite = "mix straight driving and turning in all ratios",
           .applies = needs_two_wheels,
           .columns = [](const Drive& drive, Shape shape) {
-            const double r = drive.wheel_radius, p = shape[0];
+            const double p = shape[0];
             const auto v1 = drive.coordinates[0].smooth_speed.array();
             const auto v2 = drive.coordinates[1].smooth_speed.array();
-            const Eigen::ArrayXd v = (v1.square() + (p * v2).square()).sqrt() + r * sign_width(drive);
+            const Eigen::ArrayXd v = (v1.square() + (p * v2).square() + shape[1] * shape[1]).sqrt();
             Column column;
             column.effort = {v1 / v, p * p * v2 / v};
             return std::vector{column};
@@ -185,12 +198,18 @@ Effect lateral_scrub() {
   return {.name = "lateral_scrub",
           .sentence = "Tyres that scrub when the robot turns: a yaw moment of constant size against the turn.",
           .parameters = {{"mu", "N·m²", 1}},
+          .shapes = {{.name = "softness",
+                      .unit = "rad/s",
+                      .lower = 0.004,
+                      .upper = 0.4,
+                      .scan = 6,
+                      .logarithmic = true,
+                      .scale = [](const Drive& drive) { return deviation(drive.coordinates[1].smooth_speed); }}},
           .excite = "turn on the spot and in curves, both ways",
           .applies = needs_two_wheels,
-          .columns = [](const Drive& drive, Shape) {
-            const double width = 2.0 * drive.wheel_radius * sign_width(drive) / drive.track_width;
+          .columns = [](const Drive& drive, Shape shape) {
             Column column;
-            column.effort = {{}, soft_sign(drive.coordinates[1].smooth_speed, width)};
+            column.effort = {{}, soft_sign(drive.coordinates[1].smooth_speed, shape[0])};
             return std::vector{column};
           }};
 }
@@ -198,7 +217,7 @@ Effect lateral_scrub() {
 }  // namespace
 
 std::vector<Effect> friction_effects(std::size_t joints) {
-  std::vector<Effect> effects{coulomb(),       stribeck(), viscous(joints), quadratic_drag(joints),
+  std::vector<Effect> effects{coulomb(),       stribeck(),      viscous(joints), quadratic_drag(joints),
                               load_friction(), friction_drift()};
   if (joints == 2) {
     for (auto* make : {&coulomb_asymmetric, &viscous_asymmetric, &caster_drag, &lateral_scrub}) {

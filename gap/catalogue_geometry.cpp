@@ -84,10 +84,11 @@ Effect slope() {
               },
           .physical =
               [](std::span<const double> c, Shape) {
-                return std::vector<PhysicalValue>{{"g_x", "m/s²", c[0]},
-                                                  {"g_y", "m/s²", c[1]},
-                                                  {"angle_rad", "rad", std::asin(std::min(1.0, std::hypot(c[0], c[1]) / kGravity))},
-                                                  {"uphill_heading_rad", "rad", std::atan2(c[1], c[0])}};
+                return std::vector<PhysicalValue>{
+                    {"g_x", "m/s²", c[0]},
+                    {"g_y", "m/s²", c[1]},
+                    {"angle_rad", "rad", std::asin(std::min(1.0, std::hypot(c[0], c[1]) / kGravity))},
+                    {"uphill_heading_rad", "rad", std::atan2(c[1], c[0])}};
               }};
 }
 
@@ -164,8 +165,8 @@ Effect wheel_radius_asymmetric() {
                 add(larger, larger_wheel(drive, j, growth[j]));
               }
             }
-            return std::vector{
-                larger, rate_at_joints(drive, on_side(shape[0], drive.joints[0].speed, drive.joints[1].speed))};
+            return std::vector{larger,
+                               rate_at_joints(drive, on_side(shape[0], drive.joints[0].speed, drive.joints[1].speed))};
           }};
 }
 
@@ -184,15 +185,17 @@ Effect encoder_scale() {
           }};
 }
 
-// D grows by ε: the robot turns slower by ε, and the same yaw moment takes less torque by ε.
+// D grows to D(1 + ε): the robot turns slower by c = ε/(1 + ε), and the same yaw moment takes less torque by as much.
 Effect track_width() {
-  return {.name = "track_width",
-          .sentence = "The wheels stand further apart or closer together than designed.",
-          .parametric = true,
-          .parameters = {{"epsilon", "1", 0}, {"inertia_change", "1", 0, true}},
-          .excite = "turn on the spot, both ways, with the heading logged",
-          .applies = needs_two_wheels,
-          .columns = [](const Drive& drive, Shape) {
+  return {
+      .name = "track_width",
+      .sentence = "The wheels stand further apart or closer together than designed.",
+      .parametric = true,
+      .parameters = {{"narrowing", "1", 0}, {"inertia_change", "1", 0, true}},
+      .excite = "turn on the spot, both ways, with the heading logged",
+      .applies = needs_two_wheels,
+      .columns =
+          [](const Drive& drive, Shape) {
             Column column = unseen_motion(drive, {{}, -drive.coordinates[1].smooth_speed}, false);
             const std::vector<Signal> effort = inertial_efforts(drive);
             Column lever;
@@ -201,6 +204,10 @@ Effect track_width() {
             Column inertia;
             inertia.effort_rate = {{}, drive.wheel_radius * drive.physical("yaw_inertia") * drive.coordinates[1].speed};
             return std::vector{column, inertia};
+          },
+      .physical =
+          [](std::span<const double> c, Shape) {
+            return std::vector<PhysicalValue>{{"epsilon", "1", c[0] / (1.0 - c[0])}};
           }};
 }
 
@@ -210,15 +217,18 @@ Effect longitudinal_slip() {
           .parameters = {{"compliance", "1/N", 1}},
           .excite = "accelerate and brake as hard as it goes, with the pose logged",
           .applies = needs_two_wheels,
-          .columns = [](const Drive& drive, Shape) {
-            const auto lost = [&drive](std::size_t j) -> Signal {
-              return -rim_speed(drive, j).cwiseAbs().cwiseProduct(drive.joints[j].smooth_effort) / drive.wheel_radius;
-            };
-            return std::vector{unseen_rim_speeds(drive, lost(0), lost(1), false)};
-          },
-          .physical = [](std::span<const double> c, Shape) {
-            return std::vector<PhysicalValue>{{"stiffness", "N", 1.0 / c[0]}};
-          }};
+          .columns =
+              [](const Drive& drive, Shape) {
+                const auto lost = [&drive](std::size_t j) -> Signal {
+                  return -rim_speed(drive, j).cwiseAbs().cwiseProduct(drive.joints[j].smooth_effort) /
+                         drive.wheel_radius;
+                };
+                return std::vector{unseen_rim_speeds(drive, lost(0), lost(1), false)};
+              },
+          .physical =
+              [](std::span<const double> c, Shape) {
+                return std::vector<PhysicalValue>{{"stiffness", "N", 1.0 / c[0]}};
+              }};
 }
 
 Effect payload(std::size_t joints) {

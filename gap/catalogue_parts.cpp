@@ -51,7 +51,7 @@ double typical_speed(const Drive& drive) {
   return std::max({deviation(drive.joints[0].smooth_speed), drive.count, 1e-12});
 }
 
-double sign_width(const Drive& drive) { return std::max(0.02 * typical_speed(drive), drive.count * 2.0 / 3.0); }
+double sign_width(const Drive& drive) { return std::max(0.006 * typical_speed(drive), 0.4 * drive.count); }
 
 Eigen::VectorXd speed_sign(const Drive& drive, std::size_t joint) {
   return soft_sign(drive.joints[joint].smooth_speed, sign_width(drive));
@@ -149,14 +149,14 @@ ShapeParameter side() {
 }
 
 ShapeParameter side_or_opposite() {
-  return {
-      .name = "right0_left1_opposite2", .unit = "1", .lower = 0.0, .upper = 2.0, .scan = 3, .discrete = true};
+  return {.name = "right0_left1_opposite2", .unit = "1", .lower = 0.0, .upper = 2.0, .scan = 3, .discrete = true};
 }
 
 std::vector<Eigen::VectorXd> on_side(double side, const Eigen::VectorXd& right, const Eigen::VectorXd& left) {
   const bool opposite = side > 1.5;
-  return {opposite || side < 0.5 ? right : Eigen::VectorXd(),
-          opposite ? Eigen::VectorXd(-left) : side < 0.5 ? Eigen::VectorXd() : left};
+  return {opposite || side < 0.5 ? right : Eigen::VectorXd(), opposite     ? Eigen::VectorXd(-left)
+                                                              : side < 0.5 ? Eigen::VectorXd()
+                                                                           : left};
 }
 
 Applicability needs_two_wheels(const Drive& drive) {

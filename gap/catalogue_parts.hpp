@@ -19,7 +19,7 @@ namespace wheelwright::catalogue {
 /// sgn(signal), as tanh(signal/width).
 [[nodiscard]] Eigen::VectorXd soft_sign(const Eigen::VectorXd& signal, double width);
 
-/// Width for the sign of a joint's speed, rad/s: 2 % of the first joint's typical speed or two thirds of a count.
+/// Width for the sign of a joint's speed, rad/s: 0.6 % of the first joint's typical speed or 0.4 of a count.
 [[nodiscard]] double sign_width(const Drive& drive);
 
 /// Soft sign of the joint's smooth speed.

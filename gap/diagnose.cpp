@@ -3,78 +3,246 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
-#include <wheelwright/gap/catalogue.hpp>
+#include <wheelwright/gap/confusion.hpp>
+#include <wheelwright/gap/contradictions.hpp>
+#include <wheelwright/gap/drive_filter.hpp>
+#include <wheelwright/gap/estimates.hpp>
+#include <wheelwright/gap/improved_robot.hpp>
 #include <wheelwright/gap/prepared.hpp>
 #include <wheelwright/gap/selection.hpp>
+#include <wheelwright/gap/shrink.hpp>
+#include <wheelwright/gap/where.hpp>
 
 namespace wheelwright {
 namespace {
 
 constexpr std::size_t kShownOfEachSize = 8;
+constexpr double kWidePrior = 1e6;  // times the nominal value: a side of the prior that nobody gave
 
-GapVerdict verdict_of(const Selection& found) {
-  if (!found.reaches_floor) {
+GapVerdict verdict_of(const Selection& found, std::size_t alternatives) {
+  if (!found.reaches_floor || found.theta_moved) {
     return GapVerdict::unexplained;
   }
   if (!found.any_cause) {
     return GapVerdict::no_gap;
   }
-  return found.theta_moved ? GapVerdict::unexplained
-                           : (found.credible.size() > 1 ? GapVerdict::ambiguous : GapVerdict::explained);
+  return alternatives > 1 ? GapVerdict::ambiguous : GapVerdict::explained;
 }
 
-}  // namespace
-
-Diagnosis diagnose(LogSource& log, LogSource* baseline, const Robot& robot, const DiagnoseOptions& options) {
-  const PreparedGap prepared = prepare_gap(log, baseline, robot, options);
-  BlockOptions blocks = options.blocks;
-  blocks.threads = options.threads;
-  const auto problem_with = [&](const ShapeGrids& shapes) {
-    return make_problem(prepared.drive, prepared.floor, prepared.healthy, prepared.trusted, prepared.catalogue, shapes,
-                        prepared.row_options);
-  };
-  const ShapeGrids coarse = all_shapes(prepared.catalogue, prepared.drive);
-  GapProblem problem = problem_with(coarse);
-  {
-    const BlockGram gram(problem.rows.spaces, blocks);
-    problem.table.gram = &gram;
-    const std::vector<std::vector<CauseSet>> levels = search_causes(problem.table, {.threads = options.threads});
-    problem = problem_with(finer_shapes(prepared.catalogue, prepared.drive, coarse, problem.table, levels));
+// Which members of `set` are reported: a parametric cause that is the common part of another member is one with it.
+std::vector<bool> reported(const CandidateTable& table, const std::vector<Effect>& catalogue, const CauseSet& set) {
+  std::vector<bool> shown(set.members.size(), true);
+  for (std::size_t k = 0; k < set.members.size(); ++k) {
+    const std::string& name = table.names[table.candidates[set.members[k]].effect];
+    for (const std::size_t other : set.members) {
+      if (catalogue[table.candidates[other].effect].common == name) {
+        shown[k] = false;
+      }
+    }
   }
-  const BlockGram gram(problem.rows.spaces, blocks);
-  problem.table.gram = &gram;
-  SelectionOptions selection = options.selection;
-  selection.threads = options.threads;
-  selection.seed = options.seed;
-  const bool trusted = std::any_of(prepared.trusted.begin(), prepared.trusted.end(), [](bool t) { return t; });
-  const Selection found = select_causes(problem.table, problem.kinds, trusted, 1.0, selection);
+  return shown;
+}
 
-  Diagnosis result;
-  result.verdict = verdict_of(found);
-  result.beta = prepared.row_options.beta;
-  result.floor_origin = prepared.floor_origin;
-  result.notes = prepared.notes;
-  for (const std::size_t c : found.all.members) {
-    GapCause cause;
-    cause.effect = problem.table.names[problem.table.candidates[c].effect];
-    result.causes.push_back(std::move(cause));
+std::vector<std::string> reported_names(const CandidateTable& table, const std::vector<Effect>& catalogue,
+                                        const CauseSet& set) {
+  const std::vector<bool> shown = reported(table, catalogue, set);
+  std::vector<std::string> names;
+  for (std::size_t k = 0; k < set.members.size(); ++k) {
+    if (shown[k]) {
+      names.push_back(table.names[table.candidates[set.members[k]].effect]);
+    }
   }
+  return names;
+}
+
+void list_credible(Diagnosis& result, const Selection& found, const CandidateTable& table,
+                   const std::vector<Effect>& catalogue) {
   for (const CredibleSet& member : found.credible) {
-    result.credible.push_back({names_of(problem.table, member.set), member.set.held_out_error, member.p_value});
+    CredibleCauses causes{reported_names(table, catalogue, member.set), member.set.held_out_error, member.p_value};
+    const bool there = std::any_of(result.credible.begin(), result.credible.end(),
+                                   [&](const CredibleCauses& other) { return other.effects == causes.effects; });
+    if (!there) {
+      result.credible.push_back(std::move(causes));
+    }
   }
+}
+
+void list_looked_at(Diagnosis& result, const Selection& found, const CandidateTable& table) {
   std::size_t of_this_size = 0;
   for (std::size_t k = 0; k < found.looked_at.size(); ++k) {
     const CauseSet& set = found.looked_at[k];
     of_this_size = k > 0 && set.members.size() == found.looked_at[k - 1].members.size() ? of_this_size + 1 : 0;
     if (of_this_size < kShownOfEachSize) {
-      result.looked_at.push_back({names_of(problem.table, set), set.held_out_error, 0.0});
+      result.looked_at.push_back({names_of(table, set), set.held_out_error, 0.0});
     }
   }
-  result.gap = found.nominal_excess;
-  result.structural = found.refitted_excess;
-  result.remaining = found.left;
+}
+
+void list_causes(Diagnosis& result, const PreparedGap& prepared, const GapProblem& problem, const CauseSet& set,
+                 const FittedCauses& fitted, const std::vector<double>& shares) {
+  const std::vector<bool> shown = reported(problem.table, prepared.catalogue, set);
+  for (std::size_t k = 0; k < set.members.size(); ++k) {
+    if (!shown[k]) {
+      continue;
+    }
+    const Effect& effect = prepared.catalogue[problem.table.candidates[set.members[k]].effect];
+    GapCause cause{effect.name, effect.sentence, effect.parametric, fitted.numbers[k], shares[k]};
+    for (std::size_t other = 0; other < set.members.size(); ++other) {
+      if (effect.common == problem.table.names[problem.table.candidates[set.members[other]].effect]) {
+        cause.share += shares[other];
+      }
+    }
+    result.causes.push_back(std::move(cause));
+  }
+  std::stable_sort(result.causes.begin(), result.causes.end(),
+                   [](const GapCause& a, const GapCause& b) { return a.share > b.share; });
+}
+
+std::string unit_of(const PreparedGap& prepared, const GapRows& rows, std::size_t space) {
+  if (rows.kinds[space] == GapSpace::dynamic) {
+    return prepared.drive.model.output_units[space];
+  }
+  return rows.spaces[space].name == "yaw" ? "rad" : "m";
+}
+
+std::vector<ResidualSeries> series_of(const PreparedGap& prepared, const GapProblem& problem,
+                                      const FittedCauses& fitted) {
+  const BlockGram& gram = *problem.table.gram;
+  const Subset refit = subset_of(problem.table, {}, BaseModel::refitted);
+  const std::vector<Eigen::VectorXd> refitted = residuals(problem.rows, refit, gram.fit(refit).coefficients);
+  const std::vector<Eigen::VectorXd> after = residuals(problem.rows, fitted.subset, fitted.coefficients);
+  std::vector<ResidualSeries> all;
+  for (std::size_t s = 0; s < problem.rows.spaces.size(); ++s) {
+    const RowSpace& space = problem.rows.spaces[s];
+    ResidualSeries series;
+    series.space = problem.rows.kinds[s];
+    series.channel = space.name;
+    series.unit = unit_of(prepared, problem.rows, s);
+    series.t = space.t;
+    series.signal = problem.rows.signal[s];
+    series.nominal = space.response;
+    series.refitted = refitted[s];
+    series.after = after[s];
+    series.floor = space.floor;
+    all.push_back(std::move(series));
+  }
+  return all;
+}
+
+// The prior box of θ with finite sides.
+Box finite_prior(const Robot& robot, const PreparedGap& prepared) {
+  const PriorBox prior = prior_box(robot, prepared.drive.model);
+  Box box;
+  for (std::size_t j = 0; j < prior.bounds.size(); ++j) {
+    const double wide = kWidePrior * std::max(std::abs(prepared.theta[static_cast<Eigen::Index>(j)]), 1e-6);
+    box.sides.push_back({std::max(prior.bounds[j].lower, -wide), std::min(prior.bounds[j].upper, wide)});
+  }
+  return box;
+}
+
+// Mean square of the efforts in units of the floors: what shares of the gap are shares of.
+double signal_square(const GapProblem& problem) {
+  double sum = 0.0, rows = 0.0;
+  for (std::size_t s = 0; s < problem.rows.spaces.size(); ++s) {
+    rows += static_cast<double>(problem.rows.spaces[s].t.size());
+    if (problem.rows.kinds[s] == GapSpace::dynamic) {
+      sum += problem.rows.signal[s].squaredNorm() / std::pow(problem.rows.spaces[s].floor, 2);
+    }
+  }
+  return sum / rows;
+}
+
+}  // namespace
+
+Diagnosis diagnose(LogSource& log, LogSource* baseline, const Robot& robot, const DiagnoseOptions& options) {
+  const auto tell = [&options](std::string_view stage, double share) {
+    if (options.progress) {
+      options.progress(stage, share);
+    }
+  };
+  tell("reading", 0.0);
+  PreparedGap prepared = prepare_gap(log, baseline, robot, options);
+  BlockOptions blocks = options.blocks;
+  blocks.threads = options.threads;
+  SelectionOptions selection = options.selection;
+  selection.threads = options.threads;
+  selection.seed = options.seed;
+  const bool trusted = std::any_of(prepared.trusted.begin(), prepared.trusted.end(), [](bool t) { return t; });
+  const auto problem_with = [&](const ShapeGrids& shapes) {
+    return make_problem(prepared.drive, prepared.floor, prepared.healthy, prepared.trusted, prepared.catalogue, shapes,
+                        prepared.row_options);
+  };
+  tell("trying every effect", 0.2);
+  const ShapeGrids coarse = all_shapes(prepared.catalogue, prepared.drive);
+  GapProblem problem = problem_with(coarse);
+  {
+    const BlockGram gram(problem.rows.spaces, blocks);
+    problem.table.gram = &gram;
+    const Selection first = select_causes(problem.table, problem.kinds, trusted, 1.0, selection);
+    const ShapeGrids finer = finer_shapes(prepared.catalogue, coarse, problem.table, first.looked_at);
+    expect_efforts(prepared, problem, first.structural);
+    problem = problem_with(finer);
+  }
+  tell("comparing combinations", 0.4);
+  const BlockGram gram(problem.rows.spaces, blocks);
+  problem.table.gram = &gram;
+  const Selection found = select_causes(problem.table, problem.kinds, trusted, 1.0, selection);
+
+  Diagnosis result;
+  list_credible(result, found, problem.table, prepared.catalogue);
+  list_looked_at(result, found, problem.table);
+  result.verdict = verdict_of(found, result.credible.size());
+  result.beta = prepared.row_options.beta;
+  result.floor_origin = prepared.floor_origin;
+  result.notes = prepared.notes;
+  const double square = signal_square(problem);
+  result.gap = std::max(found.nominal_excess, 0.0) / square;
+  result.structural = std::max(found.refitted_excess, 0.0) / square;
+  const double whole = std::max(found.nominal_excess, found.refitted_excess);
+  result.remaining = whole > 0.0 ? std::clamp(found.left / whole, 0.0, 1.0) : 0.0;
+
+  tell("estimating", 0.55);
+  const BaseModel base = found.base;
+  const FittedCauses fitted = fit_causes(prepared, problem, found.all, base, blocks);
+  list_causes(result, prepared, problem, found.all, fitted,
+              shapley_shares(problem.table, found.all, trusted ? BaseModel::nominal : BaseModel::refitted, whole));
+  result.series = series_of(prepared, problem, fitted);
+  tell("locating", 0.65);
+  WhereOptions where_to_look;
+  where_to_look.beta = prepared.row_options.beta;
+  where_to_look.seed = options.seed;
+  result.where = locate_gap(prepared.drive, result.series, where_to_look);
+  std::vector<double> floors(prepared.floor.efforts.data(),
+                             prepared.floor.efforts.data() + prepared.floor.efforts.size());
+  const Contradictions contradictions = find_contradictions(
+      prepared.drive, prepared.row_options.beta,
+      settled(prepared.drive, prepared.row_options.beta) && moving(prepared.drive, prepared.row_options.beta), floors,
+      finite_prior(robot, prepared));
+  result.contradictions = contradictions.rows;
+  result.notes.push_back(contradictions.statement);
+  result.confusable = confusable_pairs(problem.table, trusted ? BaseModel::nominal : BaseModel::refitted);
+  result.not_excited = not_excited(problem.table, prepared.catalogue, prepared.drive);
+  result.parametric = parameter_shifts(robot, prepared.drive, problem.table, found.structural.members);
+
+  std::string why_not;
+  if (!found.all.members.empty() && found.reaches_floor) {
+    result.improved = improved_robot(robot, prepared.drive, fitted.theta, fitted.effects, fitted.intervals, why_not);
+    if (!result.improved) {
+      result.notes.push_back(why_not);
+    }
+  }
+  if (options.shrink && !found.all.members.empty()) {
+    tell("measuring how far it shrinks", 0.75);
+    ShrinkOptions how;
+    how.blocks = blocks;
+    how.seed = options.seed;
+    how.threads = options.threads;
+    result.shrink = measure_shrink(robot, prepared, {fitted.effects, base, result.improved}, how, result.notes);
+  }
+  tell("done", 1.0);
   return result;
 }
 

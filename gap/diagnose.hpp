@@ -27,6 +27,7 @@ struct DiagnoseOptions {
   double window = 0.5;         ///< s, of pose increments
   BlockOptions blocks;         ///< of time, for held-out errors
   SelectionOptions selection;
+  bool shrink = true;  ///< whether it is measured how far the gap shrinks (most of the time)
   std::uint64_t seed = 1;
   std::size_t threads = 1;                                             ///< the result does not depend on it
   std::function<void(std::string_view stage, double share)> progress;  ///< may be empty

@@ -111,9 +111,9 @@ struct Contradiction {
 /// Result of diagnose().
 struct Diagnosis {
   GapVerdict verdict = GapVerdict::no_gap;
-  std::string summary;                   ///< a few sentences for people
-  std::vector<GapCause> causes;          ///< best combination, largest share first
-  std::vector<CredibleCauses> credible;  ///< model confidence set at 90 %
+  std::string summary;                    ///< a few sentences for people
+  std::vector<GapCause> causes;           ///< best combination, largest share first
+  std::vector<CredibleCauses> credible;   ///< model confidence set at 90 %
   std::vector<CredibleCauses> looked_at;  ///< best sets of every size, the empty one first: what was tried
   std::vector<ConfusablePair> confusable;
   std::vector<GapShare> where;  ///< largest share first

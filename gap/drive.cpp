@@ -468,6 +468,7 @@ void predict_efforts(Drive& drive, const Eigen::VectorXd& theta) {
   const Eigen::MatrixXd inverse = input.inverse();
   for (std::size_t j = 0; j < drive.joints.size(); ++j) {
     drive.joints[j].predicted_effort = output * inverse.row(static_cast<Eigen::Index>(j)).transpose();
+    drive.joints[j].expected_effort = drive.joints[j].predicted_effort;
   }
   drive.theta = theta;
 }

@@ -32,6 +32,7 @@ struct JointSignals {
   Eigen::VectorXd held_effort;          ///< held from its instant to the next one; empty where efforts are not held
   Eigen::VectorXd smooth_effort;        ///< smoothed `effort`
   Eigen::VectorXd predicted_effort;     ///< of the base model on the smooth motion; empty before predict_efforts()
+  Eigen::VectorXd expected_effort;      ///< predicted_effort, or with what causes add to it (expect_efforts)
   Mask resting;                         ///< stands still
 };
 

@@ -20,8 +20,8 @@ namespace wheelwright {
 struct EffectParameter {
   std::string name{};
   std::string unit{};
-  int sign = 0;          ///< +1: physics wants >= 0; −1: <= 0; 0: either
-  bool beside = false;   ///< comes along with the effect and is no measure of it (a changed inertia): not reported
+  int sign = 0;         ///< +1: physics wants >= 0; −1: <= 0; 0: either
+  bool beside = false;  ///< comes along with the effect and is no measure of it (a changed inertia): not reported
 };
 
 /// A parameter on which an effect's columns depend nonlinearly.
@@ -65,6 +65,8 @@ struct Effect {
   std::string name{};                         ///< as in results
   std::string sentence{};                     ///< what it is, for people
   std::string family{};                       ///< of effects that are the same cause; empty where it is alone
+  std::string common{};                       ///< parametric cause that is a part of this effect: unequal gains have a
+                                              ///< mean. Where both are found it is one cause; empty: none
   bool parametric = false;                    ///< moves θ or the kinematic scale of the base model
   std::vector<EffectParameter> parameters{};  ///< one for each column
   std::vector<ShapeParameter> shapes{};       ///< what the columns depend on besides

@@ -226,16 +226,19 @@ ShapeGrids all_shapes(const std::vector<Effect>& catalogue, const Drive& drive) 
   return grids;
 }
 
-ShapeGrids finer_shapes(const std::vector<Effect>& catalogue, const Drive& drive, const ShapeGrids& grids,
-                        const CandidateTable& table, const std::vector<std::vector<CauseSet>>& levels, std::size_t sets,
-                        int points) {
+ShapeGrids finer_shapes(const std::vector<Effect>& catalogue, const ShapeGrids& grids, const CandidateTable& table,
+                        const std::vector<CauseSet>& looked_at, std::size_t sets, int points) {
   // Shapes to look closer at, by effect.
   std::vector<std::set<std::vector<double>>> centres(catalogue.size());
-  for (std::size_t size = 1; size < levels.size(); ++size) {
-    for (std::size_t k = 0; k < (size == 1 ? levels[size].size() : std::min(sets, levels[size].size())); ++k) {
-      for (const std::size_t c : levels[size][k].members) {
-        centres[table.candidates[c].effect].insert(table.candidates[c].shape);
-      }
+  std::size_t of_this_size = 0;
+  for (std::size_t k = 0; k < looked_at.size(); ++k) {
+    const std::size_t size = looked_at[k].members.size();
+    of_this_size = k > 0 && size == looked_at[k - 1].members.size() ? of_this_size + 1 : 0;
+    if (size > 1 && of_this_size >= sets) {
+      continue;
+    }
+    for (const std::size_t c : looked_at[k].members) {
+      centres[table.candidates[c].effect].insert(table.candidates[c].shape);
     }
   }
   ShapeGrids finer(catalogue.size());
@@ -251,7 +254,6 @@ ShapeGrids finer_shapes(const std::vector<Effect>& catalogue, const Drive& drive
     }
     finer[e].assign(found.begin(), found.end());
   }
-  (void)drive;
   return finer;
 }
 

@@ -69,11 +69,11 @@ using ShapeGrids = std::vector<std::vector<std::vector<double>>>;
 /// The grids of all effects of `catalogue`; none for those that do not apply to `drive`.
 [[nodiscard]] ShapeGrids all_shapes(const std::vector<Effect>& catalogue, const Drive& drive);
 
-/// Finer grids about the shapes of the best `sets` of `levels` (search_causes' result on `table`): every continuous shape
-/// goes from one point of `grids` below to one above in `points` steps each way. Effects that are in none of these sets
-/// keep the shape that was best alone.
-[[nodiscard]] ShapeGrids finer_shapes(const std::vector<Effect>& catalogue, const Drive& drive, const ShapeGrids& grids,
-                                      const CandidateTable& table, const std::vector<std::vector<CauseSet>>& levels,
+/// Finer grids about the shapes of the single effects and of the best `sets` of every other size of `looked_at`
+/// (Selection::looked_at on `table`): every continuous shape goes from one point of `grids` below to one above in `points`
+/// steps each way, and discrete ones take all their values.
+[[nodiscard]] ShapeGrids finer_shapes(const std::vector<Effect>& catalogue, const ShapeGrids& grids,
+                                      const CandidateTable& table, const std::vector<CauseSet>& looked_at,
                                       std::size_t sets = 8, int points = 3);
 
 /// Adds the columns of every effect of `catalogue` at the points of `shapes`. The table's `gram` is not set yet.

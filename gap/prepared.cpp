@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include <Eigen/LU>
 #include <Eigen/QR>
 
 #include <wheelwright/core/error.hpp>
@@ -19,11 +20,9 @@ namespace {
 
 constexpr double kUsualBeta = 10.0;  // 1/s
 
-Drive read_drive(LogSource& source, const Robot& robot) {
-  const Model model = make_model(robot);
-  const Measurement measurement = find_measurement(source, robot, model, 2);
-  source.rewind();
-  return make_drive(read_all(source), robot, measurement);
+Drive drive_of(const LogTable& log, const Robot& robot) {
+  TableSource source(log);
+  return make_drive(log, robot, find_measurement(source, robot, make_model(robot), 2));
 }
 
 std::vector<Effect> chosen_catalogue(const Model& model, const DiagnoseOptions& options) {
@@ -76,6 +75,44 @@ std::vector<FittedEffect> fitted_effects(const CandidateTable& table, const Caus
   return effects;
 }
 
+// The clocks of effort and speed differ by a little in every log (a command that is held for the sampling step of the
+// robot's own controller): an effort that comes later by δ leaves −δ τ̇. δ is fitted to what is `left`, and taken from it.
+FittedEffect timing_of(const Drive& drive, const GapRows& rows, std::vector<Eigen::VectorXd>& left,
+                       const GapRowOptions& options) {
+  Effect timing;
+  timing.name = "timing";
+  timing.parameters = {{"delay", "s", 0}};
+  timing.columns = [](const Drive& d, std::span<const double>) {
+    Column column;
+    column.effort_rate.resize(d.model.n());
+    for (std::size_t i = 0; i < d.model.n(); ++i) {
+      Eigen::VectorXd output = Eigen::VectorXd::Zero(d.rows());
+      for (std::size_t j = 0; j < d.joints.size(); ++j) {
+        output +=
+            d.model.input(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) * d.joints[j].predicted_effort;
+      }
+      column.effort_rate[i] = output;
+    }
+    return std::vector{column};
+  };
+  const std::vector<Eigen::VectorXd> column = rows_of(drive, rows, timing.columns(drive, {}).front(), options);
+  double along = 0.0, square = 0.0;
+  for (std::size_t s = 0; s < left.size(); ++s) {
+    if (column[s].size() > 0) {
+      const double weight = 1.0 / std::pow(rows.spaces[s].floor, 2);
+      along += weight * column[s].dot(left[s]);
+      square += weight * column[s].squaredNorm();
+    }
+  }
+  const double delay = square > 0.0 ? along / square : 0.0;
+  for (std::size_t s = 0; s < left.size(); ++s) {
+    if (column[s].size() > 0) {
+      left[s] -= delay * column[s];
+    }
+  }
+  return {timing, {}, Eigen::VectorXd::Constant(1, delay)};
+}
+
 // θ, floor and effects of the healthy robot.
 void learn_healthy(PreparedGap& prepared, const DiagnoseOptions& options) {
   Drive& drive = *prepared.healthy_drive;
@@ -96,9 +133,14 @@ void learn_healthy(PreparedGap& prepared, const DiagnoseOptions& options) {
   const BlockFit fit = gram.fit(subset);
   prepared.theta += fit.coefficients.head(prepared.theta.size());
   prepared.healthy = fitted_effects(problem.table, found.structural, fit, prepared.catalogue);
-  prepared.floor = floor_of(residuals(problem.rows, subset, fit.coefficients), problem.rows);
+  std::vector<Eigen::VectorXd> left = residuals(problem.rows, subset, fit.coefficients);
+  prepared.healthy.push_back(timing_of(drive, problem.rows, left, prepared.row_options));
+  prepared.floor = floor_of(left, problem.rows);
   prepared.floor_origin = "what the model leaves of the healthy log";
   for (const FittedEffect& effect : prepared.healthy) {
+    if (effect.effect.name == "timing") {
+      continue;
+    }
     prepared.notes.push_back("the healthy log shows " + effect.effect.name +
                              " already: what is reported is in addition to it");
   }
@@ -150,8 +192,8 @@ Eigen::VectorXd fit_base(const Drive& drive, double beta) {
 }
 
 GapProblem make_problem(const Drive& drive, const NoiseFloor& floor, const std::vector<FittedEffect>& healthy,
-                        const std::vector<bool>& trusted, const std::vector<Effect>& catalogue, const ShapeGrids& shapes,
-                        const GapRowOptions& options) {
+                        const std::vector<bool>& trusted, const std::vector<Effect>& catalogue,
+                        const ShapeGrids& shapes, const GapRowOptions& options) {
   GapProblem problem;
   problem.rows = make_gap_rows(drive, floor, healthy, options);
   problem.table = add_catalogue(problem.rows, drive, catalogue, shapes, options);
@@ -164,6 +206,40 @@ GapProblem make_problem(const Drive& drive, const NoiseFloor& floor, const std::
     problem.kinds.push_back({effect.parametric, effect.family});
   }
   return problem;
+}
+
+void expect_efforts(PreparedGap& prepared, const GapProblem& problem, const CauseSet& set) {
+  Drive& drive = prepared.drive;
+  const BlockFit fit = problem.table.gram->fit(subset_of(problem.table, set.members, BaseModel::refitted));
+  const std::vector<FittedEffect> effects = fitted_effects(problem.table, set, fit, prepared.catalogue);
+  const Eigen::MatrixXd inverse = drive.model.input.inverse();
+  const auto n = static_cast<Eigen::Index>(drive.model.n());
+  Eigen::MatrixXd outputs = Eigen::MatrixXd::Zero(drive.rows(), n);
+  for (const FittedEffect& effect : effects) {
+    if (effect.effect.unit_coefficient) {
+      continue;
+    }
+    const std::vector<Column> columns = effect.effect.columns(drive, effect.shape);
+    for (std::size_t c = 0; c < columns.size(); ++c) {
+      const double factor = effect.coefficients[static_cast<Eigen::Index>(c)];
+      for (std::size_t i = 0; i < columns[c].effort.size(); ++i) {
+        if (columns[c].effort[i].size() > 0) {
+          outputs.col(static_cast<Eigen::Index>(i)) += factor * columns[c].effort[i];
+        }
+      }
+    }
+  }
+  const Eigen::VectorXd nominal = drive.theta;
+  predict_efforts(drive, nominal + fit.coefficients.head(nominal.size()));
+  for (std::size_t j = 0; j < drive.joints.size(); ++j) {
+    drive.joints[j].expected_effort =
+        drive.joints[j].predicted_effort + outputs * inverse.row(static_cast<Eigen::Index>(j)).transpose();
+  }
+  const std::vector<JointSignals> expected = drive.joints;
+  predict_efforts(drive, nominal);
+  for (std::size_t j = 0; j < drive.joints.size(); ++j) {
+    drive.joints[j].expected_effort = expected[j].expected_effort;
+  }
 }
 
 std::vector<Eigen::VectorXd> residuals(const GapRows& rows, const Subset& subset, const Eigen::VectorXd& coefficients) {
@@ -188,13 +264,15 @@ std::vector<Eigen::VectorXd> residuals(const GapRows& rows, const Subset& subset
 
 PreparedGap prepare_gap(LogSource& log, LogSource* baseline, const Robot& robot, const DiagnoseOptions& options) {
   PreparedGap prepared;
-  prepared.drive = read_drive(log, robot);
+  prepared.log = read_all(log);
+  prepared.drive = drive_of(prepared.log, robot);
   const Model& model = prepared.drive.model;
   prepared.catalogue = chosen_catalogue(model, options);
   prepared.row_options.window = options.window;
   prepared.row_options.threads = options.threads;
   if (baseline != nullptr) {
-    prepared.healthy_drive = read_drive(*baseline, robot);
+    prepared.baseline_log = read_all(*baseline);
+    prepared.healthy_drive = drive_of(*prepared.baseline_log, robot);
   }
   const Drive& reference = prepared.healthy_drive ? *prepared.healthy_drive : prepared.drive;
   const double wish = options.beta ? *options.beta : kUsualBeta;

@@ -3,6 +3,7 @@
 /// What is settled before causes are sought: the drive, the nominal θ, the noise floor, what the healthy robot has already.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,7 +18,9 @@ namespace wheelwright {
 /// A log ready for the search.
 struct PreparedGap {
   std::vector<Effect> catalogue;  ///< that is looked for
-  Drive drive;                    ///< of the log, with its nominal θ
+  LogTable log;                   ///< the log as it was read
+  std::optional<LogTable> baseline_log;
+  Drive drive;  ///< of the log, with its nominal θ
   std::optional<Drive> healthy_drive;
   Eigen::VectorXd theta;              ///< p, nominal where `trusted`, else as fitted to the log
   std::vector<bool> trusted;          ///< p
@@ -46,6 +49,11 @@ struct GapProblem {
                                       const std::vector<FittedEffect>& healthy, const std::vector<bool>& trusted,
                                       const std::vector<Effect>& catalogue, const ShapeGrids& shapes,
                                       const GapRowOptions& options);
+
+/// Fits `set` beside θ to the rows of `problem` and sets JointSignals::expected_effort of prepared.drive to what comes out,
+/// the causes' own efforts included: effects that grow with the effort are then right beyond first order. Causes of unit
+/// coefficient, which are made of the measured effort, are left out.
+void expect_efforts(PreparedGap& prepared, const GapProblem& problem, const CauseSet& set);
 
 /// What `fit` of `subset` leaves in each space, in its own unit.
 [[nodiscard]] std::vector<Eigen::VectorXd> residuals(const GapRows& rows, const Subset& subset,

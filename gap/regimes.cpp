@@ -95,7 +95,9 @@ std::string joint_name(const Drive& drive, std::size_t i) {
 Mask all_resting(const Drive& drive) {
   Mask resting = Mask::Constant(drive.rows(), true);
   for (const JointSignals& joint : drive.joints) {
-    resting = resting && joint.resting;
+    for (Eigen::Index k = 0; k < resting.size(); ++k) {
+      resting[k] = resting[k] && joint.resting[k];
+    }
   }
   return resting;
 }

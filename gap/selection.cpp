@@ -88,7 +88,8 @@ class Selector {
 
   [[nodiscard]] Selection run(bool nominal_trusted) {
     Selection result;
-    CauseSearchOptions search{.threads = options_.threads};
+    CauseSearchOptions search;
+    search.threads = options_.threads;
     search.allowed.resize(kinds_.size());
     for (std::size_t e = 0; e < kinds_.size(); ++e) {
       search.allowed[e] = !moves_theta_only_[e];
@@ -121,8 +122,10 @@ class Selector {
     }
     add_parametric(result, rivals, nominal_trusted);
     result.any_cause = !result.all.members.empty() || result.theta_moved;
-    result.reaches_floor = result.left <= std::max({options_.tolerated * result.refitted_excess,
-                                                    options_.tolerated_nominal * gap_, options_.tolerated_floor});
+    result.reaches_floor =
+        result.left <= std::max({options_.tolerated * result.refitted_excess,
+                                 std::min(options_.tolerated_nominal * gap_, 4.0 * options_.tolerated_floor),
+                                 options_.tolerated_floor});
     return result;
   }
 
@@ -285,14 +288,18 @@ class Selector {
       rivals.push_back(first);
       for (const CauseSet& set : found) {
         const bool close = set.held_out_error <= first.held_out_error + 3.0 * margin(first);
-        const bool contains = first.coefficients < set.coefficients &&
-                              unexplained_by(table_, first.members, set.members, BaseModel::nominal) < options_.contained;
+        const bool contains =
+            first.coefficients < set.coefficients &&
+            unexplained_by(table_, first.members, set.members, BaseModel::nominal) < options_.contained;
         if (set.members != first.members && close && !contains) {
           rivals.push_back(set);
         }
       }
     }
     result.all = rivals.front();
+    const bool moves_theta = std::any_of(result.all.members.begin(), result.all.members.end(),
+                                         [&](std::size_t c) { return moves_theta_only_[table_.candidates[c].effect]; });
+    result.base = moves_theta ? BaseModel::nominal : BaseModel::refitted;
     std::vector<CauseSet> fewest;
     for (const CauseSet& set : rivals) {
       if (set.members.size() <= result.all.members.size()) {

@@ -24,20 +24,20 @@ namespace wheelwright {
 
 /// Options of select_causes().
 struct SelectionOptions {
-  double share = 0.03;           ///< of the gap that a cause must remove to be one …
-  double part = 0.5;             ///< … and of what is left without it
-  double large_share = 0.25;     ///< of the gap that is enough alone
-  double large_part = 0.8;       ///< of what is left that is enough …
-  double small_share = 0.01;      ///< … with this share of the gap
-  double smallest = 0.3;         ///< gain that a cause must have in any case, mean squares of the floor
-  double significance = 0.05;    ///< of a gain, over all effects that were tried
-  double misfit = 1.0;           ///< times the best set's own excess by which another set may be worse and be as good
-  double level = 0.10;           ///< 1 − level: of the confidence set
-  double tolerated = 0.04;       ///< share of the structural part that an explanation may leave …
-  double tolerated_nominal = 0.003;  ///< … or of the whole gap, θ's part included …
-  double tolerated_floor = 0.5;  ///< … or excess in mean squares of the floor, whichever is larger
-  double theta_share = 0.06;      ///< of the gap that θ may make by having moved without a cause being asked for
-  double contained = 1e-3;       ///< share of a signature that another set leaves of it, below which it contains it
+  double share = 0.03;         ///< of the gap that a cause must remove to be one …
+  double part = 0.5;           ///< … and of what is left without it
+  double large_share = 0.25;   ///< of the gap that is enough alone
+  double large_part = 0.8;     ///< of what is left that is enough …
+  double small_share = 0.01;   ///< … with this share of the gap
+  double smallest = 0.3;       ///< gain that a cause must have in any case, mean squares of the floor
+  double significance = 0.05;  ///< of a gain, over all effects that were tried
+  double misfit = 1.0;         ///< times the best set's own excess by which another set may be worse and be as good
+  double level = 0.10;         ///< 1 − level: of the confidence set
+  double tolerated = 0.04;     ///< share of the structural part that an explanation may leave …
+  double tolerated_nominal = 0.003;  ///< … or of the whole gap, θ's part included, up to four times …
+  double tolerated_floor = 0.5;      ///< … or excess in mean squares of the floor, whichever is larger
+  double theta_share = 0.06;         ///< of the gap that θ may make by having moved without a cause being asked for
+  double contained = 1e-3;           ///< share of a signature that another set leaves of it, below which it contains it
   std::uint64_t seed = 1;
   std::size_t threads = 1;
 };
@@ -56,8 +56,9 @@ struct Selection {
   double nominal_excess = 0.0;   ///< of M0 with θ nominal, above the floor; the refitted one where none is trusted
   double refitted_excess = 0.0;  ///< of M0 with θ fitted again
   double left = 0.0;             ///< excess of `structural`
-  bool theta_moved = false;      ///< θ differs from nominal and no parametric cause says why
-  bool reaches_floor = true;     ///< what is left is tolerable
+  BaseModel base = BaseModel::refitted;  ///< what `all` was judged with
+  bool theta_moved = false;              ///< θ differs from nominal and no parametric cause says why
+  bool reaches_floor = true;             ///< what is left is tolerable
   bool any_cause = false;
   std::vector<CauseSet> looked_at;  ///< every single effect and the best pairs and triples, θ fitted again
 };
