@@ -27,6 +27,8 @@ using Run = std::function<int(const std::string& command_line)>;
 [[nodiscard]] Run add_detect(CLI::App& program);
 /// wheelwright export model.json --language c
 [[nodiscard]] Run add_export(CLI::App& program);
+/// wheelwright gap LOG... --robot robot.yaml
+[[nodiscard]] Run add_gap(CLI::App& program);
 /// wheelwright identify LOG... --robot robot.yaml
 [[nodiscard]] Run add_identify(CLI::App& program);
 /// wheelwright margins LOG --model model.json

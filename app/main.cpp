@@ -36,9 +36,11 @@ int main(int argc, char** argv) {
       "Start with:  wheelwright commission LOG --robot robot.yaml --out result\n"
       "Each command has its own --help.");
   const std::vector<std::pair<std::string, Run>> commands = {
-      {"commission", add_commission(program)}, {"detect", add_detect(program)},     {"check", add_check(program)},
-      {"identify", add_identify(program)},     {"margins", add_margins(program)},   {"export", add_export(program)},
-      {"design", add_design(program)},         {"simulate", add_simulate(program)}, {"choose", add_choose(program)}};
+      {"commission", add_commission(program)}, {"detect", add_detect(program)},
+      {"check", add_check(program)},           {"identify", add_identify(program)},
+      {"margins", add_margins(program)},       {"export", add_export(program)},
+      {"design", add_design(program)},         {"simulate", add_simulate(program)},
+      {"choose", add_choose(program)},         {"gap", add_gap(program)}};
   try {
     program.parse(argc, argv);
     for (const auto& [name, run] : commands) {

@@ -112,15 +112,15 @@ std::vector<Rival> rivals_of_gap(const std::filesystem::path& file, const std::v
       continue;
     }
     Rival rival = typical_rival(effects, catalogue, drive);
-    if (std::set<std::string>(effects.begin(), effects.end()) == best) {
+    if (credible.at(i).has("parameters")) {
+      for (RivalCause& cause : rival.causes) {
+        take(cause, *find(catalogue, cause.effect), credible.at(i).at("parameters"), cause.effect + ".");
+      }
+    } else if (std::set<std::string>(effects.begin(), effects.end()) == best) {
       for (std::size_t k = 0; k < causes.size(); ++k) {
         const std::string name = causes.at(k).at("effect").text();
         take(*std::ranges::find(rival.causes, name, &RivalCause::effect), *find(catalogue, name),
              causes.at(k).at("parameters"), "");
-      }
-    } else if (credible.at(i).has("parameters")) {
-      for (RivalCause& cause : rival.causes) {
-        take(cause, *find(catalogue, cause.effect), credible.at(i).at("parameters"), cause.effect + ".");
       }
     }
     rivals.push_back(std::move(rival));

@@ -11,8 +11,8 @@
 
 namespace wheelwright::app {
 
-/// Members of the credible set of a gap.json. Parameters are those of `causes` where the effects are the same, else of
-/// credible_set[].parameters, keyed "effect.parameter"; a member without any is as large as typical_rival() makes it.
+/// Members of the credible set of a gap.json. Parameters are those of credible_set[].parameters, keyed "effect.parameter",
+/// else of `causes` where the effects are the same; a member without any is as large as typical_rival() makes it.
 /// Noise and filter of the analysed log, where the file has them, take the place of those in `noise`.
 /// Throws InputError where fewer than two members are left that the catalogue knows.
 [[nodiscard]] std::vector<Rival> rivals_of_gap(const std::filesystem::path& file, const std::vector<Effect>& catalogue,

@@ -1,0 +1,298 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include <wheelwright/gap/catalogue.hpp>
+#include <wheelwright/gap/diagnose.hpp>
+#include <wheelwright/gap/naive.hpp>
+#include <wheelwright/gap/prepared.hpp>
+#include <wheelwright/io/atomic_file.hpp>
+#include <wheelwright/io/gap_json.hpp>
+#include <wheelwright/io/robot_file.hpp>
+#include <wheelwright/io/suggest.hpp>
+#include <wheelwright/report/commission_report.hpp>
+#include <wheelwright/report/gap_report.hpp>
+#include <wheelwright/report/gap_words.hpp>
+
+#include "commands.hpp"
+#include "common.hpp"
+#include "gap_summary.hpp"
+#include "next_manoeuvre.hpp"
+#include "progress.hpp"
+
+namespace wheelwright::app {
+namespace {
+
+struct Arguments {
+  std::vector<std::filesystem::path> logs, baseline;
+  std::filesystem::path robot;
+  std::optional<double> beta;
+  std::vector<std::string> without;
+  bool no_shrink = false;
+  bool no_manoeuvre = false;
+  bool naive = false;
+  CommonOptions common;
+};
+
+constexpr const char* kHelp =
+    "Diagnoses the gap between the model of a robot and a log of it: where it lies, which effect that the model lacks "
+    "causes it, how far it shrinks once the effect is in the model, and, where causes cannot be told apart, which "
+    "drive "
+    "would tell.\n\n"
+    "A baseline is a log of the same robot when it was healthy: parameters and noise are learnt from it, and what it "
+    "shows already is no news. Without one, the nominal values of the robot file are believed.";
+
+constexpr const char* kExamples =
+    "Examples:\n"
+    "  wheelwright gap drive.csv --robot robot.yaml --baseline healthy.csv --out gap\n"
+    "  wheelwright gap monday.csv tuesday.csv --robot robot.yaml --without slope --json > gap.json\n"
+    "  then wheelwright commission drive.csv --robot gap/robot_improved.yaml --out result\n\n"
+    "Exit code: 0 a diagnosis was made, whatever it is; 2 bad input.";
+
+constexpr const char* kImproved = "robot_improved.yaml";
+constexpr const char* kNext = "next_manoeuvre.csv";
+constexpr const char* kResiduals = "residuals.csv";
+
+std::vector<std::string> names_of_files(const std::vector<std::filesystem::path>& files) {
+  std::vector<std::string> names;
+  for (const std::filesystem::path& file : files) {
+    names.push_back(file.string());
+  }
+  return names;
+}
+
+void check_without(const std::vector<std::string>& without, const std::vector<Effect>& catalogue) {
+  std::vector<std::string> names;
+  for (const Effect& effect : catalogue) {
+    names.push_back(effect.name);
+  }
+  for (const std::string& name : without) {
+    if (std::ranges::find(names, name) == names.end()) {
+      throw InputError("--without " + shown(name) + ": no effect of the catalogue: expected one of " + listed(names) +
+                       did_you_mean(name, names));
+    }
+  }
+}
+
+// What the naive rule makes of every row of the log.
+std::vector<std::string> naive_effects(LogSource& log, LogSource* baseline, const Robot& robot,
+                                       const DiagnoseOptions& options) {
+  PreparedGap prepared = prepare_gap(log, baseline, robot, options);
+  prepared.row_options.row_step = 1e-9;
+  GapProblem problem =
+      make_problem(prepared.drive, prepared.floor, prepared.healthy, prepared.trusted, prepared.catalogue,
+                   all_shapes(prepared.catalogue, prepared.drive), prepared.row_options);
+  BlockOptions blocks = options.blocks;
+  blocks.threads = options.threads;
+  const BlockGram gram(problem.rows.spaces, blocks);
+  problem.table.gram = &gram;
+  std::vector<std::string> names;
+  for (const std::size_t c : naive_selection(problem.table).members) {
+    names.push_back(problem.table.names[problem.table.candidates[c].effect]);
+  }
+  return names;
+}
+
+// What the improved robot file is, in a line that YAML ignores.
+std::string origin(const Arguments& a, const Diagnosis& d) {
+  std::vector<std::string> effects;
+  for (const GapCause& cause : d.causes) {
+    effects.push_back(report::effect_noun(cause.effect));
+  }
+  std::string line =
+      fmt::format("# {} with what `wheelwright gap` found in {}: {} ({}). {}.", a.robot.string(),
+                  fmt::join(names_of_files(a.logs), ", "), fmt::join(effects, ", "), name_of(d.verdict), software());
+  for (char& c : line) {
+    c = static_cast<unsigned char>(c) < 0x20U ? ' ' : c;
+  }
+  return line + "\n";
+}
+
+// Parameters of the credible set's members as they were fitted: `design --gap` begins from them.
+void add_rivals(Json& result, const std::vector<Rival>& rivals, const std::vector<Effect>& catalogue) {
+  for (const Rival& rival : rivals) {
+    std::vector<std::string> effects;
+    Json parameters = Json::object();
+    for (const RivalCause& cause : rival.causes) {
+      const Effect& effect = *std::ranges::find(catalogue, cause.effect, &Effect::name);
+      for (std::size_t c = 0; c < cause.coefficients.size(); ++c) {
+        parameters[effect.name + "." + effect.parameters[c].name] = {{"estimate", cause.coefficients[c]},
+                                                                     {"unit", effect.parameters[c].unit}};
+      }
+      for (std::size_t s = 0; s < cause.shape.size(); ++s) {
+        parameters[effect.name + "." + effect.shapes[s].name] = {{"estimate", cause.shape[s]},
+                                                                 {"unit", effect.shapes[s].unit}};
+      }
+      effects.push_back(cause.effect);
+    }
+    std::ranges::sort(effects);
+    for (Json& member : result["credible_set"]) {
+      auto own = member["effects"].get<std::vector<std::string>>();
+      std::ranges::sort(own);
+      if (own == effects) {
+        member["parameters"] = parameters;
+      }
+    }
+  }
+}
+
+// Designs the next drive of an ambiguous diagnosis; what hinders it becomes a note.
+NextDrive what_next(const Arguments& a, CsvLog& log, CsvLog* baseline, const Robot& robot, Diagnosis& d,
+                    const DiagnoseOptions& options) {
+  if (d.verdict != GapVerdict::ambiguous || a.no_manoeuvre) {
+    return {};
+  }
+  try {
+    NextDrive next = next_drive(log, baseline, robot, d, options);
+    if (!next.commands && !next.sentence.empty()) {
+      d.notes.push_back(next.sentence);
+    }
+    return next;
+  } catch (const InvalidArgument& error) {
+    d.notes.push_back(std::string("no manoeuvre was designed to tell the causes apart: ") + error.what());
+    return {};
+  }
+}
+
+void write_beside(const Arguments& a, const Diagnosis& d, const NextDrive& next) {
+  const std::filesystem::path& out = a.common.out;
+  write_residuals(out / kResiduals, d.series);
+  // What an earlier run left would contradict this one.
+  if (d.improved) {
+    atomic_write(out / kImproved, origin(a, d) + robot_yaml(*d.improved));
+  } else {
+    std::filesystem::remove(out / kImproved);
+  }
+  if (next.commands) {
+    write_csv(out / kNext, *next.commands);
+  } else {
+    std::filesystem::remove(out / kNext);
+  }
+}
+
+int run(const Arguments& a) {
+  make_directory(a.common);
+  const Robot robot = read_robot(a.robot);
+  const std::vector<Effect> catalogue = effect_catalogue(make_model(robot));
+  check_without(a.without, catalogue);
+  CsvOptions reader = reader_options(a.common);
+  reader.only = useful_columns(robot);
+  CsvLog log(a.logs, reader);
+  std::optional<CsvLog> baseline;
+  if (!a.baseline.empty()) {
+    baseline.emplace(a.baseline, reader);
+  }
+  CsvLog* const healthy = baseline ? &*baseline : nullptr;
+  ReportContext context = report_context(a.common, log.report(), log);
+  context.seeds = {{"permutations, bootstrap and search", a.common.seed}};
+  Progress progress(a.common.quiet);
+  DiagnoseOptions options;
+  options.without = a.without;
+  options.beta = a.beta;
+  options.shrink = !a.no_shrink;
+  options.seed = a.common.seed;
+  options.threads = static_cast<std::size_t>(a.common.threads);
+  options.progress = [&](std::string_view stage, double share) { progress.tell(stage, share); };
+  Diagnosis diagnosis;
+  NextDrive next;
+  std::vector<std::string> naive;
+  try {
+    require_columns(log, needed_columns(robot));
+    if (healthy != nullptr) {
+      require_columns(*healthy, needed_columns(robot));
+    }
+    diagnosis = diagnose(log, healthy, robot, options);
+    next = what_next(a, log, healthy, robot, diagnosis, options);
+    naive = a.naive ? naive_effects(log, healthy, robot, options) : naive;
+  } catch (const Error& error) {
+    if (!a.common.out.empty()) {
+      atomic_write(a.common.out / "report.html", failure_report(error.what(), context));
+    }
+    throw;
+  }
+  for (std::vector<std::string>* texts : {&diagnosis.notes, &diagnosis.not_excited}) {
+    for (std::string& text : *texts) {
+      text = in_words(text, catalogue);
+    }
+  }
+  const std::string promise = next.commands ? next.sentence : "";
+  if (diagnosis.summary.empty()) {
+    diagnosis.summary = report::gap_verdict(diagnosis);
+    for (const std::string& sentence : report::gap_sentences(diagnosis, promise)) {
+      diagnosis.summary += " " + sentence;
+    }
+  }
+  const bool files = !a.common.out.empty();
+  GapFiles names;
+  names.robot = a.robot.string();
+  names.logs = names_of_files(a.logs);
+  names.baseline = fmt::format("{}", fmt::join(names_of_files(a.baseline), ", "));
+  names.residuals = files ? kResiduals : "";
+  names.software = software();
+  if (next.commands) {
+    names.next_manoeuvre = NextManoeuvre{files ? kNext : "", promise};
+  }
+  Json result = to_json(diagnosis, names);
+  result["improved"] = files && diagnosis.improved ? Json(kImproved) : Json(nullptr);
+  add_rivals(result, next.rivals, catalogue);
+  if (a.naive) {
+    result["naive"] = {{"effects", naive}};
+  }
+  if (files) {
+    write_beside(a, diagnosis, next);
+  }
+  publish(a.common, result, "gap.json", files ? gap_report(diagnosis, robot.name, context, promise) : std::string());
+  if (!a.common.quiet && !a.common.json) {
+    for (const std::string& sentence : context.warnings) {
+      fmt::print("log: {}\n", sentence);
+    }
+    fmt::print("{}", summary(diagnosis, {a.common.out, a.robot, files && diagnosis.improved, promise,
+                                         files && next.commands, a.naive, naive}));
+    if (files) {
+      fmt::print("wrote {} and {}\n", (a.common.out / "gap.json").string(), (a.common.out / "report.html").string());
+    }
+  }
+  return kDone;
+}
+
+}  // namespace
+
+Run add_gap(CLI::App& program) {
+  auto a = std::make_shared<Arguments>();
+  CLI::App& command = *program.add_subcommand("gap", kHelp);
+  command.add_option("LOG", a->logs, "CSV logs (also .gz, .zst) of one robot in one state; taken together")->required();
+  command.add_option("--robot", a->robot, "Robot file (YAML): the model whose gap it is")
+      ->required()
+      ->type_name("FILE");
+  command.add_option("--baseline", a->baseline, "Log of the same robot when it was healthy (may be repeated)")
+      ->type_name("LOG")
+      ->expected(1)
+      ->allow_extra_args(false)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  command.add_option("--beta", a->beta, "Of the filter, 1/s (default: at most 10, lower where the motion is noisy)")
+      ->type_name("B")
+      ->check(CLI::Range(0.1, 1000.0));
+  command.add_option("--without", a->without, "Do not look for this effect of the catalogue (may be repeated)")
+      ->type_name("EFFECT")
+      ->expected(1)
+      ->allow_extra_args(false)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  command.add_flag("--no-shrink", a->no_shrink, "Do not measure how far the gap shrinks: much faster");
+  command.add_flag("--no-manoeuvre", a->no_manoeuvre, "Do not design a drive where causes cannot be told apart");
+  command.add_flag("--naive", a->naive,
+                   "Also say what forward selection by BIC over samples would say, to be compared with");
+  add_common(command, a->common);
+  add_map(command, a->common);
+  command.footer(kExamples);
+  return [a](const std::string& command_line) {
+    a->common.command_line = command_line;
+    return run(*a);
+  };
+}
+
+}  // namespace wheelwright::app

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// The drive that would tell apart causes which a log leaves standing.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <wheelwright/core/log.hpp>
+#include <wheelwright/gap/diagnose.hpp>
+#include <wheelwright/gap/discrimination_design.hpp>
+
+namespace wheelwright::app {
+
+/// What is to be driven next.
+struct NextDrive {
+  std::vector<Rival> rivals;         ///< members of the credible set as fitted to the log, in its order
+  std::optional<LogTable> commands;  ///< of the wheels; nothing where no drive tells any two of the rivals apart
+  std::string sentence;              ///< what the drive promises, and what no drive can
+};
+
+/// Designs the drive for the credible set of `diagnosis`, the first few members of it: each fitted to the log again, of
+/// the robot and options that diagnosed it. Limits are those of the robot file; where it has none, what the log itself
+/// drove: speeds, accelerations, and with a pose the distance from the start. Four fifths of the effort are planned with, for
+/// the controller to have the rest.
+[[nodiscard]] NextDrive next_drive(LogSource& log, LogSource* baseline, const Robot& robot, const Diagnosis& diagnosis,
+                                   const DiagnoseOptions& options);
+
+/// `text` with every name of an effect in it said in words: "dry friction" for "coulomb".
+[[nodiscard]] std::string in_words(std::string text, const std::vector<Effect>& catalogue);
+
+}  // namespace wheelwright::app
