@@ -2,7 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scores what `wheelwright gap` said of cases with withheld effects, as Markdown.
 
-    score_withheld.py ANSWERS.json RESULTS    RESULTS has CASE/gap.json (or CASE.json) for every case
+    score_withheld.py [--naive] ANSWERS.json RESULTS    RESULTS has CASE/gap.json (or CASE.json) for every case
+
+With --naive what is scored is the answer of the naive rule (`wheelwright gap --naive`), not the diagnosis.
 """
 
 import json
@@ -51,6 +53,13 @@ def credible(gap):
     return sets or ([said(gap)] if said(gap) else [])
 
 
+def naive_answer(gap):
+    """The naive rule's answer in the shape of a diagnosis: it knows no alternatives and no floor."""
+    effects = gap["naive"]["effects"]
+    return {"verdict": "explained" if effects else "no_gap",
+            "causes": [{"effect": effect, "parameters": {}} for effect in effects]}
+
+
 class Count:
     def __init__(self):
         self.good = 0
@@ -90,7 +99,7 @@ def numbers(answer):
     return {(e["effect"], name): value for e in answer["effects"] for name, value in e.get("parameters", {}).items()}
 
 
-def score(answers, results):
+def score(answers, results, naive=False):
     rows = defaultdict(Count)
     sizes = []
     confusion = defaultdict(Counter)
@@ -107,6 +116,7 @@ def score(answers, results):
             missed.append(f"{case}: {label}: no result")
             confusion["two effects" if kind == "pair" else label]["no result"] += 1
             continue
+        gap = naive_answer(gap) if naive else gap
         verdict = gap.get("verdict", "")
         causes = said(gap)
         kept = credible(gap)
@@ -166,8 +176,8 @@ def score(answers, results):
 ORDER = ["results", "single", "parametric", "two", "no effect", "outside"]
 
 
-def report(answers, results, out=sys.stdout):
-    rows, sizes, confusion, coverage, missed = score(answers, results)
+def report(answers, results, naive=False, out=sys.stdout):
+    rows, sizes, confusion, coverage, missed = score(answers, results, naive)
     print("| measure | cases |\n|---|---|", file=out)
     for name in sorted(rows, key=lambda n: next(k for k, word in enumerate(ORDER) if n.startswith(word))):
         print(f"| {name} | {rows[name]} |", file=out)
@@ -192,11 +202,13 @@ def report(answers, results, out=sys.stdout):
 
 
 def main(arguments):
+    naive = arguments[:1] == ["--naive"]
+    arguments = arguments[naive:]
     if len(arguments) != 2 or arguments[0].startswith("-"):
         print(__doc__, file=sys.stderr)
         return 2
     answers = json.loads(Path(arguments[0]).read_text(encoding="utf-8"))
-    report(answers, Path(arguments[1]))
+    report(answers, Path(arguments[1]), naive)
     return 0
 
 

@@ -7,7 +7,8 @@
 #
 # SET is a directory of cases that is there already: case_*/ (or logs/case_*/) beside answers.json. Without it a set is
 # made in DIR/set. The tool sees logs and robot file of a case and nothing else; its results are in DIR/results.
-#   --only WORD  passes --WORD to `wheelwright gap` and keeps the results in DIR/results-WORD
+#   --only WORD  passes --WORD to `wheelwright gap` and keeps the results in DIR/results-WORD; naive: scores what the
+#                naive rule said
 # The table is Markdown on standard output. BUILD (default build) is the build directory, JOBS (2) the cases at a time.
 set -eu
 root=$(cd "$(dirname "$0")/.." && pwd)
@@ -52,4 +53,6 @@ find "$logs" -maxdepth 1 -name 'case_*' -type d -exec basename {} \; | sort | xa
     --baseline "$logs/$case/baseline.csv.gz" --out "$results/$case" ${only:+--$only} --threads 1 --quiet \
     >"$results/$case.log" 2>&1 || [ $? -eq 1 ] || echo "withheld: $case failed, see $results/$case.log" >&2'
 
-python3 "$root/tools/score_withheld.py" "$set/answers.json" "$results"
+naive=''
+[ "$only" != naive ] || naive=--naive
+python3 "$root/tools/score_withheld.py" ${naive:+"$naive"} "$set/answers.json" "$results"
