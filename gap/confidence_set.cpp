@@ -34,25 +34,28 @@ std::vector<double> model_confidence_set(const std::vector<Eigen::VectorXd>& los
       best = i;
     }
   }
-  struct Rival {
-    std::size_t model;
-    Eigen::VectorXd difference;  // against the best, freed of its mean
-    double mean, error, t;
-  };
-  std::vector<Rival> rivals;
+  std::vector<double> t(losses.size());
+  std::vector<std::size_t> order{best};  // the best, then the others, the one to be dropped last first
   for (std::size_t i = 0; i < losses.size(); ++i) {
-    if (i == best) {
-      continue;
+    if (i != best) {
+      t[i] = ((losses[i] - losses[best]).mean() - options.margin) / standard_error(losses[i] - losses[best]);
+      order.push_back(i);
     }
-    Eigen::VectorXd d = losses[i] - losses[best];
-    const double mean = d.mean();
-    const double error = standard_error(d);
-    rivals.push_back({i, d.array() - mean, mean, error, (mean - options.margin) / error});
   }
-  std::stable_sort(rivals.begin(), rivals.end(), [](const Rival& a, const Rival& b) { return a.t > b.t; });
+  std::stable_sort(order.begin() + 1, order.end(), [&t](std::size_t a, std::size_t b) { return t[a] < t[b]; });
+  const auto models = static_cast<Eigen::Index>(order.size());
+  Eigen::MatrixXd centred(blocks, models), error(models, models);
+  for (Eigen::Index i = 0; i < models; ++i) {
+    const Eigen::VectorXd& loss = losses[order[static_cast<std::size_t>(i)]];
+    centred.col(i) = loss.array() - loss.mean();
+    for (Eigen::Index j = 0; j < i; ++j) {
+      error(i, j) = error(j, i) = standard_error(centred.col(i) - centred.col(j));
+    }
+  }
 
-  // How often the largest of the studentised means of the rivals k … end, resampled about zero, is at least t_k.
-  std::vector<std::size_t> beyond(rivals.size(), 0);
+  // How often the largest studentised mean among the first k + 1 models, beyond that of the best of them, is at least t_k
+  // where all are equally good: which one comes out best is left to chance too.
+  std::vector<std::size_t> beyond(order.size(), 0);
   std::mt19937_64 generator(options.seed);
   std::uniform_int_distribution<Eigen::Index> any(0, blocks - 1);
   Eigen::VectorXd weight(blocks);
@@ -61,18 +64,27 @@ std::vector<double> model_confidence_set(const std::vector<Eigen::VectorXd>& los
     for (Eigen::Index b = 0; b < blocks; ++b) {
       weight[any(generator)] += 1.0;
     }
-    double largest = -std::numeric_limits<double>::infinity();
-    for (std::size_t k = rivals.size(); k-- > 0;) {
-      const double mean = weight.dot(rivals[k].difference) / static_cast<double>(blocks);
-      largest = std::max(largest, mean / rivals[k].error);
-      beyond[k] += largest >= rivals[k].t ? 1 : 0;
+    const Eigen::VectorXd mean = centred.transpose() * weight / static_cast<double>(blocks);
+    Eigen::Index lowest = 0;
+    double largest = 0.0;
+    for (Eigen::Index k = 1; k < models; ++k) {
+      if (mean[k] < mean[lowest]) {
+        lowest = k;
+        largest = 0.0;
+        for (Eigen::Index i = 0; i < k; ++i) {
+          largest = std::max(largest, (mean[i] - mean[k]) / error(i, k));
+        }
+      } else {
+        largest = std::max(largest, (mean[k] - mean[lowest]) / error(k, lowest));
+      }
+      beyond[static_cast<std::size_t>(k)] += largest >= t[order[static_cast<std::size_t>(k)]] ? 1 : 0;
     }
   }
   std::vector<double> p(losses.size(), 1.0);
   double so_far = 0.0;
-  for (std::size_t k = 0; k < rivals.size(); ++k) {
+  for (std::size_t k = order.size() - 1; k > 0; --k) {
     so_far = std::max(so_far, (1.0 + static_cast<double>(beyond[k])) / (1.0 + static_cast<double>(options.resamples)));
-    p[rivals[k].model] = so_far;
+    p[order[k]] = so_far;
   }
   return p;
 }
