@@ -198,6 +198,10 @@ Diagnosis diagnose(LogSource& log, LogSource* baseline, const Robot& robot, cons
   result.beta = prepared.row_options.beta;
   result.floor_origin = prepared.floor_origin;
   result.notes = prepared.notes;
+  if (!found.enough_blocks) {
+    result.notes.push_back(
+        "the log is too short for any cause to stand out from chance: drive longer, or look for fewer effects");
+  }
   const double square = signal_square(problem);
   result.gap = std::max(found.nominal_excess, 0.0) / square;
   result.structural = std::max(found.refitted_excess, 0.0) / square;

@@ -53,6 +53,61 @@ Energies energies(double step, double beta, bool counted) {
           filtered_rate(impulse, beta, speed).squaredNorm()};
 }
 
+double root_mean_square(const Eigen::VectorXd& signal, const Mask& use) {
+  double sum = 0.0;
+  for (Eigen::Index k = 0; k < signal.size(); ++k) {
+    sum += use[k] ? signal[k] * signal[k] : 0.0;
+  }
+  return std::sqrt(sum / std::max(1.0, static_cast<double>(use.count())));
+}
+
+// h² ü; 0 at the ends of segments.
+Eigen::VectorXd second_difference(const Drive& drive, const Eigen::VectorXd& signal) {
+  Eigen::VectorXd difference = Eigen::VectorXd::Zero(signal.size());
+  for (std::size_t s = 0; s < drive.segment_starts.size(); ++s) {
+    const auto [first, last] = drive.segment(s);
+    for (Eigen::Index k = first + 1; k + 1 < last; ++k) {
+      difference[k] = signal[k + 1] - 2.0 * signal[k] + signal[k - 1];
+    }
+  }
+  return difference;
+}
+
+// A signal that is taken as linear between its instants lacks h²/12 of its second derivative, in the mean over a step.
+// The motion lacks it too, so that the rows are wrong by as much as that makes of the efforts.
+Eigen::VectorXd step_errors(const Drive& drive, double beta) {
+  const auto n = static_cast<Eigen::Index>(drive.model.n());
+  const Mask use = settled(drive, beta) && moving(drive, beta);
+  Eigen::VectorXd errors(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    Eigen::VectorXd output = Eigen::VectorXd::Zero(drive.rows());
+    for (std::size_t j = 0; j < drive.joints.size(); ++j) {
+      output += drive.model.input(i, static_cast<Eigen::Index>(j)) * drive.joints[j].effort;
+    }
+    errors[i] = root_mean_square(filtered(drive, beta, second_difference(drive, output)), use) / 12.0;
+  }
+  return errors;
+}
+
+// Likewise of odometry over a window: h²/12 of the change of acceleration from its one end to the other by the trapezoidal
+// rule, and half as much again where speeds are means over their step.
+IncrementNoise step_errors(const Drive& drive) {
+  const double share = drive.step * drive.step / 8.0 * std::sqrt(2.0);
+  const Mask all = Mask::Constant(drive.rows(), true);
+  const CoordinateSignals &forward = drive.coordinates[0], &turn = drive.coordinates[1];
+  IncrementNoise errors;
+  errors.forward = share * root_mean_square(forward.smooth_acceleration, all);
+  errors.lateral = share * root_mean_square(forward.smooth_speed.cwiseProduct(turn.smooth_speed), all);
+  errors.yaw = share * root_mean_square(turn.smooth_acceleration, all);
+  return errors;
+}
+
+void add(double& noise, double further) {
+  if (noise > 0.0) {
+    noise = std::hypot(noise, further);
+  }
+}
+
 }  // namespace
 
 SignalNoise signal_noise(const Drive& drive) {
@@ -89,8 +144,14 @@ NoiseFloor noise_floor(const Drive& drive, const SignalNoise& noise, double beta
       variance[i] += std::pow(noise.speed[j], 2) * (rate * rate * energy.acceleration + speed * speed * energy.speed);
     }
   }
-  floor.efforts = variance.cwiseSqrt();
+  floor.efforts = (variance + step_errors(drive, beta).cwiseAbs2()).cwiseSqrt();
   floor.increments = pose_noise(drive);
+  if (drive.two_wheels()) {
+    const IncrementNoise errors = step_errors(drive);
+    add(floor.increments.forward, errors.forward);
+    add(floor.increments.lateral, errors.lateral);
+    add(floor.increments.yaw, errors.yaw);
+  }
   if (noise.counted && drive.two_wheels()) {
     // Errors of two wheels' angles at both ends of a window.
     const double rim = drive.wheel_radius * drive.count * drive.step / std::sqrt(12.0);

@@ -31,6 +31,9 @@ double signed_rank(const CauseSet& worse, const CauseSet& better) {
   return (positive - n * (n + 1.0) / 4.0) / std::sqrt(n * (n + 1.0) * (2.0 * n + 1.0) / 24.0);
 }
 
+// The same where every one of `blocks` blocks is better.
+double largest_signed_rank(double blocks) { return std::sqrt(1.5 * blocks * (blocks + 1.0) / (2.0 * blocks + 1.0)); }
+
 // What the columns `on` leave of the products of the columns `of`.
 Eigen::MatrixXd remainder(const BlockGram& gram, const std::vector<std::size_t>& of,
                           const std::vector<std::size_t>& on) {
@@ -96,6 +99,8 @@ class Selector {
     }
     const std::vector<std::vector<CauseSet>> levels = search_causes(table_, search);
     const CauseSet& nothing = levels[0][0];
+    const auto used = static_cast<double>((table_.gram->rows().array() > 0.0).count());
+    result.enough_blocks = largest_signed_rank(used) > critical_;
     const CauseSet nominal = nominal_trusted ? evaluate(table_, {}, BaseModel::nominal) : nothing;
     result.refitted_excess = nothing.held_out_error - floor_;
     result.nominal_excess = nominal.held_out_error - floor_;
@@ -132,10 +137,13 @@ class Selector {
  private:
   [[nodiscard]] double excess(const CauseSet& set) const { return std::max(set.held_out_error - floor_, 0.0); }
 
-  // Whether `next` is worth its further causes.
+  // Whether `next` is worth its further causes. Nothing is where the floor is reached already.
   [[nodiscard]] bool gains(const CauseSet& now, const CauseSet& next, double whole) const {
     const double gain = now.held_out_error - next.held_out_error;
     const double left = excess(now);
+    if (!(left > 0.0)) {
+      return false;
+    }
     const bool counts = gain > options_.share * whole && gain > options_.part * left;
     const bool large = gain > options_.large_share * whole;
     const bool last =
@@ -225,7 +233,7 @@ class Selector {
   [[nodiscard]] std::vector<CauseSet> explain_theta(const CauseSet& structural) const {
     const CauseSet held = with_shapes_for_nominal(structural);
     const double tolerable = std::max(options_.theta_share * gap_, options_.smallest);
-    if (held.held_out_error - structural.held_out_error <= tolerable) {
+    if (excess(held) - excess(structural) <= tolerable) {
       return {held};
     }
     std::vector<std::size_t> movers;
@@ -240,7 +248,7 @@ class Selector {
         members.insert(members.end(), held.members.begin(), held.members.end());
         std::sort(members.begin(), members.end());
         CauseSet set = evaluate(table_, std::move(members), BaseModel::nominal);
-        if (set.held_out_error - structural.held_out_error <= tolerable) {
+        if (excess(set) - excess(structural) <= tolerable) {
           found.push_back(std::move(set));
         }
       };

@@ -8,7 +8,8 @@
 /// causes added until that leaves no more than θ fitted freely.
 ///
 /// A further cause is taken only if it removes a good part of what is left and a part of the whole gap that counts, by more
-/// than what chance does over blocks of time and the number of effects that were tried. The rows of a model that
+/// than what chance does over blocks of time and the number of effects that were tried; none is asked for at the floor.
+/// The rows of a model that
 /// is nearly right leave a misfit of their own (a smoothed sign, a neglected second order); the misfit of the best set is the
 /// yardstick by which others are as good.
 #pragma once
@@ -60,6 +61,7 @@ struct Selection {
   bool theta_moved = false;              ///< θ differs from nominal and no parametric cause says why
   bool reaches_floor = true;             ///< what is left is tolerable
   bool any_cause = false;
+  bool enough_blocks = true;        ///< else no gain could have been significant over so few blocks of time
   std::vector<CauseSet> looked_at;  ///< every single effect and the best pairs and triples, θ fitted again
 };
 
