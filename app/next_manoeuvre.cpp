@@ -17,10 +17,10 @@
 namespace wheelwright::app {
 namespace {
 
-constexpr std::size_t kMostRivals = 4;   // pairs grow with the square
-constexpr double kPlannedEffort = 0.8;   // of the limit
-constexpr double kDuration = 20.0;       // s
-constexpr double kShortestTravel = 0.5;  // m
+constexpr std::size_t kMostRivals = 4;               // pairs grow with the square
+constexpr double kPlannedEffort = 0.8;               // of the limit
+constexpr double kShortest = 20.0, kLongest = 60.0;  // s; between them a third of the log that was analysed
+constexpr double kShortestTravel = 0.5;              // m
 
 // The best fit of a set of effects at any of their shapes.
 CauseSet best_set(const CandidateTable& table, const std::vector<std::string>& effects, BaseModel base) {
@@ -111,7 +111,7 @@ double largest(const Drive& drive, Eigen::VectorXd JointSignals::*signal) {
 
 MotionLimits limits_within(const Drive& drive, const Robot& robot) {
   MotionLimits limits = limits_of(robot);
-  limits.duration = kDuration;
+  limits.duration = std::clamp(static_cast<double>(drive.rows()) * drive.step / 3.0, kShortest, kLongest);
   if (!(limits.joint_speed > 0.0)) {
     limits.joint_speed = largest(drive, &JointSignals::smooth_speed);
   }
@@ -164,12 +164,13 @@ NextDrive next_drive(LogSource& log, LogSource* baseline, const Robot& robot, co
       options.progress("designing the next manoeuvre", share);
     }
   };
-  const DiscriminationDesign design = design_for_discrimination(
-      subject, limits_within(prepared.drive, robot), next.rivals, prepared.catalogue, noise, search, &prepared.drive);
+  const MotionLimits limits = limits_within(prepared.drive, robot);
+  const DiscriminationDesign design =
+      design_for_discrimination(subject, limits, next.rivals, prepared.catalogue, noise, search, &prepared.drive);
   next.sentence = in_words(joined(design.sentences), prepared.catalogue);
   if (design.worst()) {
     next.commands = command_table(design.manoeuvre.plan, subject.model);
-    next.sentence = fmt::format("A drive of {:.0f} s within {:.2g} m of its start. {}", kDuration,
+    next.sentence = fmt::format("A drive of {:.0f} s within {:.2g} m of its start. {}", limits.duration,
                                 design.manoeuvre.plan.pose.topRows<2>().colwise().norm().maxCoeff(), next.sentence);
   }
   return next;
@@ -186,10 +187,13 @@ std::string in_words(std::string text, const std::vector<Effect>& catalogue) {
     const std::string word = text.substr(at, end - at);
     const bool effect = std::ranges::find(catalogue, word, &Effect::name) != catalogue.end();
     out += effect ? report::effect_noun(word) : word;
-    if (end < text.size()) {
-      out += text[end];
+    if (effect && text.compare(end, 3, " + ") == 0) {
+      out += " with ";
+      end += 3;
+    } else if (end < text.size()) {
+      out += text[end++];
     }
-    at = end + 1;
+    at = end;
   }
   return out;
 }

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+// `wheelwright gap`, as a user runs it: a simulated robot whose bearings are dry, its plain robot file, a healthy log.
+#include "app/program.hpp"
+
+#include <wheelwright/io/robot_file.hpp>
+
+namespace wheelwright {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+using testing::Outcome;
+
+constexpr double kCoulomb = 0.25;  // N·m
+
+class Gap : public testing::ProgramTest {
+ protected:
+  void drive(const std::string& name, const std::string& robot, int seed, const std::string& more = "",
+             int duration = 50) const {
+    put(name + ".yaml", "robot: " + robot +
+                            "\nparameters: {mass: 21.0, yaw_inertia: 0.9, viscous_linear: 4.0, viscous_yaw: 0.5}\n"
+                            "trajectory: {kind: commissioning, speed: 0.6, yaw_rate: 1.2, period: 8}\n" +
+                            more +
+                            "sensors: {effort: 0.02, position: 0.002, heading: 0.003, "
+                            "encoder_counts_per_turn: 4096, log: [angles, pose]}\nrate: 100\n" +
+                            fmt::format("duration: {}\nseed: {}\n", duration, seed));
+    const Outcome done = run("simulate " + name + ".yaml --out " + name + ".csv --quiet");
+    ASSERT_EQ(done.code, 0) << done.err;
+  }
+};
+
+TEST_F(Gap, ADryBearingIsNamedAndTheImprovedRobotFileTightensThresholds) {
+  drive("healthy", "robot.yaml", 1);
+  drive("real", "robot.yaml", 2, fmt::format("effects: [{{effect: coulomb, c: {}}}]\n", kCoulomb));
+  const Outcome told = run("gap real.csv --robot robot.yaml --baseline healthy.csv --out gap --naive");
+  ASSERT_EQ(told.code, 0) << told.err;
+  EXPECT_THAT(told.out, AllOf(HasSubstr("Dry friction"), HasSubstr("next: wheelwright commission"),
+                              HasSubstr("robot_improved.yaml"), Not(HasSubstr("coulomb"))));
+  EXPECT_THAT(names_in("gap"), ElementsAre("gap.json", "report.html", "residuals.csv", "robot_improved.yaml"));
+  if (has_validator()) {
+    EXPECT_EQ(misfit("gap.schema.json", "gap/gap.json"), "");
+  }
+  const Json gap = read_json(path("gap/gap.json"));
+  EXPECT_EQ(gap.at("verdict"), "explained");
+  ASSERT_EQ(gap.at("causes").size(), 1U);
+  EXPECT_EQ(gap.at("causes")[0].at("effect"), "coulomb");
+  const Json& c = gap.at("causes")[0].at("parameters").at("c");
+  EXPECT_LE(c.at("lower"), kCoulomb);
+  EXPECT_GE(c.at("upper"), kCoulomb);
+  EXPECT_TRUE(gap.at("next_manoeuvre").is_null());
+  EXPECT_THAT(gap.at("naive").at("effects"), Not(IsEmpty()));
+
+  EXPECT_THAT(bytes(path("gap/robot_improved.yaml")), HasSubstr("# robot.yaml with what"));
+  ASSERT_EQ(read_robot(path("gap/robot_improved.yaml")).effects.size(), 1U);
+  drive("improved", "gap/robot_improved.yaml", 3, "", 5);
+  const auto width = [&](const std::string& robot) {
+    const Outcome done = run("commission real.csv --robot " + robot + " --out model --quiet");
+    EXPECT_EQ(done.code, 0) << done.err;
+    const Json model = read_json(path("model/model.json"));
+    double sum = 0.0;
+    for (const Json& channel : model.at("validation").at("outputs")) {
+      sum += channel.at("width_over_torque_rms").get<double>();
+    }
+    return sum;
+  };
+  EXPECT_LT(width("gap/robot_improved.yaml"), 0.8 * width("robot.yaml"));
+}
+
+TEST_F(Gap, AHealthyRobotHasNone) {
+  drive("healthy", "robot.yaml", 1, "", 40);
+  drive("again", "robot.yaml", 2, "", 40);
+  std::filesystem::create_directories(path("gap"));
+  put("gap/robot_improved.yaml", "of an earlier run");
+  const Outcome told = run("gap again.csv --robot robot.yaml --baseline healthy.csv --no-shrink --out gap");
+  ASSERT_EQ(told.code, 0) << told.err;
+  EXPECT_THAT(told.out, AllOf(HasSubstr("No gap"), HasSubstr("nothing is to be added")));
+  EXPECT_EQ(read_json(path("gap/gap.json")).at("verdict"), "no_gap");
+  EXPECT_FALSE(std::filesystem::exists(path("gap/robot_improved.yaml")));
+}
+
+TEST_F(Gap, WhatOneLeavesOutIsNotNamed) {
+  drive("healthy", "robot.yaml", 1, "", 40);
+  drive("real", "robot.yaml", 2, fmt::format("effects: [{{effect: coulomb, c: {}}}]\n", kCoulomb), 40);
+  const Outcome told =
+      run("gap real.csv --robot robot.yaml --baseline healthy.csv --without coulomb --without coulomb_asymmetric "
+          "--no-shrink --no-manoeuvre --json");
+  ASSERT_EQ(told.code, 0) << told.err;
+  const Json gap = Json::parse(told.out);
+  for (const Json& cause : gap.at("causes")) {
+    EXPECT_NE(cause.at("effect"), "coulomb");
+  }
+  EXPECT_NE(gap.at("verdict"), "no_gap");
+  EXPECT_TRUE(gap.at("improved").is_null());
+  EXPECT_FALSE(gap.contains("naive"));
+}
+
+TEST_F(Gap, SaysWhatIsWrong) {
+  drive("short", "robot.yaml", 1, "", 1);
+  const auto complaint = [&](const std::string& arguments) {
+    const Outcome done = run("gap " + arguments + " --quiet");
+    EXPECT_EQ(done.code, 2) << arguments;
+    EXPECT_THAT(done.out, IsEmpty());
+    return done.err;
+  };
+  EXPECT_THAT(complaint("gone.csv --robot robot.yaml"), HasSubstr("gone.csv"));
+  EXPECT_THAT(complaint("short.csv --robot robot.yaml --baseline gone.csv"), HasSubstr("gone.csv"));
+  EXPECT_THAT(complaint("short.csv --robot robot.yaml --without colomb"), HasSubstr("did you mean 'coulomb'"));
+  EXPECT_THAT(complaint("short.csv --robot robot.yaml --out short"), HasSubstr("drive longer"));
+  EXPECT_THAT(names_in("short"), ElementsAre("report.html"));
+  EXPECT_THAT(complaint("short.csv --robot robot.yaml --beta 0"), HasSubstr("--beta"));
+}
+
+}  // namespace
+}  // namespace wheelwright
