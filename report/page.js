@@ -103,7 +103,7 @@
         series: [upper + 1, lower + 1], fill: colour(pale ? "tolerance" : "spread"),
       })),
       axes: [Object.assign(axis(), {label: "time, s", labelSize: 18, labelFont: "11px sans-serif", size: 32}),
-             Object.assign(axis(), {size: 62})],
+             Object.assign(axis(), {size: 62, values: (u, ticks) => ticks.map((x) => value(u, x))})],
       hooks: {
         drawClear: [paintMarks(data)],
         setSelect: [(u) => {
