@@ -33,6 +33,8 @@ class Gap : public testing::ProgramTest {
 };
 
 TEST_F(Gap, ADryBearingIsNamedAndTheImprovedRobotFileTightensThresholds) {
+  // Left open, commissioning would choose a model with dry friction by itself.
+  put("robot.yaml", bytes(path("robot.yaml")) + "parameters: [mass, yaw_inertia, viscous_linear, viscous_yaw]\n");
   drive("healthy", "robot.yaml", 1);
   drive("real", "robot.yaml", 2, fmt::format("effects: [{{effect: coulomb, c: {}}}]\n", kCoulomb));
   const Outcome told = run("gap real.csv --robot robot.yaml --baseline healthy.csv --out gap --naive");
