@@ -35,21 +35,29 @@ struct Energies {
   double acceleration;  // of f₂ * u̇ for the noise of a speed
 };
 
-Energies energies(double step, double beta, bool counted) {
+Energies energies(const Drive& drive, double beta, bool counted) {
+  const double step = drive.step;
   Drive impulse;
   impulse.step = step;
+  impulse.model.outputs = {"one"};
+  impulse.model.input = Eigen::MatrixXd::Ones(1, 1);
+  impulse.joints.resize(1);
   const auto n = static_cast<Eigen::Index>(std::ceil(40.0 / (beta * step))) + 8;
   impulse.t = Eigen::VectorXd::LinSpaced(n, 0.0, step * static_cast<double>(n - 1));
   impulse.segment_starts = {0};
   Eigen::VectorXd one = Eigen::VectorXd::Zero(n);
   one[3] = 1.0;
+  impulse.joints[0].effort = one;
+  if (drive.joints.front().held_effort.size() > 0) {
+    impulse.joints[0].held_effort = one;
+  }
   Eigen::VectorXd speed = one;
   if (counted) {
     // An error of one angle is in two speeds, with opposite signs; a speed's variance is that of two angles.
     speed[3] = std::sqrt(0.5);
     speed[4] = -std::sqrt(0.5);
   }
-  return {filtered(impulse, beta, one).squaredNorm(), filtered(impulse, beta, speed).squaredNorm(),
+  return {filtered_outputs(impulse, beta).front().squaredNorm(), filtered(impulse, beta, speed).squaredNorm(),
           filtered_rate(impulse, beta, speed).squaredNorm()};
 }
 
@@ -118,14 +126,14 @@ SignalNoise signal_noise(const Drive& drive) {
   noise.counted = drive.count > 0.0;
   for (Eigen::Index j = 0; j < joints; ++j) {
     const JointSignals& joint = drive.joints[static_cast<std::size_t>(j)];
-    noise.effort[j] = by_third_differences(drive, joint.effort);
+    noise.effort[j] = by_third_differences(drive, joint.held_effort.size() > 0 ? joint.held_effort : joint.effort);
     noise.speed[j] = noise.counted ? drive.count * std::sqrt(2.0 / 12.0) : by_third_differences(drive, joint.speed);
   }
   return noise;
 }
 
 NoiseFloor noise_floor(const Drive& drive, const SignalNoise& noise, double beta) {
-  const Energies energy = energies(drive.step, beta, noise.counted);
+  const Energies energy = energies(drive, beta, noise.counted);
   NoiseFloor floor;
   const auto n = static_cast<Eigen::Index>(drive.model.n());
   Eigen::VectorXd variance = Eigen::VectorXd::Zero(n);
@@ -164,7 +172,7 @@ NoiseFloor noise_floor(const Drive& drive, const SignalNoise& noise, double beta
 }
 
 double attenuation(const Drive& drive, const SignalNoise& noise, double beta) {
-  const Energies energy = energies(drive.step, beta, noise.counted);
+  const Energies energy = energies(drive, beta, noise.counted);
   const Mask use = settled(drive, beta);
   double largest = 0.0;
   for (std::size_t c = 0; c < drive.coordinates.size(); ++c) {

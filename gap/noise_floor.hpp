@@ -17,8 +17,9 @@ struct SignalNoise {
   bool counted = false;    ///< speeds are differences of encoder counts: their errors cancel from sample to sample
 };
 
-/// Third differences of the signals, of which a smooth motion leaves nothing; robust against jumps (median). Counted speeds
-/// have the error of a uniformly rounded angle, count·h/√12, at both ends of the interval.
+/// Third differences of the signals, of which a smooth motion leaves nothing; robust against jumps (the median of Gaussian
+/// noise: uniform noise comes out 5 % too large). Held efforts are taken as they are held. Counted speeds have the error of
+/// a uniformly rounded angle, count·h/√12, at both ends of the interval.
 [[nodiscard]] SignalNoise signal_noise(const Drive& drive);
 
 /// The floor that `noise` makes through f₂ at `beta`: of the efforts directly, and of the motion through the base
