@@ -172,10 +172,48 @@ class Selector {
     return std::max(options_.misfit * excess(best), 0.3 * options_.smallest);
   }
 
+  // Whether the causes of the set undo each other.
+  [[nodiscard]] bool cancels(const CauseSet& set) const {
+    if (set.members.size() < 2) {
+      return false;
+    }
+    const Subset subset = subset_of(table_, set.members, BaseModel::refitted);
+    const Eigen::VectorXd coefficients = table_.gram->fit(subset).coefficients;
+    // Columns of all members with their weights, member by member.
+    std::vector<std::vector<std::pair<std::size_t, double>>> parts;
+    auto next = static_cast<Eigen::Index>(table_.base.size());
+    for (const std::size_t c : set.members) {
+      const Candidate& candidate = table_.candidates[c];
+      std::vector<std::pair<std::size_t, double>> part;
+      for (const std::size_t column : candidate.columns) {
+        part.emplace_back(column, candidate.unit_coefficient ? 1.0 : coefficients[next++]);
+      }
+      parts.push_back(std::move(part));
+    }
+    double own = 0.0, together = 0.0;
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+      for (std::size_t j = 0; j < parts.size(); ++j) {
+        double product = 0.0;
+        for (const auto& [a, weight_a] : parts[i]) {
+          for (const auto& [b, weight_b] : parts[j]) {
+            product += weight_a * weight_b * table_.gram->product(a, b);
+          }
+        }
+        together += product;
+        own += i == j ? product : 0.0;
+      }
+    }
+    return own > options_.cancellation * together;
+  }
+
   // The set of a level to go on with: the best, or one it contains that is as good with fewer coefficients.
   [[nodiscard]] const CauseSet& simplest(const std::vector<CauseSet>& level) const {
-    const CauseSet* chosen = &level.front();
+    const auto first = std::find_if(level.begin(), level.end(), [this](const CauseSet& set) { return !cancels(set); });
+    const CauseSet* chosen = first == level.end() ? &level.front() : &*first;
     for (const CauseSet& set : level) {
+      if (cancels(set)) {
+        continue;
+      }
       if (set.coefficients < chosen->coefficients &&
           set.held_out_error <= level.front().held_out_error + margin(level.front()) &&
           unexplained_by(table_, set.members, level.front().members, BaseModel::refitted) < options_.contained) {
@@ -190,7 +228,7 @@ class Selector {
     std::vector<CauseSet> rivals{best};
     for (const CauseSet& set : level) {
       const bool itself = set.members == best.members;
-      const bool close = set.held_out_error <= best.held_out_error + 3.0 * margin(best) + 0.005 * gap_;
+      const bool close = !cancels(set) && set.held_out_error <= best.held_out_error + 3.0 * margin(best) + 0.005 * gap_;
       if (itself || !close) {
         continue;
       }

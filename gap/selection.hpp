@@ -34,7 +34,10 @@ struct SelectionOptions {
   double significance = 0.05;  ///< of a gain, over all effects that were tried
   double misfit = 1.0;         ///< times the best set's own excess by which another set may be worse and be as good
   double level = 0.10;         ///< 1 − level: of the confidence set
-  double tolerated = 0.04;     ///< share of the structural part that an explanation may leave …
+  double cancellation =
+      4.0;                  ///< sum of squares of the causes' own signatures over that of their sum, above which a set
+                            ///< is no explanation: causes that undo each other
+  double tolerated = 0.04;  ///< share of the structural part that an explanation may leave …
   double tolerated_nominal = 0.003;  ///< … or of the whole gap, θ's part included, up to four times …
   double tolerated_floor = 0.5;      ///< … or excess in mean squares of the floor, whichever is larger
   double theta_share = 0.06;         ///< of the gap that θ may make by having moved without a cause being asked for
