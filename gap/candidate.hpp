@@ -20,6 +20,9 @@ struct Candidate {
   std::vector<std::size_t> columns;
   std::vector<int> sign;          ///< of each column's coefficient, as Subset::sign
   bool unit_coefficient = false;  ///< the columns enter with the coefficient 1
+  std::vector<std::size_t>
+      own{};  ///< those of the columns that are the effect itself, not what comes along with it; empty:
+              ///< all
 };
 
 /// All candidates of a gap analysis. Keeps a reference to the Gram matrices.

@@ -75,7 +75,8 @@ std::vector<ConfusablePair> confusable_pairs(const CandidateTable& table, BaseMo
   }
   const auto made_up = [&](const Signature& a, const Signature& b) {
     std::vector<std::size_t> on = theta;
-    const std::vector<std::size_t>& columns = table.candidates[b.candidate].columns;
+    const Candidate& rival = table.candidates[b.candidate];
+    const std::vector<std::size_t>& columns = rival.own.empty() ? rival.columns : rival.own;
     on.insert(on.end(), columns.begin(), columns.end());
     return 1.0 - left_of(gram, table.candidates[a.candidate].columns, a.weights, on) / a.square;
   };

@@ -170,6 +170,9 @@ Diagnosis diagnose(LogSource& log, LogSource* baseline, const Robot& robot, cons
   SelectionOptions selection = options.selection;
   selection.threads = options.threads;
   selection.seed = options.seed;
+  if (!prepared.healthy_drive) {
+    selection.tolerated_floor = std::max(selection.tolerated_floor, options.sensor_floor);
+  }
   const bool trusted = std::any_of(prepared.trusted.begin(), prepared.trusted.end(), [](bool t) { return t; });
   const auto problem_with = [&](const ShapeGrids& shapes) {
     return make_problem(prepared.drive, prepared.floor, prepared.healthy, prepared.trusted, prepared.catalogue, shapes,
@@ -197,6 +200,7 @@ Diagnosis diagnose(LogSource& log, LogSource* baseline, const Robot& robot, cons
   result.verdict = verdict_of(found, result.credible.size());
   result.beta = prepared.row_options.beta;
   result.floor_origin = prepared.floor_origin;
+  result.floor_error = prepared.healthy_drive ? 0.0 : std::sqrt(1.0 + options.sensor_floor) - 1.0;
   result.notes = prepared.notes;
   if (!found.enough_blocks) {
     result.notes.push_back(

@@ -27,6 +27,9 @@ struct DiagnoseOptions {
   double window = 0.5;         ///< s, of pose increments
   BlockOptions blocks;         ///< of time, for held-out errors
   SelectionOptions selection;
+  double sensor_floor =
+      1.5;             ///< SelectionOptions::tolerated_floor without a baseline: what the sensors show of their noise
+                       ///< (quantisation, rounding, correlated errors left out) is a floor of this much error
   bool shrink = true;  ///< whether it is measured how far the gap shrinks (most of the time)
   std::uint64_t seed = 1;
   std::size_t threads = 1;                                             ///< the result does not depend on it
