@@ -200,6 +200,7 @@ BlockGram::BlockGram(const std::vector<RowSpace>& spaces, const BlockOptions& op
   check_spaces(spaces);
   check::that(blocks_ >= 2, "BlockOptions::blocks", "at least two");
   check::non_negative(options.purge, "BlockOptions::purge");
+  check::non_negative(options.shortest, "BlockOptions::shortest");
   columns_ = spaces.front().columns.size();
   double begin = std::numeric_limits<double>::infinity(), end = -begin;
   for (const RowSpace& space : spaces) {
@@ -210,6 +211,10 @@ BlockGram::BlockGram(const std::vector<RowSpace>& spaces, const BlockOptions& op
     }
   }
   check::that(all_rows_ > 0, "BlockGram spaces", "at least one row");
+  if (static_cast<double>(blocks_) * options.shortest > end - begin) {
+    blocks_ = std::clamp<std::size_t>(static_cast<std::size_t>((end - begin) / options.shortest),
+                                      std::min(std::max<std::size_t>(2, options.fewest), blocks_), blocks_);
+  }
   const double length = (end - begin) / static_cast<double>(blocks_);
   const std::size_t pairs = (columns_ + 1) * (columns_ + 2) / 2;
   gram_.assign(pairs * lanes(), 0.0);

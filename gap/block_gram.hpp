@@ -22,9 +22,13 @@ struct RowSpace {
 
 /// How rows are cut into blocks.
 struct BlockOptions {
-  std::size_t blocks = 24;  ///< of equal duration, from the first time of all spaces to the last
+  std::size_t blocks = 24;  ///< at most, of equal duration, from the first time of all spaces to the last
   double purge = 0.5;       ///< s: rows nearer than this to a border between two blocks are in no held-out block and
                             ///< train none
+  double shortest = 2.0;    ///< s: a log that is shorter than `blocks` of these has fewer blocks, so that there is
+                            ///< something to hold out between two purges …
+  std::size_t fewest = 12;  ///< … but, of those wished for, at least so many: a signed-rank test over fewer of them
+                            ///< cannot be significant for one of thirty effects
   std::size_t threads = 1;  ///< results do not depend on it
 };
 

@@ -327,7 +327,7 @@ FittedCauses fit_causes(const PreparedGap& prepared, const GapProblem& problem, 
   }
 
   FittedCauses fitted;
-  fitted.freedom = static_cast<double>(blocks.blocks) - 1.0;
+  fitted.freedom = static_cast<double>(gram.blocks()) - 1.0;
   const double t = boost::math::quantile(boost::math::students_t(fitted.freedom), 0.975);
   fitted.theta = prepared.theta;
   fitted.theta_error = Eigen::VectorXd::Zero(prepared.theta.size());
