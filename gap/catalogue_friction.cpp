@@ -137,12 +137,21 @@ Effect load_friction() {
           .sentence = "Friction in proportion to the torque that is passed on, as in a worm or harmonic drive.",
           .parameters = {{"k", "1", 1}},
           .excite = "accelerate and brake hard, and drive at constant speed",
-          .columns = [](const Drive& drive, Shape) {
-            return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
-                                           return drive.joints[j].smooth_effort.array().abs() *
-                                                  speed_sign(drive, j).array();
-                                         }))};
-          }};
+          .applies =
+              [](const Drive& drive) {
+                return drive.efforts_unsigned
+                           ? Applicability{false,
+                                           "the log has the size of the efforts only, so that this friction would "
+                                           "be all of them"}
+                           : Applicability{};
+              },
+          .columns =
+              [](const Drive& drive, Shape) {
+                return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
+                                               return drive.joints[j].smooth_effort.array().abs() *
+                                                      speed_sign(drive, j).array();
+                                             }))};
+              }};
 }
 
 Effect friction_drift() {

@@ -4,6 +4,7 @@
 
 #include <wheelwright/gap/catalogue.hpp>
 #include <wheelwright/gap/catalogue_parts.hpp>
+#include <wheelwright/gap/kinematic_rows.hpp>
 
 namespace wheelwright {
 namespace {
@@ -211,6 +212,81 @@ Effect track_width() {
           }};
 }
 
+// What the robot turns for each radian that its wheels say: 1 unless the wheels slip or the track is a wrong one.
+double turn_for_turn(const Drive& drive) {
+  const Windows windows = make_windows(drive);
+  const Increments gap = pose_gap(drive, windows);
+  Column wheels;
+  wheels.yaw = drive.coordinates[1].smooth_speed;
+  const Signal turned = increments_of(drive, windows, wheels).yaw;
+  const double square = turned.squaredNorm();
+  return square > 0.0 && gap.yaw.size() == turned.size() ? 1.0 + gap.yaw.dot(turned) / square : 1.0;
+}
+
+// A track is known better than to a seventh; wheels that must slide sideways to turn at all lose more than that.
+Applicability needs_sliding_wheels(const Drive& drive) {
+  constexpr double kMost = 1.0 / 1.15;
+  if (!drive.two_wheels()) {
+    return needs_two_wheels(drive);
+  }
+  if (!drive.has_heading() && drive.gyro.size() == 0) {
+    return {false, "the log has no heading"};
+  }
+  return turn_for_turn(drive) < kMost
+             ? Applicability{}
+             : Applicability{false,
+                             "the robot turns as its wheels say, but for what the width of its track can explain"};
+}
+
+// Instantaneous centres of rotation outside the wheels' tracks: the robot turns slower by a share, as with a wider track.
+// The moment that scrubbing takes is an effect of its own (lateral_scrub).
+Effect turning_slip() {
+  return {
+      .name = "turning_slip",
+      .sentence =
+          "The wheels slide when the robot turns, as those of a skid-steer robot do: it turns slower than they "
+          "say. Wheels and pose alone do not tell this from a wider track: measure the track on a turntable or "
+          "with a rule, or drive on other ground, where the slip is another and the track the same.",
+      .parameters = {{"slip", "1", 1}, {"inertia_change", "1", 0, true}},
+      .excite = "turn on the spot, both ways, with the heading logged, on two kinds of ground",
+      .applies = needs_sliding_wheels,
+      .columns =
+          [](const Drive& drive, Shape) {
+            Column inertia;
+            inertia.effort_rate = {{}, drive.wheel_radius * drive.physical("yaw_inertia") * drive.coordinates[1].speed};
+            return std::vector{unseen_motion(drive, {{}, -drive.coordinates[1].smooth_speed}, false), inertia};
+          },
+      .physical =
+          [](std::span<const double> c, Shape) {
+            return std::vector<PhysicalValue>{{"slip", "1", c[0]}, {"track_in_effect", "1", 1.0 / (1.0 - c[0])}};
+          }};
+}
+
+// The centre of rotation lies ahead of the axle and is dragged outwards in a curve; wheels that slide sideways pass on less
+// of their speed.
+Effect curve_slip() {
+  return {.name = "curve_slip",
+          .sentence =
+              "The robot slides in curves: its centre of rotation is ahead of or behind the wheels' axle, curves "
+              "carry it outwards, and it runs slower in them than its wheels say.",
+          .parameters = {{"ahead", "m", 0}, {"outwards", "s", 0}, {"slower", "s²", 1}},
+          .excite = "drive curves at several speeds, with the pose logged",
+          .applies =
+              [](const Drive& drive) {
+                return drive.has_pose() ? needs_sliding_wheels(drive) : Applicability{false, "the log has no pose"};
+              },
+          .columns =
+              [](const Drive& drive, Shape) {
+                const Signal& v1 = drive.coordinates[0].smooth_speed;
+                const Signal& v2 = drive.coordinates[1].smooth_speed;
+                Column ahead, outwards, slower;
+                ahead.lateral = v2;
+                outwards.lateral = -v1.cwiseProduct(v2);
+                slower.forward = -v1.cwiseProduct(v2.cwiseAbs2());
+                return std::vector{ahead, outwards, slower};
+              }};
+}
+
 Effect longitudinal_slip() {
   return {.name = "longitudinal_slip",
           .sentence = "The wheels slip in proportion to the force they pass on.",
@@ -266,8 +342,9 @@ Effect armature() {
 std::vector<Effect> geometry_effects(std::size_t joints) {
   std::vector<Effect> effects{payload(joints)};
   if (joints == 2) {
-    for (auto* make : {&com_longitudinal, &com_lateral, &slope, &wheel_out_of_round, &wheel_radius_asymmetric,
-                       &longitudinal_slip, &wheel_radius, &track_width, &encoder_scale, &armature}) {
+    for (auto* make :
+         {&com_longitudinal, &com_lateral, &slope, &wheel_out_of_round, &wheel_radius_asymmetric, &longitudinal_slip,
+          &turning_slip, &curve_slip, &wheel_radius, &track_width, &encoder_scale, &armature}) {
       effects.push_back(make());
     }
   }

@@ -51,6 +51,8 @@ struct Drive {
   double lever_arm = 0.0;                   ///< ℓ of the difference channel, m (likewise)
   double step = 0.0;                        ///< h, s
   double count = 0.0;                       ///< quantum of the speeds, rad/s (0: none known)
+  bool has_efforts = true;                  ///< else all efforts are zeros: only the pose can be compared
+  bool efforts_unsigned = false;            ///< the log has their size only: they have their joint's sign of motion
   bool angles_measured = false;             ///< else a joint's angle begins anew, at 0, in each segment
   std::size_t window = 0;                   ///< samples of the smoothing window, odd
   Eigen::VectorXd t;                        ///< s, the log's own, ascending

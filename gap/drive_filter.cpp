@@ -125,7 +125,7 @@ Mask settled(const Drive& drive, double beta, double memory) {
 }
 
 Mask moving(const Drive& drive, double beta, double share) {
-  Mask mask = Mask::Constant(drive.rows(), true);
+  Mask mask = Mask::Constant(drive.rows(), drive.has_efforts);
   for (const JointSignals& joint : drive.joints) {
     mask = mask && filtered(drive, beta, joint.resting.cast<double>().matrix()).array() <= share;
   }

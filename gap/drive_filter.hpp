@@ -29,7 +29,7 @@ namespace wheelwright {
 [[nodiscard]] Mask settled(const Drive& drive, double beta, double memory = 10.0);
 
 /// Rows for which no joint's filtered indicator of rest exceeds `share`: with stiction the torque of a resting joint
-/// is any number, and no model of motion says anything about it.
+/// is any number, and no model of motion says anything about it. None for a drive without efforts.
 [[nodiscard]] Mask moving(const Drive& drive, double beta, double share = 0.02);
 
 }  // namespace wheelwright

@@ -25,6 +25,9 @@ Eigen::VectorXd picked(const Eigen::VectorXd& signal, const std::vector<Eigen::I
 
 // Rows of efforts that are used: settled, moving, `step` apart.
 std::vector<Eigen::Index> effort_rows(const Drive& drive, const GapRowOptions& options) {
+  if (!drive.has_efforts) {
+    return {};
+  }
   Mask use = settled(drive, options.beta);
   if (options.skip_rest) {
     use = use && moving(drive, options.beta);
@@ -131,7 +134,7 @@ GapRows make_gap_rows(const Drive& drive, const NoiseFloor& floor, const std::ve
   GapRows rows;
   rows.parameters = drive.model.p();
   rows.instants = effort_rows(drive, options);
-  if (rows.instants.size() < 50) {
+  if (drive.has_efforts && rows.instants.size() < 50) {
     throw InputError("the log has " + std::to_string(rows.instants.size()) +
                      " usable instants: at least 50 in motion are needed; drive longer");
   }
@@ -168,6 +171,11 @@ GapRows make_gap_rows(const Drive& drive, const NoiseFloor& floor, const std::ve
   add("forward", gap.forward, floor.increments.forward);
   add("lateral", gap.lateral, floor.increments.lateral);
   add("yaw", gap.yaw, floor.increments.yaw);
+  if (!drive.has_efforts && rows.windows.size() < 50) {
+    throw InputError(
+        "the log has no efforts, and " + std::to_string(rows.windows.size()) +
+        " windows in which the pose can be compared with the wheels: at least 50 are needed; drive longer");
+  }
   for (const FittedEffect& effect : healthy) {
     subtract(rows, rows_of(drive, rows, effect, options));
   }
@@ -289,6 +297,9 @@ CandidateTable add_catalogue(GapRows& rows, const Drive& drive, const std::vecto
     for (std::size_t c = 0; c < task.parts.size(); ++c) {
       candidate.columns.push_back(rows.spaces.front().columns.size());
       candidate.sign.push_back(c < effect.parameters.size() ? effect.parameters[c].sign : 0);
+      if (c >= effect.parameters.size() || !effect.parameters[c].beside) {
+        candidate.own.push_back(candidate.columns.back());
+      }
       append(rows, std::move(task.parts[c]));
     }
     table.candidates.push_back(std::move(candidate));

@@ -51,7 +51,8 @@ struct GapRows {
 };
 
 /// Rows of `drive` with the response y − Yθ − Σ `healthy` (efforts) and pose − odometry − Σ `healthy` (pose), θ being
-/// drive.theta. Throws InvalidArgument when no row is left: a log that never moves, or is shorter than the filter.
+/// drive.theta. The spaces of efforts have no rows for a drive without efforts. Throws InputError when too few rows are
+/// left: a log that never moves, or is shorter than the filter.
 [[nodiscard]] GapRows make_gap_rows(const Drive& drive, const NoiseFloor& floor,
                                     const std::vector<FittedEffect>& healthy, const GapRowOptions& options);
 

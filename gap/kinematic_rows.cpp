@@ -142,6 +142,58 @@ IncrementNoise pose_noise(const Drive& drive) {
   return noise;
 }
 
+IncrementNoise repeatability(const Drive& drive, const Windows& windows, const Increments& gap, std::size_t fewest) {
+  if (gap.yaw.size() == 0 || windows.size() < fewest) {
+    return {};
+  }
+  constexpr double kNear = 0.05;
+  constexpr std::size_t kMostWindows = 2000;
+  const std::size_t stride = windows.size() / kMostWindows + 1;
+  const auto count = static_cast<Eigen::Index>((windows.size() + stride - 1) / stride);
+  Eigen::Matrix<double, 6, Eigen::Dynamic> motion(6, count);
+  for (Eigen::Index k = 0; k < count; ++k) {
+    const std::size_t at = static_cast<std::size_t>(k) * stride;
+    Eigen::Index row = 0;
+    for (const std::size_t c : {0, 1}) {
+      const Signal& v = drive.coordinates[c].smooth_speed;
+      const double unit = std::max(rms(v), 1e-12);
+      for (const auto* place : {&windows.first, &windows.middle, &windows.last}) {
+        motion(row++, k) = v[(*place)[at]] / unit;
+      }
+    }
+  }
+  IncrementNoise sum;
+  std::size_t pairs = 0;
+  for (Eigen::Index i = 0; i < count; ++i) {
+    double nearest = 6.0 * kNear * kNear;
+    Eigen::Index other = -1;
+    for (Eigen::Index j = 0; j < count; ++j) {
+      if (std::abs(i - j) < 4) {
+        continue;  // neighbours share a pose, and their errors
+      }
+      const double distance = (motion.col(i) - motion.col(j)).squaredNorm();
+      if (distance < nearest) {
+        nearest = distance;
+        other = j;
+      }
+    }
+    if (other < 0) {
+      continue;
+    }
+    const auto a = i * static_cast<Eigen::Index>(stride), b = other * static_cast<Eigen::Index>(stride);
+    const auto half_square = [a, b](const Signal& g) { return g.size() > 0 ? 0.5 * std::pow(g[a] - g[b], 2) : 0.0; };
+    sum.forward += half_square(gap.forward);
+    sum.lateral += half_square(gap.lateral);
+    sum.yaw += half_square(gap.yaw);
+    ++pairs;
+  }
+  if (pairs < fewest) {
+    return {};
+  }
+  const auto root = [pairs](double squares) { return std::sqrt(squares / static_cast<double>(pairs)); };
+  return {root(sum.forward), root(sum.lateral), root(sum.yaw)};
+}
+
 IncrementNoise root_mean_square(const Increments& gap) { return {rms(gap.forward), rms(gap.lateral), rms(gap.yaw)}; }
 
 }  // namespace wheelwright

@@ -56,6 +56,13 @@ struct IncrementNoise {
 /// itself), never below what the pose's resolution makes. Errors of the wheels are not in it.
 [[nodiscard]] IncrementNoise pose_noise(const Drive& drive);
 
+/// What of `gap` the wheels' motion does not determine: half the mean square difference between windows of nearly the same
+/// motion (both coordinates at first, middle and last row, each within a twentieth of its root mean square in the mean), each
+/// with its nearest one of another time. A drive with fewer than `fewest` such windows has none to be had. It is what
+/// repeated runs would show, the ground's and the pose's own whims included (Rice 1984).
+[[nodiscard]] IncrementNoise repeatability(const Drive& drive, const Windows& windows, const Increments& gap,
+                                           std::size_t fewest = 30);
+
 /// Root mean square of a healthy drive's pose_gap: noise of pose and wheels together.
 [[nodiscard]] IncrementNoise root_mean_square(const Increments& gap);
 

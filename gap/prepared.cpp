@@ -19,10 +19,47 @@ namespace wheelwright {
 namespace {
 
 constexpr double kUsualBeta = 10.0;  // 1/s
+constexpr const char* kTiming = "timing";
 
+// The columns that hold the joints' efforts.
+std::vector<std::string> effort_columns(const Model& model, EffortKind kind) {
+  std::vector<std::string> names;
+  for (const Joint& joint : model.joints) {
+    names.push_back(kind == EffortKind::torque    ? joint.torque
+                    : kind == EffortKind::current ? joint.current
+                                                  : joint.voltage);
+  }
+  return names;
+}
+
+// A log with a heading and none of the efforts is compared by its pose alone: zeros stand for the efforts.
 Drive drive_of(const LogTable& log, const Robot& robot) {
-  TableSource source(log);
-  return make_drive(log, robot, find_measurement(source, robot, make_model(robot), 2));
+  const Model model = make_model(robot);
+  const std::vector<std::string> efforts = effort_columns(model, robot.effort);
+  const auto logged = [&log](const std::string& name) {
+    return std::find(log.names.begin(), log.names.end(), name) != log.names.end();
+  };
+  if (std::any_of(efforts.begin(), efforts.end(), logged) || !(logged("theta") || logged("gyro_z"))) {
+    TableSource source(log);
+    return make_drive(log, robot, find_measurement(source, robot, model, 2));
+  }
+  LogTable padded = log;
+  for (const std::string& name : efforts) {
+    padded.names.push_back(name);
+    padded.columns.emplace_back(log.rows(), 0.0);
+  }
+  TableSource source(padded);
+  Drive drive = make_drive(padded, robot, find_measurement(source, robot, model, 2));
+  drive.has_efforts = false;
+  return drive;
+}
+
+// Nothing is known of efforts that are not there: any number stands for their noise.
+NoiseFloor without_efforts(NoiseFloor floor, const Drive& drive) {
+  if (!drive.has_efforts) {
+    floor.efforts = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(drive.model.n()));
+  }
+  return floor;
 }
 
 std::vector<Effect> chosen_catalogue(const Model& model, const DiagnoseOptions& options) {
@@ -44,7 +81,8 @@ NoiseFloor floor_of(const std::vector<Eigen::VectorXd>& left, const GapRows& row
   NoiseFloor floor;
   std::vector<double> efforts;
   for (std::size_t s = 0; s < left.size(); ++s) {
-    const double rms = std::sqrt(left[s].squaredNorm() / static_cast<double>(left[s].size()));
+    const double rms =
+        left[s].size() > 0 ? std::sqrt(left[s].squaredNorm() / static_cast<double>(left[s].size())) : 0.0;
     const std::string& name = rows.spaces[s].name;
     if (rows.kinds[s] == GapSpace::dynamic) {
       efforts.push_back(rms);
@@ -80,7 +118,7 @@ std::vector<FittedEffect> fitted_effects(const CandidateTable& table, const Caus
 FittedEffect timing_of(const Drive& drive, const GapRows& rows, std::vector<Eigen::VectorXd>& left,
                        const GapRowOptions& options) {
   Effect timing;
-  timing.name = "timing";
+  timing.name = kTiming;
   timing.parameters = {{"delay", "s", 0}};
   timing.columns = [](const Drive& d, std::span<const double>) {
     Column column;
@@ -119,7 +157,7 @@ void learn_healthy(PreparedGap& prepared, const DiagnoseOptions& options) {
   const double beta = prepared.row_options.beta;
   prepared.theta = fit_base(drive, beta);
   predict_efforts(drive, prepared.theta);
-  const NoiseFloor sensors = noise_floor(drive, signal_noise(drive), beta);
+  const NoiseFloor sensors = without_efforts(noise_floor(drive, signal_noise(drive), beta), drive);
   GapProblem problem = make_problem(drive, sensors, {}, std::vector<bool>(drive.model.p(), false), prepared.catalogue,
                                     all_shapes(prepared.catalogue, drive), prepared.row_options);
   BlockOptions blocks = options.blocks;
@@ -135,10 +173,10 @@ void learn_healthy(PreparedGap& prepared, const DiagnoseOptions& options) {
   prepared.healthy = fitted_effects(problem.table, found.structural, fit, prepared.catalogue);
   std::vector<Eigen::VectorXd> left = residuals(problem.rows, subset, fit.coefficients);
   prepared.healthy.push_back(timing_of(drive, problem.rows, left, prepared.row_options));
-  prepared.floor = floor_of(left, problem.rows);
+  prepared.floor = without_efforts(floor_of(left, problem.rows), drive);
   prepared.floor_origin = "what the model leaves of the healthy log";
   for (const FittedEffect& effect : prepared.healthy) {
-    if (effect.effect.name == "timing") {
+    if (effect.effect.name == kTiming) {
       continue;
     }
     prepared.notes.push_back("the healthy log shows " + effect.effect.name +
@@ -149,6 +187,9 @@ void learn_healthy(PreparedGap& prepared, const DiagnoseOptions& options) {
 }  // namespace
 
 Eigen::VectorXd fit_base(const Drive& drive, double beta) {
+  if (!drive.has_efforts) {
+    return Eigen::VectorXd::Zero(static_cast<Eigen::Index>(drive.model.p()));
+  }
   const std::vector<Eigen::VectorXd> y = filtered_outputs(drive, beta);
   const std::vector<std::vector<Eigen::VectorXd>> Y = filtered_regressor(drive, beta);
   const Mask use = settled(drive, beta) && moving(drive, beta);
@@ -206,6 +247,12 @@ GapProblem make_problem(const Drive& drive, const NoiseFloor& floor, const std::
     problem.kinds.push_back({effect.parametric, effect.family});
   }
   return problem;
+}
+
+std::vector<FittedEffect> robots_own(const std::vector<FittedEffect>& healthy) {
+  std::vector<FittedEffect> own = healthy;
+  std::erase_if(own, [](const FittedEffect& effect) { return effect.effect.name == kTiming; });
+  return own;
 }
 
 void expect_efforts(PreparedGap& prepared, const GapProblem& problem, const CauseSet& set) {
@@ -274,6 +321,16 @@ PreparedGap prepare_gap(LogSource& log, LogSource* baseline, const Robot& robot,
     prepared.baseline_log = read_all(*baseline);
     prepared.healthy_drive = drive_of(*prepared.baseline_log, robot);
   }
+  if (!prepared.drive.has_efforts) {
+    prepared.notes.push_back(
+        "the log has no efforts: only its pose is compared with what the wheels say, and effects that change the "
+        "torque "
+        "alone cannot be seen; log " +
+        effort_columns(model, robot.effort).front() + " and its like to see them");
+    if (prepared.healthy_drive && prepared.healthy_drive->has_efforts) {
+      throw InputError("the healthy log has efforts and the other one has none: log them in both, or leave them out");
+    }
+  }
   const Drive& reference = prepared.healthy_drive ? *prepared.healthy_drive : prepared.drive;
   const double wish = options.beta ? *options.beta : kUsualBeta;
   prepared.row_options.beta = options.beta ? *options.beta : choose_gap_beta(reference, signal_noise(reference), wish);
@@ -293,8 +350,17 @@ PreparedGap prepare_gap(LogSource& log, LogSource* baseline, const Robot& robot,
     }
   }
   predict_efforts(prepared.drive, prepared.theta);
-  prepared.floor = noise_floor(prepared.drive, signal_noise(prepared.drive), prepared.row_options.beta);
+  prepared.floor = without_efforts(noise_floor(prepared.drive, signal_noise(prepared.drive), prepared.row_options.beta),
+                                   prepared.drive);
   prepared.floor_origin = "the noise of the sensors, found from the log's own differences";
+  const Windows windows = make_windows(prepared.drive, prepared.row_options.window);
+  const IncrementNoise repeated = repeatability(prepared.drive, windows, pose_gap(prepared.drive, windows));
+  IncrementNoise& increments = prepared.floor.increments;
+  if (repeated.yaw > increments.yaw || repeated.forward > increments.forward || repeated.lateral > increments.lateral) {
+    increments = {std::max(increments.forward, repeated.forward), std::max(increments.lateral, repeated.lateral),
+                  std::max(increments.yaw, repeated.yaw)};
+    prepared.floor_origin += "; of the pose also how much it differs where the wheels did the same again";
+  }
   return prepared;
 }
 

@@ -32,12 +32,15 @@ struct PreparedGap {
 };
 
 /// θ by least squares on the filtered rows of `drive`, outputs weighted by their own residuals; instants at rest and before
-/// the filter has settled left out. Throws InputError where too few instants are left.
+/// the filter has settled left out; zeros for a drive without efforts. Throws InputError where too few instants are left.
 [[nodiscard]] Eigen::VectorXd fit_base(const Drive& drive, double beta);
 
 /// Reads the logs and settles all of this.
 [[nodiscard]] PreparedGap prepare_gap(LogSource& log, LogSource* baseline, const Robot& robot,
                                       const DiagnoseOptions& options);
+
+/// The effects of `healthy` that are the robot's: the offset between the clocks of effort and speed is the logger's.
+[[nodiscard]] std::vector<FittedEffect> robots_own(const std::vector<FittedEffect>& healthy);
 
 /// The rows of `prepared` with the columns of its catalogue; `table` without its `gram`.
 struct GapProblem {

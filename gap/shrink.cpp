@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <utility>
 
 #include <wheelwright/commission/commission.hpp>
@@ -58,7 +59,8 @@ CauseProblem make_cause_problem(const PreparedGap& prepared, const ShrinkCauses&
       }
     }
   }
-  p.begin = p.end = p.rows.spaces.front().t[0];
+  p.begin = std::numeric_limits<double>::infinity();
+  p.end = -p.begin;
   for (const RowSpace& space : p.rows.spaces) {
     if (space.t.size() > 0) {
       p.begin = std::min(p.begin, space.t[0]);
@@ -176,7 +178,7 @@ std::optional<Robot> robot_with(const Robot& robot, const PreparedGap& prepared,
   for (std::size_t i = 0; i < p.of_theta; ++i) {
     theta[static_cast<Eigen::Index>(p.columns[i])] += coefficients[static_cast<Eigen::Index>(i)];
   }
-  std::vector<FittedEffect> causes = prepared.healthy;
+  std::vector<FittedEffect> causes = robots_own(prepared.healthy);
   auto next = static_cast<Eigen::Index>(p.of_theta);
   for (const FittedEffect& cause : found.causes) {
     FittedEffect fitted = cause;
@@ -243,7 +245,8 @@ std::vector<ShrinkFigure> rollout_figures(const Robot& robot, const PreparedGap&
     return {};
   }
   std::string why_not;
-  const std::optional<Robot> nominal = improved_robot(robot, drive, drive.theta, prepared.healthy, {}, why_not);
+  const std::optional<Robot> nominal =
+      improved_robot(robot, drive, drive.theta, robots_own(prepared.healthy), {}, why_not);
   std::vector<std::optional<Robot>> fitted;
   const std::size_t folds = std::max<std::size_t>(2, options.rollout_folds);
   double margin = nominal ? rollout_margin(*nominal) : 0.0;
@@ -347,7 +350,7 @@ void threshold_figures(GapShrink& shrink, const Robot& robot, const PreparedGap&
   const Model& model = prepared.drive.model;
   std::string why_not;
   const std::optional<Robot> nominal =
-      improved_robot(robot, prepared.drive, prepared.drive.theta, prepared.healthy, {}, why_not);
+      improved_robot(robot, prepared.drive, prepared.drive.theta, robots_own(prepared.healthy), {}, why_not);
   const bool with_floor = prepared.baseline_log.has_value() && nominal.has_value();
   std::vector<Commissioned> runs(with_floor ? 3 : 2);
   for_all(runs.size(), options.threads, [&](std::size_t k) {
@@ -386,6 +389,10 @@ GapShrink measure_shrink(const Robot& robot, const PreparedGap& prepared, const 
                          const ShrinkOptions& options, std::vector<std::string>& notes) {
   const CauseProblem problem = make_cause_problem(prepared, found);
   GapShrink shrink;
+  if (!prepared.drive.has_efforts) {
+    notes.push_back("how far the gap shrinks is measured in the torque: the log has no efforts");
+    return shrink;
+  }
   shrink.torque_rms = torque_figures(prepared, problem, options);
   shrink.rollout = rollout_figures(robot, prepared, found, problem, options, notes);
   if (options.commissioning && found.improved) {
@@ -396,6 +403,9 @@ GapShrink measure_shrink(const Robot& robot, const PreparedGap& prepared, const 
 
 std::vector<ParameterShift> parameter_shifts(const Robot& robot, const Drive& drive, const CandidateTable& table,
                                              const std::vector<std::size_t>& structural) {
+  if (!drive.has_efforts) {
+    return {};
+  }
   const BlockFit without = table.gram->fit(subset_of(table, {}, BaseModel::refitted));
   const BlockFit with = table.gram->fit(subset_of(table, structural, BaseModel::refitted));
   const double t = student_quantile(kConfidence, static_cast<double>(table.gram->blocks()) - 1.0);
