@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/gap/diagnose.hpp>
+
+#include <algorithm>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include <wheelwright/core/error.hpp>
+
+#include "gap/noisy_log.hpp"
+
+namespace wheelwright {
+namespace {
+
+using gap_example::counted_robot;
+using gap_example::healthy_scenario;
+using gap_example::noisy_scenario;
+using gap_example::plain_robot;
+using gap_example::robot_with;
+using gap_example::simulated_drive;
+
+DiagnoseOptions quick(std::size_t threads = 1) {
+  DiagnoseOptions options;
+  options.shrink = false;
+  options.threads = threads;
+  return options;
+}
+
+Diagnosis diagnosis_of(const Scenario& scenario, bool with_baseline, const Robot& robot,
+                       const DiagnoseOptions& options = quick()) {
+  Simulation log(scenario), healthy(healthy_scenario(scenario));
+  return diagnose(log, with_baseline ? &healthy : nullptr, robot, options);
+}
+
+// No noise, no effect: at every rate, with and without stamps at the middle of the interval.
+TEST(Diagnose, TheGapOfPerfectDataIsNothing) {
+  for (const double rate : {50.0, 100.0}) {
+    for (const Sampling sampling : {Sampling::instant, Sampling::interval}) {
+      Scenario s = simulated_drive(plain_robot(), 40.0, rate);
+      s.sensors.sampling = sampling;
+      const Diagnosis found = diagnosis_of(s, false, plain_robot());
+      EXPECT_EQ(found.verdict, GapVerdict::no_gap) << rate;
+      EXPECT_TRUE(found.causes.empty());
+      EXPECT_LE(found.gap, 1e-6);
+      EXPECT_LE(found.structural, 1e-6);
+    }
+  }
+}
+
+TEST(Diagnose, ExplainsAndSharesAddUp) {
+  Robot world = robot_with("coulomb", {{"c", 0.3}});
+  world.effects.push_back({"slope", {{"g_x", {0.2, 0.2}}, {"g_y", {-0.3, -0.3}}}});
+  const Diagnosis found = diagnosis_of(noisy_scenario(world, 2), true, counted_robot());
+  EXPECT_EQ(found.verdict, GapVerdict::explained);
+  ASSERT_EQ(found.causes.size(), 2u);
+  EXPECT_GE(found.causes[0].share, found.causes[1].share);
+  EXPECT_NEAR(found.causes[0].share + found.causes[1].share + found.remaining, 1.0, 0.02);
+  for (const GapCause& cause : found.causes) {
+    const bool friction = cause.effect == "coulomb";
+    EXPECT_TRUE(friction || cause.effect == "slope") << cause.effect;
+    for (const GapEstimate& number : cause.parameters) {
+      const std::optional<double> truth = number.name == "c"     ? std::optional(0.3)
+                                          : number.name == "g_x" ? std::optional(0.2)
+                                          : number.name == "g_y" ? std::optional(-0.3)
+                                                                 : std::nullopt;
+      if (truth) {
+        EXPECT_LE(number.lower, *truth) << number.name;
+        EXPECT_GE(number.upper, *truth) << number.name;
+      }
+    }
+  }
+  EXPECT_GT(found.gap, found.structural * 0.5);
+  ASSERT_FALSE(found.credible.empty());
+  EXPECT_EQ(found.credible[0].effects, (std::vector<std::string>{"coulomb", "slope"}));
+  ASSERT_FALSE(found.looked_at.empty());
+  EXPECT_TRUE(found.looked_at[0].effects.empty());
+}
+
+void expect_same(const Diagnosis& a, const Diagnosis& b) {
+  EXPECT_EQ(a.verdict, b.verdict);
+  EXPECT_EQ(a.gap, b.gap);
+  EXPECT_EQ(a.structural, b.structural);
+  EXPECT_EQ(a.remaining, b.remaining);
+  ASSERT_EQ(a.causes.size(), b.causes.size());
+  for (std::size_t k = 0; k < a.causes.size(); ++k) {
+    EXPECT_EQ(a.causes[k].effect, b.causes[k].effect);
+    EXPECT_EQ(a.causes[k].share, b.causes[k].share);
+    ASSERT_EQ(a.causes[k].parameters.size(), b.causes[k].parameters.size());
+    for (std::size_t i = 0; i < a.causes[k].parameters.size(); ++i) {
+      EXPECT_EQ(a.causes[k].parameters[i].estimate, b.causes[k].parameters[i].estimate);
+      EXPECT_EQ(a.causes[k].parameters[i].lower, b.causes[k].parameters[i].lower);
+      EXPECT_EQ(a.causes[k].parameters[i].upper, b.causes[k].parameters[i].upper);
+    }
+  }
+  ASSERT_EQ(a.credible.size(), b.credible.size());
+  for (std::size_t k = 0; k < a.credible.size(); ++k) {
+    EXPECT_EQ(a.credible[k].effects, b.credible[k].effects);
+    EXPECT_EQ(a.credible[k].held_out_error, b.credible[k].held_out_error);
+    EXPECT_EQ(a.credible[k].p_value, b.credible[k].p_value);
+  }
+  ASSERT_EQ(a.looked_at.size(), b.looked_at.size());
+  for (std::size_t k = 0; k < a.looked_at.size(); ++k) {
+    EXPECT_EQ(a.looked_at[k].effects, b.looked_at[k].effects);
+    EXPECT_EQ(a.looked_at[k].held_out_error, b.looked_at[k].held_out_error);
+  }
+  ASSERT_EQ(a.where.size(), b.where.size());
+  for (std::size_t k = 0; k < a.where.size(); ++k) {
+    EXPECT_EQ(a.where[k].regime, b.where[k].regime);
+    EXPECT_EQ(a.where[k].share, b.where[k].share);
+    EXPECT_EQ(a.where[k].p_value, b.where[k].p_value);
+  }
+  ASSERT_EQ(a.series.size(), b.series.size());
+  for (std::size_t k = 0; k < a.series.size(); ++k) {
+    EXPECT_EQ(a.series[k].after, b.series[k].after);
+  }
+  ASSERT_EQ(a.shrink.torque_rms.size(), b.shrink.torque_rms.size());
+  for (std::size_t k = 0; k < a.shrink.torque_rms.size(); ++k) {
+    EXPECT_EQ(a.shrink.torque_rms[k].after, b.shrink.torque_rms[k].after);
+    EXPECT_EQ(a.shrink.torque_rms[k].upper, b.shrink.torque_rms[k].upper);
+  }
+}
+
+TEST(Diagnose, DoesNotDependOnTheNumberOfThreads) {
+  const Scenario s = noisy_scenario(robot_with("actuator_lag", {{"T", 0.03}}), 5);
+  const Diagnosis one = diagnosis_of(s, true, counted_robot(), quick(1));
+  expect_same(one, diagnosis_of(s, true, counted_robot(), quick(2)));
+  expect_same(one, diagnosis_of(s, true, counted_robot(), quick(1)));
+}
+
+TEST(Diagnose, TellsHowFarItIs) {
+  DiagnoseOptions options = quick();
+  std::vector<double> shares;
+  options.progress = [&shares](std::string_view stage, double share) {
+    EXPECT_FALSE(stage.empty());
+    shares.push_back(share);
+  };
+  (void)diagnosis_of(noisy_scenario(counted_robot(), 1), false, counted_robot(), options);
+  EXPECT_TRUE(std::is_sorted(shares.begin(), shares.end()));
+  EXPECT_EQ(shares.front(), 0.0);
+  EXPECT_EQ(shares.back(), 1.0);
+}
+
+TEST(Diagnose, SaysThatALogIsTooShort) {
+  Scenario s = noisy_scenario(robot_with("coulomb", {{"c", 0.3}}), 1);
+  const auto said = [&s](std::size_t blocks) {
+    DiagnoseOptions options = quick();
+    options.blocks.blocks = blocks;
+    const Diagnosis found = diagnosis_of(s, false, counted_robot(), options);
+    EXPECT_NE(found.verdict, GapVerdict::no_gap);
+    return std::any_of(found.notes.begin(), found.notes.end(),
+                       [](const std::string& note) { return note.find("drive longer") != std::string::npos; });
+  };
+  EXPECT_TRUE(said(8));
+  EXPECT_FALSE(said(24));
+}
+
+}  // namespace
+}  // namespace wheelwright

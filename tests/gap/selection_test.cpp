@@ -1,0 +1,305 @@
+// SPDX-License-Identifier: Apache-2.0
+// Oracle: the simulator, which knows what it did.
+#include <wheelwright/gap/selection.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <ostream>
+#include <random>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include <wheelwright/core/error.hpp>
+
+#include "gap/noisy_log.hpp"
+
+namespace wheelwright {
+namespace {
+
+using gap_example::counted_robot;
+using gap_example::noisy_scenario;
+using gap_example::prepared_log;
+using gap_example::Problem;
+using gap_example::robot_with;
+
+using Names = std::vector<std::string>;
+
+struct Found {
+  Names causes;
+  std::vector<Names> credible;
+  Selection selection;
+};
+
+Found found_on(const Scenario& scenario, bool with_baseline, const DiagnoseOptions& options = {}) {
+  const PreparedGap prepared = prepared_log(scenario, with_baseline, options);
+  const Problem problem(prepared);
+  Found found;
+  found.selection = problem.select();
+  found.causes = names_of(problem.problem.table, found.selection.all);
+  for (const CredibleSet& member : found.selection.credible) {
+    found.credible.push_back(names_of(problem.problem.table, member.set));
+  }
+  return found;
+}
+
+bool alarmed(const Selection& selection) { return selection.any_cause || !selection.reaches_floor; }
+
+TEST(SelectCausesSlow, FindsNothingInNoise) {
+  int alarms = 0;
+  for (unsigned seed = 1; seed <= 60; ++seed) {
+    Scenario s = noisy_scenario(counted_robot(), seed);
+    s.duration = 26.0;
+    const PreparedGap prepared = prepared_log(s, false);
+    alarms += alarmed(Problem(prepared, {.blocks = 16}).select()) ? 1 : 0;
+  }
+  EXPECT_LE(alarms, 1);
+}
+
+TEST(SelectCauses, FindsNothingInNoiseBesideAHealthyLog) {
+  for (unsigned seed = 101; seed <= 104; ++seed) {
+    EXPECT_FALSE(alarmed(found_on(noisy_scenario(counted_robot(), seed), true).selection)) << seed;
+  }
+}
+
+// One cause of `accepted` must come out, and nothing else with it.
+struct Case {
+  std::string name;
+  std::function<Scenario()> scenario;
+  Names accepted;
+  bool with_baseline = false;  // else the nominal values of the robot file are believed
+  friend std::ostream& operator<<(std::ostream& out, const Case& c) { return out << c.name; }
+};
+
+Case effect_case(const std::string& name, const std::map<std::string, double>& parameters, Names accepted = {}) {
+  if (accepted.empty()) {
+    accepted = {name};
+  }
+  return {name, [=] { return noisy_scenario(robot_with(name, parameters), 3); }, accepted, false};
+}
+
+Case parameter_case(const std::string& name, const std::function<void(DriveParameters&)>& change) {
+  const auto scenario = [change] {
+    Scenario s = noisy_scenario(counted_robot(), 4);
+    change(s.parameters);
+    return s;
+  };
+  return {name, scenario, {name}, true};
+}
+
+Case with_baseline(Case c) {
+  c.with_baseline = true;
+  return c;
+}
+
+constexpr double kRadius = 0.0975, kHalfTrack = 0.1905;
+
+class SingleCause : public testing::TestWithParam<Case> {};
+
+TEST_P(SingleCause, IsFoundAndNothingElse) {
+  const Case& c = GetParam();
+  const Found found = found_on(c.scenario(), c.with_baseline);
+  ASSERT_EQ(found.causes.size(), 1u) << (found.causes.empty() ? "" : found.causes.back());
+  EXPECT_TRUE(std::count(c.accepted.begin(), c.accepted.end(), found.causes[0])) << found.causes[0];
+  EXPECT_TRUE(found.selection.reaches_floor);
+  EXPECT_FALSE(found.selection.theta_moved);
+  EXPECT_LE(found.selection.left, 0.1 * found.selection.nominal_excess);
+  ASSERT_FALSE(found.credible.empty());
+  EXPECT_EQ(found.credible.front(), found.causes);
+}
+
+const auto kLags = Names{"actuator_lag", "delay", "sensor_time_offset"};
+
+INSTANTIATE_TEST_SUITE_P(
+    SelectCauses, SingleCause,
+    testing::Values(
+        effect_case("coulomb", {{"c", 0.3}}), effect_case("coulomb_asymmetric", {{"c_R", 0.5}, {"c_L", 0.1}}),
+        effect_case("com_longitudinal", {{"a", 0.05}}), effect_case("slope", {{"g_x", 0.3}, {"g_y", 0.1}}),
+        effect_case("actuator_lag", {{"T", 0.04}}, kLags), with_baseline(effect_case("wheel_radius", {{"eps", 0.03}})),
+        with_baseline(effect_case("track_width", {{"eps", 0.05}})),
+        parameter_case("payload",
+                       [](DriveParameters& p) {
+                         p.mass = 26.0;
+                         p.yaw_inertia = 0.98;
+                       }),
+        parameter_case("armature",
+                       [](DriveParameters& p) {
+                         const double more = 2.0 * 0.02 / (kRadius * kRadius);  // two wheels of 0.02 kg·m²
+                         p.mass += more;
+                         p.yaw_inertia += more * kHalfTrack * kHalfTrack;
+                       }),
+        parameter_case("viscous",
+                       [](DriveParameters& p) {
+                         p.viscous_x = p.viscous_y = 8.0;
+                         p.viscous_yaw *= 2.0;
+                       }),
+        parameter_case("torque_gain",
+                       [](DriveParameters& p) {
+                         for (double* x : {&p.mass, &p.yaw_inertia, &p.viscous_x, &p.viscous_y, &p.viscous_yaw}) {
+                           *x *= 1.2;
+                         }
+                       })),
+    [](const testing::TestParamInfo<Case>& given) { return given.param.name; });
+
+TEST(SelectCauses, FindsTwoCausesTogether) {
+  Robot world = robot_with("coulomb", {{"c", 0.3}});
+  world.effects.push_back({"slope", {{"g_x", {0.2, 0.2}}, {"g_y", {-0.3, -0.3}}}});
+  const Found found = found_on(noisy_scenario(world, 6), false);
+  EXPECT_EQ(found.causes, (Names{"coulomb", "slope"}));
+}
+
+// Never another name with a clean bill: either what is left is too much, or its own family is named.
+class MissingCause : public testing::TestWithParam<Case> {};
+
+TEST_P(MissingCause, IsNotBlamedOnAnother) {
+  const Case& c = GetParam();
+  DiagnoseOptions options;
+  options.without = {c.name};
+  const Found found = found_on(c.scenario(), c.with_baseline, options);
+  const bool named = found.causes.size() == 1 && std::count(c.accepted.begin(), c.accepted.end(), found.causes[0]) > 0;
+  EXPECT_TRUE(!found.selection.reaches_floor || found.selection.theta_moved || named)
+      << (found.causes.empty() ? "nothing" : found.causes[0]);
+}
+
+INSTANTIATE_TEST_SUITE_P(SelectCauses, MissingCause,
+                         testing::Values(effect_case("slope", {{"g_x", 0.3}, {"g_y", 0.1}}),
+                                         effect_case("coulomb", {{"c", 0.3}}, {"coulomb_asymmetric"}),
+                                         effect_case("actuator_lag", {{"T", 0.04}}, kLags),
+                                         effect_case("com_longitudinal", {{"a", 0.05}})),
+                         [](const testing::TestParamInfo<Case>& given) { return given.param.name; });
+
+// A spring that pulls the robot back to its start: in no catalogue but the user's.
+Effect tether() {
+  Effect effect;
+  effect.name = "tether";
+  effect.parameters = {{"stiffness", "N/m", 1}};
+  effect.columns = [](const Drive& d, std::span<const double>) {
+    Column column;
+    column.effort = {d.wheel_radius *
+                     (d.x.array() * d.heading.array().cos() + d.y.array() * d.heading.array().sin()).matrix()};
+    return std::vector{column};
+  };
+  return effect;
+}
+
+TEST(SelectCauses, FindsAUsersOwnEffect) {
+  const Scenario s = noisy_scenario(counted_robot(), 8);
+  LogTable log = simulate(s), healthy = simulate(gap_example::healthy_scenario(s));
+  const auto column = [&log](const std::string& name) -> std::vector<double>& {
+    return log
+        .columns[static_cast<std::size_t>(std::find(log.names.begin(), log.names.end(), name) - log.names.begin())];
+  };
+  for (std::size_t k = 0; k < log.t.size(); ++k) {
+    const double along = std::cos(column("theta")[k]) * column("x")[k] + std::sin(column("theta")[k]) * column("y")[k];
+    column("tau_r")[k] += 0.5 * kRadius * 3.0 * along;
+    column("tau_l")[k] += 0.5 * kRadius * 3.0 * along;
+  }
+  DiagnoseOptions options;
+  options.catalogue = effect_catalogue();
+  const auto selected = [&] {
+    TableSource real(log), before(healthy);
+    const PreparedGap prepared = prepare_gap(real, &before, counted_robot(), options);
+    const Problem problem(prepared);
+    const Selection selection = problem.select();
+    return std::pair(names_of(problem.problem.table, selection.all), selection.reaches_floor);
+  };
+  const auto [unknown, reached] = selected();
+  EXPECT_FALSE(reached) << (unknown.empty() ? "nothing" : unknown[0]);
+  options.catalogue->push_back(tether());
+  EXPECT_EQ(selected(), std::pair(Names{"tether"}, true));
+}
+
+// A table by hand: one column that is there, one of noise, and the same one again beside a further column.
+struct Table {
+  std::vector<RowSpace> spaces;
+  CandidateTable table;
+  std::vector<EffectKind> kinds;
+
+  Table(double size, double noise, Eigen::Index rows = 960) {
+    std::mt19937_64 generator(2);
+    std::normal_distribution<double> normal;
+    const auto random = [&] {
+      Eigen::VectorXd x(rows);
+      for (double& value : x) {
+        value = normal(generator);
+      }
+      return x;
+    };
+    RowSpace space;
+    space.name = "by hand";
+    space.t = Eigen::VectorXd::LinSpaced(rows, 0.0, static_cast<double>(rows) / 16.0);
+    space.columns = {random(), random(), random(), random()};
+    space.response = size * space.columns[1] + noise * random();
+    table.base = {0};
+    table.names = {"there", "chance", "there and more"};
+    table.candidates = {{0, {}, {1}, {0}, false}, {1, {}, {2}, {0}, false}, {2, {}, {1, 3}, {0, 0}, false}};
+    kinds.resize(3);
+    spaces.push_back(std::move(space));
+  }
+
+  [[nodiscard]] Selection select(double floor = 1.0) {
+    const BlockGram gram(spaces);
+    table.gram = &gram;
+    return select_causes(table, kinds, false, floor);
+  }
+};
+
+TEST(SelectCauses, PrefersTheSimplerOfNestedEffects) {
+  const Selection found = Table(2.0, 1.0).select();
+  EXPECT_EQ(found.all.members, std::vector<std::size_t>{0});
+  ASSERT_EQ(found.credible.size(), 1u);
+  EXPECT_TRUE(found.reaches_floor);
+}
+
+TEST(SelectCauses, AsksForNothingBelowTheFloor) {
+  const Selection found = Table(2.0, 1.0).select(6.0);
+  EXPECT_FALSE(found.any_cause);
+  EXPECT_TRUE(found.reaches_floor);
+  EXPECT_LT(found.refitted_excess, 0.0);
+}
+
+TEST(SelectCauses, SaysWhenNothingCouldBeSignificant) {
+  Table table(5.0, 1.0);
+  const BlockGram few(table.spaces, {.blocks = 6});
+  table.table.gram = &few;
+  const Selection found = select_causes(table.table, table.kinds, false, 1.0);
+  EXPECT_EQ(found.enough_blocks, true) << "three effects want 2.13 deviations, and six blocks have 2.2";
+  table.kinds.resize(30);
+  table.table.names.resize(30);
+  const Selection many = select_causes(table.table, table.kinds, false, 1.0);
+  EXPECT_FALSE(many.enough_blocks);
+  EXPECT_FALSE(many.any_cause);
+}
+
+TEST(SelectCauses, NeedsAGramAndAKindForEachEffect) {
+  Table table(1.0, 1.0);
+  EXPECT_THROW((void)select_causes(table.table, table.kinds, false, 1.0), InvalidArgument);
+  const BlockGram gram(table.spaces);
+  table.table.gram = &gram;
+  table.kinds.pop_back();
+  EXPECT_THROW((void)select_causes(table.table, table.kinds, false, 1.0), InvalidArgument);
+}
+
+TEST(UnexplainedBy, IsTheShareThatAnotherSetCannotMakeUp) {
+  Table table(1.0, 1.0);
+  const BlockGram gram(table.spaces);
+  table.table.gram = &gram;
+  EXPECT_LT(unexplained_by(table.table, {0}, {2}, BaseModel::refitted), 1e-8);
+  EXPECT_GT(unexplained_by(table.table, {2}, {0}, BaseModel::refitted), 0.9);
+  const RowSpace& space = table.spaces[0];
+  const auto freed = [&space](std::size_t k) {
+    const Eigen::VectorXd& theta = space.columns[0];
+    return Eigen::VectorXd(space.columns[k] - theta * (theta.dot(space.columns[k]) / theta.squaredNorm()));
+  };
+  const Eigen::VectorXd a = freed(1), b = freed(2);
+  const double cosine = a.dot(b) / (a.norm() * b.norm());
+  EXPECT_NEAR(unexplained_by(table.table, {0}, {1}, BaseModel::refitted), 1.0 - cosine * cosine, 1e-8);
+}
+
+}  // namespace
+}  // namespace wheelwright
