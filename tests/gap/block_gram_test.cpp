@@ -168,12 +168,21 @@ TEST(BlockGram, ThreadsDoNotChangeABit) {
   EXPECT_EQ(one.held_out_error({{0, 3}}), three.held_out_error({{0, 3}}));
 }
 
+TEST(BlockGram, ShortLogsHaveFewerBlocks) {
+  const std::vector<RowSpace> spaces = random_spaces(7);  // of 40 s
+  EXPECT_EQ(BlockGram(spaces, {.blocks = 16}).blocks(), 16U);
+  EXPECT_EQ(BlockGram(spaces, {.blocks = 24}).blocks(), 20U);
+  EXPECT_EQ(BlockGram(spaces, {.blocks = 24, .shortest = 10.0}).blocks(), 12U);
+  EXPECT_EQ(BlockGram(spaces, {.blocks = 24, .shortest = 10.0, .fewest = 2}).blocks(), 4U);
+  EXPECT_EQ(BlockGram(spaces, {.blocks = 6, .shortest = 10.0}).blocks(), 6U);
+}
+
 TEST(BlockGram, MisuseIsRefused) {
   std::vector<RowSpace> spaces = random_spaces(6);
   const BlockGram gram(spaces, options());
   EXPECT_THROW((void)gram.held_out_error({{5}}), InvalidArgument);
   EXPECT_THROW((void)gram.held_out_error({{0}, {}, {1, 1}}), InvalidArgument);
-  EXPECT_THROW(BlockGram(spaces, {.blocks = 40, .purge = 2.0}), InvalidArgument);
+  EXPECT_THROW(BlockGram(spaces, {.blocks = 40, .purge = 2.5}), InvalidArgument);
   spaces[0].columns[2][3] = std::nan("");
   EXPECT_THROW(BlockGram(spaces, options()), InvalidArgument);
 }

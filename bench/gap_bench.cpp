@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: Apache-2.0
+// The whole gap diagnosis of a simulated drive with a healthy baseline log, next to what one would write first: least
+// squares by Eigen's QR on every row, for every effect at every shape and every pair, with random ten-fold cross-validation.
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <numeric>
+#include <random>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <Eigen/QR>
+
+#include <wheelwright/gap/diagnose.hpp>
+#include <wheelwright/gap/prepared.hpp>
+#include <wheelwright/sim/simulation.hpp>
+
+#include "bench.hpp"
+
+namespace wheelwright::bench {
+namespace {
+
+constexpr double kRate = 200.0;  // Hz
+constexpr std::size_t kFolds = 10;
+
+Robot plain_robot() {
+  Robot robot;
+  robot.wheel_radius = 0.0975;
+  robot.track_width = 0.381;
+  robot.nominal = {{"mass", 21.0}, {"yaw_inertia", 0.9}, {"viscous_linear", 4.0}, {"viscous_yaw", 0.145}};
+  return robot;
+}
+
+/// A multi-sine drive with noise on everything, of a robot whose centre of mass lies `ahead` of the axle.
+LogTable drive(double duration, double ahead, std::uint64_t seed) {
+  Scenario s;
+  s.robot = plain_robot();
+  if (ahead > 0.0) {
+    s.robot.effects = {{"com_longitudinal", {{"a", {ahead, ahead}}}}};
+  }
+  s.parameters = {.mass = 21.0, .yaw_inertia = 0.9, .viscous_x = 4.0, .viscous_y = 4.0, .viscous_yaw = 0.145};
+  s.trajectory = {.kind = Trajectory::Kind::multi_sine, .speed = 0.8, .yaw_rate = 1.6, .period = 8.0};
+  s.duration = duration;
+  s.rate = kRate;
+  s.sensors.wheel_speed = 0.01;
+  s.sensors.effort = 0.05;
+  s.sensors.position = s.sensors.heading = 0.002;
+  s.sensors.angles = s.sensors.commands = false;
+  s.seed = seed;
+  Simulation simulation(s);
+  return read_all(simulation);
+}
+
+double seconds_of(const std::function<void()>& work) {
+  const auto start = std::chrono::steady_clock::now();
+  work();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// All rows of all spaces, whitened, with the columns of `members` beside θ; the last column is the response.
+Eigen::MatrixXd stacked(const GapProblem& problem, const std::vector<std::size_t>& members) {
+  const Subset subset = subset_of(problem.table, members, BaseModel::refitted);
+  const auto n = static_cast<Eigen::Index>(subset.columns.size());
+  Eigen::Index total = 0;
+  for (const RowSpace& space : problem.rows.spaces) total += space.t.size();
+  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(total, n + 1);
+  Eigen::Index at = 0;
+  for (const RowSpace& space : problem.rows.spaces) {
+    const Eigen::Index m = space.t.size();
+    for (Eigen::Index j = 0; j < n; ++j) {
+      const Eigen::VectorXd& column = space.columns[subset.columns[static_cast<std::size_t>(j)]];
+      if (column.size() > 0) rows.col(j).segment(at, m) = column / space.floor;
+    }
+    Eigen::VectorXd response = space.response;
+    for (const std::size_t c : subset.fixed) {
+      if (space.columns[c].size() > 0) response -= space.columns[c];
+    }
+    rows.col(n).segment(at, m) = response / space.floor;
+    at += m;
+  }
+  return rows;
+}
+
+double cross_validated(const GapProblem& problem, const std::vector<std::size_t>& members,
+                       const std::vector<Eigen::Index>& order) {
+  const Eigen::MatrixXd rows = stacked(problem, members);
+  const Eigen::Index n = rows.cols() - 1;
+  double sum = 0.0;
+  for (std::size_t fold = 0; fold < kFolds; ++fold) {
+    std::vector<Eigen::Index> train, test;
+    for (std::size_t k = 0; k < order.size(); ++k) {
+      (k % kFolds == fold ? test : train).push_back(order[k]);
+    }
+    const Eigen::MatrixXd X = rows(train, Eigen::all);
+    const Eigen::VectorXd fit = X.leftCols(n).colPivHouseholderQr().solve(X.col(n));
+    const Eigen::MatrixXd Z = rows(test, Eigen::all);
+    sum += (Z.col(n) - Z.leftCols(n) * fit).squaredNorm();
+  }
+  return sum / static_cast<double>(rows.rows());
+}
+
+/// The best single effect or pair of a plain search; rows and columns are given to it.
+std::vector<std::size_t> plain_search(const GapProblem& problem) {
+  Eigen::Index total = 0;
+  for (const RowSpace& space : problem.rows.spaces) total += space.t.size();
+  std::vector<Eigen::Index> order(static_cast<std::size_t>(total));
+  std::iota(order.begin(), order.end(), Eigen::Index{0});
+  std::shuffle(order.begin(), order.end(), std::mt19937_64(1));
+  const double infinity = std::numeric_limits<double>::infinity();
+  std::vector<std::pair<double, std::size_t>> single(problem.table.names.size(), {infinity, 0});
+  for (std::size_t c = 0; c < problem.table.candidates.size(); ++c) {
+    auto& best = single[problem.table.candidates[c].effect];
+    best = std::min(best, {cross_validated(problem, {c}, order), c});
+  }
+  double least = infinity;
+  std::vector<std::size_t> chosen;
+  for (std::size_t a = 0; a < single.size(); ++a) {
+    for (std::size_t b = a + 1; b < single.size(); ++b) {
+      if (!std::isfinite(single[a].first + single[b].first)) {
+        continue;
+      }
+      const std::vector<std::size_t> pair{std::min(single[a].second, single[b].second),
+                                          std::max(single[a].second, single[b].second)};
+      const double error = cross_validated(problem, pair, order);
+      if (error < least) {
+        least = error;
+        chosen = pair;
+      }
+    }
+  }
+  return chosen;
+}
+
+double plain_seconds(TableSource& log, TableSource& baseline) {
+  PreparedGap prepared = prepare_gap(log, &baseline, plain_robot(), {});
+  prepared.row_options.row_step = 1e-9;
+  const GapProblem problem =
+      make_problem(prepared.drive, prepared.floor, prepared.healthy, prepared.trusted, prepared.catalogue,
+                   all_shapes(prepared.catalogue, prepared.drive), prepared.row_options);
+  return seconds_of([&] { keep(plain_search(problem)); });
+}
+
+std::vector<Measurement> catalogue() {
+  std::vector<Measurement> result;
+  double of_plain = 0.0;
+  for (const bool shrink : {false, true}) {
+    for (const std::size_t threads : {1, 2}) {
+      double shorter = 0.0;
+      for (const double duration : {120.0, 240.0}) {
+        const LogTable real = drive(duration, 0.03, 2), base = drive(duration, 0.0, 1);
+        TableSource log(real), baseline(base);
+        if (of_plain == 0.0) {
+          of_plain = plain_seconds(log, baseline);
+        }
+        DiagnoseOptions options;
+        options.shrink = shrink;
+        options.threads = threads;
+        std::vector<double> times;
+        std::string found;
+        for (int k = 0; k < 3; ++k) {
+          times.push_back(seconds_of([&] {
+            const Diagnosis diagnosis = diagnose(log, &baseline, plain_robot(), options);
+            found = diagnosis.causes.empty() ? "nothing" : diagnosis.causes.front().effect;
+          }));
+        }
+        std::sort(times.begin(), times.end());
+        const std::string name = shrink ? "gap/catalogue and shrink" : "gap/catalogue";
+        const bool first = duration < 200.0;
+        result.push_back({name, real.rows(), 4, static_cast<int>(threads), times[1],
+                          first ? "eigen qr, random 10-fold" : "the same at 120 s", first ? of_plain : shorter,
+                          fmt::format("{:.0f} s at {:.0f} Hz, finds {}", duration, kRate, found)});
+        shorter = times[1];
+      }
+    }
+  }
+  return result;
+}
+
+const bool registered = register_bench("gap/catalogue", catalogue);
+
+}  // namespace
+}  // namespace wheelwright::bench
