@@ -148,6 +148,7 @@ IncrementNoise repeatability(const Drive& drive, const Windows& windows, const I
   }
   constexpr double kNear = 0.05;
   constexpr std::size_t kMostWindows = 2000;
+  constexpr Eigen::Index kApart = 4;  // neighbours share a pose, and their errors
   const std::size_t stride = windows.size() / kMostWindows + 1;
   const auto count = static_cast<Eigen::Index>((windows.size() + stride - 1) / stride);
   Eigen::Matrix<double, 6, Eigen::Dynamic> motion(6, count);
@@ -167,10 +168,8 @@ IncrementNoise repeatability(const Drive& drive, const Windows& windows, const I
   for (Eigen::Index i = 0; i < count; ++i) {
     double nearest = 6.0 * kNear * kNear;
     Eigen::Index other = -1;
-    for (Eigen::Index j = 0; j < count; ++j) {
-      if (std::abs(i - j) < 4) {
-        continue;  // neighbours share a pose, and their errors
-      }
+    for (Eigen::Index k = kApart; k <= count - kApart; ++k) {
+      const Eigen::Index j = (i + k) % count;  // from i onwards: equals pair with another one each
       const double distance = (motion.col(i) - motion.col(j)).squaredNorm();
       if (distance < nearest) {
         nearest = distance;

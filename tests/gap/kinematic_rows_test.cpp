@@ -93,5 +93,18 @@ TEST(KinematicRows, WithoutAPositionOnlyYawIsLeft) {
   EXPECT_EQ(pose_gap(drive, windows).yaw.size(), 0);
 }
 
+// The same motion throughout: what is always missing is repeated, and only the noise of two poses differs.
+TEST(KinematicRows, RepeatedMotionShowsTheNoiseAndNotWhatIsMissing) {
+  constexpr double noise = 2e-3;
+  const Drive drive = circle(0.9, 0.03, noise, 40000);
+  const Windows windows = make_windows(drive, 0.5);
+  const IncrementNoise found = repeatability(drive, windows, pose_gap(drive, windows));
+  for (const double value : {found.forward, found.lateral, found.yaw}) {
+    EXPECT_NEAR(value, std::sqrt(2.0) * noise, 0.15 * std::sqrt(2.0) * noise);
+  }
+  const IncrementNoise too_few = repeatability(drive, windows, pose_gap(drive, windows), windows.size() + 1);
+  EXPECT_EQ(too_few.yaw, 0.0);
+}
+
 }  // namespace
 }  // namespace wheelwright
