@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cmath>
 
 #include <wheelwright/gap/catalogue.hpp>
@@ -213,7 +214,10 @@ Effect lateral_scrub() {
                       .upper = 0.4,
                       .scan = 6,
                       .logarithmic = true,
-                      .scale = [](const Drive& drive) { return deviation(drive.coordinates[1].smooth_speed); }}},
+                      .scale =
+                          [](const Drive& drive) {
+                            return std::max(deviation(drive.coordinates[1].smooth_speed), 1e-12);
+                          }}},
           .excite = "turn on the spot and in curves, both ways",
           .applies = needs_two_wheels,
           .columns = [](const Drive& drive, Shape shape) {

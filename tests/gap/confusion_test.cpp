@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+// Oracle: columns of known angles.
+#include <wheelwright/gap/confusion.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <Eigen/QR>
+
+#include "gap/noisy_log.hpp"
+
+namespace wheelwright {
+namespace {
+
+using testing::Contains;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+// Orthonormal columns: θ, a, b, c; "mixed" is cos of a and sin of b beside a good part of θ.
+struct Angles {
+  std::vector<RowSpace> spaces;
+  CandidateTable table;
+
+  explicit Angles(double cosine) {
+    std::mt19937_64 generator(4);
+    std::normal_distribution<double> normal;
+    const Eigen::Index rows = 1200;
+    Eigen::MatrixXd random(rows, 5);
+    for (double& x : random.reshaped()) {
+      x = normal(generator);
+    }
+    const Eigen::MatrixXd q =
+        Eigen::HouseholderQR<Eigen::MatrixXd>(random).householderQ() * Eigen::MatrixXd::Identity(rows, 5);
+    RowSpace space;
+    space.name = "made up";
+    space.t = Eigen::VectorXd::LinSpaced(rows, 0.0, 60.0);
+    const double scale = std::sqrt(static_cast<double>(rows));
+    for (Eigen::Index k = 0; k < 4; ++k) {
+      space.columns.emplace_back(scale * q.col(k));
+    }
+    space.columns.emplace_back(scale *
+                               (3.0 * q.col(0) + cosine * q.col(1) + std::sqrt(1.0 - cosine * cosine) * q.col(2)));
+    space.columns.emplace_back(scale * q.col(0));
+    space.response = scale * (q.col(0) + 2.0 * q.col(1) + q.col(4));
+    table.base = {0};
+    table.names = {"first", "mixed", "other", "like theta"};
+    table.candidates = {
+        {0, {}, {1}, {0}, false}, {1, {}, {4}, {0}, false}, {2, {}, {3}, {0}, false}, {3, {}, {5}, {0}, false}};
+    spaces.push_back(std::move(space));
+  }
+};
+
+TEST(ConfusablePairs, HaveTheSquaredCosineOfWhatThetaLeaves) {
+  for (const double cosine : {0.96, 0.99, 0.9999}) {
+    Angles made(cosine);
+    const BlockGram gram(made.spaces);
+    made.table.gram = &gram;
+    const std::vector<ConfusablePair> pairs = confusable_pairs(made.table, BaseModel::refitted);
+    ASSERT_EQ(pairs.size(), 1u);
+    EXPECT_EQ(pairs[0].first, "first");
+    EXPECT_EQ(pairs[0].second, "mixed");
+    EXPECT_NEAR(pairs[0].similarity, cosine * cosine, 1e-6);
+  }
+  Angles made(0.9);
+  const BlockGram gram(made.spaces);
+  made.table.gram = &gram;
+  EXPECT_TRUE(confusable_pairs(made.table, BaseModel::refitted).empty());
+  EXPECT_EQ(confusable_pairs(made.table, BaseModel::refitted, 0.8).size(), 1u);
+}
+
+// Held, θ hides nothing: "mixed" is nine parts θ's column of ten.
+TEST(ConfusablePairs, AreOthersWhereThetaIsHeld) {
+  Angles made(0.99);
+  const BlockGram gram(made.spaces);
+  made.table.gram = &gram;
+  const std::vector<ConfusablePair> pairs = confusable_pairs(made.table, BaseModel::nominal, 0.85);
+  ASSERT_EQ(pairs.size(), 1u);
+  EXPECT_EQ(pairs[0].first, "mixed");
+  EXPECT_EQ(pairs[0].second, "like theta");
+  EXPECT_NEAR(pairs[0].similarity, 0.9, 1e-6);
+}
+
+// Straight on without a turn: nothing can be said of what turning shows, and all else still is.
+TEST(NotExcited, NamesWhatALogCannotShowAndWhatWould) {
+  const auto sentences = [](double yaw_rate) {
+    Scenario s = gap_example::noisy_scenario(gap_example::counted_robot(), 1);
+    s.sensors.encoder_counts_per_turn.reset();
+    s.trajectory.kind = yaw_rate > 0.0 ? Trajectory::Kind::multi_sine : Trajectory::Kind::straight;
+    s.trajectory.yaw_rate = yaw_rate;
+    DiagnoseOptions options;
+    options.catalogue = gap_example::only({"coulomb", "lateral_scrub", "com_longitudinal", "payload"});
+    const PreparedGap prepared = gap_example::prepared_log(s, false, options);
+    const gap_example::Problem problem(prepared);
+    return not_excited(problem.problem.table, prepared.catalogue, prepared.drive);
+  };
+  EXPECT_TRUE(sentences(1.6).empty());
+  const std::vector<std::string> straight = sentences(0.0);
+  EXPECT_THAT(straight, Contains(AllOf(StartsWith("lateral_scrub:"), HasSubstr("turn on the spot"))));
+  EXPECT_THAT(straight, Contains(AllOf(StartsWith("com_longitudinal:"), HasSubstr("drive"))));
+  EXPECT_THAT(straight, Not(Contains(StartsWith("payload:")))) << "a change of theta is no structure";
+}
+
+}  // namespace
+}  // namespace wheelwright
