@@ -21,9 +21,10 @@ struct ConfidenceSetOptions {
 /// p-value of each model of a model confidence set (Hansen, Lunde and Nason 2011): models are dropped one by one, the one
 /// with the largest studentised mean loss beyond that of the best (plus the margin) first, and the p-value of each is the
 /// largest of the tests up to its own; the best has 1. A model belongs to the set of level 1 − a where its p-value is at
-/// least a, and all models that are equally good are in it together with that probability: which of them comes out best by
-/// chance is resampled too. `losses` holds one vector per model, one value per block; blocks are resampled whole, so that they may be
-/// correlated inside. Throws InvalidArgument unless all have the same length, at least four.
+/// least a, and all models that are equally good are in it together with that probability, to what a bootstrap of the
+/// blocks can do: which of them comes out best by chance is resampled too. `losses` holds one vector per model, one value
+/// per block; blocks are resampled whole, so that they may be correlated inside. Throws InvalidArgument unless all have the
+/// same length, at least four.
 [[nodiscard]] std::vector<double> model_confidence_set(const std::vector<Eigen::VectorXd>& losses,
                                                        const ConfidenceSetOptions& options = {});
 
