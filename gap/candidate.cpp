@@ -155,7 +155,11 @@ CauseSet evaluate(const CandidateTable& table, std::vector<std::size_t> members,
   set.loss = table.gram->held_out_loss(subset);
   set.held_out_error = set.loss.sum() / table.gram->rows().sum();
   const std::size_t theta = (base == BaseModel::refitted ? table.base : table.unknown).size();
-  set.coefficients = static_cast<double>(subset.columns.size() - theta);
+  std::size_t numbers = subset.columns.size() - theta;
+  for (const std::size_t c : members) {
+    numbers += table.candidates[c].shape.size();
+  }
+  set.coefficients = static_cast<double>(numbers);
   set.members = std::move(members);
   return set;
 }

@@ -45,7 +45,7 @@ struct CauseSet {
   std::vector<std::size_t> members;  ///< indices of candidates, ascending; at most one of an effect
   double held_out_error = 0.0;       ///< mean square in units of the floor
   Eigen::VectorXd loss;              ///< of each block
-  double coefficients = 0.0;         ///< number of those that are estimated besides θ
+  double coefficients = 0.0;         ///< number of coefficients and shapes that are estimated besides θ
 };
 
 /// The least-squares problem of the set.

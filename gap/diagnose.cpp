@@ -143,12 +143,13 @@ Box finite_prior(const Robot& robot, const PreparedGap& prepared) {
   return box;
 }
 
-// Mean square of the efforts in units of the floors: what shares of the gap are shares of.
-double signal_square(const GapProblem& problem) {
+// Mean square of the efforts in units of the floors, or of the pose's increments where there are no efforts: what shares of
+// the gap are shares of.
+double signal_square(const GapProblem& problem, bool efforts) {
   double sum = 0.0, rows = 0.0;
   for (std::size_t s = 0; s < problem.rows.spaces.size(); ++s) {
     rows += static_cast<double>(problem.rows.spaces[s].t.size());
-    if (problem.rows.kinds[s] == GapSpace::dynamic) {
+    if (problem.rows.kinds[s] == GapSpace::dynamic || !efforts) {
       sum += problem.rows.signal[s].squaredNorm() / std::pow(problem.rows.spaces[s].floor, 2);
     }
   }
@@ -206,7 +207,7 @@ Diagnosis diagnose(LogSource& log, LogSource* baseline, const Robot& robot, cons
     result.notes.push_back(
         "the log is too short for any cause to stand out from chance: drive longer, or look for fewer effects");
   }
-  const double square = signal_square(problem);
+  const double square = signal_square(problem, prepared.drive.has_efforts);
   result.gap = std::max(found.nominal_excess, 0.0) / square;
   result.structural = std::max(found.refitted_excess, 0.0) / square;
   const double whole = std::max(found.nominal_excess, found.refitted_excess);

@@ -70,7 +70,11 @@ std::vector<Effect> chosen_catalogue(const Model& model, const DiagnoseOptions& 
   for (const std::string& name : options.without) {
     const auto gone = std::remove_if(all.begin(), all.end(), [&](const Effect& e) { return e.name == name; });
     if (gone == all.end()) {
-      throw InvalidArgument("DiagnoseOptions::without: there is no effect called " + name);
+      std::string known;
+      for (const Effect& effect : all) {
+        known.append(known.empty() ? "" : ", ").append(effect.name);
+      }
+      throw InvalidArgument("DiagnoseOptions::without: there is no effect called " + name + "; there are " + known);
     }
     all.erase(gone, all.end());
   }
@@ -173,6 +177,11 @@ void learn_healthy(PreparedGap& prepared, const DiagnoseOptions& options) {
   prepared.healthy = fitted_effects(problem.table, found.structural, fit, prepared.catalogue);
   std::vector<Eigen::VectorXd> left = residuals(problem.rows, subset, fit.coefficients);
   prepared.healthy.push_back(timing_of(drive, problem.rows, left, prepared.row_options));
+  // Held out, as the errors of other logs are that are measured by it.
+  const double held_out = std::sqrt(std::max(fit.held_out_error / std::max(fit.mean_square, 1e-300), 1.0));
+  for (Eigen::VectorXd& rows : left) {
+    rows *= held_out;
+  }
   prepared.floor = without_efforts(floor_of(left, problem.rows), drive);
   prepared.floor_origin = "what the model leaves of the healthy log";
   for (const FittedEffect& effect : prepared.healthy) {

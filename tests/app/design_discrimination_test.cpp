@@ -26,7 +26,8 @@ TEST_F(DesignDiscrimination, TellsNamedCausesApart) {
   const Outcome done =
       run(std::string(kDrive) + "--between coulomb --between caster_drag --size coulomb=0.2 --out plan");
   ASSERT_EQ(done.code, 0) << done.err;
-  EXPECT_THAT(names_in("plan"), ::testing::ElementsAre("design.json", "figure_eight.csv", "manoeuvre.csv", "report.html"));
+  EXPECT_THAT(names_in("plan"),
+              ::testing::ElementsAre("design.json", "figure_eight.csv", "manoeuvre.csv", "report.html"));
   const Json design = read_json(path("plan/design.json"));
   EXPECT_EQ(design.at("for"), "discrimination");
   EXPECT_EQ(design.at("rivals")[0].at("causes")[0].at("coefficients")[0], 0.2);

@@ -213,7 +213,11 @@ TEST(Catalogue, FrictionIsExplainedByItsColumn) {
                     {1.0},
                     {0.4},
                     0.15});
-  expect_explained({"viscous", friction([](int, double w, double) { return 0.05 * w; }), {}, {0.05}, 1e-3});
+  expect_explained({"viscous",
+                    friction([](int, double w, double) { return 0.05 * w; }),
+                    {},
+                    {2.0 * 0.05 / (kR * kR), 0.5 * 0.05 * kD * kD / (kR * kR)},
+                    1e-3});
   expect_explained({"viscous_asymmetric",
                     friction([](int j, double w, double) { return j == 1 ? 0.05 * w : 0.0; }),
                     {1.0},
@@ -231,17 +235,18 @@ TEST(Catalogue, ForcesAndMassesAreExplainedByTheirColumns) {
   World drag;
   drag.force = [](double, double v, double, double) { return 6.0 * v * std::abs(v); };
   drag.moment = [](double, double, double w, double, double) { return 0.5 * w * std::abs(w); };
-  expect_explained({"quadratic_drag", drive_of(drag), {}, {6.0, 0.5}, 0.01});
+  expect_explained({"quadratic_drag", drive_of(drag), {}, {6.0 * kR, 0.5 * kR}, 0.01});
   World scrub;
   scrub.moment = [](double, double, double w, double, double) { return 1.5 * sign(w); };
-  expect_explained({"lateral_scrub", drive_of(scrub), {}, {1.5}, 0.08});
+  expect_explained({"lateral_scrub", drive_of(scrub), {0.005}, {1.5 * kR}, 0.08});
   World caster;
   caster.force = [](double, double v, double w, double) { return 4.0 * v / std::hypot(v, 0.3 * w); };
   caster.moment = [](double, double v, double w, double, double) { return 4.0 * 0.09 * w / std::hypot(v, 0.3 * w); };
-  expect_explained({"caster_drag", drive_of(caster), {0.3}, {4.0}, 0.1});
+  expect_explained({"caster_drag", drive_of(caster), {0.3, 1e-3}, {4.0 * kR}, 0.1});
   World slope;
   slope.force = [](double, double, double, double heading) { return kM * 9.80665 * 0.02 * std::cos(heading - 0.8); };
-  expect_explained({"slope", drive_of(slope), {}, {0.02 * std::cos(0.8), 0.02 * std::sin(0.8)}, 0.01});
+  expect_explained(
+      {"slope", drive_of(slope), {}, {9.80665 * 0.02 * std::cos(0.8), 9.80665 * 0.02 * std::sin(0.8)}, 0.01});
   World ahead;  // the inertia about the axle is the base model's
   ahead.inertial_force = [](double, double, double w, double, double) { return -kM * 0.1 * w * w; };
   ahead.moment = [](double, double v, double w, double, double) { return kM * 0.1 * v * w; };
@@ -296,7 +301,7 @@ TEST(Catalogue, GeometryIsExplainedInTorqueAndPose) {
   expect_explained({"wheel_radius", drive_of(both), {}, {-0.02, 0.0}, 0.03});
   World wide;
   wide.track = 1.02 * kD;
-  expect_explained({"track_width", drive_of(wide), {}, {0.02, 0.0}, 0.04});
+  expect_explained({"track_width", drive_of(wide), {}, {0.02 / 1.02, 0.0}, 0.04});
   expect_explained({"encoder_scale", drive_of({}, 0.0, 0.0, 1.02), {0.0}, {0.02, 0.0}, 0.04});
 }
 
