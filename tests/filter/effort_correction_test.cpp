@@ -17,7 +17,7 @@ EffortCorrector corrector(const EffortCorrection& correction, Hold hold) { retur
 // A unit step of a held effort at 0: y = 1 − e^{−t/T}, its mean over [t, t + h] = 1 − T/h (e^{−t/T} − e^{−(t+h)/T}).
 TEST(EffortCorrection, TheLagOfAStepIsTheExponential) {
   constexpr double lag = 0.03;
-  EffortCorrector c = corrector({.lag = lag}, Hold::zero_order);
+  EffortCorrector c = corrector({.gain = {}, .lag = lag}, Hold::zero_order);
   const double nothing = 0.0, unit = 1.0;
   c.step(-kStep, &nothing);
   c.step(0.0, &unit);
@@ -32,7 +32,7 @@ TEST(EffortCorrection, TheLagOfAStepIsTheExponential) {
 // The effort t, logged linear between samples: y = t − T + T e^{−t/T}.
 TEST(EffortCorrection, TheLagOfARampIsExact) {
   constexpr double lag = 0.03;
-  EffortCorrector c = corrector({.lag = lag}, Hold::first_order);
+  EffortCorrector c = corrector({.gain = {}, .lag = lag}, Hold::first_order);
   double t = 0.0;
   for (int k = 0; k < 30; ++k) {
     c.step(t, &t);
@@ -45,8 +45,8 @@ TEST(EffortCorrection, TheLagOfARampIsExact) {
 // shifted interval.
 TEST(EffortCorrection, ADelayShifts) {
   constexpr double delay = 2.3 * kStep;
-  EffortCorrector linear = corrector({.delay = delay}, Hold::first_order);
-  EffortCorrector held = corrector({.delay = delay}, Hold::zero_order);
+  EffortCorrector linear = corrector({.gain = {}, .delay = delay}, Hold::first_order);
+  EffortCorrector held = corrector({.gain = {}, .delay = delay}, Hold::zero_order);
   const auto u = [](int k) { return std::sin(0.7 * k) + 0.1 * k; };
   for (int k = 0; k < 40; ++k) {
     const double now = u(k);
@@ -73,7 +73,7 @@ TEST(EffortCorrection, SaturationDeadZoneAndGainActInThisOrder) {
 
 // The same samples after a restart give the same bits, however long the corrector ran before.
 TEST(EffortCorrection, ARestartForgets) {
-  const EffortCorrection both{.delay = 0.034, .lag = 0.02};
+  const EffortCorrection both{.gain = {}, .delay = 0.034, .lag = 0.02};
   EffortCorrector fresh = corrector(both, Hold::first_order), used = corrector(both, Hold::first_order);
   for (int k = 0; k < 57; ++k) {
     const double u = std::cos(0.3 * k);
@@ -90,16 +90,20 @@ TEST(EffortCorrection, ARestartForgets) {
 }
 
 TEST(EffortCorrection, WhatMakesNoSenseIsRefused) {
-  EXPECT_THROW(corrector({.delay = -0.1}, Hold::first_order), InvalidArgument);
+  EXPECT_THROW(corrector({.gain = {}, .delay = -0.1}, Hold::first_order), InvalidArgument);
   EXPECT_THROW(corrector({.gain = {1.0, 1.0}}, Hold::first_order), InvalidArgument);
-  EXPECT_THROW(EffortCorrector({.delay = 0.1}, 1, Hold::first_order, 0.0), InvalidArgument);
-  Robot robot{.wheel_radius = 0.1, .track_width = 0.4};
+  EXPECT_THROW(EffortCorrector({.gain = {}, .delay = 0.1}, 1, Hold::first_order, 0.0), InvalidArgument);
+  Robot robot;
+  robot.wheel_radius = 0.1;
+  robot.track_width = 0.4;
   robot.effects = {{"sensor_time_offset", {{"dt", {-0.01, -0.01}}}}};
   EXPECT_THROW(static_cast<void>(effort_correction(robot)), InvalidArgument);
 }
 
 TEST(EffortCorrection, ARobotWithoutSuchEffectsHasNone) {
-  Robot robot{.wheel_radius = 0.1, .track_width = 0.4};
+  Robot robot;
+  robot.wheel_radius = 0.1;
+  robot.track_width = 0.4;
   EXPECT_TRUE(effort_correction(robot).empty());
   robot.effects = {{"coulomb", {{"c", {0.1, 0.1}}}}};
   EXPECT_TRUE(effort_correction(robot).empty());

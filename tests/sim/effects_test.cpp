@@ -111,7 +111,7 @@ INSTANTIATE_TEST_SUITE_P(
                       Case{"lateral_scrub", {{"mu", 0.06}}}, Case{"wheel_radius_asymmetric", {{"eps", 0.03}}},
                       Case{"wheel_radius", {{"eps", -0.04}}, true}, Case{"track_width", {{"eps", 0.05}}, true},
                       Case{"encoder_scale", {{"s_R", 0.02}, {"s_L", -0.01}}}),
-    [](const ::testing::TestParamInfo<Case>& info) { return info.param.effect; });
+    [](const ::testing::TestParamInfo<Case>& one) { return one.param.effect; });
 
 }  // namespace
 }  // namespace wheelwright
