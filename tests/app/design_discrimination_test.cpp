@@ -17,9 +17,9 @@ constexpr const char* kDrive =
 constexpr const char* kGap = R"({"schema": "wheelwright/gap/1",
   "filter": {"order": 2, "alpha": 5, "beta": 5},
   "shrink": {"torque_rms": {"sum": {"floor": 0.05}, "difference": {"floor": 0.01}}},
-  "causes": [{"effect": "actuator_lag", "parameters": {"time_constant_s": {"estimate": 0.04}}}],
+  "causes": [{"effect": "actuator_lag", "parameters": {"T": {"estimate": 0.04}}}],
   "credible_set": [{"effects": ["actuator_lag"]},
-                   {"effects": ["delay"], "parameters": {"delay.delay_s": {"estimate": 0.037}}},
+                   {"effects": ["delay"], "parameters": {"delay.T_d": {"estimate": 0.037}}},
                    {"effects": ["of_my_own"]}]})";
 
 TEST_F(DesignDiscrimination, TellsNamedCausesApart) {
@@ -30,7 +30,7 @@ TEST_F(DesignDiscrimination, TellsNamedCausesApart) {
               ::testing::ElementsAre("design.json", "figure_eight.csv", "manoeuvre.csv", "report.html"));
   const Json design = read_json(path("plan/design.json"));
   EXPECT_EQ(design.at("for"), "discrimination");
-  EXPECT_EQ(design.at("rivals")[0].at("causes")[0].at("coefficients")[0], 0.2);
+  EXPECT_DOUBLE_EQ(design.at("rivals")[0].at("causes")[0].at("coefficients")[0].get<double>(), 0.2);
   EXPECT_EQ(design.at("pairs").size(), 2U);
   for (const auto& [limit, share] : design.at("use").items()) {
     EXPECT_LE(share.get<double>(), 1.0) << limit;
@@ -50,8 +50,8 @@ TEST_F(DesignDiscrimination, TakesTheCredibleSetOfAGap) {
 TEST_F(DesignDiscrimination, SaysWhatIsWrong) {
   EXPECT_THAT(run(std::string(kDrive) + "--between coulomb").err, HasSubstr("at least twice"));
   EXPECT_THAT(run(std::string(kDrive) + "--between coulomb --between gremlins").err, HasSubstr("gremlins"));
-  EXPECT_THAT(run(std::string(kDrive) + "--between coulomb --between delay --size coulomb.c=1").err,
-              HasSubstr("no parameter 'c'"));
+  EXPECT_THAT(run(std::string(kDrive) + "--between coulomb --between delay --size coulomb.nonsense=1").err,
+              HasSubstr("no parameter 'nonsense'"));
   EXPECT_THAT(run(std::string(kDrive) + "--between coulomb --between delay --size slope=1").err, HasSubstr("slope"));
   EXPECT_EQ(run("design --robot robot.yaml --for bounds --gap gap.json").code, 2);
 }

@@ -202,12 +202,12 @@ TEST(CauseSet, HasTheHeldOutErrorOfItsColumnsBesideTheta) {
   const std::vector<std::size_t>& columns = made.table.candidates[two].columns;
   const CauseSet refitted = evaluate(made.table, {two}, BaseModel::refitted);
   EXPECT_NEAR(refitted.held_out_error, held_out_by_hand(made.spaces[0], {0, 1, columns[0], columns[1]}), 1e-9);
-  EXPECT_EQ(refitted.coefficients, 2.0);
+  EXPECT_EQ(refitted.coefficients, 3.0);  // two columns and a shape
   EXPECT_DOUBLE_EQ(refitted.loss.sum() / gram.rows().sum(), refitted.held_out_error);
   // Held: only the column without a nominal value is fitted beside.
   const CauseSet held = evaluate(made.table, {two}, BaseModel::nominal);
   EXPECT_NEAR(held.held_out_error, held_out_by_hand(made.spaces[0], {1, columns[0], columns[1]}), 1e-9);
-  EXPECT_EQ(held.coefficients, 2.0);
+  EXPECT_EQ(held.coefficients, 3.0);
 }
 
 TEST(CauseSet, SubtractsWhatHasNoCoefficient) {
@@ -217,7 +217,7 @@ TEST(CauseSet, SubtractsWhatHasNoCoefficient) {
   const BlockGram gram(made.spaces);
   made.table.gram = &gram;
   const CauseSet set = evaluate(made.table, {unit}, BaseModel::refitted);
-  EXPECT_EQ(set.coefficients, 0.0);
+  EXPECT_EQ(set.coefficients, 1.0);  // its shape
   RowSpace less = made.spaces[0];
   less.response -= less.columns[made.table.candidates[unit].columns[0]];
   EXPECT_NEAR(set.held_out_error, held_out_by_hand(less, {0, 1}), 1e-9);

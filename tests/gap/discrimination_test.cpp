@@ -98,7 +98,7 @@ TEST(Discrimination, DryFrictionAtOneSpeedAndAtTwo) {
   const PlannedNoise noise = torque_only(s);
   const double c = 0.1, u = 0.3, w = 0.6, half = 200.0;
   // A scrubbing moment is no match for it on a straight line: its column is zero there.
-  const std::vector<Rival> rivals{rival("coulomb", {c}), rival("lateral_scrub", {0.1})};
+  const std::vector<Rival> rivals{rival("coulomb", {c}), rival("lateral_scrub", {0.1}, {0.01})};
   const auto one =
       discrimination(planned_drive(plan_of_speeds(s, 2.0 * half, [&](double) { return Eigen::Vector2d(u, 0.0); }), s),
                      rivals, effect_catalogue(), noise);
@@ -153,7 +153,7 @@ TEST(Discrimination, DecidesAtThePromisedRate) {
   PlannedNoise noise = torque_only(s);
   const StageFamily family(s, limits(16.0), 3);
   const Drive drive = planned_drive(family.plan(std::vector{0.9, 0.6, 0.5, 0.1, 0.7, 0.2, 0.8, 0.1, 0.4}, s.step), s);
-  std::vector<Rival> rivals{rival("coulomb", {0.1}), rival("caster_drag", {1.0}, {0.2})};
+  std::vector<Rival> rivals{rival("coulomb", {0.1}), rival("caster_drag", {1.0}, {0.2, 0.002})};
   double deviations = discrimination(drive, rivals, catalogue, noise)[0].deviations();
   ASSERT_GT(deviations, 0.0);
   const double size = 0.1 / deviations;  // so that it is one deviation
