@@ -384,23 +384,14 @@ class Improvement {
     return true;
   }
 
-  // The simulator's motor crosses the gap under the whole torque: for as long as the lost share of the pulse would be whole.
+  // What was found is the rotor's inertia times the play; the simulator's rotor has a set share of the wheel's load.
   bool convert_backlash() {
     if (find("mass") == nullptr) {
       return refuse("backlash needs a model with the mass in it");
     }
-    double square = 0.0;
-    for (const JointSignals& joint : drive_.joints) {
-      square += joint.smooth_effort.squaredNorm() / static_cast<double>(drive_.rows() * std::ssize(drive_.joints));
-    }
-    const double motor =
+    const double rotor =
         kMotorShare * 0.5 * improved_.nominal.at("mass") * improved_.wheel_radius * improved_.wheel_radius;
-    const double crossing = std::max(coefficient(0), 0.0) * shape(0);
-    const double gap = 0.5 * std::sqrt(square) / unit_ / motor * crossing * crossing;
-    if (!(gap > 0.0)) {
-      return true;
-    }
-    set("gap", std::min(gap, 1.0));
+    set("gap", std::min(shape(0) / unit_ / rotor, 1.0));
     return true;
   }
 

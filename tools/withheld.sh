@@ -6,7 +6,8 @@
 #   tools/withheld.sh [--seed S] [--cases N] [--profile standard|hard] [--kind KIND] [--out DIR] [--only naive] [SET]
 #
 # SET is a directory of cases that is there already: case_*/ (or logs/case_*/) beside answers.json. Without it a set is
-# made in DIR/set. The tool sees logs and robot file of a case and nothing else; its results are in DIR/results.
+# made in DIR/set. The tool sees logs and robot file of a case and nothing else; its results are in DIR/results, without
+# the drive that would split ambiguous causes, which takes longer than all the rest.
 #   --only WORD  passes --WORD to `wheelwright gap` and keeps the results in DIR/results-WORD; naive: scores what the
 #                naive rule said
 # The table is Markdown on standard output. BUILD (default build) is the build directory, JOBS (2) the cases at a time.
@@ -50,7 +51,7 @@ find "$logs" -maxdepth 1 -name 'case_*' -type d -exec basename {} \; | sort | xa
   case={}
   rm -rf "$results/$case"
   "$bin/wheelwright" gap "$logs/$case/real.csv.gz" --robot "$logs/$case/robot.yaml" \
-    --baseline "$logs/$case/baseline.csv.gz" --out "$results/$case" ${only:+--$only} --threads 1 --quiet \
+    --baseline "$logs/$case/baseline.csv.gz" --out "$results/$case" ${only:+--$only} --threads 1 --quiet --no-manoeuvre \
     >"$results/$case.log" 2>&1 || [ $? -eq 1 ] || echo "withheld: $case failed, see $results/$case.log" >&2'
 
 naive=''
