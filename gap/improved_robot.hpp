@@ -34,7 +34,7 @@ namespace wheelwright {
 ///   the mean at both wheels, encoder_scale −e/(1 + e). The efforts of com_* and slope keep their size when the mass is
 ///   another than that of `drive.theta`.
 /// - The eccentric radius of wheel_out_of_round is left out: the robot file has its torque only. A backlash is given the
-///   gap in which the simulator loses as much of a typical effort as was found.
+///   gap that has the found product with the inertia of the simulator's rotor.
 /// - `intervals` has the 95 % interval of each cause's coefficients, or is empty. Linear parameters get an interval
 ///   about the estimate, three times as wide and at least as wide as the estimate (a prior that is to hold for certain);
 ///   without, the estimate alone. A parameter that is 0, or has the wrong sign, is left out.
