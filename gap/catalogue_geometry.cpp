@@ -57,14 +57,16 @@ Effect com_longitudinal() {
 Effect com_lateral() {
   return {.name = "com_lateral",
           .sentence = "The centre of mass lies to the left or right of the middle.",
-          .parameters = {{"b", "m", 0}},
+          .parameters = {{"b", "m", 0}, {"inertia_change", "1", 0, true}},
           .excite = "accelerate and brake hard on a straight line",
           .applies = needs_two_wheels,
           .columns = [](const Drive& drive, Shape) {
             const double rm = drive.wheel_radius * drive.physical("mass");
             Column column;
             column.effort_rate = {-rm * drive.coordinates[1].speed, -rm * drive.coordinates[0].speed};
-            return std::vector{column};
+            Column inertia;
+            inertia.effort_rate = {{}, drive.wheel_radius * drive.physical("yaw_inertia") * drive.coordinates[1].speed};
+            return std::vector{column, inertia};
           }};
 }
 

@@ -254,7 +254,7 @@ TEST(Catalogue, ForcesAndMassesAreExplainedByTheirColumns) {
   World beside;
   beside.inertial_force = [](double, double, double, double, double turn) { return -kM * 0.05 * turn; };
   beside.moment = [](double, double, double, double along, double) { return -kM * 0.05 * along; };
-  expect_explained({"com_lateral", drive_of(beside), {}, {0.05}, 1e-3});
+  expect_explained({"com_lateral", drive_of(beside), {}, {0.05, 0.0}, 1e-3});
   World load;
   load.inertial_force = [](double, double, double, double along, double) { return 3.0 * along; };
   load.moment = [](double, double, double, double, double turn) { return 0.1 * turn; };
