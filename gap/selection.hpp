@@ -29,7 +29,7 @@ struct SelectionOptions {
   double part = 0.5;           ///< … and of what is left without it
   double large_share = 0.25;   ///< of the gap that is enough alone
   double large_part = 0.8;     ///< of what is left that is enough …
-  double small_share = 0.01;   ///< … with this share of the gap
+  double small_share = 0.002;  ///< … with this share of the gap
   double smallest = 0.3;       ///< gain that a cause must have in any case, mean squares of the floor
   double significance = 0.05;  ///< of a gain, over all effects that were tried
   double misfit = 1.0;         ///< times the best set's own excess by which another set may be worse and be as good
