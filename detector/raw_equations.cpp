@@ -82,6 +82,8 @@ void add_functions(RawEquations& e, const Term& term, const std::vector<TermValu
 
 RawEquations raw_equations(const Model& model, const Measurement& measurement, const SensorErrors& sensors,
                            const ReferenceMotion& motion, std::size_t first, std::size_t last) {
+  check::that(measurement.correction.empty(), "measurement",
+              "efforts as the wheels get them: raw equations do not correct saturation, dead zones, gains or lags");
   check::that(first < last && last < motion.instants() &&
                   std::upper_bound(motion.segment_starts.begin(), motion.segment_starts.end(), first) ==
                       std::upper_bound(motion.segment_starts.begin(), motion.segment_starts.end(), last),

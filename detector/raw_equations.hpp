@@ -67,7 +67,8 @@ struct RawEquations {
 };
 
 /// The equations between instants `first` and `last` of `motion` (one segment), with the errors of `sensors` (for mean
-/// speeds and angles: of the angle). Throws InvalidArgument unless first < last are instants of one segment.
+/// speeds and angles: of the angle). Throws InvalidArgument unless first < last are instants of one segment, and for a
+/// measurement with a correction of its efforts.
 [[nodiscard]] RawEquations raw_equations(const Model& model, const Measurement& measurement,
                                          const SensorErrors& sensors, const ReferenceMotion& motion, std::size_t first,
                                          std::size_t last);

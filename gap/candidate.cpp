@@ -164,6 +164,12 @@ CauseSet evaluate(const CandidateTable& table, std::vector<std::size_t> members,
   return set;
 }
 
+CauseSet evaluate_without(const CandidateTable& table, const CauseSet& set, std::size_t k, BaseModel base) {
+  std::vector<std::size_t> others = set.members;
+  others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
+  return evaluate(table, std::move(others), base);
+}
+
 std::vector<std::size_t> effects_of(const CandidateTable& table, const CauseSet& set) {
   std::vector<std::size_t> effects;
   for (const std::size_t c : set.members) {

@@ -54,6 +54,10 @@ struct CauseSet {
 /// The set with its held-out error.
 [[nodiscard]] CauseSet evaluate(const CandidateTable& table, std::vector<std::size_t> members, BaseModel base);
 
+/// `set` without its member `k`.
+[[nodiscard]] CauseSet evaluate_without(const CandidateTable& table, const CauseSet& set, std::size_t k,
+                                        BaseModel base);
+
 /// Effects of the set, ascending.
 [[nodiscard]] std::vector<std::size_t> effects_of(const CandidateTable& table, const CauseSet& set);
 

@@ -13,15 +13,6 @@ using namespace catalogue;
 using Signal = Eigen::VectorXd;
 using Shape = std::span<const double>;
 
-template <typename Function>
-std::vector<Signal> each_joint(const Drive& drive, const Function& function) {
-  std::vector<Signal> signals;
-  for (std::size_t j = 0; j < drive.joints.size(); ++j) {
-    signals.push_back(function(j));
-  }
-  return signals;
-}
-
 // u through T y' = u − y, from y = u at each segment's start.
 Signal lagged(const Drive& drive, const Signal& u, double T) {
   const StepWeights w(1.0 / T, drive.step);
@@ -54,16 +45,8 @@ Signal shifted(const Drive& drive, const Signal& u, double delay) {
 
 double typical_effort(const Drive& drive) { return std::max(deviation(drive.joints[0].smooth_effort), 1e-12); }
 
-double largest_effort(const Drive& drive) {
-  double largest = 1e-12;
-  for (const JointSignals& joint : drive.joints) {
-    largest = std::max(largest, joint.effort.cwiseAbs().maxCoeff());
-  }
-  return largest;
-}
-
 ShapeParameter duration(const char* name) {
-  return {.name = name, .unit = "s", .lower = 0.004, .upper = 0.25, .scan = 40, .logarithmic = true};
+  return {.name = name, .unit = "s", .lower = 0.004, .upper = 0.25, .scan = 40, .logarithmic = true, .resolution = 0.1};
 }
 
 std::vector<PhysicalValue> gain_of_excess(std::span<const double> c, Shape) {
@@ -179,54 +162,89 @@ Effect torque_bias(std::size_t joints) {
   return effect;
 }
 
+// τ less what passes, b clip(τ/b), as b tanh(τ/edge): linear in b. With a wide edge the column would be the commanded effort
+// itself, which explains anything; so would a low limit of saturation() beside it.
 Effect torque_deadzone() {
   return {.name = "torque_deadzone",
           .sentence = "The actuator answers only to what exceeds a dead zone.",
           .parameters = {{"b", "N·m", 1}},
+          .shapes = {{.name = "edge",
+                      .unit = "N·m",
+                      .lower = 0.015,
+                      .upper = 0.25,
+                      .scan = 3,
+                      .logarithmic = true,
+                      .scale = typical_effort}},
           .excite = "brake with the motors: torque against the motion",
-          .columns = [](const Drive& drive, Shape) {
-            const double width = 0.015 * typical_effort(drive);
+          .columns = [](const Drive& drive, Shape shape) {
             return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) {
-                                           return soft_sign(drive.joints[j].smooth_effort, width);
+                                           return soft_sign(drive.joints[j].smooth_effort, shape[0]);
                                          }))};
           }};
 }
 
 Effect saturation() {
-  return {
-      .name = "saturation",
-      .sentence = "The actuator's torque is limited below what is commanded.",
-      .shapes = {{.name = "tau_max", .unit = "N·m", .lower = 0.3, .upper = 0.98, .scan = 18, .scale = largest_effort}},
-      .unit_coefficient = true,
-      .excite = "accelerate as hard as it goes",
-      .columns = [](const Drive& drive, Shape shape) {
-        return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
-                                       const Signal& u = drive.joints[j].effort;
-                                       return u - u.cwiseMax(-shape[0]).cwiseMin(shape[0]);
-                                     }))};
-      }};
+  return {.name = "saturation",
+          .sentence = "The actuator's torque is limited below what is commanded.",
+          .shapes = {{.name = "tau_max",
+                      .unit = "N·m",
+                      .lower = 1.0,
+                      .upper = 8.0,
+                      .scan = 24,
+                      .logarithmic = true,
+                      .scale = typical_effort}},
+          .unit_coefficient = true,
+          .excite = "accelerate as hard as it goes",
+          .columns = [](const Drive& drive, Shape shape) {
+            return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
+                                           const Signal& u = drive.joints[j].effort;
+                                           return u - u.cwiseMax(-shape[0]).cwiseMin(shape[0]);
+                                         }))};
+          }};
 }
 
-// Momentum that the rotor of a gear with play has against its wheel: while the play is crossed the torque turns the rotor
-// alone, ṗ = τ, and x, the rotor's inertia times the angle it is ahead by, goes from one side to the other, ẋ = p; at a
-// side p is handed over at once. `width` is the rotor's inertia times the play.
-Signal rotor_momentum(const Drive& drive, const Signal& effort, double width) {
-  constexpr int kSubsteps = 8;
-  Signal momentum = Signal::Zero(effort.size());
+// The inertia of a joint whose torque is all for acceleration.
+double typical_inertia(const Drive& drive) {
+  double effort = 0.0, acceleration = 1e-300;
+  for (const JointSignals& joint : drive.joints) {
+    effort += joint.smooth_effort.squaredNorm();
+    acceleration += joint.smooth_acceleration.squaredNorm();
+  }
+  return std::max(std::sqrt(effort / acceleration), 1e-12);
+}
+
+// A rotor with play against its wheel: inertia J, play `gap`, and where they touch a spring and a damper that only push,
+// of the rotor's own frequency ω and damping ratio ζ.
+struct Play {
+  double width = 0.0;  // J·gap
+  double inertia = 0.0;
+  double frequency = 0.0;
+  double damping = 0.0;
+};
+
+// Momentum p = Jẋ that the rotor has against its wheel, Jx = q the angle it is ahead by:
+//
+//     ṗ = τ − Jω̇ − c,    q̇ = p,    c = ω²(q ∓ width/2) + 2ζω p beyond the play, where that pushes; else 0.
+//
+// c is what the wheel gets of τ less what the rotor's own inertia takes, so that ṗ is what it misses.
+Signal rotor_momentum(const Drive& drive, const JointSignals& joint, const Play& play) {
+  constexpr double kStepsToARadian = 3.0;
+  constexpr int kFewest = 4;
+  const int steps = std::max(kFewest, static_cast<int>(std::ceil(kStepsToARadian * play.frequency * drive.step)));
+  const double h = drive.step / steps, half = 0.5 * play.width;
+  const double stiffness = play.frequency * play.frequency, damping = 2.0 * play.damping * play.frequency;
+  Signal momentum = Signal::Zero(joint.effort.size());
   for (std::size_t s = 0; s < drive.segment_starts.size(); ++s) {
     const auto [first, last] = drive.segment(s);
-    double x = effort[first] < 0.0 ? -0.5 * width : 0.5 * width;
-    double p = 0.0;
+    double q = joint.effort[first] < 0.0 ? -half : half, p = 0.0;
     for (Eigen::Index k = first; k + 1 < last; ++k) {
-      const double h = drive.step / kSubsteps;
-      for (int i = 0; i < kSubsteps; ++i) {
-        const double torque = effort[k] + (effort[k + 1] - effort[k]) * (i + 0.5) / kSubsteps;
-        p += h * torque;
-        x += h * p;
-        if (std::abs(x) >= 0.5 * width) {
-          x = std::copysign(0.5 * width, x);
-          p = 0.0;
-        }
+      const double own = play.inertia * (joint.smooth_speed[k + 1] - joint.smooth_speed[k]) / drive.step;
+      const double slope = (joint.effort[k + 1] - joint.effort[k]) / steps;
+      for (int i = 0; i < steps; ++i) {
+        const double beyond = q - std::clamp(q, -half, half);
+        const double contact = beyond == 0.0 ? 0.0 : stiffness * beyond + damping * p;
+        p += h * (joint.effort[k] + slope * (i + 0.5) - own - (contact * beyond > 0.0 ? contact : 0.0));
+        q += h * p;
       }
       momentum[k + 1] = p;
     }
@@ -236,22 +254,38 @@ Signal rotor_momentum(const Drive& drive, const Signal& effort, double width) {
 
 // The torque that the wheel misses is the rotor's own ṗ: none in the mean, a loss and then an impact.
 Effect backlash() {
-  return {.name = "backlash",
-          .sentence = "Play in the gears: after a torque reversal the gap is crossed first.",
-          .shapes = {{.name = "inertia_gap",
-                      .unit = "kg·m²·rad",
-                      .lower = 1e-5,
-                      .upper = 2e-2,
-                      .scan = 14,
-                      .logarithmic = true,
-                      .scale = typical_effort}},
-          .unit_coefficient = true,
-          .excite = "reverse the torque often, gently and hard",
-          .columns = [](const Drive& drive, Shape shape) {
-            return std::vector{rate_at_joints(drive, each_joint(drive, [&](std::size_t j) {
-                                                return rotor_momentum(drive, drive.joints[j].smooth_effort, shape[0]);
-                                              }))};
-          }};
+  return {
+      .name = "backlash",
+      .sentence = "Play in the gears: after a torque reversal the gap is crossed first.",
+      .shapes = {{.name = "inertia_gap",
+                  .unit = "kg·m²·rad",
+                  .lower = 1e-5,
+                  .upper = 2e-2,
+                  .scan = 14,
+                  .logarithmic = true,
+                  .scale = typical_effort},
+                 {.name = "inertia",
+                  .unit = "kg·m²",
+                  .lower = 0.003,
+                  .upper = 0.5,
+                  .scan = 3,
+                  .logarithmic = true,
+                  .scale = typical_inertia},
+                 {.name = "contact_frequency",
+                  .unit = "rad/s",
+                  .lower = 60.0,
+                  .upper = 500.0,
+                  .scan = 2,
+                  .logarithmic = true},
+                 {.name = "contact_damping", .unit = "1", .lower = 0.15, .upper = 1.0, .scan = 2, .logarithmic = true}},
+      .unit_coefficient = true,
+      .inexact = 0.1,
+      .excite = "reverse the torque often, gently and hard",
+      .columns = [](const Drive& drive, Shape shape) {
+        const Play play{shape[0], shape[1], shape[2], shape[3]};
+        return std::vector{rate_at_joints(
+            drive, each_joint(drive, [&](std::size_t j) { return rotor_momentum(drive, drive.joints[j], play); }))};
+      }};
 }
 
 Effect battery_sag() {

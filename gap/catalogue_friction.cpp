@@ -12,16 +12,6 @@ using namespace catalogue;
 using Signal = Eigen::VectorXd;
 using Shape = std::span<const double>;
 
-// One signal per joint.
-template <typename Function>
-std::vector<Signal> each_joint(const Drive& drive, const Function& function) {
-  std::vector<Signal> signals;
-  for (std::size_t j = 0; j < drive.joints.size(); ++j) {
-    signals.push_back(function(j));
-  }
-  return signals;
-}
-
 std::vector<Signal> speed_signs(const Drive& drive) {
   return each_joint(drive, [&drive](std::size_t j) { return speed_sign(drive, j); });
 }
@@ -156,20 +146,20 @@ Effect load_friction() {
 }
 
 Effect friction_drift() {
-  return {
-      .name = "friction_drift",
-      .sentence = "Friction that changes as the drive warms up: viscous (kind 0) or dry (kind 1).",
-      .parameters = {{"loss", "N·m·s/rad (dry: N·m)", 0}},
-      .shapes = {{.name = "kind_viscous0_dry1", .unit = "1", .lower = 0.0, .upper = 1.0, .scan = 2, .discrete = true},
-                 {.name = "T", .unit = "s", .lower = 10.0, .upper = 200.0, .scan = 8, .logarithmic = true}},
-      .excite = "drive for several minutes from cold, the same manoeuvre again and again",
-      .columns = [](const Drive& drive, Shape shape) {
-        const Signal warmth = 1.0 - (-(drive.t.array() - drive.t[0]) / shape[1]).exp();
-        return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
-                                       return shape[0] < 0.5 ? -warmth.cwiseProduct(drive.joints[j].smooth_speed)
-                                                             : -warmth.cwiseProduct(speed_sign(drive, j));
-                                     }))};
-      }};
+  return {.name = "friction_drift",
+          .sentence = "Friction, viscous and dry, that changes as the drive warms up.",
+          .parameters = {{"loss", "N·m·s/rad", 0}, {"loss_dry", "N·m", 0}},
+          .shapes = {{.name = "T", .unit = "s", .lower = 10.0, .upper = 200.0, .scan = 8, .logarithmic = true}},
+          .excite = "drive for several minutes from cold, the same manoeuvre again and again",
+          .columns = [](const Drive& drive, Shape shape) {
+            const Signal warmth = 1.0 - (-(drive.t.array() - drive.t[0]) / shape[0]).exp();
+            const auto lost = [&](auto friction) {
+              return at_joints(
+                  drive, each_joint(drive, [&](std::size_t j) -> Signal { return -warmth.cwiseProduct(friction(j)); }));
+            };
+            return std::vector{lost([&](std::size_t j) { return drive.joints[j].smooth_speed; }),
+                               lost([&](std::size_t j) { return speed_sign(drive, j); })};
+          }};
 }
 
 // A castor at the distance p from the axle's middle slides with V² = v1² + p² v2².

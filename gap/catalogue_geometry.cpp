@@ -87,10 +87,12 @@ Effect slope() {
               },
           .physical =
               [](std::span<const double> c, Shape) {
+                // The model's mass holds 2J/r² of the wheels and rotors, on which no gravity acts.
+                constexpr double kMostOfWheels = 0.25;
                 return std::vector<PhysicalValue>{
                     {"g_x", "m/s²", c[0]},
                     {"g_y", "m/s²", c[1]},
-                    {"angle_rad", "rad", std::asin(std::min(1.0, std::hypot(c[0], c[1]) / kGravity))},
+                    {"angle_rad", "rad", std::asin(std::min(1.0, std::hypot(c[0], c[1]) / kGravity)), kMostOfWheels},
                     {"uphill_heading_rad", "rad", std::atan2(c[1], c[0])}};
               }};
 }
@@ -289,24 +291,34 @@ Effect curve_slip() {
               }};
 }
 
+// The rim runs ahead of the ground by the share σ = σ_max tanh(F/(k σ_max)) of the ground's speed, F the force that the
+// wheel passes on in the direction of its motion.
 Effect longitudinal_slip() {
   return {.name = "longitudinal_slip",
-          .sentence = "The wheels slip in proportion to the force they pass on.",
-          .parameters = {{"compliance", "1/N", 1}},
+          .sentence = "The wheels slip in proportion to the force they pass on, up to a largest share.",
+          .shapes = {{.name = "stiffness",
+                      .unit = "N",
+                      .lower = 1.5,
+                      .upper = 1500.0,
+                      .scan = 12,
+                      .logarithmic = true,
+                      .scale =
+                          [](const Drive& drive) {
+                            return std::max(deviation(drive.joints[0].smooth_effort), 1e-12) / drive.wheel_radius;
+                          }},
+                     {.name = "largest", .unit = "1", .lower = 0.05, .upper = 1.0, .scan = 3, .logarithmic = true}},
+          .unit_coefficient = true,
           .excite = "accelerate and brake as hard as it goes, with the pose logged",
           .applies = needs_two_wheels,
-          .columns =
-              [](const Drive& drive, Shape) {
-                const auto lost = [&drive](std::size_t j) -> Signal {
-                  return -rim_speed(drive, j).cwiseAbs().cwiseProduct(drive.joints[j].smooth_effort) /
-                         drive.wheel_radius;
-                };
-                return std::vector{unseen_rim_speeds(drive, lost(0), lost(1), false)};
-              },
-          .physical =
-              [](std::span<const double> c, Shape) {
-                return std::vector<PhysicalValue>{{"stiffness", "N", 1.0 / c[0]}};
-              }};
+          .columns = [](const Drive& drive, Shape shape) {
+            const auto lost = [&](std::size_t j) -> Signal {
+              const Signal rim = rim_speed(drive, j);
+              const auto force = drive.joints[j].smooth_effort.array() / drive.wheel_radius;
+              const Signal share = shape[1] * (rim.array().sign() * force / (shape[0] * shape[1])).tanh();
+              return -rim.array() * share.array() / (1.0 + share.array());
+            };
+            return std::vector{unseen_rim_speeds(drive, lost(0), lost(1), false)};
+          }};
 }
 
 Effect payload(std::size_t joints) {

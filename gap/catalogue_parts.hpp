@@ -34,6 +34,16 @@ namespace wheelwright::catalogue {
 /// The column of the derivatives of such efforts.
 [[nodiscard]] Column rate_at_joints(const Drive& drive, const std::vector<Eigen::VectorXd>& effort);
 
+/// function(j) for every joint j.
+template <typename Function>
+[[nodiscard]] std::vector<Eigen::VectorXd> each_joint(const Drive& drive, const Function& function) {
+  std::vector<Eigen::VectorXd> signals;
+  for (std::size_t j = 0; j < drive.joints.size(); ++j) {
+    signals.push_back(function(j));
+  }
+  return signals;
+}
+
 /// A signal at one joint, empty ones at the others.
 [[nodiscard]] std::vector<Eigen::VectorXd> only(const Drive& drive, std::size_t joint, Eigen::VectorXd signal);
 

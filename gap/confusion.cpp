@@ -5,90 +5,110 @@
 #include <limits>
 #include <optional>
 
-#include <Eigen/Cholesky>
+#include <wheelwright/gap/remainder.hpp>
 
 namespace wheelwright {
 namespace {
 
-Eigen::MatrixXd products(const BlockGram& gram, const std::vector<std::size_t>& a, const std::vector<std::size_t>& b) {
-  Eigen::MatrixXd m(static_cast<Eigen::Index>(a.size()), static_cast<Eigen::Index>(b.size()));
-  for (Eigen::Index i = 0; i < m.rows(); ++i) {
-    for (Eigen::Index j = 0; j < m.cols(); ++j) {
-      m(i, j) = gram.product(a[static_cast<std::size_t>(i)], b[static_cast<std::size_t>(j)]);
-    }
-  }
-  return m;
-}
-
 // Σ signature² that the columns `on` leave of Σ weight·column.
 double left_of(const BlockGram& gram, const std::vector<std::size_t>& columns, const Eigen::VectorXd& weights,
                const std::vector<std::size_t>& on) {
-  const double square = weights.dot(products(gram, columns, columns) * weights);
-  if (on.empty()) {
-    return square;
-  }
-  Eigen::MatrixXd A = products(gram, on, on);
-  const Eigen::VectorXd unit = A.diagonal().cwiseMax(std::numeric_limits<double>::min()).cwiseSqrt().cwiseInverse();
-  A = unit.asDiagonal() * A * unit.asDiagonal();
-  A.diagonal().array() += 1e-10;
-  const Eigen::VectorXd c = unit.asDiagonal() * (products(gram, on, columns) * weights);
-  return std::max(square - c.dot(A.ldlt().solve(c)), 0.0);
+  return std::max(weights.dot(remainder(gram, columns, on) * weights), 0.0);
 }
 
-struct Signature {
-  std::size_t candidate = 0;
-  Eigen::VectorXd weights;
-  double square = 0.0;  // beside θ
-};
+const std::vector<std::size_t>& theta_columns(const CandidateTable& table, BaseModel base) {
+  return base == BaseModel::refitted ? table.base : table.unknown;
+}
+
+double beside_theta(const CandidateTable& table, const Signature& signature, BaseModel base) {
+  return left_of(*table.gram, own_columns(table.candidates[signature.candidate]), signature.weights,
+                 theta_columns(table, base));
+}
+
+// The candidate of effect `e` whose shape its signature has, if it has any.
+std::optional<std::size_t> typical_candidate(const CandidateTable& table, std::size_t e, BaseModel base,
+                                             double without) {
+  constexpr double kPresent = 0.9;
+  std::vector<std::size_t> candidates;
+  double least = std::numeric_limits<double>::infinity();
+  std::size_t best = 0;
+  for (std::size_t c = 0; c < table.candidates.size(); ++c) {
+    if (table.candidates[c].effect == e) {
+      candidates.push_back(c);
+      if (const double error = evaluate(table, {c}, base).held_out_error; error < least) {
+        least = error;
+        best = c;
+      }
+    }
+  }
+  if (candidates.empty()) {
+    return std::nullopt;
+  }
+  return least < kPresent * without ? best : candidates[candidates.size() / 2];
+}
 
 }  // namespace
 
-std::vector<ConfusablePair> confusable_pairs(const CandidateTable& table, BaseModel base, double least) {
-  const BlockGram& gram = *table.gram;
-  const std::vector<std::size_t>& theta = base == BaseModel::refitted ? table.base : table.unknown;
+const std::vector<std::size_t>& own_columns(const Candidate& candidate) {
+  return candidate.own.empty() ? candidate.columns : candidate.own;
+}
+
+std::vector<std::optional<Signature>> signatures(const CandidateTable& table, BaseModel base) {
+  const double without = evaluate(table, {}, base).held_out_error;
   std::vector<std::optional<Signature>> of_effect(table.names.size());
-  std::vector<double> error(table.names.size(), std::numeric_limits<double>::infinity());
-  for (std::size_t c = 0; c < table.candidates.size(); ++c) {
-    const std::size_t e = table.candidates[c].effect;
-    const CauseSet set = evaluate(table, {c}, base);
-    if (set.held_out_error < error[e]) {
-      error[e] = set.held_out_error;
-      of_effect[e] = Signature{c, {}, 0.0};
-    }
-  }
-  for (std::optional<Signature>& signature : of_effect) {
-    if (!signature) {
+  for (std::size_t e = 0; e < of_effect.size(); ++e) {
+    const std::optional<std::size_t> c = typical_candidate(table, e, base, without);
+    if (!c) {
       continue;
     }
-    const Candidate& candidate = table.candidates[signature->candidate];
-    const auto n = static_cast<Eigen::Index>(candidate.columns.size());
-    signature->weights = Eigen::VectorXd::Ones(n);
+    const Candidate& candidate = table.candidates[*c];
+    const std::vector<std::size_t>& own = own_columns(candidate);
+    Signature signature{*c, Eigen::VectorXd::Ones(static_cast<Eigen::Index>(own.size()))};
     if (!candidate.unit_coefficient) {
-      Subset subset = subset_of(table, {signature->candidate}, base);
+      Subset subset = subset_of(table, {*c}, base);
       subset.sign.clear();
-      signature->weights = gram.fit(subset).coefficients.tail(n);
+      const Eigen::VectorXd fitted = table.gram->fit(subset).coefficients;
+      for (std::size_t k = 0; k < own.size(); ++k) {
+        const auto at = std::ranges::find(subset.columns, own[k]) - subset.columns.begin();
+        signature.weights[static_cast<Eigen::Index>(k)] = fitted[at];
+      }
     }
-    signature->square = left_of(gram, candidate.columns, signature->weights, theta);
-    if (!(signature->square > 0.0)) {
-      signature.reset();
+    if (beside_theta(table, signature, base) > 0.0) {
+      of_effect[e] = std::move(signature);
     }
   }
-  const auto made_up = [&](const Signature& a, const Signature& b) {
-    std::vector<std::size_t> on = theta;
-    const Candidate& rival = table.candidates[b.candidate];
-    const std::vector<std::size_t>& columns = rival.own.empty() ? rival.columns : rival.own;
-    on.insert(on.end(), columns.begin(), columns.end());
-    return 1.0 - left_of(gram, table.candidates[a.candidate].columns, a.weights, on) / a.square;
-  };
+  return of_effect;
+}
+
+double made_up(const CandidateTable& table, const Signature& a, const Signature& b, BaseModel base) {
+  const double square = beside_theta(table, a, base);
+  if (!(square > 0.0)) {
+    return 1.0;
+  }
+  std::vector<std::size_t> on = theta_columns(table, base);
+  const std::vector<std::size_t>& columns = own_columns(table.candidates[b.candidate]);
+  on.insert(on.end(), columns.begin(), columns.end());
+  const double left = left_of(*table.gram, own_columns(table.candidates[a.candidate]), a.weights, on);
+  return std::clamp(1.0 - left / square, 0.0, 1.0);
+}
+
+std::vector<ConfusablePair> confusable_pairs(const CandidateTable& table, BaseModel base, double least) {
+  return confusable_pairs(table, signatures(table, base), base, least);
+}
+
+std::vector<ConfusablePair> confusable_pairs(const CandidateTable& table,
+                                             const std::vector<std::optional<Signature>>& of_effect, BaseModel base,
+                                             double least) {
   std::vector<ConfusablePair> pairs;
   for (std::size_t a = 0; a < of_effect.size(); ++a) {
     for (std::size_t b = a + 1; b < of_effect.size(); ++b) {
       if (!of_effect[a] || !of_effect[b]) {
         continue;
       }
-      const double similarity = std::max(made_up(*of_effect[a], *of_effect[b]), made_up(*of_effect[b], *of_effect[a]));
+      const double similarity = std::max(made_up(table, *of_effect[a], *of_effect[b], base),
+                                         made_up(table, *of_effect[b], *of_effect[a], base));
       if (similarity >= least) {
-        pairs.push_back({table.names[a], table.names[b], std::min(similarity, 1.0), false, {}});
+        pairs.push_back({table.names[a], table.names[b], similarity, false, {}});
       }
     }
   }

@@ -3,8 +3,12 @@
 /// Which effects look alike on a log, and which it could not show.
 #pragma once
 
+#include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
+
+#include <Eigen/Core>
 
 #include <wheelwright/gap/candidate.hpp>
 #include <wheelwright/gap/diagnosis.hpp>
@@ -12,9 +16,30 @@
 
 namespace wheelwright {
 
-/// Pairs of effects of which the one makes up at least `least` of the other's signature, θ fitted again beside both (or
-/// held, where it is trusted), most alike first. An effect's signature is what its columns add with the coefficients that fit this log best, at the shape that
-/// fits best; of the two directions the larger similarity counts.
+/// What one effect itself adds to the rows: Σ weight·column of a candidate's own columns.
+struct Signature {
+  std::size_t candidate = 0;
+  Eigen::VectorXd weights;  ///< of own_columns()
+};
+
+/// Candidate::own, or all columns where it is empty.
+[[nodiscard]] const std::vector<std::size_t>& own_columns(const Candidate& candidate);
+
+/// The signature of each effect as it fits the response of `table` best by itself, θ fitted again beside it (or held, where
+/// it is trusted); nothing for an effect without candidates or whose signature θ makes up. An effect that leaves more than
+/// 90 % of what is there without it at every shape is not on the log: its shape is then the one in the middle of its
+/// candidates, not what fits noise.
+[[nodiscard]] std::vector<std::optional<Signature>> signatures(const CandidateTable& table, BaseModel base);
+
+/// Share of signature `a` that the own columns of `b` make up beside θ, 0 … 1; 1 where θ makes it up by itself.
+[[nodiscard]] double made_up(const CandidateTable& table, const Signature& a, const Signature& b, BaseModel base);
+
+/// Pairs of effects of which, of `of_effect` (signatures()), the one makes up at least `least` of the other's signature, most alike first; of the two
+/// directions the larger similarity counts.
+[[nodiscard]] std::vector<ConfusablePair> confusable_pairs(const CandidateTable& table,
+                                                           const std::vector<std::optional<Signature>>& of_effect,
+                                                           BaseModel base, double least = 0.9);
+/// The same of signatures(table, base).
 [[nodiscard]] std::vector<ConfusablePair> confusable_pairs(const CandidateTable& table, BaseModel base,
                                                            double least = 0.9);
 

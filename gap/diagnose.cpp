@@ -10,10 +10,12 @@
 #include <wheelwright/gap/contradictions.hpp>
 #include <wheelwright/gap/drive_filter.hpp>
 #include <wheelwright/gap/estimates.hpp>
+#include <wheelwright/gap/further_drive.hpp>
 #include <wheelwright/gap/improved_robot.hpp>
 #include <wheelwright/gap/prepared.hpp>
 #include <wheelwright/gap/selection.hpp>
 #include <wheelwright/gap/shrink.hpp>
+#include <wheelwright/gap/tuned_shapes.hpp>
 #include <wheelwright/gap/where.hpp>
 
 namespace wheelwright {
@@ -186,7 +188,11 @@ Diagnosis diagnose(LogSource& log, LogSource* baseline, const Robot& robot, cons
     const BlockGram gram(problem.rows.spaces, blocks);
     problem.table.gram = &gram;
     const Selection first = select_causes(problem.table, problem.kinds, trusted, 1.0, selection);
-    const ShapeGrids finer = finer_shapes(prepared.catalogue, coarse, problem.table, first.looked_at);
+    ShapeGrids finer = finer_shapes(prepared.catalogue, coarse, problem.table, first.looked_at);
+    TuneOptions tune;
+    tune.seed = options.seed;
+    tune.threads = options.threads;
+    add_tuned_shapes(finer, prepared, problem, first.looked_at, tune);
     expect_efforts(prepared, problem, first.structural);
     problem = problem_with(finer);
   }
@@ -219,6 +225,8 @@ Diagnosis diagnose(LogSource& log, LogSource* baseline, const Robot& robot, cons
   list_causes(result, prepared, problem, found.all, fitted,
               shapley_shares(problem.table, found.all, trusted ? BaseModel::nominal : BaseModel::refitted, whole));
   result.series = series_of(prepared, problem, fitted);
+  result.theta = fitted.theta;
+  result.fitted = fitted.effects;
   tell("locating", 0.65);
   WhereOptions where_to_look;
   where_to_look.beta = prepared.row_options.beta;
@@ -232,7 +240,10 @@ Diagnosis diagnose(LogSource& log, LogSource* baseline, const Robot& robot, cons
       finite_prior(robot, prepared));
   result.contradictions = contradictions.rows;
   result.notes.push_back(contradictions.statement);
-  result.confusable = confusable_pairs(problem.table, trusted ? BaseModel::nominal : BaseModel::refitted);
+  const BaseModel alike = trusted ? BaseModel::nominal : BaseModel::refitted;
+  const std::vector<std::optional<Signature>> on_log = signatures(problem.table, alike);
+  result.confusable = confusable_pairs(problem.table, on_log, alike);
+  judge_pairs(result.confusable, problem.table, on_log, alike, prepared, robot, blocks);
   result.not_excited = not_excited(problem.table, prepared.catalogue, prepared.drive);
   result.parametric = parameter_shifts(robot, prepared.drive, problem.table, found.structural.members);
 

@@ -13,6 +13,7 @@
 
 #include <wheelwright/core/log.hpp>
 #include <wheelwright/gap/effect.hpp>
+#include <wheelwright/gap/gap_rows.hpp>
 #include <wheelwright/gap/residual_series.hpp>
 #include <wheelwright/model/robot.hpp>
 
@@ -88,6 +89,8 @@ struct GapShrink {
   std::vector<ShrinkFigure> rollout;          ///< open loop
   std::vector<ShrinkFigure> threshold_width;  ///< per channel, median of u − l
   std::vector<ShrinkFigure> smallest_fault;   ///< per channel, share of the wheel radius
+  std::vector<ShrinkFigure>
+      fresh_torque_rms;  ///< per channel, on another log that nothing was fitted to; where there is one
 };
 
 /// A parameter of θ: as designed, as the log has it without the causes (poisoned by them), and with them.
@@ -129,6 +132,8 @@ struct Diagnosis {
   std::vector<std::string> not_excited;  ///< effects that this log could not show, with what to drive
   std::vector<std::string> notes;
   std::vector<ResidualSeries> series;  ///< for pictures
+  Eigen::VectorXd theta;               ///< p, θ_L with the causes beside it
+  std::vector<FittedEffect> fitted;    ///< the causes
   std::optional<Robot> improved;       ///< the robot with its causes, where the robot file can carry them
 };
 

@@ -33,6 +33,7 @@ struct ShapeParameter {
   std::size_t scan = 1;      ///< points of the grid on which a search begins (on each side of zero)
   bool logarithmic = false;  ///< grid in equal ratios instead of equal steps
   bool both_signs = false;   ///< |value| is between the bounds, its sign either
+  double resolution = 0.0;   ///< of a time: steps of the log below which stamps and holds of its makers are not known
   bool discrete = false;     ///< the grid's points are all values there are (a side, a kind): nothing lies between
   std::function<double(const Drive&)> scale{};  ///< of this drive, > 0 (a typical speed …); empty: 1
 };
@@ -42,6 +43,7 @@ struct PhysicalValue {
   std::string name{};
   std::string unit{};
   double value = 0.0;
+  double larger = 0.0;  ///< share by which it may be larger for what the model does not know
 };
 
 /// What an effect adds per unit of one of its parameters. Signals have one value per instant of the drive and are not
@@ -72,7 +74,9 @@ struct Effect {
   std::vector<ShapeParameter> shapes{};       ///< what the columns depend on besides
   bool unit_coefficient = false;  ///< the one column's coefficient is 1; `parameters` is empty, the shapes are
                                   ///< what is estimated
-  std::string excite{};           ///< the manoeuvre that would show it
+  double inexact = 0.0;  ///< share of what it takes off that its columns leave at best (impacts shorter than a sampling
+                         ///< interval); an explanation with it may leave so much more
+  std::string excite{};  ///< the manoeuvre that would show it
   std::function<Applicability(const Drive&)> applies{};  ///< empty: on every drive
   /// The columns at `shape` (one value for each of `shapes`), for a drive on which the effect applies and whose efforts
   /// are predicted (predict_efforts).

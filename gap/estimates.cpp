@@ -8,166 +8,21 @@
 
 #include <boost/math/distributions/students_t.hpp>
 
-#include <wheelwright/identify/variable_projection.hpp>
+#include <wheelwright/gap/causes_model.hpp>
 
 namespace wheelwright {
 namespace {
 
-// What the columns themselves leave out (softened signs, second orders), as a share of each number: measured on an independent
-// world as what the intervals of chance alone lack.
+// What the columns themselves leave out (softened signs, second orders), as a share of each number: a share in any case, and
+// a part of what the fit leaves above the floor beside what the effect takes off (root mean squares), since some of that
+// goes along with the effect's own columns. Measured on an independent world as what the intervals of chance alone lack.
 constexpr double kForm = 0.01;
+constexpr double kMisfit = 0.3;
 
-// A continuous shape of one member of a set.
-struct FreeShape {
-  std::size_t member = 0;
-  std::size_t shape = 0;
-  double lower = 0.0;
-  double upper = 0.0;
-};
-
-// Rows of all spaces one after the other, in units of their floors.
-Eigen::VectorXd stacked(const GapRows& rows, const std::vector<Eigen::VectorXd>& parts) {
-  Eigen::Index size = 0;
-  for (const RowSpace& space : rows.spaces) {
-    size += space.t.size();
-  }
-  Eigen::VectorXd all = Eigen::VectorXd::Zero(size);
-  Eigen::Index at = 0;
-  for (std::size_t s = 0; s < rows.spaces.size(); ++s) {
-    const Eigen::Index n = rows.spaces[s].t.size();
-    if (parts[s].size() > 0) {
-      all.segment(at, n) = parts[s] / rows.spaces[s].floor;
-    }
-    at += n;
-  }
-  return all;
+double form_of(const CandidateTable& table, const CauseSet& set, std::size_t k, BaseModel base, double mean_square) {
+  const double own = evaluate_without(table, set, k, base).held_out_error - mean_square;
+  return kForm + kMisfit * std::sqrt(std::clamp((mean_square - 1.0) / std::max(own, 1e-300), 0.0, 1.0));
 }
-
-std::vector<Eigen::VectorXd> column_parts(const GapRows& rows, std::size_t column) {
-  std::vector<Eigen::VectorXd> parts;
-  for (const RowSpace& space : rows.spaces) {
-    parts.push_back(space.columns[column]);
-  }
-  return parts;
-}
-
-// The set of causes with its continuous shapes free.
-class CausesModel final : public SeparableModel {
- public:
-  CausesModel(const PreparedGap& prepared, const GapProblem& problem, const CauseSet& set, BaseModel base)
-      : prepared_(prepared), problem_(problem) {
-    for (const std::size_t c : set.members) {
-      members_.push_back(problem.table.candidates[c]);
-    }
-    const std::vector<std::size_t>& theta = base == BaseModel::refitted ? problem.table.base : problem.table.unknown;
-    for (const std::size_t column : theta) {
-      theta_.push_back(stacked(problem.rows, column_parts(problem.rows, column)));
-    }
-    std::vector<Eigen::VectorXd> response;
-    for (const RowSpace& space : problem.rows.spaces) {
-      response.push_back(space.response);
-    }
-    response_ = stacked(problem.rows, response);
-    for (std::size_t k = 0; k < members_.size(); ++k) {
-      const Effect& effect = prepared.catalogue[members_[k].effect];
-      for (std::size_t s = 0; s < effect.shapes.size(); ++s) {
-        if (!effect.shapes[s].discrete) {
-          const Interval bounds = shape_bounds(effect.shapes[s], prepared.drive);
-          const double sign = effect.shapes[s].both_signs && members_[k].shape[s] < 0.0 ? -1.0 : 1.0;
-          free_.push_back({k, s, std::min(sign * bounds.lower, sign * bounds.upper),
-                           std::max(sign * bounds.lower, sign * bounds.upper)});
-        }
-      }
-    }
-    for (const Candidate& member : members_) {
-      linear_ += member.unit_coefficient ? 0 : static_cast<Eigen::Index>(member.columns.size());
-    }
-  }
-
-  [[nodiscard]] const Eigen::VectorXd& response() const override { return response_; }
-  [[nodiscard]] Eigen::Index shapes() const override { return static_cast<Eigen::Index>(free_.size()); }
-  [[nodiscard]] Eigen::Index columns() const override { return static_cast<Eigen::Index>(theta_.size()) + linear_; }
-  [[nodiscard]] const std::vector<FreeShape>& free() const { return free_; }
-  [[nodiscard]] const std::vector<Candidate>& members() const { return members_; }
-
-  [[nodiscard]] Eigen::VectorXd start() const {
-    Eigen::VectorXd shape(shapes());
-    for (std::size_t k = 0; k < free_.size(); ++k) {
-      shape[static_cast<Eigen::Index>(k)] =
-          std::clamp(members_[free_[k].member].shape[free_[k].shape], free_[k].lower, free_[k].upper);
-    }
-    return shape;
-  }
-
-  // Shapes of member `k` where the free ones are `shape`.
-  [[nodiscard]] std::vector<double> shape_of(std::size_t k, const Eigen::VectorXd& shape) const {
-    std::vector<double> own = members_[k].shape;
-    for (std::size_t f = 0; f < free_.size(); ++f) {
-      if (free_[f].member == k) {
-        own[free_[f].shape] = shape[static_cast<Eigen::Index>(f)];
-      }
-    }
-    return own;
-  }
-
-  // Columns of member `k`, row parts by space.
-  [[nodiscard]] std::vector<std::vector<Eigen::VectorXd>> parts_of(std::size_t k,
-                                                                   const std::vector<double>& shape) const {
-    std::vector<std::vector<Eigen::VectorXd>> parts;
-    for (const Column& column : prepared_.catalogue[members_[k].effect].columns(prepared_.drive, shape)) {
-      parts.push_back(rows_of(prepared_.drive, problem_.rows, column, prepared_.row_options));
-    }
-    return parts;
-  }
-
-  bool evaluate(const Eigen::VectorXd& shape, bool derivatives, SeparableValues& at) const override {
-    fill(shape, at.offset, at.columns);
-    at.offset_by.clear();
-    at.columns_by.clear();
-    for (Eigen::Index f = 0; derivatives && f < shapes(); ++f) {
-      const double step = kStep * std::max(std::abs(shape[f]), 1e-9);
-      Eigen::VectorXd above = shape, below = shape;
-      above[f] += step;
-      below[f] -= step;
-      Eigen::VectorXd offset_above, offset_below;
-      Eigen::MatrixXd columns_above, columns_below;
-      fill(above, offset_above, columns_above);
-      fill(below, offset_below, columns_below);
-      at.offset_by.emplace_back((offset_above - offset_below) / (2.0 * step));
-      at.columns_by.emplace_back((columns_above - columns_below) / (2.0 * step));
-    }
-    return true;
-  }
-
- private:
-  static constexpr double kStep = 1e-3;
-
-  void fill(const Eigen::VectorXd& shape, Eigen::VectorXd& offset, Eigen::MatrixXd& columns) const {
-    offset = Eigen::VectorXd::Zero(response_.size());
-    columns.resize(response_.size(), this->columns());
-    Eigen::Index at = 0;
-    for (const Eigen::VectorXd& column : theta_) {
-      columns.col(at++) = column;
-    }
-    for (std::size_t k = 0; k < members_.size(); ++k) {
-      for (const std::vector<Eigen::VectorXd>& part : parts_of(k, shape_of(k, shape))) {
-        if (members_[k].unit_coefficient) {
-          offset += stacked(problem_.rows, part);
-        } else {
-          columns.col(at++) = stacked(problem_.rows, part);
-        }
-      }
-    }
-  }
-
-  const PreparedGap& prepared_;
-  const GapProblem& problem_;
-  std::vector<Candidate> members_;
-  std::vector<Eigen::VectorXd> theta_;
-  Eigen::VectorXd response_;
-  std::vector<FreeShape> free_;
-  Eigen::Index linear_ = 0;
-};
 
 // The numbers of one effect and, by differences, how they depend on coefficients and shapes.
 std::vector<PhysicalValue> values_of(const Effect& effect, const Eigen::VectorXd& coefficients,
@@ -187,7 +42,7 @@ std::vector<PhysicalValue> values_of(const Effect& effect, const Eigen::VectorXd
 
 std::vector<GapEstimate> numbers_of(const Effect& effect, const Eigen::VectorXd& coefficients,
                                     const std::vector<double>& shape, const std::vector<std::size_t>& free_shapes,
-                                    const Eigen::MatrixXd& covariance, double t) {
+                                    const Eigen::MatrixXd& covariance, double t, double form, double time_step) {
   const std::vector<PhysicalValue> values = values_of(effect, coefficients, shape);
   const Eigen::Index n = coefficients.size();
   const auto count = static_cast<Eigen::Index>(values.size());
@@ -213,8 +68,10 @@ std::vector<GapEstimate> numbers_of(const Effect& effect, const Eigen::VectorXd&
   for (Eigen::Index v = 0; v < count; ++v) {
     const PhysicalValue& value = values[static_cast<std::size_t>(v)];
     const double half = std::hypot(
-        t * std::sqrt(std::max((by.row(v) * covariance * by.row(v).transpose()).value(), 0.0)), kForm * value.value);
-    numbers.push_back({value.name, value.unit, value.value, value.value - half, value.value + half, false});
+        t * std::sqrt(std::max((by.row(v) * covariance * by.row(v).transpose()).value(), 0.0)), form * value.value);
+    const Interval more{std::min(value.larger * value.value, 0.0), std::max(value.larger * value.value, 0.0)};
+    numbers.push_back(
+        {value.name, value.unit, value.value, value.value - half + more.lower, value.value + half + more.upper, false});
   }
   for (std::size_t s = 0; s < effect.shapes.size(); ++s) {
     const bool named = std::any_of(numbers.begin(), numbers.end(),
@@ -226,7 +83,8 @@ std::vector<GapEstimate> numbers_of(const Effect& effect, const Eigen::VectorXd&
     for (std::size_t f = 0; f < free_shapes.size(); ++f) {
       if (free_shapes[f] == s) {
         const Eigen::Index k = n + static_cast<Eigen::Index>(f);
-        half = std::hypot(t * std::sqrt(std::max(covariance(k, k), 0.0)), kForm * shape[s]);
+        half = std::hypot(t * std::sqrt(std::max(covariance(k, k), 0.0)), form * shape[s],
+                          effect.shapes[s].resolution * time_step);
       }
     }
     numbers.push_back({effect.shapes[s].name, effect.shapes[s].unit, shape[s], shape[s] - half, shape[s] + half, true});
@@ -266,16 +124,10 @@ FittedCauses fit_causes(const PreparedGap& prepared, const GapProblem& problem, 
     own.floor = space.floor;
     spaces.push_back(std::move(own));
   }
-  const auto append = [&](const std::vector<Eigen::VectorXd>& parts) {
-    for (std::size_t s = 0; s < spaces.size(); ++s) {
-      spaces[s].columns.push_back(parts[s]);
-    }
-    return spaces.front().columns.size() - 1;
-  };
   Subset subset;
   const std::vector<std::size_t>& theta = base == BaseModel::refitted ? problem.table.base : problem.table.unknown;
   for (const std::size_t column : theta) {
-    subset.columns.push_back(append(column_parts(problem.rows, column)));
+    subset.columns.push_back(add_column(spaces, column_parts(problem.rows, column)));
     subset.sign.push_back(0);
   }
   std::vector<std::size_t> first_column;
@@ -285,9 +137,9 @@ FittedCauses fit_causes(const PreparedGap& prepared, const GapProblem& problem, 
     const std::vector<std::vector<Eigen::VectorXd>> parts = model.parts_of(k, model.shape_of(k, shape));
     for (std::size_t c = 0; c < parts.size(); ++c) {
       if (member.unit_coefficient) {
-        subset.fixed.push_back(append(parts[c]));
+        subset.fixed.push_back(add_column(spaces, parts[c]));
       } else {
-        subset.columns.push_back(append(parts[c]));
+        subset.columns.push_back(add_column(spaces, parts[c]));
         subset.sign.push_back(member.sign[c]);
       }
     }
@@ -316,7 +168,7 @@ FittedCauses fit_causes(const PreparedGap& prepared, const GapProblem& problem, 
           derivative[s] = derivative[s].size() > 0 ? Eigen::VectorXd(derivative[s] + part) : part;
         }
       }
-      subset.columns.push_back(append(derivative));
+      subset.columns.push_back(add_column(spaces, derivative));
       subset.sign.push_back(0);
     }
     gram = BlockGram(spaces, blocks);
@@ -369,7 +221,8 @@ FittedCauses fit_causes(const PreparedGap& prepared, const GapProblem& problem, 
       intervals.push_back({effect.coefficients[c] - half, effect.coefficients[c] + half});
     }
     fitted.intervals.push_back(std::move(intervals));
-    fitted.numbers.push_back(numbers_of(effect.effect, effect.coefficients, effect.shape, free_shapes, covariance, t));
+    fitted.numbers.push_back(numbers_of(effect.effect, effect.coefficients, effect.shape, free_shapes, covariance, t,
+                                        form_of(problem.table, set, k, base, fit.mean_square), prepared.drive.step));
     fitted.effects.push_back(std::move(effect));
   }
   fitted.subset = subset_of(problem.table, set.members, base);

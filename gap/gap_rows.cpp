@@ -60,12 +60,6 @@ void subtract(GapRows& rows, const std::vector<Eigen::VectorXd>& part) {
   }
 }
 
-void append(GapRows& rows, std::vector<Eigen::VectorXd> part) {
-  for (std::size_t s = 0; s < rows.spaces.size(); ++s) {
-    rows.spaces[s].columns.push_back(std::move(part[s]));
-  }
-}
-
 // `centre`, with each continuous coordinate moved towards its neighbours on `grid` in `points` steps each way, one
 // coordinate at a time.
 std::vector<std::vector<double>> shapes_about(const Effect& effect, const std::vector<std::vector<double>>& grid,
@@ -182,6 +176,29 @@ GapRows make_gap_rows(const Drive& drive, const NoiseFloor& floor, const std::ve
   return rows;
 }
 
+std::size_t add_column(std::vector<RowSpace>& spaces, std::vector<Eigen::VectorXd> parts) {
+  for (std::size_t s = 0; s < spaces.size(); ++s) {
+    spaces[s].columns.push_back(std::move(parts[s]));
+  }
+  return spaces.front().columns.size() - 1;
+}
+
+Eigen::VectorXd residual(const RowSpace& space, const Subset& subset, const Eigen::VectorXd& coefficients) {
+  Eigen::VectorXd left = space.response;
+  for (const std::size_t c : subset.fixed) {
+    if (space.columns[c].size() > 0) {
+      left -= space.columns[c];
+    }
+  }
+  for (Eigen::Index k = 0; k < coefficients.size(); ++k) {
+    const Eigen::VectorXd& column = space.columns[subset.columns[static_cast<std::size_t>(k)]];
+    if (column.size() > 0) {
+      left -= coefficients[k] * column;
+    }
+  }
+  return left;
+}
+
 std::vector<Eigen::VectorXd> rows_of(const Drive& drive, const GapRows& rows, const Column& column,
                                      const GapRowOptions& options) {
   std::vector<Eigen::VectorXd> parts(rows.spaces.size());
@@ -295,12 +312,11 @@ CandidateTable add_catalogue(GapRows& rows, const Drive& drive, const std::vecto
     candidate.shape = std::move(task.shape);
     candidate.unit_coefficient = effect.unit_coefficient;
     for (std::size_t c = 0; c < task.parts.size(); ++c) {
-      candidate.columns.push_back(rows.spaces.front().columns.size());
+      candidate.columns.push_back(add_column(rows.spaces, std::move(task.parts[c])));
       candidate.sign.push_back(c < effect.parameters.size() ? effect.parameters[c].sign : 0);
       if (c >= effect.parameters.size() || !effect.parameters[c].beside) {
         candidate.own.push_back(candidate.columns.back());
       }
-      append(rows, std::move(task.parts[c]));
     }
     table.candidates.push_back(std::move(candidate));
   }

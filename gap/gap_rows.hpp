@@ -56,6 +56,14 @@ struct GapRows {
 [[nodiscard]] GapRows make_gap_rows(const Drive& drive, const NoiseFloor& floor,
                                     const std::vector<FittedEffect>& healthy, const GapRowOptions& options);
 
+/// Adds a column, one part for each space, and returns its index.
+std::size_t add_column(std::vector<RowSpace>& spaces, std::vector<Eigen::VectorXd> parts);
+
+/// What `subset` with the first of its coefficients leaves of the response of `space`; without any, the response less the
+/// fixed columns.
+[[nodiscard]] Eigen::VectorXd residual(const RowSpace& space, const Subset& subset,
+                                       const Eigen::VectorXd& coefficients);
+
 /// The part of `column` in each space of `rows`.
 [[nodiscard]] std::vector<Eigen::VectorXd> rows_of(const Drive& drive, const GapRows& rows, const Column& column,
                                                    const GapRowOptions& options);

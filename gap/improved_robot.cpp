@@ -277,10 +277,9 @@ class Improvement {
     } else if (name == "saturation") {
       set(first, shape(0) / unit_);
     } else if (name == "torque_deadzone" || name == "load_friction") {
-      if (!(coefficient(0) > 0.0)) {
-        return true;
+      if (coefficient(0) > 0.0) {
+        set(first, name == "load_friction" ? coefficient(0) : coefficient(0) / unit_);
       }
-      set(first, name == "load_friction" ? coefficient(0) : coefficient(0) / unit_);
     } else if (name == "torque_gain_asymmetric") {
       set(first, (excess_[1] - excess_[0]) / (2.0 + excess_.sum()));
     } else if (name == "wheel_radius_asymmetric") {
@@ -293,9 +292,7 @@ class Improvement {
     } else if (name == "battery_sag") {
       convert_sag();
     } else if (name == "longitudinal_slip") {
-      if (coefficient(0) > 0.0) {
-        set(first, 1.0 / (coefficient(0) * unit_));
-      }
+      set(first, shape(0) / unit_);
     } else if (name == "wheel_out_of_round") {
       for (std::size_t j = 0; j < cause_->effect.parameters.size(); ++j) {
         if (!cause_->effect.parameters[j].beside) {
@@ -366,21 +363,31 @@ class Improvement {
     set("R_b", coefficient(1) != 0.0 ? found[1] * unit_ : 0.0);
   }
 
-  // The file's k is a share of all friction: of the viscous one where that is what changes, else of the dry one.
+  // The file's k is a share of all friction: the one that comes nearest to what was lost over the log, if it comes near.
   bool convert_drift() {
-    const bool dry = shape(0) >= 0.5;
+    constexpr double kNear = 0.3;  // root mean square
     const double* const viscous = find("viscous_linear");
-    const double coulomb = has_effect(improved_, "coulomb") ? unit_ * effect_value(improved_, "coulomb", "c")
-                           : find("coulomb") != nullptr     ? *find("coulomb")
-                                                            : 0.0;
-    const double whole = dry ? coulomb : viscous != nullptr ? *viscous : 0.0;
-    const double lost = dry ? coefficient(0) : 2.0 * coefficient(0) / drive_.wheel_radius;
-    if (!(whole > 0.0) || std::abs(lost) > whole) {
-      return refuse("friction_drift is a share of the robot's " + std::string(dry ? "dry" : "viscous") +
-                    " friction in a robot file, and more than that was lost");
+    const double slope = viscous != nullptr ? 0.5 * drive_.wheel_radius * *viscous : 0.0;
+    const double dry = has_effect(improved_, "coulomb") ? unit_ * effect_value(improved_, "coulomb", "c")
+                       : find("coulomb") != nullptr     ? *find("coulomb")
+                                                        : 0.0;
+    double both = 0.0, friction = 0.0, lost = 0.0;
+    for (const JointSignals& joint : drive_.joints) {
+      for (const double w : joint.smooth_speed) {
+        const double whole = slope * w + std::copysign(dry, w);
+        const double part = coefficient(0) * w + std::copysign(coefficient(1), w);
+        both += whole * part;
+        friction += whole * whole;
+        lost += part * part;
+      }
     }
-    set("k", lost / whole);
-    set("T", shape(1));
+    const double k = both / friction;
+    if (!(friction > 0.0) || std::abs(k) > 1.0 || lost - k * both > kNear * kNear * lost) {
+      return refuse(
+          "friction_drift is a share of all of the robot's friction in a robot file, and what was lost is not");
+    }
+    set("k", k);
+    set("T", shape(0));
     return true;
   }
 

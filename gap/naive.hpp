@@ -16,7 +16,7 @@ struct NaiveChoice {
   double criterion = 0.0;            ///< the smallest n ln s² + k ln n that was reached
 };
 
-/// Forward selection of single effects by the Bayesian information criterion (BIC), θ fitted again beside them,
+/// Forward selection of single effects by the Bayesian information criterion (Schwarz 1978), θ fitted again beside them,
 /// in sample: at each step the candidate that lowers n ln s² + k ln n most, until none does or there are `largest`.
 /// s² is the mean square over all n rows of the table, k counts the coefficients of θ and of the causes and their shapes.
 ///

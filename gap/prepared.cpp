@@ -253,7 +253,7 @@ GapProblem make_problem(const Drive& drive, const NoiseFloor& floor, const std::
     }
   }
   for (const Effect& effect : catalogue) {
-    problem.kinds.push_back({effect.parametric, effect.family});
+    problem.kinds.push_back({effect.inexact});
   }
   return problem;
 }
@@ -264,20 +264,16 @@ std::vector<FittedEffect> robots_own(const std::vector<FittedEffect>& healthy) {
   return own;
 }
 
-void expect_efforts(PreparedGap& prepared, const GapProblem& problem, const CauseSet& set) {
-  Drive& drive = prepared.drive;
-  const BlockFit fit = problem.table.gram->fit(subset_of(problem.table, set.members, BaseModel::refitted));
-  const std::vector<FittedEffect> effects = fitted_effects(problem.table, set, fit, prepared.catalogue);
+void expect_efforts(Drive& drive, const Eigen::VectorXd& theta, const std::vector<FittedEffect>& causes) {
   const Eigen::MatrixXd inverse = drive.model.input.inverse();
-  const auto n = static_cast<Eigen::Index>(drive.model.n());
-  Eigen::MatrixXd outputs = Eigen::MatrixXd::Zero(drive.rows(), n);
-  for (const FittedEffect& effect : effects) {
-    if (effect.effect.unit_coefficient) {
+  Eigen::MatrixXd outputs = Eigen::MatrixXd::Zero(drive.rows(), static_cast<Eigen::Index>(drive.model.n()));
+  for (const FittedEffect& cause : causes) {
+    if (cause.effect.unit_coefficient) {
       continue;
     }
-    const std::vector<Column> columns = effect.effect.columns(drive, effect.shape);
+    const std::vector<Column> columns = cause.effect.columns(drive, cause.shape);
     for (std::size_t c = 0; c < columns.size(); ++c) {
-      const double factor = effect.coefficients[static_cast<Eigen::Index>(c)];
+      const double factor = cause.coefficients[static_cast<Eigen::Index>(c)];
       for (std::size_t i = 0; i < columns[c].effort.size(); ++i) {
         if (columns[c].effort[i].size() > 0) {
           outputs.col(static_cast<Eigen::Index>(i)) += factor * columns[c].effort[i];
@@ -286,34 +282,29 @@ void expect_efforts(PreparedGap& prepared, const GapProblem& problem, const Caus
     }
   }
   const Eigen::VectorXd nominal = drive.theta;
-  predict_efforts(drive, nominal + fit.coefficients.head(nominal.size()));
+  predict_efforts(drive, theta);
+  std::vector<Eigen::VectorXd> expected;
   for (std::size_t j = 0; j < drive.joints.size(); ++j) {
-    drive.joints[j].expected_effort =
-        drive.joints[j].predicted_effort + outputs * inverse.row(static_cast<Eigen::Index>(j)).transpose();
+    expected.emplace_back(drive.joints[j].predicted_effort +
+                          outputs * inverse.row(static_cast<Eigen::Index>(j)).transpose());
   }
-  const std::vector<JointSignals> expected = drive.joints;
   predict_efforts(drive, nominal);
   for (std::size_t j = 0; j < drive.joints.size(); ++j) {
-    drive.joints[j].expected_effort = expected[j].expected_effort;
+    drive.joints[j].expected_effort = std::move(expected[j]);
   }
+}
+
+void expect_efforts(PreparedGap& prepared, const GapProblem& problem, const CauseSet& set) {
+  Drive& drive = prepared.drive;
+  const BlockFit fit = problem.table.gram->fit(subset_of(problem.table, set.members, BaseModel::refitted));
+  expect_efforts(drive, drive.theta + fit.coefficients.head(drive.theta.size()),
+                 fitted_effects(problem.table, set, fit, prepared.catalogue));
 }
 
 std::vector<Eigen::VectorXd> residuals(const GapRows& rows, const Subset& subset, const Eigen::VectorXd& coefficients) {
   std::vector<Eigen::VectorXd> left;
   for (const RowSpace& space : rows.spaces) {
-    Eigen::VectorXd r = space.response;
-    for (std::size_t k = 0; k < subset.columns.size(); ++k) {
-      const Eigen::VectorXd& column = space.columns[subset.columns[k]];
-      if (column.size() > 0) {
-        r -= coefficients[static_cast<Eigen::Index>(k)] * column;
-      }
-    }
-    for (const std::size_t c : subset.fixed) {
-      if (space.columns[c].size() > 0) {
-        r -= space.columns[c];
-      }
-    }
-    left.push_back(std::move(r));
+    left.push_back(residual(space, subset, coefficients));
   }
   return left;
 }

@@ -53,9 +53,12 @@ struct GapProblem {
                                       const std::vector<Effect>& catalogue, const ShapeGrids& shapes,
                                       const GapRowOptions& options);
 
-/// Fits `set` beside θ to the rows of `problem` and sets JointSignals::expected_effort of prepared.drive to what comes out,
-/// the causes' own efforts included: effects that grow with the effort are then right beyond first order. Causes of unit
-/// coefficient, which are made of the measured effort, are left out.
+/// Sets JointSignals::expected_effort of `drive` to what a model with `theta` and `causes` expects, the causes' own efforts
+/// included: effects that grow with the effort are then right beyond first order. Causes of unit coefficient, which are
+/// made of the measured effort, are left out.
+void expect_efforts(Drive& drive, const Eigen::VectorXd& theta, const std::vector<FittedEffect>& causes);
+
+/// The same with `set` fitted beside θ to the rows of `problem`.
 void expect_efforts(PreparedGap& prepared, const GapProblem& problem, const CauseSet& set);
 
 /// What `fit` of `subset` leaves in each space, in its own unit.

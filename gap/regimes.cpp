@@ -170,7 +170,8 @@ void add_joints(Collector& collect) {
     collect.add("direction", name + " forwards", moving && speed > 0.0);
     collect.add("direction", name + " backwards", moving && speed < 0.0);
     collect.add("reversal", "reversal of the " + name, reversals(drive, joint, collect.options().reversal));
-    collect.add_quarters("effort", "effort of the " + name, effort.abs(), Mask::Constant(drive.rows(), true), "");
+    collect.add_quarters("effort", "effort of the " + name, effort.abs(), Mask::Constant(drive.rows(), true),
+                         drive.model.output_units.empty() ? "" : drive.model.output_units.front());
     collect.add("braking", name + " braking", moving && effort * speed < 0.0);
     if (drive.wheel_radius > 0.0) {
       collect.add_sectors("wheel angle", name + " at", joint.angle.array());

@@ -5,12 +5,13 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <random>
 
-#include <Eigen/Cholesky>
 #include <boost/math/distributions/normal.hpp>
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/gap/confidence_set.hpp>
+#include <wheelwright/gap/remainder.hpp>
 
 namespace wheelwright {
 namespace {
@@ -31,33 +32,26 @@ double signed_rank(const CauseSet& worse, const CauseSet& better) {
   return (positive - n * (n + 1.0) / 4.0) / std::sqrt(n * (n + 1.0) * (2.0 * n + 1.0) / 24.0);
 }
 
-// The same where every one of `blocks` blocks is better.
-double largest_signed_rank(double blocks) { return std::sqrt(1.5 * blocks * (blocks + 1.0) / (2.0 * blocks + 1.0)); }
-
-// What the columns `on` leave of the products of the columns `of`.
-Eigen::MatrixXd remainder(const BlockGram& gram, const std::vector<std::size_t>& of,
-                          const std::vector<std::size_t>& on) {
-  const auto n = static_cast<Eigen::Index>(of.size());
-  const auto k = static_cast<Eigen::Index>(on.size());
-  const auto products = [&gram](const std::vector<std::size_t>& a, const std::vector<std::size_t>& b) {
-    Eigen::MatrixXd m(static_cast<Eigen::Index>(a.size()), static_cast<Eigen::Index>(b.size()));
-    for (Eigen::Index i = 0; i < m.rows(); ++i) {
-      for (Eigen::Index j = 0; j < m.cols(); ++j) {
-        m(i, j) = gram.product(a[static_cast<std::size_t>(i)], b[static_cast<std::size_t>(j)]);
-      }
+// Probability that the logarithms of the savings add up to so much when their signs are left to chance: for an effect that
+// shows in half of the blocks only, but there by far. By random signs. Below the floor's own mean square savings count by
+// their size.
+double sign_flip_p(const CauseSet& worse, const CauseSet& better, std::uint64_t seed) {
+  constexpr int kFlips = 20000;
+  const Eigen::ArrayXd d = worse.loss - better.loss;
+  const Eigen::ArrayXd size = d.abs().log1p();
+  const double seen = (d.sign() * size).sum() * (1.0 - 1e-12);
+  std::mt19937_64 generator(seed);
+  int as_large = 0;
+  for (int k = 0; k < kFlips; ++k) {
+    double sum = 0.0;
+    std::uint64_t bits = 0;
+    for (Eigen::Index i = 0; i < size.size(); ++i) {
+      bits = i % 64 == 0 ? generator() : bits >> 1U;
+      sum += (bits & 1U) != 0U ? size[i] : -size[i];
     }
-    return m;
-  };
-  Eigen::MatrixXd rest = products(of, of);
-  if (n > 0 && k > 0) {
-    Eigen::MatrixXd A = products(on, on);
-    const Eigen::VectorXd unit = A.diagonal().cwiseMax(std::numeric_limits<double>::min()).cwiseSqrt().cwiseInverse();
-    A = unit.asDiagonal() * A * unit.asDiagonal();
-    A.diagonal().array() += 1e-10;
-    const Eigen::MatrixXd c = unit.asDiagonal() * products(on, of);
-    rest -= c.transpose() * A.ldlt().solve(c);
+    as_large += sum >= seen ? 1 : 0;
   }
-  return rest;
+  return (1.0 + as_large) / (1.0 + kFlips);
 }
 
 // Largest share of a column of candidate `c` that θ cannot make up.
@@ -80,7 +74,8 @@ class Selector {
            const SelectionOptions& options)
       : table_(table), kinds_(kinds), floor_(floor_error), options_(options) {
     const auto tried = static_cast<double>(std::max<std::size_t>(kinds.size(), 1));
-    critical_ = boost::math::quantile(boost::math::complement(boost::math::normal(), options.significance / tried));
+    level_ = options.significance / (2.0 * tried);  // two tests of each
+    critical_ = boost::math::quantile(boost::math::complement(boost::math::normal(), level_));
     moves_theta_only_.assign(kinds.size(), true);
     for (std::size_t c = 0; c < table.candidates.size(); ++c) {
       if (beyond_theta(table, c) > options.contained) {
@@ -100,7 +95,7 @@ class Selector {
     const std::vector<std::vector<CauseSet>> levels = search_causes(table_, search);
     const CauseSet& nothing = levels[0][0];
     const auto used = static_cast<double>((table_.gram->rows().array() > 0.0).count());
-    result.enough_blocks = largest_signed_rank(used) > critical_;
+    result.enough_blocks = std::exp2(-used) < level_;
     const CauseSet nominal = nominal_trusted ? evaluate(table_, {}, BaseModel::nominal) : nothing;
     result.refitted_excess = nothing.held_out_error - floor_;
     result.nominal_excess = nominal.held_out_error - floor_;
@@ -111,13 +106,12 @@ class Selector {
       if (levels[size].empty()) {
         continue;
       }
-      const CauseSet& next = simplest(levels[size]);
-      if (gains(best, next, result.refitted_excess)) {
-        best = all_needed(next, result.refitted_excess);
+      const CauseSet* next = simplest(levels[size]);
+      if (next != nullptr && gains(best, *next, result.refitted_excess)) {
+        best = all_needed(*next, result.refitted_excess);
       }
     }
     result.structural = best;
-    result.left = best.held_out_error - floor_;
     for (const std::vector<CauseSet>& level : levels) {
       result.looked_at.insert(result.looked_at.end(), level.begin(), level.end());
     }
@@ -126,9 +120,10 @@ class Selector {
       rivals = rivals_of(best, levels[best.members.size()]);
     }
     add_parametric(result, rivals, nominal_trusted);
+    result.left = result.structural.held_out_error - floor_;
     result.any_cause = !result.all.members.empty() || result.theta_moved;
     result.reaches_floor =
-        result.left <= std::max({options_.tolerated * result.refitted_excess,
+        result.left <= std::max({options_.tolerated * result.refitted_excess + inexact(result.structural),
                                  std::min(options_.tolerated_nominal * gap_, 4.0 * options_.tolerated_floor),
                                  options_.tolerated_floor});
     return result;
@@ -148,15 +143,14 @@ class Selector {
     const bool large = gain > options_.large_share * whole;
     const bool last =
         gain > options_.large_part * left && gain > options_.tolerated_floor && gain > options_.small_share * whole;
-    return gain > options_.smallest && (counts || large || last) && signed_rank(now, next) > critical_;
+    return gain > options_.smallest && (counts || large || last) &&
+           (signed_rank(now, next) > critical_ || sign_flip_p(now, next, options_.seed) < level_);
   }
 
   // The set without those of its members that it does as well without.
   [[nodiscard]] CauseSet all_needed(CauseSet set, double whole) const {
     for (std::size_t k = 0; k < set.members.size() && set.members.size() > 1;) {
-      std::vector<std::size_t> others = set.members;
-      others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
-      CauseSet without = evaluate(table_, std::move(others), BaseModel::refitted);
+      CauseSet without = evaluate_without(table_, set, k, BaseModel::refitted);
       if (gains(without, set, whole)) {
         ++k;
       } else {
@@ -167,60 +161,110 @@ class Selector {
     return set;
   }
 
+  // What the columns of the set leave at best.
+  [[nodiscard]] double inexact(const CauseSet& set) const {
+    double sum = 0.0;
+    for (std::size_t k = 0; k < set.members.size(); ++k) {
+      if (const double share = kinds_[table_.candidates[set.members[k]].effect].inexact; share > 0.0) {
+        const double without = evaluate_without(table_, set, k, BaseModel::refitted).held_out_error;
+        sum += share * std::max(without - set.held_out_error, 0.0);
+      }
+    }
+    return sum;
+  }
+
+  // Whether some member of the set is there for what comes along with it, not for the effect itself.
+  [[nodiscard]] bool hollow(const CauseSet& set) const {
+    constexpr double kOwn = 0.1;
+    for (std::size_t k = 0; k < set.members.size(); ++k) {
+      const Candidate& member = table_.candidates[set.members[k]];
+      if (member.own.empty() || member.own.size() == member.columns.size()) {
+        continue;
+      }
+      const double without = evaluate_without(table_, set, k, BaseModel::refitted).held_out_error;
+      Subset subset = subset_of(table_, set.members, BaseModel::refitted);
+      for (std::size_t c = subset.columns.size(); c-- > 0;) {
+        if (std::ranges::find(member.own, subset.columns[c]) != member.own.end()) {
+          subset.columns.erase(subset.columns.begin() + static_cast<std::ptrdiff_t>(c));
+          subset.sign.erase(subset.sign.begin() + static_cast<std::ptrdiff_t>(c));
+        }
+      }
+      const double beside = table_.gram->fit(subset).held_out_error;
+      if (beside - set.held_out_error < kOwn * (without - set.held_out_error)) {
+        return true;
+      }
+    }
+    return false;
+  }
+
+  // Whether the set is no explanation, however little it leaves.
+  [[nodiscard]] bool absurd(const CauseSet& set) const { return cancels(set) || hollow(set); }
+
   // How much worse than `best` a set may be and still be as good.
   [[nodiscard]] double margin(const CauseSet& best) const {
     return std::max(options_.misfit * excess(best), 0.3 * options_.smallest);
   }
 
-  // Whether the causes of the set undo each other.
+  // Whether the causes of the set undo each other, or all of them what they move θ by.
   [[nodiscard]] bool cancels(const CauseSet& set) const {
-    if (set.members.size() < 2) {
+    if (set.members.empty()) {
       return false;
     }
     const Subset subset = subset_of(table_, set.members, BaseModel::refitted);
     const Eigen::VectorXd coefficients = table_.gram->fit(subset).coefficients;
-    // Columns of all members with their weights, member by member.
-    std::vector<std::vector<std::pair<std::size_t, double>>> parts;
-    auto next = static_cast<Eigen::Index>(table_.base.size());
+    // Columns of θ, then of all members, with their weights.
+    using Part = std::vector<std::pair<std::size_t, double>>;
+    std::vector<Part> parts(1);
+    Eigen::Index next = 0;
+    for (const std::size_t column : table_.base) {
+      parts.front().emplace_back(column, coefficients[next++]);
+    }
     for (const std::size_t c : set.members) {
       const Candidate& candidate = table_.candidates[c];
-      std::vector<std::pair<std::size_t, double>> part;
+      Part part;
       for (const std::size_t column : candidate.columns) {
         part.emplace_back(column, candidate.unit_coefficient ? 1.0 : coefficients[next++]);
       }
       parts.push_back(std::move(part));
     }
-    double own = 0.0, together = 0.0;
-    for (std::size_t i = 0; i < parts.size(); ++i) {
-      for (std::size_t j = 0; j < parts.size(); ++j) {
-        double product = 0.0;
-        for (const auto& [a, weight_a] : parts[i]) {
-          for (const auto& [b, weight_b] : parts[j]) {
-            product += weight_a * weight_b * table_.gram->product(a, b);
-          }
+    const auto product = [this](const Part& a, const Part& b) {
+      double sum = 0.0;
+      for (const auto& [i, weight_i] : a) {
+        for (const auto& [j, weight_j] : b) {
+          sum += weight_i * weight_j * table_.gram->product(i, j);
         }
-        together += product;
-        own += i == j ? product : 0.0;
+      }
+      return sum;
+    };
+    double own = 0.0, causes = 0.0, beside = 0.0;
+    for (std::size_t i = 1; i < parts.size(); ++i) {
+      own += product(parts[i], parts[i]);
+      beside += product(parts[i], parts.front());
+      for (std::size_t j = 1; j < parts.size(); ++j) {
+        causes += product(parts[i], parts[j]);
       }
     }
-    return own > options_.cancellation * together;
+    const double theta = product(parts.front(), parts.front());
+    const double all = causes + 2.0 * beside + theta;
+    return own > options_.cancellation * causes || own + theta > options_.theta_cancellation * all;
   }
 
-  // The set of a level to go on with: the best, or one it contains that is as good with fewer coefficients.
-  [[nodiscard]] const CauseSet& simplest(const std::vector<CauseSet>& level) const {
-    const auto first = std::find_if(level.begin(), level.end(), [this](const CauseSet& set) { return !cancels(set); });
-    const CauseSet* chosen = first == level.end() ? &level.front() : &*first;
+  // The set of a level to go on with: the best that is no absurdity, or one that it contains and that is as good with fewer
+  // coefficients.
+  [[nodiscard]] const CauseSet* simplest(const std::vector<CauseSet>& level) const {
+    const auto first = std::find_if(level.begin(), level.end(), [this](const CauseSet& set) { return !absurd(set); });
+    if (first == level.end()) {
+      return nullptr;
+    }
+    const CauseSet* chosen = &*first;
     for (const CauseSet& set : level) {
-      if (cancels(set)) {
-        continue;
-      }
       if (set.coefficients < chosen->coefficients &&
-          set.held_out_error <= level.front().held_out_error + margin(level.front()) &&
+          set.held_out_error <= level.front().held_out_error + margin(level.front()) && !absurd(set) &&
           unexplained_by(table_, set.members, level.front().members, BaseModel::refitted) < options_.contained) {
         chosen = &set;
       }
     }
-    return *chosen;
+    return chosen;
   }
 
   // Sets of as many causes that are as good as `best`, itself first. A set that merely contains another one is left out.
@@ -228,8 +272,8 @@ class Selector {
     std::vector<CauseSet> rivals{best};
     for (const CauseSet& set : level) {
       const bool itself = set.members == best.members;
-      const bool close = !cancels(set) && set.held_out_error <= best.held_out_error + 3.0 * margin(best) + 0.005 * gap_;
-      if (itself || !close) {
+      const bool close = set.held_out_error <= best.held_out_error + 3.0 * margin(best) + 0.005 * gap_;
+      if (itself || !close || absurd(set)) {
         continue;
       }
       const bool contains = std::any_of(rivals.begin(), rivals.end(), [&](const CauseSet& other) {
@@ -254,7 +298,7 @@ class Selector {
         }
         std::vector<std::size_t> members = best.members;
         members[k] = c;
-        if (evaluate(table_, members, BaseModel::refitted).held_out_error > set.held_out_error + margin(set)) {
+        if (excess(evaluate(table_, members, BaseModel::refitted)) > excess(set) + margin(set)) {
           continue;
         }
         CauseSet other = evaluate(table_, members, BaseModel::nominal);
@@ -270,7 +314,7 @@ class Selector {
   // an empty one where none is needed. Nothing where no such set does.
   [[nodiscard]] std::vector<CauseSet> explain_theta(const CauseSet& structural) const {
     const CauseSet held = with_shapes_for_nominal(structural);
-    const double tolerable = std::max(options_.theta_share * gap_, options_.smallest);
+    const double tolerable = std::max(options_.theta_share * gap_ + inexact(structural), options_.smallest);
     if (excess(held) - excess(structural) <= tolerable) {
       return {held};
     }
@@ -315,41 +359,60 @@ class Selector {
     if (structural.empty()) {
       structural.push_back(result.structural);
     }
-    result.all = result.structural;
-    std::vector<CauseSet> rivals;
+    struct Rival {
+      CauseSet set;
+      std::size_t structural = 0;
+      bool moves_theta = false;  // without saying why
+    };
+    std::vector<Rival> rivals;
     for (std::size_t i = 0; i < structural.size(); ++i) {
       if (!nominal_trusted) {
-        rivals.push_back(structural[i]);
+        rivals.push_back({structural[i], i});
         continue;
       }
       const std::vector<CauseSet> found = explain_theta(structural[i]);
-      if (i == 0) {
-        result.theta_moved = found.empty();
-      }
       if (found.empty()) {
-        rivals.push_back(structural[i]);
+        rivals.push_back({structural[i], i, true});
         continue;
       }
       const CauseSet& first = simplest_of(found);
-      rivals.push_back(first);
+      rivals.push_back({first, i});
       for (const CauseSet& set : found) {
         const bool close = set.held_out_error <= first.held_out_error + 3.0 * margin(first);
         const bool contains =
             first.coefficients < set.coefficients &&
             unexplained_by(table_, first.members, set.members, BaseModel::nominal) < options_.contained;
         if (set.members != first.members && close && !contains) {
-          rivals.push_back(set);
+          rivals.push_back({set, i});
         }
       }
     }
-    result.all = rivals.front();
+    // With θ held, the right one of causes that do as well with θ fitted again is the one that leaves least.
+    const std::size_t most = rivals.front().moves_theta ? SIZE_MAX : rivals.front().set.members.size();
+    const auto comparable = [&](const Rival& rival) { return !rival.moves_theta && rival.set.members.size() <= most; };
+    const CauseSet* least = nullptr;
+    for (const Rival& rival : rivals) {
+      if (nominal_trusted && comparable(rival) &&
+          (least == nullptr || rival.set.held_out_error < least->held_out_error)) {
+        least = &rival.set;
+      }
+    }
+    if (least != nullptr) {
+      const double as_good = excess(*least) + margin(*least);
+      const auto lead = std::ranges::find_if(
+          rivals, [&](const Rival& rival) { return comparable(rival) && excess(rival.set) <= as_good; });
+      std::rotate(rivals.begin(), lead, lead + 1);
+    }
+    result.all = rivals.front().set;
+    result.structural = structural[rivals.front().structural];
+    result.theta_moved = rivals.front().moves_theta;
     const bool moves_theta = std::any_of(result.all.members.begin(), result.all.members.end(),
                                          [&](std::size_t c) { return moves_theta_only_[table_.candidates[c].effect]; });
     result.base = moves_theta ? BaseModel::nominal : BaseModel::refitted;
     std::vector<CauseSet> fewest;
-    for (const CauseSet& set : rivals) {
-      if (set.members.size() <= result.all.members.size()) {
-        fewest.push_back(set);
+    for (const Rival& rival : rivals) {
+      if (rival.set.members.size() <= result.all.members.size()) {
+        fewest.push_back(rival.set);
       }
     }
     confide(result, fewest);
@@ -392,7 +455,8 @@ class Selector {
   const std::vector<EffectKind>& kinds_;
   double floor_;
   SelectionOptions options_;
-  double critical_ = 0.0;
+  double level_ = 0.0;                  // of a test
+  double critical_ = 0.0;               // standard deviations, of that level
   std::vector<bool> moves_theta_only_;  // by effect: θ fitted again takes all of it
   double gap_ = 0.0;
 };

@@ -34,10 +34,11 @@ struct SelectionOptions {
   double significance = 0.05;  ///< of a gain, over all effects that were tried
   double misfit = 1.0;         ///< times the best set's own excess by which another set may be worse and be as good
   double level = 0.10;         ///< 1 − level: of the confidence set
-  double cancellation =
-      4.0;                  ///< sum of squares of the causes' own signatures over that of their sum, above which a set
-                            ///< is no explanation: causes that undo each other
-  double tolerated = 0.04;  ///< share of the structural part that an explanation may leave …
+  double cancellation = 4.0;   ///< sum of squares of the causes' own signatures over that of their sum, above
+                               ///< which a set is no explanation: causes that undo each other
+  double theta_cancellation = 300.0;  ///< the same with what θ moves by among them; larger, since a cause that θ had
+                                      ///< taken up moves it back
+  double tolerated = 0.04;  ///< share of the structural part that an explanation may leave (EffectKind::inexact more) …
   double tolerated_nominal = 0.003;  ///< … or of the whole gap, θ's part included, up to four times …
   double tolerated_floor = 0.5;      ///< … or excess in mean squares of the floor, whichever is larger
   double theta_share = 0.06;         ///< of the gap that θ may make by having moved without a cause being asked for
@@ -68,14 +69,13 @@ struct Selection {
   std::vector<CauseSet> looked_at;  ///< every single effect and the best pairs and triples, θ fitted again
 };
 
-/// Which effects the table holds.
+/// What selection must know of an effect besides its columns.
 struct EffectKind {
-  bool parametric = false;  ///< only moves θ: looked for with θ nominal
-  std::string family;       ///< effects of one family count as the same cause
+  double inexact = 0.0;  ///< Effect::inexact
 };
 
-/// Selects. `floor_error` is the mean square that noise alone leaves (1 where the floors are right). Parametric effects
-/// (EffectKind::parametric) are tried only with `nominal_trusted`.
+/// Selects. `floor_error` is the mean square that noise alone leaves (1 where the floors are right); `kinds` has one for
+/// each effect. Effects that move θ only, which is found from the columns, are tried only with `nominal_trusted`.
 [[nodiscard]] Selection select_causes(const CandidateTable& table, const std::vector<EffectKind>& kinds,
                                       bool nominal_trusted, double floor_error, const SelectionOptions& options = {});
 

@@ -25,11 +25,9 @@ constexpr double kConfidence = 0.95;
 // θ and the causes' coefficients as one signed least-squares problem on the rows.
 struct CauseProblem {
   GapRows rows;
-  std::vector<std::size_t> columns;  // whose coefficients are estimated
-  std::vector<int> sign;
-  std::vector<std::size_t> fixed;  // whose coefficient is 1
-  std::size_t of_theta = 0;        // the first of `columns`
-  double begin = 0.0, end = 0.0;   // s
+  Subset subset;
+  std::size_t of_theta = 0;       // the first of the subset's columns
+  double begin = 0.0, end = 0.0;  // s
 };
 
 CauseProblem make_cause_problem(const PreparedGap& prepared, const ShrinkCauses& found) {
@@ -38,24 +36,20 @@ CauseProblem make_cause_problem(const PreparedGap& prepared, const ShrinkCauses&
   p.rows = make_gap_rows(drive, prepared.floor, prepared.healthy, prepared.row_options);
   for (std::size_t j = 0; j < p.rows.parameters; ++j) {
     if (found.base == BaseModel::refitted || !prepared.trusted[j]) {
-      p.columns.push_back(j);
+      p.subset.columns.push_back(j);
     }
   }
-  p.of_theta = p.columns.size();
-  p.sign.assign(p.of_theta, 0);
+  p.of_theta = p.subset.columns.size();
+  p.subset.sign.assign(p.of_theta, 0);
   for (const FittedEffect& cause : found.causes) {
     const std::vector<Column> columns = cause.effect.columns(drive, cause.shape);
     for (std::size_t c = 0; c < columns.size(); ++c) {
-      const std::size_t at = p.rows.spaces.front().columns.size();
-      std::vector<Eigen::VectorXd> part = rows_of(drive, p.rows, columns[c], prepared.row_options);
-      for (std::size_t s = 0; s < p.rows.spaces.size(); ++s) {
-        p.rows.spaces[s].columns.push_back(std::move(part[s]));
-      }
+      const std::size_t at = add_column(p.rows.spaces, rows_of(drive, p.rows, columns[c], prepared.row_options));
       if (cause.effect.unit_coefficient) {
-        p.fixed.push_back(at);
+        p.subset.fixed.push_back(at);
       } else {
-        p.columns.push_back(at);
-        p.sign.push_back(cause.effect.parameters[c].sign);
+        p.subset.columns.push_back(at);
+        p.subset.sign.push_back(cause.effect.parameters[c].sign);
       }
     }
   }
@@ -70,20 +64,9 @@ CauseProblem make_cause_problem(const PreparedGap& prepared, const ShrinkCauses&
   return p;
 }
 
-// The response less the fixed columns.
-Eigen::VectorXd response_of(const CauseProblem& p, const RowSpace& space) {
-  Eigen::VectorXd response = space.response;
-  for (const std::size_t c : p.fixed) {
-    if (space.columns[c].size() > 0) {
-      response -= space.columns[c];
-    }
-  }
-  return response;
-}
-
 // Fit to the rows whose times `use` takes.
 Eigen::VectorXd fit_rows(const CauseProblem& p, const std::function<bool(double)>& use) {
-  const auto n = static_cast<Eigen::Index>(p.columns.size());
+  const auto n = static_cast<Eigen::Index>(p.subset.columns.size());
   Eigen::MatrixXd A = Eigen::MatrixXd::Zero(n, n);
   Eigen::VectorXd b = Eigen::VectorXd::Zero(n);
   for (const RowSpace& space : p.rows.spaces) {
@@ -94,28 +77,18 @@ Eigen::VectorXd fit_rows(const CauseProblem& p, const std::function<bool(double)
     }
     Eigen::MatrixXd X = Eigen::MatrixXd::Zero(kept.size(), n);
     for (Eigen::Index i = 0; i < n; ++i) {
-      const Eigen::VectorXd& column = space.columns[p.columns[static_cast<std::size_t>(i)]];
+      const Eigen::VectorXd& column = space.columns[p.subset.columns[static_cast<std::size_t>(i)]];
       if (column.size() > 0) {
         X.col(i) = column.cwiseProduct(kept);
       }
     }
     A += X.transpose() * X;
-    b += X.transpose() * response_of(p, space).cwiseProduct(kept);
+    b += X.transpose() * residual(space, p.subset, {}).cwiseProduct(kept);
   }
   const Eigen::VectorXd unit =
       A.diagonal().unaryExpr([](double square) { return square > 0.0 ? 1.0 / std::sqrt(square) : 0.0; });
   const Eigen::MatrixXd scaled = unit.asDiagonal() * A * unit.asDiagonal();
-  return unit.cwiseProduct(signed_least_squares(scaled, unit.cwiseProduct(b), p.sign).x);
-}
-
-Eigen::VectorXd left_by(const CauseProblem& p, const RowSpace& space, const Eigen::VectorXd& coefficients) {
-  Eigen::VectorXd left = response_of(p, space);
-  for (std::size_t i = 0; i < p.columns.size(); ++i) {
-    if (space.columns[p.columns[i]].size() > 0) {
-      left -= coefficients[static_cast<Eigen::Index>(i)] * space.columns[p.columns[i]];
-    }
-  }
-  return left;
+  return unit.cwiseProduct(signed_least_squares(scaled, unit.cwiseProduct(b), p.subset.sign).x);
 }
 
 // Part `k` of `count` equal parts of the rows' duration.
@@ -147,7 +120,7 @@ std::vector<ShrinkFigure> torque_figures(const PreparedGap& prepared, const Caus
     const auto at = static_cast<Eigen::Index>(block);
     for (Eigen::Index i = 0; i < n; ++i) {
       const RowSpace& space = p.rows.spaces[static_cast<std::size_t>(i)];
-      const Eigen::VectorXd left = left_by(p, space, fit);
+      const Eigen::VectorXd left = residual(space, p.subset, fit);
       for (Eigen::Index k = 0; k < left.size(); ++k) {
         if (part.holds(space.t[k])) {
           before(at, i) += space.response[k] * space.response[k];
@@ -176,7 +149,7 @@ std::optional<Robot> robot_with(const Robot& robot, const PreparedGap& prepared,
                                 const CauseProblem& p, const Eigen::VectorXd& coefficients, std::string& why_not) {
   Eigen::VectorXd theta = prepared.drive.theta;
   for (std::size_t i = 0; i < p.of_theta; ++i) {
-    theta[static_cast<Eigen::Index>(p.columns[i])] += coefficients[static_cast<Eigen::Index>(i)];
+    theta[static_cast<Eigen::Index>(p.subset.columns[i])] += coefficients[static_cast<Eigen::Index>(i)];
   }
   std::vector<FittedEffect> causes = robots_own(prepared.healthy);
   auto next = static_cast<Eigen::Index>(p.of_theta);

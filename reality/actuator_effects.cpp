@@ -111,11 +111,10 @@ Effect saturation(const RobotDesign& robot, Random, double severity) {
           0.0};
 }
 
-Effect backlash(const RobotDesign& robot, Random random, double severity) {
+Effect backlash(const RobotDesign& robot, Random, double severity) {
   // The rotor runs through the gap before it meets the wheel: a mass, a gap and a stiff damped spring, in substeps.
   const double gap = 0.03 * severity;
-  const double inertia =
-      robot.body.armature[right] + random.uniform(0.02, 0.04) * robot.mass * robot.radius * robot.radius;
+  const double inertia = robot.body.armature[right];
   struct Rotor {
     Pair angle{}, speed{};
   };

@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scores what `wheelwright gap` said of cases with withheld effects, as Markdown.
 
-    score_withheld.py [--naive] ANSWERS.json RESULTS    RESULTS has CASE/gap.json (or CASE.json) for every case
+    score_withheld.py [--naive|--removed] ANSWERS.json RESULTS    RESULTS has CASE/gap.json (or CASE.json) for every case
 
-With --naive what is scored is the answer of the naive rule (`wheelwright gap --naive`), not the diagnosis.
+With --naive what is scored is the answer of the naive rule (`wheelwright gap --naive`), not the diagnosis. With --removed the
+hidden effect was not in the tool's catalogue: whatever is said to explain the log is wrong.
 """
 
 import json
@@ -99,12 +100,78 @@ def numbers(answer):
     return {(e["effect"], name): value for e in answer["effects"] for name, value in e.get("parameters", {}).items()}
 
 
+def figures_of(gap, kind):
+    """Figures of one kind with numbers in them, by channel."""
+    return {name: f for name, f in gap.get("shrink", {}).get(kind, {}).items()
+            if f.get("after") is not None and f.get("before") is not None}
+
+
+class Promise:
+    """What was promised of the shrinking, and what came of it."""
+
+    def __init__(self):
+        self.fresh = []
+        self.after = []
+        self.fault = []
+        self.fell = []
+
+    def add(self, gap):
+        fresh = figures_of(gap, "fresh_torque_rms")
+        for name, held_out in figures_of(gap, "torque_rms").items():
+            if name in fresh and held_out["after"] > 0.0:
+                self.fresh.append(fresh[name]["after"] / held_out["after"])
+            if (held_out.get("floor") or 0.0) > 0.0:
+                self.after.append(held_out["after"] / held_out["floor"])
+        for fault in figures_of(gap, "smallest_fault").values():
+            if (fault.get("floor") or 0.0) > 0.0:
+                self.fault.append(fault["after"] / fault["floor"])
+            if fault["before"] > 0.0:
+                self.fell.append(fault["after"] / fault["before"])
+
+    def rows(self):
+        def near(values, limit):
+            return sum(abs(value - 1.0) <= limit for value in values)
+
+        def line(values):
+            return f"{median(values):.3g}" if values else "–"
+
+        fresh = Count()
+        fresh.good, fresh.all = near(self.fresh, 0.1), len(self.fresh)
+        yield "fresh log: torque residual within 10 % of what was promised (channels)", str(fresh)
+        yield "fresh log: torque residual over what was promised, median", line(self.fresh)
+        yield "held-out torque residual with the causes over the floor, median", line(self.after)
+        yield "smallest certain radius fault with the causes over that of the healthy robot, median", line(self.fault)
+        yield "smallest certain radius fault with the causes over that without, median", line(self.fell)
+
+
+def report_removed(answers, results, out=sys.stdout):
+    """The hidden effect was taken from the tool's catalogue."""
+    said_of = defaultdict(Counter)
+    unexplained, wrong = Count(), Count()
+    for case, answer in sorted(answers.items()):
+        if class_of(answer) not in ("single", "parametric"):
+            continue
+        gap = load(results, case)
+        verdict = gap.get("verdict", "") if gap else "no result"
+        unexplained.add(verdict == "unexplained")
+        wrong.add(verdict == "explained" and len(said(gap)) == 1)
+        said_of[answer["effects"][0]["effect"]][
+            verdict if verdict in ("unexplained", "no_gap", "no result")
+            else " + ".join(sorted(said(gap))) + (" (ambiguous)" if verdict == "ambiguous" else "")] += 1
+    print(f"| measure | cases |\n|---|---|\n| removed from the catalogue: unexplained | {unexplained} |", file=out)
+    print(f"| removed from the catalogue: explained by one other cause | {wrong} |", file=out)
+    print("\n| removed | said (cases) |\n|---|---|", file=out)
+    for truth in sorted(said_of):
+        print(f"| {truth} | {', '.join(f'{what} {n}' for what, n in said_of[truth].most_common())} |", file=out)
+
+
 def score(answers, results, naive=False):
     rows = defaultdict(Count)
     sizes = []
     confusion = defaultdict(Counter)
     coverage = defaultdict(Count)
     missed = []
+    promise = Promise()
     for case, answer in sorted(answers.items()):
         kind = class_of(answer)
         truth = [e["effect"] for e in answer["effects"]]
@@ -164,20 +231,22 @@ def score(answers, results, naive=False):
             missed.append(f"{case}: {label}: {answered}; credible set {kept}; closest rival "
                           f"{oracle.get('closest_rival', '–')}, gap {answer.get('gap_percent_after_refit')} %")
 
+        if right and truth:
+            promise.add(gap)
         true = numbers(answer)
         for cause in gap.get("causes", []):
             for name, interval in cause.get("parameters", {}).items():
                 value = true.get((cause["effect"], name))
                 if value is not None and interval.get("lower") is not None and interval.get("upper") is not None:
                     coverage[f"{cause['effect']}.{name}"].add(interval["lower"] <= value <= interval["upper"])
-    return rows, sizes, confusion, coverage, missed
+    return rows, sizes, confusion, coverage, missed, promise
 
 
 ORDER = ["results", "single", "parametric", "two", "no effect", "outside"]
 
 
 def report(answers, results, naive=False, out=sys.stdout):
-    rows, sizes, confusion, coverage, missed = score(answers, results, naive)
+    rows, sizes, confusion, coverage, missed, promise = score(answers, results, naive)
     print("| measure | cases |\n|---|---|", file=out)
     for name in sorted(rows, key=lambda n: next(k for k, word in enumerate(ORDER) if n.startswith(word))):
         print(f"| {name} | {rows[name]} |", file=out)
@@ -187,6 +256,9 @@ def report(answers, results, naive=False, out=sys.stdout):
         total.good += count.good
         total.all += count.all
     print(f"| parameters within their intervals | {total} |", file=out)
+    if promise.after:
+        for name, value in promise.rows():
+            print(f"| {name} | {value} |", file=out)
 
     print("\n| hidden | said (cases) |\n|---|---|", file=out)
     for truth in sorted(confusion):
@@ -202,13 +274,16 @@ def report(answers, results, naive=False, out=sys.stdout):
 
 
 def main(arguments):
-    naive = arguments[:1] == ["--naive"]
-    arguments = arguments[naive:]
+    mode = arguments[0] if arguments[:1] in (["--naive"], ["--removed"]) else ""
+    arguments = arguments[bool(mode):]
     if len(arguments) != 2 or arguments[0].startswith("-"):
         print(__doc__, file=sys.stderr)
         return 2
     answers = json.loads(Path(arguments[0]).read_text(encoding="utf-8"))
-    report(answers, Path(arguments[1]), naive)
+    if mode == "--removed":
+        report_removed(answers, Path(arguments[1]))
+    else:
+        report(answers, Path(arguments[1]), mode == "--naive")
     return 0
 
 

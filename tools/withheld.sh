@@ -3,13 +3,15 @@
 #
 # Withheld effects: has `wheelwright gap` name what another physics engine hid in logs, and scores the answers.
 #
-#   tools/withheld.sh [--seed S] [--cases N] [--profile standard|hard] [--kind KIND] [--out DIR] [--only naive] [SET]
+#   tools/withheld.sh [--seed S] [--cases N] [--profile standard|hard] [--kind KIND] [--out DIR] [--only naive|removed] [SET]
 #
 # SET is a directory of cases that is there already: case_*/ (or logs/case_*/) beside answers.json. Without it a set is
 # made in DIR/set. The tool sees logs and robot file of a case and nothing else; its results are in DIR/results, without
 # the drive that would split ambiguous causes, which takes longer than all the rest.
-#   --only WORD  passes --WORD to `wheelwright gap` and keeps the results in DIR/results-WORD; naive: scores what the
-#                naive rule said
+#   --only naive    scores what the naive rule said; results in DIR/results-naive
+#   --only removed  takes the hidden effect (and those that contain it) out of the tool's catalogue, for cases of one effect
+#                   of the catalogue; results in DIR/results-removed
+# Where the set has a second log of each case (fresh/case_*/), what is promised of the shrinking is checked on it.
 # The table is Markdown on standard output. BUILD (default build) is the build directory, JOBS (2) the cases at a time.
 set -eu
 root=$(cd "$(dirname "$0")/.." && pwd)
@@ -45,15 +47,34 @@ logs=$set
 results=$out/results${only:+-$only}
 mkdir -p "$results"
 
-# Exit code 1 is an answer ("there is a gap"); anything above is a failure, which the score counts.
-export bin logs results only
-find "$logs" -maxdepth 1 -name 'case_*' -type d -exec basename {} \; | sort | xargs -P "$jobs" -I '{}' sh -c '
-  case={}
-  rm -rf "$results/$case"
-  "$bin/wheelwright" gap "$logs/$case/real.csv.gz" --robot "$logs/$case/robot.yaml" \
-    --baseline "$logs/$case/baseline.csv.gz" --out "$results/$case" ${only:+--$only} --threads 1 --quiet --no-manoeuvre \
-    >"$results/$case.log" 2>&1 || [ $? -eq 1 ] || echo "withheld: $case failed, see $results/$case.log" >&2'
+# Lines "case option…" of what is run.
+python3 - "$set/answers.json" "$only" >"$results/runs" <<'PY'
+import json, sys
 
-naive=''
-[ "$only" != naive ] || naive=--naive
-python3 "$root/tools/score_withheld.py" ${naive:+"$naive"} "$set/answers.json" "$results"
+ALSO = {"coulomb": ["coulomb_asymmetric"], "armature": ["payload"], "wheel_radius": ["wheel_radius_asymmetric"],
+        "torque_gain": ["torque_gain_asymmetric"], "viscous": ["viscous_asymmetric"]}
+answers, only = json.load(open(sys.argv[1], encoding="utf-8")), sys.argv[2]
+for case, answer in sorted(answers.items()):
+    effects = [effect["effect"] for effect in answer["effects"]]
+    if only == "naive":
+        print(case, "--naive", "--no-shrink")
+    elif only != "removed":
+        print(case)
+    elif len(effects) == 1 and answer.get("in_catalogue", True):
+        print(case, "--no-shrink", *(f"--without {name}" for name in effects + ALSO.get(effects[0], [])))
+PY
+
+# Exit code 1 is an answer ("there is a gap"); anything above is a failure, which the score counts.
+export bin set logs results
+xargs -P "$jobs" -I '{}' sh -c '
+  set -- {}
+  case=$1; shift
+  rm -rf "$results/$case"
+  fresh=$(dirname "$logs")/fresh/$case/real.csv.gz
+  [ -f "$fresh" ] && set -- "$@" --fresh "$fresh"
+  "$bin/wheelwright" gap "$logs/$case/real.csv.gz" --robot "$logs/$case/robot.yaml" \
+    --baseline "$logs/$case/baseline.csv.gz" --out "$results/$case" --threads 1 --quiet --no-manoeuvre "$@" \
+    >"$results/$case.log" 2>&1 || [ $? -eq 1 ] || echo "withheld: $case failed, see $results/$case.log" >&2' \
+  <"$results/runs"
+
+python3 "$root/tools/score_withheld.py" ${only:+"--$only"} "$set/answers.json" "$results"

@@ -188,6 +188,10 @@ TEST(Consistency, RejectsWhatMakesNoSense) {
   EXPECT_THROW((void)test.smallest_detectable(drive.motion, kBias, 0.5, 5, 0.1), InvalidArgument);
   EXPECT_THROW((void)test.smallest_detectable(drive.motion, kBias, 1.0, 29, 0.1), InvalidArgument);
   EXPECT_THROW(ConsistencyTest(drive.model, drive.measurement, {.effort = -0.1}, drive.set), InvalidArgument);
+  Measurement late = drive.measurement;
+  late.correction.lag = 0.05;
+  ConsistencyTest corrected(drive.model, late, {.effort = 0.1}, drive.set);
+  EXPECT_THROW((void)corrected.consistent(drive.motion, Eigen::MatrixXd::Zero(1, 30), 5, 7), InvalidArgument);
 }
 
 }  // namespace

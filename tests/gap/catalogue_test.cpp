@@ -228,7 +228,8 @@ TEST(Catalogue, FrictionIsExplainedByItsColumn) {
                     {},
                     {0.2},
                     0.25});  // the column is made of the command, 1.2 times what is passed on
-  expect_explained({"torque_deadzone", friction([](int, double, double t) { return 0.2 * sign(t); }), {}, {0.2}, 0.08});
+  expect_explained(
+      {"torque_deadzone", friction([](int, double, double t) { return 0.2 * sign(t); }), {0.01}, {0.2}, 0.08});
 }
 
 TEST(Catalogue, ForcesAndMassesAreExplainedByTheirColumns) {

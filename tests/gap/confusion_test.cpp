@@ -12,6 +12,8 @@
 #include <gtest/gtest.h>
 #include <Eigen/QR>
 
+#include <wheelwright/gap/further_drive.hpp>
+
 #include "gap/noisy_log.hpp"
 
 namespace wheelwright {
@@ -83,6 +85,35 @@ TEST(ConfusablePairs, AreOthersWhereThetaIsHeld) {
   EXPECT_EQ(pairs[0].first, "mixed");
   EXPECT_EQ(pairs[0].second, "like theta");
   EXPECT_NEAR(pairs[0].similarity, 0.9, 1e-6);
+}
+
+// The twin has the columns of dry friction: no drive separates the two. A second copy of itself beside it makes another
+// effect of which it is a special case. Straight ahead, a caster's drag is dry friction; in turns it is not.
+TEST(JudgePairs, TellsWhatThisLogLacksFromWhatNoLogHas) {
+  Scenario s = gap_example::noisy_scenario(gap_example::robot_with("coulomb", {{"c", 0.3}}), 1);
+  s.trajectory.kind = Trajectory::Kind::straight;
+  DiagnoseOptions options;
+  options.catalogue = gap_example::only({"coulomb", "coulomb_asymmetric", "caster_drag"});
+  options.catalogue->push_back(options.catalogue->front());
+  options.catalogue->back().name = "twin";
+  const PreparedGap prepared = gap_example::prepared_log(s, false, options);
+  const gap_example::Problem problem(prepared);
+  const CandidateTable& table = problem.problem.table;
+  std::vector<ConfusablePair> pairs = confusable_pairs(table, BaseModel::refitted, 0.0);
+  judge_pairs(pairs, table, signatures(table, BaseModel::refitted), BaseModel::refitted, prepared,
+              gap_example::counted_robot(), {});
+  const auto pair = [&pairs](const std::string& first, const std::string& second) {
+    return *std::ranges::find_if(pairs,
+                                 [&](const ConfusablePair& p) { return p.first == first && p.second == second; });
+  };
+  EXPECT_NEAR(pair("coulomb", "twin").similarity, 1.0, 1e-6);
+  EXPECT_TRUE(pair("coulomb", "twin").inseparable);
+  EXPECT_THAT(pair("coulomb", "twin").reason, HasSubstr("lifted off the ground"));
+  EXPECT_FALSE(pair("coulomb", "coulomb_asymmetric").inseparable);
+  EXPECT_THAT(pair("coulomb", "coulomb_asymmetric").reason, StartsWith("coulomb is a special case"));
+  EXPECT_GT(pair("coulomb", "caster_drag").similarity, 0.99);
+  EXPECT_FALSE(pair("coulomb", "caster_drag").inseparable);
+  EXPECT_THAT(pair("coulomb", "caster_drag").reason, StartsWith("not excited: reverse often"));
 }
 
 // Straight on without a turn: nothing can be said of what turning shows, and all else still is.

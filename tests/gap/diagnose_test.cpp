@@ -2,14 +2,17 @@
 #include <wheelwright/gap/diagnose.hpp>
 
 #include <algorithm>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include <wheelwright/core/error.hpp>
+#include <wheelwright/gap/fresh_log.hpp>
 
 #include "gap/noisy_log.hpp"
 
@@ -140,6 +143,30 @@ TEST(Diagnose, TellsHowFarItIs) {
   EXPECT_TRUE(std::is_sorted(shares.begin(), shares.end()));
   EXPECT_EQ(shares.front(), 0.0);
   EXPECT_EQ(shares.back(), 1.0);
+}
+
+// The promise is held out; the fresh log was not looked at.
+TEST(TorqueOn, AFreshLogHoldsThePromise) {
+  for (const auto& [name, parameters] : std::vector<std::pair<std::string, std::map<std::string, double>>>{
+           {"coulomb", {{"c", 0.3}}}, {"actuator_lag", {{"T", 0.05}}}, {"torque_gain_asymmetric", {{"g", 0.1}}}}) {
+    SCOPED_TRACE(name);
+    const Robot world = robot_with(name, parameters);
+    DiagnoseOptions options;
+    Simulation log(noisy_scenario(world, 5)), healthy(healthy_scenario(noisy_scenario(world, 5)));
+    const Diagnosis found = diagnose(log, &healthy, counted_robot(), options);
+    ASSERT_EQ(found.verdict, GapVerdict::explained);
+    Simulation fresh(noisy_scenario(world, 6)), before(healthy_scenario(noisy_scenario(world, 5)));
+    const std::vector<ShrinkFigure> there = torque_on(fresh, &before, counted_robot(), found, options);
+    ASSERT_EQ(there.size(), found.shrink.torque_rms.size());
+    for (std::size_t k = 0; k < there.size(); ++k) {
+      const ShrinkFigure& promised = found.shrink.torque_rms[k];
+      EXPECT_LT(there[k].lower, promised.upper) << there[k].name;
+      EXPECT_GT(there[k].upper, promised.lower) << there[k].name;
+      EXPECT_LT(there[k].after, 0.5 * there[k].before) << there[k].name;
+      EXPECT_LT(there[k].lower, there[k].after);
+      EXPECT_GT(there[k].upper, there[k].after);
+    }
+  }
 }
 
 TEST(Diagnose, SaysThatALogIsTooShort) {

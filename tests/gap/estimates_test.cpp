@@ -33,6 +33,7 @@ FittedCauses fitted_single(const PreparedGap& prepared, BaseModel base = BaseMod
 struct Coverage {
   std::string effect, parameter;
   double truth;
+  double clock = 0.0;  // half of what the interval has in any case: a tenth of the log's step
 };
 
 class Intervals : public testing::TestWithParam<Coverage> {};
@@ -55,11 +56,12 @@ TEST_P(Intervals, HoldTheTruth) {
     EXPECT_NEAR(0.5 * (number.lower + number.upper), number.estimate, 1e-9 * c.truth);
   }
   EXPECT_GE(covered, 54);
-  EXPECT_LE(widths / 60.0, 0.1 * c.truth);
+  EXPECT_LE(widths / 60.0, 0.1 * c.truth + 2.0 * c.clock);
 }
 
 INSTANTIATE_TEST_SUITE_P(FitCauses, Intervals,
-                         testing::Values(Coverage{"coulomb", "c", 0.3}, Coverage{"actuator_lag", "T", 0.03}),
+                         testing::Values(Coverage{"coulomb", "c", 0.3},
+                                         Coverage{"actuator_lag", "T", 0.03, 0.1 / 50.0}),
                          [](const testing::TestParamInfo<Coverage>& given) { return given.param.effect; });
 
 // The shape lies between the points of the grid.

@@ -265,10 +265,10 @@ TEST(SelectCauses, AsksForNothingBelowTheFloor) {
 
 TEST(SelectCauses, SaysWhenNothingCouldBeSignificant) {
   Table table(5.0, 1.0);
-  const BlockGram few(table.spaces, {.blocks = 6});
+  const BlockGram few(table.spaces, {.blocks = 8});
   table.table.gram = &few;
   const Selection found = select_causes(table.table, table.kinds, false, 1.0);
-  EXPECT_EQ(found.enough_blocks, true) << "three effects want 2.13 deviations, and six blocks have 2.2";
+  EXPECT_EQ(found.enough_blocks, true) << "the signs of eight blocks have a chance of 1/256, three effects want 1/120";
   table.kinds.resize(30);
   table.table.names.resize(30);
   const Selection many = select_causes(table.table, table.kinds, false, 1.0);

@@ -162,7 +162,7 @@ TEST(Shrink, ThresholdsAndSmallestFaultsFall) {
 }
 
 TEST(Shrink, WhatCannotBeMeasuredIsLeftOutAndSaid) {
-  const World world = with("longitudinal_slip", "stiffness", 1000.0);
+  const World world = with("longitudinal_slip", "stiffness", 1000.0, {1000.0, 0.2});
   const PreparedGap log = prepared_log(world.robot, 3, 8.0);
   const Found found = found_on(log, world);
   std::vector<std::string> notes;

@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/gap/further_drive.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <random>
+
+#include <wheelwright/core/error.hpp>
+#include <wheelwright/design/stages.hpp>
+#include <wheelwright/filter/measurement.hpp>
+#include <wheelwright/gap/discrimination_design.hpp>
+#include <wheelwright/gap/planned_drive.hpp>
+
+namespace wheelwright {
+namespace {
+
+constexpr double kPlannedEffort = 0.8;               // of the limit
+constexpr double kShortest = 20.0, kLongest = 60.0;  // s; between them a third of the log that was analysed
+constexpr double kShortestTravel = 0.5;              // m
+constexpr int kProbes = 3;                           // random manoeuvres
+constexpr std::size_t kStages = 8;                   // of each
+constexpr double kImitated = 1e-3;                   // share of a signature
+
+double largest(const Drive& drive, Eigen::VectorXd JointSignals::*signal) {
+  double value = 0.0;
+  for (const JointSignals& joint : drive.joints) {
+    value = std::max(value, (joint.*signal).cwiseAbs().maxCoeff());
+  }
+  return value;
+}
+
+std::size_t effect_index(const CandidateTable& table, const std::string& name) {
+  return static_cast<std::size_t>(std::ranges::find(table.names, name) - table.names.begin());
+}
+
+// Whether each column of `a` is a sum of columns of `b`, which has more.
+bool special_case(const CandidateTable& table, const Signature& a, const Signature& b, BaseModel base) {
+  const std::size_t count = own_columns(table.candidates[a.candidate]).size();
+  if (count >= own_columns(table.candidates[b.candidate]).size()) {
+    return false;
+  }
+  const auto n = static_cast<Eigen::Index>(count);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    if (made_up(table, {a.candidate, Eigen::VectorXd::Unit(n, k)}, b, base) < 1.0 - kImitated) {
+      return false;
+    }
+  }
+  return true;
+}
+
+// What one pair is on some manoeuvres.
+struct Judged {
+  bool separable = false;
+  bool first_is_special = true, second_is_special = true;
+};
+
+std::string reason_for(const Judged& pair, const Effect& first, const Effect& second,
+                       const std::vector<Effect>& catalogue) {
+  if (pair.first_is_special || pair.second_is_special) {
+    const Effect& simple = pair.first_is_special ? first : second;
+    const Effect& general = pair.first_is_special ? second : first;
+    return simple.name + " is a special case of " + general.name +
+           ", which shows only in what goes beyond it: " + general.excite;
+  }
+  if (pair.separable) {
+    return "not excited: " + first.excite + (second.excite == first.excite ? "" : "; " + second.excite);
+  }
+  return "inseparable by any log of these sensors: " +
+         splitting_measurement({{{first.name, {}, {}}}}, {{{second.name, {}, {}}}}, catalogue);
+}
+
+Drive random_drive(const StageFamily& family, const DesignSubject& subject, const Drive& like,
+                   std::mt19937_64& generator) {
+  std::vector<double> x(family.dimension());
+  std::ranges::generate(x, [&] { return static_cast<double>(generator() >> 11) * 0x1p-53; });
+  Drive drive = planned_drive(family.plan(x, subject.step), subject);
+  drive.has_efforts = like.has_efforts;
+  if (!like.has_pose()) {
+    drive.x = drive.y = drive.heading = {};
+  }
+  return drive;
+}
+
+}  // namespace
+
+DesignSubject subject_of(const PreparedGap& prepared, const Robot& robot, const Eigen::VectorXd& theta) {
+  DesignSubject subject;
+  subject.robot = robot;
+  subject.model = prepared.drive.model;
+  if (prepared.drive.has_efforts) {
+    TableSource source(prepared.log);
+    subject.measurement = find_measurement(source, robot, subject.model, 2);
+  }
+  subject.filter = {2, prepared.row_options.beta, prepared.row_options.beta};
+  subject.theta = theta;
+  for (const double value : theta) {
+    subject.effort_box.sides.push_back({value, value});
+  }
+  subject.prior.sides = prior_box(robot, subject.model).bounds;
+  subject.step = prepared.drive.step;
+  return subject;
+}
+
+MotionLimits limits_within(const PreparedGap& prepared, const Robot& robot) {
+  const Drive& drive = prepared.drive;
+  MotionLimits limits = limits_of(robot);
+  limits.duration = std::clamp(static_cast<double>(drive.rows()) * drive.step / 3.0, kShortest, kLongest);
+  if (!(limits.joint_speed > 0.0)) {
+    limits.joint_speed = largest(drive, &JointSignals::smooth_speed);
+  }
+  if (limits.effort) {
+    limits.effort = kPlannedEffort * *limits.effort;
+  }
+  if (!limits.joint_acceleration) {
+    limits.joint_acceleration = largest(drive, &JointSignals::smooth_acceleration);
+  }
+  if (drive.has_pose()) {
+    double travel = 0.0;
+    for (std::size_t k = 0; k < drive.segment_starts.size(); ++k) {
+      const auto [first, last] = drive.segment(k);
+      for (Eigen::Index i = first; i < last; ++i) {
+        travel = std::max(travel, std::hypot(drive.x[i] - drive.x[first], drive.y[i] - drive.y[first]));
+      }
+    }
+    limits.radius = std::max(travel, kShortestTravel);
+  }
+  return limits;
+}
+
+void judge_pairs(std::vector<ConfusablePair>& pairs, const CandidateTable& table,
+                 const std::vector<std::optional<Signature>>& on_log, BaseModel base, const PreparedGap& prepared,
+                 const Robot& robot, const BlockOptions& blocks) {
+  ShapeGrids shapes(prepared.catalogue.size());
+  for (const ConfusablePair& pair : pairs) {
+    for (const std::string& name : {pair.first, pair.second}) {
+      const std::size_t e = effect_index(table, name);
+      shapes[e] = {table.candidates[on_log[e]->candidate].shape};
+    }
+  }
+  const DesignSubject subject = subject_of(prepared, robot, prepared.theta);
+  std::optional<StageFamily> family;
+  try {
+    family.emplace(subject, limits_within(prepared, robot), kStages);
+  } catch (const InvalidArgument&) {
+    return;
+  }
+  std::mt19937_64 generator(1);
+  std::vector<Judged> judged(pairs.size());
+  for (int probe = 0; probe < kProbes; ++probe) {
+    const Drive drive = random_drive(*family, subject, prepared.drive, generator);
+    GapProblem problem =
+        make_problem(drive, prepared.floor, {}, prepared.trusted, prepared.catalogue, shapes, prepared.row_options);
+    const BlockGram gram(problem.rows.spaces, blocks);
+    problem.table.gram = &gram;
+    std::vector<Signature> here(table.names.size());
+    for (std::size_t c = 0; c < problem.table.candidates.size(); ++c) {
+      const std::size_t e = problem.table.candidates[c].effect;
+      here[e] = {c, on_log[e]->weights};
+    }
+    for (std::size_t k = 0; k < pairs.size(); ++k) {
+      const Signature &a = here[effect_index(table, pairs[k].first)], &b = here[effect_index(table, pairs[k].second)];
+      judged[k].separable = judged[k].separable || made_up(problem.table, a, b, base) < 1.0 - kImitated ||
+                            made_up(problem.table, b, a, base) < 1.0 - kImitated;
+      judged[k].first_is_special = judged[k].first_is_special && special_case(problem.table, a, b, base);
+      judged[k].second_is_special = judged[k].second_is_special && special_case(problem.table, b, a, base);
+    }
+  }
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    const Effect& first = prepared.catalogue[effect_index(table, pairs[k].first)];
+    const Effect& second = prepared.catalogue[effect_index(table, pairs[k].second)];
+    pairs[k].reason = reason_for(judged[k], first, second, prepared.catalogue);
+    pairs[k].inseparable = !judged[k].separable && !judged[k].first_is_special && !judged[k].second_is_special;
+  }
+}
+
+}  // namespace wheelwright
