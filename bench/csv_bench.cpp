@@ -4,7 +4,6 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
-#include <random>
 #include <string>
 #include <vector>
 
@@ -15,25 +14,13 @@
 #include <wheelwright/io/csv.hpp>
 
 #include "bench.hpp"
+#include "temporary_file.hpp"
 
 namespace wheelwright::bench {
 namespace {
 
 constexpr std::size_t rows = 1000000;
 constexpr int repetitions = 5;
-
-/// A file that is gone when the benchmark is.
-struct TemporaryFile {
-  std::filesystem::path path =
-      std::filesystem::temp_directory_path() / fmt::format("wheelwright-bench-{}.csv", std::random_device{}());
-  TemporaryFile() = default;
-  TemporaryFile(const TemporaryFile&) = delete;
-  TemporaryFile& operator=(const TemporaryFile&) = delete;
-  ~TemporaryFile() {
-    std::error_code ignored;
-    std::filesystem::remove(path, ignored);
-  }
-};
 
 /// A log of a differential-drive robot at 100 Hz with pose, as loggers print it.
 void write_log(const std::filesystem::path& path) {
@@ -83,7 +70,7 @@ Measurement measure(const std::string& name, const std::filesystem::path& path, 
 }
 
 std::vector<Measurement> csv_against_bare_read() {
-  const TemporaryFile file;
+  const TemporaryFile file("csv");
   write_log(file.path);
   CsvLog log({file.path});
   return {measure("io/csv walk", file.path, [&] { walk(log); }), measure("io/csv open and walk", file.path, [&] {

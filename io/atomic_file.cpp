@@ -4,6 +4,7 @@
 #include <cerrno>
 #include <cstring>
 #include <string>
+#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -12,71 +13,75 @@
 namespace wheelwright {
 namespace {
 
-/// A file beside `path` that did not exist before, opened for writing; nullptr with errno set where there can be none.
-std::FILE* open_beside(const std::filesystem::path& path, std::filesystem::path& temporary) {
+[[noreturn]] void cannot(const std::filesystem::path& place, std::string_view what) {
+  throw InputError(place.string() + ": " + std::string(what) + " (" + std::strerror(errno) +
+                   "): expected enough room on the disk and the right to write");
+}
+
+}  // namespace
+
+FileBeside::FileBeside(std::filesystem::path place) : place_(std::move(place)) {
+  std::error_code ignored;
+  if (std::filesystem::is_directory(place_, ignored)) {
+    throw InputError(place_.string() + ": is a directory: expected the name of a file to write");
+  }
   for (int attempt = 0; attempt < 1000; ++attempt) {
-    temporary = path;
-    temporary += ".part" + std::to_string(attempt);
-    if (std::FILE* file = std::fopen(temporary.c_str(), "wbx")) {
-      return file;
+    path_ = place_;
+    path_ += ".part" + std::to_string(attempt);
+    if (std::FILE* file = std::fopen(path_.c_str(), "wbx")) {
+      std::fclose(file);
+      return;
     }
     if (errno != EEXIST) {
       break;
     }
   }
-  return nullptr;
+  throw InputError(place_.string() + ": cannot be written (" + std::strerror(errno) +
+                   "): expected a file name in an existing, writable directory");
 }
 
-}  // namespace
-
-AtomicFile::AtomicFile(std::filesystem::path path) : path_(std::move(path)) {
-  std::error_code ignored;
-  if (std::filesystem::is_directory(path_, ignored)) {
-    throw InputError(path_.string() + ": is a directory: expected the name of a file to write");
+FileBeside::~FileBeside() {
+  if (!path_.empty()) {
+    std::error_code ignored;
+    std::filesystem::remove(path_, ignored);
   }
-  file_ = open_beside(path_, temporary_);
+}
+
+void FileBeside::put() {
+  std::error_code error;
+  std::filesystem::rename(path_, place_, error);
+  if (error) {
+    errno = error.value();
+    cannot(place_, "cannot be put in its place");
+  }
+  path_.clear();
+}
+
+AtomicFile::AtomicFile(std::filesystem::path path)
+    : beside_(std::move(path)), file_(std::fopen(beside_.path().c_str(), "wb")) {
   if (file_ == nullptr) {
-    throw InputError(path_.string() + ": cannot be written (" + std::strerror(errno) +
-                     "): expected a file name in an existing, writable directory");
+    cannot(beside_.place(), "cannot be written");
   }
 }
 
 AtomicFile::~AtomicFile() {
   if (file_ != nullptr) {
     std::fclose(file_);
-    std::error_code ignored;
-    std::filesystem::remove(temporary_, ignored);
   }
-}
-
-void AtomicFile::fail(std::string_view what) {
-  throw InputError(path_.string() + ": " + std::string(what) + " (" + std::strerror(errno) +
-                   "): expected enough room on the disk and the right to write");
 }
 
 void AtomicFile::write(std::string_view bytes) {
   if (std::fwrite(bytes.data(), 1, bytes.size(), file_) != bytes.size()) {
-    fail("cannot be written");
+    cannot(beside_.place(), "cannot be written");
   }
 }
 
 void AtomicFile::commit() {
-  if (std::fflush(file_) != 0) {
-    fail("cannot be written");
+  const bool flushed = std::fflush(file_) == 0;
+  if (!flushed || std::fclose(std::exchange(file_, nullptr)) != 0) {
+    cannot(beside_.place(), "cannot be written");
   }
-  std::FILE* const file = std::exchange(file_, nullptr);
-  std::error_code error;
-  if (std::fclose(file) == 0) {
-    std::filesystem::rename(temporary_, path_, error);
-    if (!error) {
-      return;
-    }
-    errno = error.value();
-  }
-  const int reason = errno;
-  std::filesystem::remove(temporary_, error);
-  errno = reason;
-  fail("cannot be put in its place");
+  beside_.put();
 }
 
 void atomic_write(const std::filesystem::path& path, std::string_view content) {

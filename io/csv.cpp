@@ -2,30 +2,25 @@
 #include <wheelwright/io/csv.hpp>
 
 #include <algorithm>
-#include <limits>
+#include <cmath>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <span>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/io/csv_rows.hpp>
+#include <wheelwright/io/csv_streams.hpp>
 #include <wheelwright/io/line_reader.hpp>
+#include <wheelwright/io/stream_aligner.hpp>
 
 namespace wheelwright {
 namespace {
 
-constexpr std::size_t steps_for_median = 100001;
-constexpr double gap_factor = 5.0;
-using Outcome = CsvRowReader::Outcome;
-
-double middle_of(std::vector<double>& steps) {
-  if (steps.empty()) {
-    return 0.0;
-  }
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return *middle;
-}
+constexpr std::size_t looked_at = 5000;  ///< rows at the beginning of a file, for columns with rates of their own
 
 /// Content lines of one file behind its header.
 struct FileWalk {
@@ -51,13 +46,11 @@ CsvHeader header_of(FileWalk& walk, const CsvOptions& options, const std::string
   return read_csv_header(line, options, fmt::format("{}:{}", path, walk.lines.number()));
 }
 
-/// Names (time apart) that all of `headers` have, in the order of the first one's fields.
-std::vector<std::string> shared_names(const std::vector<CsvHeader>& headers) {
+/// Names (time apart) of what `header` has, in the order of its fields.
+std::vector<std::string> names_of(const CsvHeader& header) {
   std::vector<std::pair<std::size_t, std::string>> by_field;
-  for (const auto& [name, field] : headers.front().found) {
-    const bool everywhere = std::all_of(headers.begin(), headers.end(),
-                                        [&, &wanted = name](const CsvHeader& h) { return h.found.contains(wanted); });
-    if (name != "t" && everywhere) {
+  for (const auto& [name, field] : header.found) {
+    if (name != "t") {
       by_field.emplace_back(field, name);
     }
   }
@@ -83,176 +76,245 @@ std::vector<std::string> fields_without(const CsvHeader& header, const std::vect
   return ignored;
 }
 
-}  // namespace
-
-struct CsvLog::Impl {
-  std::vector<std::filesystem::path> paths;
-  CsvOptions options;
-  std::vector<CsvHeader> headers;
-  std::vector<std::string> names;
-  LogReport report;
-
-  std::size_t file = 0;
-  std::unique_ptr<FileWalk> walk;
-  std::unique_ptr<CsvRowReader> rows;
-  std::size_t first_row = 0;
-
-  /// Opens file `k` behind its header, for `reader`.
-  std::unique_ptr<FileWalk> begin(std::size_t k, CsvRowReader& reader, bool hashed) {
-    auto opened = std::make_unique<FileWalk>(paths[k], hashed);
-    reader.begin_file(header_of(*opened, options, paths[k].string()), paths[k].string());
-    return opened;
-  }
-
-  void read_headers() {
-    for (const auto& path : paths) {
-      FileWalk opened(path, false);
-      headers.push_back(header_of(opened, options, path.string()));
-    }
-    names = shared_names(headers);
-  }
-
-  /// Median over the first steps > 0, from a reading that counts nothing.
-  void find_median_step() {
-    std::vector<double> steps;
-    CsvRowReader reader(names, nullptr);
-    for (std::size_t k = 0; k < paths.size() && steps.size() < steps_for_median; ++k) {
-      const auto opened = begin(k, reader, false);
-      std::string_view line;
-      double before = 0.0;
-      while (steps.size() < steps_for_median && opened->next(line)) {
-        const Outcome outcome = reader.read(line, opened->lines.number(), opened->lines.terminated());
-        if (outcome == Outcome::row) {
-          steps.push_back(reader.t() - before);
-        }
-        before = reader.t();
-      }
-    }
-    report.median_step = middle_of(steps);
-  }
-
-  /// Reads everything once and fills the report.
-  void survey() {
-    CsvRowReader reader(names, &report);
-    reader.set_longest_step(longest_step());
-    for (std::size_t k = 0; k < paths.size(); ++k) {
-      const std::size_t rows_before = report.rows;
-      auto& file_report = report.files.emplace_back();
-      const auto opened = begin(k, reader, true);
-      std::string_view line;
-      double start = 0.0, last = 0.0;
-      while (opened->next(line)) {
-        const Outcome outcome = reader.read(line, opened->lines.number(), opened->lines.terminated());
-        if (outcome == Outcome::new_segment) {
-          ++file_report.segments;
-          file_report.seconds += last - start;
-          start = reader.t();
-        }
-        last = outcome == Outcome::dropped ? last : reader.t();
-      }
-      file_report.path = paths[k].string();
-      file_report.packing = opened->lines.source().packing();
-      file_report.bytes = opened->lines.source().file_bytes();
-      file_report.hash = opened->lines.source().hash();
-      file_report.header = headers[k].fields;
-      file_report.ignored = fields_without(headers[k], names);
-      file_report.rows = report.rows - rows_before;
-      file_report.seconds += last - start;
-      report.segments += file_report.segments;
-      report.seconds += file_report.seconds;
-    }
-  }
-
-  void judge() const {
-    const std::string where = paths.front().string() + (paths.size() > 1 ? " and the other files" : "");
-    if (report.rows < std::max<std::size_t>(options.min_rows, 1)) {
-      std::string message = fmt::format("{}: {} usable rows of {}: expected at least {}", where, report.rows,
-                                        report.rows_read, options.min_rows);
-      for (const std::string& sentence : sentences(report)) {
-        message += "; " + sentence;
-      }
-      throw InputError(message);
-    }
-    if (report.rows > 1 && !(report.median_step > 0.0) && report.resets.count > 0) {
-      throw InputError(where + ": column t never increases: expected times in seconds, one row after the other");
-    }
-  }
-
-  [[nodiscard]] double longest_step() const {
-    return report.median_step > 0.0 ? gap_factor * report.median_step : std::numeric_limits<double>::infinity();
-  }
-
-  void rewind() {
-    file = 0;
-    first_row = 0;
-    walk.reset();
-    rows = std::make_unique<CsvRowReader>(names, nullptr);
-    rows->set_longest_step(longest_step());
-  }
-
-  bool next(LogBlock& block) {
-    const std::size_t limit = options.block_rows;
-    block.first_row = first_row;
-    block.segment_starts.clear();
-    block.t.resize(limit);
-    block.columns.resize(names.size());
-    for (auto& column : block.columns) {
-      column.resize(limit);
-    }
-    std::size_t count = 0;
-    std::string_view line;
-    while (count < limit && file < paths.size()) {
-      if (!walk) {
-        walk = begin(file, *rows, false);
-      }
-      if (!walk->next(line)) {
-        walk.reset();
-        ++file;
-        continue;
-      }
-      const Outcome outcome = rows->read(line, walk->lines.number(), walk->lines.terminated());
-      if (outcome == Outcome::dropped) {
-        continue;
-      }
-      if (outcome == Outcome::new_segment) {
-        block.segment_starts.push_back(count);
-      }
-      block.t[count] = rows->t();
-      for (std::size_t c = 0; c < names.size(); ++c) {
-        block.columns[c][count] = rows->values()[c];
-      }
-      ++count;
-    }
-    block.t.resize(count);
-    for (auto& column : block.columns) {
-      column.resize(count);
-    }
-    first_row += count;
-    return count > 0;
-  }
-};
-
-CsvLog::CsvLog(std::vector<std::filesystem::path> paths, CsvOptions options) : impl_(std::make_unique<Impl>()) {
-  check::that(!paths.empty(), "paths", "at least one file");
-  check::that(options.block_rows > 0, "block_rows", "at least 1");
-  impl_->paths = std::move(paths);
-  impl_->options = std::move(options);
-  impl_->read_headers();
-  impl_->find_median_step();
-  impl_->survey();
-  impl_->judge();
-  impl_->rewind();
+void describe_file(const FileWalk& lines, const CsvHeader& header, const std::vector<std::string>& names,
+                   LogFileReport& file) {
+  const ByteSource& source = lines.lines.source();
+  file.format = "csv";
+  file.packing = source.packing();
+  file.bytes = source.file_bytes();
+  file.hash = source.hash();
+  file.header = header.fields;
+  file.ignored = fields_without(header, names);
 }
 
-CsvLog::~CsvLog() = default;
-CsvLog::CsvLog(CsvLog&&) noexcept = default;
-CsvLog& CsvLog::operator=(CsvLog&&) noexcept = default;
+/// A table with one clock.
+class CsvWalk final : public RowWalk {
+ public:
+  CsvWalk(const std::filesystem::path& path, const CsvOptions& options, const std::vector<std::string>& names,
+          double longest_step, LogReport* report)
+      : names_(names), rows_(names, report), lines_(path, report != nullptr) {
+    rows_.set_longest_step(longest_step);
+    header_ = header_of(lines_, options, path.string());
+    rows_.begin_file(header_, path.string());
+  }
 
-const std::vector<std::string>& CsvLog::columns() const { return impl_->names; }
-bool CsvLog::next(LogBlock& block) { return impl_->next(block); }
-void CsvLog::rewind() { impl_->rewind(); }
-double CsvLog::median_step() const { return impl_->report.median_step; }
-const LogReport& CsvLog::report() const { return impl_->report; }
+  bool next(RowOutcome& outcome) override {
+    std::string_view line;
+    if (!lines_.next(line)) {
+      return false;
+    }
+    outcome = rows_.read(line, lines_.lines.number(), lines_.lines.terminated());
+    return true;
+  }
+  [[nodiscard]] double t() const override { return rows_.t(); }
+  [[nodiscard]] const double* values() const override { return rows_.values(); }
+  void describe(LogFileReport& file) const override { describe_file(lines_, header_, names_, file); }
+
+ private:
+  const std::vector<std::string>& names_;
+  CsvRowReader rows_;
+  FileWalk lines_;
+  CsvHeader header_;
+};
+
+/// A table whose columns are filled in different rows: brought to the rows of the first stream.
+class MergedCsvWalk final : public RowWalk {
+ public:
+  MergedCsvWalk(const std::filesystem::path& path, const CsvOptions& options, const std::vector<std::string>& names,
+                const std::vector<CsvStream>& streams, double longest_step, LogReport* report)
+      : names_(names),
+        streams_(streams),
+        rows_(names, report),
+        cleaner_(names, report),
+        lines_(path, report != nullptr),
+        row_(names.size() + 1) {
+    header_ = header_of(lines_, options, path.string());
+    rows_.begin_file(header_, path.string());
+    rows_.let_miss(std::vector<bool>(names.size(), true));
+    cleaner_.set_longest_step(longest_step);
+    cleaner_.begin_file(path.string() + ":");
+    std::vector<AlignedStream> aligned;
+    for (const CsvStream& stream : streams_) {
+      AlignedStream of;
+      of.columns = stream.columns;
+      for (const std::size_t c : stream.columns) {
+        of.angle.push_back(names[c] == "theta");
+      }
+      of.longest_gap = static_cast<std::int64_t>(gap_factor * static_cast<double>(stream.median_step));
+      aligned.push_back(std::move(of));
+    }
+    aligner_.emplace(names.size(), std::move(aligned));
+  }
+
+  bool next(RowOutcome& outcome) override {
+    std::int64_t ns = 0;
+    while (!aligner_->pop(ns, std::span(row_).subspan(1))) {
+      std::string_view line;
+      if (finished_) {
+        return false;
+      }
+      if (!lines_.next(line)) {
+        aligner_->finish();
+        finished_ = true;
+      } else if (!take(line)) {
+        outcome = RowOutcome::dropped;
+        return true;
+      }
+    }
+    row_[0] = waiting_.front().t;
+    const std::size_t number = waiting_.front().number;
+    waiting_.pop_front();
+    for (std::size_t c = 0; c < names_.size(); ++c) {
+      if (std::isnan(row_[c + 1])) {
+        cleaner_.count(&LogReport::uncovered, number, names_[c]);
+        outcome = RowOutcome::dropped;
+        return true;
+      }
+    }
+    outcome = cleaner_.place(row_, number);
+    return true;
+  }
+
+  [[nodiscard]] double t() const override { return cleaner_.t(); }
+  [[nodiscard]] const double* values() const override { return row_.data() + 1; }
+  void describe(LogFileReport& file) const override {
+    describe_file(lines_, header_, names_, file);
+    for (std::size_t s = 1; s < streams_.size(); ++s) {
+      for (const std::size_t c : streams_[s].columns) {
+        file.interpolated.push_back({names_[c],
+                                     fmt::format("the rows that have it (a share of {:.2g})", streams_[s].filled),
+                                     aligner_->error()[c]});
+      }
+      if (const std::size_t stale = aligner_->stale(s); stale > 0) {
+        file.notes.push_back(fmt::format("{} samples of {} are not later than the one before and were left out", stale,
+                                         names_[streams_[s].columns.front()]));
+      }
+    }
+  }
+
+ private:
+  struct Waiting {
+    double t = 0.0;
+    std::size_t number = 0;
+  };
+
+  /// Hands the samples of a line to the aligner; false when the line, or its part of the first stream, is dropped.
+  bool take(std::string_view line) {
+    const std::size_t number = lines_.lines.number();
+    if (!rows_.read_numbers(line, number, lines_.lines.terminated())) {
+      return false;
+    }
+    const std::span<const double> values = rows_.row();
+    const std::int64_t ns = std::llround(values[0] * 1e9);
+    bool whole = true;
+    for (std::size_t s = 0; s < streams_.size(); ++s) {
+      sample_.clear();
+      std::size_t missing = 0;
+      for (const std::size_t c : streams_[s].columns) {
+        sample_.push_back(values[c + 1]);
+        missing += std::isnan(values[c + 1]) ? 1 : 0;
+      }
+      if (missing == 0) {
+        aligner_->push(s, ns, sample_);
+        if (s == 0) {
+          waiting_.push_back({values[0], number});
+        }
+      } else if (s == 0 && missing < sample_.size()) {
+        cleaner_.count(&LogReport::empty, number);
+        whole = false;
+      }
+    }
+    return whole;
+  }
+
+  const std::vector<std::string>& names_;
+  std::vector<CsvStream> streams_;
+  CsvRowReader rows_;
+  RowCleaner cleaner_;
+  FileWalk lines_;
+  CsvHeader header_;
+  std::optional<StreamAligner> aligner_;
+  std::deque<Waiting> waiting_;  ///< rows of the first stream that are in the aligner
+  std::vector<double> row_;      ///< time, then the columns
+  std::vector<double> sample_;
+  bool finished_ = false;
+};
+
+class CsvFile final : public RowFile {
+ public:
+  CsvFile(std::filesystem::path path, CsvOptions options) : path_(std::move(path)), options_(std::move(options)) {
+    FileWalk lines(path_, false);
+    names_ = names_of(header_of(lines, options_, path_.string()));
+  }
+
+  [[nodiscard]] std::string path() const override { return path_.string(); }
+  [[nodiscard]] const std::vector<std::string>& columns() const override { return names_; }
+  [[nodiscard]] std::unique_ptr<RowWalk> open(const std::vector<std::string>& names, double longest_step,
+                                              LogReport* report) override {
+    if (looked_for_ != names) {
+      look_for_streams(names);
+    }
+    if (streams_.size() > 1) {
+      return std::make_unique<MergedCsvWalk>(path_, options_, names, streams_, longest_step, report);
+    }
+    return std::make_unique<CsvWalk>(path_, options_, names, longest_step, report);
+  }
+
+ private:
+  /// Streams of the first rows. What is wrong with one of them is left to the walk, which says so.
+  void look_for_streams(const std::vector<std::string>& names) {
+    CsvRowReader rows(names, nullptr);
+    FileWalk lines(path_, false);
+    rows.begin_file(header_of(lines, options_, path_.string()), path_.string());
+    rows.let_miss(std::vector<bool>(names.size(), true));
+    CsvStreamFinder finder(names);
+    std::string_view line;
+    try {
+      for (std::size_t k = 0; k < looked_at && lines.next(line); ++k) {
+        if (rows.read_numbers(line, lines.lines.number(), lines.lines.terminated())) {
+          finder.add(rows.row()[0], rows.row().data() + 1);
+        }
+      }
+      streams_ = finder.streams();
+    } catch (const InputError&) {
+      streams_.clear();
+    }
+    std::size_t found = 0;
+    for (const CsvStream& stream : streams_) {
+      found += stream.columns.size();
+    }
+    if (found < names.size()) {
+      streams_.clear();
+    }
+    looked_for_ = names;
+  }
+
+  std::filesystem::path path_;
+  CsvOptions options_;
+  std::vector<std::string> names_;
+  std::vector<std::string> looked_for_;
+  std::vector<CsvStream> streams_;
+};
+
+std::vector<std::unique_ptr<RowFile>> csv_files(const std::vector<std::filesystem::path>& paths,
+                                                const CsvOptions& options) {
+  check::that(!paths.empty(), "paths", "at least one file");
+  check::that(options.block_rows > 0, "block_rows", "at least 1");
+  std::vector<std::unique_ptr<RowFile>> files;
+  for (const auto& path : paths) {
+    files.push_back(csv_file(path, options));
+  }
+  return files;
+}
+
+}  // namespace
+
+std::unique_ptr<RowFile> csv_file(const std::filesystem::path& path, const CsvOptions& options) {
+  return std::make_unique<CsvFile>(path, options);
+}
+
+CsvLog::CsvLog(const std::vector<std::filesystem::path>& paths, const CsvOptions& options)
+    : RowLog(csv_files(paths, options), {options.block_rows, options.min_rows}) {}
 
 struct CsvRowParser::Impl {
   CsvHeader header;
@@ -292,7 +354,7 @@ CsvRowParser::CsvRowParser(std::string_view header, const CsvOptions& options, d
     header.remove_suffix(1);
   }
   impl_->header = read_csv_header(header, options, name + ":1");
-  impl_->names = shared_names({impl_->header});
+  impl_->names = names_of(impl_->header);
   impl_->rows = std::make_unique<CsvRowReader>(impl_->names, &impl_->report);
   impl_->rows->begin_file(impl_->header, std::move(name));
   impl_->learning = median_step == 0.0;
@@ -318,8 +380,8 @@ bool CsvRowParser::parse(std::string_view line, LogBlock& block) {
     return false;
   }
   const double before = own.rows->t();
-  const Outcome outcome = own.rows->read(line, own.line_number, true);
-  if (outcome == Outcome::dropped) {
+  const RowOutcome outcome = own.rows->read(line, own.line_number, true);
+  if (outcome == RowOutcome::dropped) {
     return false;
   }
   block.first_row = own.report.rows - 1;
@@ -329,7 +391,7 @@ bool CsvRowParser::parse(std::string_view line, LogBlock& block) {
     block.columns[c].assign(1, own.rows->values()[c]);
   }
   block.segment_starts.clear();
-  if (outcome == Outcome::new_segment) {
+  if (outcome == RowOutcome::new_segment) {
     block.segment_starts.push_back(0);
     ++own.report.segments;
   } else {

@@ -16,41 +16,30 @@
 #include <wheelwright/core/log.hpp>
 #include <wheelwright/io/csv_header.hpp>
 #include <wheelwright/io/csv_report.hpp>
+#include <wheelwright/io/row_log.hpp>
 
 namespace wheelwright {
 
 /// A log in one or several CSV files. Memory does not grow with the files.
-class CsvLog final : public LogSource {
+class CsvLog final : public RowLog {
  public:
-  /// Reads all of `paths` once: the median step, the hashes, and everything that report() says. Each file begins a new
-  /// segment; columns() are those that all files have, in the order of the first. What is repaired and counted, and
-  /// what is not:
+  /// Reads all of `paths` once, as RowLog does; columns() are those that all files have, in the order of the first. What
+  /// is repaired and counted, and what is not:
   /// - a row with an empty, NaN or infinite used field, or with the time of the row before, is dropped;
+  /// - columns that more than a fifth of a file's first rows lack were sampled apart (csv_streams.hpp): they are brought to
+  ///   the times of the other rows as topics of a bag are (stream_aligner.hpp), and the report says so;
   /// - time that goes backwards, and a step of more than 5 × the median step, begin a new segment;
   /// - `theta` is unwrapped inside a segment, so that no step exceeds π;
   /// - a last line without line end that is cut off is dropped;
   /// - text in a used field, a wrong number of fields, and values beyond LogColumn::limit throw.
   /// Throws InputError, naming file, line, column, value and what was expected, for those, for files that open_bytes or
-  /// read_csv_header reject, for time that never increases, and for fewer than `min_rows` usable rows.
-  /// Throws InvalidArgument when `paths` is empty or `block_rows` is 0.
-  explicit CsvLog(std::vector<std::filesystem::path> paths, CsvOptions options = {});
-  ~CsvLog() override;
-  CsvLog(CsvLog&&) noexcept;
-  CsvLog& operator=(CsvLog&&) noexcept;
-
-  [[nodiscard]] const std::vector<std::string>& columns() const override;
-  /// As LogSource::next; throws InputError where a file has changed into something unusable since the construction.
-  bool next(LogBlock& block) override;
-  void rewind() override;
-  /// Median of at most the first 100 001 steps, s.
-  [[nodiscard]] double median_step() const override;
-  /// What the first reading found.
-  [[nodiscard]] const LogReport& report() const;
-
- private:
-  struct Impl;
-  std::unique_ptr<Impl> impl_;
+  /// read_csv_header reject, for time that never increases, and for fewer than `min_rows` usable rows. The median step
+  /// is that of at most the first 100 001. Throws InvalidArgument when `paths` is empty or `block_rows` is 0.
+  explicit CsvLog(const std::vector<std::filesystem::path>& paths, const CsvOptions& options = {});
 };
+
+/// One file of such a log. Throws InputError as CsvLog does for its header.
+[[nodiscard]] std::unique_ptr<RowFile> csv_file(const std::filesystem::path& path, const CsvOptions& options);
 
 /// The same cleaning for rows that come one at a time (standard input of `detect --follow`).
 class CsvRowParser {
@@ -76,15 +65,6 @@ class CsvRowParser {
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
-
-/// Throws InputError, naming each missing column, `file`, what the file has and the nearest name, unless `source` has
-/// all of `names`. A name may list alternatives of which one suffices: "omega_r|phi_r". `header` is what the file has
-/// as written; where it is empty, the columns of `source` are named.
-void require_columns(const LogSource& source, const std::vector<std::string>& names, std::string_view file,
-                     const std::vector<std::string>& header = {});
-
-/// The same for a CSV log, which knows its files.
-void require_columns(const CsvLog& log, const std::vector<std::string>& names);
 
 /// Writes `table` with the header t, names...; numbers are the shortest that read back exactly. Packed with gzip or
 /// zstd when the name ends in .gz or .zst. The file appears whole or not at all. Segments are not marked: a reader

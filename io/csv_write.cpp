@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <memory>
+#include <string>
+#include <vector>
 
 #include <zlib.h>
 #include <zstd.h>
@@ -9,9 +12,12 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/io/atomic_file.hpp>
 #include <wheelwright/io/csv.hpp>
+#include <wheelwright/io/log_write.hpp>
 
 namespace wheelwright {
 namespace {
+
+constexpr std::size_t rows_at_once = 4096;
 
 /// Takes text, puts bytes into a file.
 class Packer {
@@ -102,48 +108,70 @@ void append_number(std::string& text, double value) {
   text.append(digits.data(), end);
 }
 
-void check_table(const LogTable& table) {
-  check::that(table.names.size() == table.columns.size(), "log", "one name for each column");
-  for (const double t : table.t) {
-    check::finite(t, "log time");
+class CsvWriter final : public LogWriter {
+ public:
+  CsvWriter(const std::filesystem::path& path, const std::vector<std::string>& names)
+      : file_(path), packer_(packer_for(path, file_)), columns_(names.size()), text_("t") {
+    for (const std::string& name : names) {
+      text_ += "," + name;
+    }
+    text_ += '\n';
   }
-  for (std::size_t c = 0; c < table.columns.size(); ++c) {
-    const std::string& name = table.names[c];
-    check::that(!name.empty() && name.find_first_of(",;\t\"\r\n#") == std::string::npos, "log column '" + name + "'",
-                "a name without separators, quotes, # and line ends");
-    check::that(table.columns[c].size() == table.rows(), "log column '" + name + "'",
-                "as many values as there are times");
-    for (const double value : table.columns[c]) {
-      check::finite(value, "log column '" + name + "'");
+
+  void write(const LogBlock& block) override {
+    check_block(block, columns_);
+    for (std::size_t k = 0; k < block.rows(); ++k) {
+      append_number(text_, block.t[k]);
+      for (const auto& column : block.columns) {
+        text_ += ',';
+        append_number(text_, column[k]);
+      }
+      text_ += '\n';
+      if (text_.size() > (std::size_t{1} << 16)) {
+        packer_->write(text_, false);
+        text_.clear();
+      }
     }
   }
-}
+
+  void commit() override {
+    packer_->write(text_, true);
+    file_.commit();
+  }
+
+ private:
+  AtomicFile file_;
+  std::unique_ptr<Packer> packer_;
+  std::size_t columns_;
+  std::string text_;
+};
 
 }  // namespace
 
+std::unique_ptr<LogWriter> create_csv(const std::filesystem::path& path, const std::vector<std::string>& names) {
+  check_column_names(names);
+  return std::make_unique<CsvWriter>(path, names);
+}
+
 void write_csv(const std::filesystem::path& path, const LogTable& table) {
-  check_table(table);
-  AtomicFile file(path);
-  const auto packer = packer_for(path, file);
-  std::string text = "t";
-  for (const std::string& name : table.names) {
-    text += "," + name;
-  }
-  text += '\n';
-  for (std::size_t k = 0; k < table.rows(); ++k) {
-    append_number(text, table.t[k]);
-    for (const auto& column : table.columns) {
-      text += ',';
-      append_number(text, column[k]);
+  check::that(table.names.size() == table.columns.size(), "log", "one name for each column");
+  const auto writer = create_csv(path, table.names);
+  LogBlock block;
+  block.columns.resize(table.columns.size());
+  for (std::size_t first = 0; first < table.rows(); first += rows_at_once) {
+    const std::size_t last = std::min(table.rows(), first + rows_at_once);
+    const auto part = [&](const std::vector<double>& column, std::vector<double>& to) {
+      check::that(column.size() == table.rows(), "log column", "as many values as there are times");
+      to.assign(column.begin() + static_cast<std::ptrdiff_t>(first),
+                column.begin() + static_cast<std::ptrdiff_t>(last));
+    };
+    part(table.t, block.t);
+    for (std::size_t c = 0; c < table.columns.size(); ++c) {
+      part(table.columns[c], block.columns[c]);
     }
-    text += '\n';
-    if (text.size() > (std::size_t{1} << 16)) {
-      packer->write(text, false);
-      text.clear();
-    }
+    writer->write(block);
   }
-  packer->write(text, true);
-  file.commit();
+  writer->commit();
 }
 
 }  // namespace wheelwright

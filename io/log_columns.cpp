@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <initializer_list>
 #include <map>
 #include <vector>
 
@@ -160,6 +161,15 @@ const LogColumn* recognise_log_column(std::string_view text) {
   }
   const LogColumn& column = all().columns[it->second];
   return unit.empty() || same_unit(unit, column.unit) ? &column : nullptr;
+}
+
+int row_weight(std::string_view name) {
+  const auto begins = [&](std::initializer_list<std::string_view> words) {
+    return std::ranges::any_of(words, [&](std::string_view word) { return name.starts_with(word); });
+  };
+  return begins({"tau", "current", "voltage", "effort"})    ? 10000
+         : begins({"omega", "phi", "position", "velocity"}) ? 100
+                                                            : 1;
 }
 
 std::string plain_name(std::string_view text) {

@@ -30,6 +30,10 @@ struct LogColumn {
 /// ("Time [s]" is `t`; "Time [ms]" is nothing). nullptr where it means none.
 [[nodiscard]] const LogColumn* recognise_log_column(std::string_view text);
 
+/// Which of several streams of samples gives a log its rows: that whose columns' weights sum to most. Efforts go before
+/// motion, motion before the rest.
+[[nodiscard]] int row_weight(std::string_view name);
+
 /// `text` in lower case, blanks, '-', '.' and '/' as single '_', none at the ends.
 [[nodiscard]] std::string plain_name(std::string_view text);
 

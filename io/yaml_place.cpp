@@ -63,19 +63,26 @@ YamlPlace YamlPlace::parse(std::string_view text, std::string file, bool lines) 
 }
 
 std::vector<std::pair<std::string, YamlPlace>> YamlPlace::members(const std::vector<std::string>& known) const {
+  return members_of(&known);
+}
+
+std::vector<std::pair<std::string, YamlPlace>> YamlPlace::members() const { return members_of(nullptr); }
+
+std::vector<std::pair<std::string, YamlPlace>> YamlPlace::members_of(const std::vector<std::string>* known) const {
+  const std::string of = known == nullptr ? "" : ", of " + listed(*known);
   if (!node_->node.IsMap()) {
-    fail("keys with values, of " + listed(known));
+    fail("keys with values" + of);
   }
   std::vector<std::pair<std::string, YamlPlace>> out;
   for (const auto& member : node_->node) {
     const YamlPlace at_key(node_->with(member.first), key_);
     if (!member.first.IsScalar()) {
-      at_key.fail("a key, one of " + listed(known));
+      at_key.fail(known == nullptr ? "a key" : "a key, one of " + listed(*known));
     }
     const std::string name = member.first.Scalar();
-    if (std::find(known.begin(), known.end(), name) == known.end()) {
+    if (known != nullptr && std::find(known->begin(), known->end(), name) == known->end()) {
       at_key.say(fmt::format("{}unknown key {}: expected one of {}{}", key_.empty() ? "" : key_ + ": ", shown(name),
-                             listed(known), did_you_mean(name, known)));
+                             listed(*known), did_you_mean(name, *known)));
     }
     const std::string full = key_.empty() ? name : key_ + "." + name;
     if (std::any_of(out.begin(), out.end(), [&](const auto& before) { return before.first == name; })) {
@@ -85,6 +92,8 @@ std::vector<std::pair<std::string, YamlPlace>> YamlPlace::members(const std::vec
   }
   return out;
 }
+
+bool YamlPlace::is_mapping() const { return node_->node.IsMap(); }
 
 bool YamlPlace::is_scalar() const { return node_->node.IsScalar(); }
 
@@ -132,6 +141,8 @@ double YamlPlace::positive() const {
 }
 
 bool YamlPlace::boolean() const { return choice({"true", "false"}) == 0; }
+
+std::string YamlPlace::where() const { return node_->where(); }
 
 void YamlPlace::fail(std::string_view expected) const {
   say(fmt::format("{}{}: expected {}", key_.empty() ? "" : key_ + ": ", node_->value(), expected));

@@ -24,6 +24,11 @@ class YamlPlace {
   /// for repeated keys, and for keys not in `known` (with the nearest that is).
   [[nodiscard]] std::vector<std::pair<std::string, YamlPlace>> members(const std::vector<std::string>& known) const;
 
+  /// All members, whatever their keys; throws as members() does.
+  [[nodiscard]] std::vector<std::pair<std::string, YamlPlace>> members() const;
+
+  /// Whether this is a mapping.
+  [[nodiscard]] bool is_mapping() const;
   /// Whether this is a single value (neither a list nor a mapping, nor nothing).
   [[nodiscard]] bool is_scalar() const;
   /// Elements of a list.
@@ -41,6 +46,8 @@ class YamlPlace {
   /// true or false.
   [[nodiscard]] bool boolean() const;
 
+  /// "robot.yaml:4".
+  [[nodiscard]] std::string where() const;
   /// Throws InputError "file:line: key: value: expected `expected`".
   [[noreturn]] void fail(std::string_view expected) const;
   /// Throws InputError "file:line: `message`".
@@ -49,6 +56,7 @@ class YamlPlace {
  private:
   struct Node;
   YamlPlace(std::shared_ptr<const Node> node, std::string key);
+  [[nodiscard]] std::vector<std::pair<std::string, YamlPlace>> members_of(const std::vector<std::string>* known) const;
 
   std::shared_ptr<const Node> node_;
   std::string key_;

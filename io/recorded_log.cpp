@@ -4,8 +4,8 @@
 #include <fmt/format.h>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/io/csv.hpp>
 #include <wheelwright/io/log_columns.hpp>
+#include <wheelwright/io/recorded_log.hpp>
 #include <wheelwright/io/suggest.hpp>
 
 namespace wheelwright {
@@ -60,7 +60,7 @@ void require_columns(const LogSource& source, const std::vector<std::string>& na
   }
 }
 
-void require_columns(const CsvLog& log, const std::vector<std::string>& names) {
+void require_columns(const RecordedLog& log, const std::vector<std::string>& names) {
   for (const LogFileReport& file : log.report().files) {
     const bool lacks = std::any_of(names.begin(), names.end(), [&](const std::string& name) {
       const auto alternatives = alternatives_of(name);

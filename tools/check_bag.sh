@@ -1,0 +1,47 @@
+#!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
+#
+# Wheelwright and Foxglove's npm packages read the same numbers out of each other's recordings of ROS 2 messages; and the
+# databases that Wheelwright writes are whole for the sqlite3 program. Wants Node and npm, and fetches four packages from
+# npm into a scratch directory; ctest does not run it.
+set -eu
+cd "$(dirname "$0")/.."
+scratch=$(mktemp -d)
+trap 'rm -rf "$scratch"' EXIT
+command -v npm >/dev/null || { echo "bag: npm is missing" >&2; exit 2; }
+
+mkdir "$scratch/include"
+ln -s "$PWD" "$scratch/include/wheelwright"
+"${CXX:-g++}" -std=c++20 -O1 -I "$scratch/include" -o "$scratch/check_bag" tools/check_bag.cpp io/ros_*.cpp io/mcap_*.cpp \
+  io/bag.cpp io/bag_database.cpp io/bag_database_file.cpp io/bag_mcap.cpp io/bag_metadata.cpp io/bag_parts.cpp \
+  io/bag_source.cpp io/bag_sqlite.cpp io/bag_temporary.cpp io/bag_unpacker.cpp io/bag_write.cpp io/atomic_file.cpp \
+  io/byte_source.cpp io/suggest.cpp io/xxh64.cpp -lfmt -lz -lzstd -llz4 -lsqlite3 -lfastcdr -lyaml-cpp
+cp tools/check_bag.mjs "$scratch"
+cd "$scratch"
+npm install --silent --no-audit --no-fund --ignore-scripts @mcap/core@2.2.2 @foxglove/wasm-zstd@1.0.1 \
+  @foxglove/rosmsg@5.0.5 @foxglove/rosmsg2-serialization@3.1.0
+
+same() {
+  sort ours.txt > a.txt
+  sort theirs.txt > b.txt
+  cmp a.txt b.txt || { diff a.txt b.txt | head >&2; echo "bag: $1: read differently" >&2; exit 1; }
+  [ -s a.txt ] || { echo "bag: $1: nothing was read" >&2; exit 1; }
+  echo "bag: $1: $(wc -l < a.txt) numbers, the same on both sides"
+}
+./check_bag write ours.mcap
+./check_bag read ours.mcap > ours.txt
+node check_bag.mjs read ours.mcap > theirs.txt
+same "written here"
+./check_bag types > types.json
+node check_bag.mjs write types.json theirs.mcap > theirs.txt
+./check_bag read theirs.mcap > ours.txt
+same "written there"
+
+./check_bag write ours.db3
+./check_bag read ours.db3 > theirs.txt
+./check_bag read ours.mcap > ours.txt
+same "as a database"
+if command -v sqlite3 >/dev/null; then
+  [ "$(sqlite3 ours.db3 'PRAGMA integrity_check')" = ok ] || { echo "bag: the database is not whole" >&2; exit 1; }
+  echo "bag: the database is whole"
+fi
