@@ -5,169 +5,145 @@
 #include <cmath>
 #include <utility>
 
-#include <wheelwright/core/check.hpp>
+#include <wheelwright/commission/detector_walk.hpp>
 
 namespace wheelwright {
 namespace {
 
-struct OutputBin {
-  double torque = 0.0, predicted = 0.0, low = 0.0, high = 0.0, lower = 0.0, upper = 0.0, use = -1.0;
-
-  void absorb(const OutputBin& other) {
-    low = std::min(low, other.low);
-    high = std::max(high, other.high);
-    if (other.use > use) {
-      lower = other.lower;
-      upper = other.upper;
-      use = other.use;
-      torque = other.torque;
-      predicted = other.predicted;
-    }
-  }
-};
-
-struct Bin {
-  double first = 0.0, last = 0.0;
-  bool starts = false;
-  std::vector<OutputBin> outputs;
-
-  void absorb(const Bin& other) {
-    last = other.last;
-    starts = starts || other.starts;
-    for (std::size_t i = 0; i < outputs.size(); ++i) {
-      outputs[i].absorb(other.outputs[i]);
-    }
-  }
-};
-
-double use_of(const ChannelDecision& c) {
-  const double half = 0.5 * c.threshold.width();
-  return half > 0.0 ? std::abs(c.residual - 0.5 * (c.threshold.lower + c.threshold.upper)) / half : 0.0;
+double use_of(double residual, double lower, double upper) {
+  const double half = 0.5 * (upper - lower);
+  return half > 0.0 ? std::abs(residual - 0.5 * (lower + upper)) / half : 0.0;
 }
 
-// Equal numbers of instants in every bin; when the bins are full, neighbours are joined.
+// Calls `change` with every column of a trace.
+template <typename Change>
+void for_each_column(OutputTrace& o, const Change& change) {
+  for (std::vector<double>* column : {&o.torque, &o.predicted, &o.residual_low, &o.residual_high, &o.lower, &o.upper}) {
+    change(*column);
+  }
+}
+
+// Equal numbers of instants in every bin; when the bins are full, neighbours are joined. A bin shows effort and threshold
+// of its instant that is nearest to the threshold.
 class Binner {
  public:
-  Binner(std::size_t outputs, std::size_t most) : most_(std::max<std::size_t>(most, 16)), outputs_(outputs) {}
+  Binner(std::size_t outputs, std::size_t most) : most_(std::max<std::size_t>(most, 16)) {
+    trace_.outputs.resize(outputs);
+  }
 
   void add(double t, bool starts, const Decision& decision) {
-    Bin bin{t, t, starts, std::vector<OutputBin>(outputs_)};
-    for (std::size_t i = 0; i < outputs_; ++i) {
+    if (in_last_ == length_ && last_.size() == most_) {
+      halve();
+    }
+    trace_.t.push_back(t);
+    last_.push_back(t);
+    starts_.push_back(starts);
+    for (std::size_t i = 0; i < trace_.outputs.size(); ++i) {
       const ChannelDecision& c = decision.channels[i];
-      bin.outputs[i] = {c.predicted + c.residual, c.predicted,       c.residual, c.residual,
-                        c.threshold.lower,        c.threshold.upper, use_of(c)};
+      OutputTrace& o = trace_.outputs[i];
+      o.torque.push_back(c.predicted + c.residual);
+      o.predicted.push_back(c.predicted);
+      o.residual_low.push_back(c.residual);
+      o.residual_high.push_back(c.residual);
+      o.lower.push_back(c.threshold.lower);
+      o.upper.push_back(c.threshold.upper);
     }
     if (in_last_ == 0 || in_last_ == length_) {
-      if (bins_.size() == most_) {
-        halve();
-      }
-    }
-    if (in_last_ == 0 || in_last_ >= length_) {
-      bins_.push_back(std::move(bin));
       in_last_ = 1;
     } else {
-      bins_.back().absorb(bin);
+      join(last_.size() - 2, last_.size() - 1);
+      resize(last_.size() - 1);
       ++in_last_;
     }
   }
 
-  [[nodiscard]] Trace trace() const {
-    Trace trace;
-    trace.outputs.resize(outputs_);
-    for (const Bin& bin : bins_) {
-      if (bin.starts && !trace.t.empty()) {
-        trace.breaks.push_back(trace.t.size());
+  Trace trace() {
+    for (std::size_t k = 0; k < last_.size(); ++k) {
+      if (k > 0 && starts_[k]) {
+        trace_.breaks.push_back(k);
       }
-      trace.t.push_back(0.5 * (bin.first + bin.last));
-      for (std::size_t i = 0; i < outputs_; ++i) {
-        const OutputBin& from = bin.outputs[i];
-        OutputTrace& to = trace.outputs[i];
-        to.torque.push_back(from.torque);
-        to.predicted.push_back(from.predicted);
-        to.residual_low.push_back(from.low);
-        to.residual_high.push_back(from.high);
-        to.lower.push_back(from.lower);
-        to.upper.push_back(from.upper);
-      }
+      trace_.t[k] = 0.5 * (trace_.t[k] + last_[k]);
     }
-    return trace;
+    return std::move(trace_);
   }
 
  private:
-  void halve() {
-    for (std::size_t k = 0; 2 * k < bins_.size(); ++k) {
-      Bin joined = std::move(bins_[2 * k]);
-      if (2 * k + 1 < bins_.size()) {
-        joined.absorb(bins_[2 * k + 1]);
+  // Joins bin `from` to bin `to`, which lies before it.
+  void join(std::size_t to, std::size_t from) {
+    last_[to] = last_[from];
+    starts_[to] = starts_[to] || starts_[from];
+    for (OutputTrace& o : trace_.outputs) {
+      const auto use = [&o](std::size_t k) { return use_of(o.torque[k] - o.predicted[k], o.lower[k], o.upper[k]); };
+      o.residual_low[to] = std::min(o.residual_low[to], o.residual_low[from]);
+      o.residual_high[to] = std::max(o.residual_high[to], o.residual_high[from]);
+      if (use(from) > use(to)) {
+        for (std::vector<double>* column : {&o.torque, &o.predicted, &o.lower, &o.upper}) {
+          (*column)[to] = (*column)[from];
+        }
       }
-      bins_[k] = std::move(joined);
     }
-    in_last_ = bins_.size() % 2 == 1 ? length_ : 2 * length_;
-    bins_.resize((bins_.size() + 1) / 2);
+  }
+
+  void halve() {
+    for (std::size_t k = 0; 2 * k < last_.size(); ++k) {
+      trace_.t[k] = trace_.t[2 * k];
+      last_[k] = last_[2 * k];
+      starts_[k] = starts_[2 * k];
+      for (OutputTrace& o : trace_.outputs) {
+        for_each_column(o, [k](std::vector<double>& column) { column[k] = column[2 * k]; });
+      }
+      if (2 * k + 1 < last_.size()) {
+        join(k, 2 * k + 1);
+      }
+    }
+    in_last_ = last_.size() % 2 == 1 ? length_ : 2 * length_;
+    resize((last_.size() + 1) / 2);
     length_ *= 2;
   }
 
+  void resize(std::size_t bins) {
+    trace_.t.resize(bins);
+    last_.resize(bins);
+    starts_.resize(bins);
+    for (OutputTrace& o : trace_.outputs) {
+      for_each_column(o, [bins](std::vector<double>& column) { column.resize(bins); });
+    }
+  }
+
   std::size_t most_;
-  std::size_t outputs_;
   std::size_t length_ = 1;
   std::size_t in_last_ = 0;
-  std::vector<Bin> bins_;
+  Trace trace_;  // t: of the first instant of each bin
+  std::vector<double> last_;
+  std::vector<bool> starts_;
 };
 
 // Walks the log through a detector of either residual, with `n` outputs.
 template <typename AnyDetector>
 Detection walk(LogSource& log, AnyDetector& detector, std::size_t n, const DetectionOptions& options) {
-  std::vector<std::size_t> pick;
-  for (const auto& name : detector.filter().measurement().columns()) {
-    const auto column = log.find(name);
-    check::that(column.has_value(), "log", "a column '" + name + "', which the model was commissioned on");
-    pick.push_back(*column);
-  }
   Detection d;
   d.outside.assign(n, 0);
   d.utilisation.assign(n, 0.0);
   d.nrmse.assign(n, 0.0);
-  std::vector<double> torque_square(n), residual_square(n), sample(pick.size());
+  std::vector<double> torque_square(n), residual_square(n);
   EventRecorder recorder(n, options.merge);
   Binner binner(n, options.most_points);
-  log.rewind();
-  LogBlock block;
   double before = 0.0;
-  bool new_segment = true;
-  while (log.next(block)) {
-    d.rows += block.rows();
-    std::size_t segment = 0;
-    for (std::size_t k = 0; k < block.rows(); ++k) {
-      if (segment < block.segment_starts.size() && block.segment_starts[segment] == k) {
-        ++segment;
-        detector.restart();
-        new_segment = true;
-      }
-      for (std::size_t c = 0; c < pick.size(); ++c) {
-        sample[c] = block.columns[pick[c]][k];
-      }
-      const double t = block.t[k];
-      const Decision& decision = detector.step(t, sample);
-      if (!decision.valid) {
-        continue;
-      }
-      ++d.instants;
-      d.seconds += new_segment ? 0.0 : std::max(0.0, t - before);
-      before = t;
-      binner.add(t, new_segment, decision);
-      new_segment = false;
-      for (std::size_t i = 0; i < n; ++i) {
-        const ChannelDecision& c = decision.channels[i];
-        d.outside[i] += c.outside ? 1 : 0;
-        d.utilisation[i] = std::max(d.utilisation[i], use_of(c));
-        const double torque = c.predicted + c.residual;
-        torque_square[i] += torque * torque;
-        residual_square[i] += c.residual * c.residual;
-        recorder.add(i, block.first_row + k, t, c.residual, c.threshold.lower, c.threshold.upper, c.outside, c.alarm);
-      }
+  d.rows = walk_detector(log, detector, [&](std::size_t row, double t, bool first, const Decision& decision) {
+    ++d.instants;
+    d.seconds += first ? 0.0 : std::max(0.0, t - before);
+    before = t;
+    binner.add(t, first, decision);
+    for (std::size_t i = 0; i < n; ++i) {
+      const ChannelDecision& c = decision.channels[i];
+      d.outside[i] += c.outside ? 1 : 0;
+      d.utilisation[i] = std::max(d.utilisation[i], use_of(c.residual, c.threshold.lower, c.threshold.upper));
+      const double torque = c.predicted + c.residual;
+      torque_square[i] += torque * torque;
+      residual_square[i] += c.residual * c.residual;
+      recorder.add(i, row, t, c.residual, c.threshold.lower, c.threshold.upper, c.outside, c.alarm);
     }
-  }
-  log.rewind();
+  });
   for (std::size_t i = 0; i < n; ++i) {
     d.nrmse[i] = torque_square[i] > 0.0 ? std::sqrt(residual_square[i] / torque_square[i]) : 0.0;
   }

@@ -42,6 +42,10 @@ Shape ramp(double s) {
 
 }  // namespace
 
+double shortest_duration(std::size_t stages) {
+  return std::max(0.5, 2.0 * (kRest + (static_cast<double>(stages) + 1.0) * kShortest));
+}
+
 StageFamily::StageFamily(const DesignSubject& subject, const MotionLimits& limits, std::size_t stages)
     : subject_(&subject),
       limits_(limits),
@@ -50,7 +54,8 @@ StageFamily::StageFamily(const DesignSubject& subject, const MotionLimits& limit
       motion_(subject.model.motion) {
   validate(limits);
   check::that(stages > 0, "stages", "at least 1");
-  check::that(limits.duration >= 0.5, "limits.duration", "at least 0.5 s");
+  check::that(limits.duration >= shortest_duration(stages), "limits.duration",
+              "at least the shortest_duration of this many stages");
   Eigen::VectorXd creep = Eigen::VectorXd::Constant(static_cast<Eigen::Index>(joints_), 1e-6 * limits.joint_speed);
   if (limits.effort) {
     const EffortModel effort(subject);
@@ -151,7 +156,7 @@ Plan StageFamily::plan(std::span<const double> x, double step) const {
     if (moving <= half) {
       break;
     }
-    if (moving <= (stages_ + 1.0) * kShortest || half < (stages_ + 1.0) * kShortest) {
+    if (moving <= (stages_ + 1.0) * kShortest || half < (1.0 - 1e-12) * (stages_ + 1.0) * kShortest) {
       throw InvalidArgument("limits.duration: expected more time for this many stages");
     }
     for (Eigen::VectorXd& u : target) {

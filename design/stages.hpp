@@ -22,6 +22,9 @@
 
 namespace wheelwright {
 
+/// The least duration (s) of a drive with `stages` stages a half: its rests, and its ramps where nothing limits them.
+[[nodiscard]] double shortest_duration(std::size_t stages);
+
 /// The family of manoeuvres with K stages a half. A member is named by a point x of the cube [0, 1]^dimension(): of each
 /// stage the joints' speeds (0: full speed backwards, 1: full speed forwards) and the share of the time that its speed is
 /// held. Every point of the cube is a manoeuvre within the limits, so that a search needs no constraints:
@@ -38,7 +41,7 @@ namespace wheelwright {
 class StageFamily {
  public:
   /// Keeps a reference to `subject`. Throws InvalidArgument when `limits` does not pass its `validate`, `stages` is 0,
-  /// or no motion is within the limits (dry friction above the effort limit, a duration of less than half a second).
+  /// or no motion is within the limits (dry friction above the effort limit, a duration below shortest_duration).
   StageFamily(const DesignSubject& subject, const MotionLimits& limits, std::size_t stages);
 
   /// Number of coordinates of x: stages · (joints + 1).
