@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/report/commission_report.hpp>
 
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -12,6 +13,7 @@
 #include <wheelwright/report/page.hpp>
 #include <wheelwright/report/parameter_table.hpp>
 #include <wheelwright/report/parameter_view.hpp>
+#include <wheelwright/report/set_drawings.hpp>
 #include <wheelwright/report/signals.hpp>
 #include <wheelwright/report/text.hpp>
 
@@ -37,12 +39,26 @@ const char* status_class(Standing standing) {
   return "bad";
 }
 
-std::vector<ChartMark> contradiction_marks(const Commissioning& result) {
+// Moments that decide: rows of a contradiction as lines, samples that set a bound as pins. Of one output, or of all.
+std::vector<ChartMark> deciding_marks(const Commissioning& result, std::optional<std::size_t> output = {}) {
   std::vector<ChartMark> marks;
+  const auto add = [&](const RowOrigin& o, const std::string& label, bool pin) {
+    if (!o.is_prior && o.output == output.value_or(o.output)) {
+      marks.push_back({o.t, o.t, label, pin});
+    }
+  };
   for (const WeightedRow& w : result.feasible.contradiction) {
-    const RowOrigin& o = w.row.origin;
-    if (!o.is_prior) {
-      marks.push_back({o.t, o.t, output_name(result.model.model, o.output)});
+    add(w.row.origin, output_name(result.model.model, w.row.origin.output), false);
+  }
+  if (result.feasible.contradiction.empty()) {
+    const std::vector<ParameterViews> views = parameter_views(result);
+    for (std::size_t j = 0; j < views.size(); ++j) {
+      for (const RowOrigin& o : result.parameters[j].lower_binding) {
+        add(o, words(views[j].best().name) + " ≥", true);
+      }
+      for (const RowOrigin& o : result.parameters[j].upper_binding) {
+        add(o, words(views[j].best().name) + " ≤", true);
+      }
     }
   }
   return marks;
@@ -50,11 +66,18 @@ std::vector<ChartMark> contradiction_marks(const Commissioning& result) {
 
 std::string residual_section(const Commissioning& result, const Detection& own, const TimeAxis& axis) {
   const CommissionedModel& m = result.model;
+  std::vector<std::vector<ChartMark>> marks;
+  for (std::size_t i = 0; i < own.trace.outputs.size(); ++i) {
+    marks.push_back(deciding_marks(result, i));
+  }
   return paragraph(
              "ε = τ_f − Y_f θ̂ must stay inside the grey band [l, u] while there is no fault: the band holds for every "
-             "parameter of the feasible set and every admissible noise. Drag to zoom (all charts follow), Shift and "
-             "drag to pan, double click for the whole log.") +
-         residual_charts(own.trace, m.robot, m.model, {}, axis) + torque_charts(own.trace, m.robot, m.model, axis);
+             "parameter of the feasible set and every admissible noise. Triangles at the time axis: the samples that "
+             "set a parameter’s lower (≥) or upper (≤) bound. Drag to zoom (all charts follow), Shift and drag to pan, "
+             "double click for the whole log; arrow keys, + and − do the same where a chart has the focus.") +
+         residual_charts(own.trace, m.robot, m.model, marks, axis, "trace") +
+         torque_charts(own.trace, m.robot, m.model, axis, "trace") +
+         thinning_note(own.instants, own.trace.t.size(), "instants");
 }
 
 std::string kinematic_section(const KinematicCommissioning& k) {
@@ -85,7 +108,7 @@ std::string kinematic_section(const KinematicCommissioning& k) {
 }
 
 std::string signals_section(const ReportContext& context, const std::vector<ChartMark>& marks, const TimeAxis& axis) {
-  return context.signals ? signal_charts(*context.signals, marks, axis)
+  return context.signals ? signal_charts(*context.signals, marks, axis, context.rows)
                          : paragraph("The raw signals were not handed to this page.");
 }
 
@@ -106,12 +129,13 @@ std::string commission_report(const Commissioning& result, const ReportContext& 
   };
   add("contradiction", "Contradiction", contradiction_section(result, axis));
   add("parameters", "Parameters", parameter_table(result, axis));
+  add("set", "Feasible set", set_projections(result));
   add("estimators", "Estimators", estimator_table(result));
   if (context.own_log && !context.own_log->trace.t.empty()) {
     add("residual", "Residual and threshold", residual_section(result, *context.own_log, axis));
   }
   add("kinematic", "Wheel odometry against pose or gyro", kinematic_section(result.kinematic));
-  add("signals", "Raw signals", signals_section(context, contradiction_marks(result), axis));
+  add("signals", "Raw signals", signals_section(context, deciding_marks(result), axis));
   if (result.status != Commissioning::Status::empty) {
     add("validation", "Validation on held-out driving", validation_section(result));
   }
@@ -124,9 +148,9 @@ std::string commission_report(const Commissioning& result, const ReportContext& 
 std::string failure_report(const std::string& error_message, const ReportContext& context) {
   const TimeAxis axis = axis_for(context);
   PageContent content;
-  content.title = context.title.empty() ? "Commissioning failed" : context.title;
+  content.title = context.title.empty() ? "No result" : context.title;
   content.status = "bad";
-  content.verdict = "No result: commissioning stopped with an error.";
+  content.verdict = "No result: the command stopped with an error.";
   content.sentences = {error_message, "What could be read of the log is shown below, as it was measured."};
   content.software = context.software;
   content.sections.push_back({"signals", "Raw signals", signals_section(context, {}, axis)});

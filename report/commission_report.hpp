@@ -15,7 +15,7 @@ namespace wheelwright {
 /// every name is escaped, every number is finite.
 [[nodiscard]] std::string commission_report(const Commissioning& result, const ReportContext& context);
 
-/// The page when commissioning could not be done at all: the error, what is known of the log, and its raw signals.
+/// The page of any command that stopped with an error: the error, what is known of the log, and its raw signals.
 [[nodiscard]] std::string failure_report(const std::string& error_message, const ReportContext& context);
 
 }  // namespace wheelwright

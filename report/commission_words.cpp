@@ -127,7 +127,9 @@ std::string sees(const Commissioning& result) {
   }
   if (result.model.robot.model == "differential_drive") {
     return fmt::format(
-        "The smallest change of both wheel radii that is certain to be seen is {} (|δ1|/r = √(1+κ) − 1 with κ = {}).",
+        "The smallest change of both wheel radii that is certain to be seen is {}, at the best moment of the held-out "
+        "driving (|δ1|/r = √(1+κ) − 1 with κ = {}); `wheelwright margins` says it for other faults, and while doing "
+        "what.",
         percent(radius_change(*kappa)), number(*kappa));
   }
   return fmt::format(

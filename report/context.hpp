@@ -3,6 +3,7 @@
 /// What a report says beside the result itself: where the result came from, and the signals behind it.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -27,7 +28,8 @@ struct ReportContext {
   std::string software;               ///< name and version, e.g. "wheelwright 0.1.0"
   std::string command_line;           ///< what makes this page again
   std::vector<std::string> warnings;  ///< what the log reader repaired or split, one sentence each
-  std::optional<LogTable> signals;    ///< raw signals; longer tables are thinned on the page, peaks kept
+  std::optional<LogTable> signals;    ///< raw signals; more than 2·10⁶ rows are thinned on the page, peaks kept
+  std::size_t rows = 0;               ///< of the log, where it has more of them than `signals`
   std::optional<Detection> own_log;   ///< commission_report: the model's detector on the log it was made from
 };
 

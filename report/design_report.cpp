@@ -114,17 +114,18 @@ std::string speed_charts(const Plan& plan, const Model& model, const TimeAxis& a
     Chart c;
     c.title = title;
     c.unit = unit;
-    c.t = commands.t;
+    c.clock = "plan";
     for (std::size_t i = 0; i < names.size(); ++i) {
       c.series.push_back({names[i], commands.column(names[i]), i == 0 ? Line::first : Line::second});
     }
     return figure(c, axis);
   };
+  const std::string times = clock("plan", commands.t, {}, axis);
   if (model.joints.size() == 1) {
-    return chart("Command", "per s", {"command"}) + chart("Position", "", {"position"});
+    return times + chart("Command", "per s", {"command"}) + chart("Position", "", {"position"});
   }
-  return chart("Wheel-speed commands", "rad/s", {"command_r", "command_l"}) + chart("Forward speed v1", "m/s", {"v1"}) +
-         chart("Yaw rate v2", "rad/s", {"v2"});
+  return times + chart("Wheel-speed commands", "rad/s", {"command_r", "command_l"}) +
+         chart("Forward speed v1", "m/s", {"v1"}) + chart("Yaw rate v2", "rad/s", {"v2"});
 }
 
 std::vector<std::string> design_words(const BoundsDesign& design, const DesignSubject& subject,

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/report/detect_report.hpp>
 
-#include <algorithm>
 #include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 
+#include <wheelwright/report/detect_words.hpp>
 #include <wheelwright/report/page.hpp>
 #include <wheelwright/report/parameter_view.hpp>
 #include <wheelwright/report/signals.hpp>
@@ -20,54 +20,6 @@ namespace {
 
 TimeAxis axis_for(const Detection& detection, const ReportContext& context) {
   return context.signals && context.signals->rows() > 0 ? TimeAxis(context.signals->t) : TimeAxis(detection.trace.t);
-}
-
-double largest(const std::vector<double>& values) {
-  return values.empty() ? 0.0 : *std::max_element(values.begin(), values.end());
-}
-
-std::string verdict(const Detection& detection, std::size_t kinematic_events) {
-  if (detection.instants == 0 && kinematic_events == 0) {
-    return "Nothing was watched: the log has no instant with a decision.";
-  }
-  const std::size_t events = detection.events.size() + kinematic_events;
-  return events == 0 ? "No fault was seen."
-                     : fmt::format("{}: the robot did not behave like its model.", capital(plural(events, "event")));
-}
-
-std::vector<std::string> sentences(const Detection& detection, const CommissionedModel& model, const TimeAxis& axis) {
-  std::vector<std::string> out = {fmt::format("{} instants were watched over {} of driving.", count(detection.instants),
-                                              with_unit(number(detection.seconds, 4), "s"))};
-  if (detection.instants == 0) {
-    out.emplace_back(
-        "The filter needs some time to settle at the beginning of every segment: the log, or each of its "
-        "segments, is too short.");
-    return out;
-  }
-  if (detection.events.empty()) {
-    out.push_back(
-        fmt::format("The residual stayed inside its threshold or left it too briefly for an alarm; it went {} of "
-                    "the way to the threshold at most.",
-                    percent(largest(detection.utilisation))));
-    out.emplace_back(
-        "A fault smaller than the threshold allows for, or one that does not show in this driving, is not "
-        "excluded.");
-    return out;
-  }
-  const Event& first = *std::min_element(detection.events.begin(), detection.events.end(),
-                                         [](const Event& a, const Event& b) { return a.alarm < b.alarm; });
-  const Event& worst = *std::max_element(detection.events.begin(), detection.events.end(),
-                                         [](const Event& a, const Event& b) { return a.peak_ratio < b.peak_ratio; });
-  out.push_back(fmt::format("The first alarm came at {} in the output {}; the residual had left its threshold at {}.",
-                            axis.text(first.alarm), output_name(model.model, first.output), axis.text(first.start)));
-  out.push_back(
-      fmt::format("The clearest excess is at {} in the output {}: {} times as far from the middle of [l, u] as the "
-                  "threshold allows.",
-                  axis.text(worst.peak_time), output_name(model.model, worst.output), number(worst.peak_ratio)));
-  out.emplace_back(
-      "Without a fault no parameter of the feasible set and no admissible noise explains this: a fault, an effect "
-      "that was absent when the robot was commissioned (payload, floor), or noise beyond its bounds.");
-  return out;
 }
 
 std::string event_table(const Detection& detection, const CommissionedModel& model, const TimeAxis& axis) {
@@ -133,21 +85,38 @@ std::string kinematic_section(const KinematicFindings& kinematic, const Commissi
                          with_unit(number(model.kinematic->window), "s"), count(d.instants),
                          with_unit(number(d.seconds, 4), "s"))) +
          event_table(d, names, axis) + output_table(d, names) +
-         (d.trace.t.empty() ? std::string() : residual_charts(d.trace, names.robot, names.model, marks, axis));
+         (d.trace.t.empty() ? std::string()
+                            : residual_charts(d.trace, names.robot, names.model, marks, axis, "kinematic") +
+                                  thinning_note(d.instants, d.trace.t.size(), "instants"));
 }
 
 std::string isolation_section(const std::vector<Isolation>& isolations, const Detection& detection,
                               const TimeAxis& axis) {
-  std::string out = paragraph(
-      "Which faults of the catalogue the data around each alarm leave possible. What is excluded is proved to explain "
-      "them with no size, no onset, no parameters of the feasible set and no admissible noise; the true size and onset "
-      "of "
-      "a fault of the catalogue lie in the intervals.");
+  using Verdict = FaultFinding::Verdict;
+  std::vector<std::vector<Cell>> rows;
   for (std::size_t k = 0; k < isolations.size() && k < detection.events.size(); ++k) {
-    const std::string alarm = axis.text(detection.events[k].alarm);
-    out += paragraph(fmt::format("<b>Event {}</b>, alarm at {}: {}", k + 1, alarm, escape(sentence(isolations[k]))));
+    std::vector<std::string> possible, excluded, open;
+    for (const FaultFinding& f : isolations[k].findings) {
+      switch (f.verdict) {
+        case Verdict::consistent: possible.push_back(capital(sentence(f))); break;
+        case Verdict::excluded: excluded.push_back(words(f.fault.name)); break;
+        case Verdict::not_examined: open.push_back(words(f.fault.name)); break;
+      }
+    }
+    const Event& e = detection.events[k];
+    std::string others =
+        fmt::format("<details><summary>{} excluded</summary>{}</details>", excluded.size(), escape(list(excluded)));
+    if (!open.empty()) {
+      others += "<small>not examined: " + escape(list(open)) + "</small>";
+    }
+    rows.push_back({time_button(e.start, e.end, "event " + std::to_string(k + 1), axis),
+                    possible.empty() ? "Nothing in the catalogue explains it." : bullets(possible), others});
   }
-  return out;
+  return paragraph(
+             "Which faults of the catalogue the data around each alarm leave possible. What is excluded is proved to "
+             "explain them with no size, no onset, no parameters of the feasible set and no admissible noise; the true "
+             "size and onset of a fault of the catalogue lie in the intervals.") +
+         table({"", "Still possible", "other faults"}, rows);
 }
 
 }  // namespace
@@ -171,8 +140,8 @@ std::string detect_report(const Detection& detection, const CommissionedModel& m
   const std::size_t kinematic_events = kinematic.detection ? kinematic.detection->events.size() : 0;
   const bool fault = !detection.events.empty() || kinematic_events > 0;
   content.status = fault ? "bad" : detection.instants == 0 ? "caution" : "good";
-  content.verdict = verdict(detection, kinematic_events);
-  content.sentences = sentences(detection, model, axis);
+  content.verdict = detect_verdict(detection, kinematic_events);
+  content.sentences = detect_words(detection, model, isolations, axis);
   if (kinematic_events > 0) {
     const Event& first = kinematic.detection->events.front();
     content.sentences.push_back(fmt::format(
@@ -190,12 +159,13 @@ std::string detect_report(const Detection& detection, const CommissionedModel& m
          paragraph("Without a fault ε = τ_f − Y_f θ̂ stays inside the grey band [l, u]. Events are shaded and numbered. "
                    "Drag to "
                    "zoom (all charts follow), Shift and drag to pan, double click for the whole log.") +
-             residual_charts(detection.trace, model.robot, model.model, marks, axis) +
-             torque_charts(detection.trace, model.robot, model.model, axis)});
+             residual_charts(detection.trace, model.robot, model.model, marks, axis, "trace") +
+             torque_charts(detection.trace, model.robot, model.model, axis, "trace") +
+             thinning_note(detection.instants, detection.trace.t.size(), "instants")});
   }
   content.sections.push_back({"kinematic", "Kinematic residual", kinematic_section(kinematic, model, axis)});
   content.sections.push_back({"signals", "Raw signals",
-                              context.signals ? signal_charts(*context.signals, all_marks, axis)
+                              context.signals ? signal_charts(*context.signals, all_marks, axis, context.rows)
                                               : paragraph("The raw signals were not handed to this page.")});
   std::string data = output_table(detection, model);
   data += paragraph(

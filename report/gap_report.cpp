@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <utility>
 #include <vector>
 
@@ -22,8 +23,6 @@ namespace wheelwright {
 using namespace report;
 
 namespace {
-
-constexpr std::size_t kMostPoints = 3000;
 
 std::string note(const std::string& text) { return paragraph("<span class=\"note\">" + text + "</span>"); }
 
@@ -54,7 +53,8 @@ std::string causes_section(const Diagnosis& d) {
   for (const GapCause& cause : d.causes) {
     std::string parameters;
     for (const GapEstimate& p : cause.parameters) {
-      parameters += (parameters.empty() ? "" : "<br>") + escape(words(p.name)) + " " + escape(estimate_words(p));
+      parameters +=
+          (parameters.empty() ? "" : "<br>") + escape(parameter_words(p.name)) + " " + escape(estimate_words(p));
     }
     rows.push_back({escape(capital(effect_noun(cause.effect))) + "<small>" + escape(cause.sentence) + "</small>",
                     "<code>" + escape(cause.effect) + "</code>", numeric(percent(cause.share)), parameters});
@@ -129,7 +129,8 @@ std::vector<std::size_t> breaks_of(const Eigen::VectorXd& t) {
   return out;
 }
 
-std::string residual_chart(const Diagnosis& d, const ResidualSeries& s, const TimeAxis& axis) {
+std::string residual_chart(const Diagnosis& d, std::size_t index, const TimeAxis& axis) {
+  const ResidualSeries& s = d.series[index];
   LogTable table;
   table.t.assign(s.t.begin(), s.t.end());
   table.segment_starts = breaks_of(s.t);
@@ -147,17 +148,13 @@ std::string residual_chart(const Diagnosis& d, const ResidualSeries& s, const Ti
   if (table.names.empty()) {
     return {};
   }
-  const LogTable thin = thinned(table, kMostPoints);
-  Chart chart{.title = channel_title(s),
-              .unit = unit_of(s.unit),
-              .t = thin.t,
-              .series = {},
-              .bands = {},
-              .marks = {},
-              .breaks = thin.segment_starts};
+  const LogTable thin = thinned(table, most_chart_points);
+  const std::string id = fmt::format("gap-{}", index);
+  Chart chart{.title = channel_title(s), .unit = unit_of(s.unit), .clock = id, .series = {}, .bands = {}, .marks = {}};
+  const std::vector<double> above(thin.rows(), 2.0 * s.floor), below(thin.rows(), -2.0 * s.floor);
   if (s.floor > 0.0) {
-    chart.series.push_back({"+2 × floor", std::vector<double>(thin.t.size(), 2.0 * s.floor), Line::bound});
-    chart.series.push_back({"−2 × floor", std::vector<double>(thin.t.size(), -2.0 * s.floor), Line::bound});
+    chart.series.push_back({"+2 × floor", above, Line::bound});
+    chart.series.push_back({"−2 × floor", below, Line::bound});
     chart.bands.push_back({0, 1, true});
   }
   for (std::size_t c = 0; c < thin.names.size(); ++c) {
@@ -169,13 +166,13 @@ std::string residual_chart(const Diagnosis& d, const ResidualSeries& s, const Ti
       chart.marks.push_back({c.t, c.t, "contradiction"});
     }
   }
-  return figure(chart, axis);
+  return clock(id, thin.t, thin.segment_starts, axis) + figure(chart, axis);
 }
 
 std::string residual_section(const Diagnosis& d, const TimeAxis& axis) {
   std::string out;
-  for (const ResidualSeries& s : d.series) {
-    out += residual_chart(d, s, axis);
+  for (std::size_t k = 0; k < d.series.size(); ++k) {
+    out += residual_chart(d, k, axis);
   }
   return out.empty() ? out
                      : paragraph(
@@ -189,6 +186,7 @@ std::string residual_section(const Diagnosis& d, const TimeAxis& axis) {
 std::string shrink_section(const Diagnosis& d) {
   const std::pair<const char*, const std::vector<ShrinkFigure>*> groups[] = {
       {"Filtered torque, root mean square", &d.shrink.torque_rms},
+      {"Filtered torque on a fresh log, to which nothing was fitted", &d.shrink.fresh_torque_rms},
       {"Open-loop simulation, root mean square error", &d.shrink.rollout},
       {"Width of the detection threshold u − l, median", &d.shrink.threshold_width},
       {"Smallest certainly detected change of wheel radius", &d.shrink.smallest_fault}};
@@ -206,7 +204,23 @@ std::string shrink_section(const Diagnosis& d) {
                        "whiskers: 95 % interval; grey: what noise alone leaves. Bars of one figure share a scale.");
 }
 
-std::string where_section(const Diagnosis& d) {
+// Buttons for the shares whose regime is a stretch of time, "t = 20 to 25 s".
+std::string time_links(const std::vector<GapShare>& shares, const ResidualSeries& series, const TimeAxis& axis) {
+  std::string out;
+  for (const GapShare& share : shares) {
+    double from = 0.0, to = 0.0;
+    if (share.kind == "time" && series.t.size() > 0 &&
+        std::sscanf(share.regime.c_str(), "t = %lf to %lf s", &from, &to) == 2) {
+      const double origin = share.regime.ends_with("from the start") ? series.t[0] : 0.0;
+      out += (out.empty() ? "" : ", ") +
+             time_button(origin + from, origin + to,
+                         fmt::format("{} ({}\u00a0%)", share.regime, number(100.0 * share.share, 2)), axis);
+    }
+  }
+  return out.empty() ? out : paragraph("Show in the charts: " + out + ".");
+}
+
+std::string where_section(const Diagnosis& d, const TimeAxis& axis) {
   std::string out;
   std::vector<GapShare> channels;
   for (const GapShare& s : d.where) {
@@ -227,7 +241,8 @@ std::string where_section(const Diagnosis& d) {
     }
     // Findings first: what is large only because it is always there tells nothing.
     std::stable_partition(regimes.begin(), regimes.end(), [](const GapShare& share) { return is_finding(share); });
-    const std::string by_regime = share_bars(regimes, 14), by_band = share_bars(bands) + spectrum_drawing(s, d.beta);
+    const std::string by_regime = share_bars(regimes, 14) + time_links(regimes, s, axis),
+                      by_band = share_bars(bands) + spectrum_drawing(s, d.beta);
     if (!by_regime.empty() || !by_band.empty()) {
       out += fmt::format("<h3>{}</h3><div class=\"pairs\"><div>{}</div><div>{}</div></div>", escape(channel_title(s)),
                          by_regime, by_band);
@@ -313,6 +328,14 @@ std::string data_section(const Diagnosis& d, const ReportContext& context, const
                     : "<h3>Repairs and remarks of the log reader</h3>\n" + bullets(context.warnings));
 }
 
+std::string signals_section(const Diagnosis& d, const ReportContext& context, const TimeAxis& axis) {
+  std::vector<ChartMark> marks;
+  for (const Contradiction& c : d.contradictions) {
+    marks.push_back({c.t, c.t, "contradiction"});
+  }
+  return context.signals ? signal_charts(*context.signals, marks, axis, context.rows) : std::string();
+}
+
 TimeAxis axis_of(const Diagnosis& d, const ReportContext& context) {
   if (context.signals && context.signals->rows() > 0) {
     return TimeAxis(context.signals->t);
@@ -340,10 +363,11 @@ std::string gap_report(const Diagnosis& d, const std::string& robot, const Repor
   add("residual", "Residual over time", residual_section(d, axis));
   add("shrink", "How far it shrinks", shrink_section(d));
   add("apart", "What cannot be told apart", apart_section(d, next_manoeuvre));
-  add("where", "Where it lies", where_section(d));
+  add("where", "Where it lies", where_section(d, axis));
   add("place", "By place", place_section(d, context));
   add("parameters", "Parameters", parameters_section(d));
   add("contradiction", "Contradictions", contradiction_section(d, axis));
+  add("signals", "Raw signals", signals_section(d, context, axis));
   add("data", "Data", data_section(d, context, axis));
   return page(content);
 }

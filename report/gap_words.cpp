@@ -14,7 +14,7 @@
 namespace wheelwright::report {
 namespace {
 
-constexpr std::array<std::pair<std::string_view, std::string_view>, 31> kNouns = {{
+constexpr std::array<std::pair<std::string_view, std::string_view>, 33> kNouns = {{
     {"coulomb", "dry friction"},
     {"coulomb_asymmetric", "dry friction that differs between the wheels"},
     {"stribeck", "dry friction that fades with speed"},
@@ -46,6 +46,19 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 31> kNouns =
     {"wheel_radius", "a wheel radius other than designed"},
     {"track_width", "a track width other than designed"},
     {"encoder_scale", "an encoder scale other than in the robot file"},
+    {"turning_slip", "slip in turns"},
+    {"curve_slip", "slip in fast curves"},
+}};
+
+constexpr std::array<std::pair<std::string_view, std::string_view>, 8> kParameterNames{{
+    {"mass_kg", "mass"},
+    {"angle_rad", "angle"},
+    {"uphill_heading_rad", "uphill heading"},
+    {"dt", "time offset"},
+    {"epsilon", "relative change"},
+    {"inertia_gap", "inertia times play"},
+    {"side_right0_left1", "side (0 right, 1 left)"},
+    {"right0_left1_opposite2", "side (0 right, 1 left, 2 both, opposite)"},
 }};
 
 std::string whole_percent(double share) { return decimal(100.0 * share, 0) + "\u00a0%"; }
@@ -68,7 +81,7 @@ std::string parameters_of(const GapCause& cause) {
   }
   std::vector<std::string> parts;
   for (const GapEstimate& p : cause.parameters) {
-    parts.push_back(words(p.name) + " " + estimate_words(p));
+    parts.push_back(parameter_words(p.name) + " " + estimate_words(p));
   }
   return list(parts);
 }
@@ -138,6 +151,15 @@ std::vector<std::string> credible_names(const Diagnosis& d) {
 }
 
 }  // namespace
+
+std::string parameter_words(std::string_view parameter) {
+  for (const auto& [name, text] : kParameterNames) {
+    if (name == parameter) {
+      return std::string(text);
+    }
+  }
+  return words(parameter);
+}
 
 std::string effect_noun(std::string_view effect) {
   const auto found =

@@ -17,6 +17,9 @@ namespace wheelwright::report {
 /// Several as one: "dry friction with a dragging castor"; "none" for no effect.
 [[nodiscard]] std::string effect_nouns(const std::vector<std::string>& effects);
 
+/// A parameter of an effect as words: "angle_rad" → "angle", "side_right0_left1" → "side (0 right, 1 left)".
+[[nodiscard]] std::string parameter_words(std::string_view parameter);
+
 /// "0.312 N·m [0.290, 0.330]".
 [[nodiscard]] std::string estimate_words(const GapEstimate& estimate);
 

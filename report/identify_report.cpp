@@ -48,7 +48,8 @@ std::string identify_report(const Identification& result, const ReportContext& c
   add("kinematics", "Kinematics", kinematics_section(result));
   add("robust", "Outliers and physical sense", robust_section(result, axis));
   add("noise", "Noise", column_noise_section(result));
-  add("signals", "Raw signals", context.signals ? signal_charts(*context.signals, {}, axis) : std::string());
+  add("signals", "Raw signals",
+      context.signals ? signal_charts(*context.signals, {}, axis, context.rows) : std::string());
   std::vector<std::string> remarks = result.notes;
   remarks.insert(remarks.end(), context.warnings.begin(), context.warnings.end());
   add("data", "Data", provenance(context, axis) + bullets(remarks));

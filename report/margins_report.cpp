@@ -9,6 +9,7 @@
 #include <wheelwright/commission/margin_words.hpp>
 #include <wheelwright/report/margin_drawings.hpp>
 #include <wheelwright/report/page.hpp>
+#include <wheelwright/report/signals.hpp>
 #include <wheelwright/report/text.hpp>
 #include <wheelwright/report/time_axis.hpp>
 
@@ -124,6 +125,9 @@ std::string margins_report(const MarginSurvey& survey, const CommissionedModel& 
     }
   }
   content.sections.push_back({"words", "In words", bullets(sentences)});
+  if (context.signals) {
+    content.sections.push_back({"signals", "Raw signals", signal_charts(*context.signals, {}, axis, context.rows)});
+  }
   content.sections.push_back({"data", "Data", provenance(context, axis)});
   return page(content);
 }

@@ -45,24 +45,23 @@ std::string page(const PageContent& content) {
   out += fmt::format("<section id=\"result\" class=\"result {}\"><p class=\"verdict\">{}</p>\n", content.status,
                      escape(content.verdict));
   for (const std::string& sentence : content.sentences) {
-    out += paragraph(escape(sentence));
+    out += paragraph(escape_with_code(sentence));
   }
+  out += "<noscript><p class=\"warning\">The charts need JavaScript; all words and tables are here.</p></noscript>\n";
   out += "</section>\n";
   for (const Section& section : content.sections) {
     out += fmt::format("<section id=\"{}\"><h2>{}</h2>\n", section.id, escape(section.heading));
     out += section.body + "</section>\n";
   }
   out += "</main>\n<footer>" + escape(content.software) + "</footer>\n";
-  out +=
-      "<div id=\"zoom\" role=\"toolbar\" aria-label=\"Zoom\" hidden><span id=\"zoom-range\"></span>"
-      "<button type=\"button\" data-pan=\"-0.5\" aria-label=\"Earlier\">←</button>"
-      "<button type=\"button\" data-pan=\"0.5\" aria-label=\"Later\">→</button>"
-      "<button type=\"button\" data-reset>whole log</button></div>\n";
-  out += "<script>";
-  out += embedded::uplot_js;
-  out += "</script>\n<script>";
-  out += embedded::page_js;
-  return out + "</script>\n</body>\n</html>\n";
+  out += "<div id=\"zoom\" role=\"toolbar\" aria-label=\"Zoom\" hidden></div>\n";
+  for (const std::string_view script :
+       {embedded::uplot_js, embedded::series_js, embedded::charts_js, embedded::links_js}) {
+    out += "<script>";
+    out += script;
+    out += "</script>\n";
+  }
+  return out + "</body>\n</html>\n";
 }
 
 std::string table(const std::vector<Cell>& header, const std::vector<std::vector<Cell>>& rows) {
@@ -93,7 +92,7 @@ std::string bullets(const std::vector<std::string>& items) {
   }
   std::string out = "<ul>";
   for (const std::string& item : items) {
-    out += "<li>" + escape(item) + "</li>";
+    out += "<li>" + escape_with_code(item) + "</li>";
   }
   return out + "</ul>\n";
 }

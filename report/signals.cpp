@@ -6,6 +6,8 @@
 #include <string_view>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include <wheelwright/report/drawing.hpp>
 #include <wheelwright/report/page.hpp>
 #include <wheelwright/report/parameter_view.hpp>
@@ -13,8 +15,6 @@
 
 namespace wheelwright::report {
 namespace {
-
-constexpr std::size_t most_signal_points = 6000;
 
 struct Group {
   std::string_view title;
@@ -63,15 +63,21 @@ std::pair<double, double> extremes(const std::vector<double>& values, std::size_
   return {values[std::min(low, high)], values[std::max(low, high)]};
 }
 
+// From the smallest of `lower` to the largest of `upper`; 0 where there are none.
+double extent(const std::vector<double>& lower, const std::vector<double>& upper) {
+  return lower.empty() || upper.empty()
+             ? 0.0
+             : *std::max_element(upper.begin(), upper.end()) - *std::min_element(lower.begin(), lower.end());
+}
+
 Chart signal_chart(const LogTable& table, const Group& group, const std::vector<std::size_t>& columns,
                    const std::vector<ChartMark>& marks) {
   Chart chart{.title = std::string(group.title),
               .unit = std::string(group.unit),
-              .t = table.t,
+              .clock = "signals",
               .series = {},
               .bands = {},
-              .marks = marks,
-              .breaks = table.segment_starts};
+              .marks = marks};
   constexpr Line lines[] = {Line::first, Line::second, Line::third};
   for (std::size_t i = 0; i < columns.size(); ++i) {
     chart.series.push_back({table.names[columns[i]], table.columns[columns[i]], lines[i % 3]});
@@ -112,10 +118,18 @@ LogTable thinned(const LogTable& table, std::size_t most) {
   return out;
 }
 
-std::string signal_charts(const LogTable& signals, const std::vector<ChartMark>& marks, const TimeAxis& axis) {
-  const LogTable table = thinned(signals, most_signal_points);
+std::string signal_charts(const LogTable& signals, const std::vector<ChartMark>& marks, const TimeAxis& axis,
+                          std::size_t rows) {
+  LogTable thin;
+  if (signals.rows() > most_chart_points) {
+    thin = thinned(signals, most_chart_points);
+  }
+  const LogTable& table = thin.rows() > 0 ? thin : signals;
   std::vector<bool> used(table.names.size(), false);
-  std::string out;
+  std::string out = clock("signals", table.t, table.segment_starts, axis);
+  if (out.empty()) {
+    return paragraph("The raw signals were not handed to this page.");
+  }
   for (const Group& group : groups()) {
     std::vector<std::size_t> columns;
     for (const std::string_view wanted : group.columns) {
@@ -135,54 +149,65 @@ std::string signal_charts(const LogTable& signals, const std::vector<ChartMark>&
       out += figure(signal_chart(table, {table.names[c], "", {}}, {c}, marks), axis);
     }
   }
-  if (table.rows() < signals.rows()) {
-    out += paragraph("<span class=\"note\">" + count(signals.rows()) +
-                     " rows, drawn as the smallest and largest value of each short stretch: no peak is lost.</span>");
-  }
+  out += thinning_note(std::max(rows, signals.rows()), table.rows(), "rows");
   if (const std::string path = driven_path(table); !path.empty()) {
     out +=
         "<figure><figcaption>Driven path <span class=\"unit\">x to the right, y up, one scale; the ring is the "
         "start</span></figcaption>" +
         path + "</figure>\n";
   }
-  return out.empty() ? paragraph("The raw signals were not handed to this page.") : out;
+  return out;
 }
 
 std::string residual_charts(const Trace& trace, const Robot& robot, const Model& model,
-                            const std::vector<std::vector<ChartMark>>& marks, const TimeAxis& axis) {
-  std::string out;
+                            const std::vector<std::vector<ChartMark>>& marks, const TimeAxis& axis,
+                            const std::string& clock_id) {
+  std::string out = clock(clock_id, trace.t, trace.breaks, axis);
   for (std::size_t i = 0; i < trace.outputs.size(); ++i) {
     const OutputTrace& o = trace.outputs[i];
-    const Chart chart{.title = "Residual of the output " + output_name(model, i),
-                      .unit = output_unit_of(robot, model, i),
-                      .t = trace.t,
-                      .series = {{"u (upper threshold)", o.upper, Line::bound},
-                                 {"l (lower threshold)", o.lower, Line::bound},
-                                 {"ε, largest", o.residual_high, Line::first},
-                                 {"ε, smallest", o.residual_low, Line::first}},
-                      .bands = {{0, 1, true}, {2, 3, false}},
-                      .marks = i < marks.size() ? marks[i] : std::vector<ChartMark>{},
-                      .breaks = trace.breaks};
+    const double span = extent(o.lower, o.upper);
+    Chart chart{.title = "Residual of the output " + output_name(model, i),
+                .unit = output_unit_of(robot, model, i),
+                .clock = clock_id,
+                .series = {{"u (upper threshold)", o.upper, Line::bound, span},
+                           {"l (lower threshold)", o.lower, Line::bound, span}},
+                .bands = {{0, 1, true}},
+                .marks = i < marks.size() ? marks[i] : std::vector<ChartMark>{}};
+    if (o.residual_high == o.residual_low) {
+      chart.series.push_back({"residual ε", o.residual_high, Line::first, span});
+    } else {
+      chart.series.push_back({"ε, largest", o.residual_high, Line::first, span});
+      chart.series.push_back({"ε, smallest", o.residual_low, Line::first, span});
+      chart.bands.push_back({2, 3, false});
+    }
     out += figure(chart, axis);
   }
   return out;
 }
 
-std::string torque_charts(const Trace& trace, const Robot& robot, const Model& model, const TimeAxis& axis) {
+std::string torque_charts(const Trace& trace, const Robot& robot, const Model& model, const TimeAxis& axis,
+                          const std::string& clock_id) {
   std::string out;
   for (std::size_t i = 0; i < trace.outputs.size(); ++i) {
     const OutputTrace& o = trace.outputs[i];
     const Chart chart{
         .title = "Filtered effort of the output " + output_name(model, i),
         .unit = output_unit_of(robot, model, i),
-        .t = trace.t,
+        .clock = clock_id,
         .series = {{"measured τ_f", o.torque, Line::first}, {"predicted Y_f θ̂", o.predicted, Line::second}},
         .bands = {},
-        .marks = {},
-        .breaks = trace.breaks};
+        .marks = {}};
     out += figure(chart, axis);
   }
   return out;
+}
+
+std::string thinning_note(std::size_t all, std::size_t drawn, const char* what) {
+  return drawn >= all ? std::string()
+                      : paragraph(fmt::format("<span class=\"note\">{} {} of the log are drawn as {} points, the "
+                                              "smallest and the largest value of each short stretch: peaks are "
+                                              "kept, single samples are not.</span>",
+                                              count(all), what, count(drawn)));
 }
 
 }  // namespace wheelwright::report

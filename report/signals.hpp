@@ -19,16 +19,20 @@ namespace wheelwright::report {
 [[nodiscard]] LogTable thinned(const LogTable& table, std::size_t most);
 
 /// Charts of the raw signals, grouped by kind (wheel speeds, angles, efforts, commands, pose, IMU, single axis, others),
-/// each with `marks`. HTML; a sentence where there are none.
+/// each with `marks`. `rows`: of the log, where `signals` was thinned before. HTML; a sentence where there are none.
 [[nodiscard]] std::string signal_charts(const LogTable& signals, const std::vector<ChartMark>& marks,
-                                        const TimeAxis& axis);
+                                        const TimeAxis& axis, std::size_t rows = 0);
 
-/// The residual of each output inside [l, u], with the marks of that output.
+/// The residual of each output inside [l, u], with the marks of that output. `clock` becomes the id of the trace's times.
 [[nodiscard]] std::string residual_charts(const Trace& trace, const Robot& robot, const Model& model,
-                                          const std::vector<std::vector<ChartMark>>& marks, const TimeAxis& axis);
+                                          const std::vector<std::vector<ChartMark>>& marks, const TimeAxis& axis,
+                                          const std::string& clock);
 
-/// Filtered torque, measured against predicted, for each output.
+/// Filtered torque, measured against predicted, for each output. residual_charts() put its times on the page as `clock`.
 [[nodiscard]] std::string torque_charts(const Trace& trace, const Robot& robot, const Model& model,
-                                        const TimeAxis& axis);
+                                        const TimeAxis& axis, const std::string& clock);
+
+/// A note that `all` things were drawn as `drawn` points; empty where none is missing. HTML.
+[[nodiscard]] std::string thinning_note(std::size_t all, std::size_t drawn, const char* what);
 
 }  // namespace wheelwright::report

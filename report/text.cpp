@@ -104,6 +104,18 @@ std::string escape(std::string_view text) {
   return out;
 }
 
+std::string escape_with_code(std::string_view text) {
+  std::string out;
+  while (true) {
+    const std::size_t open = text.find('`'), close = open == text.npos ? text.npos : text.find('`', open + 1);
+    if (close == text.npos) {
+      return out + escape(text);
+    }
+    out += escape(text.substr(0, open)) + "<code>" + escape(text.substr(open + 1, close - open - 1)) + "</code>";
+    text.remove_prefix(close + 1);
+  }
+}
+
 std::string words(std::string_view identifier) {
   std::string text(identifier);
   std::replace(text.begin(), text.end(), '_', ' ');

@@ -15,6 +15,9 @@ namespace wheelwright::report {
 /// tab and line feed become U+FFFD.
 [[nodiscard]] std::string escape(std::string_view text);
 
+/// The same, and what stands between two backticks becomes <code>.
+[[nodiscard]] std::string escape_with_code(std::string_view text);
+
 /// An identifier as words: "yaw_inertia" → "yaw inertia".
 [[nodiscard]] std::string words(std::string_view identifier);
 

@@ -70,7 +70,8 @@ TEST(GapReport, HoldsEverySectionOfWhatIsKnown) {
   }
   EXPECT_TRUE(example::holds(page, {"Sim-to-real gap of example robot", "Turn on the spot for 20 s.",
                                     "class=\"result caution\"", "\"contradiction\"", "12.500\u00a0s"}));
-  EXPECT_EQ(times(page, "<figure class=\"chart\">"), 2U);  // one for each channel
+  EXPECT_EQ(times(page, "<figure class=\"chart\">"),
+            2U + 4U);  // residuals, and the raw signals  // one for each channel
   EXPECT_TRUE(example::lacks(page, {">nan<", ">inf<", "nan &", "−nan", "nan %", "inf %"}));
 }
 

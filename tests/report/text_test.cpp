@@ -23,6 +23,12 @@ double value(std::string text) {
   return std::stod(text);
 }
 
+TEST(EscapeWithCode, TurnsBackticksIntoCode) {
+  EXPECT_EQ(escape_with_code("say `a < b` & `c`"), "say <code>a &lt; b</code> &amp; <code>c</code>");
+  EXPECT_EQ(escape_with_code("one ` alone"), "one ` alone");
+  EXPECT_EQ(escape_with_code("`<script>`"), "<code>&lt;script&gt;</code>");
+}
+
 TEST(Escape, LeavesNothingThatMarkupWouldRead) {
   EXPECT_EQ(escape("<b a=\"1\" c='2'>&amp;"), "&lt;b a=&quot;1&quot; c=&#39;2&#39;&gt;&amp;amp;");
   EXPECT_EQ(escape("τ_f µ — plain"), "τ_f µ — plain");

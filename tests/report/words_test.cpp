@@ -85,7 +85,7 @@ TEST(CommissionWords, OfAnEmptySetSayTheContradictionAndWhatToDo) {
               AllOf(HasSubstr("1.80 times as large"), HasSubstr("2 samples of the log"), HasSubstr("What to do")));
   const std::string page = commission_report(c, example::context(300));
   EXPECT_TRUE(example::holds(page, {"12.500\u00a0s", "31.250\u00a0s", "side of the prior"}));
-  EXPECT_TRUE(example::holds(page, {"[12.5,12.5,\"sum\"]"}));  // marked on the raw signals
+  EXPECT_TRUE(example::holds(page, {"[12.500000,12.500000,\"sum\",0]"}));  // marked on the raw signals
 }
 
 TEST(CommissionWords, OfNothingSayWhatToDrive) {
@@ -163,7 +163,10 @@ TEST(FailureReport, ShowsTheErrorAndTheRawSignals) {
 TEST(DetectReport, SaysWhenAndWhereTheFirstEventCame) {
   const CommissionedModel model = example::done().model;
   const std::string page = detect_report(example::detection(900, true), model, example::context(900));
-  EXPECT_TRUE(example::holds(page, {"1 event", "first alarm came at 6.020\u00a0s in the output sum", "[6,9,\"1\"]"}));
+  EXPECT_TRUE(example::holds(
+      page, {"1 event", "first alarm came at 6.020\u00a0s in the output sum",
+             "Of 9.000\u00a0s of driving, 3.00\u00a0s in the output sum contradict the fault-free model.",
+             "[6.000000,9.000000,\"1\",0]"}));
   const std::string healthy = detect_report(example::detection(900, false), model, example::context(900));
   EXPECT_TRUE(example::holds(healthy, {"No fault was seen", "30.0 %"}));
   EXPECT_TRUE(example::lacks(healthy, {"first alarm"}));

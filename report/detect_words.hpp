@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// The result of a detection in plain sentences.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include <wheelwright/commission/event_isolation.hpp>
+#include <wheelwright/commission/trace.hpp>
+#include <wheelwright/report/time_axis.hpp>
+
+namespace wheelwright::report {
+
+/// One short sentence; `kinematic_events` are those of the kinematic residual. Text, not HTML.
+[[nodiscard]] std::string detect_verdict(const Detection& detection, std::size_t kinematic_events);
+
+/// What was watched; where there are events: the first and the clearest one, how much of the driving contradicts the
+/// fault-free model, what this means, and which faults of the catalogue the first event leaves possible. Text, not HTML.
+[[nodiscard]] std::vector<std::string> detect_words(const Detection& detection, const CommissionedModel& model,
+                                                    const std::vector<Isolation>& isolations, const TimeAxis& axis);
+
+}  // namespace wheelwright::report
