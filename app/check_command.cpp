@@ -39,9 +39,8 @@ constexpr const char* kExamples =
 int run(const Arguments& a) {
   make_directory(a.common);
   const ModelClaims claims = read_claims(a.model);
-  CsvOptions reader = reader_options(a.common);
-  reader.only = useful_columns(claims.robot);
-  CsvLog log(a.logs, reader);
+  const auto opened = open_robot_log(a.logs, claims.robot, a.common);
+  RecordedLog& log = *opened;
   require_columns(log, claims.measurement.columns());
   const ModelCheck check = check_model(claims, log, log.report());
   CheckedFiles files{a.model.string(), {}};
@@ -66,15 +65,9 @@ Run add_check(CLI::App& program) {
   auto a = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("check", kHelp);
   command.add_option("MODEL", a->model, "model.json of `wheelwright commission`")->required();
-  command.add_option("LOG", a->logs, "The CSV logs it was commissioned on (also .gz, .zst), in the same order")
-      ->required();
-  add_common(command, a->common);
+  command.add_option("LOG", a->logs, "The logs it was commissioned on, in the same order")->required();
   add_map(command, a->common);
-  command.footer(kExamples);
-  return [a](const std::string& command_line) {
-    a->common.command_line = command_line;
-    return run(*a);
-  };
+  return finish(command, a, kExamples, run);
 }
 
 }  // namespace wheelwright::app

@@ -10,7 +10,6 @@
 #include <wheelwright/commission/detector_choice.hpp>
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/io/choice_json.hpp>
-#include <wheelwright/io/csv.hpp>
 #include <wheelwright/io/model_file.hpp>
 #include <wheelwright/io/robot_file.hpp>
 #include <wheelwright/report/commission_report.hpp>
@@ -18,6 +17,7 @@
 #include "commands.hpp"
 #include "common.hpp"
 #include "progress.hpp"
+#include "units.hpp"
 
 namespace wheelwright::app {
 namespace {
@@ -123,10 +123,10 @@ int run(const Arguments& a) {
     options.trial.faults.push_back(stated(text));
   }
   make_directory(a.common);
-  const Robot robot = read_robot(a.robot);
-  CsvOptions reader = reader_options(a.common);
-  reader.only = useful_columns(robot);
-  CsvLog log(a.logs, reader);
+  Robot robot = read_robot(a.robot);
+  const auto opened = open_robot_log(a.logs, robot, a.common);
+  RecordedLog& log = *opened;
+  robot = with_interpolation_errors(robot, log.report());
   require_columns(log, needed_columns(robot));
   Progress progress(a.common.quiet);
   options.trial.threads = static_cast<std::size_t>(a.common.threads);
@@ -170,7 +170,7 @@ int run(const Arguments& a) {
 Run add_choose(CLI::App& program) {
   auto a = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("choose", kHelp);
-  command.add_option("LOG", a->logs, "CSV logs (also .gz, .zst) of fault-free driving; several are taken together")
+  command.add_option("LOG", a->logs, "Logs of fault-free driving (CSV, rosbag2, HDF5); several are taken together")
       ->required();
   command.add_option("--robot", a->robot, "Robot file (YAML)")->required()->type_name("FILE");
   command
@@ -181,6 +181,7 @@ Run add_choose(CLI::App& program) {
       ->allow_extra_args(false)
       ->type_name("NAME=SIZE");
   command.add_option("--window", a->choice.trial.window, "Time after the onset in which it is to be seen, s")
+      ->transform(in_unit("s"))
       ->type_name("S")
       ->check(CLI::Range(1e-3, 3600.0))
       ->capture_default_str();
@@ -190,13 +191,8 @@ Run add_choose(CLI::App& program) {
       ->type_name("P")
       ->check(CLI::Range(0.0, 0.5))
       ->capture_default_str();
-  add_common(command, a->common);
   add_map(command, a->common);
-  command.footer(kExamples);
-  return [a](const std::string& command_line) {
-    a->common.command_line = command_line;
-    return run(*a);
-  };
+  return finish(command, a, kExamples, run);
 }
 
 }  // namespace wheelwright::app

@@ -21,18 +21,28 @@ using Run = std::function<int(const std::string& command_line)>;
 [[nodiscard]] Run add_choose(CLI::App& program);
 /// wheelwright commission LOG... --robot robot.yaml
 [[nodiscard]] Run add_commission(CLI::App& program);
+/// wheelwright completion bash|zsh|fish
+[[nodiscard]] Run add_completion(CLI::App& program);
+/// wheelwright convert IN... OUT
+[[nodiscard]] Run add_convert(CLI::App& program);
 /// wheelwright design --model model.json --for bounds
 [[nodiscard]] Run add_design(CLI::App& program);
 /// wheelwright detect LOG --model model.json [--follow]
 [[nodiscard]] Run add_detect(CLI::App& program);
+/// wheelwright doctor LOG... [--robot robot.yaml]
+[[nodiscard]] Run add_doctor(CLI::App& program);
 /// wheelwright export model.json --language c
 [[nodiscard]] Run add_export(CLI::App& program);
 /// wheelwright gap LOG... --robot robot.yaml
 [[nodiscard]] Run add_gap(CLI::App& program);
 /// wheelwright identify LOG... --robot robot.yaml
 [[nodiscard]] Run add_identify(CLI::App& program);
+/// wheelwright man [COMMAND]
+[[nodiscard]] Run add_man(CLI::App& program);
 /// wheelwright margins LOG --model model.json
 [[nodiscard]] Run add_margins(CLI::App& program);
+/// wheelwright robot --urdf FILE | --sdf FILE | --ros2-control FILE
+[[nodiscard]] Run add_robot(CLI::App& program);
 /// wheelwright simulate SCENARIO.yaml --out LOG
 [[nodiscard]] Run add_simulate(CLI::App& program);
 

@@ -11,6 +11,7 @@
 #include <wheelwright/io/atomic_file.hpp>
 #include <wheelwright/io/model_file.hpp>
 #include <wheelwright/io/robot_file.hpp>
+#include <wheelwright/report/chart.hpp>
 #include <wheelwright/report/commission_report.hpp>
 
 #include "commands.hpp"
@@ -45,10 +46,10 @@ constexpr const char* kExamples =
 
 int run(const Arguments& a) {
   make_directory(a.common);
-  const Robot robot = read_robot(a.robot);
-  CsvOptions reader = reader_options(a.common);
-  reader.only = useful_columns(robot);
-  CsvLog log(a.logs, reader);
+  Robot robot = read_robot(a.robot);
+  const auto opened = open_robot_log(a.logs, robot, a.common);
+  RecordedLog& log = *opened;
+  robot = with_interpolation_errors(robot, log.report());
   ReportContext context = report_context(a.common, log.report(), log);
   Progress progress(a.common.quiet);
   CommissionOptions options;
@@ -61,7 +62,7 @@ int run(const Arguments& a) {
     require_columns(log, needed_columns(robot));
     result = commission(log, robot, options);
     if (!result.model.facets.empty() && !a.common.out.empty()) {
-      context.own_log = detect(log, make_detector(result.model));
+      context.own_log = detect(log, make_detector(result.model), {.most_points = report::most_chart_points});
     }
   } catch (const Error& error) {
     if (!a.common.out.empty()) {
@@ -71,9 +72,7 @@ int run(const Arguments& a) {
   }
   publish(a.common, to_json(result, log.report(), software()), "model.json", commission_report(result, context));
   if (!a.common.quiet && !a.common.json) {
-    for (const std::string& sentence : context.warnings) {
-      fmt::print("log: {}\n", sentence);
-    }
+    print_log(context.warnings);
     fmt::print("{}", summary(result));
     if (!a.common.out.empty()) {
       fmt::print("wrote {} and {}\n", (a.common.out / "model.json").string(), (a.common.out / "report.html").string());
@@ -87,7 +86,8 @@ int run(const Arguments& a) {
 Run add_commission(CLI::App& program) {
   auto a = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("commission", kHelp);
-  command.add_option("LOG", a->logs, "CSV logs (also .gz, .zst); several are taken together")->required();
+  command.add_option("LOG", a->logs, "Logs (CSV also .gz and .zst, rosbag2, HDF5); several are taken together")
+      ->required();
   command.add_option("--robot", a->robot, "Robot file (YAML)")->required()->type_name("FILE");
   command.add_flag("--statistical", a->statistical,
                    "Propagate declared sensor noise at a confidence of 99.9 % instead of in the worst case");
@@ -95,13 +95,8 @@ Run add_commission(CLI::App& program) {
       ->type_name("N")
       ->capture_default_str();
   add_persistence(command, a->persistence, "1/1");
-  add_common(command, a->common);
   add_map(command, a->common);
-  command.footer(kExamples);
-  return [a](const std::string& command_line) {
-    a->common.command_line = command_line;
-    return run(*a);
-  };
+  return finish(command, a, kExamples, run);
 }
 
 }  // namespace wheelwright::app

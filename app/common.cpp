@@ -14,8 +14,7 @@
 #include <wheelwright/io/log_columns.hpp>
 #include <wheelwright/io/suggest.hpp>
 #include <wheelwright/model/robot.hpp>
-
-#include "raw_signals.hpp"
+#include <wheelwright/report/raw_signals.hpp>
 
 namespace wheelwright::app {
 
@@ -30,11 +29,23 @@ void add_common(CLI::App& command, CommonOptions& options) {
   command.add_flag("--quiet", options.quiet, "No progress and no summary; errors are still told");
 }
 
+void add_footer(CLI::App& command, const char* text) { command.footer(text); }
+
 void add_map(CLI::App& command, CommonOptions& options) {
   command
-      .add_option("--map", options.map,
-                  "Read the log column NAME from the file's column COLUMN (repeatable), e.g. --map omega_r=wheel_2")
+      .add_option(
+          "--map", options.map,
+          "Read the log column NAME from the file's column COLUMN, or from a bag's TOPIC.FIELD (repeatable), e.g. "
+          "--map omega_r=wheel_2 or --map omega_r=/joint_states.velocity[right_wheel]")
       ->type_name("NAME=COLUMN")
+      ->expected(1)
+      ->allow_extra_args(false)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  command
+      .add_option("--msg-path", options.msg_path,
+                  "Directory with definitions of messages (PKG/msg/TYPE.msg), for bags that do not bring their own "
+                  "(repeatable)")
+      ->type_name("DIR")
       ->expected(1)
       ->allow_extra_args(false)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
@@ -63,21 +74,24 @@ void add_persistence(CLI::App& command, std::optional<Persistence>& persistence,
 void add_set(CLI::App& command, ParameterSetKind& set) {
   command.add_option("--set", set, "Threshold from the feasible set itself (polytope) or from its box")
       ->transform(CLI::CheckedTransformer(std::map<std::string, ParameterSetKind>{
-          {"polytope", ParameterSetKind::polytope}, {"box", ParameterSetKind::box}}))
+                                              {"polytope", ParameterSetKind::polytope}, {"box", ParameterSetKind::box}})
+                      .description("{polytope,box}"))
       ->type_name("SET");
 }
 
 void add_test(CLI::App& command, Test& test) {
   command.add_option("--test", test, "Compare with [l, u] (two_sided) or with rho as the paper does (symmetric)")
       ->transform(CLI::CheckedTransformer(
-          std::map<std::string, Test>{{"two_sided", Test::two_sided}, {"symmetric", Test::symmetric}}))
+                      std::map<std::string, Test>{{"two_sided", Test::two_sided}, {"symmetric", Test::symmetric}})
+                      .description("{two_sided,symmetric}"))
       ->type_name("TEST");
 }
 
 std::string software() { return std::string("wheelwright ") + WHEELWRIGHT_VERSION; }
 
-CsvOptions reader_options(const CommonOptions& options) {
-  CsvOptions reader;
+LogOptions reader_options(const CommonOptions& options) {
+  LogOptions reader;
+  reader.msg_path = options.msg_path;
   for (const std::string& entry : options.map) {
     const std::size_t at = entry.find('=');
     if (at == std::string::npos || at == 0 || at + 1 == entry.size()) {
@@ -115,6 +129,13 @@ std::vector<std::string> useful_columns(const Robot& robot) {
   return names;
 }
 
+std::unique_ptr<RecordedLog> open_robot_log(const std::vector<std::filesystem::path>& paths, const Robot& robot,
+                                            const CommonOptions& options) {
+  LogOptions reader = reader_options(options);
+  reader.only = useful_columns(robot);
+  return open_log(paths, reader);
+}
+
 std::vector<std::string> needed_columns(const Robot& robot) {
   std::vector<std::string> names;
   for (const Joint& joint : make_model(robot).joints) {
@@ -147,6 +168,12 @@ void publish(const CommonOptions& options, const Json& result, const std::string
   }
 }
 
+void print_log(const std::vector<std::string>& sentences) {
+  for (const std::string& sentence : sentences) {
+    fmt::print("log: {}\n", sentence);
+  }
+}
+
 ReportContext report_context(const CommonOptions& options, const LogReport& data, LogSource& log) {
   ReportContext context;
   for (const LogFileReport& file : data.files) {
@@ -155,7 +182,10 @@ ReportContext report_context(const CommonOptions& options, const LogReport& data
   context.software = software();
   context.command_line = options.command_line;
   context.warnings = sentences(data);
-  context.signals = raw_signals(log);
+  if (!options.out.empty()) {
+    context.signals = report::raw_signals(log);
+    context.rows = data.rows;
+  }
   return context;
 }
 

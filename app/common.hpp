@@ -5,14 +5,17 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include <wheelwright/detector/row_detector.hpp>
-#include <wheelwright/io/csv.hpp>
 #include <wheelwright/io/json_file.hpp>
+#include <wheelwright/io/log_file.hpp>
 #include <wheelwright/report/context.hpp>
+
+#include "commands.hpp"
 
 namespace CLI {
 class App;
@@ -30,18 +33,34 @@ enum ExitCode : int {
 
 /// Options that every command has.
 struct CommonOptions {
-  std::filesystem::path out;     ///< directory of results; empty: none
-  bool json = false;             ///< the result on standard output, and nothing else there
-  bool quiet = false;            ///< no progress, no summary
-  int threads = 1;               ///< most threads
-  std::uint64_t seed = 1;        ///< of everything random
-  std::vector<std::string> map;  ///< name=column
-  std::string command_line;      ///< as the user gave it
+  std::filesystem::path out;                    ///< directory of results; empty: none
+  bool json = false;                            ///< the result on standard output, and nothing else there
+  bool quiet = false;                           ///< no progress, no summary
+  int threads = 1;                              ///< most threads
+  std::uint64_t seed = 1;                       ///< of everything random
+  std::vector<std::string> map;                 ///< name=column
+  std::vector<std::filesystem::path> msg_path;  ///< directories with definitions of messages
+  std::string command_line;                     ///< as the user gave it
 };
 
 /// Adds the common options to `command`.
 void add_common(CLI::App& command, CommonOptions& options);
-/// Adds --map to a command that reads logs.
+/// What stands below the options in the help of `command`.
+void add_footer(CLI::App& command, const char* text);
+
+/// The end of every registration: the common options, the examples, and what runs the command. `Arguments` has a member
+/// `common`.
+template <typename Arguments>
+[[nodiscard]] Run finish(CLI::App& command, std::shared_ptr<Arguments> arguments, const char* examples,
+                         int (*run)(const Arguments&)) {
+  add_common(command, arguments->common);
+  add_footer(command, examples);
+  return [arguments, run](const std::string& command_line) {
+    arguments->common.command_line = command_line;
+    return run(*arguments);
+  };
+}
+/// Adds --map and --msg-path to a command that reads logs.
 void add_map(CLI::App& command, CommonOptions& options);
 
 /// Adds --persistence K/N; `persistence` stays empty where it is not given. `otherwise` says what holds then.
@@ -56,7 +75,11 @@ void add_test(CLI::App& command, Test& test);
 [[nodiscard]] std::string software();
 
 /// --map as reader options. Throws InputError where an entry is not name=column, or its name none of the log contract.
-[[nodiscard]] CsvOptions reader_options(const CommonOptions& options);
+[[nodiscard]] LogOptions reader_options(const CommonOptions& options);
+
+/// The log in `paths`, with the columns that `robot` can use. Throws InputError as open_log does.
+[[nodiscard]] std::unique_ptr<RecordedLog> open_robot_log(const std::vector<std::filesystem::path>& paths,
+                                                          const Robot& robot, const CommonOptions& options);
 
 /// Columns that a robot of this model can use, so that a defect elsewhere in a file does no harm.
 [[nodiscard]] std::vector<std::string> useful_columns(const Robot& robot);
@@ -70,6 +93,9 @@ void make_directory(const CommonOptions& options);
 /// Writes `result` to out/name and report to out/report.html where a directory is wanted, and the result to standard
 /// output with --json.
 void publish(const CommonOptions& options, const Json& result, const std::string& name, const std::string& report);
+
+/// Prints what reading a log found (sentences(LogReport)), a line each, on standard output.
+void print_log(const std::vector<std::string>& sentences);
 
 /// The context of a report: files, repairs, software, command line, raw signals of `log` (which is walked once).
 [[nodiscard]] ReportContext report_context(const CommonOptions& options, const LogReport& data, LogSource& log);

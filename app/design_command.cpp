@@ -24,6 +24,7 @@
 #include "design_result.hpp"
 #include "progress.hpp"
 #include "rivals.hpp"
+#include "units.hpp"
 
 namespace wheelwright::app {
 namespace {
@@ -66,6 +67,11 @@ constexpr const char* kExamples =
 
 MotionLimits limits_from(const Arguments& a, const Robot& robot) {
   MotionLimits limits = limits_of(robot);
+  if (const double shortest = shortest_duration(a.stages); a.duration < shortest) {
+    throw InputError(fmt::format(
+        "--duration {} s: expected at least {} s, since each half of the drive has {} stages (--stages) of speed",
+        a.duration, shortest, a.stages));
+  }
   limits.duration = a.duration;
   limits.joint_speed = a.speed.value_or(limits.joint_speed);
   limits.joint_acceleration = a.acceleration ? a.acceleration : limits.joint_acceleration;
@@ -98,11 +104,10 @@ std::vector<InspectedFault> inspected(const Arguments& a, const CommissionedMode
       fault.asked = each.fault.name == name ? each.asked : fault.asked;
     }
     if (equals != std::string::npos) {
-      const auto size = to_number(text.substr(equals + 1));
-      if (!size || !(*size > 0.0)) {
+      fault.asked = quantity(text.substr(equals + 1), fault.fault.unit, "--fault " + text);
+      if (!(fault.asked > 0.0)) {
         throw InputError("--fault " + text + ": expected NAME=SIZE with a size > 0");
       }
-      fault.asked = *size;
     }
     faults.push_back(std::move(fault));
   }
@@ -230,25 +235,31 @@ Run add_design(CLI::App& program) {
                   "it leaves open has β = 10 1/s")
       ->type_name("FILE");
   command.add_option("--duration", a->duration, "Length of the drive, s")
+      ->transform(in_unit("s"))
       ->type_name("S")
-      ->check(CLI::Range(0.5, 3600.0))
+      ->check(CLI::Range(0.0, 3600.0))
       ->capture_default_str();
   command.add_option("--speed", a->speed, "Largest wheel speed, rad/s (single axis: its own unit)")
+      ->transform(in_unit("rad/s"))
       ->type_name("X")
       ->check(CLI::PositiveNumber);
   command.add_option("--acceleration", a->acceleration, "Largest wheel acceleration, rad/s²")
+      ->transform(in_unit("rad/s²"))
       ->type_name("X")
       ->check(CLI::PositiveNumber);
   command.add_option("--effort", a->effort, "Largest effort of a wheel, N·m (or A, V, as in the robot file)")
       ->type_name("X")
       ->check(CLI::PositiveNumber);
   command.add_option("--radius", a->radius, "Largest distance from the start, m")
+      ->transform(in_unit("m"))
       ->type_name("M")
       ->check(CLI::PositiveNumber);
   command.add_option("--box", a->box, "Room seen from the start, m: x ahead, y to the left")
+      ->transform(in_unit("m"))
       ->type_name("XMIN XMAX YMIN YMAX")
       ->expected(4);
   command.add_option("--rate", a->rate, "Samples per second of the log to come, Hz (with --robot; a model knows)")
+      ->transform(in_unit("Hz"))
       ->type_name("HZ")
       ->check(CLI::Range(5.0, 5000.0))
       ->capture_default_str();
@@ -256,9 +267,10 @@ Run add_design(CLI::App& program) {
       .add_option("--criterion", a->criterion,
                   "Relative widths are judged by their geometric_mean, their mean, or the largest")
       ->transform(CLI::CheckedTransformer(
-          std::map<std::string, WidthCriterion>{{"geometric_mean", WidthCriterion::geometric_mean},
-                                                {"mean", WidthCriterion::mean},
-                                                {"largest", WidthCriterion::largest}}))
+                      std::map<std::string, WidthCriterion>{{"geometric_mean", WidthCriterion::geometric_mean},
+                                                            {"mean", WidthCriterion::mean},
+                                                            {"largest", WidthCriterion::largest}})
+                      .description("{geometric_mean,mean,largest}"))
       ->default_str("geometric_mean");
   command
       .add_option("--fault", a->faults,
@@ -284,12 +296,7 @@ Run add_design(CLI::App& program) {
       ->type_name("N")
       ->check(CLI::Range(1, 20))
       ->capture_default_str();
-  add_common(command, a->common);
-  command.footer(kExamples);
-  return [a](const std::string& command_line) {
-    a->common.command_line = command_line;
-    return run(*a);
-  };
+  return finish(command, a, kExamples, run);
 }
 
 }  // namespace wheelwright::app

@@ -9,11 +9,14 @@
 
 #include <wheelwright/commission/trace.hpp>
 #include <wheelwright/io/model_file.hpp>
+#include <wheelwright/report/chart.hpp>
 #include <wheelwright/report/detect_report.hpp>
 
 #include "commands.hpp"
 #include "common.hpp"
+#include "failure_page.hpp"
 #include "follow.hpp"
+#include "series.hpp"
 #include "summary.hpp"
 
 namespace wheelwright::app {
@@ -22,6 +25,7 @@ namespace {
 struct Arguments {
   std::filesystem::path log;
   std::filesystem::path model;
+  std::filesystem::path series;
   bool follow = false;
   DetectorOptions detector;
   std::optional<Persistence> persistence;
@@ -36,25 +40,9 @@ constexpr const char* kHelp =
 constexpr const char* kExamples =
     "Examples:\n"
     "  wheelwright detect drive.csv --model result/model.json --out check\n"
+    "  wheelwright detect drive.mcap --model result/model.json --series residual.mcap\n"
     "  robot_driver | wheelwright detect --follow --model result/model.json\n\n"
     "Exit code: 0 no fault, 1 a fault was found, 2 bad input.";
-
-// The kinematic residual, where model and log have it; else why not.
-KinematicWatch watch_kinematics(LogSource& log, const CommissionedModel& model, const DetectorOptions& options) {
-  if (!model.kinematic) {
-    return {std::nullopt, "the log that the model was commissioned on had neither a usable pose nor a gyro"};
-  }
-  std::string missing;
-  for (const std::string& name : model.kinematic->measurement.columns()) {
-    if (!log.find(name)) {
-      missing += (missing.empty() ? "" : ", ") + name;
-    }
-  }
-  if (!missing.empty()) {
-    return {std::nullopt, "the log has no " + missing};
-  }
-  return {detect(log, make_detector(*model.kinematic, options)), {}};
-}
 
 int run(const Arguments& a) {
   CommissionedModel model = read_model(a.model);
@@ -63,7 +51,7 @@ int run(const Arguments& a) {
     model.kinematic->persistence = a.persistence.value_or(model.kinematic->persistence);
   }
   Detector detector = make_detector(model, a.detector);
-  CsvOptions reader = reader_options(a.common);
+  LogOptions reader = reader_options(a.common);
   reader.only = useful_columns(model.robot);
   if (a.follow) {
     return follow(std::cin, std::cout, std::move(detector), model, a.detector, reader, a.common.json) ? kNo : kDone;
@@ -72,10 +60,18 @@ int run(const Arguments& a) {
     throw InputError("detect: expected a LOG, or --follow to read rows from standard input");
   }
   make_directory(a.common);
-  CsvLog log({a.log}, reader);
-  require_columns(log, model.measurement.columns());
-  const Detection detection = detect(log, std::move(detector));
-  const KinematicWatch kinematic = watch_kinematics(log, model, a.detector);
+  const auto opened = open_log({a.log}, reader);
+  RecordedLog& log = *opened;
+  const ReportContext context = report_context(a.common, log.report(), log);
+  DetectionOptions watch;
+  if (!a.common.out.empty()) {
+    watch.most_points = report::most_chart_points;
+  }
+  const Detection detection = or_failure_page(a.common, context, [&] {
+    require_columns(log, model.measurement.columns());
+    return detect(log, std::move(detector), watch);
+  });
+  const KinematicWatch kinematic = watch_kinematics(log, model, a.detector, watch);
   EventIsolationOptions isolation;
   isolation.isolation.threads = static_cast<std::size_t>(std::max(a.common.threads, 1));
   const std::vector<Isolation> isolations = isolate_events(log, model, detection, isolation);
@@ -86,19 +82,23 @@ int run(const Arguments& a) {
     add_kinematic(json, kinematic, model);
     std::string page;
     if (!a.common.out.empty()) {
-      page = detect_report(detection, model, report_context(a.common, log.report(), log),
-                           {.detection = kinematic.detection, .message = kinematic.message}, isolations);
+      page = detect_report(detection, model, context, {.detection = kinematic.detection, .message = kinematic.message},
+                           isolations);
     }
     publish(a.common, json, "detection.json", page);
   }
+  if (!a.series.empty()) {
+    write_series(a.series, log, model, a.detector, log.report().files.front().time_origin);
+  }
   if (!a.common.quiet && !a.common.json) {
-    for (const std::string& sentence : sentences(log.report())) {
-      fmt::print("log: {}\n", sentence);
-    }
+    print_log(sentences(log.report()));
     fmt::print("{}{}{}", summary(detection, model), summary(isolations, detection), summary(kinematic, model));
     if (!a.common.out.empty()) {
       fmt::print("wrote {} and {}\n", (a.common.out / "detection.json").string(),
                  (a.common.out / "report.html").string());
+    }
+    if (!a.series.empty()) {
+      fmt::print("wrote {}\n", a.series.string());
     }
   }
   return fault ? kNo : kDone;
@@ -109,19 +109,20 @@ int run(const Arguments& a) {
 Run add_detect(CLI::App& program) {
   auto a = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("detect", kHelp);
-  command.add_option("LOG", a->log, "CSV log (also .gz, .zst)");
+  command.add_option("LOG", a->log, "Log (CSV also .gz and .zst, rosbag2, HDF5)");
   command.add_option("--model", a->model, "model.json of `wheelwright commission`")->required()->type_name("FILE");
   command.add_flag("--follow", a->follow, "Read CSV rows from standard input as they come, tell events at once");
+  command
+      .add_option(
+          "--series", a->series,
+          "Write residual, thresholds and decisions over time into FILE (.csv, .mcap, .db3, .h5), for PlotJuggler, "
+          "Foxglove and the like")
+      ->type_name("FILE");
   add_set(command, a->detector.set);
   add_test(command, a->detector.test);
   add_persistence(command, a->persistence, "the model's");
-  add_common(command, a->common);
   add_map(command, a->common);
-  command.footer(kExamples);
-  return [a](const std::string& command_line) {
-    a->common.command_line = command_line;
-    return run(*a);
-  };
+  return finish(command, a, kExamples, run);
 }
 
 }  // namespace wheelwright::app

@@ -104,12 +104,7 @@ Run add_export(CLI::App& program) {
   add_set(command, a->detector.set);
   add_test(command, a->detector.test);
   add_persistence(command, a->persistence, "the model's");
-  add_common(command, a->common);
-  command.footer(kExamples);
-  return [a](const std::string& command_line) {
-    a->common.command_line = command_line;
-    return run(*a);
-  };
+  return finish(command, a, kExamples, run);
 }
 
 }  // namespace wheelwright::app

@@ -9,9 +9,11 @@
 
 #include <wheelwright/gap/catalogue.hpp>
 #include <wheelwright/gap/diagnose.hpp>
+#include <wheelwright/gap/fresh_log.hpp>
 #include <wheelwright/gap/naive.hpp>
 #include <wheelwright/gap/prepared.hpp>
 #include <wheelwright/io/atomic_file.hpp>
+#include <wheelwright/io/csv.hpp>
 #include <wheelwright/io/gap_json.hpp>
 #include <wheelwright/io/robot_file.hpp>
 #include <wheelwright/io/suggest.hpp>
@@ -24,12 +26,14 @@
 #include "gap_summary.hpp"
 #include "next_manoeuvre.hpp"
 #include "progress.hpp"
+#include "rivals.hpp"
+#include "units.hpp"
 
 namespace wheelwright::app {
 namespace {
 
 struct Arguments {
-  std::vector<std::filesystem::path> logs, baseline;
+  std::vector<std::filesystem::path> logs, baseline, fresh;
   std::filesystem::path robot;
   std::optional<double> beta;
   std::vector<std::string> without;
@@ -113,52 +117,6 @@ std::string origin(const Arguments& a, const Diagnosis& d) {
   return line + "\n";
 }
 
-// Parameters of the credible set's members as they were fitted: `design --gap` begins from them.
-void add_rivals(Json& result, const std::vector<Rival>& rivals, const std::vector<Effect>& catalogue) {
-  for (const Rival& rival : rivals) {
-    std::vector<std::string> effects;
-    Json parameters = Json::object();
-    for (const RivalCause& cause : rival.causes) {
-      const Effect& effect = *std::ranges::find(catalogue, cause.effect, &Effect::name);
-      for (std::size_t c = 0; c < cause.coefficients.size(); ++c) {
-        parameters[effect.name + "." + effect.parameters[c].name] = {{"estimate", cause.coefficients[c]},
-                                                                     {"unit", effect.parameters[c].unit}};
-      }
-      for (std::size_t s = 0; s < cause.shape.size(); ++s) {
-        parameters[effect.name + "." + effect.shapes[s].name] = {{"estimate", cause.shape[s]},
-                                                                 {"unit", effect.shapes[s].unit}};
-      }
-      effects.push_back(cause.effect);
-    }
-    std::ranges::sort(effects);
-    for (Json& member : result["credible_set"]) {
-      auto own = member["effects"].get<std::vector<std::string>>();
-      std::ranges::sort(own);
-      if (own == effects) {
-        member["parameters"] = parameters;
-      }
-    }
-  }
-}
-
-// Designs the next drive of an ambiguous diagnosis; what hinders it becomes a note.
-NextDrive what_next(const Arguments& a, CsvLog& log, CsvLog* baseline, const Robot& robot, Diagnosis& d,
-                    const DiagnoseOptions& options) {
-  if (d.verdict != GapVerdict::ambiguous || a.no_manoeuvre) {
-    return {};
-  }
-  try {
-    NextDrive next = next_drive(log, baseline, robot, d, options);
-    if (!next.commands && !next.sentence.empty()) {
-      d.notes.push_back(next.sentence);
-    }
-    return next;
-  } catch (const InvalidArgument& error) {
-    d.notes.push_back(std::string("no manoeuvre was designed to tell the causes apart: ") + error.what());
-    return {};
-  }
-}
-
 void write_beside(const Arguments& a, const Diagnosis& d, const NextDrive& next) {
   const std::filesystem::path& out = a.common.out;
   write_residuals(out / kResiduals, d.series);
@@ -177,17 +135,14 @@ void write_beside(const Arguments& a, const Diagnosis& d, const NextDrive& next)
 
 int run(const Arguments& a) {
   make_directory(a.common);
-  const Robot robot = read_robot(a.robot);
+  Robot robot = read_robot(a.robot);
   const std::vector<Effect> catalogue = effect_catalogue(make_model(robot));
   check_without(a.without, catalogue);
-  CsvOptions reader = reader_options(a.common);
-  reader.only = useful_columns(robot);
-  CsvLog log(a.logs, reader);
-  std::optional<CsvLog> baseline;
-  if (!a.baseline.empty()) {
-    baseline.emplace(a.baseline, reader);
-  }
-  CsvLog* const healthy = baseline ? &*baseline : nullptr;
+  const auto opened = open_robot_log(a.logs, robot, a.common);
+  RecordedLog& log = *opened;
+  const auto baseline = a.baseline.empty() ? nullptr : open_robot_log(a.baseline, robot, a.common);
+  RecordedLog* const healthy = baseline.get();
+  robot = with_interpolation_errors(robot, log.report());
   ReportContext context = report_context(a.common, log.report(), log);
   context.seeds = {{"permutations, bootstrap and search", a.common.seed}};
   Progress progress(a.common.quiet);
@@ -207,7 +162,12 @@ int run(const Arguments& a) {
       require_columns(*healthy, needed_columns(robot));
     }
     diagnosis = diagnose(log, healthy, robot, options);
-    next = what_next(a, log, healthy, robot, diagnosis, options);
+    if (!a.fresh.empty()) {
+      const auto fresh = open_robot_log(a.fresh, robot, a.common);
+      require_columns(*fresh, needed_columns(robot));
+      diagnosis.shrink.fresh_torque_rms = torque_on(*fresh, healthy, robot, diagnosis, options);
+    }
+    next = a.no_manoeuvre ? NextDrive{} : what_next(log, healthy, robot, diagnosis, options);
     naive = a.naive ? naive_effects(log, healthy, robot, options) : naive;
   } catch (const Error& error) {
     if (!a.common.out.empty()) {
@@ -248,9 +208,7 @@ int run(const Arguments& a) {
   }
   publish(a.common, result, "gap.json", files ? gap_report(diagnosis, robot.name, context, promise) : std::string());
   if (!a.common.quiet && !a.common.json) {
-    for (const std::string& sentence : context.warnings) {
-      fmt::print("log: {}\n", sentence);
-    }
+    print_log(context.warnings);
     fmt::print("{}", summary(diagnosis, {a.common.out, a.robot, files && diagnosis.improved, promise,
                                          files && next.commands, a.naive, naive}));
     if (files) {
@@ -265,7 +223,7 @@ int run(const Arguments& a) {
 Run add_gap(CLI::App& program) {
   auto a = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("gap", kHelp);
-  command.add_option("LOG", a->logs, "CSV logs (also .gz, .zst) of one robot in one state; taken together")->required();
+  command.add_option("LOG", a->logs, "Logs (CSV, rosbag2, HDF5) of one robot in one state; taken together")->required();
   command.add_option("--robot", a->robot, "Robot file (YAML): the model whose gap it is")
       ->required()
       ->type_name("FILE");
@@ -274,7 +232,14 @@ Run add_gap(CLI::App& program) {
       ->expected(1)
       ->allow_extra_args(false)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  command
+      .add_option("--fresh", a->fresh, "Another log of the robot as it is now: whether what is promised holds there")
+      ->type_name("LOG")
+      ->expected(1)
+      ->allow_extra_args(false)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   command.add_option("--beta", a->beta, "Of the filter, 1/s (default: at most 10, lower where the motion is noisy)")
+      ->transform(in_unit("1/s"))
       ->type_name("B")
       ->check(CLI::Range(0.1, 1000.0));
   command.add_option("--without", a->without, "Do not look for this effect of the catalogue (may be repeated)")
@@ -286,13 +251,8 @@ Run add_gap(CLI::App& program) {
   command.add_flag("--no-manoeuvre", a->no_manoeuvre, "Do not design a drive where causes cannot be told apart");
   command.add_flag("--naive", a->naive,
                    "Also say what forward selection by BIC over samples would say, to be compared with");
-  add_common(command, a->common);
   add_map(command, a->common);
-  command.footer(kExamples);
-  return [a](const std::string& command_line) {
-    a->common.command_line = command_line;
-    return run(*a);
-  };
+  return finish(command, a, kExamples, run);
 }
 
 }  // namespace wheelwright::app

@@ -17,7 +17,7 @@ std::string causes_words(const Diagnosis& d) {
   for (const GapCause& cause : d.causes) {
     out += fmt::format("  {}: {}\n", report::capital(report::effect_noun(cause.effect)), cause.sentence);
     for (const GapEstimate& p : cause.parameters) {
-      out += fmt::format("      {} {}\n", report::words(p.name), report::estimate_words(p));
+      out += fmt::format("      {} {}\n", report::parameter_words(p.name), report::estimate_words(p));
     }
   }
   return out;
@@ -95,7 +95,9 @@ std::string summary(const Diagnosis& d, const GapResults& r) {
   }
   out += titled("causes, 95 % intervals", causes_words(d));
   out += titled("held out, before → after the causes are in the model",
-                figures_words(d.shrink.torque_rms, "torque residual") + figures_words(d.shrink.rollout, "rollout") +
+                figures_words(d.shrink.torque_rms, "torque residual") +
+                    figures_words(d.shrink.fresh_torque_rms, "torque residual, fresh log") +
+                    figures_words(d.shrink.rollout, "rollout") +
                     figures_words(d.shrink.threshold_width, "width of the threshold") +
                     figures_words(d.shrink.smallest_fault, "smallest radius fault"));
   out += titled("parameters fitted to this log without the causes", shifts_words(d));

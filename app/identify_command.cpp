@@ -15,6 +15,7 @@
 
 #include "commands.hpp"
 #include "common.hpp"
+#include "failure_page.hpp"
 #include "identify_summary.hpp"
 #include "progress.hpp"
 
@@ -47,7 +48,7 @@ constexpr const char* kExamples =
     "Exit code: 0 the log shows parameters (or kinematics), 1 it shows none, 2 bad input.";
 
 // Wheel speeds and a pose, and no effort at all.
-bool for_kinematics_only(const CsvLog& log, const Robot& robot) {
+bool for_kinematics_only(const LogSource& log, const Robot& robot) {
   const std::vector<std::string> needed = needed_columns(robot);
   const bool effort = std::ranges::any_of(needed, [&](const std::string& name) { return log.find(name).has_value(); });
   return !effort && robot.model != "single_axis" && log.find("theta") && log.find("omega_r") && log.find("omega_l");
@@ -55,10 +56,10 @@ bool for_kinematics_only(const CsvLog& log, const Robot& robot) {
 
 int run(const Arguments& a) {
   make_directory(a.common);
-  const Robot robot = read_robot(a.robot);
-  CsvOptions reader = reader_options(a.common);
-  reader.only = useful_columns(robot);
-  CsvLog log(a.logs, reader);
+  Robot robot = read_robot(a.robot);
+  const auto opened = open_robot_log(a.logs, robot, a.common);
+  RecordedLog& log = *opened;
+  robot = with_interpolation_errors(robot, log.report());
   if (!for_kinematics_only(log, robot)) {
     require_columns(log, needed_columns(robot));
   }
@@ -69,13 +70,16 @@ int run(const Arguments& a) {
   options.seed = a.common.seed;
   options.shapes = !a.no_shapes;
   options.progress = [&](std::string_view stage, double share) { progress.tell(stage, share); };
-  const Identification result = identify(log, robot, options);
+  const Identification result = or_failure_page(a.common, context, [&] {
+    if (!for_kinematics_only(log, robot)) {
+      require_columns(log, needed_columns(robot));
+    }
+    return identify(log, robot, options);
+  });
   publish(a.common, to_json(result, log.report(), software(), a.common.seed), "identification.json",
           identify_report(result, context));
   if (!a.common.quiet && !a.common.json) {
-    for (const std::string& sentence : context.warnings) {
-      fmt::print("log: {}\n", sentence);
-    }
+    print_log(context.warnings);
     fmt::print("{}", summary(result));
     if (!a.common.out.empty()) {
       fmt::print("wrote {} and {}\n", (a.common.out / "identification.json").string(),
@@ -90,16 +94,12 @@ int run(const Arguments& a) {
 Run add_identify(CLI::App& program) {
   auto a = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("identify", kHelp);
-  command.add_option("LOG", a->logs, "CSV logs (also .gz, .zst); several are taken together")->required();
+  command.add_option("LOG", a->logs, "Logs (CSV also .gz and .zst, rosbag2, HDF5); several are taken together")
+      ->required();
   command.add_option("--robot", a->robot, "Robot file (YAML)")->required()->type_name("FILE");
   command.add_flag("--no-shapes", a->no_shapes, "Do not look for delay, lags and Stribeck speed");
-  add_common(command, a->common);
   add_map(command, a->common);
-  command.footer(kExamples);
-  return [a](const std::string& command_line) {
-    a->common.command_line = command_line;
-    return run(*a);
-  };
+  return finish(command, a, kExamples, run);
 }
 
 }  // namespace wheelwright::app

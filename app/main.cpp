@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <exception>
-#include <iostream>
+#include <memory>
+#include <sstream>
 #include <vector>
 
 #include <fmt/format.h>
@@ -8,12 +9,23 @@
 
 #include <wheelwright/core/error.hpp>
 
+#include "command_tree.hpp"
 #include "commands.hpp"
 #include "common.hpp"
 
 namespace {
 
 using namespace wheelwright::app;
+
+// Of each command one sentence: the rest is in its own help.
+class ShortList : public CLI::Formatter {
+ public:
+  std::string make_subcommand(const CLI::App* command) const override {
+    std::ostringstream out;
+    CLI::detail::format_help(out, command->get_name(), first_sentence(command->get_description()), get_column_width());
+    return out.str();
+  }
+};
 
 std::string joined(int count, char** words) {
   std::string line = "wheelwright";
@@ -27,20 +39,36 @@ std::string joined(int count, char** words) {
 
 int main(int argc, char** argv) {
   CLI::App program(
-      "Wheelwright: model-based fault detection for wheeled robots, guaranteed and tight.\n"
+      "Model-based fault detection for wheeled robots, guaranteed and tight.\n"
       "A robot and a log of fault-free driving go in; a model with thresholds that no healthy robot exceeds comes "
-      "out.");
+      "out.",
+      "wheelwright");
   program.set_version_flag("--version", software());
   program.require_subcommand(1);
+  program.formatter(std::make_shared<ShortList>());
   program.footer(
       "Start with:  wheelwright commission LOG --robot robot.yaml --out result\n"
       "Each command has its own --help.");
-  const std::vector<std::pair<std::string, Run>> commands = {
-      {"commission", add_commission(program)}, {"detect", add_detect(program)},
-      {"check", add_check(program)},           {"identify", add_identify(program)},
-      {"margins", add_margins(program)},       {"export", add_export(program)},
-      {"design", add_design(program)},         {"simulate", add_simulate(program)},
-      {"choose", add_choose(program)},         {"gap", add_gap(program)}};
+  const std::vector<std::pair<std::string, Run>> commands = {{"commission", add_commission(program)},
+                                                             {"detect", add_detect(program)},
+                                                             {"doctor", add_doctor(program)},
+                                                             {"check", add_check(program)},
+                                                             {"identify", add_identify(program)},
+                                                             {"margins", add_margins(program)},
+                                                             {"export", add_export(program)},
+                                                             {"design", add_design(program)},
+                                                             {"simulate", add_simulate(program)},
+                                                             {"choose", add_choose(program)},
+                                                             {"gap", add_gap(program)},
+                                                             {"convert", add_convert(program)},
+                                                             {"robot", add_robot(program)},
+                                                             {"completion", add_completion(program)},
+                                                             {"man", add_man(program)}};
+  program.failure_message([argc, argv, &program](const CLI::App*, const CLI::Error& error) {
+    const std::string meant = suggestion(words_of(program), {argv + 1, argv + argc});
+    return fmt::format("wheelwright: {}{}\nRun with --help for more information.\n", error.what(),
+                       meant.empty() ? "" : "; " + meant);
+  });
   try {
     program.parse(argc, argv);
     for (const auto& [name, run] : commands) {

@@ -10,14 +10,15 @@
 
 #include <wheelwright/commission/margin_survey.hpp>
 #include <wheelwright/commission/margin_words.hpp>
-#include <wheelwright/io/csv.hpp>
 #include <wheelwright/io/margins_json.hpp>
 #include <wheelwright/io/model_file.hpp>
 #include <wheelwright/report/margins_report.hpp>
 
 #include "commands.hpp"
 #include "common.hpp"
+#include "failure_page.hpp"
 #include "progress.hpp"
+#include "units.hpp"
 
 namespace wheelwright::app {
 namespace {
@@ -80,10 +81,9 @@ std::string table(const MarginSurvey& survey, const ResidualMargins& residual) {
 int run(const Arguments& a) {
   const CommissionedModel model = read_model(a.model);
   make_directory(a.common);
-  CsvOptions reader = reader_options(a.common);
-  reader.only = useful_columns(model.robot);
-  CsvLog log({a.log}, reader);
-  require_columns(log, model.measurement.columns());
+  const auto opened = open_robot_log({a.log}, model.robot, a.common);
+  RecordedLog& log = *opened;
+  const ReportContext context = report_context(a.common, log.report(), log);
   Progress progress(a.common.quiet);
   MarginSurveyOptions options = a.survey;
   options.faults = a.faults;
@@ -94,16 +94,16 @@ int run(const Arguments& a) {
   }
   options.margins.threads = static_cast<std::size_t>(a.common.threads);
   options.margins.progress = [&](std::string_view stage, double share) { progress.tell(stage, share); };
-  const MarginSurvey survey = survey_margins(log, model, options);
+  const MarginSurvey survey = or_failure_page(a.common, context, [&] {
+    require_columns(log, model.measurement.columns());
+    return survey_margins(log, model, options);
+  });
   if (!a.common.out.empty() || a.common.json) {
     publish(a.common, to_json(survey, a.model.string(), a.log.string(), software()), "margins.json",
-            a.common.out.empty() ? std::string()
-                                 : margins_report(survey, model, report_context(a.common, log.report(), log)));
+            a.common.out.empty() ? std::string() : margins_report(survey, model, context));
   }
   if (!a.common.quiet && !a.common.json) {
-    for (const std::string& sentence : sentences(log.report())) {
-      fmt::print("log: {}\n", sentence);
-    }
+    print_log(sentences(log.report()));
     for (const ResidualMargins& residual : survey.residuals) {
       fmt::print("{}", table(survey, residual));
     }
@@ -123,17 +123,19 @@ int run(const Arguments& a) {
 Run add_margins(CLI::App& program) {
   auto a = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("margins", kHelp);
-  command.add_option("LOG", a->log, "CSV log (also .gz, .zst)")->required();
+  command.add_option("LOG", a->log, "Log (CSV also .gz and .zst, rosbag2, HDF5)")->required();
   command.add_option("--model", a->model, "model.json of `wheelwright commission`")->required()->type_name("FILE");
   command.add_option("--fault", a->faults, "Only this fault of the catalogue (may be repeated)")
       ->type_name("NAME")
       ->allow_extra_args(false);
   command
       .add_option("--window", a->windows, "Time after the onset by which a fault is to be seen, s (may be repeated)")
+      ->transform(in_unit("s"))
       ->type_name("S")
       ->allow_extra_args(false)
       ->check(CLI::Range(1e-3, 3600.0));
   command.add_option("--onset-step", a->survey.margins.onset_step, "Time between the onsets that are tried, s")
+      ->transform(in_unit("s"))
       ->type_name("S")
       ->check(CLI::Range(1e-3, 3600.0))
       ->capture_default_str();
@@ -145,13 +147,8 @@ Run add_margins(CLI::App& program) {
       ->capture_default_str();
   add_set(command, a->survey.set);
   add_persistence(command, a->persistence, "the model's");
-  add_common(command, a->common);
   add_map(command, a->common);
-  command.footer(kExamples);
-  return [a](const std::string& command_line) {
-    a->common.command_line = command_line;
-    return run(*a);
-  };
+  return finish(command, a, kExamples, run);
 }
 
 }  // namespace wheelwright::app

@@ -3,24 +3,19 @@
 
 #include <algorithm>
 #include <cctype>
-#include <cmath>
 
 #include <fmt/format.h>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/design/limits.hpp>
-#include <wheelwright/filter/measurement.hpp>
 #include <wheelwright/gap/estimates.hpp>
+#include <wheelwright/gap/further_drive.hpp>
 #include <wheelwright/gap/prepared.hpp>
 #include <wheelwright/report/gap_words.hpp>
 
 namespace wheelwright::app {
 namespace {
 
-constexpr std::size_t kMostRivals = 4;               // pairs grow with the square
-constexpr double kPlannedEffort = 0.8;               // of the limit
-constexpr double kShortest = 20.0, kLongest = 60.0;  // s; between them a third of the log that was analysed
-constexpr double kShortestTravel = 0.5;              // m
+constexpr std::size_t kMostRivals = 4;  // pairs grow with the square
 
 // The best fit of a set of effects at any of their shapes.
 CauseSet best_set(const CandidateTable& table, const std::vector<std::string>& effects, BaseModel base) {
@@ -85,55 +80,6 @@ std::vector<Rival> fitted_rivals(const PreparedGap& prepared, const Diagnosis& d
   return rivals;
 }
 
-DesignSubject subject_of(const PreparedGap& prepared, const Robot& robot, const Eigen::VectorXd& theta) {
-  DesignSubject subject;
-  subject.robot = robot;
-  subject.model = prepared.drive.model;
-  TableSource source(prepared.log);
-  subject.measurement = find_measurement(source, robot, subject.model, 2);
-  subject.filter = {2, prepared.row_options.beta, prepared.row_options.beta};
-  subject.theta = theta;
-  for (const double value : theta) {
-    subject.effort_box.sides.push_back({value, value});
-  }
-  subject.prior.sides = prior_box(robot, subject.model).bounds;
-  subject.step = prepared.drive.step;
-  return subject;
-}
-
-double largest(const Drive& drive, Eigen::VectorXd JointSignals::*signal) {
-  double value = 0.0;
-  for (const JointSignals& joint : drive.joints) {
-    value = std::max(value, (joint.*signal).cwiseAbs().maxCoeff());
-  }
-  return value;
-}
-
-MotionLimits limits_within(const Drive& drive, const Robot& robot) {
-  MotionLimits limits = limits_of(robot);
-  limits.duration = std::clamp(static_cast<double>(drive.rows()) * drive.step / 3.0, kShortest, kLongest);
-  if (!(limits.joint_speed > 0.0)) {
-    limits.joint_speed = largest(drive, &JointSignals::smooth_speed);
-  }
-  if (limits.effort) {
-    limits.effort = kPlannedEffort * *limits.effort;
-  }
-  if (!limits.joint_acceleration) {
-    limits.joint_acceleration = largest(drive, &JointSignals::smooth_acceleration);
-  }
-  if (drive.has_pose()) {
-    double travel = 0.0;
-    for (std::size_t k = 0; k < drive.segment_starts.size(); ++k) {
-      const auto [first, last] = drive.segment(k);
-      for (Eigen::Index i = first; i < last; ++i) {
-        travel = std::max(travel, std::hypot(drive.x[i] - drive.x[first], drive.y[i] - drive.y[first]));
-      }
-    }
-    limits.radius = std::max(travel, kShortestTravel);
-  }
-  return limits;
-}
-
 std::string joined(const std::vector<std::string>& sentences) { return fmt::format("{}", fmt::join(sentences, " ")); }
 
 }  // namespace
@@ -164,7 +110,7 @@ NextDrive next_drive(LogSource& log, LogSource* baseline, const Robot& robot, co
       options.progress("designing the next manoeuvre", share);
     }
   };
-  const MotionLimits limits = limits_within(prepared.drive, robot);
+  const MotionLimits limits = limits_within(prepared, robot);
   const DiscriminationDesign design =
       design_for_discrimination(subject, limits, next.rivals, prepared.catalogue, noise, search, &prepared.drive);
   next.sentence = in_words(joined(design.sentences), prepared.catalogue);
@@ -196,6 +142,23 @@ std::string in_words(std::string text, const std::vector<Effect>& catalogue) {
     at = end;
   }
   return out;
+}
+
+NextDrive what_next(LogSource& log, LogSource* baseline, const Robot& robot, Diagnosis& d,
+                    const DiagnoseOptions& options) {
+  if (d.verdict != GapVerdict::ambiguous) {
+    return {};
+  }
+  try {
+    NextDrive next = next_drive(log, baseline, robot, d, options);
+    if (!next.commands && !next.sentence.empty()) {
+      d.notes.push_back(next.sentence);
+    }
+    return next;
+  } catch (const InvalidArgument& error) {
+    d.notes.push_back(std::string("no manoeuvre was designed to tell the causes apart: ") + error.what());
+    return {};
+  }
 }
 
 }  // namespace wheelwright::app

@@ -27,6 +27,10 @@ struct NextDrive {
 [[nodiscard]] NextDrive next_drive(LogSource& log, LogSource* baseline, const Robot& robot, const Diagnosis& diagnosis,
                                    const DiagnoseOptions& options);
 
+/// next_drive() where `diagnosis` is ambiguous; what hinders it, or what no drive can tell, becomes a note of it.
+[[nodiscard]] NextDrive what_next(LogSource& log, LogSource* baseline, const Robot& robot, Diagnosis& diagnosis,
+                                  const DiagnoseOptions& options);
+
 /// `text` with every name of an effect in it said in words: "dry friction with a delay of the torque" for "coulomb + delay".
 [[nodiscard]] std::string in_words(std::string text, const std::vector<Effect>& catalogue);
 

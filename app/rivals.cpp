@@ -9,7 +9,8 @@
 
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/io/json_file.hpp>
-#include <wheelwright/io/number.hpp>
+
+#include "units.hpp"
 
 namespace wheelwright::app {
 namespace {
@@ -53,28 +54,30 @@ void take_noise(const JsonPlace& root, const Model& model, PlannedNoise& noise) 
 void resize(Rival& rival, const std::vector<Effect>& catalogue, const std::string& text) {
   const std::size_t equals = text.find('=');
   const std::string what = text.substr(0, equals), effect = what.substr(0, what.find('.'));
-  const auto value = equals == std::string::npos ? std::nullopt : to_number(text.substr(equals + 1));
-  if (!value) {
+  if (equals == std::string::npos) {
     throw InputError("--size " + text + ": expected EFFECT=VALUE or EFFECT.PARAMETER=VALUE");
   }
+  const auto value = [&](const std::string& unit) {
+    return quantity(text.substr(equals + 1), unit.empty() ? "1" : unit, "--size " + text);
+  };
   for (RivalCause& cause : rival.causes) {
     if (cause.effect != effect) {
       continue;
     }
     const Effect& known = *find(catalogue, effect);
     if (what == effect && !cause.coefficients.empty()) {
-      const double scale = *value / cause.coefficients[0];
+      const double scale = value(known.parameters[0].unit) / cause.coefficients[0];
       std::ranges::for_each(cause.coefficients, [scale](double& c) { c *= scale; });
     } else if (what == effect) {
-      cause.shape[0] = *value;
+      cause.shape[0] = value(known.shapes[0].unit);
     } else {
       const std::string name = what.substr(effect.size() + 1);
       const auto coefficient = std::ranges::find(known.parameters, name, &EffectParameter::name);
       const auto shape = std::ranges::find(known.shapes, name, &ShapeParameter::name);
       if (coefficient != known.parameters.end()) {
-        cause.coefficients[static_cast<std::size_t>(coefficient - known.parameters.begin())] = *value;
+        cause.coefficients[static_cast<std::size_t>(coefficient - known.parameters.begin())] = value(coefficient->unit);
       } else if (shape != known.shapes.end()) {
-        cause.shape[static_cast<std::size_t>(shape - known.shapes.begin())] = *value;
+        cause.shape[static_cast<std::size_t>(shape - known.shapes.begin())] = value(shape->unit);
       } else {
         std::string names;
         for (const EffectParameter& p : known.parameters) names += " " + p.name;
@@ -157,6 +160,34 @@ std::vector<Rival> rivals_named(const std::vector<std::string>& names, const std
     }
   }
   return rivals;
+}
+
+void add_rivals(Json& result, const std::vector<Rival>& rivals, const std::vector<Effect>& catalogue) {
+  for (const Rival& rival : rivals) {
+    std::vector<std::string> effects;
+    Json parameters = Json::object();
+    for (const RivalCause& cause : rival.causes) {
+      const Effect& effect = *std::ranges::find(catalogue, cause.effect, &Effect::name);
+      const auto add = [&](const auto& parameter, double value) {
+        parameters[effect.name + "." + parameter.name] = {{"estimate", value}, {"unit", parameter.unit}};
+      };
+      for (std::size_t c = 0; c < cause.coefficients.size(); ++c) {
+        add(effect.parameters[c], cause.coefficients[c]);
+      }
+      for (std::size_t s = 0; s < cause.shape.size(); ++s) {
+        add(effect.shapes[s], cause.shape[s]);
+      }
+      effects.push_back(cause.effect);
+    }
+    std::ranges::sort(effects);
+    for (Json& member : result["credible_set"]) {
+      auto own = member["effects"].get<std::vector<std::string>>();
+      std::ranges::sort(own);
+      if (own == effects) {
+        member["parameters"] = parameters;
+      }
+    }
+  }
 }
 
 }  // namespace wheelwright::app

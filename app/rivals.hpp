@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <wheelwright/gap/discrimination.hpp>
+#include <wheelwright/io/json_file.hpp>
 
 namespace wheelwright::app {
 
@@ -23,5 +24,8 @@ namespace wheelwright::app {
 [[nodiscard]] std::vector<Rival> rivals_named(const std::vector<std::string>& names,
                                               const std::vector<std::string>& sizes,
                                               const std::vector<Effect>& catalogue, const Drive& drive);
+
+/// Adds the parameters of `rivals` to the members of the credible set of a gap.json: `design --gap` begins from them.
+void add_rivals(Json& result, const std::vector<Rival>& rivals, const std::vector<Effect>& catalogue);
 
 }  // namespace wheelwright::app

@@ -274,4 +274,21 @@ void add_kinematic(Json& json, const KinematicWatch& watch, const CommissionedMo
                        {"seconds", d.seconds}};
 }
 
+KinematicWatch watch_kinematics(LogSource& log, const CommissionedModel& model, const DetectorOptions& options,
+                                const DetectionOptions& detection) {
+  if (!model.kinematic) {
+    return {std::nullopt, "the log that the model was commissioned on had neither a usable pose nor a gyro"};
+  }
+  std::string missing;
+  for (const std::string& name : model.kinematic->measurement.columns()) {
+    if (!log.find(name)) {
+      missing += (missing.empty() ? "" : ", ") + name;
+    }
+  }
+  if (!missing.empty()) {
+    return {std::nullopt, "the log has no " + missing};
+  }
+  return {detect(log, make_detector(*model.kinematic, options), detection), {}};
+}
+
 }  // namespace wheelwright::app

@@ -25,6 +25,10 @@ struct KinematicWatch {
   std::string message;                 ///< why not, for people
 };
 
+/// The kinematic residual of `log`, where it and the model have one.
+[[nodiscard]] KinematicWatch watch_kinematics(LogSource& log, const CommissionedModel& model,
+                                              const DetectorOptions& options, const DetectionOptions& detection = {});
+
 /// `model` with the outputs of its kinematic model in the place of its own, for summary, event_line, to_json and reports.
 [[nodiscard]] CommissionedModel with_kinematic_outputs(const CommissionedModel& model);
 

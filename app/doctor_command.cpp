@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <memory>
+#include <optional>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include <wheelwright/commission/log_health.hpp>
+#include <wheelwright/io/health_json.hpp>
+#include <wheelwright/io/robot_file.hpp>
+#include <wheelwright/report/health_report.hpp>
+
+#include "commands.hpp"
+#include "common.hpp"
+
+namespace wheelwright::app {
+namespace {
+
+struct Arguments {
+  std::vector<std::filesystem::path> logs;
+  std::filesystem::path robot;
+  std::size_t most_rows = 1000000;
+  bool all = false;
+  CommonOptions common;
+};
+
+constexpr const char* kHelp =
+    "Says what a log lacks before anything is made of it: rates, gaps and clocks, stuck, stale, coarse or limited "
+    "signals, rest, which manoeuvres are missing, and units, signs and sides that do not fit each other. Each finding "
+    "says what to do next.\n\n"
+    "Without a robot file the kind of robot is guessed from the columns, and scales (radius, track, mass) cannot be "
+    "checked.";
+
+constexpr const char* kExamples =
+    "Examples:\n"
+    "  wheelwright doctor drive.csv\n"
+    "  wheelwright doctor drive.csv --robot robot.yaml --out examined    # doctor.json, report.html\n"
+    "  wheelwright doctor drive.csv --robot robot.yaml --all             # also what is as it should be\n\n"
+    "Exit code: 0 the log can be commissioned, 1 it cannot or should not be as it stands, 2 bad input.";
+
+// At most `most` rows of `log`, in memory.
+LogTable first_rows(LogSource& log, std::size_t most) {
+  LogTable table;
+  table.names = log.columns();
+  table.columns.resize(table.names.size());
+  LogBlock block;
+  log.rewind();
+  while (table.rows() < most && log.next(block)) {
+    const std::size_t take = std::min(block.rows(), most - table.rows());
+    for (const std::size_t start : block.segment_starts) {
+      if (start < take) {
+        table.segment_starts.push_back(table.rows() + start);
+      }
+    }
+    for (std::size_t c = 0; c < table.columns.size(); ++c) {
+      table.columns[c].insert(table.columns[c].end(), block.columns[c].begin(),
+                              block.columns[c].begin() + static_cast<std::ptrdiff_t>(take));
+    }
+    table.t.insert(table.t.end(), block.t.begin(), block.t.begin() + static_cast<std::ptrdiff_t>(take));
+  }
+  log.rewind();
+  return table;
+}
+
+std::string stretches(const LogFinding& finding) {
+  if (finding.when.empty()) {
+    return {};
+  }
+  constexpr std::size_t kShown = 4;
+  std::string text = "at t = ";
+  for (std::size_t k = 0; k < std::min(kShown, finding.when.size()); ++k) {
+    text += fmt::format("{}{:.5g} to {:.5g} s", k > 0 ? ", " : "", finding.when[k].lower, finding.when[k].upper);
+  }
+  return finding.stretches > kShown ? text + fmt::format(" and {} more", finding.stretches - kShown) : text;
+}
+
+// `text` in lines of at most `width` bytes, each behind `indent`.
+std::string wrapped(const std::string& text, const std::string& indent, std::size_t width = 100) {
+  std::string out;
+  std::size_t begin = 0;
+  while (begin < text.size()) {
+    std::size_t end = text.size();
+    if (end - begin > width) {
+      end = text.rfind(' ', begin + width);
+      end = end == std::string::npos || end <= begin ? text.find(' ', begin + width) : end;
+      end = std::min(end, text.size());
+    }
+    out += indent + text.substr(begin, end - begin) + "\n";
+    begin = end + 1;
+  }
+  return out;
+}
+
+void tell(const LogHealth& health, bool all) {
+  for (const LogFinding& finding : health.findings) {
+    if (finding.severity == FindingSeverity::fine && !all) {
+      continue;
+    }
+    fmt::print("{}: {}\n{}", to_string(finding.severity), finding.id, wrapped(finding.sentence, "  "));
+    if (const std::string when = stretches(finding); !when.empty()) {
+      fmt::print("{}", wrapped(when, "  "));
+    }
+    if (!finding.next.empty()) {
+      fmt::print("{}", wrapped(finding.next, "  → "));
+    }
+  }
+  const std::size_t fine = health.count(FindingSeverity::fine);
+  if (!all && fine > 0) {
+    fmt::print("{} check{} found nothing to mention (--all shows them)\n", fine, fine == 1 ? "" : "s");
+  }
+  if (!health.assumed.empty()) {
+    fmt::print("{}\n", health.assumed);
+  }
+  fmt::print("{}\n", health.sentence);
+}
+
+int run(const Arguments& a) {
+  make_directory(a.common);
+  const std::optional<Robot> robot = a.robot.empty() ? std::nullopt : std::optional(read_robot(a.robot));
+  LogOptions reader = reader_options(a.common);
+  if (robot) {
+    reader.only = useful_columns(*robot);
+  }
+  const auto opened = open_log(a.logs, reader);
+  RecordedLog& log = *opened;
+  const LogTable table = first_rows(log, a.most_rows);
+  LogHealth health = examine(table, robot, reader_counts(log.report()));
+  if (table.rows() < log.report().rows) {
+    health.findings.push_back(
+        {.id = "time.first_rows_only",
+         .sentence = fmt::format("Only the first {} of {} rows were looked at.", table.rows(), log.report().rows),
+         .next = "--rows N looks at more.",
+         .value = static_cast<double>(table.rows())});
+    health.findings.back().severity = FindingSeverity::notice;
+  }
+  if (!a.common.out.empty() || a.common.json) {
+    HealthFiles files{a.robot.string(), {}, software()};
+    for (const std::filesystem::path& path : a.logs) {
+      files.logs.push_back(path.string());
+    }
+    publish(a.common, to_json(health, files), "doctor.json",
+            health_report(health, report_context(a.common, log.report(), log)));
+  }
+  if (!a.common.quiet && !a.common.json) {
+    print_log(sentences(log.report()));
+    tell(health, a.all);
+    if (!a.common.out.empty()) {
+      fmt::print("wrote {} and {}\n", (a.common.out / "doctor.json").string(), (a.common.out / "report.html").string());
+    }
+  }
+  return health.verdict == LogVerdict::commission ? kDone : kNo;
+}
+
+}  // namespace
+
+Run add_doctor(CLI::App& program) {
+  auto a = std::make_shared<Arguments>();
+  CLI::App& command = *program.add_subcommand("doctor", kHelp);
+  command.add_option("LOG", a->logs, "Logs (CSV also .gz and .zst, rosbag2, HDF5); several are taken together")
+      ->required();
+  command.add_option("--robot", a->robot, "Robot file (YAML): scales of units and its own model are checked too")
+      ->type_name("FILE");
+  command.add_flag("--all", a->all, "Show what is as it should be, too");
+  command.add_option("--rows", a->most_rows, "Look at the first N rows")
+      ->type_name("N")
+      ->check(CLI::Range(std::size_t{1}, std::size_t{1000000000}))
+      ->capture_default_str();
+  add_map(command, a->common);
+  return finish(command, a, kExamples, run);
+}
+
+}  // namespace wheelwright::app

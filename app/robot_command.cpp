@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <memory>
+#include <optional>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include <wheelwright/io/atomic_file.hpp>
+#include <wheelwright/io/robot_file.hpp>
+#include <wheelwright/io/robot_origin.hpp>
+#include <wheelwright/io/ros2_control.hpp>
+#include <wheelwright/io/sdf.hpp>
+#include <wheelwright/io/urdf.hpp>
+
+#include "commands.hpp"
+#include "common.hpp"
+#include "units.hpp"
+
+namespace wheelwright::app {
+namespace {
+
+struct Arguments {
+  std::filesystem::path urdf, sdf, ros2_control, file;
+  std::string controller;
+  RobotHints hints;
+  bool force = false;
+  CommonOptions common;
+};
+
+constexpr const char* kHelp =
+    "Writes a robot file from what a robot already has: its URDF or SDF and the parameters of its ros2_control "
+    "diff_drive_controller. Above each value stands where it came from; what cannot be used is an error that says "
+    "where it "
+    "stands.";
+
+constexpr const char* kExamples =
+    "Examples:\n"
+    "  wheelwright robot --urdf my_robot.urdf --ros2-control controllers.yaml --out-file robot.yaml\n"
+    "  wheelwright robot --sdf model.sdf --left left_wheel_joint --right right_wheel_joint > robot.yaml\n"
+    "  wheelwright robot --urdf my_robot.urdf --wheel-radius 9.75cm --massless camera_link\n\n"
+    "xacro has to be expanded first: xacro my_robot.urdf.xacro > my_robot.urdf.";
+
+RobotWithOrigins made(const Arguments& a) {
+  if (a.urdf.empty() && a.sdf.empty() && a.ros2_control.empty()) {
+    throw InputError("robot: expected at least one of --urdf, --sdf, --ros2-control");
+  }
+  if (!a.urdf.empty() && !a.sdf.empty()) {
+    throw InputError("--urdf and --sdf: two descriptions of one robot: expected one of them");
+  }
+  if (!a.controller.empty() && a.ros2_control.empty()) {
+    throw InputError("--controller: expected --ros2-control FILE with it");
+  }
+  std::optional<RobotTree> tree;
+  if (!a.urdf.empty()) {
+    tree = read_urdf(a.urdf);
+  } else if (!a.sdf.empty()) {
+    tree = read_sdf(a.sdf);
+  }
+  std::optional<DriveFacts> controller;
+  if (!a.ros2_control.empty()) {
+    controller = read_ros2_control(a.ros2_control, a.controller);
+  }
+  return robot_from(tree ? &*tree : nullptr, controller ? &*controller : nullptr, a.hints);
+}
+
+int run(const Arguments& a) {
+  if (!a.file.empty() && !a.common.out.empty()) {
+    throw InputError("--out-file and --out: two places for one file: expected one of them");
+  }
+  const std::filesystem::path target = a.common.out.empty() ? a.file : a.common.out / "robot.yaml";
+  if (!target.empty() && !a.force && std::filesystem::exists(target)) {
+    throw InputError(target.string() + ": is there already: expected a new name, or --force");
+  }
+  const RobotWithOrigins robot = made(a);
+  const std::string text = robot_yaml(robot);
+  static_cast<void>(parse_robot(text, target.empty() ? "the robot file" : target.string()));
+  if (!target.empty()) {
+    make_directory(a.common);
+    atomic_write(target, text);
+  }
+  if (a.common.json) {
+    Json result{{"schema", "wheelwright/robot-file/1"}, {"software", software()}, {"files", robot.files}};
+    result["robot"] = to_json(robot.robot);
+    result["origins"] = robot.origins;
+    result["remarks"] = robot.remarks;
+    fmt::print("{}\n", json_text(result));
+  } else if (target.empty()) {
+    fmt::print("{}", text);
+  } else if (!a.common.quiet) {
+    fmt::print("wrote {}\n", target.string());
+    for (const std::string& remark : robot.remarks) {
+      fmt::print("  {}\n", remark);
+    }
+  }
+  return kDone;
+}
+
+}  // namespace
+
+Run add_robot(CLI::App& program) {
+  auto a = std::make_shared<Arguments>();
+  CLI::App& command = *program.add_subcommand("robot", kHelp);
+  command.add_option("--urdf", a->urdf, "Robot description in URDF: geometry, masses, joints")->type_name("FILE");
+  command.add_option("--sdf", a->sdf, "Robot description in SDF, in place of URDF")->type_name("FILE");
+  command.add_option("--ros2-control", a->ros2_control, "Parameters of a diff_drive_controller (YAML)")
+      ->type_name("FILE");
+  command.add_option("--controller", a->controller, "Name of the controller, where the file has several")
+      ->type_name("NAME");
+  command.add_option("--out-file", a->file, "The robot file to write; without it, standard output")->type_name("FILE");
+  command.add_flag("--force", a->force, "Write over a file that is there");
+  for (const auto& [name, joints, side] :
+       {std::tuple{"--left", &a->hints.left, "left"}, {"--right", &a->hints.right, "right"}}) {
+    command.add_option(name, *joints, fmt::format("Joint of the driven wheel on the {} side", side))
+        ->type_name("JOINT")
+        ->allow_extra_args(false);
+  }
+  command.add_option("--wheel-radius", a->hints.wheel_radius, "Radius of the wheels, before what the files say, m")
+      ->transform(in_unit("m"))
+      ->type_name("LENGTH");
+  command.add_option("--track-width", a->hints.track_width, "Distance of the wheels, before what the files say, m")
+      ->transform(in_unit("m"))
+      ->type_name("LENGTH");
+  command.add_option("--massless", a->hints.massless, "A link that has a shape and no mass (may be repeated)")
+      ->type_name("LINK")
+      ->allow_extra_args(false);
+  command.add_option("--name", a->hints.name, "Name of the robot")->type_name("NAME");
+  const Run added = finish(command, a, kExamples, run);
+  command.get_option("--out")->description("Write robot.yaml into this directory");
+  return added;
+}
+
+}  // namespace wheelwright::app

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+// `wheelwright convert`, as a user runs it: the same log in every format is the same log.
+#include "app/program.hpp"
+
+namespace wheelwright {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+using testing::Outcome;
+
+class Convert : public testing::ProgramTest {
+ protected:
+  static std::string shipped() { return fmt::format("'{}'", (examples() / "healthy.csv.gz").string()); }
+
+  // model.json without what names the files.
+  Json model_of(const std::string& log) {
+    const Outcome done = run("commission " + log + " --robot robot.yaml --json");
+    EXPECT_EQ(done.code, 0) << done.err;
+    Json model = Json::parse(done.out, nullptr, false);
+    model.erase("data");
+    return model;
+  }
+};
+
+TEST_F(Convert, TheModelIsTheSameToTheLastDigitFromEveryFormat) {
+  const Json model = model_of(shipped());
+  ASSERT_TRUE(model.contains("parameters"));
+  for (const std::string to :
+       {"drive.csv.zst", "drive.h5", "none.mcap --compression none", "zstd.mcap --compression zstd",
+        "lz4.mcap --compression lz4", "drive.db3", "recording"}) {
+    const Outcome done = run("convert " + shipped() + " " + to);
+    ASSERT_EQ(done.code, 0) << done.err;
+    EXPECT_THAT(done.out, HasSubstr(": 12001 rows, 120 s in 1 segment"));
+    EXPECT_EQ(model_of(to.substr(0, to.find(' '))), model) << to;
+  }
+  // And back.
+  ASSERT_EQ(run("convert recording back.csv --quiet").code, 0);
+  EXPECT_EQ(testing::lines_of(bytes(path("back.csv"))).size(), 12002U);
+  EXPECT_EQ(model_of("back.csv"), model);
+}
+
+TEST_F(Convert, SaysWhatItRepaired) {
+  std::vector<std::string> lines = healthy_lines();
+  lines.resize(400);
+  lines.insert(lines.begin() + 10, lines[10]);
+  put_lines("drive.csv", lines);
+  const Outcome done = run("convert drive.csv drive.mcap");
+  EXPECT_EQ(done.code, 0) << done.err;
+  EXPECT_THAT(done.out, HasSubstr("1 row dropped: the same time stamp as the row before (first at drive.csv:12)"));
+  const Json json = Json::parse(run("convert drive.csv again.mcap --json").out);
+  EXPECT_EQ(json.at("schema"), "wheelwright/convert/1");
+  EXPECT_EQ(json.at("rows"), 399);
+  EXPECT_EQ(json.at("rows_read"), 400);
+}
+
+TEST_F(Convert, ReplacesNothingUnasked) {
+  put("drive.csv", "mine");
+  const Outcome refused = run("convert " + shipped() + " drive.csv");
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("drive.csv: it is there already: --force replaces it"));
+  EXPECT_EQ(bytes(path("drive.csv")), "mine");
+  EXPECT_EQ(run("convert " + shipped() + " drive.csv --force").code, 0);
+  EXPECT_EQ(run("convert " + shipped()).code, 2);
+}
+
+TEST_F(Convert, DetectWritesItsSeriesForOthersToPlot) {
+  commission_shipped();
+  const Outcome done = run("detect " + shipped() + " --model model/model.json --series residual.mcap");
+  EXPECT_EQ(done.code, 0) << done.err;
+  EXPECT_THAT(done.out, HasSubstr("wrote residual.mcap"));
+  ASSERT_EQ(run("convert residual.mcap nothing.csv").code, 2) << "residuals are no columns of a log";
+  const Outcome table = run("detect " + shipped() + " --model model/model.json --series residual.csv --quiet");
+  EXPECT_EQ(table.code, 0);
+  const std::vector<std::string> lines = testing::lines_of(bytes(path("residual.csv")));
+  EXPECT_THAT(lines.at(0), AllOf(HasSubstr("t,residual_"), HasSubstr(",lower_"), HasSubstr(",alarm_")));
+  EXPECT_GT(lines.size(), 11000U);
+  // A fault-free log stays between its thresholds, row by row.
+  for (std::size_t k = 1; k < lines.size(); ++k) {
+    double t = 0.0, residual = 0.0, lower = 0.0, upper = 0.0;
+    ASSERT_EQ(std::sscanf(lines[k].c_str(), "%lf,%lf,%lf,%lf", &t, &residual, &lower, &upper), 4);
+    ASSERT_LE(lower, residual);
+    ASSERT_LE(residual, upper);
+  }
+}
+
+}  // namespace
+}  // namespace wheelwright

@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: Apache-2.0
+// Help, suggestions, completion and manual pages of every command, and units.
+#include <regex>
+#include <set>
+
+#include "app/program.hpp"
+#include "app/progress.hpp"
+#include "app/units.hpp"
+
+namespace wheelwright {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using testing::lines_of;
+using ::testing::Not;
+using testing::Outcome;
+
+class Manners : public testing::ProgramTest {
+ protected:
+  /// Names of the commands, as the help of the program lists them.
+  std::vector<std::string> commands() const {
+    std::vector<std::string> out;
+    bool listed = false;
+    for (const std::string& line : lines_of(run("--help").out)) {
+      if (listed && line.starts_with("  ") && line[2] != ' ') {
+        out.push_back(line.substr(2, line.find(' ', 2) - 2));
+      }
+      listed = listed || line == "Subcommands:";
+    }
+    return out;
+  }
+
+  /// Long options that the help of `command` lists.
+  std::set<std::string> options(const std::string& command) const {
+    std::set<std::string> out;
+    const std::regex option("^  (?:-[a-zA-Z],)?(--[a-z0-9-]+)");
+    for (const std::string& line : lines_of(run(command + " --help").out)) {
+      if (std::smatch found; std::regex_search(line, found, option)) {
+        out.insert(found[1]);
+      }
+    }
+    return out;
+  }
+
+  /// What bash offers for the words, the last of which is being typed.
+  std::vector<std::string> offered(const std::vector<std::string>& words) const {
+    std::string array;
+    for (const std::string& word : words) {
+      array += " '" + word + "'";
+    }
+    put("ask.sh", fmt::format("source ./completion.bash\nCOMP_WORDS=({})\nCOMP_CWORD={}\n_wheelwright\nprintf '%s\\n' "
+                              "\"${{COMPREPLY[@]}}\"\n",
+                              array, words.size() - 1));
+    EXPECT_EQ(std::system(fmt::format("cd '{}' && bash ask.sh > answer", directory_.string()).c_str()), 0);
+    return lines_of(bytes(path("answer")));
+  }
+};
+
+TEST_F(Manners, EveryCommandHasExamples) {
+  const std::vector<std::string> all = commands();
+  ASSERT_THAT(all, AllOf(Contains("commission"), Contains("robot"), Contains("man")));
+  for (const std::string& command : all) {
+    const std::string help = run(command + " --help").out;
+    std::size_t examples = 0;
+    for (const std::string& line : lines_of(help)) {
+      examples += line.starts_with("  ") && line.find("wheelwright " + command + " ") != std::string::npos ? 1 : 0;
+    }
+    EXPECT_GE(examples, 2u) << help;
+    EXPECT_THAT(help, HasSubstr("Examples:\n"));
+    EXPECT_THAT(help, Not(HasSubstr("->"))) << "an enumeration shows its insides";
+  }
+}
+
+TEST_F(Manners, MisspeltWordsAreUnderstood) {
+  for (const auto& [words, meant] : {std::pair{"comission x.csv", "did you mean 'commission' instead of 'comission'?"},
+                                     {"detect x.csv --modle m.json", "did you mean '--model' instead of '--modle'?"},
+                                     {"detect --qiuet x.csv", "'--quiet'"},
+                                     {"--verison", "'--version'"},
+                                     {"frobnicate", "there is no command 'frobnicate': expected one of commission"},
+                                     {"man dettect", "did you mean 'detect'?"}}) {
+    const Outcome outcome = run(words);
+    EXPECT_EQ(outcome.code, 2) << words;
+    EXPECT_THAT(outcome.out, IsEmpty());
+    EXPECT_THAT(outcome.err, HasSubstr(meant)) << words;
+  }
+  EXPECT_THAT(run("detect x.csv").err, Not(HasSubstr("did you mean")));
+}
+
+TEST_F(Manners, BashOffersWhatTheHelpLists) {
+  put("completion.bash", run("completion bash").out);
+  EXPECT_EQ(std::system(fmt::format("bash -n '{}'", path("completion.bash").string()).c_str()), 0);
+  EXPECT_EQ(offered({"wheelwright", ""}), commands());
+  EXPECT_THAT(offered({"wheelwright", "det"}), ::testing::ElementsAre("detect"));
+  for (const std::string& command : commands()) {
+    std::set<std::string> words;
+    for (const std::string& word : offered({"wheelwright", command, "--"})) {
+      words.insert(word);
+    }
+    EXPECT_EQ(words, options(command)) << command;
+  }
+  EXPECT_THAT(offered({"wheelwright", "design", "--for", "de"}), ::testing::ElementsAre("detection"));
+  EXPECT_THAT(offered({"wheelwright", "completion", ""}), ::testing::ElementsAre("bash", "zsh", "fish"));
+  EXPECT_THAT(offered({"wheelwright", "detect", "--set", ""}), ::testing::UnorderedElementsAre("polytope", "box"));
+  put("a file.json", "{}");
+  EXPECT_THAT(offered({"wheelwright", "detect", "--model", "a"}), Contains("a file.json"));
+  std::filesystem::create_directory(path("a folder"));
+  EXPECT_THAT(offered({"wheelwright", "detect", "--out", "a"}), ::testing::ElementsAre("a folder"));
+}
+
+// Neither shell need be there: the scripts name every option and are well formed where the shells say so.
+TEST_F(Manners, OtherShellsHaveEveryOption) {
+  const std::string zsh = run("completion zsh").out, fish = run("completion fish").out;
+  EXPECT_TRUE(zsh.starts_with("#compdef wheelwright\n"));
+  for (const std::string& command : commands()) {
+    EXPECT_THAT(zsh, HasSubstr("\n      " + command + ")\n"));
+    for (const std::string& option : options(command)) {
+      EXPECT_THAT(zsh, HasSubstr(option + "["));
+      EXPECT_THAT(fish, HasSubstr(fmt::format("'__fish_seen_subcommand_from {}' -l {} ", command, option.substr(2))));
+    }
+  }
+  put("_wheelwright", zsh);
+  put("wheelwright.fish", fish);
+  for (const auto& [shell, file] : {std::pair{"zsh", "_wheelwright"}, {"fish", "wheelwright.fish"}}) {
+    EXPECT_EQ(std::system(fmt::format("cd '{}' && {{ ! command -v {} > /dev/null || {} -n {}; }}", directory_.string(),
+                                      shell, shell, file)
+                              .c_str()),
+              0)
+        << shell;
+  }
+}
+
+TEST_F(Manners, ManualPagesFormatWithoutAWarning) {
+  ASSERT_EQ(run("man --out pages").code, 0);
+  std::vector<std::string> expected = {"wheelwright.1"};
+  for (const std::string& command : commands()) {
+    expected.push_back("wheelwright-" + command + ".1");
+  }
+  EXPECT_THAT(names_in("pages"), ::testing::UnorderedElementsAreArray(expected));
+  for (const std::string& command : commands()) {
+    const std::string page = bytes(path("pages/wheelwright-" + command + ".1"));
+    EXPECT_EQ(page, run("man " + command).out);
+    std::size_t at = 0;
+    for (const std::string section :
+         {".TH ", ".SH NAME", ".SH SYNOPSIS", ".SH DESCRIPTION", ".SH OPTIONS", ".SH EXAMPLES", ".SH SEE ALSO"}) {
+      const std::size_t next = page.find(section);
+      EXPECT_NE(next, std::string::npos) << command << " " << section;
+      at = section == ".SH EXAMPLES" ? at : std::max(at, next);
+      EXPECT_TRUE(section == ".SH EXAMPLES" || next == at) << command << " " << section << " out of order";
+    }
+    for (const char c : page) {
+      ASSERT_LT(static_cast<unsigned char>(c), 0x80) << command << ": roff of its own letters only";
+    }
+  }
+  if (std::system("command -v man > /dev/null") == 0 && std::system("command -v groff > /dev/null") == 0) {
+    const Outcome none;
+    EXPECT_EQ(std::system(fmt::format("cd '{}' && for page in pages/*; do LC_ALL=C.UTF-8 MANROFFOPT= man --warnings -l "
+                                      "$page 2>> warnings > $page.txt || exit 1; done",
+                                      directory_.string())
+                              .c_str()),
+              0);
+    EXPECT_THAT(bytes(path("warnings")), IsEmpty());
+    const std::string detect = bytes(path("pages/wheelwright-detect.1.txt"));
+    for (const std::string& option : options("detect")) {
+      EXPECT_THAT(detect, HasSubstr(option));
+    }
+    EXPECT_THAT(detect, HasSubstr("robot_driver | wheelwright detect --follow"));
+  }
+}
+
+TEST_F(Manners, NoEscapesWhereNobodyWatches) {
+  const std::string log = (examples() / "healthy.csv.gz").string();
+  const Outcome outcome = run("commission '" + log + "' --robot robot.yaml --out model");
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ((outcome.out + outcome.err).find('\033'), std::string::npos);
+}
+
+TEST(Units, AreThoseOfTheQuantity) {
+  using app::quantity;
+  EXPECT_EQ(quantity("120", "s"), 120.0);
+  EXPECT_EQ(quantity("2min", "s"), 120.0);
+  EXPECT_EQ(quantity(" 2 min", "s"), 120.0);
+  EXPECT_EQ(quantity("5 cm", "m"), 0.05);  // the nearest double
+  EXPECT_EQ(quantity("97.5mm", "m"), 0.0975);
+  EXPECT_EQ(quantity("20 Hz", "Hz"), 20.0);
+  EXPECT_EQ(quantity("1 kHz", "Hz"), 1000.0);
+  EXPECT_EQ(quantity("180deg", "rad"), M_PI);
+  EXPECT_DOUBLE_EQ(quantity("60 rpm", "rad/s"), 2.0 * M_PI);
+  for (const char* text : {"3 rad/s²", "3 rad/s^2", "3rad/s2"}) {
+    EXPECT_EQ(quantity(text, "rad/s²"), 3.0) << text;
+  }
+  for (const char* text : {"0.2 N·m", "0.2 N*m", "0.2Nm"}) {
+    EXPECT_EQ(quantity(text, "N·m"), 0.2) << text;
+  }
+  EXPECT_EQ(quantity("3 %", "1"), 0.03);
+  EXPECT_EQ(quantity("4 N·s²/m", "N·s²/m"), 4.0);
+  for (const char* text : {"", "s", "2 parsec", "2 m", "nan", "inf", "1e400", "2min3", "2 M", "--2", "1e308 h"}) {
+    EXPECT_THAT(testing::input_error([&] { static_cast<void>(quantity(text, "s")); }),
+                AllOf(HasSubstr("expected a number in s"), HasSubstr("s, ms, us, min, h")))
+        << text;
+  }
+}
+
+TEST(Progress, SaysWhatIsLeftWhenThatCanBeKnown) {
+  using app::progress_line;
+  EXPECT_EQ(progress_line("fitting", 0.4, 12.0), " 40 %  fitting (12 s, about 18 s left)");
+  EXPECT_EQ(progress_line("fitting", 0.1, 60.0), " 10 %  fitting (1 min, about 9 min left)");
+  EXPECT_EQ(progress_line("fitting", 0.05, 600.0), "  5 %  fitting (10 min, about 3 h 10 min left)");
+  EXPECT_EQ(progress_line("fitting", 0.5, 1.0), " 50 %  fitting (1 s)");     // too early
+  EXPECT_EQ(progress_line("fitting", 0.01, 30.0), "  1 %  fitting (30 s)");  // too little
+  EXPECT_EQ(progress_line("done", 1.0, 30.0), "100 %  done (30 s)");
+}
+
+}  // namespace
+}  // namespace wheelwright
