@@ -1,0 +1,296 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <filesystem>
+#include <mutex>
+#include <optional>
+
+#include <pybind11/stl/filesystem.h>
+#include <nlohmann/json.hpp>
+
+#include <wheelwright/commission/event_isolation.hpp>
+#include <wheelwright/commission/trace.hpp>
+#include <wheelwright/core/check.hpp>
+
+#include "../app/common.hpp"
+#include "../app/summary.hpp"
+#include "arrays.hpp"
+#include "detector_run.hpp"
+#include "long_work.hpp"
+#include "module.hpp"
+
+namespace wheelwright::python {
+namespace {
+
+constexpr double kMerge = 0.5;  // s, as detect()
+
+using Rule = std::optional<std::pair<std::size_t, std::size_t>>;
+
+DetectorOptions options_of(const std::string& set, const std::string& test, const Rule& persistence) {
+  check::that(set == "polytope" || set == "box", "set '" + set + "'", "polytope or box");
+  check::that(test == "two_sided" || test == "symmetric", "test '" + test + "'", "two_sided or symmetric");
+  DetectorOptions options;
+  options.set = set == "box" ? ParameterSetKind::box : ParameterSetKind::polytope;
+  options.test = test == "symmetric" ? Test::symmetric : Test::two_sided;
+  if (persistence) {
+    options.persistence = Persistence{persistence->first, persistence->second};
+  }
+  return options;
+}
+
+// An event with the name of its channel.
+struct EventObject {
+  Event event;
+  std::string output;
+};
+
+std::vector<EventObject> named(const std::vector<Event>& events, const std::vector<std::string>& outputs) {
+  std::vector<EventObject> out;
+  for (const Event& event : events) {
+    out.push_back({event, outputs[event.output]});
+  }
+  return out;
+}
+
+struct RunObject {
+  DetectorRun run;
+  std::vector<std::string> outputs;
+};
+
+struct DetectorObject {
+  ModelObject model;
+  Detector detector;
+};
+
+// Fields of the last decision, as a robot would read them.
+struct DecisionObject {
+  bool fault = false;
+  std::vector<double> residual, predicted, lower, upper, rho;
+  std::vector<std::uint8_t> outside, alarm;
+};
+
+py::array flags(const std::vector<std::uint8_t>& v, std::vector<py::ssize_t> shape, py::handle owner) {
+  static_assert(sizeof(bool) == sizeof(std::uint8_t));
+  return view(reinterpret_cast<const bool*>(v.data()), std::move(shape), owner);
+}
+
+py::object step(DetectorObject& d, double t, const Doubles& sample) {
+  const auto columns = static_cast<py::ssize_t>(d.detector.filter().measurement().columns().size());
+  const Decision& decision = d.detector.step(t, values(sample, "sample", columns));
+  if (!decision.valid) {
+    return py::none();
+  }
+  DecisionObject out;
+  out.fault = decision.fault;
+  for (const ChannelDecision& c : decision.channels) {
+    out.residual.push_back(c.residual);
+    out.predicted.push_back(c.predicted);
+    out.lower.push_back(c.threshold.lower);
+    out.upper.push_back(c.threshold.upper);
+    out.rho.push_back(c.threshold.rho());
+    out.outside.push_back(c.outside ? 1 : 0);
+    out.alarm.push_back(c.alarm ? 1 : 0);
+  }
+  return py::cast(std::move(out));
+}
+
+RunObject run(const DetectorObject& d, LogObject& log, py::object progress) {
+  LongWork work(std::move(progress));
+  Detector detector = d.detector;  // the stream of step() goes on where it was
+  return work.run([&] {
+    const LogWalk walk(log);
+    WatchedLog source(*log.source, work);
+    return RunObject{run_detector(source, detector, kMerge), d.model.model->model.outputs};
+  });
+}
+
+struct DetectionObject {
+  ModelObject model;
+  std::string log;
+  Detection detection;
+  app::KinematicWatch kinematic;
+  std::vector<Isolation> isolations;
+
+  [[nodiscard]] bool fault() const {
+    return !detection.events.empty() || (kinematic.detection && !kinematic.detection->events.empty());
+  }
+  [[nodiscard]] Json json() const {
+    Json json = app::to_json(detection, *model.model, model.path, log);
+    app::add_isolation(json, isolations);
+    app::add_kinematic(json, kinematic, *model.model);
+    return json;
+  }
+  [[nodiscard]] std::string summary() const {
+    return app::summary(detection, *model.model) + app::summary(isolations, detection) +
+           app::summary(kinematic, *model.model);
+  }
+};
+
+DetectionObject detect_in(LogObject& log, const ModelObject& given, const std::string& set, const std::string& test,
+                          const Rule& persistence, std::size_t threads, py::object progress) {
+  LongWork work(std::move(progress));
+  const DetectorOptions options = options_of(set, test, persistence);
+  return work.run([&] {
+    auto model = std::make_shared<CommissionedModel>(*given.model);
+    model->persistence = options.persistence.value_or(model->persistence);
+    if (model->kinematic) {
+      model->kinematic->persistence = options.persistence.value_or(model->kinematic->persistence);
+    }
+    DetectorOptions own = options;
+    own.persistence.reset();
+    const LogWalk walk(log);
+    require_columns(*log.source, model->measurement.columns());
+    WatchedLog source(*log.source, work);
+    DetectionObject out{{model, given.path}, log.name(), {}, {}, {}};
+    const auto tell = work.teller();
+    tell("the torque residual", 0.0);
+    out.detection = detect(source, make_detector(*model, own));
+    tell("the kinematic residual", 0.4);
+    out.kinematic = app::watch_kinematics(source, *model, own);
+    tell("what the events can be", 0.8);
+    EventIsolationOptions isolation;
+    isolation.isolation.threads = threads;
+    out.isolations = isolate_events(source, *model, out.detection, isolation);
+    tell("done", 1.0);
+    return out;
+  });
+}
+
+void bind_event(py::module_& m) {
+  py::class_<EventObject>(m, "Event", "One fault event in one channel. Times in s.")
+      .def_property_readonly("output", [](const EventObject& e) { return e.output; })
+      .def_property_readonly(
+          "start", [](const EventObject& e) { return e.event.start; }, "first instant outside the threshold")
+      .def_property_readonly(
+          "alarm", [](const EventObject& e) { return e.event.alarm; }, "when the persistence rule was satisfied")
+      .def_property_readonly(
+          "end", [](const EventObject& e) { return e.event.end; }, "last instant outside")
+      .def_property_readonly("peak_time", [](const EventObject& e) { return e.event.peak_time; })
+      .def_property_readonly(
+          "peak_residual", [](const EventObject& e) { return e.event.peak_residual; }, "unit of the output")
+      .def_property_readonly(
+          "peak_ratio", [](const EventObject& e) { return e.event.peak_ratio; },
+          "distance from the middle of [l, u] over half its width, > 1")
+      .def_property_readonly("instants", [](const EventObject& e) { return e.event.instants; })
+      .def_property_readonly(
+          "start_row", [](const EventObject& e) { return e.event.start_sample; }, "row of the log")
+      .def("__repr__", [](const EventObject& e) {
+        return "<wheelwright.Event in " + e.output + " at " + std::to_string(e.event.alarm) + " s>";
+      });
+}
+
+void bind_decision(py::module_& m) {
+  const auto numbers = [](auto member) {
+    return [member](const py::object& self) { return view(self.cast<const DecisionObject&>().*member, self); };
+  };
+  const auto truths = [](auto member) {
+    return [member](const py::object& self) {
+      const auto& v = self.cast<const DecisionObject&>().*member;
+      return flags(v, {static_cast<py::ssize_t>(v.size())}, self);
+    };
+  };
+  py::class_<DecisionObject>(m, "Decision", "The decision at one instant; arrays of shape (n,), read-only.")
+      .def_readonly("fault", &DecisionObject::fault, "an alarm stands in some channel")
+      .def_property_readonly("residual", numbers(&DecisionObject::residual), "(29)")
+      .def_property_readonly("predicted", numbers(&DecisionObject::predicted), "Y_f theta (30)")
+      .def_property_readonly("lower", numbers(&DecisionObject::lower), "l <= residual without a fault")
+      .def_property_readonly("upper", numbers(&DecisionObject::upper), "residual <= u without a fault")
+      .def_property_readonly("rho", numbers(&DecisionObject::rho), "max(u, -l) (34)")
+      .def_property_readonly("outside", truths(&DecisionObject::outside))
+      .def_property_readonly("alarm", truths(&DecisionObject::alarm));
+}
+
+void bind_run(py::module_& m) {
+  const auto numbers = [](auto member) {
+    return [member](const py::object& self) {
+      const auto& o = self.cast<const RunObject&>();
+      return view((o.run.*member).data(),
+                  {static_cast<py::ssize_t>(o.run.t.size()), static_cast<py::ssize_t>(o.run.outputs)}, self);
+    };
+  };
+  const auto truths = [](auto member) {
+    return [member](const py::object& self) {
+      const auto& o = self.cast<const RunObject&>();
+      return flags(o.run.*member, {static_cast<py::ssize_t>(o.run.t.size()), static_cast<py::ssize_t>(o.run.outputs)},
+                   self);
+    };
+  };
+  py::class_<RunObject>(m, "DetectorRun",
+                        "Every decision over a log: K instants, n outputs. Arrays are read-only views of shape (K, n) "
+                        "where nothing else is said.")
+      .def_property_readonly(
+          "t", [](const py::object& self) { return view(self.cast<const RunObject&>().run.t, self); }, "s, shape (K,)")
+      .def_property_readonly(
+          "row",
+          [](const py::object& self) {
+            const auto& rows = self.cast<const RunObject&>().run.row;
+            return view(rows.data(), {static_cast<py::ssize_t>(rows.size())}, self);
+          },
+          "rows of the log, shape (K,)")
+      .def_readonly("outputs", &RunObject::outputs, "names of the n channels")
+      .def_property_readonly("residual", numbers(&DetectorRun::residual), "(29)")
+      .def_property_readonly("predicted", numbers(&DetectorRun::predicted), "Y_f theta (30)")
+      .def_property_readonly("lower", numbers(&DetectorRun::lower), "l <= residual without a fault")
+      .def_property_readonly("upper", numbers(&DetectorRun::upper), "residual <= u without a fault")
+      .def_property_readonly("outside", truths(&DetectorRun::outside))
+      .def_property_readonly("alarm", truths(&DetectorRun::alarm))
+      .def_property_readonly(
+          "fault", [](const RunObject& o) { return !o.run.events.empty(); }, "whether there is an event")
+      .def_property_readonly("events", [](const RunObject& o) { return named(o.run.events, o.outputs); })
+      .def("__len__", [](const RunObject& o) { return o.run.t.size(); });
+}
+
+}  // namespace
+
+void bind_detector(py::module_& m) {
+  bind_event(m);
+  bind_decision(m);
+  bind_run(m);
+  py::class_<DetectorObject>(m, "Detector",
+                             "Filter, threshold and decision of the paper's section V. step() has a memory and serves "
+                             "one thread at a time; run() has none.")
+      .def(py::init(
+               [](const ModelObject& model, const std::string& set, const std::string& test, const Rule& persistence) {
+                 return DetectorObject{model, make_detector(*model.model, options_of(set, test, persistence))};
+               }),
+           py::arg("model"), py::kw_only(), py::arg("set") = "polytope", py::arg("test") = "two_sided",
+           py::arg("persistence") = std::nullopt,
+           "set: polytope (the feasible set itself) or box. test: two_sided (l <= residual <= u) or symmetric "
+           "(|residual| <= rho, the paper's (35)). persistence: (k, n), an alarm is k of the last n instants outside; "
+           "by default the model's.")
+      .def_property_readonly(
+          "columns", [](const DetectorObject& d) { return d.detector.filter().measurement().columns(); },
+          "columns of a sample, in the order of step()")
+      .def("step", &step, py::arg("t"), py::arg("sample"),
+           "Takes the sample at time t (s), shape (columns,), and decides; None until the filter has settled. A gap of "
+           "more than five nominal steps, or a time that does not increase, restarts the filter.")
+      .def(
+          "restart", [](DetectorObject& d) { d.detector.restart(); }, "Forgets all samples: for a gap in the data.")
+      .def("run", &run, py::arg("log"), py::kw_only(), py::arg("progress") = py::none(),
+           "All decisions over a log, from a fresh start. The interpreter's lock is released.");
+  py::class_<DetectionObject>(m, "Detection", "What `wheelwright detect` says of a log: both residuals, and isolation.")
+      .def_property_readonly("fault", &DetectionObject::fault)
+      .def_property_readonly(
+          "events", [](const DetectionObject& d) { return named(d.detection.events, d.model.model->model.outputs); },
+          "of the torque residual")
+      .def_property_readonly(
+          "kinematic_events",
+          [](const DetectionObject& d) {
+            return d.kinematic.detection
+                       ? named(d.kinematic.detection->events, app::with_kinematic_outputs(*d.model.model).model.outputs)
+                       : std::vector<EventObject>{};
+          },
+          "of wheel odometry against pose or gyro")
+      .def_property_readonly("summary", &DetectionObject::summary)
+      .def(
+          "to_dict", [](const DetectionObject& d) { return to_python(d.json()); },
+          "The content of detection.json (io/detection.schema.json).")
+      .def(
+          "save", [](const DetectionObject& d, const std::filesystem::path& path) { write_json(path, d.json()); },
+          py::arg("path"), "Writes detection.json, whole or not at all.");
+  m.def("detect", &detect_in, py::arg("log"), py::arg("model"), py::kw_only(), py::arg("set") = "polytope",
+        py::arg("test") = "two_sided", py::arg("persistence") = std::nullopt, py::arg("threads") = 1,
+        py::arg("progress") = py::none(),
+        "Looks for faults in a log with a commissioned model, as `wheelwright detect` does.\n\n"
+        "The interpreter's lock is released; Ctrl-C ends the work. Raises InputError where the log lacks a column.");
+}
+
+}  // namespace wheelwright::python

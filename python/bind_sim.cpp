@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <array>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <variant>
+
+#include <pybind11/stl/filesystem.h>
+#include <nlohmann/json.hpp>
+
+#include <wheelwright/core/check.hpp>
+#include <wheelwright/design/detection.hpp>
+#include <wheelwright/design/manoeuvre.hpp>
+#include <wheelwright/design/stages.hpp>
+#include <wheelwright/io/scenario_file.hpp>
+#include <wheelwright/sim/simulation.hpp>
+
+#include "../app/common.hpp"
+#include "../app/design_result.hpp"
+#include "array_log.hpp"
+#include "arrays.hpp"
+#include "long_work.hpp"
+#include "module.hpp"
+
+namespace wheelwright::python {
+namespace {
+
+using Path = std::filesystem::path;
+
+std::unique_ptr<LogObject> simulated(const std::variant<Path, py::dict>& given,
+                                     const std::optional<std::uint64_t>& seed) {
+  Scenario scenario = std::holds_alternative<Path>(given)
+                          ? read_scenario(std::get<Path>(given))
+                          : parse_scenario(json_text(to_json(std::get<py::dict>(given), "scenario")), "scenario", ".");
+  scenario.seed = seed.value_or(scenario.seed);
+  LongWork work{py::none()};
+  const LogTable table = work.run([&] {
+    Simulation simulation(scenario);
+    WatchedLog source(simulation, work);
+    return read_all(source);
+  });
+  CsvOptions options;
+  options.min_rows = 1;
+  auto log = std::make_unique<LogObject>();
+  log->source = array_log(arrays_of(table), options);
+  return log;
+}
+
+struct DesignObject {
+  LogTable commands;
+  std::optional<LogTable> figure_eight;
+  Json json;
+  std::string summary;
+};
+
+MotionLimits limits_for(const Robot& robot, double duration, const std::optional<double>& speed,
+                        const std::optional<double>& acceleration, const std::optional<double>& effort,
+                        const std::optional<double>& radius, const std::optional<std::array<double, 4>>& box) {
+  MotionLimits limits = limits_of(robot);
+  limits.duration = duration;
+  limits.joint_speed = speed.value_or(limits.joint_speed);
+  limits.joint_acceleration = acceleration ? acceleration : limits.joint_acceleration;
+  limits.effort = effort ? effort : limits.effort;
+  limits.radius = radius;
+  if (box) {
+    limits.box = {Interval{(*box)[0], (*box)[1]}, Interval{(*box)[2], (*box)[3]}};
+  }
+  validate(limits);
+  return limits;
+}
+
+WidthCriterion criterion_called(const std::string& name) {
+  check::that(name == "geometric_mean" || name == "mean" || name == "largest", "criterion '" + name + "'",
+              "geometric_mean, mean or largest");
+  return name == "mean"      ? WidthCriterion::mean
+         : name == "largest" ? WidthCriterion::largest
+                             : WidthCriterion::geometric_mean;
+}
+
+std::vector<InspectedFault> inspected(const std::map<std::string, double>& faults, const CommissionedModel& model) {
+  if (faults.empty()) {
+    return usual_inspection(model);
+  }
+  const std::vector<FaultType> catalogue = fault_catalogue(model.model, model.estimate, model.robot.effort);
+  std::vector<InspectedFault> out;
+  for (const auto& [name, size] : faults) {
+    out.push_back({find_fault(catalogue, name), check::positive(size, "faults['" + name + "']")});
+  }
+  return out;
+}
+
+std::unique_ptr<DesignObject> design(const std::variant<const ModelObject*, const RobotObject*>& of,
+                                     const std::string& aim, double duration, const std::optional<double>& speed,
+                                     const std::optional<double>& acceleration, const std::optional<double>& effort,
+                                     const std::optional<double>& radius,
+                                     const std::optional<std::array<double, 4>>& box, double rate,
+                                     const std::string& criterion, const std::map<std::string, double>& faults,
+                                     std::size_t stages, std::uint64_t seed, std::size_t threads, py::object progress) {
+  check::that(aim == "bounds" || aim == "detection", "aim '" + aim + "'", "bounds or detection");
+  const bool from_model = std::holds_alternative<const ModelObject*>(of);
+  check::that(aim == "bounds" || from_model, "aim 'detection'", "a commissioned Model, not a Robot");
+  check::positive(rate, "rate");
+  const Robot& robot = from_model ? std::get<0>(of)->model->robot : std::get<1>(of)->robot;
+  const MotionLimits limits = limits_for(robot, duration, speed, acceleration, effort, radius, box);
+  const WidthCriterion wanted = criterion_called(criterion);
+  LongWork work(std::move(progress));
+  DesignOptions options;
+  options.stages = stages;
+  options.seed = seed;
+  options.threads = threads;
+  options.progress = work.teller();
+  return work.run([&] {
+    const DesignSubject subject = from_model ? subject_of(*std::get<0>(of)->model) : subject_of(robot, 1.0 / rate);
+    auto out = std::make_unique<DesignObject>();
+    const auto finish = [&](const auto& made) {
+      out->json["software"] = app::software();
+      out->json["seed"] = seed;
+      out->commands = command_table(made.manoeuvre.plan, subject.model);
+      if (made.figure_eight_plan) {
+        out->figure_eight = command_table(*made.figure_eight_plan, subject.model);
+      }
+    };
+    if (aim == "detection") {
+      // As the command line: an evaluation walks the plan once for each fault.
+      options.samples = 150;
+      options.descents = 3;
+      options.steps = 250;
+      const CommissionedModel& model = *std::get<0>(of)->model;
+      const DetectionDesign made = design_for_detection(model, subject, limits, inspected(faults, model), options);
+      out->json = app::to_json(made, limits);
+      out->summary = app::summary(made);
+      finish(made);
+    } else {
+      const BoundsDesign made = design_for_bounds(subject, limits, wanted, options);
+      out->json = app::to_json(made, subject, limits);
+      out->summary = app::summary(made, subject);
+      finish(made);
+    }
+    return out;
+  });
+}
+
+}  // namespace
+
+void bind_sim(py::module_& m) {
+  m.def("simulate", &simulated, py::arg("scenario"), py::arg("seed") = std::nullopt,
+        "Drives the paper's robot as a scenario file (or a dict with its keys) says, and returns what its sensors "
+        "would log. seed: of all noise, in place of the scenario's.\n\n"
+        "Raises InputError, naming file, line and key. The interpreter's lock is released; Ctrl-C ends the work.");
+  py::class_<DesignObject>(m, "Design", "A manoeuvre, and what it promises.")
+      .def_property_readonly(
+          "commands", [](const DesignObject& d) { return arrays_of(d.commands); },
+          "t (s), wheel-speed commands command_r, command_l (rad/s), and the motion that they are for; read-only, "
+          "shape (rows,) each")
+      .def_property_readonly(
+          "figure_eight",
+          [](const DesignObject& d) {
+            return d.figure_eight ? std::optional<py::dict>(arrays_of(*d.figure_eight)) : std::nullopt;
+          },
+          "the best figure eight within the same limits; None for other than differential drives")
+      .def_readonly("summary", &DesignObject::summary)
+      .def(
+          "to_dict", [](const DesignObject& d) { return to_python(d.json); }, "The content of design.json.")
+      .def(
+          "save", [](const DesignObject& d, const Path& path) { write_json(path, d.json); }, py::arg("path"),
+          "Writes design.json, whole or not at all.");
+  m.def("design", &design, py::arg("of"), py::arg("aim") = "bounds", py::kw_only(), py::arg("duration") = 20.0,
+        py::arg("speed") = std::nullopt, py::arg("acceleration") = std::nullopt, py::arg("effort") = std::nullopt,
+        py::arg("radius") = std::nullopt, py::arg("box") = std::nullopt, py::arg("rate") = 100.0,
+        py::arg("criterion") = "geometric_mean", py::arg("faults") = std::map<std::string, double>{},
+        py::arg("stages") = DesignOptions{}.stages, py::arg("seed") = 1, py::arg("threads") = 1,
+        py::arg("progress") = py::none(),
+        "Designs a drive for a Model (or, for bounds, a Robot with nominal values and declared noise), as "
+        "`wheelwright design` does.\n\n"
+        "aim: bounds (narrow bounds on theta) or detection (certain to find faults that are small). duration: s. speed "
+        "(rad/s), acceleration (rad/s^2), effort (N m): of a wheel; those of the robot file where they are not given. "
+        "radius: m about the start; box: (xmin, xmax, ymin, ymax), m. rate: of the log to come, Hz, for a Robot. "
+        "criterion: geometric_mean, mean or largest. faults: name -> size asked for. The result does not depend on "
+        "`threads`. The interpreter's lock is released; Ctrl-C ends the work.");
+}
+
+}  // namespace wheelwright::python

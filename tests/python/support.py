@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the tests of the Python package share. ctest says where the program and the sources are."""
+
+import functools
+import json
+import os
+import subprocess
+import tempfile
+from pathlib import Path
+
+import wheelwright as ww
+
+SOURCE = Path(os.environ["WHEELWRIGHT_SOURCE_DIR"])
+PROGRAM = os.environ["WHEELWRIGHT_PROGRAM"]
+ROBOT = SOURCE / "examples" / "robot.yaml"
+HEALTHY = SOURCE / "examples" / "healthy.csv.gz"
+SCENARIOS = SOURCE / "examples" / "scenarios"
+
+
+def program(*arguments):
+    """What `wheelwright ARGUMENTS --json` prints, as Python reads it."""
+    command = [PROGRAM, *map(str, arguments), "--json"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=600)
+    if done.returncode > 1:
+        raise AssertionError(f"{' '.join(command)}: {done.stderr}")
+    return json.loads(done.stdout)
+
+
+@functools.lru_cache(maxsize=None)
+def robot():
+    return ww.read_robot(ROBOT)
+
+
+def healthy_log():
+    return ww.read_log(HEALTHY, robot())
+
+
+@functools.lru_cache(maxsize=None)
+def commissioned():
+    return ww.commission(healthy_log(), robot())
+
+
+@functools.lru_cache(maxsize=None)
+def scratch():
+    """A directory that goes with the process."""
+    return tempfile.TemporaryDirectory()
+
+
+def path(name):
+    return Path(scratch().name) / name
+
+
+@functools.lru_cache(maxsize=None)
+def model_file():
+    """model.json of the shipped log, written by Python."""
+    commissioned().save(path("model.json"))
+    return path("model.json")
+
+
+@functools.lru_cache(maxsize=None)
+def fault_file():
+    """A drive of 30 s in which a tyre loses radius after 15 s."""
+    scenario = SCENARIOS / "fault.yaml"
+    text = scenario.read_text().replace("../robot.yaml", str(ROBOT)).replace("onset: 30", "onset: 15")
+    short = path("fault.yaml")
+    short.write_text(text.replace("duration: 60", "duration: 30"))
+    ww.simulate(short).save(path("fault.csv"))
+    return path("fault.csv")
+
+
+def different(a, b, where=""):
+    """The first place in which two results differ, or None. Numbers must agree to the last bit."""
+    if type(a) is not type(b):
+        return f"{where}: {a!r} and {b!r}"
+    if isinstance(a, dict):
+        if list(a) != list(b):
+            return f"{where}: keys {list(a)} and {list(b)}"
+        return next((d for k in a if (d := different(a[k], b[k], f"{where}/{k}"))), None)
+    if isinstance(a, list):
+        if len(a) != len(b):
+            return f"{where}: {len(a)} and {len(b)} entries"
+        return next((d for i, (x, y) in enumerate(zip(a, b)) if (d := different(x, y, f"{where}/{i}"))), None)
+    return None if a == b else f"{where}: {a!r} and {b!r}"

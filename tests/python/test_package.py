@@ -1,0 +1,179 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The package as a package: its types, its wheel."""
+
+import ast
+import base64
+import contextlib
+import csv
+import hashlib
+import importlib.util
+import inspect
+import io
+import os
+import re
+import shutil
+import subprocess
+import sys
+import textwrap
+import unittest
+import zipfile
+from pathlib import Path
+
+import wheelwright as ww
+import wheelwright._core as core
+from support import HEALTHY, ROBOT, SOURCE, fault_file, path
+
+PACKAGE = Path(ww.__file__).parent
+
+
+def run(*command, **environment):
+    return subprocess.run([sys.executable, *map(str, command)], capture_output=True, text=True, timeout=300,
+                          env={**os.environ, **environment})
+
+
+def arguments_of(thing):
+    """Names of the arguments in a signature as pybind11 writes it, '*' among them; with '=' where there is a default."""
+    text = thing.__doc__.split("\n")[0]
+    text = text[text.index("(") + 1:text.rindex(") -> ")]
+    parts, depth = [""], 0
+    for c in text:
+        depth += (c in "([{<") - (c in ")]}>")
+        if c == "," and depth == 0:
+            parts.append("")
+        else:
+            parts[-1] += c
+    names = []
+    for part in (part.strip() for part in parts):
+        name = part.split(":")[0].strip()
+        names.append(name + ("=" if re.search(r" = [^=]*$", part) else ""))
+    return [name for name in names if name and name != "self"]
+
+
+def arguments_in_stub(function):
+    a = function.args
+    plain = [argument.arg for argument in a.args if argument.arg != "self"]
+    first_default = len(plain) - len(a.defaults)
+    names = [name + ("=" if i >= first_default else "") for i, name in enumerate(plain)]
+    if a.kwonlyargs:
+        names.append("*")
+        names += [k.arg + ("=" if d is not None else "") for k, d in zip(a.kwonlyargs, a.kw_defaults)]
+    if a.kwarg:
+        names.append("**" + a.kwarg.arg)
+    return names
+
+
+class Types(unittest.TestCase):
+    def test_the_stub_has_what_the_module_has(self):
+        stub = ast.parse((PACKAGE / "_core.pyi").read_text())
+        here = {node.name: node for node in stub.body if isinstance(node, (ast.FunctionDef, ast.ClassDef))
+                and not node.name.startswith("_")}
+        self.assertEqual(set(here) | {"software"}, {name for name in dir(core) if not name.startswith("_")})
+        for name, node in here.items():
+            thing = getattr(core, name)
+            if isinstance(node, ast.FunctionDef):
+                self.assertEqual(arguments_in_stub(node), arguments_of(thing), name)
+            elif not issubclass(thing, Exception):
+                self.same_members(name, node, thing)
+
+    def same_members(self, name, node, thing):
+        members = {each.name: each for each in node.body if isinstance(each, ast.FunctionDef)}
+        public = {key for key, value in vars(thing).items() if not key.startswith("_")}
+        self.assertEqual({key for key in members if not key.startswith("_")}, public, name)
+        for key, each in members.items():
+            is_property = any(isinstance(d, ast.Name) and d.id == "property" for d in each.decorator_list)
+            value = vars(thing)[key]
+            self.assertEqual(is_property, isinstance(value, property), f"{name}.{key}")
+            if not is_property:
+                self.assertEqual(arguments_in_stub(each), arguments_of(value), f"{name}.{key}")
+
+    def mypy(self, *arguments):
+        if importlib.util.find_spec("mypy") is None:
+            self.skipTest("mypy is not installed")
+        return run(*arguments, MYPYPATH=str(PACKAGE.parent), MYPY_CACHE_DIR=str(path("mypy")))
+
+    def test_the_example_is_strictly_typed(self):
+        # matplotlib 3.6 has no types.
+        path("mypy.ini").write_text("[mypy]\nstrict = True\n[mypy-matplotlib.*]\nignore_missing_imports = True\n")
+        done = self.mypy("-m", "mypy", "--config-file", path("mypy.ini"), SOURCE / "examples" / "commission_a_bag.py")
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+
+    def test_wrong_use_is_found(self):
+        path("wrong.py").write_text("import wheelwright as ww\n"
+                                    "log = ww.read_log('a.csv')\n"
+                                    "ww.commission(log, 'robot.yaml')\n"
+                                    "ww.Detector(ww.read_model('m.json'), set='polygon')\n")
+        done = self.mypy("-m", "mypy", "--strict", path("wrong.py"))
+        self.assertIn("wrong.py:3:", done.stdout)
+        self.assertIn("wrong.py:4:", done.stdout)
+
+    def test_everything_public_says_what_it_is(self):
+        for name in ww.__all__:
+            thing = getattr(ww, name)
+            self.assertTrue(inspect.getdoc(thing), name)
+
+
+class Page(unittest.TestCase):
+    def test_its_first_example_runs(self):
+        page = (SOURCE / "docs" / "python.md").read_text()
+        code = re.search(r"((?:^ {4}.*\n|^\n)+)", page[page.index("    import numpy"):], re.M).group(1)
+        # As it stands there it takes ten seconds.
+        for quick, options in (("baseline=log", "shrink=False, manoeuvre=False"), ("radius=1.5", "stages=1, duration=6.0")):
+            self.assertIn(quick, code)
+            code = code.replace(quick, f"{quick}, {options}")
+        place = path("page")
+        place.mkdir()
+        for name, source in (("robot.yaml", ROBOT), ("monday.csv.gz", HEALTHY), ("today.csv", fault_file())):
+            shutil.copy(source, place / name)
+        names = {}
+        before = os.getcwd()
+        os.chdir(place)
+        try:
+            with contextlib.redirect_stdout(io.StringIO()):
+                exec(textwrap.dedent(code), names)
+        finally:
+            os.chdir(before)
+        self.assertTrue(names["run"].fault and names["found"].fault)
+        self.assertTrue((place / "model.json").exists())
+        self.assertIn("command_r", names["plan"])
+
+
+class Wheel(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        done = run(SOURCE / "python" / "make_wheel.py", PACKAGE, "--version", ww.__version__, "--license",
+                   SOURCE / "LICENSE", "--out", path("dist"))
+        assert done.returncode == 0, done.stderr
+        cls.wheel = Path(done.stdout.strip())
+
+    def test_its_record_is_right(self):
+        with zipfile.ZipFile(self.wheel) as archive:
+            self.assertIsNone(archive.testzip())
+            names = archive.namelist()
+            record = next(name for name in names if name.endswith(".dist-info/RECORD"))
+            rows = {row[0]: row[1:] for row in csv.reader(io.StringIO(archive.read(record).decode()))}
+            self.assertEqual(sorted(rows), sorted(names))
+            for name, (digest, size) in rows.items():
+                if name != record:
+                    content = archive.read(name)
+                    self.assertEqual(int(size), len(content))
+                    expected = base64.urlsafe_b64encode(hashlib.sha256(content).digest()).rstrip(b"=").decode()
+                    self.assertEqual(digest, "sha256=" + expected)
+            self.assertIn("wheelwright/py.typed", names)
+            self.assertIn("wheelwright/_core.pyi", names)
+
+    def test_it_works_where_it_is_installed(self):
+        place = path("site")
+        if importlib.util.find_spec("pip") is not None:
+            done = run("-m", "pip", "install", "--no-index", "--no-deps", "--quiet", "--disable-pip-version-check",
+                       "--root-user-action=ignore", "--target", place, self.wheel)
+            self.assertEqual(done.returncode, 0, done.stderr)
+        else:
+            zipfile.ZipFile(self.wheel).extractall(place)
+        done = run("-c", f"import wheelwright as ww; print(ww.__file__, ww.read_robot({str(ROBOT)!r}).name)",
+                   PYTHONPATH=str(place))
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(done.stdout.split(), [str(place / "wheelwright" / "__init__.py"), "example"])
+
+
+if __name__ == "__main__":
+    unittest.main()
