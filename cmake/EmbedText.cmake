@@ -7,8 +7,8 @@
 #
 # wheelwright_find_uplot(JS CSS)
 #
-# Sets JS and CSS to the paths of uPlot's script and style sheet as npm installed them; the configuration fails where
-# they are missing.
+# Sets JS and CSS to the paths of uPlot's script and style sheet, from what npm installed; the configuration fails where
+# that is missing. The script has uPlot's licence in front, which asks to be in every copy.
 #
 #   include(EmbedText)
 #   wheelwright_find_uplot(uplot_js uplot_css)
@@ -67,11 +67,24 @@ endfunction()
 
 function(wheelwright_find_uplot js css)
   set(dist ${PROJECT_SOURCE_DIR}/node_modules/uplot/dist)
-  foreach(file uPlot.iife.min.js uPlot.min.css)
-    if(NOT EXISTS ${dist}/${file})
-      message(FATAL_ERROR "node_modules/uplot/dist/${file} is missing: run tools/setup.sh, which brings in uPlot")
+  set(licence ${dist}/../LICENSE)
+  foreach(file ${dist}/uPlot.iife.min.js ${dist}/uPlot.min.css ${licence})
+    if(NOT EXISTS ${file})
+      message(FATAL_ERROR "${file} is missing: run tools/setup.sh, which brings in uPlot")
     endif()
   endforeach()
-  set(${js} ${dist}/uPlot.iife.min.js PARENT_SCOPE)
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${dist}/uPlot.iife.min.js ${licence})
+  file(READ ${licence} notice)
+  file(READ ${dist}/uPlot.iife.min.js script)
+  set(licensed ${CMAKE_CURRENT_BINARY_DIR}/embedded/uPlot.js)
+  set(text "/*! uPlot, script and style sheet:\n\n${notice}\n*/\n${script}")
+  set(before "")
+  if(EXISTS ${licensed})
+    file(READ ${licensed} before)
+  endif()
+  if(NOT text STREQUAL before)
+    file(WRITE ${licensed} "${text}")
+  endif()
+  set(${js} ${licensed} PARENT_SCOPE)
   set(${css} ${dist}/uPlot.min.css PARENT_SCOPE)
 endfunction()

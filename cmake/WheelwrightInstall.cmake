@@ -3,11 +3,13 @@
 # The package that find_package(Wheelwright) finds, in the build tree's install tree.
 include(CMakePackageConfigHelpers)
 set(WHEELWRIGHT_CMAKE_DIR ${CMAKE_INSTALL_LIBDIR}/cmake/Wheelwright)
-install(EXPORT WheelwrightTargets NAMESPACE Wheelwright:: DESTINATION ${WHEELWRIGHT_CMAKE_DIR})
+install(EXPORT WheelwrightTargets NAMESPACE Wheelwright:: DESTINATION ${WHEELWRIGHT_CMAKE_DIR}
+  COMPONENT development)
 configure_package_config_file(cmake/WheelwrightConfig.cmake.in ${CMAKE_BINARY_DIR}/WheelwrightConfig.cmake
   INSTALL_DESTINATION ${WHEELWRIGHT_CMAKE_DIR})
 # Below 1.0 a minor version may change the interface.
 write_basic_package_version_file(${CMAKE_BINARY_DIR}/WheelwrightConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${CMAKE_BINARY_DIR}/WheelwrightConfig.cmake ${CMAKE_BINARY_DIR}/WheelwrightConfigVersion.cmake
-  cmake/WheelwrightDependencies.cmake DESTINATION ${WHEELWRIGHT_CMAKE_DIR})
-install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
+  cmake/WheelwrightDependencies.cmake DESTINATION ${WHEELWRIGHT_CMAKE_DIR} COMPONENT development)
+# Debian's packages have their copyright file instead (WheelwrightPackage.cmake).
+install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT licence)

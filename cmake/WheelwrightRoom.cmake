@@ -6,6 +6,8 @@
 # through one symbolic link per room in the build tree, which is also the base of the installed FILE_SET. FOLDER is for a
 # part of a room that has a target of its own, since it links what the rest should not: its headers are the room's.
 
+# Of what names none: the rooms are `development`.
+set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME program)
 set(WHEELWRIGHT_INCLUDE_TREE ${CMAKE_BINARY_DIR}/include)
 set(WHEELWRIGHT_WARNINGS -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual -Werror)
 
@@ -42,5 +44,6 @@ function(wheelwright_room name)
   set_target_properties(${target} PROPERTIES EXPORT_NAME ${name} VERIFY_INTERFACE_HEADER_SETS ON
     POSITION_INDEPENDENT_CODE ON)
   set_property(GLOBAL APPEND PROPERTY WHEELWRIGHT_ROOMS ${target})
-  install(TARGETS ${target} EXPORT WheelwrightTargets FILE_SET HEADERS)
+  install(TARGETS ${target} EXPORT WheelwrightTargets ARCHIVE COMPONENT development LIBRARY COMPONENT development
+    FILE_SET HEADERS COMPONENT development)
 endfunction()

@@ -21,7 +21,7 @@ check() {
   printf '#include <wheelwright/%s>\n' "$header" > "$source"
   # shellcheck disable=SC2046
   "$clang" -std=c++20 -fsyntax-only -Wdocumentation -Werror=documentation -Wno-documentation-html -I "$scratch" \
-    $(pkg-config --cflags-only-I eigen3 | sed 's/-I/-isystem /g') "$source" || {
+    $(pkg-config --cflags-only-I eigen3 hdf5 python3 | sed 's/-I/-isystem /g') "$source" || {
     echo "docs: $header" >&2
     : > "$scratch/failed"
   }

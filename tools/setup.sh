@@ -5,19 +5,25 @@
 #
 #   tools/setup.sh         Debian packages for the program and the tests, and uPlot from npm
 #   tools/setup.sh --ci    the same and clang-format, clang-tidy and clang, which continuous integration uses
+#   tools/setup.sh --docs, tools/setup.sh --packages
+#                          the same and what tools/docs.sh, tools/package.sh and tools/check_package.sh need
 set -eu
 cd "$(dirname "$0")/.."
 
 packages="g++ cmake ninja-build pkg-config python3
-  libeigen3-dev libfmt-dev libyaml-cpp-dev nlohmann-json3-dev zlib1g-dev libzstd-dev libboost-dev
+  libeigen3-dev libfmt-dev libyaml-cpp-dev nlohmann-json3-dev zlib1g-dev libzstd-dev liblz4-dev libboost-dev
+  libsqlite3-dev libfastcdr-dev libhdf5-dev libtinyxml2-dev
   libceres-dev libnlopt-cxx-dev libnlopt-dev coinor-libclp-dev
   libcli11-dev
-  libgtest-dev libgmock-dev librapidcheck-dev libbenchmark-dev python3-jsonschema
-  libglpk-dev liblapack-dev libqsopt-ex-dev libmujoco-dev"
+  libgtest-dev libgmock-dev python3-jsonschema
+  libglpk-dev liblapack-dev libqsopt-ex-dev libmujoco-dev
+  pybind11-dev python3-dev python3-numpy"
 case "${1:-}" in
   '') ;;
-  --ci) packages="$packages clang clang-format clang-tidy" ;;
-  *) echo "usage: tools/setup.sh [--ci]" >&2; exit 2 ;;
+  --ci) packages="$packages clang clang-format clang-tidy python3-mypy python3-matplotlib" ;;
+  --docs) packages="$packages python3-sphinx python3-myst-parser python3-sphinxcontrib.bibtex doxygen graphviz" ;;
+  --packages) packages="$packages dpkg-dev file fakeroot lintian debootstrap" ;;
+  *) echo "usage: tools/setup.sh [--ci | --docs | --packages]" >&2; exit 2 ;;
 esac
 
 # install PACKAGE...: the ones that dpkg does not have.
