@@ -253,7 +253,8 @@ TEST_F(LogFile, WhatIsNoLogIsSaid) {
   EXPECT_THAT(error(path("a.h5")), HasSubstr("a.h5: no dataset 'b' for column omega_r: the file has /log/a"));
   EXPECT_THAT(input_error([&] { (void)create_log(path("a.xlsx"), {"x"}); }), HasSubstr("a.xlsx: unknown ending"));
   std::filesystem::create_directory(path("empty"));
-  EXPECT_THAT(error(path("empty")), HasSubstr("empty: is a directory: expected a file, or a directory with a recording"));
+  EXPECT_THAT(error(path("empty")),
+              HasSubstr("empty: is a directory: expected a file, or a directory with a recording"));
   EXPECT_THROW((void)open_log({}), InvalidArgument);
 }
 
