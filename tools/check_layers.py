@@ -13,7 +13,7 @@ import tempfile
 from pathlib import Path
 
 # Room -> rooms whose headers it may include (its own apart). None: all of them.
-WALK = ["core", "model", "filter", "bounds", "identify", "detector", "commission", "design", "gap", "sensitivity"]
+WALK = ["core", "model", "filter", "bounds", "identify", "detector", "commission", "design", "gap", "sensitivity", "fleet"]
 
 
 def before(room):
@@ -31,6 +31,7 @@ MAY_INCLUDE = {
     "design": before("design"),
     "gap": before("gap") | {"sim"},
     "sensitivity": before("sensitivity"),
+    "fleet": before("fleet"),
     "sim": {"core", "model"},
     "io": set(WALK) | {"sim"},  # its scenario is a struct that comes from a file (docs/decisions.md, 14)
     "report": set(WALK),

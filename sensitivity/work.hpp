@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Independent items of work: on the threads of one machine, as one shard of many, or on the ranks of MPI
+/// (work_on_ranks.hpp), always with the same results.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <string>
+#include <string_view>
+
+namespace wheelwright {
+
+/// Items of work, numbered from 0.
+struct Work {
+  std::size_t items = 0;
+  /// The result of one item, as text. Called from several threads at once; an item gives the same text whenever and
+  /// wherever it is evaluated. What it throws ends the run: a failure that is a result has to be returned.
+  std::function<std::string(std::size_t item)> evaluate;
+};
+
+/// Results that are there already, and the place for new ones. Called from one thread at a time.
+class ResultStore {
+ public:
+  virtual ~ResultStore() = default;
+  /// Whether the item's result is there.
+  [[nodiscard]] virtual bool has(std::size_t item) = 0;
+  /// Keeps the result of an item.
+  virtual void put(std::size_t item, std::string_view result) = 0;
+};
+
+/// One of `count` parts of the work: the items i with i mod count = index.
+struct Shard {
+  std::size_t index = 0;  ///< below `count`
+  std::size_t count = 1;
+};
+
+/// Options of run_work().
+struct RunOptions {
+  std::size_t threads = 1;
+  Shard shard = {};
+  std::function<void(std::size_t done, std::size_t items)> progress = {};  ///< of the shard; may be empty
+};
+
+/// What a run did.
+struct RunCount {
+  std::size_t found = 0;      ///< items of the shard whose result was there already
+  std::size_t evaluated = 0;  ///< items that were evaluated now
+};
+
+/// Evaluates the items of the shard that `store` does not have, and puts each into it as soon as it is done, in any
+/// order. Throws what an item or the store throws, when the items under way have ended; InvalidArgument for no thread
+/// or a shard that is none.
+RunCount run_work(const Work& work, ResultStore& store, const RunOptions& options = {});
+
+}  // namespace wheelwright
