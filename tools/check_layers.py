@@ -30,7 +30,7 @@ MAY_INCLUDE = {
     "commission": before("commission"),
     "design": before("design"),
     "gap": before("gap") | {"sim"},
-    "sensitivity": before("sensitivity"),
+    "sensitivity": before("sensitivity") | {"sim"},
     "fleet": before("fleet"),
     "sim": {"core", "model"},
     "io": set(WALK) | {"sim"},  # its scenario is a struct that comes from a file (docs/decisions.md, 14)
