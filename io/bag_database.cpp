@@ -75,15 +75,23 @@ bool Statement::is_integer(int column) const { return sqlite3_column_type(statem
 void Database::Close::operator()(sqlite3* database) const { sqlite3_close_v2(database); }
 
 Database::Database(const std::filesystem::path& path, const std::string& shown, Mode mode) {
-  const int flags = mode == Mode::unchanging ? SQLITE_OPEN_READONLY : SQLITE_OPEN_READWRITE;
+  const int flags = mode == Mode::unchanging ? SQLITE_OPEN_READONLY
+                    : mode == Mode::keeping  ? SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE
+                                             : SQLITE_OPEN_READWRITE;
+  const std::string name = path.empty() ? "" : address(path) + (mode == Mode::unchanging ? "?immutable=1" : "");
   sqlite3* database = nullptr;
-  const int result = sqlite3_open_v2((address(path) + (mode == Mode::unchanging ? "?immutable=1" : "")).c_str(),
-                                     &database, flags | SQLITE_OPEN_URI | SQLITE_OPEN_NOMUTEX, nullptr);
+  const int result = sqlite3_open_v2(name.c_str(), &database, flags | SQLITE_OPEN_URI | SQLITE_OPEN_NOMUTEX, nullptr);
   database_.reset(database);
   if (result != SQLITE_OK) {
     throw InputError(fmt::format("{}: cannot be opened as an SQLite database ({})", shown, error()));
   }
   if (mode == Mode::writing) {
+    return;
+  }
+  if (mode == Mode::keeping) {
+    // Before the first look at the file: its write-ahead log then needs no memory shared between processes, which file
+    // systems of clusters lack.
+    run("PRAGMA locking_mode=EXCLUSIVE; PRAGMA trusted_schema=OFF; PRAGMA cell_size_check=ON;");
     return;
   }
   // What a foreign file says is data: nothing of it is run. With a writable schema SQLite reads files that are cut off
@@ -101,6 +109,11 @@ bool Database::run(const std::string& sql) {
 void Database::forget() { sqlite3_db_release_memory(database_.get()); }
 
 std::string Database::error() const { return sqlite3_errmsg(database_.get()); }
+
+bool Database::in_use() const {
+  const int code = sqlite3_errcode(database_.get());
+  return code == SQLITE_BUSY || code == SQLITE_LOCKED;
+}
 
 bool Database::close() { return sqlite3_close(database_.release()) == SQLITE_OK; }
 

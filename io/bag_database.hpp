@@ -51,10 +51,12 @@ class Statement {
 class Database {
  public:
   /// How to open one: `unchanging` reads a file that nobody writes, without a lock, and without looking for a journal;
-  /// `recovering` may play a journal back into it; `writing` begins an empty one.
-  enum class Mode { unchanging, recovering, writing };
+  /// `recovering` may play a journal back into it; `writing` begins an empty one; `keeping` goes on with one of ours,
+  /// or begins it where there is none, and keeps everybody else out until it is closed.
+  enum class Mode { unchanging, recovering, writing, keeping };
 
-  /// Throws InputError, beginning with `shown`, when it cannot be opened.
+  /// With `keeping`, an empty path is a database that is gone when it is closed. Throws InputError, beginning with `shown`,
+  /// when it cannot be opened.
   Database(const std::filesystem::path& path, const std::string& shown, Mode mode);
 
   [[nodiscard]] Statement prepare(std::string_view sql) const { return {database_.get(), sql}; }
@@ -65,6 +67,8 @@ class Database {
   void forget();
   /// What went wrong last, in words.
   [[nodiscard]] std::string error() const;
+  /// Whether that was another process that has it open.
+  [[nodiscard]] bool in_use() const;
   /// Closes it; false when that fails.
   bool close();
 

@@ -35,11 +35,16 @@ struct Shard {
   std::size_t count = 1;
 };
 
+/// How many of `items` items a shard has. Throws InvalidArgument unless index < count.
+[[nodiscard]] std::size_t items_of(const Shard& shard, std::size_t items);
+
 /// Options of run_work().
 struct RunOptions {
   std::size_t threads = 1;
   Shard shard = {};
-  std::function<void(std::size_t done, std::size_t items)> progress = {};  ///< of the shard; may be empty
+  /// How many items of the shard are there, behind each; `done` only grows. Called from one thread at a time; may be
+  /// empty.
+  std::function<void(std::size_t done, std::size_t items)> progress = {};
 };
 
 /// What a run did.
@@ -49,8 +54,9 @@ struct RunCount {
 };
 
 /// Evaluates the items of the shard that `store` does not have, and puts each into it as soon as it is done, in any
-/// order. Throws what an item or the store throws, when the items under way have ended; InvalidArgument for no thread
-/// or a shard that is none.
+/// order; memory does not grow with the number of items. The first that an item, the store or the progress throws is
+/// thrown when the items under way have ended; their results are in the store. Throws InvalidArgument for no thread or a
+/// shard that is none.
 RunCount run_work(const Work& work, ResultStore& store, const RunOptions& options = {});
 
 }  // namespace wheelwright

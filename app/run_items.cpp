@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "run_items.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <filesystem>
+#include <regex>
+#include <set>
+#include <string_view>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include <wheelwright/io/suggest.hpp>
+#include <wheelwright/io/xxh64.hpp>
+
+#include "ranks.hpp"
+
+namespace wheelwright::app {
+namespace {
+
+namespace fs = std::filesystem;
+using Opening = SqliteResults::Opening;
+
+constexpr const char* kResults = "results.sqlite";
+constexpr std::size_t kNamed = 5;  // items that a message names
+
+// "I/N", or nothing.
+std::optional<Shard> parsed(std::string_view text) {
+  const char* const end = text.data() + text.size();
+  Shard shard;
+  const auto i = std::from_chars(text.data(), end, shard.index);
+  const bool slash = i.ec == std::errc() && i.ptr != end && *i.ptr == '/';
+  const auto n = std::from_chars(slash ? i.ptr + 1 : end, end, shard.count);
+  if (!slash || n.ec != std::errc() || n.ptr != end || shard.index < 1 || shard.index > shard.count) {
+    return std::nullopt;
+  }
+  --shard.index;
+  return shard;
+}
+
+void check_together(const CommonOptions& common, const ScaleOptions& scale) {
+  const char* const given = scale.shard ? "--shard" : scale.merge ? "--merge" : scale.fresh ? "--fresh" : nullptr;
+  if (given != nullptr && common.out.empty()) {
+    throw InputError(fmt::format("{}: expected --out DIR, where the results are kept", given));
+  }
+  if (scale.shard && scale.merge) {
+    throw InputError("--shard and --merge: expected one of them; --merge comes when all shards are done");
+  }
+  if ((scale.shard || scale.merge) && launched_by_mpi()) {
+    throw InputError(fmt::format("{} under mpirun: expected one of them, both share the items out", given));
+  }
+}
+
+// What every process that takes part has to agree on.
+std::string fingerprint(const Plan& plan, const StoredItems& items) {
+  std::string text;
+  for (const auto& [name, value] : plan) {
+    text += fmt::format("{}: {}\n", name, value);
+  }
+  Xxh64 keys;
+  for (std::size_t item = 0; item < items.count; ++item) {
+    const std::string key = items.key(item) + '\n';
+    keys.update(key.data(), key.size());
+  }
+  return text + fmt::format("{} items {}\n", items.count, keys.text());
+}
+
+// Shards in `directory`, by file name.
+std::vector<std::pair<fs::path, Shard>> shards_in(const fs::path& directory) {
+  static const std::regex pattern("shard-([0-9]+)-of-([0-9]+)\\.sqlite");
+  std::vector<std::pair<fs::path, Shard>> shards;
+  for (const fs::directory_entry& entry : fs::directory_iterator(directory)) {
+    const std::string name = entry.path().filename().string();
+    std::smatch match;
+    if (std::regex_match(name, match, pattern)) {
+      if (const std::optional<Shard> shard = parsed(match[1].str() + "/" + match[2].str())) {
+        shards.emplace_back(entry.path(), *shard);
+      }
+    }
+  }
+  std::ranges::sort(shards, {}, [](const auto& entry) { return std::pair(entry.second.count, entry.second.index); });
+  return shards;
+}
+
+// Throws unless nothing is missing.
+void check_complete(SqliteResults& results, const std::vector<std::pair<fs::path, Shard>>& shards) {
+  std::size_t missing = 0;
+  std::vector<std::string> names;
+  const std::size_t count = shards.back().second.count;
+  std::set<std::size_t> of;
+  results.each_missing([&](std::size_t item) {
+    ++missing;
+    of.insert(item % count + 1);
+    if (names.size() < kNamed) {
+      names.push_back(shown(results.items().key(item)));
+    }
+  });
+  if (missing == 0) {
+    return;
+  }
+  std::vector<std::string> again;
+  for (const std::size_t index : of) {
+    again.push_back(again.size() < kNamed ? fmt::format("--shard {}/{}", index, count) : "…");
+    if (again.size() > kNamed) {
+      break;
+    }
+  }
+  throw InputError(
+      fmt::format("{}: {} of {} items are missing ({}{}): expected all; evaluate them with {} instead of --merge and "
+                  "merge again, or "
+                  "without --merge, which evaluates what is missing",
+                  results.file().string(), missing, results.items().count, listed(names), missing > kNamed ? ", …" : "",
+                  listed(again)));
+}
+
+}  // namespace
+
+void add_scale_options(CLI::App& command, ScaleOptions& options) {
+  command
+      .add_option_function<std::string>(
+          "--shard",
+          [&options](const std::string& text) {
+            options.shard = parsed(text);
+            if (!options.shard) {
+              throw CLI::ValidationError("--shard '" + text + "': expected I/N with 1 <= I <= N, e.g. 3/7",
+                                         CLI::ExitCodes::ValidationError);
+            }
+          },
+          "Evaluate the Ith of N parts only, into its own file in --out; --merge takes the parts together")
+      ->type_name("I/N");
+  command.add_flag("--merge", options.merge, "Take together what the shards in --out evaluated; evaluate nothing");
+  command.add_flag("--fresh", options.fresh,
+                   "Throw away what an earlier run left in --out, instead of going on with it");
+}
+
+ItemsRun run_items(const ItemsToRun& items, const CommonOptions& common, const ScaleOptions& scale,
+                   const std::function<void(std::size_t, std::size_t)>& progress) {
+  check_together(common, scale);
+  make_directory(common);
+  Plan plan = items.plan;
+  plan.emplace_back("the program", software());
+  const StoredItems stored{items.work.items, items.key};
+  const Opening opening = scale.fresh ? Opening::fresh : Opening::resume;
+  const auto open = [&](const std::string& name) {
+    return std::make_unique<SqliteResults>(common.out.empty() ? fs::path() : common.out / name, plan, stored, opening);
+  };
+  RunOptions options{static_cast<std::size_t>(common.threads), {}, progress};
+  ItemsRun run;
+  if (scale.shard) {
+    const Shard shard = *scale.shard;
+    const auto results = open(fmt::format("shard-{}-of-{}.sqlite", shard.index + 1, shard.count));
+    options.shard = shard;
+    run.count = run_work(items.work, *results, options);
+    if (!common.quiet && !common.json) {
+      fmt::print("shard {} of {}: {} items evaluated, {} were there; {}\nwhen all are done: the same with --merge\n",
+                 shard.index + 1, shard.count, run.count.evaluated, run.count.found, results->file().string());
+    }
+    return run;
+  }
+  if (scale.merge) {
+    const auto shards = shards_in(common.out);
+    if (shards.empty()) {
+      throw InputError(common.out.string() + ": no shard-I-of-N.sqlite: expected what --shard I/N leaves there");
+    }
+    std::vector<fs::path> files;
+    for (const auto& [file, shard] : shards) {
+      files.push_back(file);
+    }
+    run.results = open(kResults);
+    run.results->merge(files);
+    check_complete(*run.results, shards);
+    run.count.found = stored.count;
+    return run;
+  }
+  if (launched_by_mpi()) {
+    std::unique_ptr<SqliteResults> results;
+    const std::optional<RunCount> count = run_on_ranks(
+        items.work, fingerprint(plan, stored),
+        [&]() -> ResultStore& {
+          results = open(kResults);
+          return *results;
+        },
+        options);
+    if (count) {
+      run.results = std::move(results);
+      run.count = *count;
+    }
+    return run;
+  }
+  run.results = open(kResults);
+  run.count = run_work(items.work, *run.results, options);
+  return run;
+}
+
+}  // namespace wheelwright::app

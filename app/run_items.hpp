@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// The many items of a command: on threads, as one shard of several, or on the ranks of MPI, with results that outlive the
+/// process.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include <wheelwright/io/result_store.hpp>
+#include <wheelwright/sensitivity/work.hpp>
+
+#include "common.hpp"
+
+namespace wheelwright::app {
+
+/// How a command shares its items out.
+struct ScaleOptions {
+  std::optional<Shard> shard = {};  ///< --shard I/N is index I - 1 of N
+  bool merge = false;
+  bool fresh = false;
+};
+
+/// Adds --shard I/N, --merge and --fresh.
+void add_scale_options(CLI::App& command, ScaleOptions& options);
+
+/// What is to be evaluated.
+struct ItemsToRun {
+  Work work;
+  /// StoredItems::key of each item. Messages name items by the beginning of their keys: begin with a name.
+  std::function<std::string(std::size_t item)> key;
+  /// What every result depends on; run_items() adds the program's version. No option that changes no result (threads, shard).
+  Plan plan;
+};
+
+/// What came of it.
+struct ItemsRun {
+  /// All results, to be read in the order of items; null where this process has nothing more to do: it then ends with
+  /// kDone, and prints nothing.
+  std::unique_ptr<SqliteResults> results = nullptr;
+  RunCount count = {};
+};
+
+/// Evaluates the items that are not in OUT/results.sqlite yet, on `common.threads` threads, and where mpirun started the
+/// program, on all its processes: rank 0 has the results. With --shard only the shard's, into OUT/shard-I-of-N.sqlite; says
+/// on standard output what was done. With --merge none: takes over all OUT/shard-*-of-*.sqlite. Without --out the results
+/// are gone with the process.
+///
+/// Throws what an item throws; InputError as SqliteResults does, for options that do not go together, and where --merge
+/// leaves items missing: the message names them and the shards that evaluate them.
+[[nodiscard]] ItemsRun run_items(const ItemsToRun& items, const CommonOptions& common, const ScaleOptions& scale,
+                                 const std::function<void(std::size_t done, std::size_t items)>& progress = {});
+
+}  // namespace wheelwright::app
