@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/fleet/drift.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include <boost/math/distributions/chi_squared.hpp>
+#include <boost/math/distributions/normal.hpp>
+#include <boost/math/distributions/students_t.hpp>
+
+#include <wheelwright/fleet/holm.hpp>
+
+namespace wheelwright {
+namespace {
+
+constexpr double days_a_week = 7.0;
+constexpr double worth_of_a_median = 0.37;
+
+void take_certain(ParameterDrift& drift, std::span<const DriftPoint> points) {
+  for (std::size_t a = 0; a < points.size(); ++a) {
+    for (std::size_t b = a + 1; b < points.size(); ++b) {
+      const double up = round_down(points[b].lower - points[a].upper);
+      const double down = round_up(points[b].upper - points[a].lower);
+      const double change = up > 0.0 ? up : down < 0.0 ? down : 0.0;
+      if (std::abs(change) > std::abs(drift.certain)) {
+        drift.certain = change;
+        drift.certain_from = points[a].when;
+        drift.certain_to = points[b].when;
+      }
+    }
+  }
+}
+
+void take_line(ParameterDrift& drift, std::span<const DriftPoint> points, double unit) {
+  double weight = 0.0, time = 0.0, value = 0.0, used = 0.0;
+  const auto usable = [](const DriftPoint& p) {
+    return std::isfinite(p.estimate) && std::isfinite(p.standard_error) && p.standard_error > 0.0;
+  };
+  const double origin = points.front().when;
+  const auto t = [&](const DriftPoint& p) { return (p.when - origin) / unit; };
+  for (const DriftPoint& p : points) {
+    if (usable(p)) {
+      const double w = 1.0 / (p.standard_error * p.standard_error);
+      weight += w;
+      time += w * t(p);
+      value += w * p.estimate;
+      used += 1.0;
+    }
+  }
+  if (used < 2.0) {
+    return;
+  }
+  time /= weight;
+  value /= weight;
+  double tt = 0.0, tx = 0.0;
+  for (const DriftPoint& p : points) {
+    if (usable(p)) {
+      const double w = 1.0 / (p.standard_error * p.standard_error);
+      tt += w * (t(p) - time) * (t(p) - time);
+      tx += w * (t(p) - time) * (p.estimate - value);
+    }
+  }
+  if (!(tt > 0.0)) {
+    return;
+  }
+  drift.has_trend = true;
+  drift.slope = tx / tt;
+  drift.slope_error = std::sqrt(1.0 / tt);
+  drift.freedom = used - 2.0;
+  for (const DriftPoint& p : points) {
+    if (usable(p)) {
+      const double z = (p.estimate - value - drift.slope * (t(p) - time)) / p.standard_error;
+      drift.chi_square += z * z;
+    }
+  }
+}
+
+// What logs of a parameter differ by, over what their standard errors say, as a ratio of variances.
+struct Repeats {
+  double ratio = 1.0;
+  double freedom = 0.0;  // 0: nothing is known
+};
+
+std::map<std::size_t, Repeats> repeats_of(std::span<const ParameterDrift> drift) {
+  std::map<std::size_t, std::vector<double>> ratios;
+  std::map<std::size_t, Repeats> out;
+  for (const ParameterDrift& d : drift) {
+    if (d.has_trend && d.freedom > 0.0) {
+      ratios[d.column].push_back(d.chi_square / boost::math::median(boost::math::chi_squared(d.freedom)));
+      out[d.column].freedom += worth_of_a_median * d.freedom;
+    }
+  }
+  for (auto& [column, values] : ratios) {
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    out[column].ratio = std::max(1.0, *middle);
+  }
+  return out;
+}
+
+}  // namespace
+
+std::optional<ParameterDrift> drift_through(std::span<const DriftPoint> points, bool dated) {
+  if (points.size() < 2) {
+    return std::nullopt;
+  }
+  ParameterDrift drift;
+  drift.dated = dated;
+  drift.logs = points.size();
+  drift.first = points.front().when;
+  drift.last = points.back().when;
+  take_certain(drift, points);
+  take_line(drift, points, dated ? days_a_week : 1.0);
+  return drift;
+}
+
+std::vector<ParameterDrift> drift_of(const RobotRecord& record, std::size_t robot, FleetTable& table) {
+  std::map<std::size_t, std::vector<DriftPoint>> points;
+  const auto take = [&](const LogRecord& log) {
+    for (const RecordedParameter& p : log.parameters) {
+      constexpr double none = std::numeric_limits<double>::quiet_NaN();
+      points[column_of(table, p)].push_back({.when = log.when,
+                                             .estimate = p.estimate.value_or(none),
+                                             .standard_error = p.standard_error.value_or(none),
+                                             .lower = p.lower,
+                                             .upper = p.upper});
+    }
+  };
+  take(record.commissioning);
+  for (const CheckRecord& check : record.checks) {
+    take(check.log);
+  }
+  std::vector<ParameterDrift> out;
+  for (auto& [column, series] : points) {
+    std::stable_sort(series.begin(), series.end(), [](const auto& a, const auto& b) { return a.when < b.when; });
+    if (auto drift = drift_through(series, record.dated)) {
+      drift->robot = robot;
+      drift->column = column;
+      out.push_back(*drift);
+    }
+  }
+  return out;
+}
+
+void judge_drift(std::vector<ParameterDrift>& drift) {
+  const std::map<std::size_t, Repeats> repeats = repeats_of(drift);
+  std::vector<double> p;
+  for (ParameterDrift& d : drift) {
+    if (!d.has_trend) {
+      continue;
+    }
+    const auto found = repeats.find(d.column);
+    const Repeats known = found == repeats.end() ? Repeats{} : found->second;
+    d.slope_error *= std::sqrt(known.ratio);
+    const double z = std::abs(d.slope) / d.slope_error;
+    double factor = 0.0;
+    if (known.freedom > 0.0) {
+      const boost::math::students_t law(known.freedom);
+      d.p = 2.0 * boost::math::cdf(boost::math::complement(law, z));
+      factor = boost::math::quantile(law, 0.975);
+    } else {
+      const boost::math::normal law;
+      d.p = 2.0 * boost::math::cdf(boost::math::complement(law, z));
+      factor = boost::math::quantile(law, 0.975);
+    }
+    d.lower = d.slope - factor * d.slope_error;
+    d.upper = d.slope + factor * d.slope_error;
+    p.push_back(d.p);
+  }
+  const std::vector<double> adjusted = holm(p);
+  std::size_t k = 0;
+  for (ParameterDrift& d : drift) {
+    if (d.has_trend) {
+      d.adjusted_p = adjusted[k++];
+    }
+  }
+  const auto size = [](const ParameterDrift& d) { return d.has_trend ? std::abs(d.slope) / d.slope_error : 0.0; };
+  std::stable_sort(drift.begin(), drift.end(), [&](const ParameterDrift& a, const ParameterDrift& b) {
+    const bool sure_a = a.certain != 0.0, sure_b = b.certain != 0.0;
+    if (sure_a != sure_b) {
+      return sure_a;
+    }
+    return a.adjusted_p != b.adjusted_p ? a.adjusted_p < b.adjusted_p : size(a) > size(b);
+  });
+}
+
+bool repeats_known(std::span<const ParameterDrift> drift) {
+  return std::any_of(drift.begin(), drift.end(), [](const auto& d) { return d.has_trend && d.freedom > 0.0; });
+}
+
+}  // namespace wheelwright
