@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 #
-# wheelwright_room(NAME [FOLDER room] HEADERS h... [SOURCES s...] [USES room...] [LINK lib...] [LINK_PRIVATE lib...])
+# wheelwright_room(NAME [FOLDER room] [PROGRAM_ONLY] HEADERS h... [SOURCES s...] [USES room...] [LINK lib...] [LINK_PRIVATE lib...])
 #
 # One target per room: wheelwright_NAME, alias Wheelwright::NAME. Headers are seen as <wheelwright/NAME/x.hpp>
 # through one symbolic link per room in the build tree, which is also the base of the installed FILE_SET. FOLDER is for a
 # part of a room that has a target of its own, since it links what the rest should not: its headers are the room's.
+# PROGRAM_ONLY serves our own programs and is not installed.
 
 # Of what names none: the rooms are `development`.
 set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME program)
@@ -12,7 +13,7 @@ set(WHEELWRIGHT_INCLUDE_TREE ${CMAKE_BINARY_DIR}/include)
 set(WHEELWRIGHT_WARNINGS -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual -Werror)
 
 function(wheelwright_room name)
-  cmake_parse_arguments(ROOM "" "FOLDER" "HEADERS;SOURCES;USES;LINK;LINK_PRIVATE" ${ARGN})
+  cmake_parse_arguments(ROOM "PROGRAM_ONLY" "FOLDER" "HEADERS;SOURCES;USES;LINK;LINK_PRIVATE" ${ARGN})
   if(NOT ROOM_FOLDER)
     set(ROOM_FOLDER ${name})
   endif()
@@ -43,6 +44,9 @@ function(wheelwright_room name)
   endif()
   set_target_properties(${target} PROPERTIES EXPORT_NAME ${name} VERIFY_INTERFACE_HEADER_SETS ON
     POSITION_INDEPENDENT_CODE ON)
+  if(ROOM_PROGRAM_ONLY)
+    return()
+  endif()
   set_property(GLOBAL APPEND PROPERTY WHEELWRIGHT_ROOMS ${target})
   install(TARGETS ${target} EXPORT WheelwrightTargets ARCHIVE COMPONENT development LIBRARY COMPONENT development
     FILE_SET HEADERS COMPONENT development)

@@ -14,6 +14,7 @@ packages="g++ cmake ninja-build pkg-config python3
   libeigen3-dev libfmt-dev libyaml-cpp-dev nlohmann-json3-dev zlib1g-dev libzstd-dev liblz4-dev libboost-dev
   libsqlite3-dev libfastcdr-dev libhdf5-dev libtinyxml2-dev
   libceres-dev libnlopt-cxx-dev libnlopt-dev coinor-libclp-dev libtbb-dev
+  libopenmpi-dev openmpi-bin
   libcli11-dev
   libgtest-dev libgmock-dev python3-jsonschema
   libglpk-dev liblapack-dev libqsopt-ex-dev libmujoco-dev
