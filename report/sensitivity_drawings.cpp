@@ -178,7 +178,7 @@ std::string tornado(const OneAtATime& study, const std::vector<std::string>& inp
   out += line(x(study.nominal), top, x(study.nominal), bottom, "class=\"nominal\"");
   out += text(left + 0.5 * span, bottom + 31.0, "middle", words(quantity));
   out +=
-      text(left + 0.5 * span, bottom + 49.0, "middle", "open: input at its lower end, full: at its upper end; * gaps");
+      text(left + 0.5 * span, bottom + 49.0, "middle", "pale: input at its lower end, full: at its upper end; * gaps");
   return out + "</svg>";
 }
 
@@ -258,7 +258,7 @@ std::string sobol_bars(const SobolIndices& indices, const std::vector<std::strin
   }
   out += line(x(0.0), top, x(0.0), bottom, "class=\"nominal\"");
   out += text(left + 0.5 * span, bottom + 31.0, "middle", "share of the variance");
-  out += text(left + 0.5 * span, bottom + 48.0, "middle", "full: by itself, open: with its interactions");
+  out += text(left + 0.5 * span, bottom + 48.0, "middle", "full: by itself, pale: with its interactions");
   return out + "</svg>";
 }
 
@@ -337,7 +337,7 @@ std::string sensitivity_map(const GridMap& map, const Eigen::VectorXd& x, const 
       } else if (std::min(width, height) >= 34.0) {
         // On dark cells the paper's colour is read, on pale ones the ink's.
         out += fmt::format("<text style=\"fill:var({})\" x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">{}</text>",
-                           opacity > 0.55 ? "--paper" : "--ink", x0 + 0.5 * width, y0 + 0.5 * height + 4.0,
+                           opacity > 0.6 ? "--paper" : "--ink", x0 + 0.5 * width, y0 + 0.5 * height + 4.0,
                            number(value, 2));
       }
     }

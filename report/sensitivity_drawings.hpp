@@ -22,7 +22,7 @@ struct AxisLabel {
   std::string unit = {};
 };
 
-/// One bar for each input about the quantity's nominal value, the largest swing on top, at most `most`: open towards the
+/// One bar for each input about the quantity's nominal value, the largest swing on top, at most `most`: pale towards the
 /// value at the input's lower end, full towards that at its upper end, a thin line over the whole range of values where
 /// they go beyond both. `inputs` names them in the design's order, with their ranges if wanted.
 [[nodiscard]] std::string tornado(const OneAtATime& study, const std::vector<std::string>& inputs,
@@ -34,7 +34,7 @@ struct AxisLabel {
                                             double nominal_y, bool logarithmic, const AxisLabel& input,
                                             const AxisLabel& quantity);
 
-/// Two bars for each input, the first-order index full and the total index open, with their intervals as whiskers, the
+/// Two bars for each input, the first-order index full and the total index pale, with their intervals as whiskers, the
 /// largest total index on top, at most `most`. Empty unless the indices were estimated.
 [[nodiscard]] std::string sobol_bars(const SobolIndices& indices, const std::vector<std::string>& inputs,
                                      std::size_t most = 16);
