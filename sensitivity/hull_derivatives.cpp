@@ -46,11 +46,14 @@ Eigen::VectorXd direction(const Polytope::Block& block, const HullOptimum& optim
 
 // Whether the row passes through θ*, as nearly as its evaluation tells.
 bool is_active(const Polytope::Block& block, const HullOptimum& optimum, const HalfSpace& row) {
-  const Eigen::VectorXd g = block.coordinates.transform.transpose() * pick(row.a, block.parameters);
-  const double norm = g.norm();
+  const double slack = row.b - row.a.dot(optimum.at);
   const double rounding =
       64.0 * std::numeric_limits<double>::epsilon() * (std::abs(row.b) + row.a.cwiseAbs().dot(optimum.at.cwiseAbs()));
-  return norm > 0.0 && row.b - row.a.dot(optimum.at) <= std::max(kActive * norm, rounding);
+  if (slack > std::max(kActive * block.coordinates.transform.norm() * row.a.norm(), rounding)) {
+    return false;  // nearly every row of a log, without a further look
+  }
+  const double norm = (block.coordinates.transform.transpose() * pick(row.a, block.parameters)).norm();
+  return norm > 0.0 && slack <= std::max(kActive * norm, rounding);
 }
 
 void add_if_active(const Polytope::Block& block, HullOptimum& optimum, const HalfSpace& row) {

@@ -4,164 +4,19 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <utility>
 
 #include <fmt/format.h>
 
-#include <wheelwright/bounds/slab_rows.hpp>
-#include <wheelwright/commission/noise_budget.hpp>
 #include <wheelwright/core/check.hpp>
-#include <wheelwright/filter/regression_stream.hpp>
 #include <wheelwright/sensitivity/local_inputs.hpp>
+#include <wheelwright/sensitivity/row_rates.hpp>
 
 namespace wheelwright {
 namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr double kAgree = 1e-6;                   // left and right derivative, relative
-constexpr double kSmooth = 1e-3;                  // forward and backward rates of a row, relative
-constexpr double kNoise = 1e-6;                   // of a rate, in sizes of the set per relative change of the input
-constexpr double kJump = 1e3;                     // beyond this, in the same unit, a row jumps
-using Row = std::pair<std::size_t, std::size_t>;  // sample, output
-struct BothSides {
-  HalfSpace upper, lower;
-};
-using RowsAt = std::map<Row, BothSides>;
-
-bool is_declared(const Commissioning& c) {
-  return std::ranges::all_of(c.noise, [](const OutputNoise& o) { return o.origin == NoiseOrigin::declared; });
-}
-
-Box prior_of(const Robot& robot, const Model& model) { return Box{prior_box(robot, model).bounds}; }
-
-// The log's rows for the robot `at`, chosen things as in `c`.
-RegressionStream rows_of(LogSource& log, const Commissioning& c, const RobotAt& at, const Model& model,
-                         double confidence) {
-  const Measurement& measurement = c.model.measurement;
-  SignalErrors errors = c.row_errors;
-  if (is_declared(c)) {
-    errors = propagate(model, at.filter, measurement, noise_budget(at.robot, measurement, c.survey).sensors,
-                       {.mode = c.noise_mode,
-                        .confidence = confidence,
-                        .rows = static_cast<double>(c.survey.rows),
-                        .largest_step = c.survey.largest_step});
-  }
-  FilterDesign filter = at.filter;
-  // The same instants, whatever β: an instant that stands on the edge stays.
-  filter.settle *= filter.beta / c.model.filter.beta * (1.0 - 1e-9);
-  return RegressionStream(log, RegressorFilter(model, filter, measurement, errors));
-}
-
-// The half-spaces of `wanted` rows.
-RowsAt rows_at(LogSource& log, const Commissioning& c, const RobotAt& at, double confidence, const RowsAt& wanted) {
-  const Model model = make_model(at.robot);
-  const SlabRows slabs(prior_of(at.robot, model));
-  RegressionStream rows = rows_of(log, c, at, model, confidence);
-  RowsAt found;
-  RegressionBlock block;
-  rows.rewind();
-  while (found.size() < wanted.size() && rows.next(block)) {
-    for (Eigen::Index r = 0; r < block.rows(); ++r) {
-      const auto k = static_cast<std::size_t>(r);
-      const Row row{block.sample[k / block.outputs], k % block.outputs};
-      if (wanted.contains(row)) {
-        BothSides& both = found[row];
-        slabs.half_spaces(block, r, both.upper, both.lower);
-      }
-    }
-  }
-  return found;
-}
-
-RowsAt active_rows(const HullOptima& optima) {
-  RowsAt rows;
-  for (const auto* side : {&optima.lower, &optima.upper}) {
-    for (const HullOptimum& optimum : *side) {
-      for (const WeightedRow& active : optimum.active) {
-        const RowOrigin& origin = active.row.origin;
-        if (!origin.is_prior) {
-          rows[{origin.sample, origin.output}];
-        }
-      }
-    }
-  }
-  return rows;
-}
-
-// The active half-space `row` where the input has been moved; nothing where it is gone.
-std::optional<HalfSpace> moved(const HalfSpace& row, const RowsAt& rows, const Box& prior) {
-  HalfSpace result = row;
-  if (row.origin.is_prior) {
-    const Interval& side = prior.sides[row.origin.parameter];
-    result.b = row.origin.side == Side::upper ? side.upper : -side.lower;
-    return result;
-  }
-  const auto at = rows.find({row.origin.sample, row.origin.output});
-  if (at == rows.end()) {
-    return std::nullopt;
-  }
-  return row.origin.side == Side::upper ? at->second.upper : at->second.lower;
-}
-
-RowRate rate(const HalfSpace& from, const HalfSpace& to, double step) {
-  return {(to.a - from.a) / step, (to.b - from.b) / step};
-}
-
-struct Rates {
-  std::vector<RowRate> left, right;
-  std::string trouble;  // why there are none
-};
-
-// Rates of the active rows, by differences; one-sided where a row has a kink.
-Rates row_rates(const HullOptima& optima, const HullOptimum& optimum, const LocalInput& input, double step,
-                const RowsAt& before, const Box& prior_before, const RowsAt& after, const Box& prior_after) {
-  Rates rates;
-  const Polytope::Block& block = optima.set.blocks()[optimum.block];
-  for (const WeightedRow& active : optimum.active) {
-    const auto low = moved(active.row, before, prior_before), high = moved(active.row, after, prior_after);
-    if (!low || !high) {
-      rates.trouble = row_in_words(active.row.origin) + " is there on one side of the value only";
-      return rates;
-    }
-    const RowRate left = rate(*low, active.row, step), right = rate(active.row, *high, step);
-    const double g_left = left.b - left.a.dot(optimum.at), g_right = right.b - right.a.dot(optimum.at);
-    double size = 0.0;  // of the block along the row
-    for (std::size_t k = 0; k < block.parameters.size(); ++k) {
-      const double a = active.row.a[static_cast<Eigen::Index>(block.parameters[k])];
-      size = std::hypot(size, a * block.coordinates.transform.row(static_cast<Eigen::Index>(k)).norm());
-    }
-    const double scale = size / std::abs(input.value);
-    if (std::abs(g_left - g_right) <= kSmooth * (std::abs(g_left) + std::abs(g_right)) + kNoise * scale) {
-      rates.left.push_back(rate(*low, *high, 2.0 * step));
-      rates.right.push_back(rates.left.back());
-    } else if (std::abs(g_left - g_right) > kJump * scale) {
-      rates.trouble = row_in_words(active.row.origin) + " jumps";
-      return rates;
-    } else {
-      rates.left.push_back(left);
-      rates.right.push_back(right);
-    }
-  }
-  return rates;
-}
-
-// Rates where only sides of the prior move.
-Rates prior_rates(const HullOptimum& optimum, const PriorRate& prior, double per_physical, std::size_t parameter) {
-  Rates rates;
-  for (const WeightedRow& active : optimum.active) {
-    const RowOrigin& origin = active.row.origin;
-    RowRate left, right;
-    if (origin.is_prior && origin.parameter == parameter) {
-      const bool upper = origin.side == Side::upper;
-      left.b = per_physical * (upper ? prior.upper_left : -prior.lower_left);
-      right.b = per_physical * (upper ? prior.upper_right : -prior.lower_right);
-    }
-    rates.left.push_back(std::move(left));
-    rates.right.push_back(std::move(right));
-  }
-  return rates;
-}
+constexpr double kAgree = 1e-6;  // left and right derivative, relative
 
 // A lower side at 0 that holds a bound: below it, errors of the rows' columns count with the other sign.
 bool sign_opens(const HullOptimum& optimum, const Box& box, std::size_t j) {
@@ -180,7 +35,7 @@ struct Derived {
   std::string why_not;
 };
 
-Derived derive(const HullOptima& optima, const HullOptimum& optimum, const Rates& rates, double noise,
+Derived derive(const HullOptima& optima, const HullOptimum& optimum, const RowRates& rates, double noise,
                const std::string& name) {
   if (!optimum.found) {
     return {{kNan, kNan}, why_not_regular(optimum, name)};
@@ -259,12 +114,12 @@ LocalSensitivity local_derivatives(LogSource& log, const Commissioning& c, const
   const RobotAt at{c.model.robot, c.model.filter};
   HullOptima optima = hull_optima(*c.feasible.polytope, c.prior);
   {
-    RegressionStream rows = rows_of(log, c, at, model, options.confidence);
+    RegressionStream rows = rows_of(log, c, at, options.confidence);
     add_active_rows(optima, rows, c.dropped);
   }
-  const RowsAt wanted = active_rows(optima);
+  const LogRows wanted = active_rows(optima);
   result.notes.emplace_back("instants, columns, parameters and outliers left out are held as commissioning chose them");
-  if (!is_declared(c)) {
+  if (!noise_is_declared(c)) {
     result.notes.emplace_back(
         "noise is estimated from the log: the rows' error bounds are held fixed, how the estimate itself follows an "
         "input is not seen");
@@ -275,15 +130,15 @@ LocalSensitivity local_derivatives(LogSource& log, const Commissioning& c, const
     const LocalInput input = local_input(at, model, name);
     LocalDerivative derivative{input.name, input.unit, input.value, {}};
     const double step = options.step * std::abs(input.value);
-    RowsAt before, after;
+    LogRows before, after;
     Box prior_before, prior_after;
     if (!input.prior) {
       check::that(step > 0.0, "input " + name, "a value other than 0");
       const RobotAt low = with_input(at, input, input.value - step), high = with_input(at, input, input.value + step);
       before = rows_at(log, c, low, options.confidence, wanted);
       after = rows_at(log, c, high, options.confidence, wanted);
-      prior_before = prior_of(low.robot, make_model(low.robot));
-      prior_after = prior_of(high.robot, make_model(high.robot));
+      prior_before = prior_of(low.robot);
+      prior_after = prior_of(high.robot);
     }
     for (std::size_t j = 0; j < model.p(); ++j) {
       const double width = result.upper[j] - result.lower[j];
