@@ -66,10 +66,10 @@ struct SobolIndices {
 /// replicates, standard errors their jackknife that leaves out one replicate at a time (efron1982), intervals
 /// estimate ± Student's t with one degree of freedom less than replicates. In repetitions with other seeds, the stated
 /// share of such intervals holds the exact index, as far as the estimates are normally distributed. Measured over 1000
-/// seeds at 95 %: 92 to 97 % for each index of three smooth functions, from 8 replicates of 16 points on
-/// (tests/sensitivity/sobol_coverage_test.cpp repeats a part). They hold too little for a quantity that differs from a
-/// constant on a small part of the cube: 93 to 94 % for an event of probability 9 %, but for one of 1 % only 38 %, and
-/// 62 % with 16 replicates, since 5 or 10 base points then tell everything.
+/// seeds at 95 %: on average 95 to 97 %, at least 92 % for each index of three functions, from 8 replicates of 16 points
+/// on (tests/sensitivity/sobol_coverage_test.cpp repeats a part). They hold too little for a quantity that differs from a
+/// constant on a small part of the cube: 94 % with 8 replicates of 64 points for an event of probability 9 %, but for one
+/// of 1 % only 38 %, and 62 % with 16 replicates, since 5 or 10 base points then tell everything.
 ///
 /// A base point that lacks one of its k + 2 values is left out for that quantity, with all of them, and counted: nothing
 /// is imputed. Indices are then those of the inputs for which the quantity has a value, which are no longer independent;
