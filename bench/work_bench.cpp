@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+// What sharing out costs an item that costs nothing, and what keeping a result costs against a file that is flushed behind
+// each (which survives a kill, too, but finds nothing again).
+#include <cstddef>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include <wheelwright/core/error.hpp>
+#include <wheelwright/io/result_store.hpp>
+#include <wheelwright/sensitivity/work.hpp>
+
+#include "bench.hpp"
+#include "temporary_file.hpp"
+
+namespace wheelwright::bench {
+namespace {
+
+constexpr std::size_t shared_items = 200'000;
+constexpr std::size_t kept_items = 20'000;
+constexpr int repetitions = 5;
+
+class Counter : public ResultStore {
+ public:
+  bool has(std::size_t /*item*/) override { return false; }
+  void put(std::size_t /*item*/, std::string_view result) override { bytes += result.size(); }
+  std::size_t bytes = 0;
+};
+
+std::vector<Measurement> sharing() {
+  std::vector<Measurement> measurements;
+  const Work work{shared_items, [](std::size_t item) { return std::string(item % 8, 'x'); }};
+  for (const std::size_t threads : {1U, 2U}) {
+    const auto shared = [&] {
+      Counter counter;
+      run_work(work, counter, {threads, {}, {}});
+      keep(counter.bytes);
+    };
+    const auto bare = [&] {
+      Counter counter;
+      for (std::size_t item = 0; item < shared_items; ++item) {
+        counter.put(item, work.evaluate(item));
+      }
+      keep(counter.bytes);
+    };
+    const auto [ours, peer] = interleaved_medians(shared, bare, repetitions);
+    measurements.push_back({"sensitivity/work", shared_items, 0, static_cast<int>(threads), ours, "a loop", peer,
+                            fmt::format("{:.0f} ns/item", 1e9 * ours / shared_items)});
+  }
+  return measurements;
+}
+
+std::vector<Measurement> keeping() {
+  std::vector<Measurement> measurements;
+  for (const std::size_t size : {300U, 5000U}) {
+    const std::string result(size, 'x');
+    const auto store = [&] {
+      const TemporaryFile file("sqlite");
+      SqliteResults results(file.path, {},
+                            {kept_items, [](std::size_t item) { return fmt::format("robot {}", item); }});
+      for (std::size_t item = 0; item < kept_items; ++item) {
+        results.put(item, result);
+      }
+    };
+    const auto flushed = [&] {
+      const TemporaryFile file("txt");
+      const std::unique_ptr<std::FILE, int (*)(std::FILE*)> out(std::fopen(file.path.c_str(), "wb"), &std::fclose);
+      if (!out) {
+        throw Error(file.path.string() + ": cannot be opened");
+      }
+      for (std::size_t item = 0; item < kept_items; ++item) {
+        std::fwrite(result.data(), 1, result.size(), out.get());
+        std::fflush(out.get());
+      }
+    };
+    const auto [ours, peer] = interleaved_medians(store, flushed, repetitions);
+    measurements.push_back({"io/result_store", kept_items, 0, 1, ours, "flushed file", peer,
+                            fmt::format("{} bytes, {:.1f} us/put", size, 1e6 * ours / kept_items)});
+  }
+  return measurements;
+}
+
+const bool registered_sharing = register_bench("sensitivity/work", sharing);
+const bool registered_keeping = register_bench("io/result_store", keeping);
+
+}  // namespace
+}  // namespace wheelwright::bench
