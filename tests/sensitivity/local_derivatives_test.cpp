@@ -169,6 +169,31 @@ TEST(LocalDerivatives, EstimatedNoiseIsHeldFixedAndSaysSo) {
   EXPECT_THROW(static_cast<void>(local_derivatives(log, result, {.inputs = {"prior.charm"}})), InvalidArgument);
 }
 
+// A lower side at 0 that is met: raised, it moves the bound with it; below it, a sign is open. The report says so.
+TEST(LocalDerivatives, SayWhereThereIsNone) {
+  Scenario s = speed_drive(5);
+  s.robot.noise.wheel_speed.value = 0.6;
+  s.robot.noise.effort.value = 1.0;
+  s.robot.prior = {{"viscous_yaw", {0.0, 10.0}}};
+  LogTable table = simulate(s);
+  TableSource log(table);
+  const LocalSensitivity local = local_derivatives(
+      log, commission(log, s.robot), {.inputs = {"prior.viscous_yaw.lower", "prior.viscous_yaw", "declared.effort"}});
+  ASSERT_EQ(local.lower[3], 0.0);
+  const ParameterDerivative& side = local.inputs[0].parameters[3];
+  EXPECT_NEAR(side.lower.right, s.robot.wheel_radius, 1e-12);
+  EXPECT_TRUE(std::isnan(side.lower.left));
+  EXPECT_FALSE(side.differentiable || side.elasticity);
+  // A narrower prior raises the side, a wider one leaves it at 0.
+  const ParameterDerivative& factor = local.inputs[1].parameters[3];
+  EXPECT_NEAR(factor.lower.left, -5.0 * s.robot.wheel_radius, 1e-12);
+  EXPECT_EQ(factor.lower.right, 0.0);
+  EXPECT_FALSE(factor.differentiable);
+  const std::vector<std::string> words = not_differentiable(local);
+  ASSERT_FALSE(words.empty());
+  EXPECT_NE(words[0].find("not differentiable in prior.viscous_yaw.lower"), std::string::npos) << words[0];
+}
+
 // A log twice the same: every row that holds a bound stands there twice, and both move with the robot file together.
 TEST(LocalDerivatives, ADriveThatIsLoggedTwiceHasTheDerivativesOfOne) {
   const Scenario s = speed_drive(6);
