@@ -67,7 +67,7 @@ class SqliteResults::Tables {
  public:
   Tables(const fs::path& file, const Plan& plan, Opening opening)
       : shown_(file.empty() ? "results" : file.string()), database_(file, shown_, Database::Mode::keeping) {
-    demand(database_.run("PRAGMA busy_timeout=1000; BEGIN EXCLUSIVE"));
+    demand(database_.run("PRAGMA busy_timeout=300; BEGIN EXCLUSIVE"));
     Transaction transaction(database_);
     const std::int64_t tables = number("SELECT count(*) FROM sqlite_master");
     const std::int64_t owner = number("PRAGMA application_id");
