@@ -70,7 +70,7 @@ std::vector<std::string> names_of(const CommandWords& command) {
 }
 
 bool OptionWords::takes_file() const {
-  static const std::vector<std::string> files = {"FILE", "LOG", "MODEL", "SCENARIO", "STUDY", "IN", "OUT"};
+  static const std::vector<std::string> files = {"FILE", "LOG", "MODEL", "SCENARIO", "STUDY", "LIST", "IN", "OUT"};
   return choices.empty() && std::find(files.begin(), files.end(), value) != files.end();
 }
 

@@ -33,6 +33,8 @@ using Run = std::function<int(const std::string& command_line)>;
 [[nodiscard]] Run add_doctor(CLI::App& program);
 /// wheelwright export model.json --language c
 [[nodiscard]] Run add_export(CLI::App& program);
+/// wheelwright fleet DIR|LIST --robot robot.yaml
+[[nodiscard]] Run add_fleet(CLI::App& program);
 /// wheelwright gap LOG... --robot robot.yaml
 [[nodiscard]] Run add_gap(CLI::App& program);
 /// wheelwright identify LOG... --robot robot.yaml

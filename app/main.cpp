@@ -60,6 +60,7 @@ int main(int argc, char** argv) {
                                                              {"simulate", add_simulate(program)},
                                                              {"choose", add_choose(program)},
                                                              {"gap", add_gap(program)},
+                                                             {"fleet", add_fleet(program)},
                                                              {"convert", add_convert(program)},
                                                              {"robot", add_robot(program)},
                                                              {"completion", add_completion(program)},

@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include <wheelwright/fleet/examine_robot.hpp>
+#include <wheelwright/fleet/fleet_result.hpp>
+#include <wheelwright/io/atomic_file.hpp>
+#include <wheelwright/io/fleet_json.hpp>
+#include <wheelwright/io/fleet_list.hpp>
+#include <wheelwright/io/pooled_prior_file.hpp>
+#include <wheelwright/io/robot_file.hpp>
+#include <wheelwright/report/fleet_report.hpp>
+
+#include "commands.hpp"
+#include "common.hpp"
+#include "progress.hpp"
+#include "run_items.hpp"
+
+namespace wheelwright::app {
+namespace {
+
+struct Arguments {
+  std::filesystem::path list, robot;
+  bool statistical = false;
+  FleetOptions judge;
+  ScaleOptions scale;
+  CommonOptions common;
+};
+
+constexpr const char* kHelp =
+    "Commissions and checks the logs of many robots: which robots stand outside the others, which drift, which logs "
+    "raise alarms, and a prior that makes the next robot's bounds tighter, with a stated coverage. A bad log never "
+    "stops the rest, and a run that was killed goes on where it was.";
+
+constexpr const char* kExamples =
+    "LIST is a directory, or a CSV file with the header robot,log and any of when, robot_file, role:\n\n"
+    "  robot,log,when,role\n"
+    "  amy,amy/monday.csv,2026-03-02,commission\n"
+    "  amy,amy/friday.csv,2026-03-06,check\n"
+    "  bob,bob.mcap,2026-03-02,\n\n"
+    "Paths are relative to the list; when is a date or a number of days; without a role the earliest log of a robot\n"
+    "commissions and the later ones are checked. In a directory each directory is a robot (with its own robot.yaml,\n"
+    "where it has one), and each log beside those is a robot of its own.\n\n"
+    "Results: fleet.json, fleet.csv (a row for each robot and parameter), pooled_prior.yaml (to copy into the next\n"
+    "robot's file) and report.html. What was examined is kept in results.sqlite: run again to go on, or when logs "
+    "were\n"
+    "added or changed; only those are examined.\n\n"
+    "Examples:\n"
+    "  wheelwright fleet fleet.csv --robot robot.yaml --out result --threads 8\n"
+    "  wheelwright fleet logs --robot robot.yaml --out result --coverage 0.9\n"
+    "  mpirun wheelwright fleet fleet.csv --robot robot.yaml --out result\n"
+    "  wheelwright fleet fleet.csv --robot robot.yaml --out result --shard 1/10     (and 2/10 … 10/10, anywhere)\n"
+    "  wheelwright fleet fleet.csv --robot robot.yaml --out result --merge\n\n"
+    "Exit code: 0 all is well, 1 a robot stands outside, drifts, raised an alarm, contradicts its model or could not "
+    "be\nexamined (the report lists which), 2 bad usage or no such list.";
+
+FleetLog log_of(const FleetListRobot& robot, const std::vector<FleetListLog>& logs, const std::optional<Robot>& fleet,
+                const CommonOptions& common) {
+  FleetLog out;
+  std::vector<std::filesystem::path> paths;
+  for (const FleetListLog& log : logs) {
+    out.name += (out.name.empty() ? "" : ", ") + log.path.string();
+    paths.push_back(log.path);
+  }
+  out.when = logs.empty() ? 0.0 : logs.front().when;
+  out.open = [file = robot.robot_file, &fleet, &common, paths] {
+    if (paths.empty()) {
+      throw InputError("no log to commission with: expected one with the role commission, or none");
+    }
+    if (file.empty() && !fleet) {
+      throw InputError("no robot file: expected --robot, or a robot.yaml or robot_file of its own");
+    }
+    const Robot declared = file.empty() ? *fleet : read_robot(file);
+    std::unique_ptr<RecordedLog> log = open_robot_log(paths, declared, common);
+    require_columns(*log, needed_columns(declared));
+    Robot robot_with_errors = with_interpolation_errors(declared, log->report());
+    return OpenedLog{std::move(log), std::move(robot_with_errors)};
+  };
+  return out;
+}
+
+RobotLogs logs_of(const FleetListRobot& robot, const std::optional<Robot>& fleet, const CommonOptions& common) {
+  RobotLogs logs{.robot = robot.name,
+                 .dated = robot.dated,
+                 .commissioning = log_of(robot, robot.commission, fleet, common),
+                 .findings = robot.findings};
+  for (const FleetListLog& check : robot.checks) {
+    logs.checks.push_back(log_of(robot, {check}, fleet, common));
+  }
+  return logs;
+}
+
+Plan plan_of(const Arguments& a, const std::optional<Robot>& fleet) {
+  Plan plan = {{"fleet format", kFleetSchema},
+               {"--robot", fleet ? json_text(to_json(*fleet), -1) : std::string("none")},
+               {"--statistical", a.statistical ? "yes" : "no"}};
+  std::string maps;
+  for (const std::string& map : a.common.map) {
+    maps += map + " ";
+  }
+  plan.emplace_back("--map", maps);
+  return plan;
+}
+
+// Reads the records in the order of items: the fleet, and fleet.csv on the way.
+FleetResult gather(SqliteResults& results, const Arguments& a) {
+  FleetResult fleet;
+  std::optional<AtomicFile> csv;
+  if (!a.common.out.empty()) {
+    csv.emplace(a.common.out / "fleet.csv");
+    csv->write(fleet_csv_header());
+  }
+  results.each([&](std::size_t item, std::string_view text) {
+    const RobotRecord record = record_from_text(text, fmt::format("{}: item {}", results.file().string(), item));
+    take(fleet, record);
+    if (csv) {
+      csv->write(fleet_csv_rows(record));
+    }
+  });
+  if (csv) {
+    csv->commit();
+  }
+  FleetOptions options = a.judge;
+  options.prior.seed = a.common.seed;
+  options.drift_level = a.judge.population.level;
+  judge_fleet(fleet, options);
+  return fleet;
+}
+
+// What makes the page again. How the work was shared out is left out: the page does not depend on it.
+std::string command_of(const Arguments& a) {
+  std::string out = "wheelwright fleet " + a.list.string();
+  out += a.robot.empty() ? "" : " --robot " + a.robot.string();
+  out += fmt::format(" --level {} --coverage {} --seed {}", a.judge.population.level, a.judge.prior.coverage,
+                     a.common.seed);
+  out += a.statistical ? " --statistical" : "";
+  for (const std::string& map : a.common.map) {
+    out += " --map " + map;
+  }
+  return out + " --out DIR";
+}
+
+int run(const Arguments& a) {
+  make_directory(a.common);
+  (void)reader_options(a.common);  // what is wrong with --map is wrong for every log
+  const std::vector<FleetListRobot> robots = read_fleet(a.list);
+  const std::optional<Robot> own = a.robot.empty() ? std::nullopt : std::optional(read_robot(a.robot));
+  ExamineOptions examine;
+  examine.commission.noise_mode = a.statistical ? NoiseMode::statistical : NoiseMode::worst_case;
+  ItemsToRun items;
+  items.work.items = robots.size();
+  items.work.evaluate = [&](std::size_t item) {
+    return record_text(examine_robot(logs_of(robots[item], own, a.common), examine));
+  };
+  items.key = [&](std::size_t item) { return key_of(robots[item]); };
+  items.plan = plan_of(a, own);
+  std::optional<Progress> progress(a.common.quiet);
+  const ItemsRun run = run_items(items, a.common, a.scale, [&](std::size_t done, std::size_t all) {
+    progress->tell(fmt::format("robot {} of {}", done, all), static_cast<double>(done) / static_cast<double>(all));
+  });
+  progress.reset();
+  if (!run.results) {
+    return kDone;
+  }
+  const FleetResult fleet = gather(*run.results, a);
+  ReportContext context;
+  context.software = software();
+  context.command_line = command_of(a);
+  context.log_files = {a.list.string()};
+  context.seeds = {{"which robots the pooled prior learns from", a.common.seed}};
+  if (!a.common.out.empty()) {
+    atomic_write(a.common.out / "pooled_prior.yaml", pooled_prior_yaml(fleet, software()));
+  }
+  publish(a.common, to_json(fleet, a.list.string(), software()), "fleet.json",
+          a.common.out.empty() ? std::string() : fleet_report(fleet, context));
+  if (!a.common.quiet && !a.common.json) {
+    for (const std::string& sentence : sentences(fleet)) {
+      fmt::print("{}\n", sentence);
+    }
+    if (!a.common.out.empty()) {
+      fmt::print("wrote fleet.json, fleet.csv, pooled_prior.yaml and report.html to {}\n", a.common.out.string());
+    }
+  }
+  return fleet.well() ? kDone : kNo;
+}
+
+}  // namespace
+
+Run add_fleet(CLI::App& program) {
+  auto a = std::make_shared<Arguments>();
+  CLI::App& command = *program.add_subcommand("fleet", kHelp);
+  command.add_option("LIST", a->list, "Directory of logs, or list of robots and logs (CSV)")->required();
+  command.add_option("--robot", a->robot, "Robot file (YAML) of every robot that has none of its own")
+      ->type_name("FILE");
+  command
+      .add_option("--level", a->judge.population.level,
+                  "Probability that any robot of a fleet of equals is called outside, and that any is said to drift")
+      ->type_name("P")
+      ->check(CLI::Range(1e-9, 0.5))
+      ->capture_default_str();
+  command
+      .add_option("--coverage", a->judge.prior.coverage,
+                  "Probability with which the pooled prior is to hold the next robot")
+      ->type_name("P")
+      ->check(CLI::Range(0.01, 0.9999))
+      ->capture_default_str();
+  command.add_flag("--statistical", a->statistical,
+                   "Propagate declared sensor noise at a confidence of 99.9 % instead of in the worst case");
+  add_scale_options(command, a->scale);
+  add_map(command, a->common);
+  return finish(command, a, kExamples, run);
+}
+
+}  // namespace wheelwright::app
