@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // killed_rank FILE RANK: a run into a store in which RANK kills itself after 20 items; nobody with RANK = -1. Rank 0 then
 // checks every result, and prints how many items were there before. killed.cmake runs it.
+#include <chrono>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
 #include <string>
+#include <thread>
 
 #include <wheelwright/io/result_store.hpp>
 #include <wheelwright/sensitivity/work_on_ranks.hpp>
@@ -24,6 +26,8 @@ int main(int argc, char** argv) {
                     if (mpi.rank() == killed && ++calls == 20) {
                       std::raise(SIGKILL);
                     }
+                    // Long enough that each rank has its share.
+                    std::this_thread::sleep_for(std::chrono::milliseconds(2));
                     return wheelwright::testing::text_of(item);
                   }};
   std::unique_ptr<SqliteResults> store;
