@@ -7,7 +7,6 @@
 #include <map>
 
 #include <boost/math/distributions/chi_squared.hpp>
-#include <boost/math/distributions/normal.hpp>
 #include <boost/math/distributions/students_t.hpp>
 
 #include <wheelwright/fleet/holm.hpp>
@@ -17,6 +16,7 @@ namespace {
 
 constexpr double days_a_week = 7.0;
 constexpr double worth_of_a_median = 0.37;
+constexpr std::size_t fewest_pairs = 10;  // robots with two logs that teach how much logs differ
 
 void take_certain(ParameterDrift& drift, std::span<const DriftPoint> points) {
   for (std::size_t a = 0; a < points.size(); ++a) {
@@ -69,12 +69,18 @@ void take_line(ParameterDrift& drift, std::span<const DriftPoint> points, double
   drift.slope = tx / tt;
   drift.slope_error = std::sqrt(1.0 / tt);
   drift.freedom = used - 2.0;
+  double doubt = 0.0;  // Satterthwaite's: sum of squared shares of the slope's variance over their freedom
   for (const DriftPoint& p : points) {
     if (usable(p)) {
+      const double w = 1.0 / (p.standard_error * p.standard_error);
+      const double share = w * (t(p) - time) * (t(p) - time) / tt;
+      doubt += share * share / p.freedom;
+      drift.chi_mean += w * (p.estimate - value) * (p.estimate - value);
       const double z = (p.estimate - value - drift.slope * (t(p) - time)) / p.standard_error;
       drift.chi_square += z * z;
     }
   }
+  drift.own_freedom = 1.0 / doubt;
 }
 
 // What logs of a parameter differ by, over what their standard errors say, as a ratio of variances.
@@ -84,18 +90,33 @@ struct Repeats {
 };
 
 std::map<std::size_t, Repeats> repeats_of(std::span<const ParameterDrift> drift) {
-  std::map<std::size_t, std::vector<double>> ratios;
-  std::map<std::size_t, Repeats> out;
+  struct Ratios {
+    std::vector<double> line, mean;
+    double line_freedom = 0.0, mean_freedom = 0.0;
+  };
+  std::map<std::size_t, Ratios> ratios;
   for (const ParameterDrift& d : drift) {
-    if (d.has_trend && d.freedom > 0.0) {
-      ratios[d.column].push_back(d.chi_square / boost::math::median(boost::math::chi_squared(d.freedom)));
-      out[d.column].freedom += worth_of_a_median * d.freedom;
+    if (!d.has_trend) {
+      continue;
     }
+    Ratios& r = ratios[d.column];
+    if (d.freedom > 0.0) {
+      r.line.push_back(d.chi_square / boost::math::median(boost::math::chi_squared(d.freedom)));
+      r.line_freedom += d.freedom;
+    }
+    r.mean.push_back(d.chi_mean / boost::math::median(boost::math::chi_squared(d.freedom + 1.0)));
+    r.mean_freedom += d.freedom + 1.0;
   }
-  for (auto& [column, values] : ratios) {
+  std::map<std::size_t, Repeats> out;
+  for (auto& [column, r] : ratios) {
+    const bool line = !r.line.empty();
+    std::vector<double>& values = line ? r.line : r.mean;
+    if (!line && values.size() < fewest_pairs) {
+      continue;
+    }
     const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
     std::nth_element(values.begin(), middle, values.end());
-    out[column].ratio = std::max(1.0, *middle);
+    out[column] = {std::max(1.0, *middle), worth_of_a_median * (line ? r.line_freedom : r.mean_freedom)};
   }
   return out;
 }
@@ -125,7 +146,8 @@ std::vector<ParameterDrift> drift_of(const RobotRecord& record, std::size_t robo
                                              .estimate = p.estimate.value_or(none),
                                              .standard_error = p.standard_error.value_or(none),
                                              .lower = p.lower,
-                                             .upper = p.upper});
+                                             .upper = p.upper,
+                                             .freedom = p.freedom.value_or(std::numeric_limits<double>::infinity())});
     }
   };
   take(record.commissioning);
@@ -155,16 +177,10 @@ void judge_drift(std::vector<ParameterDrift>& drift) {
     const Repeats known = found == repeats.end() ? Repeats{} : found->second;
     d.slope_error *= std::sqrt(known.ratio);
     const double z = std::abs(d.slope) / d.slope_error;
-    double factor = 0.0;
-    if (known.freedom > 0.0) {
-      const boost::math::students_t law(known.freedom);
-      d.p = 2.0 * boost::math::cdf(boost::math::complement(law, z));
-      factor = boost::math::quantile(law, 0.975);
-    } else {
-      const boost::math::normal law;
-      d.p = 2.0 * boost::math::cdf(boost::math::complement(law, z));
-      factor = boost::math::quantile(law, 0.975);
-    }
+    const double doubt = 1.0 / d.own_freedom + (known.freedom > 0.0 ? 1.0 / known.freedom : 0.0);
+    const boost::math::students_t law(doubt > 0.0 ? 1.0 / doubt : std::numeric_limits<double>::infinity());
+    d.p = 2.0 * boost::math::cdf(boost::math::complement(law, z));
+    const double factor = boost::math::quantile(law, 0.975);
     d.lower = d.slope - factor * d.slope_error;
     d.upper = d.slope + factor * d.slope_error;
     p.push_back(d.p);

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstddef>
+#include <limits>
 #include <optional>
 #include <span>
 #include <vector>
@@ -20,6 +21,7 @@ struct DriftPoint {
   double standard_error = 0.0;  ///< NaN where there is none
   double lower = 0.0;           ///< guaranteed
   double upper = 0.0;
+  double freedom = std::numeric_limits<double>::infinity();  ///< of the standard error
 };
 
 /// What the logs of one robot say of one parameter over time.
@@ -39,10 +41,12 @@ struct ParameterDrift {
   double slope_error = 0.0;  ///< standard error of the slope
   double lower = 0.0;        ///< 95 % interval of the slope
   double upper = 0.0;
-  double chi_square = 0.0;  ///< Σ w (x − line)², w = 1/s²
-  double freedom = 0.0;     ///< of chi_square: logs with estimates − 2
-  double p = 1.0;           ///< of a slope of 0, two-sided
-  double adjusted_p = 1.0;  ///< Holm over robots and parameters
+  double chi_square = 0.0;                                       ///< Σ w (x − line)², w = 1/s²
+  double freedom = 0.0;                                          ///< of chi_square: logs with estimates − 2
+  double chi_mean = 0.0;                                         ///< Σ w (x − weighted mean)²
+  double own_freedom = std::numeric_limits<double>::infinity();  ///< of slope_error, from those of the standard errors
+  double p = 1.0;                                                ///< of a slope of 0, two-sided
+  double adjusted_p = 1.0;                                       ///< Holm over robots and parameters
 
   /// Whether the robot drifts: for certain, or by a trend that is unlikely to be chance.
   [[nodiscard]] bool drifts(double level) const { return certain != 0.0 || (has_trend && adjusted_p <= level); }
@@ -60,16 +64,18 @@ struct ParameterDrift {
 /// Fills in p, adjusted_p and interval, the fleet taken together, and sorts: certain changes first, then small adjusted p.
 ///
 /// A log's own standard error does not know of floor, payload and temperature, which differ from log to log. How much they
-/// add is learnt from the whole fleet: φ of each parameter is the median over its robots with three logs or more of
-/// chi_square over the median of χ² with its degrees of freedom, at least 1; slope errors are multiplied by √φ (`birge1932`),
-/// and the slope over it is compared with Student's t with 0.37 Σ freedom (what a median is worth). With two logs a robot
-/// there is nothing to learn from: slopes are then compared with the normal distribution and rest on the standard errors
-/// alone.
+/// add is learnt from the whole fleet: φ of each parameter, at least 1, multiplies the squared slope errors (`birge1932`). It is
+/// the median over its robots of χ² over the median of its law: where robots have three logs or more, χ² is chi_square; where all
+/// have two and there are at least 10, it is chi_mean, so that a change which most robots share counts as the difference between
+/// logs and not as drift. Fewer robots with two logs teach nothing: φ = 1, and trends rest on the standard errors alone.
+///
+/// The slope over its error is compared with Student's t of ν degrees of freedom, 1/ν = 1/own_freedom + 1/(0.37 Σ freedom of the
+/// χ²), what a median is worth.
 ///
 /// The certain change assumes nothing but the noise bounds of the two logs.
 void judge_drift(std::vector<ParameterDrift>& drift);
 
-/// Whether some parameter of `drift` had fleet-wide repeats to learn φ from.
+/// Whether some robot of `drift` has three logs, so that repeats are known apart from drift.
 [[nodiscard]] bool repeats_known(std::span<const ParameterDrift> drift);
 
 }  // namespace wheelwright

@@ -144,6 +144,7 @@ std::vector<RecordedParameter> recorded_parameters(const Commissioning& result) 
                    .is_prior_key = physical,
                    .estimate = estimate ? std::optional(*estimate / unit) : std::nullopt,
                    .standard_error = error ? std::optional(*error / std::abs(unit)) : std::nullopt,
+                   .freedom = error ? std::optional(std::max(result.residuals.freedom, 1.0)) : std::nullopt,
                    .lower = bounds.lower,
                    .upper = bounds.upper,
                    .lower_is_prior = p.lower_is_prior,

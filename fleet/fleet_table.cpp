@@ -25,6 +25,7 @@ void add(FleetTable& table, const RobotRecord& record) {
     table.columns[column].entries.push_back({.robot = robot,
                                              .estimate = p.estimate.value_or(none),
                                              .standard_error = p.standard_error.value_or(none),
+                                             .freedom = p.freedom.value_or(std::numeric_limits<double>::infinity()),
                                              .lower = p.lower,
                                              .upper = p.upper,
                                              .prior = p.prior});

@@ -17,6 +17,7 @@ struct FleetEntry {
   std::size_t robot = 0;        ///< index into FleetTable::robots
   double estimate = 0.0;        ///< NaN where the log does not show it
   double standard_error = 0.0;  ///< NaN where there is none
+  double freedom = 0.0;         ///< of the standard error; infinite where it is taken as exact
   double lower = 0.0;           ///< guaranteed
   double upper = 0.0;
   Interval prior{};  ///< in which they were sought

@@ -98,7 +98,8 @@ Population describe_population(const FleetTable& table, const PopulationOptions&
       const double s = shown.errors[i];
       const double sd = std::sqrt(s * s + others.spread * others.spread + others.centre_error * others.centre_error);
       const double t = sd > 0.0 ? (shown.values[i] - others.centre) / sd : 0.0;
-      p.push_back(two_sided(t, others.freedom));
+      const double own = sd > 0.0 ? s * s / (sd * sd) : 0.0;
+      p.push_back(two_sided(t, 1.0 / (1.0 / others.freedom + own * own / shown.entries[i]->freedom)));
       if (p.back() <= options.level) {
         which.push_back(p.size() - 1);
         candidates.push_back(

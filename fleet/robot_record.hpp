@@ -30,7 +30,8 @@ struct RecordedParameter {
   bool is_prior_key = false;               ///< `name` is a key of a robot file's `prior`
   std::optional<double> estimate{};        ///< nothing where the log does not show the parameter
   std::optional<double> standard_error{};  ///< of the estimate, where it is finite
-  double lower = 0.0;                      ///< guaranteed
+  std::optional<double> freedom{};  ///< degrees of freedom of the standard error; nothing where it is taken as exact
+  double lower = 0.0;               ///< guaranteed
   double upper = 0.0;
   bool lower_is_prior = false;  ///< the log does not tighten this side
   bool upper_is_prior = false;

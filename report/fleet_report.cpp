@@ -122,8 +122,8 @@ std::string drift_section(const FleetResult& fleet) {
       std::string(
           repeats_known(fleet.drift)
               ? "; how much logs differ beyond their standard errors was learnt from the whole fleet."
-              : "; with two logs a robot it rests on the standard errors alone, which do not know of floor, payload "
-                "and temperature."));
+              : "; with two logs a robot, a change that most robots share cannot be told from what differs between "
+                "logs (floor, payload, temperature)."));
   for (std::size_t j = 0; j < fleet.table.columns.size(); ++j) {
     const bool any = std::any_of(drifting.begin(), drifting.end(), [&](const auto& d) { return d.column == j; });
     const std::string strip = any ? slope_strip(fleet, j) : std::string();

@@ -83,7 +83,8 @@ TEST(Drift, ChanceIsSeldomTakenForATrend) {
     double extra;
   };
   constexpr int fleets = 300;
-  for (const Case& c : {Case{6, 2, 0.0}, Case{40, 2, 0.0}, Case{6, 4, 0.0}, Case{40, 3, 0.0}, Case{40, 4, 0.5}}) {
+  for (const Case& c :
+       {Case{6, 2, 0.0}, Case{40, 2, 0.0}, Case{40, 2, 0.5}, Case{6, 4, 0.0}, Case{40, 3, 0.0}, Case{40, 4, 0.5}}) {
     Random random(c.robots * 10 + c.logs);
     int wrong = 0;
     for (int f = 0; f < fleets; ++f) {
@@ -97,6 +98,35 @@ TEST(Drift, ChanceIsSeldomTakenForATrend) {
     EXPECT_LE(wrong, 0.05 * fleets + 4.0 * std::sqrt(0.05 * 0.95 * fleets))
         << c.robots << " robots, " << c.logs << " logs, " << c.extra;
   }
+}
+
+// Standard errors of few degrees of freedom are wrong by themselves: Student's law allows for it.
+TEST(Drift, StandardErrorsThatAreThemselvesUncertainAreAllowedFor) {
+  constexpr int fleets = 300;
+  constexpr std::size_t freedom = 5;
+  Random random(41);
+  int wrong = 0;
+  for (int f = 0; f < fleets; ++f) {
+    std::vector<ParameterDrift> fleet;
+    for (std::size_t i = 0; i < 30; ++i) {
+      std::vector<DriftPoint> points;
+      for (int k = 0; k < 2; ++k) {
+        double sum = 0.0;
+        for (std::size_t n = 0; n < freedom; ++n) {
+          const double z = random.normal();
+          sum += z * z;
+        }
+        points.push_back({7.0 * k, random.normal(), std::sqrt(sum / freedom), -50.0, 50.0, freedom});
+      }
+      fleet.push_back(*drift_through(points, true));
+      EXPECT_GE(fleet.back().own_freedom, freedom);
+      EXPECT_LE(fleet.back().own_freedom, 2.0 * freedom + 1e-9);
+    }
+    judge_drift(fleet);
+    wrong += fleet[0].drifts(0.05) ? 1 : 0;
+  }
+  RecordProperty("fleets_with_false_drift_uncertain", wrong);
+  EXPECT_LE(wrong, 0.05 * fleets + 4.0 * std::sqrt(0.05 * 0.95 * fleets));
 }
 
 TEST(Drift, TheRobotThatDriftsStandsFirst) {

@@ -31,6 +31,7 @@ RobotRecord full_record() {
   record.commissioning.parameters[1].standard_error.reset();
   record.commissioning.parameters[1].lower = std::nextafter(1.0, 2.0);
   record.commissioning.parameters[1].upper_is_prior = true;
+  record.commissioning.parameters[0].freedom = 6.5;
   record.outputs = {{.name = "sum", .unit = "N·m", .median_width = 0.1, .instants = 7, .false_alarms = 1}};
   record.smallest_radius_change = 0.04;
   CheckRecord check;
