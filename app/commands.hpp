@@ -45,6 +45,8 @@ using Run = std::function<int(const std::string& command_line)>;
 [[nodiscard]] Run add_margins(CLI::App& program);
 /// wheelwright robot --urdf FILE | --sdf FILE | --ros2-control FILE
 [[nodiscard]] Run add_robot(CLI::App& program);
+/// wheelwright sensitivity STUDY.yaml
+[[nodiscard]] Run add_sensitivity(CLI::App& program);
 /// wheelwright simulate SCENARIO.yaml --out LOG
 [[nodiscard]] Run add_simulate(CLI::App& program);
 

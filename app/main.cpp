@@ -55,6 +55,7 @@ int main(int argc, char** argv) {
                                                              {"check", add_check(program)},
                                                              {"identify", add_identify(program)},
                                                              {"margins", add_margins(program)},
+                                                             {"sensitivity", add_sensitivity(program)},
                                                              {"export", add_export(program)},
                                                              {"design", add_design(program)},
                                                              {"simulate", add_simulate(program)},

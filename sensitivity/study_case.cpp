@@ -34,7 +34,8 @@ const Sensor& sensor_of(const std::string& name) {
       return sensor;
     }
   }
-  throw InvalidArgument("input " + name + ": expected wheel_speed, wheel_angle, effort, position or heading behind the dot");
+  throw InvalidArgument("input " + name +
+                        ": expected wheel_speed, wheel_angle, effort, position or heading behind the dot");
 }
 
 struct Truth {
@@ -154,9 +155,8 @@ LogTable thinned(const LogTable& log, const Robot& robot, double rate) {
   if (every == 1) {
     return log;
   }
-  const bool angles = std::ranges::any_of(log.names, [](const std::string& name) {
-    return name.starts_with("phi") || name == "position";
-  });
+  const bool angles = std::ranges::any_of(
+      log.names, [](const std::string& name) { return name.starts_with("phi") || name == "position"; });
   check::that(angles || robot.speed_source == SpeedSource::measured, "input rate",
               "a log with wheel angles, or speed_source: measured in the robot file: means over a step cannot be "
               "thinned");
@@ -191,7 +191,8 @@ const std::vector<StudyInputKind>& study_input_kinds() {
       {"wheel_radius", "m", "wheel radius as the robot file has it"},
       {"track_width", "m", "track width as the robot file has it"},
       {"encoder_counts_per_turn", "1", "counts a turn of the wheel"},
-      {"prior.NAME", "1", "width of the robot file's prior for NAME, as a factor (ratio of its ends where they are > 0)"},
+      {"prior.NAME", "1",
+       "width of the robot file's prior for NAME, as a factor (ratio of its ends where they are > 0)"},
       {"rate", "Hz", "samples a second; a recorded log is thinned"},
       {"duration", "s", "length of the drive, from its beginning"},
       {"outliers", "1", "instants at which an effort is wrong by ten times its root mean square"},

@@ -19,14 +19,14 @@ namespace wheelwright {
 
 /// A robot with a drive: a recorded log, or a scenario that is driven anew. Without inputs, what a study starts from.
 struct StudyCase {
-  Robot robot;                             ///< what the engineer believes: the robot file that is commissioned with
-  std::optional<Scenario> scenario{};      ///< the world, whose robot is the true one; else `log` is the drive
-  std::shared_ptr<const LogTable> log{};   ///< a recorded drive
-  std::optional<double> rate{};            ///< Hz, of a recorded log: every n-th row, n >= 1 nearest to it
-  std::optional<double> duration{};        ///< s from the beginning of a recorded log
-  std::size_t outliers = 0;                ///< instants at which an effort is grossly wrong
-  std::size_t outliers_allowed = 0;        ///< CommissionOptions::outliers
-  std::optional<std::uint64_t> seed{};     ///< of the scenario's noise and of where outliers lie
+  Robot robot;                            ///< what the engineer believes: the robot file that is commissioned with
+  std::optional<Scenario> scenario{};     ///< the world, whose robot is the true one; else `log` is the drive
+  std::shared_ptr<const LogTable> log{};  ///< a recorded drive
+  std::optional<double> rate{};           ///< Hz, of a recorded log: every n-th row, n >= 1 nearest to it
+  std::optional<double> duration{};       ///< s from the beginning of a recorded log
+  std::size_t outliers = 0;               ///< instants at which an effort is grossly wrong
+  std::size_t outliers_allowed = 0;       ///< CommissionOptions::outliers
+  std::optional<std::uint64_t> seed{};    ///< of the scenario's noise and of where outliers lie
 };
 
 /// What can be an input, with its unit and a sentence.

@@ -158,9 +158,8 @@ struct Reader {
 };
 
 bool asks(const std::vector<StudyQuantity>& quantities, std::initializer_list<Kind> kinds) {
-  return std::ranges::any_of(quantities, [&](const StudyQuantity& q) {
-    return std::ranges::find(kinds, q.kind) != kinds.end();
-  });
+  return std::ranges::any_of(quantities,
+                             [&](const StudyQuantity& q) { return std::ranges::find(kinds, q.kind) != kinds.end(); });
 }
 
 double share_outside(const Commissioning& result) {

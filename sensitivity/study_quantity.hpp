@@ -30,8 +30,8 @@ struct StudyQuantity {
     polytope_over_box,  ///< width of [l, u], feasible set over interval hull
     gap,                ///< 1 where the sim-to-real gap's verdict is `subject`, else 0
   };
-  std::string name;     ///< as the study file has it, e.g. "width.r_mass"
-  std::string unit;     ///< empty for pure numbers
+  std::string name;  ///< as the study file has it, e.g. "width.r_mass"
+  std::string unit;  ///< empty for pure numbers
   Kind kind = Kind::width;
   std::size_t index = 0;  ///< of the parameter or output
   std::string subject;    ///< name of the fault or verdict
@@ -51,8 +51,8 @@ struct StudyQuantity {
 
 /// What evaluate_case() takes beside the case.
 struct EvaluateOptions {
-  double window = 1.0;             ///< s, of smallest_fault
-  std::size_t most_onsets = 60;    ///< of smallest_fault and delay
+  double window = 1.0;           ///< s, of smallest_fault
+  std::size_t most_onsets = 60;  ///< of smallest_fault and delay
 };
 
 /// What a point gave.

@@ -36,21 +36,22 @@ TEST(StudyQuantity, FamiliesStandForAllTheirMembers) {
 
 TEST(StudyQuantity, SaysWhatItExpected) {
   const StudyCase subject = simulated();
-  for (const std::string wrong : {"widths", "width.colour", "threshold", "smallest_fault.leg", "delay.wheel_radius",
-                                  "delay.wheel_radius=0", "delay.wheel_radius=1x", "gap", "gap.maybe", "commissioned.x",
-                                  "smallest_fault.wheel_radius=2"}) {
-    EXPECT_THROW(study_quantities({wrong}, subject.robot), InvalidArgument) << wrong;
+  for (const std::string wrong :
+       {"widths", "width.colour", "threshold", "smallest_fault.leg", "delay.wheel_radius", "delay.wheel_radius=0",
+        "delay.wheel_radius=1x", "gap", "gap.maybe", "commissioned.x", "smallest_fault.wheel_radius=2"}) {
+    EXPECT_THROW(static_cast<void>(study_quantities({wrong}, subject.robot)), InvalidArgument) << wrong;
   }
 }
 
 // The numbers are those of the pipeline.
 TEST(StudyQuantity, ReadsTheCommissioning) {
   const StudyCase subject = simulated();
-  const auto quantities = study_quantities({"lower", "upper", "width", "estimate", "standard_error", "false_alarms",
-                                            "commissioned", "polytope_over_box", "threshold"
-                                            ".mean",
-                                            "threshold.peak"},
-                                           subject.robot);
+  const auto quantities = study_quantities(
+      {"lower", "upper", "width", "estimate", "standard_error", "false_alarms", "commissioned", "polytope_over_box",
+       "threshold"
+       ".mean",
+       "threshold.peak"},
+      subject.robot);
   const CaseResult result = evaluate_case(subject, quantities);
   ASSERT_EQ(result.values.size(), quantities.size());
   EXPECT_EQ(result.finding, "");

@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <memory>
+#include <optional>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include <wheelwright/commission/commission.hpp>
+#include <wheelwright/io/robot_file.hpp>
+#include <wheelwright/io/study_file.hpp>
+#include <wheelwright/io/study_json.hpp>
+#include <wheelwright/io/xxh64.hpp>
+#include <wheelwright/report/sensitivity_report.hpp>
+#include <wheelwright/sensitivity/local_derivatives.hpp>
+#include <wheelwright/sensitivity/study.hpp>
+
+#include "commands.hpp"
+#include "common.hpp"
+#include "progress.hpp"
+#include "run_items.hpp"
+#include "study_summary.hpp"
+
+namespace wheelwright::app {
+namespace {
+
+struct Arguments {
+  std::filesystem::path study;
+  ScaleOptions scale;
+  CommonOptions common;
+};
+
+constexpr const char* kHelp =
+    "What would a better sensor, another filter or a longer drive buy? Commissions the robot of a study file at many "
+    "settings of its inputs and says how bounds, thresholds and the smallest faults that are certainly seen depend on "
+    "them.";
+
+constexpr const char* kExamples =
+    "A study file:\n"
+    "  scenario: scenario.yaml          # driven anew at every point; or log: drive.csv and robot: robot.yaml\n"
+    "  inputs:\n"
+    "    noise.effort: [0.005, 0.05]\n"
+    "    filter.beta: {range: [5, 60], scale: log}\n"
+    "    wheel_radius: {relative: [-0.02, 0.02]}\n"
+    "  quantities: [width, threshold.mean, smallest_fault.wheel_radius]\n"
+    "  methods: {local: true, one_at_a_time: {levels: 5}, sobol: {points: 64}}\n\n"
+    "Examples:\n"
+    "  wheelwright sensitivity study.yaml --out result --threads 8\n"
+    "  mpirun wheelwright sensitivity study.yaml --out result\n"
+    "  wheelwright sensitivity study.yaml --out result --shard 3/40     # of a job array; then --merge\n\n"
+    "Results are kept as they come: a run that was killed goes on where it was. docs/sensitivity.md lists all inputs "
+    "and "
+    "quantities.";
+
+// What the drive and the robot are, apart from the inputs.
+std::string fingerprint_of(const Study& study) {
+  Xxh64 hash;
+  const auto add = [&](const std::string& text) { hash.update(text.data(), text.size()); };
+  add(robot_yaml(study.subject.robot));
+  if (study.subject.scenario) {
+    add(robot_yaml(study.subject.scenario->robot));
+  }
+  const LogTable drive = drive_of_case(study.subject);
+  const auto numbers = [&](const std::vector<double>& column) {
+    hash.update(reinterpret_cast<const char*>(column.data()), column.size() * sizeof(double));
+  };
+  numbers(drive.t);
+  for (std::size_t c = 0; c < drive.names.size(); ++c) {
+    add(drive.names[c]);
+    numbers(drive.columns[c]);
+  }
+  return hash.text();
+}
+
+ItemsToRun items_of(const Study& study, const StudyDesign& design) {
+  const auto point = [&](std::size_t item) -> Eigen::VectorXd {
+    return design.points.row(static_cast<Eigen::Index>(design.rows[item]));
+  };
+  ItemsToRun items;
+  items.work.items = design.rows.size();
+  items.work.evaluate = [&study, point](std::size_t item) { return text_of(evaluate_point(study, point(item))); };
+  items.key = [&study, point](std::size_t item) { return name_of_point(study, point(item)); };
+  std::string quantities;
+  for (const StudyQuantity& quantity : study.quantities) {
+    quantities += (quantities.empty() ? "" : ", ") + quantity.name;
+  }
+  items.plan = {{"robot and drive", fingerprint_of(study)},
+                {"quantities", quantities},
+                {"window", fmt::format("{}", study.evaluate.window)}};
+  return items;
+}
+
+// The inputs that have local derivatives: those of the robot file.
+std::vector<std::string> local_inputs(const Study& study) {
+  std::vector<std::string> names;
+  for (const StudyInput& input : study.inputs) {
+    for (const char* family : {"noise.", "declared.", "filter.", "wheel_radius", "track_width", "prior."}) {
+      if (input.name.starts_with(family)) {
+        names.push_back(input.name);
+      }
+    }
+  }
+  return names;
+}
+
+// Derivatives at the nominal point; without a model or an input that has any, a note says so.
+std::optional<LocalSensitivity> derivatives(const Study& study, std::vector<std::string>& notes) {
+  const std::vector<std::string> inputs = local_inputs(study);
+  if (!study.methods.local || inputs.empty()) {
+    if (study.methods.local) {
+      notes.push_back("no local derivatives: none of the inputs stands in the robot file");
+    }
+    return std::nullopt;
+  }
+  try {
+    const StudyCase nominal = case_at(study, nominal_point(study.inputs));
+    const LogTable table = drive_of_case(nominal);
+    TableSource log(table);
+    CommissionOptions options;
+    options.outliers = nominal.outliers_allowed;
+    const Commissioning commissioning = commission(log, nominal.robot, options);
+    return local_derivatives(log, commissioning, {.inputs = inputs});
+  } catch (const Error& error) {
+    notes.push_back(std::string("no local derivatives: ") + error.what());
+    return std::nullopt;
+  }
+}
+
+int run(const Arguments& a) {
+  make_directory(a.common);
+  StudyFile file = read_study(a.study);
+  const Study& study = file.study;
+  const StudyDesign design = design_of(study);
+  Progress progress(a.common.quiet);
+  const ItemsRun done = run_items(items_of(study, design), a.common, a.scale, [&](std::size_t k, std::size_t n) {
+    progress.tell(fmt::format("point {} of {}", k, n), n > 0 ? static_cast<double>(k) / static_cast<double>(n) : 1.0);
+  });
+  if (!done.results) {
+    return kDone;
+  }
+  StudyValues values(study, design);
+  done.results->each([&](std::size_t item, std::string_view text) { values.put(item, case_result(text)); });
+  const StudyResult result = values.result();
+  const std::optional<LocalSensitivity> local = derivatives(study, file.notes);
+  ReportContext context;
+  context.software = software();
+  context.command_line = a.common.command_line;
+  publish(a.common, to_json(file, result, local, a.study.string(), software()), "sensitivity.json",
+          a.common.out.empty() ? std::string() : sensitivity_report(study, result, local, file.notes, context));
+  if (!a.common.quiet && !a.common.json) {
+    print_log(file.notes);
+    fmt::print("{}", summary(study, result, local));
+    if (!a.common.out.empty()) {
+      fmt::print("wrote {} and {}\n", (a.common.out / "sensitivity.json").string(),
+                 (a.common.out / "report.html").string());
+    }
+  }
+  return kDone;
+}
+
+}  // namespace
+
+Run add_sensitivity(CLI::App& program) {
+  auto a = std::make_shared<Arguments>();
+  CLI::App& command = *program.add_subcommand("sensitivity", kHelp);
+  command.add_option("STUDY", a->study, "Study file (YAML)")->required();
+  add_scale_options(command, a->scale);
+  return finish(command, a, kExamples, run);
+}
+
+}  // namespace wheelwright::app

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// The page of a sensitivity study.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <wheelwright/report/context.hpp>
+#include <wheelwright/sensitivity/local_derivatives.hpp>
+#include <wheelwright/sensitivity/study.hpp>
+
+namespace wheelwright {
+
+/// One self-contained HTML page: what matters most for each quantity in words, tornado charts and curves, shares of the
+/// variance, elementary effects, maps, the bounds' derivatives and where there are none, and what could not be evaluated.
+[[nodiscard]] std::string sensitivity_report(const Study& study, const StudyResult& result,
+                                             const std::optional<LocalSensitivity>& local,
+                                             const std::vector<std::string>& notes, const ReportContext& context);
+
+}  // namespace wheelwright
