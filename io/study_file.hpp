@@ -39,7 +39,7 @@ struct StudyFile {
 ///       local: true | false
 ///       one_at_a_time: {levels: 5}
 ///       morris: {trajectories: 20, levels: 4}
-///       sobol: {points: 64, replicates: 16, confidence: 0.95}
+///       sobol: {points: 64, replicates: 8, confidence: 0.95}
 ///       grid: {levels: 5} | {levels: {NAME: 5, ...}}     inputs that are not named stay nominal
 ///     seed: 1                           of the designs
 ///

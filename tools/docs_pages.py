@@ -33,6 +33,7 @@ ROOMS = {
     "design": "manoeuvres",
     "sim": "the robot in closed loop, with faults and effects",
     "gap": "the sim-to-real gap",
+    "sensitivity": "studies over inputs; work on threads, shards and ranks",
     "fleet": "many robots: population, drift, pooled prior",
     "io": "logs, robot files, JSON",
     "report": "the page of a result",
