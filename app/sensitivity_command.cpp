@@ -94,7 +94,8 @@ ItemsToRun items_of(const Study& study, const StudyDesign& design) {
 std::vector<std::string> local_inputs(const Study& study) {
   std::vector<std::string> names;
   for (const StudyInput& input : study.inputs) {
-    for (const char* family : {"noise.", "declared.", "filter.", "wheel_radius", "track_width", "prior."}) {
+    for (const char* family :
+         {"noise.", "declared.", "filter.", "wheel_radius", "track_width", "encoder_counts_per_turn", "prior."}) {
       if (input.name.starts_with(family)) {
         names.push_back(input.name);
       }
