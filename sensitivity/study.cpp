@@ -54,10 +54,14 @@ std::string settle_filter(StudyCase& subject, const std::vector<std::string>& in
   TableSource log(table);
   const FilterDesign design = settle(log, subject.robot).filter;
   subject.robot.filter.order = design.order;
-  subject.robot.filter.alpha = subject.robot.filter.alpha.value_or(design.alpha);
   subject.robot.filter.beta = design.beta;
-  return fmt::format("the filter's nominal constants were chosen from the drive: order {}, α = {:.4g}, β = {:.4g} 1/s",
-                     design.order, *subject.robot.filter.alpha, design.beta);
+  if (std::ranges::find(inputs, "filter.alpha") != inputs.end()) {
+    subject.robot.filter.alpha = subject.robot.filter.alpha.value_or(design.alpha);
+  }
+  return fmt::format(
+      "the filter's nominal constants were chosen from the drive: order {}, β = {:.4g} 1/s, {}", design.order,
+      design.beta,
+      subject.robot.filter.alpha ? fmt::format("α = {:.4g} 1/s", *subject.robot.filter.alpha) : "α the same as β");
 }
 
 Eigen::VectorXd nominal_point(const std::vector<StudyInput>& inputs) {
