@@ -190,7 +190,7 @@ struct StudyReader {
       StudyCase trial = result.study.subject;
       set_input(trial, name, end);
     }
-    if (nominal && input.nominal != *nominal) {
+    if (nominal && std::abs(input.nominal - *nominal) > 1e-6 * std::abs(*nominal)) {
       result.notes.push_back(name +
                              " is varied in a range that does not hold its own value: where others are varied, it "
                              "is at the end of the range nearest to that");
