@@ -89,7 +89,7 @@ TEST(StudyQuantity, ABetterSensorBuysSomething) {
 
 TEST(StudyQuantity, ALargerFaultIsSeenSooner) {
   const StudyCase subject = simulated();
-  const auto quantities = study_quantities({"delay.wheel_radius=0.005", "delay.wheel_radius=0.02"}, subject.robot);
+  const auto quantities = study_quantities({"delay.wheel_radius=0.25", "delay.wheel_radius=0.45"}, subject.robot);
   const CaseResult result = evaluate_case(subject, quantities);
   EXPECT_GE(result.values[0], result.values[1]);
   EXPECT_TRUE(std::isfinite(result.values[1]));
@@ -99,7 +99,8 @@ TEST(StudyQuantity, ALargerFaultIsSeenSooner) {
 TEST(StudyQuantity, WithoutAModelThereIsAFinding) {
   const auto quantities = study_quantities({"width.mass", "commissioned"}, simulated().robot);
   StudyCase subject = simulated();
-  set_input(subject, "declared.effort", 1e-6);
+  set_input(subject, "noise.effort", 2.0);
+  set_input(subject, "declared.effort", 0.001);
   CaseResult result = evaluate_case(subject, quantities);
   EXPECT_TRUE(std::isnan(result.values[0]));
   EXPECT_EQ(result.values[1], 0.0);
