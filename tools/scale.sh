@@ -56,9 +56,9 @@ one=$took
 timed "2 threads" two -- --threads 2
 same two
 if command -v mpirun >/dev/null; then
-  timed "2 ranks" ranks2 mpirun -n 2 --oversubscribe -- --threads 1
+  timed "2 ranks" ranks2 mpirun -n 2 --oversubscribe --bind-to none -- --threads 1
   same ranks2
-  timed "4 ranks" ranks4 mpirun -n 4 --oversubscribe -- --threads 1
+  timed "4 ranks" ranks4 mpirun -n 4 --oversubscribe --bind-to none -- --threads 1
   same ranks4
 fi
 from=$(seconds)
