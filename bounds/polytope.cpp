@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include <wheelwright/bounds/block_parts.hpp>
 #include <wheelwright/bounds/certificate.hpp>
 #include <wheelwright/bounds/refined_multipliers.hpp>
 
@@ -12,22 +13,6 @@ namespace wheelwright {
 namespace {
 
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
-
-Eigen::VectorXd pick(const Eigen::VectorXd& all, const std::vector<std::size_t>& parameters) {
-  Eigen::VectorXd part(static_cast<Eigen::Index>(parameters.size()));
-  for (std::size_t k = 0; k < parameters.size(); ++k) {
-    part[static_cast<Eigen::Index>(k)] = all[static_cast<Eigen::Index>(parameters[k])];
-  }
-  return part;
-}
-
-HalfSpace spread(const HalfSpace& row, const std::vector<std::size_t>& parameters, std::size_t p) {
-  HalfSpace full{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(p)), row.b, row.origin};
-  for (std::size_t k = 0; k < parameters.size(); ++k) {
-    full.a[static_cast<Eigen::Index>(parameters[k])] = row.a[static_cast<Eigen::Index>(k)];
-  }
-  return full;
-}
 
 CertifiedBound spread(CertifiedBound bound, const std::vector<std::size_t>& parameters, std::size_t p) {
   for (WeightedRow& weighted : bound.binding) {

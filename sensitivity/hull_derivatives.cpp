@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <Eigen/LU>
 
+#include <wheelwright/bounds/block_parts.hpp>
 #include <wheelwright/bounds/linear_program.hpp>
 #include <wheelwright/bounds/slab_rows.hpp>
 #include <wheelwright/core/check.hpp>
@@ -19,22 +20,6 @@ constexpr double kActive = 1e-9;    // slack, relative to the block's size
 constexpr double kPositive = 1e-9;  // multiplier, relative to the direction
 constexpr double kOptimal = 1e-10;  // how far below the optimum counts as optimal, in sizes of the block
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-
-Eigen::VectorXd pick(const Eigen::VectorXd& all, const std::vector<std::size_t>& parameters) {
-  Eigen::VectorXd part(static_cast<Eigen::Index>(parameters.size()));
-  for (std::size_t k = 0; k < parameters.size(); ++k) {
-    part[static_cast<Eigen::Index>(k)] = all[static_cast<Eigen::Index>(parameters[k])];
-  }
-  return part;
-}
-
-HalfSpace spread(const HalfSpace& row, const std::vector<std::size_t>& parameters, std::size_t p) {
-  HalfSpace full{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(p)), row.b, row.origin};
-  for (std::size_t k = 0; k < parameters.size(); ++k) {
-    full.a[static_cast<Eigen::Index>(parameters[k])] = row.a[static_cast<Eigen::Index>(k)];
-  }
-  return full;
-}
 
 // ±e_j in the parameters of the block.
 Eigen::VectorXd direction(const Polytope::Block& block, const HullOptimum& optimum) {
