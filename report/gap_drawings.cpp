@@ -12,21 +12,11 @@
 
 #include <wheelwright/gap/spectrum.hpp>
 #include <wheelwright/gap/where.hpp>
+#include <wheelwright/report/svg.hpp>
 #include <wheelwright/report/text.hpp>
 
 namespace wheelwright::report {
 namespace {
-
-std::string open_svg(double width, double height, const std::string& label) {
-  return fmt::format(
-      "<svg viewBox=\"0 0 {0:.0f} {1:.0f}\" width=\"{0:.0f}\" height=\"{1:.0f}\" role=\"img\" aria-label=\"{2}\">",
-      width, height, escape(label));
-}
-
-std::string text(double x, double y, const char* anchor, const std::string& what, bool ink = false) {
-  return fmt::format("<text{} x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\">{}</text>", ink ? " class=\"ink\"" : "", x,
-                     y, anchor, escape(what));
-}
 
 std::string line(double x1, double y1, double x2, double y2, const std::string& style) {
   return fmt::format("<line x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\" {}/>", x1, y1, x2, y2, style);
@@ -96,15 +86,15 @@ std::string shrink_bars(const std::vector<ShrinkFigure>& figures) {
     const double largest = std::max({std::isfinite(f.before) ? f.before : 0.0, std::isfinite(f.after) ? f.after : 0.0,
                                      std::isfinite(f.upper) ? f.upper : 0.0, f.floor, 1e-300});
     const char* known = figure_words(f.name);
-    out += text(left - 10.0, y + 18.0, "end", known != nullptr ? known : words(f.name), true);
+    out += svg_text(left - 10.0, y + 18.0, "end", known != nullptr ? known : words(f.name), true);
     const auto size = [&](double value) { return f.unit == "1" ? percent(value) : with_unit(number(value), f.unit); };
     const auto bar = [&](double value, const char* name, const char* style, const std::string& note) {
       if (!std::isfinite(value)) {
-        out += text(left + 4.0, y + 9.5, "start", fmt::format("{}: none", name));
+        out += svg_text(left + 4.0, y + 9.5, "start", fmt::format("{}: none", name));
       } else {
         const double length = longest * std::max(0.0, value) / largest;
         out += rectangle(left, y, std::max(length, 0.8), height, style);
-        out += text(left + longest + 12.0, y + 9.5, "start", fmt::format("{} {}{}", name, size(value), note));
+        out += svg_text(left + longest + 12.0, y + 9.5, "start", fmt::format("{} {}{}", name, size(value), note));
       }
     };
     bar(f.before, "before", "class=\"bar\" style=\"stroke-dasharray:3 2\"", "");
@@ -145,14 +135,14 @@ std::string share_bars(const std::vector<GapShare>& shares, std::size_t most) {
     const GapShare& s = shares[k];
     const double y = 4.0 + row * static_cast<double>(k);
     const bool finding = is_finding(s);
-    out += text(left - 8.0, y + 11.5, "end", s.regime, finding);
+    out += svg_text(left - 8.0, y + 11.5, "end", s.regime, finding);
     out +=
         rectangle(left, y, std::max(0.8, longest * s.share), 14.0, finding ? "class=\"full\"" : "class=\"bar open\"");
     const bool part = s.kind != "channel";
     if (part) {
       out += line(left + longest * s.presence, y - 2.0, left + longest * s.presence, y + 16.0, "class=\"whisker\"");
     }
-    out += text(
+    out += svg_text(
         left + longest + 12.0, y + 11.5, "start",
         fmt::format("{:.0f} %{}, p {}", 100.0 * s.share, part ? fmt::format(" in {:.0f} %", 100.0 * s.presence) : "",
                     s.p_value < 0.001 ? "< 0.001" : "= " + decimal(s.p_value, 3)),
@@ -197,11 +187,11 @@ std::string spectrum_drawing(const ResidualSeries& series, double beta) {
   std::string out = open_svg(width, height, "spectrum before, re-fitted, after, and of the floor");
   for (const double tick : x.ticks()) {
     out += line(x(tick), top, x(tick), height - bottom, "class=\"axis\"") +
-           text(x(tick), height - bottom + 14.0, "middle", fmt::format("{:g}", tick));
+           svg_text(x(tick), height - bottom + 14.0, "middle", fmt::format("{:g}", tick));
   }
   for (const double tick : y.ticks()) {
     out += line(left, y(tick), width - right, y(tick), "class=\"axis\"") +
-           text(left - 6.0, y(tick) + 4.0, "end", number(tick, 1));
+           svg_text(left - 6.0, y(tick) + 4.0, "end", number(tick, 1));
   }
   double at = top + 12.0;
   for (std::size_t k = 0; k < lines.size(); ++k) {
@@ -222,10 +212,10 @@ std::string spectrum_drawing(const ResidualSeries& series, double beta) {
     }
     out += fmt::format("<path d=\"{}\" {}/>", d, stroke(kLooks[k]));
     out += line(width - right + 10.0, at, width - right + 38.0, at, stroke(kLooks[k]));
-    out += text(width - right + 44.0, at + 4.0, "start", kStages[k], true);
+    out += svg_text(width - right + 44.0, at + 4.0, "start", kStages[k], true);
     at += 18.0;
   }
-  out += text(0.5 * (left + width - right), height - 6.0, "middle", "frequency, Hz");
+  out += svg_text(0.5 * (left + width - right), height - 6.0, "middle", "frequency, Hz");
   out += fmt::format(
       "<text x=\"14\" y=\"{0:.0f}\" transform=\"rotate(-90 14 {0:.0f})\" text-anchor=\"middle\">density, "
       "({1})²/Hz</text>",
@@ -287,13 +277,14 @@ std::string position_map(const ResidualSeries& series, const LogTable& signals, 
         left + size * at.first, top + height - size * (at.second + 1), size - 0.5, size - 0.5, 0.08 + 0.92 * shade,
         x0 + cell * (at.first + 0.5), y0 + cell * (at.second + 0.5), number(rms, 2), escape(series.unit));
   }
-  out += text(left, top + height + 14.0, "start", number(x0, 2)) +
-         text(left + width, top + height + 14.0, "end", number(x1, 2)) +
-         text(left + 0.5 * width, top + height + 14.0, "middle", "x, m") +
-         text(left - 5.0, top + height, "end", number(y0, 2)) + text(left - 5.0, top + 10.0, "end", number(y1, 2)) +
-         text(left - 5.0, top + 0.5 * height, "end", "y, m") +
-         text(left, top + height + 36.0, "start",
-              fmt::format("dark {0} {2}, pale {1} {2}", number(high, 2), number(low, 2), series.unit));
+  out += svg_text(left, top + height + 14.0, "start", number(x0, 2)) +
+         svg_text(left + width, top + height + 14.0, "end", number(x1, 2)) +
+         svg_text(left + 0.5 * width, top + height + 14.0, "middle", "x, m") +
+         svg_text(left - 5.0, top + height, "end", number(y0, 2)) +
+         svg_text(left - 5.0, top + 10.0, "end", number(y1, 2)) +
+         svg_text(left - 5.0, top + 0.5 * height, "end", "y, m") +
+         svg_text(left, top + height + 36.0, "start",
+                  fmt::format("dark {0} {2}, pale {1} {2}", number(high, 2), number(low, 2), series.unit));
   return out + "</svg>";
 }
 
@@ -337,7 +328,7 @@ std::string confusability_matrix(const std::vector<ConfusablePair>& pairs, std::
   }
   for (std::size_t row = 1; row < names.size(); ++row) {
     const double y = slant + cell * static_cast<double>(row - 1);
-    out += text(left - 8.0, y + 21.0, "end", words(names[row]), true);
+    out += svg_text(left - 8.0, y + 21.0, "end", words(names[row]), true);
     for (std::size_t column = 0; column < row; ++column) {
       const double x = left + cell * static_cast<double>(column);
       const auto found = cells.find({row, column});
@@ -347,7 +338,7 @@ std::string confusability_matrix(const std::vector<ConfusablePair>& pairs, std::
                        fmt::format("style=\"fill:var(--first);fill-opacity:{:.2f};stroke:var({});stroke-width:{}\"",
                                    0.06 + 0.54 * similarity, framed ? "--ink" : "--rule", framed ? 2 : 1));
       if (found != cells.end()) {
-        out += text(x + 0.5 * cell, y + 21.0, "middle", fmt::format("{:.0f}", 100.0 * similarity), true);
+        out += svg_text(x + 0.5 * cell, y + 21.0, "middle", fmt::format("{:.0f}", 100.0 * similarity), true);
       }
     }
   }

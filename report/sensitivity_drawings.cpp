@@ -9,21 +9,11 @@
 #include <fmt/format.h>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/report/svg.hpp>
 #include <wheelwright/report/text.hpp>
 
 namespace wheelwright::report {
 namespace {
-
-std::string open_svg(double width, double height, const std::string& label) {
-  return fmt::format(
-      "<svg viewBox=\"0 0 {0:.0f} {1:.0f}\" width=\"{0:.0f}\" height=\"{1:.0f}\" role=\"img\" aria-label=\"{2}\">",
-      width, height, escape(label));
-}
-
-std::string text(double x, double y, const char* anchor, const std::string& what, bool ink = false) {
-  return fmt::format("<text{} x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\">{}</text>", ink ? " class=\"ink\"" : "", x,
-                     y, anchor, escape(what));
-}
 
 std::string upright(double y, const std::string& what) {
   return fmt::format(
@@ -101,7 +91,7 @@ std::string across(const Axis& x, double top, double bottom) {
   std::string out;
   for (const double tick : x.ticks()) {
     out += line(x(tick), top, x(tick), bottom, "class=\"axis\"") +
-           text(x(tick), bottom + 14.0, "middle", fmt::format("{:.4g}", tick));
+           svg_text(x(tick), bottom + 14.0, "middle", fmt::format("{:.4g}", tick));
   }
   return out;
 }
@@ -110,7 +100,7 @@ std::string up(const Axis& y, double left, double right) {
   std::string out;
   for (const double tick : y.ticks()) {
     out += line(left, y(tick), right, y(tick), "class=\"axis\"") +
-           text(left - 6.0, y(tick) + 4.0, "end", fmt::format("{:.4g}", tick));
+           svg_text(left - 6.0, y(tick) + 4.0, "end", fmt::format("{:.4g}", tick));
   }
   return out;
 }
@@ -154,7 +144,7 @@ std::string tornado(const OneAtATime& study, const std::vector<std::string>& inp
   for (std::size_t k = 0; k < n; ++k) {
     const InputCurve& curve = study.inputs[study.order[k]];
     const double y = top + row * static_cast<double>(k) + 4.0, middle = y + 7.0;
-    out += text(left - 8.0, y + 11.5, "end", inputs[study.order[k]], true);
+    out += svg_text(left - 8.0, y + 11.5, "end", inputs[study.order[k]], true);
     double least = study.nominal, greatest = study.nominal;
     for (const double value : curve.values) {
       least = std::fmin(least, value);
@@ -172,13 +162,13 @@ std::string tornado(const OneAtATime& study, const std::vector<std::string>& inp
       out += whisker(x(least), x(greatest), middle);
     }
     if (curve.missing > 0) {
-      out += text(left + span + 4.0, y + 11.5, "start", "*");
+      out += svg_text(left + span + 4.0, y + 11.5, "start", "*");
     }
   }
   out += line(x(study.nominal), top, x(study.nominal), bottom, "class=\"nominal\"");
-  out += text(left + 0.5 * span, bottom + 31.0, "middle", words(quantity));
-  out +=
-      text(left + 0.5 * span, bottom + 49.0, "middle", "pale: input at its lower end, full: at its upper end; * gaps");
+  out += svg_text(left + 0.5 * span, bottom + 31.0, "middle", words(quantity));
+  out += svg_text(left + 0.5 * span, bottom + 49.0, "middle",
+                  "pale: input at its lower end, full: at its upper end; * gaps");
   return out + "</svg>";
 }
 
@@ -217,8 +207,8 @@ std::string sensitivity_curve(const Eigen::VectorXd& x, const Eigen::VectorXd& y
     out += fmt::format("<circle class=\"centre\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"4.5\"/>", across_axis(nominal_x),
                        up_axis(nominal_y));
   }
-  out +=
-      text(0.5 * (left + right), height - 6.0, "middle", words(input)) + upright(0.5 * (top + bottom), words(quantity));
+  out += svg_text(0.5 * (left + right), height - 6.0, "middle", words(input)) +
+         upright(0.5 * (top + bottom), words(quantity));
   return out + "</svg>";
 }
 
@@ -248,7 +238,7 @@ std::string sobol_bars(const SobolIndices& indices, const std::vector<std::strin
   out += across(x, top, bottom);
   for (std::size_t k = 0; k < n; ++k) {
     const double y = top + row * static_cast<double>(k) + 4.0;
-    out += text(left - 8.0, y + 17.0, "end", inputs[order[k]], true);
+    out += svg_text(left - 8.0, y + 17.0, "end", inputs[order[k]], true);
     const auto draw = [&](const SobolIndex& index, double at, const char* style) {
       out += bar(x(0.0), x(index.estimate), at, 11.0, style) +
              whisker(x(std::max(index.lower, x.low)), x(std::min(index.upper, x.high)), at + 5.5);
@@ -257,8 +247,8 @@ std::string sobol_bars(const SobolIndices& indices, const std::vector<std::strin
     draw(indices.total[order[k]], y + 13.0, "class=\"bar\"");
   }
   out += line(x(0.0), top, x(0.0), bottom, "class=\"nominal\"");
-  out += text(left + 0.5 * span, bottom + 31.0, "middle", "share of the variance");
-  out += text(left + 0.5 * span, bottom + 48.0, "middle", "full: by itself, pale: with its interactions");
+  out += svg_text(left + 0.5 * span, bottom + 31.0, "middle", "share of the variance");
+  out += svg_text(left + 0.5 * span, bottom + 48.0, "middle", "full: by itself, pale: with its interactions");
   return out + "</svg>";
 }
 
@@ -296,11 +286,11 @@ std::string morris_scatter(const std::vector<ElementaryEffects>& effects, const 
     out += whisker(x(std::max(e.lower, 0.0)), x(e.upper), y(e.deviation));
     out +=
         fmt::format("<circle class=\"dot\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3\"/>", x(e.mean_absolute), y(e.deviation));
-    out += text(x(e.mean_absolute) + 5.0, y(e.deviation) - 5.0, "start", label, true);
-    out += text(right + 14.0, top + 12.0 + 16.0 * static_cast<double>(k), "start",
-                fmt::format("{} {}", label, inputs[order[k]]), true);
+    out += svg_text(x(e.mean_absolute) + 5.0, y(e.deviation) - 5.0, "start", label, true);
+    out += svg_text(right + 14.0, top + 12.0 + 16.0 * static_cast<double>(k), "start",
+                    fmt::format("{} {}", label, inputs[order[k]]), true);
   }
-  out += text(0.5 * (left + right), bottom + 32.0, "middle", "mean absolute effect μ* on " + words(quantity)) +
+  out += svg_text(0.5 * (left + right), bottom + 32.0, "middle", "mean absolute effect μ* on " + words(quantity)) +
          upright(0.5 * (top + bottom), "spread σ");
   return out + "</svg>";
 }
@@ -342,14 +332,15 @@ std::string sensitivity_map(const GridMap& map, const Eigen::VectorXd& x, const 
       }
     }
   }
-  out += text(left, top + side + 14.0, "start", number(x[0], 2)) +
-         text(left + side, top + side + 14.0, "end", number(x[x.size() - 1], 2)) +
-         text(left + 0.5 * side, top + side + 29.0, "middle", words(x_label)) +
-         text(left - 5.0, top + side, "end", number(y[0], 2)) +
-         text(left - 5.0, top + 10.0, "end", number(y[y.size() - 1], 2)) + upright(top + 0.5 * side, words(y_label)) +
-         text(left + 0.5 * side, top + side + 50.0, "middle",
-              fmt::format("{}: dark {}, pale {}", quantity.name, with_unit(number(shade.high), quantity.unit),
-                          with_unit(number(shade.low), quantity.unit)));
+  out += svg_text(left, top + side + 14.0, "start", number(x[0], 2)) +
+         svg_text(left + side, top + side + 14.0, "end", number(x[x.size() - 1], 2)) +
+         svg_text(left + 0.5 * side, top + side + 29.0, "middle", words(x_label)) +
+         svg_text(left - 5.0, top + side, "end", number(y[0], 2)) +
+         svg_text(left - 5.0, top + 10.0, "end", number(y[y.size() - 1], 2)) +
+         upright(top + 0.5 * side, words(y_label)) +
+         svg_text(left + 0.5 * side, top + side + 50.0, "middle",
+                  fmt::format("{}: dark {}, pale {}", quantity.name, with_unit(number(shade.high), quantity.unit),
+                              with_unit(number(shade.low), quantity.unit)));
   return out + "</svg>";
 }
 
