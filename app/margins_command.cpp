@@ -14,6 +14,7 @@
 #include <wheelwright/io/model_file.hpp>
 #include <wheelwright/report/margins_report.hpp>
 
+#include "columns.hpp"
 #include "commands.hpp"
 #include "common.hpp"
 #include "failure_page.hpp"
@@ -51,27 +52,19 @@ constexpr const char* kExamples =
 std::string table(const MarginSurvey& survey, const ResidualMargins& residual) {
   const std::size_t window = shown_window(survey);
   constexpr std::size_t name_width = 28, width = 19;
-  // Widths count what is seen: the dash and the minus sign are one column and three bytes.
-  const auto pad = [](std::string text, std::size_t to) {
-    std::size_t columns = 0;
-    for (const char c : text) {
-      columns += (static_cast<unsigned char>(c) & 0xC0U) != 0x80U ? 1 : 0;
-    }
-    return columns < to ? std::string(to - columns, ' ').insert(0, text) : text + " ";
-  };
   std::string out = fmt::format("{} residual, seen for certain within {:g} s, when it sets in while\n", residual.name,
                                 survey.windows[window]);
-  out += pad("", name_width);
+  out += padded("", name_width);
   for (const auto& [kind, count] : survey.manoeuvres) {
     const std::string_view name = words(kind);
-    out += pad(std::string(name.substr(0, name.find(' '))), width);
+    out += padded(std::string(name.substr(0, name.find(' '))), width);
   }
   out += "\n";
   for (const FaultMargins& margins : residual.margins) {
     const bool sides = !margins.fault.whole && margins.fault.range.lower < 0.0;
-    out += pad("  " + margins.fault.name + (sides ? margins.side > 0.0 ? " +" : " −" : ""), name_width);
+    out += padded("  " + margins.fault.name + (sides ? margins.side > 0.0 ? " +" : " −" : ""), name_width);
     for (const auto& [kind, count] : survey.manoeuvres) {
-      out += pad(certain_words(margins, window, kind), width);
+      out += padded(certain_words(margins, window, kind), width);
     }
     out += "\n";
   }

@@ -9,6 +9,8 @@
 
 #include <wheelwright/report/text.hpp>
 
+#include "columns.hpp"
+
 namespace wheelwright::app {
 namespace {
 
@@ -17,14 +19,6 @@ constexpr std::size_t kFindings = 5;
 std::string with_unit(const std::string& unit) { return unit.empty() || unit == "1" ? "" : " " + unit; }
 
 std::string shown(double x) { return report::number(x, 3); }
-
-// Columns count what is seen: signs and dashes are one column and several bytes.
-std::string padded(std::string text, std::size_t width) {
-  const auto columns = static_cast<std::size_t>(
-      std::ranges::count_if(text, [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));
-  text.append(columns < width ? width - columns : 1, ' ');
-  return text;
-}
 
 std::string interval(const SobolIndex& index) {
   return fmt::format("{} [{}, {}]", report::decimal(index.estimate, 2), report::decimal(index.lower, 2),
