@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/commission/physical.hpp>
+#include <wheelwright/io/json_number.hpp>
 #include <wheelwright/io/model_words.hpp>
 #include <wheelwright/report/page.hpp>
 #include <wheelwright/report/text.hpp>
@@ -51,8 +52,6 @@ std::string facet_sentence(const FacetVerdicts& facets) {
   }
   return text;
 }
-
-Json number_or_null(double x) { return std::isfinite(x) ? Json(x) : Json(nullptr); }
 
 }  // namespace
 
@@ -110,9 +109,9 @@ Json to_json(const ModelCheck& check, const ModelClaims& claims, const LogReport
                       {"unit", parameter_unit(claims.robot, parameter)},
                       {"side", word_of(kSideWords, each.side)},
                       {"stated", each.stated},
-                      {"shown", number_or_null(each.shown)},
+                      {"shown", or_null(each.shown)},
                       {"proved", each.proved},
-                      {"shortfall", number_or_null(each.shortfall)},
+                      {"shortfall", or_null(each.shortfall)},
                       {"rows", claim_of(each, claims).proof.size()},
                       {"reason", each.reason}});
   }
@@ -137,7 +136,7 @@ Json to_json(const ModelCheck& check, const ModelClaims& claims, const LogReport
   if (check.emptiness) {
     json["contradiction"] = {{"rows", claims.contradiction.size()},
                              {"proved", check.emptiness->proved},
-                             {"shortfall", number_or_null(check.emptiness->shortfall)}};
+                             {"shortfall", or_null(check.emptiness->shortfall)}};
   }
   return json;
 }

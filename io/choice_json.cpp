@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/io/choice_json.hpp>
 
-#include <cmath>
 #include <utility>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
+#include <wheelwright/io/json_number.hpp>
 
 namespace wheelwright {
 namespace {
@@ -18,8 +18,6 @@ const char* name_of(Guarantee guarantee) {
   }
   return "";
 }
-
-Json or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 Json filter_json(const FilterDesign& filter) {
   return {{"order", filter.order}, {"alpha", filter.alpha}, {"beta", filter.beta}};

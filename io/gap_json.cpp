@@ -10,13 +10,12 @@
 
 #include <wheelwright/gap/where.hpp>
 #include <wheelwright/io/atomic_file.hpp>
+#include <wheelwright/io/json_number.hpp>
 
 namespace wheelwright {
 namespace {
 
 const char* name_of(GapSpace space) { return space == GapSpace::dynamic ? "dynamic" : "kinematic"; }
-
-Json or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 Json causes_json(const std::vector<GapCause>& causes) {
   Json list = Json::array();

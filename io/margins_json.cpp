@@ -1,22 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/io/margins_json.hpp>
 
-#include <cmath>
 #include <utility>
 
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/commission/margin_words.hpp>
+#include <wheelwright/io/json_number.hpp>
 
 namespace wheelwright {
 namespace {
 
-Json size_json(double size) { return std::isfinite(size) ? Json(size) : Json(nullptr); }
-
 Json sizes_json(const std::vector<double>& sizes) {
   Json list = Json::array();
   for (const double size : sizes) {
-    list.push_back(size_json(size));
+    list.push_back(or_null(size));
   }
   return list;
 }
@@ -42,15 +40,15 @@ Json summary_json(const FaultMargins& margins, const MarginSurvey& survey, const
       }
       Json channels = Json::object();
       for (std::size_t i = 0; i < outputs.size(); ++i) {
-        channels[outputs[i]] = size_json(summarise(margins, w, kind, i).worst);
+        channels[outputs[i]] = or_null(summarise(margins, w, kind, i).worst);
       }
       list.push_back({{"manoeuvre", name_of(kind)},
                       {"window", survey.windows[w]},
                       {"onsets", all.onsets},
                       {"certain_at", all.certain},
-                      {"best", size_json(all.best)},
-                      {"median", size_json(all.median)},
-                      {"worst", size_json(all.worst)},
+                      {"best", or_null(all.best)},
+                      {"median", or_null(all.median)},
+                      {"worst", or_null(all.worst)},
                       {"worst_by_output", std::move(channels)}});
     }
   }
@@ -63,7 +61,7 @@ Json onsets_json(const FaultMargins& margins) {
     list.push_back({{"t", onset.t},
                     {"manoeuvre", name_of(onset.kind)},
                     {"certain", sizes_json(onset.certain)},
-                    {"hidden", size_json(onset.hidden)}});
+                    {"hidden", or_null(onset.hidden)}});
   }
   return list;
 }
@@ -73,7 +71,7 @@ Json map_json(const OperatingMap& map) {
   for (Eigen::Index a = 0; a < map.smallest.rows(); ++a) {
     Json row = Json::array();
     for (Eigen::Index b = 0; b < map.smallest.cols(); ++b) {
-      row.push_back(size_json(map.smallest(a, b)));
+      row.push_back(or_null(map.smallest(a, b)));
     }
     smallest.push_back(std::move(row));
   }

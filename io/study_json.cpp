@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/io/study_json.hpp>
 
-#include <cmath>
 #include <utility>
 
 #include <nlohmann/json.hpp>
+#include <wheelwright/io/json_number.hpp>
 
 namespace wheelwright {
 namespace {
-
-Json or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 Json inputs_json(const Study& study) {
   Json list = Json::array();

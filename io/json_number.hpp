@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Numbers that may not be there, in results.
+#pragma once
+
+#include <cmath>
+
+#include <nlohmann/json.hpp>
+
+#include <wheelwright/io/json_file.hpp>
+
+namespace wheelwright {
+
+/// `value`, or null where it is NaN or infinite.
+[[nodiscard]] inline Json or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+}  // namespace wheelwright
