@@ -13,6 +13,7 @@
 #include "model_check.hpp"
 
 namespace wheelwright::app {
+namespace check_command {
 namespace {
 
 struct Arguments {
@@ -60,8 +61,10 @@ int run(const Arguments& a) {
 }
 
 }  // namespace
+}  // namespace check_command
 
 Run add_check(CLI::App& program) {
+  using namespace check_command;
   auto a = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("check", kHelp);
   command.add_option("MODEL", a->model, "model.json of `wheelwright commission`")->required();

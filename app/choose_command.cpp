@@ -20,6 +20,7 @@
 #include "units.hpp"
 
 namespace wheelwright::app {
+namespace choose_command {
 namespace {
 
 struct Arguments {
@@ -166,8 +167,10 @@ int run(const Arguments& a) {
 }
 
 }  // namespace
+}  // namespace choose_command
 
 Run add_choose(CLI::App& program) {
+  using namespace choose_command;
   auto a = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("choose", kHelp);
   command.add_option("LOG", a->logs, "Logs of fault-free driving (CSV, rosbag2, HDF5); several are taken together")

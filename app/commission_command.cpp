@@ -20,6 +20,7 @@
 #include "summary.hpp"
 
 namespace wheelwright::app {
+namespace commission_command {
 namespace {
 
 struct Arguments {
@@ -82,8 +83,10 @@ int run(const Arguments& a) {
 }
 
 }  // namespace
+}  // namespace commission_command
 
 Run add_commission(CLI::App& program) {
+  using namespace commission_command;
   auto a = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("commission", kHelp);
   command.add_option("LOG", a->logs, "Logs (CSV also .gz and .zst, rosbag2, HDF5); several are taken together")

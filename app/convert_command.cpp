@@ -14,6 +14,7 @@
 #include "progress.hpp"
 
 namespace wheelwright::app {
+namespace convert_command {
 namespace {
 
 struct Arguments {
@@ -81,8 +82,10 @@ int run(const Arguments& a) {
 }
 
 }  // namespace
+}  // namespace convert_command
 
 Run add_convert(CLI::App& program) {
+  using namespace convert_command;
   auto a = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("convert", kHelp);
   command.add_option("IN OUT", a->paths, "Logs to read (several are taken together), and last the file to write")

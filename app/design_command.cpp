@@ -27,6 +27,7 @@
 #include "units.hpp"
 
 namespace wheelwright::app {
+namespace design_command {
 namespace {
 
 struct Arguments {
@@ -220,8 +221,10 @@ int run(const Arguments& a) {
 }
 
 }  // namespace
+}  // namespace design_command
 
 Run add_design(CLI::App& program) {
+  using namespace design_command;
   auto a = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("design", kHelp);
   command.add_option("--for", a->aim, "What the drive is for: bounds, detection or discrimination")

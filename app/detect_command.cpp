@@ -20,6 +20,7 @@
 #include "summary.hpp"
 
 namespace wheelwright::app {
+namespace detect_command {
 namespace {
 
 struct Arguments {
@@ -105,8 +106,10 @@ int run(const Arguments& a) {
 }
 
 }  // namespace
+}  // namespace detect_command
 
 Run add_detect(CLI::App& program) {
+  using namespace detect_command;
   auto a = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("detect", kHelp);
   command.add_option("LOG", a->log, "Log (CSV also .gz and .zst, rosbag2, HDF5)");

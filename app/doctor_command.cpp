@@ -16,6 +16,7 @@
 #include "common.hpp"
 
 namespace wheelwright::app {
+namespace doctor_command {
 namespace {
 
 struct Arguments {
@@ -154,8 +155,10 @@ int run(const Arguments& a) {
 }
 
 }  // namespace
+}  // namespace doctor_command
 
 Run add_doctor(CLI::App& program) {
+  using namespace doctor_command;
   auto a = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("doctor", kHelp);
   command.add_option("LOG", a->logs, "Logs (CSV also .gz and .zst, rosbag2, HDF5); several are taken together")

@@ -13,6 +13,7 @@
 #include "common.hpp"
 
 namespace wheelwright::app {
+namespace export_command {
 namespace {
 
 struct Arguments {
@@ -90,8 +91,10 @@ int run(const Arguments& a) {
 }
 
 }  // namespace
+}  // namespace export_command
 
 Run add_export(CLI::App& program) {
+  using namespace export_command;
   auto a = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("export", kHelp);
   command.add_option("MODEL", a->model, "model.json of `wheelwright commission`")->required();

@@ -23,6 +23,7 @@
 #include "run_items.hpp"
 
 namespace wheelwright::app {
+namespace fleet_command {
 namespace {
 
 struct Arguments {
@@ -191,8 +192,10 @@ int run(const Arguments& a) {
 }
 
 }  // namespace
+}  // namespace fleet_command
 
 Run add_fleet(CLI::App& program) {
+  using namespace fleet_command;
   auto a = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("fleet", kHelp);
   command.add_option("LIST", a->list, "Directory of logs, or list of robots and logs (CSV)")->required();

@@ -30,6 +30,7 @@
 #include "units.hpp"
 
 namespace wheelwright::app {
+namespace gap_command {
 namespace {
 
 struct Arguments {
@@ -219,8 +220,10 @@ int run(const Arguments& a) {
 }
 
 }  // namespace
+}  // namespace gap_command
 
 Run add_gap(CLI::App& program) {
+  using namespace gap_command;
   auto a = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("gap", kHelp);
   command.add_option("LOG", a->logs, "Logs (CSV, rosbag2, HDF5) of one robot in one state; taken together")->required();

@@ -20,6 +20,7 @@
 #include "progress.hpp"
 
 namespace wheelwright::app {
+namespace identify_command {
 namespace {
 
 struct Arguments {
@@ -90,8 +91,10 @@ int run(const Arguments& a) {
 }
 
 }  // namespace
+}  // namespace identify_command
 
 Run add_identify(CLI::App& program) {
+  using namespace identify_command;
   auto a = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("identify", kHelp);
   command.add_option("LOG", a->logs, "Logs (CSV also .gz and .zst, rosbag2, HDF5); several are taken together")

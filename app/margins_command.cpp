@@ -22,6 +22,7 @@
 #include "units.hpp"
 
 namespace wheelwright::app {
+namespace margins_command {
 namespace {
 
 struct Arguments {
@@ -112,8 +113,10 @@ int run(const Arguments& a) {
 }
 
 }  // namespace
+}  // namespace margins_command
 
 Run add_margins(CLI::App& program) {
+  using namespace margins_command;
   auto a = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("margins", kHelp);
   command.add_option("LOG", a->log, "Log (CSV also .gz and .zst, rosbag2, HDF5)")->required();

@@ -18,6 +18,7 @@
 #include "units.hpp"
 
 namespace wheelwright::app {
+namespace robot_command {
 namespace {
 
 struct Arguments {
@@ -97,8 +98,10 @@ int run(const Arguments& a) {
 }
 
 }  // namespace
+}  // namespace robot_command
 
 Run add_robot(CLI::App& program) {
+  using namespace robot_command;
   auto a = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("robot", kHelp);
   command.add_option("--urdf", a->urdf, "Robot description in URDF: geometry, masses, joints")->type_name("FILE");

@@ -22,6 +22,7 @@
 #include "study_summary.hpp"
 
 namespace wheelwright::app {
+namespace sensitivity_command {
 namespace {
 
 struct Arguments {
@@ -160,8 +161,10 @@ int run(const Arguments& a) {
 }
 
 }  // namespace
+}  // namespace sensitivity_command
 
 Run add_sensitivity(CLI::App& program) {
+  using namespace sensitivity_command;
   auto a = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("sensitivity", kHelp);
   command.add_option("STUDY", a->study, "Study file (YAML)")->required();

@@ -14,6 +14,7 @@
 #include "common.hpp"
 
 namespace wheelwright::app {
+namespace simulate_command {
 namespace {
 
 struct Arguments {
@@ -56,8 +57,10 @@ int run(const Arguments& a) {
 }
 
 }  // namespace
+}  // namespace simulate_command
 
 Run add_simulate(CLI::App& program) {
+  using namespace simulate_command;
   auto a = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("simulate", kHelp);
   command.add_option("SCENARIO", a->scenario, "Scenario file (YAML)")->required();

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/bounds/check_certificate.hpp>
+#include <wheelwright/core/limits.hpp>
 
 #include <algorithm>
 #include <array>
@@ -14,8 +15,7 @@ namespace {
 
 using Rational = boost::multiprecision::cpp_rational;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr std::size_t kMostRounds = 16;
+constexpr std::size_t kMostNarrowings = 16;
 constexpr double kNarrower = 1e-12;  // of its width: a side that gains less is not worth another round
 
 /// The finite double as the rational that it is.
@@ -234,7 +234,7 @@ HullCheck check_hull(std::span<const BoundClaim> lower, std::span<const BoundCla
   HullCheck result{
       .lower = std::vector<CertificateCheck>(p), .upper = std::vector<CertificateCheck>(p), .proved = prior};
   bool narrower = true;
-  while (narrower && !result.contradiction && !result.all_proved() && result.rounds < kMostRounds) {
+  while (narrower && !result.contradiction && !result.all_proved() && result.rounds < kMostNarrowings) {
     narrower = false;
     ++result.rounds;
     for (std::size_t k = 0; k < 2 * p && !result.contradiction; ++k) {

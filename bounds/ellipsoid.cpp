@@ -1,15 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/bounds/ellipsoid.hpp>
+#include <wheelwright/core/limits.hpp>
 
 #include <cmath>
 #include <limits>
 
 namespace wheelwright {
-namespace {
-
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
-
-}  // namespace
 
 Ellipsoid::Ellipsoid(const Eigen::VectorXd& centre, const Eigen::MatrixXd& shape)
     : Ellipsoid([&] {

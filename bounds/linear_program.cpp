@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/bounds/linear_program.hpp>
+#include <wheelwright/core/limits.hpp>
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include <Eigen/LU>
@@ -18,8 +18,6 @@ constexpr double kGoodPivot = 1e-7;    // below this the inverse is made afresh 
 constexpr std::size_t kRefactor = 24;  // exchanges after which the inverse is made afresh
 constexpr double kAccurate = 1e-13;    // residual of the basis' equations that needs no fresh inverse
 constexpr double kOnBox = 1e-9;        // multiplier of a side of the box that matters
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 }  // namespace
 

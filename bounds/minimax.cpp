@@ -13,12 +13,12 @@
 #include <wheelwright/bounds/slab_rows.hpp>
 #include <wheelwright/bounds/spread_sample.hpp>
 #include <wheelwright/bounds/survey.hpp>
+#include <wheelwright/core/limits.hpp>
 
 namespace wheelwright {
 namespace {
 
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
-constexpr std::size_t kPortion = 1 << 14;
+constexpr std::size_t kScanned = 1 << 14;
 constexpr std::size_t kSmall = 64;  // rows that are not worth a store of their own
 constexpr double kAside = 1e-6;     // of γ: room for rounding below which a row is not put aside
 
@@ -329,8 +329,8 @@ MinimaxFit fit(const SlabColumns& rows, const Box& prior, const std::vector<doub
     const double floor = (1.0 - kAside) * epigraph.gamma();
     SlabStore aside;
     std::fill(peaks.begin(), peaks.end(), 0.0);
-    for (std::size_t first = 0; first < rows.n; first += kPortion) {
-      const SlabColumns portion = rows.part(first, std::min(kPortion, rows.n - first));
+    for (std::size_t first = 0; first < rows.n; first += kScanned) {
+      const SlabColumns portion = rows.part(first, std::min(kScanned, rows.n - first));
       aside.append(portion, epigraph.beyond(portion, centre, half, floor * w, peaks.data()));
     }
     const SlabColumns near = aside.view();

@@ -14,9 +14,6 @@ namespace {
 
 using Criterion = OuterEllipsoidOptions::Criterion;
 
-Interval point(double x) { return {x, x}; }
-double magnitude(Interval x) { return std::max(std::abs(x.lower), std::abs(x.upper)); }
-
 /// Least factor by which one step may change det M: a slab that bounds a direction alone is not dropped at once.
 constexpr double kLeastFactor = 0.1;
 

@@ -14,11 +14,8 @@
 namespace wheelwright {
 namespace {
 
-Interval point(double x) { return {x, x}; }
-double magnitude(Interval x) { return std::max(std::abs(x.lower), std::abs(x.upper)); }
-
 /// Least factor by which one step may change det M: a column that spans a direction alone is not dropped at once.
-constexpr double kLeastFactor = 0.1;
+constexpr double kLeastGeneratorFactor = 0.1;
 
 /// Minimises trace M⁻¹ + Σ s over s >= 0, M = Σ s_i g_i g_iᵀ, for columns g_i.
 class Design {
@@ -102,7 +99,7 @@ class Design {
     if (!(v > 0.0)) {
       return;
     }
-    const double best = std::max(u.norm(), kLeastFactor), zero = 1.0 - s_[i] * v;
+    const double best = std::max(u.norm(), kLeastGeneratorFactor), zero = 1.0 - s_[i] * v;
     const double t = best > zero ? (best - 1.0) / v : -s_[i], factor = std::max(best, zero);
     if (std::isfinite(t) && t != 0.0) {
       s_[i] = best > zero ? s_[i] + t : 0.0;

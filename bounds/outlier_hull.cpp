@@ -15,19 +15,19 @@
 #include <wheelwright/bounds/linear_program.hpp>
 #include <wheelwright/bounds/slab_rows.hpp>
 #include <wheelwright/bounds/survey.hpp>
+#include <wheelwright/core/limits.hpp>
 
 namespace wheelwright {
 namespace {
 
 using Samples = std::vector<std::size_t>;  // ascending
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kSlack = 1e-12;     // of the width: what cutting a branch off may cost
 constexpr double kLoose = 1e-10;     // of the width: a certified bound that is worse is tried in another way
 constexpr double kViolated = 1e-11;  // of the reach of a row over the box
 constexpr std::size_t kWorst = 64;   // rows that a point adds in a round
 constexpr std::size_t kMostRounds = 40;
-constexpr std::size_t kMostColumns = 32;  // of kernels::Table::violated
+constexpr std::size_t kMostViolatedColumns = 32;  // of kernels::Table::violated
 
 Samples united(Samples samples, const std::vector<WeightedRow>& rows) {
   for (const WeightedRow& weighted : rows) {
@@ -363,7 +363,7 @@ void find_violations(RegressionSource& source, const Samples& excluded, const Bo
   packer.walk(source, excluded, [&](const SlabColumns& columns, const std::vector<char>&) {
     numbers.resize(columns.n);
     std::iota(numbers.begin(), numbers.end(), 0U);
-    if (p <= kMostColumns) {
+    if (p <= kMostViolatedColumns) {
       const kernels::Slabs rows{
           columns.Y.data(), columns.dY.empty() ? nullptr : columns.dY.data(), columns.y, columns.dy, columns.n, p};
       numbers.resize(kernels::best().violated(rows, points.data(), open.size(), numbers.data()));

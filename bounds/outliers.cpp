@@ -10,7 +10,7 @@
 namespace wheelwright {
 namespace {
 
-using Samples = std::set<std::size_t>;
+using SampleSet = std::set<std::size_t>;
 
 /// Feasible sets with samples left out, and what their contradictions say.
 class Trials {
@@ -18,7 +18,7 @@ class Trials {
   Trials(RegressionSource& source, const Box& prior, const OutlierOptions& options)
       : source_(source), prior_(prior), options_(options) {}
 
-  FeasibleSet without(const Samples& dropped) {
+  FeasibleSet without(const SampleSet& dropped) {
     FeasibleSetOptions set = options_.set;
     set.excluded_samples.insert(set.excluded_samples.end(), dropped.begin(), dropped.end());
     ++count;
@@ -27,8 +27,8 @@ class Trials {
     return result;
   }
 
-  static Samples members(const FeasibleSet& set) {
-    Samples samples;
+  static SampleSet members(const FeasibleSet& set) {
+    SampleSet samples;
     for (const WeightedRow& weighted : set.contradiction) {
       samples.insert(weighted.row.origin.sample);
     }
@@ -36,7 +36,7 @@ class Trials {
   }
 
   /// The member of the contradiction of `set`, computed without `dropped`, with the largest share at least squares.
-  std::size_t most_suspect(const FeasibleSet& set, const Samples& dropped) {
+  std::size_t most_suspect(const FeasibleSet& set, const SampleSet& dropped) {
     std::vector<std::size_t> excluded = options_.set.excluded_samples;
     excluded.insert(excluded.end(), dropped.begin(), dropped.end());
     std::sort(excluded.begin(), excluded.end());
@@ -56,7 +56,7 @@ class Trials {
   const OutlierOptions& options_;
 };
 
-OutlierResult answer(FeasibleSet set, const Samples& dropped, bool minimal, std::size_t count) {
+OutlierResult answer(FeasibleSet set, const SampleSet& dropped, bool minimal, std::size_t count) {
   return {std::move(set), {dropped.begin(), dropped.end()}, minimal, count};
 }
 
@@ -69,13 +69,14 @@ OutlierResult feasible_set_with_outliers(RegressionSource& source, const Box& pr
     return answer(std::move(plain), {}, true, trials.count);
   }
 
-  std::map<Samples, Samples> layer{{{}, Trials::members(plain)}};  // dropped so far → the contradiction that is left
+  std::map<SampleSet, SampleSet> layer{
+      {{}, Trials::members(plain)}};  // dropped so far → the contradiction that is left
   bool exhausted = false;
   for (std::size_t depth = 1; depth <= options.most && !exhausted; ++depth) {
-    std::map<Samples, Samples> next;
+    std::map<SampleSet, SampleSet> next;
     for (const auto& [dropped, contradiction] : layer) {
       for (const std::size_t sample : contradiction) {
-        Samples more = dropped;
+        SampleSet more = dropped;
         more.insert(sample);
         if (next.contains(more)) {
           continue;
@@ -100,7 +101,7 @@ OutlierResult feasible_set_with_outliers(RegressionSource& source, const Box& pr
     return answer(std::move(plain), {}, trials.one_part, trials.count);
   }
 
-  Samples dropped;
+  SampleSet dropped;
   FeasibleSet set = plain;
   while (dropped.size() < options.most && !set.contradiction.empty()) {
     dropped.insert(trials.most_suspect(set, dropped));

@@ -8,11 +8,10 @@
 #include <wheelwright/bounds/block_parts.hpp>
 #include <wheelwright/bounds/certificate.hpp>
 #include <wheelwright/bounds/refined_multipliers.hpp>
+#include <wheelwright/core/limits.hpp>
 
 namespace wheelwright {
 namespace {
-
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 
 CertifiedBound spread(CertifiedBound bound, const std::vector<std::size_t>& parameters, std::size_t p) {
   for (WeightedRow& weighted : bound.binding) {

@@ -1,18 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/bounds/support_table.hpp>
+#include <wheelwright/core/limits.hpp>
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 namespace wheelwright {
-namespace {
-
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
-constexpr double kTiny = std::numeric_limits<double>::min();
-
-}  // namespace
 
 std::optional<SupportTable> SupportTable::make(const Polytope& set, const SupportTableOptions& options) {
   check::that(options.slots > 0 && options.vertices >= 2, "support table", "at least one slot and two vertices");

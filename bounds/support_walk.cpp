@@ -7,17 +7,16 @@
 #include <utility>
 
 #include <wheelwright/bounds/linear_program.hpp>
+#include <wheelwright/core/limits.hpp>
 
 namespace wheelwright {
 namespace {
 
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
-constexpr double kTiny = std::numeric_limits<double>::min();
-constexpr double kTight = 1e-13;  // share of the size of h that negative multipliers may cost
-constexpr double kPivot = 1e-10;  // smallest pivot
-constexpr double kLoose = 1e-9;   // of vertices that are looked through
-constexpr double kApart = 1e-13;  // facets are moved outward by up to this where edges are followed
-constexpr double kAsNew = 8.0;    // times rounding: an inverse that needs no refinement
+constexpr double kTight = 1e-13;         // share of the size of h that negative multipliers may cost
+constexpr double kWalkPivot = 1e-10;     // smallest pivot
+constexpr double kLooseVertices = 1e-9;  // of vertices that are looked through
+constexpr double kApart = 1e-13;         // facets are moved outward by up to this where edges are followed
+constexpr double kAsNew = 8.0;           // times rounding: an inverse that needs no refinement
 constexpr std::uint32_t kNone = 0xffffffff;
 constexpr std::uint32_t kFull = kNone - 1;
 
@@ -72,7 +71,7 @@ SupportWalk::SupportWalk(Polytope set, const SupportWalkOptions& options) : set_
     walk.q = block.parameters.size();
     walk.parameters = block.parameters;
     const bool few = block.vertices && static_cast<std::size_t>(block.vertices->points.cols()) <= options.few &&
-                     block.vertices->looseness <= kLoose;
+                     block.vertices->looseness <= kLooseVertices;
     walk.walked = !few && begin(walk, block, options);
     walks_.push_back(std::move(walk));
   }
@@ -354,7 +353,7 @@ std::uint32_t SupportWalk::step(Walk& walk, std::uint32_t from, std::size_t leav
     walk.slack[static_cast<std::size_t>(basis[r])] = std::numeric_limits<double>::infinity();
   }
   const kernels::Found end =
-      loops.first_blocking(rows, walk.slack.data(), walk.direction.data(), kPivot, walk.along.data());
+      loops.first_blocking(rows, walk.slack.data(), walk.direction.data(), kWalkPivot, walk.along.data());
   if (!(end.value < std::numeric_limits<double>::infinity())) {
     return kNone;
   }

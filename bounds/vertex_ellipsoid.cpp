@@ -13,7 +13,7 @@ namespace wheelwright {
 namespace {
 
 /// Least factor by which one step may change det M: a point that spans a direction alone is not dropped at once.
-constexpr double kLeastFactor = 0.1;
+constexpr double kLeastWeightFactor = 0.1;
 
 /// Weights u >= 0 of lifted points x = (z, 1) that maximise log det M − Σ u, M = Σ u x xᵀ. At the optimum xᵀM⁻¹x <= 1
 /// for all points, and Σ u = q + 1; elsewhere Σ u · max xᵀM⁻¹x is larger than that.
@@ -106,7 +106,7 @@ class PointDesign {
   /// Exact maximisation over u_i: with u_i + t and v = xᵀM⁻¹x, log(1 + tv) − t has its maximum where 1 + tv = v.
   void step(Eigen::Index i) {
     const Eigen::VectorXd w = inverse_ * x_.col(i);
-    const double v = x_.col(i).dot(w), best = std::max(v, kLeastFactor), zero = 1.0 - u_[i] * v;
+    const double v = x_.col(i).dot(w), best = std::max(v, kLeastWeightFactor), zero = 1.0 - u_[i] * v;
     if (!(v > 0.0)) {
       return;
     }

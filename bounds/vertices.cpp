@@ -11,12 +11,12 @@
 #include <Eigen/LU>
 
 #include <wheelwright/core/interval.hpp>
+#include <wheelwright/core/limits.hpp>
 
 namespace wheelwright {
 namespace {
 
 constexpr std::size_t kMaxDimension = 16;
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 
 /// The facets that meet in a vertex (p of them) or an edge (p − 1), ascending; unused places hold −1.
 using Facets = std::array<int, kMaxDimension>;

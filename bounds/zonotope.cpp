@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/bounds/zonotope.hpp>
+#include <wheelwright/core/limits.hpp>
 
 #include <cmath>
 #include <limits>
 
 namespace wheelwright {
 namespace {
-
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 
 Zonotope::Block whole(const Eigen::VectorXd& centre, const Eigen::MatrixXd& generators) {
   Zonotope::Block block{{}, centre, generators, Eigen::VectorXd::Zero(centre.size())};

@@ -11,6 +11,10 @@
 set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME program)
 set(WHEELWRIGHT_INCLUDE_TREE ${CMAKE_BINARY_DIR}/include)
 set(WHEELWRIGHT_WARNINGS -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual -Werror)
+if(CMAKE_UNITY_BUILD)
+  # What stands in an unnamed namespace of one file looks like a header's to GCC.
+  list(APPEND WHEELWRIGHT_WARNINGS $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
+endif()
 
 function(wheelwright_room name)
   cmake_parse_arguments(ROOM "PROGRAM_ONLY" "FOLDER" "HEADERS;SOURCES;USES;LINK;LINK_PRIVATE" ${ARGN})
@@ -28,9 +32,6 @@ function(wheelwright_room name)
     add_library(${target} ${ROOM_SOURCES})
     # No fused multiply-add: batch and streaming, and every machine, give the same digits.
     target_compile_options(${target} PRIVATE ${WHEELWRIGHT_WARNINGS} -ffp-contract=off)
-    if(WHEELWRIGHT_PRECOMPILED)
-      target_precompile_headers(${target} PRIVATE <Eigen/Dense> <string> <vector>)
-    endif()
   else()
     set(scope INTERFACE)
     add_library(${target} INTERFACE)

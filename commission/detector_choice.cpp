@@ -11,25 +11,25 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/core/for_all.hpp>
+#include <wheelwright/core/limits.hpp>
 #include <wheelwright/filter/measurement.hpp>
 #include <wheelwright/identify/minimise_scalar.hpp>
 
 namespace wheelwright {
 namespace {
 
-constexpr double kNone = std::numeric_limits<double>::infinity();
-constexpr double kMostBetaStep = 0.5;    // βh
-constexpr double kShareOfLog = 0.2;      // of the longest segment that a filter may take to settle
-constexpr double kSpeedMemory = 3.0;     // time constants of a filter on speeds
-constexpr double kBetaTolerance = 0.01;  // of log β
-constexpr double kSameBeta = 1e-9;       // relative
+constexpr double kFastestStep = 0.5;       // βh
+constexpr double kShareToSettle = 0.2;     // of the longest segment that a filter may take to settle
+constexpr double kSpeedMemory = 3.0;       // time constants of a filter on speeds
+constexpr double kChoiceTolerance = 0.01;  // of log β
+constexpr double kSameBeta = 1e-9;         // relative
 
 struct Wish {
   FilterDesign filter;
   std::string origin;
 };
 
-FilterDesign design_of(int order, double beta) { return {.order = order, .alpha = beta, .beta = beta}; }
+FilterDesign equal_poles(int order, double beta) { return {.order = order, .alpha = beta, .beta = beta}; }
 
 std::vector<StatedFault> faults_for(const Robot& robot, const std::vector<StatedFault>& stated) {
   if (!stated.empty()) {
@@ -45,9 +45,9 @@ std::vector<StatedFault> faults_for(const Robot& robot, const std::vector<Stated
 std::vector<double> grid(int order, const Measurement& measurement, const Survey& seen,
                          const DetectorChoiceOptions& options) {
   const double memory = measurement.motion == MotionKind::speed ? kSpeedMemory : FilterDesign{}.settle;
-  const double fastest = kMostBetaStep / check::positive(seen.median_step, "sampling step of the log");
+  const double fastest = kFastestStep / check::positive(seen.median_step, "sampling step of the log");
   const double slowest =
-      std::min(std::max(order / options.trial.window, memory / (kShareOfLog * seen.longest_segment)), fastest);
+      std::min(std::max(order / options.trial.window, memory / (kShareToSettle * seen.longest_segment)), fastest);
   if (!(slowest < fastest)) {
     return {fastest};
   }
@@ -74,16 +74,16 @@ std::vector<Wish> wishes(const LogTable& log, const Robot& robot, const Detector
     }
     const Survey seen = survey(source, measurement);
     for (const double beta : grid(order, measurement, seen, options)) {
-      all.push_back({design_of(order, beta), "grid"});
+      all.push_back({equal_poles(order, beta), "grid"});
     }
     if (order == 1) {
-      all.push_back({design_of(1, 20.0), "the paper's"});
+      all.push_back({equal_poles(1, 20.0), "the paper's"});
     }
     if (order != robot.filter.order.value_or(2)) {
       continue;
     }
     if (robot.filter.beta) {
-      all.push_back({design_of(order, *robot.filter.beta), "the robot file's"});
+      all.push_back({equal_poles(order, *robot.filter.beta), "the robot file's"});
     } else {
       // As settle() asks: for the widest model that the robot may have.
       Robot wide = robot;
@@ -99,7 +99,7 @@ std::vector<Wish> wishes(const LogTable& log, const Robot& robot, const Detector
 std::string named(const StatedMargin& margin) { return margin.fault + (margin.side > 0.0 ? " +" : " −"); }
 
 void rate(DetectorCandidate& candidate, const std::vector<std::string>& hopeless) {
-  candidate.size = candidate.delay = candidate.faults.size() > hopeless.size() ? 0.0 : kNone;
+  candidate.size = candidate.delay = candidate.faults.size() > hopeless.size() ? 0.0 : kInfinity;
   for (const StatedMargin& margin : candidate.faults) {
     if (std::ranges::find(hopeless, named(margin)) == hopeless.end()) {
       candidate.size = std::max(candidate.size, margin.median / margin.asked);
@@ -112,7 +112,7 @@ std::vector<std::string> hopeless_among(const std::vector<DetectorCandidate>& ca
   std::vector<std::string> seen, hopeless;
   for (const DetectorCandidate& candidate : candidates) {
     for (const StatedMargin& margin : candidate.faults) {
-      if (margin.median < kNone) {
+      if (margin.median < kInfinity) {
         seen.push_back(named(margin));
       }
     }
@@ -129,7 +129,7 @@ std::vector<std::string> hopeless_among(const std::vector<DetectorCandidate>& ca
 }
 
 double least_size(const std::vector<DetectorCandidate>& candidates) {
-  double least = kNone;
+  double least = kInfinity;
   for (const DetectorCandidate& candidate : candidates) {
     least = std::min(least, candidate.size);
   }
@@ -184,7 +184,7 @@ class Search {
     try_grid();
     refine();
     put_in_order(choice_.candidates, options_.tie);
-    if (!(choice_.candidates.front().size < kNone)) {
+    if (!(choice_.candidates.front().size < kInfinity)) {
       choice_.notes.push_back("no filter is certain to see a stated fault within the window, whenever it sets in");
       return std::move(choice_);
     }
@@ -233,11 +233,11 @@ class Search {
   void refine() {
     const double least = least_size(choice_.candidates);
     const auto best = std::ranges::find(choice_.candidates, least, &DetectorCandidate::size);
-    if (!(least < kNone) || options_.most_refinements == 0) {
+    if (!(least < kInfinity) || options_.most_refinements == 0) {
       return;
     }
     const FilterDesign start = best->filter;
-    double lower = start.beta, upper = start.beta, below = 0.0, above = kNone;
+    double lower = start.beta, upper = start.beta, below = 0.0, above = kInfinity;
     for (const DetectorCandidate& candidate : choice_.candidates) {
       const double beta = candidate.filter.beta;
       if (candidate.filter.order == start.order && candidate.origin == "grid") {
@@ -246,8 +246,8 @@ class Search {
       }
     }
     lower = below > 0.0 ? below : lower;
-    upper = above < kNone ? above : upper;
-    if (!(std::log(upper / lower) > kBetaTolerance)) {
+    upper = above < kInfinity ? above : upper;
+    if (!(std::log(upper / lower) > kChoiceTolerance)) {
       return;
     }
     std::size_t done = 0;
@@ -257,7 +257,7 @@ class Search {
           if (log_beta == centre) {
             return least;
           }
-          const FilterDesign design = design_of(start.order, std::exp(log_beta));
+          const FilterDesign design = equal_poles(start.order, std::exp(log_beta));
           for (const DetectorCandidate& known : choice_.candidates) {
             if (known.filter.order == design.order && std::abs(known.filter.beta / design.beta - 1.0) < kSameBeta) {
               return known.size;
@@ -267,7 +267,7 @@ class Search {
           return add(design, {{}}, "refined", options_.trial);
         },
         std::log(lower), std::log(upper), centre,
-        {.most_evaluations = options_.most_refinements + 1, .tolerance = kBetaTolerance}));
+        {.most_evaluations = options_.most_refinements + 1, .tolerance = kChoiceTolerance}));
   }
 
   // The chosen filter under other rules, and under the strict guarantee where that was not asked for.
@@ -286,9 +286,9 @@ class Search {
   double add(const FilterDesign& filter, const std::vector<Persistence>& persistences, const std::string& origin,
              const TrialOptions& trial) {
     if (persistences.empty()) {
-      return kNone;
+      return kInfinity;
     }
-    double least = kNone;
+    double least = kInfinity;
     for (DetectorCandidate& candidate : try_detector(log_, *robot_, filter, persistences, origin, trial).candidates) {
       rate(candidate, choice_.hopeless);
       least = std::min(least, candidate.size);

@@ -10,12 +10,12 @@
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/error.hpp>
+#include <wheelwright/core/limits.hpp>
 #include <wheelwright/detector/margins.hpp>
 
 namespace wheelwright {
 namespace {
 
-constexpr double kNone = std::numeric_limits<double>::infinity();
 constexpr double kHour = 3600.0;          // s
 constexpr double kShare = 0.2;            // stated size of a share where none is given
 constexpr std::size_t kDelaySteps = 40;   // of the window
@@ -82,7 +82,7 @@ StatedMargin margin_of(const FaultMargins& margins, double asked, const std::vec
     }
     sizes.push_back(onset.certain.back());
     const auto seen = std::find_if(onset.certain.begin(), onset.certain.end(), [&](double x) { return x <= asked; });
-    delays.push_back(seen == onset.certain.end() ? kNone
+    delays.push_back(seen == onset.certain.end() ? kInfinity
                                                  : windows[static_cast<std::size_t>(seen - onset.certain.begin())]);
   }
   check::that(!sizes.empty(), "log", "driving that is longer than the window, after the filter has settled");

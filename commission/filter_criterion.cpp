@@ -3,11 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include <Eigen/Dense>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/limits.hpp>
 #include <wheelwright/filter/noise.hpp>
 #include <wheelwright/filter/regression_stream.hpp>
 #include <wheelwright/identify/estimate.hpp>
@@ -17,11 +17,10 @@
 namespace wheelwright {
 namespace {
 
-constexpr double kInfinite = std::numeric_limits<double>::infinity();
-constexpr double kCollinear = 1e-12;  // of a column's Σ Y²: what the columns before it leave
-constexpr double kMostNoise = 0.9;    // of a direction of Σ YᵀY
-constexpr double kExplained = 0.5;    // of the torque
-constexpr std::size_t kFewestInstants = 50;
+constexpr double kCollinear = 1e-12;      // of a column's Σ Y²: what the columns before it leave
+constexpr double kMostNoise = 0.9;        // of a direction of Σ YᵀY
+constexpr double kExplainedTorque = 0.5;  // of the torque
+constexpr std::size_t kFewestCompared = 50;
 constexpr std::size_t kBuffer = 256;
 
 // Rows of one filter on their way to take(rows).
@@ -123,7 +122,7 @@ double geometric_mean(const Eigen::VectorXd& values, const std::vector<bool>& co
       number += 1.0;
     }
   }
-  return number > 0.0 ? std::exp(sum / number) : kInfinite;
+  return number > 0.0 ? std::exp(sum / number) : kInfinity;
 }
 
 }  // namespace
@@ -149,7 +148,7 @@ std::vector<FilterValue> FilterEvaluation::operator()(const std::vector<FilterDe
   std::vector<Fit> fits = fit(designs);
   leave_out(fits);
   for (Fit& f : fits) {
-    if (f.moments.instants() >= kFewestInstants) {
+    if (f.moments.instants() >= kFewestCompared) {
       f.weights = efficient_weights(f.moments);
       f.estimate = ordinary_least_squares(f.moments, {.weights = f.weights, .excluded = excluded_});
     }
@@ -182,7 +181,7 @@ void FilterEvaluation::leave_out(const std::vector<Fit>& fits) {
   excluded_.assign(model_.p(), false);
   const Eigen::VectorXd ones = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(model_.n()));
   for (const Fit& f : fits) {
-    if (f.moments.instants() < kFewestInstants) {
+    if (f.moments.instants() < kFewestCompared) {
       continue;
     }
     // Elimination column by column: the pivot is what the columns before leave.
@@ -201,7 +200,7 @@ void FilterEvaluation::leave_out(const std::vector<Fit>& fits) {
 }
 
 FilterValue FilterEvaluation::predicted_error(const Fit& f) const {
-  FilterValue value{kInfinite, Eigen::VectorXd::Zero(static_cast<Eigen::Index>(model_.p()))};
+  FilterValue value{kInfinity, Eigen::VectorXd::Zero(static_cast<Eigen::Index>(model_.p()))};
   if (!f.estimate.usable) {
     return value;
   }
@@ -254,7 +253,7 @@ std::vector<FilterValue> FilterEvaluation::threshold_widths(const std::vector<Fi
   std::vector<FilterValue> values;
   std::vector<bool> explained(model_.n(), false);
   for (std::size_t k = 0; k < fits.size(); ++k) {
-    values.push_back({kInfinite, Eigen::VectorXd::Constant(n, kInfinite)});
+    values.push_back({kInfinity, Eigen::VectorXd::Constant(n, kInfinity)});
     const Fit& f = fits[k];
     if (!f.estimate.usable) {
       continue;
@@ -272,7 +271,7 @@ std::vector<FilterValue> FilterEvaluation::threshold_widths(const std::vector<Fi
       const double spread = (f.estimate.covariance * f.moments.of_output(at).YY).trace();
       const double of_theta = std::sqrt(std::max(spread, 0.0) / static_cast<double>(summary.instants));
       values[k].parts[i] = 2.0 * (bound + t * of_theta) / rest.torque_rms;
-      explained[at] = explained[at] || rest.rms < kExplained * rest.torque_rms;
+      explained[at] = explained[at] || rest.rms < kExplainedTorque * rest.torque_rms;
     }
   }
   if (explained_.empty()) {

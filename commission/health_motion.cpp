@@ -20,7 +20,7 @@ namespace {
 constexpr double kSome = 0.02;             // share of the rows that makes a manoeuvre count
 constexpr double kLongestDelay = 0.2;      // s
 constexpr std::size_t kDelayRows = 60000;  // of the log, for the delay
-constexpr double kRisk = 1e-3;             // for fit_log; not used further
+constexpr double kUnusedRisk = 1e-3;       // for fit_log; not used further
 
 LogFinding about_motion(const char* id, FindingSeverity severity, std::string sentence, std::string next, double value,
                         std::string unit) {
@@ -375,7 +375,7 @@ bool check_motion(const HealthView& view, std::vector<LogFinding>& findings) {
     TableSource log(*view.log);
     Robot robot = view.robot;
     const Setting s = settle(log, robot);
-    const Fit fit = fit_log(log, s, Part::everything, kRisk);
+    const Fit fit = fit_log(log, s, Part::everything, kUnusedRisk);
     const bool excited = check_excitation(view, log, s, fit, findings);
     if (excited) {
       check_effort_scale(view, s, fit, findings);

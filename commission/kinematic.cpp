@@ -19,8 +19,8 @@ namespace {
 
 using Status = KinematicCommissioning::Status;
 
-constexpr double kConfidence = 0.95;    // of the statistical intervals
-constexpr double kAboveMinimax = 1.05;  // a raised bound over the smallest that explains the log
+constexpr double kOdometryConfidence = 0.95;  // of the statistical intervals
+constexpr double kAboveMinimax = 1.05;        // a raised bound over the smallest that explains the log
 constexpr std::size_t kFewestWindows = 8;
 
 // What is settled before a fit.
@@ -105,14 +105,14 @@ OdometryStream make_rows(const Frame& s, const OdometryErrors& errors) {
   return {*s.log, OdometryFilter(s.measurement, s.window, errors)};
 }
 
-enum class For { learning, driving };
+enum class Purpose { learning, driving };
 
-OdometryErrors with_noise(const Frame& s, const std::vector<OutputNoise>& noise, For use) {
+OdometryErrors with_noise(const Frame& s, const std::vector<OutputNoise>& noise, Purpose use) {
   Eigen::VectorXd estimated = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(noise.size()));
   for (std::size_t i = 0; i < noise.size(); ++i) {
     if (noise[i].origin == NoiseOrigin::estimated) {
       estimated[static_cast<Eigen::Index>(i)] =
-          std::max(use == For::learning ? noise[i].learning : noise[i].bound, std::numeric_limits<double>::min());
+          std::max(use == Purpose::learning ? noise[i].learning : noise[i].bound, std::numeric_limits<double>::min());
     }
   }
   OdometryErrors errors = s.declared;
@@ -164,7 +164,7 @@ std::optional<Fit> fit_rows(const Frame& s, Part part, double risk) {
     };
     solve();
     fit.excitation = judge_excitation(fit.squares, fit.residuals.standard_error,
-                                      student_quantile(kConfidence, std::max(fit.residuals.freedom, 1.0)));
+                                      student_quantile(kOdometryConfidence, std::max(fit.residuals.freedom, 1.0)));
     for (const ExcitationFinding& finding : fit.excitation) {
       excluded.push_back(finding.state == Excitation::not_excited);
     }
@@ -218,7 +218,7 @@ BoundedSet bounded_set(const Frame& s, Part part, std::vector<OutputNoise>& nois
       std::ranges::all_of(noise, [](const OutputNoise& o) { return o.origin == NoiseOrigin::estimated; });
   BoundedSet result;
   for (int attempt = 0;; ++attempt) {
-    OdometryStream stream = make_rows(s, with_noise(s, noise, For::learning));
+    OdometryStream stream = make_rows(s, with_noise(s, noise, Purpose::learning));
     FoldedSource rows(stream, part, s.log_rows, s.folds);
     result.set = feasible_set(rows, s.prior);
     if (result.set.status == FeasibleSet::Status::nonempty || !all_estimated || attempt > 0) {
@@ -334,7 +334,7 @@ void validate_held_out(const Frame& s, KinematicCommissioning& result) {
   if (set.status != FeasibleSet::Status::nonempty) {
     return;
   }
-  OdometryStream unseen = make_rows(s, with_noise(s, noise, For::driving));
+  OdometryStream unseen = make_rows(s, with_noise(s, noise, Purpose::driving));
   FoldedSource held_out(unseen, Part::held_out, s.log_rows, s.folds);
   result.validation = validate_on(held_out, ThresholdRule(*set.polytope, best_guess(*fit, *set.polytope)));
 }
@@ -392,7 +392,7 @@ KinematicCommissioning commission_kinematics(LogSource& log, const Robot& robot,
   const Polytope& set = *bounded.set.polytope;
   result.model = KinematicModel{.measurement = s.measurement,
                                 .window = s.window,
-                                .errors = with_noise(s, result.noise, For::driving),
+                                .errors = with_noise(s, result.noise, Purpose::driving),
                                 .estimate = best_guess(*fit, set),
                                 .facets = set.facets(),
                                 .box = bounded.set.hull,

@@ -17,7 +17,7 @@
 namespace wheelwright {
 namespace {
 
-constexpr std::size_t kFewestInstants = 50;
+constexpr std::size_t kFewestLearned = 50;
 
 void tell(const SettingOptions& options, std::string_view stage, double share) {
   if (options.progress) {
@@ -107,8 +107,8 @@ Setting settle(LogSource& log, const Robot& robot, const SettingOptions& options
   s.measurement = find_measurement(log, robot, s.model, order);
   tell(options, "looking at the log", 0.05);
   s.survey = survey(log, s.measurement);
-  check::that(s.survey.rows >= kFewestInstants, "log",
-              fmt::format("at least {} rows (it has {})", kFewestInstants, s.survey.rows));
+  check::that(s.survey.rows >= kFewestLearned, "log",
+              fmt::format("at least {} rows (it has {})", kFewestLearned, s.survey.rows));
   if (robot.filter.beta) {
     const double beta = *robot.filter.beta;
     s.filter = {.order = order, .alpha = robot.filter.alpha.value_or(beta), .beta = beta};

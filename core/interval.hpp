@@ -32,6 +32,11 @@ struct Interval {
   friend bool operator==(const Interval&, const Interval&) = default;
 };
 
+/// [x, x].
+inline Interval point(double x) { return {x, x}; }
+/// Largest |x| of the interval.
+inline double magnitude(Interval x) { return std::max(std::abs(x.lower), std::abs(x.upper)); }
+
 /// { x + y }, enclosed.
 inline Interval operator+(Interval x, Interval y) {
   return {round_down(x.lower + y.lower), round_up(x.upper + y.upper)};

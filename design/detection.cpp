@@ -3,24 +3,23 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <utility>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/limits.hpp>
 #include <wheelwright/detector/fault_margin.hpp>
 #include <wheelwright/detector/lasting.hpp>
 
 namespace wheelwright {
 namespace {
 
-constexpr double kNone = std::numeric_limits<double>::infinity();
 constexpr double kNever = 1e6;  // objective where a fault is never certain, times how far it is from it
 
 // A promise, and where there is none by how much the largest size misses the threshold, as a share of its width.
 struct Judged {
   PromisedFault promise;
-  double missing = kNone;
+  double missing = kInfinity;
 };
 
 void check_inspected(const std::vector<InspectedFault>& faults) {
@@ -43,7 +42,7 @@ std::vector<Judged> judge(const Plan& plan, const DesignSubject& subject, const 
     const std::size_t first = all.size();
     for (const double side : {1.0, -1.0}) {
       if ((side > 0.0 ? fault.range.upper : -fault.range.lower) > 0.0) {
-        all.push_back({{fault, side, check::positive(inspected.asked, "asked"), kNone, 0.0, 0}, kNone});
+        all.push_back({{fault, side, check::positive(inspected.asked, "asked"), kInfinity, 0.0, 0}, kInfinity});
       }
     }
     FaultFilter rows(fault, subject.model, subject.filter, motion);
@@ -61,24 +60,24 @@ std::vector<Judged> judge(const Plan& plan, const DesignSubject& subject, const 
           // One instant is enough where persistence is 1 of 1: then only smaller sizes are worth a search.
           const bool once = persistence.n == 1;
           const double limit =
-              once && p.smallest < kNone ? std::abs(fault.kappa(p.side * p.smallest)) * (1.0 - 1e-6) : most;
+              once && p.smallest < kInfinity ? std::abs(fault.kappa(p.side * p.smallest)) * (1.0 - 1e-6) : most;
           std::optional<double> kappa;
           if (fault.whole) {
-            kappa = (!once || p.smallest == kNone) && margin.certain(row, most, p.side, i) ? std::optional(most)
-                                                                                           : std::nullopt;
+            kappa = (!once || p.smallest == kInfinity) && margin.certain(row, most, p.side, i) ? std::optional(most)
+                                                                                               : std::nullopt;
           } else {
             kappa = margin.smallest_certain(row, limit, p.side, i);
           }
           if (!once) {
-            const double size = lasting[(k - first) * rows.outputs() + i].add(kappa.value_or(kNone));
-            const bool smaller = size < kNone && std::abs(fault.magnitude(p.side * size)) < p.smallest;
+            const double size = lasting[(k - first) * rows.outputs() + i].add(kappa.value_or(kInfinity));
+            const bool smaller = size < kInfinity && std::abs(fault.magnitude(p.side * size)) < p.smallest;
             kappa = smaller ? std::optional(size) : std::nullopt;
           }
           if (kappa) {
             p.smallest = std::abs(fault.magnitude(p.side * *kappa));
             p.t = motion.t[rows.instant()] - motion.t.front();
             p.output = i;
-          } else if (p.smallest == kNone) {
+          } else if (p.smallest == kInfinity) {
             all[k].missing = std::min(all[k].missing, margin.missing(row, most, p.side, i));
           }
         }
@@ -105,8 +104,8 @@ PlanObjective certain_detection(const DesignSubject& subject, const ThresholdRul
     double worst = 0.0;
     for (const Judged& judged : judge(plan, subject, rule, faults, persistence)) {
       const PromisedFault& p = judged.promise;
-      worst =
-          std::max(worst, p.smallest < kNone ? p.smallest / p.asked : kNever * (1.0 + std::min(judged.missing, 1e6)));
+      worst = std::max(worst,
+                       p.smallest < kInfinity ? p.smallest / p.asked : kNever * (1.0 + std::min(judged.missing, 1e6)));
     }
     return worst;
   };

@@ -12,9 +12,9 @@ namespace wheelwright {
 namespace {
 
 constexpr double kFirstZeroOfJ0 = 2.404825557695773;
-constexpr double kRamp = 1.0;   // s from rest, and to rest
-constexpr double kRest = 0.1;   // s of standstill at both ends
-constexpr double kStep = 0.02;  // s, for the search
+constexpr double kRamp = 1.0;        // s from rest, and to rest
+constexpr double kRestAtEnds = 0.1;  // s of standstill at both ends
+constexpr double kStep = 0.02;       // s, for the search
 
 struct Window {
   double value = 0.0;
@@ -41,7 +41,7 @@ Plan plan_of(const FigureEight& eight, const DesignSubject& subject, double dura
   plan.speed.resize(2, samples);
   plan.acceleration.resize(2, samples);
   for (Eigen::Index k = 0; k < samples; ++k) {
-    const double t = plan.t(k) - kRest, left = duration - kRest - plan.t(k);
+    const double t = plan.t(k) - kRestAtEnds, left = duration - kRestAtEnds - plan.t(k);
     const Window begin = smooth_step(t), end = smooth_step(left);
     const Window window{begin.value * end.value, begin.rate * end.value - begin.value * end.rate};
     const double yaw = kFirstZeroOfJ0 * w * std::cos(w * t), yaw_rate = -kFirstZeroOfJ0 * w * w * std::sin(w * t);

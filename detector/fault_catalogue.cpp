@@ -26,16 +26,16 @@ Eigen::MatrixXd of_joint(const Eigen::MatrixXd& map, std::size_t joint) {
   return map.col(j) * inverse.row(j);
 }
 
-struct Side {
+struct WheelSide {
   std::size_t joint;
   std::string suffix, words;
 };
 
-std::vector<Side> sides_of(const Model& model) {
+std::vector<WheelSide> sides_of(const Model& model) {
   if (model.joints.size() == 2) {
     return {{0, "_right", "the right wheel's"}, {1, "_left", "the left wheel's"}};
   }
-  std::vector<Side> sides;
+  std::vector<WheelSide> sides;
   for (std::size_t j = 0; j < model.joints.size(); ++j) {
     sides.push_back(
         {j, model.joints.size() == 1 ? std::string() : std::string("_").append(std::to_string(j + 1)), "the joint's"});
@@ -43,7 +43,7 @@ std::vector<Side> sides_of(const Model& model) {
   return sides;
 }
 
-void add_efforts(std::vector<FaultType>& all, const Model& model, const Side& side, const std::string& unit) {
+void add_efforts(std::vector<FaultType>& all, const Model& model, const WheelSide& side, const std::string& unit) {
   const Eigen::MatrixXd own = of_joint(model.input, side.joint);
   FaultType loss{.name = "effort_loss" + side.suffix,
                  .sentence = side.words + " actuator delivers less than its effort says",
@@ -72,7 +72,7 @@ void add_efforts(std::vector<FaultType>& all, const Model& model, const Side& si
                  .effort = -own});
 }
 
-void add_encoders(std::vector<FaultType>& all, const Model& model, const Side& side) {
+void add_encoders(std::vector<FaultType>& all, const Model& model, const WheelSide& side) {
   const Eigen::MatrixXd own = of_joint(model.motion, side.joint);
   all.push_back({.name = "encoder_scale" + side.suffix,
                  .sentence = side.words + " encoder counts too much (negative: too little)",
@@ -94,7 +94,7 @@ void add_encoders(std::vector<FaultType>& all, const Model& model, const Side& s
                  .profile = {.kind = FaultProfile::Kind::pulse, .rise = kDropout}});
 }
 
-void add_radii(std::vector<FaultType>& all, const Model& model, const Side& side) {
+void add_radii(std::vector<FaultType>& all, const Model& model, const WheelSide& side) {
   const Eigen::MatrixXd own = of_joint(model.motion, side.joint), ground = of_joint(model.input, side.joint);
   const Interval range{-kMostRadius, kMostRadius};
   all.push_back({.name = "wheel_radius" + side.suffix,
@@ -136,7 +136,7 @@ std::vector<FaultType> fault_catalogue(const Model& model, const Eigen::VectorXd
     both.sentence = "both wheels' radii change slowly, over 20 s";
     both.profile = {.kind = FaultProfile::Kind::drift, .rise = kDrift};
     all.push_back(both);
-    for (const Side& side : sides_of(model)) {
+    for (const WheelSide& side : sides_of(model)) {
       add_radii(all, model, side);
     }
     all.push_back({.name = "matched",
@@ -159,7 +159,7 @@ std::vector<FaultType> fault_catalogue(const Model& model, const Eigen::VectorXd
   }
   const std::string torque = model.output_units.empty() ? "" : model.output_units.front();
   const std::string unit = effort == EffortKind::torque ? torque : effort == EffortKind::current ? "A" : "V";
-  for (const Side& side : sides_of(model)) {
+  for (const WheelSide& side : sides_of(model)) {
     add_efforts(all, model, side, unit);
     add_encoders(all, model, side);
   }

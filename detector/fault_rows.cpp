@@ -81,14 +81,9 @@ Parts parts_of(const Term& term, const FaultType& fault, const Instant& at) {
   return parts;
 }
 
-FaultSignals zeros(const Model& model) {
-  const auto n = static_cast<Eigen::Index>(model.n()), p = static_cast<Eigen::Index>(model.p());
-  return {RowMatrix::Zero(n, p), RowMatrix::Zero(n, p), RowMatrix::Zero(n, p), Eigen::VectorXd::Zero(n)};
-}
-
 // Signature at one instant; `held` is what a reading that stands still shows.
 FaultSignals signature(const FaultType& fault, const Model& model, const Instant& at, const RowMatrix& held) {
-  FaultSignals out = zeros(model);
+  FaultSignals out = FaultSignals::none(model);
   const auto n = static_cast<Eigen::Index>(model.n());
   const double s = at.profile;
   for (const Term& term : model.terms) {
@@ -121,13 +116,18 @@ FaultSignals signature(const FaultType& fault, const Model& model, const Instant
 
 }  // namespace
 
+FaultSignals FaultSignals::none(const Model& model) {
+  const auto n = static_cast<Eigen::Index>(model.n()), p = static_cast<Eigen::Index>(model.p());
+  return {RowMatrix::Zero(n, p), RowMatrix::Zero(n, p), RowMatrix::Zero(n, p), Eigen::VectorXd::Zero(n)};
+}
+
 FaultFilter::FaultFilter(FaultType fault, const Model& model, const FilterDesign& design, const ReferenceMotion& motion)
     : fault_(std::move(fault)),
       model_(&model),
       design_(design),
       motion_(&motion),
       held_(RowMatrix::Zero(static_cast<Eigen::Index>(model.n()), static_cast<Eigen::Index>(model.p()))),
-      filtered_(zeros(model)) {
+      filtered_(FaultSignals::none(model)) {
   validate(fault_, model);
   validate(design_);
   cascades_.resize(model.n() * (3 * model.p() + 1));
@@ -164,7 +164,7 @@ void FaultFilter::begin(std::size_t onset) {
   end_ = next == motion_->segment_starts.end() ? motion_->instants() : *next;
   onset_ = k_ = onset;
   std::fill(cascades_.begin(), cascades_.end(), Cascade{});
-  filtered_ = zeros(*model_);
+  filtered_ = FaultSignals::none(*model_);
   before_ = point(onset);
   const auto n = static_cast<Eigen::Index>(model_->n());
   if (fault_.held_effort) {

@@ -34,6 +34,9 @@ struct FaultRow {
 struct FaultSignals {
   RowMatrix g1, g2, s;
   Eigen::VectorXd c;
+
+  /// Those of no fault, for the rows of `model`.
+  [[nodiscard]] static FaultSignals none(const Model& model);
 };
 
 /// Rows of a faulty drive from a fault's onset on, whichever residual they belong to.

@@ -19,13 +19,13 @@
 namespace wheelwright {
 namespace {
 
-constexpr double kMemory = 12.0;      // of the filter, in units of 1/β
-constexpr double kFresh = 2.0;        // of this, in the same units, an onset is still to be seen
-constexpr double kNarrower = 0.9;     // a turn that leaves more than this of an interval is the last
-constexpr double kRounding = 1e-12;   // of a row's coefficients, relative to all that is added in it
-constexpr int kTurns = 12;            // of narrowing
-constexpr int kHalvings = 24;         // of an interval of sizes
-constexpr double kStillJoint = 1e-9;  // rad/s, of a reading that stands still
+constexpr double kMemory = 12.0;        // of the filter, in units of 1/β
+constexpr double kFresh = 2.0;          // of this, in the same units, an onset is still to be seen
+constexpr double kNarrower = 0.9;       // a turn that leaves more than this of an interval is the last
+constexpr double kRowRounding = 1e-12;  // of a row's coefficients, relative to all that is added in it
+constexpr int kTurns = 12;              // of narrowing
+constexpr int kHalvings = 24;           // of an interval of sizes
+constexpr double kStillJoint = 1e-9;    // rad/s, of a reading that stands still
 
 // Instants of the motion that are looked at.
 struct Window {
@@ -331,7 +331,7 @@ class Search {
             std::abs(size * c) + std::abs(a[static_cast<std::size_t>(p_)]) + std::abs(a[own]) + std::abs(a[own + n_]);
       }
       HalfSpace upper, lower;
-      slabs.half_spaces(a, da, y, dy + kRounding * sum, {}, upper, lower);
+      slabs.half_spaces(a, da, y, dy + kRowRounding * sum, {}, upper, lower);
       all.push_back(std::move(upper));
       all.push_back(std::move(lower));
     }

@@ -3,16 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/for_all.hpp>
+#include <wheelwright/core/limits.hpp>
 #include <wheelwright/detector/lasting.hpp>
 
 namespace wheelwright {
 namespace {
-
-constexpr double kNone = std::numeric_limits<double>::infinity();
 
 // The instants at which faults set in: settled ones, evenly in time, that leave room for a window.
 std::vector<std::size_t> choose_onsets(const ReferenceMotion& motion, const MarginOptions& options) {
@@ -23,10 +21,10 @@ std::vector<std::size_t> choose_onsets(const ReferenceMotion& motion, const Marg
   }
   const double step =
       std::max(options.onset_step, settled * median_step(motion.t) / static_cast<double>(options.most_onsets));
-  double next = -kNone;
+  double next = -kInfinity;
   for (std::size_t k = 0; k < motion.instants(); ++k) {
     const bool begins = std::binary_search(motion.segment_starts.begin(), motion.segment_starts.end(), k);
-    next = begins ? -kNone : next;
+    next = begins ? -kInfinity : next;
     const auto after = std::upper_bound(motion.segment_starts.begin(), motion.segment_starts.end(), k);
     const std::size_t last = (after == motion.segment_starts.end() ? motion.instants() : *after) - 1;
     const bool room = k + 2 <= last && motion.t[last] - motion.t[k] > options.windows.front();
@@ -64,16 +62,16 @@ class ChannelBest {
   [[nodiscard]] double best() const { return best_; }
 
   void add(FaultMargin& margin, const FaultRow& row, double side, std::size_t channel) {
-    if (whole_ && best_ < kNone) {
+    if (whole_ && best_ < kInfinity) {
       return;
     }
     if (persistence_.n == 1) {
       // Only a row that shows a smaller size for certain is worth a search.
-      const double limit = best_ < kNone ? best_ * (1.0 - 1e-9) : largest_;
+      const double limit = best_ < kInfinity ? best_ * (1.0 - 1e-9) : largest_;
       best_ = smallest(margin, row, limit, side, channel).value_or(best_);
       return;
     }
-    best_ = std::min(best_, lasting_.add(smallest(margin, row, largest_, side, channel).value_or(kNone)));
+    best_ = std::min(best_, lasting_.add(smallest(margin, row, largest_, side, channel).value_or(kInfinity)));
   }
 
  private:
@@ -89,7 +87,7 @@ class ChannelBest {
   Lasting lasting_;
   double largest_;
   bool whole_;
-  double best_ = kNone;
+  double best_ = kInfinity;
 };
 
 OnsetMargin margin_at(const ReferenceMotion& motion, const FaultMargins& margins, std::size_t onset, FaultRows& rows,
@@ -105,11 +103,11 @@ OnsetMargin margin_at(const ReferenceMotion& motion, const FaultMargins& margins
   double hidden = largest, window_hidden = largest;
   std::size_t window = 0;
   const auto size_of = [&](double kappa) {
-    return kappa < kNone ? std::abs(fault.magnitude(margins.side * kappa)) : kNone;
+    return kappa < kInfinity ? std::abs(fault.magnitude(margins.side * kappa)) : kInfinity;
   };
   const auto close_windows = [&](double since) {
     for (; window < options.windows.size() && since > options.windows[window]; ++window) {
-      double best = kNone;
+      double best = kInfinity;
       for (std::size_t i = 0; i < n; ++i) {
         result.by_channel[i].push_back(size_of(channels[i].best()));
         best = std::min(best, result.by_channel[i].back());
@@ -156,13 +154,13 @@ MarginSummary summarise(const FaultMargins& margins, std::size_t window, std::op
   }
   MarginSummary summary;
   summary.onsets = sizes.size();
-  summary.best = summary.most = summary.median = summary.worst = kNone;
+  summary.best = summary.most = summary.median = summary.worst = kInfinity;
   if (!sizes.empty()) {
     std::sort(sizes.begin(), sizes.end());
     summary.certain =
-        static_cast<std::size_t>(std::count_if(sizes.begin(), sizes.end(), [](double x) { return x < kNone; }));
+        static_cast<std::size_t>(std::count_if(sizes.begin(), sizes.end(), [](double x) { return x < kInfinity; }));
     summary.best = sizes.front();
-    summary.most = summary.certain > 0 ? sizes[summary.certain - 1] : kNone;
+    summary.most = summary.certain > 0 ? sizes[summary.certain - 1] : kInfinity;
     summary.median = sizes[sizes.size() / 2];
     summary.worst = sizes.back();
   }

@@ -9,11 +9,6 @@
 namespace wheelwright {
 namespace {
 
-FaultSignals zeros(const Model& model) {
-  const auto n = static_cast<Eigen::Index>(model.n()), p = static_cast<Eigen::Index>(model.p());
-  return {RowMatrix::Zero(n, p), RowMatrix::Zero(n, p), RowMatrix::Zero(n, p), Eigen::VectorXd::Zero(n)};
-}
-
 // x + f y, part by part.
 FaultSignals sum(const FaultSignals& x, double f, const FaultSignals& y) {
   return {x.g1 + f * y.g1, x.g2 + f * y.g2, x.s, x.c + f * y.c};
@@ -60,7 +55,7 @@ OnsetRows::OnsetRows(const FaultType& fault, const Model& model, const FilterDes
       first_(first),
       end_(end),
       gain_(std::pow(design.alpha, design.order)),
-      bound_{zeros(model), zeros(model)} {
+      bound_{FaultSignals::none(model), FaultSignals::none(model)} {
   check::that(knows(fault), "fault '" + fault.name + "'", "a step or a drift");
   check::that(first < end && end <= motion.instants(), "instants", "a range of the motion");
   if (encoder_) {
@@ -70,7 +65,7 @@ OnsetRows::OnsetRows(const FaultType& fault, const Model& model, const FilterDes
   fault_.held_effort = false;
   step_ = fault_;
   step_.profile = {};
-  state_.assign(end - first, {zeros(model), zeros(model)});
+  state_.assign(end - first, {FaultSignals::none(model), FaultSignals::none(model)});
   state_[0].z1.g1 = jump(first);
   take(step_, false);
   if (design.order == 2) {
@@ -106,7 +101,7 @@ RowMatrix OnsetRows::jump(std::size_t k) const {
   if (fault_.slip.size() > 0) {
     moved += fault_.slip;
   }
-  RowMatrix out = zeros(*model_).g1;
+  RowMatrix out = FaultSignals::none(*model_).g1;
   for (const Term& term : model_->terms) {
     if (term.kind == Term::Kind::acceleration) {
       out(static_cast<Eigen::Index>(term.output), static_cast<Eigen::Index>(term.parameter)) +=
@@ -128,7 +123,7 @@ OnsetRows::State OnsetRows::left(std::size_t from, std::size_t at) const {
 void OnsetRows::between(std::size_t a, std::size_t b) {
   check::that(a >= first_ && a < b && b + 1 < end_, "onset", "instants of the motion");
   s_ = b + 1;
-  bound_ = {zeros(*model_), zeros(*model_)};
+  bound_ = {FaultSignals::none(*model_), FaultSignals::none(*model_)};
   const std::size_t from = a > first_ ? a - 1 : a;
   const RowMatrix counted = jump(s_);
   for (std::size_t k = from; k <= s_; ++k) {
@@ -152,7 +147,7 @@ void OnsetRows::between(std::size_t a, std::size_t b) {
       part->g2 *= uncertain_;
       part->c *= uncertain_;
     }
-    drifting_.assign(end_ - s_, zeros(*model_));
+    drifting_.assign(end_ - s_, FaultSignals::none(*model_));
     FaultFilter filter(fault_, *model_, design_, *motion_);
     filter.begin(s_);
     while (filter.instant() + 1 < end_ && filter.next()) {

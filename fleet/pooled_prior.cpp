@@ -9,11 +9,12 @@
 #include <fmt/format.h>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/limits.hpp>
+#include <wheelwright/fleet/median.hpp>
 
 namespace wheelwright {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr std::size_t fewest_learning = 5;
 constexpr double hidden_width = 0.5;  // bounds wider than this share of the prior show nothing
 
@@ -47,18 +48,12 @@ std::vector<std::size_t> shuffled(const FleetTable& table, std::uint64_t seed) {
   return order;
 }
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 bool shown(const FleetEntry& e) { return e.upper - e.lower <= hidden_width * (e.prior.upper - e.prior.lower); }
 
 // Centre, scales and the hull of the priors. `learns` says of each robot of the table whether it is of the first half.
 PooledParameter learn(const FleetColumn& column, std::size_t at, const std::vector<bool>& learns, std::size_t learning,
                       double most_hidden) {
-  PooledParameter out{.column = at, .before = {infinity, -infinity}};
+  PooledParameter out{.column = at, .before = {kInfinity, -kInfinity}};
   std::vector<double> middles, below, above;
   std::size_t seen = 0;
   for (const FleetEntry& e : column.entries) {
@@ -105,7 +100,7 @@ std::vector<double> scores_of(const FleetTable& table, const std::vector<PooledP
   }
   for (std::size_t i = 0; i < scores.size(); ++i) {
     if (met[i] < included) {
-      scores[i] = infinity;
+      scores[i] = kInfinity;
     }
   }
   return scores;

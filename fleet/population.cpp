@@ -10,17 +10,12 @@
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/fleet/holm.hpp>
+#include <wheelwright/fleet/median.hpp>
 
 namespace wheelwright {
 namespace {
 
 constexpr std::size_t most_left_out = 200;
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // Values from the (1 − share)/2 quantile of the lower bounds to the other one of the upper bounds, taken outward.
 Interval central_range(const FleetColumn& column, double share) {

@@ -18,21 +18,21 @@ constexpr double kUneven = 0.01;        // share of the median step
 constexpr double kRestSpeed = 0.01;     // of the root mean square of the speed
 constexpr std::size_t kFewestRows = 3;  // of a segment
 
-using Signal = std::vector<double>;
+using Series = std::vector<double>;
 
 // The columns that are used, each as one signal; empty where the log has none.
 struct Columns {
-  std::vector<Signal> motion, effort;
-  Signal heading, x, y, gyro;
+  std::vector<Series> motion, effort;
+  Series heading, x, y, gyro;
 
   template <typename Function>
   void for_each(const Function& function) {
     for (auto* group : {&motion, &effort}) {
-      for (Signal& signal : *group) {
+      for (Series& signal : *group) {
         function(signal);
       }
     }
-    for (Signal* signal : {&heading, &x, &y, &gyro}) {
+    for (Series* signal : {&heading, &x, &y, &gyro}) {
       if (!signal->empty()) {
         function(*signal);
       }
@@ -40,9 +40,9 @@ struct Columns {
   }
 };
 
-Signal optional_column(const LogTable& log, std::string_view name) {
+Series optional_column(const LogTable& log, std::string_view name) {
   const auto found = std::ranges::find(log.names, name);
-  return found == log.names.end() ? Signal{} : log.columns[static_cast<std::size_t>(found - log.names.begin())];
+  return found == log.names.end() ? Series{} : log.columns[static_cast<std::size_t>(found - log.names.begin())];
 }
 
 Columns take(const LogTable& log, const Measurement& measurement) {
@@ -64,16 +64,16 @@ Columns take(const LogTable& log, const Measurement& measurement) {
   return columns;
 }
 
-Signal part(const Signal& signal, std::size_t first, std::size_t last) {
-  return signal.empty() ? Signal{}
-                        : Signal(signal.begin() + static_cast<std::ptrdiff_t>(first),
+Series part(const Series& signal, std::size_t first, std::size_t last) {
+  return signal.empty() ? Series{}
+                        : Series(signal.begin() + static_cast<std::ptrdiff_t>(first),
                                  signal.begin() + static_cast<std::ptrdiff_t>(last));
 }
 
 Columns part(const Columns& all, std::size_t first, std::size_t last) {
   Columns columns;
-  for (const Signal& signal : all.motion) columns.motion.push_back(part(signal, first, last));
-  for (const Signal& signal : all.effort) columns.effort.push_back(part(signal, first, last));
+  for (const Series& signal : all.motion) columns.motion.push_back(part(signal, first, last));
+  for (const Series& signal : all.effort) columns.effort.push_back(part(signal, first, last));
   columns.heading = part(all.heading, first, last);
   columns.x = part(all.x, first, last);
   columns.y = part(all.y, first, last);
@@ -81,7 +81,7 @@ Columns part(const Columns& all, std::size_t first, std::size_t last) {
   return columns;
 }
 
-void unwrap(Signal& angle) {
+void unwrap(Series& angle) {
   double turns = 0.0;
   double before = angle.empty() ? 0.0 : angle.front();
   for (double& value : angle) {
@@ -95,31 +95,31 @@ void unwrap(Signal& angle) {
 double sign(double x) { return static_cast<double>(x > 0.0) - static_cast<double>(x < 0.0); }
 
 // Angles at the samples become mean speeds between them; everything else its mean between them.
-void to_middles(Signal& t, Columns& columns, std::vector<Signal>& angle, bool held) {
+void to_middles(Series& t, Columns& columns, std::vector<Series>& angle, bool held) {
   const std::size_t n = t.size() - 1;
   for (std::size_t j = 0; j < columns.motion.size(); ++j) {
-    Signal& motion = columns.motion[j];
-    angle.push_back(Signal(n));
+    Series& motion = columns.motion[j];
+    angle.push_back(Series(n));
     for (std::size_t k = 0; k < n; ++k) {
       angle[j][k] = 0.5 * (motion[k] + motion[k + 1]);
       motion[k] = (motion[k + 1] - motion[k]) / (t[k + 1] - t[k]);
     }
     motion.pop_back();
   }
-  const auto mean = [n](Signal& signal) {
+  const auto mean = [n](Series& signal) {
     for (std::size_t k = 0; k < n; ++k) {
       signal[k] = 0.5 * (signal[k] + signal[k + 1]);
     }
     signal.pop_back();
   };
-  for (Signal& effort : columns.effort) {
+  for (Series& effort : columns.effort) {
     if (held) {
       effort.pop_back();
     } else {
       mean(effort);
     }
   }
-  for (Signal* signal : {&columns.heading, &columns.x, &columns.y, &columns.gyro}) {
+  for (Series* signal : {&columns.heading, &columns.x, &columns.y, &columns.gyro}) {
     if (!signal->empty()) {
       mean(*signal);
     }
@@ -127,11 +127,11 @@ void to_middles(Signal& t, Columns& columns, std::vector<Signal>& angle, bool he
   mean(t);
 }
 
-void resample(Signal& t, Columns& columns, std::vector<Signal>& angle, double step, bool hold_effort) {
+void resample(Series& t, Columns& columns, std::vector<Series>& angle, double step, bool hold_effort) {
   const auto n = static_cast<std::size_t>(std::floor((t.back() - t.front()) / step + 1e-9)) + 1;
   std::vector<std::size_t> before(n);
-  Signal share(n);
-  Signal even(n);
+  Series share(n);
+  Series even(n);
   for (std::size_t k = 0, i = 0; k < n; ++k) {
     even[k] = t.front() + static_cast<double>(k) * step;
     while (i + 2 < t.size() && t[i + 1] <= even[k]) {
@@ -140,22 +140,22 @@ void resample(Signal& t, Columns& columns, std::vector<Signal>& angle, double st
     before[k] = i;
     share[k] = std::clamp((even[k] - t[i]) / (t[i + 1] - t[i]), 0.0, 1.0);
   }
-  const auto linear = [&](Signal& signal) {
-    Signal result(n);
+  const auto linear = [&](Series& signal) {
+    Series result(n);
     for (std::size_t k = 0; k < n; ++k) {
       result[k] = signal[before[k]] + share[k] * (signal[before[k] + 1] - signal[before[k]]);
     }
     signal = std::move(result);
   };
-  const auto held = [&](Signal& signal) {
-    Signal result(n);
+  const auto held = [&](Series& signal) {
+    Series result(n);
     for (std::size_t k = 0; k < n; ++k) {
       result[k] = signal[before[k] + (share[k] >= 1.0 ? 1 : 0)];
     }
     signal = std::move(result);
   };
   if (hold_effort) {
-    std::vector<Signal> efforts = std::exchange(columns.effort, {});
+    std::vector<Series> efforts = std::exchange(columns.effort, {});
     columns.for_each(linear);
     std::ranges::for_each(efforts, held);
     columns.effort = std::move(efforts);
@@ -166,23 +166,23 @@ void resample(Signal& t, Columns& columns, std::vector<Signal>& angle, double st
   t = std::move(even);
 }
 
-void append(Eigen::VectorXd& to, const Signal& signal) {
+void append(Eigen::VectorXd& to, const Series& signal) {
   const Eigen::Index before = to.size();
   to.conservativeResize(before + static_cast<Eigen::Index>(signal.size()));
   to.tail(static_cast<Eigen::Index>(signal.size())) =
       Eigen::Map<const Eigen::VectorXd>(signal.data(), static_cast<Eigen::Index>(signal.size()));
 }
 
-Signal integral(const Signal& speed, double step) {
-  Signal sum(speed.size(), 0.0);
+Series integral(const Series& speed, double step) {
+  Series sum(speed.size(), 0.0);
   for (std::size_t k = 1; k < speed.size(); ++k) {
     sum[k] = sum[k - 1] + 0.5 * step * (speed[k - 1] + speed[k]);
   }
   return sum;
 }
 
-Signal means_of_neighbours(const Signal& held) {
-  Signal mean = held;
+Series means_of_neighbours(const Series& held) {
+  Series mean = held;
   for (std::size_t k = 1; k < held.size(); ++k) {
     mean[k] = 0.5 * (held[k - 1] + held[k]);
   }
@@ -201,7 +201,7 @@ double noise_by_differences(const Eigen::VectorXd& x) {
   if (x.size() < 8) {
     return 0.0;
   }
-  Signal magnitude;
+  Series magnitude;
   for (Eigen::Index k = 3; k < x.size(); ++k) {
     magnitude.push_back(std::abs(x[k] - 3.0 * x[k - 1] + 3.0 * x[k - 2] - x[k - 3]));
   }
@@ -259,13 +259,13 @@ void smooth_joint(const Drive& drive, JointSignals& joint) {
   joint.smooth_acceleration /= drive.step;
 }
 
-void append_segment(Drive& drive, Signal t, Columns columns, const Measurement& measurement) {
+void append_segment(Drive& drive, Series t, Columns columns, const Measurement& measurement) {
   const bool angles = measurement.motion == MotionKind::angle;
   const bool held = measurement.hold == Hold::zero_order;
   const std::size_t rows = t.size();
   if (measurement.effort_unsigned) {
     for (std::size_t j = 0; j < columns.effort.size(); ++j) {
-      const Signal& motion = columns.motion[j];
+      const Series& motion = columns.motion[j];
       for (std::size_t k = 0; k < rows; ++k) {
         const double direction = angles ? (k > 0 ? motion[k] - motion[k - 1] : 0.0) : motion[k];
         columns.effort[j][k] = std::abs(columns.effort[j][k]) * sign(direction);
@@ -273,14 +273,14 @@ void append_segment(Drive& drive, Signal t, Columns columns, const Measurement& 
     }
   }
   if (measurement.count > 0.0) {
-    for (Signal& motion : columns.motion) {
+    for (Series& motion : columns.motion) {
       for (double& value : motion) {
         value = std::round(value / measurement.count) * measurement.count;
       }
     }
   }
   unwrap(columns.heading);
-  std::vector<Signal> angle;
+  std::vector<Series> angle;
   if (angles) {
     to_middles(t, columns, angle, held);
   }

@@ -18,7 +18,7 @@ namespace {
 constexpr double kPlannedEffort = 0.8;               // of the limit
 constexpr double kShortest = 20.0, kLongest = 60.0;  // s; between them a third of the log that was analysed
 constexpr double kShortestTravel = 0.5;              // m
-constexpr int kProbes = 3;                           // random manoeuvres
+constexpr int kProbeDrives = 3;                      // random manoeuvres
 constexpr std::size_t kStages = 8;                   // of each
 constexpr double kImitated = 1e-3;                   // share of a signature
 
@@ -147,7 +147,7 @@ void judge_pairs(std::vector<ConfusablePair>& pairs, const CandidateTable& table
   }
   std::mt19937_64 generator(1);
   std::vector<Judged> judged(pairs.size());
-  for (int probe = 0; probe < kProbes; ++probe) {
+  for (int probe = 0; probe < kProbeDrives; ++probe) {
     const Drive drive = random_drive(*family, subject, prepared.drive, generator);
     GapProblem problem =
         make_problem(drive, prepared.floor, {}, prepared.trusted, prepared.catalogue, shapes, prepared.row_options);

@@ -67,7 +67,7 @@ double noise_of(const Drive& drive, const Signal& signal) {
   return std::max(*middle / (0.6744897501960817 * std::sqrt(20.0)), resolution / std::sqrt(12.0));
 }
 
-double rms(const Signal& signal) {
+double rms_of(const Signal& signal) {
   return signal.size() > 0 ? std::sqrt(signal.squaredNorm() / static_cast<double>(signal.size())) : 0.0;
 }
 
@@ -157,7 +157,7 @@ IncrementNoise repeatability(const Drive& drive, const Windows& windows, const I
     Eigen::Index row = 0;
     for (const std::size_t c : {0, 1}) {
       const Signal& v = drive.coordinates[c].smooth_speed;
-      const double unit = std::max(rms(v), 1e-12);
+      const double unit = std::max(rms_of(v), 1e-12);
       for (const auto* place : {&windows.first, &windows.middle, &windows.last}) {
         motion(row++, k) = v[(*place)[at]] / unit;
       }
@@ -193,6 +193,8 @@ IncrementNoise repeatability(const Drive& drive, const Windows& windows, const I
   return {root(sum.forward), root(sum.lateral), root(sum.yaw)};
 }
 
-IncrementNoise root_mean_square(const Increments& gap) { return {rms(gap.forward), rms(gap.lateral), rms(gap.yaw)}; }
+IncrementNoise root_mean_square(const Increments& gap) {
+  return {rms_of(gap.forward), rms_of(gap.lateral), rms_of(gap.yaw)};
+}
 
 }  // namespace wheelwright

@@ -11,7 +11,7 @@
 namespace wheelwright {
 namespace {
 
-using Signal = Eigen::ArrayXd;
+using Samples = Eigen::ArrayXd;
 
 // Collects the regimes of a drive that are not too rare.
 class Collector {
@@ -26,7 +26,7 @@ class Collector {
   }
 
   // Quarters of `values` over the instants of `among`.
-  void add_quarters(const std::string& kind, const std::string& what, const Signal& values, const Mask& among,
+  void add_quarters(const std::string& kind, const std::string& what, const Samples& values, const Mask& among,
                     const std::string& unit) {
     const std::vector<double> edges = quantiles(values, among, {0.25, 0.5, 0.75});
     if (edges.empty()) {
@@ -49,16 +49,16 @@ class Collector {
   }
 
   // Equal sectors of the full turn.
-  void add_sectors(const std::string& kind, const std::string& what, const Signal& angle) {
+  void add_sectors(const std::string& kind, const std::string& what, const Samples& angle) {
     const double width = 360.0 / options_.sectors;
-    const Signal turn = angle / (2.0 * std::numbers::pi);
-    const Signal sector = ((turn - turn.floor()) * options_.sectors).floor();
+    const Samples turn = angle / (2.0 * std::numbers::pi);
+    const Samples sector = ((turn - turn.floor()) * options_.sectors).floor();
     for (int k = 0; k < options_.sectors; ++k) {
       add(kind, fmt::format("{} {:g} to {:g}°", what, k * width, (k + 1) * width), sector == k);
     }
   }
 
-  static std::vector<double> quantiles(const Signal& values, const Mask& among, const std::vector<double>& shares) {
+  static std::vector<double> quantiles(const Samples& values, const Mask& among, const std::vector<double>& shares) {
     std::vector<double> sorted;
     for (Eigen::Index k = 0; k < values.size(); ++k) {
       if (among[k]) {
@@ -129,11 +129,11 @@ void add_motion(Collector& collect) {
     return;
   }
   const CoordinateSignals& forward = drive.coordinates.front();
-  const Signal speed = forward.smooth_speed.array();
+  const Samples speed = forward.smooth_speed.array();
   const std::string unit = drive.model.coordinates.size() > 1 ? "m/s" : "m/s or rad/s";
   collect.add_quarters("speed", "speed", speed.abs(), moving, unit);
 
-  const Signal along = forward.smooth_acceleration.array() * speed.sign();
+  const Samples along = forward.smooth_acceleration.array() * speed.sign();
   if (const auto edges = Collector::quantiles(along, moving, {0.2, 0.8}); !edges.empty()) {
     collect.add("acceleration", "slowing down", moving && along <= edges[0]);
     collect.add("acceleration", "at about constant speed", moving && along > edges[0] && along < edges[1]);
@@ -142,7 +142,7 @@ void add_motion(Collector& collect) {
   if (drive.coordinates.size() < 2) {
     return;
   }
-  const Signal yaw = drive.coordinates[1].smooth_speed.array();
+  const Samples yaw = drive.coordinates[1].smooth_speed.array();
   const auto fastest = Collector::quantiles(yaw.abs(), moving, {0.95});
   if (fastest.empty()) {
     return;
@@ -165,7 +165,7 @@ void add_joints(Collector& collect) {
   for (std::size_t i = 0; i < drive.joints.size(); ++i) {
     const JointSignals& joint = drive.joints[i];
     const std::string name = joint_name(drive, i);
-    const Signal speed = joint.smooth_speed.array(), effort = joint.smooth_effort.array();
+    const Samples speed = joint.smooth_speed.array(), effort = joint.smooth_effort.array();
     const Mask moving = !joint.resting;
     collect.add("direction", name + " forwards", moving && speed > 0.0);
     collect.add("direction", name + " backwards", moving && speed < 0.0);
@@ -193,8 +193,8 @@ void add_place(Collector& collect) {
   if (!(dx > 0.0) || !(dy > 0.0)) {
     return;
   }
-  const Signal column = ((drive.x.array() - x0) / dx).floor().min(grid - 1.0);
-  const Signal row = ((drive.y.array() - y0) / dy).floor().min(grid - 1.0);
+  const Samples column = ((drive.x.array() - x0) / dx).floor().min(grid - 1.0);
+  const Samples row = ((drive.y.array() - y0) / dy).floor().min(grid - 1.0);
   for (int a = 0; a < grid; ++a) {
     for (int b = 0; b < grid; ++b) {
       collect.add("position",
@@ -214,7 +214,7 @@ void add_time(Collector& collect) {
   }
   const bool epoch = std::abs(begin) > 1e6;  // a clock's seconds since long ago say nothing
   const double origin = epoch ? begin : 0.0;
-  const Signal stretch = ((drive.t.array() - begin) / width).floor().min(stretches - 1.0);
+  const Samples stretch = ((drive.t.array() - begin) / width).floor().min(stretches - 1.0);
   for (int k = 0; k < stretches; ++k) {
     collect.add("time",
                 fmt::format("t = {:.4g} to {:.4g} s{}", begin - origin + k * width, begin - origin + (k + 1) * width,

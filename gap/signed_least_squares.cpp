@@ -9,7 +9,7 @@
 namespace wheelwright {
 namespace {
 
-constexpr double kDetermined = 1e-10;  // share of a squared column that the ones before it must leave
+constexpr double kIndependent = 1e-10;  // share of a squared column that the ones before it must leave
 
 using Flags = std::vector<bool>;
 
@@ -20,7 +20,7 @@ Eigen::MatrixXd factor(const Eigen::MatrixXd& A, Flags& use) {
   for (Eigen::Index j = 0; j < n; ++j) {
     const auto u = static_cast<std::size_t>(j);
     const double pivot = use[u] ? A(j, j) - L.row(j).head(j).squaredNorm() : 0.0;
-    if (!use[u] || !(pivot > kDetermined * A(j, j))) {
+    if (!use[u] || !(pivot > kIndependent * A(j, j))) {
       use[u] = false;
       L.row(j).setZero();
       continue;

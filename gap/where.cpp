@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <numeric>
 #include <random>
 #include <string>
@@ -15,6 +14,7 @@
 #include <boost/math/distributions/students_t.hpp>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/limits.hpp>
 #include <wheelwright/gap/drive_filter.hpp>
 #include <wheelwright/gap/permutation.hpp>
 #include <wheelwright/gap/spectrum.hpp>
@@ -23,10 +23,9 @@
 namespace wheelwright {
 namespace {
 
-constexpr Eigen::Index kFewestRows = 64;
-constexpr int kNoises = 24;  // of each kind
-constexpr double kNever = std::numeric_limits<double>::infinity();
-constexpr std::array kEdges = {0.0, 0.2, 0.5, 1.0, 2.0, 5.0, kNever};  // Hz
+constexpr Eigen::Index kFewestLocated = 64;
+constexpr int kNoises = 24;                                               // of each kind
+constexpr std::array kEdges = {0.0, 0.2, 0.5, 1.0, 2.0, 5.0, kInfinity};  // Hz
 constexpr std::size_t kBands = kEdges.size() - 1;
 using Bands = std::array<double, kBands>;
 
@@ -254,7 +253,7 @@ std::vector<GapShare> locate_gap(const Drive& drive, const std::vector<ResidualS
   check_input(series, options);
   std::vector<const ResidualSeries*> used;
   for (const ResidualSeries& s : series) {
-    if (s.t.size() >= kFewestRows && drive.rows() > 1) {
+    if (s.t.size() >= kFewestLocated && drive.rows() > 1) {
       used.push_back(&s);
     }
   }

@@ -15,9 +15,9 @@
 namespace wheelwright {
 namespace {
 
-constexpr double kSingular = 1e-12;       // reciprocal condition, columns scaled
-constexpr std::size_t kFewStretches = 4;  // fewer cannot show their own spread
-constexpr double kMostMissed = 0.5;       // of the variance, that is allowed for
+constexpr double kSingularResample = 1e-12;  // reciprocal condition, columns scaled
+constexpr std::size_t kFewStretches = 4;     // fewer cannot show their own spread
+constexpr double kMostMissed = 0.5;          // of the variance, that is allowed for
 
 // An index below `count`, each as likely, the same with every standard library.
 std::size_t below(std::mt19937_64& generator, std::size_t count) {
@@ -101,7 +101,7 @@ BlockBootstrap block_bootstrap(const RegressionMoments& moments, const BlockBoot
       c_sum += c.col(start);
     }
     const Eigen::PartialPivLU<Eigen::MatrixXd> lu(A_sum.reshaped(q, q));
-    if (!(lu.rcond() > kSingular)) {
+    if (!(lu.rcond() > kSingularResample)) {
       ++result.singular;
       continue;
     }

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include <Eigen/LU>
 #include <Eigen/QR>
@@ -11,12 +10,11 @@
 #include <fmt/format.h>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/limits.hpp>
 #include <wheelwright/identify/nonnegative_least_squares.hpp>
 
 namespace wheelwright {
 namespace {
-
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 
 /// The problem in scaled columns x = D⁻¹θ and constraints of unit length: min ‖Rx − c‖ subject to Ax <= b.
 struct Scaled {

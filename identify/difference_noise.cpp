@@ -49,7 +49,7 @@ struct Sums {
   double largest = 0.0;
 };
 
-DifferenceNoise judge(const Sums& sums, std::size_t windows) {
+DifferenceNoise judge_windows(const Sums& sums, std::size_t windows) {
   DifferenceNoise noise;
   noise.windows = windows;
   if (windows < kFewestWindows) {
@@ -131,7 +131,7 @@ std::vector<DifferenceNoise> difference_noise(LogSource& log, const std::vector<
   std::vector<DifferenceNoise> result;
   result.reserve(sums.size());
   for (const Sums& s : sums) {
-    result.push_back(judge(s, windows));
+    result.push_back(judge_windows(s, windows));
   }
   return result;
 }

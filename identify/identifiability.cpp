@@ -15,11 +15,11 @@
 namespace wheelwright {
 namespace {
 
-constexpr double kRoundings = 64.0;       // ε of a row
-constexpr double kSignalOverNoise = 3.0;  // as in excitation.hpp
-constexpr double kTakesPart = 0.1;        // of a direction's largest scaled entry
-constexpr double kDependent = 1e-6;       // of a regrouping coefficient, scaled
-constexpr double kEqualRest = 0.5;        // of the longest rest of a column
+constexpr double kRoundings = 64.0;    // ε of a row
+constexpr double kClearOfNoise = 3.0;  // as in excitation.hpp
+constexpr double kTakesPart = 0.1;     // of a direction's largest scaled entry
+constexpr double kDependent = 1e-6;    // of a regrouping coefficient, scaled
+constexpr double kEqualRest = 0.5;     // of the longest rest of a column
 
 std::vector<Eigen::Index> members_of(const Eigen::VectorXd& scaled, double least) {
   std::vector<Eigen::Index> members;
@@ -61,13 +61,13 @@ std::vector<Eigen::Index> base_columns(Eigen::MatrixXd rest, int rank) {
   return base;
 }
 
-struct Scaled {
+struct ScaledDirections {
   Eigen::MatrixXd R;       // columns of length one
   Eigen::VectorXd length;  // of the columns before
   Eigen::MatrixXd V;       // right singular vectors
 };
 
-void find_base(const IdentifiabilityInput& input, const Scaled& scaled, Identifiability& result) {
+void find_base(const IdentifiabilityInput& input, const ScaledDirections& scaled, Identifiability& result) {
   const auto p = static_cast<Eigen::Index>(input.parameters.size());
   result.base = base_columns(scaled.R, result.rank);
   std::vector<Eigen::Index> others;
@@ -123,7 +123,7 @@ void find_base(const IdentifiabilityInput& input, const Scaled& scaled, Identifi
   }
 }
 
-void find_noise(const IdentifiabilityInput& input, const Scaled& scaled, Identifiability& result) {
+void find_noise(const IdentifiabilityInput& input, const ScaledDirections& scaled, Identifiability& result) {
   result.noise_rank = result.rank;
   if (input.noise.size() == 0 || result.rank == 0) {
     return;
@@ -131,7 +131,7 @@ void find_noise(const IdentifiabilityInput& input, const Scaled& scaled, Identif
   const Eigen::VectorXd size = scaled.length.unaryExpr([](double s) { return s > 0.0 ? 1.0 / s : 1.0; });
   const Eigen::MatrixXd V = scaled.V.leftCols(result.rank);
   const Eigen::MatrixXd noise = V.transpose() * size.asDiagonal() * input.noise * size.asDiagonal() * V;
-  Eigen::MatrixXd excess = -kSignalOverNoise * kSignalOverNoise * noise;
+  Eigen::MatrixXd excess = -kClearOfNoise * kClearOfNoise * noise;
   excess.diagonal() += result.singular_values.head(result.rank).cwiseAbs2();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(excess);
   for (Eigen::Index k = 0; k < excess.rows() && eigen.eigenvalues()[k] <= 0.0; ++k) {
@@ -230,7 +230,7 @@ Identifiability identifiability(const IdentifiabilityInput& input) {
   check::that(input.size.size() == 0 || (input.size.size() == p && (input.size.array() > 0.0).all()), "size",
               "a number > 0 for each parameter, or none");
 
-  Scaled scaled;
+  ScaledDirections scaled;
   scaled.length = input.factor.colwise().norm();
   scaled.R = input.factor;
   for (Eigen::Index j = 0; j < p; ++j) {

@@ -13,8 +13,8 @@ namespace wheelwright {
 namespace {
 
 constexpr double kWindows = 60.0;
-constexpr double kSingular = 1e-13;   // eigenvalue of the scaled Gram matrix, of the largest
-constexpr double kConfounded = 1e-5;  // part of a scaled unit vector in the null space
+constexpr double kNoInformation = 1e-13;  // eigenvalue of the scaled Gram matrix, of the largest
+constexpr double kConfounded = 1e-5;      // part of a scaled unit vector in the null space
 
 }  // namespace
 
@@ -54,7 +54,7 @@ InformationOverTime information_over_time(const RegressionMoments& moments, cons
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(
       Eigen::MatrixXd(one_over.asDiagonal() * G * one_over.asDiagonal()));
   const Eigen::VectorXd inverse = eigen.eigenvalues().unaryExpr(
-      [&](double value) { return value > kSingular * eigen.eigenvalues()[p - 1] ? 1.0 / value : 0.0; });
+      [&](double value) { return value > kNoInformation * eigen.eigenvalues()[p - 1] ? 1.0 / value : 0.0; });
   const auto W = static_cast<Eigen::Index>(result.windows.size());
 
   for (Eigen::Index j = 0; j < p; ++j) {

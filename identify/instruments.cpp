@@ -11,7 +11,7 @@
 namespace wheelwright {
 namespace {
 
-constexpr double kSingular = 1e-9;  // reciprocal condition
+constexpr double kSingularCross = 1e-9;  // reciprocal condition
 constexpr int kSubsteps = 2;
 
 Eigen::MatrixXd inertia(const Model& model, const Eigen::VectorXd& theta) {
@@ -27,7 +27,8 @@ Eigen::MatrixXd inertia(const Model& model, const Eigen::VectorXd& theta) {
 }
 
 bool invertible(const Eigen::MatrixXd& m) {
-  return m.rows() == m.cols() && m.allFinite() && m.fullPivLu().isInvertible() && m.fullPivLu().rcond() > kSingular;
+  return m.rows() == m.cols() && m.allFinite() && m.fullPivLu().isInvertible() &&
+         m.fullPivLu().rcond() > kSingularCross;
 }
 
 Measurement of_instruments(const Measurement& rows, const std::vector<std::string>& motion) {

@@ -125,7 +125,7 @@ void adjust(std::vector<SharingTest>& tests) {
   }
 }
 
-std::string sentence(const SharingTest& test, const std::vector<JointLog>& logs) {
+std::string sharing_sentence(const SharingTest& test, const std::vector<JointLog>& logs) {
   if (!test.tested) {
     return test.parameter + ": fewer than two logs know it by themselves, so that sharing cannot be tested";
   }
@@ -244,7 +244,7 @@ JointFit joint_fit(const std::vector<JointLog>& logs, const std::vector<JointPar
   }
   adjust(fit.sharing);
   for (SharingTest& test : fit.sharing) {
-    test.words = sentence(test, logs);
+    test.words = sharing_sentence(test, logs);
     fit.compatible = fit.compatible && !(test.adjusted_p < 0.05);
   }
   return fit;

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <memory>
 #include <numbers>
 #include <optional>
@@ -13,16 +12,16 @@
 #include <Eigen/Dense>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/limits.hpp>
 #include <wheelwright/identify/block_sums.hpp>
 #include <wheelwright/identify/noise_level.hpp>
 
 namespace wheelwright {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kMadToSigma = 1.4826;
 constexpr int kRescalings = 20;
-constexpr std::size_t kFewestWindows = 8;
+constexpr std::size_t kFewestArcs = 8;
 
 // Shared unknowns, all of order one: v = ρ r/2 (a_R ω_R + a_L ω_L), θ̇ = γ r/D (a_R ω_R − a_L ω_L), a = 1 ± ε; the
 // pose's point is κ D ahead of the axle and its stamp is δ late.
@@ -428,7 +427,7 @@ KinematicCalibration calibrate_kinematics(const LogTable& log, const KinematicOp
   KinematicCalibration result;
   std::vector<Window> windows = cut(log, options, position, result);
   result.windows = windows.size();
-  check::that(windows.size() >= kFewestWindows, "kinematic calibration",
+  check::that(windows.size() >= kFewestArcs, "kinematic calibration",
               "at least 8 windows with poses, found " + std::to_string(windows.size()));
   Fit fit(std::move(windows), options, position);
   result.converged = fit.settle();

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include <ceres/ceres.h>
 
@@ -11,12 +10,11 @@
 #include <Eigen/QR>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/limits.hpp>
 #include <wheelwright/identify/least_squares.hpp>
 
 namespace wheelwright {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// All rows at once: residual root((y − Y(θ0 + Tz))/s).
 class Roots final : public ceres::CostFunction {

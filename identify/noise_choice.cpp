@@ -10,7 +10,7 @@ namespace wheelwright {
 namespace {
 
 constexpr double kUncorrelated = 0.2;
-constexpr double kStandardErrors = 3.0;
+constexpr double kClearlyLarger = 3.0;
 
 struct Level {
   NoiseMethod method;
@@ -19,7 +19,7 @@ struct Level {
 
 // Whether a is the larger by more than chance.
 bool exceeds(const Level& a, const Level& b) {
-  return 2.0 * std::log(a.sd / b.sd) > kStandardErrors * std::hypot(a.relative_sd, b.relative_sd);
+  return 2.0 * std::log(a.sd / b.sd) > kClearlyLarger * std::hypot(a.relative_sd, b.relative_sd);
 }
 
 std::string_view assumption_of(NoiseMethod method) {

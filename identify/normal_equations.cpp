@@ -18,7 +18,7 @@ namespace wheelwright {
 namespace {
 
 constexpr double kWorstCondition = 1e6;
-constexpr std::size_t kTile = 256;
+constexpr std::size_t kPackedRows = 256;
 
 using Walk = std::function<void(const std::function<void(const RegressionBlock&)>&)>;
 
@@ -30,7 +30,7 @@ class Gradient {
         p_(static_cast<std::size_t>(theta.size())),
         columns_((p_ + gram_kernels::kGroup - 1) / gram_kernels::kGroup * gram_kernels::kGroup),
         theta_(columns_, 0.0),
-        tile_(kTile * columns_, 0.0),
+        tile_(kPackedRows * columns_, 0.0),
         of_tile_(columns_) {
     std::copy(theta.begin(), theta.end(), theta_.begin());
     sum_ = Eigen::VectorXd::Zero(theta.size());
@@ -41,8 +41,8 @@ class Gradient {
     const std::size_t n = rows.outputs;
     for (std::size_t i = 0; i < n; ++i) {
       const double w = (*weights_)[static_cast<Eigen::Index>(i)];
-      for (std::size_t k = 0; k < rows.instants(); k += kTile) {
-        const std::size_t count = std::min(kTile, rows.instants() - k);
+      for (std::size_t k = 0; k < rows.instants(); k += kPackedRows) {
+        const std::size_t count = std::min(kPackedRows, rows.instants() - k);
         const double* Y = rows.Y.data() + (k * n + i) * p_;
         std::size_t stride = n * p_;
         if (p_ != columns_) {

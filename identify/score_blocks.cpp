@@ -11,8 +11,8 @@
 namespace wheelwright {
 namespace {
 
-constexpr double kSingular = 1e-12;   // reciprocal condition, columns scaled
-constexpr double kWholeBlock = 1e-6;  // times are rounded: so much more than whole blocks is none
+constexpr double kSingularScore = 1e-12;  // reciprocal condition, columns scaled
+constexpr double kWholeBlock = 1e-6;      // times are rounded: so much more than whole blocks is none
 
 double typical_seconds(const std::vector<MomentBlock>& blocks) {
   if (blocks.size() < 2) {
@@ -100,7 +100,8 @@ ScoreBlocks score_blocks(const RegressionMoments& moments, const EstimatorOption
   }
   const Eigen::PartialPivLU<Eigen::MatrixXd> lu(s.total_A);
   const Eigen::PartialPivLU<Eigen::MatrixXd> shape_lu(s.shape);
-  s.solvable = s.total_A.allFinite() && s.total_c.allFinite() && lu.rcond() > kSingular && shape_lu.rcond() > kSingular;
+  s.solvable = s.total_A.allFinite() && s.total_c.allFinite() && lu.rcond() > kSingularScore &&
+               shape_lu.rcond() > kSingularScore;
   if (!s.solvable) {
     s.reason =
         with_z ? "the instruments do not tell the parameters apart" : "the log does not tell the parameters apart";

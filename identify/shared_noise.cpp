@@ -12,10 +12,10 @@ namespace {
 
 constexpr std::size_t kOrder = 6;
 constexpr std::size_t kLags = 4;
-constexpr std::size_t kFewestWindows = 50;
-constexpr double kEvenStep = 0.1;  // of the median step
+constexpr std::size_t kFewestSharedWindows = 50;
+constexpr double kEvenGrid = 0.1;  // of the median step
 constexpr double kCorrelated = 0.1;
-constexpr double kStandardErrors = 10.7;  // six of white series: √(C(24, 12))/C(12, 6)/√N each
+constexpr double kCorrelationErrors = 10.7;  // six of white series: √(C(24, 12))/C(12, 6)/√N each
 
 // The sixth difference of a series, value by value.
 class Difference {
@@ -65,7 +65,7 @@ bool share_noise(LogSource& log, const std::vector<std::string>& first, const st
     for (std::size_t k = 0; k < block.rows(); ++k) {
       const bool starts = segment < block.segment_starts.size() && block.segment_starts[segment] == k;
       segment += starts ? 1 : 0;
-      const bool even = std::abs(block.t[k] - before - step) <= kEvenStep * step;
+      const bool even = std::abs(block.t[k] - before - step) <= kEvenGrid * step;
       run = starts || !even ? 1 : run + 1;
       before = block.t[k];
       const bool whole = run > kOrder + kLags;
@@ -86,10 +86,10 @@ bool share_noise(LogSource& log, const std::vector<std::string>& first, const st
     }
   }
   log.rewind();
-  if (windows < kFewestWindows) {
+  if (windows < kFewestSharedWindows) {
     return false;
   }
-  const double limit = std::max(kCorrelated, kStandardErrors / std::sqrt(static_cast<double>(windows)));
+  const double limit = std::max(kCorrelated, kCorrelationErrors / std::sqrt(static_cast<double>(windows)));
   return std::ranges::any_of(pairs, [&](const Pair& pair) {
     const double size = std::sqrt(pair.squares_first * pair.squares_second);
     return std::ranges::any_of(pair.products, [&](double product) { return std::abs(product) > limit * size; });

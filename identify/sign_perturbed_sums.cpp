@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <random>
 
 #include <Eigen/Cholesky>
@@ -12,6 +11,7 @@
 #include <Eigen/LU>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/limits.hpp>
 #include <wheelwright/identify/block_length.hpp>
 #include <wheelwright/identify/score_blocks.hpp>
 
@@ -20,7 +20,6 @@ namespace {
 
 constexpr double kLostVariance = 0.05;  // at the edges of groups whose length is chosen
 constexpr double kFlat = 1e-12;         // an ellipsoid's axis of a smaller eigenvalue is taken to be unbounded
-constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
 // {z : zᵀz <= ‖b − Qz‖²} as Σ λ_k u_k² + 2 g_k u_k <= d in the coordinates u = Uᵀz.
 struct Ellipsoid {
@@ -43,7 +42,7 @@ Ellipsoid ellipsoid(const Eigen::MatrixXd& Q, const Eigen::VectorXd& b) {
 // derivative is bisected in log(ξλ_min − 1). Every ξ gives an upper bound.
 double largest_norm(const Ellipsoid& e) {
   if (!e.bounded) {
-    return kInfinite;
+    return kInfinity;
   }
   const double least = e.lambda.minCoeff();
   const auto value = [&](double xi) {
@@ -148,10 +147,10 @@ bool SignPerturbedSums::contains(const Eigen::VectorXd& theta) const {
 SignPerturbedBounds SignPerturbedSums::bounds() const {
   const auto p = static_cast<Eigen::Index>(parameters_);
   SignPerturbedBounds result{Eigen::VectorXd::Zero(p), Eigen::VectorXd::Zero(p), Eigen::MatrixXd::Zero(p, p),
-                             kInfinite};
+                             kInfinity};
   if (!usable_) {
-    result.lower(kept_).setConstant(-kInfinite);
-    result.upper(kept_).setConstant(kInfinite);
+    result.lower(kept_).setConstant(-kInfinity);
+    result.upper(kept_).setConstant(kInfinity);
     return result;
   }
   const Eigen::Index q = c_.rows();
@@ -169,8 +168,8 @@ SignPerturbedBounds SignPerturbedSums::bounds() const {
     for (Eigen::Index j = 0; j < q; ++j) {
       const double shift = rows.row(j).dot(centre);
       const double reach = std::sqrt(size * (rows.row(j).transpose().array().square() / e.lambda.array()).sum());
-      up[static_cast<std::size_t>(j)].push_back(e.bounded ? shift + reach : kInfinite);
-      down[static_cast<std::size_t>(j)].push_back(e.bounded ? reach - shift : kInfinite);
+      up[static_cast<std::size_t>(j)].push_back(e.bounded ? shift + reach : kInfinity);
+      down[static_cast<std::size_t>(j)].push_back(e.bounded ? reach - shift : kInfinity);
     }
   }
   result.radius = nth_largest(norms, q_);

@@ -63,10 +63,10 @@ double mean(const std::vector<double>& x, std::size_t first, std::size_t last) {
   return sum / static_cast<double>(last - first);
 }
 
-class Gathering {
+class StandstillGathering {
  public:
-  Gathering(LogSource& log, const StandstillSigns& signs, const std::vector<std::string>& columns,
-            const StandstillOptions& options)
+  StandstillGathering(LogSource& log, const StandstillSigns& signs, const std::vector<std::string>& columns,
+                      const StandstillOptions& options)
       : options_(options),
         commands_(find_all(log, signs.commands)),
         by_angle_(signs.speeds.empty() && !signs.angles.empty()),
@@ -286,7 +286,7 @@ Standstill standstill_noise(LogSource& log, const StandstillSigns& signs, const 
   check::positive(options.slow, "slow");
   check::that(options.piece >= options.least_time + 2.0 * options.trim, "piece", "a whole stretch with its ends");
   check::that(!columns.empty(), "columns", "at least one");
-  Gathering gathering(log, signs, columns, options);
+  StandstillGathering gathering(log, signs, columns, options);
   walk(log, [&](const LogBlock& block, std::size_t k, bool starts) { gathering.size_up(block, k, starts); });
   walk(log, [&](const LogBlock& block, std::size_t k, bool starts) { gathering.take(block, k, starts); });
   gathering.finish();

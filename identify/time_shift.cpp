@@ -11,7 +11,7 @@
 namespace wheelwright {
 namespace {
 
-using Jet = ceres::Jet<double, 1>;
+using ShiftJet = ceres::Jet<double, 1>;
 
 constexpr double kSettle = 6.0;  // time constants after which e^{−6} = 0.2 % is left of how a lag began
 
@@ -129,7 +129,7 @@ bool TimeShiftedRows::evaluate(const Eigen::VectorXd& shape, bool derivatives, S
   const auto put = [&](const auto& entry) {
     for (Eigen::Index i = 0; i < n; ++i, ++next) {
       for (Eigen::Index j = 0; j < p; ++j) {
-        const Jet e = entry(i, j);
+        const ShiftJet e = entry(i, j);
         at.columns(next, j) = e.a;
         if (derivatives) {
           at.columns_by[0](next, j) = e.v[0];
@@ -137,9 +137,9 @@ bool TimeShiftedRows::evaluate(const Eigen::VectorXd& shape, bool derivatives, S
       }
     }
   };
-  const Jet shift(value, 0);
+  const ShiftJet shift(value, 0);
   if (effect_ == TimeEffect::effort_lag) {
-    lag<Jet>(Y_, outputs_, t_, starts_, shift, [&](std::size_t k, const auto& z) {
+    lag<ShiftJet>(Y_, outputs_, t_, starts_, shift, [&](std::size_t k, const auto& z) {
       if (keep_[k]) {
         put([&](Eigen::Index i, Eigen::Index j) { return z(i, j); });
       }
@@ -147,7 +147,7 @@ bool TimeShiftedRows::evaluate(const Eigen::VectorXd& shape, bool derivatives, S
     return true;
   }
   if (effect_ == TimeEffect::actuator_lag) {
-    const Jet share = shift / upper_;
+    const ShiftJet share = shift / upper_;
     for (const std::size_t k : kept_) {
       const auto lagged = lagged_.middleRows(static_cast<Eigen::Index>(k) * n, n);
       const auto now = rows_of(k);
@@ -164,15 +164,15 @@ bool TimeShiftedRows::evaluate(const Eigen::VectorXd& shape, bool derivatives, S
       const double when = t_[k] - value;
       while (cell + 2 < starts_[s + 1] && t_[cell + 1] <= when) ++cell;
       const double h = t_[cell + 1] - t_[cell];
-      const Jet u = (t_[k] - shift - t_[cell]) / h;
+      const ShiftJet u = (t_[k] - shift - t_[cell]) / h;
       const std::size_t a = cell > starts_[s] ? cell - 1 : cell;
       const std::size_t b = cell + 2 < starts_[s + 1] ? cell + 2 : cell + 1;
       const double left = h / (t_[cell + 1] - t_[a]);
       const double right = h / (t_[b] - t_[cell]);
-      const Jet h00 = (1.0 + 2.0 * u) * (1.0 - u) * (1.0 - u);
-      const Jet h10 = u * (1.0 - u) * (1.0 - u);
-      const Jet h01 = u * u * (3.0 - 2.0 * u);
-      const Jet h11 = u * u * (u - 1.0);
+      const ShiftJet h00 = (1.0 + 2.0 * u) * (1.0 - u) * (1.0 - u);
+      const ShiftJet h10 = u * (1.0 - u) * (1.0 - u);
+      const ShiftJet h01 = u * u * (3.0 - 2.0 * u);
+      const ShiftJet h11 = u * u * (u - 1.0);
       const auto y0 = rows_of(a);
       const auto y1 = rows_of(cell);
       const auto y2 = rows_of(cell + 1);

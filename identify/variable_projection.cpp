@@ -9,6 +9,7 @@
 #include <Eigen/Dense>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/limits.hpp>
 #include <wheelwright/identify/block_sums.hpp>
 #include <wheelwright/identify/noise_level.hpp>
 
@@ -16,7 +17,6 @@ namespace wheelwright {
 namespace {
 
 constexpr double kHopeless = 1e6;  // half width of an interval over the estimate, without bounds to judge by
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // The linear problem at one ω, weighted, and its solution.
 struct Projection {

@@ -22,8 +22,8 @@
 namespace wheelwright {
 namespace {
 
-constexpr std::int64_t second = 1'000'000'000;
-constexpr std::int64_t wall_clock = 100'000'000 * second;
+constexpr std::int64_t one_second = 1'000'000'000;
+constexpr std::int64_t wall_clock = 100'000'000 * one_second;
 constexpr std::size_t first_messages = 2000;
 constexpr std::size_t looked_at = 20000;  ///< messages at least, for topics that a recording without index has
 
@@ -147,7 +147,7 @@ class BagWalk final : public RowWalk {
       }
       read_on();
     }
-    row_[0] = static_cast<double>(time - origin_) / static_cast<double>(second);
+    row_[0] = static_cast<double>(time - origin_) / static_cast<double>(one_second);
     ++number_;
     if (const std::string* missing = uncovered()) {
       cleaner_.count(&LogReport::uncovered, number_, *missing);
@@ -168,7 +168,7 @@ class BagWalk final : public RowWalk {
       file.hash += (file.hash.empty() ? "" : " ") + of.hash;
       file.notes.insert(file.notes.end(), of.losses.begin(), of.losses.end());
     }
-    file.time_origin = static_cast<double>(origin_ / second);
+    file.time_origin = static_cast<double>(origin_ / one_second);
     file.header = plan_.choice.header;
     for (const std::string& field : plan_.choice.header) {
       if (!is_used(field)) {
@@ -349,7 +349,7 @@ class BagFile final : public RowFile {
       const std::int64_t first = rows.stamps.empty() ? 0
                                  : stamped           ? rows.stamps.front().value_or(0)
                                                      : rows.log_times.front();
-      *origin_ = first > wall_clock ? first / second * second : 0;
+      *origin_ = first > wall_clock ? first / one_second * one_second : 0;
     }
   }
 

@@ -11,7 +11,7 @@
 namespace wheelwright::bag {
 namespace {
 
-constexpr std::size_t longest_file = std::size_t{1} << 26;
+constexpr std::size_t longest_metadata = std::size_t{1} << 26;
 
 [[noreturn]] void fail(const std::string& name, const YAML::Mark& mark, const std::string& what) {
   throw InputError(mark.is_null() ? fmt::format("{}: {}", name, what)
@@ -29,7 +29,7 @@ std::string quoted(const std::string& text) {
 
 Metadata read_metadata(const std::filesystem::path& path) {
   const std::string name = path.string();
-  const std::string text = read_bytes(path, longest_file);
+  const std::string text = read_bytes(path, longest_metadata);
   try {
     const YAML::Node information = YAML::Load(text)["rosbag2_bagfile_information"];
     if (!information.IsDefined() || !information.IsMap()) {

@@ -18,7 +18,7 @@
 namespace wheelwright::bag {
 namespace {
 
-constexpr std::size_t piece = std::size_t{1} << 18;
+constexpr std::size_t bag_piece = std::size_t{1} << 18;
 
 /// A file that was packed with zstd as a whole, read from its unpacked copy.
 class PackedSource final : public Source {
@@ -69,7 +69,7 @@ class PackedSource final : public Source {
     };
     check(to != nullptr);
     const auto from = open_bytes(path, hashed);
-    std::vector<char> buffer(piece);
+    std::vector<char> buffer(bag_piece);
     std::uint64_t unpacked = 0;
     try {
       while (const std::size_t got = from->read(buffer.data(), buffer.size())) {

@@ -18,7 +18,7 @@
 namespace wheelwright {
 namespace {
 
-constexpr std::size_t piece = std::size_t{1} << 18;
+constexpr std::size_t bytes_at_once = std::size_t{1} << 18;
 
 /// The file itself, with count and hash of what was read.
 class RawFile {
@@ -92,7 +92,7 @@ class PlainSource final : public FileSource {
 
 class GzipSource final : public FileSource {
  public:
-  GzipSource(RawFile raw, std::string head) : FileSource(std::move(raw), std::move(head)), buffer_(piece) {
+  GzipSource(RawFile raw, std::string head) : FileSource(std::move(raw), std::move(head)), buffer_(bytes_at_once) {
     if (inflateInit2(&stream_, 15 + 16) != Z_OK) {
       throw Error("zlib cannot start");
     }
@@ -103,7 +103,7 @@ class GzipSource final : public FileSource {
 
   std::size_t read(char* to, std::size_t size) override {
     stream_.next_out = reinterpret_cast<Bytef*>(to);
-    stream_.avail_out = static_cast<uInt>(std::min(size, piece));
+    stream_.avail_out = static_cast<uInt>(std::min(size, bytes_at_once));
     const uInt wanted = stream_.avail_out;
     while (stream_.avail_out == wanted) {
       if (stream_.avail_in == 0) {
@@ -139,7 +139,7 @@ class GzipSource final : public FileSource {
 class ZstdSource final : public FileSource {
  public:
   ZstdSource(RawFile raw, std::string head)
-      : FileSource(std::move(raw), std::move(head)), buffer_(piece), stream_(ZSTD_createDStream()) {
+      : FileSource(std::move(raw), std::move(head)), buffer_(bytes_at_once), stream_(ZSTD_createDStream()) {
     if (!stream_) {
       throw Error("zstd cannot start");
     }
@@ -234,7 +234,7 @@ std::unique_ptr<ByteSource> open_bytes(const std::filesystem::path& path, bool h
 std::string read_bytes(const std::filesystem::path& path, std::size_t limit) {
   const auto source = open_bytes(path);
   std::string text;
-  std::vector<char> buffer(piece);
+  std::vector<char> buffer(bytes_at_once);
   while (const std::size_t got = source->read(buffer.data(), buffer.size())) {
     text.append(buffer.data(), got);
     if (text.size() > limit) {

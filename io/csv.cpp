@@ -20,7 +20,7 @@
 namespace wheelwright {
 namespace {
 
-constexpr std::size_t looked_at = 5000;  ///< rows at the beginning of a file, for columns with rates of their own
+constexpr std::size_t rows_looked_at = 5000;  ///< rows at the beginning of a file, for columns with rates of their own
 
 /// Content lines of one file behind its header.
 struct FileWalk {
@@ -270,7 +270,7 @@ class CsvFile final : public RowFile {
     CsvStreamFinder finder(names);
     std::string_view line;
     try {
-      for (std::size_t k = 0; k < looked_at && lines.next(line); ++k) {
+      for (std::size_t k = 0; k < rows_looked_at && lines.next(line); ++k) {
         if (rows.read_numbers(line, lines.lines.number(), lines.lines.terminated())) {
           finder.add(rows.row()[0], rows.row().data() + 1);
         }

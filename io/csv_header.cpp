@@ -13,7 +13,7 @@
 namespace wheelwright {
 namespace {
 
-std::string_view trimmed(std::string_view text) {
+std::string_view trimmed_field(std::string_view text) {
   const std::size_t begin = text.find_first_not_of(" \t\r");
   return begin == std::string_view::npos ? std::string_view()
                                          : text.substr(begin, text.find_last_not_of(" \t\r") - begin + 1);
@@ -126,14 +126,14 @@ std::vector<std::string> split_fields(std::string_view line, char separator) {
     }
   }
   for (std::string& field : fields) {
-    field = trimmed(field);
+    field = trimmed_field(field);
     if (field.size() >= 2 && field.front() == '"' && field.back() == '"') {
       std::string inner;
       for (std::size_t k = 1; k + 1 < field.size(); ++k) {
         inner += field[k];
         k += field[k] == '"' && field[k + 1] == '"' && k + 2 < field.size() ? 1 : 0;
       }
-      field = trimmed(inner);
+      field = trimmed_field(inner);
     }
   }
   return fields;

@@ -17,7 +17,7 @@
 namespace wheelwright {
 namespace {
 
-constexpr std::size_t rows_at_once = 4096;
+constexpr std::size_t rows_written_at_once = 4096;
 
 /// Takes text, puts bytes into a file.
 class Packer {
@@ -158,8 +158,8 @@ void write_csv(const std::filesystem::path& path, const LogTable& table) {
   const auto writer = create_csv(path, table.names);
   LogBlock block;
   block.columns.resize(table.columns.size());
-  for (std::size_t first = 0; first < table.rows(); first += rows_at_once) {
-    const std::size_t last = std::min(table.rows(), first + rows_at_once);
+  for (std::size_t first = 0; first < table.rows(); first += rows_written_at_once) {
+    const std::size_t last = std::min(table.rows(), first + rows_written_at_once);
     const auto part = [&](const std::vector<double>& column, std::vector<double>& to) {
       check::that(column.size() == table.rows(), "log column", "as many values as there are times");
       to.assign(column.begin() + static_cast<std::ptrdiff_t>(first),

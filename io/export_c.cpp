@@ -15,14 +15,13 @@
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/error.hpp>
+#include <wheelwright/core/limits.hpp>
 #include <wheelwright/io/export_c_text.hpp>
 #include <wheelwright/model/differential_drive.hpp>
 #include <wheelwright/model/single_axis.hpp>
 
 namespace wheelwright {
 namespace {
-
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 
 /// The functions of the models in model/ that stand in their terms.
 enum class Function { along_x, along_y, signs_sum, signs_difference, sign_of_speed, one };

@@ -28,7 +28,7 @@ const std::vector<std::string> kColumns = {"robot", "log", "when", "robot_file",
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
 // A row of a list as it was read.
-struct Row {
+struct ListRow {
   std::size_t line = 0;
   fs::path log;
   std::optional<double> when;
@@ -112,11 +112,11 @@ void demand_file(FleetListRobot& robot, const fs::path& path) {
 }
 
 // Orders the logs and deals out the roles.
-FleetListRobot robot_of(const std::string& name, std::vector<Row> rows) {
+FleetListRobot robot_of(const std::string& name, std::vector<ListRow> rows) {
   FleetListRobot robot{.name = name};
   std::set<fs::path> seen;
-  std::vector<Row> kept;
-  for (Row& row : rows) {
+  std::vector<ListRow> kept;
+  for (ListRow& row : rows) {
     if (!row.robot_file.empty() && !robot.robot_file.empty() && robot.robot_file != row.robot_file) {
       robot.findings.push_back(fmt::format("line {}: robot_file {}: the robot has {} already, which is used", row.line,
                                            shown(row.robot_file), robot.robot_file.string()));
@@ -131,15 +131,15 @@ FleetListRobot robot_of(const std::string& name, std::vector<Row> rows) {
     kept.push_back(std::move(row));
   }
   const auto dated =
-      static_cast<std::size_t>(std::ranges::count_if(kept, [](const Row& r) { return r.when.has_value(); }));
+      static_cast<std::size_t>(std::ranges::count_if(kept, [](const ListRow& r) { return r.when.has_value(); }));
   robot.dated = !kept.empty() && dated == kept.size();
   if (dated > 0 && !robot.dated) {
     robot.findings.push_back("some of its logs have no date: they are taken in the order of the list");
   }
   if (robot.dated) {
-    std::ranges::stable_sort(kept, {}, [](const Row& r) { return *r.when; });
+    std::ranges::stable_sort(kept, {}, [](const ListRow& r) { return *r.when; });
   }
-  const bool roles = std::ranges::any_of(kept, [](const Row& r) { return r.role == "commission"; });
+  const bool roles = std::ranges::any_of(kept, [](const ListRow& r) { return r.role == "commission"; });
   for (std::size_t k = 0; k < kept.size(); ++k) {
     const FleetListLog log{kept[k].log, robot.dated ? *kept[k].when : static_cast<double>(k)};
     const bool commissions = roles ? kept[k].role == "commission" : kept[k].role.empty() && robot.commission.empty();
@@ -156,7 +156,7 @@ std::vector<FleetListRobot> read_list(const fs::path& path) {
   std::string_view line;
   std::map<std::string, std::size_t> column;
   std::vector<std::string> header, order;
-  std::map<std::string, std::vector<Row>> rows;
+  std::map<std::string, std::vector<ListRow>> rows;
   while (lines.next(line)) {
     if (line.find_first_not_of(" \t") == std::string_view::npos || line.front() == '#') {
       continue;
@@ -246,7 +246,7 @@ std::optional<double> date_in(const std::string& name) {
 std::vector<FleetListRobot> read_directory(const fs::path& directory) {
   std::vector<FleetListRobot> fleet;
   for (const fs::path& entry : entries_of(directory)) {
-    std::vector<Row> rows;
+    std::vector<ListRow> rows;
     if (is_log(entry)) {
       rows.push_back({0, entry, std::nullopt, {}, {}});
     } else if (fs::is_directory(entry)) {
@@ -255,8 +255,8 @@ std::vector<FleetListRobot> read_directory(const fs::path& directory) {
           rows.push_back({0, log, date_in(log.filename().string()), {}, {}});
         }
       }
-      const bool all = std::ranges::all_of(rows, [](const Row& r) { return r.when.has_value(); });
-      for (Row& row : rows) {
+      const bool all = std::ranges::all_of(rows, [](const ListRow& r) { return r.when.has_value(); });
+      for (ListRow& row : rows) {
         row.when = all ? row.when : std::nullopt;
       }
     } else {

@@ -188,9 +188,9 @@ struct Choice {
   std::vector<std::string> notes;
 };
 
-class Chooser {
+class DatasetChooser {
  public:
-  Chooser(const std::string& path, const LogOptions& options, std::vector<Source> sources)
+  DatasetChooser(const std::string& path, const LogOptions& options, std::vector<Source> sources)
       : path_(path), options_(options), sources_(std::move(sources)) {}
 
   Choice choose() {
@@ -373,7 +373,7 @@ class Hdf5File final : public RowFile {
  public:
   Hdf5File(std::filesystem::path path, const LogOptions& options) : path_(std::move(path)) {
     const Handle file = open_file(path_);
-    choice_ = Chooser(path_.string(), options, list_sources(file.get())).choose();
+    choice_ = DatasetChooser(path_.string(), options, list_sources(file.get())).choose();
     for (const auto& [name, source] : choice_.found) {
       if (name != "t") {
         names_.push_back(name);

@@ -17,7 +17,7 @@
 namespace wheelwright {
 namespace {
 
-constexpr std::size_t longest_file = std::size_t{1} << 30;
+constexpr std::size_t longest_json = std::size_t{1} << 30;
 constexpr int deepest = 200;
 
 /// Counts depth while parsing: what is nested deeper than any result of ours is not read.
@@ -58,7 +58,7 @@ Json parse_json(std::string_view text, const std::string& file) {
   }
 }
 
-Json read_json(const std::filesystem::path& path) { return parse_json(read_bytes(path, longest_file), path.string()); }
+Json read_json(const std::filesystem::path& path) { return parse_json(read_bytes(path, longest_json), path.string()); }
 
 JsonPlace::JsonPlace(const Json& value, std::string file) : JsonPlace(value, std::move(file), "") {}
 

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cmath>
+#include <optional>
 
 #include <nlohmann/json.hpp>
 
@@ -13,5 +14,8 @@ namespace wheelwright {
 
 /// `value`, or null where it is NaN or infinite.
 [[nodiscard]] inline Json or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+/// The same of what may be absent.
+[[nodiscard]] inline Json or_null(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
 
 }  // namespace wheelwright

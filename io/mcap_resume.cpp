@@ -9,7 +9,7 @@
 namespace wheelwright::mcap {
 namespace {
 
-constexpr std::size_t piece = std::size_t{1} << 16;
+constexpr std::size_t resume_piece = std::size_t{1} << 16;
 constexpr std::size_t longest_head = head_bytes + chunk_head_bytes;
 
 bool known_in_data_section(std::uint8_t op) {
@@ -129,7 +129,7 @@ std::uint64_t find_record(WindowedFile& file, const DataSection& section, std::u
   std::uint64_t at = from;
   while (at < section.end) {
     file.leave(at);
-    const auto size = static_cast<std::size_t>(std::min<std::uint64_t>(piece + longest_head, section.end - at));
+    const auto size = static_cast<std::size_t>(std::min<std::uint64_t>(resume_piece + longest_head, section.end - at));
     const bool last = at + size == section.end;
     const std::size_t searched = last ? size : size - longest_head;
     std::string_view bytes = file.view(at, size);

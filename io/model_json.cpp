@@ -5,6 +5,7 @@
 
 #include <wheelwright/commission/physical.hpp>
 #include <wheelwright/io/estimators_json.hpp>
+#include <wheelwright/io/json_number.hpp>
 #include <wheelwright/io/kinematic_json.hpp>
 #include <wheelwright/io/model_file.hpp>
 #include <wheelwright/io/model_words.hpp>
@@ -14,8 +15,6 @@ namespace wheelwright {
 namespace {
 
 constexpr std::size_t kMostVertices = 256;
-
-Json optional_number(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
 
 Json origin_json(const RowOrigin& origin, const Model& model) {
   if (origin.is_prior) {
@@ -96,10 +95,10 @@ Json parameter_json(const Commissioning& r, std::size_t j, const Robot& robot, c
   };
   return {{"name", p.parameter.name},
           {"unit", parameter_unit(robot, p.parameter)},
-          {"estimate", optional_number(p.estimate)},
+          {"estimate", or_null(p.estimate)},
           {"lower", p.lower},
           {"upper", p.upper},
-          {"standard_error", optional_number(p.standard_error)},
+          {"standard_error", or_null(p.standard_error)},
           {"chebyshev_centre", p.chebyshev},
           {"excitation", word_of(kExcitationWords, p.excitation)},
           {"reason", p.reason},

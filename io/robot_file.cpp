@@ -13,7 +13,7 @@
 namespace wheelwright {
 namespace {
 
-constexpr std::size_t longest_file = std::size_t{1} << 20;
+constexpr std::size_t longest_robot_file = std::size_t{1} << 20;
 constexpr double longest_radius = 10.0;  // m: beyond this the file means millimetres
 constexpr double longest_track = 100.0;  // m
 
@@ -231,7 +231,7 @@ Robot read_from(const YamlPlace& root) {
 Robot parse_robot(std::string_view text, const std::string& file) { return read_from(YamlPlace::parse(text, file)); }
 
 Robot read_robot(const std::filesystem::path& path) {
-  return parse_robot(read_bytes(path, longest_file), path.string());
+  return parse_robot(read_bytes(path, longest_robot_file), path.string());
 }
 
 Robot robot_from_json(const Json& object, const std::string& where) {

@@ -16,8 +16,8 @@ namespace {
 
 constexpr double contradiction = 0.1;    // of the value: two sources that cannot both be meant
 constexpr double difference = 1e-3;      // worth a word
-constexpr double longest_radius = 10.0;  // m, as in the robot file: beyond this a file means millimetres
-constexpr double longest_track = 100.0;  // m
+constexpr double most_radius = 10.0;     // m, as in the robot file: beyond this a file means millimetres
+constexpr double most_track = 100.0;     // m
 constexpr double largest_offset = 0.01;  // of the track: a centre of mass that the basic model may leave out
 
 struct Maker {
@@ -149,7 +149,7 @@ struct Maker {
   }
 
   static void require_metres(double value, const std::string& key, const std::string& from) {
-    const double largest = key == "wheel_radius" ? longest_radius : longest_track;
+    const double largest = key == "wheel_radius" ? most_radius : most_track;
     if (!(value > 0.0 && value <= largest)) {
       throw InputError(fmt::format("{}: {} {}: expected metres, > 0 and at most {}", from, key, value, largest));
     }

@@ -15,8 +15,8 @@
 namespace wheelwright {
 namespace {
 
-constexpr std::size_t longest_file = std::size_t{1} << 22;
-constexpr std::size_t deepest = 8;        // namespaces above a controller, groups below
+constexpr std::size_t longest_parameters = std::size_t{1} << 22;
+constexpr std::size_t deepest_group = 8;  // namespaces above a controller, groups below
 constexpr std::size_t most_keys = 20000;  // aliases may multiply a small file
 
 using Parameters = std::map<std::string, YamlPlace>;
@@ -28,7 +28,7 @@ struct Controller {
   FilePlace place;
 };
 
-struct Walk {
+struct ParameterWalk {
   std::size_t keys = 0;
   std::vector<Controller> controllers;
   std::vector<std::string> rates;  ///< remarks
@@ -45,7 +45,7 @@ struct Walk {
   void flatten(const YamlPlace& at, const std::string& prefix, Parameters& out, std::size_t depth) {
     for (const auto& [key, place] : members(at)) {
       const std::string full = prefix.empty() ? key : prefix + "." + key;
-      if (place.is_mapping() && depth < deepest) {
+      if (place.is_mapping() && depth < deepest_group) {
         flatten(place, full, out, depth + 1);
       } else if (!out.emplace(full, place).second) {
         place.say(full + " stands there twice, dotted and nested: expected it once");
@@ -67,7 +67,7 @@ struct Walk {
       return;
     }
     for (const auto& [key, place] : inside) {
-      if (place.is_mapping() && depth < deepest) {
+      if (place.is_mapping() && depth < deepest_group) {
         find(place, key == "ros__parameters" ? name : key, depth + 1);
       } else if (key == "update_rate") {
         const double rate = place.positive();
@@ -179,7 +179,7 @@ struct ControllerReader {
 }  // namespace
 
 DriveFacts parse_ros2_control(std::string_view text, const std::string& file, const std::string& controller) {
-  Walk walk;
+  ParameterWalk walk;
   walk.find(YamlPlace::parse(text, file), "", 0);
   std::vector<std::string> names;
   for (const Controller& each : walk.controllers) {
@@ -207,7 +207,7 @@ DriveFacts parse_ros2_control(std::string_view text, const std::string& file, co
 }
 
 DriveFacts read_ros2_control(const std::filesystem::path& path, const std::string& controller) {
-  return parse_ros2_control(read_bytes(path, longest_file), path.string(), controller);
+  return parse_ros2_control(read_bytes(path, longest_parameters), path.string(), controller);
 }
 
 }  // namespace wheelwright

@@ -17,12 +17,12 @@
 namespace wheelwright {
 namespace {
 
-constexpr std::size_t longest_file = std::size_t{1} << 20;
+constexpr std::size_t longest_definition = std::size_t{1} << 20;
 constexpr std::size_t most_entries = 1'000'000;
 
-constexpr std::array<std::string_view, 13> words = {"bool",    "int8",   "uint8",  "int16",  "uint16",
-                                                    "int32",   "uint32", "int64",  "uint64", "float32",
-                                                    "float64", "string", "wstring"};
+constexpr std::array<std::string_view, 13> type_words = {"bool",    "int8",   "uint8",  "int16",  "uint16",
+                                                         "int32",   "uint32", "int64",  "uint64", "float32",
+                                                         "float64", "string", "wstring"};
 
 /// "pkg/Type", as fields name it.
 std::string short_name(const std::string& name) {
@@ -62,7 +62,7 @@ std::string ros_definition_text(const RosDefinition& definition) {
         continue;
       }
       text += field.kind == RosKind::message ? short_name(definition.messages[field.message].name)
-                                             : std::string(words[static_cast<std::size_t>(field.kind)]);
+                                             : std::string(type_words[static_cast<std::size_t>(field.kind)]);
       if (field.longest > 0) {
         text += fmt::format("<={}", field.longest);
       }
@@ -93,7 +93,8 @@ std::optional<RosDefinition> RosDefinitions::find(const std::string& type_name) 
       return ros::bundled_message(name);
     }
     const std::string source = file->second.string();
-    const std::string text = std::filesystem::is_empty(file->second) ? "" : read_bytes(file->second, longest_file);
+    const std::string text =
+        std::filesystem::is_empty(file->second) ? "" : read_bytes(file->second, longest_definition);
     auto messages = ros::read_messages(name, text, source);
     return &read.emplace(name, std::move(messages[name])).first->second;
   };

@@ -4,20 +4,18 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
-#include <limits>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/limits.hpp>
 #include <wheelwright/io/ros_path.hpp>
 #include <wheelwright/io/ros_plan.hpp>
 #include <wheelwright/io/ros_walk.hpp>
 
 namespace wheelwright {
 namespace {
-
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 /// The path to the seconds and to the nanoseconds of the stamp; empty where the type has none.
 std::vector<ros::Path> stamp_paths(const RosDefinition& definition) {
@@ -93,12 +91,12 @@ bool RosExtractor::read(std::string_view cdr, std::span<double> values) {
   if (values.size() != own.count) {
     check::that(false, "RosExtractor::read", fmt::format("as many values as paths, {}", own.count));
   }
-  std::fill(values.begin(), values.end(), nan);
+  std::fill(values.begin(), values.end(), kNan);
   own.stamp.reset();
   own.error.clear();
   const ros::WalkTargets to{.values = values, .more = own.time};
   if (!ros::walk(own.plan, own.definition.name(), cdr, own.places, to, own.error)) {
-    std::fill(values.begin(), values.end(), nan);
+    std::fill(values.begin(), values.end(), kNan);
     return false;
   }
   if (own.stamped) {

@@ -16,12 +16,12 @@ namespace {
 using eprosima::fastcdr::Cdr;
 using eprosima::fastcdr::FastBuffer;
 
-constexpr std::int64_t second = 1'000'000'000;
+constexpr std::int64_t ros_second = 1'000'000'000;
 
 void put(Cdr& to, const RosHeader& header) {
-  check::that(header.stamp >= 0 && header.stamp / second <= std::numeric_limits<std::int32_t>::max(),
+  check::that(header.stamp >= 0 && header.stamp / ros_second <= std::numeric_limits<std::int32_t>::max(),
               "RosHeader::stamp", "a time from 0 to 2^31 s");
-  to << static_cast<std::int32_t>(header.stamp / second) << static_cast<std::uint32_t>(header.stamp % second)
+  to << static_cast<std::int32_t>(header.stamp / ros_second) << static_cast<std::uint32_t>(header.stamp % ros_second)
      << header.frame_id;
 }
 

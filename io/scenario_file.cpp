@@ -20,7 +20,7 @@
 namespace wheelwright {
 namespace {
 
-constexpr std::size_t longest_file = std::size_t{1} << 20;
+constexpr std::size_t longest_scenario = std::size_t{1} << 20;
 constexpr double largest_seed = 9007199254740992.0;  // 2⁵³: whole numbers beyond it are not all doubles
 
 using Names = std::vector<std::string>;
@@ -33,7 +33,7 @@ double not_negative(const YamlPlace& place) {
   return place.number("a number >= 0", [](double value) { return value >= 0.0; });
 }
 
-Eigen::Vector3d pose(const YamlPlace& place) {
+Eigen::Vector3d pose_at(const YamlPlace& place) {
   const std::string expected = "three numbers [x, y, theta]";
   const auto elements = place.elements(expected);
   if (elements.size() != 3) {
@@ -156,7 +156,7 @@ struct ScenarioReader {
       read_controller(place);
     } else if (key == "start") {
       for (const auto& [name, value] : place.members({"pose", "error"})) {
-        (name == "pose" ? scenario.initial_pose : scenario.initial_pose_error) = pose(value);
+        (name == "pose" ? scenario.initial_pose : scenario.initial_pose_error) = pose_at(value);
       }
     } else if (key == "faults") {
       for (const YamlPlace& element : place.elements("a list of faults")) {
@@ -331,7 +331,7 @@ Scenario parse_scenario(std::string_view text, const std::string& file, const st
 }
 
 Scenario read_scenario(const std::filesystem::path& path) {
-  return parse_scenario(read_bytes(path, longest_file), path.string(), path.parent_path());
+  return parse_scenario(read_bytes(path, longest_scenario), path.string(), path.parent_path());
 }
 
 }  // namespace wheelwright

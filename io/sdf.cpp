@@ -18,7 +18,7 @@ namespace {
 
 using Eigen::Isometry3d;
 
-constexpr std::size_t longest_file = std::size_t{1} << 24;
+constexpr std::size_t longest_sdf = std::size_t{1} << 24;
 constexpr double no_limit = 1e16;  // SDF's own word for it
 
 XmlPlace model_of(const XmlPlace& root) {
@@ -204,7 +204,7 @@ RobotTree parse_sdf(std::string_view text, const std::string& file) {
 }
 
 RobotTree read_sdf(const std::filesystem::path& path) {
-  return parse_sdf(read_bytes(path, longest_file), path.string());
+  return parse_sdf(read_bytes(path, longest_sdf), path.string());
 }
 
 }  // namespace wheelwright

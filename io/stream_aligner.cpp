@@ -8,11 +8,11 @@
 #include <utility>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/limits.hpp>
 
 namespace wheelwright {
 namespace {
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double turn = 2.0 * std::numbers::pi;
 constexpr double unseen = 9.0 / 8.0;
 
@@ -74,7 +74,7 @@ bool StreamAligner::pop(std::int64_t& time, std::span<double> row) {
   }
   Sample& sample = first.samples.front();
   time = sample.time;
-  std::fill(row.begin(), row.end(), nan);
+  std::fill(row.begin(), row.end(), kNan);
   for (std::size_t k = 0; k < sample.values.size(); ++k) {
     row[first.layout.columns[k]] = sample.values[k];
   }

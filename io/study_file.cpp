@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::size_t kLongestFile = std::size_t{1} << 20;
 
-double any_number(const YamlPlace& place) {
+double number_at(const YamlPlace& place) {
   return place.number("a number", [](double) { return true; });
 }
 
@@ -36,7 +36,7 @@ std::pair<double, double> two_numbers(const YamlPlace& place) {
   if (ends.size() != 2) {
     place.fail(expected);
   }
-  const std::pair<double, double> range = {any_number(ends[0]), any_number(ends[1])};
+  const std::pair<double, double> range = {number_at(ends[0]), number_at(ends[1])};
   if (!(range.first < range.second)) {
     place.fail(expected);
   }
@@ -162,7 +162,7 @@ struct StudyReader {
         } else if (key == "scale") {
           input.logarithmic = value.choice({"linear", "log"}) == 1;
         } else {
-          nominal = any_number(value);
+          nominal = number_at(value);
         }
       }
     } else {

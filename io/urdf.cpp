@@ -17,7 +17,7 @@ namespace {
 
 using Eigen::Isometry3d;
 
-constexpr std::size_t longest_file = std::size_t{1} << 24;
+constexpr std::size_t longest_urdf = std::size_t{1} << 24;
 
 /// Reads elements into a RobotTree whose places are still those of the links and joints themselves.
 struct UrdfReader {
@@ -222,7 +222,7 @@ RobotTree parse_urdf(std::string_view text, const std::string& file) {
 }
 
 RobotTree read_urdf(const std::filesystem::path& path) {
-  return parse_urdf(read_bytes(path, longest_file), path.string());
+  return parse_urdf(read_bytes(path, longest_urdf), path.string());
 }
 
 }  // namespace wheelwright

@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::string_view blanks = " \t\r\n";
 
-std::string_view trimmed(std::string_view text) {
+std::string_view without_blanks(std::string_view text) {
   const std::size_t begin = text.find_first_not_of(blanks);
   return begin == std::string_view::npos ? "" : text.substr(begin, text.find_last_not_of(blanks) + 1 - begin);
 }
@@ -138,7 +138,7 @@ std::string XmlPlace::need_attribute(std::string_view name) const {
 
 std::string XmlPlace::text() const {
   const char* value = node_->element->GetText();
-  return std::string(trimmed(value == nullptr ? "" : value));
+  return std::string(without_blanks(value == nullptr ? "" : value));
 }
 
 double XmlPlace::number(std::string_view name) const { return numbers(name, 1).front(); }
@@ -148,7 +148,7 @@ double XmlPlace::number() const { return numbers({}, 1).front(); }
 std::vector<double> XmlPlace::numbers(std::string_view name, std::size_t count) const {
   const std::string all = name.empty() ? text() : need_attribute(name);
   std::vector<double> out;
-  std::string_view rest = trimmed(all);
+  std::string_view rest = without_blanks(all);
   while (!rest.empty()) {
     const std::string_view word = rest.substr(0, rest.find_first_of(blanks));
     const auto value = to_number(word);
@@ -156,7 +156,7 @@ std::vector<double> XmlPlace::numbers(std::string_view name, std::size_t count) 
       break;
     }
     out.push_back(*value);
-    rest = trimmed(rest.substr(word.size()));
+    rest = without_blanks(rest.substr(word.size()));
   }
   if (!rest.empty() || out.size() != count) {
     fail(fmt::format("{}{}: expected {}", name.empty() ? "" : std::string(name) + " ", shown(all),

@@ -6,20 +6,20 @@
 #include <utility>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/limits.hpp>
 
 namespace wheelwright {
 namespace {
 
 using Parameters = std::vector<EffectParameterLaw>;
 
-constexpr double infinite = std::numeric_limits<double>::infinity();
 constexpr double longest_time = 10.0;  // s: of a lag, a delay, an offset
 constexpr double largest_share = 0.5;  // of a radius, a track, an encoder's scale
 constexpr double longest_drift = 1e6;  // s
 
 EffectParameterLaw linear(const char* name, const char* unit) { return {name, unit, true}; }
 EffectParameterLaw not_negative(const char* name, const char* unit) { return {name, unit, true, 0.0}; }
-EffectParameterLaw shape(const char* name, const char* unit, double upper = infinite) {
+EffectParameterLaw shape(const char* name, const char* unit, double upper = kInfinity) {
   return {name, unit, false, 0.0, upper, true};
 }
 EffectParameterLaw share(const char* name) { return {name, "1", false, -largest_share, largest_share}; }

@@ -11,7 +11,7 @@
 namespace wheelwright::reality {
 namespace {
 
-constexpr double gravity = 9.81;
+constexpr double standard_gravity = 9.81;
 
 /// A mass on a joint of the chassis, at `place` and `arm` below (or above) it.
 std::string hung(std::string_view name, double height, std::string_view joint, double arm, double mass, double size) {
@@ -25,7 +25,7 @@ Effect pendulum(const RobotDesign& robot, Random random, double severity) {
   const double mass = std::min(0.12 * severity, 0.4) * robot.mass;
   const double length = robot.half_track * random.uniform(0.5, 1.2);
   const double ratio = random.uniform(0.02, 0.12);
-  const double damping = 2.0 * ratio * mass * length * std::sqrt(gravity * length);
+  const double damping = 2.0 * ratio * mass * length * std::sqrt(standard_gravity * length);
   return {"pendulum",
           {{"mass_kg", mass}, {"length_m", length}, {"damping_ratio", ratio}},
           [=](Body& body) {
@@ -61,7 +61,7 @@ Effect flexible_mast(const RobotDesign& robot, Random random, double severity) {
   const double mass = std::min(0.12 * severity, 0.4) * robot.mass;
   const double length = robot.half_track * random.uniform(1.0, 2.0);
   const double inertia = mass * length * length;
-  const double stiffness = inertia * frequency * frequency + mass * gravity * length;
+  const double stiffness = inertia * frequency * frequency + mass * standard_gravity * length;
   return {"flexible_mast",
           {{"mass_kg", mass}, {"length_m", length}, {"frequency_Hz", frequency / (2.0 * std::numbers::pi)}},
           [=](Body& body) {

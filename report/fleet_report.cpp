@@ -20,8 +20,6 @@ namespace {
 
 constexpr std::size_t kMostRows = 500;
 
-std::string note(const std::string& text) { return paragraph("<span class=\"note\">" + text + "</span>"); }
-
 // A table of the first kMostRows items for which `row` gives cells; "none" where there is none.
 template <typename Items, typename Row>
 std::string limited(const std::vector<Cell>& header, const Items& items, const Row& row) {

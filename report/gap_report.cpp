@@ -24,8 +24,6 @@ using namespace report;
 
 namespace {
 
-std::string note(const std::string& text) { return paragraph("<span class=\"note\">" + text + "</span>"); }
-
 const char* status_of(GapVerdict verdict) {
   switch (verdict) {
     case GapVerdict::no_gap:
@@ -35,8 +33,6 @@ const char* status_of(GapVerdict verdict) {
   }
   return "bad";
 }
-
-std::string unit_of(const std::string& unit) { return unit == "1" ? "" : unit; }
 
 std::string channel_title(const ResidualSeries& s) {
   return s.space == GapSpace::dynamic ? "Torque residual of the " + words(s.channel) + " channel"

@@ -4,21 +4,19 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <vector>
 
 #include <fmt/format.h>
 
 #include <wheelwright/commission/margin_words.hpp>
+#include <wheelwright/core/limits.hpp>
 #include <wheelwright/report/text.hpp>
 
 namespace wheelwright::report {
 namespace {
 
-constexpr double kNone = std::numeric_limits<double>::infinity();
-
 // A logarithmic axis.
-struct LogAxis {
+struct MarginAxis {
   double low, high, from, to;
   [[nodiscard]] double operator()(double x) const {
     return from + (to - from) * std::log(x / low) / std::log(high / low);
@@ -26,7 +24,7 @@ struct LogAxis {
 };
 
 // 1, 2 and 5 times powers of ten inside the axis.
-std::vector<double> ticks(const LogAxis& axis) {
+std::vector<double> ticks(const MarginAxis& axis) {
   std::vector<double> out;
   for (double power = std::pow(10.0, std::floor(std::log10(axis.low))); power <= axis.high; power *= 10.0) {
     for (const double m : {1.0, 2.0, 5.0}) {
@@ -46,7 +44,7 @@ struct Curve {
   std::vector<std::pair<double, double>> median, worst;
 };
 
-std::string path(const std::vector<std::pair<double, double>>& points, const LogAxis& x, const LogAxis& y,
+std::string path(const std::vector<std::pair<double, double>>& points, const MarginAxis& x, const MarginAxis& y,
                  std::size_t style, double width) {
   std::string d;
   for (const auto& [at, size] : points) {
@@ -60,7 +58,7 @@ std::string path(const std::vector<std::pair<double, double>>& points, const Log
 
 std::string delay_curves(const FaultMargins& margins, const MarginSurvey& survey) {
   std::vector<Curve> curves;
-  double low = kNone, high = 0.0;
+  double low = kInfinity, high = 0.0;
   for (const auto& [kind, count] : survey.manoeuvres) {
     Curve curve{std::string(words(kind)), {}, {}};
     for (std::size_t w = 0; w < survey.windows.size(); ++w) {
@@ -83,8 +81,8 @@ std::string delay_curves(const FaultMargins& margins, const MarginSurvey& survey
   }
   constexpr double width = 520.0, height = 260.0, left = 70.0, right = 170.0, top = 10.0, bottom = 40.0;
   const double scale = margins.fault.unit == "1" ? 100.0 : 1.0;
-  const LogAxis x{survey.windows.front(), survey.windows.back(), left, width - right};
-  const LogAxis y{scale * low / 1.1, scale * high * 1.1, height - bottom, top};
+  const MarginAxis x{survey.windows.front(), survey.windows.back(), left, width - right};
+  const MarginAxis y{scale * low / 1.1, scale * high * 1.1, height - bottom, top};
   std::string out = fmt::format(
       "<svg viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\" role=\"img\" aria-label=\"smallest certain size over "
       "delay\">",
@@ -133,7 +131,7 @@ std::string delay_curves(const FaultMargins& margins, const MarginSurvey& survey
 
 std::string margin_map(const OperatingMap& map, const FaultType& fault, const std::string& x_label,
                        const std::string& y_label) {
-  double low = kNone, high = 0.0;
+  double low = kInfinity, high = 0.0;
   for (const double size : map.smallest.reshaped()) {
     if (std::isfinite(size) && size > 0.0) {
       low = std::min(low, size);

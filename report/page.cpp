@@ -86,6 +86,8 @@ std::string table(const std::vector<Cell>& header, const std::vector<std::vector
 
 std::string paragraph(std::string_view html) { return fmt::format("<p>{}</p>\n", html); }
 
+std::string note(std::string_view html) { return paragraph("<span class=\"note\">" + std::string(html) + "</span>"); }
+
 std::string bullets(const std::vector<std::string>& items) {
   if (items.empty()) {
     return {};

@@ -52,6 +52,9 @@ struct Cell {
 /// <p> of HTML.
 [[nodiscard]] std::string paragraph(std::string_view html);
 
+/// <p> of HTML that is an aside.
+[[nodiscard]] std::string note(std::string_view html);
+
 /// <ul> of texts; empty for no item.
 [[nodiscard]] std::string bullets(const std::vector<std::string>& items);
 

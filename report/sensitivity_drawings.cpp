@@ -21,7 +21,7 @@ std::string upright(double y, const std::string& what) {
       escape(what));
 }
 
-std::string line(double x1, double y1, double x2, double y2, const char* style) {
+std::string stroke(double x1, double y1, double x2, double y2, const char* style) {
   return fmt::format("<line {} x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\"/>", style, x1, y1, x2, y2);
 }
 
@@ -35,10 +35,12 @@ std::string whisker(double from, double to, double y) {
                      from, to, y - 3.0, y);
 }
 
-std::string words(const AxisLabel& label) { return label.unit.empty() ? label.name : label.name + ", " + label.unit; }
+std::string label_words(const AxisLabel& label) {
+  return label.unit.empty() ? label.name : label.name + ", " + label.unit;
+}
 
 // An axis from pixel `from` to pixel `to` over the numbers that it has taken.
-struct Axis {
+struct Scale {
   double from = 0.0, to = 1.0;
   bool logarithmic = false;
   double low = std::numeric_limits<double>::infinity();
@@ -87,19 +89,19 @@ struct Axis {
   }
 };
 
-std::string across(const Axis& x, double top, double bottom) {
+std::string across(const Scale& x, double top, double bottom) {
   std::string out;
   for (const double tick : x.ticks()) {
-    out += line(x(tick), top, x(tick), bottom, "class=\"axis\"") +
+    out += stroke(x(tick), top, x(tick), bottom, "class=\"axis\"") +
            svg_text(x(tick), bottom + 14.0, "middle", fmt::format("{:.4g}", tick));
   }
   return out;
 }
 
-std::string up(const Axis& y, double left, double right) {
+std::string up(const Scale& y, double left, double right) {
   std::string out;
   for (const double tick : y.ticks()) {
-    out += line(left, y(tick), right, y(tick), "class=\"axis\"") +
+    out += stroke(left, y(tick), right, y(tick), "class=\"axis\"") +
            svg_text(left - 6.0, y(tick) + 4.0, "end", fmt::format("{:.4g}", tick));
   }
   return out;
@@ -126,7 +128,7 @@ std::string tornado(const OneAtATime& study, const std::vector<std::string>& inp
   names_fit(inputs, study.inputs.size());
   constexpr double row = 22.0, top = 6.0, span = 340.0;
   const double left = room(inputs);
-  Axis x{left, left + span};
+  Scale x{left, left + span};
   const std::size_t n = std::min(most, study.order.size());
   for (std::size_t k = 0; k < n; ++k) {
     for (const double y : study.inputs[study.order[k]].values) {
@@ -165,8 +167,8 @@ std::string tornado(const OneAtATime& study, const std::vector<std::string>& inp
       out += svg_text(left + span + 4.0, y + 11.5, "start", "*");
     }
   }
-  out += line(x(study.nominal), top, x(study.nominal), bottom, "class=\"nominal\"");
-  out += svg_text(left + 0.5 * span, bottom + 31.0, "middle", words(quantity));
+  out += stroke(x(study.nominal), top, x(study.nominal), bottom, "class=\"nominal\"");
+  out += svg_text(left + 0.5 * span, bottom + 31.0, "middle", label_words(quantity));
   out += svg_text(left + 0.5 * span, bottom + 49.0, "middle",
                   "pale: input at its lower end, full: at its upper end; * gaps");
   return out + "</svg>";
@@ -178,7 +180,7 @@ std::string sensitivity_curve(const Eigen::VectorXd& x, const Eigen::VectorXd& y
               fmt::format("{}, one for each place", x.size()));
   check::that(!logarithmic || (x.array() > 0.0).all(), "places on a logarithmic axis", "numbers > 0");
   constexpr double width = 320.0, height = 210.0, left = 70.0, top = 10.0, bottom = height - 42.0, right = width - 14.0;
-  Axis across_axis{left, right, logarithmic}, up_axis{bottom, top};
+  Scale across_axis{left, right, logarithmic}, up_axis{bottom, top};
   for (Eigen::Index k = 0; k < x.size(); ++k) {
     across_axis.take(x[k]);
     up_axis.take(y[k]);
@@ -207,8 +209,8 @@ std::string sensitivity_curve(const Eigen::VectorXd& x, const Eigen::VectorXd& y
     out += fmt::format("<circle class=\"centre\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"4.5\"/>", across_axis(nominal_x),
                        up_axis(nominal_y));
   }
-  out += svg_text(0.5 * (left + right), height - 6.0, "middle", words(input)) +
-         upright(0.5 * (top + bottom), words(quantity));
+  out += svg_text(0.5 * (left + right), height - 6.0, "middle", label_words(input)) +
+         upright(0.5 * (top + bottom), label_words(quantity));
   return out + "</svg>";
 }
 
@@ -224,7 +226,7 @@ std::string sobol_bars(const SobolIndices& indices, const std::vector<std::strin
                    [&](std::size_t a, std::size_t b) { return indices.total[a].estimate > indices.total[b].estimate; });
   constexpr double row = 34.0, top = 6.0, span = 300.0;
   const double left = room(inputs), bottom = top + row * static_cast<double>(n);
-  Axis x{left, left + span};
+  Scale x{left, left + span};
   x.take(0.0);
   x.take(1.0);
   for (std::size_t k = 0; k < n; ++k) {
@@ -246,7 +248,7 @@ std::string sobol_bars(const SobolIndices& indices, const std::vector<std::strin
     draw(indices.first[order[k]], y, "class=\"full\"");
     draw(indices.total[order[k]], y + 13.0, "class=\"bar\"");
   }
-  out += line(x(0.0), top, x(0.0), bottom, "class=\"nominal\"");
+  out += stroke(x(0.0), top, x(0.0), bottom, "class=\"nominal\"");
   out += svg_text(left + 0.5 * span, bottom + 31.0, "middle", "share of the variance");
   out += svg_text(left + 0.5 * span, bottom + 48.0, "middle", "full: by itself, pale: with its interactions");
   return out + "</svg>";
@@ -257,7 +259,7 @@ std::string morris_scatter(const std::vector<ElementaryEffects>& effects, const 
   names_fit(inputs, effects.size());
   constexpr double left = 70.0, top = 10.0, side = 280.0, right = left + side;
   const double bottom = std::max(top + 220.0, top + 16.0 * static_cast<double>(effects.size()));
-  Axis x{left, right}, y{bottom, top};
+  Scale x{left, right}, y{bottom, top};
   x.take(0.0);
   y.take(0.0);
   std::vector<std::size_t> order;
@@ -279,7 +281,7 @@ std::string morris_scatter(const std::vector<ElementaryEffects>& effects, const 
   std::string out = open_svg(right + 20.0 + room(inputs), bottom + 44.0, "size and spread of each input's effect");
   out += across(x, top, bottom) + up(y, left, right);
   const double diagonal = std::min(x.high, y.high);
-  out += line(x(0.0), y(0.0), x(diagonal), y(diagonal), "class=\"nominal\"");
+  out += stroke(x(0.0), y(0.0), x(diagonal), y(diagonal), "class=\"nominal\"");
   for (std::size_t k = 0; k < order.size(); ++k) {
     const ElementaryEffects& e = effects[order[k]];
     const std::string label = std::to_string(k + 1);
@@ -290,8 +292,9 @@ std::string morris_scatter(const std::vector<ElementaryEffects>& effects, const 
     out += svg_text(right + 14.0, top + 12.0 + 16.0 * static_cast<double>(k), "start",
                     fmt::format("{} {}", label, inputs[order[k]]), true);
   }
-  out += svg_text(0.5 * (left + right), bottom + 32.0, "middle", "mean absolute effect μ* on " + words(quantity)) +
-         upright(0.5 * (top + bottom), "spread σ");
+  out +=
+      svg_text(0.5 * (left + right), bottom + 32.0, "middle", "mean absolute effect μ* on " + label_words(quantity)) +
+      upright(0.5 * (top + bottom), "spread σ");
   return out + "</svg>";
 }
 
@@ -299,7 +302,7 @@ std::string sensitivity_map(const GridMap& map, const Eigen::VectorXd& x, const 
                             const AxisLabel& x_label, const AxisLabel& y_label, const AxisLabel& quantity) {
   check::that(x.size() == map.values.rows() && y.size() == map.values.cols(), "values of a map's inputs",
               fmt::format("{} and {}, as the map", map.values.rows(), map.values.cols()));
-  Axis shade{0.08, 0.92};
+  Scale shade{0.08, 0.92};
   for (const double value : map.values.reshaped()) {
     shade.take(value);
   }
@@ -322,8 +325,8 @@ std::string sensitivity_map(const GridMap& map, const Eigen::VectorXd& x, const 
           x0, y0, width - 0.5, height - 0.5, known ? "--first" : "--pale", opacity, number(x[a]), number(y[b]),
           known ? escape(with_unit(number(value), quantity.unit)) : "no value");
       if (!known) {
-        out += line(x0, y0, x0 + width - 0.5, y0 + height - 0.5, "class=\"axis\"") +
-               line(x0, y0 + height - 0.5, x0 + width - 0.5, y0, "class=\"axis\"");
+        out += stroke(x0, y0, x0 + width - 0.5, y0 + height - 0.5, "class=\"axis\"") +
+               stroke(x0, y0 + height - 0.5, x0 + width - 0.5, y0, "class=\"axis\"");
       } else if (std::min(width, height) >= 34.0) {
         // On dark cells the paper's colour is read, on pale ones the ink's.
         out += fmt::format("<text style=\"fill:var({})\" x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">{}</text>",
@@ -334,10 +337,10 @@ std::string sensitivity_map(const GridMap& map, const Eigen::VectorXd& x, const 
   }
   out += svg_text(left, top + side + 14.0, "start", number(x[0], 2)) +
          svg_text(left + side, top + side + 14.0, "end", number(x[x.size() - 1], 2)) +
-         svg_text(left + 0.5 * side, top + side + 29.0, "middle", words(x_label)) +
+         svg_text(left + 0.5 * side, top + side + 29.0, "middle", label_words(x_label)) +
          svg_text(left - 5.0, top + side, "end", number(y[0], 2)) +
          svg_text(left - 5.0, top + 10.0, "end", number(y[y.size() - 1], 2)) +
-         upright(top + 0.5 * side, words(y_label)) +
+         upright(top + 0.5 * side, label_words(y_label)) +
          svg_text(left + 0.5 * side, top + side + 50.0, "middle",
                   fmt::format("{}: dark {}, pale {}", quantity.name, with_unit(number(shade.high), quantity.unit),
                               with_unit(number(shade.low), quantity.unit)));

@@ -23,8 +23,6 @@ constexpr std::size_t kSentences = 6;  // at the head of the page
 constexpr std::size_t kFindings = 10;
 constexpr double kLarge = 0.05;  // share of left-out points from which indices mean little
 
-std::string unit_of(const std::string& unit) { return unit == "1" ? "" : unit; }
-
 AxisLabel axis(const StudyQuantity& quantity) { return {quantity.name, unit_of(quantity.unit)}; }
 AxisLabel axis(const StudyInput& input) { return {input.name, unit_of(input.unit)}; }
 

@@ -151,6 +151,8 @@ std::string plural(std::size_t n, std::string_view noun) {
   return (n == 0 ? "no" : count(n)) + " " + std::string(noun) + (n == 1 ? "" : "s");
 }
 
+std::string unit_of(const std::string& unit) { return unit == "1" ? "" : unit; }
+
 std::string percent(double share, int digits) {
   if (!std::isfinite(share)) {
     return std::string(missing);

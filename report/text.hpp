@@ -36,6 +36,9 @@ namespace wheelwright::report {
 /// "no events", "1 event", "2 events": the plural is `noun` with s.
 [[nodiscard]] std::string plural(std::size_t n, std::string_view noun);
 
+/// `unit` behind a number: nothing for "1".
+[[nodiscard]] std::string unit_of(const std::string& unit);
+
 /// A share as a percentage: 0.0414 → "4.14 %".
 [[nodiscard]] std::string percent(double share, int digits = 3);
 

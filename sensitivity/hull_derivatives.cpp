@@ -12,6 +12,7 @@
 #include <wheelwright/bounds/linear_program.hpp>
 #include <wheelwright/bounds/slab_rows.hpp>
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/limits.hpp>
 
 namespace wheelwright {
 namespace {
@@ -19,7 +20,6 @@ namespace {
 constexpr double kActive = 1e-9;    // slack, relative to the block's size
 constexpr double kPositive = 1e-9;  // multiplier, relative to the direction
 constexpr double kOptimal = 1e-10;  // how far below the optimum counts as optimal, in sizes of the block
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 // ±e_j in the parameters of the block.
 Eigen::VectorXd direction(const Polytope::Block& block, const HullOptimum& optimum) {

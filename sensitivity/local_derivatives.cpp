@@ -3,19 +3,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/limits.hpp>
 #include <wheelwright/sensitivity/local_inputs.hpp>
 #include <wheelwright/sensitivity/row_rates.hpp>
 
 namespace wheelwright {
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kAgree = 1e-6;  // left and right derivative, relative
 
 // A lower side at 0 that holds a bound: below it, errors of the rows' columns count with the other sign.

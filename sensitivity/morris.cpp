@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 #include <random>
 
@@ -11,11 +10,10 @@
 #include <boost/math/distributions/students_t.hpp>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/limits.hpp>
 
 namespace wheelwright {
 namespace {
-
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 // The move of every input along every trajectory.
 struct Trajectories {
@@ -76,7 +74,7 @@ Trajectories trajectories(Eigen::Index inputs, const MorrisOptions& options) {
 }
 
 ElementaryEffects summary(const std::vector<double>& effects, double confidence) {
-  ElementaryEffects out{kNone, kNone, kNone, kNone, kNone, kNone, static_cast<Eigen::Index>(effects.size())};
+  ElementaryEffects out{kNan, kNan, kNan, kNan, kNan, kNan, static_cast<Eigen::Index>(effects.size())};
   if (effects.empty()) {
     return out;
   }

@@ -3,17 +3,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 
 #include <fmt/format.h>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/limits.hpp>
 
 namespace wheelwright {
 namespace {
-
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 void validate(Eigen::Index inputs, Eigen::Index levels) {
   check::that(inputs >= 1, "inputs of a study", "at least 1");
@@ -63,7 +61,7 @@ std::vector<OneAtATime> one_at_a_time(const Eigen::MatrixXd& values, Eigen::Inde
   validate(inputs, levels);
   check::that(values.rows() == 1 + inputs * levels, fmt::format("{} rows of values", values.rows()),
               fmt::format("{}, one for each row of the design", 1 + inputs * levels));
-  const Eigen::MatrixXd finite = values.unaryExpr([](double y) { return std::isfinite(y) ? y : kNone; });
+  const Eigen::MatrixXd finite = values.unaryExpr([](double y) { return std::isfinite(y) ? y : kNan; });
   std::vector<OneAtATime> out;
   for (Eigen::Index q = 0; q < finite.cols(); ++q) {
     out.push_back(curves(finite.col(q), inputs, levels));

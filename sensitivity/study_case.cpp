@@ -13,14 +13,14 @@
 namespace wheelwright {
 namespace {
 
-struct Sensor {
+struct NoisySensor {
   const char* name;
   const char* unit;
   NoiseBound SensorNoise::*declared;
   double Sensors::*simulated;
 };
 
-constexpr Sensor kSensors[] = {
+constexpr NoisySensor kNoisySensors[] = {
     {"wheel_speed", "rad/s", &SensorNoise::wheel_speed, &Sensors::wheel_speed},
     {"wheel_angle", "rad", &SensorNoise::wheel_angle, &Sensors::wheel_angle},
     {"effort", "", &SensorNoise::effort, &Sensors::effort},
@@ -28,8 +28,8 @@ constexpr Sensor kSensors[] = {
     {"heading", "rad", &SensorNoise::heading, &Sensors::heading},
 };
 
-const Sensor& sensor_of(const std::string& name) {
-  for (const Sensor& sensor : kSensors) {
+const NoisySensor& noisy_sensor(const std::string& name) {
+  for (const NoisySensor& sensor : kNoisySensors) {
     if (name.substr(name.find('.') + 1) == sensor.name) {
       return sensor;
     }
@@ -207,7 +207,7 @@ const std::vector<StudyInputKind>& study_input_kinds() {
 std::string unit_of_input(const std::string& name) {
   const StudyInputKind& kind = kind_of(name);
   if (kind.name.ends_with(".SENSOR")) {
-    return sensor_of(name).unit;
+    return noisy_sensor(name).unit;
   }
   if (kind.name == "truth.NAME") {
     static const std::pair<const char*, const char*> units[] = {
@@ -224,10 +224,10 @@ std::optional<double> nominal_of_input(const StudyCase& subject, const std::stri
   demand_scenario(subject, kind);
   const Robot& robot = subject.robot;
   if (kind.name == "declared.SENSOR") {
-    return (robot.noise.*sensor_of(name).declared).value;
+    return (robot.noise.*noisy_sensor(name).declared).value;
   }
   if (kind.name == "noise.SENSOR") {
-    const Sensor& sensor = sensor_of(name);
+    const NoisySensor& sensor = noisy_sensor(name);
     return subject.scenario ? subject.scenario->sensors.*sensor.simulated : (robot.noise.*sensor.declared).value;
   }
   if (kind.name == "prior.NAME") {
@@ -274,7 +274,7 @@ void set_input(StudyCase& subject, const std::string& name, double x) {
   check::finite(x, "input " + name);
   Robot& robot = subject.robot;
   if (kind.name.ends_with(".SENSOR")) {
-    const Sensor& sensor = sensor_of(name);
+    const NoisySensor& sensor = noisy_sensor(name);
     (robot.noise.*sensor.declared).value = check::non_negative(x, "input " + name);
     if (subject.scenario && kind.name == "noise.SENSOR") {
       subject.scenario->sensors.*sensor.simulated = x;

@@ -13,6 +13,7 @@
 #include <wheelwright/commission/margin_survey.hpp>
 #include <wheelwright/commission/physical.hpp>
 #include <wheelwright/core/error.hpp>
+#include <wheelwright/core/limits.hpp>
 #include <wheelwright/detector/fault_type.hpp>
 #include <wheelwright/gap/diagnose.hpp>
 
@@ -20,8 +21,6 @@ namespace wheelwright {
 namespace {
 
 using Kind = StudyQuantity::Kind;
-
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 const std::vector<std::pair<std::string, Kind>>& families() {
   static const std::vector<std::pair<std::string, Kind>> all = {
@@ -168,7 +167,7 @@ double share_outside(const Commissioning& result) {
     outside += v.outside;
     instants += v.instants;
   }
-  return instants > 0 ? static_cast<double>(outside) / static_cast<double>(instants) : kNone;
+  return instants > 0 ? static_cast<double>(outside) / static_cast<double>(instants) : kNan;
 }
 
 struct Thresholds {
@@ -188,8 +187,8 @@ Thresholds thresholds_over(LogSource& log, const CommissionedModel& model) {
     }
   });
   for (std::size_t i = 0; i < t.mean.size(); ++i) {
-    t.mean[i] = instants > 0 ? t.mean[i] / static_cast<double>(instants) : kNone;
-    t.peak[i] = instants > 0 ? t.peak[i] : kNone;
+    t.mean[i] = instants > 0 ? t.mean[i] / static_cast<double>(instants) : kNan;
+    t.peak[i] = instants > 0 ? t.peak[i] : kNan;
   }
   return t;
 }
@@ -293,8 +292,8 @@ void read_off(LogSource& log, const StudyCase& subject, const std::vector<StudyQ
         case Kind::lower: value = c.parameters[q.index].lower; break;
         case Kind::upper: value = c.parameters[q.index].upper; break;
         case Kind::width: value = c.parameters[q.index].upper - c.parameters[q.index].lower; break;
-        case Kind::estimate: value = c.parameters[q.index].estimate.value_or(kNone); break;
-        case Kind::standard_error: value = c.parameters[q.index].standard_error.value_or(kNone); break;
+        case Kind::estimate: value = c.parameters[q.index].estimate.value_or(kNan); break;
+        case Kind::standard_error: value = c.parameters[q.index].standard_error.value_or(kNan); break;
         case Kind::threshold_mean: value = thresholds->mean[q.index]; break;
         case Kind::threshold_peak: value = thresholds->peak[q.index]; break;
         case Kind::smallest_fault:
@@ -325,11 +324,11 @@ std::vector<StudyQuantity> study_quantities(const std::vector<std::string>& name
 CaseResult evaluate_case(const StudyCase& subject, const std::vector<StudyQuantity>& quantities,
                          const EvaluateOptions& options) {
   CaseResult result;
-  result.values.assign(quantities.size(), kNone);
+  result.values.assign(quantities.size(), kNan);
   const auto without_model = [&](const std::string& why) {
     result.finding = why;
     for (std::size_t i = 0; i < quantities.size(); ++i) {
-      result.values[i] = quantities[i].kind == Kind::commissioned ? 0.0 : kNone;
+      result.values[i] = quantities[i].kind == Kind::commissioned ? 0.0 : kNan;
     }
   };
   try {

@@ -5,7 +5,7 @@
 
 #include "app/program.hpp"
 
-namespace wheelwright {
+namespace wheelwright::bad_input_test {
 namespace {
 
 using ::testing::AllOf;
@@ -296,4 +296,4 @@ TEST_F(BadInput, FollowNamesTheRowsItLeavesOut) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::bad_input_test

@@ -5,7 +5,7 @@
 
 #include "app/program.hpp"
 
-namespace wheelwright {
+namespace wheelwright::check_test {
 namespace {
 
 using ::testing::AllOf;
@@ -336,4 +336,4 @@ TEST_F(Check, AModelWithoutCertificatesStillDetects) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::check_test

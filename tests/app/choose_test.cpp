@@ -2,7 +2,7 @@
 // `wheelwright choose`, as a user runs it.
 #include "app/program.hpp"
 
-namespace wheelwright {
+namespace wheelwright::choose_test {
 namespace {
 
 using ::testing::AllOf;
@@ -58,4 +58,4 @@ TEST_F(Choose, TellsWhatIsWrongWithAQuestion) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::choose_test

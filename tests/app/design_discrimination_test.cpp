@@ -2,7 +2,7 @@
 // The manoeuvre that tells causes apart, from names and from a gap.json.
 #include "app/program.hpp"
 
-namespace wheelwright {
+namespace wheelwright::design_discrimination_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -57,4 +57,4 @@ TEST_F(DesignDiscrimination, SaysWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::design_discrimination_test

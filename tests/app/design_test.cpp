@@ -2,7 +2,7 @@
 // Design a manoeuvre, drive it in simulation, commission its log: three commands in a row.
 #include "app/program.hpp"
 
-namespace wheelwright {
+namespace wheelwright::design_test {
 namespace {
 
 using ::testing::AllOf;
@@ -93,4 +93,4 @@ TEST_F(Design, WhatIsMissingIsAskedFor) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::design_test

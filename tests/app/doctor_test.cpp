@@ -2,7 +2,7 @@
 // `wheelwright doctor`, as a user runs it.
 #include "app/program.hpp"
 
-namespace wheelwright {
+namespace wheelwright::doctor_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -74,4 +74,4 @@ TEST_F(Doctor, NamesMissingColumnsAndBadInput) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::doctor_test

@@ -6,7 +6,7 @@
 #include "app/program.hpp"
 #include "support/c_detector.hpp"
 
-namespace wheelwright {
+namespace wheelwright::export_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -112,4 +112,4 @@ TEST_F(Export, HelpNamesItsOptions) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::export_test

@@ -8,7 +8,7 @@
 
 #include "app/program.hpp"
 
-namespace wheelwright {
+namespace wheelwright::fleet_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -168,4 +168,4 @@ TEST_F(FleetCommand, BadUsageIsTold) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::fleet_test

@@ -4,7 +4,7 @@
 
 #include <wheelwright/io/robot_file.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap_test {
 namespace {
 
 using ::testing::AllOf;
@@ -116,4 +116,4 @@ TEST_F(Gap, SaysWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::gap_test

@@ -4,7 +4,7 @@
 
 #include "app/program.hpp"
 
-namespace wheelwright {
+namespace wheelwright::identify_test {
 namespace {
 
 using ::testing::AllOf;
@@ -131,4 +131,4 @@ TEST_F(Identify, FitsItsSchema) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::identify_test

@@ -7,7 +7,7 @@
 #include "app/progress.hpp"
 #include "app/units.hpp"
 
-namespace wheelwright {
+namespace wheelwright::manners_test {
 namespace {
 
 using ::testing::AllOf;
@@ -214,4 +214,4 @@ TEST(Progress, SaysWhatIsLeftWhenThatCanBeKnown) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::manners_test

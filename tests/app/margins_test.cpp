@@ -2,7 +2,7 @@
 // `wheelwright margins`, as a user runs it: on the drive that was commissioned with, a pose beside it.
 #include "app/program.hpp"
 
-namespace wheelwright {
+namespace wheelwright::margins_test {
 namespace {
 
 using ::testing::AllOf;
@@ -101,4 +101,4 @@ TEST_F(Margins, TellWhatIsWrongWithAQuestion) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::margins_test

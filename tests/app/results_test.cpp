@@ -3,7 +3,7 @@
 // their schemas.
 #include "app/program.hpp"
 
-namespace wheelwright {
+namespace wheelwright::results_test {
 namespace {
 
 using ::testing::AllOf;
@@ -198,4 +198,4 @@ TEST_F(Results, SchemasRefuseWhatIsNotThere) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::results_test

@@ -6,7 +6,7 @@
 
 #include "io/robot_samples.hpp"
 
-namespace wheelwright {
+namespace wheelwright::robot_test {
 namespace {
 
 using ::testing::AllOf;
@@ -82,4 +82,4 @@ TEST_F(RobotCommand, RefusalsLeaveNothing) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::robot_test

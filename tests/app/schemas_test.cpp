@@ -3,7 +3,7 @@
 #include "app/program.hpp"
 #include "io/robot_samples.hpp"
 
-namespace wheelwright {
+namespace wheelwright::schemas_test {
 namespace {
 
 using testing::Outcome;
@@ -91,4 +91,4 @@ TEST_F(Schemas, Robot) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::schemas_test

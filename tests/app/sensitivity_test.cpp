@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/program.hpp"
 
-namespace wheelwright {
+namespace wheelwright::sensitivity_test {
 namespace {
 
 using testing::Outcome;
@@ -89,4 +89,4 @@ TEST_F(Sensitivity, SaysWhatIsWrongInTheStudy) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::sensitivity_test

@@ -2,7 +2,7 @@
 // Help, exit codes, and what goes to which stream.
 #include "app/program.hpp"
 
-namespace wheelwright {
+namespace wheelwright::usage_test {
 namespace {
 
 using ::testing::AllOf;
@@ -108,4 +108,4 @@ TEST_F(Usage, QuietIsSilent) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::usage_test

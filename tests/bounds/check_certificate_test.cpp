@@ -11,11 +11,12 @@
 #include <gtest/gtest.h>
 
 #include <wheelwright/bounds/feasible_set.hpp>
+#include <wheelwright/core/limits.hpp>
 
 #include "bounds/exact.hpp"
 #include "bounds/rows.hpp"
 
-namespace wheelwright {
+namespace wheelwright::check_certificate_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -24,7 +25,6 @@ using testing_rows::cube;
 using testing_rows::Random;
 using testing_rows::Rows;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kTiny = std::numeric_limits<double>::denorm_min();
 
 WeightedRow weighted(const std::vector<double>& a, double b, double multiplier) {
@@ -327,4 +327,4 @@ TEST(CheckHull, AContradictionIsTold) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::check_certificate_test

@@ -9,7 +9,7 @@
 
 #include "bounds/rows.hpp"
 
-namespace wheelwright {
+namespace wheelwright::closed_form_test {
 namespace {
 
 using testing_rows::Rows;
@@ -112,4 +112,4 @@ TEST(ClosedForm, klee_minty_cube) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::closed_form_test

@@ -7,7 +7,7 @@
 
 #include "bounds/exact_lp.hpp"
 
-namespace wheelwright {
+namespace wheelwright::exact_lp_test {
 namespace {
 
 using exact_lp::Family;
@@ -93,4 +93,4 @@ INSTANTIATE_TEST_SUITE_P(Families, ExactLp, ::testing::ValuesIn(exact_lp::famili
 INSTANTIATE_TEST_SUITE_P(Families, SlowExactLp, ::testing::ValuesIn(exact_lp::families), test_name);
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::exact_lp_test

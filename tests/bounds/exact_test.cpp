@@ -10,7 +10,7 @@
 #include "bounds/exact.hpp"
 #include "bounds/rows.hpp"
 
-namespace wheelwright {
+namespace wheelwright::exact_test {
 namespace {
 
 using exact::rational;
@@ -305,4 +305,4 @@ TEST(Farkas, contradiction_is_exact_and_irreducible) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::exact_test

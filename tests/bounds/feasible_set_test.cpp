@@ -9,7 +9,7 @@
 #include "bounds/exact.hpp"
 #include "bounds/rows.hpp"
 
-namespace wheelwright {
+namespace wheelwright::feasible_set_test {
 namespace {
 
 using testing_rows::BlockSource;
@@ -211,4 +211,4 @@ TEST(Outliers, fewest_are_dropped_and_the_truth_is_kept) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::feasible_set_test

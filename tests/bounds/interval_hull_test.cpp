@@ -13,7 +13,7 @@
 
 #include "bounds/rows.hpp"
 
-namespace wheelwright {
+namespace wheelwright::interval_hull_test {
 namespace {
 
 using testing_rows::BlockSource;
@@ -177,4 +177,4 @@ TEST(MinimaxInMemory, ClosedFormsAndTheSource) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::interval_hull_test

@@ -8,7 +8,7 @@
 
 #include "bounds/rows.hpp"
 
-namespace wheelwright {
+namespace wheelwright::laws_test {
 namespace {
 
 using testing_rows::Random;
@@ -281,4 +281,4 @@ TEST(Polytope, rejects_the_empty_set_and_bad_shapes) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::laws_test

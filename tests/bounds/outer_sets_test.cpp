@@ -11,7 +11,7 @@
 #include "bounds/exact.hpp"
 #include "bounds/rows.hpp"
 
-namespace wheelwright {
+namespace wheelwright::outer_sets_test {
 namespace {
 
 using exact::Rational;
@@ -497,4 +497,4 @@ TEST(OuterSets, may_be_a_point) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::outer_sets_test

@@ -16,7 +16,7 @@
 #include "bounds/exact.hpp"
 #include "bounds/rows.hpp"
 
-namespace wheelwright {
+namespace wheelwright::outlier_hull_test {
 namespace {
 
 using exact::Rational;
@@ -280,4 +280,4 @@ TEST(OutlierHull, leaves_out_what_it_is_told_to) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::outlier_hull_test

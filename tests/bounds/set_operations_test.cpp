@@ -12,7 +12,7 @@
 #include "bounds/rows.hpp"
 #include "support/allocations.hpp"
 
-namespace wheelwright {
+namespace wheelwright::set_operations_test {
 namespace {
 
 using testing_rows::Random;
@@ -137,4 +137,4 @@ TEST(OnlineSets, allocate_nothing) {
 #endif
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::set_operations_test

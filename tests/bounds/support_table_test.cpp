@@ -11,7 +11,7 @@
 #include "bounds/exact.hpp"
 #include "bounds/rows.hpp"
 
-namespace wheelwright {
+namespace wheelwright::support_table_test {
 namespace {
 
 using exact::rational;
@@ -206,4 +206,4 @@ TEST(SupportTable, IsNoneWhereThereIsNoRoom) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::support_table_test

@@ -11,7 +11,7 @@
 #include "bounds/exact.hpp"
 #include "bounds/rows.hpp"
 
-namespace wheelwright {
+namespace wheelwright::support_walk_test {
 namespace {
 
 using exact::rational;
@@ -160,4 +160,4 @@ TEST(SupportWalk, ABudgetOfNothingIsNoWorseThanTheHull) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::support_walk_test

@@ -10,7 +10,7 @@
 
 #include "bounds/rows.hpp"
 
-namespace wheelwright {
+namespace wheelwright::tracker_test {
 namespace {
 
 using testing_rows::cube;
@@ -116,4 +116,4 @@ TEST(Tracker, MisuseIsRefused) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::tracker_test

@@ -11,7 +11,7 @@
 
 #include "support/drives.hpp"
 
-namespace wheelwright {
+namespace wheelwright::contradiction_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -134,4 +134,4 @@ TEST(Unusable, AMissingColumnIsNamed) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::contradiction_test

@@ -14,7 +14,7 @@
 #include "detector/detectability.hpp"
 #include "support/drives.hpp"
 
-namespace wheelwright {
+namespace wheelwright::detector_choice_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -227,4 +227,4 @@ TEST(DetectorChoice, KeepsWhatItPromises) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::detector_choice_test

@@ -7,7 +7,7 @@
 
 #include "support/drives.hpp"
 
-namespace wheelwright {
+namespace wheelwright::effects_test {
 namespace {
 
 // Noise inside its declared bounds: the truth is inside the guaranteed ones, and without the effects nothing explains the
@@ -37,4 +37,4 @@ TEST(CommissionEffects, WhatALogCannotBeCorrectedForIsRefused) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::effects_test

@@ -14,7 +14,7 @@
 #include "support/drives.hpp"
 #include "support/random.hpp"
 
-namespace wheelwright {
+namespace wheelwright::filter_choice_test {
 namespace {
 
 using testing_support::Autoregression;
@@ -231,4 +231,4 @@ TEST(FilterChoice, WidthHoldsEveryResidualOfTheLog) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::filter_choice_test

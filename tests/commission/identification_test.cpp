@@ -14,7 +14,7 @@
 
 #include "support/drives.hpp"
 
-namespace wheelwright {
+namespace wheelwright::identification_test {
 namespace {
 
 using ::testing::Contains;
@@ -227,4 +227,4 @@ TEST(ShapeWords, SayWhereTheLogDoesNotShowIt) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::identification_test

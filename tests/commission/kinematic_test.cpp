@@ -13,7 +13,7 @@
 
 #include "support/kinematic_drives.hpp"
 
-namespace wheelwright {
+namespace wheelwright::kinematic_test {
 namespace {
 
 using testing_support::posed_drive;
@@ -172,4 +172,4 @@ TEST(Kinematic, SaysHowLongTheWindowIs) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::kinematic_test

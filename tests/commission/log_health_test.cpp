@@ -18,7 +18,7 @@
 
 #include "support/kinematic_drives.hpp"
 
-namespace wheelwright {
+namespace wheelwright::log_health_test {
 namespace {
 
 using testing_support::posed_drive;
@@ -382,4 +382,4 @@ TEST(LogHealthRecordings, NoneIsFatal) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::log_health_test

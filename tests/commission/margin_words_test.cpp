@@ -6,7 +6,7 @@
 
 #include <wheelwright/commission/margin_words.hpp>
 
-namespace wheelwright {
+namespace wheelwright::margin_words_test {
 namespace {
 
 TEST(MarginWords, AreTwoDigitsUpwards) {
@@ -21,4 +21,4 @@ TEST(MarginWords, AreTwoDigitsUpwards) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::margin_words_test

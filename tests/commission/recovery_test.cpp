@@ -9,7 +9,7 @@
 
 #include "support/drives.hpp"
 
-namespace wheelwright {
+namespace wheelwright::recovery_test {
 namespace {
 
 using testing_support::exact_drive;
@@ -106,4 +106,4 @@ TEST(Recovery, CommissioningGivesTheSameAndBoundsTheTruth) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::recovery_test

@@ -9,7 +9,7 @@
 
 #include "support/drives.hpp"
 
-namespace wheelwright {
+namespace wheelwright::slow_guarantee_test {
 namespace {
 
 using testing_support::noisy_drive;
@@ -122,4 +122,4 @@ TEST(SlowGuarantee, TenMillionSamplesWithoutAnAlarm) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::slow_guarantee_test

@@ -10,7 +10,7 @@
 
 #include "support/kinematic_drives.hpp"
 
-namespace wheelwright {
+namespace wheelwright::slow_kinematic_test {
 namespace {
 
 using testing_support::posed_drive;
@@ -102,4 +102,4 @@ TEST(SlowKinematic, LateralSlipIsSeenWithinAWindowWhereItMustBe) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::slow_kinematic_test

@@ -15,7 +15,7 @@
 #include <wheelwright/io/csv.hpp>
 #include <wheelwright/io/robot_file.hpp>
 
-namespace wheelwright {
+namespace wheelwright::slow_recordings_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -148,4 +148,4 @@ TEST_F(SlowRecordings, EveryRobotOfTheFleetGivesAModel) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::slow_recordings_test

@@ -11,7 +11,7 @@
 
 #include "support/drives.hpp"
 
-namespace wheelwright {
+namespace wheelwright::trace_test {
 namespace {
 
 using testing_support::noisy_drive;
@@ -123,4 +123,4 @@ TEST(Detect, ALogWithoutTheColumnsIsRefused) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::trace_test

@@ -7,16 +7,15 @@
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/interval.hpp>
+#include <wheelwright/core/limits.hpp>
 
 #include "support/random.hpp"
 
-namespace wheelwright {
+namespace wheelwright::interval_test {
 namespace {
 
 using Rational = boost::multiprecision::cpp_rational;
 using testing_support::Random;
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 // Doubles of either sign between 1e-12 and 1e12.
 double wide(Random& random) { return random.symmetric() * std::pow(10.0, 12.0 * random.symmetric()); }
@@ -56,19 +55,19 @@ TEST(Interval, RoundsByOneUnitInTheLastPlace) {
   EXPECT_EQ(round_up(1.0), 1.0 + std::numeric_limits<double>::epsilon());
   EXPECT_EQ(round_down(round_up(1.0)), 1.0);
   EXPECT_EQ(round_up(0.0), std::numeric_limits<double>::denorm_min());
-  EXPECT_EQ(round_up(infinity), infinity);
-  EXPECT_EQ(round_down(-infinity), -infinity);
+  EXPECT_EQ(round_up(kInfinity), kInfinity);
+  EXPECT_EQ(round_down(-kInfinity), -kInfinity);
 }
 
-TEST(Interval, NaNIsInNone) { EXPECT_FALSE((Interval{-infinity, infinity}.contains(std::nan("")))); }
+TEST(Interval, NaNIsInNone) { EXPECT_FALSE((Interval{-kInfinity, kInfinity}.contains(std::nan("")))); }
 
 TEST(Check, NaNFails) {
   const double nan = std::nan("");
   EXPECT_THROW(check::finite(nan, "x"), InvalidArgument);
-  EXPECT_THROW(check::finite(-infinity, "x"), InvalidArgument);
+  EXPECT_THROW(check::finite(-kInfinity, "x"), InvalidArgument);
   EXPECT_THROW(check::positive(nan, "x"), InvalidArgument);
   EXPECT_THROW(check::positive(0.0, "x"), InvalidArgument);
-  EXPECT_THROW(check::positive(infinity, "x"), InvalidArgument);
+  EXPECT_THROW(check::positive(kInfinity, "x"), InvalidArgument);
   EXPECT_THROW(check::non_negative(nan, "x"), InvalidArgument);
   EXPECT_THROW(check::non_negative(-1e-300, "x"), InvalidArgument);
   EXPECT_EQ(check::non_negative(0.0, "x"), 0.0);
@@ -82,4 +81,4 @@ TEST(Check, NaNFails) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::interval_test

@@ -8,7 +8,7 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/core/log.hpp>
 
-namespace wheelwright {
+namespace wheelwright::log_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -129,4 +129,4 @@ TEST(JoinedSource, IsOneLogAfterTheOther) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::log_test

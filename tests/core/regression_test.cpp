@@ -11,7 +11,7 @@
 #include "support/random.hpp"
 #include "support/rows.hpp"
 
-namespace wheelwright {
+namespace wheelwright::regression_test {
 namespace {
 
 using testing_support::block_of;
@@ -56,11 +56,13 @@ using Sources =
     ::testing::Types<Table, Stream, Folded<Part::everything>, Folded<Part::training>, Folded<Part::held_out>>;
 
 }  // namespace
+}  // namespace wheelwright::regression_test
 
-namespace testing_support {
-INSTANTIATE_TYPED_TEST_SUITE_P(AllSources, RegressionSourceLaws, Sources);
-}  // namespace testing_support
+namespace wheelwright::testing_support {
+INSTANTIATE_TYPED_TEST_SUITE_P(AllSources, RegressionSourceLaws, regression_test::Sources);
+}  // namespace wheelwright::testing_support
 
+namespace wheelwright::regression_test {
 namespace {
 
 TEST(RegressionTable, RefusesWhatIsNoRegression) {
@@ -109,4 +111,4 @@ TEST(Folds, MisuseIsRefused) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::regression_test

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // An inspection drive: better than the figure eight, and its promise is kept when a broken robot drives it.
 #include <cmath>
-#include <limits>
 #include <string>
 
 #include <gtest/gtest.h>
 
+#include <wheelwright/core/limits.hpp>
 #include <wheelwright/design/detection.hpp>
 #include <wheelwright/detector/fault_rows.hpp>
 #include <wheelwright/sim/simulation.hpp>
@@ -13,12 +13,10 @@
 #include "design/robots.hpp"
 #include "support/drives.hpp"
 
-namespace wheelwright {
+namespace wheelwright::detection_test {
 namespace {
 
 using testing_support::noisy_drive;
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 struct Prepared {
   Scenario scenario;
@@ -199,4 +197,4 @@ TEST(Detection, SaysWhichFaultCannotBeInspected) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::detection_test

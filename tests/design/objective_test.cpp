@@ -13,7 +13,7 @@
 
 #include "design/robots.hpp"
 
-namespace wheelwright {
+namespace wheelwright::objective_test {
 namespace {
 
 using testing_support::small_robot;
@@ -121,4 +121,4 @@ TEST(FigureEightPlan, TheBestOneKeepsToTheLimitsAndBeatsASlowerOne) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::objective_test

@@ -12,7 +12,7 @@
 
 #include "design/robots.hpp"
 
-namespace wheelwright {
+namespace wheelwright::slow_manoeuvre_test {
 namespace {
 
 using testing_support::large_robot;
@@ -115,4 +115,4 @@ TEST(SlowManoeuvre, AnyFunctionOfTheRowsCanBeTheAim) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::slow_manoeuvre_test

@@ -9,7 +9,7 @@
 #include "support/drives.hpp"
 #include "support/kinematic_drives.hpp"
 
-namespace wheelwright {
+namespace wheelwright::allocation_test {
 namespace {
 
 #ifdef WHEELWRIGHT_COUNTS_ALLOCATIONS
@@ -106,4 +106,4 @@ TEST(Allocation, IsNotCountedHere) { GTEST_SKIP() << "allocations are counted wi
 #endif
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::allocation_test

@@ -13,7 +13,7 @@
 
 #include "detector/detectability.hpp"
 
-namespace wheelwright {
+namespace wheelwright::consistency_test {
 namespace {
 
 using namespace testing_support;
@@ -195,4 +195,4 @@ TEST(Consistency, RejectsWhatMakesNoSense) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::consistency_test

@@ -13,7 +13,7 @@
 #include "support/drives.hpp"
 #include "support/random.hpp"
 
-namespace wheelwright {
+namespace wheelwright::detector_test {
 namespace {
 
 using testing_support::exact_drive;
@@ -193,4 +193,4 @@ TEST(Detector, MisuseIsRefused) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::detector_test

@@ -3,21 +3,19 @@
 // and the worst noise.
 #include <array>
 #include <cmath>
-#include <limits>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include <wheelwright/core/limits.hpp>
 #include <wheelwright/detector/fault_margin.hpp>
 
 #include "support/random.hpp"
 
-namespace wheelwright {
+namespace wheelwright::fault_margin_test {
 namespace {
 
 using testing_support::Random;
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // A row in memory.
 struct OwnRow {
@@ -272,4 +270,4 @@ TEST(FaultMargin, HiddenSizesAreHiddenAndTight) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::fault_margin_test

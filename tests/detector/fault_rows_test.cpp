@@ -11,7 +11,7 @@
 
 #include "support/drives.hpp"
 
-namespace wheelwright {
+namespace wheelwright::fault_rows_test {
 namespace {
 
 using testing_support::exact_drive;
@@ -271,4 +271,4 @@ TEST(FaultRows, RefuseFaultsThatMakeNoSense) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::fault_rows_test

@@ -13,7 +13,7 @@
 
 #include "detector/detectability.hpp"
 
-namespace wheelwright {
+namespace wheelwright::isolation_test {
 namespace {
 
 using testing_support::Breakage;
@@ -269,4 +269,4 @@ TEST(IsolationWords, MisuseThrows) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::isolation_test

@@ -8,7 +8,7 @@
 
 #include "support/kinematic_drives.hpp"
 
-namespace wheelwright {
+namespace wheelwright::kinematic_detector_test {
 namespace {
 
 using testing_support::posed_drive;
@@ -110,4 +110,4 @@ TEST(KinematicDetector, WantsASetOfItsOwnParameters) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::kinematic_detector_test

@@ -5,11 +5,12 @@
 
 #include <gtest/gtest.h>
 
+#include <wheelwright/core/limits.hpp>
 #include <wheelwright/detector/margins.hpp>
 
 #include "detector/detectability.hpp"
 
-namespace wheelwright {
+namespace wheelwright::margins_test {
 namespace {
 
 using testing_support::Breakage;
@@ -23,7 +24,6 @@ using testing_support::promise;
 using testing_support::random_run;
 using testing_support::watch;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kShare = 0.75;  // of the declared noise: half of it is there, and what interpolation adds
 
 struct Tally {
@@ -118,4 +118,4 @@ TEST_P(SlowMarginsPart, AreKeptInFiveHundredRuns) {
 INSTANTIATE_TEST_SUITE_P(Quarters, SlowMarginsPart, ::testing::Range<std::uint64_t>(0, 4));
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::margins_test

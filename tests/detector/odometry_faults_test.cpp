@@ -2,12 +2,12 @@
 // Faults in the kinematic residual against the simulator, and margins that only it can promise.
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <memory>
 
 #include <gtest/gtest.h>
 
 #include <wheelwright/commission/kinematic.hpp>
+#include <wheelwright/core/limits.hpp>
 #include <wheelwright/detector/margins.hpp>
 #include <wheelwright/detector/odometry_faults.hpp>
 
@@ -15,7 +15,7 @@
 #include "support/drives.hpp"
 #include "support/random.hpp"
 
-namespace wheelwright {
+namespace wheelwright::odometry_faults_test {
 namespace {
 
 using testing_support::exact_drive;
@@ -24,7 +24,6 @@ using testing_support::noisy_drive;
 using testing_support::Shown;
 
 constexpr double kOnset = 7.0;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 FaultType find_fault(const Model& model, const std::string& name) {
   for (const FaultType& fault : fault_catalogue(model, Eigen::VectorXd::Ones(static_cast<Eigen::Index>(model.p())))) {
@@ -295,4 +294,4 @@ TEST(SlowOdometryFaults, PromisesAreKeptInThreeHundredRuns) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::odometry_faults_test

@@ -8,7 +8,7 @@
 
 #include "support/drives.hpp"
 
-namespace wheelwright {
+namespace wheelwright::radius_fault_test {
 namespace {
 
 using testing_support::exact_drive;
@@ -86,4 +86,4 @@ TEST(RadiusFault, IsDetectedWhereItIsCertain) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::radius_fault_test

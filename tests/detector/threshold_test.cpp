@@ -11,7 +11,7 @@
 
 #include "support/random.hpp"
 
-namespace wheelwright {
+namespace wheelwright::threshold_test {
 namespace {
 
 using testing_support::Random;
@@ -149,4 +149,4 @@ TEST(Threshold, MisuseIsRefused) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::threshold_test

@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-namespace wheelwright {
+namespace wheelwright::encoder_test {
 namespace {
 
 double printed(double x, int decimals) {
@@ -78,4 +78,4 @@ TEST(FindEncoder, KnownCountsAreChecked) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::encoder_test

@@ -12,7 +12,7 @@
 #include <wheelwright/model/differential_drive.hpp>
 #include <wheelwright/model/single_axis.hpp>
 
-namespace wheelwright {
+namespace wheelwright::noise_test {
 namespace {
 
 Measurement axis(MotionKind motion) {
@@ -196,4 +196,4 @@ TEST(StatisticalNoise, OfTwoJointsIsNeverBelowWhatTheyCanDoTogether) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::noise_test

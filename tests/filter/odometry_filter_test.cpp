@@ -13,7 +13,7 @@
 
 #include "support/random.hpp"
 
-namespace wheelwright {
+namespace wheelwright::odometry_filter_test {
 namespace {
 
 using testing_support::Random;
@@ -422,4 +422,4 @@ TEST(OdometryFilter, SaysWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::odometry_filter_test

@@ -10,7 +10,7 @@
 #include <wheelwright/model/differential_drive.hpp>
 #include <wheelwright/model/single_axis.hpp>
 
-namespace wheelwright {
+namespace wheelwright::regressor_filter_test {
 namespace {
 
 const DifferentialDrive kRobot{.wheel_radius = 0.1, .track_width = 0.4};
@@ -192,4 +192,4 @@ TEST(RegressorFilter, SpeedlessOrderOneIsRefused) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::regressor_filter_test

@@ -9,7 +9,7 @@
 
 #include "fleet/fleets.hpp"
 
-namespace wheelwright {
+namespace wheelwright::drift_test {
 namespace {
 
 using testing_support::Random;
@@ -169,4 +169,4 @@ TEST(Drift, OfARecordGoesByParameter) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::drift_test

@@ -12,7 +12,7 @@
 #include "fleet/simulated.hpp"
 #include "support/random.hpp"
 
-namespace wheelwright {
+namespace wheelwright::examine_robot_test {
 namespace {
 
 using testing_support::broken;
@@ -150,4 +150,4 @@ TEST(ExamineRobot, APriorOfTheFleetTightensTheNextRobot) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::examine_robot_test

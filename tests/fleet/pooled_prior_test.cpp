@@ -11,7 +11,7 @@
 
 #include "fleet/fleets.hpp"
 
-namespace wheelwright {
+namespace wheelwright::pooled_prior_test {
 namespace {
 
 using testing_support::drawn_record;
@@ -197,4 +197,4 @@ TEST(PooledPrior, RefusesOptionsThatMakeNoSense) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::pooled_prior_test

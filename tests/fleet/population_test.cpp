@@ -13,7 +13,7 @@
 
 #include "fleet/fleets.hpp"
 
-namespace wheelwright {
+namespace wheelwright::population_test {
 namespace {
 
 using testing_support::drawn_record;
@@ -155,4 +155,4 @@ TEST(Population, RefusesOptionsThatMakeNoSense) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::population_test

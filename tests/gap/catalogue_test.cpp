@@ -16,7 +16,7 @@
 #include <wheelwright/gap/drive_filter.hpp>
 #include <wheelwright/gap/kinematic_rows.hpp>
 
-namespace wheelwright {
+namespace wheelwright::catalogue_test {
 namespace {
 
 constexpr double kR = 0.1, kD = 0.4, kL = 0.2, kM = 20.0, kI = 0.8, kF1 = 5.0, kF3 = 0.6, kH = 0.005, kBeta = 10.0;
@@ -344,4 +344,4 @@ TEST(Catalogue, SingleAxisHasItsOwnEffects) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::catalogue_test

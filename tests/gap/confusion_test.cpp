@@ -16,7 +16,7 @@
 
 #include "gap/noisy_log.hpp"
 
-namespace wheelwright {
+namespace wheelwright::confusion_test {
 namespace {
 
 using testing::Contains;
@@ -137,4 +137,4 @@ TEST(NotExcited, NamesWhatALogCannotShowAndWhatWould) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::confusion_test

@@ -11,7 +11,7 @@
 
 #include "gap/made_up_drive.hpp"
 
-namespace wheelwright {
+namespace wheelwright::contradictions_test {
 namespace {
 
 constexpr double kBeta = 5.0, kMass = 20.0, kInertia = 0.8, kDrag = 4.0, kYawDrag = 0.5;
@@ -106,4 +106,4 @@ TEST(Contradictions, RefuseWhatMakesNoSense) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::contradictions_test

@@ -16,7 +16,7 @@
 
 #include "gap/noisy_log.hpp"
 
-namespace wheelwright {
+namespace wheelwright::diagnose_test {
 namespace {
 
 using gap_example::counted_robot;
@@ -184,4 +184,4 @@ TEST(Diagnose, SaysThatALogIsTooShort) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::diagnose_test

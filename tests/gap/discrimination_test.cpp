@@ -19,7 +19,7 @@
 
 #include "design/robots.hpp"
 
-namespace wheelwright {
+namespace wheelwright::discrimination_test {
 namespace {
 
 using testing_support::small_robot;
@@ -293,4 +293,4 @@ TEST(SlowDiscriminationDesign, BeatsTheFigureEightAndRandomManoeuvres) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::discrimination_test

@@ -8,7 +8,7 @@
 
 #include <wheelwright/filter/regressor_filter.hpp>
 
-namespace wheelwright {
+namespace wheelwright::drive_filter_test {
 namespace {
 
 constexpr double kStep = 0.01, kBeta = 8.0;
@@ -111,4 +111,4 @@ TEST(DriveFilter, AConstantKeepsItsValueAndItsRateIsZero) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::drive_filter_test

@@ -9,7 +9,7 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/gap/drive_filter.hpp>
 
-namespace wheelwright {
+namespace wheelwright::drive_test {
 namespace {
 
 Robot axis() {
@@ -123,4 +123,4 @@ TEST(Drive, MisuseIsRefused) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::drive_test

@@ -14,7 +14,7 @@
 
 #include "gap/simulated_gap.hpp"
 
-namespace wheelwright {
+namespace wheelwright::improved_robot_test {
 namespace {
 
 using gap_example::drive_of_log;
@@ -204,4 +204,4 @@ TEST(WithNominal, TakesThetaAndWidensAPriorThatExcludesIt) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::improved_robot_test

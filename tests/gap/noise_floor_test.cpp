@@ -13,7 +13,7 @@
 
 #include "gap/simulated_gap.hpp"
 
-namespace wheelwright {
+namespace wheelwright::noise_floor_test {
 namespace {
 
 using gap_example::drive_of_log;
@@ -172,4 +172,4 @@ TEST(SignalNoise, ForgetsMotionAndJumps) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::noise_floor_test

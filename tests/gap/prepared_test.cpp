@@ -12,7 +12,7 @@
 
 #include "gap/noisy_log.hpp"
 
-namespace wheelwright {
+namespace wheelwright::prepared_test {
 namespace {
 
 using gap_example::counted_robot;
@@ -136,4 +136,4 @@ TEST(PrepareGap, SaysWhatIsWrongAndWhatToDo) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::prepared_test

@@ -13,7 +13,7 @@
 #include <wheelwright/io/csv.hpp>
 #include <wheelwright/io/robot_file.hpp>
 
-namespace wheelwright {
+namespace wheelwright::recordings_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -126,4 +126,4 @@ TEST_F(GapRecordings, UnsignedEffortsAreNoLoadFriction) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::recordings_test

@@ -13,7 +13,7 @@
 
 #include "gap/simulated_gap.hpp"
 
-namespace wheelwright {
+namespace wheelwright::rollout_test {
 namespace {
 
 using gap_example::drive_of_log;
@@ -171,4 +171,4 @@ TEST(RolloutRms, IntervalIsThatOfIndependentValues) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::rollout_test

@@ -19,7 +19,7 @@
 
 #include "gap/noisy_log.hpp"
 
-namespace wheelwright {
+namespace wheelwright::selection_test {
 namespace {
 
 using gap_example::counted_robot;
@@ -302,4 +302,4 @@ TEST(UnexplainedBy, IsTheShareThatAnotherSetCannotMakeUp) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::selection_test

@@ -12,7 +12,7 @@
 
 #include "gap/simulated_gap.hpp"
 
-namespace wheelwright {
+namespace wheelwright::shrink_test {
 namespace {
 
 using gap_example::effect_called;
@@ -216,4 +216,4 @@ TEST(ParameterShifts, ShowWhatTheMissingCauseHadPoisoned) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::shrink_test

@@ -8,7 +8,7 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/gap/spectrum.hpp>
 
-namespace wheelwright {
+namespace wheelwright::spectrum_test {
 namespace {
 
 TEST(GapSpectrum, OfASineIsItsMeanSquareAtItsFrequency) {
@@ -60,4 +60,4 @@ TEST(GapSpectrum, TooShortALogHasNone) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::spectrum_test

@@ -13,7 +13,7 @@
 #include "support/random.hpp"
 #include "support/rows.hpp"
 
-namespace wheelwright {
+namespace wheelwright::block_bootstrap_test {
 namespace {
 
 using testing_support::Autoregression;
@@ -141,4 +141,4 @@ TEST(BlockLength, IsOneForIndependentValues) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::block_bootstrap_test

@@ -11,7 +11,7 @@
 
 #include "support/random.hpp"
 
-namespace wheelwright {
+namespace wheelwright::block_sums_test {
 namespace {
 
 using testing_support::Autoregression;
@@ -128,4 +128,4 @@ TEST(LongRunCovariance, TooFewValuesGiveNoCovariance) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::block_sums_test

@@ -13,7 +13,7 @@
 #include "support/random.hpp"
 #include "support/rows.hpp"
 
-namespace wheelwright {
+namespace wheelwright::estimate_test {
 namespace {
 
 using testing_support::block_of;
@@ -165,4 +165,4 @@ TEST(ContrastTest, FindsNothingBetweenEqualEstimates) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::estimate_test

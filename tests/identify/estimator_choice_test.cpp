@@ -11,7 +11,7 @@
 #include "support/random.hpp"
 #include "support/rows.hpp"
 
-namespace wheelwright {
+namespace wheelwright::estimator_choice_test {
 namespace {
 
 using testing_support::block_of;
@@ -155,4 +155,4 @@ TEST(SharedNoise, IsSeenInCommandsMadeFromTheMeasurement) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::estimator_choice_test

@@ -7,7 +7,7 @@
 #include "support/random.hpp"
 #include "support/rows.hpp"
 
-namespace wheelwright {
+namespace wheelwright::excitation_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -58,4 +58,4 @@ TEST(Excitation, AnIntervalThatHoldsZeroIsIndistinct) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::excitation_test

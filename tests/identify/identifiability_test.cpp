@@ -11,7 +11,7 @@
 #include "support/random.hpp"
 #include "support/rows.hpp"
 
-namespace wheelwright {
+namespace wheelwright::identifiability_test {
 namespace {
 
 using testing_support::block_of;
@@ -192,4 +192,4 @@ TEST(DirectionWords, ReadAsSentences) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::identifiability_test

@@ -11,7 +11,7 @@
 #include "support/random.hpp"
 #include "support/rows.hpp"
 
-namespace wheelwright {
+namespace wheelwright::information_over_time_test {
 namespace {
 
 using testing_support::block_of;
@@ -110,4 +110,4 @@ TEST(InformationOverTime, IsNoneWhereParametersAreConfounded) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::information_over_time_test

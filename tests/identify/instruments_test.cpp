@@ -11,7 +11,7 @@
 
 #include "support/drives.hpp"
 
-namespace wheelwright {
+namespace wheelwright::instruments_test {
 namespace {
 
 using testing_support::exact_drive;
@@ -112,4 +112,4 @@ TEST(MotionSimulation, IsRefusedWhereItCannotBe) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::instruments_test

@@ -12,7 +12,7 @@
 
 #include "support/random.hpp"
 
-namespace wheelwright {
+namespace wheelwright::kinematic_calibration_test {
 namespace {
 
 using testing_support::Random;
@@ -231,4 +231,4 @@ INSTANTIATE_TEST_SUITE_P(Recordings, SlowSkidSteer,
                          [](const auto& recording) { return std::string(recording.index == 0 ? "Warthog" : "Husky"); });
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::kinematic_calibration_test

@@ -11,7 +11,7 @@
 #include "support/random.hpp"
 #include "support/rows.hpp"
 
-namespace wheelwright {
+namespace wheelwright::least_squares_test {
 namespace {
 
 using testing_support::block_of;
@@ -192,4 +192,4 @@ TEST(LeastSquares, MisuseIsRefused) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::least_squares_test

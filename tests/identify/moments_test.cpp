@@ -12,7 +12,7 @@
 #include "support/random.hpp"
 #include "support/rows.hpp"
 
-namespace wheelwright {
+namespace wheelwright::moments_test {
 namespace {
 
 using testing_support::block_of;
@@ -149,4 +149,4 @@ TEST(EfficientWeights, AreOneOverEachOutputsNoise) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::moments_test

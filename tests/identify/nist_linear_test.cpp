@@ -8,7 +8,7 @@
 #include "identify/nist.hpp"
 #include "support/rows.hpp"
 
-namespace wheelwright {
+namespace wheelwright::nist_linear_test {
 namespace {
 
 using testing_support::block_of;
@@ -71,4 +71,4 @@ INSTANTIATE_TEST_SUITE_P(StRD, NistLinear,
                          [](const auto& problem) { return std::string(problem.param.name); });
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::nist_linear_test

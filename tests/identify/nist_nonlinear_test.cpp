@@ -7,7 +7,7 @@
 
 #include "identify/nist_models.hpp"
 
-namespace wheelwright {
+namespace wheelwright::nist_nonlinear_test {
 namespace {
 
 using testing_support::digits;
@@ -94,4 +94,4 @@ TEST(NistBoxBod, SaysThatItIsLostOnThePlateau) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::nist_nonlinear_test

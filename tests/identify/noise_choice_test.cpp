@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace wheelwright {
+namespace wheelwright::noise_choice_test {
 namespace {
 
 DifferenceNoise differences(DifferenceNoise::Kind kind, double sd) {
@@ -85,4 +85,4 @@ TEST(NoiseChoice, MakesItsBoundAsItSays) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::noise_choice_test

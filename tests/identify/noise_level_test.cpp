@@ -11,7 +11,7 @@
 #include "support/random.hpp"
 #include "support/rows.hpp"
 
-namespace wheelwright {
+namespace wheelwright::noise_level_test {
 namespace {
 
 using testing_support::Autoregression;
@@ -158,4 +158,4 @@ TEST(StudentQuantile, IsThatOfTheTables) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::noise_level_test

@@ -12,7 +12,7 @@
 #include "support/random.hpp"
 #include "support/rows.hpp"
 
-namespace wheelwright {
+namespace wheelwright::normal_equations_test {
 namespace {
 
 using testing_support::block_of;
@@ -74,4 +74,4 @@ TEST(NormalEquations, SayWhenQrIsNeeded) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::normal_equations_test

@@ -8,7 +8,7 @@
 #include "support/random.hpp"
 #include "support/rows.hpp"
 
-namespace wheelwright {
+namespace wheelwright::regions_test {
 namespace {
 
 using testing_support::Autoregression;
@@ -94,4 +94,4 @@ TEST(Regions, AreUnboundedWhereNothingIsKnown) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::regions_test

@@ -9,7 +9,7 @@
 
 #include "support/random.hpp"
 
-namespace wheelwright {
+namespace wheelwright::repeat_noise_test {
 namespace {
 
 using testing_support::Autoregression;
@@ -120,4 +120,4 @@ TEST(RepeatNoise, DoesNotReachAcrossGaps) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::repeat_noise_test

@@ -10,7 +10,7 @@
 #include "support/random.hpp"
 #include "support/rows.hpp"
 
-namespace wheelwright {
+namespace wheelwright::residual_statistics_test {
 namespace {
 
 using testing_support::Autoregression;
@@ -104,4 +104,4 @@ TEST(Covariance, IsHonestUnderAutocorrelatedResiduals) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::residual_statistics_test

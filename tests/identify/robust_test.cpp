@@ -17,7 +17,7 @@
 #include "support/random.hpp"
 #include "support/rows.hpp"
 
-namespace wheelwright {
+namespace wheelwright::robust_test {
 namespace {
 
 using testing_support::Autoregression;
@@ -405,4 +405,4 @@ TEST(RobustFit, MisuseIsRefused) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::robust_test

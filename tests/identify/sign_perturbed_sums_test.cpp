@@ -14,7 +14,7 @@
 #include "support/random.hpp"
 #include "support/rows.hpp"
 
-namespace wheelwright {
+namespace wheelwright::sign_perturbed_sums_test {
 namespace {
 
 using testing_support::block_of;
@@ -226,4 +226,4 @@ TEST(SignPerturbedSums, LeaveParametersOut) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::sign_perturbed_sums_test

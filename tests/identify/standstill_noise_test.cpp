@@ -12,7 +12,7 @@
 
 #include "support/random.hpp"
 
-namespace wheelwright {
+namespace wheelwright::standstill_noise_test {
 namespace {
 
 using testing_support::Autoregression;
@@ -158,4 +158,4 @@ TEST(StandstillSigns, AreThoseThatAllJointsHave) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::standstill_noise_test

@@ -12,7 +12,7 @@
 #include "support/random.hpp"
 #include "support/rows.hpp"
 
-namespace wheelwright {
+namespace wheelwright::time_shift_test {
 namespace {
 
 using testing_support::Autoregression;
@@ -282,4 +282,4 @@ TEST(Stribeck, FastDrivingLeavesItsSpeedFlat) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::time_shift_test

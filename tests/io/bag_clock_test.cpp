@@ -6,7 +6,7 @@
 
 #include <wheelwright/io/bag_clock.hpp>
 
-namespace wheelwright {
+namespace wheelwright::bag_clock_test {
 namespace {
 
 using testing::HasSubstr;
@@ -74,4 +74,4 @@ TEST(BagClocks, NoMessagesAreNoClockAndNoCrash) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::bag_clock_test

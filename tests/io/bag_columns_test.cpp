@@ -10,7 +10,7 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/io/bag_columns.hpp>
 
-namespace wheelwright {
+namespace wheelwright::bag_columns_test {
 namespace {
 
 using testing::Contains;
@@ -207,4 +207,4 @@ TEST(SideOfJoint, IsAWordOfTheNameAndNeverBoth) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::bag_columns_test

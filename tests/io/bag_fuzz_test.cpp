@@ -11,7 +11,7 @@
 
 #include <wheelwright/io/ros_extractor.hpp>
 
-namespace wheelwright {
+namespace wheelwright::bag_fuzz_test {
 namespace {
 
 using testing::all_items;
@@ -156,4 +156,4 @@ TEST_F(BagFuzz, PackedFilesCutOffAnywhere) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::bag_fuzz_test

@@ -15,7 +15,7 @@
 #include <wheelwright/io/ros_write.hpp>
 #include <wheelwright/io/xxh64.hpp>
 
-namespace wheelwright {
+namespace wheelwright::bag_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -293,4 +293,4 @@ TEST_F(Bag, NamesWithOddCharactersAreOpened) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::bag_test

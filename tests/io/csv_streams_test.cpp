@@ -11,7 +11,7 @@
 
 #include "io/scratch.hpp"
 
-namespace wheelwright {
+namespace wheelwright::csv_streams_test {
 namespace {
 
 using ::testing::Contains;
@@ -107,4 +107,4 @@ TEST_F(MergedCsv, DefectsAreStillToldWithTheirLine) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::csv_streams_test

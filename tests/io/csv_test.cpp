@@ -10,7 +10,7 @@
 
 #include "io/scratch.hpp"
 
-namespace wheelwright {
+namespace wheelwright::csv_test {
 namespace {
 
 using ::testing::AllOf;
@@ -445,4 +445,4 @@ TEST(CsvRowParser, LearnsTheMedianStep) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::csv_test

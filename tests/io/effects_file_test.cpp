@@ -9,7 +9,7 @@
 #include <wheelwright/io/scenario_file.hpp>
 #include <wheelwright/model/effect_law.hpp>
 
-namespace wheelwright {
+namespace wheelwright::effects_file_test {
 namespace {
 
 const std::string kHead = "wheel_radius: 0.0975\ntrack_width: 0.381\n";
@@ -102,4 +102,4 @@ TEST(EffectsFile, AScenarioAddsItsOwn) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::effects_file_test

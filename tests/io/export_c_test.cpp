@@ -15,7 +15,7 @@
 #include "support/c_detector.hpp"
 #include "support/random.hpp"
 
-namespace wheelwright {
+namespace wheelwright::export_c_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -344,4 +344,4 @@ TEST_F(SlowExportC, AMillionSamplesHaveTheSameBits) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::export_c_test

@@ -14,7 +14,7 @@
 #include "fleet/fleets.hpp"
 #include "io/scratch.hpp"
 
-namespace wheelwright {
+namespace wheelwright::fleet_json_test {
 namespace {
 
 using testing_support::drawn_record;
@@ -109,4 +109,4 @@ TEST(PooledPriorFile, SaysWhyThereIsNone) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::fleet_json_test

@@ -6,7 +6,7 @@
 
 #include "io/scratch.hpp"
 
-namespace wheelwright {
+namespace wheelwright::fleet_list_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -144,4 +144,4 @@ TEST_F(FleetList, AKeyIsAnotherWhereALogChanged) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::fleet_list_test

@@ -11,7 +11,7 @@
 
 #include "io/scratch.hpp"
 
-namespace wheelwright {
+namespace wheelwright::fuzz_test {
 namespace {
 
 using Fuzz = testing::ScratchTest;
@@ -149,4 +149,4 @@ TEST_F(Fuzz, JsonText) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::fuzz_test

@@ -15,7 +15,7 @@
 #include "io/scratch.hpp"
 #include "report/gap_example.hpp"
 
-namespace wheelwright {
+namespace wheelwright::gap_json_test {
 namespace {
 
 GapFiles files() {
@@ -135,4 +135,4 @@ TEST_F(GapJsonFile, HasALinePerRowAndChannel) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::gap_json_test

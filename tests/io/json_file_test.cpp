@@ -11,7 +11,7 @@
 
 #include "io/scratch.hpp"
 
-namespace wheelwright {
+namespace wheelwright::json_file_test {
 namespace {
 
 using ::testing::AllOf;
@@ -86,4 +86,4 @@ TEST_F(JsonFile, TextThatIsNoJson) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::json_file_test

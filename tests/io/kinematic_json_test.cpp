@@ -12,7 +12,7 @@
 
 #include "support/kinematic_drives.hpp"
 
-namespace wheelwright {
+namespace wheelwright::kinematic_json_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -118,4 +118,4 @@ TEST(KinematicJson, TheRobotFileMayGiveTheWindow) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::kinematic_json_test

@@ -19,7 +19,7 @@
 
 #include "io/scratch.hpp"
 
-namespace wheelwright {
+namespace wheelwright::log_file_test {
 namespace {
 
 using ::testing::AllOf;
@@ -378,4 +378,4 @@ TEST_F(LogFile, DamagedHdf5IsReadOrRefused) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::log_file_test

@@ -11,7 +11,7 @@
 #include "io/mcap_samples.hpp"
 #include "io/scratch.hpp"
 
-namespace wheelwright {
+namespace wheelwright::mcap_file_test {
 namespace {
 
 using testing::McapKind;
@@ -319,4 +319,4 @@ TEST_F(McapFile, WriterRefuses) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::mcap_file_test

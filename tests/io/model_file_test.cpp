@@ -14,7 +14,7 @@
 
 #include "io/scratch.hpp"
 
-namespace wheelwright {
+namespace wheelwright::model_file_test {
 namespace {
 
 using ::testing::AllOf;
@@ -246,4 +246,4 @@ TEST_F(ModelFileErrors, ALogThatShowsNothingMakesNoModel) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::model_file_test

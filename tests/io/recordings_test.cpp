@@ -10,7 +10,7 @@
 #include <wheelwright/io/csv.hpp>
 #include <wheelwright/io/robot_file.hpp>
 
-namespace wheelwright {
+namespace wheelwright::recordings_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -89,4 +89,4 @@ TEST_F(Recordings, PackedBaselines) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::recordings_test

@@ -16,7 +16,7 @@
 
 #include "io/scratch.hpp"
 
-namespace wheelwright {
+namespace wheelwright::result_store_test {
 namespace {
 
 using ::testing::AllOf;
@@ -264,4 +264,4 @@ TEST_F(ResultStoreTest, AMergeThatFailsChangesNothing) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::result_store_test

@@ -8,7 +8,7 @@
 
 #include "io/scratch.hpp"
 
-namespace wheelwright {
+namespace wheelwright::robot_file_test {
 namespace {
 
 using ::testing::AllOf;
@@ -212,4 +212,4 @@ TEST(RobotFile, JsonObjectErrorsNameTheKey) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::robot_file_test

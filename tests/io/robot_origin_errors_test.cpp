@@ -14,7 +14,7 @@
 #include "io/robot_samples.hpp"
 #include "io/scratch.hpp"
 
-namespace wheelwright {
+namespace wheelwright::robot_origin_errors_test {
 namespace {
 
 using ::testing::AllOf;
@@ -272,4 +272,4 @@ TEST(RobotOriginFuzz, Controller) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::robot_origin_errors_test

@@ -12,7 +12,7 @@
 #include "io/robot_samples.hpp"
 #include "io/scratch.hpp"
 
-namespace wheelwright {
+namespace wheelwright::robot_origin_test {
 namespace {
 
 using ::testing::AllOf;
@@ -201,4 +201,4 @@ TEST(RobotOrigin, VisualShapeIsSecondChoiceAndSaidSo) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::robot_origin_test

@@ -10,7 +10,7 @@
 
 #include "io/scratch.hpp"
 
-namespace wheelwright {
+namespace wheelwright::robot_schema_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -55,4 +55,4 @@ TEST(RobotSchema, CoversWhatIsWritten) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::robot_schema_test

@@ -7,7 +7,7 @@
 
 #include <wheelwright/io/ros_definition.hpp>
 
-namespace wheelwright {
+namespace wheelwright::ros_definition_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -162,4 +162,4 @@ TEST(RosDefinition, TextsChangedAtRandomAreReadOrRefused) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::ros_definition_test

@@ -14,7 +14,7 @@
 #include <wheelwright/io/ros_extractor.hpp>
 #include <wheelwright/io/ros_write.hpp>
 
-namespace wheelwright {
+namespace wheelwright::ros_extractor_test {
 namespace {
 
 using testing::HandCdr;
@@ -445,4 +445,4 @@ TEST(RosEncoder, FieldNames) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::ros_extractor_test

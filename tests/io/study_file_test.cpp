@@ -5,7 +5,7 @@
 
 #include <wheelwright/core/error.hpp>
 
-namespace wheelwright {
+namespace wheelwright::study_file_test {
 namespace {
 
 const std::filesystem::path kFolder = std::filesystem::path(WHEELWRIGHT_SOURCE_DIR) / "examples" / "studies";
@@ -106,4 +106,4 @@ TEST(StudyFile, SaysFileLineKeyValueAndWhatWasExpected) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::study_file_test

@@ -10,7 +10,7 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/model/faults.hpp>
 
-namespace wheelwright {
+namespace wheelwright::faults_test {
 namespace {
 
 using Kind = Fault::Kind;
@@ -198,4 +198,4 @@ TEST(ValidateFaults, RefusesWhatIsNoProfile) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::faults_test

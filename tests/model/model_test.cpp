@@ -11,7 +11,7 @@
 #include <wheelwright/model/robot.hpp>
 #include <wheelwright/model/single_axis.hpp>
 
-namespace wheelwright {
+namespace wheelwright::model_test {
 namespace {
 
 using testing::ElementsAre;
@@ -233,4 +233,4 @@ TEST(Regressor, RefusesTheWrongNumberOfCoordinates) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::model_test

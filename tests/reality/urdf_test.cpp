@@ -14,7 +14,7 @@
 #include "io/robot_samples.hpp"
 #include "io/scratch.hpp"
 
-namespace wheelwright {
+namespace wheelwright::urdf_test {
 namespace {
 
 using UrdfInTheEngine = testing::ScratchTest;
@@ -77,4 +77,4 @@ TEST_F(UrdfInTheEngine, MassMatrixOfTheRollingRobotIsTheNominalOne) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::urdf_test

@@ -19,7 +19,7 @@
 #include "report/example.hpp"
 #include "report/gap_example.hpp"
 
-namespace wheelwright {
+namespace wheelwright::browser_test {
 namespace {
 
 namespace example = report_example;
@@ -215,4 +215,4 @@ TEST_F(Browser, SaysWhenItIsTooOld) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::browser_test

@@ -7,7 +7,7 @@
 
 #include "fleet/fleets.hpp"
 
-namespace wheelwright {
+namespace wheelwright::fleet_report_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -74,4 +74,4 @@ TEST(FleetReport, IsThereForAFleetThatGaveNothing) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::fleet_report_test

@@ -11,7 +11,7 @@
 #include "report/example.hpp"
 #include "report/gap_example.hpp"
 
-namespace wheelwright {
+namespace wheelwright::gap_report_test {
 namespace {
 
 using namespace report;
@@ -122,4 +122,4 @@ TEST(GapDrawings, ASpectrumNeedsALog) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::gap_report_test

@@ -24,7 +24,7 @@
 #include "report/gap_example.hpp"
 #include "support/drives.hpp"
 
-namespace wheelwright {
+namespace wheelwright::page_test {
 namespace {
 
 namespace example = report_example;
@@ -261,4 +261,4 @@ TEST(Thinned, KeepsEveryPeakAndEverySegment) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::page_test

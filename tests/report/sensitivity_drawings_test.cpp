@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Drawings of sensitivity studies: well formed, escaped, in order, and none where there is nothing to show.
-#include <limits>
 #include <regex>
 #include <string>
 #include <vector>
@@ -10,15 +9,15 @@
 #include <gtest/gtest.h>
 
 #include <wheelwright/core/error.hpp>
+#include <wheelwright/core/limits.hpp>
 #include <wheelwright/report/sensitivity_drawings.hpp>
 
-namespace wheelwright {
+namespace wheelwright::sensitivity_drawings_test {
 namespace {
 
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 const report::AxisLabel kQuantity{"width of <mass> & \"rest\"", "kg"};
 const std::vector<std::string> kInputs = {"noise <1>", "α & β"};
 const std::string kSafe = "noise &lt;1&gt;";
@@ -53,7 +52,7 @@ void expect_well_formed(const std::string& svg) {
 
 OneAtATime study() {
   Eigen::MatrixXd values(7, 1);
-  values << 5.0, 4.0, 5.0, 6.0, 9.0, kNone, 1.0;
+  values << 5.0, 4.0, 5.0, 6.0, 9.0, kNan, 1.0;
   return one_at_a_time(values, 2, 3).at(0);
 }
 
@@ -66,7 +65,7 @@ TEST(Tornado, HasTheLargestSwingOnTop) {
 
 TEST(Tornado, IsNoneWithoutValues) {
   EXPECT_EQ(report::tornado({}, {}, kQuantity), "");
-  EXPECT_EQ(report::tornado(one_at_a_time(Eigen::MatrixXd::Constant(7, 1, kNone), 2, 3).at(0), kInputs, kQuantity), "");
+  EXPECT_EQ(report::tornado(one_at_a_time(Eigen::MatrixXd::Constant(7, 1, kNan), 2, 3).at(0), kInputs, kQuantity), "");
   EXPECT_THROW((void)report::tornado(study(), {"one"}, kQuantity), InvalidArgument);
 }
 
@@ -75,7 +74,7 @@ TEST(Tornado, ShowsAConstantQuantity) {
 }
 
 TEST(SensitivityCurve, BreaksWhereValuesAreMissing) {
-  const Eigen::Vector<double, 5> x(0.01, 0.1, 1.0, 10.0, 100.0), y(1.0, 2.0, kNone, 3.0, 2.0);
+  const Eigen::Vector<double, 5> x(0.01, 0.1, 1.0, 10.0, 100.0), y(1.0, 2.0, kNan, 3.0, 2.0);
   for (const bool logarithmic : {false, true}) {
     const std::string svg = report::sensitivity_curve(x, y, 1.0, 2.5, logarithmic, {"β", "1/s"}, kQuantity);
     expect_well_formed(svg);
@@ -83,14 +82,14 @@ TEST(SensitivityCurve, BreaksWhereValuesAreMissing) {
     ASSERT_TRUE(std::regex_search(svg, path, std::regex(" d=\"(M[0-9. ]+L[0-9. ]+M[0-9. ]+L[0-9. ]+)\"")));
     EXPECT_THAT(svg, HasSubstr("class=\"centre\""));
   }
-  EXPECT_THAT(report::sensitivity_curve(x, y, 1.0, kNone, true, {"β", "1/s"}, kQuantity),
+  EXPECT_THAT(report::sensitivity_curve(x, y, 1.0, kNan, true, {"β", "1/s"}, kQuantity),
               Not(HasSubstr("class=\"centre\"")));
 }
 
 TEST(SensitivityCurve, IsNoneWithoutValues) {
-  const Eigen::Vector2d x(0.0, 1.0), none(kNone, kNone), one(1.0, 1.0);
+  const Eigen::Vector2d x(0.0, 1.0), none(kNan, kNan), one(1.0, 1.0);
   EXPECT_EQ(report::sensitivity_curve({}, {}, 0.0, 0.0, false, {}, kQuantity), "");
-  EXPECT_EQ(report::sensitivity_curve(x, none, 0.0, kNone, false, {}, kQuantity), "");
+  EXPECT_EQ(report::sensitivity_curve(x, none, 0.0, kNan, false, {}, kQuantity), "");
   EXPECT_THROW((void)report::sensitivity_curve(x, one.head(1), 0.0, 1.0, false, {}, kQuantity), InvalidArgument);
   EXPECT_THROW((void)report::sensitivity_curve(x, one, 0.5, 1.0, true, {}, kQuantity), InvalidArgument);
   expect_well_formed(report::sensitivity_curve(x, one, 0.5, 1.0, false, {}, kQuantity));
@@ -132,7 +131,7 @@ TEST(MorrisScatter, NumbersInputsBySize) {
 }
 
 TEST(MorrisScatter, IsNoneWithoutEffects) {
-  const ElementaryEffects none{kNone, kNone, kNone, kNone, kNone, kNone, 0};
+  const ElementaryEffects none{kNan, kNan, kNan, kNan, kNan, kNan, 0};
   EXPECT_EQ(report::morris_scatter({none, none}, kInputs, kQuantity), "");
   EXPECT_EQ(report::morris_scatter({}, {}, kQuantity), "");
   expect_well_formed(report::morris_scatter({none, {}}, kInputs, kQuantity));
@@ -140,7 +139,7 @@ TEST(MorrisScatter, IsNoneWithoutEffects) {
 
 TEST(SensitivityMap, CrossesCellsWithoutAValue) {
   const GridMap map{Eigen::Vector2d(0.0, 1.0), Eigen::Vector2d(0.0, 1.0),
-                    (Eigen::Matrix2d() << 1.0, 2.0, kNone, 4.0).finished()};
+                    (Eigen::Matrix2d() << 1.0, 2.0, kNan, 4.0).finished()};
   const std::string svg = report::sensitivity_map(map, map.x, map.y, {"a < b", "s"}, {"c", ""}, kQuantity);
   expect_well_formed(svg);
   EXPECT_THAT(svg, HasSubstr("no value"));
@@ -149,7 +148,7 @@ TEST(SensitivityMap, CrossesCellsWithoutAValue) {
 }
 
 TEST(SensitivityMap, IsNoneWithoutValues) {
-  const GridMap map{Eigen::Vector2d(0.0, 1.0), Eigen::Vector2d(0.0, 1.0), Eigen::Matrix2d::Constant(kNone)};
+  const GridMap map{Eigen::Vector2d(0.0, 1.0), Eigen::Vector2d(0.0, 1.0), Eigen::Matrix2d::Constant(kNan)};
   EXPECT_EQ(report::sensitivity_map(map, map.x, map.y, {}, {}, kQuantity), "");
   EXPECT_EQ(report::sensitivity_map({}, {}, {}, {}, {}, kQuantity), "");
   EXPECT_THROW((void)report::sensitivity_map(map, map.x.head(1), map.y, {}, {}, kQuantity), InvalidArgument);
@@ -159,4 +158,4 @@ TEST(SensitivityMap, IsNoneWithoutValues) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::sensitivity_drawings_test

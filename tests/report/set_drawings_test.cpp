@@ -13,7 +13,7 @@
 
 #include "report/example.hpp"
 
-namespace wheelwright {
+namespace wheelwright::set_drawings_test {
 namespace {
 
 namespace example = report_example;
@@ -67,4 +67,4 @@ TEST(SetProjections, StandOnThePage) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::set_drawings_test

@@ -7,7 +7,7 @@
 
 #include "support/random.hpp"
 
-namespace wheelwright {
+namespace wheelwright::hull_derivatives_test {
 namespace {
 
 using testing_support::Random;
@@ -288,4 +288,4 @@ TEST(HullDerivatives, ParallelFacetsOfRandomSetsGiveTheOneSidedDifferences) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::hull_derivatives_test

@@ -10,7 +10,7 @@
 
 #include "support/drives.hpp"
 
-namespace wheelwright {
+namespace wheelwright::local_derivatives_test {
 namespace {
 
 using testing_support::noisy_drive;
@@ -222,4 +222,4 @@ TEST(LocalDerivatives, ADriveThatIsLoggedTwiceHasTheDerivativesOfOne) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::local_derivatives_test

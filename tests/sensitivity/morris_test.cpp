@@ -9,17 +9,16 @@
 #include <boost/math/distributions/binomial.hpp>
 
 #include <wheelwright/core/error.hpp>
+#include <wheelwright/core/limits.hpp>
 #include <wheelwright/sensitivity/grid.hpp>
 #include <wheelwright/sensitivity/morris.hpp>
 
 #include "sensitivity/test_functions.hpp"
 
-namespace wheelwright {
+namespace wheelwright::morris_test {
 namespace {
 
 namespace example = sensitivity_example;
-
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 std::vector<ElementaryEffects> effects(const example::TestFunction& f, const MorrisOptions& options = {}) {
   return morris_effects(example::evaluate(f, morris_design(f.inputs, options)), f.inputs, options).at(0);
@@ -136,8 +135,8 @@ TEST(MorrisEffects, AreCountedWhereValuesAreMissing) {
   const auto f = example::additive(Eigen::Vector3d(1.0, 2.0, 3.0));
   const MorrisOptions options{.trajectories = 6};
   Eigen::MatrixXd values = example::evaluate(f, morris_design(3, options)).replicate(1, 3);
-  values(1, 0) = kNone;                          // the end of one move, the start of the next
-  values.col(1).tail(5 * 4).setConstant(kNone);  // one trajectory is left
+  values(1, 0) = kNan;                          // the end of one move, the start of the next
+  values.col(1).tail(5 * 4).setConstant(kNan);  // one trajectory is left
   values.col(2).setConstant(std::numeric_limits<double>::infinity());
   const auto found = morris_effects(values, 3, options);
   Eigen::Index count = 0;
@@ -159,9 +158,9 @@ TEST(MorrisEffects, RefuseWhatIsNoScreening) {
   EXPECT_THROW((void)morris_design(2, {.trajectories = 1}), InvalidArgument);
   EXPECT_THROW((void)morris_design(2, {.levels = 5}), InvalidArgument);
   EXPECT_THROW((void)morris_design(2, {.levels = 0}), InvalidArgument);
-  EXPECT_THROW((void)morris_design(2, {.confidence = kNone}), InvalidArgument);
+  EXPECT_THROW((void)morris_design(2, {.confidence = kNan}), InvalidArgument);
   EXPECT_THROW((void)morris_effects(Eigen::MatrixXd::Zero(59, 1), 2), InvalidArgument);
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::morris_test

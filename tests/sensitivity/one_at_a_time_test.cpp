@@ -7,16 +7,15 @@
 #include <gtest/gtest.h>
 
 #include <wheelwright/core/error.hpp>
+#include <wheelwright/core/limits.hpp>
 #include <wheelwright/sensitivity/one_at_a_time.hpp>
 
 #include "sensitivity/test_functions.hpp"
 
-namespace wheelwright {
+namespace wheelwright::one_at_a_time_test {
 namespace {
 
 namespace example = sensitivity_example;
-
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 TEST(OneAtATimeDesign, VariesOneInputFromEndToEnd) {
   const Eigen::Vector3d nominal(0.2, 0.5, 1.0);
@@ -61,8 +60,8 @@ TEST(OneAtATime, SwingsAsFarAsTheNominalPoint) {
 
 TEST(OneAtATime, KeepsGapsWhereValuesAreMissing) {
   Eigen::MatrixXd values(7, 2);  // two inputs, three levels
-  values.col(0) << 1.0, 0.0, kNone, 3.0, kNone, std::numeric_limits<double>::infinity(), kNone;
-  values.col(1).setConstant(kNone);
+  values.col(0) << 1.0, 0.0, kNan, 3.0, kNan, std::numeric_limits<double>::infinity(), kNan;
+  values.col(1).setConstant(kNan);
   const auto found = one_at_a_time(values, 2, 3);
   EXPECT_EQ(found[0].inputs[0].missing, 1);
   EXPECT_EQ(found[0].inputs[0].swing, 3.0);
@@ -77,10 +76,10 @@ TEST(OneAtATime, KeepsGapsWhereValuesAreMissing) {
 TEST(OneAtATime, RefusesWhatIsNoStudy) {
   EXPECT_THROW((void)one_at_a_time_design(Eigen::VectorXd()), InvalidArgument);
   EXPECT_THROW((void)one_at_a_time_design(Eigen::Vector2d(0.5, 1.5)), InvalidArgument);
-  EXPECT_THROW((void)one_at_a_time_design(Eigen::Vector2d(0.5, kNone)), InvalidArgument);
+  EXPECT_THROW((void)one_at_a_time_design(Eigen::Vector2d(0.5, kNan)), InvalidArgument);
   EXPECT_THROW((void)one_at_a_time_design(Eigen::Vector2d(0.5, 0.5), 1), InvalidArgument);
   EXPECT_THROW((void)one_at_a_time(Eigen::MatrixXd::Zero(10, 1), 2), InvalidArgument);
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::one_at_a_time_test

@@ -14,7 +14,7 @@
 
 #include "sensitivity/test_functions.hpp"
 
-namespace wheelwright {
+namespace wheelwright::sobol_coverage_test {
 namespace {
 
 namespace example = sensitivity_example;
@@ -75,4 +75,4 @@ TEST(SobolIntervals, AreNotTooWide) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::sobol_coverage_test

@@ -10,7 +10,7 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/sensitivity/sobol_points.hpp>
 
-namespace wheelwright {
+namespace wheelwright::sobol_points_test {
 namespace {
 
 TEST(SobolPoints, StratifyEveryCoordinate) {
@@ -72,4 +72,4 @@ TEST(SobolPoints, RefuseWhatIsNoDesign) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::sobol_points_test

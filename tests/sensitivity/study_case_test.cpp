@@ -11,7 +11,7 @@
 
 #include "support/drives.hpp"
 
-namespace wheelwright {
+namespace wheelwright::study_case_test {
 namespace {
 
 using testing_support::noisy_drive;
@@ -146,4 +146,4 @@ TEST(StudyCase, SaysWhatItExpected) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::study_case_test

@@ -10,7 +10,7 @@
 
 #include "support/drives.hpp"
 
-namespace wheelwright {
+namespace wheelwright::study_quantity_test {
 namespace {
 
 StudyCase simulated() {
@@ -114,4 +114,4 @@ TEST(StudyQuantity, WithoutAModelThereIsAFinding) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::study_quantity_test

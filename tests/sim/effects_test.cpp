@@ -14,7 +14,7 @@
 #include <wheelwright/model/effect_law.hpp>
 #include <wheelwright/sim/simulation.hpp>
 
-namespace wheelwright {
+namespace wheelwright::effects_test {
 namespace {
 
 struct Case {
@@ -114,4 +114,4 @@ INSTANTIATE_TEST_SUITE_P(
     [](const ::testing::TestParamInfo<Case>& one) { return one.param.effect; });
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::effects_test

@@ -7,7 +7,7 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/sim/noise.hpp>
 
-namespace wheelwright {
+namespace wheelwright::noise_test {
 namespace {
 
 TEST(Noise, NeverExceedsItsBoundInAMillionDraws) {
@@ -75,4 +75,4 @@ TEST(Noise, WithoutABoundTheMeasurementIsExact) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::noise_test

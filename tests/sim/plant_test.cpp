@@ -8,7 +8,7 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/sim/plant.hpp>
 
-namespace wheelwright {
+namespace wheelwright::plant_test {
 namespace {
 
 using Kind = Fault::Kind;
@@ -213,4 +213,4 @@ TEST(Plant, RefusesParametersAndFaultsThatAreNone) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::plant_test

@@ -12,7 +12,7 @@
 
 #include "io/scratch.hpp"
 
-namespace wheelwright {
+namespace wheelwright::scenario_file_test {
 namespace {
 
 const std::string head =
@@ -199,4 +199,4 @@ TEST(ScenarioFile, ExamplesCanBeDriven) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::scenario_file_test

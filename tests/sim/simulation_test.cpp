@@ -11,7 +11,7 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/sim/simulation.hpp>
 
-namespace wheelwright {
+namespace wheelwright::simulation_test {
 namespace {
 
 using Kind = Trajectory::Kind;
@@ -318,7 +318,7 @@ TEST(Simulation, GapsSplitTheLogAndTheRobotDrivesOn) {
   s.gaps = {{10.0, 12.0}, {30.0, 30.5}};
   const LogTable log = simulate(s);
   EXPECT_EQ(log.rows(), whole.rows() - 200 - 50);
-  ASSERT_THAT(log.segment_starts, testing::ElementsAre(0U, 1000U, 2800U));
+  ASSERT_THAT(log.segment_starts, ::testing::ElementsAre(0U, 1000U, 2800U));
   EXPECT_EQ(log.t[1000], 12.0);
   EXPECT_EQ(log.column("phi_r").back(), whole.column("phi_r").back());
 }
@@ -369,7 +369,8 @@ TEST(Simulation, RefusesAScenarioThatMakesNoSense) {
   const auto refused = [](auto change, const char* field) {
     Scenario s = scenario();
     change(s);
-    EXPECT_THAT([&] { Simulation simulation(s); }, testing::ThrowsMessage<InvalidArgument>(testing::HasSubstr(field)));
+    EXPECT_THAT([&] { Simulation simulation(s); },
+                ::testing::ThrowsMessage<InvalidArgument>(::testing::HasSubstr(field)));
   };
   refused([](Scenario& s) { s.rate = 0.0; }, "rate");
   refused([](Scenario& s) { s.duration = std::nan(""); }, "duration");
@@ -389,4 +390,4 @@ TEST(Simulation, RefusesAScenarioThatMakesNoSense) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::simulation_test

@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// The limits of double by short names.
+#pragma once
+
+#include <limits>
+
+namespace wheelwright {
+
+inline constexpr double kEpsilon = std::numeric_limits<double>::epsilon();    ///< from 1 to the next double
+inline constexpr double kInfinity = std::numeric_limits<double>::infinity();  ///< no bound, or never
+inline constexpr double kNan = std::numeric_limits<double>::quiet_NaN();      ///< no value
+inline constexpr double kTiny = std::numeric_limits<double>::min();           ///< smallest normal double
+
+}  // namespace wheelwright
