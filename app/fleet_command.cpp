@@ -97,10 +97,10 @@ RobotLogs logs_of(const FleetListRobot& robot, const std::optional<Robot>& fleet
   return logs;
 }
 
-Plan plan_of(const Arguments& a, const std::optional<Robot>& fleet) {
-  Plan plan = {{"fleet format", kFleetSchema},
-               {"--robot", fleet ? json_text(to_json(*fleet), -1) : std::string("none")},
-               {"--statistical", a.statistical ? "yes" : "no"}};
+StoredPlan plan_of(const Arguments& a, const std::optional<Robot>& fleet) {
+  StoredPlan plan = {{"fleet format", kFleetSchema},
+                     {"--robot", fleet ? json_text(to_json(*fleet), -1) : std::string("none")},
+                     {"--statistical", a.statistical ? "yes" : "no"}};
   std::string maps;
   for (const std::string& map : a.common.map) {
     maps += map + " ";

@@ -56,7 +56,7 @@ void check_together(const CommonOptions& common, const ScaleOptions& scale) {
 }
 
 // What every process that takes part has to agree on.
-std::string fingerprint(const Plan& plan, const StoredItems& items) {
+std::string fingerprint(const StoredPlan& plan, const StoredItems& items) {
   std::string text;
   for (const auto& [name, value] : plan) {
     text += fmt::format("{}: {}\n", name, value);
@@ -141,7 +141,7 @@ ItemsRun run_items(const ItemsToRun& items, const CommonOptions& common, const S
                    const std::function<void(std::size_t, std::size_t)>& progress) {
   check_together(common, scale);
   make_directory(common);
-  Plan plan = items.plan;
+  StoredPlan plan = items.plan;
   plan.emplace_back("the program", software());
   const StoredItems stored{items.work.items, items.key};
   const Opening opening = scale.fresh ? Opening::fresh : Opening::resume;

@@ -33,7 +33,7 @@ struct ItemsToRun {
   /// StoredItems::key of each item. Messages name items by the beginning of their keys: begin with a name.
   std::function<std::string(std::size_t item)> key;
   /// What every result depends on; run_items() adds the program's version. No option that changes no result (threads, shard).
-  Plan plan;
+  StoredPlan plan;
 };
 
 /// What came of it.

@@ -41,7 +41,7 @@ class Transaction {
 
 }  // namespace
 
-std::string difference(const Plan& there, const Plan& here) {
+std::string difference(const StoredPlan& there, const StoredPlan& here) {
   const std::map<std::string, std::string> old(there.begin(), there.end());
   const std::map<std::string, std::string> now(here.begin(), here.end());
   std::string text;
@@ -65,7 +65,7 @@ std::string difference(const Plan& there, const Plan& here) {
 // The open file.
 class SqliteResults::Tables {
  public:
-  Tables(const fs::path& file, const Plan& plan, Opening opening)
+  Tables(const fs::path& file, const StoredPlan& plan, Opening opening)
       : shown_(file.empty() ? "results" : file.string()), database_(file, shown_, Database::Mode::keeping) {
     demand(database_.run("PRAGMA busy_timeout=300; BEGIN EXCLUSIVE"));
     Transaction transaction(database_);
@@ -165,7 +165,7 @@ class SqliteResults::Tables {
     return statement.integer(0);
   }
 
-  void begin(const Plan& plan) {
+  void begin(const StoredPlan& plan) {
     demand(database_.run(
         fmt::format("PRAGMA application_id={}; PRAGMA user_version={};"
                     "CREATE TABLE plan(name TEXT PRIMARY KEY, value TEXT NOT NULL);"
@@ -180,8 +180,8 @@ class SqliteResults::Tables {
     }
   }
 
-  void compare(const Plan& plan) const {
-    Plan there;
+  void compare(const StoredPlan& plan) const {
+    StoredPlan there;
     Statement rows = prepare("SELECT name, value FROM plan");
     Statement::Result step = rows.step();
     for (; step == Statement::Result::row; step = rows.step()) {
@@ -214,7 +214,7 @@ class SqliteResults::Tables {
   Statement insert_;
 };
 
-SqliteResults::SqliteResults(const fs::path& file, const Plan& plan, StoredItems items, Opening opening)
+SqliteResults::SqliteResults(const fs::path& file, const StoredPlan& plan, StoredItems items, Opening opening)
     : file_(file), plan_(plan), items_(std::move(items)) {
   check::that(std::map<std::string, std::string>(plan.begin(), plan.end()).size() == plan.size(), "plan",
               "each name once");

@@ -18,10 +18,10 @@
 namespace wheelwright {
 
 /// What every result of a run depends on, beside the item itself: names and values, e.g. {"--beta", "40"}. Names differ.
-using Plan = std::vector<std::pair<std::string, std::string>>;
+using StoredPlan = std::vector<std::pair<std::string, std::string>>;
 
 /// "--beta is 40 there and 30 here; …": where two plans differ; empty where they do not. Their order does not count.
-[[nodiscard]] std::string difference(const Plan& there, const Plan& here);
+[[nodiscard]] std::string difference(const StoredPlan& there, const StoredPlan& here);
 
 /// The items of a run.
 struct StoredItems {
@@ -47,7 +47,7 @@ class SqliteResults final : public ResultStore {
   /// Opens or begins the store in `file`; an empty path is one that is gone with the object. Throws InputError, naming the
   /// file and what to do, where it cannot be opened, is in use, is no store of results or one of another version of the
   /// format, or holds results of another plan. InvalidArgument for a plan with a name twice.
-  SqliteResults(const std::filesystem::path& file, const Plan& plan, StoredItems items,
+  SqliteResults(const std::filesystem::path& file, const StoredPlan& plan, StoredItems items,
                 Opening opening = Opening::resume);
   ~SqliteResults() override;
   SqliteResults(const SqliteResults&) = delete;
@@ -76,7 +76,7 @@ class SqliteResults final : public ResultStore {
  private:
   class Tables;
   std::filesystem::path file_;
-  Plan plan_;
+  StoredPlan plan_;
   StoredItems items_;
   std::unique_ptr<Tables> tables_;
 };

@@ -83,7 +83,7 @@ CODE = {".hpp", ".cpp", ".cmake", ".py", ".sh", ".js", ".css"}
 TEXT = CODE | {".md", ".yaml", ".yml", ".json", ".txt", ".cff", ".bib", ".in", ""}
 SKIP = re.compile(r"^(?:\.git|\.cache|build.*|node_modules|out|__pycache__)$")
 # A type that is defined in two headers of one namespace is two types of one name to the linker, which keeps one of them.
-TYPE = re.compile(r"^(?:struct|class|enum class|enum)\s+(\w+)\b(?!\s*<)[^;]*$", re.M)
+TYPE = re.compile(r"^(?:(?:struct|class|enum class|enum)\s+(\w+)\b(?!\s*<)[^;]*$|using\s+(\w+)\s*=)", re.M)
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]')
 
 
@@ -145,7 +145,7 @@ def check_links(room, relative, text, report):
 
 def check_types(relative, text, types, report):
     for match in TYPE.finditer(without_comments(text)):
-        name = match.group(1)
+        name = match.group(1) or match.group(2)
         number = text[: match.start()].count("\n") + 1
         if name in types:
             report(relative, number, f"{name} is defined in {types[name]} too")
@@ -216,6 +216,7 @@ def self_test():
         "no licence": ("core/x.cpp", "int x;\n"),
         "no licence in a script": ("tools/x", "#!/bin/sh\ntrue\n"),
         "one name, two types": ("detector/x.hpp", head + "class A final {\n};\n"),
+        "one name, a type and an alias": ("detector/x.hpp", head + "using A = int;\n"),
         "no guard": ("core/x.hpp", spdx),
         "private path": ("docs/x.md", "see /" + "work/main\n"),
         "another private path": ("examples/x.yaml", "log: /" + "tmp/bash_jobs.0/x\n"),

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // `wheelwright margins`, as a user runs it: on the drive that was commissioned with, a pose beside it.
+#include <limits>
+
 #include "app/program.hpp"
 
 namespace wheelwright::margins_test {

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The feasible set of simulated rows: what it must contain, and what it must not depend on.
+#include <limits>
+
 #include <gtest/gtest.h>
 
 #include <wheelwright/bounds/feasible_set.hpp>

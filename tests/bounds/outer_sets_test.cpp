@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Ellipsoids and zonotopes around polytopes: inclusion in exact rationals, closed forms, units.
+#include <limits>
+
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>

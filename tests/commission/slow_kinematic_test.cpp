@@ -2,6 +2,7 @@
 // What is promised of the kinematic residual under declared noise, counted.
 #include <cmath>
 #include <cstdint>
+#include <limits>
 
 #include <gtest/gtest.h>
 

@@ -24,7 +24,7 @@ using ::testing::HasSubstr;
 using testing::input_error;
 using Opening = SqliteResults::Opening;
 
-const Plan kPlan = {{"study.yaml", "xxh64:0"}, {"--beta", "40"}};
+const StoredPlan kPlan = {{"study.yaml", "xxh64:0"}, {"--beta", "40"}};
 
 StoredItems items(std::size_t count, const std::string& before = "robot ") {
   return {count, [before](std::size_t item) { return before + std::to_string(item); }};
@@ -99,9 +99,9 @@ TEST_F(ResultStoreTest, OneResultForAKey) {
 
 TEST_F(ResultStoreTest, AnotherPlanIsRefusedAndNamed) {
   { SqliteResults(file(), kPlan, items(2)).put(0, "x"); }
-  const Plan reordered = {kPlan[1], kPlan[0]};
+  const StoredPlan reordered = {kPlan[1], kPlan[0]};
   EXPECT_TRUE(SqliteResults(file(), reordered, items(2)).has(0));
-  const Plan other = {{"study.yaml", "xxh64:0"}, {"--beta", "30"}, {"--alpha", "10"}};
+  const StoredPlan other = {{"study.yaml", "xxh64:0"}, {"--beta", "30"}, {"--alpha", "10"}};
   EXPECT_THAT(input_error([&] { SqliteResults(file(), other, items(2)); }),
               AllOf(HasSubstr("results.sqlite"), HasSubstr("--beta is 40 there and 30 here"),
                     HasSubstr("--alpha is not told there and 10 here"), HasSubstr("--out"), HasSubstr("--fresh"),

@@ -32,7 +32,7 @@ int main(int argc, char** argv) {
                   }};
   std::unique_ptr<SqliteResults> store;
   const RunCount count = run_work_on_ranks(mpi, work, "", [&]() -> ResultStore& {
-    store = std::make_unique<SqliteResults>(argv[1], Plan{},
+    store = std::make_unique<SqliteResults>(argv[1], StoredPlan{},
                                             StoredItems{300, [](std::size_t item) { return std::to_string(item); }});
     return *store;
   });
