@@ -18,7 +18,7 @@
 #include "bench.hpp"
 #include "temporary_file.hpp"
 
-namespace wheelwright::bench {
+namespace wheelwright::bench::bag_bench {
 namespace {
 
 constexpr std::size_t messages = 1'000'000;
@@ -97,4 +97,4 @@ std::vector<Measurement> bag_against_undecoded() {
 const bool registered = register_bench("io/bag", bag_against_undecoded);
 
 }  // namespace
-}  // namespace wheelwright::bench
+}  // namespace wheelwright::bench::bag_bench

@@ -11,7 +11,7 @@
 
 #include "bench.hpp"
 
-namespace wheelwright::bench {
+namespace wheelwright::bench::bounds_bench {
 namespace {
 
 constexpr double noise = 0.1;
@@ -78,4 +78,4 @@ std::vector<Measurement> sets() {
 const bool registered = register_bench("bounds/source", sets);
 
 }  // namespace
-}  // namespace wheelwright::bench
+}  // namespace wheelwright::bench::bounds_bench

@@ -16,7 +16,7 @@
 #include "bench.hpp"
 #include "temporary_file.hpp"
 
-namespace wheelwright::bench {
+namespace wheelwright::bench::csv_bench {
 namespace {
 
 constexpr std::size_t rows = 1000000;
@@ -82,4 +82,4 @@ std::vector<Measurement> csv_against_bare_read() {
 const bool registered = register_bench("io/csv", csv_against_bare_read);
 
 }  // namespace
-}  // namespace wheelwright::bench
+}  // namespace wheelwright::bench::csv_bench

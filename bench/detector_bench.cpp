@@ -27,7 +27,7 @@
 #include "bench.hpp"
 #include "drive_rows.hpp"
 
-namespace wheelwright::bench {
+namespace wheelwright::bench::detector_bench {
 namespace {
 
 constexpr int kRepetitions = 5;
@@ -242,4 +242,4 @@ const bool registered = register_bench("detector/step", steps) && register_bench
                         register_bench("detector/support", supports);
 
 }  // namespace
-}  // namespace wheelwright::bench
+}  // namespace wheelwright::bench::detector_bench

@@ -19,7 +19,7 @@
 #include "drive_rows.hpp"
 #include "lp_peers.hpp"
 
-namespace wheelwright::bench {
+namespace wheelwright::bench::engine_bench {
 namespace {
 
 struct Kind {
@@ -227,4 +227,4 @@ const bool registered = register_bench("bounds/hull", hulls) && register_bench("
                         register_bench("bounds/threads", threads);
 
 }  // namespace
-}  // namespace wheelwright::bench
+}  // namespace wheelwright::bench::engine_bench

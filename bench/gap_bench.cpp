@@ -22,7 +22,7 @@
 
 #include "bench.hpp"
 
-namespace wheelwright::bench {
+namespace wheelwright::bench::gap_bench {
 namespace {
 
 constexpr double kRate = 200.0;  // Hz
@@ -184,4 +184,4 @@ std::vector<Measurement> catalogue() {
 const bool registered = register_bench("gap/catalogue", catalogue);
 
 }  // namespace
-}  // namespace wheelwright::bench
+}  // namespace wheelwright::bench::gap_bench

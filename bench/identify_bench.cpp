@@ -19,7 +19,7 @@ extern "C" void dgels_(const char* trans, const int* m, const int* n, const int*
                        double* b, const int* ldb, double* work, const int* lwork, int* info);
 #endif
 
-namespace wheelwright::bench {
+namespace wheelwright::bench::identify_bench {
 namespace {
 
 constexpr std::size_t kRows = 1000000;
@@ -103,4 +103,4 @@ const bool registered_normal = register_bench("identify/normal_equations", norma
 const bool registered_instruments = register_bench("identify/instrumental_variables", instruments);
 
 }  // namespace
-}  // namespace wheelwright::bench
+}  // namespace wheelwright::bench::identify_bench

@@ -16,7 +16,7 @@
 #include "drive_rows.hpp"
 #include "lp_peers.hpp"
 
-namespace wheelwright::bench {
+namespace wheelwright::bench::lp_peers_bench {
 namespace {
 
 constexpr double agreement = 1e-6;  // of the width, or of γ
@@ -194,4 +194,4 @@ std::vector<Measurement> peers() {
 const bool registered = register_bench("bounds/peers", peers);
 
 }  // namespace
-}  // namespace wheelwright::bench
+}  // namespace wheelwright::bench::lp_peers_bench

@@ -18,7 +18,7 @@
 #include "bench.hpp"
 #include "temporary_file.hpp"
 
-namespace wheelwright::bench {
+namespace wheelwright::bench::mcap_bench {
 namespace {
 
 constexpr std::size_t messages = 2'000'000;
@@ -103,4 +103,4 @@ std::vector<Measurement> mcap_against_bare_read() {
 const bool registered = register_bench("io/mcap", mcap_against_bare_read);
 
 }  // namespace
-}  // namespace wheelwright::bench
+}  // namespace wheelwright::bench::mcap_bench

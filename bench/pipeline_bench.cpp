@@ -30,7 +30,7 @@
 
 #include "bench.hpp"
 
-namespace wheelwright::bench {
+namespace wheelwright::bench::pipeline_bench {
 namespace {
 
 constexpr int repetitions = 3;
@@ -331,4 +331,4 @@ const bool registered =
     register_bench("commission/all", commission_all) && register_bench("commission/file", commission_file);
 
 }  // namespace
-}  // namespace wheelwright::bench
+}  // namespace wheelwright::bench::pipeline_bench

@@ -60,7 +60,7 @@ int main(int argc, char** argv) {
       [&]() -> ResultStore& {
         if (argc == 6) {
           store = std::make_unique<SqliteResults>(
-              argv[5], Plan{}, StoredItems{items, [](std::size_t item) { return "robot " + std::to_string(item); }},
+              argv[5], StoredPlan{}, StoredItems{items, [](std::size_t item) { return "robot " + std::to_string(item); }},
               SqliteResults::Opening::fresh);
         } else {
           store = std::make_unique<Nowhere>();

@@ -17,7 +17,7 @@
 #include "bench.hpp"
 #include "temporary_file.hpp"
 
-namespace wheelwright::bench {
+namespace wheelwright::bench::work_bench {
 namespace {
 
 constexpr std::size_t shared_items = 200'000;
@@ -88,4 +88,4 @@ const bool registered_sharing = register_bench("sensitivity/work", sharing);
 const bool registered_keeping = register_bench("io/result_store", keeping);
 
 }  // namespace
-}  // namespace wheelwright::bench
+}  // namespace wheelwright::bench::work_bench
