@@ -55,19 +55,20 @@ int main(int argc, char** argv) {
   std::unique_ptr<ResultStore> store;
   const double before = processor_seconds();
   const auto begin = std::chrono::steady_clock::now();
-  const RunCount count = run_work_on_ranks(
-      mpi, work, "",
-      [&]() -> ResultStore& {
-        if (argc == 6) {
-          store = std::make_unique<SqliteResults>(
-              argv[5], StoredPlan{}, StoredItems{items, [](std::size_t item) { return "robot " + std::to_string(item); }},
-              SqliteResults::Opening::fresh);
-        } else {
-          store = std::make_unique<Nowhere>();
-        }
-        return *store;
-      },
-      {threads, {}, {}});
+  const RunCount count =
+      run_work_on_ranks(mpi, work, "",
+                        [&]() -> ResultStore& {
+                          if (argc == 6) {
+                            store = std::make_unique<SqliteResults>(
+                                argv[5], StoredPlan{},
+                                StoredItems{items, [](std::size_t item) { return "robot " + std::to_string(item); }},
+                                SqliteResults::Opening::fresh);
+                          } else {
+                            store = std::make_unique<Nowhere>();
+                          }
+                          return *store;
+                        },
+                        {threads, {}, {}});
   const double wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   const double processor = processor_seconds() - before;
   std::printf("rank %d of %d, %zu threads: %zu items, %.3f s, %.0f items/s, processor %.3f s, %.2f us/item, %.2f %%\n",
