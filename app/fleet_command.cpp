@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cstdio>
 #include <memory>
 #include <optional>
@@ -147,6 +148,31 @@ std::string command_of(const Arguments& a) {
   return out + " --out DIR";
 }
 
+// Why logs failed, the most frequent reasons first, each with one log that it befell.
+void tell_failures(const FleetResult& fleet) {
+  constexpr std::size_t kMostReasons = 5;
+  struct Reason {
+    const FleetFinding* first;
+    std::size_t count;
+  };
+  std::vector<Reason> reasons;
+  for (const FleetFinding& finding : fleet.failed) {
+    const auto known = std::find_if(reasons.begin(), reasons.end(),
+                                    [&](const Reason& reason) { return reason.first->text == finding.text; });
+    known == reasons.end() ? reasons.push_back({&finding, 1}) : void(++known->count);
+  }
+  std::stable_sort(reasons.begin(), reasons.end(), [](const Reason& a, const Reason& b) { return a.count > b.count; });
+  for (std::size_t i = 0; i < std::min(reasons.size(), kMostReasons); ++i) {
+    const auto& [first, count] = reasons[i];
+    const std::string& robot = fleet.table.robots[first->robot];
+    fmt::print("  {}{}{}: {}\n", robot, first->log.empty() ? "" : ", " + first->log,
+               count > 1 ? fmt::format(" and {} more", count - 1) : "", first->text);
+  }
+  if (reasons.size() > kMostReasons) {
+    fmt::print("  and {} other reasons: see fleet.json or report.html in --out\n", reasons.size() - kMostReasons);
+  }
+}
+
 int run(const Arguments& a) {
   make_directory(a.common);
   (void)reader_options(a.common);  // what is wrong with --map is wrong for every log
@@ -184,6 +210,7 @@ int run(const Arguments& a) {
     for (const std::string& sentence : sentences(fleet)) {
       fmt::print("{}\n", sentence);
     }
+    tell_failures(fleet);
     if (!a.common.out.empty()) {
       fmt::print("wrote fleet.json, fleet.csv, pooled_prior.yaml and report.html to {}\n", a.common.out.string());
     }

@@ -167,5 +167,15 @@ TEST_F(FleetCommand, BadUsageIsTold) {
   EXPECT_THAT(lost.out, HasSubstr("gone.csv: no such file"));
 }
 
+TEST_F(FleetCommand, TellsWhyNothingCouldBeExamined) {
+  put("a.csv", "t\n0\n");
+  put("b.csv", "t\n0\n");
+  put("list.csv", "robot,log\namy,a.csv\nbob,b.csv\ncleo,gone.csv\n");
+  const Outcome told = run("fleet list.csv");
+  EXPECT_EQ(told.code, 1);
+  EXPECT_THAT(told.out, HasSubstr("  amy, a.csv and 2 more: no robot file: expected --robot"));
+  EXPECT_THAT(told.out, HasSubstr("  cleo: gone.csv: no such file"));
+}
+
 }  // namespace
 }  // namespace wheelwright::fleet_test
