@@ -159,7 +159,11 @@ void tell_failures(const FleetResult& fleet) {
   for (const FleetFinding& finding : fleet.failed) {
     const auto known = std::find_if(reasons.begin(), reasons.end(),
                                     [&](const Reason& reason) { return reason.first->text == finding.text; });
-    known == reasons.end() ? reasons.push_back({&finding, 1}) : void(++known->count);
+    if (known == reasons.end()) {
+      reasons.push_back({&finding, 1});
+    } else {
+      ++known->count;
+    }
   }
   std::stable_sort(reasons.begin(), reasons.end(), [](const Reason& a, const Reason& b) { return a.count > b.count; });
   for (std::size_t i = 0; i < std::min(reasons.size(), kMostReasons); ++i) {
