@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/io/json_number.hpp>
+#include <wheelwright/io/json_vector.hpp>
 #include <wheelwright/io/model_words.hpp>
 
 namespace wheelwright {
@@ -88,14 +89,6 @@ Json validation_json(const KinematicCommissioning& r, const OdometryMeasurement&
   return {{"blocks", folds.blocks}, {"held_out_every", folds.hold_out_every}, {"purge", window}, {"outputs", outputs}};
 }
 
-Eigen::VectorXd exact_vector_at(const JsonPlace& place, std::size_t size) {
-  const std::vector<double> values = place.numbers();
-  if (values.size() != size) {
-    place.fail("an array of " + std::to_string(size) + " numbers");
-  }
-  return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(size));
-}
-
 double bound_at(const JsonPlace& place) {
   const double value = place.number();
   if (!(value >= 0.0)) {
@@ -162,25 +155,25 @@ std::optional<KinematicModel> kinematic_from_json(const JsonPlace& place) {
   model.window = place.at("window").number();
   const std::size_t p = model.measurement.parameters().size(), n = model.measurement.outputs().size();
   const JsonPlace detector = place.at("detector"), errors = detector.at("error_bounds"), set = place.at("feasible_set");
-  model.estimate = exact_vector_at(detector.at("estimate"), p);
+  model.estimate = vector_at(detector.at("estimate"), p);
   model.errors.motion = bound_at(errors.at("motion"));
   model.errors.position = bound_at(errors.at("position"));
   model.errors.heading = bound_at(errors.at("heading"));
   model.errors.acceleration = bound_at(errors.at("acceleration"));
   model.errors.yaw_gain = bound_at(errors.at("yaw_gain"));
-  model.errors.estimated = exact_vector_at(errors.at("estimated"), n);
+  model.errors.estimated = vector_at(errors.at("estimated"), n);
   model.persistence = {detector.at("persistence").at("k").count(), detector.at("persistence").at("n").count()};
   const JsonPlace a = set.at("A");
-  const Eigen::VectorXd b = exact_vector_at(set.at("b"), a.size());
+  const Eigen::VectorXd b = vector_at(set.at("b"), a.size());
   for (std::size_t k = 0; k < a.size(); ++k) {
-    model.facets.push_back({exact_vector_at(a.at(k), p), b[static_cast<Eigen::Index>(k)], {}});
+    model.facets.push_back({vector_at(a.at(k), p), b[static_cast<Eigen::Index>(k)], {}});
   }
   const JsonPlace hull = set.at("hull");
   if (hull.size() != p) {
     hull.fail("an array of " + std::to_string(p) + " intervals");
   }
   for (std::size_t j = 0; j < p; ++j) {
-    const Eigen::VectorXd side = exact_vector_at(hull.at(j), 2);
+    const Eigen::VectorXd side = vector_at(hull.at(j), 2);
     if (!(side[0] <= side[1])) {
       hull.at(j).fail("[lower, upper] with lower <= upper");
     }

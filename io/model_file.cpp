@@ -3,25 +3,13 @@
 
 #include <nlohmann/json.hpp>
 
+#include <wheelwright/io/json_vector.hpp>
 #include <wheelwright/io/kinematic_json.hpp>
 #include <wheelwright/io/model_words.hpp>
 #include <wheelwright/io/robot_file.hpp>
 
 namespace wheelwright {
 namespace {
-
-Eigen::VectorXd vector_at(const JsonPlace& place) {
-  const std::vector<double> values = place.numbers();
-  return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
-}
-
-Eigen::VectorXd vector_at(const JsonPlace& place, std::size_t size) {
-  Eigen::VectorXd values = vector_at(place);
-  if (static_cast<std::size_t>(values.size()) != size) {
-    place.fail("an array of " + std::to_string(size) + " numbers");
-  }
-  return values;
-}
 
 FilterDesign read_filter(const JsonPlace& place) {
   FilterDesign filter{.order = static_cast<int>(place.at("order").count()),
