@@ -122,6 +122,7 @@ DesignSubject subject_of(const CommissionedModel& model) {
   if (!worst_case) {
     subject.errors = model.errors;
   }
+  subject.warrant = model.warrant;
   return subject;
 }
 
