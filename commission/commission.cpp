@@ -256,9 +256,7 @@ std::string status_message(const Setting& s, const Commissioning& result) {
   return {};
 }
 
-}  // namespace
-
-Commissioning commission(LogSource& log, const Robot& robot, const CommissionOptions& options) {
+Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionOptions& options) {
   Commissioning result;
   result.noise_mode = options.noise_mode;
   const Setting s = settle(log, robot,
@@ -340,6 +338,14 @@ Commissioning commission(LogSource& log, const Robot& robot, const CommissionOpt
   }
   log.rewind();
   tell(options, "done", 1.0);
+  return result;
+}
+
+}  // namespace
+
+Commissioning commission(LogSource& log, const Robot& robot, const CommissionOptions& options) {
+  Commissioning result = commissioned(log, robot, options);
+  settle_warrants(result);
   return result;
 }
 

@@ -119,6 +119,7 @@ DesignSubject subject_of(const CommissionedModel& model) {
   if (!worst_case) {
     subject.errors = model.errors;
   }
+  subject.warrant = model.warrant;
   return subject;
 }
 
