@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <wheelwright/core/regression.hpp>
+#include <wheelwright/core/warrant.hpp>
 #include <wheelwright/detector/threshold.hpp>
 
 namespace wheelwright {
