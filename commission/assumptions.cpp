@@ -11,8 +11,6 @@
 namespace wheelwright {
 namespace {
 
-using Verdict = AssumptionVerdict;
-
 constexpr double kLongestStep = 1.5;  // median steps: beyond it rows are missing
 constexpr const char* kRowsExplained =
     "some parameters explain every row within its bound, and none of the held-out rows "
@@ -20,7 +18,7 @@ constexpr const char* kRowsExplained =
 
 // What the rows themselves say of model and noise, taken together.
 struct RowsVerdict {
-  Verdict verdict = Verdict::not_tested;
+  AssumptionVerdict verdict = AssumptionVerdict::not_tested;
   std::string detail;
 };
 
@@ -28,9 +26,10 @@ bool learnt(const OutputNoise& noise) { return noise.origin == NoiseOrigin::esti
 
 RowsVerdict rows_verdict(const Commissioning& r) {
   if (r.status == Commissioning::Status::empty) {
-    return {Verdict::fails, fmt::format("no parameters explain the log: one of the assumptions fails, or the noise is "
-                                        "{:.3g} times as large",
-                                        r.minimax)};
+    return {AssumptionVerdict::fails,
+            fmt::format("no parameters explain the log: one of the assumptions fails, or the noise is "
+                        "{:.3g} times as large",
+                        r.minimax)};
   }
   std::size_t outside = 0, instants = 0;
   for (const OutputValidation& v : r.validation) {
@@ -38,16 +37,18 @@ RowsVerdict rows_verdict(const Commissioning& r) {
     instants = std::max(instants, v.instants);
   }
   if (outside > 0) {
-    return {Verdict::fails, fmt::format("{} held-out rows of {} instants leave their threshold: one of the assumptions "
-                                        "fails",
-                                        outside, instants)};
+    return {AssumptionVerdict::fails,
+            fmt::format("{} held-out rows of {} instants leave their threshold: one of the assumptions "
+                        "fails",
+                        outside, instants)};
   }
   if (instants == 0 || std::ranges::any_of(r.noise, learnt)) {
-    return {Verdict::not_tested, instants == 0 ? "no row was held out"
+    return {AssumptionVerdict::not_tested, instants == 0
+                                               ? "no row was held out"
                                                : "the noise bounds were learnt from the rows that they would have to "
                                                  "judge"};
   }
-  return {Verdict::holds, fmt::format("{} instants held out, none outside", instants)};
+  return {AssumptionVerdict::holds, fmt::format("{} instants held out, none outside", instants)};
 }
 
 Assumption assumed_hold(const Robot& robot) {
@@ -103,7 +104,9 @@ Assumption assumed_geometry(const Commissioning& r) {
     }
   }
   const bool bounds_learnt = std::ranges::any_of(k.noise, learnt);
-  a.verdict = a.detail.empty() ? Verdict::holds : bounds_learnt ? Verdict::not_tested : Verdict::fails;
+  a.verdict = a.detail.empty() ? AssumptionVerdict::holds
+              : bounds_learnt  ? AssumptionVerdict::not_tested
+                               : AssumptionVerdict::fails;
   if (bounds_learnt) {
     a.detail += a.detail.empty() ? "against bounds learnt from the log" : ": against bounds learnt from the log";
   }
@@ -117,8 +120,9 @@ void add_noise_bounds(std::vector<Assumption>& list, const Commissioning& r, con
          .statement = "Noise and driving to come stay as they were in this log.",
          .declared_by = "noise: estimate",
          .test = "no held-out row leaves its threshold",
-         .verdict = rows.verdict == Verdict::fails ? Verdict::fails : Verdict::not_tested,
-         .detail = rows.verdict == Verdict::fails ? rows.detail : "says nothing of driving that is unlike it"});
+         .verdict = rows.verdict == AssumptionVerdict::fails ? AssumptionVerdict::fails : AssumptionVerdict::not_tested,
+         .detail =
+             rows.verdict == AssumptionVerdict::fails ? rows.detail : "says nothing of driving that is unlike it"});
     return;
   }
   const SensorNoise& noise = r.model.robot.noise;
@@ -182,7 +186,7 @@ Assumption lost_rows(const Survey& survey) {
                .declared_by = {},
                .test = fmt::format("no step within a segment is longer than {:g} median steps", kLongestStep)};
   const double ratio = survey.median_step > 0.0 ? survey.largest_step / survey.median_step : 0.0;
-  a.verdict = ratio > 0.0 && ratio <= kLongestStep ? Verdict::holds : Verdict::not_tested;
+  a.verdict = ratio > 0.0 && ratio <= kLongestStep ? AssumptionVerdict::holds : AssumptionVerdict::not_tested;
   a.detail = fmt::format("the longest is {:.3g} s, the median {:.3g} s", survey.largest_step, survey.median_step);
   return a;
 }
@@ -210,16 +214,16 @@ Assumption time_constant(const Commissioning& r) {
     const double shortest = f->upper > 0.0 ? m->lower / f->upper : 0.0;
     all = all && m->lower > half * f->upper;
     if (m->upper < half * f->lower) {
-      a.verdict = Verdict::fails;
+      a.verdict = AssumptionVerdict::fails;
     }
     a.detail +=
         fmt::format("{}{} over {} is at least {:.3g} s", a.detail.empty() ? "" : "; ", inertia, viscous, shortest);
   }
   if (a.detail.empty() || r.status == Commissioning::Status::empty) {
-    a.verdict = Verdict::not_tested;
+    a.verdict = AssumptionVerdict::not_tested;
     a.detail.clear();
-  } else if (a.verdict != Verdict::fails) {
-    a.verdict = all ? Verdict::holds : Verdict::not_tested;
+  } else if (a.verdict != AssumptionVerdict::fails) {
+    a.verdict = all ? AssumptionVerdict::holds : AssumptionVerdict::not_tested;
   }
   a.detail += fmt::format("{}half a step is {:.3g} s", a.detail.empty() ? "" : "; ", half);
   return a;
@@ -236,7 +240,7 @@ Assumption assumed_prior(const Commissioning& r) {
     }
   }
   const bool bounded = r.status != Commissioning::Status::empty && !r.parameters.empty();
-  a.verdict = bounded && a.detail.empty() ? Verdict::holds : Verdict::not_tested;
+  a.verdict = bounded && a.detail.empty() ? AssumptionVerdict::holds : AssumptionVerdict::not_tested;
   return a;
 }
 
@@ -272,7 +276,7 @@ Warrant settle_outputs(std::vector<OutputNoise>& noise, std::vector<OutputValida
 }  // namespace
 
 std::string_view verdict_word(AssumptionVerdict verdict) {
-  return verdict == Verdict::holds ? "holds" : verdict == Verdict::fails ? "fails" : "not tested";
+  return verdict == AssumptionVerdict::holds ? "holds" : verdict == AssumptionVerdict::fails ? "fails" : "not tested";
 }
 
 std::vector<Assumption> assumptions_of(const Commissioning& result) {
@@ -306,7 +310,7 @@ std::vector<Assumption> assumptions_of(const Commissioning& result) {
 void settle_warrants(Commissioning& result) {
   result.assumptions = assumptions_of(result);
   const bool contradicted = std::ranges::any_of(
-      result.assumptions, [](const Assumption& assumption) { return assumption.verdict == Verdict::fails; });
+      result.assumptions, [](const Assumption& assumption) { return assumption.verdict == AssumptionVerdict::fails; });
   result.model.assumptions = result.assumptions;
   result.model.warrant = settle_outputs(result.noise, result.validation, result.noise_mode, contradicted);
   for (ParameterResult& parameter : result.parameters) {

@@ -10,6 +10,7 @@
 #include <wheelwright/bounds/box.hpp>
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/core/regression.hpp>
+#include <wheelwright/core/warrant.hpp>
 #include <wheelwright/detector/reference_motion.hpp>
 #include <wheelwright/model/robot.hpp>
 

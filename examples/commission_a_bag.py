@@ -41,7 +41,7 @@ for note in log.notes:
     print("  ", note)
 
 # %% [markdown]
-# Best-guess parameters, guaranteed bounds, thresholds, and a trial on driving that was held out.
+# Best-guess parameters, bounds (guaranteed or extrapolated), thresholds, and a trial on driving that was held out.
 
 
 # %%

@@ -113,17 +113,23 @@ OdometryMeasurement read_measurement(const JsonPlace& place) {
   return m;
 }
 
-/// Of a model from before it said so, what its noise tells.
+/// What the numbers stand on; of a model from before it said so, what its noise tells.
 Warrant kinematic_warrant(const JsonPlace& place) {
-  const JsonPlace outputs = place.at("noise").at("outputs");
-  bool declared = outputs.size() > 0;
-  for (std::size_t i = 0; i < outputs.size(); ++i) {
-    declared = declared && value_of(kNoiseOriginWords, outputs.at(i).at("origin")) == NoiseOrigin::declared;
-  }
-  return warrant_at(place, declared ? Warrant::guaranteed : Warrant::extrapolated);
+  const bool told = place.has("warrant") || !place.has("noise");
+  return warrant_at(place, !told && all_declared(place.at("noise")) ? Warrant::guaranteed : Warrant::extrapolated);
 }
 
 }  // namespace
+
+bool all_declared(const JsonPlace& noise) {
+  const JsonPlace outputs = noise.at("outputs");
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    if (value_of(kNoiseOriginWords, outputs.at(i).at("origin")) != NoiseOrigin::declared) {
+      return false;
+    }
+  }
+  return outputs.size() > 0;
+}
 
 std::optional<Json> kinematic_json(const KinematicCommissioning& r, const FoldOptions& folds) {
   if (r.status == Status::absent) {

@@ -17,4 +17,7 @@ namespace wheelwright {
 /// and key, when a number is missing or impossible.
 [[nodiscard]] std::optional<KinematicModel> kinematic_from_json(const JsonPlace& place);
 
+/// Whether each of the `outputs` of an object `noise` has the origin "declared", and there is one.
+[[nodiscard]] bool all_declared(const JsonPlace& noise);
+
 }  // namespace wheelwright

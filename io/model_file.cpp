@@ -245,13 +245,13 @@ void read_data(const JsonPlace& place, ModelClaims& claims) {
 
 /// What the numbers of a model stand on; of a model from before it said so, what its noise tells.
 Warrant warrant_of_model(const JsonPlace& root) {
-  const JsonPlace noise = root.at("noise"), outputs = noise.at("outputs");
-  bool declared = outputs.size() > 0;
-  for (std::size_t i = 0; i < outputs.size(); ++i) {
-    declared = declared && value_of(kNoiseOriginWords, outputs.at(i).at("origin")) == NoiseOrigin::declared;
+  if (root.has("warrant") || !root.has("noise")) {
+    return warrant_at(root, Warrant::extrapolated);
   }
-  const bool worst_case = value_of(kNoiseModeWords, noise.at("mode")) == NoiseMode::worst_case;
-  return warrant_at(root, !declared ? Warrant::extrapolated : worst_case ? Warrant::guaranteed : Warrant::statistical);
+  const bool worst_case = value_of(kNoiseModeWords, root.at("noise").at("mode")) == NoiseMode::worst_case;
+  return !all_declared(root.at("noise")) ? Warrant::extrapolated
+         : worst_case                    ? Warrant::guaranteed
+                                         : Warrant::statistical;
 }
 
 /// The document's root, after a look at its schema.

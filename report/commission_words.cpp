@@ -197,10 +197,9 @@ std::vector<std::string> words_with_model(const Commissioning& result) {
   }
   out.push_back(footing(result));
   out.push_back(held_out(result));
-  out.push_back(sees(result));
-  if (result.model.warrant != Warrant::guaranteed && smallest_certain_kappa(result)) {
-    out.push_back(certain_meaning(result.model.warrant));
-  }
+  out.push_back(sees(result) + (smallest_certain_kappa(result) && result.model.warrant != Warrant::guaranteed
+                                    ? " " + certain_meaning(result.model.warrant)
+                                    : ""));
   if (false_alarms(result) > 0) {
     out.emplace_back(
         "What to do: look at those moments in the log; where they are no fault, commission on longer and more "

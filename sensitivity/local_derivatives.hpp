@@ -14,6 +14,7 @@
 
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/core/log.hpp>
+#include <wheelwright/core/warrant.hpp>
 #include <wheelwright/sensitivity/hull_derivatives.hpp>
 
 namespace wheelwright {

@@ -31,6 +31,7 @@ RobotRecord full_record() {
   record.commissioning.parameters[1].standard_error.reset();
   record.commissioning.parameters[1].lower = std::nextafter(1.0, 2.0);
   record.commissioning.parameters[1].upper_is_prior = true;
+  record.commissioning.parameters[0].warrant = Warrant::guaranteed;
   record.commissioning.parameters[0].freedom = 6.5;
   record.outputs = {{.name = "sum", .unit = "N·m", .median_width = 0.1, .instants = 7, .false_alarms = 1}};
   record.smallest_radius_change = 0.04;
@@ -72,7 +73,7 @@ TEST(FleetJson, CsvHasARowForEachParameter) {
   EXPECT_EQ(std::count(rows.begin(), rows.end(), '\n'), 2 + 2) << "the name has a line end of its own, in quotes";
   EXPECT_NE(rows.find("\"a \"\"b\"\", c\nµ\",commissioned,mass,kg,"), std::string::npos) << rows;
   RobotRecord empty{.robot = "lost", .dated = false, .commissioning = {}};
-  EXPECT_EQ(fleet_csv_rows(empty), "lost,unreadable,,,,,,,,\n");
+  EXPECT_EQ(fleet_csv_rows(empty), "lost,unreadable,,,,,,,,,\n");
   const auto commas = [](const std::string& text) { return std::count(text.begin(), text.end(), ','); };
   EXPECT_EQ(commas(fleet_csv_rows(empty)), commas(fleet_csv_header()));
 }

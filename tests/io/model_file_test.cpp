@@ -152,6 +152,42 @@ TEST(ModelFile, GivesBackTheClaimsWithTheirProofs) {
   EXPECT_EQ(claims.rows, result.survey.rows);
 }
 
+TEST(ModelFile, GivesBackWhatItsNumbersStandOn) {
+  const Commissioning declared = commissioned(scenario_of("multi_sine", 20.0, kDeclared, kSensors));
+  const Commissioning learnt = commissioned(scenario_of("multi_sine", 20.0, "", kSensors));
+  for (const auto& [result, warrant] :
+       {std::pair(&declared, Warrant::guaranteed), std::pair(&learnt, Warrant::extrapolated)}) {
+    ASSERT_EQ(result->model.warrant, warrant) << result->message;
+    Json json = to_json(*result, LogReport{}, "test");
+    const std::string word(warrant_word(warrant));
+    EXPECT_EQ(json.at("warrant"), word);
+    for (const Json& parameter : json.at("parameters")) {
+      EXPECT_EQ(parameter.at("warrant"), word);
+    }
+    for (const auto& quantity : json.at("physical").items()) {
+      EXPECT_EQ(quantity.value().at("warrant"), word);
+    }
+    EXPECT_EQ(model_from_json(json, "f").warrant, warrant);
+    EXPECT_EQ(model_from_json(json, "f").assumptions, result->assumptions);
+    EXPECT_EQ(claims_from_json(json, "f").warrant, warrant);
+    EXPECT_EQ(claims_from_json(json, "f").assumptions, result->assumptions);
+    if (warrant == Warrant::extrapolated) {
+      EXPECT_EQ(json_text(json).find("guarantee"), std::string::npos);
+    }
+
+    // A model from before warrants were told: what its noise says, and no assumptions.
+    json.erase("warrant");
+    json.erase("assumptions");
+    EXPECT_EQ(model_from_json(json, "f").warrant, warrant);
+    EXPECT_TRUE(model_from_json(json, "f").assumptions.empty());
+    json["noise"]["mode"] = "statistical";
+    EXPECT_EQ(model_from_json(json, "f").warrant,
+              warrant == Warrant::guaranteed ? Warrant::statistical : Warrant::extrapolated);
+    json.erase("noise");
+    EXPECT_EQ(model_from_json(json, "f").warrant, Warrant::extrapolated);
+  }
+}
+
 class ModelFileErrors : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
@@ -202,9 +238,9 @@ TEST_F(ModelFileErrors, EveryMissingKeyIsNamed) {
         continue;
       }
       // What a detector does without is the record of how it came about, and the second residual.
-      const std::vector<std::string> record = {"software", "status",         "message",    "noise",    "parameters",
-                                               "physical", "identification", "validation", "data",     "notes",
-                                               "delay",    "chosen",         "curve",      "kinematic"};
+      const std::vector<std::string> record = {
+          "software", "status", "message", "noise",  "parameters", "physical",  "identification", "validation",
+          "data",     "notes",  "delay",   "chosen", "curve",      "kinematic", "warrant",        "assumptions"};
       EXPECT_THAT(record, ::testing::Contains(member.key()));
     }
   }
@@ -229,6 +265,8 @@ TEST_F(ModelFileErrors, WrongTypesAndValuesAreNamed) {
       {"/feasible_set/hull/0", Json::array({2.0, 1.0}), "/feasible_set/hull/0"},
       {"/robot/wheel_radius", -1.0, "wheel_radius"},
       {"/robot", "a robot", "/robot"},
+      {"/warrant", "certain", R"(/warrant: '"certain"': expected one of guaranteed, extrapolated, statistical)"},
+      {"/assumptions/0/verdict", "maybe", "/assumptions/0/verdict"},
   };
   for (const auto& [pointer, value, expected] : cases) {
     EXPECT_THAT(message(pointer, value), AllOf(HasSubstr("robot7/model.json"), HasSubstr(expected))) << pointer;

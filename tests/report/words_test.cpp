@@ -44,7 +44,7 @@ TEST(CommissionWords, OfAModelSayWhatWasFoundAndWhatItSees) {
   const Commissioning c = example::done();
   EXPECT_EQ(standing(c), Standing::good);
   const std::string text = spoken(c);
-  EXPECT_THAT(text, HasSubstr("Mass 21.30\u00a0kg (guaranteed 20.90 to 21.70)"));
+  EXPECT_THAT(text, HasSubstr("Mass 21.30\u00a0kg (extrapolated 20.90 to 21.70)"));
   EXPECT_THAT(text, HasSubstr("3500 instants"));
   EXPECT_THAT(text, HasSubstr("no false alarm"));
   EXPECT_THAT(text, HasSubstr("62.0 %"));
@@ -63,10 +63,17 @@ TEST(CommissionWords, SayWhatTheGuaranteeStandsOn) {
   for (OutputNoise& noise : c.noise) {
     noise.origin = NoiseOrigin::declared;
   }
-  EXPECT_THAT(spoken(c),
-              AllOf(HasSubstr("declared noise bounds"), HasSubstr("every noise"), Not(HasSubstr("extrapolated"))));
+  settle_warrants(c);
+  EXPECT_THAT(spoken(c), AllOf(HasSubstr("declared noise bounds"), HasSubstr("every noise"),
+                               HasSubstr("(guaranteed 20.90 to 21.70)"), Not(HasSubstr("extrapolated"))));
   c.noise_mode = NoiseMode::statistical;
-  EXPECT_THAT(spoken(c), HasSubstr("confidence"));
+  settle_warrants(c);
+  EXPECT_THAT(spoken(c), AllOf(HasSubstr("confidence"), HasSubstr("(statistical 20.90 to 21.70)"),
+                               Not(HasSubstr("uarantee")), Not(HasSubstr("extrapolated"))));
+  c.validation.front().outside = 2;
+  settle_warrants(c);
+  EXPECT_THAT(spoken(c), AllOf(HasSubstr("the log contradicts these"), HasSubstr("(extrapolated 20.90 to 21.70)"),
+                               Not(HasSubstr("uarantee"))));
 }
 
 TEST(CommissionWords, OfAPartialResultSayWhatToDrive) {
@@ -125,11 +132,11 @@ TEST(CommissionWords, FalseAlarmsAndIdleThresholdsAreNotPraised) {
   EXPECT_THAT(spoken(untried), HasSubstr("no held-out driving"));
 }
 
-TEST(CommissionWords, DoNotCallABoundOfThePriorGuaranteedByTheLog) {
+TEST(CommissionWords, DoNotCallABoundOfThePriorOneOfTheLog) {
   Commissioning c = example::done();
   c.parameters[0].lower = 0.0;
   c.parameters[0].lower_is_prior = true;
-  EXPECT_THAT(spoken(c), HasSubstr("(guaranteed at most 21.7)"));
+  EXPECT_THAT(spoken(c), HasSubstr("(extrapolated at most 21.7)"));
   c.parameters[0].upper_is_prior = true;
   EXPECT_THAT(spoken(c), HasSubstr("(bounded by the prior alone)"));
 }
@@ -143,7 +150,7 @@ TEST(CommissionReport, ShowsNoPhysicalValuesWithoutTheMotorsConstants) {
   EXPECT_TRUE(example::lacks(commission_report(example::done(), example::context(300)), {"not identifiable"}));
 }
 
-TEST(CommissionReport, GuaranteesNothingOfAnEmptySet) {
+TEST(CommissionReport, BoundsNothingOfAnEmptySet) {
   const ReportContext context = example::context(300);
   EXPECT_TRUE(example::holds(commission_report(example::done(), context), {"20.90 to 21.70", "class=\"bar\""}));
   EXPECT_TRUE(example::lacks(commission_report(example::empty(), context), {"20.90 to 21.70", "class=\"bar"}));

@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: Apache-2.0
+// Guaranteed, extrapolated, statistical: which word a commissioning earns, and what its log says of the assumptions.
+#include <algorithm>
+#include <set>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include <wheelwright/commission/assumptions.hpp>
+#include <wheelwright/commission/commission.hpp>
+#include <wheelwright/io/byte_source.hpp>
+
+#include "support/drives.hpp"
+
+namespace wheelwright::assumptions_test {
+namespace {
+
+using testing_support::noisy_drive;
+using Verdict = AssumptionVerdict;
+
+Commissioning commissioned(const Scenario& scenario, NoiseMode mode = NoiseMode::worst_case) {
+  Simulation log(scenario);
+  CommissionOptions options;
+  options.noise_mode = mode;
+  return commission(log, scenario.robot, options);
+}
+
+Scenario undeclared() {
+  Scenario s = noisy_drive(1);
+  s.robot.noise = {};
+  s.robot.encoder_counts_per_turn.reset();
+  return s;
+}
+
+std::set<Warrant> warrants(const Commissioning& c) {
+  std::set<Warrant> all = {c.model.warrant};
+  for (const ParameterResult& p : c.parameters) {
+    all.insert(p.warrant);
+  }
+  for (const OutputNoise& n : c.noise) {
+    all.insert(n.warrant);
+  }
+  for (const OutputValidation& v : c.validation) {
+    all.insert(v.warrant);
+  }
+  return all;
+}
+
+const Assumption& of(const std::vector<Assumption>& list, const std::string& id) {
+  const auto found = std::ranges::find(list, id, &Assumption::id);
+  if (found == list.end()) {
+    throw Error("no assumption " + id);
+  }
+  return *found;
+}
+
+TEST(Warrants, DeclaredBoundsAreGuaranteed) {
+  EXPECT_EQ(warrants(commissioned(noisy_drive(1))), (std::set{Warrant::guaranteed}));
+}
+
+TEST(Warrants, BoundsLearntFromTheLogAreExtrapolatedInEitherMode) {
+  EXPECT_EQ(warrants(commissioned(undeclared())), (std::set{Warrant::extrapolated}));
+  EXPECT_EQ(warrants(commissioned(undeclared(), NoiseMode::statistical)), (std::set{Warrant::extrapolated}));
+}
+
+TEST(Warrants, DeclaredBoundsAtAConfidenceAreStatistical) {
+  const Commissioning c = commissioned(noisy_drive(1), NoiseMode::statistical);
+  EXPECT_EQ(warrants(c), (std::set{Warrant::statistical}));
+  EXPECT_EQ(of(c.assumptions, "noise_independent").verdict, Verdict::not_tested);
+}
+
+TEST(Warrants, NothingIsGuaranteedWhereAnAssumptionFails) {
+  Commissioning c = commissioned(noisy_drive(1));
+  c.validation.front().outside = 1;
+  settle_warrants(c);
+  EXPECT_EQ(of(c.assumptions, "constant_parameters").verdict, Verdict::fails);
+  EXPECT_EQ(warrants(c), (std::set{Warrant::extrapolated}));
+}
+
+TEST(Warrants, TheWeakerOfTwoIsSymmetricIdempotentAndAssociative) {
+  const auto all = {Warrant::guaranteed, Warrant::extrapolated, Warrant::statistical};
+  for (const Warrant a : all) {
+    EXPECT_EQ(weaker(a, a), a);
+    EXPECT_EQ(weaker(a, Warrant::guaranteed), a);
+    EXPECT_EQ(weaker(a, Warrant::extrapolated), Warrant::extrapolated);
+    for (const Warrant b : all) {
+      EXPECT_EQ(weaker(a, b), weaker(b, a));
+      for (const Warrant c : all) {
+        EXPECT_EQ(weaker(weaker(a, b), c), weaker(a, weaker(b, c)));
+      }
+    }
+  }
+}
+
+TEST(Assumptions, AreTheSameInResultAndModelEachNamedOnce) {
+  const Commissioning c = commissioned(noisy_drive(1));
+  EXPECT_EQ(c.assumptions, c.model.assumptions);
+  std::set<std::string> ids;
+  for (const Assumption& a : c.assumptions) {
+    EXPECT_TRUE(ids.insert(a.id).second) << a.id;
+    EXPECT_TRUE(a.statement.ends_with('.')) << a.statement;
+    EXPECT_TRUE(a.verdict == Verdict::not_tested || !a.test.empty()) << a.id << ": a verdict without a test";
+  }
+}
+
+// docs/assumptions.md has a row for each that code can list, and the key that declares it.
+TEST(Assumptions, AreInTheirTable) {
+  const std::string page =
+      read_bytes(std::filesystem::path(WHEELWRIGHT_SOURCE_DIR) / "docs/assumptions.md", std::size_t{1} << 20);
+  Scenario limited = noisy_drive(1);
+  limited.robot.limits = {{"effort", 1e3}, {"speed", 1e3}, {"acceleration", 1e3}};
+  limited.sensors.pose = true;
+  Scenario speeds = noisy_drive(1);
+  speeds.sensors.angles = false;
+  speeds.sensors.speeds = true;
+  speeds.robot.encoder_counts_per_turn.reset();
+  speeds.robot.noise.wheel_speed.value = 0.05;
+  for (const Commissioning& c : {commissioned(limited), commissioned(speeds), commissioned(undeclared()),
+                                 commissioned(noisy_drive(1), NoiseMode::statistical)}) {
+    for (const Assumption& a : c.assumptions) {
+      EXPECT_NE(page.find("| `" + a.id + "` |"), std::string::npos) << a.id;
+    }
+  }
+}
+
+TEST(Assumptions, SayHowTheRobotFileDeclaresItsEfforts) {
+  Commissioning c;
+  c.model.robot.hold = Hold::zero_order;
+  EXPECT_NE(of(assumptions_of(c), "effort_hold").statement.find("unknown moment"), std::string::npos);
+  c.model.robot.effort_changes = EffortChanges::at_samples;
+  EXPECT_EQ(of(assumptions_of(c), "effort_hold").statement.find("unknown moment"), std::string::npos);
+  c.model.robot.hold = Hold::first_order;
+  EXPECT_NE(of(assumptions_of(c), "effort_hold").statement.find("straight"), std::string::npos);
+  EXPECT_NE(of(assumptions_of(c), "effort_delay").statement.find("neither late nor early"), std::string::npos);
+  c.model.robot.effort_delay = {0.002, 0.0125};
+  EXPECT_NE(of(assumptions_of(c), "effort_delay").statement.find("between 0.002 and 0.0125 s"), std::string::npos);
+}
+
+// m/f of 21 kg and 4 N·s/m is 5.25 s: twice that as a step is exactly what the motion between samples cannot show.
+TEST(Assumptions, TheTimeConstantIsHeldAgainstHalfAStep) {
+  Commissioning c;
+  ParameterResult m, f;
+  m.parameter.physical = "mass";
+  m.lower = 20.0;
+  m.upper = 22.0;
+  f.parameter.physical = "viscous_linear";
+  f.lower = 3.5;
+  f.upper = 4.0;
+  c.parameters = {m, f};
+  const auto at_step = [&](double step) {
+    c.survey.median_step = step;
+    return of(assumptions_of(c), "time_constant").verdict;
+  };
+  EXPECT_EQ(at_step(2.0 * 20.0 / 4.0 - 0.01), Verdict::holds);
+  EXPECT_EQ(at_step(2.0 * 20.0 / 4.0 + 0.01), Verdict::not_tested);
+  EXPECT_EQ(at_step(2.0 * 22.0 / 3.5 - 0.01), Verdict::not_tested);
+  EXPECT_EQ(at_step(2.0 * 22.0 / 3.5 + 0.01), Verdict::fails);
+}
+
+TEST(Assumptions, ALongStepIsNoProofThatNoRowIsMissing) {
+  Commissioning c;
+  c.survey.median_step = 0.01;
+  c.survey.largest_step = 0.015;
+  EXPECT_EQ(of(assumptions_of(c), "lost_rows").verdict, Verdict::holds);
+  c.survey.largest_step = 0.0151;
+  EXPECT_EQ(of(assumptions_of(c), "lost_rows").verdict, Verdict::not_tested);
+}
+
+TEST(Assumptions, OfAnEmptySetSomeFail) {
+  Scenario s = noisy_drive(1);
+  s.robot.noise.effort.value = 1e-4;  // a two-hundredth of the noise that is there
+  const Commissioning c = commissioned(s);
+  ASSERT_EQ(c.status, Commissioning::Status::empty);
+  EXPECT_EQ(of(c.assumptions, "noise_effort").verdict, Verdict::fails);
+  EXPECT_EQ(warrants(c), (std::set{Warrant::extrapolated}));
+}
+
+}  // namespace
+}  // namespace wheelwright::assumptions_test
