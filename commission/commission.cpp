@@ -247,6 +247,11 @@ void describe_assumptions(const Setting& s, Commissioning& result) {
         "the noise bounds are extrapolated from the residuals of this log: they hold while the noise and "
         "the driving stay like it; declare `noise:` in the robot file for bounds that stand on the sensors");
   }
+  if (s.noise_complete && s.measurement.hold == Hold::zero_order && s.measurement.changes == EffortChanges::between) {
+    notes.push_back(
+        "commands were taken to change at an unknown moment between two samples: where they change at the samples, "
+        "`effort: {changes: at_samples}` in the robot file says so and narrows the bounds; else a higher rate does");
+  }
   if (s.measurement.effort_unsigned) {
     notes.push_back(
         "the effort is unsigned: its sign was taken from the direction of motion, which is wrong while a "

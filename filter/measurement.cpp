@@ -41,6 +41,27 @@ struct SpeedSample {
   bool even = true;
 };
 
+// The step than which one in a hundred is shorter.
+double shortest_step_of(LogSource& log) {
+  std::vector<double> steps;
+  log.rewind();
+  LogBlock block;
+  while (steps.size() < kMostSpeeds && log.next(block)) {
+    for (std::size_t k = 1; k < block.rows(); ++k) {
+      if (!std::binary_search(block.segment_starts.begin(), block.segment_starts.end(), k)) {
+        steps.push_back(block.t[k] - block.t[k - 1]);
+      }
+    }
+  }
+  log.rewind();
+  if (steps.empty()) {
+    return 0.0;
+  }
+  const auto at = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 100);
+  std::nth_element(steps.begin(), at, steps.end());
+  return *at;
+}
+
 SpeedSample sample_speeds(LogSource& log, const std::vector<std::string>& columns) {
   SpeedSample sample;
   std::vector<std::size_t> pick;
@@ -69,9 +90,13 @@ SpeedSample sample_speeds(LogSource& log, const std::vector<std::string>& column
 }  // namespace
 
 double Measurement::longest_step() const {
-  constexpr double kHole = 1.75;      // steps: rows are lost; steps of 2 and 3 ticks are not
-  constexpr double kUnlike = 1.05;    // of encoder differences: their interval is one step
-  return (motion == MotionKind::mean_speed ? kUnlike : kHole) * nominal_step;
+  constexpr double kHole = 1.75, kLeast = 1.35, kUnlike = 1.05;  // nominal steps
+  constexpr double kTwo = 1.96;                                  // shortest steps: two of them, and rounding
+  if (motion == MotionKind::mean_speed) {
+    return kUnlike * nominal_step;
+  }
+  return shortest_step > 0.0 ? std::clamp(kTwo * shortest_step, kLeast * nominal_step, kHole * nominal_step)
+                             : kHole * nominal_step;
 }
 
 std::vector<std::string> Measurement::columns() const {
@@ -90,6 +115,7 @@ Measurement find_measurement(LogSource& log, const Robot& robot, const Model& mo
   m.delay = robot.effort_delay;
   m.effort_unsigned = robot.effort_unsigned;
   m.nominal_step = log.median_step();
+  m.shortest_step = shortest_step_of(log);
   m.correction = effort_correction(robot);
 
   std::vector<std::string> angles, speeds;

@@ -34,11 +34,13 @@ struct Measurement {
   bool effort_unsigned = false;             ///< the sign of an effort is taken from its joint's direction of motion
   double count = 0.0;                       ///< mean_speed: speeds are whole multiples of this, rad/s (0: not rounded)
   double nominal_step = 0.0;                ///< median step of the log it was found on, s
+  double shortest_step = 0.0;               ///< one in a hundred steps of that log was shorter, s (0: not known)
 
   EffortCorrection correction{};  ///< of the efforts, before anything else is made of them
 
   /// A longer step between two samples is a hole in the log: nothing is known of the effort in it, s; 0 where no step is
-  /// known.
+  /// known. 1.75 nominal steps, for steps that vary less: as long as two of the shortest together, but at least 1.35
+  /// nominal steps; for mean speeds, whose interval is one step, 1.05 of these.
   [[nodiscard]] double longest_step() const;
 
   /// Columns in the order in which RegressorFilter wants a sample: motion, effort, heading where there is one.

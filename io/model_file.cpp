@@ -35,6 +35,7 @@ Measurement read_measurement(const JsonPlace& place, const Model& model, const R
   m.effort_unsigned = place.at("effort_unsigned").boolean();
   m.count = place.at("count").number();
   m.nominal_step = place.at("nominal_step").number();
+  m.shortest_step = place.has("shortest_step") ? place.at("shortest_step").number() : 0.0;
   m.changes = robot.effort_changes;
   m.delay = robot.effort_delay;
   m.correction = effort_correction(robot);

@@ -82,7 +82,8 @@ Json measurement_json(const Measurement& m) {
           {"hold", word_of(kHoldWords, m.hold)},
           {"effort_unsigned", m.effort_unsigned},
           {"count", m.count},
-          {"nominal_step", m.nominal_step}};
+          {"nominal_step", m.nominal_step},
+          {"shortest_step", m.shortest_step}};
 }
 
 Json noise_json(const Commissioning& r, const Model& model) {
