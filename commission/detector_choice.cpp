@@ -160,9 +160,9 @@ std::string assumption(Guarantee guarantee, double false_alarms) {
           "(an encoder's rounding is that only while wheels turn by several counts a sample)",
           false_alarms);
     case Guarantee::extrapolated:
-      return "noise is not declared: its bounds are extrapolated from the residuals of this log, and the promise "
-             "holds as far as driving to come is like it; declare `noise:` in the robot file for one that stands on "
-             "the sensors";
+      return "noise is not declared, or the log contradicts an assumption: bounds are extrapolated from this log, and "
+             "the promise holds as far as driving to come is like it; declare `noise:` in the robot file for one that "
+             "stands on the sensors";
   }
   return {};
 }

@@ -148,11 +148,12 @@ class Margins {
 };
 
 Guarantee guarantee_of(const Commissioning& result) {
-  const bool declared =
-      std::ranges::all_of(result.noise, [](const OutputNoise& noise) { return noise.origin == NoiseOrigin::declared; });
-  return !declared                                    ? Guarantee::extrapolated
-         : result.noise_mode == NoiseMode::worst_case ? Guarantee::never
-                                                      : Guarantee::hourly;
+  switch (result.model.warrant) {
+    case Warrant::guaranteed: return Guarantee::never;
+    case Warrant::statistical: return Guarantee::hourly;
+    case Warrant::extrapolated: return Guarantee::extrapolated;
+  }
+  return Guarantee::extrapolated;
 }
 
 }  // namespace
