@@ -292,7 +292,7 @@ struct ScenarioReader {
       if (name == "sampling") {
         sensors.sampling = static_cast<Sampling>(value.choice({"instant", "interval"}));
       } else if (name == "noise") {
-        sensors.noise = static_cast<NoiseShape>(value.choice({"uniform", "truncated_gaussian"}));
+        sensors.noise = static_cast<NoiseShape>(value.choice({"uniform", "truncated_gaussian", "two_point"}));
       } else if (name == "encoder_counts_per_turn") {
         sensors.encoder_counts_per_turn = value.positive();
       } else if (name == "log") {

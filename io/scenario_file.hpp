@@ -23,8 +23,8 @@ namespace wheelwright {
 ///     start: {pose: [x, y, θ], error: [x, y, θ]}                                 of the reference; robot minus reference
 ///     faults: [{kind: wheel_radius | wheel_radius_right | wheel_radius_left | slip_x | slip_y | slip_yaw | matched |
 ///               unmatched, magnitude (m, m/s, rad/s), onset (s), shape: step | ramp | smooth, rise_time (s), end (s)}]
-///     sensors: {sampling: instant | interval, noise: uniform | truncated_gaussian, wheel_speed, wheel_angle, effort,
-///               position, heading (bounds), encoder_counts_per_turn, log: [angles, speeds, pose, commands]}
+///     sensors: {sampling: instant | interval, noise: uniform | truncated_gaussian | two_point, wheel_speed, wheel_angle,
+///               effort, position, heading (bounds), encoder_counts_per_turn, log: [angles, speeds, pose, commands]}
 ///     effects: [{effect: name, parameter: value, ...}]      as in a robot file; beside those that the robot brings
 ///     duration (s; by default 60, or that of the table), rate (Hz), time_jitter (share of the period), gaps: [[from, to], ...] (s), seed
 ///

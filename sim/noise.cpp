@@ -25,6 +25,9 @@ double Noise::uniform() { return 2.0 * (static_cast<double>(generator_() >> 11U)
 
 double Noise::unit() {
   double x = uniform();
+  if (shape_ == NoiseShape::two_point) {
+    return x < 0.0 ? -1.0 : 1.0;
+  }
   if (shape_ == NoiseShape::truncated_gaussian) {
     // Rejection from the uniform: density ∝ exp(−(3x)²/2) on [−1, 1]; 1 − (3x)²/2 lies below it and spares most of exp.
     for (;;) {

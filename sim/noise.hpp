@@ -12,6 +12,7 @@ namespace wheelwright {
 enum class NoiseShape {
   uniform,             ///< on [−bound, bound]
   truncated_gaussian,  ///< standard deviation bound/3 before it is cut at ±bound
+  two_point,           ///< −bound or bound, as a coin decides
 };
 
 /// One stream of noise. Draws are made of mt19937_64 by own transforms, so they do not depend on the standard library.

@@ -4,7 +4,9 @@
 # Installs what the build needs and is not there yet. The second run does nothing.
 #
 #   tools/setup.sh         Debian packages for the program and the tests, and uPlot from npm
-#   tools/setup.sh --ci    the same and clang-format, clang-tidy and clang, which continuous integration uses
+#   tools/setup.sh --ci    the same and clang-format, clang-tidy and clang, which continuous integration uses, and what some
+#                          tests need that are skipped elsewhere: a browser, shells, man (half a minute, nearly all of it
+#                          Chromium's)
 #   tools/setup.sh --docs, tools/setup.sh --packages
 #                          the same and what tools/docs.sh, tools/package.sh and tools/check_package.sh need
 set -eu
@@ -21,7 +23,8 @@ packages="g++ cmake ninja-build pkg-config python3
   pybind11-dev python3-dev python3-numpy"
 case "${1:-}" in
   '') ;;
-  --ci) packages="$packages clang clang-format clang-tidy python3-mypy python3-matplotlib" ;;
+  --ci) packages="$packages clang clang-format clang-tidy python3-mypy python3-matplotlib
+    chromium zsh fish man-db groff-base" ;;
   --docs) packages="$packages python3-sphinx python3-myst-parser python3-sphinxcontrib.bibtex doxygen graphviz" ;;
   --packages) packages="$packages dpkg-dev file fakeroot lintian debootstrap" ;;
   *) echo "usage: tools/setup.sh [--ci | --docs | --packages]" >&2; exit 2 ;;

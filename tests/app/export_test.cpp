@@ -42,8 +42,8 @@ class Export : public testing::ProgramTest {
 };
 
 TEST_F(Export, DecidesAsDetectDoes) {
-  if (!testing_support::has_c_compiler()) {
-    GTEST_SKIP() << "there is no cc";
+  if (testing_support::skip_unless(testing_support::has_c_compiler(), "there is no cc")) {
+    return;
   }
   commission_shipped();
   simulate("fault.yaml", "fault.csv");

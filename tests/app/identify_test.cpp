@@ -95,8 +95,8 @@ TEST_F(Identify, BadInputIsTwoAndLeavesNoResult) {
 }
 
 TEST_F(Identify, FitsItsSchema) {
-  if (!has_validator()) {
-    GTEST_SKIP() << "python3-jsonschema is not installed";
+  if (testing_support::skip_unless(has_validator(), "python3-jsonschema is not installed")) {
+    return;
   }
   put_still();
   put("line.yaml",

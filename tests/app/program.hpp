@@ -20,6 +20,7 @@
 #include <wheelwright/io/json_file.hpp>
 
 #include "io/scratch.hpp"
+#include "support/skip.hpp"
 
 namespace wheelwright::testing {
 

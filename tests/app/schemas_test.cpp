@@ -11,9 +11,7 @@ using testing::Outcome;
 class Schemas : public testing::ProgramTest {
  protected:
   void SetUp() override {
-    if (!has_validator()) {
-      GTEST_SKIP() << "python3-jsonschema is not installed";
-    }
+    (void)testing_support::skip_unless(has_validator(), "python3-jsonschema is not installed");
   }
 
   static std::string shipped() { return fmt::format("'{}'", (examples() / "healthy.csv.gz").string()); }

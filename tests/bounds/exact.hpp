@@ -91,6 +91,62 @@ inline Rational dot(const std::vector<Rational>& a, const std::vector<Rational>&
   return sum;
 }
 
+/// The smallest double that is not below x.
+inline double rounded_up(const Rational& x) {
+  auto guess = static_cast<double>(x);
+  while (rational(guess) < x) {
+    guess = round_up(guess);
+  }
+  while (rational(round_down(guess)) >= x) {
+    guess = round_down(guess);
+  }
+  return guess;
+}
+
+/// The smallest double >= |y − Y·θ|: a bound on the noise of a row that θ meets exactly.
+inline double noise_of(const std::vector<double>& Y, const std::vector<double>& theta, double y) {
+  Rational rest = rational(y);
+  for (std::size_t j = 0; j < Y.size(); ++j) {
+    rest -= rational(Y[j]) * rational(theta[j]);
+  }
+  return rounded_up(abs(rest));
+}
+
+/// Whether θ satisfies every row exactly.
+inline bool satisfies(std::span<const HalfSpace> rows, std::span<const double> theta) {
+  for (const HalfSpace& row : rows) {
+    Rational left = 0;
+    for (std::size_t j = 0; j < theta.size(); ++j) {
+      left += rational(row.a[static_cast<Eigen::Index>(j)]) * rational(theta[j]);
+    }
+    if (left > rational(row.b)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+/// `at`, which is a point of { row·θ <= b } but for rounding, moved towards the inner point `inside` until it is one.
+inline std::vector<double> pulled_inside(std::span<const HalfSpace> rows, std::span<const double> at,
+                                         std::span<const double> inside) {
+  std::vector<double> point(at.begin(), at.end());
+  for (double step = 0x1p-53; step <= 1.0 && !satisfies(rows, point); step *= 2.0) {
+    for (std::size_t j = 0; j < point.size(); ++j) {
+      point[j] = at[j] + step * (inside[j] - at[j]);
+    }
+  }
+  return point;
+}
+
+/// a·θ.
+inline Rational dot(std::span<const double> a, std::span<const double> theta) {
+  Rational sum = 0;
+  for (std::size_t j = 0; j < a.size(); ++j) {
+    sum += rational(a[j]) * rational(theta[j]);
+  }
+  return sum;
+}
+
 /// All vertices of { row·θ <= b }: every p-subset of rows is tried. For p <= 3 and tens of rows.
 inline std::vector<std::vector<Rational>> vertices(const std::vector<Row>& rows, std::size_t p) {
   std::vector<std::vector<Rational>> found;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Published bounds against exact optima (QSopt_ex), p from 1 to 12: never inside, with zero tolerance, and further out
-// than 1e-9 of the exact width in at most one problem of a thousand. Thousands of problems: exact_lp_study.cpp.
+// Published bounds against exact optima (QSopt_ex), p from 1 to 12: never inside, with zero tolerance, and no further out
+// than 1e-9 of the exact width, or than rounding of the data where the set is a sliver. No problem is exempted; thousands
+// of them: exact_lp_study.cpp.
 #include <gtest/gtest.h>
 
 #include <wheelwright/bounds/minimax.hpp>
@@ -16,7 +17,7 @@ using exact_lp::Tally;
 void expect_exact(const Tally& tally) {
   EXPECT_EQ(tally.inside, 0U) << summary(tally) << '\n' << tally.failures;
   EXPECT_EQ(tally.empty, 0U) << summary(tally) << '\n' << tally.failures;
-  EXPECT_LE(1000 * tally.loose, tally.problems) << summary(tally) << '\n' << tally.failures;
+  EXPECT_EQ(tally.loose, 0U) << summary(tally) << '\n' << tally.failures;
 }
 
 class ExactLp : public ::testing::TestWithParam<Family> {};

@@ -8,6 +8,7 @@
 #include <wheelwright/bounds/tracker.hpp>
 #include <wheelwright/core/error.hpp>
 
+#include "bounds/exact.hpp"
 #include "bounds/rows.hpp"
 
 namespace wheelwright::tracker_test {
@@ -30,7 +31,7 @@ Rows driven(std::uint64_t seed, std::size_t p, std::size_t count, const Theta& t
     for (std::size_t j = 0; j < p; ++j) {
       y += Y[j] * now[j];
     }
-    rows.add(Y, y, kNoise * (1.0 + 1e-12));
+    rows.add(Y, y, std::max(kNoise, exact::noise_of(Y, now, y)));
   }
   return rows;
 }

@@ -17,6 +17,7 @@
 #include <wheelwright/sim/simulation.hpp>
 
 #include "support/kinematic_drives.hpp"
+#include "support/skip.hpp"
 
 namespace wheelwright::log_health_test {
 namespace {
@@ -367,8 +368,8 @@ TEST_F(LogHealthTest, AnEmptyLogIsNoAccident) {
 // Recordings of real machines, where they lie beside the project.
 TEST(LogHealthRecordings, NoneIsFatal) {
   const std::filesystem::path data = std::filesystem::path(WHEELWRIGHT_SHARED_DIR) / "data";
-  if (!std::filesystem::exists(data)) {
-    GTEST_SKIP() << "no recordings in " << data;
+  if (testing_support::skip_without_recordings(data)) {
+    return;
   }
   for (const auto& [robot, log] :
        {std::pair{"emps.yaml", "emps/emps.csv"}, std::pair{"warthog.yaml", "warthog/current.csv"},

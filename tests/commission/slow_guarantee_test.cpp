@@ -27,7 +27,7 @@ Scenario varied_drive(std::uint64_t seed, double duration) {
                   .viscous_yaw = vary(17, 0.1, 1.5)};
   s.parameters.viscous_y = s.parameters.viscous_x;
   s.trajectory.kind = seed % 3 == 0 ? Trajectory::Kind::multi_sine : Trajectory::Kind::commissioning;
-  s.sensors.noise = seed % 2 == 0 ? NoiseShape::uniform : NoiseShape::truncated_gaussian;
+  s.sensors.noise = testing_support::kNoiseShapes[seed / 2 % 3];
   s.robot.hold = seed % 5 < 3 ? Hold::zero_order : Hold::first_order;
   return s;
 }

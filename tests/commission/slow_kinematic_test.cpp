@@ -29,7 +29,7 @@ Scenario varied_drive(std::uint64_t seed, double duration) {
   s.sensors.position = s.robot.noise.position.value.emplace(vary(13, 0.0, 0.005));
   s.sensors.heading = s.robot.noise.heading.value.emplace(vary(17, 0.0, 0.01));
   s.robot.kinematic_window = vary(19, 0.2, 1.5);
-  s.sensors.noise = seed % 2 == 0 ? NoiseShape::uniform : NoiseShape::truncated_gaussian;
+  s.sensors.noise = testing_support::kNoiseShapes[seed / 2 % 3];
   s.trajectory.kind = seed % 3 == 0 ? Trajectory::Kind::multi_sine : Trajectory::Kind::commissioning;
   return s;
 }

@@ -15,6 +15,8 @@
 #include <wheelwright/io/csv.hpp>
 #include <wheelwright/io/robot_file.hpp>
 
+#include "support/skip.hpp"
+
 namespace wheelwright::slow_recordings_test {
 namespace {
 
@@ -23,9 +25,8 @@ namespace fs = std::filesystem;
 class SlowRecordings : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (!fs::exists(root / "data") || !fs::exists(root / "withheld-dev")) {
-      GTEST_SKIP() << "no recordings in " << root;
-    }
+    (void)(testing_support::skip_without_recordings(root / "data") ||
+           testing_support::skip_without_recordings(root / "withheld-dev"));
   }
   const fs::path root = WHEELWRIGHT_SHARED_DIR;
 };

@@ -13,6 +13,8 @@
 #include <wheelwright/io/csv.hpp>
 #include <wheelwright/io/robot_file.hpp>
 
+#include "support/skip.hpp"
+
 namespace wheelwright::recordings_test {
 namespace {
 
@@ -22,9 +24,7 @@ using ::testing::Contains;
 class GapRecordings : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (!fs::exists(root)) {
-      GTEST_SKIP() << "no recordings in " << root;
-    }
+    (void)testing_support::skip_without_recordings(root);
   }
   [[nodiscard]] Diagnosis diagnosed(const std::string& log, const Robot& robot) const {
     CsvLog file({root / log});

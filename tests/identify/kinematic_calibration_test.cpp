@@ -11,6 +11,7 @@
 #include <wheelwright/io/csv.hpp>
 
 #include "support/random.hpp"
+#include "support/skip.hpp"
 
 namespace wheelwright::kinematic_calibration_test {
 namespace {
@@ -193,8 +194,8 @@ class SlowSkidSteer : public ::testing::TestWithParam<Recording> {};
 // Real skid-steer robots answer like a robot with a wider track (README of the recordings); halves of the data agree.
 TEST_P(SlowSkidSteer, EffectiveTrackIsThatOfTheRecordingAndOfItsHalves) {
   const std::filesystem::path path = std::filesystem::path(WHEELWRIGHT_SHARED_DIR) / "data/warthog" / GetParam().file;
-  if (!std::filesystem::exists(path)) {
-    GTEST_SKIP() << "the recordings are not here";
+  if (testing_support::skip_without_recordings(path)) {
+    return;
   }
   CsvLog file({path});
   const LogTable log = read_all(file);

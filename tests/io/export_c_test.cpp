@@ -14,6 +14,7 @@
 #include "io/scratch.hpp"
 #include "support/c_detector.hpp"
 #include "support/random.hpp"
+#include "support/skip.hpp"
 
 namespace wheelwright::export_c_test {
 namespace {
@@ -155,9 +156,7 @@ struct World {
 class ExportC : public testing::ScratchTest {
  protected:
   void SetUp() override {
-    if (!testing_support::has_c_compiler()) {
-      GTEST_SKIP() << "there is no cc";
-    }
+    (void)testing_support::skip_unless(testing_support::has_c_compiler(), "there is no cc");
   }
 
   /// Runs both over `blocks` blocks of `rows` rows, with a restart between blocks.
@@ -277,8 +276,8 @@ TEST_F(ExportC, CallsNothingButWhatItStates) {
   ASSERT_EQ(
       std::system(("cc -std=c99 -O2 -c -fno-stack-protector -o '" + object + "' '" + source.string() + "'").c_str()),
       0);
-  if (std::system("nm --version > /dev/null 2>&1") != 0) {
-    GTEST_SKIP() << "there is no nm";
+  if (testing_support::skip_unless(std::system("nm --version > /dev/null 2>&1") == 0, "there is no nm")) {
+    return;
   }
   ASSERT_EQ(std::system(("nm '" + object + "' > '" + path("names").string() + "'").c_str()), 0);
   std::istringstream names(bytes(path("names")));

@@ -10,6 +10,8 @@
 #include <wheelwright/io/csv.hpp>
 #include <wheelwright/io/robot_file.hpp>
 
+#include "support/skip.hpp"
+
 namespace wheelwright::recordings_test {
 namespace {
 
@@ -19,9 +21,7 @@ using ::testing::ElementsAre;
 class Recordings : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (!fs::exists(root / "data")) {
-      GTEST_SKIP() << "no recordings in " << root;
-    }
+    (void)testing_support::skip_without_recordings(root / "data");
   }
   std::vector<fs::path> all(const fs::path& folder, const std::string& ending) const {
     std::vector<fs::path> found;

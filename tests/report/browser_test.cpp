@@ -18,6 +18,7 @@
 
 #include "report/example.hpp"
 #include "report/gap_example.hpp"
+#include "support/skip.hpp"
 
 namespace wheelwright::browser_test {
 namespace {
@@ -29,8 +30,9 @@ constexpr const char* chromium = "/usr/bin/chromium";
 class Browser : public testing::Test {
  protected:
   void SetUp() override {
-    if (!std::filesystem::exists(chromium)) {
-      GTEST_SKIP() << chromium << " is not installed: pages were not drawn";
+    if (testing_support::skip_unless(std::filesystem::exists(chromium),
+                                     std::string(chromium) + " is not installed: pages were not drawn")) {
+      return;
     }
     std::string pattern = (std::filesystem::temp_directory_path() / "wheelwright-report-XXXXXX").string();
     ASSERT_NE(mkdtemp(pattern.data()), nullptr);

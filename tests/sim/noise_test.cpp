@@ -11,7 +11,7 @@ namespace wheelwright::noise_test {
 namespace {
 
 TEST(Noise, NeverExceedsItsBoundInAMillionDraws) {
-  for (const NoiseShape shape : {NoiseShape::uniform, NoiseShape::truncated_gaussian}) {
+  for (const NoiseShape shape : {NoiseShape::uniform, NoiseShape::truncated_gaussian, NoiseShape::two_point}) {
     Noise noise(7, 0, 0.02, shape);
     double largest = 0.0;
     for (int i = 0; i < 1000000; ++i) {
@@ -37,7 +37,8 @@ TEST(Noise, HasTheMomentsOfItsShape) {
   const double density = std::exp(-4.5) / std::sqrt(2.0 * 3.14159265358979323846);
   const double gaussian = (1.0 - 6.0 * density / std::erf(3.0 / std::sqrt(2.0))) / 9.0;
   for (const auto& [shape, variance] :
-       {std::pair{NoiseShape::uniform, 1.0 / 3.0}, std::pair{NoiseShape::truncated_gaussian, gaussian}}) {
+       {std::pair{NoiseShape::uniform, 1.0 / 3.0}, std::pair{NoiseShape::truncated_gaussian, gaussian},
+        std::pair{NoiseShape::two_point, 1.0}}) {
     Noise noise(3, 1, 1.0, shape);
     double sum = 0.0, squares = 0.0, product = 0.0, last = 0.0;
     for (int i = 0; i < n; ++i) {

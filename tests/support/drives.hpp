@@ -3,6 +3,7 @@
 /// Simulated drives that the tests of several rooms share, and the filtered rows they give.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -16,6 +17,9 @@ namespace wheelwright::testing_support {
 
 /// The four parameters of (20).
 inline const std::vector<std::string> kFour = {"mass", "yaw_inertia", "viscous_linear", "viscous_yaw"};
+
+/// All shapes of noise; two_point is at its bound in every sample.
+inline constexpr std::array kNoiseShapes{NoiseShape::uniform, NoiseShape::truncated_gaussian, NoiseShape::two_point};
 
 /// What a drive's log shows of its motion.
 enum class Shown {
