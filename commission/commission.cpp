@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include <wheelwright/bounds/outliers.hpp>
+#include <wheelwright/commission/contradiction_search.hpp>
 #include <wheelwright/commission/fit.hpp>
 #include <wheelwright/commission/setting.hpp>
 #include <wheelwright/core/check.hpp>
@@ -49,7 +50,8 @@ SignalErrors with_noise(const Setting& s, const std::vector<OutputNoise>& noise,
 // The feasible set; where an *estimated* bound is too small for the prior box (θ̂ may lie outside it), it is raised to
 // just above the minimax fit.
 OutlierResult bounded_set(LogSource& log, const Setting& s, Part part, std::vector<OutputNoise>& noise,
-                          std::size_t outliers, std::vector<std::string>& notes) {
+                          std::size_t outliers, std::vector<std::string>& notes, double& raised) {
+  raised = 1.0;
   constexpr double kAboveMinimax = 1.05;
   for (int attempt = 0;; ++attempt) {
     RegressionStream rows = make_rows(log, s, with_noise(s, noise, For::learning));
@@ -73,7 +75,7 @@ OutlierResult bounded_set(LogSource& log, const Setting& s, Part part, std::vect
     }
     RegressionStream bare = make_rows(log, s, s.declared);
     FoldedSource bare_folded(bare, part, s.survey.rows, s.folds);
-    const double factor = kAboveMinimax * minimax_fit(bare_folded, s.prior, options).upper;
+    const double factor = raised = kAboveMinimax * minimax_fit(bare_folded, s.prior, options).upper;
     notes.push_back(
         fmt::format("the estimated noise bound was raised by {:.3g}: within the prior box no parameters "
                     "explain the log with less",
@@ -183,7 +185,14 @@ void describe_assumptions(const Setting& s, Commissioning& result) {
                           2.0 * 3.14159265358979323846 / (s.measurement.count * s.measurement.nominal_step))
             : "wheel speeds were taken as means over the sampling interval, as the robot file says");
   } else if (s.measurement.motion == MotionKind::speed && s.filter.order == 2) {
-    notes.push_back("wheel speeds are not differenced encoder counts: they were taken as samples of the speed");
+    notes.push_back(
+        s.measurement.unused_count > 0.0
+            ? fmt::format("wheel speeds are whole multiples of {:.4g} rad/s; they were taken as samples of the speed with "
+                          "the declared `wheel_speed` noise: write `encoder_counts_per_turn: {:.0f}` into the robot file "
+                          "if they are differenced counts",
+                          s.measurement.unused_count,
+                          2.0 * 3.14159265358979323846 / (s.measurement.unused_count * s.measurement.nominal_step))
+            : "wheel speeds are not differenced encoder counts: they were taken as samples of the speed");
   }
   if (!s.noise_complete) {
     notes.push_back(
@@ -197,8 +206,11 @@ void describe_assumptions(const Setting& s, Commissioning& result) {
   }
   for (std::size_t j = 0; j < s.model.p(); ++j) {
     if (!s.prior_declared[j] && (result.parameters[j].lower_is_prior || result.parameters[j].upper_is_prior)) {
-      notes.push_back(fmt::format("a bound of {} is the tool's own wide default, not the robot's",
-                                  result.parameters[j].parameter.name));
+      const Parameter& p = result.parameters[j].parameter;
+      notes.push_back(
+          fmt::format("a bound of {} is the tool's own wide default ({} from {:.3g} to {:.3g} {}), not the robot's: "
+                      "`prior:` in the robot file replaces it",
+                      p.name, p.physical, p.prior.lower, p.prior.upper, p.physical_unit));
     }
   }
 }
@@ -231,6 +243,47 @@ std::string reservations(const Setting& s, const Commissioning& result) {
   return text;
 }
 
+// The contradictions that leave no model, each with what to do.
+std::string withdrawal(const Commissioning& result) {
+  std::string text;
+  for (const LogContradiction& c : result.contradictions) {
+    if (c.withdraws) {
+      text += fmt::format("{}{}: {}", text.empty() ? "" : "; ", c.sentence, c.next);
+    }
+  }
+  return text;
+}
+
+// Where the proof of emptiness leans on an upper end of the tool's own default prior: what to write into the robot file.
+std::string default_prior_in_the_way(const Setting& s, const Commissioning& result) {
+  for (const WeightedRow& weighted : result.feasible.contradiction) {
+    const RowOrigin& origin = weighted.row.origin;
+    if (origin.is_prior && weighted.multiplier > 0.0 && origin.side == Side::upper &&
+        !s.prior_declared[origin.parameter]) {
+      const Parameter& p = s.model.parameters[origin.parameter];
+      return fmt::format(
+          "no {0} within the tool's own default prior, at most {1:.3g} {2}, explains the log: check the units of efforts "
+          "and motion, or, where the robot is that large, write `prior: {{{0}: [lower, upper]}}` into the robot file",
+          p.physical, p.prior.upper, p.physical_unit);
+    }
+  }
+  return {};
+}
+
+// A model that the log contradicts is not published.
+void withdraw(Commissioning& result) {
+  CommissionedModel& model = result.model;
+  model.estimate.resize(0);
+  model.facets.clear();
+  model.box = {};
+  model.kinematic.reset();
+  result.status = Commissioning::Status::contradicted;
+}
+
+bool withdrawn(const Commissioning& result) {
+  return std::ranges::any_of(result.contradictions, [](const LogContradiction& c) { return c.withdraws; });
+}
+
 std::string status_message(const Setting& s, const Commissioning& result) {
   std::string missing, todo;
   for (const ParameterResult& p : result.parameters) {
@@ -247,11 +300,19 @@ std::string status_message(const Setting& s, const Commissioning& result) {
       return "commissioned, but the log says nothing about " + missing + ": " + todo +
              ", and commission again; until then their bounds are those of the prior" + reservations(s, result);
     case Commissioning::Status::nothing: return "the log says nothing about any parameter: " + todo;
-    case Commissioning::Status::empty:
+    case Commissioning::Status::empty: {
+      const std::string why = withdrawal(result), prior = default_prior_in_the_way(s, result);
+      if (!prior.empty()) {
+        return prior;
+      }
       return fmt::format(
           "no parameters explain the log within the declared noise: it would have to be {:.3g} times as "
-          "large; a fault, an effect that the model lacks, or noise bounds that are too small",
-          result.minimax);
+          "large; {}",
+          result.minimax,
+          why.empty() ? "a fault, an effect that the model lacks, or noise bounds that are too small" : why);
+    }
+    case Commissioning::Status::contradicted:
+      return "no model: " + withdrawal(result);
   }
   return {};
 }
@@ -284,9 +345,13 @@ Commissioning commission(LogSource& log, const Robot& robot, const CommissionOpt
   result.rank = fit.squares.rank;
   result.condition = fit.squares.condition;
 
+  tell(options, "looking for contradictions", 0.35);
+  result.contradictions = contradictions_in_log(log, s, fit);
+
   tell(options, "bounding", 0.4);
   result.noise = output_noise(s, fit, options.extrapolation);
-  OutlierResult bounded = bounded_set(log, s, Part::everything, result.noise, options.outliers, result.notes);
+  double raised = 1.0;
+  OutlierResult bounded = bounded_set(log, s, Part::everything, result.noise, options.outliers, result.notes, raised);
   result.feasible = std::move(bounded.set);
   result.dropped = std::move(bounded.dropped);
   result.prior = s.prior;
@@ -327,7 +392,8 @@ Commissioning commission(LogSource& log, const Robot& robot, const CommissionOpt
   const Fit trained = fit_log(log, s, Part::training, options.extrapolation.risk);
   std::vector<OutputNoise> noise = output_noise(s, trained, options.extrapolation);
   std::vector<std::string> unused;
-  const FeasibleSet set = bounded_set(log, s, Part::training, noise, options.outliers, unused).set;
+  double unused_factor = 1.0;
+  const FeasibleSet set = bounded_set(log, s, Part::training, noise, options.outliers, unused, unused_factor).set;
   if (set.status == FeasibleSet::Status::nonempty) {
     RegressionStream unseen = make_rows(log, s, with_noise(s, noise, For::driving));
     FoldedSource held_out(unseen, Part::held_out, s.survey.rows, s.folds);
@@ -337,6 +403,13 @@ Commissioning commission(LogSource& log, const Robot& robot, const CommissionOpt
       const double ratio = v.median_width_box > 0.0 ? v.median_width / v.median_width_box : 1.0;
       result.polytope_over_box = std::max(result.polytope_over_box, ratio);
     }
+  }
+  for (LogContradiction& found : contradictions_in_result(result, s, raised)) {
+    result.contradictions.push_back(std::move(found));
+  }
+  if (withdrawn(result)) {
+    withdraw(result);
+    result.message = status_message(s, result);
   }
   log.rewind();
   tell(options, "done", 1.0);
