@@ -9,8 +9,10 @@
 #include <wheelwright/commission/physical.hpp>
 #include <wheelwright/io/json_number.hpp>
 #include <wheelwright/io/model_words.hpp>
+#include <wheelwright/io/warrant_json.hpp>
 #include <wheelwright/report/page.hpp>
 #include <wheelwright/report/text.hpp>
+#include <wheelwright/report/warrant_section.hpp>
 
 #include "common.hpp"
 
@@ -55,6 +57,17 @@ std::string facet_sentence(const FacetVerdicts& facets) {
 
 }  // namespace
 
+std::string proof_scope(const ModelClaims& claims) {
+  const auto tested = std::ranges::count(claims.assumptions, AssumptionVerdict::holds, &Assumption::verdict);
+  return fmt::format(
+      "What is proved is arithmetic: the bounds follow from the rows of the log within the stated noise. "
+      "That the assumptions hold is not proved{}. The bounds are {}.",
+      claims.assumptions.empty() ? ", and the model does not list them"
+                                 : fmt::format(": commissioning took {}, of which {} were tested on the log and held",
+                                               claims.assumptions.size(), tested),
+      warrant_word(claims.warrant));
+}
+
 std::string verdict(const ModelCheck& check, const ModelClaims& claims) {
   if (!check.proved()) {
     return fmt::format("not proved: {} statement{} of the model {} not follow from the log", check.failures.size(),
@@ -95,6 +108,10 @@ std::string summary(const ModelCheck& check, const ModelClaims& claims) {
   for (const std::string& premise : check.premises) {
     text += "  given: " + premise + "\n";
   }
+  text += "  " + proof_scope(claims) + "\n";
+  for (const Assumption& a : claims.assumptions) {
+    text += fmt::format("  assumed ({}): {}\n", verdict_word(a.verdict), a.statement);
+  }
   return text;
 }
 
@@ -122,6 +139,8 @@ Json to_json(const ModelCheck& check, const ModelClaims& claims, const LogReport
       {"model", files.model},
       {"proved", check.proved()},
       {"message", verdict(check, claims)},
+      {"warrant", warrant_word(claims.warrant)},
+      {"scope", proof_scope(claims)},
       {"data", {{"same", check.same_log}, {"rows", data.rows}, {"segments", data.segments}, {"files", log_files}}},
       {"bounds", bounds},
       {"facets",
@@ -132,7 +151,8 @@ Json to_json(const ModelCheck& check, const ModelClaims& claims, const LogReport
         {"wrong", facets.wrong.size()}}},
       {"failures", check.failures},
       {"warnings", check.warnings},
-      {"premises", check.premises}};
+      {"premises", check.premises},
+      {"assumptions", assumptions_json(claims.assumptions)}};
   if (check.emptiness) {
     json["contradiction"] = {{"rows", claims.contradiction.size()},
                              {"proved", check.emptiness->proved},
@@ -158,7 +178,9 @@ std::string check_report(const ModelCheck& check, const ModelClaims& claims, con
   content.sentences = {
       "Every proof was evaluated in exact rational arithmetic on rows that were filtered again from the log, without "
       "the "
-      "solver that found them."};
+      "solver that found them.",
+      proof_scope(claims)};
+  content.warrant = claims.warrant;
   content.sections = {{"bounds", "Bounds", table({"parameter", "", "bound", "", "stands on"}, rows)}};
   if (!check.emptiness) {
     content.sections.push_back(
@@ -171,6 +193,9 @@ std::string check_report(const ModelCheck& check, const ModelClaims& claims, con
     content.sections.push_back({"warnings", "Warnings", bullets(check.warnings)});
   }
   content.sections.push_back({"premises", "Given, not proved", bullets(check.premises)});
+  if (std::string given = assumptions_section(claims.assumptions); !given.empty()) {
+    content.sections.push_back({"assumptions", "Assumptions", std::move(given)});
+  }
   content.sections.push_back(
       {"files", "Files",
        definitions({{"model", files.model}, {"log", fmt::format("{}", fmt::join(files.logs, ", "))}})});

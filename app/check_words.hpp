@@ -16,6 +16,9 @@ struct CheckedFiles {
   std::vector<std::string> logs;
 };
 
+/// What the proof is about and what it is not, one sentence or two.
+[[nodiscard]] std::string proof_scope(const ModelClaims& claims);
+
 /// The answer in one sentence.
 [[nodiscard]] std::string verdict(const ModelCheck& check, const ModelClaims& claims);
 

@@ -33,7 +33,7 @@ struct Arguments {
 
 constexpr const char* kHelp =
     "Chooses the filter's order, α and β and the decision rule for the faults that are to be seen, under a stated "
-    "guarantee against false alarms, and says what every other choice costs.";
+    "promise about false alarms, and says what every other choice costs.";
 
 constexpr const char* kExamples =
     "Every candidate is commissioned on LOG and asked, for the motion of LOG, from what size on a fault is certain to "

@@ -34,7 +34,8 @@ struct Arguments {
 
 constexpr const char* kHelp =
     "From a log of fault-free driving to a model that a detector can carry: best-guess parameters by least squares on "
-    "filtered torque, guaranteed bounds on them, thresholds, and a trial on driving that was held out.\n\n"
+    "filtered torque, bounds on them (guaranteed where the robot file declares its sensors' noise, else extrapolated), "
+    "thresholds, and a trial on driving that was held out.\n\n"
     "Drive so that every parameter shows: speed up and brake, drive curves and change the yaw rate, in both "
     "directions, for a minute or more.";
 

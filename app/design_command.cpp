@@ -47,7 +47,7 @@ struct Arguments {
 
 constexpr const char* kHelp =
     "Designs a drive within limits of speed, acceleration, effort, space and time, and writes it as a table of "
-    "wheel-speed commands: for the narrowest guaranteed bounds on the parameters (bounds), or as an inspection that is "
+    "wheel-speed commands: for the narrowest bounds on the parameters (bounds), or as an inspection that is "
     "certain to find faults that are as small as possible (detection), or to tell apart causes of a sim-to-real gap "
     "(discrimination).";
 
@@ -196,6 +196,7 @@ int run(const Arguments& a) {
   const auto finish = [&](Json result, const auto& design, const std::string& words) {
     result["software"] = software();
     result["seed"] = a.common.seed;
+    result["warrant"] = warrant_word(subject.warrant);
     write_plans(a, subject.model, design.manoeuvre.plan, design.figure_eight_plan);
     publish(a.common, result, "design.json", design_report(design, subject, limits, context));
     tell(a, words);

@@ -8,6 +8,7 @@
 #include <wheelwright/io/atomic_file.hpp>
 #include <wheelwright/io/export_c.hpp>
 #include <wheelwright/io/model_file.hpp>
+#include <wheelwright/io/warrant_json.hpp>
 
 #include "commands.hpp"
 #include "common.hpp"
@@ -58,6 +59,8 @@ Json to_json(const Arguments& a, const CommissionedModel& model, const Detector&
     }
   }
   result["vertices"] = vertices;
+  result["warrant"] = warrant_word(model.warrant);
+  result["assumptions"] = assumptions_json(model.assumptions);
   if (file.empty()) {
     result["text"] = text;
   } else {
@@ -72,8 +75,10 @@ int run(const Arguments& a) {
   model.persistence = a.persistence.value_or(model.persistence);
   const Detector detector = make_detector(model, a.detector);
   const std::string text = c_header(
-      detector,
-      {.name = a.name, .robot = model.robot.name, .source = a.model.filename().string(), .software = software()});
+      detector, {.name = a.name,
+                 .robot = model.robot.name,
+                 .source = fmt::format("{}, thresholds {}", a.model.filename().string(), warrant_word(model.warrant)),
+                 .software = software()});
   std::string file;
   if (!a.common.out.empty()) {
     make_directory(a.common);

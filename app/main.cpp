@@ -39,9 +39,9 @@ std::string joined(int count, char** words) {
 
 int main(int argc, char** argv) {
   CLI::App program(
-      "Model-based fault detection for wheeled robots, guaranteed and tight.\n"
-      "A robot and a log of fault-free driving go in; a model with thresholds that no healthy robot exceeds comes "
-      "out.",
+      "Model-based fault detection for wheeled robots, with thresholds that are derived, not tuned.\n"
+      "A robot and a log of fault-free driving go in; a model with thresholds that no healthy robot exceeds, while the "
+      "assumptions that it lists hold, comes out.",
       "wheelwright");
   program.set_version_flag("--version", software());
   program.require_subcommand(1);

@@ -37,7 +37,8 @@ struct Arguments {
 constexpr const char* kHelp =
     "Says beforehand which faults a commissioned robot's detector is certain to see, from what size on, how soon, and "
     "in "
-    "which manoeuvre: for the motion of LOG, whatever the parameters within their bounds and the noise within its own.";
+    "which manoeuvre: for the motion of LOG, whatever the parameters within their bounds and the noise within its own. "
+    "Whether that is guaranteed, extrapolated or statistical depends on what the model stands on, and is said.";
 
 constexpr const char* kExamples =
     "LOG is a drive to be judged: the one that was commissioned with, another, or a simulated one. A row of the table "
@@ -99,7 +100,7 @@ int run(const Arguments& a) {
   if (!a.common.quiet && !a.common.json) {
     print_log(sentences(log.report()));
     for (const ResidualMargins& residual : survey.residuals) {
-      fmt::print("{}", table(survey, residual));
+      fmt::print("{}{}\n", table(survey, residual), certain_meaning(residual.warrant));
     }
     if (!survey.without_kinematic.empty()) {
       fmt::print("no kinematic residual: {}\n", survey.without_kinematic);

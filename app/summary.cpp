@@ -8,15 +8,17 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include <wheelwright/commission/margin_words.hpp>
 #include <wheelwright/commission/physical.hpp>
 #include <wheelwright/identify/noise_level.hpp>
+#include <wheelwright/io/warrant_json.hpp>
 
 #include "common.hpp"
 
 namespace wheelwright::app {
 namespace {
 
-// One line of the parameter table: name, estimate, guaranteed interval, statistical half-width, unit.
+// One line of the parameter table: name, estimate, interval of bounds, statistical half-width, unit.
 std::string line(const std::string& name, const std::optional<double>& estimate, double lower, double upper,
                  const std::optional<double>& half, const std::string& unit, bool lower_is_prior, bool upper_is_prior) {
   const auto end = [](double value, bool prior) { return fmt::format("{:.5g}{}", value, prior ? " (prior)" : ""); };
@@ -29,8 +31,8 @@ std::string parameter_table(const Commissioning& r) {
   const Robot& robot = r.model.robot;
   const auto scales = physical_scales(robot, r.model.model);
   const double t = student_quantile(0.95, std::max(r.residuals.freedom, 1.0));
-  std::string text =
-      fmt::format("  {:<20} {:>11}   guaranteed interval   ± 95 % statistical\n", "parameter", "estimate");
+  std::string text = fmt::format("  {:<20} {:>11}   {} interval   ± 95 % statistical\n", "parameter", "estimate",
+                                 warrant_word(r.model.warrant));
   for (std::size_t j = 0; j < r.parameters.size(); ++j) {
     const ParameterResult& p = r.parameters[j];
     const PhysicalScale s = scales ? (*scales)[j] : PhysicalScale{};
@@ -50,6 +52,7 @@ std::string parameter_table(const Commissioning& r) {
     text +=
         "  (physical values need the motor's constants in the robot file: motor: {torque_constant, gear_ratio, …})\n";
   }
+  text += fmt::format("  {}\n  {}\n", warrant_meaning(r.model.warrant), statistical_remark());
   return text;
 }
 
@@ -67,6 +70,9 @@ std::string smallest_fault(const Robot& robot, double kappa) {
 
 std::string kinematic_table(const KinematicCommissioning& k) {
   std::string text;
+  if (k.model) {
+    text += fmt::format("  {:<20} {:>11}   {} interval\n", "pose or gyro", "estimate", warrant_word(k.model->warrant));
+  }
   for (const KinematicParameter& p : k.parameters) {
     text += line(p.name, p.estimate, p.lower, p.upper, std::nullopt, p.unit == "1" ? "" : p.unit, false, false);
   }
@@ -76,6 +82,20 @@ std::string kinematic_table(const KinematicCommissioning& k) {
     const OutputValidation& v = k.validation[i];
     text += fmt::format("  held out, {}: {} false alarms in {} instants, median width of the threshold {:.3g} {}\n",
                         outputs[i], v.outside, v.instants, v.median_width, units[i]);
+  }
+  return text;
+}
+
+// How many assumptions hold, and those that fail, with what shows it.
+std::string assumption_lines(const std::vector<Assumption>& assumptions) {
+  using Verdict = AssumptionVerdict;
+  const auto number = [&](Verdict verdict) { return std::ranges::count(assumptions, verdict, &Assumption::verdict); };
+  std::string text = fmt::format("  assumptions: {} hold on this log, {} not tested, {} fail (model.json lists them)\n",
+                                 number(Verdict::holds), number(Verdict::not_tested), number(Verdict::fails));
+  for (const Assumption& a : assumptions) {
+    if (a.verdict == Verdict::fails) {
+      text += fmt::format("    fails: {} {}\n", a.statement, a.detail);
+    }
   }
   return text;
 }
@@ -107,7 +127,7 @@ std::string summary(const Commissioning& r) {
                       r.survey.rows, r.survey.segments, r.survey.segments == 1 ? "" : "s", r.survey.seconds,
                       r.model.filter.order, r.model.filter.beta, r.model.filter.delay());
   if (r.status == Commissioning::Status::empty) {
-    return text + contradiction_table(r) + contradiction_notes(r);
+    return text + contradiction_table(r) + contradiction_notes(r) + assumption_lines(r.assumptions);
   }
   if (r.status == Commissioning::Status::contradicted) {
     return text + contradiction_notes(r);
@@ -126,7 +146,11 @@ std::string summary(const Commissioning& r) {
                         r.model.model.outputs[i], v.outside, v.instants, 100.0 * v.nrmse);
     text += "; " + smallest_fault(r.model.robot, v.smallest_kappa) + "\n";
   }
+  if (!r.validation.empty() && r.model.warrant != Warrant::guaranteed) {
+    text += fmt::format("  {}\n", certain_meaning(r.model.warrant));
+  }
   text += kinematic_table(r.kinematic);
+  text += assumption_lines(r.assumptions);
   for (const std::string& note : r.notes) {
     text += "  note: " + note + "\n";
   }
@@ -178,6 +202,7 @@ std::string summary(const Detection& d, const CommissionedModel& model) {
       text += fmt::format("  … and {} more (--json lists them all)\n", d.events.size() - most);
     }
   }
+  text += fmt::format("  thresholds: {}\n", warrant_word(model.warrant));
   for (std::size_t i = 0; i < d.utilisation.size(); ++i) {
     text += fmt::format("  {}: residual {:.2g} % of the torque, at most {:.0f} % of its threshold used\n",
                         model.model.outputs[i], 100.0 * d.nrmse[i], 100.0 * d.utilisation[i]);
@@ -203,6 +228,8 @@ Json to_json(const Detection& d, const CommissionedModel& model, const std::stri
                {"software", software()},
                {"model", model_file},
                {"log", log},
+               {"warrant", warrant_word(model.warrant)},
+               {"assumptions", assumptions_json(model.assumptions)},
                {"fault", !d.events.empty()},
                {"rows", d.rows},
                {"instants", d.instants},
@@ -259,6 +286,7 @@ CommissionedModel with_kinematic_outputs(const CommissionedModel& model) {
   view.robot.effort = EffortKind::torque;  // units are those of the pose
   view.model = model.kinematic ? kinematic_outputs(*model.kinematic) : Model{};
   view.persistence = model.kinematic ? model.kinematic->persistence : model.persistence;
+  view.warrant = model.kinematic ? model.kinematic->warrant : model.warrant;
   return view;
 }
 
@@ -282,6 +310,7 @@ std::string summary(const KinematicWatch& watch, const CommissionedModel& model)
   if (d.events.size() > most) {
     text += fmt::format("  … and {} more (--json lists them all)\n", d.events.size() - most);
   }
+  text += fmt::format("  thresholds: {}\n", warrant_word(view.warrant));
   for (std::size_t i = 0; i < d.utilisation.size(); ++i) {
     text +=
         fmt::format("  {}: at most {:.0f} % of its threshold used\n", view.model.outputs[i], 100.0 * d.utilisation[i]);
@@ -302,7 +331,8 @@ void add_kinematic(Json& json, const KinematicWatch& watch, const CommissionedMo
   std::ranges::stable_sort(events, {}, [](const Json& event) { return event.at("alarm").get<double>(); });
   json["events"] = events;
   json["fault"] = !events.empty();
-  json["kinematic"] = {{"watched", watch.detection.has_value()},
+  json["kinematic"] = {{"warrant", warrant_word(view.warrant)},
+                       {"watched", watch.detection.has_value()},
                        {"message", watch.message},
                        {"instants", d.instants},
                        {"seconds", d.seconds}};

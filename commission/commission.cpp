@@ -317,9 +317,7 @@ std::string status_message(const Setting& s, const Commissioning& result) {
   return {};
 }
 
-}  // namespace
-
-Commissioning commission(LogSource& log, const Robot& robot, const CommissionOptions& options) {
+Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionOptions& options) {
   Commissioning result;
   result.noise_mode = options.noise_mode;
   const Setting s = settle(log, robot,
@@ -346,7 +344,11 @@ Commissioning commission(LogSource& log, const Robot& robot, const CommissionOpt
   result.condition = fit.squares.condition;
 
   tell(options, "looking for contradictions", 0.35);
-  result.contradictions = contradictions_in_log(log, s, fit);
+  SignalFindings signals = contradictions_in_log(log, s, fit);
+  result.contradictions = std::move(signals.contradictions);
+  if (signals.timing) {
+    result.effort_shift = signals.timing->delay;
+  }
 
   tell(options, "bounding", 0.4);
   result.noise = output_noise(s, fit, options.extrapolation);
@@ -413,6 +415,14 @@ Commissioning commission(LogSource& log, const Robot& robot, const CommissionOpt
   }
   log.rewind();
   tell(options, "done", 1.0);
+  return result;
+}
+
+}  // namespace
+
+Commissioning commission(LogSource& log, const Robot& robot, const CommissionOptions& options) {
+  Commissioning result = commissioned(log, robot, options);
+  settle_warrants(result);
   return result;
 }
 

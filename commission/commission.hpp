@@ -11,6 +11,7 @@
 
 #include <wheelwright/bounds/feasible_set.hpp>
 #include <wheelwright/bounds/minimax.hpp>
+#include <wheelwright/commission/assumptions.hpp>
 #include <wheelwright/commission/contradictions.hpp>
 #include <wheelwright/commission/filter_choice.hpp>
 #include <wheelwright/commission/folds.hpp>
@@ -39,6 +40,8 @@ struct CommissionedModel {
   Box box;                        ///< finite box that bounds the set (the certified hull)
   Persistence persistence;
   std::optional<KinematicModel> kinematic{};  ///< of the kinematic residual, where the log had a pose or a gyro
+  Warrant warrant = Warrant::extrapolated;    ///< of set, hull and thresholds
+  std::vector<Assumption> assumptions{};      ///< that they stand on, with what the log said of each
 };
 
 /// What commissioning found about one parameter.
@@ -48,7 +51,7 @@ struct ParameterResult {
   std::string reason;                    ///< why it is not identified, for people
   std::optional<double> estimate;        ///< nothing where the log does not show the parameter
   std::optional<double> standard_error;  ///< honest under autocorrelated residuals
-  double lower = 0.0;                    ///< guaranteed bounds (certified hull)
+  double lower = 0.0;                    ///< bounds (certified hull)
   double upper = 0.0;
   double chebyshev = 0.0;       ///< centre of the feasible set
   bool lower_is_prior = false;  ///< the bound is the prior box's: the log does not tighten it
@@ -56,6 +59,7 @@ struct ParameterResult {
   bool estimate_inside = true;           ///< least squares may leave the hull
   std::vector<RowOrigin> lower_binding;  ///< samples that set the lower bound
   std::vector<RowOrigin> upper_binding;
+  Warrant warrant = Warrant::extrapolated;  ///< of lower and upper
 };
 
 /// The result of commissioning.
@@ -84,14 +88,16 @@ struct Commissioning {
   FoldOptions folds;
   double minimax = 0.0;     ///< where the set is empty: by how much the bounds n̄ on the effort would have to be
                             ///< raised for it not to be (those on the motion kept); else 0
+  std::optional<double> effort_shift;  ///< s, by which the efforts seem late beyond the middle of what is declared
   std::vector<LogContradiction> contradictions;  ///< found whatever the status; one that withdraws leaves no model
   Box prior;                ///< in which the set was sought
   SignalErrors row_errors;  ///< dY and dy of the rows that the set is made of: OutputNoise::learning in `output`
-  std::vector<std::size_t> dropped;  ///< rows of the log whose instants the set leaves out as outliers
-  FeasibleSet feasible;              ///< the set, its hull, certificates
-  KinematicCommissioning kinematic;  ///< of the kinematic residual; its model is also CommissionedModel::kinematic
-  double polytope_over_box = 1.0;    ///< median width of [l, u]: polytope over box, held out, worst output
-  std::vector<std::string> notes;    ///< what was assumed, repaired or chosen, for people
+  std::vector<std::size_t> dropped;     ///< rows of the log whose instants the set leaves out as outliers
+  FeasibleSet feasible;                 ///< the set, its hull, certificates
+  KinematicCommissioning kinematic;     ///< of the kinematic residual; its model is also CommissionedModel::kinematic
+  double polytope_over_box = 1.0;       ///< median width of [l, u]: polytope over box, held out, worst output
+  std::vector<std::string> notes;       ///< what was repaired or chosen, for people
+  std::vector<Assumption> assumptions;  ///< everything that is taken as given, with what the log says of it
 };
 
 /// Options of commission().

@@ -227,33 +227,31 @@ Eigen::VectorXd unshifted(const TimeShiftedRows& model, const Eigen::VectorXd& w
 }
 
 std::string shift_words(const Setting& s, const EffortTiming& timing) {
-  const double steps = timing.delay / s.survey.median_step;
-  const double half = std::abs(std::abs(steps) - 0.5);
+  const double late = timing.delay + 0.5 * (s.robot.effort_delay.lower + s.robot.effort_delay.upper);
+  const double half = std::abs(std::abs(timing.delay / s.survey.median_step) - 0.5);
+  const std::string declare = fmt::format(
+      "where the shift is constant and known, declare it, as a range that holds it: `effort: {{delay: [{:.3g}, {:.3g}]}}` in "
+      "the robot file",
+      late - 5.0 * timing.standard_error, late + 5.0 * timing.standard_error);
   if (timing.delay < 0.0 && s.measurement.hold == Hold::first_order && half < kManyStepsOff) {
     return "that is half a step: speeds that are differenced backwards are stamped half a step late (stamp them in the "
-           "middle of their interval, or log angles), and efforts that are held commands want `hold: zero_order`";
+           "middle of their interval, or log angles), and efforts that are held commands want `hold: zero_order`; " +
+           declare;
   }
   if (timing.delay > 0.0 && s.measurement.hold == Hold::zero_order && half < kManyStepsOff) {
-    return "that is half a step, as with efforts that are measured and not held: `effort: {hold: first_order}` in the "
-           "robot file; else declare it as `effort: {delay: …}`";
+    return "that is half a step, as with efforts that are measured and not held (`hold: first_order`); " + declare;
   }
-  return timing.delay > 0.0
-             ? fmt::format("stamp efforts and motion by one clock where they are measured, or, where the lateness is "
-                           "constant and known, declare it: `effort: {{delay: {:.3g}}}` in the robot file",
-                           timing.delay)
-             : "stamp efforts and motion by one clock where they are measured: speeds that are differenced backwards "
-               "belong to the middle of their interval, and held efforts to its beginning";
+  return "stamp efforts and motion by one clock where they are measured; " + declare;
 }
 
-void find_latency(LogSource& log, const Setting& s, const Fit& fit, std::vector<LogContradiction>& out) {
-  const std::optional<EffortTiming> timing = effort_timing(log, s, fit);
+void find_latency(const Setting& s, const std::optional<EffortTiming>& timing, std::vector<LogContradiction>& out) {
   if (!timing || !is_latency(*timing, s.survey.median_step)) {
     return;
   }
   out.push_back({.kind = Kind::effort_timing,
                  .subject = s.measurement.effort_columns.front(),
                  .value = timing->delay,
-                 .limit = kLeastShift * s.survey.median_step,
+                 .limit = timing->declared + kLeastShift * s.survey.median_step,
                  .sentence = fmt::format("the efforts come {:.3g} ± {:.1g} ms {} the motion, {:.2g} steps of the log",
                                          1e3 * std::abs(timing->delay), 2e3 * timing->standard_error,
                                          timing->delay > 0.0 ? "after" : "before",
@@ -410,6 +408,9 @@ std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& s, cons
       return cost_curve(model, Eigen::VectorXd::Zero(1), 0, shift, shift + 1e-9, 2, fit.weights).front().weighted_rss;
     };
     EffortTiming timing{.delay = found.shape[0], .standard_error = found.standard_error[0], .freedom = found.freedom};
+    const bool moving = s.measurement.hold == Hold::zero_order && s.robot.effort_changes == EffortChanges::between;
+    timing.declared = 0.5 * (s.robot.effort_delay.upper - s.robot.effort_delay.lower) +
+                      (moving ? 0.5 * s.survey.median_step : 0.0);
     const double without = rss(0.0);
     timing.residual_ratio = without > 0.0 ? std::sqrt(found.weighted_rss / without) : 1.0;
     timing.mirror_ratio = without > 0.0 ? std::sqrt(rss(-timing.delay) / without) : 1.0;
@@ -428,24 +429,26 @@ std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& s, cons
 }
 
 bool is_latency(const EffortTiming& timing, double step) {
-  const double shift = std::abs(timing.delay);
+  const double shift = std::max(0.0, std::abs(timing.delay) - timing.declared);
   return shift > kLeastShift * step && shift > certain(timing.freedom) * timing.standard_error && timing.mirror_ratio > kMirror &&
          (timing.residual_ratio < kLowersResidual || timing.moved > kMovesParameter);
 }
 
-std::vector<LogContradiction> contradictions_in_log(LogSource& log, const Setting& s, const Fit& fit) {
-  std::vector<LogContradiction> found;
+SignalFindings contradictions_in_log(LogSource& log, const Setting& s, const Fit& fit) {
+  SignalFindings findings;
+  std::vector<LogContradiction>& found = findings.contradictions;
   find_constant_efforts(log, s, found);
   const std::vector<JointFit> joints = fit_joints(log, s);
   find_unrelated_efforts(s, joints, found);
   if (found.empty()) {  // nothing else is worth a word beside a dead sensor
-    find_latency(log, s, fit, found);
+    findings.timing = effort_timing(log, s, fit);
+    find_latency(s, findings.timing, found);
     find_wrong_signs(s, fit, found);
     find_uneven_efforts(s, joints, found);
     find_uneven_halves(log, s, fit, found);
   }
   log.rewind();
-  return found;
+  return findings;
 }
 
 std::vector<LogContradiction> contradictions_in_result(const Commissioning& result, const Setting& s, double raised) {

@@ -18,7 +18,9 @@ struct Commissioning;
 
 /// A constant shift in time between effort and motion, by least squares over filtered rows (TimeShiftedRows).
 struct EffortTiming {
-  double delay = 0.0;           ///< s; > 0: the logged effort comes late
+  double delay = 0.0;           ///< s, beyond the middle of what is declared; > 0: the logged effort comes late
+  double declared = 0.0;        ///< s, half of the range that is declared: of effort.delay, and of a step where held
+                                ///< efforts may change between samples
   double standard_error = 0.0;  ///< s, honest under autocorrelated residuals
   double freedom = 1.0;         ///< degrees of freedom of its Student's t
   double residual_ratio = 1.0;  ///< rms residual with the shift over that without
@@ -31,15 +33,21 @@ struct EffortTiming {
 [[nodiscard]] std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& setting, const Fit& fit,
                                                         double longest = 0.2, std::size_t most_rows = 60000);
 
-/// Whether `timing` is a latency that a model must not be made with: told from zero at a risk of 1e-8 (Student's t), longer
-/// than a quarter of `step` (s), of an effect that is not symmetric in the sign of the shift (interpolation averages noise,
+/// Whether `timing` is a latency that a model must not be made with: beyond what is declared, told from that at a risk of
+/// 1e-8 (Student's t) and further from it than a quarter of `step` (s), of an effect that is not symmetric in the sign of the shift (interpolation averages noise,
 /// which lowers the residual for a shift either way), and one that either lowers the residual by 1 % or more or moves a
 /// parameter by two standard errors. Healthy logs with even steps showed 0.09 steps at most.
 [[nodiscard]] bool is_latency(const EffortTiming& timing, double step);
 
-/// What the signals say before any set is made: constant and unrelated efforts, timing, wheels that disagree, signs,
-/// halves that disagree. Walks `log` a few times.
-[[nodiscard]] std::vector<LogContradiction> contradictions_in_log(LogSource& log, const Setting& setting, const Fit& fit);
+/// What the signals of a log say before any set is made.
+struct SignalFindings {
+  std::vector<LogContradiction> contradictions;
+  std::optional<EffortTiming> timing;  ///< nothing where no shift is told, or was not looked for
+};
+
+/// Constant and unrelated efforts; where there are none, timing, wrong signs, wheels and halves that disagree. Walks `log`
+/// a few times.
+[[nodiscard]] SignalFindings contradictions_in_log(LogSource& log, const Setting& setting, const Fit& fit);
 
 /// What a finished commissioning says against itself: best guesses outside their set, held-out rows outside the
 /// thresholds, a noise bound that had to be raised by `raised` for the prior box to explain the log.

@@ -160,7 +160,7 @@ std::string assumption(Guarantee guarantee, double false_alarms) {
           "(an encoder's rounding is that only while wheels turn by several counts a sample)",
           false_alarms);
     case Guarantee::extrapolated:
-      return "noise is not declared: its bounds are extrapolated from the residuals of this log, and the guarantee "
+      return "noise is not declared: its bounds are extrapolated from the residuals of this log, and the promise "
              "holds as far as driving to come is like it; declare `noise:` in the robot file for one that stands on "
              "the sensors";
   }

@@ -291,7 +291,7 @@ void add_noise(const Identification& r, std::vector<std::string>& steps) {
     if (loud) {
       steps.push_back(
           fmt::format("{} is noisier than its bound {} ({:.2g} {}): its standard deviation is {:.2g}. Raise "
-                      "the bound in the robot file; guarantees stand on it.",
+                      "the bound in the robot file; bounds stand on it.",
                       n.column, n.known->origin, n.known->bound, n.unit, n.choice.sd));
     }
   }
@@ -502,7 +502,7 @@ std::vector<std::string> next_steps(const Identification& r) {
             ? "Drive so that every parameter shows: speed up and brake, drive curves, in both directions, for a minute "
               "or "
               "more."
-            : "Nothing is missing. `wheelwright commission` makes guaranteed bounds and thresholds of the same log.");
+            : "Nothing is missing. `wheelwright commission` makes bounds and thresholds of the same log.");
   }
   return steps;
 }

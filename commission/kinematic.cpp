@@ -50,6 +50,19 @@ struct BoundedSet {
   double raise = 1.0;
 };
 
+// What the motion at a pose's time may be elsewhere than the samples about it say. Angles behind mean speeds are taken
+// half-way between their times: a·h²/8. Speeds are integrated by the trapezoidal rule: with no more than a limit on the
+// acceleration that is wrong by a·h/4 of a speed.
+double between_samples(double acceleration, const Survey& survey, MotionKind motion) {
+  const double h = survey.largest_step;
+  switch (motion) {
+    case MotionKind::angle: return 0.0;
+    case MotionKind::mean_speed: return acceleration * h * h / 8.0;
+    case MotionKind::speed: return acceleration * h / 4.0;
+  }
+  return 0.0;
+}
+
 Frame settle(LogSource& log, const Robot& robot, const OdometryMeasurement& m, const Survey& survey,
              const KinematicCommissionOptions& options) {
   check::that(options.radius_share > 0.0 && options.radius_share < 1.0, "radius share", "a number inside (0, 1)");
@@ -91,12 +104,11 @@ Frame settle(LogSource& log, const Robot& robot, const OdometryMeasurement& m, c
     s.is_declared.push_back(output == "yaw" ? heading : output == "gyro_yaw" ? false : position);
   }
   if (heading) {
-    s.declared.motion = *motion + (m.motion == MotionKind::angle ? 0.0 : interpolation_error(survey, m.motion));
+    const std::vector<double> limit = acceleration_limit(robot, survey, m.motion, *motion);
+    s.declared.acceleration = limit.empty() ? 0.0 : *std::ranges::max_element(limit);
+    s.declared.motion = *motion + between_samples(s.declared.acceleration, survey, m.motion);
     s.declared.heading = *robot.noise.heading.value;
     s.declared.position = robot.noise.position.value.value_or(0.0);
-    for (const double a : survey.largest_acceleration) {
-      s.declared.acceleration = std::max(s.declared.acceleration, a);
-    }
     s.declared.yaw_gain = (1.0 + options.radius_share) * gain;
   }
   return s;

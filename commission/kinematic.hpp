@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The kinematic residual commissioned: effective wheel radii and yaw gains with guaranteed bounds, from the pose or gyro
-/// of a fault-free log.
+/// The kinematic residual commissioned: effective wheel radii and yaw gains with bounds, from the pose or gyro of a
+/// fault-free log.
 #pragma once
 
 #include <optional>
@@ -32,6 +32,7 @@ struct KinematicModel {
   std::vector<HalfSpace> facets;  ///< of the feasible set
   Box box;                        ///< its certified hull
   Persistence persistence;
+  Warrant warrant = Warrant::extrapolated;  ///< of set, hull and thresholds
 };
 
 /// What commissioning found about one kinematic parameter.
@@ -42,9 +43,10 @@ struct KinematicParameter {
   std::string reason;              ///< why it is not identified, for people
   std::optional<double> estimate;  ///< least squares; nothing where the log does not show the parameter
   std::optional<double> standard_error;
-  double lower = 0.0;  ///< guaranteed bounds (certified hull)
+  double lower = 0.0;  ///< bounds (certified hull)
   double upper = 0.0;
-  double nominal = 0.0;  ///< of the robot file's geometry; 0 for a bias
+  double nominal = 0.0;                     ///< of the robot file's geometry; 0 for a bias
+  Warrant warrant = Warrant::extrapolated;  ///< of lower and upper
 };
 
 /// Result of commission_kinematics().

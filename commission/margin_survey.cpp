@@ -87,6 +87,7 @@ MarginSurvey survey_margins(LogSource& log, const CommissionedModel& model, cons
   survey.windows = margins.windows;
   survey.persistence = margins.persistence;
   survey.noise_share = margins.noise_share;
+  survey.assumptions = model.assumptions;
   const std::vector<FaultType> faults =
       chosen(fault_catalogue(model.model, model.estimate, model.robot.effort), options.faults);
 
@@ -99,7 +100,12 @@ MarginSurvey survey_margins(LogSource& log, const CommissionedModel& model, cons
                           ? 0.0
                           : motion.t[k] - motion.t[k - 1];
   }
-  ResidualMargins torque{.name = "torque", .outputs = model.model.outputs, .margins = {}, .blind = {}, .maps = {}};
+  ResidualMargins torque{.name = "torque",
+                         .outputs = model.model.outputs,
+                         .margins = {},
+                         .blind = {},
+                         .maps = {},
+                         .warrant = model.warrant};
   const ThresholdRule rule(Polytope(model.facets, model.box), model.estimate, options.set);
   torque.margins = margins_along(
       motion, faults, rule,
@@ -129,8 +135,12 @@ MarginSurvey survey_margins(LogSource& log, const CommissionedModel& model, cons
       return survey;
     }
   }
-  ResidualMargins kinematic{
-      .name = "kinematic", .outputs = k.measurement.outputs(), .margins = {}, .blind = {}, .maps = {}};
+  ResidualMargins kinematic{.name = "kinematic",
+                            .outputs = k.measurement.outputs(),
+                            .margins = {},
+                            .blind = {},
+                            .maps = {},
+                            .warrant = k.warrant};
   std::vector<FaultType> visible;
   for (const FaultType& fault : faults) {
     if (moves(fault) || fault.seen.size() > 0) {

@@ -35,11 +35,12 @@ struct FaultMaps {
 
 /// Margins in one residual.
 struct ResidualMargins {
-  std::string name;                   ///< "torque" or "kinematic"
-  std::vector<std::string> outputs;   ///< channels
-  std::vector<FaultMargins> margins;  ///< of the faults that this residual can see at all
-  std::vector<std::string> blind;     ///< faults that leave no trace in it, whatever their size
-  std::vector<FaultMaps> maps;        ///< torque only
+  std::string name;                         ///< "torque" or "kinematic"
+  std::vector<std::string> outputs;         ///< channels
+  std::vector<FaultMargins> margins;        ///< of the faults that this residual can see at all
+  std::vector<std::string> blind;           ///< faults that leave no trace in it, whatever their size
+  std::vector<FaultMaps> maps;              ///< torque only
+  Warrant warrant = Warrant::extrapolated;  ///< of the thresholds: in which sense a size is certain
 };
 
 /// Everything that `wheelwright margins` says.
@@ -50,6 +51,7 @@ struct MarginSurvey {
   double seconds = 0.0;                                           ///< of driving
   std::vector<std::pair<ManoeuvreKind, std::size_t>> manoeuvres;  ///< onsets of each kind in the drive
   std::vector<ResidualMargins> residuals;                         ///< torque; kinematic where model and log have it
+  std::vector<Assumption> assumptions;                            ///< of the model
   std::string without_kinematic;  ///< why there is no kinematic residual; empty where there is one
 };
 

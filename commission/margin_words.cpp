@@ -78,12 +78,12 @@ std::string sentence(const MarginSurvey& survey, const FaultMargins& of) {
     name += of.side > 0.0 ? " (+)" : " (−)";
   }
   std::string out = name + ": ";
-  out += seen.empty() ? "not guaranteed to be seen at every moment of any manoeuvre" : "certainly seen " + joined(seen);
+  out += seen.empty() ? "not certain to be seen at every moment of any manoeuvre" : "certainly seen " + joined(seen);
   if (!at_best.empty()) {
     out += fmt::format("; at some moments only while {}", joined(at_best));
   }
   if (!unseen.empty()) {
-    out += fmt::format("; cannot be guaranteed while {}", joined(unseen));
+    out += fmt::format("; not certain while {}", joined(unseen));
   }
   return out + ".";
 }
@@ -123,6 +123,18 @@ std::size_t shown_window(const MarginSurvey& survey) {
     shown = survey.windows[w] <= 1.0 ? w : shown;
   }
   return shown;
+}
+
+std::string certain_meaning(Warrant warrant) {
+  return warrant == Warrant::guaranteed ? "“Certain” is meant as guaranteed: for all parameters that the commissioning "
+                                          "log allows and for every noise "
+                                          "within the sensors’ declared bounds, while the assumptions listed hold."
+         : warrant == Warrant::statistical ? "“Certain” is meant statistically: for all parameters that the "
+                                             "commissioning log allows, at the confidence "
+                                             "at which the sensors’ declared noise was taken through the filter."
+                                           : "“Certain” is extrapolated: it takes the noise bounds that were learnt "
+                                             "from the commissioning log for true "
+                                             "and holds as far as noise and driving stay like that log.";
 }
 
 std::vector<std::string> margin_sentences(const MarginSurvey& survey) {

@@ -22,8 +22,11 @@ namespace wheelwright {
 /// The window that tables show: the longest one up to a second.
 [[nodiscard]] std::size_t shown_window(const MarginSurvey& survey);
 
+/// In which sense a size is called certain, one sentence.
+[[nodiscard]] std::string certain_meaning(Warrant warrant);
+
 /// A sentence or two for each fault and side: in which manoeuvres it is certainly seen, from what size on, how soon, by
-/// which residual, and in which it is not guaranteed.
+/// which residual, and in which it is not certain.
 [[nodiscard]] std::vector<std::string> margin_sentences(const MarginSurvey& survey);
 
 }  // namespace wheelwright

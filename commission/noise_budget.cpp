@@ -28,7 +28,7 @@ std::optional<double> motion_error(const Robot& robot, const Measurement& measur
   return std::nullopt;
 }
 
-NoiseBudget noise_budget(const Robot& robot, const Measurement& measurement, const Survey& survey) {
+NoiseBudget noise_budget(const Robot& robot, const Measurement& measurement) {
   NoiseBudget budget;
   const auto motion = motion_error(robot, measurement);
   const bool declared_motion = robot.noise.wheel_speed.value || robot.noise.wheel_angle.value ||
@@ -37,10 +37,15 @@ NoiseBudget noise_budget(const Robot& robot, const Measurement& measurement, con
     return budget;
   }
   budget.complete = true;
-  budget.sensors.motion = *motion + interpolation_error(survey, measurement.motion);
+  budget.sensors.motion = *motion;
   budget.sensors.effort = *robot.noise.effort.value;
   budget.sensors.heading = robot.noise.heading.value.value_or(0.0);
   return budget;
+}
+
+Eigen::VectorXd coordinate_limit(const Model& model, const std::vector<double>& joint_limit) {
+  return model.motion.cwiseAbs() *
+         Eigen::Map<const Eigen::VectorXd>(joint_limit.data(), static_cast<Eigen::Index>(joint_limit.size()));
 }
 
 }  // namespace wheelwright

@@ -4,10 +4,13 @@
 #pragma once
 
 #include <optional>
+#include <vector>
 
-#include <wheelwright/commission/survey.hpp>
+#include <Eigen/Core>
+
 #include <wheelwright/filter/measurement.hpp>
 #include <wheelwright/filter/noise.hpp>
+#include <wheelwright/model/model.hpp>
 #include <wheelwright/model/robot.hpp>
 
 namespace wheelwright {
@@ -19,10 +22,13 @@ struct NoiseBudget {
 };
 
 /// For complete declarations: half a count for count-differenced speeds and encoder angles, else the declared bound of
-/// the motion column, plus what interpolation may add (survey.hpp); the declared bound of the effort. Otherwise the
-/// equation error as a whole is estimated from the residuals: it then holds the noise of all sensors, and adding
+/// the motion column; the declared bound of the effort. What happens between samples is no noise: SignalErrors::motion.
+/// Otherwise the equation error as a whole is estimated from the residuals: it then holds the noise of all sensors, and adding
 /// propagated bounds to it would count them twice.
-[[nodiscard]] NoiseBudget noise_budget(const Robot& robot, const Measurement& measurement, const Survey& survey);
+[[nodiscard]] NoiseBudget noise_budget(const Robot& robot, const Measurement& measurement);
+
+/// `limit` of each joint (acceleration_limit) as one of each coordinate of `model`.
+[[nodiscard]] Eigen::VectorXd coordinate_limit(const Model& model, const std::vector<double>& joint_limit);
 
 /// Bound on the error of the motion column alone, where the robot file or the encoder tells it: rad for angles and mean
 /// speeds, rad/s for speeds.

@@ -3,6 +3,7 @@
 /// The bound on what an output's residual can be without a fault, and where it comes from.
 #pragma once
 
+#include <wheelwright/core/warrant.hpp>
 #include <wheelwright/identify/noise_level.hpp>
 
 namespace wheelwright {
@@ -20,6 +21,7 @@ struct OutputNoise {
   double learning = 0.0;  ///< for the rows of this log, from which the feasible set is made; what was seen needs
                           ///< no extrapolation, so it is the smaller of the two
   ExtrapolatedBound how;  ///< how `bound` came about, meaningful where estimated
+  Warrant warrant = Warrant::extrapolated;  ///< of both bounds
 };
 
 }  // namespace wheelwright

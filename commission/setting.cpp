@@ -139,7 +139,7 @@ Setting settle(LogSource& log, const Robot& robot, const SettingOptions& options
           "instruments");
     }
   }
-  const NoiseBudget budget = noise_budget(s.robot, s.measurement, s.survey);
+  const NoiseBudget budget = noise_budget(s.robot, s.measurement);
   s.noise_complete = budget.complete;
   if (budget.complete) {
     s.declared = propagate(s.model, s.filter, s.measurement, budget.sensors,
@@ -147,6 +147,8 @@ Setting settle(LogSource& log, const Robot& robot, const SettingOptions& options
                             .confidence = options.confidence,
                             .rows = static_cast<double>(s.survey.rows),
                             .largest_step = s.survey.largest_step});
+    s.declared.motion.limit = coordinate_limit(
+        s.model, acceleration_limit(s.robot, s.survey, s.measurement.motion, budget.sensors.motion));
   }
   return s;
 }

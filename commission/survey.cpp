@@ -11,10 +11,15 @@ namespace {
 // The last two windows of one joint.
 class JointWatch {
  public:
-  void restart() { filled_ = 0; }
+  void restart() {
+    filled_ = 0;
+    steps_ = 0;
+  }
 
-  void add(double t, double value, bool is_angle, double& top_speed, double& top_acceleration, double& reversals) {
+  void add(double t, double value, bool is_angle, double& top_speed, double& top_acceleration, double& sharpest,
+           double& reversals) {
     const std::size_t n = times_.size();
+    look_at_step(t, value, is_angle, sharpest);
     times_[filled_ % n] = t;
     values_[filled_ % n] = value;
     ++filled_;
@@ -41,6 +46,26 @@ class JointWatch {
   }
 
  private:
+  // Change of the speed from one step to the next.
+  void look_at_step(double t, double value, bool is_angle, double& sharpest) {
+    const double h = t - last_t_;
+    if (!is_angle) {
+      sharpest = steps_ > 0 ? std::max(sharpest, std::abs(value - last_) / h) : sharpest;
+    } else if (steps_ > 0) {
+      const double slope = (value - last_) / h;
+      if (steps_ > 1) {
+        sharpest = std::max(sharpest, std::abs(slope - last_slope_) / (0.5 * (h + last_step_)));
+      }
+      last_slope_ = slope;
+    }
+    last_step_ = h;
+    last_t_ = t;
+    last_ = value;
+    ++steps_;
+  }
+
+  std::size_t steps_ = 0;
+  double last_t_ = 0.0, last_ = 0.0, last_step_ = 0.0, last_slope_ = 0.0;
   std::array<double, 2 * kSurveyWindow + 1> times_{}, values_{};
   std::size_t filled_ = 0;
   double direction_ = 0.0;
@@ -54,6 +79,7 @@ Survey survey(LogSource& log, const Measurement& measurement) {
   const std::size_t joints = measurement.motion_columns.size();
   s.largest_speed.assign(joints, 0.0);
   s.largest_acceleration.assign(joints, 0.0);
+  s.sharpest_change.assign(joints, 0.0);
   s.reversals.assign(joints, 0.0);
   std::vector<std::size_t> pick;
   for (const auto& name : measurement.motion_columns) {
@@ -90,7 +116,7 @@ Survey survey(LogSource& log, const Measurement& measurement) {
       before = t;
       for (std::size_t j = 0; j < joints; ++j) {
         watch[j].add(t, block.columns[pick[j]][k], is_angle, s.largest_speed[j], s.largest_acceleration[j],
-                     s.reversals[j]);
+                     s.sharpest_change[j], s.reversals[j]);
       }
     }
     s.rows += block.rows();
@@ -102,16 +128,19 @@ Survey survey(LogSource& log, const Measurement& measurement) {
   return s;
 }
 
-double interpolation_error(const Survey& survey, MotionKind motion) {
-  double acceleration = 0.0;
-  for (const double a : survey.largest_acceleration) {
-    acceleration = std::max(acceleration, a);
+std::vector<double> acceleration_limit(const Robot& robot, const Survey& survey, MotionKind motion,
+                                       double motion_error) {
+  std::vector<double> limit(survey.largest_acceleration.size());
+  const auto declared = robot.limits.find("acceleration");
+  // Two samples of a speed, the four of two steps of an angle.
+  const double h = survey.median_step;
+  const double noise = motion == MotionKind::speed ? 2.0 * motion_error / h : 4.0 * motion_error / (h * h);
+  for (std::size_t j = 0; j < limit.size(); ++j) {
+    const double sharp = j < survey.sharpest_change.size() ? survey.sharpest_change[j] - noise : 0.0;
+    limit[j] = declared != robot.limits.end() ? declared->second
+                                              : kBeyondSamples * std::max(survey.largest_acceleration[j], sharp);
   }
-  const double h = survey.largest_step;
-  if (motion == MotionKind::speed) {
-    return acceleration * h / 8.0 / static_cast<double>(kSurveyWindow);
-  }
-  return acceleration * h * h / 8.0;
+  return limit;
 }
 
 }  // namespace wheelwright

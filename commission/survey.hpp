@@ -8,6 +8,7 @@
 
 #include <wheelwright/core/log.hpp>
 #include <wheelwright/filter/measurement.hpp>
+#include <wheelwright/model/robot.hpp>
 
 namespace wheelwright {
 
@@ -20,7 +21,9 @@ struct Survey {
   double median_step = 0.0;                  ///< s
   double largest_step = 0.0;                 ///< within a segment, s
   std::vector<double> largest_speed;         ///< per joint, |speed|, rad/s or m/s
-  std::vector<double> largest_acceleration;  ///< per joint, over windows of `smoothing` steps, rad/s² or m/s²
+  std::vector<double> largest_acceleration;  ///< per joint, over windows of kSurveyWindow steps, rad/s² or m/s²
+  std::vector<double> sharpest_change;       ///< per joint, from one step to the next, of the speed over time, noise
+                                             ///< and all, rad/s² or m/s²
   std::vector<double> reversals;             ///< per joint: how often its speed changed sign
 };
 
@@ -30,9 +33,14 @@ inline constexpr std::size_t kSurveyWindow = 10;
 /// Walks `log` once.
 [[nodiscard]] Survey survey(LogSource& log, const Measurement& measurement);
 
-/// What linear interpolation between samples may add to the error of the motion column: a·h²/8 for angles and mean
-/// speeds (rad), with the largest acceleration seen and the largest step; for speeds the like with the largest jerk is
-/// below the noise of any encoder and is taken as a·h/8 times the ratio of step to window (rad/s).
-[[nodiscard]] double interpolation_error(const Survey& survey, MotionKind motion);
+/// Limit on the acceleration of each joint at every instant, rad/s² (m/s²): limits.acceleration of the robot file where it
+/// has one, else kBeyondSamples times the largest that the samples show, those of windows and those of single steps less
+/// what errors of `motion_error` (of the motion column, rad or rad/s) may have put there. Without a declaration this is an
+/// assumption: that the motion between samples is no rougher than that.
+[[nodiscard]] std::vector<double> acceleration_limit(const Robot& robot, const Survey& survey, MotionKind motion,
+                                                     double motion_error);
+
+/// Of acceleration_limit().
+inline constexpr double kBeyondSamples = 4.0;
 
 }  // namespace wheelwright

@@ -24,6 +24,7 @@ struct OutputValidation {
   double median_width = 0.0;         ///< median of u − l, unit of the output
   double median_width_box = 0.0;     ///< the same with the interval hull in place of the set
   double smallest_kappa = 0.0;  ///< smallest |κ| of ζ = κ·Yθ that some instant shows for certain, both directions
+  Warrant warrant = Warrant::extrapolated;  ///< of the threshold that was tried
 };
 
 /// Walks `rows` and compares every instant with its threshold. κ: an instant shows ζ = κ·Yθ for certain when

@@ -9,6 +9,7 @@
 
 #include <wheelwright/commission/noise_budget.hpp>
 #include <wheelwright/commission/physical.hpp>
+#include <wheelwright/commission/survey.hpp>
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/design/plan.hpp>
@@ -34,13 +35,6 @@ std::optional<double> nominal_parameter(const Robot& robot, const Model& model, 
 
 SignalErrors worst_case_errors(const DesignSubject& subject, const NoiseBudget& budget) {
   return propagate(subject.model, subject.filter, subject.measurement, budget.sensors);
-}
-
-Survey still(const DesignSubject& subject) {
-  Survey survey;
-  survey.largest_step = survey.median_step = subject.step;
-  survey.largest_acceleration.assign(subject.model.joints.size(), 0.0);
-  return survey;
 }
 
 // The planned log: motion as the sensors see it without noise, efforts left at zero.
@@ -84,8 +78,11 @@ RegressorFilter planned_filter(LogSource& log, const DesignSubject& subject) {
   if (subject.errors) {
     errors = *subject.errors;
   } else {
-    const Survey seen = survey(log, subject.measurement);
-    errors = worst_case_errors(subject, noise_budget(subject.robot, subject.measurement, seen));
+    const NoiseBudget budget = noise_budget(subject.robot, subject.measurement);
+    errors = worst_case_errors(subject, budget);
+    errors.motion.limit =
+        coordinate_limit(subject.model, acceleration_limit(subject.robot, survey(log, subject.measurement),
+                                                           subject.measurement.motion, budget.sensors.motion));
   }
   return RegressorFilter(subject.model, subject.filter, subject.measurement, errors);
 }
@@ -115,13 +112,14 @@ DesignSubject subject_of(const CommissionedModel& model) {
     }
   }
   // A model from the statistical mode has smaller bounds than the worst case.
-  const NoiseBudget budget = noise_budget(subject.robot, subject.measurement, still(subject));
+  const NoiseBudget budget = noise_budget(subject.robot, subject.measurement);
   const bool worst_case =
       budget.complete &&
       (worst_case_errors(subject, budget).output.array() <= model.errors.output.array() * (1.0 + 1e-9)).all();
   if (!worst_case) {
     subject.errors = model.errors;
   }
+  subject.warrant = model.warrant;
   return subject;
 }
 
@@ -150,6 +148,8 @@ DesignSubject subject_of(const Robot& robot, double step, const FilterDesign& fi
 
   Measurement& m = subject.measurement;
   m.hold = robot.hold;
+  m.changes = robot.effort_changes;
+  m.delay = robot.effort_delay;
   m.nominal_step = step;
   const NoiseBound& angle_noise = robot.model == "single_axis" ? robot.noise.position : robot.noise.wheel_angle;
   const bool angles = subject.filter.order == 2 && robot.speed_source != SpeedSource::measured &&
@@ -159,7 +159,7 @@ DesignSubject subject_of(const Robot& robot, double step, const FilterDesign& fi
     m.motion_columns.push_back(angles ? joint.angle : joint.speed);
     m.effort_columns.push_back("effort of " + joint.speed);
   }
-  if (!noise_budget(robot, m, still(subject)).complete) {
+  if (!noise_budget(robot, m).complete) {
     throw InvalidArgument(
         "the noise is not declared: expected noise: {wheel_speed: …, effort: …} in the robot file (bounds, rad/s and "
         "the unit of the effort), or a commissioned model, which has found it");

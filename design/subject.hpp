@@ -29,6 +29,7 @@ struct DesignSubject {
   Box prior;                           ///< in which bounds are sought, as commission() does
   std::optional<SignalErrors> errors;  ///< of the rows; nothing: from the declared noise and the planned acceleration
   double step = 0.01;                  ///< sampling step of the log to come, s
+  Warrant warrant = Warrant::guaranteed;  ///< of the promises: that of the model, or of the declared noise
 
   /// The commissioned bounds, where there are any: what the manoeuvre is to improve on.
   std::optional<Box> known;

@@ -130,6 +130,7 @@ FaultFilter::FaultFilter(FaultType fault, const Model& model, const FilterDesign
       filtered_(FaultSignals::none(model)) {
   validate(fault_, model);
   validate(design_);
+  kernel_ = FilterKernel(design_, motion.kind, motion.nominal_step);
   cascades_.resize(model.n() * (3 * model.p() + 1));
 }
 
@@ -163,7 +164,7 @@ void FaultFilter::begin(std::size_t onset) {
   const auto next = std::upper_bound(motion_->segment_starts.begin(), motion_->segment_starts.end(), onset);
   end_ = next == motion_->segment_starts.end() ? motion_->instants() : *next;
   onset_ = k_ = onset;
-  std::fill(cascades_.begin(), cascades_.end(), Cascade{});
+  std::fill(cascades_.begin(), cascades_.end(), KernelState{});
   filtered_ = FaultSignals::none(*model_);
   before_ = point(onset);
   const auto n = static_cast<Eigen::Index>(model_->n());
@@ -173,11 +174,16 @@ void FaultFilter::begin(std::size_t onset) {
   if (fault_.profile.jumps()) {
     // Motion beyond v, and what is seen, are there at once: their derivatives have an impulse.
     const std::size_t p = model_->p(), size = model_->n() * p;
+    const auto jump = [](KernelState& state, double by) {
+      state.z1 += by;
+      state.fast += by;
+    };
     for (const Term& term : model_->terms) {
       if (term.kind == Term::Kind::acceleration) {
         const std::size_t at = term.output * p + term.parameter;
-        cascades_[at].z1 += term.scale * before_.moved[static_cast<Eigen::Index>(term.coordinate)];
-        cascades_[2 * size + at].z1 += term.scale * before_.seen[static_cast<Eigen::Index>(term.coordinate)];
+        const auto c = static_cast<Eigen::Index>(term.coordinate);
+        jump(cascades_[at], term.scale * before_.moved[c]);
+        jump(cascades_[2 * size + at], term.scale * before_.seen[c]);
       }
     }
   }
@@ -185,19 +191,17 @@ void FaultFilter::begin(std::size_t onset) {
 
 void FaultFilter::begin_broken(std::size_t first) {
   begin(first);
-  std::fill(cascades_.begin(), cascades_.end(), Cascade{});
+  std::fill(cascades_.begin(), cascades_.end(), KernelState{});
 }
 
-void FaultFilter::filter(const FaultSignals& begin, const FaultSignals& end, double h) {
-  if (h != weights_.step()) {
-    weights_ = StepWeights(design_.beta, h);
-  }
-  const double gain = design_.order == 1 ? design_.alpha : design_.alpha * design_.alpha;
+void FaultFilter::filter(const FaultSignals& begin, const FaultSignals& end, const std::array<double, 2>& shares,
+                         double h) {
+  kernel_.prepare(h);
   std::size_t at = 0;
   const auto advance = [&](const auto& from, const auto& to, auto& out) {
     for (Eigen::Index e = 0; e < from.size(); ++e, ++at) {
-      cascades_[at].linear(weights_, from.data()[e], to.data()[e]);
-      out.data()[e] = gain * (design_.order == 1 ? cascades_[at].z1 : cascades_[at].z2);
+      kernel_.take(cascades_[at], shares[0] * from.data()[e] + shares[1] * to.data()[e]);
+      out.data()[e] = kernel_.value(cascades_[at]);
     }
   };
   advance(begin.g1, end.g1, filtered_.g1);
@@ -206,12 +210,28 @@ void FaultFilter::filter(const FaultSignals& begin, const FaultSignals& end, dou
   advance(begin.c, end.c, filtered_.c);
 }
 
+FaultSignals FaultFilter::state(double KernelState::*part) const {
+  FaultSignals out = FaultSignals::none(*model_);
+  std::size_t at = 0;
+  const auto fill = [&](auto& to) {
+    for (Eigen::Index e = 0; e < to.size(); ++e, ++at) {
+      to.data()[e] = cascades_[at].*part;
+    }
+  };
+  fill(out.g1);
+  fill(out.g2);
+  fill(out.s);
+  fill(out.c);
+  return out;
+}
+
 bool FaultFilter::next() {
   if (k_ + 1 >= end_) {
     return false;
   }
   const auto a = static_cast<Eigen::Index>(k_), b = a + 1;
-  const double h = motion_->instant[k_ + 1] - motion_->instant[k_];
+  const std::array<double, 2> shares = motion_->shares(k_);
+  const double h = shares[0] + shares[1];
   const Point after = point(k_ + 1);
   const Eigen::VectorXd v0 = motion_->speed.col(a), v1 = motion_->speed.col(b);
   const Eigen::VectorXd joints0 = motion_->joint_speed.col(a), joints1 = motion_->joint_speed.col(b);
@@ -225,7 +245,7 @@ bool FaultFilter::next() {
                                      {after.profile, v1, joints1, motion_->heading[k_ + 1], acceleration, after.moved,
                                       moved_rate, after.seen, seen_rate, after.joint_seen},
                                      held_);
-  filter(begin, end, h);
+  filter(begin, end, shares, motion_->step[k_ + 1]);
   before_ = after;
   ++k_;
   return true;

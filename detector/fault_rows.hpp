@@ -3,13 +3,14 @@
 /// The rows that a detector sees once a fault has set in, as polynomials of its size.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <span>
 #include <vector>
 
 #include <wheelwright/detector/fault_type.hpp>
 #include <wheelwright/detector/reference_motion.hpp>
-#include <wheelwright/filter/exact.hpp>
+#include <wheelwright/filter/kernel.hpp>
 
 namespace wheelwright {
 
@@ -55,8 +56,9 @@ class FaultRows {
   [[nodiscard]] virtual FaultRow row(std::size_t i) const = 0;
 };
 
-/// Rows of the torque residual: filters a fault's signature along a reference motion. Between instants speeds are linear, as the
-/// filter has them, so accelerations are constant and products with the fault's profile need no derivative of noise. At
+/// Rows of the torque residual: filters a fault's signature along a reference motion, with the filter's own kernel: what
+/// happens between two instants counts as RegressorFilter counts it. Products with the fault's profile need no derivative
+/// of noise. At
 /// the onset of a step the robot's own speed goes on (its mass sees to that) and what the encoders show jumps; the
 /// reading of an effort changes with no more than its gain.
 class FaultFilter final : public FaultRows {
@@ -71,6 +73,8 @@ class FaultFilter final : public FaultRows {
   bool next() override;
   [[nodiscard]] std::size_t instant() const override { return k_; }
   [[nodiscard]] FaultRow row(std::size_t i) const override;
+  /// What one signal of the filter remembers, entry by entry: `part` of its state.
+  [[nodiscard]] FaultSignals state(double KernelState::*part) const;
   /// The fault.
   [[nodiscard]] const FaultType& fault() const { return fault_; }
 
@@ -81,16 +85,16 @@ class FaultFilter final : public FaultRows {
     Eigen::VectorXd moved, seen, joint_seen;
   };
   [[nodiscard]] Point point(std::size_t k) const;
-  void filter(const FaultSignals& begin, const FaultSignals& end, double h);
+  void filter(const FaultSignals& begin, const FaultSignals& end, const std::array<double, 2>& shares, double h);
 
   FaultType fault_;
   const Model* model_;
   FilterDesign design_;
   const ReferenceMotion* motion_;
   RowMatrix held_;  // filtered rows at the onset over the static gain
-  StepWeights weights_;
+  FilterKernel kernel_;
   Point before_;
-  std::vector<Cascade> cascades_;  // g1, g2, s, c one after the other
+  std::vector<KernelState> cascades_;  // g1, g2, s, c one after the other
   FaultSignals filtered_;
   std::size_t onset_ = 0, k_ = 0, end_ = 0;
 };

@@ -48,6 +48,7 @@ OnsetRows::OnsetRows(const FaultType& fault, const Model& model, const FilterDes
     : fault_(fault),
       model_(&model),
       design_(design),
+      kernel_(design, motion.kind, motion.nominal_step),
       angles_(kind != MotionKind::speed),
       encoder_(fault.seen.size() > 0),
       errors_(&errors),
@@ -55,7 +56,7 @@ OnsetRows::OnsetRows(const FaultType& fault, const Model& model, const FilterDes
       first_(first),
       end_(end),
       gain_(std::pow(design.alpha, design.order)),
-      bound_{FaultSignals::none(model), FaultSignals::none(model)} {
+      bound_{FaultSignals::none(model), FaultSignals::none(model), FaultSignals::none(model)} {
   check::that(knows(fault), "fault '" + fault.name + "'", "a step or a drift");
   check::that(first < end && end <= motion.instants(), "instants", "a range of the motion");
   if (encoder_) {
@@ -65,30 +66,17 @@ OnsetRows::OnsetRows(const FaultType& fault, const Model& model, const FilterDes
   fault_.held_effort = false;
   step_ = fault_;
   step_.profile = {};
-  state_.assign(end - first, {FaultSignals::none(model), FaultSignals::none(model)});
-  state_[0].z1.g1 = jump(first);
-  take(step_, false);
-  if (design.order == 2) {
-    take(step_, true);
-  }
+  state_.assign(end - first, {FaultSignals::none(model), FaultSignals::none(model), FaultSignals::none(model)});
+  state_[0].z1.g1 = state_[0].fast.g1 = jump(first);
+  take(step_);
 }
 
-void OnsetRows::take(const FaultType& fault, bool second) {
-  FaultFilter filter(fault, *model_, {second ? 2 : 1, design_.alpha, design_.beta, design_.settle}, *motion_);
-  const double gain = second ? design_.alpha * design_.alpha : design_.alpha;
+void OnsetRows::take(const FaultType& fault) {
+  FaultFilter filter(fault, *model_, design_, *motion_);
   filter.begin(first_);
   while (filter.instant() + 1 < end_ && filter.next()) {
-    State& state = state_[filter.instant() - first_];
-    FaultSignals& z = second ? state.z2 : state.z1;
-    for (std::size_t i = 0; i < model_->n(); ++i) {
-      const FaultRow row = filter.row(i);
-      const auto at = static_cast<Eigen::Index>(i);
-      for (std::size_t j = 0; j < model_->p(); ++j) {
-        z.g1(at, static_cast<Eigen::Index>(j)) = row.g1[j] / gain;
-        z.g2(at, static_cast<Eigen::Index>(j)) = row.g2[j] / gain;
-      }
-      z.c[at] = row.c / gain;
-    }
+    state_[filter.instant() - first_] = {filter.state(&KernelState::z1), filter.state(&KernelState::z2),
+                                         filter.state(&KernelState::fast)};
   }
 }
 
@@ -113,36 +101,48 @@ RowMatrix OnsetRows::jump(std::size_t k) const {
 
 // The state at instant `at` of a step that set in at `from`.
 OnsetRows::State OnsetRows::left(std::size_t from, std::size_t at) const {
-  const double x = motion_->instant[at] - motion_->instant[from], decay = std::exp(-design_.beta * x);
+  // For angles the step before an instant was counted on the way there, for speeds on the way on.
+  double x = 0.0;
+  for (std::size_t k = from + 1; k <= at; ++k) {
+    x += motion_->step[k];
+  }
+  const double decay = std::exp(-design_.beta * x);
   const State& now = state_[at - first_];
   State before = state_[from - first_];
-  before.z1.g1 -= jump(from);
-  return {sum(now.z1, -decay, before.z1), sum(sum(now.z2, -decay, before.z2), -decay * x, before.z1)};
+  const RowMatrix impulse = jump(from);
+  before.z1.g1 -= impulse;
+  before.fast.g1 -= impulse;
+  return {sum(now.z1, -decay, before.z1), sum(sum(now.z2, -decay, before.z2), -decay * x, before.z1),
+          sum(now.fast, -std::exp(-kernel_.gamma() * x), before.fast)};
 }
 
 void OnsetRows::between(std::size_t a, std::size_t b) {
   check::that(a >= first_ && a < b && b + 1 < end_, "onset", "instants of the motion");
   s_ = b + 1;
-  bound_ = {FaultSignals::none(*model_), FaultSignals::none(*model_)};
+  bound_ = {FaultSignals::none(*model_), FaultSignals::none(*model_), FaultSignals::none(*model_)};
   const std::size_t from = a > first_ ? a - 1 : a;
   const RowMatrix counted = jump(s_);
   for (std::size_t k = from; k <= s_; ++k) {
     State state = left(k, s_);
     state.z1.g1 -= counted;
+    state.fast.g1 -= counted;
     raise(bound_.z1, state.z1);
     raise(bound_.z2, state.z2);
+    raise(bound_.fast, state.fast);
   }
   // The speed's own error in the impulse.
   const Eigen::VectorXd error = or_zero(fault_.motion, model_->coordinates.size()).cwiseAbs() * errors_->speed_sample;
   for (const Term& term : model_->terms) {
     if (term.kind == Term::Kind::acceleration) {
       const auto i = static_cast<Eigen::Index>(term.output), j = static_cast<Eigen::Index>(term.parameter);
-      bound_.z1.g1(i, j) += std::abs(term.scale) * error[static_cast<Eigen::Index>(term.coordinate)];
+      const double by = std::abs(term.scale) * error[static_cast<Eigen::Index>(term.coordinate)];
+      bound_.z1.g1(i, j) += by;
+      bound_.fast.g1(i, j) += by;
     }
   }
   if (drifts(fault_)) {
     uncertain_ = std::min(1.0, (motion_->instant[s_] - motion_->instant[from]) / fault_.profile.rise);
-    for (FaultSignals* part : {&bound_.z1, &bound_.z2}) {
+    for (FaultSignals* part : {&bound_.z1, &bound_.z2, &bound_.fast}) {
       part->g1 *= uncertain_;
       part->g2 *= uncertain_;
       part->c *= uncertain_;
@@ -166,8 +166,13 @@ void OnsetRows::between(std::size_t a, std::size_t b) {
 // Filtered, of a step that sets in at s_.
 FaultSignals OnsetRows::filtered(std::size_t k) const {
   const State state = left(s_, k);
-  const FaultSignals& z = design_.order == 1 ? state.z1 : state.z2;
-  return {gain_ * z.g1, gain_ * z.g2, z.s, gain_ * z.c};
+  if (design_.order == 1) {
+    return {gain_ * state.z1.g1, gain_ * state.z1.g2, state.z1.s, gain_ * state.z1.c};
+  }
+  const double slow = gain_ * kernel_.slow(), quick = slow * kernel_.apart();
+  const auto value = [&](const auto& z1, const auto& z2, const auto& fast) { return slow * z2 - quick * (z1 - fast); };
+  return {value(state.z1.g1, state.z2.g1, state.fast.g1), value(state.z1.g2, state.z2.g2, state.fast.g2), state.z1.s,
+          value(state.z1.c, state.z2.c, state.fast.c)};
 }
 
 OnsetRow OnsetRows::row(std::size_t k, std::size_t i) const {
@@ -176,7 +181,7 @@ OnsetRow OnsetRows::row(std::size_t k, std::size_t i) const {
   const FaultSignals step = filtered(k);
   const FaultSignals& signals = drifts(fault_) ? drifting_[k - s_] : step;
   const double x = motion_->instant[k] - motion_->instant[s_], decay = std::exp(-design_.beta * x);
-  const double newest = angles_ ? design_.alpha * design_.alpha * x * decay : 0.0;
+  const double newest = angles_ ? kernel_.gain() * kernel_.slow() * x * decay : 0.0;
   const double onset_error = drifts(fault_) ? newest + design_.static_gain() / fault_.profile.rise : newest;
 
   OnsetRow out{signals.g1.row(at),
@@ -237,17 +242,24 @@ OnsetRow OnsetRows::row(std::size_t k, std::size_t i) const {
   return out;
 }
 
+// A doubt δ in the state at t_s is worth, x later, at most gain γ/(γ − β) e^{−βx} (|δz2| + x|δz1| + (|δz1| + |δfast|)/(γ − β)).
 double OnsetRows::level_bound(std::size_t i, double kappa, const Eigen::VectorXd& largest) const {
   const auto at = static_cast<Eigen::Index>(i);
-  const FaultSignals& z = design_.order == 1 ? bound_.z1 : bound_.z2;
-  return kTransition * (kappa * (z.g1.row(at).dot(largest) + z.c[at]) + kappa * kappa * z.g2.row(at).dot(largest));
+  const auto size = [&](const FaultSignals& z) {
+    return kappa * (z.g1.row(at).dot(largest) + z.c[at]) + kappa * kappa * z.g2.row(at).dot(largest);
+  };
+  if (design_.order == 1) {
+    return kTransition * size(bound_.z1);
+  }
+  return kTransition * kernel_.slow() * (size(bound_.z2) + kernel_.apart() * (size(bound_.z1) + size(bound_.fast)));
 }
 
 double OnsetRows::ramp_bound(std::size_t i, double kappa, const Eigen::VectorXd& largest) const {
   const auto at = static_cast<Eigen::Index>(i);
   return design_.order == 1 ? 0.0
-                            : kTransition * (kappa * (bound_.z1.g1.row(at).dot(largest) + bound_.z1.c[at]) +
-                                             kappa * kappa * bound_.z1.g2.row(at).dot(largest));
+                            : kTransition * kernel_.slow() *
+                                  (kappa * (bound_.z1.g1.row(at).dot(largest) + bound_.z1.c[at]) +
+                                   kappa * kappa * bound_.z1.g2.row(at).dot(largest));
 }
 
 }  // namespace wheelwright

@@ -75,16 +75,17 @@ class OnsetRows {
 
  private:
   struct State {
-    FaultSignals z1, z2;
+    FaultSignals z1, z2, fast;  // KernelState, entry by entry
   };
   [[nodiscard]] RowMatrix jump(std::size_t k) const;
   [[nodiscard]] State left(std::size_t from, std::size_t at) const;
   [[nodiscard]] FaultSignals filtered(std::size_t k) const;
-  void take(const FaultType& fault, bool second);
+  void take(const FaultType& fault);
 
   FaultType fault_, step_;
   const Model* model_;
   FilterDesign design_;
+  FilterKernel kernel_;
   bool angles_, encoder_;
   const SignalErrors* errors_;
   const ReferenceMotion* motion_;

@@ -27,35 +27,38 @@ ReferenceMotion read_reference(LogSource& log, RegressorFilter filter) {
   };
   log.rewind();
   LogBlock block;
-  double last = 0.0;
-  std::size_t since = 0;  // samples of this segment
+  const bool nodes = filter.measurement().motion != MotionKind::speed;
+  motion.kind = filter.measurement().motion;
+  motion.nominal_step = filter.measurement().nominal_step;
+  std::size_t seen = 0;
   while (log.next(block)) {
     for (std::size_t k = 0; k < block.rows(); ++k) {
       if (std::binary_search(block.segment_starts.begin(), block.segment_starts.end(), k)) {
         filter.restart();
-        since = 0;
+        seen = 0;
       }
       for (std::size_t c = 0; c < pick.size(); ++c) {
         sample[c] = block.columns[pick[c]][k];
       }
       const bool settled = filter.step(block.t[k], sample);
-      ++since;
-      // The recursion begins with the second sample where angles are differenced.
-      if (since == 1 && filter.measurement().motion == MotionKind::angle) {
+      if (filter.instants() == 0 || filter.instants() == seen) {
+        seen = filter.instants();
         continue;
       }
-      const bool begins = since == (filter.measurement().motion == MotionKind::angle ? 2u : 1u);
-      if (begins) {
+      const double length = !nodes && filter.instants() == 1 ? 0.0 : filter.step_length();
+      if (filter.instants() == 1) {
         motion.segment_starts.push_back(motion.t.size());
         angle.setZero();
       } else {
-        angle += 0.5 * (filter.instant() - last) * (before + filter.joint_speed());
+        angle += nodes ? 0.5 * (motion.step.back() * before + length * filter.joint_speed())
+                       : 0.5 * length * (before + filter.joint_speed());
       }
+      seen = filter.instants();
       before = filter.joint_speed();
-      last = filter.instant();
       motion.sample.push_back(block.first_row + k);
       motion.t.push_back(block.t[k]);
-      motion.instant.push_back(last);
+      motion.instant.push_back(filter.instant());
+      motion.step.push_back(length);
       motion.heading.push_back(filter.heading());
       motion.settled.push_back(settled);
       append(speed, filter.speed());

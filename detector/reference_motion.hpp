@@ -3,6 +3,7 @@
 /// A drive that margins are asked for: its motion, instant by instant, and the rows that a healthy robot would show.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <vector>
 
@@ -14,13 +15,16 @@
 
 namespace wheelwright {
 
-/// The motion of a drive at the instants of the filter (the samples, or for angles the middles of the sampling
-/// intervals). What follows from it is about a robot that drives just so; efforts of the log it was read from play no
+/// The motion of a drive at the instants of the filter (the samples; for angles and mean speeds the ends of the steps
+/// between them, with the means over these steps). What follows from it is about a robot that drives just so; efforts of the log it was read from play no
 /// part.
 struct ReferenceMotion {
   std::vector<std::size_t> sample;          ///< K rows of the log
   std::vector<double> t;                    ///< K times of these rows, s
   std::vector<double> instant;              ///< K times of the instants, s
+  std::vector<double> step;                 ///< K lengths of the steps that end there, s (speeds: 0 for a segment's first)
+  MotionKind kind = MotionKind::speed;      ///< what the motion was read from
+  double nominal_step = 0.0;                ///< of the measurement, s
   Eigen::MatrixXd speed;                    ///< coordinates × K, v
   Eigen::MatrixXd joint_speed;              ///< joints × K
   Eigen::MatrixXd joint_angle;              ///< joints × K, integral of joint_speed over the segment
@@ -31,6 +35,12 @@ struct ReferenceMotion {
 
   /// Number of instants K.
   [[nodiscard]] std::size_t instants() const { return t.size(); }
+  /// By how much the steps that end at instants k and k + 1 count for what happens between them, s: all of the second for
+  /// speeds, half of each for angles.
+  [[nodiscard]] std::array<double, 2> shares(std::size_t k) const {
+    const double half = 0.5 * step[k + 1];
+    return {kind == MotionKind::speed ? half : 0.5 * step[k], half};
+  }
 };
 
 /// The motion of `log` as `filter` reads it, whose error bounds the rows get. Walks the log once and holds it. Throws

@@ -90,4 +90,21 @@ struct Cascade {
   void increment(const StepWeights& w, double by) { advance(w, w.increment1() * by, w.increment2() * by); }
 };
 
+/// Σ q_k P(x_k) e^{−x_k} with P(x) = 1 − x + x²/2, x_k = β(t − t_k), over impulses q_k >= 0 at the times t_k: at least
+/// Σ q_k sup |1 − x| e^{−x} over x >= x_k, since |1 − x| <= P(x) and P(x)e^{−x} falls. α² times it bounds what the slope of f₂
+/// makes of the impulses.
+struct SlopeMajorant {
+  double s0 = 0.0;
+  double s1 = 0.0;
+  double s2 = 0.0;
+
+  /// A step with x = βh and e^{−x} = `decay`, and then an impulse of area `q`.
+  void advance(double decay, double x, double q) {
+    s2 = decay * (s2 + x * (2.0 * s1 + x * s0));
+    s1 = decay * (s1 + x * s0);
+    s0 = decay * s0 + q;
+  }
+  [[nodiscard]] double value() const { return s0 - s1 + 0.5 * s2; }
+};
+
 }  // namespace wheelwright

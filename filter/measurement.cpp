@@ -69,6 +69,12 @@ SpeedSample sample_speeds(LogSource& log, const std::vector<std::string>& column
 
 }  // namespace
 
+double Measurement::longest_step() const {
+  constexpr double kHole = 1.75;      // steps: rows are lost; steps of 2 and 3 ticks are not
+  constexpr double kUnlike = 1.05;    // of encoder differences: their interval is one step
+  return (motion == MotionKind::mean_speed ? kUnlike : kHole) * nominal_step;
+}
+
 std::vector<std::string> Measurement::columns() const {
   std::vector<std::string> all = motion_columns;
   all.insert(all.end(), effort_columns.begin(), effort_columns.end());
@@ -81,6 +87,8 @@ std::vector<std::string> Measurement::columns() const {
 Measurement find_measurement(LogSource& log, const Robot& robot, const Model& model, int order) {
   Measurement m;
   m.hold = robot.hold;
+  m.changes = robot.effort_changes;
+  m.delay = robot.effort_delay;
   m.effort_unsigned = robot.effort_unsigned;
   m.nominal_step = log.median_step();
   m.correction = effort_correction(robot);

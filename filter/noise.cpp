@@ -2,12 +2,13 @@
 #include <wheelwright/filter/noise.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <optional>
 
 #include <wheelwright/core/check.hpp>
-#include <wheelwright/filter/exact.hpp>
+#include <wheelwright/filter/kernel.hpp>
 
 namespace wheelwright {
 namespace {
@@ -21,32 +22,32 @@ struct Energies {
   double cross = 0.0;  // of acceleration and speed
 };
 
-Energies impulse_energies(const FilterDesign& d, MotionKind motion, Hold hold, double h) {
-  const StepWeights w(d.beta, h);
-  const double gain = std::pow(d.alpha, d.order);
-  const auto out = [&](const Cascade& c) { return gain * (d.order == 1 ? c.z1 : c.z2); };
+Energies impulse_energies(const FilterDesign& d, MotionKind motion, Hold hold, double h,
+                          EffortChanges changes = EffortChanges::at_samples) {
+  FilterKernel kernel(d, motion, h);
+  kernel.prepare(h);
   const bool angles = motion != MotionKind::speed;
-  Cascade effort, speed, slope;
+  KernelState effort, speed, slope;
   Energies e;
   const auto steps = static_cast<long>(std::ceil(60.0 / (d.beta * h))) + 3;
-  double before = 0.0;
-  double speed_before = 0.0;
+  std::array<double, 3> sample{};  // newest first
   for (long k = 0; k < steps; ++k) {
-    const double now = k == 0 ? 1.0 : 0.0;
-    const double speed_now = angles ? (now - before) / h : now;
-    speed.linear(w, speed_before, speed_now);
-    slope.increment(w, speed_now - speed_before);
+    sample = {k == 0 ? 1.0 : 0.0, sample[0], sample[1]};
+    const double change = sample[0] - sample[1], before = sample[1] - sample[2];
+    kernel.take(slope, angles ? (change - before) / h : change);
+    kernel.take(speed, angles ? 0.5 * (change + before) : 0.5 * h * (sample[0] + sample[1]));
     if (hold == Hold::zero_order) {
-      effort.held(w, before);
+      kernel.take(effort, angles ? 0.5 * h * (sample[1] + sample[2]) : h * sample[1]);
     } else {
-      effort.linear(w, before, now);
+      const double linear = 0.5 * h * (angles ? (sample[0] + 4.0 * sample[1] + sample[2]) / 3.0 : sample[0] + sample[1]);
+      const double curved = changes == EffortChanges::between ? h * (sample[0] - 2.0 * sample[1] + sample[2]) / 12.0 : 0.0;
+      kernel.take(effort, linear - curved);
     }
-    e.acceleration += out(slope) * out(slope);
-    e.speed += out(speed) * out(speed);
-    e.effort += out(effort) * out(effort);
-    e.cross += out(slope) * out(speed);
-    before = now;
-    speed_before = speed_now;
+    const double a = kernel.value(slope), v = kernel.value(speed), u = kernel.value(effort);
+    e.acceleration += a * a;
+    e.speed += v * v;
+    e.effort += u * u;
+    e.cross += a * v;
   }
   return e;
 }
@@ -89,7 +90,7 @@ KernelNorms statistical_norms(const FilterDesign& design, MotionKind motion, dou
 NoiseGram noise_gram(const Model& model, const FilterDesign& design, const Measurement& measurement, double step) {
   validate(design);
   check::positive(step, "noise_gram step");
-  const Energies e = impulse_energies(design, measurement.motion, measurement.hold, step);
+  const Energies e = impulse_energies(design, measurement.motion, measurement.hold, step, measurement.changes);
   const Eigen::MatrixXd joints = model.motion * model.motion.transpose();
   const auto p = static_cast<Eigen::Index>(model.p());
   NoiseGram gram;
@@ -145,6 +146,8 @@ SignalErrors propagate(const Model& model, const FilterDesign& design, const Mea
                       ? (sensors.effort * across(input, norms.effort, likely.effort)).eval()
                       : (sensors.effort * norms.effort * input.cwiseAbs().rowwise().sum()).eval();
   errors.heading = sensors.heading;
+  errors.between_samples = true;
+  errors.motion.effort = sensors.effort * input.cwiseAbs().rowwise().sum();
   errors.joint_sample = sensors.motion;
   if (measurement.motion != MotionKind::speed && sensors.motion > 0.0) {
     errors.joint_sample *= 2.0 / check::positive(measurement.nominal_step, "measurement nominal_step");

@@ -9,6 +9,7 @@
 
 #include <wheelwright/filter/design.hpp>
 #include <wheelwright/filter/measurement.hpp>
+#include <wheelwright/filter/motion_bound.hpp>
 #include <wheelwright/model/model.hpp>
 
 namespace wheelwright {
@@ -42,9 +43,11 @@ struct SignalErrors {
   Eigen::VectorXd acceleration;  ///< per coordinate: of its filtered acceleration (empty: all zero)
   Eigen::VectorXd speed;         ///< per coordinate: of its filtered speed
   Eigen::VectorXd output;        ///< per output: of τ_f
-  Eigen::VectorXd speed_sample;  ///< per coordinate: of its unfiltered speed inside a piece, for function terms
-  double joint_sample = 0.0;     ///< of each joint's unfiltered speed, for function terms
+  Eigen::VectorXd speed_sample;  ///< per coordinate: of its unfiltered speed, mean of a nominal step or sample
+  double joint_sample = 0.0;     ///< of each joint's unfiltered speed, mean of a nominal step or sample
   double heading = 0.0;          ///< rad
+  bool between_samples = false;  ///< dY and dy hold what motion and efforts may do between two samples as well
+  MotionBound motion{};          ///< how fast the motion can change between two samples
 };
 
 /// Norms of the kernels that turn a motion or effort error of size 1 into the error of a filtered signal.
@@ -54,16 +57,18 @@ struct KernelNorms {
   double effort = 0.0;
 };
 
-/// L1 norms (sup |f * n| over |n| <= 1), exact for the continuous kernels:
+/// L1 norms (sup |f * n| over |n| <= 1), of the continuous kernels:
 ///   order 1, speeds:  f*n: α/β;  f*ṅ: 2α
 ///   order 2, angles:  f₂*n: α²/β²;  f₂*ṅ: 2α²/(eβ);  f₂*n̈: 2α²(1 + e⁻²)
 ///   order 2, speeds:  f₂*n: α²/β²;  f₂*ṅ: 2α²/(eβ)
-/// Mean speeds, linear between the mid-points of their intervals, are a moving average of the slope of the angles: an
-/// average does not raise an L1 norm. The error of the first mean speed of a segment is added by RegressorFilter.
+/// For speeds f*n and f₂*n are exact, the others bound those of RegressorFilter's kernels for steps of any length: these
+/// kernels interpolate f₂, or average it over steps, and neither raises the total variation of a function or of its
+/// slope. The effort's norm is that of a long even log; where steps are uneven RegressorFilter follows the kernel's area.
+/// What the beginning of a segment adds to f₂*n̈ is added by RegressorFilter, too.
 [[nodiscard]] KernelNorms worst_case_norms(const FilterDesign& design, MotionKind motion);
 
 /// L2 norms (root of the summed squares of the weights of all samples) for a constant step `step` (s), found by sending
-/// a unit sample through the filter itself. For small βh: f*n: α√(h/(2β)), f*ṅ: about α, f₂*n: α²√(h/(4β³)),
+/// a unit sample through the filter's recursion. For small βh: f*n: α√(h/(2β)), f*ṅ: about α, f₂*n: α²√(h/(4β³)),
 /// f₂*ṅ: α²√(h/(4β)), f₂*n̈: about α²/√2 (the newest two angles enter with half of α² each).
 [[nodiscard]] KernelNorms statistical_norms(const FilterDesign& design, MotionKind motion, double step);
 

@@ -3,6 +3,8 @@
 /// Samples in, rows {τ_f, Y_f} out: the one recursion behind the batch and the online use of the filter.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <span>
 #include <vector>
 
@@ -12,7 +14,9 @@
 #include <wheelwright/filter/design.hpp>
 #include <wheelwright/filter/effort_correction.hpp>
 #include <wheelwright/filter/exact.hpp>
+#include <wheelwright/filter/kernel.hpp>
 #include <wheelwright/filter/measurement.hpp>
+#include <wheelwright/filter/motion_bound.hpp>
 #include <wheelwright/filter/noise.hpp>
 #include <wheelwright/model/model.hpp>
 
@@ -26,15 +30,30 @@ struct FilteredRow {
   Eigen::VectorXd dy;  ///< n, n̄ >= 0
 };
 
-/// Filters torque and regressor sample by sample: (28) for τ_f, the identities of theory section 2 for Y_f, discretised
-/// exactly for steps of any length.
+/// Filters torque and regressor sample by sample: (28) for τ_f, the identities of theory section 2 for Y_f, with kernels
+/// that need no motion between samples for the acceleration, whatever the steps.
 ///
-/// Between samples: speeds and functions of the motion (friction terms) linear; efforts as Measurement::hold says. Angles
-/// are first reduced to mean speeds over their intervals, and efforts to means alike, both at the intervals' mid-points:
-/// a moving average of both sides of (20), which leaves the equation as it is. Where both sides are interpolated alike the
-/// errors of second order in the step cancel; a filter of the angles themselves would keep (βh)²/12 of the inertia.
+/// A row is the equation (20) multiplied by a weight w and integrated. For **angles** w goes linearly from one sample to the
+/// next, with the values of a smoothed f₂ there (kernel.hpp), from 0 at the first sample of a segment: ẅ is a row of impulses at the samples, and with s_k the mean
+/// speed of the step before t_k, h_k its length, without any error
+///
+///     ∫ w φ̈ dt = Σ w_k (s_k+1 − s_k)
+///     ∫ w φ̇ dt = Σ w_k (h_k s_k + h_k+1 s_k+1)/2  + Σ ẇ_k ∫ (s − middle)(φ̇ − s_k) ds,   |last integral| <= h_k³/12 sup|φ̈|
+///
+/// **Mean speeds** are angles at the ends of their intervals, a known half step after their stamps. For **speeds** w is
+/// constant over each step, with the mean of f or f₂ over it: ∫ w v̇ dt = Σ w_k (v_k − v_k−1), and the trapezoidal rule for
+/// ∫ w v dt. The effort is integrated with the same w:
+///
+///     held, changes at samples   exactly
+///     held, changes between      the mean of both samples of the step; half their difference goes into dy
+///     linear, at samples         exactly
+///     linear, between            as a parabola through three samples; what makes it differ from the line goes into dy
+///     late by an unknown time    the middle of all values that may have acted in the step; half their range goes into dy
+///
+/// dY and dy hold the sensors' errors (noise.hpp) and, where SignalErrors::between_samples says so, what motion and efforts
+/// may do between samples, by SignalErrors::motion. Functions of the motion are then enclosed for every instant of a step.
 /// Efforts pass Measurement::correction first; where that has a memory, rows begin when it has forgotten the segment's start
-/// too, unless the segment begins at rest without effort.
+/// too, unless the segment begins at rest without effort. A correction takes efforts as changing at samples.
 ///
 /// step() does not allocate. Batch filtering is this class in a loop, so that both give the same bits.
 class RegressorFilter {
@@ -47,8 +66,10 @@ class RegressorFilter {
 
   /// Takes the sample at time `t` (s): motion of each joint, effort of each joint, heading where
   /// Measurement::heading_column names one (the order of Measurement::columns()). `t` must exceed that of the sample
-  /// before. Returns whether row() now holds an instant of the regression: not for the first sample of a segment, nor
-  /// before the filter has settled (FilterDesign::settle).
+  /// before. A step that is longer than Measurement::longest_step restarts the filter: nothing is known of the effort in
+  /// it. Returns whether row() now holds an instant of the regression: not for the first samples of a segment, nor
+  /// before the filter has settled (FilterDesign::settle; after lost rows, before the segment's beginning weighs less
+  /// than the noise of all later samples).
   bool step(double t, std::span<const double> sample);
 
   /// The instant at the last sample.
@@ -59,65 +80,96 @@ class RegressorFilter {
   /// What dY and dy are made of; zeros where nothing was given.
   [[nodiscard]] const SignalErrors& errors() const { return errors_; }
 
-  /// Time of the instant that the row belongs to, s: the sample's, or for angles the middle of the last sampling
-  /// interval.
+  /// Number of instants since the segment began: one for each step between two samples (for speeds: for each sample) that
+  /// the filter has taken.
+  [[nodiscard]] std::size_t instants() const { return instants_; }
+  /// Time of the last instant, s: the end of the last step taken.
   [[nodiscard]] double instant() const { return t_; }
-  /// Speeds of the model's coordinates at that instant, as the filter takes them.
+  /// Speeds of the model's coordinates at that instant: means over the step that ends there, for speeds the sample.
   [[nodiscard]] const Eigen::VectorXd& speed() const { return speed_; }
-  /// Speeds of the joints at that instant.
-  [[nodiscard]] const Eigen::VectorXd& joint_speed() const {
-    return measurement_.motion == MotionKind::angle ? joint_speed_ : joint_;
-  }
-  /// Heading at that instant, rad: measured where there is a column for it, else odometry from the segment's start.
+  /// Speeds of the joints, alike.
+  [[nodiscard]] const Eigen::VectorXd& joint_speed() const { return joint_speed_; }
+  /// Heading at that instant, rad: measured where there is a column for it, else odometry from the segment's start. In the
+  /// middle of the step for angles and mean speeds.
   [[nodiscard]] double heading() const { return heading_; }
+  /// Length of the last step, s.
+  [[nodiscard]] double step_length() const { return length_; }
 
  private:
-  // One FOH sample of all signals, at time `t`.
-  bool advance(double t);
-  void begin(double t);
-
+  // What a sample brings: motion and effort of the joints.
+  struct Sample {
+    double t = 0.0;
+    Eigen::VectorXd joint;
+    Eigen::VectorXd effort;  // at the stamp
+    Eigen::VectorXd over;    // held efforts: what acts in the step that ends at the stamp
+    double heading = 0.0;
+  };
+  // Integrals of a step's effort with weights that fall from 1 to 0 and rise from 0 to 1, over its length; doubt alike.
+  struct StepEffort {
+    Eigen::VectorXd falling, rising, doubt;
+  };
   struct FunctionTerm {
     std::size_t term;
-    Cascade value;
-    Cascade error;
-    double last_value = 0.0;
-    double last_error = 0.0;
+    KernelState value{};
+    KernelState error{};
   };
 
-  void read_motion(std::span<const double> sample);
-  void read_efforts(double t, std::span<const double> sample);
+  [[nodiscard]] const Sample& sample(std::size_t age) const {
+    return ring_[(newest_ + ring_.size() - age) % ring_.size()];
+  }
+  void read(double t, std::span<const double> sample);
+  void read_effort(Sample& now, std::span<const double> sample);
+  [[nodiscard]] bool take();
+  bool describe(std::size_t age);
+  void measure_motion(const Sample& now, const Sample& before);
+  bool measure_effort(std::size_t age);
+  void effort_of_range(std::size_t age, double begin, double end);
+  [[nodiscard]] bool effort_is_covered(double end) const;
+  void to_outputs(const Eigen::VectorXd& joint, Eigen::VectorXd& output) const;
+  void begin();
+  void follow_angles();
+  void follow_speeds();
+  void curve_effort(double a, double b, const Eigen::VectorXd& first, const Eigen::VectorXd& middle,
+                    const Eigen::VectorXd& last, double corrected, double covered);
   [[nodiscard]] bool settled() const;
-  void evaluate_functions(const Eigen::VectorXd& speed);
-  void advance_motion(const StepWeights& w);
-  void advance_efforts(const StepWeights& w);
   void write_row();
-  [[nodiscard]] double filtered(const Cascade& c) const;
 
   Model model_;
   FilterDesign design_;
   Measurement measurement_;
   SignalErrors errors_;
+  StepEnclosure enclosure_;
   EffortCorrector corrector_;
+  bool angles_ = false;    // steps between angles, measured or those behind mean speeds
+  std::size_t ahead_ = 0;  // samples that efforts are known ahead of the motion that is filtered
+  bool ranged_ = false;    // efforts are late by an unknown time
 
-  StepWeights weights_;
-  bool started_ = false;  // a sample of this segment was seen
-  bool running_ = false;  // the recursion has its first instant
-  bool at_rest_ = false;  // the segment begins at standstill
-  double t0_ = 0.0;       // first instant of the recursion
-  double t_ = 0.0;        // last instant of the recursion
-  double sample_time_ = 0.0;
+  std::vector<Sample> ring_;
+  std::size_t newest_ = 0;
+  std::size_t samples_ = 0;    // of this segment
+  std::size_t instants_ = 0;
+  bool after_loss_ = false;  // the segment begins after lost rows
+  bool at_rest_ = false;     // the segment begins at standstill
+
+  FilterKernel kernel_;
+  double t0_ = 0.0;  // first instant
+  double t_ = 0.0;   // last instant
+  double length_ = 0.0, length_before_ = 0.0;
   double heading_ = 0.0;
-  double heading_sample_ = 0.0;
-  Eigen::VectorXd joint_, joint_before_, joint_speed_;  // motion as measured
-  Eigen::VectorXd joint_effort_;
-  Eigen::VectorXd speed_, speed_before_;                  // of coordinates
-  Eigen::VectorXd effort_sample_, effort_sample_before_;  // of outputs, as measured
-  Eigen::VectorXd effort_, effort_before_;                // of outputs, at the instants of the recursion
-  std::vector<Cascade> motion_;                           // driven by the coordinates' speeds
-  std::vector<Cascade> slope_;                            // driven by their derivatives
-  std::vector<Cascade> torque_;
+  Eigen::VectorXd speed_, speed_before_, joint_speed_;
+  StepMotion step_, step_before_;
+  StepEffort effort_, effort_before_;
+  Eigen::VectorXd curve_, curve_doubt_;  // of the efforts about the node
+  std::vector<KernelState> motion_;          // driven by the coordinates' speeds
+  std::vector<KernelState> slope_;           // driven by their derivatives
+  std::vector<KernelState> torque_, torque_doubt_;
+  std::vector<KernelState> motion_doubt_;          // speeds: error of the trapezoidal rule
+  std::vector<SlopeMajorant> slope_doubt_;     // angles: the same, by the slope of the kernel
+  std::vector<double> first_doubt_;            // of a segment's first step, where the kernel rises from 0
+  KernelState area_, start_;                   // of a constant 1, and of the first node alone
+  double first_length_ = 0.0;
   std::vector<FunctionTerm> functions_;
-  std::vector<double> state_speed_, state_joint_, joint_error_;
+  Eigen::VectorXd low_, high_, scratch_, effort_change_;
   FilteredRow row_;
 };
 

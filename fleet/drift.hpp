@@ -19,7 +19,7 @@ struct DriftPoint {
   double when = 0.0;            ///< days, or the order
   double estimate = 0.0;        ///< NaN where the log does not show it
   double standard_error = 0.0;  ///< NaN where there is none
-  double lower = 0.0;           ///< guaranteed
+  double lower = 0.0;           ///< bounds
   double upper = 0.0;
   double freedom = std::numeric_limits<double>::infinity();  ///< of the standard error
 };
@@ -32,7 +32,7 @@ struct ParameterDrift {
   std::size_t logs = 0;  ///< with bounds
   double first = 0.0;    ///< `when` of the first and last log
   double last = 0.0;
-  double certain = 0.0;  ///< least change between the two logs whose guaranteed intervals are furthest apart, with its
+  double certain = 0.0;  ///< least change between the two logs whose intervals of bounds are furthest apart, with its
                          ///< sign; 0 where all intervals meet
   double certain_from = 0.0;  ///< `when` of these two, the earlier first
   double certain_to = 0.0;

@@ -150,7 +150,8 @@ std::vector<RecordedParameter> recorded_parameters(const Commissioning& result) 
                    .upper = bounds.upper,
                    .lower_is_prior = p.lower_is_prior,
                    .upper_is_prior = p.upper_is_prior,
-                   .prior = prior});
+                   .prior = prior,
+                   .warrant = p.warrant});
   }
   for (const KinematicParameter& p :
        result.kinematic.model ? result.kinematic.parameters : std::vector<KinematicParameter>{}) {
@@ -166,7 +167,8 @@ std::vector<RecordedParameter> recorded_parameters(const Commissioning& result) 
                    .upper = p.upper,
                    .lower_is_prior = !shown,
                    .upper_is_prior = !shown,
-                   .prior = {p.lower, p.upper}});
+                   .prior = {p.lower, p.upper},
+                   .warrant = p.warrant});
   }
   return out;
 }

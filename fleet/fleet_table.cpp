@@ -8,10 +8,14 @@ namespace wheelwright {
 std::size_t column_of(FleetTable& table, const RecordedParameter& parameter) {
   for (std::size_t j = 0; j < table.columns.size(); ++j) {
     if (table.columns[j].name == parameter.name && table.columns[j].unit == parameter.unit) {
+      table.columns[j].warrant = weaker(table.columns[j].warrant, parameter.warrant);
       return j;
     }
   }
-  table.columns.push_back({.name = parameter.name, .unit = parameter.unit, .is_prior_key = parameter.is_prior_key});
+  table.columns.push_back({.name = parameter.name,
+                           .unit = parameter.unit,
+                           .is_prior_key = parameter.is_prior_key,
+                           .warrant = parameter.warrant});
   return table.columns.size() - 1;
 }
 

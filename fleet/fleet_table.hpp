@@ -18,7 +18,7 @@ struct FleetEntry {
   double estimate = 0.0;        ///< NaN where the log does not show it
   double standard_error = 0.0;  ///< NaN where there is none
   double freedom = 0.0;         ///< of the standard error; infinite where it is taken as exact
-  double lower = 0.0;           ///< guaranteed
+  double lower = 0.0;           ///< bounds
   double upper = 0.0;
   Interval prior{};  ///< in which they were sought
 };
@@ -28,7 +28,8 @@ struct FleetColumn {
   std::string name;
   std::string unit;
   bool is_prior_key = false;
-  std::vector<FleetEntry> entries{};  ///< ascending robots
+  std::vector<FleetEntry> entries{};        ///< ascending robots
+  Warrant warrant = Warrant::extrapolated;  ///< the weakest of all logs' bounds of it, those of checks included
 };
 
 /// Robots in the order in which they were added.

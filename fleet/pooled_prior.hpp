@@ -54,7 +54,7 @@ struct PooledPrior {
 ///
 ///     S_i = max over parameters of max((c − l_i)/s_below, (u_i − c)/s_above)
 ///
-/// of the farthest corner of its *guaranteed* bounds: at least the score of its true θ, which nobody sees. The box is all
+/// of the farthest corner of its bounds: at least the score of its true θ, which nobody sees. The box is all
 /// points with a score of at most the k-th smallest, k = ⌈(m + 1)(1 − a)⌉, cut to the hull of the robots' own priors.
 ///
 /// Where the robots and the next one are exchangeable and their noise keeps to its bounds, P(θ of the next robot in the

@@ -40,8 +40,8 @@ struct RobotOutside {
   double p = 1.0;           ///< two-sided
   double adjusted_p = 1.0;  ///< Holm over robots and parameters
   double certainly_beyond =
-      0.0;               ///< share of the other robots whose whole guaranteed interval lies on one side of its own
-  bool certain = false;  ///< its guaranteed interval does not meet where the central share of the others certainly is
+      0.0;               ///< share of the other robots whose whole interval of bounds lies on one side of its own
+  bool certain = false;  ///< its interval of bounds does not meet where the central share of the others certainly is
 };
 
 /// The result of describe_population().

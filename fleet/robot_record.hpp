@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <wheelwright/core/interval.hpp>
+#include <wheelwright/core/warrant.hpp>
 
 namespace wheelwright {
 
@@ -31,11 +32,12 @@ struct RecordedParameter {
   std::optional<double> estimate{};        ///< nothing where the log does not show the parameter
   std::optional<double> standard_error{};  ///< of the estimate, where it is finite
   std::optional<double> freedom{};  ///< degrees of freedom of the standard error; nothing where it is taken as exact
-  double lower = 0.0;               ///< guaranteed
+  double lower = 0.0;               ///< of the bounds, in the sense of `warrant`
   double upper = 0.0;
   bool lower_is_prior = false;  ///< the log does not tighten this side
   bool upper_is_prior = false;
-  Interval prior{};  ///< in which the bounds were sought; [lower, upper] where that is not known
+  Interval prior{};                         ///< in which the bounds were sought; [lower, upper] where that is not known
+  Warrant warrant = Warrant::extrapolated;  ///< of lower and upper
 
   friend bool operator==(const RecordedParameter&, const RecordedParameter&) = default;
 };

@@ -387,10 +387,7 @@ PlannedNoise expected_noise(const DesignSubject& subject) {
       noise.output[i] = errors.output[static_cast<Eigen::Index>(i)] / kExtreme;
     }
   } else {
-    Survey still;
-    still.largest_step = still.median_step = subject.step;
-    still.largest_acceleration.assign(subject.model.joints.size(), 0.0);
-    const NoiseBudget budget = noise_budget(subject.robot, subject.measurement, still);
+    const NoiseBudget budget = noise_budget(subject.robot, subject.measurement);
     check::that(budget.complete, "noise", "declared bounds of motion and effort");
     const NoiseGram gram = noise_gram(subject.model, {2, noise.beta, noise.beta}, subject.measurement, subject.step);
     const double motion = budget.sensors.motion, effort = budget.sensors.effort;

@@ -79,9 +79,9 @@ RegionRow sign_row(const SignPerturbedSums& sums, std::size_t p) {
   return row;
 }
 
-RegionRow hull_row(const GuaranteedHull& hull) {
+RegionRow hull_row(const IntervalBounds& hull) {
   RegionRow row;
-  row.method = RegionMethod::guaranteed_hull;
+  row.method = RegionMethod::interval_hull;
   row.available = row.all_at_once = true;
   row.confidence = 1.0;
   row.lower = hull.lower;
@@ -98,13 +98,13 @@ std::string_view to_string(RegionMethod method) {
     case RegionMethod::student_t: return "student_t";
     case RegionMethod::block_bootstrap: return "block_bootstrap";
     case RegionMethod::sign_perturbed_sums: return "sign_perturbed_sums";
-    case RegionMethod::guaranteed_hull: return "guaranteed_hull";
+    case RegionMethod::interval_hull: return "interval_hull";
   }
   return {};
 }
 
 RegionComparison compare_regions(const RegressionMoments& moments, const Estimate& estimate,
-                                 const RegionOptions& options, const std::optional<GuaranteedHull>& hull) {
+                                 const RegionOptions& options, const std::optional<IntervalBounds>& hull) {
   const std::size_t p = moments.parameters();
   check::that(static_cast<std::size_t>(estimate.theta.size()) == p, "estimate", "one of these moments");
   const bool instruments = estimate.estimator == Estimator::instrumental_variables;
@@ -132,7 +132,7 @@ RegionComparison compare_regions(const RegressionMoments& moments, const Estimat
   }
   if (hull) {
     check::that(static_cast<std::size_t>(hull->lower.size()) == p && hull->upper.size() == hull->lower.size(),
-                "guaranteed hull", "an interval for each parameter");
+                "interval hull", "an interval for each parameter");
     comparison.rows.push_back(hull_row(*hull));
   }
   return comparison;

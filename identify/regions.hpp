@@ -17,7 +17,7 @@
 namespace wheelwright {
 
 /// How a row of the comparison was found.
-enum class RegionMethod { student_t, block_bootstrap, sign_perturbed_sums, guaranteed_hull };
+enum class RegionMethod { student_t, block_bootstrap, sign_perturbed_sums, interval_hull };
 
 /// Name for people and files: "student_t", …
 [[nodiscard]] std::string_view to_string(RegionMethod method);
@@ -27,15 +27,15 @@ struct RegionRow {
   RegionMethod method = RegionMethod::student_t;
   bool available = false;    ///< if not, `remark` says why
   bool all_at_once = false;  ///< the promise is for all parameters together, not for each of them
-  double confidence = 0.0;   ///< of the promise; 1 for the guaranteed hull
+  double confidence = 0.0;   ///< of the promise; 1 for the interval hull
   Eigen::VectorXd lower;     ///< p; ±∞ where there is no bound
   Eigen::VectorXd upper;     ///< p
   std::string promise;       ///< one line: how often, and under which assumption
   std::string remark;        ///< why it is not available, or a doubt; may be empty
 };
 
-/// The guaranteed interval hull, by the caller (bounds/).
-struct GuaranteedHull {
+/// The interval hull, by the caller (bounds/).
+struct IntervalBounds {
   Eigen::VectorXd lower;  ///< p
   Eigen::VectorXd upper;  ///< p
   Eigen::VectorXd error;  ///< ē of each output
@@ -63,6 +63,6 @@ struct RegionComparison {
 /// squares there, and the remark says so.
 [[nodiscard]] RegionComparison compare_regions(const RegressionMoments& moments, const Estimate& estimate,
                                                const RegionOptions& options = {},
-                                               const std::optional<GuaranteedHull>& hull = std::nullopt);
+                                               const std::optional<IntervalBounds>& hull = std::nullopt);
 
 }  // namespace wheelwright

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 #include <wheelwright/io/json_number.hpp>
+#include <wheelwright/io/warrant_json.hpp>
 
 namespace wheelwright {
 namespace {
@@ -17,6 +18,15 @@ const char* name_of(Guarantee guarantee) {
     case Guarantee::extrapolated: return "extrapolated";
   }
   return "";
+}
+
+Warrant warrant_of(Guarantee guarantee) {
+  switch (guarantee) {
+    case Guarantee::never: return Warrant::guaranteed;
+    case Guarantee::hourly: return Warrant::statistical;
+    case Guarantee::extrapolated: return Warrant::extrapolated;
+  }
+  return Warrant::extrapolated;
 }
 
 Json filter_json(const FilterDesign& filter) {
@@ -37,6 +47,7 @@ Json candidate_json(const DetectorCandidate& candidate) {
   }
   return {{"filter", filter_json(candidate.filter)},
           {"guarantee", name_of(candidate.guarantee)},
+          {"warrant", warrant_word(warrant_of(candidate.guarantee))},
           {"persistence", {{"k", candidate.persistence.k}, {"n", candidate.persistence.n}}},
           {"origin", candidate.origin},
           {"failure", candidate.failure},

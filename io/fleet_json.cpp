@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/io/number.hpp>
+#include <wheelwright/io/warrant_json.hpp>
 #include <wheelwright/io/words.hpp>
 
 namespace wheelwright {
@@ -38,7 +39,8 @@ Json log_json(const LogRecord& log) {
                           {"upper", p.upper},
                           {"lower_is_prior", p.lower_is_prior},
                           {"upper_is_prior", p.upper_is_prior},
-                          {"prior", {p.prior.lower, p.prior.upper}}});
+                          {"prior", {p.prior.lower, p.prior.upper}},
+                          {"warrant", warrant_word(p.warrant)}});
   }
   return {{"log", log.log},
           {"when", log.when},
@@ -69,7 +71,8 @@ LogRecord log_from(const JsonPlace& at) {
                               .upper = p.at("upper").number(),
                               .lower_is_prior = p.at("lower_is_prior").boolean(),
                               .upper_is_prior = p.at("upper_is_prior").boolean(),
-                              .prior = {p.at("prior").at(std::size_t{0}).number(), p.at("prior").at(1).number()}});
+                              .prior = {p.at("prior").at(std::size_t{0}).number(), p.at("prior").at(1).number()},
+                              .warrant = warrant_at(p, Warrant::extrapolated)});
   }
   return log;
 }
@@ -78,7 +81,11 @@ Json population_json(const FleetResult& fleet) {
   Json list = Json::array();
   for (const ParameterPopulation& p : fleet.population.parameters) {
     const FleetColumn& column = fleet.table.columns[p.column];
-    Json entry = {{"parameter", column.name}, {"unit", column.unit}, {"robots", p.shown}, {"described", p.described}};
+    Json entry = {{"parameter", column.name},
+                  {"unit", column.unit},
+                  {"warrant", warrant_word(column.warrant)},
+                  {"robots", p.shown},
+                  {"described", p.described}};
     if (p.described) {
       entry["centre"] = p.fit.centre;
       entry["centre_standard_error"] = p.fit.centre_error;
@@ -101,6 +108,7 @@ Json outside_json(const FleetResult& fleet) {
                     {"p_value", o.p},
                     {"adjusted_p_value", o.adjusted_p},
                     {"certain", o.certain},
+                    {"warrant", warrant_word(fleet.table.columns[o.column].warrant)},
                     {"certainly_beyond", o.certainly_beyond}});
   }
   return list;
@@ -117,6 +125,7 @@ Json drift_json(const FleetResult& fleet) {
                   {"unit", fleet.table.columns[d.column].unit},
                   {"logs", d.logs},
                   {"per", d.dated ? "week" : "log"},
+                  {"warrant", warrant_word(fleet.table.columns[d.column].warrant)},
                   {"certain", nullptr},
                   {"trend", nullptr}};
     if (d.certain != 0.0) {
@@ -270,7 +279,7 @@ Json to_json(const FleetResult& fleet, const std::string& list, const std::strin
 }
 
 std::string fleet_csv_header() {
-  return "robot,status,parameter,unit,estimate,standard_error,lower,upper,lower_is_prior,upper_is_prior\n";
+  return "robot,status,parameter,unit,estimate,standard_error,lower,upper,lower_is_prior,upper_is_prior,warrant\n";
 }
 
 std::string fleet_csv_rows(const RobotRecord& record) {
@@ -278,11 +287,11 @@ std::string fleet_csv_rows(const RobotRecord& record) {
   const auto text = [](const std::optional<double>& x) { return x ? number_text(*x) : std::string(); };
   std::string out;
   for (const RecordedParameter& p : record.commissioning.parameters) {
-    out +=
-        begin + fmt::format("{},{},{},{},{},{},{:d},{:d}\n", p.name, p.unit, text(p.estimate), text(p.standard_error),
-                            number_text(p.lower), number_text(p.upper), p.lower_is_prior, p.upper_is_prior);
+    out += begin + fmt::format("{},{},{},{},{},{},{:d},{:d},{}\n", p.name, p.unit, text(p.estimate),
+                               text(p.standard_error), number_text(p.lower), number_text(p.upper), p.lower_is_prior,
+                               p.upper_is_prior, warrant_word(p.warrant));
   }
-  return out.empty() ? begin + ",,,,,,,\n" : out;
+  return out.empty() ? begin + ",,,,,,,,\n" : out;
 }
 
 }  // namespace wheelwright

@@ -10,6 +10,7 @@
 #include <wheelwright/io/json_number.hpp>
 #include <wheelwright/io/json_vector.hpp>
 #include <wheelwright/io/model_words.hpp>
+#include <wheelwright/io/warrant_json.hpp>
 
 namespace wheelwright {
 namespace {
@@ -49,7 +50,8 @@ Json noise_json(const KinematicCommissioning& r, const OdometryMeasurement& m) {
                     {"unit", units[i]},
                     {"origin", word_of(kNoiseOriginWords, n.origin)},
                     {"bound", n.bound},
-                    {"learning", n.learning}});
+                    {"learning", n.learning},
+                    {"warrant", warrant_word(n.warrant)}});
   }
   return {{"outputs", list}, {"declared_too_small", r.declared_too_small}, {"raise", r.raise}};
 }
@@ -62,6 +64,7 @@ Json parameters_json(const KinematicCommissioning& r) {
                     {"estimate", or_null(p.estimate)},
                     {"lower", p.lower},
                     {"upper", p.upper},
+                    {"warrant", warrant_word(p.warrant)},
                     {"standard_error", or_null(p.standard_error)},
                     {"nominal", p.nominal},
                     {"excitation", word_of(kExcitationWords, p.excitation)},
@@ -110,6 +113,16 @@ OdometryMeasurement read_measurement(const JsonPlace& place) {
   return m;
 }
 
+/// Of a model from before it said so, what its noise tells.
+Warrant kinematic_warrant(const JsonPlace& place) {
+  const JsonPlace outputs = place.at("noise").at("outputs");
+  bool declared = outputs.size() > 0;
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    declared = declared && value_of(kNoiseOriginWords, outputs.at(i).at("origin")) == NoiseOrigin::declared;
+  }
+  return warrant_at(place, declared ? Warrant::guaranteed : Warrant::extrapolated);
+}
+
 }  // namespace
 
 std::optional<Json> kinematic_json(const KinematicCommissioning& r, const FoldOptions& folds) {
@@ -126,6 +139,7 @@ std::optional<Json> kinematic_json(const KinematicCommissioning& r, const FoldOp
     a.push_back(numbers(facet.a));
     b.push_back(facet.b);
   }
+  json["warrant"] = warrant_word(m.warrant);
   json["window"] = m.window;
   json["outputs"] = m.measurement.outputs();
   json["measurement"] = measurement_json(m.measurement);
@@ -153,6 +167,7 @@ std::optional<KinematicModel> kinematic_from_json(const JsonPlace& place) {
   KinematicModel model;
   model.measurement = read_measurement(place.at("measurement"));
   model.window = place.at("window").number();
+  model.warrant = kinematic_warrant(place);
   const std::size_t p = model.measurement.parameters().size(), n = model.measurement.outputs().size();
   const JsonPlace detector = place.at("detector"), errors = detector.at("error_bounds"), set = place.at("feasible_set");
   model.estimate = vector_at(detector.at("estimate"), p);

@@ -7,6 +7,7 @@
 
 #include <wheelwright/commission/margin_words.hpp>
 #include <wheelwright/io/json_number.hpp>
+#include <wheelwright/io/warrant_json.hpp>
 
 namespace wheelwright {
 namespace {
@@ -120,10 +121,12 @@ Json to_json(const MarginSurvey& survey, const std::string& model, const std::st
       faults.push_back(fault_json(margins, survey, residual));
     }
     json["residuals"].push_back({{"residual", residual.name},
+                                 {"warrant", warrant_word(residual.warrant)},
                                  {"outputs", residual.outputs},
                                  {"blind", residual.blind},
                                  {"faults", std::move(faults)}});
   }
+  json["assumptions"] = assumptions_json(survey.assumptions);
   return json;
 }
 

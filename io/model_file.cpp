@@ -7,6 +7,7 @@
 #include <wheelwright/io/kinematic_json.hpp>
 #include <wheelwright/io/model_words.hpp>
 #include <wheelwright/io/robot_file.hpp>
+#include <wheelwright/io/warrant_json.hpp>
 
 namespace wheelwright {
 namespace {
@@ -208,6 +209,17 @@ void read_data(const JsonPlace& place, ModelClaims& claims) {
   claims.segments = place.at("segments").count();
 }
 
+/// What the numbers of a model stand on; of a model from before it said so, what its noise tells.
+Warrant warrant_of_model(const JsonPlace& root) {
+  const JsonPlace noise = root.at("noise"), outputs = noise.at("outputs");
+  bool declared = outputs.size() > 0;
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    declared = declared && value_of(kNoiseOriginWords, outputs.at(i).at("origin")) == NoiseOrigin::declared;
+  }
+  const bool worst_case = value_of(kNoiseModeWords, noise.at("mode")) == NoiseMode::worst_case;
+  return warrant_at(root, !declared ? Warrant::extrapolated : worst_case ? Warrant::guaranteed : Warrant::statistical);
+}
+
 /// The document's root, after a look at its schema.
 JsonPlace root_of(const Json& json, const std::string& file) {
   JsonPlace root(json, file);
@@ -240,6 +252,8 @@ CommissionedModel model_from_json(const Json& json, const std::string& file) {
   if (root.has("kinematic")) {
     model.kinematic = kinematic_from_json(root.at("kinematic"));
   }
+  model.warrant = warrant_of_model(root);
+  model.assumptions = assumptions_at(root);
   return model;
 }
 
@@ -257,6 +271,8 @@ ModelClaims claims_from_json(const Json& json, const std::string& file) {
   read_noise(root.at("noise"), claims);
   read_set(root.at("feasible_set"), claims);
   read_parameters(root.at("parameters"), claims);
+  claims.warrant = warrant_of_model(root);
+  claims.assumptions = assumptions_at(root);
   if (root.has("physical")) {
     const JsonPlace physical = root.at("physical");
     for (const std::string& name : physical.keys()) {

@@ -60,6 +60,8 @@ struct ModelClaims {
   std::vector<LogFileReport> files;          ///< path, hash, bytes and rows of each file of the log
   std::size_t rows = 0;                      ///< of the log
   std::size_t segments = 0;                  ///< of the log
+  Warrant warrant = Warrant::extrapolated;   ///< of the bounds, as the model states it
+  std::vector<Assumption> assumptions;       ///< that it took; none of a model from before it listed them
 };
 
 /// Reads the claims of a model.json, also of one that holds no model. Throws InputError, naming file and key, when it

@@ -10,6 +10,7 @@
 #include <wheelwright/io/model_file.hpp>
 #include <wheelwright/io/model_words.hpp>
 #include <wheelwright/io/robot_file.hpp>
+#include <wheelwright/io/warrant_json.hpp>
 
 namespace wheelwright {
 namespace {
@@ -76,7 +77,8 @@ Json noise_json(const Commissioning& r, const Model& model) {
                    {"unit", output_unit(r.model.robot, model.output_units[i])},
                    {"origin", word_of(kNoiseOriginWords, n.origin)},
                    {"bound", n.bound},
-                   {"learning", n.learning}};
+                   {"learning", n.learning},
+                   {"warrant", warrant_word(n.warrant)}};
     if (n.origin == NoiseOrigin::estimated) {
       output["over_rms"] = n.how.over_rms;
       output["over_largest"] = n.how.over_largest;
@@ -98,6 +100,7 @@ Json parameter_json(const Commissioning& r, std::size_t j, const Robot& robot, c
           {"estimate", or_null(p.estimate)},
           {"lower", p.lower},
           {"upper", p.upper},
+          {"warrant", warrant_word(p.warrant)},
           {"standard_error", or_null(p.standard_error)},
           {"chebyshev_centre", p.chebyshev},
           {"excitation", word_of(kExcitationWords, p.excitation)},
@@ -123,6 +126,7 @@ Json physical_json(const Commissioning& r, const Robot& robot, const Model& mode
                   {"estimate", p.estimate ? Json(physical(*p.estimate)) : Json(nullptr)},
                   {"lower", scaled.lower},
                   {"upper", scaled.upper},
+                  {"warrant", warrant_word(p.warrant)},
                   {"standard_error", p.standard_error ? Json(s.scale * *p.standard_error) : Json(nullptr)}};
     if (const auto nominal = robot.nominal.find(p.parameter.physical); nominal != robot.nominal.end()) {
       entry["nominal"] = nominal->second;
@@ -195,6 +199,7 @@ Json validation_json(const Commissioning& r, const Model& model) {
     const OutputValidation& v = r.validation[i];
     const auto share = [&](double width) { return v.torque_rms > 0.0 ? width / v.torque_rms : 0.0; };
     outputs.push_back({{"output", model.outputs[i]},
+                       {"warrant", warrant_word(v.warrant)},
                        {"instants", v.instants},
                        {"coverage", v.coverage},
                        {"coverage_noise_free", v.coverage_noise_free},
@@ -250,6 +255,7 @@ Json to_json(const Commissioning& r, const LogReport& data, const std::string& s
                {"software", software},
                {"status", word_of(kStatusWords, r.status)},
                {"message", r.message},
+               {"warrant", warrant_word(m.warrant)},
                {"robot", to_json(m.robot)},
                {"filter", filter_json(m.filter, r.filter_choice)},
                {"measurement", measurement_json(m.measurement)},
@@ -278,6 +284,7 @@ Json to_json(const Commissioning& r, const LogReport& data, const std::string& s
   }
   json["contradictions"] = contradictions_json(r);
   json["data"] = data_json(r, data);
+  json["assumptions"] = assumptions_json(r.assumptions);
   json["notes"] = r.notes;
   return json;
 }

@@ -35,7 +35,7 @@ std::string pooled_prior_yaml(const FleetResult& fleet, const std::string& softw
   out += comment((prior.exists ? "Coverage: " : "No box: ") + prior.message + ".");
   if (prior.exists) {
     out += comment(
-        "It is distribution-free (split conformal prediction on guaranteed bounds); \"drawn alike\" means "
+        "It is distribution-free (split conformal prediction on the robots' bounds); \"drawn alike\" means "
         "exchangeable: the next robot is of the same kind, not one that was chosen for being different.");
   }
   std::string rows;

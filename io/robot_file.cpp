@@ -2,6 +2,7 @@
 #include <wheelwright/io/robot_file.hpp>
 
 #include <algorithm>
+#include <cmath>
 
 #include <nlohmann/json.hpp>
 
@@ -16,6 +17,7 @@ namespace {
 constexpr std::size_t longest_robot_file = std::size_t{1} << 20;
 constexpr double longest_radius = 10.0;  // m: beyond this the file means millimetres
 constexpr double longest_track = 100.0;  // m
+constexpr double longest_delay = 1.0;    // s: beyond this the file means milliseconds
 
 using Names = std::vector<std::string>;
 
@@ -154,11 +156,15 @@ struct RobotReader {
 
   void read_measurement(const std::string& key, const YamlPlace& place) {
     if (key == "effort") {
-      for (const auto& [name, value] : place.members({"kind", "hold", "unsigned"})) {
+      for (const auto& [name, value] : place.members({"kind", "hold", "unsigned", "changes", "delay"})) {
         if (name == "kind") {
           robot.effort = static_cast<EffortKind>(value.choice({"torque", "current", "voltage"}));
         } else if (name == "hold") {
           robot.hold = static_cast<Hold>(value.choice({"zero_order", "first_order"}));
+        } else if (name == "changes") {
+          robot.effort_changes = static_cast<EffortChanges>(value.choice({"between", "at_samples"}));
+        } else if (name == "delay") {
+          robot.effort_delay = delay(value);
         } else {
           robot.effort_unsigned = value.boolean();
         }
@@ -172,6 +178,26 @@ struct RobotReader {
     } else if (key == "speed_source") {
       robot.speed_source = static_cast<SpeedSource>(place.choice({"auto", "encoder_difference", "measured"}));
     }
+  }
+
+  static Interval delay(const YamlPlace& place) {
+    const std::string_view expected = "seconds between -1 and 1, or two such numbers [lo, hi] with lo <= hi";
+    const auto seconds = [&](const YamlPlace& end) {
+      return end.number(expected, [](double value) { return std::abs(value) <= longest_delay; });
+    };
+    if (place.is_scalar()) {
+      const double both = seconds(place);
+      return {both, both};
+    }
+    const auto ends = place.elements(expected);
+    if (ends.size() != 2) {
+      place.fail(expected);
+    }
+    const Interval interval{seconds(ends[0]), seconds(ends[1])};
+    if (interval.lower > interval.upper) {
+      ends[1].fail(expected);
+    }
+    return interval;
   }
 
   void read_noise(const YamlPlace& place) {

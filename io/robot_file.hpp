@@ -17,8 +17,9 @@ namespace wheelwright {
 ///
 ///     name, model: differential_drive | single_axis, wheel_radius (m), track_width (m), lever_arm: half_track | track,
 ///     friction: isotropic | anisotropic, parameters: [physical names], effort: {kind: torque | current | voltage,
-///     hold: zero_order | first_order, unsigned: bool}, nominal: {physical name: value}, prior: {physical name: [lo,
-///     hi]}, noise: estimate | {wheel_speed, wheel_angle, effort, position, heading: bound | estimate},
+///     hold: zero_order | first_order, unsigned: bool, changes: between | at_samples, delay: s | [lo, hi]},
+///     nominal: {physical name: value}, prior: {physical name: [lo, hi]},
+///     noise: estimate | {wheel_speed, wheel_angle, effort, position, heading: bound | estimate},
 ///     filter: auto | {order: 1 | 2, alpha, beta: 1/s}, encoder_counts_per_turn, speed_source: auto |
 ///     encoder_difference | measured, limits: {effort, speed, acceleration}, motor: {torque_constant, resistance,
 ///     back_emf, gear_ratio}, effects: [{effect: name, parameter: value | [lo, hi], ...}] (model/effect_law.hpp)

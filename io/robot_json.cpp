@@ -67,6 +67,7 @@ std::string yaml_line(const std::string& key, const Json& value) { return key + 
 Json to_json(const Robot& robot) {
   constexpr std::array efforts = {"torque", "current", "voltage"};
   constexpr std::array holds = {"zero_order", "first_order"};
+  constexpr std::array changes = {"between", "at_samples"};
   constexpr std::array sources = {"auto", "encoder_difference", "measured"};
   Json out = {{"name", robot.name}, {"model", robot.model}};
   if (robot.model == "differential_drive") {
@@ -83,7 +84,9 @@ Json to_json(const Robot& robot) {
   }
   out["effort"] = {{"kind", efforts[static_cast<std::size_t>(robot.effort)]},
                    {"hold", holds[static_cast<std::size_t>(robot.hold)]},
-                   {"unsigned", robot.effort_unsigned}};
+                   {"unsigned", robot.effort_unsigned},
+                   {"changes", changes[static_cast<std::size_t>(robot.effort_changes)]},
+                   {"delay", Json::array({robot.effort_delay.lower, robot.effort_delay.upper})}};
   for (const auto& [name, value] : robot.nominal) {
     out["nominal"][name] = value;
   }

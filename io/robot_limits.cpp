@@ -117,6 +117,8 @@ void add_effort(RobotWithOrigins& out, const RobotTree* tree, const WheelJoints*
     out.origins["effort.hold"] =
         where + (state != nullptr ? ": it is measured" : ": it is a command, held till the next");
   }
+  out.origins["effort.changes"] = "default, because no file tells";
+  out.origins["effort.delay"] = "default, because no file tells";
   out.origins["effort.unsigned"] = "default, because no file tells";
   for (const JointInterfaces* each : of_wheels) {
     if (each->reduction && !robot.motor) {

@@ -5,6 +5,7 @@
 
 #include <nlohmann/json.hpp>
 #include <wheelwright/io/json_number.hpp>
+#include <wheelwright/io/warrant_json.hpp>
 
 namespace wheelwright {
 namespace {
@@ -118,7 +119,7 @@ Json local_json(const LocalSensitivity& local) {
     inputs.push_back(
         {{"input", input.input}, {"unit", input.unit}, {"value", input.value}, {"parameters", std::move(parameters)}});
   }
-  return {{"inputs", std::move(inputs)}, {"notes", local.notes}};
+  return {{"warrant", warrant_word(local.warrant)}, {"inputs", std::move(inputs)}, {"notes", local.notes}};
 }
 
 }  // namespace

@@ -31,9 +31,11 @@ TermValue signs(const MotionState& state, double of_left) {
   TermValue sum;
   for (std::size_t j = 0; j < 2; ++j) {
     const double w = state.joint_speed[j];
-    const double sign = static_cast<double>(w > 0.0) - static_cast<double>(w < 0.0);
-    sum.value += (j == 0 ? 1.0 : of_left) * sign;
-    sum.error += state.joint_error[j] > 0.0 && std::abs(w) <= state.joint_error[j] ? 1.0 + std::abs(sign) : 0.0;
+    if (state.joint_error[j] > 0.0 && std::abs(w) <= state.joint_error[j]) {
+      sum.error += 1.0;
+    } else {
+      sum.value += (j == 0 ? 1.0 : of_left) * (static_cast<double>(w > 0.0) - static_cast<double>(w < 0.0));
+    }
   }
   return sum;
 }

@@ -22,7 +22,7 @@ double sign(double x) { return static_cast<double>(x > 0.0) - static_cast<double
 bool in_doubt(double x, double error) { return error > 0.0 && std::abs(x) <= error; }
 
 // sgn x; any number in [−1, 1] where it is in doubt.
-TermValue sign_of(double x, double error) { return {sign(x), in_doubt(x, error) ? 1.0 + std::abs(sign(x)) : 0.0}; }
+TermValue sign_of(double x, double error) { return in_doubt(x, error) ? TermValue{0.0, 1.0} : TermValue{sign(x), 0.0}; }
 
 // constants: joint.
 TermValue dry(const MotionState& s, const Constants& constants) {
@@ -36,7 +36,7 @@ TermValue stribeck(const MotionState& s, const Constants& constants) {
   const double w = s.joint_speed[j], error = s.joint_error[j], x = w / constants[1];
   const double value = std::exp(-x * x) * sign(w);
   const double smooth = std::min(1.0, std::sqrt(2.0 / std::numbers::e) * error / constants[1]);
-  return {value, in_doubt(w, error) ? 1.0 + std::abs(value) : smooth};
+  return in_doubt(w, error) ? TermValue{0.0, 1.0} : TermValue{value, smooth};
 }
 
 TermValue one(const MotionState&, const Constants&) { return {1.0, 0.0}; }
@@ -74,8 +74,10 @@ TermValue caster_direction(const MotionState& s, const Constants& constants) {
   const std::array<double, 2> along = {s.speed[0], p * s.speed[1]};
   const double v = std::hypot(along[0], along[1]), error = std::hypot(s.speed_error[0], p * s.speed_error[1]);
   const double value = v > 0.0 ? along[static_cast<std::size_t>(constants[1])] / v : 0.0;
-  return {value, in_doubt(v, error) ? 1.0 + std::abs(value)
-                                    : (v > 0.0 ? std::min(2.0, 0.5 * std::numbers::pi * error / v) : 0.0)};
+  if (in_doubt(v, error)) {
+    return {0.0, 1.0};
+  }
+  return {value, v > 0.0 ? std::min(2.0, 0.5 * std::numbers::pi * error / v) : 0.0};
 }
 
 // What stands behind the θ of an effect's parameter: its name, and whether the mass is in it.

@@ -26,6 +26,12 @@ enum class Hold {
   first_order,  ///< measured, linear between samples
 };
 
+/// When a held effort (Hold::zero_order) is replaced by the next one.
+enum class EffortChanges {
+  between,     ///< at an unknown moment between the stamps of the two
+  at_samples,  ///< exactly at the stamp of the next one
+};
+
 /// Where logged wheel speeds come from.
 enum class SpeedSource {
   automatic,           ///< found from the data
@@ -85,9 +91,11 @@ struct Robot {
   bool anisotropic_friction = false;  ///< five parameters (f1 ≠ f2) instead of four
   EffortKind effort = EffortKind::torque;
   Hold hold = Hold::first_order;
-  bool effort_unsigned = false;                        ///< only |effort| was logged
-  std::map<std::string, double> nominal;               ///< physical parameter -> value as designed
-  std::map<std::string, Interval> prior;               ///< physical parameter -> bounds known beforehand
+  EffortChanges effort_changes = EffortChanges::between;  ///< of a held effort
+  Interval effort_delay{0.0, 0.0};        ///< s, holds the constant time by which logged efforts are late (< 0: early)
+  bool effort_unsigned = false;           ///< only |effort| was logged
+  std::map<std::string, double> nominal;  ///< physical parameter -> value as designed
+  std::map<std::string, Interval> prior;  ///< physical parameter -> bounds known beforehand
   std::optional<std::vector<std::string>> parameters;  ///< requested parameters; nothing means the model's choice
   SensorNoise noise;
   FilterWish filter;

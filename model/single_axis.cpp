@@ -6,12 +6,13 @@
 namespace wheelwright {
 namespace {
 
-// At rest dry friction is anywhere in [−1, 1]; where the sign of the speed is in doubt it may be the other one.
+// At rest, and where the sign of the speed is in doubt, dry friction is anywhere in [−1, 1].
 TermValue sign_of_speed(const MotionState& state) {
   const double v = state.speed[0];
-  const double sign = v > 0.0 ? 1.0 : (v < 0.0 ? -1.0 : 0.0);
-  const bool in_doubt = std::abs(v) <= state.speed_error[0];
-  return {sign, in_doubt ? 1.0 + std::abs(sign) : 0.0};
+  if (std::abs(v) <= state.speed_error[0]) {
+    return {0.0, 1.0};
+  }
+  return {v > 0.0 ? 1.0 : -1.0, 0.0};
 }
 
 TermValue one(const MotionState&) { return {1.0, 0.0}; }

@@ -10,6 +10,7 @@
 #include <wheelwright/io/log_file.hpp>
 #include <wheelwright/io/model_file.hpp>
 #include <wheelwright/io/model_words.hpp>
+#include <wheelwright/io/warrant_json.hpp>
 
 #include "../app/common.hpp"
 #include "../app/summary.hpp"
@@ -72,8 +73,11 @@ void bind_parameter(py::module_& m) {
       .def_readonly("reason", &ParameterResult::reason, "why it is not identified, for people")
       .def_readonly("estimate", &ParameterResult::estimate, "None where the log does not show the parameter")
       .def_readonly("standard_error", &ParameterResult::standard_error, "honest under autocorrelated residuals")
-      .def_readonly("lower", &ParameterResult::lower, "guaranteed")
-      .def_readonly("upper", &ParameterResult::upper, "guaranteed")
+      .def_readonly("lower", &ParameterResult::lower, "bound, in the sense of warrant")
+      .def_readonly("upper", &ParameterResult::upper, "bound, in the sense of warrant")
+      .def_property_readonly(
+          "warrant", [](const ParameterResult& p) { return std::string(warrant_word(p.warrant)); },
+          "what the bounds stand on: guaranteed, extrapolated or statistical")
       .def_readonly("chebyshev", &ParameterResult::chebyshev, "centre of the feasible set")
       .def_readonly("lower_is_prior", &ParameterResult::lower_is_prior, "the log does not tighten the prior's bound")
       .def_readonly("upper_is_prior", &ParameterResult::upper_is_prior)
@@ -130,6 +134,12 @@ void bind_model(py::module_& m) {
           [](const py::object& self) { return view(self.cast<const ModelObject&>().model->estimate, self); },
           "theta of (30), shape (p,), read-only view; the Chebyshev centre's where the log does not show a parameter")
       .def_property_readonly(
+          "warrant", [](const ModelObject& o) { return std::string(warrant_word(o.model->warrant)); },
+          "what bounds and thresholds stand on: guaranteed, extrapolated or statistical")
+      .def_property_readonly(
+          "assumptions", [](const ModelObject& o) { return to_python(assumptions_json(o.model->assumptions)); },
+          "what is taken as given: a list of dicts with id, statement, declared_by, test, verdict and detail")
+      .def_property_readonly(
           "feasible_set",
           [](const ModelObject& o) { return std::make_unique<SetObject>(Polytope(o.model->facets, o.model->box)); },
           "the set of all theta that the log allows")
@@ -179,10 +189,17 @@ void bind_commission(py::module_& m) {
           "shape (p,), read-only view")
       .def_property_readonly(
           "lower", [](const py::object& self) { return view(self.cast<const CommissionObject&>().lower, self); },
-          "guaranteed lower bounds, shape (p,), read-only view")
+          "lower bounds in the sense of warrant, shape (p,), read-only view")
       .def_property_readonly(
           "upper", [](const py::object& self) { return view(self.cast<const CommissionObject&>().upper, self); },
-          "guaranteed upper bounds, shape (p,), read-only view")
+          "upper bounds in the sense of warrant, shape (p,), read-only view")
+      .def_property_readonly(
+          "warrant", [](const CommissionObject& c) { return std::string(warrant_word(c.result->model.warrant)); },
+          "what bounds and thresholds stand on: guaranteed (declared sensor bounds, and no assumption that a test "
+          "contradicts), extrapolated (noise bounds learnt from the log) or statistical")
+      .def_property_readonly(
+          "assumptions", [](const CommissionObject& c) { return to_python(assumptions_json(c.result->assumptions)); },
+          "what is taken as given: a list of dicts with id, statement, declared_by, test, verdict and detail")
       .def_property_readonly("rank", [](const CommissionObject& c) { return c.result->rank; })
       .def_property_readonly("condition", [](const CommissionObject& c) { return c.result->condition; })
       .def_property_readonly(

@@ -16,7 +16,7 @@ import sysconfig
 import zipfile
 from pathlib import Path
 
-SUMMARY = "Guaranteed, tight model-based fault detection for wheeled robots"
+SUMMARY = "Tight model-based fault detection for wheeled robots"
 
 
 def tag():

@@ -16,6 +16,7 @@
 #include <wheelwright/report/set_drawings.hpp>
 #include <wheelwright/report/signals.hpp>
 #include <wheelwright/report/text.hpp>
+#include <wheelwright/report/warrant_section.hpp>
 
 namespace wheelwright {
 
@@ -85,6 +86,7 @@ std::string kinematic_section(const KinematicCommissioning& k) {
   if (!k.model) {
     return out;
   }
+  out += warrant_note(k.model->warrant);
   std::vector<std::vector<Cell>> rows;
   for (const KinematicParameter& p : k.parameters) {
     const std::string unit = p.unit == "1" ? "" : p.unit;
@@ -122,12 +124,16 @@ std::string commission_report(const Commissioning& result, const ReportContext& 
   content.verdict = verdict(result);
   content.sentences = commission_words(result);
   content.software = context.software;
+  if (result.status != Commissioning::Status::empty) {
+    content.warrant = result.model.warrant;
+  }
   const auto add = [&](const char* id, const char* heading, std::string body) {
     if (!body.empty()) {
       content.sections.push_back({id, heading, std::move(body)});
     }
   };
   add("contradiction", "Contradiction", contradiction_section(result, axis));
+  add("assumptions", "Assumptions", assumptions_section(result.assumptions));
   add("parameters", "Parameters", parameter_table(result, axis));
   add("set", "Feasible set", set_projections(result));
   add("estimators", "Estimators", estimator_table(result));

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include <wheelwright/commission/margin_words.hpp>
 #include <wheelwright/report/parameter_view.hpp>
 #include <wheelwright/report/text.hpp>
 
@@ -51,15 +52,16 @@ std::vector<std::string> idle_outputs(const Commissioning& result) {
   return names;
 }
 
-std::string guaranteed(const ParameterView& v) {
+std::string bounds_text(const ParameterView& v) {
+  const std::string word(warrant_word(v.warrant));
   const auto [lower, upper] = outward(v.lower, v.upper);
   if (v.lower_is_prior && v.upper_is_prior) {
     return "bounded by the prior alone";
   }
   if (v.lower_is_prior || v.upper_is_prior) {
-    return v.lower_is_prior ? "guaranteed at most " + upper : "guaranteed at least " + lower;
+    return v.lower_is_prior ? word + " at most " + upper : word + " at least " + lower;
   }
-  return "guaranteed " + lower + " to " + upper;
+  return word + " " + lower + " to " + upper;
 }
 
 std::string estimates(const Commissioning& result) {
@@ -68,7 +70,7 @@ std::string estimates(const Commissioning& result) {
   for (std::size_t j = 0; j < views.size(); ++j) {
     const ParameterView& v = views[j].best();
     if (v.estimate && result.parameters[j].excitation != Excitation::not_excited) {
-      items.push_back(with_unit(v.name + " " + estimate_text(v), v.unit) + " (" + guaranteed(v) + ")");
+      items.push_back(with_unit(v.name + " " + estimate_text(v), v.unit) + " (" + bounds_text(v) + ")");
     }
   }
   if (physical_values_unknown(result)) {
@@ -78,22 +80,33 @@ std::string estimates(const Commissioning& result) {
 }
 
 std::string footing(const Commissioning& result) {
-  std::vector<std::string> declared, estimated;
+  std::vector<std::string> declared, estimated, broken;
   for (std::size_t i = 0; i < result.noise.size(); ++i) {
     (result.noise[i].origin == NoiseOrigin::declared ? declared : estimated)
         .push_back(output_name(result.model.model, i));
   }
+  for (const Assumption& a : result.assumptions) {
+    if (a.verdict == AssumptionVerdict::fails) {
+      broken.push_back(a.statement);
+    }
+  }
+  if (!broken.empty()) {
+    return "The bounds stand on assumptions of which the log contradicts these: " +
+           fmt::format("{}", fmt::join(broken, " "));
+  }
   if (estimated.empty()) {
     return result.noise_mode == NoiseMode::worst_case
-               ? "The guarantee stands on the sensors’ declared noise bounds: it holds for every noise within them."
-               : "The guarantee stands on the sensors’ declared noise bounds and on their noise being independent from "
+               ? "The guarantee stands on the sensors’ declared noise bounds: it holds for every noise within them, "
+                 "while "
+                 "the assumptions listed below hold."
+               : "The bounds stand on the sensors’ declared noise bounds and on their noise being independent from "
                  "sample to sample, at the stated confidence.";
   }
   if (declared.empty()) {
-    return "The guarantee stands on noise bounds that were extrapolated from the residuals of this log: it holds while "
+    return "The bounds stand on noise bounds that were extrapolated from the residuals of this log: they hold while "
            "noise and driving stay like it.";
   }
-  return "The guarantee stands on the sensors’ declared noise for " + list(declared) +
+  return "The bounds stand on the sensors’ declared noise for " + list(declared) +
          ", and on bounds extrapolated from the residuals of this log for " + list(estimated) + ".";
 }
 
@@ -195,6 +208,9 @@ std::vector<std::string> words_with_model(const Commissioning& result) {
   out.push_back(footing(result));
   out.push_back(held_out(result));
   out.push_back(sees(result));
+  if (result.model.warrant != Warrant::guaranteed && smallest_certain_kappa(result)) {
+    out.push_back(certain_meaning(result.model.warrant));
+  }
   if (false_alarms(result) > 0) {
     out.emplace_back(
         "What to do: look at those moments in the log; where they are no fault, commission on longer and more "

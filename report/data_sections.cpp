@@ -12,6 +12,7 @@
 #include <wheelwright/report/page.hpp>
 #include <wheelwright/report/parameter_view.hpp>
 #include <wheelwright/report/text.hpp>
+#include <wheelwright/report/warrant_section.hpp>
 
 namespace wheelwright::report {
 namespace {
@@ -102,7 +103,7 @@ std::string noise_section(const Commissioning& result) {
       largest = number(result.residuals.outputs[i].largest);
     }
     rows.push_back({unit_cell(result, i), numeric(number(n.bound)), numeric(number(n.learning)), numeric(rms),
-                    numeric(largest), escape(how)});
+                    numeric(largest), warrant_badge(n.warrant) + "<small>" + escape(how) + "</small>"});
   }
   if (rows.empty()) {
     return paragraph("No noise bound was reached.");

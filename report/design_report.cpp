@@ -67,7 +67,7 @@ std::string bounds_table(const BoundsDesign& design, const DesignSubject& subjec
   }
   return table(header, rows) +
          paragraph(
-             "Half widths of guaranteed bounds. Promised: what a log driven along the plan gives at least, whatever "
+             "Half widths of bounds. Promised: what a log driven along the plan gives at least, whatever "
              "the "
              "noise within its declared bounds, as far as the robot follows its commands: the widest bounds come from "
              "a "
@@ -240,6 +240,7 @@ std::string design_report(const DetectionDesign& design, const DesignSubject& su
           "manoeuvres within the limits.",
           count(design.manoeuvre.evaluations))};
   content.software = context.software;
+  content.warrant = subject.warrant;
   content.sections.push_back({"faults", "What is certainly found", faults_table(design, subject)});
   add_plan(content, design.manoeuvre, subject, limits, context);
   return page(content);
@@ -262,6 +263,7 @@ std::string design_report(const DiscriminationDesign& design, const DesignSubjec
                        stages + "."};
   content.sentences.insert(content.sentences.end(), design.sentences.begin(), design.sentences.end());
   content.software = context.software;
+  content.warrant = subject.warrant;
   content.sections.push_back({"pairs", "How well causes are told apart", separations_table(design)});
   add_plan(content, design.manoeuvre, subject, limits, context);
   return page(content);
@@ -272,16 +274,17 @@ std::string design_report(const BoundsDesign& design, const DesignSubject& subje
   PageContent content;
   content.title = context.title.empty() ? "Manoeuvre for " + subject.robot.name : context.title;
   content.status = "good";
-  content.verdict = "A manoeuvre for narrow guaranteed bounds.";
+  content.verdict = "A manoeuvre for narrow bounds.";
   if (design.figure_eight) {
     const double mine = combined(relative_widths(design.promised, subject), WidthCriterion::geometric_mean);
     const double eight = combined(relative_widths(design.promised_eight, subject), WidthCriterion::geometric_mean);
     content.verdict = fmt::format(
-        "A manoeuvre whose guaranteed bounds are, in the geometric mean, {} as wide as those of the best figure eight.",
+        "A manoeuvre whose bounds are, in the geometric mean, {} as wide as those of the best figure eight.",
         percent(mine / eight, 2));
   }
   content.sentences = design_words(design, subject, limits);
   content.software = context.software;
+  content.warrant = subject.warrant;
   content.sections.push_back({"bounds", "Promised bounds", bounds_table(design, subject)});
   add_plan(content, design.manoeuvre, subject, limits, context);
   return page(content);

@@ -11,6 +11,7 @@
 #include <wheelwright/report/parameter_view.hpp>
 #include <wheelwright/report/signals.hpp>
 #include <wheelwright/report/text.hpp>
+#include <wheelwright/report/warrant_section.hpp>
 
 namespace wheelwright {
 
@@ -149,6 +150,7 @@ std::string detect_report(const Detection& detection, const CommissionedModel& m
         capital(plural(kinematic_events, "event")), axis.text(first.alarm)));
   }
   content.software = context.software;
+  content.warrant = model.warrant;
   content.sections.push_back({"events", "Events", event_table(detection, model, axis)});
   if (!isolations.empty()) {
     content.sections.push_back({"isolation", "What it can be", isolation_section(isolations, detection, axis)});
@@ -176,6 +178,9 @@ std::string detect_report(const Detection& detection, const CommissionedModel& m
   data += provenance(context, axis);
   if (!context.warnings.empty()) {
     data += "<h3>Repairs and remarks of the log reader</h3>\n" + bullets(context.warnings);
+  }
+  if (std::string given = assumptions_section(model.assumptions); !given.empty()) {
+    content.sections.push_back({"assumptions", "Assumptions", std::move(given)});
   }
   content.sections.push_back({"data", "Data", std::move(data)});
   return page(content);

@@ -11,7 +11,7 @@
 
 namespace wheelwright::report {
 
-/// The guaranteed interval as a box, the 95 % interval as whiskers, Chebyshev centre and nominal value. The scale is that
+/// The interval of the bounds as a box, the 95 % interval as whiskers, Chebyshev centre and nominal value. The scale is that
 /// of what the log says: the prior's sides may lie beyond the drawing, an arrow then tells.
 [[nodiscard]] std::string interval_bar(const ParameterView& view);
 

@@ -10,7 +10,7 @@
 
 namespace wheelwright::report {
 
-/// All robots' guaranteed intervals of parameter number `parameter` of the population, sorted by estimate, with the
+/// All robots' intervals of bounds of parameter number `parameter` of the population, sorted by estimate, with the
 /// population's centre and its ± 2 spreads as a band, and the robots outside marked. Up to 400 robots each have an interval of
 /// their own; of more, each of 400 columns shows the envelope of its robots' bounds and estimates, and robots outside stay marked.
 /// The scale is that of the estimates: bounds may run beyond it. Empty where no robot shows the parameter.

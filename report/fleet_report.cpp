@@ -11,6 +11,7 @@
 #include <wheelwright/report/page.hpp>
 #include <wheelwright/report/text.hpp>
 #include <wheelwright/report/time_axis.hpp>
+#include <wheelwright/report/warrant_section.hpp>
 
 namespace wheelwright {
 
@@ -70,7 +71,7 @@ std::string population_section(const FleetResult& fleet) {
              100.0 * fleet.drift_level, count(fleet.population.tests))) +
          strips +
          note(
-             "Bars: guaranteed bounds; dark: estimates; band: centre ± 2 spreads; rings: robots outside. Where robots "
+             "Bars: bounds; dark: estimates; band: centre ± 2 spreads; rings: robots outside. Where robots "
              "are "
              "many, a bar is the envelope of neighbours.");
 }
@@ -86,11 +87,12 @@ std::string outside_section(const FleetResult& fleet) {
                        numeric(escape(with_unit(number(o.value, 4), column.unit))),
                        numeric(number(o.deviations)),
                        numeric(number(o.adjusted_p, 2)),
-                       o.certain ? "yes: beyond " + escape(percent(o.certainly_beyond)) + " of the others"
+                       o.certain ? "yes: beyond " + escape(percent(o.certainly_beyond)) + " of the others " +
+                                       warrant_badge(column.warrant)
                                  : std::string("no: bounds meet")};
              }) +
          note(
-             "For certain: the robot’s guaranteed bounds lie entirely beyond those of at least 95 % of the robots that "
+             "For certain: the robot’s bounds lie entirely beyond those of at least 95 % of the robots that "
              "are "
              "not outside.");
 }
@@ -108,14 +110,14 @@ std::string drift_section(const FleetResult& fleet) {
                                       escape(words(column.name)),
                                       numeric(d.certain == 0.0 ? std::string("–")
                                                                : escape((d.certain > 0.0 ? "at least +" : "at most ") +
-                                                                        with_unit(number(d.certain, 3), column.unit))),
+                                                                        with_unit(number(d.certain, 3), column.unit)) +
+                                                                     " " + warrant_badge(column.warrant)),
                                       numeric(d.has_trend ? escape(with_unit(number(d.slope), per)) : "–"),
                                       numeric(d.has_trend ? "[" + number(d.lower) + ", " + number(d.upper) + "]" : "–"),
                                       numeric(d.has_trend ? number(d.adjusted_p, 2) : "–")};
                             });
   out += note(
-      "A change is certain where the guaranteed bounds of two logs do not meet: it assumes nothing but the noise "
-      "bounds. "
+      "A change is certain where the bounds of two logs do not meet: it assumes nothing but the noise bounds. "
       "A trend is a line through the logs’ estimates" +
       std::string(
           repeats_known(fleet.drift)
@@ -183,7 +185,6 @@ std::string prior_section(const FleetResult& fleet) {
              "pooled_prior.yaml holds it as a robot file takes it. The coverage is for the whole box at once and needs "
              "no "
              "distribution: centres and scales come from one half of the robots, and the size of the box from the "
-             "guaranteed "
              "bounds of the other half, none left out.");
 }
 

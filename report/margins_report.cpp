@@ -12,6 +12,7 @@
 #include <wheelwright/report/signals.hpp>
 #include <wheelwright/report/text.hpp>
 #include <wheelwright/report/time_axis.hpp>
+#include <wheelwright/report/warrant_section.hpp>
 
 namespace wheelwright {
 
@@ -40,7 +41,7 @@ std::string margins_table(const MarginSurvey& survey, const ResidualMargins& res
     }
     rows.push_back(std::move(row));
   }
-  std::string out = table(header, rows);
+  std::string out = warrant_note(residual.warrant) + table(header, rows);
   if (!residual.blind.empty()) {
     std::vector<std::string> names;
     for (const std::string& name : residual.blind) {
@@ -103,10 +104,10 @@ std::string margins_report(const MarginSurvey& survey, const CommissionedModel& 
   content.title = context.title.empty() ? "What is certainly seen: " + model.robot.name : context.title;
   content.status = "good";
   content.verdict = "Faults that this robot's detector is certain to see in this drive.";
-  content.sentences.push_back(fmt::format(
-      "Every size below is a guarantee for {} of driving: it holds for all parameters that the commissioning "
-      "log allows and for all noise within its bounds.",
-      with_unit(number(survey.seconds), "s")));
+  content.warrant = model.warrant;
+  content.sentences.push_back(certain_meaning(model.warrant));
+  content.sentences.push_back(
+      fmt::format("Every size below is about {} of driving.", with_unit(number(survey.seconds), "s")));
   if (!survey.without_kinematic.empty()) {
     content.sentences.push_back("There is no kinematic residual: " + survey.without_kinematic +
                                 ". Slip across the heading cannot be promised while driving straight.");
@@ -127,6 +128,9 @@ std::string margins_report(const MarginSurvey& survey, const CommissionedModel& 
   content.sections.push_back({"words", "In words", bullets(sentences)});
   if (context.signals) {
     content.sections.push_back({"signals", "Raw signals", signal_charts(*context.signals, {}, axis, context.rows)});
+  }
+  if (std::string given = assumptions_section(survey.assumptions); !given.empty()) {
+    content.sections.push_back({"assumptions", "Assumptions", std::move(given)});
   }
   content.sections.push_back({"data", "Data", provenance(context, axis)});
   return page(content);

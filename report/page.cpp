@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <wheelwright/report/text.hpp>
+#include <wheelwright/report/warrant_section.hpp>
 
 #include "report_assets.hpp"
 
@@ -44,6 +45,9 @@ std::string page(const PageContent& content) {
   out += navigation(content.sections) + "</header>\n<main>\n";
   out += fmt::format("<section id=\"result\" class=\"result {}\"><p class=\"verdict\">{}</p>\n", content.status,
                      escape(content.verdict));
+  if (content.warrant) {
+    out += warrant_note(*content.warrant);
+  }
   for (const std::string& sentence : content.sentences) {
     out += paragraph(escape_with_code(sentence));
   }

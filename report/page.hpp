@@ -3,11 +3,13 @@
 /// The frame of a report: one HTML file with its style, its script and uPlot inside.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include <wheelwright/core/warrant.hpp>
 #include <wheelwright/report/context.hpp>
 #include <wheelwright/report/time_axis.hpp>
 
@@ -28,7 +30,8 @@ struct PageContent {
   std::string verdict;
   std::vector<std::string> sentences;
   std::vector<Section> sections;
-  std::string software;  ///< for the footer
+  std::string software;              ///< for the footer
+  std::optional<Warrant> warrant{};  ///< of the page's numbers, told beneath the verdict
 };
 
 /// The page as HTML.

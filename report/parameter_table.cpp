@@ -13,6 +13,7 @@
 #include <wheelwright/report/page.hpp>
 #include <wheelwright/report/parameter_view.hpp>
 #include <wheelwright/report/text.hpp>
+#include <wheelwright/report/warrant_section.hpp>
 
 namespace wheelwright::report {
 namespace {
@@ -50,10 +51,10 @@ std::string set_by(const char* side, const std::vector<RowOrigin>& rows, bool is
 }
 
 std::string interval_cells(const ParameterView& v, bool with_nominal) {
-  std::string guaranteed = "–";
+  std::string bounds = "–";
   if (v.has_set) {
     const auto [lower, upper] = outward(v.lower, v.upper);
-    guaranteed = lower + " to " + upper;
+    bounds = lower + " to " + upper;
   }
   const std::string statistical =
       v.estimate && v.spread
@@ -62,7 +63,7 @@ std::string interval_cells(const ParameterView& v, bool with_nominal) {
           : "–";
   std::string out =
       fmt::format("<td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td>",
-                  estimate_text(v), guaranteed, statistical, centre_text(v));
+                  estimate_text(v), bounds, statistical, centre_text(v));
   if (with_nominal) {
     out += fmt::format("<td class=\"n\">{}</td>", v.nominal ? number(*v.nominal, 4) : "–");
   }
@@ -98,8 +99,9 @@ std::string remarks(const Commissioning& result, const std::vector<ParameterView
       items.push_back(name + ": " + r.reason + ".");
     }
     if (!r.estimate_inside && views[j].theta.has_set) {
-      items.push_back("The estimate of " + name +
-                      " lies outside the guaranteed interval; the Chebyshev centre lies inside.");
+      items.push_back(
+          "The estimate of " + name +
+          fmt::format(" lies outside the {} interval; the Chebyshev centre lies inside.", warrant_word(r.warrant)));
     }
   }
   if (physical_values_unknown(result)) {
@@ -123,16 +125,17 @@ std::string parameter_table(const Commissioning& result, const TimeAxis& axis) {
   std::string out = fmt::format(
       "<div class=\"wide\"><table class=\"parameters\"><thead><tr><th scope=\"col\">Parameter</th><th "
       "scope=\"col\">unit"
-      "</th><th scope=\"col\" class=\"n\">estimate</th><th scope=\"col\" class=\"n\">guaranteed</th>"
+      "</th><th scope=\"col\" class=\"n\">estimate</th><th scope=\"col\" class=\"n\">{}</th>"
       "<th scope=\"col\" class=\"n\">95 % statistical</th><th scope=\"col\" class=\"n\">centre</th>{}"
       "<th scope=\"col\">intervals</th><th scope=\"col\">bound set by</th></tr></thead><tbody>\n",
-      with_nominal ? "<th scope=\"col\" class=\"n\">nominal</th>" : "");
+      warrant_badge(result.model.warrant), with_nominal ? "<th scope=\"col\" class=\"n\">nominal</th>" : "");
   for (std::size_t j = 0; j < views.size(); ++j) {
     out += rows_of(views[j], result.parameters[j], with_nominal, result, axis);
   }
   out += "</tbody></table></div>\n";
+  out += "<p class=\"note\">" + escape(statistical_remark()) + "</p>\n";
   out +=
-      "<p class=\"note\">Box: guaranteed interval (dashed: a side is the prior’s; arrow: it goes on beyond the "
+      "<p class=\"note\">Box: interval of the bounds (dashed: a side is the prior’s; arrow: it goes on beyond the "
       "drawing). Black dot and whiskers: estimate with its 95 % interval. Ring: Chebyshev centre of the "
       "feasible set. Dashed "
       "line: nominal value. “Bound set by” names the samples that prove each bound: those moments of the log decide. ";

@@ -43,7 +43,8 @@ ParameterView theta_view(const Commissioning& result, const ParameterResult& r) 
                      .nominal = {},
                      .lower_is_prior = r.lower_is_prior,
                      .upper_is_prior = r.upper_is_prior,
-                     .has_set = result.status != Commissioning::Status::empty};
+                     .has_set = result.status != Commissioning::Status::empty,
+                     .warrant = r.warrant};
   if (r.estimate && r.standard_error) {
     view.spread = student_quantile(0.95, std::max(result.residuals.freedom, 1.0)) * *r.standard_error;
   }

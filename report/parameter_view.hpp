@@ -18,13 +18,14 @@ struct ParameterView {
   std::string unit;
   std::optional<double> estimate;
   std::optional<double> spread;  ///< half of the 95 % interval, t·standard error
-  double lower = 0.0;            ///< guaranteed
+  double lower = 0.0;            ///< bounds, in the sense of `warrant`
   double upper = 0.0;
   double centre = 0.0;            ///< Chebyshev centre
   std::optional<double> nominal;  ///< of the robot file
   bool lower_is_prior = false;
   bool upper_is_prior = false;
-  bool has_set = true;  ///< false: the feasible set is empty, and nothing is guaranteed
+  bool has_set = true;                      ///< false: the feasible set is empty, and nothing is bounded
+  Warrant warrant = Warrant::extrapolated;  ///< of lower and upper
 };
 
 /// A parameter as θ_L,j, and as a physical quantity where the robot file tells the scale and the two differ.

@@ -11,6 +11,7 @@
 #include <wheelwright/report/sensitivity_drawings.hpp>
 #include <wheelwright/report/text.hpp>
 #include <wheelwright/report/time_axis.hpp>
+#include <wheelwright/report/warrant_section.hpp>
 
 namespace wheelwright {
 
@@ -177,8 +178,9 @@ Section local_section(const LocalSensitivity& local) {
     rows.push_back(std::move(row));
   }
   std::string body = local.inputs.empty() ? std::string() : table(header, rows);
+  body += warrant_note(local.warrant);
   body += paragraph(
-      "<span class=\"note\">Rate at which the width of each guaranteed interval changes with an input, from the "
+      "<span class=\"note\">Rate at which the width of each interval of bounds changes with an input, from the "
       "multipliers of the linear programs that bound it: exact for this log as long as the same samples hold the "
       "bounds. "
       "Two numbers are the rates below and above the value. Elasticity: per cent of width per per cent of the "

@@ -45,7 +45,7 @@ namespace wheelwright::report {
 /// `text` followed by a unit, if there is one.
 [[nodiscard]] std::string with_unit(std::string text, std::string_view unit);
 
-/// The ends of a guaranteed interval in decimals that show its width to two digits, rounded outward: what is printed
+/// The ends of an interval of bounds in decimals that show its width to two digits, rounded outward: what is printed
 /// contains [lower, upper]. "–" for an end that is not finite.
 [[nodiscard]] std::pair<std::string, std::string> outward(double lower, double upper);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// How the guaranteed bounds of the parameters move when their rows move: derivatives from the linear programs' duals.
+/// How the bounds of the parameters move when their rows move: derivatives from the linear programs' duals.
 ///
 /// An upper bound is V = max { θ_j : a_i·θ <= b_i }. When rows depend on a number s, with rates a_i' and b_i', then
 /// (envelope theorem; Gol'shtein 1972 and Freund 1985 where the optimum is degenerate)

@@ -93,6 +93,7 @@ std::vector<std::string> default_inputs(const RobotAt& at, const Model& model, c
 LocalSensitivity local_derivatives(LogSource& log, const Commissioning& c, const LocalOptions& options) {
   check::that(options.step > 0.0 && options.step <= 0.01, "step", "a relative step in (0, 0.01]");
   LocalSensitivity result;
+  result.warrant = c.model.warrant;
   const Model& model = c.model.model;
   for (const ParameterResult& p : c.parameters) {
     result.parameters.push_back(p.parameter.name);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What a guaranteed bound gains or loses per unit of an input of the robot file: exact, at the point where one stands.
+/// What a bound gains or loses per unit of an input of the robot file: exact, at the point where one stands.
 ///
 /// The rows that hold a bound are smooth functions of an input; their multipliers turn the rows' rates into the bound's
 /// (hull_derivatives.hpp). No linear program over the log is solved again: per input, the log is walked twice, for all
@@ -55,6 +55,7 @@ struct LocalSensitivity {
   std::optional<HullOptima> optima{};   ///< what holds them; nothing where there are no derivatives
   std::vector<LocalDerivative> inputs;  ///< in the order asked for; none where there are no derivatives
   std::vector<std::string> notes;       ///< what is held fixed, and why there are none where there are none, for people
+  Warrant warrant = Warrant::extrapolated;  ///< of the bounds
 };
 
 /// Derivatives of all bounds of `commissioning`, which was made from `log`. None (see notes) where its set is empty or a

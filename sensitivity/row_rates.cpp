@@ -47,11 +47,15 @@ RegressionStream rows_of(LogSource& log, const Commissioning& c, const RobotAt& 
   const Measurement& measurement = c.model.measurement;
   SignalErrors errors = c.row_errors;
   if (noise_is_declared(c)) {
-    errors = propagate(model, at.filter, measurement, noise_budget(at.robot, measurement, c.survey).sensors,
+    errors = propagate(model, at.filter, measurement, noise_budget(at.robot, measurement).sensors,
                        {.mode = c.noise_mode,
                         .confidence = confidence,
                         .rows = static_cast<double>(c.survey.rows),
                         .largest_step = c.survey.largest_step});
+    // What happens between samples is bounded as it was when the set was made.
+    const Eigen::VectorXd effort = errors.motion.effort;
+    errors.motion = c.row_errors.motion;
+    errors.motion.effort = effort;
   }
   FilterDesign filter = at.filter;
   // The same instants, whatever β: an instant that stands on the edge stays.

@@ -16,8 +16,8 @@ namespace wheelwright {
 struct StudyQuantity {
   /// What it is about.
   enum class Kind {
-    lower,              ///< guaranteed lower bound of the parameter
-    upper,              ///< guaranteed upper bound
+    lower,              ///< lower bound of the parameter
+    upper,              ///< upper bound
     width,              ///< upper − lower
     estimate,           ///< θ̂
     standard_error,     ///< of θ̂

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Guaranteed, tight model-based fault detection for wheeled robots.
+"""Tight model-based fault detection for wheeled robots.
 
     import wheelwright as ww
 

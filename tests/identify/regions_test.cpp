@@ -31,7 +31,7 @@ RegressionMoments moments_of(std::uint64_t seed, Eigen::Index instants, double p
 TEST(Regions, StandSideBySideWithTheirPromises) {
   const RegressionMoments moments = moments_of(1, 4000, 0.3);
   const Estimate estimate = ordinary_least_squares(moments);
-  const GuaranteedHull hull{Eigen::Vector2d(0.5, -2.5), Eigen::Vector2d(1.5, -1.5), Eigen::VectorXd::Constant(1, 4.5),
+  const IntervalBounds hull{Eigen::Vector2d(0.5, -2.5), Eigen::Vector2d(1.5, -1.5), Eigen::VectorXd::Constant(1, 4.5),
                             "N·m"};
   RegionOptions options;
   options.bootstrap.resamples = 500;

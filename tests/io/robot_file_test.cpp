@@ -21,7 +21,7 @@ wheel_radius: 0.0975
 track_width: 0.381
 footprint: {radius: 0.4}
 lever_arm: track
-effort: {kind: voltage, hold: zero_order, unsigned: true}
+effort: {kind: voltage, hold: zero_order, unsigned: true, changes: at_samples, delay: [-0.001, 0.02]}
 nominal: {mass: 21.0, yaw_inertia: 0.9, viscous_linear: 4.0, viscous_yaw: 0.5}
 prior:   {mass: [5, 60]}
 noise:   {wheel_speed: 0.02, effort: estimate, position: 0.002, wheel_angle: 1.0e-3}
@@ -46,6 +46,8 @@ TEST(RobotFile, ReadsEveryKey) {
   EXPECT_EQ(robot.effort, EffortKind::voltage);
   EXPECT_EQ(robot.hold, Hold::zero_order);
   EXPECT_TRUE(robot.effort_unsigned);
+  EXPECT_EQ(robot.effort_changes, EffortChanges::at_samples);
+  EXPECT_EQ(robot.effort_delay, (Interval{-0.001, 0.02}));
   EXPECT_EQ(robot.nominal.at("viscous_yaw"), 0.5);
   EXPECT_EQ(robot.prior.at("mass"), (Interval{5.0, 60.0}));
   EXPECT_EQ(robot.noise.wheel_speed.value, 0.02);
@@ -70,6 +72,12 @@ TEST(RobotFile, DefaultsAreThoseOfRobot) {
   expected.track_width = 0.5;
   EXPECT_EQ(to_json(parse_robot(least, "f")), to_json(expected));
   EXPECT_EQ(to_json(parse_robot(least + "noise: estimate\nfilter: auto\n", "f")), to_json(expected));
+}
+
+TEST(RobotFile, AnEffortsDelayIsANumberOrBoundsAndNoneByDefault) {
+  EXPECT_EQ(parse_robot(least, "f").effort_delay, (Interval{0.0, 0.0}));
+  EXPECT_EQ(parse_robot(least, "f").effort_changes, EffortChanges::between);
+  EXPECT_EQ(parse_robot("effort: {delay: 0.005}\n" + least, "f").effort_delay, (Interval{0.005, 0.005}));
 }
 
 TEST(RobotFile, SingleAxisAndAnisotropicFriction) {
@@ -131,13 +139,20 @@ INSTANTIATE_TEST_SUITE_P(
         Bad{"friction: none", "friction: 'none': expected one of isotropic, anisotropic"},
         Bad{"friction: isotropc",
             "friction: 'isotropc': expected one of isotropic, anisotropic; did you mean 'isotropic'?"},
-        Bad{"effort: torque", "effort: 'torque': expected keys with values, of kind, hold, unsigned"},
+        Bad{"effort: torque", "effort: 'torque': expected keys with values, of kind, hold, unsigned, changes"},
         Bad{"effort: {kind: torqe}",
             "effort.kind: 'torqe': expected one of torque, current, voltage; did you mean 'torque'?"},
         Bad{"effort: {hold: none}", "effort.hold: 'none': expected one of zero_order, first_order"},
         Bad{"effort: {unsigned: maybe}", "effort.unsigned: 'maybe': expected one of true, false"},
+        Bad{"effort: {changes: at_sample}",
+            "effort.changes: 'at_sample': expected one of between, at_samples; did you mean 'at_samples'?"},
+        Bad{"effort: {delay: 20}", "effort.delay: '20': expected seconds between -1 and 1"},
+        Bad{"effort: {delay: late}", "effort.delay: 'late': expected seconds between -1 and 1"},
+        Bad{"effort: {delay: .nan}", "effort.delay: '.nan': expected seconds between -1 and 1"},
+        Bad{"effort: {delay: [0.01]}", "effort.delay: a list of 1: expected seconds between -1 and 1, or two such"},
+        Bad{"effort: {delay: [0.02, 0.01]}", "effort.delay: '0.01': expected seconds between -1 and 1, or two such"},
         Bad{"effort: {knd: torque}",
-            "effort: unknown key 'knd': expected one of kind, hold, unsigned; did you mean 'kind'?"},
+            "effort: unknown key 'knd': expected one of kind, hold, unsigned, changes, delay; did you mean 'kind'?"},
         Bad{"nominal: {mas: 3}", "nominal: unknown key 'mas'"},
         Bad{"nominal: {mass: -3}", "nominal.mass: '-3': expected a number > 0"},
         Bad{"nominal: {mass: heavy}", "nominal.mass: 'heavy': expected a number > 0"},

@@ -1,0 +1,341 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/commission/assumptions.hpp>
+
+#include <algorithm>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include <wheelwright/commission/commission.hpp>
+
+namespace wheelwright {
+namespace {
+
+using Verdict = AssumptionVerdict;
+
+constexpr double kLongestStep = 1.5;  // median steps: beyond it rows are missing
+constexpr const char* kRowsExplained =
+    "some parameters explain every row within its bound, and none of the held-out rows "
+    "leaves the threshold that was made without it";
+
+// What the rows themselves say of model and noise, taken together.
+struct RowsVerdict {
+  Verdict verdict = Verdict::not_tested;
+  std::string detail;
+};
+
+bool learnt(const OutputNoise& noise) { return noise.origin == NoiseOrigin::estimated; }
+
+RowsVerdict rows_verdict(const Commissioning& r) {
+  if (r.status == Commissioning::Status::empty) {
+    return {Verdict::fails, fmt::format("no parameters explain the log: one of the assumptions fails, or the noise is "
+                                        "{:.3g} times as large",
+                                        r.minimax)};
+  }
+  std::size_t outside = 0, instants = 0;
+  for (const OutputValidation& v : r.validation) {
+    outside += v.outside;
+    instants = std::max(instants, v.instants);
+  }
+  if (outside > 0) {
+    return {Verdict::fails, fmt::format("{} held-out rows of {} instants leave their threshold: one of the assumptions "
+                                        "fails",
+                                        outside, instants)};
+  }
+  if (instants == 0 || std::ranges::any_of(r.noise, learnt)) {
+    return {Verdict::not_tested, instants == 0 ? "no row was held out"
+                                               : "the noise bounds were learnt from the rows that they would have to "
+                                                 "judge"};
+  }
+  return {Verdict::holds, fmt::format("{} instants held out, none outside", instants)};
+}
+
+Assumption assumed_hold(const Robot& robot) {
+  Assumption a{.id = "effort_hold", .declared_by = "effort.hold, effort.changes"};
+  a.statement = robot.hold == Hold::first_order ? "Efforts are measured: straight between two stamps."
+                : robot.effort_changes == EffortChanges::at_samples
+                    ? "Efforts are commands: each acts from its stamp to the stamp of the next."
+                    : "Efforts are commands: each acts until the next replaces it, at an unknown moment between their "
+                      "stamps.";
+  return a;
+}
+
+Assumption assumed_delay(const Commissioning& r) {
+  const Interval d = r.model.robot.effort_delay;
+  Assumption a{.id = "effort_delay",
+               .declared_by = "effort.delay",
+               .test = "no constant shift beyond the declared one explains the log better"};
+  const auto latency = std::ranges::find(r.contradictions, LogContradiction::Kind::effort_timing, &LogContradiction::kind);
+  if (latency != r.contradictions.end()) {
+    a.verdict = Verdict::fails;
+    a.detail = latency->sentence;
+  } else if (r.effort_shift) {
+    a.verdict = Verdict::holds;
+    a.detail = fmt::format("the best shift is {:.2g} s", *r.effort_shift);
+  } else {
+    a.detail = "the log tells no shift";
+  }
+  a.statement = d.lower == 0.0 && d.upper == 0.0 ? "Efforts are neither late nor early against the motion."
+                : d.lower == d.upper
+                    ? fmt::format("Efforts are late against the motion by {:g} s, all by the same.", d.lower)
+                    : fmt::format(
+                          "Efforts are late against the motion by something between {:g} and {:g} s, all by "
+                          "the same.",
+                          d.lower, d.upper);
+  return a;
+}
+
+Assumption assumed_speeds(const Measurement& m) {
+  Assumption a{.id = "speed_kind", .declared_by = "speed_source, encoder_counts_per_turn"};
+  switch (m.motion) {
+    case MotionKind::angle: a.statement = "Wheel angles are those at their stamps."; break;
+    case MotionKind::mean_speed:
+      a.statement = "Wheel speeds are differences of encoder counts, stamped in the middle of their interval.";
+      a.detail = m.count > 0.0 ? "the speeds are whole multiples of one count a step" : "taken as the robot file says";
+      break;
+    case MotionKind::speed: a.statement = "Wheel speeds are samples of the speed at their stamps."; break;
+  }
+  return a;
+}
+
+Assumption assumed_geometry(const Commissioning& r) {
+  Assumption a{.id = "geometry",
+               .statement = "Wheel radius and track width are those of the robot file, the same for both wheels.",
+               .declared_by = "wheel_radius, track_width",
+               .test = "the radii and yaw gains that pose or gyro allow include the robot file's"};
+  const KinematicCommissioning& k = r.kinematic;
+  if (k.status != KinematicCommissioning::Status::done) {
+    a.detail = "pose or gyro do not show all radii and yaw gains";
+    return a;
+  }
+  for (const KinematicParameter& p : k.parameters) {
+    if (p.name != "gyro_bias" && !(p.lower <= p.nominal && p.nominal <= p.upper)) {
+      a.detail += fmt::format("{}{} in [{:.5g}, {:.5g}], {:.5g} in the robot file", a.detail.empty() ? "" : "; ",
+                              p.name, p.lower, p.upper, p.nominal);
+    }
+  }
+  const bool bounds_learnt = std::ranges::any_of(k.noise, learnt);
+  a.verdict = a.detail.empty() ? Verdict::holds : bounds_learnt ? Verdict::not_tested : Verdict::fails;
+  if (bounds_learnt) {
+    a.detail += a.detail.empty() ? "against bounds learnt from the log" : ": against bounds learnt from the log";
+  }
+  return a;
+}
+
+void add_noise_bounds(std::vector<Assumption>& list, const Commissioning& r, const RowsVerdict& rows) {
+  if (std::ranges::any_of(r.noise, learnt)) {
+    list.push_back(
+        {.id = "noise_learnt",
+         .statement = "Noise and driving to come stay as they were in this log.",
+         .declared_by = "noise: estimate",
+         .test = "no held-out row leaves its threshold",
+         .verdict = rows.verdict == Verdict::fails ? Verdict::fails : Verdict::not_tested,
+         .detail = rows.verdict == Verdict::fails ? rows.detail : "says nothing of driving that is unlike it"});
+    return;
+  }
+  const SensorNoise& noise = r.model.robot.noise;
+  const auto add = [&](const char* name, const NoiseBound& bound, const char* unit) {
+    if (bound.value) {
+      list.push_back({.id = fmt::format("noise_{}", name),
+                      .statement = fmt::format("The error of {} never exceeds {:g} {}.", name, *bound.value, unit),
+                      .declared_by = fmt::format("noise.{}", name),
+                      .test = kRowsExplained,
+                      .verdict = rows.verdict,
+                      .detail = rows.detail});
+      std::ranges::replace(list.back().statement, '_', ' ');
+    }
+  };
+  const bool from_counts = r.model.measurement.motion == MotionKind::mean_speed && r.model.measurement.count > 0.0;
+  if (from_counts || r.model.robot.encoder_counts_per_turn) {
+    list.push_back({.id = "noise_encoder",
+                    .statement = "The encoder's angle is wrong by half a count at most.",
+                    .declared_by = "encoder_counts_per_turn",
+                    .test = kRowsExplained,
+                    .verdict = rows.verdict,
+                    .detail = rows.detail});
+  } else {
+    add("wheel_speed", noise.wheel_speed, "rad/s");
+    add("wheel_angle", noise.wheel_angle, "rad");
+  }
+  const EffortKind kind = r.model.robot.effort;
+  add("effort", noise.effort, kind == EffortKind::torque ? "N·m" : kind == EffortKind::current ? "A" : "V");
+  if (r.noise_mode == NoiseMode::statistical) {
+    list.push_back({.id = "noise_independent",
+                    .statement = "Errors of the sensors are of zero mean and independent from sample to sample.",
+                    .declared_by = "--statistical"});
+  }
+}
+
+Assumption model_shape(const Commissioning& r, const RowsVerdict& rows) {
+  const bool dry =
+      std::ranges::any_of(r.parameters, [](const ParameterResult& p) { return p.parameter.physical == "coulomb"; });
+  const std::string friction = dry ? "viscous and dry" : "viscous only";
+  const std::string effects = r.model.robot.effects.empty() ? "" : ", with the effects that the robot file names";
+  return {.id = "friction_shape",
+          .statement = fmt::format("A rigid robot on level ground without slip; friction is {}{}.", friction, effects),
+          .declared_by = "parameters, effects",
+          .test = kRowsExplained,
+          .verdict = rows.verdict,
+          .detail = rows.detail};
+}
+
+Assumption constant_parameters(const RowsVerdict& rows) {
+  return {.id = "constant_parameters",
+          .statement = "Mass, inertia and friction are the same throughout the log, and in driving to come.",
+          .declared_by = {},
+          .test = "no held-out row leaves the threshold that was made without it",
+          .verdict = rows.verdict,
+          .detail = rows.detail};
+}
+
+Assumption lost_rows(const Survey& survey) {
+  Assumption a{.id = "lost_rows",
+               .statement = "No row is missing between two that are filtered together.",
+               .declared_by = {},
+               .test = fmt::format("no step within a segment is longer than {:g} median steps", kLongestStep)};
+  const double ratio = survey.median_step > 0.0 ? survey.largest_step / survey.median_step : 0.0;
+  a.verdict = ratio > 0.0 && ratio <= kLongestStep ? Verdict::holds : Verdict::not_tested;
+  a.detail = fmt::format("the longest is {:.3g} s, the median {:.3g} s", survey.largest_step, survey.median_step);
+  return a;
+}
+
+// Bounds of the parameter whose physical quantity is `name`; nothing where the model has none.
+const ParameterResult* of_quantity(const Commissioning& r, std::string_view name) {
+  const auto found = std::ranges::find_if(r.parameters, [&](const auto& p) { return p.parameter.physical == name; });
+  return found == r.parameters.end() ? nullptr : &*found;
+}
+
+Assumption time_constant(const Commissioning& r) {
+  Assumption a{.id = "time_constant",
+               .statement = "The robot's time constant, inertia over viscous friction, is longer than half a step.",
+               .declared_by = {},
+               .test = "the bounds of inertia and friction against half of the median step"};
+  const double half = 0.5 * r.survey.median_step;
+  bool all = true;
+  for (const auto& [inertia, viscous] :
+       {std::pair{"mass", "viscous_linear"}, std::pair{"mass", "viscous_x"}, std::pair{"mass", "viscous_y"},
+        std::pair{"yaw_inertia", "viscous_yaw"}, std::pair{"inertia", "viscous"}}) {
+    const ParameterResult *m = of_quantity(r, inertia), *f = of_quantity(r, viscous);
+    if (m == nullptr || f == nullptr) {
+      continue;
+    }
+    const double shortest = f->upper > 0.0 ? m->lower / f->upper : 0.0;
+    all = all && m->lower > half * f->upper;
+    if (m->upper < half * f->lower) {
+      a.verdict = Verdict::fails;
+    }
+    a.detail +=
+        fmt::format("{}{} over {} is at least {:.3g} s", a.detail.empty() ? "" : "; ", inertia, viscous, shortest);
+  }
+  if (a.detail.empty() || r.status == Commissioning::Status::empty) {
+    a.verdict = Verdict::not_tested;
+    a.detail.clear();
+  } else if (a.verdict != Verdict::fails) {
+    a.verdict = all ? Verdict::holds : Verdict::not_tested;
+  }
+  a.detail += fmt::format("{}half a step is {:.3g} s", a.detail.empty() ? "" : "; ", half);
+  return a;
+}
+
+Assumption assumed_prior(const Commissioning& r) {
+  Assumption a{.id = "prior",
+               .statement = "Every parameter lies in its prior: the robot file's, or the tool's wide default.",
+               .declared_by = "prior",
+               .test = "no bound is the prior's own"};
+  for (const ParameterResult& p : r.parameters) {
+    if (p.lower_is_prior || p.upper_is_prior) {
+      a.detail += (a.detail.empty() ? "a bound is the prior's for " : ", ") + p.parameter.name;
+    }
+  }
+  const bool bounded = r.status != Commissioning::Status::empty && !r.parameters.empty();
+  a.verdict = bounded && a.detail.empty() ? Verdict::holds : Verdict::not_tested;
+  return a;
+}
+
+void add_limits(std::vector<Assumption>& list, const Robot& robot) {
+  for (const auto& [name, value] : robot.limits) {
+    list.push_back(
+        {.id = "limit_" + name,
+         .statement = fmt::format("The {} of a wheel never exceeds {:g}, between samples either.", name, value),
+         .declared_by = "limits." + name});
+  }
+}
+
+Warrant warrant_of(const OutputNoise& noise, NoiseMode mode, bool contradicted) {
+  return contradicted || learnt(noise)    ? Warrant::extrapolated
+         : mode == NoiseMode::statistical ? Warrant::statistical
+                                          : Warrant::guaranteed;
+}
+
+// Sets the warrant of each output's noise and thresholds; the weakest of them.
+Warrant settle_outputs(std::vector<OutputNoise>& noise, std::vector<OutputValidation>& validation, NoiseMode mode,
+                       bool contradicted) {
+  Warrant all = noise.empty() ? Warrant::extrapolated : Warrant::guaranteed;
+  for (OutputNoise& each : noise) {
+    each.warrant = warrant_of(each, mode, contradicted);
+    all = weaker(all, each.warrant);
+  }
+  for (OutputValidation& each : validation) {
+    each.warrant = all;  // a threshold stands on the set, and the set on all outputs
+  }
+  return all;
+}
+
+}  // namespace
+
+std::string_view verdict_word(AssumptionVerdict verdict) {
+  return verdict == Verdict::holds ? "holds" : verdict == Verdict::fails ? "fails" : "not tested";
+}
+
+std::vector<Assumption> assumptions_of(const Commissioning& result) {
+  const RowsVerdict rows = rows_verdict(result);
+  const Robot& robot = result.model.robot;
+  std::vector<Assumption> list = {
+      assumed_hold(robot),
+      assumed_delay(result),
+      {.id = "clocks",
+       .statement = "Stamps are those of the instants of measurement, of motion and effort by one clock.",
+       .declared_by = {}},
+      assumed_speeds(result.model.measurement)};
+  add_noise_bounds(list, result, rows);
+  list.push_back(model_shape(result, rows));
+  list.push_back(constant_parameters(rows));
+  list.push_back(lost_rows(result.survey));
+  list.push_back(time_constant(result));
+  list.push_back(assumed_prior(result));
+  add_limits(list, robot);
+  if (robot.model == "differential_drive") {
+    list.push_back(assumed_geometry(result));
+  }
+  if (result.kinematic.model) {
+    list.push_back({.id = "pose_independent",
+                    .statement = "Pose and gyro are measured without the wheels: none is wheel odometry.",
+                    .declared_by = {},
+                    .test = "no combination of the wheel angles is all that a pose says",
+                    .verdict = Verdict::holds});
+  }
+  return list;
+}
+
+void settle_warrants(Commissioning& result) {
+  result.assumptions = assumptions_of(result);
+  const bool contradicted = std::ranges::any_of(
+      result.assumptions, [](const Assumption& assumption) { return assumption.verdict == Verdict::fails; });
+  result.model.assumptions = result.assumptions;
+  result.model.warrant = settle_outputs(result.noise, result.validation, result.noise_mode, contradicted);
+  for (ParameterResult& parameter : result.parameters) {
+    parameter.warrant = result.model.warrant;
+  }
+  KinematicCommissioning& kinematic = result.kinematic;
+  const Warrant warrant = settle_outputs(kinematic.noise, kinematic.validation, NoiseMode::worst_case, contradicted);
+  for (KinematicParameter& parameter : kinematic.parameters) {
+    parameter.warrant = warrant;
+  }
+  for (std::optional<KinematicModel>* model : {&kinematic.model, &result.model.kinematic}) {
+    if (*model) {
+      (*model)->warrant = warrant;
+    }
+  }
+}
+
+}  // namespace wheelwright

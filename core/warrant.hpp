@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Guaranteed, extrapolated, statistical: what a published number stands on.
+#pragma once
+
+#include <string_view>
+
+namespace wheelwright {
+
+/// What a bound, a threshold or a margin stands on. Results say per number which one it is, and these words are used in
+/// no other sense.
+enum class Warrant {
+  guaranteed,    ///< declared bounds of the sensors, and assumptions of which no test failed (docs/assumptions.md)
+  extrapolated,  ///< noise bounds learnt from a log, or an assumption that the log contradicts
+  statistical,   ///< declared noise that is also independent from sample to sample, at a stated confidence
+};
+
+/// "guaranteed", "extrapolated" or "statistical".
+[[nodiscard]] constexpr std::string_view warrant_word(Warrant warrant) {
+  return warrant == Warrant::guaranteed    ? "guaranteed"
+         : warrant == Warrant::statistical ? "statistical"
+                                           : "extrapolated";
+}
+
+/// What the word means, one sentence for people.
+[[nodiscard]] constexpr std::string_view warrant_meaning(Warrant warrant) {
+  return warrant == Warrant::guaranteed ? "Guaranteed: holds for every noise within the sensors’ declared bounds, "
+                                          "while the assumptions listed hold."
+         : warrant == Warrant::statistical
+             ? "Statistical: holds at the stated confidence, for noise inside its declared bounds that is independent "
+               "from sample to sample and of zero mean."
+             : "Extrapolated: stands on noise bounds learnt from a log, or on an assumption that the log contradicts; "
+               "it holds as far as noise and driving to come are like that log.";
+}
+
+/// What a statistical interval of an estimate leaves out, one sentence for people.
+[[nodiscard]] constexpr std::string_view statistical_remark() {
+  return "± 95 % statistical: scatter only; errors that do not average out, such as a constant offset of the effort "
+         "within its bound or an encoder's scale, are not in it.";
+}
+
+/// The weaker of two, for what stands on both: extrapolated, which has no stated confidence, before statistical before
+/// guaranteed.
+[[nodiscard]] constexpr Warrant weaker(Warrant a, Warrant b) {
+  const auto either = [&](Warrant w) { return a == w || b == w; };
+  return either(Warrant::extrapolated)  ? Warrant::extrapolated
+         : either(Warrant::statistical) ? Warrant::statistical
+                                        : Warrant::guaranteed;
+}
+
+}  // namespace wheelwright
