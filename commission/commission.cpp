@@ -47,27 +47,85 @@ SignalErrors with_noise(const Setting& s, const std::vector<OutputNoise>& noise,
   return errors;
 }
 
+// What bounds the motion between samples: a first set stands on the limit of the accelerations, the next ones on the
+// dynamics with the parameters of the set before, as long as that brings something.
+struct Bounded {
+  OutlierResult result;
+  MotionBound learning;  // of the rows that the set is made of
+  MotionBound driving;   // for driving to come: what was seen in this log is no limit of that
+  double raised = 1.0;   // factor on an estimated noise bound without which the prior box explains nothing
+};
+
+OutlierResult set_of(LogSource& log, const Setting& s, Part part, const SignalErrors& errors, std::size_t outliers) {
+  RegressionStream rows = make_rows(log, s, errors);
+  FoldedSource folded(rows, part, s.survey.rows, s.folds);
+  if (outliers > 0) {
+    return feasible_set_with_outliers(folded, s.prior, {.most = outliers, .set = {}});
+  }
+  OutlierResult result;
+  result.set = feasible_set(folded, s.prior);
+  return result;
+}
+
+double widths(const Box& hull, const Box& unit) {
+  double sum = 0.0;
+  for (std::size_t j = 0; j < hull.dimension(); ++j) {
+    const double width = unit.sides[j].upper - unit.sides[j].lower;
+    sum += width > 0.0 ? (hull.sides[j].upper - hull.sides[j].lower) / width : 0.0;
+  }
+  return sum / static_cast<double>(hull.dimension());
+}
+
+Bounded refined_set(LogSource& log, const Setting& s, Part part, SignalErrors errors, std::size_t outliers) {
+  constexpr int kPasses = 4;
+  constexpr double kWorthAnother = 0.98;  // of the widths
+  Bounded best;
+  best.result = set_of(log, s, part, errors, outliers);
+  best.learning = best.driving = errors.motion;
+  const bool declared = s.robot.limits.contains("acceleration");
+  for (int pass = 1; pass < kPasses && errors.between_samples; ++pass) {
+    if (best.result.set.status != FeasibleSet::Status::nonempty) {
+      return best;
+    }
+    MotionBound bound = motion_bound(s.model, best.result.set.hull.sides);
+    if (bound.mobility.size() == 0) {
+      return best;
+    }
+    bound.effort = errors.motion.effort;
+    best.driving = bound;
+    if (declared) {
+      best.driving.limit = errors.motion.limit;
+    }
+    bound.limit = errors.motion.limit;
+    SignalErrors sharper = errors;
+    sharper.motion = bound;
+    OutlierResult next = set_of(log, s, part, sharper, outliers);
+    const bool better = next.set.status != FeasibleSet::Status::nonempty ||
+                        widths(next.set.hull, best.result.set.hull) < kWorthAnother;
+    best.result = std::move(next);
+    best.learning = bound;
+    if (!better) {
+      return best;
+    }
+  }
+  return best;
+}
+
 // The feasible set; where an *estimated* bound is too small for the prior box (θ̂ may lie outside it), it is raised to
 // just above the minimax fit.
-OutlierResult bounded_set(LogSource& log, const Setting& s, Part part, std::vector<OutputNoise>& noise,
-                          std::size_t outliers, std::vector<std::string>& notes, double& raised) {
-  raised = 1.0;
+Bounded bounded_set(LogSource& log, const Setting& s, Part part, std::vector<OutputNoise>& noise, std::size_t outliers,
+                    std::vector<std::string>& notes) {
   constexpr double kAboveMinimax = 1.05;
+  double raised = 1.0;
   for (int attempt = 0;; ++attempt) {
-    RegressionStream rows = make_rows(log, s, with_noise(s, noise, For::learning));
-    FoldedSource folded(rows, part, s.survey.rows, s.folds);
-    OutlierResult relaxed;
-    if (outliers > 0) {
-      relaxed = feasible_set_with_outliers(folded, s.prior, {.most = outliers, .set = {}});
-      if (!relaxed.dropped.empty()) {
-        notes.push_back(fmt::format("{} instants were left out of the feasible set as outliers (at rows {})",
-                                    relaxed.dropped.size(), fmt::join(relaxed.dropped, ", ")));
-      }
-    } else {
-      relaxed.set = feasible_set(folded, s.prior);
+    Bounded bounded = refined_set(log, s, part, with_noise(s, noise, For::learning), outliers);
+    bounded.raised = raised;
+    if (!bounded.result.dropped.empty()) {
+      notes.push_back(fmt::format("{} instants were left out of the feasible set as outliers (at rows {})",
+                                  bounded.result.dropped.size(), fmt::join(bounded.result.dropped, ", ")));
     }
-    if (relaxed.set.status == FeasibleSet::Status::nonempty || s.noise_complete || attempt > 0) {
-      return relaxed;
+    if (bounded.result.set.status == FeasibleSet::Status::nonempty || s.noise_complete || attempt > 0) {
+      return bounded;
     }
     MinimaxOptions options;
     for (const OutputNoise& o : noise) {
@@ -153,8 +211,9 @@ CommissionedModel described_model(const Setting& s, Persistence persistence) {
 }
 
 void finish_model(CommissionedModel& model, const Setting& s, const std::vector<OutputNoise>& noise, const Fit& fit,
-                  const FeasibleSet& set) {
+                  const FeasibleSet& set, const MotionBound& motion) {
   model.errors = with_noise(s, noise, For::driving);
+  model.errors.motion = motion;
   model.estimate = best_guess(fit, *set.polytope);
   model.facets = set.polytope->facets();
   model.box = set.hull;
@@ -352,12 +411,12 @@ Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionO
 
   tell(options, "bounding", 0.4);
   result.noise = output_noise(s, fit, options.extrapolation);
-  double raised = 1.0;
-  OutlierResult bounded = bounded_set(log, s, Part::everything, result.noise, options.outliers, result.notes, raised);
-  result.feasible = std::move(bounded.set);
-  result.dropped = std::move(bounded.dropped);
+  Bounded bounded = bounded_set(log, s, Part::everything, result.noise, options.outliers, result.notes);
+  result.feasible = std::move(bounded.result.set);
+  result.dropped = std::move(bounded.result.dropped);
   result.prior = s.prior;
   result.row_errors = with_noise(s, result.noise, For::learning);
+  result.row_errors.motion = bounded.learning;
   result.parameters = parameter_results(s, fit, result.feasible);
   describe_assumptions(s, result);
   if (!result.kinematic.message.empty()) {
@@ -388,16 +447,18 @@ Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionO
   if (result.status == Commissioning::Status::nothing) {
     return result;
   }
-  finish_model(result.model, s, result.noise, fit, result.feasible);
+  finish_model(result.model, s, result.noise, fit, result.feasible, bounded.driving);
 
   tell(options, "validating on held-out blocks", 0.7);
   const Fit trained = fit_log(log, s, Part::training, options.extrapolation.risk);
   std::vector<OutputNoise> noise = output_noise(s, trained, options.extrapolation);
   std::vector<std::string> unused;
-  double unused_factor = 1.0;
-  const FeasibleSet set = bounded_set(log, s, Part::training, noise, options.outliers, unused, unused_factor).set;
+  const Bounded learnt = bounded_set(log, s, Part::training, noise, options.outliers, unused);
+  const FeasibleSet& set = learnt.result.set;
   if (set.status == FeasibleSet::Status::nonempty) {
-    RegressionStream unseen = make_rows(log, s, with_noise(s, noise, For::driving));
+    SignalErrors errors = with_noise(s, noise, For::driving);
+    errors.motion = learnt.driving;
+    RegressionStream unseen = make_rows(log, s, errors);
     FoldedSource held_out(unseen, Part::held_out, s.survey.rows, s.folds);
     result.validation = validate_on(held_out, ThresholdRule(*set.polytope, best_guess(trained, *set.polytope)));
     result.polytope_over_box = 0.0;
@@ -406,7 +467,7 @@ Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionO
       result.polytope_over_box = std::max(result.polytope_over_box, ratio);
     }
   }
-  for (LogContradiction& found : contradictions_in_result(result, s, raised)) {
+  for (LogContradiction& found : contradictions_in_result(result, s, bounded.raised)) {
     result.contradictions.push_back(std::move(found));
   }
   if (withdrawn(result)) {

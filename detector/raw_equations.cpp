@@ -17,31 +17,32 @@ struct Stencil {
   std::array<double, 3> slope{}, level{};
 };
 
-// Length of the interval that the mean speed of instant `i` is of, s.
-double interval(const Measurement& measurement, const ReferenceMotion& motion, std::size_t i) {
-  return measurement.motion == MotionKind::angle ? 2.0 * (motion.t[i] - motion.instant[i]) : measurement.nominal_step;
-}
-
 Stencil stencil(const Measurement& measurement, const ReferenceMotion& motion, std::size_t i) {
-  const double length = motion.instant[i + 1] - motion.instant[i];
+  const std::array<double, 2> shares = motion.shares(i);
+  const double length = shares[0] + shares[1];
   if (measurement.motion == MotionKind::speed) {
     return {{0.0, -1.0 / length, 1.0 / length}, {0.0, 0.5, 0.5}};
   }
-  const double a = 1.0 / interval(measurement, motion, i), b = 1.0 / interval(measurement, motion, i + 1);
+  const double a = 1.0 / motion.step[i], b = 1.0 / motion.step[i + 1];
   return {{a / length, -(a + b) / length, b / length}, {-0.5 * a, 0.5 * (a - b), 0.5 * b}};
 }
 
 // Weights of the efforts of samples of instant i−1, i, i+1 in equation i.
 std::array<double, 3> effort_weights(const Measurement& measurement, const ReferenceMotion& motion, std::size_t i) {
-  const bool held = measurement.hold == Hold::zero_order;
-  if (measurement.motion != MotionKind::angle) {
-    return held ? std::array{0.0, 1.0, 0.0} : std::array{0.0, 0.5, 0.5};
+  const bool held = measurement.hold == Hold::zero_order, curved = measurement.changes == EffortChanges::between;
+  if (measurement.motion == MotionKind::mean_speed) {
+    return held ? std::array{0.125, 0.75, 0.125} : std::array{0.0, 0.5, 0.5};
   }
-  const double a = interval(measurement, motion, i), b = interval(measurement, motion, i + 1), sum = a + b;
+  if (measurement.motion == MotionKind::speed) {
+    const double curve = curved ? 1.0 / 12.0 : 0.0;
+    return held ? std::array{0.0, 1.0, 0.0} : std::array{-curve, 0.5 + 2.0 * curve, 0.5 - curve};
+  }
+  const double a = motion.step[i], b = motion.step[i + 1], sum = a + b;
   if (held) {
     return {a / sum, b / sum, 0.0};
   }
-  return {a / (3.0 * sum), 2.0 / 3.0, b / (3.0 * sum)};
+  const double least = std::min(a, b), curve = curved ? least * least * least / (3.0 * sum * sum) : 0.0;
+  return {a / (3.0 * sum) - curve / a, 2.0 / 3.0 + curve * (1.0 / a + 1.0 / b), b / (3.0 * sum) - curve / b};
 }
 
 std::vector<TermValue> function_values(const Term& term, const SignalErrors& errors, const ReferenceMotion& motion,
@@ -92,7 +93,8 @@ RawEquations raw_equations(const Model& model, const Measurement& measurement, c
   const std::size_t n = model.n(), p = model.p(), joints = model.joints.size(), count = last - first;
   RawEquations e{.outputs = n, .parameters = p, .first = first};
   for (std::size_t k = 0; k < count; ++k) {
-    e.length.push_back(motion.instant[first + k + 1] - motion.instant[first + k]);
+    const std::array<double, 2> shares = motion.shares(first + k);
+    e.length.push_back(shares[0] + shares[1]);
   }
   e.Y = RowMatrix::Zero(static_cast<Eigen::Index>(count * n), static_cast<Eigen::Index>(p));
   // Samples are numbered from the one before the first instant.
@@ -155,7 +157,9 @@ Eigen::VectorXd raw_efforts(const RawEquations& equations, const Model& model, c
   const auto n = static_cast<Eigen::Index>(equations.outputs);
   for (std::size_t k = 0; k < equations.count(); ++k) {
     const std::array<double, 3> taps = effort_weights(measurement, motion, equations.first + k);
-    const std::size_t sample = motion.sample[equations.first + k];
+    // A mean speed's instant comes with the sample after it.
+    const std::size_t late = measurement.motion == MotionKind::mean_speed ? 1 : 0;
+    const std::size_t sample = motion.sample[equations.first + k] - late;
     for (std::size_t q = 0; q < 3; ++q) {
       if (taps[q] != 0.0) {
         const std::size_t row = sample + q - 1;

@@ -8,12 +8,13 @@
 ///
 ///     ∫ g_k v̇ dt = (v(w_k+1) − v(w_k))/H_k
 ///     ∫ g_k τ dt = (h_k τ_k−1 + h_k+1 τ_k)/(2H_k)                                       zero-order hold
-///                = (h_k τ_k−1/2 + (h_k + h_k+1) τ_k + h_k+1 τ_k+1/2)/(3H_k)             first order: 1/6, 4/6, 1/6
+///                = (h_k τ_k−1/2 + (h_k + h_k+1) τ_k + h_k+1 τ_k+1/2)/(3H_k)             linear: 1/6, 4/6, 1/6
+///                = the same less a parabola's curvature                                 curved: 1/12, 10/12, 1/12
 ///
 /// and ∫ g_k v dt = (v(w_k) + v(w_k+1))/2 up to terms of second order in the step, as for functions of the motion. For
 /// **mean speeds** w_k and w_k+1 stand in the log, and efforts are taken as RegressorFilter takes them, as for **speeds**,
 /// where g_k is the box on [t_k, t_k+1]: τ_k (zero order) or (τ_k + τ_k+1)/2. The filter's rows are weighted sums of these
-/// equations, up to O((βh)²) of how the two interpolate.
+/// equations.
 ///
 /// The sensors' errors enter by the sample: φ_k by |n| <= n̄_φ (for mean speeds the angle at the ends of an interval,
 /// for speeds the speed), τ_k by |n| <= n̄_τ, functions of the motion by their own error bound.

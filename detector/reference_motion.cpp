@@ -50,8 +50,8 @@ ReferenceMotion read_reference(LogSource& log, RegressorFilter filter) {
         motion.segment_starts.push_back(motion.t.size());
         angle.setZero();
       } else {
-        angle += nodes ? 0.5 * (motion.step.back() * before + length * filter.joint_speed())
-                       : 0.5 * length * (before + filter.joint_speed());
+        const double earlier = nodes ? motion.step.back() : length;
+        angle += 0.5 * (earlier * before + length * filter.joint_speed());
       }
       seen = filter.instants();
       before = filter.joint_speed();

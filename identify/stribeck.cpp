@@ -7,7 +7,6 @@
 #include <ceres/jet.h>
 
 #include <wheelwright/core/check.hpp>
-#include <wheelwright/filter/exact.hpp>
 
 namespace wheelwright {
 namespace {
@@ -26,7 +25,8 @@ Jet stribeck(double omega, const Jet& omega_s) {
 }  // namespace
 
 StribeckRows::StribeckRows(LogSource& log, RegressorFilter filter)
-    : design_(filter.design()), input_(filter.model().input) {
+    : kernel_(filter.design(), filter.measurement().motion, filter.measurement().nominal_step),
+      input_(filter.model().input) {
   const Measurement& measurement = filter.measurement();
   std::vector<std::size_t> pick;
   for (const std::string& name : measurement.columns()) {
@@ -35,41 +35,28 @@ StribeckRows::StribeckRows(LogSource& log, RegressorFilter filter)
     pick.push_back(*at);
   }
   const auto joints = filter.model().joints.size();
-  const bool angles = measurement.motion == MotionKind::angle;
-  std::vector<double> sample(pick.size()), motion(joints), before(joints), speeds, Y, y;
-  double last = 0.0;
-  bool second = false;  // the sample before started a segment
+  std::vector<double> sample(pick.size()), speeds, Y, y;
+  std::size_t seen = 0;
   log.rewind();
   LogBlock block;
   while (log.next(block)) {
     std::size_t segment = 0;
     for (std::size_t k = 0; k < block.rows(); ++k) {
-      const bool starts = segment < block.segment_starts.size() && block.segment_starts[segment] == k;
-      if (starts) {
+      if (segment < block.segment_starts.size() && block.segment_starts[segment] == k) {
         filter.restart();
+        seen = 0;
         ++segment;
       }
       for (std::size_t c = 0; c < pick.size(); ++c) {
         sample[c] = block.columns[pick[c]][k];
       }
-      before.swap(motion);
-      for (std::size_t j = 0; j < joints; ++j) {
-        const double q = measurement.count;
-        motion[j] = q > 0.0 ? std::round(sample[j] / q) * q : sample[j];
-      }
       const bool gives_row = filter.step(block.t[k], sample);
-      // An angle makes an instant together with the one before it, half-way between them.
-      if (!angles) {
-        instants_.push_back({block.t[k], starts, gives_row});
-        speeds.insert(speeds.end(), motion.begin(), motion.end());
-      } else if (!starts) {
-        instants_.push_back({0.5 * (last + block.t[k]), second, gives_row});
-        for (std::size_t j = 0; j < joints; ++j) {
-          speeds.push_back((motion[j] - before[j]) / (block.t[k] - last));
-        }
+      if (filter.instants() != 0 && filter.instants() != seen) {
+        instants_.push_back({filter.step_length(), filter.instants() == 1, gives_row});
+        const Eigen::VectorXd& speed = filter.joint_speed();
+        speeds.insert(speeds.end(), speed.data(), speed.data() + speed.size());
       }
-      second = starts;
-      last = block.t[k];
+      seen = filter.instants();
       if (gives_row) {
         const FilteredRow& row = filter.row();
         Y.insert(Y.end(), row.Y.data(), row.Y.data() + row.Y.size());
@@ -97,19 +84,18 @@ bool StribeckRows::evaluate(const Eigen::VectorXd& shape, bool derivatives, Sepa
   at.columns.leftCols(p) = Y_;
   at.columns_by.assign(derivatives ? 1 : 0, Eigen::MatrixXd::Zero(response_.size(), p + 1));
   const auto joints = static_cast<std::size_t>(speed_.rows());
-  std::vector<Cascade> value(joints), slope(joints);
+  std::vector<KernelState> value(joints), slope(joints);
   std::vector<Jet> before(joints);
   Eigen::VectorXd filtered(speed_.rows()), filtered_slope(speed_.rows());
-  const auto output = [&](const Cascade& c) {
-    return design_.order == 1 ? design_.alpha * c.z1 : design_.alpha * design_.alpha * c.z2;
-  };
-  StepWeights weights;
+  FilterKernel kernel = kernel_;
   Eigen::Index next = 0;
   for (std::size_t k = 0; k < instants_.size(); ++k) {
     const Instant& instant = instants_[k];
-    const double h = instant.begins ? 0.0 : instant.t - instants_[k - 1].t;
-    if (!instant.begins && h != weights.step()) {
-      weights = StepWeights(design_.beta, h);
+    double share_before = 0.0;
+    const double share = 0.5 * instant.length;
+    if (!instant.begins) {
+      kernel.prepare(instant.length);
+      share_before = kernel.nodes() ? 0.5 * instants_[k - 1].length : share;
     }
     for (std::size_t j = 0; j < joints; ++j) {
       const auto i = static_cast<Eigen::Index>(j);
@@ -117,12 +103,12 @@ bool StribeckRows::evaluate(const Eigen::VectorXd& shape, bool derivatives, Sepa
       if (instant.begins) {
         value[j] = slope[j] = {};
       } else {
-        value[j].linear(weights, before[j].a, now.a);
-        slope[j].linear(weights, before[j].v[0], now.v[0]);
+        kernel.take(value[j], share_before * before[j].a + share * now.a);
+        kernel.take(slope[j], share_before * before[j].v[0] + share * now.v[0]);
       }
       before[j] = now;
-      filtered[i] = output(value[j]);
-      filtered_slope[i] = output(slope[j]);
+      filtered[i] = kernel.value(value[j]);
+      filtered_slope[i] = kernel.value(slope[j]);
     }
     if (instant.gives_row) {
       at.columns.col(p).segment(next, n) = input_ * filtered;

@@ -33,12 +33,12 @@ class StribeckRows final : public SeparableModel {
   bool evaluate(const Eigen::VectorXd& shape, bool derivatives, SeparableValues& at) const override;
 
  private:
-  // An instant of the recursion: joint speeds, and whether it begins a segment and gives a row.
+  // An instant of the filter: the step that ends there, and whether it begins a segment and gives a row.
   struct Instant {
-    double t;
+    double length;
     bool begins, gives_row;
   };
-  FilterDesign design_;
+  FilterKernel kernel_;
   Eigen::MatrixXd input_;
   std::vector<Instant> instants_;
   Eigen::MatrixXd speed_;  // joints × instants

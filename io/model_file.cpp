@@ -35,11 +35,44 @@ Measurement read_measurement(const JsonPlace& place, const Model& model, const R
   m.effort_unsigned = place.at("effort_unsigned").boolean();
   m.count = place.at("count").number();
   m.nominal_step = place.at("nominal_step").number();
+  m.changes = robot.effort_changes;
+  m.delay = robot.effort_delay;
   m.correction = effort_correction(robot);
   if (m.motion_columns.size() != model.joints.size() || m.effort_columns.size() != model.joints.size()) {
     place.fail("one motion column and one effort column for each joint of the model");
   }
   return m;
+}
+
+/// What bounds motion and efforts between samples: nothing in models that were written before there was such a thing.
+void read_between_samples(const JsonPlace& place, const Model& model, SignalErrors& errors) {
+  if (!place.has("between_samples") || place.at("between_samples").value().is_null()) {
+    return;
+  }
+  const JsonPlace between = place.at("between_samples");
+  errors.between_samples = true;
+  MotionBound& bound = errors.motion;
+  bound.limit = vector_at(between.at("acceleration"));
+  bound.largest = vector_at(between.at("largest"));
+  bound.effort = vector_at(between.at("effort"), model.n());
+  const JsonPlace mobility = between.at("mobility");
+  const auto coordinates = static_cast<Eigen::Index>(model.coordinates.size());
+  if (mobility.size() > 0) {
+    bound.mobility.resize(coordinates, static_cast<Eigen::Index>(model.n()));
+    if (mobility.size() != model.coordinates.size()) {
+      mobility.fail("one row for each of the " + std::to_string(coordinates) + " coordinates, or none");
+    }
+    for (Eigen::Index c = 0; c < coordinates; ++c) {
+      bound.mobility.row(c) = vector_at(mobility.at(static_cast<std::size_t>(c)), model.n());
+    }
+  }
+  const auto fits = [](const Eigen::MatrixXd& values, std::size_t size) {
+    return (values.size() == 0 || static_cast<std::size_t>(values.size()) == size) && (values.array() >= 0.0).all();
+  };
+  if (!fits(bound.limit, model.coordinates.size()) || !fits(bound.mobility, model.coordinates.size() * model.n()) ||
+      !fits(bound.largest, bound.mobility.size() > 0 ? model.p() : 0) || !fits(bound.effort, model.n())) {
+    between.fail("bounds >= 0, acceleration for each coordinate, largest for each parameter where there is a mobility");
+  }
 }
 
 /// Bounds on the motion, those on the effort left out.
@@ -54,6 +87,7 @@ SignalErrors read_motion_errors(const JsonPlace& place, const Model& model) {
   errors.speed_sample = optional_vector("speed_sample");
   errors.joint_sample = place.at("joint_sample").number();
   errors.heading = place.at("heading").number();
+  read_between_samples(place, model, errors);
   return errors;
 }
 

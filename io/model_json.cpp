@@ -40,13 +40,29 @@ Json proof_json(const std::vector<WeightedRow>& rows, const Model& model) {
   return list;
 }
 
+// What bounds motion and efforts between samples; null where the rows do not hold it.
+Json between_samples_json(const SignalErrors& errors) {
+  if (!errors.between_samples) {
+    return nullptr;
+  }
+  Json mobility = Json::array();
+  for (Eigen::Index c = 0; c < errors.motion.mobility.rows(); ++c) {
+    mobility.push_back(numbers(Eigen::VectorXd(errors.motion.mobility.row(c))));
+  }
+  return {{"acceleration", numbers(errors.motion.limit)},
+          {"mobility", std::move(mobility)},
+          {"largest", numbers(errors.motion.largest)},
+          {"effort", numbers(errors.motion.effort)}};
+}
+
 // What the motion in the rows can be wrong by; what the effort can is said elsewhere.
 Json motion_errors_json(const SignalErrors& errors) {
   return {{"acceleration", numbers(errors.acceleration)},
           {"speed", numbers(errors.speed)},
           {"speed_sample", numbers(errors.speed_sample)},
           {"joint_sample", errors.joint_sample},
-          {"heading", errors.heading}};
+          {"heading", errors.heading},
+          {"between_samples", between_samples_json(errors)}};
 }
 
 Json filter_json(const FilterDesign& filter, const FilterChoice& choice) {
@@ -268,14 +284,10 @@ Json to_json(const Commissioning& r, const LogReport& data, const std::string& s
   json["identification"] = identification_json(r);
   json["feasible_set"] = set_json(r, m.model);
   if (has_model) {
+    Json bounds = motion_errors_json(m.errors);
+    bounds["output"] = numbers(m.errors.output);
     json["detector"] = {{"estimate", numbers(m.estimate)},
-                        {"error_bounds",
-                         {{"acceleration", numbers(m.errors.acceleration)},
-                          {"speed", numbers(m.errors.speed)},
-                          {"output", numbers(m.errors.output)},
-                          {"speed_sample", numbers(m.errors.speed_sample)},
-                          {"joint_sample", m.errors.joint_sample},
-                          {"heading", m.errors.heading}}},
+                        {"error_bounds", std::move(bounds)},
                         {"persistence", {{"k", m.persistence.k}, {"n", m.persistence.n}}}};
   }
   json["validation"] = validation_json(r, m.model);
