@@ -43,7 +43,7 @@ constexpr const char* kExamples =
     "  wheelwright detect drive.csv --model result/model.json --out check\n"
     "  wheelwright detect drive.mcap --model result/model.json --series residual.mcap\n"
     "  robot_driver | wheelwright detect --follow --model result/model.json\n\n"
-    "Exit code: 0 no fault, 1 a fault was found, 2 bad input.";
+    "Exit code: 0 no fault, 1 a fault was found, 2 bad input, or no instant of it could be decided.";
 
 int run(const Arguments& a) {
   CommissionedModel model = read_model(a.model);
@@ -55,7 +55,7 @@ int run(const Arguments& a) {
   LogOptions reader = reader_options(a.common);
   reader.only = useful_columns(model.robot);
   if (a.follow) {
-    return follow(std::cin, std::cout, std::move(detector), model, a.detector, reader, a.common.json) ? kNo : kDone;
+    return follow(std::cin, std::cout, std::move(detector), model, a.detector, reader, a.common.json);
   }
   if (a.log.empty()) {
     throw InputError("detect: expected a LOG, or --follow to read rows from standard input");
@@ -77,10 +77,15 @@ int run(const Arguments& a) {
   isolation.isolation.threads = static_cast<std::size_t>(std::max(a.common.threads, 1));
   const std::vector<Isolation> isolations = isolate_events(log, model, detection, isolation);
   const bool fault = !detection.events.empty() || (kinematic.detection && !kinematic.detection->events.empty());
+  const std::string undecided =
+      detection.instants == 0 ? why_undecided(model, log.report().rows, log.median_step()) : std::string();
   if (!a.common.out.empty() || a.common.json) {
     Json json = to_json(detection, model, a.model.string(), a.log.string());
     add_isolation(json, isolations);
     add_kinematic(json, kinematic, model);
+    if (!undecided.empty()) {
+      json["undecided"] = undecided;
+    }
     std::string page;
     if (!a.common.out.empty()) {
       page = detect_report(detection, model, context, {.detection = kinematic.detection, .message = kinematic.message},
@@ -102,7 +107,10 @@ int run(const Arguments& a) {
       fmt::print("wrote {}\n", a.series.string());
     }
   }
-  return fault ? kNo : kDone;
+  if (!undecided.empty()) {
+    fmt::print(stderr, "wheelwright detect: {}: {}\n", a.log.string(), undecided);
+  }
+  return fault ? kNo : undecided.empty() ? kDone : kBadInput;
 }
 
 }  // namespace

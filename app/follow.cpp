@@ -18,7 +18,8 @@
 namespace wheelwright::app {
 namespace {
 
-constexpr double kMerge = 0.5;  // s, as detect() on a whole log
+constexpr double kMerge = 0.5;             // s, as detect() on a whole log
+constexpr std::size_t kMostTimes = 1000;  // rows from which the step is taken
 
 // Positions of the columns `names`; nothing, and `missing` says which, where there are not all of them.
 std::optional<std::vector<std::size_t>> pick_columns(const CsvRowParser& parser, const std::vector<std::string>& names,
@@ -55,6 +56,7 @@ class Watch {
       sample_[c] = row.columns[pick_[c]][0];
     }
     const Decision& decision = detector_.step(row.t[0], sample_);
+    decisions_ += decision.valid ? 1 : 0;
     for (std::size_t i = 0; decision.valid && i < decision.channels.size(); ++i) {
       const ChannelDecision& c = decision.channels[i];
       if (recorder_.add(i, number, row.t[0], c.residual, c.threshold.lower, c.threshold.upper, c.outside, c.alarm)) {
@@ -64,6 +66,8 @@ class Watch {
     }
   }
   [[nodiscard]] bool any() const { return !recorder_.events().empty(); }
+  /// Rows at which a decision was made.
+  [[nodiscard]] std::size_t decisions() const { return decisions_; }
 
  private:
   AnyDetector detector_;
@@ -71,12 +75,13 @@ class Watch {
   CommissionedModel model_;
   std::vector<double> sample_;
   EventRecorder recorder_;
+  std::size_t decisions_ = 0;
 };
 
 }  // namespace
 
-bool follow(std::istream& in, std::ostream& out, Detector detector, const CommissionedModel& model,
-            const DetectorOptions& options, const CsvOptions& reader, bool json) {
+ExitCode follow(std::istream& in, std::ostream& out, Detector detector, const CommissionedModel& model,
+                const DetectorOptions& options, const CsvOptions& reader, bool json) {
   std::string line;
   do {
     if (!std::getline(in, line)) {
@@ -100,6 +105,7 @@ bool follow(std::istream& in, std::ostream& out, Detector detector, const Commis
   }
   LogBlock row;
   std::size_t number = 0;
+  std::vector<double> times;  // of the first rows
   while (std::getline(in, line)) {
     try {
       if (!parser.parse(line, row)) {
@@ -110,12 +116,22 @@ bool follow(std::istream& in, std::ostream& out, Detector detector, const Commis
       continue;
     }
     torque.take(row, number, out, json);
+    if (times.size() < kMostTimes) {
+      times.push_back(row.t[0]);
+    }
     if (kinematic) {
       kinematic->take(row, number, out, json);
     }
     ++number;
   }
-  return torque.any() || (kinematic && kinematic->any());
+  if (torque.any() || (kinematic && kinematic->any())) {
+    return kNo;
+  }
+  if (torque.decisions() > 0) {
+    return kDone;
+  }
+  fmt::print(stderr, "wheelwright detect: {}\n", why_undecided(model, number, median_step(times)));
+  return kBadInput;
 }
 
 }  // namespace wheelwright::app

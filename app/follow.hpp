@@ -9,13 +9,16 @@
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/io/csv_header.hpp>
 
+#include "common.hpp"
+
 namespace wheelwright::app {
 
 /// Reads CSV rows from `in` until its end and writes an event to `out` at the instant its alarm is raised: a line of
 /// text, or with `json` one JSON object a line. A row that cannot be used is told on standard error and left out. Returns
-/// whether there was an event. The kinematic residual is watched with `options` where the model and the rows have it; on
+/// kDone, kNo where there was an event, or kBadInput where the torque residual was not decided at any row, with the reason
+/// on standard error. The kinematic residual is watched with `options` where the model and the rows have it; on
 /// standard error it is said when the rows lack its columns.
-bool follow(std::istream& in, std::ostream& out, Detector detector, const CommissionedModel& model,
-            const DetectorOptions& options, const CsvOptions& reader, bool json);
+ExitCode follow(std::istream& in, std::ostream& out, Detector detector, const CommissionedModel& model,
+                const DetectorOptions& options, const CsvOptions& reader, bool json);
 
 }  // namespace wheelwright::app

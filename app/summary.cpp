@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -110,6 +111,14 @@ std::string contradiction_table(const Commissioning& r) {
   return text;
 }
 
+std::string contradiction_notes(const Commissioning& r) {
+  std::string text;
+  for (const LogContradiction& c : r.contradictions) {
+    text += fmt::format("  {}: {}\n    → {}\n", c.withdraws ? "contradiction" : "doubt", c.sentence, c.next);
+  }
+  return text;
+}
+
 }  // namespace
 
 std::string summary(const Commissioning& r) {
@@ -118,9 +127,12 @@ std::string summary(const Commissioning& r) {
                       r.survey.rows, r.survey.segments, r.survey.segments == 1 ? "" : "s", r.survey.seconds,
                       r.model.filter.order, r.model.filter.beta, r.model.filter.delay());
   if (r.status == Commissioning::Status::empty) {
-    return text + contradiction_table(r) + assumption_lines(r.assumptions);
+    return text + contradiction_table(r) + contradiction_notes(r) + assumption_lines(r.assumptions);
   }
-  text += parameter_table(r);
+  if (r.status == Commissioning::Status::contradicted) {
+    return text + contradiction_notes(r);
+  }
+  text += parameter_table(r) + contradiction_notes(r);
   if (!r.estimators.reason.empty()) {
     text += fmt::format("  estimated by {}\n", r.estimators.reason);
   }
@@ -150,10 +162,32 @@ std::string event_line(const Event& e, const CommissionedModel& model) {
                      e.alarm, model.model.outputs[e.output], e.start, e.peak_ratio);
 }
 
+std::string why_undecided(const CommissionedModel& model, std::size_t rows, double step) {
+  constexpr double sparser = 1.5;  // steps of the model, from which on sparseness is worth a word
+  const double nominal = model.measurement.nominal_step;
+  const double ratio = nominal > 0.0 ? step / nominal : 1.0;
+  std::string text = "no instant was decided, so that nothing is known of faults: ";
+  for (const auto& [factor, unit] : {std::pair{1e3, "ms"}, std::pair{1e6, "µs"}, std::pair{1e9, "ns"}}) {
+    if (ratio > 0.2 * factor && ratio < 5.0 * factor) {
+      return text + fmt::format("the rows are {:.4g} s apart, {:.3g} times as far as those that the model was commissioned "
+                                "on ({:.4g} s); is their time in {}? It has to be in s",
+                                step, ratio, nominal, unit);
+    }
+  }
+  if (ratio > sparser) {
+    return text + fmt::format("the rows are {:.4g} s apart, {:.3g} times as far as those that the model was commissioned on "
+                              "({:.4g} s): log faster, or commission on a log like this one",
+                              step, ratio, nominal);
+  }
+  return text + fmt::format("{} row{} {:.4g} s apart are too few, or too often interrupted, for the filter, which settles in "
+                            "{:.3g} s",
+                            rows, rows == 1 ? "" : "s", step, model.filter.settle / model.filter.beta);
+}
+
 std::string summary(const Detection& d, const CommissionedModel& model) {
   std::string text;
   if (d.instants == 0) {
-    return "no decision: the log is too short for the filter to settle\n";
+    return {};  // why_undecided() is told instead
   }
   if (d.events.empty()) {
     text = fmt::format("no fault in {:.1f} s ({} instants)\n", d.seconds, d.instants);

@@ -44,6 +44,9 @@ void add_kinematic(Json& detection, const KinematicWatch& watch, const Commissio
 /// Adds what its first events are isolated to to a detection as JSON, before add_kinematic().
 void add_isolation(Json& detection, const std::vector<Isolation>& isolations);
 
+/// Why a detector of `model` decided at no instant of `rows` rows with the median step `step` (s), with what to do about it.
+[[nodiscard]] std::string why_undecided(const CommissionedModel& model, std::size_t rows, double step);
+
 /// One event in a line.
 [[nodiscard]] std::string event_line(const Event& event, const CommissionedModel& model);
 

@@ -61,9 +61,21 @@ Assumption assumed_hold(const Robot& robot) {
   return a;
 }
 
-Assumption assumed_delay(const Robot& robot) {
-  const Interval d = robot.effort_delay;
-  Assumption a{.id = "effort_delay", .declared_by = "effort.delay"};
+Assumption assumed_delay(const Commissioning& r) {
+  const Interval d = r.model.robot.effort_delay;
+  Assumption a{.id = "effort_delay",
+               .declared_by = "effort.delay",
+               .test = "no constant shift beyond the declared one explains the log better"};
+  const auto latency = std::ranges::find(r.contradictions, LogContradiction::Kind::effort_timing, &LogContradiction::kind);
+  if (latency != r.contradictions.end()) {
+    a.verdict = Verdict::fails;
+    a.detail = latency->sentence;
+  } else if (r.effort_shift) {
+    a.verdict = Verdict::holds;
+    a.detail = fmt::format("the best shift is {:.2g} s", *r.effort_shift);
+  } else {
+    a.detail = "the log tells no shift";
+  }
   a.statement = d.lower == 0.0 && d.upper == 0.0 ? "Efforts are neither late nor early against the motion."
                 : d.lower == d.upper
                     ? fmt::format("Efforts are late against the motion by {:g} s, all by the same.", d.lower)
@@ -284,7 +296,7 @@ std::vector<Assumption> assumptions_of(const Commissioning& result) {
   const Robot& robot = result.model.robot;
   std::vector<Assumption> list = {
       assumed_hold(robot),
-      assumed_delay(robot),
+      assumed_delay(result),
       {.id = "clocks",
        .statement = "Stamps are those of the instants of measurement, of motion and effort by one clock.",
        .declared_by = {}},
@@ -302,7 +314,9 @@ std::vector<Assumption> assumptions_of(const Commissioning& result) {
   if (result.kinematic.model) {
     list.push_back({.id = "pose_independent",
                     .statement = "Pose and gyro are measured without the wheels: none is wheel odometry.",
-                    .declared_by = {}});
+                    .declared_by = {},
+                    .test = "no combination of the wheel angles is all that a pose says",
+                    .verdict = Verdict::holds});
   }
   return list;
 }

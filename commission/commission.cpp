@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include <wheelwright/bounds/outliers.hpp>
+#include <wheelwright/commission/contradiction_search.hpp>
 #include <wheelwright/commission/fit.hpp>
 #include <wheelwright/commission/setting.hpp>
 #include <wheelwright/core/check.hpp>
@@ -52,6 +53,7 @@ struct Bounded {
   OutlierResult result;
   MotionBound learning;  // of the rows that the set is made of
   MotionBound driving;   // for driving to come: what was seen in this log is no limit of that
+  double raised = 1.0;   // factor on an estimated noise bound without which the prior box explains nothing
 };
 
 OutlierResult set_of(LogSource& log, const Setting& s, Part part, const SignalErrors& errors, std::size_t outliers) {
@@ -114,8 +116,10 @@ Bounded refined_set(LogSource& log, const Setting& s, Part part, SignalErrors er
 Bounded bounded_set(LogSource& log, const Setting& s, Part part, std::vector<OutputNoise>& noise, std::size_t outliers,
                     std::vector<std::string>& notes) {
   constexpr double kAboveMinimax = 1.05;
+  double raised = 1.0;
   for (int attempt = 0;; ++attempt) {
     Bounded bounded = refined_set(log, s, part, with_noise(s, noise, For::learning), outliers);
+    bounded.raised = raised;
     if (!bounded.result.dropped.empty()) {
       notes.push_back(fmt::format("{} instants were left out of the feasible set as outliers (at rows {})",
                                   bounded.result.dropped.size(), fmt::join(bounded.result.dropped, ", ")));
@@ -129,7 +133,7 @@ Bounded bounded_set(LogSource& log, const Setting& s, Part part, std::vector<Out
     }
     RegressionStream bare = make_rows(log, s, s.declared);
     FoldedSource bare_folded(bare, part, s.survey.rows, s.folds);
-    const double factor = kAboveMinimax * minimax_fit(bare_folded, s.prior, options).upper;
+    const double factor = raised = kAboveMinimax * minimax_fit(bare_folded, s.prior, options).upper;
     notes.push_back(
         fmt::format("the estimated noise bound was raised by {:.3g}: within the prior box no parameters "
                     "explain the log with less",
@@ -240,7 +244,14 @@ void describe_assumptions(const Setting& s, Commissioning& result) {
                           2.0 * 3.14159265358979323846 / (s.measurement.count * s.measurement.nominal_step))
             : "wheel speeds were taken as means over the sampling interval, as the robot file says");
   } else if (s.measurement.motion == MotionKind::speed && s.filter.order == 2) {
-    notes.push_back("wheel speeds are not differenced encoder counts: they were taken as samples of the speed");
+    notes.push_back(
+        s.measurement.unused_count > 0.0
+            ? fmt::format("wheel speeds are whole multiples of {:.4g} rad/s; they were taken as samples of the speed with "
+                          "the declared `wheel_speed` noise: write `encoder_counts_per_turn: {:.0f}` into the robot file "
+                          "if they are differenced counts",
+                          s.measurement.unused_count,
+                          2.0 * 3.14159265358979323846 / (s.measurement.unused_count * s.measurement.nominal_step))
+            : "wheel speeds are not differenced encoder counts: they were taken as samples of the speed");
   }
   if (!s.noise_complete) {
     notes.push_back(
@@ -259,8 +270,11 @@ void describe_assumptions(const Setting& s, Commissioning& result) {
   }
   for (std::size_t j = 0; j < s.model.p(); ++j) {
     if (!s.prior_declared[j] && (result.parameters[j].lower_is_prior || result.parameters[j].upper_is_prior)) {
-      notes.push_back(fmt::format("a bound of {} is the tool's own wide default, not the robot's",
-                                  result.parameters[j].parameter.name));
+      const Parameter& p = result.parameters[j].parameter;
+      notes.push_back(
+          fmt::format("a bound of {} is the tool's own wide default ({} from {:.3g} to {:.3g} {}), not the robot's: "
+                      "`prior:` in the robot file replaces it",
+                      p.name, p.physical, p.prior.lower, p.prior.upper, p.physical_unit));
     }
   }
 }
@@ -293,6 +307,47 @@ std::string reservations(const Setting& s, const Commissioning& result) {
   return text;
 }
 
+// The contradictions that leave no model, each with what to do.
+std::string withdrawal(const Commissioning& result) {
+  std::string text;
+  for (const LogContradiction& c : result.contradictions) {
+    if (c.withdraws) {
+      text += fmt::format("{}{}: {}", text.empty() ? "" : "; ", c.sentence, c.next);
+    }
+  }
+  return text;
+}
+
+// Where the proof of emptiness leans on an upper end of the tool's own default prior: what to write into the robot file.
+std::string default_prior_in_the_way(const Setting& s, const Commissioning& result) {
+  for (const WeightedRow& weighted : result.feasible.contradiction) {
+    const RowOrigin& origin = weighted.row.origin;
+    if (origin.is_prior && weighted.multiplier > 0.0 && origin.side == Side::upper &&
+        !s.prior_declared[origin.parameter]) {
+      const Parameter& p = s.model.parameters[origin.parameter];
+      return fmt::format(
+          "no {0} within the tool's own default prior, at most {1:.3g} {2}, explains the log: check the units of efforts "
+          "and motion, or, where the robot is that large, write `prior: {{{0}: [lower, upper]}}` into the robot file",
+          p.physical, p.prior.upper, p.physical_unit);
+    }
+  }
+  return {};
+}
+
+// A model that the log contradicts is not published.
+void withdraw(Commissioning& result) {
+  CommissionedModel& model = result.model;
+  model.estimate.resize(0);
+  model.facets.clear();
+  model.box = {};
+  model.kinematic.reset();
+  result.status = Commissioning::Status::contradicted;
+}
+
+bool withdrawn(const Commissioning& result) {
+  return std::ranges::any_of(result.contradictions, [](const LogContradiction& c) { return c.withdraws; });
+}
+
 std::string status_message(const Setting& s, const Commissioning& result) {
   std::string missing, todo;
   for (const ParameterResult& p : result.parameters) {
@@ -309,11 +364,19 @@ std::string status_message(const Setting& s, const Commissioning& result) {
       return "commissioned, but the log says nothing about " + missing + ": " + todo +
              ", and commission again; until then their bounds are those of the prior" + reservations(s, result);
     case Commissioning::Status::nothing: return "the log says nothing about any parameter: " + todo;
-    case Commissioning::Status::empty:
+    case Commissioning::Status::empty: {
+      const std::string why = withdrawal(result), prior = default_prior_in_the_way(s, result);
+      if (!prior.empty()) {
+        return prior;
+      }
       return fmt::format(
           "no parameters explain the log within the declared noise: it would have to be {:.3g} times as "
-          "large; a fault, an effect that the model lacks, or noise bounds that are too small",
-          result.minimax);
+          "large; {}",
+          result.minimax,
+          why.empty() ? "a fault, an effect that the model lacks, or noise bounds that are too small" : why);
+    }
+    case Commissioning::Status::contradicted:
+      return "no model: " + withdrawal(result);
   }
   return {};
 }
@@ -343,6 +406,13 @@ Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionO
   result.residuals = fit.residuals;
   result.rank = fit.squares.rank;
   result.condition = fit.squares.condition;
+
+  tell(options, "looking for contradictions", 0.35);
+  SignalFindings signals = contradictions_in_log(log, s, fit);
+  result.contradictions = std::move(signals.contradictions);
+  if (signals.timing) {
+    result.effort_shift = signals.timing->delay;
+  }
 
   tell(options, "bounding", 0.4);
   result.noise = output_noise(s, fit, options.extrapolation);
@@ -401,6 +471,13 @@ Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionO
       const double ratio = v.median_width_box > 0.0 ? v.median_width / v.median_width_box : 1.0;
       result.polytope_over_box = std::max(result.polytope_over_box, ratio);
     }
+  }
+  for (LogContradiction& found : contradictions_in_result(result, s, bounded.raised)) {
+    result.contradictions.push_back(std::move(found));
+  }
+  if (withdrawn(result)) {
+    withdraw(result);
+    result.message = status_message(s, result);
   }
   log.rewind();
   tell(options, "done", 1.0);

@@ -12,6 +12,7 @@
 #include <wheelwright/bounds/feasible_set.hpp>
 #include <wheelwright/bounds/minimax.hpp>
 #include <wheelwright/commission/assumptions.hpp>
+#include <wheelwright/commission/contradictions.hpp>
 #include <wheelwright/commission/filter_choice.hpp>
 #include <wheelwright/commission/folds.hpp>
 #include <wheelwright/commission/kinematic.hpp>
@@ -69,6 +70,7 @@ struct Commissioning {
     partial,  ///< a model came out, but some parameters are not excited: their bounds are the prior's
     empty,    ///< no θ explains the log within the declared noise: see contradiction; no model
     nothing,  ///< no parameter is excited: no model
+    contradicted,  ///< a set came out, but the log contradicts what it stands on: see contradictions; no model
   };
   Status status = Status::done;
   std::string message;      ///< one sentence for people, with what to do next where that is needed
@@ -86,6 +88,8 @@ struct Commissioning {
   FoldOptions folds;
   double minimax = 0.0;     ///< where the set is empty: by how much the bounds n̄ on the effort would have to be
                             ///< raised for it not to be (those on the motion kept); else 0
+  std::optional<double> effort_shift;  ///< s, by which the efforts seem late beyond the middle of what is declared
+  std::vector<LogContradiction> contradictions;  ///< found whatever the status; one that withdraws leaves no model
   Box prior;                ///< in which the set was sought
   SignalErrors row_errors;  ///< dY and dy of the rows that the set is made of: OutputNoise::learning in `output`
   std::vector<std::size_t> dropped;     ///< rows of the log whose instants the set leaves out as outliers

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <wheelwright/commission/contradiction_search.hpp>
 #include <wheelwright/commission/fit.hpp>
 #include <wheelwright/commission/health_view.hpp>
 #include <wheelwright/commission/physical.hpp>
@@ -11,15 +12,11 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/identify/direction_words.hpp>
 #include <wheelwright/identify/information_over_time.hpp>
-#include <wheelwright/identify/time_shift.hpp>
-#include <wheelwright/identify/variable_projection.hpp>
 
 namespace wheelwright {
 namespace {
 
 constexpr double kSome = 0.02;             // share of the rows that makes a manoeuvre count
-constexpr double kLongestDelay = 0.2;      // s
-constexpr std::size_t kDelayRows = 60000;  // of the log, for the delay
 constexpr double kUnusedRisk = 1e-3;       // for fit_log; not used further
 
 LogFinding about_motion(const char* id, FindingSeverity severity, std::string sentence, std::string next, double value,
@@ -297,30 +294,21 @@ bool check_excitation(const HealthView& view, LogSource& log, const Setting& s, 
 
 // Effort against motion in time, where a shift explains the log better than none.
 void check_delay(const HealthView& view, const Setting& s, const Fit& fit, std::vector<LogFinding>& out) {
-  if (s.measurement.effort_unsigned) {
+  TableSource source(*view.log);
+  const std::optional<EffortTiming> timing = effort_timing(source, s, fit);
+  if (!timing) {
     return;
   }
-  const LogTable part = slice(*view.log, 0, std::min(view.log->rows(), kDelayRows));
-  TableSource source(part);
-  RegressionStream stream = make_rows(source, s);
-  const TimeShiftedRows model(read_all(stream), TimeEffect::delay, -kLongestDelay, kLongestDelay);
-  VariableProjectionOptions options = model.options();
-  options.weights = fit.weights;
-  const SeparableFit found = variable_projection(model, options);
-  const bool told = found.end == SearchEnd::converged && found.state[0] == ShapeState::identified;
-  if (!told) {
-    return;
-  }
-  const double delay = found.shape[0], error = found.standard_error[0];
-  const double without = cost_curve(model, Eigen::VectorXd::Zero(1), 0, 0.0, 1e-9, 2, fit.weights).front().weighted_rss;
-  const double left = without > 0.0 ? std::sqrt(found.weighted_rss / without) : 1.0;
-  const bool matters = std::abs(delay) > 3.0 * error && left < 0.95 && std::abs(delay) > 0.25 * view.step;
+  const double delay = timing->delay, error = timing->standard_error, left = timing->residual_ratio;
+  const bool matters = is_latency(*timing, view.step) ||
+                       (std::abs(delay) > 3.0 * error && left < 0.95 && std::abs(delay) > 0.25 * view.step);
   const bool large = matters && std::abs(delay) > 0.75 * view.step;
   LogFinding f{.id = "time.effort_delay",
                .topic = FindingTopic::time,
-               .severity = large     ? FindingSeverity::warning
-                           : matters ? FindingSeverity::notice
-                                     : FindingSeverity::fine};
+               .severity = is_latency(*timing, view.step) ? FindingSeverity::fatal
+                           : large                        ? FindingSeverity::warning
+                           : matters                      ? FindingSeverity::notice
+                                                          : FindingSeverity::fine};
   f.columns = s.measurement.effort_columns;
   f.value = delay;
   f.unit = std::string("s");
@@ -381,11 +369,7 @@ bool check_motion(const HealthView& view, std::vector<LogFinding>& findings) {
       check_effort_scale(view, s, fit, findings);
       check_sides(s, fit, findings);
       check_remainder(s, fit, findings);
-      try {
-        check_delay(view, s, fit, findings);
-      } catch (const InvalidArgument&) {
-        // Segments too short for any shift: nothing is claimed of it.
-      }
+      check_delay(view, s, fit, findings);
     }
     return excited;
   } catch (const Error& error) {

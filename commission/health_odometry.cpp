@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <complex>
 #include <numbers>
@@ -10,6 +11,7 @@
 #include <Eigen/Dense>
 
 #include <wheelwright/commission/health_view.hpp>
+#include <wheelwright/commission/pose_origin.hpp>
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/identify/kinematic_calibration.hpp>
 
@@ -350,6 +352,38 @@ void check_pose_delay(const HealthView& view, std::vector<LogFinding>& out) {
   }
 }
 
+// A pose that the wheels explain to the last digit.
+void check_pose_origin(const HealthView& view, std::vector<LogFinding>& out) {
+  if (view.column("theta") == nullptr) {
+    return;
+  }
+  OdometryMeasurement m;
+  m.heading = true;
+  m.position = view.column("x") != nullptr && view.column("y") != nullptr;
+  m.nominal_step = view.step;
+  const bool angles = view.joints[0].angle != nullptr && view.joints[1].angle != nullptr;
+  m.motion = angles ? MotionKind::angle : MotionKind::speed;
+  for (const JointView& j : view.joints) {
+    m.motion_columns.push_back(angles ? j.angle_name : j.speed_name);
+  }
+  TableSource log(*view.log);
+  const PoseOrigin origin = pose_origin(log, m, kWindow, view.robot.encoder_counts_per_turn.value_or(0.0));
+  if (origin.sentence.empty()) {
+    return;
+  }
+  std::string sentence = origin.sentence + ".";
+  sentence[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(sentence[0])));
+  out.push_back(about_units("signals.pose_repeats_wheels", FindingSeverity::warning, std::move(sentence),
+                            "It is not used: log a pose that does not come from the wheels (camera, lidar, motion "
+                            "capture), or a gyro.",
+                            origin.heading_repeats && m.position ? std::vector<std::string>{"x", "y", "theta"}
+                            : origin.heading_repeats             ? std::vector<std::string>{"theta"}
+                                                                 : std::vector<std::string>{"x", "y"},
+                            origin.heading_repeats ? origin.heading_rest : origin.position_rest));
+  out.back().topic = FindingTopic::signals;
+  out.back().unit = origin.heading_repeats ? "rad" : "m";
+}
+
 }  // namespace
 
 void check_odometry(const HealthView& view, std::vector<LogFinding>& findings) {
@@ -358,6 +392,7 @@ void check_odometry(const HealthView& view, std::vector<LogFinding>& findings) {
   if (view.joints.size() != 2 || !view.has_motion() || (!theta && !gyro)) {
     return;
   }
+  check_pose_origin(view, findings);
   const std::vector<Window> windows = windows_of(view);
   const bool position = theta && view.column("x") != nullptr && view.column("y") != nullptr;
   const double scale = position ? heading_scale(windows) : 1.0;

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numbers>
 #include <optional>
 #include <set>
 
@@ -16,6 +17,7 @@
 namespace wheelwright {
 namespace {
 
+constexpr double kTurn = 2.0 * std::numbers::pi;
 constexpr std::size_t kLongRun = 20;  // rows of one value from which on a column may be stuck
 constexpr double kLongTime = 0.5;     // s, likewise
 constexpr std::size_t kPinned = 5;    // rows at an extreme value that make a limit
@@ -272,7 +274,8 @@ void check_resolution(const HealthView& view, const Column& c, const std::vector
   }
   const auto encoder = view.robot.model == "single_axis" || !(view.step > 0.0)
                            ? std::nullopt
-                           : find_encoder(sample, is_angle ? 1.0 : view.step);
+                       : is_angle ? find_encoder_of_angles(sample)
+                                  : find_encoder(sample, view.step);
   if (!encoder) {
     return;
   }
@@ -385,10 +388,42 @@ void check_rest(const HealthView& view, const std::vector<Column>& columns, std:
   }
 }
 
+// Wheel angles that come back every turn.
+void check_wrapped(const HealthView& view, const ReaderCounts& reader, std::vector<LogFinding>& out) {
+  if (reader.unwrapped > 0) {
+    out.push_back(about("signals.wrapped", FindingSeverity::notice, "",
+                        fmt::format("Wheel angles jump back by a whole turn {} times: they are wrapped at 2π, and were "
+                                    "unwrapped on reading.",
+                                    reader.unwrapped),
+                        "Log angles that go on, where the driver has them: a wrapped one is lost where rows are missing.",
+                        static_cast<double>(reader.unwrapped), "1"));
+  }
+  for (const JointView& j : view.joints) {
+    if (j.angle == nullptr || view.model.joints.size() != 2) {
+      continue;
+    }
+    std::size_t jumps = 0;
+    for (const auto& [first, last] : view.segments) {
+      for (std::size_t k = first + 1; k < last; ++k) {
+        const double step = std::abs((*j.angle)[k] - (*j.angle)[k - 1]);
+        jumps += std::abs(step - kTurn) < 0.25 * kTurn ? 1U : 0U;
+      }
+    }
+    const auto [least, most] = std::ranges::minmax(*j.angle);
+    if (jumps > 0 && most - least <= kTurn + 1e-3) {
+      out.push_back(about("signals.wrapped", FindingSeverity::fatal, j.angle_name,
+                          fmt::format("{} never leaves one turn and jumps by one {} times: it is wrapped at 2π.",
+                                      j.angle_name, jumps),
+                          "Unwrap it: an angle has to go on counting.", static_cast<double>(jumps), "1"));
+    }
+  }
+}
+
 }  // namespace
 
-void check_signals(const HealthView& view, std::vector<LogFinding>& findings) {
+void check_signals(const HealthView& view, const ReaderCounts& reader, std::vector<LogFinding>& findings) {
   const std::vector<Column> columns = columns_of(view);
+  check_wrapped(view, reader, findings);
   std::map<ColumnKind, std::pair<std::vector<std::string>, double>> stale;
   for (const Column& c : columns) {
     const std::vector<Run> runs = runs_of(view, *c.values);

@@ -59,7 +59,7 @@ void set_stretches(LogFinding& finding, const HealthView& view, const std::vecto
 /// Rates, jitter, what is missing between rows, stamps that are too coarse, length.
 void check_time(const HealthView& view, const ReaderCounts& reader, std::vector<LogFinding>& findings);
 /// Columns that stand still, repeat, are coarse or noisy, or end at a limit; rest.
-void check_signals(const HealthView& view, std::vector<LogFinding>& findings);
+void check_signals(const HealthView& view, const ReaderCounts& reader, std::vector<LogFinding>& findings);
 /// Directions, speeds, accelerations; what the filtered regressor says of each parameter; effort against motion in time.
 /// Returns whether commissioning would get as far as bounds.
 bool check_motion(const HealthView& view, std::vector<LogFinding>& findings);

@@ -10,6 +10,7 @@
 
 #include <wheelwright/bounds/minimax.hpp>
 #include <wheelwright/commission/noise_budget.hpp>
+#include <wheelwright/commission/pose_origin.hpp>
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/identify/least_squares.hpp>
 #include <wheelwright/identify/residual_statistics.hpp>
@@ -370,7 +371,16 @@ KinematicCommissioning commission_kinematics(LogSource& log, const Robot& robot,
                                  options.window);
     return result;
   }
-  Frame s = settle(log, robot, *measurement, survey, options);
+  OdometryMeasurement independent = *measurement;
+  const PoseOrigin origin =
+      pose_origin(log, independent, options.window, robot.encoder_counts_per_turn.value_or(0.0));
+  independent.heading = independent.heading && !origin.heading_repeats;
+  independent.position = independent.position && !origin.position_repeats;
+  if (!independent.heading && !independent.gyro) {
+    result.message = "no kinematic residual: " + origin.sentence;
+    return result;
+  }
+  Frame s = settle(log, robot, independent, survey, options);
   result.prior = s.prior;
   const auto fit = fit_rows(s, Part::everything, s.extrapolation.risk);
   if (!fit) {
@@ -411,7 +421,7 @@ KinematicCommissioning commission_kinematics(LogSource& log, const Robot& robot,
                                 .persistence = options.persistence};
   tell_declared(s, result.model->estimate, result.noise);
   validate_held_out(s, result);
-  result.message = message_of(s, result);
+  result.message = message_of(s, result) + (origin.sentence.empty() ? "" : "; " + origin.sentence);
   log.rewind();
   return result;
 }

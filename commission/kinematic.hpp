@@ -55,7 +55,8 @@ struct KinematicCommissioning {
   enum class Status {
     done,     ///< a model came out
     partial,  ///< a model came out; the bounds of some parameters are those of the prior
-    absent,   ///< the log or the robot has nothing to compare wheel odometry with: no model
+    absent,   ///< the log or the robot has nothing to compare wheel odometry with (a pose that repeats the wheels is
+              ///< nothing, see pose_origin.hpp): no model
     nothing,  ///< too little driving, or no parameters in the prior box explain it: no model
   };
   Status status = Status::absent;

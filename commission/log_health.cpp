@@ -161,7 +161,7 @@ LogHealth examine(const LogTable& log, const std::optional<Robot>& robot, const 
   check_columns(view, health.findings);
   check_time(view, reader, health.findings);
   if (log.rows() > 0) {
-    check_signals(view, health.findings);
+    check_signals(view, reader, health.findings);
     check_odometry(view, health.findings);
   }
   const bool reaches_bounds = log.rows() > 0 && check_motion(view, health.findings);

@@ -46,15 +46,18 @@ double refine(std::span<const double> magnitudes, double quantum) {
   return quantum;
 }
 
-bool is_decimal(double quantum) {
-  const double scaled = quantum / std::pow(10.0, std::floor(std::log10(quantum * (1.0 + 1e-6))));
-  return std::ranges::any_of(std::vector{1.0, 2.0, 5.0}, [&](double d) { return std::abs(scaled / d - 1.0) < 1e-6; });
+// Whether `quantum` is 1, 2 or 5 · 10ᵏ, to the relative accuracy `near`.
+bool is_decimal(double quantum, double near) {
+  const double scaled = quantum / std::pow(10.0, std::floor(std::log10(quantum * (1.0 + near))));
+  return std::ranges::any_of(std::vector{1.0, 2.0, 5.0}, [&](double d) { return std::abs(scaled / d - 1.0) < near; });
 }
 
-}  // namespace
+constexpr double kNearDecimal = 1e-6;
+constexpr double kNearRpm = 1e-4;  // printed decimals blur a quantum that is no decimal number itself
+constexpr double kRpm = 2.0 * std::numbers::pi / 60.0;
 
-std::optional<EncoderFinding> find_encoder(std::span<const double> speeds, double step,
-                                           std::optional<double> counts_per_turn) {
+std::optional<EncoderFinding> search(std::span<const double> speeds, double step, bool of_angles,
+                                     std::optional<double> counts_per_turn) {
   check::positive(step, "find_encoder step");
   std::vector<double> magnitudes;
   magnitudes.reserve(speeds.size());
@@ -83,7 +86,8 @@ std::optional<EncoderFinding> find_encoder(std::span<const double> speeds, doubl
       continue;
     }
     const double counts = turn_over(quantum, step);
-    if (counts < 8.0 || counts > kMostCounts || is_decimal(quantum)) {
+    if (counts < 8.0 || counts > kMostCounts || is_decimal(quantum, kNearDecimal) ||
+        (!of_angles && is_decimal(quantum / kRpm, kNearRpm))) {
       return std::nullopt;
     }
     const double whole = turn_over(std::round(counts), step);
@@ -100,6 +104,17 @@ std::optional<EncoderFinding> find_encoder(std::span<const double> speeds, doubl
     }
   }
   return std::nullopt;
+}
+
+}  // namespace
+
+std::optional<EncoderFinding> find_encoder(std::span<const double> speeds, double step,
+                                           std::optional<double> counts_per_turn) {
+  return search(speeds, step, false, counts_per_turn);
+}
+
+std::optional<EncoderFinding> find_encoder_of_angles(std::span<const double> steps) {
+  return search(steps, 1.0, true, std::nullopt);
 }
 
 }  // namespace wheelwright

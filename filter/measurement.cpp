@@ -11,6 +11,7 @@ namespace wheelwright {
 namespace {
 
 constexpr std::size_t kMostSpeeds = 200000;  // enough to find an encoder; longer logs are not searched further
+constexpr double kHalf = 0.5 * (1.0 - 1e-6);  // of a quantum: what rounding to it makes wrong, as printed
 constexpr double kEvenSteps = 0.02;          // steps further apart than this share are not one sampling interval
 
 std::string join(const std::vector<std::string>& words) {
@@ -145,7 +146,11 @@ Measurement find_measurement(LogSource& log, const Robot& robot, const Model& mo
     const SpeedSample sample = sample_speeds(log, speeds);
     const auto encoder =
         sample.even ? find_encoder(sample.speeds, m.nominal_step, robot.encoder_counts_per_turn) : std::nullopt;
-    if (encoder) {
+    const auto& declared = robot.noise.wheel_speed.value;
+    const bool told = robot.encoder_counts_per_turn || robot.speed_source == SpeedSource::encoder_difference;
+    if (encoder && !told && declared && *declared >= kHalf * encoder->speed_step) {
+      m.unused_count = encoder->speed_step;
+    } else if (encoder) {
       m.motion = MotionKind::mean_speed;
       m.count = encoder->speed_step;
     } else if (robot.speed_source == SpeedSource::encoder_difference) {

@@ -35,6 +35,8 @@ struct Measurement {
   double count = 0.0;                       ///< mean_speed: speeds are whole multiples of this, rad/s (0: not rounded)
   double nominal_step = 0.0;                ///< median step of the log it was found on, s
   double shortest_step = 0.0;               ///< one in a hundred steps of that log was shorter, s (0: not known)
+  double unused_count = 0.0;  ///< speed: what `count` would be if the declared bound of the speeds did not stand above
+                              ///< it, rad/s (0: nothing was found)
 
   EffortCorrection correction{};  ///< of the efforts, before anything else is made of them
 
@@ -48,7 +50,9 @@ struct Measurement {
 };
 
 /// Finds how `log` measures `robot`: angles where the log has them, else speeds; for order 2 and speed_source automatic
-/// the log is searched for count-differenced speeds (encoder.hpp); efforts are corrected for the robot's effects. Walks the log once. Throws InputError when a joint
+/// the log is searched for count-differenced speeds (encoder.hpp). What is merely found never replaces what is declared:
+/// where the robot file bounds the noise of the wheel speeds by half of the quantum found or more, and neither gives
+/// encoder_counts_per_turn nor asks for speed_source encoder_difference, the speeds are samples with that bound. Efforts are corrected for the robot's effects. Walks the log once. Throws InputError when a joint
 /// has no usable motion or effort column (naming the columns that were looked for), InvalidArgument when order 1 is
 /// asked of a log that has angles only.
 [[nodiscard]] Measurement find_measurement(LogSource& log, const Robot& robot, const Model& model, int order);

@@ -17,7 +17,8 @@ RobotStatus status_of(Commissioning::Status status) {
   switch (status) {
     case Commissioning::Status::done: return RobotStatus::commissioned;
     case Commissioning::Status::partial: return RobotStatus::partial;
-    case Commissioning::Status::empty: return RobotStatus::contradicted;
+    case Commissioning::Status::empty:
+    case Commissioning::Status::contradicted: return RobotStatus::contradicted;
     case Commissioning::Status::nothing: return RobotStatus::nothing;
   }
   return RobotStatus::nothing;

@@ -20,6 +20,7 @@ std::vector<std::string> sentences(const LogReport& report) {
   say(report.resets, "new segment", "new segments", "where time goes backwards");
   say(report.gaps, "new segment", "new segments",
       fmt::format("at gaps longer than 5 x the median step of {:.6g} s", report.median_step));
+  say(report.angle_wraps, "jump", "jumps", "of a wheel angle by a whole turn undone: it was wrapped at 2π");
   for (const LogFileReport& file : report.files) {
     if (file.time_origin != 0.0) {
       out.push_back(fmt::format("{}: times are counted from {:.0f} s of its own clock", file.path, file.time_origin));

@@ -57,6 +57,7 @@ struct LogReport {
   Occurrences resets;        ///< segments begun because time went backwards
   Occurrences gaps;          ///< segments begun because a step is more than 5 × the median step
   Occurrences wraps;         ///< jumps of `theta` by more than π that were unwrapped (no row is lost)
+  Occurrences angle_wraps;   ///< jumps of a wheel angle by a turn that were unwrapped (no row is lost)
 
   /// Whether no row was dropped.
   [[nodiscard]] bool clean() const { return rows == rows_read; }

@@ -32,7 +32,8 @@ ReaderCounts reader_counts(const LogReport& report) {
   return {.rows_read = report.rows_read,
           .incomplete = report.empty.count + report.not_finite.count,
           .duplicates = report.duplicates.count,
-          .truncated = report.truncated.count};
+          .truncated = report.truncated.count,
+          .unwrapped = report.angle_wraps.count};
 }
 
 Json to_json(const LogHealth& health, const HealthFiles& files) {

@@ -235,6 +235,20 @@ Json validation_json(const Commissioning& r, const Model& model) {
           {"outputs", outputs}};
 }
 
+Json contradictions_json(const Commissioning& r) {
+  Json list = Json::array();
+  for (const LogContradiction& c : r.contradictions) {
+    list.push_back({{"id", to_string(c.kind)},
+                    {"withdraws", c.withdraws},
+                    {"subject", c.subject},
+                    {"value", c.value},
+                    {"limit", c.limit},
+                    {"sentence", c.sentence},
+                    {"next", c.next}});
+  }
+  return list;
+}
+
 Json data_json(const Commissioning& r, const LogReport& data) {
   Json files = Json::array();
   for (const LogFileReport& f : data.files) {
@@ -281,6 +295,7 @@ Json to_json(const Commissioning& r, const LogReport& data, const std::string& s
   if (auto kinematic = kinematic_json(r.kinematic, r.folds)) {
     json["kinematic"] = std::move(*kinematic);
   }
+  json["contradictions"] = contradictions_json(r);
   json["data"] = data_json(r, data);
   json["assumptions"] = assumptions_json(r.assumptions);
   json["notes"] = r.notes;

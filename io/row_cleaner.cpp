@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/io/row_cleaner.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <utility>
@@ -19,6 +20,8 @@ RowCleaner::RowCleaner(const std::vector<std::string>& names, LogReport* report)
     limits_.push_back(column != nullptr ? column->limit : std::numeric_limits<double>::max());
     if (name == "theta") {
       theta_ = limits_.size() - 1;
+    } else if (name == "phi_r" || name == "phi_l") {
+      wheels_.push_back({.index = limits_.size() - 1});
     }
   }
 }
@@ -26,6 +29,9 @@ RowCleaner::RowCleaner(const std::vector<std::string>& names, LogReport* report)
 void RowCleaner::begin_file(std::string place) {
   place_ = std::move(place);
   fresh_ = true;
+  for (WheelAngle& wheel : wheels_) {
+    wheel = {.index = wheel.index};
+  }
 }
 
 RowOutcome RowCleaner::place(std::span<double> row, std::size_t number) {
@@ -53,6 +59,9 @@ RowOutcome RowCleaner::place(std::span<double> row, std::size_t number) {
   }
   if (theta_ != 0) {
     unwrap(row[theta_], starts, number);
+  }
+  for (WheelAngle& wheel : wheels_) {
+    unwrap(wheel, row[wheel.index], starts, number);
   }
   return starts ? RowOutcome::new_segment : RowOutcome::row;
 }
@@ -83,6 +92,26 @@ void RowCleaner::unwrap(double& theta, bool new_segment, std::size_t number) {
   }
   theta_before_ = theta;
   theta += turns_ * 2.0 * std::numbers::pi;
+}
+
+void RowCleaner::unwrap(WheelAngle& wheel, double& angle, bool new_segment, std::size_t number) {
+  constexpr double turn = 2.0 * std::numbers::pi, small = 0.5 * std::numbers::pi, slack = 1e-3;
+  const double step = angle - wheel.before;
+  wheel.least = std::min(wheel.least, angle);
+  wheel.most = std::max(wheel.most, angle);
+  if (new_segment) {
+    wheel.turns = 0.0;
+  } else if (std::abs(step) > std::numbers::pi && std::abs(std::abs(step) - turn) < small &&
+             wheel.largest_step < small && wheel.most - wheel.least <= turn + slack) {
+    wheel.turns -= std::copysign(1.0, step);
+    if (report_ != nullptr && report_->angle_wraps.count++ == 0) {
+      report_->angle_wraps.first = at(number) + ", column " + names_[wheel.index];
+    }
+  } else {
+    wheel.largest_step = std::max(wheel.largest_step, std::abs(step));
+  }
+  wheel.before = angle;
+  angle += wheel.turns * turn;
 }
 
 void RowCleaner::count(Occurrences LogReport::*what, std::size_t number, std::string_view detail) {

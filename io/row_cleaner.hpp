@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Rows of numbers → clean rows of a log, whatever the format: defects dropped and counted, segments split, heading
-/// unwrapped.
+/// Rows of numbers → clean rows of a log, whatever the format: defects dropped and counted, segments split, heading and
+/// wheel angles unwrapped.
 #pragma once
 
 #include <cstddef>
@@ -37,7 +37,10 @@ class RowCleaner {
   /// |value| above this cannot be meant, for time and each column.
   [[nodiscard]] const std::vector<double>& limits() const { return limits_; }
 
-  /// Decides by its time what a row is whose values are finite and within limits(), and unwraps its heading in place.
+  /// Decides by its time what a row is whose values are finite and within limits(), and unwraps its angles in place: the
+  /// heading wherever it jumps by more than π, a wheel angle (phi_r, phi_l) where it jumps by nearly a turn and cannot but
+  /// be wrapped: all its values so far lie within one turn, and every other step, and this one with the turn taken away,
+  /// is below π/2.
   RowOutcome place(std::span<double> row, std::size_t number);
 
   /// The same for any row: one that has a value which is not finite is dropped. Throws InputError, naming the column,
@@ -57,7 +60,17 @@ class RowCleaner {
   [[nodiscard]] std::string expectation(std::size_t index) const;
 
  private:
+  // A wheel angle, which may be wrapped or not.
+  struct WheelAngle {
+    std::size_t index = 0;
+    double before = 0.0;  // as logged
+    double turns = 0.0;   // to add
+    double least = std::numeric_limits<double>::infinity(), most = -least;
+    double largest_step = 0.0;  // that is not a wrap
+  };
+
   void unwrap(double& theta, bool new_segment, std::size_t number);
+  void unwrap(WheelAngle& wheel, double& angle, bool new_segment, std::size_t number);
 
   std::vector<std::string> names_;  ///< time, then the columns
   std::vector<double> limits_;
@@ -69,6 +82,7 @@ class RowCleaner {
   std::size_t theta_ = 0;      ///< index of the heading, 0 where there is none
   double theta_before_ = 0.0;  ///< as logged
   double turns_ = 0.0;         ///< whole turns to add
+  std::vector<WheelAngle> wheels_;
 };
 
 }  // namespace wheelwright

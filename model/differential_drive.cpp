@@ -49,7 +49,7 @@ Parameter viscous(const char* axis, double r) {
           .physical = std::string("viscous_") + axis,
           .physical_unit = "N·s/m",
           .per_physical = r,
-          .prior = {0.0, 1e5},
+          .prior = {0.0, 1e7},
           .excite = std::string(axis) == "linear" ? "drive straight at different speeds"
                                                   : "drive straight at different speeds, heading along x and along y"};
 }
@@ -96,7 +96,7 @@ Model DifferentialDrive::model() const {
        .physical = "mass",
        .physical_unit = "kg",
        .per_physical = r,
-       .prior = {0.0, 1e4},
+       .prior = {0.0, 1e6},
        .excite = "accelerate and brake"},
       {.output = 0, .kind = Term::Kind::acceleration, .coordinate = 0});
   add({.name = "r_yaw_inertia",
@@ -104,7 +104,7 @@ Model DifferentialDrive::model() const {
        .physical = "yaw_inertia",
        .physical_unit = "kg·m²",
        .per_physical = r,
-       .prior = {0.0, 1e5},
+       .prior = {0.0, 1e8},
        .excite = "turn with changing yaw rate"},
       {.output = 1, .kind = Term::Kind::acceleration, .coordinate = 1});
   if (anisotropic_friction) {
@@ -119,7 +119,7 @@ Model DifferentialDrive::model() const {
        .physical = "viscous_yaw",
        .physical_unit = "N·m·s/rad",
        .per_physical = r,
-       .prior = {0.0, 1e5},
+       .prior = {0.0, 1e8},
        .excite = "drive in curves"},
       {.output = 1, .kind = Term::Kind::speed, .coordinate = 1});
   if (coulomb) {
@@ -128,7 +128,7 @@ Model DifferentialDrive::model() const {
          .physical = "coulomb",
          .physical_unit = "N·m",
          .per_physical = 1.0,
-         .prior = {0.0, 1e4},
+         .prior = {0.0, 1e6},
          .excite = "drive in both directions"},
         {.output = 0, .kind = Term::Kind::function, .function = signs_sum});
     m.terms.push_back({.output = 1,

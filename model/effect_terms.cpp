@@ -15,7 +15,7 @@ namespace {
 
 using Constants = std::array<double, 2>;
 
-constexpr double unknown_mass = 1e4;  // kg
+constexpr double unknown_mass = 1e6;  // kg
 
 double sign(double x) { return static_cast<double>(x > 0.0) - static_cast<double>(x < 0.0); }
 

@@ -36,7 +36,7 @@ void add_dry_friction(Model& model, std::size_t parameter);
 
 /// Whether the model parameter with the physical name `physical` is one of the robot's effects, and what the file says of
 /// the physical quantity: its interval; [v/3, 3v] for a single value v; for com_* and slope times the mass, which is that
-/// of the robot's prior, else [m/3, 3m] of the nominal m, else anything up to 10⁴ kg.
+/// of the robot's prior, else [m/3, 3m] of the nominal m, else anything up to 10⁶ kg.
 [[nodiscard]] std::optional<Interval> effect_prior(const Robot& robot, const std::string& physical);
 
 /// The physical quantity that a simulator with the mass `mass` (kg) takes for the same parameter; nothing where it is of

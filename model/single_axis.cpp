@@ -34,14 +34,14 @@ Model SingleAxis::model() const {
     m.parameters.push_back({name, unit, name, unit, 1.0, prior, excite});
     m.terms.push_back(term);
   };
-  add("inertia", "kg (rotary: kg·m²)", {0.0, 1e4}, "accelerate and brake", {.kind = Term::Kind::acceleration});
-  add("viscous", "N·s/m (rotary: N·m·s/rad)", {0.0, 1e5}, "move at different speeds", {.kind = Term::Kind::speed});
+  add("inertia", "kg (rotary: kg·m²)", {0.0, 1e6}, "accelerate and brake", {.kind = Term::Kind::acceleration});
+  add("viscous", "N·s/m (rotary: N·m·s/rad)", {0.0, 1e7}, "move at different speeds", {.kind = Term::Kind::speed});
   if (coulomb) {
-    add("coulomb", "N (rotary: N·m)", {0.0, 1e5}, "move in both directions",
+    add("coulomb", "N (rotary: N·m)", {0.0, 1e7}, "move in both directions",
         {.kind = Term::Kind::function, .function = sign_of_speed});
   }
   if (offset) {
-    add("offset", "N (rotary: N·m)", {-1e5, 1e5}, "move in both directions",
+    add("offset", "N (rotary: N·m)", {-1e7, 1e7}, "move in both directions",
         {.kind = Term::Kind::function, .function = one});
   }
   return m;

@@ -159,7 +159,12 @@ void bind_commission(py::module_& m) {
   py::class_<CommissionObject>(m, "Commission", "The result of commission(): model.json and the numbers in it.")
       .def_property_readonly(
           "status", [](const CommissionObject& c) { return word_of(kStatusWords, c.result->status); },
-          "done, partial (bounds of some parameters are the prior's), empty (no theta explains the log) or nothing")
+          "done, partial (bounds of some parameters are the prior's), empty (no theta explains the log), nothing, or "
+          "contradicted (the log contradicts what a model takes for granted: contradictions)")
+      .def_property_readonly(
+          "contradictions",
+          [](const CommissionObject& c) { return to_python(c.json().at("contradictions")); },
+          "list of dicts: id, withdraws, subject, value, limit, sentence, next")
       .def_property_readonly("message", [](const CommissionObject& c) { return c.result->message; })
       .def_property_readonly("notes", [](const CommissionObject& c) { return c.result->notes; })
       .def_property_readonly("parameters", [](const CommissionObject& c) { return c.result->parameters; })

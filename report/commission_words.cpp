@@ -190,8 +190,18 @@ std::string contradiction(const Commissioning& result) {
                      t.size() == 1 ? "itself" : "themselves", t.size() == 1 ? "it" : "them");
 }
 
+// Each contradiction that withdraws a model (or does not) with what to do about it.
+void tell_contradictions(const Commissioning& result, bool withdraws, std::vector<std::string>& out) {
+  for (const LogContradiction& c : result.contradictions) {
+    if (c.withdraws == withdraws) {
+      out.push_back(fmt::format("{}. What to do: {}.", capital(c.sentence), c.next));
+    }
+  }
+}
+
 std::vector<std::string> words_with_model(const Commissioning& result) {
   std::vector<std::string> out = {estimates(result)};
+  tell_contradictions(result, false, out);
   if (std::string missing = unseen(result); !missing.empty()) {
     out.push_back(std::move(missing));
   }
@@ -249,6 +259,7 @@ std::string verdict(const Commissioning& result) {
     case Status::partial: return "Commissioned in part: the log does not show every parameter.";
     case Status::empty: return "No model: the log contradicts the model within the declared noise.";
     case Status::nothing: return "No model: the log shows none of the parameters.";
+    case Status::contradicted: return "No model: the log contradicts what a model takes for granted.";
   }
   return {};
 }
@@ -271,6 +282,13 @@ std::vector<std::string> commission_words(const Commissioning& result) {
       out.emplace_back("No useful threshold can be made of this log.");
       return out;
     }
+    case Status::contradicted: {
+      std::vector<std::string> out;
+      tell_contradictions(result, true, out);
+      tell_contradictions(result, false, out);
+      out.emplace_back("Numbers below are what the log says by itself; no threshold is made of them.");
+      return out;
+    }
     case Status::empty: {
       std::vector<std::string> out = {fmt::format(
           "No parameters within their prior explain this log while the sensors keep to their noise bounds: these "
@@ -279,6 +297,8 @@ std::vector<std::string> commission_words(const Commissioning& result) {
       if (std::string text = contradiction(result); !text.empty()) {
         out.push_back(std::move(text));
       }
+      tell_contradictions(result, true, out);
+      tell_contradictions(result, false, out);
       out.emplace_back(
           "This means one of three things: a fault during the drive, an effect that the model lacks (payload "
           "that moves, slip, dry friction), or noise bounds in the robot file that are too small.");

@@ -8,6 +8,7 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using testing::Outcome;
 
 class Results : public testing::ProgramTest {
@@ -132,6 +133,64 @@ TEST_F(Results, SeveralLogsAreTakenTogether) {
   EXPECT_EQ(data.at("segments"), 2);
 }
 
+// Held commands read as if they were measured are half a step early: two holds would give two disjoint sets.
+TEST_F(Results, AContradictedLogLeavesNoModelThatADetectorBelieves) {
+  put("measured.yaml",
+      "model: differential_drive\nwheel_radius: 0.0975\ntrack_width: 0.381\nnoise: estimate\n"
+      "effort: {kind: torque, hold: first_order}\n");
+  const Outcome outcome = run("commission " + shipped() + " --robot measured.yaml --out late");
+  EXPECT_EQ(outcome.code, 1) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("before the motion"));
+  EXPECT_THAT(outcome.out, HasSubstr("hold: zero_order"));
+  EXPECT_THAT(outcome.out, Not(HasSubstr("guaranteed interval")));
+  const Json model = read_json(path("late/model.json"));
+  EXPECT_EQ(model.at("status"), "contradicted");
+  EXPECT_EQ(model.at("contradictions").at(0).at("id"), "effort_timing");
+  EXPECT_FALSE(model.contains("detector"));
+  if (has_validator()) {
+    EXPECT_EQ(misfit("model.schema.json", "late/model.json"), "");
+  }
+  const Outcome refused = run("detect " + shipped() + " --model late/model.json");
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("holds no model"));
+}
+
+// Time in ms, rows six times sparser than the model's, and a log that is over before the filter has settled.
+TEST_F(Results, ALogOfWhichNothingIsDecidedIsAnAnswer) {
+  commission_shipped();
+  const std::vector<std::string> lines = healthy_lines();
+  std::vector<std::string> in_ms = {lines[0]}, sparse = {lines[0]};
+  const std::vector<std::string> brief(lines.begin(), lines.begin() + 20);
+  for (std::size_t k = 1; k < lines.size(); ++k) {
+    const std::size_t comma = lines[k].find(',');
+    in_ms.push_back(fmt::format("{:.10g}", 1e3 * std::stod(lines[k].substr(0, comma))) + lines[k].substr(comma));
+    if (k % 6 == 0) {
+      sparse.push_back(lines[k]);
+    }
+  }
+  put_lines("ms.csv", in_ms);
+  put_lines("sparse.csv", sparse);
+  put_lines("brief.csv", brief);
+  const Outcome follow_ms = run("detect --follow --model model/model.json", "ms.csv");
+  EXPECT_EQ(follow_ms.code, 2);
+  EXPECT_THAT(follow_ms.err, HasSubstr("is their time in ms?"));
+  const Outcome follow_sparse = run("detect --follow --model model/model.json", "sparse.csv");
+  EXPECT_EQ(follow_sparse.code, 2);
+  EXPECT_THAT(follow_sparse.err, HasSubstr("6 times as far"));
+  const Outcome ms = run("detect ms.csv --model model/model.json --out ms --json");
+  if (Json::parse(ms.out).at("instants") == 0) {
+    EXPECT_EQ(ms.code, 2);
+    EXPECT_THAT(ms.err, HasSubstr("is their time in ms?"));
+  }
+  const Outcome too_short = run("detect brief.csv --model model/model.json --out brief");
+  EXPECT_EQ(too_short.code, 2);
+  EXPECT_THAT(too_short.err, HasSubstr("no instant was decided"));
+  EXPECT_THAT(read_json(path("brief/detection.json")).at("undecided").get<std::string>(), HasSubstr("too few"));
+  if (has_validator()) {
+    EXPECT_EQ(misfit("detection.schema.json", "brief/detection.json"), "");
+  }
+}
+
 TEST_F(Results, FitTheirSchemas) {
   if (testing_support::skip_unless(has_validator(), "python3-jsonschema is not installed")) {
     return;
@@ -148,7 +207,8 @@ TEST_F(Results, FitTheirSchemas) {
   EXPECT_EQ(read_json(path("partial/model.json")).at("status"), "partial");
   EXPECT_EQ(misfit("model.schema.json", "partial/model.json"), "");
 
-  put("estimated.yaml", "model: differential_drive\nwheel_radius: 0.0975\ntrack_width: 0.381\nnoise: estimate\n");
+  put("estimated.yaml", "model: differential_drive\nwheel_radius: 0.0975\ntrack_width: 0.381\nnoise: estimate\n"
+      "effort: {kind: torque, hold: zero_order}\n");
   EXPECT_EQ(run("commission line.csv --robot estimated.yaml --out estimated").code, 0);
   EXPECT_EQ(misfit("model.schema.json", "estimated/model.json"), "");
 

@@ -109,6 +109,37 @@ TEST(Kinematic, IsAbsentWithoutAPose) {
   EXPECT_NE(std::ranges::find(result.notes, result.kinematic.message), result.notes.end());
 }
 
+// Odometry as a base driver publishes it, from the same encoder: margins on it would be those of a perfect sensor.
+TEST(Kinematic, APoseFromTheWheelsIsNoMeasurementOfItsOwn) {
+  const Scenario s = posed_drive(11);
+  LogTable log = simulate(s);
+  const double r = s.robot.wheel_radius, gain = r / s.robot.track_width;
+  const std::vector<double>&right = log.column("phi_r"), &left = log.column("phi_l");
+  std::vector<double>&x = log.column("x"), &y = log.column("y"), &theta = log.column("theta");
+  const std::vector<double> independent = theta;
+  const auto integrate = [&](bool heading) {
+    for (std::size_t k = 1; k < log.rows(); ++k) {
+      const double a = right[k] - right[k - 1], b = left[k] - left[k - 1];
+      theta[k] = heading ? theta[k - 1] + gain * (a - b) : independent[k];
+      x[k] = x[k - 1] + 0.5 * r * (a + b) * std::cos(0.5 * (theta[k] + theta[k - 1]));
+      y[k] = y[k - 1] + 0.5 * r * (a + b) * std::sin(0.5 * (theta[k] + theta[k - 1]));
+    }
+    TableSource source(log);
+    return commission(source, s.robot);
+  };
+  const Commissioning all = integrate(true);
+  EXPECT_EQ(all.kinematic.status, Status::absent);
+  EXPECT_FALSE(all.model.kinematic.has_value());
+  EXPECT_NE(all.kinematic.message.find("wheel odometry over again"), std::string::npos) << all.kinematic.message;
+  EXPECT_EQ(all.status, Commissioning::Status::done) << "the torque residual needs no pose";
+  // Positions of the wheels under a heading of its own, as a filter of wheels and gyro makes them.
+  const Commissioning positions = integrate(false);
+  ASSERT_TRUE(positions.model.kinematic.has_value()) << positions.kinematic.message;
+  EXPECT_FALSE(positions.model.kinematic->measurement.position);
+  EXPECT_TRUE(positions.model.kinematic->measurement.heading);
+  EXPECT_NE(positions.kinematic.message.find("x and y"), std::string::npos);
+}
+
 TEST(Kinematic, StraightDrivingLeavesTheTurnToThePrior) {
   const KinematicCommissioning result = commissioned(straight_drive(7, 20.0));
   ASSERT_TRUE(result.model.has_value()) << result.message;

@@ -182,8 +182,41 @@ TEST_F(LogHealthTest, LateEffortsAreTimed) {
     std::vector<double>& tau = log.column(name);
     std::rotate(tau.begin(), tau.end() - kLate, tau.end());
   }
-  const LogFinding found = expect("time.effort_delay", kWarning);
+  const LogFinding found = expect("time.effort_delay", kFatal);
   EXPECT_NEAR(found.value, 0.05, 0.005);
+}
+
+TEST_F(LogHealthTest, AWrappedWheelAngleIsFatal) {
+  log.names[*TableSource(log).find("omega_r")] = "phi_r";
+  log.names[*TableSource(log).find("omega_l")] = "phi_l";
+  for (const char* name : {"phi_r", "phi_l"}) {
+    double angle = 0.0;
+    for (double& value : log.column(name)) {
+      angle += 0.01 * value;
+      value = std::remainder(angle, 2.0 * std::numbers::pi);
+    }
+  }
+  expect("signals.wrapped", kFatal);
+}
+
+TEST_F(LogHealthTest, AnglesThatWereUnwrappedOnReadingAreTold) {
+  const LogHealth read = examine(log, std::nullopt, {.rows_read = log.rows(), .unwrapped = 93});
+  ASSERT_NE(read.find("signals.wrapped"), nullptr);
+  EXPECT_EQ(read.find("signals.wrapped")->severity, FindingSeverity::notice);
+  EXPECT_THAT(read.find("signals.wrapped")->sentence, ::testing::HasSubstr("93 times"));
+}
+
+TEST_F(LogHealthTest, APoseFromTheWheelsIsTold) {
+  const double r = 0.0975, c = r / 0.381;
+  const std::vector<double>&right = log.column("omega_r"), &left = log.column("omega_l");
+  std::vector<double>&x = log.column("x"), &y = log.column("y"), &theta = log.column("theta");
+  for (std::size_t k = 1; k < log.rows(); ++k) {
+    const double h = log.t[k] - log.t[k - 1];
+    theta[k] = theta[k - 1] + c * h * (right[k] - left[k]);
+    x[k] = x[k - 1] + 0.5 * r * h * (right[k] + left[k]) * std::cos(theta[k - 1]);
+    y[k] = y[k - 1] + 0.5 * r * h * (right[k] + left[k]) * std::sin(theta[k - 1]);
+  }
+  expect("signals.pose_repeats_wheels", kWarning);
 }
 
 TEST_F(LogHealthTest, ALatePoseIsTimed) {

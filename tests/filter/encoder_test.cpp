@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/filter/encoder.hpp>
+#include <wheelwright/filter/measurement.hpp>
 
 #include <cmath>
 #include <numbers>
@@ -61,6 +62,63 @@ TEST(FindEncoder, DecimalsAreNoEncoder) {
     }
     EXPECT_FALSE(find_encoder(speeds, 0.01)) << decimals;
   }
+}
+
+// Drives that report whole rpm (or tenths, or tens of them), printed with few or many decimals.
+TEST(FindEncoder, WholeRpmAreNoEncoder) {
+  const double rpm = 2.0 * std::numbers::pi / 60.0;
+  for (const double unit : {0.1, 0.5, 1.0, 2.0, 5.0, 10.0}) {
+    for (const int decimals : {4, 6, 12}) {
+      for (const double step : {0.002, 0.01, 0.05}) {
+        std::vector<double> speeds;
+        for (int k = 0; k < 4000; ++k) {
+          const double speed = 12.0 * std::sin(0.007 * k) + 5.0 * std::sin(0.0231 * k);
+          speeds.push_back(printed(std::round(speed / (unit * rpm)) * unit * rpm, decimals));
+        }
+        EXPECT_FALSE(find_encoder(speeds, step)) << unit << " rpm, " << decimals << " decimals, " << step << " s";
+      }
+    }
+  }
+}
+
+TEST(FindEncoder, AnglesMayHaveAnyNumberOfCounts) {
+  for (const double counts : {600.0, 1200.0, 6000.0}) {
+    std::vector<double> steps = differenced(counts, 0.01, 8.0, 9);
+    for (double& step : steps) {
+      step *= 0.01;
+    }
+    const auto found = find_encoder_of_angles(steps);
+    ASSERT_TRUE(found) << counts;
+    EXPECT_EQ(found->counts_per_turn, counts);
+  }
+}
+
+// What is merely found replaces nothing that is declared, unless that cannot be: a rounded speed is wrong by half a unit.
+TEST(FindEncoder, AQuantumThatIsFoundReplacesNoDeclaredBound) {
+  LogTable log;
+  log.names = {"omega_r", "omega_l", "tau_r", "tau_l"};
+  const auto speeds = differenced(4096.0, 0.01, 8.0, 9);
+  log.columns.assign(4, speeds);
+  for (std::size_t k = 0; k < speeds.size(); ++k) {
+    log.t.push_back(0.01 * static_cast<double>(k));
+  }
+  TableSource source(log);
+  Robot robot;
+  robot.wheel_radius = 0.1;
+  robot.track_width = 0.4;
+  const double count = 2.0 * std::numbers::pi / (4096.0 * 0.01);
+  const auto found = [&] { return find_measurement(source, robot, make_model(robot), 2); };
+  EXPECT_EQ(found().motion, MotionKind::mean_speed);
+  robot.noise.wheel_speed.value = 0.5 * count;
+  EXPECT_EQ(found().motion, MotionKind::speed);
+  EXPECT_NEAR(found().unused_count, count, 1e-6);
+  robot.noise.wheel_speed.value = 3.0 * count;
+  EXPECT_EQ(found().motion, MotionKind::speed);
+  robot.noise.wheel_speed.value = 0.1 * count;
+  EXPECT_EQ(found().motion, MotionKind::mean_speed) << "no speed rounded to it can have so small an error";
+  robot.noise.wheel_speed.value = 3.0 * count;
+  robot.encoder_counts_per_turn = 4096.0;
+  EXPECT_EQ(found().motion, MotionKind::mean_speed);
 }
 
 TEST(FindEncoder, SmoothSpeedsAreNoEncoder) {

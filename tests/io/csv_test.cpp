@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include <fmt/format.h>
+
 #include "io/scratch.hpp"
 
 namespace wheelwright::csv_test {
@@ -251,6 +253,44 @@ TEST_F(Csv, UnwrapsTheHeadingInsideSegments) {
   }
   EXPECT_LE(std::abs(theta[100]), std::numbers::pi) << "a segment begins with the heading as logged";
   EXPECT_GE(report.wraps.count, 20u);
+}
+
+TEST_F(Csv, WheelAnglesWrappedAtATurnAreUnwrappedAndCounted) {
+  for (const bool from_zero : {false, true}) {
+    std::string text = "t,phi_r,phi_l\n";
+    const double turn = 2.0 * std::numbers::pi;
+    for (int k = 0; k < 400; ++k) {
+      const double right = 0.3 * k, left = 40.0 * std::sin(0.02 * k);
+      const auto wrapped = [&](double angle) {
+        return from_zero ? angle - turn * std::floor(angle / turn) : std::remainder(angle, turn);
+      };
+      text += fmt::format("{},{:.9f},{:.9f}\n", 0.01 * k, wrapped(right), wrapped(left));
+    }
+    const LogTable table = read(text);
+    for (std::size_t k = 1; k < table.rows(); ++k) {
+      ASSERT_NEAR(table.column("phi_r")[k] - table.column("phi_r")[k - 1], 0.3, 1e-8) << k;
+      const double left = 40.0 * (std::sin(0.02 * static_cast<double>(k)) - std::sin(0.02 * static_cast<double>(k - 1)));
+      ASSERT_NEAR(table.column("phi_l")[k] - table.column("phi_l")[k - 1], left, 1e-8) << k;
+    }
+    EXPECT_GE(report.angle_wraps.count, 30u);
+    EXPECT_EQ(report.rows, 400u);
+    const std::vector<std::string> told = sentences(report);
+    EXPECT_TRUE(std::ranges::any_of(told, [](const std::string& s) { return s.find("wrapped") != std::string::npos; }));
+  }
+}
+
+// A wheel so fast that a step is most of a turn, and a counter that is set back: neither is a wrap.
+TEST_F(Csv, WheelAnglesThatAreNotWrappedStayAsTheyAre) {
+  std::string text = "t,phi_r,phi_l\n";
+  for (int k = 0; k < 200; ++k) {
+    text += fmt::format("{},{},{}\n", 0.1 * k, 5.5 * k, k < 100 ? 0.5 * k : 0.5 * k - 50.0);
+  }
+  const LogTable table = read(text);
+  for (std::size_t k = 0; k < table.rows(); ++k) {
+    ASSERT_EQ(table.column("phi_r")[k], 5.5 * static_cast<double>(k));
+    ASSERT_EQ(table.column("phi_l")[k], 0.5 * static_cast<double>(k) - (k < 100 ? 0.0 : 50.0));
+  }
+  EXPECT_EQ(report.angle_wraps.count, 0u);
 }
 
 TEST_F(Csv, MedianStepIsThatOfTheFirstSteps) {

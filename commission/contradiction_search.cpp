@@ -1,0 +1,514 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/commission/contradiction_search.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include <fmt/format.h>
+#include <Eigen/QR>
+
+#include <wheelwright/commission/commission.hpp>
+#include <wheelwright/commission/physical.hpp>
+#include <wheelwright/core/error.hpp>
+#include <wheelwright/identify/noise_level.hpp>
+#include <wheelwright/identify/time_shift.hpp>
+#include <wheelwright/identify/variable_projection.hpp>
+
+namespace wheelwright {
+namespace {
+
+using Kind = LogContradiction::Kind;
+
+constexpr double kRiskOfWithdrawal = 1e-8;  // two-sided, of Student's t: a model is withdrawn in error once in 10⁸ looks
+constexpr double kMaterial = 0.1;           // of the weighted effort: a wrong sign below it is a note
+constexpr double kLeastShift = 0.25;    // of a step: interpolation between samples leaves up to a tenth of one
+constexpr double kMovesParameter = 2.0;  // standard errors
+constexpr double kLowersResidual = 0.99;
+constexpr double kMirror = 1.001;        // a true shift is worse than none with its sign turned
+constexpr double kUnrelated = 0.05;      // share of an effort's variation that motion must explain of it
+constexpr double kManyStepsOff = 0.2;    // of a step: how near half a step a shift must be to be one
+constexpr double kMuchRaised = 3.0;      // factor on an estimated noise bound
+constexpr double kWheelsDiffer = 1.15;   // ratio of the masses that two wheels show: worth a note
+constexpr double kWheelsContradict = 1.8;  // the same: a unit, a gear or a sensor is wrong
+constexpr double kManyOutside = 0.01;      // of the held-out instants
+constexpr std::size_t kFewestHalf = 200;   // instants of a half from which on it is looked at
+
+// Standard errors beyond which a difference is taken for real.
+double certain(double freedom) { return student_quantile(1.0 - kRiskOfWithdrawal, std::max(freedom, 1.0)); }
+
+// A column of the log over all rows.
+struct ColumnRange {
+  double least = std::numeric_limits<double>::infinity();
+  double most = -std::numeric_limits<double>::infinity();
+  [[nodiscard]] bool constant() const { return least == most; }
+};
+
+std::vector<ColumnRange> ranges_of(LogSource& log, const std::vector<std::string>& columns) {
+  std::vector<std::size_t> pick;
+  for (const std::string& column : columns) {
+    pick.push_back(*log.find(column));
+  }
+  std::vector<ColumnRange> ranges(columns.size());
+  LogBlock block;
+  log.rewind();
+  while (log.next(block)) {
+    for (std::size_t c = 0; c < pick.size() && block.rows() > 0; ++c) {
+      const auto [least, most] = std::ranges::minmax(block.columns[pick[c]]);
+      ranges[c] = {std::min(ranges[c].least, least), std::max(ranges[c].most, most)};
+    }
+  }
+  log.rewind();
+  return ranges;
+}
+
+void find_constant_efforts(LogSource& log, const Setting& s, std::vector<LogContradiction>& out) {
+  const std::vector<ColumnRange> efforts = ranges_of(log, s.measurement.effort_columns);
+  const std::vector<ColumnRange> motions = ranges_of(log, s.measurement.motion_columns);
+  for (std::size_t j = 0; j < efforts.size(); ++j) {
+    if (efforts[j].constant() && !motions[j].constant()) {
+      const std::string& name = s.measurement.effort_columns[j];
+      out.push_back({.kind = Kind::effort_constant,
+                     .subject = name,
+                     .value = efforts[j].least,
+                     .sentence = fmt::format("{} is {:.6g} in every row although {} changes: no force is measured", name,
+                                             efforts[j].least, s.measurement.motion_columns[j]),
+                     .next = "check that the sensor is connected and that the right column is read (--map)"});
+    }
+  }
+}
+
+// The effort of each joint by itself, on all that the motion offers: what the rows say of it.
+struct JointFit {
+  double explained = 1.0;      // share of its square
+  Eigen::VectorXd estimate;    // of each column
+  Eigen::VectorXd error;       // standard errors
+  double freedom = 1.0;
+};
+
+// Columns of the outputs' rows side by side, those that are zero throughout left out: (output, parameter).
+std::vector<std::pair<std::size_t, std::size_t>> side_by_side(const Model& model) {
+  std::vector<std::pair<std::size_t, std::size_t>> columns;
+  for (std::size_t j = 0; j < model.p(); ++j) {
+    for (std::size_t i = 0; i < model.n(); ++i) {
+      if (std::ranges::any_of(model.terms, [&](const Term& t) { return t.output == i && t.parameter == j; })) {
+        columns.emplace_back(i, j);
+      }
+    }
+  }
+  return columns;
+}
+
+RegressionBlock joint_rows(const RegressionBlock& block, const Eigen::RowVectorXd& share,
+                           const std::vector<std::pair<std::size_t, std::size_t>>& columns) {
+  const auto n = static_cast<Eigen::Index>(block.outputs);
+  RegressionBlock rows;
+  rows.resize(block.instants(), 1, columns.size());
+  rows.sample = block.sample;
+  rows.t = block.t;
+  rows.dY.setZero();
+  rows.dy.setZero();
+  for (std::size_t k = 0; k < block.instants(); ++k) {
+    const auto at = static_cast<Eigen::Index>(k);
+    rows.y[at] = share.dot(block.y.segment(at * n, n));
+    for (std::size_t c = 0; c < columns.size(); ++c) {
+      rows.Y(at, static_cast<Eigen::Index>(c)) = block.Y(at * n + static_cast<Eigen::Index>(columns[c].first),
+                                                         static_cast<Eigen::Index>(columns[c].second));
+    }
+  }
+  return rows;
+}
+
+std::vector<JointFit> fit_joints(LogSource& log, const Setting& s) {
+  const auto joints = static_cast<std::size_t>(s.model.input.cols());
+  if (s.model.input.rows() != s.model.input.cols() || joints < 2 || s.measurement.effort_unsigned) {
+    return {};
+  }
+  const Eigen::MatrixXd shares = s.model.input.fullPivHouseholderQr().inverse();
+  if (!shares.allFinite()) {
+    return {};
+  }
+  const auto columns = side_by_side(s.model);
+  std::vector<LeastSquares> sums(joints, LeastSquares(columns.size()));
+  RegressionStream rows = make_rows(log, s);
+  RegressionBlock block;
+  const auto each = [&](auto&& visit) {
+    rows.rewind();
+    while (rows.next(block)) {
+      for (std::size_t j = 0; j < joints; ++j) {
+        visit(j, joint_rows(block, shares.row(static_cast<Eigen::Index>(j)), columns));
+      }
+    }
+  };
+  each([&](std::size_t j, const RegressionBlock& of_joint) { sums[j].add(of_joint); });
+  if (sums.front().instants() < kFewestHalf) {
+    return {};
+  }
+  std::vector<LeastSquaresFit> fits;
+  std::vector<ResidualStatistics> statistics;
+  for (const LeastSquares& sum : sums) {
+    fits.push_back(sum.solve());
+    statistics.emplace_back(fits.back().estimate, Eigen::VectorXd::Ones(1));
+  }
+  each([&](std::size_t j, const RegressionBlock& of_joint) { statistics[j].add(of_joint); });
+  std::vector<JointFit> result;
+  for (std::size_t j = 0; j < joints; ++j) {
+    const LeastSquaresFit& fit = fits[j];
+    const ResidualSummary summary = statistics[j].summary(fit.inverse_gram);
+    result.push_back({.explained = fit.weighted_tss > 0.0 ? 1.0 - fit.weighted_rss / fit.weighted_tss : 0.0,
+                      .estimate = fit.estimate,
+                      .error = summary.standard_error,
+                      .freedom = summary.freedom});
+  }
+  return result;
+}
+
+void find_unrelated_efforts(const Setting& s, const std::vector<JointFit>& joints, std::vector<LogContradiction>& out) {
+  for (std::size_t j = 0; j < joints.size(); ++j) {
+    const std::string& name = s.measurement.effort_columns[j];
+    const bool told = std::ranges::any_of(out, [&](const LogContradiction& c) { return c.subject == name; });
+    if (!told && joints[j].explained < kUnrelated) {
+      out.push_back({.kind = Kind::effort_unrelated,
+                     .subject = name,
+                     .value = joints[j].explained,
+                     .limit = kUnrelated,
+                     .sentence = fmt::format("{} does not depend on the motion: all of it together explains {:.2g} % of "
+                                             "this effort",
+                                             name, 100.0 * std::max(0.0, joints[j].explained)),
+                     .next = "check that the sensor is connected and that the right column is read (--map)"});
+    }
+  }
+}
+
+// Both wheels of a differential drive carry half of the mass: their efforts must show one and the same.
+void find_uneven_efforts(const Setting& s, const std::vector<JointFit>& joints, std::vector<LogContradiction>& out) {
+  if (joints.size() != 2 || s.robot.model != "differential_drive" || !s.robot.effects.empty()) {
+    return;
+  }
+  const auto columns = side_by_side(s.model);
+  const auto mass = std::ranges::find_if(columns, [&](const auto& column) {
+    return column.first == 0 && s.model.parameters[column.second].physical == "mass";
+  });
+  if (mass == columns.end()) {
+    return;
+  }
+  const auto at = static_cast<Eigen::Index>(mass - columns.begin());
+  const double right = joints[0].estimate[at], left = joints[1].estimate[at];
+  const double least = std::min(right, left), most = std::max(right, left);
+  const double error = std::hypot(joints[0].error[at], joints[1].error[at]);
+  if (!(least > 0.0) || most < kWheelsDiffer * least || most - least < certain(std::min(joints[0].freedom, joints[1].freedom)) * error) {
+    return;
+  }
+  const auto& names = s.measurement.effort_columns;
+  const double ratio = most / least;
+  out.push_back({.kind = Kind::wheels_disagree,
+                 .withdraws = ratio > kWheelsContradict,
+                 .subject = right > left ? names[0] : names[1],
+                 .value = ratio,
+                 .limit = kWheelsContradict,
+                 .sentence = fmt::format("by {} the robot has {:.3g} times the mass that it has by {}",
+                                         right > left ? names[0] : names[1], ratio, right > left ? names[1] : names[0]),
+                 .next = "check unit, gear and torque constant of both efforts; a load far beside the middle does the "
+                         "same, and `gap` tells it"});
+}
+
+// θ at shift 0 on the rows of `model`.
+Eigen::VectorXd unshifted(const TimeShiftedRows& model, const Eigen::VectorXd& weights) {
+  SeparableValues at;
+  model.evaluate(Eigen::VectorXd::Zero(1), false, at);
+  Eigen::VectorXd y = model.response();
+  for (Eigen::Index r = 0; r < y.size(); ++r) {
+    const double w = weights[r % weights.size()];
+    at.columns.row(r) *= w;
+    y[r] *= w;
+  }
+  return at.columns.colPivHouseholderQr().solve(y);
+}
+
+std::string shift_words(const Setting& s, const EffortTiming& timing) {
+  const double late = timing.delay + 0.5 * (s.robot.effort_delay.lower + s.robot.effort_delay.upper);
+  const double half = std::abs(std::abs(timing.delay / s.survey.median_step) - 0.5);
+  const std::string declare = fmt::format(
+      "where the shift is constant and known, declare it, as a range that holds it: `effort: {{delay: [{:.3g}, {:.3g}]}}` in "
+      "the robot file",
+      late - 5.0 * timing.standard_error, late + 5.0 * timing.standard_error);
+  if (timing.delay < 0.0 && s.measurement.hold == Hold::first_order && half < kManyStepsOff) {
+    return "that is half a step: speeds that are differenced backwards are stamped half a step late (stamp them in the "
+           "middle of their interval, or log angles), and efforts that are held commands want `hold: zero_order`; " +
+           declare;
+  }
+  if (timing.delay > 0.0 && s.measurement.hold == Hold::zero_order && half < kManyStepsOff) {
+    return "that is half a step, as with efforts that are measured and not held (`hold: first_order`); " + declare;
+  }
+  return "stamp efforts and motion by one clock where they are measured; " + declare;
+}
+
+void find_latency(const Setting& s, const std::optional<EffortTiming>& timing, std::vector<LogContradiction>& out) {
+  if (!timing || !is_latency(*timing, s.survey.median_step)) {
+    return;
+  }
+  out.push_back({.kind = Kind::effort_timing,
+                 .subject = s.measurement.effort_columns.front(),
+                 .value = timing->delay,
+                 .limit = timing->declared + kLeastShift * s.survey.median_step,
+                 .sentence = fmt::format("the efforts come {:.3g} ± {:.1g} ms {} the motion, {:.2g} steps of the log",
+                                         1e3 * std::abs(timing->delay), 2e3 * timing->standard_error,
+                                         timing->delay > 0.0 ? "after" : "before",
+                                         std::abs(timing->delay) / s.survey.median_step),
+                 .next = shift_words(s, *timing)});
+}
+
+// A parameter as people know it: name, value and unit.
+struct InWords {
+  std::string name, unit;
+  double scale = 1.0, offset = 0.0;
+  [[nodiscard]] double value(double theta) const { return scale * theta - offset; }
+};
+
+InWords in_words(const Setting& s, std::size_t j) {
+  const auto scales = physical_scales(s.robot, s.model);
+  const Parameter& p = s.model.parameters[j];
+  return scales ? InWords{p.physical, p.physical_unit, (*scales)[j].scale, (*scales)[j].offset}
+                : InWords{p.name, parameter_unit(s.robot, p)};
+}
+
+void find_wrong_signs(const Setting& s, const Fit& fit, std::vector<LogContradiction>& out) {
+  const auto instants = static_cast<double>(std::max<std::size_t>(fit.squares.instants, 1));
+  const double effort = std::sqrt(fit.squares.weighted_tss / instants);
+  for (std::size_t j = 0; j < s.model.p(); ++j) {
+    const auto at = static_cast<Eigen::Index>(j);
+    const double estimate = fit.estimate[at], error = fit.residuals.standard_error[at];
+    if (fit.excitation[j].state != Excitation::identified || s.prior.sides[j].lower < 0.0 ||
+        s.measurement.effort_unsigned || !(estimate < -certain(fit.residuals.freedom) * error)) {
+      continue;
+    }
+    const InWords w = in_words(s, j);
+    out.push_back({.kind = Kind::wrong_sign,
+                   .withdraws = -estimate * fit.squares.column_rms[at] > kMaterial * effort,
+                   .subject = s.model.parameters[j].physical,
+                   .value = w.value(estimate),
+                   .limit = 0.0,
+                   .sentence = fmt::format("the log shows a negative {}: {:.4g} ± {:.2g} {}", w.name, w.value(estimate),
+                                           2.0 * std::abs(w.scale) * error, w.unit),
+                   .next = "check the signs of efforts and motion, right and left, and their clocks; an effect that "
+                           "the model lacks (`gap` finds it) may do the same"});
+  }
+}
+
+// Least squares on each half of the log's rows.
+void find_uneven_halves(LogSource& log, const Setting& s, const Fit& fit, std::vector<LogContradiction>& out) {
+  if (fit.choice.candidates.empty() || fit.choice.chosen > 0 || fit.choice.in_doubt) {
+    return;  // least squares is biased by noise, and by how much depends on the driving
+  }
+  const std::size_t middle = s.survey.rows / 2;
+  RegressionStream rows = make_rows(log, s, s.declared);
+  RegressionBlock block;
+  const auto each = [&](auto&& visit) {
+    rows.rewind();
+    while (rows.next(block)) {
+      const auto from = std::ranges::lower_bound(block.sample, middle) - block.sample.begin();
+      visit(std::size_t{0}, std::size_t{0}, static_cast<std::size_t>(from));
+      visit(std::size_t{1}, static_cast<std::size_t>(from), block.instants());
+    }
+  };
+  std::vector<LeastSquares> sums(2, LeastSquares(s.model.p(), fit.weights));
+  each([&](std::size_t half, std::size_t first, std::size_t last) { sums[half].add(block, first, last); });
+  if (std::min(sums[0].instants(), sums[1].instants()) < kFewestHalf) {
+    return;
+  }
+  std::vector<bool> excluded;
+  for (const ExcitationFinding& finding : fit.excitation) {
+    excluded.push_back(finding.state == Excitation::not_excited);
+  }
+  std::vector<LeastSquaresFit> fits;
+  std::vector<ResidualStatistics> statistics;
+  for (const LeastSquares& sum : sums) {
+    fits.push_back(sum.solve(excluded));
+    statistics.emplace_back(fits.back().estimate, fit.weights);
+  }
+  each([&](std::size_t half, std::size_t first, std::size_t last) { statistics[half].add(block, first, last); });
+  std::vector<ResidualSummary> residuals;
+  std::vector<std::vector<ExcitationFinding>> excitation;
+  for (std::size_t half = 0; half < 2; ++half) {
+    residuals.push_back(statistics[half].summary(fits[half].inverse_gram));
+    excitation.push_back(judge_excitation(fits[half], residuals[half].standard_error,
+                                          student_quantile(0.95, std::max(residuals[half].freedom, 1.0))));
+  }
+  for (std::size_t j = 0; j < s.model.p(); ++j) {
+    const auto at = static_cast<Eigen::Index>(j);
+    const double a = fits[0].estimate[at], b = fits[1].estimate[at];
+    const double error = std::hypot(residuals[0].standard_error[at], residuals[1].standard_error[at]);
+    const bool shown = !excluded[j] && excitation[0][j].state != Excitation::not_excited &&
+                       excitation[1][j].state != Excitation::not_excited;
+    const double sure = certain(std::min(residuals[0].freedom, residuals[1].freedom)) * error;
+    if (!shown || !(std::abs(a - b) > sure)) {
+      continue;
+    }
+    const InWords w = in_words(s, j);
+    const double half_a = 2.0 * std::abs(w.scale) * residuals[0].standard_error[at];
+    const double half_b = 2.0 * std::abs(w.scale) * residuals[1].standard_error[at];
+    out.push_back({.kind = Kind::halves_disagree,
+                   .withdraws = false,
+                   .subject = s.model.parameters[j].physical,
+                   .value = std::abs(a - b),
+                   .limit = sure,
+                   .sentence = fmt::format("the first half of the log gives {} {:.4g} ± {:.2g} {}, the second {:.4g} ± "
+                                           "{:.2g} {}",
+                                           w.name, w.value(a), half_a, w.unit, w.value(b), half_b, w.unit),
+                   .next = "the robot changed on the way (load, temperature, a fault), or the model lacks an effect: "
+                           "commission the halves by themselves, or let `gap` look at the log"});
+  }
+}
+
+}  // namespace
+
+std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& s, const Fit& fit, double longest,
+                                          std::size_t most_rows) {
+  if (s.measurement.effort_unsigned) {
+    return std::nullopt;
+  }
+  RegressionBlock rows;
+  {
+    RegressionStream stream = make_rows(log, s);
+    RegressionBlock block;
+    std::vector<RegressionBlock> parts;
+    std::size_t instants = 0;
+    stream.rewind();
+    while (instants < most_rows && stream.next(block)) {
+      instants += block.instants();
+      parts.push_back(block);
+    }
+    log.rewind();
+    rows.resize(instants, s.model.n(), s.model.p());
+    std::size_t first = 0;
+    for (const RegressionBlock& part : parts) {
+      const auto at = static_cast<Eigen::Index>(first * s.model.n());
+      std::ranges::copy(part.sample, rows.sample.begin() + static_cast<std::ptrdiff_t>(first));
+      std::ranges::copy(part.t, rows.t.begin() + static_cast<std::ptrdiff_t>(first));
+      rows.Y.middleRows(at, part.rows()) = part.Y;
+      rows.y.segment(at, part.rows()) = part.y;
+      first += part.instants();
+    }
+    rows.dY.setZero();
+    rows.dy.setZero();
+  }
+  if (rows.instants() < kFewestHalf) {
+    return std::nullopt;
+  }
+  try {
+    const TimeShiftedRows model(rows, TimeEffect::delay, -longest, longest);
+    VariableProjectionOptions options = model.options();
+    options.weights = fit.weights;
+    const SeparableFit found = variable_projection(model, options);
+    if (found.end != SearchEnd::converged || found.state[0] != ShapeState::identified) {
+      return std::nullopt;
+    }
+    const auto rss = [&](double shift) {
+      return cost_curve(model, Eigen::VectorXd::Zero(1), 0, shift, shift + 1e-9, 2, fit.weights).front().weighted_rss;
+    };
+    EffortTiming timing{.delay = found.shape[0], .standard_error = found.standard_error[0], .freedom = found.freedom};
+    const bool moving = s.measurement.hold == Hold::zero_order && s.robot.effort_changes == EffortChanges::between;
+    timing.declared = 0.5 * (s.robot.effort_delay.upper - s.robot.effort_delay.lower) +
+                      (moving ? 0.5 * s.survey.median_step : 0.0);
+    const double without = rss(0.0);
+    timing.residual_ratio = without > 0.0 ? std::sqrt(found.weighted_rss / without) : 1.0;
+    timing.mirror_ratio = without > 0.0 ? std::sqrt(rss(-timing.delay) / without) : 1.0;
+    const Eigen::VectorXd moved = (found.linear - unshifted(model, fit.weights)).cwiseAbs();
+    for (std::size_t j = 0; j < s.model.p(); ++j) {
+      const auto at = static_cast<Eigen::Index>(j);
+      const double error = fit.residuals.standard_error[at];
+      if (fit.excitation[j].state == Excitation::identified && error > 0.0) {
+        timing.moved = std::max(timing.moved, moved[at] / error);
+      }
+    }
+    return timing;
+  } catch (const InvalidArgument&) {
+    return std::nullopt;  // segments shorter than the longest shift
+  }
+}
+
+bool is_latency(const EffortTiming& timing, double step) {
+  const double shift = std::max(0.0, std::abs(timing.delay) - timing.declared);
+  return shift > kLeastShift * step && shift > certain(timing.freedom) * timing.standard_error && timing.mirror_ratio > kMirror &&
+         (timing.residual_ratio < kLowersResidual || timing.moved > kMovesParameter);
+}
+
+SignalFindings contradictions_in_log(LogSource& log, const Setting& s, const Fit& fit) {
+  SignalFindings findings;
+  std::vector<LogContradiction>& found = findings.contradictions;
+  find_constant_efforts(log, s, found);
+  const std::vector<JointFit> joints = fit_joints(log, s);
+  find_unrelated_efforts(s, joints, found);
+  if (found.empty()) {  // nothing else is worth a word beside a dead sensor
+    findings.timing = effort_timing(log, s, fit);
+    find_latency(s, findings.timing, found);
+    find_wrong_signs(s, fit, found);
+    find_uneven_efforts(s, joints, found);
+    find_uneven_halves(log, s, fit, found);
+  }
+  log.rewind();
+  return findings;
+}
+
+std::vector<LogContradiction> contradictions_in_result(const Commissioning& result, const Setting& s, double raised) {
+  std::vector<LogContradiction> found;
+  const double t = student_quantile(0.95, std::max(result.residuals.freedom, 1.0));
+  for (std::size_t j = 0; j < result.parameters.size(); ++j) {
+    const ParameterResult& p = result.parameters[j];
+    const Interval& prior = s.prior.sides[j];
+    const InWords w = in_words(s, j);
+    if (raised > kMuchRaised && p.estimate && !prior.contains(*p.estimate)) {
+      found.push_back(
+          {.kind = Kind::prior_edge,
+           .subject = p.parameter.physical,
+           .value = raised,
+           .limit = kMuchRaised,
+           .sentence = fmt::format("{} is {:.4g} {} by least squares, outside its prior [{:.4g}, {:.4g}]{}; within it the "
+                                   "noise would have to be {:.3g} times as large",
+                                   w.name, w.value(*p.estimate), w.unit, w.value(prior.lower), w.value(prior.upper),
+                                   s.prior_declared[j] ? "" : ", the tool's own wide default", raised),
+           .next = fmt::format("check units and signs; where they are right, give the robot's own bounds: `prior: {{{}: "
+                               "[…, …]}}` in the robot file",
+                               p.parameter.physical)});
+    }
+    if (!p.estimate || p.estimate_inside || !p.standard_error) {
+      continue;
+    }
+    const double gap = *p.estimate < p.lower ? p.lower - *p.estimate : *p.estimate - p.upper;
+    const double reach = t * *p.standard_error;
+    const bool far = gap > certain(result.residuals.freedom) * *p.standard_error && gap > 0.5 * (p.upper - p.lower);
+    found.push_back(
+        {.kind = Kind::estimate_outside,
+         .withdraws = far && s.noise_complete,
+         .subject = p.parameter.physical,
+         .value = *p.estimate,
+         .limit = *p.estimate < p.lower ? p.lower : p.upper,
+         .sentence = fmt::format("the best guess of {}, {:.5g} ± {:.2g} {}, lies outside [{:.5g}, {:.5g}]{}", w.name,
+                                 w.value(*p.estimate), std::abs(w.scale) * reach, w.unit, w.value(p.lower),
+                                 w.value(p.upper), gap > reach ? " with its whole 95 % interval" : ""),
+         .next = gap > reach ? "one of the assumptions behind them does not hold: look for an offset of an effort, for "
+                               "clocks, and let `gap` look for an effect that the model lacks"
+                             : "take the interval, not the guess"});
+  }
+  for (std::size_t i = 0; i < result.validation.size(); ++i) {
+    const OutputValidation& v = result.validation[i];
+    if (v.outside == 0) {
+      continue;
+    }
+    const double share = static_cast<double>(v.outside) / static_cast<double>(v.instants);
+    found.push_back({.kind = Kind::held_out_outside,
+                     .withdraws = s.noise_complete || share > kManyOutside,
+                     .subject = s.model.outputs[i],
+                     .value = share,
+                     .limit = s.noise_complete ? 0.0 : kManyOutside,
+                     .sentence = fmt::format("{} of {} instants that were held out ({:.2g} %) leave the thresholds of the "
+                                             "{} channel",
+                                             v.outside, v.instants, 100.0 * share, s.model.outputs[i]),
+                     .next = "the log is not of one healthy robot in one kind of driving: look at these moments, drive "
+                             "longer, or declare the sensors' noise"});
+  }
+  return found;
+}
+
+}  // namespace wheelwright

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// The search for contradictions: efforts that measure nothing or come late, wrong signs, halves and wheels that disagree.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include <wheelwright/commission/contradictions.hpp>
+#include <wheelwright/commission/fit.hpp>
+#include <wheelwright/commission/setting.hpp>
+#include <wheelwright/core/log.hpp>
+
+namespace wheelwright {
+
+struct Commissioning;
+
+/// A constant shift in time between effort and motion, by least squares over filtered rows (TimeShiftedRows).
+struct EffortTiming {
+  double delay = 0.0;           ///< s, beyond the middle of what is declared; > 0: the logged effort comes late
+  double declared = 0.0;        ///< s, half of the range that is declared: of effort.delay, and of a step where held
+                                ///< efforts may change between samples
+  double standard_error = 0.0;  ///< s, honest under autocorrelated residuals
+  double freedom = 1.0;         ///< degrees of freedom of its Student's t
+  double residual_ratio = 1.0;  ///< rms residual with the shift over that without
+  double mirror_ratio = 1.0;    ///< the same with the shift's sign turned: a true shift makes it larger than 1
+  double moved = 0.0;           ///< largest change of a parameter by the shift, in its standard errors
+};
+
+/// The shift that explains the first `most_rows` rows of `log` best, at most `longest` either way; nothing where none is
+/// told (flat, at the end of what is searched, segments too short, unsigned efforts).
+[[nodiscard]] std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& setting, const Fit& fit,
+                                                        double longest = 0.2, std::size_t most_rows = 60000);
+
+/// Whether `timing` is a latency that a model must not be made with: beyond what is declared, told from that at a risk of
+/// 1e-8 (Student's t) and further from it than a quarter of `step` (s), of an effect that is not symmetric in the sign of the shift (interpolation averages noise,
+/// which lowers the residual for a shift either way), and one that either lowers the residual by 1 % or more or moves a
+/// parameter by two standard errors. Healthy logs with even steps showed 0.09 steps at most.
+[[nodiscard]] bool is_latency(const EffortTiming& timing, double step);
+
+/// What the signals of a log say before any set is made.
+struct SignalFindings {
+  std::vector<LogContradiction> contradictions;
+  std::optional<EffortTiming> timing;  ///< nothing where no shift is told, or was not looked for
+};
+
+/// Constant and unrelated efforts; where there are none, timing, wrong signs, wheels and halves that disagree. Walks `log`
+/// a few times.
+[[nodiscard]] SignalFindings contradictions_in_log(LogSource& log, const Setting& setting, const Fit& fit);
+
+/// What a finished commissioning says against itself: best guesses outside their set, held-out rows outside the
+/// thresholds, a noise bound that had to be raised by `raised` for the prior box to explain the log.
+[[nodiscard]] std::vector<LogContradiction> contradictions_in_result(const Commissioning& result, const Setting& setting,
+                                                                  double raised);
+
+}  // namespace wheelwright

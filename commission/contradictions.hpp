@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Findings that contradict what a commissioned model takes for granted: each is an answer, some leave no model.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace wheelwright {
+
+/// One contradiction.
+struct LogContradiction {
+  /// What contradicts what.
+  enum class Kind {
+    effort_constant,   ///< an effort has one value in every row although its joint moves
+    effort_unrelated,  ///< an effort that motion does not explain at all
+    effort_timing,     ///< efforts late or early against the motion, beyond what is declared
+    wheels_disagree,   ///< the efforts of two joints do not show one and the same mass
+    wrong_sign,        ///< a quantity that cannot be negative is, significantly
+    prior_edge,        ///< only a far larger noise lets the prior explain the log
+    estimate_outside,  ///< the best guess lies outside the set, with its whole interval
+    halves_disagree,   ///< the two halves of the log give different robots
+    held_out_outside,  ///< driving that was held out leaves the thresholds
+  };
+  Kind kind = Kind::effort_constant;
+  bool withdraws = true;  ///< no model is published; false: a note beside a model
+  std::string subject{};  ///< the parameter, column or output that it is about
+  double value = 0.0;     ///< what was found: s, share, factor, or the parameter's unit
+  double limit = 0.0;     ///< what it was compared with, same unit
+  std::string sentence{}; ///< what was found, with its numbers
+  std::string next{};     ///< what to do about it
+};
+
+/// Name for files: "effort_constant" and so on.
+[[nodiscard]] std::string_view to_string(LogContradiction::Kind kind);
+
+}  // namespace wheelwright

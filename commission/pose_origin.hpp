@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Whether a pose is a measurement of its own, or wheel odometry over again.
+#pragma once
+
+#include <string>
+
+#include <wheelwright/core/log.hpp>
+#include <wheelwright/filter/odometry_filter.hpp>
+
+namespace wheelwright {
+
+/// What the pose of a log repeats of the wheels.
+struct PoseOrigin {
+  bool heading_repeats = false;   ///< theta is a combination of the wheel angles
+  bool position_repeats = false;  ///< x, y advance by a combination of the wheel angles
+  double heading_rest = 0.0;      ///< rad, rms over windows of what the wheels leave of the heading
+  double position_rest = 0.0;     ///< m, the same of the way travelled
+  std::string sentence;           ///< for people; empty where nothing repeats
+};
+
+/// Compares the change of heading over windows of `window` seconds with the best combination of the changes of both wheel
+/// angles (speeds are integrated by the rectangle before, the rectangle after and the trapezium, whichever fits best), and
+/// the length of the way with another one.
+///
+/// A heading repeats the wheels where less is left than 10⁻⁶ rad rms, which no sensor of its own would agree to with wheels
+/// on a floor; or where no more is left than the rounding of the heading's decimals, and that is less than a third of what
+/// the wheels' own counts (where they are known: half a count each) would leave of an independent heading. A way repeats
+/// them below 10⁻⁵ m. Nothing is claimed of fewer than eight windows, or of a robot that hardly turns (drives).
+/// Walks `log` once.
+[[nodiscard]] PoseOrigin pose_origin(LogSource& log, const OdometryMeasurement& measurement, double window,
+                                     double counts_per_turn = 0.0);
+
+}  // namespace wheelwright

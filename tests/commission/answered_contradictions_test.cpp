@@ -1,0 +1,299 @@
+// SPDX-License-Identifier: Apache-2.0
+// Logs that contradict what a model takes for granted: each has a name and a sentence, and leaves no model.
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <wheelwright/commission/commission.hpp>
+#include <wheelwright/commission/contradiction_search.hpp>
+
+#include "support/drives.hpp"
+
+namespace wheelwright::answered_contradictions_test {
+namespace {
+
+using ::testing::HasSubstr;
+using Kind = LogContradiction::Kind;
+using Status = Commissioning::Status;
+using testing_support::noisy_drive;
+
+// Commands that change at samples, whose noise is learnt from the log, as `wheelwright robot` writes it.
+Scenario learnt_drive(std::uint64_t seed, double duration = 30.0) {
+  Scenario s = noisy_drive(seed, duration);
+  s.robot.effort_changes = EffortChanges::at_samples;
+  s.robot.noise = {};
+  return s;
+}
+
+Commissioning commissioned(const LogTable& table, const Robot& robot) {
+  TableSource log(table);
+  return commission(log, robot);
+}
+
+const LogContradiction* find(const Commissioning& result, Kind kind) {
+  const auto found = std::ranges::find(result.contradictions, kind, &LogContradiction::kind);
+  return found == result.contradictions.end() ? nullptr : &*found;
+}
+
+bool any_withdraws(const Commissioning& result) {
+  return std::ranges::any_of(result.contradictions, &LogContradiction::withdraws);
+}
+
+void expect_no_model(const Commissioning& result) {
+  EXPECT_TRUE(result.status == Status::contradicted || result.status == Status::empty) << result.message;
+  EXPECT_TRUE(result.model.facets.empty());
+  EXPECT_FALSE(result.model.kinematic.has_value());
+}
+
+// Efforts logged `rows` rows after they acted.
+LogTable late(LogTable table, std::ptrdiff_t rows) {
+  for (const char* name : {"tau_r", "tau_l"}) {
+    std::vector<double>& tau = table.column(name);
+    std::rotate(tau.begin(), rows > 0 ? tau.end() - rows : tau.begin() - rows, tau.end());
+  }
+  return slice(table, 20, table.rows() - 20);
+}
+
+TEST(AnsweredContradiction, ADeadCurrentSensorIsNoRobotOfNoMass) {
+  for (const bool declared : {false, true}) {
+    Scenario s = learnt_drive(1);
+    if (declared) {
+      s.robot.noise.effort.value = 0.02;
+    }
+    LogTable table = simulate(s);
+    for (const char* name : {"tau_r", "tau_l"}) {
+      std::ranges::fill(table.column(name), 0.0);
+    }
+    const Commissioning result = commissioned(table, s.robot);
+    expect_no_model(result);
+    const LogContradiction* found = find(result, Kind::effort_constant);
+    ASSERT_NE(found, nullptr);
+    EXPECT_TRUE(found->withdraws);
+    EXPECT_THAT(result.message, HasSubstr("tau_r is 0 in every row"));
+  }
+}
+
+TEST(AnsweredContradiction, OneDeadSensorOfTwoIsNamed) {
+  const Scenario s = learnt_drive(2);
+  LogTable table = simulate(s);
+  std::ranges::fill(table.column("tau_l"), 0.7);
+  const Commissioning result = commissioned(table, s.robot);
+  expect_no_model(result);
+  ASSERT_NE(find(result, Kind::effort_constant), nullptr);
+  EXPECT_EQ(find(result, Kind::effort_constant)->subject, "tau_l");
+}
+
+TEST(AnsweredContradiction, AnEffortOfNoiseAloneDependsOnNoMotion) {
+  const Scenario s = learnt_drive(3);
+  LogTable table = simulate(s);
+  std::mt19937_64 rng(3);
+  std::normal_distribution<double> noise(0.0, 0.5);
+  std::ranges::generate(table.column("tau_r"), [&] { return noise(rng); });
+  const Commissioning result = commissioned(table, s.robot);
+  expect_no_model(result);
+  ASSERT_NE(find(result, Kind::effort_unrelated), nullptr);
+  EXPECT_EQ(find(result, Kind::effort_unrelated)->subject, "tau_r");
+}
+
+TEST(AnsweredContradiction, TorquesOneSampleLateOrEarlyAreTold) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    for (const int rows : {1, -1, 2}) {
+      const Scenario s = learnt_drive(seed);
+      const Commissioning result = commissioned(late(simulate(s), rows), s.robot);
+      expect_no_model(result);
+      const LogContradiction* found = find(result, Kind::effort_timing);
+      ASSERT_NE(found, nullptr) << "seed " << seed << ", " << rows << " rows";
+      EXPECT_NEAR(found->value, 0.01 * rows, 0.001);
+      EXPECT_THAT(found->next, HasSubstr("effort: {delay: ["));
+    }
+  }
+}
+
+TEST(AnsweredContradiction, TenMillisecondsAreToldAtLowerRatesToo) {
+  for (const double rate : {25.0, 50.0}) {
+    Scenario s = learnt_drive(6, 60.0);
+    s.rate = 100.0;
+    const LogTable fine = late(simulate(s), 1);
+    // Every fourth or second row of efforts that are measured.
+    const auto every = static_cast<std::size_t>(100.0 / rate);
+    LogTable coarse;
+    coarse.names = fine.names;
+    coarse.columns.resize(fine.columns.size());
+    for (std::size_t k = 0; k < fine.rows(); k += every) {
+      coarse.t.push_back(fine.t[k]);
+      for (std::size_t c = 0; c < fine.columns.size(); ++c) {
+        coarse.columns[c].push_back(fine.columns[c][k]);
+      }
+    }
+    s.robot.hold = Hold::first_order;
+    const Commissioning result = commissioned(coarse, s.robot);
+    // 10 ms, and half of a 10 ms step by which a held command is late for one that is measured.
+    const LogContradiction* found = find(result, Kind::effort_timing);
+    ASSERT_NE(found, nullptr) << rate;
+    EXPECT_NEAR(found->value, 0.005, 0.004) << rate;
+  }
+}
+
+// The usual driver: ω_k = (φ_k − φ_{k−1})/h with the stamp of φ_k.
+TEST(AnsweredContradiction, SpeedsDifferencedBackwardsAreToldByTheirLag) {
+  Scenario s = learnt_drive(7, 60.0);
+  s.sensors.encoder_counts_per_turn = 65536.0;
+  s.robot.encoder_counts_per_turn.reset();
+  s.robot.effort_changes = EffortChanges::at_samples;
+  const LogTable angles = simulate(s);
+  LogTable speeds = slice(angles, 1, angles.rows());
+  for (const auto& [angle, speed] : {std::pair{"phi_r", "omega_r"}, std::pair{"phi_l", "omega_l"}}) {
+    const std::vector<double>& phi = angles.column(angle);
+    std::vector<double>& column = speeds.column(angle);
+    for (std::size_t k = 1; k < phi.size(); ++k) {
+      column[k - 1] = (phi[k] - phi[k - 1]) / (angles.t[k] - angles.t[k - 1]);
+    }
+    *std::ranges::find(speeds.names, angle) = speed;
+  }
+  const Commissioning result = commissioned(speeds, s.robot);
+  expect_no_model(result);
+  const LogContradiction* found = find(result, Kind::effort_timing);
+  ASSERT_NE(found, nullptr) << result.message;
+  EXPECT_NEAR(found->value, -0.005, 0.002);
+}
+
+TEST(AnsweredContradiction, ADeclaredDelayIsNone) {
+  Scenario s = learnt_drive(8);
+  const LogTable table = late(simulate(s), 1);
+  s.robot.effort_delay = {0.009, 0.011};
+  const Commissioning result = commissioned(table, s.robot);
+  EXPECT_EQ(result.status, Status::done) << result.message;
+  EXPECT_EQ(find(result, Kind::effort_timing), nullptr);
+}
+
+TEST(AnsweredContradiction, HealthyLogsHaveNone) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    for (const bool declared : {false, true}) {
+      Scenario s = learnt_drive(seed, seed % 2 == 0 ? 12.0 : 30.0);
+      if (declared) {
+        s.robot.noise.effort.value = 0.02;
+      }
+      const Commissioning result = commissioned(simulate(s), s.robot);
+      EXPECT_FALSE(any_withdraws(result)) << "seed " << seed << ": " << result.message;
+      EXPECT_EQ(result.status, Status::done) << "seed " << seed << ": " << result.message;
+    }
+  }
+}
+
+TEST(AnsweredContradiction, SwappedEffortsShowANegativeInertia) {
+  const Scenario s = learnt_drive(9);
+  LogTable table = simulate(s);
+  std::swap(table.column("tau_r"), table.column("tau_l"));
+  const Commissioning result = commissioned(table, s.robot);
+  expect_no_model(result);
+  const LogContradiction* found = find(result, Kind::wrong_sign);
+  ASSERT_NE(found, nullptr) << result.message;
+  EXPECT_TRUE(found->withdraws);
+  EXPECT_LT(found->value, 0.0);
+}
+
+TEST(AnsweredContradiction, TwoEffortsOfDifferentUnitsDisagreeAboutTheMass) {
+  const Scenario s = learnt_drive(10);
+  LogTable table = simulate(s);
+  for (double& tau : table.column("tau_l")) {
+    tau *= 0.4;
+  }
+  const Commissioning result = commissioned(table, s.robot);
+  expect_no_model(result);
+  const LogContradiction* found = find(result, Kind::wheels_disagree);
+  ASSERT_NE(found, nullptr) << result.message;
+  EXPECT_EQ(found->subject, "tau_r");
+  EXPECT_NEAR(found->value, 2.5, 0.1);
+}
+
+TEST(AnsweredContradiction, HalvesOfDifferentMassDisagree) {
+  Scenario s = learnt_drive(11, 40.0);
+  LogTable table = simulate(s);
+  s.parameters.mass *= 1.2;
+  s.seed = 12;
+  const LogTable heavier = simulate(s);
+  table.segment_starts = {0, table.rows()};
+  for (std::size_t k = 0; k < heavier.rows(); ++k) {
+    table.t.push_back(heavier.t[k] + 100.0);
+  }
+  for (std::size_t c = 0; c < table.columns.size(); ++c) {
+    table.columns[c].insert(table.columns[c].end(), heavier.columns[c].begin(), heavier.columns[c].end());
+  }
+  const Commissioning result = commissioned(table, s.robot);
+  const LogContradiction* found = find(result, Kind::halves_disagree);
+  ASSERT_NE(found, nullptr) << result.message;
+  EXPECT_EQ(found->subject, "mass");
+}
+
+// Numbers as they were on real logs: the guess, its 95 % interval and the set lie apart.
+TEST(AnsweredContradiction, ABestGuessFarOutsideADeclaredSetWithdrawsTheModel) {
+  Scenario s = noisy_drive(13);
+  Simulation log(s);
+  Commissioning result = commission(log, s.robot);
+  ASSERT_EQ(result.status, Status::done) << result.message;
+  Setting setting = settle(log, s.robot);
+  ASSERT_TRUE(setting.noise_complete);
+  ParameterResult& mass = result.parameters[0];
+  const double width = mass.upper - mass.lower;
+  const auto outside_by = [&](double widths, double error) {
+    mass.estimate = mass.upper + widths * width;
+    mass.standard_error = error * width;
+    mass.estimate_inside = false;
+    const auto found = contradictions_in_result(result, setting, 1.0);
+    return found.empty() ? -1 : static_cast<int>(found.front().withdraws);
+  };
+  EXPECT_EQ(outside_by(2.0, 0.01), 1);
+  EXPECT_EQ(outside_by(2.0, 1.5), 0) << "its interval reaches the set";
+  EXPECT_EQ(outside_by(0.1, 0.001), 0) << "noise at its bounds moves least squares by as much";
+  setting.noise_complete = false;
+  EXPECT_EQ(outside_by(2.0, 0.01), 0) << "the set is learnt: a doubt beside the model";
+}
+
+TEST(AnsweredContradiction, HeldOutRowsOutsideTheThresholdsAreTold) {
+  Scenario s = learnt_drive(14);
+  Simulation log(s);
+  Commissioning result = commission(log, s.robot);
+  ASSERT_EQ(result.status, Status::done) << result.message;
+  const Setting setting = settle(log, s.robot);
+  result.validation[0].instants = 1000;
+  result.validation[0].outside = 50;
+  const auto many = contradictions_in_result(result, setting, 1.0);
+  ASSERT_EQ(many.size(), 1U);
+  EXPECT_EQ(many[0].kind, Kind::held_out_outside);
+  EXPECT_TRUE(many[0].withdraws);
+  result.validation[0].outside = 1;
+  EXPECT_FALSE(contradictions_in_result(result, setting, 1.0).at(0).withdraws);
+}
+
+// A straddle carrier, and a robot beyond the tool's own default, which has to be named.
+TEST(AnsweredContradiction, AHeavyRobotIsCommissionedAndTheDefaultPriorIsNamed) {
+  for (const double factor : {2000.0, 2e5}) {
+    for (const bool declared : {true, false}) {
+      Scenario s = noisy_drive(15);
+      LogTable table = simulate(s);  // 21 kg
+      for (const char* name : {"tau_r", "tau_l"}) {
+        for (double& tau : table.column(name)) {
+          tau *= factor;
+        }
+      }
+      *s.robot.noise.effort.value *= factor;
+      if (!declared) {
+        s.robot.noise = {};
+      }
+      const Commissioning result = commissioned(table, s.robot);
+      if (factor < 1e4) {
+        EXPECT_EQ(result.status, Status::done) << result.message;
+        continue;
+      }
+      expect_no_model(result);
+      EXPECT_THAT(result.message, HasSubstr("prior: {mass: ["));
+      EXPECT_THAT(result.message, HasSubstr("the tool's own"));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace wheelwright::answered_contradictions_test
