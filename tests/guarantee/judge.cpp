@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "judge.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <exception>
+#include <vector>
+
+#include <wheelwright/bounds/feasible_set.hpp>
+#include <wheelwright/commission/commission.hpp>
+#include <wheelwright/commission/margin_survey.hpp>
+#include <wheelwright/core/regression.hpp>
+
+namespace wheelwright::guarantee {
+namespace {
+
+using Wide = __float128;  // holds products of doubles exactly
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+bool declared_only(const Commissioning& result) {
+  return std::ranges::all_of(result.noise, [](const OutputNoise& n) { return n.origin == NoiseOrigin::declared; });
+}
+
+void check_truth(const Scene& scene, const Commissioning& result, Verdict& verdict) {
+  std::vector<Wide> theta;
+  for (const ParameterResult& p : result.parameters) {
+    const auto truth = scene.truth.find(p.parameter.physical);
+    if (truth == scene.truth.end()) {
+      verdict.outside += p.parameter.physical + "(unknown) ";
+      theta.push_back(0);
+      continue;
+    }
+    const Wide value = static_cast<Wide>(truth->second) * static_cast<Wide>(p.parameter.per_physical);
+    theta.push_back(value);
+    if (value < static_cast<Wide>(p.lower) || value > static_cast<Wide>(p.upper)) {
+      verdict.outside += p.parameter.physical + " ";
+    }
+    if (p.parameter.physical == "mass" || p.parameter.physical == "inertia") {
+      verdict.width = (p.upper - p.lower) / static_cast<double>(value);
+    }
+  }
+  for (const HalfSpace& facet : result.model.facets) {
+    Wide sum = 0;
+    for (std::size_t j = 0; j < theta.size(); ++j) {
+      sum += static_cast<Wide>(facet.a[static_cast<Eigen::Index>(j)]) * theta[j];
+    }
+    verdict.facet_cuts = verdict.facet_cuts || sum > static_cast<Wide>(facet.b);
+  }
+}
+
+// Width of the mass for rows without any error but the sensors' worst case, at the stamps of the log: exact filtered
+// motion, errors of the size of the kernels' L1 norms, nothing between samples.
+double oracle_width(const Case& c, const Scene& scene, const Commissioning& result) {
+  const double beta = result.model.filter.beta, alpha = result.model.filter.alpha, a2 = alpha * alpha;
+  const bool axis = c.truth.axis;
+  const bool speeds = c.sense == Sense::speed || c.sense == Sense::whole_rpm;
+  const double to_body = axis ? 1.0 : c.truth.radius;  // two wheels of r/2 each
+  const double e = std::exp(1.0);
+  const double rate_norm = 2.0 * a2 / (e * beta), level_norm = a2 / (beta * beta);
+  const double n_acceleration = to_body * c.motion_bound * (speeds ? rate_norm : 2.0 * a2 * (1.0 + std::exp(-2.0)));
+  const double n_speed = to_body * c.motion_bound * (speeds ? level_norm : rate_norm);
+  const double n_effort = (axis ? 1.0 : 2.0) * *scene.robot.noise.effort.value * level_norm;
+  const double per = axis ? 1.0 : c.truth.radius;
+  const double mass = per * c.truth.mass, viscous = per * c.truth.viscous_linear;
+
+  RegressionBlock block;
+  block.outputs = 1;
+  block.parameters = 2;
+  std::vector<double> rows;
+  double z1 = 0.0, z2 = 0.0;
+  std::size_t k = 0;
+  for (std::size_t i = 1; i < scene.exact_t.size() && k < scene.learned.rows(); ++i) {
+    const double h = scene.exact_t[i] - scene.exact_t[i - 1];
+    const double decay = std::exp(-beta * h);
+    const double v = 0.5 * (scene.exact_speed[i] + scene.exact_speed[i - 1]);
+    z2 = decay * z2 + decay * h * z1 + v * (1.0 - decay - beta * h * decay) / (beta * beta);
+    z1 = decay * z1 + v * (1.0 - decay) / beta;
+    if (scene.exact_t[i] >= scene.learned.t[k] - 0.25 * h) {
+      if (speeds || beta * scene.learned.t[k] >= result.model.filter.settle) {
+        rows.insert(rows.end(), {a2 * (z1 - beta * z2), a2 * z2});
+        block.t.push_back(scene.learned.t[k]);
+        block.sample.push_back(k);
+      }
+      ++k;
+    }
+  }
+  if (block.t.empty()) {
+    return 0.0;
+  }
+  const auto n = static_cast<Eigen::Index>(block.t.size());
+  block.Y = Eigen::Map<const RowMatrix>(rows.data(), n, 2);
+  block.dY.resize(n, 2);
+  block.dY.col(0).setConstant(n_acceleration);
+  block.dY.col(1).setConstant(n_speed);
+  block.y = block.Y * Eigen::Vector2d(mass, viscous);
+  block.dy = Eigen::VectorXd::Constant(n, n_effort);
+  Box prior;
+  for (const char* physical : {axis ? "inertia" : "mass", axis ? "viscous" : "viscous_linear"}) {
+    for (std::size_t j = 0; j < result.parameters.size(); ++j) {
+      if (result.parameters[j].parameter.physical == physical) prior.sides.push_back(result.prior.sides[j]);
+    }
+  }
+  RegressionTable table(std::move(block));
+  const FeasibleSet set = feasible_set(table, prior);
+  return set.status == FeasibleSet::Status::nonempty ? (set.hull.sides[0].upper - set.hull.sides[0].lower) / mass : 0.0;
+}
+
+void watch(const LogTable& log, const CommissionedModel& model, Verdict& verdict) {
+  Detector detector = make_detector(model);
+  std::vector<const std::vector<double>*> columns;
+  for (const std::string& column : model.measurement.columns()) {
+    columns.push_back(&log.column(column));
+  }
+  std::vector<double> sample(columns.size());
+  bool alarmed = false;
+  for (std::size_t k = 0; k < log.rows(); ++k) {
+    for (std::size_t j = 0; j < columns.size(); ++j) {
+      sample[j] = (*columns[j])[k];
+    }
+    const Decision& decision = detector.step(log.t[k], sample);
+    ++verdict.watched;
+    verdict.decisions += decision.valid ? 1 : 0;
+    verdict.alarms += decision.fault ? 1 : 0;
+    verdict.events += decision.fault && !alarmed ? 1 : 0;
+    if (decision.fault && verdict.first_alarm < 0.0) {
+      verdict.first_alarm = log.t[k];
+    }
+    alarmed = decision.fault;
+  }
+}
+
+// Losses of effort of sizes that margins call certain within a window, at a few onsets: each has to be seen.
+void try_faults(const Case& c, const Scene& scene, const CommissionedModel& model, Verdict& verdict) {
+  constexpr double kWindowSteps = 100.0;
+  constexpr std::size_t kOnsets = 6;
+  const double window = kWindowSteps / c.rate;
+  TableSource log(scene.watched);
+  MarginSurveyOptions options;
+  options.margins.windows = {window};
+  options.margins.onset_step = (scene.watched.t.back() - scene.watched.t.front()) / static_cast<double>(kOnsets);
+  options.margins.most_onsets = kOnsets;
+  options.faults = {c.truth.axis ? "effort_loss" : "effort_loss_right"};
+  options.map_points = 0;
+  const MarginSurvey survey = survey_margins(log, model, options);
+  for (const ResidualMargins& residual : survey.residuals) {
+    for (const FaultMargins& fault : residual.margins) {
+      for (const OnsetMargin& onset : fault.onsets) {
+        if (residual.name != "torque" || fault.side < 0.0 || onset.certain.empty() ||
+            !(onset.certain[0] < fault.largest())) {
+          continue;
+        }
+        const LogTable faulty = watch_fault(c, {.onset = onset.t, .share = onset.certain[0]});
+        const auto sees = [&](const LogTable& table) {
+          Detector detector = make_detector(model);
+          const std::vector<std::string> names = model.measurement.columns();
+          std::vector<double> sample(names.size());
+          bool seen = false;
+          for (std::size_t k = 0; k < table.rows() && table.t[k] <= onset.t + window + 2.0 / c.rate; ++k) {
+            for (std::size_t i = 0; i < names.size(); ++i) sample[i] = table.column(names[i])[k];
+            const bool alarm = detector.step(table.t[k], sample).fault;
+            seen = seen || (alarm && table.t[k] >= onset.t);
+          }
+          return seen;
+        };
+        ++verdict.faults;
+        verdict.missed += sees(faulty) ? 0 : 1;
+      }
+    }
+  }
+}
+
+}  // namespace
+
+const char* name(Verdict::End end) {
+  static constexpr const char* kNames[] = {"guaranteed", "learnt", "empty", "refused"};
+  return kNames[static_cast<std::size_t>(end)];
+}
+
+Verdict judge(const Case& c, const JudgeOptions& options) {
+  const Scene scene = play(c, options.oracle);
+  Verdict verdict;
+  verdict.rows = scene.learned.rows();
+  const auto start = std::chrono::steady_clock::now();
+  try {
+    TableSource log(scene.learned);
+    const Commissioning result = commission(log, scene.robot);
+    verdict.commission_seconds = seconds_since(start);
+    verdict.message = result.message;
+    switch (result.status) {
+      case Commissioning::Status::empty:
+      case Commissioning::Status::contradicted: verdict.end = Verdict::End::empty; return verdict;
+      case Commissioning::Status::nothing: verdict.end = Verdict::End::refused; return verdict;
+      case Commissioning::Status::done:
+      case Commissioning::Status::partial: break;
+    }
+    verdict.end = declared_only(result) ? Verdict::End::guaranteed : Verdict::End::learnt;
+    check_truth(scene, result, verdict);
+    const auto watching = std::chrono::steady_clock::now();
+    watch(scene.watched, result.model, verdict);
+    verdict.watch_seconds = seconds_since(watching);
+    const bool steps = c.changes == Changes::at_samples && c.lost == 0.0 && c.sense != Sense::mean_speed;
+    if (options.faults && steps && c.broken == Broken::none && verdict.end == Verdict::End::guaranteed) {
+      try_faults(c, scene, result.model, verdict);
+    }
+    if (options.oracle && c.truth.coulomb == 0.0 && result.model.filter.order == 2) {
+      verdict.oracle = oracle_width(c, scene, result);
+    }
+  } catch (const std::exception& e) {
+    verdict.end = Verdict::End::refused;
+    verdict.message = e.what();
+    verdict.commission_seconds = seconds_since(start);
+  }
+  return verdict;
+}
+
+}  // namespace wheelwright::guarantee

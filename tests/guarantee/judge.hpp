@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Whether what the library says of a case is true.
+#pragma once
+
+#include <cstddef>
+#include <string>
+
+#include "scene.hpp"
+
+namespace wheelwright::guarantee {
+
+/// What came of a case.
+struct Verdict {
+  /// How commissioning ended.
+  enum class End {
+    guaranteed,  ///< a model that stands on the declared bounds
+    learnt,      ///< a model that stands on bounds estimated from the log: no guarantee is given
+    empty,       ///< "no parameters explain the log", or it contradicts what its bounds stand on
+    refused,     ///< no model, for another reason
+  };
+  End end = End::refused;
+  std::string message;        ///< of the library
+  std::string outside;        ///< parameters whose true value is not in [lower, upper]
+  bool facet_cuts = false;    ///< a facet of the set leaves the truth out
+  double width = 0.0;         ///< upper − lower of the mass (axis: inertia) over the true value
+  double oracle = 0.0;        ///< the same for exact rows with the sensors' worst case only; 0: not sought
+  std::size_t rows = 0;       ///< learnt from
+  std::size_t watched = 0;    ///< samples of the second drive
+  std::size_t decisions = 0;  ///< of them, decided on
+  std::size_t alarms = 0;     ///< decisions with a fault that is none
+  std::size_t events = 0;     ///< alarms that follow a decision without
+  double first_alarm = -1.0;  ///< s
+  std::size_t faults = 0;     ///< tried, of a size and in a time that margins call certain
+  std::size_t missed = 0;     ///< of them, without an alarm in that time
+  double commission_seconds = 0.0;
+  double watch_seconds = 0.0;
+
+  [[nodiscard]] bool truth_outside() const { return !outside.empty() || facet_cuts; }
+  /// A broken promise: the truth is cut off, a healthy robot alarms, or a log that keeps to its assumptions is called
+  /// impossible. `kept`: whether the log keeps to its assumptions. Where it does not, only a guaranteed set without the
+  /// truth counts: a model that does not fit its log may be called impossible, and alarms tell of the same thing.
+  [[nodiscard]] bool violation(bool kept) const {
+    return end == End::guaranteed ? truth_outside() || ((alarms > 0 || missed > 0) && kept) : end == End::empty && kept;
+  }
+};
+
+[[nodiscard]] const char* name(Verdict::End end);
+
+struct JudgeOptions {
+  bool oracle = false;  ///< also find Verdict::oracle
+  bool faults = false;  ///< also drive with faults that margins call certain (efforts held, changed at samples)
+};
+
+[[nodiscard]] Verdict judge(const Case& c, const JudgeOptions& options = {});
+
+}  // namespace wheelwright::guarantee
