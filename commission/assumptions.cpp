@@ -7,11 +7,11 @@
 #include <fmt/format.h>
 
 #include <wheelwright/commission/commission.hpp>
+#include <wheelwright/commission/noise_budget.hpp>
 
 namespace wheelwright {
 namespace {
 
-constexpr double kLongestStep = 1.5;  // median steps: beyond it rows are missing
 constexpr const char* kRowsExplained =
     "some parameters explain every row within its bound, and none of the held-out rows "
     "leaves the threshold that was made without it";
@@ -53,7 +53,11 @@ RowsVerdict rows_verdict(const Commissioning& r) {
 
 Assumption assumed_hold(const Robot& robot) {
   Assumption a{.id = "effort_hold", .declared_by = "effort.hold, effort.changes"};
-  a.statement = robot.hold == Hold::first_order ? "Efforts are measured: straight between two stamps."
+  a.statement = robot.hold == Hold::first_order
+                    ? (robot.effort_changes == EffortChanges::at_samples
+                           ? "Efforts are measured: straight between two stamps."
+                           : "Efforts are measured: between two stamps somewhere from straight to a parabola through "
+                             "the stamps about them.")
                 : robot.effort_changes == EffortChanges::at_samples
                     ? "Efforts are commands: each acts from its stamp to the stamp of the next."
                     : "Efforts are commands: each acts until the next replaces it, at an unknown moment between their "
@@ -68,10 +72,10 @@ Assumption assumed_delay(const Commissioning& r) {
                .test = "no constant shift beyond the declared one explains the log better"};
   const auto latency = std::ranges::find(r.contradictions, LogContradiction::Kind::effort_timing, &LogContradiction::kind);
   if (latency != r.contradictions.end()) {
-    a.verdict = Verdict::fails;
+    a.verdict = AssumptionVerdict::fails;
     a.detail = latency->sentence;
   } else if (r.effort_shift) {
-    a.verdict = Verdict::holds;
+    a.verdict = AssumptionVerdict::holds;
     a.detail = fmt::format("the best shift is {:.2g} s", *r.effort_shift);
   } else {
     a.detail = "the log tells no shift";
@@ -192,52 +196,45 @@ Assumption constant_parameters(const RowsVerdict& rows) {
           .detail = rows.detail};
 }
 
-Assumption lost_rows(const Survey& survey) {
+Assumption lost_rows(const Measurement& m, const Survey& survey) {
+  const double longest = m.longest_step();
   Assumption a{.id = "lost_rows",
                .statement = "No row is missing between two that are filtered together.",
                .declared_by = {},
-               .test = fmt::format("no step within a segment is longer than {:g} median steps", kLongestStep)};
-  const double ratio = survey.median_step > 0.0 ? survey.largest_step / survey.median_step : 0.0;
-  a.verdict = ratio > 0.0 && ratio <= kLongestStep ? AssumptionVerdict::holds : AssumptionVerdict::not_tested;
-  a.detail = fmt::format("the longest is {:.3g} s, the median {:.3g} s", survey.largest_step, survey.median_step);
+               .test = "the shortest steps of the log tell two steps from one"};
+  const bool apart = m.motion == MotionKind::mean_speed || m.shortest_step <= 0.0 || 2.0 * m.shortest_step > longest;
+  a.verdict = longest > 0.0 && apart ? AssumptionVerdict::holds : AssumptionVerdict::not_tested;
+  a.detail = fmt::format("a step longer than {:.3g} s begins anew; the longest is {:.3g} s, the median {:.3g} s{}", longest,
+                         survey.largest_step, survey.median_step,
+                         apart ? "" : ", and steps vary so much that one missing row would not show");
   return a;
 }
 
-// Bounds of the parameter whose physical quantity is `name`; nothing where the model has none.
-const ParameterResult* of_quantity(const Commissioning& r, std::string_view name) {
-  const auto found = std::ranges::find_if(r.parameters, [&](const auto& p) { return p.parameter.physical == name; });
-  return found == r.parameters.end() ? nullptr : &*found;
-}
-
-Assumption time_constant(const Commissioning& r) {
-  Assumption a{.id = "time_constant",
-               .statement = "The robot's time constant, inertia over viscous friction, is longer than half a step.",
-               .declared_by = {},
-               .test = "the bounds of inertia and friction against half of the median step"};
-  const double half = 0.5 * r.survey.median_step;
-  bool all = true;
-  for (const auto& [inertia, viscous] :
-       {std::pair{"mass", "viscous_linear"}, std::pair{"mass", "viscous_x"}, std::pair{"mass", "viscous_y"},
-        std::pair{"yaw_inertia", "viscous_yaw"}, std::pair{"inertia", "viscous"}}) {
-    const ParameterResult *m = of_quantity(r, inertia), *f = of_quantity(r, viscous);
-    if (m == nullptr || f == nullptr) {
-      continue;
-    }
-    const double shortest = f->upper > 0.0 ? m->lower / f->upper : 0.0;
-    all = all && m->lower > half * f->upper;
-    if (m->upper < half * f->lower) {
-      a.verdict = AssumptionVerdict::fails;
-    }
-    a.detail +=
-        fmt::format("{}{} over {} is at least {:.3g} s", a.detail.empty() ? "" : "; ", inertia, viscous, shortest);
+Assumption motion_between_samples(const Commissioning& r) {
+  Assumption a{.id = "motion_between_samples", .declared_by = "limits.acceleration", .test = "none"};
+  const Measurement& m = r.model.measurement;
+  const auto limit = r.model.robot.limits.find("acceleration");
+  if (limit == r.model.robot.limits.end()) {
+    a.statement = fmt::format(
+        "In the commissioning log no wheel accelerates between two samples more than {:g} times as much as its samples "
+        "show; in driving to come the dynamics bound it.",
+        kBeyondSamples);
+    return a;
   }
-  if (a.detail.empty() || r.status == Commissioning::Status::empty) {
-    a.verdict = AssumptionVerdict::not_tested;
-    a.detail.clear();
-  } else if (a.verdict != AssumptionVerdict::fails) {
-    a.verdict = all ? AssumptionVerdict::holds : AssumptionVerdict::not_tested;
+  a.statement = fmt::format("No wheel ever accelerates by more than {:g} rad/s² (m/s²).", limit->second);
+  a.test = "the samples, less what their errors may add, show no more";
+  const auto error = motion_error(r.model.robot, m);
+  if (!error || r.survey.median_step <= 0.0) {
+    return a;
   }
-  a.detail += fmt::format("{}half a step is {:.3g} s", a.detail.empty() ? "" : "; ", half);
+  const double h = r.survey.median_step;
+  const double noise = m.motion == MotionKind::speed ? 2.0 * *error / h : 4.0 * *error / (h * h);
+  double shown = 0.0;
+  for (const double sharp : r.survey.sharpest_change) {
+    shown = std::max(shown, sharp - noise);
+  }
+  a.verdict = shown <= limit->second ? AssumptionVerdict::holds : AssumptionVerdict::fails;
+  a.detail = fmt::format("the samples show {:.3g}", shown);
   return a;
 }
 
@@ -304,8 +301,8 @@ std::vector<Assumption> assumptions_of(const Commissioning& result) {
   add_noise_bounds(list, result, rows);
   list.push_back(model_shape(result, rows));
   list.push_back(constant_parameters(rows));
-  list.push_back(lost_rows(result.survey));
-  list.push_back(time_constant(result));
+  list.push_back(lost_rows(result.model.measurement, result.survey));
+  list.push_back(motion_between_samples(result));
   list.push_back(assumed_prior(result));
   add_limits(list, robot);
   if (robot.model == "differential_drive") {
@@ -316,7 +313,7 @@ std::vector<Assumption> assumptions_of(const Commissioning& result) {
                     .statement = "Pose and gyro are measured without the wheels: none is wheel odometry.",
                     .declared_by = {},
                     .test = "no combination of the wheel angles is all that a pose says",
-                    .verdict = Verdict::holds});
+                    .verdict = AssumptionVerdict::holds});
   }
   return list;
 }

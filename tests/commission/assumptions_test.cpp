@@ -136,33 +136,30 @@ TEST(Assumptions, SayHowTheRobotFileDeclaresItsEfforts) {
   EXPECT_NE(of(assumptions_of(c), "effort_delay").statement.find("between 0.002 and 0.0125 s"), std::string::npos);
 }
 
-// m/f of 21 kg and 4 N·s/m is 5.25 s: twice that as a step is exactly what the motion between samples cannot show.
-TEST(Assumptions, TheTimeConstantIsHeldAgainstHalfAStep) {
-  Commissioning c;
-  ParameterResult m, f;
-  m.parameter.physical = "mass";
-  m.lower = 20.0;
-  m.upper = 22.0;
-  f.parameter.physical = "viscous_linear";
-  f.lower = 3.5;
-  f.upper = 4.0;
-  c.parameters = {m, f};
-  const auto at_step = [&](double step) {
-    c.survey.median_step = step;
-    return of(assumptions_of(c), "time_constant").verdict;
-  };
-  EXPECT_EQ(at_step(2.0 * 20.0 / 4.0 - 0.01), Verdict::holds);
-  EXPECT_EQ(at_step(2.0 * 20.0 / 4.0 + 0.01), Verdict::not_tested);
-  EXPECT_EQ(at_step(2.0 * 22.0 / 3.5 - 0.01), Verdict::not_tested);
-  EXPECT_EQ(at_step(2.0 * 22.0 / 3.5 + 0.01), Verdict::fails);
-}
-
-TEST(Assumptions, ALongStepIsNoProofThatNoRowIsMissing) {
+// 12 rad/s² in the samples, of which angles wrong by 1e-4 rad at 100 Hz explain 4: a limit of 7.9 is contradicted.
+TEST(Assumptions, ADeclaredAccelerationIsHeldAgainstTheSamples) {
   Commissioning c;
   c.survey.median_step = 0.01;
-  c.survey.largest_step = 0.015;
+  c.survey.sharpest_change = {3.0, 12.0};
+  c.model.measurement.motion = MotionKind::angle;
+  c.model.robot.noise.wheel_angle.value = 1e-4;
+  const auto with_limit = [&](double limit) {
+    c.model.robot.limits["acceleration"] = limit;
+    return of(assumptions_of(c), "motion_between_samples").verdict;
+  };
+  EXPECT_EQ(with_limit(8.1), Verdict::holds);
+  EXPECT_EQ(with_limit(7.9), Verdict::fails);
+  c.model.robot.limits.clear();
+  EXPECT_EQ(of(assumptions_of(c), "motion_between_samples").verdict, Verdict::not_tested);
+}
+
+// Steps that vary by more than a third hide a missing row: two short ones are shorter than a long one.
+TEST(Assumptions, WhereStepsVaryTooMuchAMissingRowDoesNotShow) {
+  Commissioning c;
+  c.survey.median_step = c.model.measurement.nominal_step = 0.01;
+  c.model.measurement.shortest_step = 0.0072;
   EXPECT_EQ(of(assumptions_of(c), "lost_rows").verdict, Verdict::holds);
-  c.survey.largest_step = 0.0151;
+  c.model.measurement.shortest_step = 0.006;
   EXPECT_EQ(of(assumptions_of(c), "lost_rows").verdict, Verdict::not_tested);
 }
 
