@@ -199,7 +199,7 @@ int run(const Arguments& a) {
     result["warrant"] = warrant_word(subject.warrant);
     write_plans(a, subject.model, design.manoeuvre.plan, design.figure_eight_plan);
     publish(a.common, result, "design.json", design_report(design, subject, limits, context));
-    tell(a, words);
+    tell(a, words + fmt::format("  these promises are {}\n", warrant_word(subject.warrant)));
   };
   if (detection) {
     // An evaluation walks the plan once for each fault: fewer of them than for bounds.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// A bound |n| <= n̄ for the guaranteed sets, made of a standard deviation, and what it promises.
+/// A bound |n| <= n̄ for the feasible sets, made of a standard deviation, and what it promises.
 #pragma once
 
 #include <string_view>

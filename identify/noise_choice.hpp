@@ -41,7 +41,7 @@ struct NoiseChoice {
   NoiseMeaning meaning = NoiseMeaning::unknown;
   double sd = 0.0;           ///< unit of the column
   double relative_sd = 0.0;  ///< standard error of sd², relative to it
-  ErrorBound bound;          ///< for the guaranteed sets (error_bound.hpp)
+  ErrorBound bound;          ///< for the feasible sets (error_bound.hpp)
   std::string assumption;    ///< what the level assumes, e.g. "noise independent from sample to sample"
   std::string reason;        ///< one sentence: why this one
 };

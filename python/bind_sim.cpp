@@ -115,6 +115,7 @@ std::unique_ptr<DesignObject> design(const std::variant<const ModelObject*, cons
     const auto finish = [&](const auto& made) {
       out->json["software"] = app::software();
       out->json["seed"] = seed;
+      out->json["warrant"] = warrant_word(subject.warrant);
       out->commands = command_table(made.manoeuvre.plan, subject.model);
       if (made.figure_eight_plan) {
         out->figure_eight = command_table(*made.figure_eight_plan, subject.model);

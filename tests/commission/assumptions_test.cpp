@@ -165,7 +165,7 @@ TEST(Assumptions, WhereStepsVaryTooMuchAMissingRowDoesNotShow) {
 
 TEST(Assumptions, OfAnEmptySetSomeFail) {
   Scenario s = noisy_drive(1);
-  s.robot.noise.effort.value = 1e-4;  // a two-hundredth of the noise that is there
+  s.sensors.effort = 2.0;  // a hundred times what is declared
   const Commissioning c = commissioned(s);
   ASSERT_EQ(c.status, Commissioning::Status::empty);
   EXPECT_EQ(of(c.assumptions, "noise_effort").verdict, Verdict::fails);
