@@ -37,7 +37,7 @@ struct Far {
   Far(std::uint64_t seed, std::size_t groups, std::size_t parameters) : q(parameters) {
     Random random(seed);
     const std::size_t p = groups * q;
-    const double size = std::pow(10.0, -3.0 * random.unit());
+    const double size = std::pow(10.0, -6.0 * random.unit());
     for (std::size_t j = 0; j < p; ++j) {
       centre.push_back(300.0 * random.symmetric());
       box.sides.push_back({centre[j] - 4.0 * size, centre[j] + 4.0 * size});
