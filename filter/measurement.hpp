@@ -29,8 +29,6 @@ struct Measurement {
   std::vector<std::string> effort_columns;  ///< one for each joint
   std::string heading_column;               ///< empty where the heading is odometry
   Hold hold = Hold::first_order;            ///< of the effort
-  EffortChanges changes = EffortChanges::between;  ///< what an effort may do between two samples, beside `hold`
-  Interval delay{0.0, 0.0};                 ///< s, holds the constant time by which logged efforts are late
   bool effort_unsigned = false;             ///< the sign of an effort is taken from its joint's direction of motion
   double count = 0.0;                       ///< mean_speed: speeds are whole multiples of this, rad/s (0: not rounded)
   double nominal_step = 0.0;                ///< median step of the log it was found on, s
@@ -39,6 +37,8 @@ struct Measurement {
                               ///< it, rad/s (0: nothing was found)
 
   EffortCorrection correction{};  ///< of the efforts, before anything else is made of them
+  EffortChanges changes = EffortChanges::between;  ///< what an effort may do between two samples, beside `hold`
+  Interval delay{0.0, 0.0};                        ///< s, holds the constant time by which logged efforts are late
 
   /// A longer step between two samples is a hole in the log: nothing is known of the effort in it, s; 0 where no step is
   /// known. 1.75 nominal steps, for steps that vary less: as long as two of the shortest together, but at least 1.35

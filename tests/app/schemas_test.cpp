@@ -10,9 +10,7 @@ using testing::Outcome;
 
 class Schemas : public testing::ProgramTest {
  protected:
-  void SetUp() override {
-    (void)testing_support::skip_unless(has_validator(), "python3-jsonschema is not installed");
-  }
+  void SetUp() override { (void)testing_support::skip_unless(has_validator(), "python3-jsonschema is not installed"); }
 
   static std::string shipped() { return fmt::format("'{}'", (examples() / "healthy.csv.gz").string()); }
 

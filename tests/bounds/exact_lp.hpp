@@ -224,9 +224,9 @@ struct Tally {
       worst_at = where + ", " + verdict.worst_at;
     }
     if (verdict.empty || verdict.inside > 0 || fails) {
-      failures += fmt::format("  {}: called empty {}, inside {}, loose {}, of a sliver {}, worst {:.2g} at {}\n", where,
-                              verdict.empty, verdict.inside, verdict.loose, verdict.sliver, verdict.worst,
-                              verdict.worst_at);
+      failures +=
+          fmt::format("  {}: called empty {}, inside {}, loose {}, of a sliver {}, worst {:.2g} at {}\n", where,
+                      verdict.empty, verdict.inside, verdict.loose, verdict.sliver, verdict.worst, verdict.worst_at);
     }
   }
 };
@@ -234,13 +234,15 @@ struct Tally {
 /// One line of numbers.
 inline std::string summary(const Tally& t) {
   return fmt::format(
-      "{:>5} problems, {:>6} values: inside {}, called empty {}, loose {}, slivers {}; worst excess {:.2g} of the width ({})",
+      "{:>5} problems, {:>6} values: inside {}, called empty {}, loose {}, slivers {}; worst excess {:.2g} of the "
+      "width ({})",
       t.problems, t.compared, t.inside, t.empty, t.loose, t.slivers, t.worst, t.worst_at);
 }
 
 /// Judges one problem and adds it to the tally.
 inline void judge_one(Tally& tally, Family family, std::size_t p, std::uint64_t seed, std::size_t trials) {
-  tally.add(judge(problem(family, p, seed), seed, trials), family, fmt::format("{}, p {}, seed {}", name_of(family), p, seed));
+  tally.add(judge(problem(family, p, seed), seed, trials), family,
+            fmt::format("{}, p {}, seed {}", name_of(family), p, seed));
 }
 
 }  // namespace wheelwright::exact_lp

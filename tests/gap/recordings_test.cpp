@@ -23,9 +23,7 @@ using ::testing::Contains;
 
 class GapRecordings : public ::testing::Test {
  protected:
-  void SetUp() override {
-    (void)testing_support::skip_without_recordings(root);
-  }
+  void SetUp() override { (void)testing_support::skip_without_recordings(root); }
   [[nodiscard]] Diagnosis diagnosed(const std::string& log, const Robot& robot) const {
     CsvLog file({root / log});
     DiagnoseOptions options;

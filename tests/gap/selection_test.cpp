@@ -170,13 +170,14 @@ TEST_P(MissingCause, IsNotBlamedOnAnother) {
   EXPECT_EQ(found.selection.theta_moved, c.theta_moved);
 }
 
-INSTANTIATE_TEST_SUITE_P(SelectCauses, MissingCause,
-                         testing::Values(missing_case(effect_case("slope", {{"g_x", 0.3}, {"g_y", 0.1}}), {}, false, false),
-                                         missing_case(effect_case("coulomb", {{"c", 0.3}}), {"coulomb_asymmetric"}, true,
-                                                      false),
-                                         missing_case(effect_case("actuator_lag", {{"T", 0.04}}), {}, false, false),
-                                         missing_case(effect_case("com_longitudinal", {{"a", 0.05}}), {}, false, false)),
-                         [](const testing::TestParamInfo<Case>& given) { return given.param.name; });
+INSTANTIATE_TEST_SUITE_P(
+    SelectCauses, MissingCause,
+    // A slope acts as a bias that turns with the heading: a bias is the best of what is left, and too little.
+    testing::Values(missing_case(effect_case("slope", {{"g_x", 0.3}, {"g_y", 0.1}}), {"torque_bias"}, false, false),
+                    missing_case(effect_case("coulomb", {{"c", 0.3}}), {"coulomb_asymmetric"}, true, false),
+                    missing_case(effect_case("actuator_lag", {{"T", 0.04}}), {"delay"}, true, false),
+                    missing_case(effect_case("com_longitudinal", {{"a", 0.05}}), {}, false, false)),
+    [](const testing::TestParamInfo<Case>& given) { return given.param.name; });
 
 // A spring that pulls the robot back to its start: in no catalogue but the user's.
 Effect tether() {

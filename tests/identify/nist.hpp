@@ -13,6 +13,9 @@
 #include <vector>
 
 #include <Eigen/Core>
+#include <Eigen/QR>
+
+#include <wheelwright/core/limits.hpp>
 
 namespace wheelwright::testing_support {
 
@@ -125,6 +128,44 @@ inline NistProblem read_nist(const std::string& name) {
     }
   }
   return p;
+}
+
+/// How far from the certified values a fit may be, absolutely.
+struct NistLimits {
+  Eigen::VectorXd estimate, sd;
+  double residual_sd = 0.0;
+};
+
+/// What backward stable least squares with the columns (or, of a nonlinear model, the Jacobian) `Y` can be asked for. The
+/// factorisation, and data that are decimals and their powers rounded to doubles, amount to other data: each column a_j and
+/// the response, of size `response`, off by γ of their norm (Higham 2002, theorems 19.4 and 20.3), γ = (p + 4√(mp))·ε for m
+/// rows of p columns, where roundings partly cancel (Higham and Mary 2019, "A new approach to probabilistic rounding error
+/// analysis", SIAM J. Sci. Comput. 41; the worst case is of order mp). With s_j = √(AᵀA)⁻¹_jj, the length of row j of A⁺,
+/// and r the residuals, to first order (Björck 1996, "Numerical methods for least squares problems", section 1.4)
+///
+///     |δx_j| <= γ(s_j t + Σ_k |(AᵀA)⁻¹_jk| ‖a_k‖ ‖r‖),    t = ‖y‖ + Σ_k ‖a_k‖ |x_k|,
+///     |δσ| <= γ(t + Σ_k s_k ‖a_k‖ ‖r‖) / √(m − p),           |δs_j| <= 2γ s_j Σ_k s_k ‖a_k‖,
+///
+/// Σ_k s_k ‖a_k‖ being a condition number (p where columns are orthogonal). Certified values are rounded by `published`.
+inline NistLimits nist_limits(const Eigen::MatrixXd& Y, const NistProblem& problem, double response, double published) {
+  using Long = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic>;
+  const Eigen::Index p = Y.cols();
+  const double gamma = (static_cast<double>(p) + 4.0 * std::sqrt(static_cast<double>(Y.rows() * p))) * kEpsilon;
+  const double root = std::sqrt(static_cast<double>(Y.rows() - p)), residual = problem.residual_sd * root;
+  const Eigen::VectorXd norm = Y.colwise().norm(), x = problem.certified.cwiseAbs();
+  const Long scaled = Y.cast<long double>() * norm.cast<long double>().cwiseInverse().asDiagonal();
+  const Long R = Long(scaled.householderQr().matrixQR().topRows(p)).triangularView<Eigen::Upper>();
+  const Long inverse = R.triangularView<Eigen::Upper>().solve(Long::Identity(p, p));
+  const Eigen::MatrixXd gram = (inverse * inverse.transpose()).cast<double>();  // of columns of norm 1
+  const Eigen::VectorXd length = gram.diagonal().cwiseSqrt();
+  const double t = response + norm.dot(x);
+  NistLimits limits;
+  limits.estimate =
+      (gamma * (length * t + gram.cwiseAbs().rowwise().sum() * residual)).cwiseQuotient(norm) + published * x;
+  limits.residual_sd = gamma * (t + length.sum() * residual) / root + published * problem.residual_sd;
+  limits.sd =
+      limits.residual_sd * length.cwiseQuotient(norm) + (2.0 * gamma * length.sum() + published) * problem.certified_sd;
+  return limits;
 }
 
 }  // namespace wheelwright::testing_support

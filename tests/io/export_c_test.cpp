@@ -155,9 +155,7 @@ struct World {
 
 class ExportC : public testing::ScratchTest {
  protected:
-  void SetUp() override {
-    (void)testing_support::skip_unless(testing_support::has_c_compiler(), "there is no cc");
-  }
+  void SetUp() override { (void)testing_support::skip_unless(testing_support::has_c_compiler(), "there is no cc"); }
 
   /// Runs both over `blocks` blocks of `rows` rows, with a restart between blocks.
   Seen same(const Case& c, std::size_t blocks, std::size_t rows, const std::string& flags = "-O2") {

@@ -20,9 +20,7 @@ using ::testing::ElementsAre;
 
 class Recordings : public ::testing::Test {
  protected:
-  void SetUp() override {
-    (void)testing_support::skip_without_recordings(root / "data");
-  }
+  void SetUp() override { (void)testing_support::skip_without_recordings(root / "data"); }
   std::vector<fs::path> all(const fs::path& folder, const std::string& ending) const {
     std::vector<fs::path> found;
     for (const auto& entry : fs::recursive_directory_iterator(root / folder)) {
