@@ -1,7 +1,58 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/io/export_c_text.hpp>
 
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include <wheelwright/core/check.hpp>
+
 namespace wheelwright::c_text {
+
+std::string hex(double x) {
+  if (std::isinf(x)) {
+    return x > 0.0 ? "HUGE_VAL" : "-HUGE_VAL";
+  }
+  check::finite(x, "a number of the exported detector");
+  return fmt::format("{:a}", x);
+}
+
+void replace_all(std::string& text, std::string_view from, std::string_view to) {
+  for (std::size_t at = text.find(from); at != std::string::npos; at = text.find(from, at + to.size())) {
+    text.replace(at, from.size(), to);
+  }
+}
+
+std::string plain(std::string text) {
+  constexpr std::array<std::pair<std::string_view, std::string_view>, 7> kWords = {
+      {{"·", "*"}, {"²", "^2"}, {"³", "^3"}, {"Ω", "Ohm"}, {"−", "-"}, {"*/", "* /"}, {"/*", "/ *"}}};
+  for (const auto& [from, to] : kWords) {
+    replace_all(text, from, to);
+  }
+  for (char& c : text) {
+    c = c >= ' ' && c <= '~' ? c : '?';
+  }
+  return text;
+}
+
+std::string combination(const Eigen::MatrixXd& matrix, std::size_t row, const char* x) {
+  std::string text;
+  for (Eigen::Index j = 0; j < matrix.cols(); ++j) {
+    text += (j == 0 ? "" : " + ") + hex(matrix(static_cast<Eigen::Index>(row), j)) + fmt::format(" * {}[{}]", x, j);
+  }
+  return text;
+}
+
+std::string numbers(const Eigen::VectorXd& x) {
+  return list(static_cast<std::size_t>(x.size()), [&](std::size_t i) { return hex(x[static_cast<Eigen::Index>(i)]); });
+}
+
+std::string numbers(const Eigen::MatrixXd& x) {
+  return list(static_cast<std::size_t>(x.rows()),
+              [&](std::size_t i) { return numbers(Eigen::VectorXd(x.row(static_cast<Eigen::Index>(i)))); });
+}
 
 const std::string_view kCompiler = R"(#include <math.h>
 #include <string.h>
@@ -31,43 +82,96 @@ typedef struct pfx_decision {
   int fault; /* an alarm stands in some channel */
   pfx_channel channel[PFX_CHANNELS];
 } pfx_decision;
+)";
 
-/* z1' = -beta z1 + u, z2' = -beta z2 + z1. */
+const std::string_view kSmoothKernel = R"(/* One filtered signal: sums of impulses with the weights exp(-beta x), x exp(-beta x) and exp(-gamma x), x their age. */
+typedef struct pfx_cascade {
+  double z1, z2, fast;
+} pfx_cascade;
+
+/* Weights of one step; computed anew only when its length changes. */
+typedef struct pfx_weights {
+  double step, decay, fast;
+} pfx_weights;
+
+static inline void pfx_prepare(pfx_weights *w, double h)
+{
+  if (h != w->step) {
+    w->step = h;
+    w->decay = exp(-(PFX_BETA * h));
+    w->fast = exp(-PFX_GAMMA * h);
+  }
+}
+
+/* An impulse q, and then a step. */
+static inline void pfx_take(pfx_cascade *c, const pfx_weights *w, double q)
+{
+  c->z1 += q;
+  c->z2 = w->decay * (c->z2 + w->step * c->z1);
+  c->z1 = w->decay * c->z1;
+  c->fast = w->fast * (c->fast + q);
+}
+
+/* The filtered signal now. */
+static inline double pfx_value(const pfx_cascade *c)
+{
+  return PFX_GAIN * (PFX_SLOW * c->z2 - PFX_QUICK * (c->z1 - c->fast));
+}
+)";
+
+const std::string_view kNodeKernel = R"(/* One filtered signal: sums of impulses with the weights exp(-beta x) and x exp(-beta x), x their age. */
 typedef struct pfx_cascade {
   double z1, z2;
 } pfx_cascade;
 
-/* Weights of one step of the exact discretisation; computed anew only when the step changes. */
+/* Weights of one step; computed anew only when its length changes. */
 typedef struct pfx_weights {
   double step, decay;
-  double held1, held2;   /* of a constant input */
-  double begin1, begin2; /* of the beginning of a linear input */
-  double end1, end2;     /* of its end */
-  double slope1, slope2; /* of its increment, for the filter of its derivative */
 } pfx_weights;
-)";
 
-const std::string_view kWeights =
-    R"(static inline void pfx_fill_weights(pfx_weights *w, double h, double decay, double i0, double i1, double i2)
+static inline void pfx_prepare(pfx_weights *w, double h)
 {
-  w->step = h;
-  w->decay = decay;
-  w->held1 = h * i0;
-  w->held2 = h * h * i1;
-  w->begin1 = h * i1;
-  w->begin2 = h * h * i2;
-  w->end1 = h * (i0 - i1);
-  w->end2 = h * h * (i1 - i2);
-  w->slope1 = i0;
-  w->slope2 = h * i1;
+  if (h != w->step) {
+    w->step = h;
+    w->decay = exp(-(PFX_BETA * h));
+  }
 }
 
-/* Weights of a step of h seconds: the integrals of w^n exp(-x w) over [0, 1], x = beta h, n = 0, 1, 2. */
-static inline void pfx_change_step(pfx_weights *w, double h)
+/* An impulse q, and then a step. */
+static inline void pfx_take(pfx_cascade *c, const pfx_weights *w, double q)
+{
+  c->z1 += q;
+  c->z2 = w->decay * (c->z2 + w->step * c->z1);
+  c->z1 = w->decay * c->z1;
+}
+
+/* The filtered signal now. */
+static inline double pfx_value(const pfx_cascade *c)
+{
+  return PFX_GAIN * c->z2;
+}
+)";
+
+const std::string_view kFirstOrderKernel = R"(/* One filtered signal: z1' = -beta z1 + u. */
+typedef struct pfx_cascade {
+  double z1;
+} pfx_cascade;
+
+/* Weights of one step; computed anew only when its length changes. */
+typedef struct pfx_weights {
+  double step, decay;
+  double increment1; /* of the integral of u over the step */
+} pfx_weights;
+
+/* increment1: the integral of exp(-x w) over w in [0, 1], x = beta h. */
+static inline void pfx_prepare(pfx_weights *w, double h)
 {
   const double x = PFX_BETA * h;
-  const double decay = exp(-x);
-  double i0, i1, i2;
+  if (h == w->step) {
+    return;
+  }
+  w->step = h;
+  w->decay = exp(-x);
   if (x < 1.0) {
     double term = 1.0, sum = 1.0 / 3.0;
     int k;
@@ -75,29 +179,93 @@ static inline void pfx_change_step(pfx_weights *w, double h)
       term *= -x / k;
       sum += term / (k + 3);
     }
-    i2 = sum;
-    i1 = 0.5 * (x * i2 + decay);
-    i0 = x * i1 + decay;
+    w->increment1 = x * (0.5 * (x * sum + w->decay)) + w->decay;
   } else {
-    i0 = (1.0 - decay) / x;
-    i1 = (i0 - decay) / x;
-    i2 = (2.0 * i1 - decay) / x;
+    w->increment1 = (1.0 - w->decay) / x;
   }
-  pfx_fill_weights(w, h, decay, i0, i1, i2);
+}
+
+/* A step over which the integral of the signal is q. */
+static inline void pfx_take(pfx_cascade *c, const pfx_weights *w, double q)
+{
+  c->z1 = w->decay * c->z1 + w->increment1 * q;
+}
+
+/* The filtered signal now. */
+static inline double pfx_value(const pfx_cascade *c)
+{
+  return PFX_GAIN * c->z1;
 }
 )";
 
-const std::string_view kCascade = R"(/* One step on which the input adds add1 to z1 and add2 to z2. */
-static inline void pfx_advance(pfx_cascade *c, const pfx_weights *w, double add1, double add2)
+const std::string_view kSpeedKernel = R"(/* One filtered signal: z1' = -beta z1 + u, z2' = -beta z2 + z1. */
+typedef struct pfx_cascade {
+  double z1, z2;
+} pfx_cascade;
+
+/* Weights of one step; computed anew only when its length changes. */
+typedef struct pfx_weights {
+  double step, decay;
+  double increment1, increment2; /* of the integral of u over the step */
+} pfx_weights;
+
+/* With the integrals of w^n exp(-x w) over [0, 1], x = beta h, n = 0, 1. */
+static inline void pfx_prepare(pfx_weights *w, double h)
 {
-  c->z2 = w->decay * (c->z2 + w->step * c->z1) + add2;
-  c->z1 = w->decay * c->z1 + add1;
+  const double x = PFX_BETA * h;
+  double i1;
+  if (h == w->step) {
+    return;
+  }
+  w->step = h;
+  w->decay = exp(-x);
+  if (x < 1.0) {
+    double term = 1.0, sum = 1.0 / 3.0;
+    int k;
+    for (k = 1; k <= 18; ++k) {
+      term *= -x / k;
+      sum += term / (k + 3);
+    }
+    i1 = 0.5 * (x * sum + w->decay);
+    w->increment1 = x * i1 + w->decay;
+  } else {
+    w->increment1 = (1.0 - w->decay) / x;
+    i1 = (w->increment1 - w->decay) / x;
+  }
+  w->increment2 = h * i1;
 }
 
-/* One step with an input that is linear from begin to end. */
-static inline void pfx_linear(pfx_cascade *c, const pfx_weights *w, double begin, double end)
+/* A step over which the integral of the signal is q. */
+static inline void pfx_take(pfx_cascade *c, const pfx_weights *w, double q)
 {
-  pfx_advance(c, w, w->begin1 * begin + w->end1 * end, w->begin2 * begin + w->end2 * end);
+  c->z2 = w->decay * (c->z2 + w->step * c->z1) + w->increment2 * q;
+  c->z1 = w->decay * c->z1 + w->increment1 * q;
+}
+
+/* The filtered signal now. */
+static inline double pfx_value(const pfx_cascade *c)
+{
+  return PFX_GAIN * c->z2;
+}
+)";
+
+const std::string_view kMajorant = R"(/* Sum of impulses with the weight (1 - x + x^2 / 2) exp(-x), x beta times their age: bounds what the slope of the kernel
+ * makes of them. */
+typedef struct pfx_majorant {
+  double s0, s1, s2;
+} pfx_majorant;
+
+/* A step with x = beta h, and then an impulse q. */
+static inline void pfx_majorant_take(pfx_majorant *m, double decay, double x, double q)
+{
+  m->s2 = decay * (m->s2 + x * (2.0 * m->s1 + x * m->s0));
+  m->s1 = decay * (m->s1 + x * m->s0);
+  m->s0 = decay * m->s0 + q;
+}
+
+static inline double pfx_majorant_value(const pfx_majorant *m)
+{
+  return m->s0 - m->s1 + 0.5 * m->s2;
 }
 )";
 
@@ -191,16 +359,16 @@ static inline void pfx_threshold(pfx_state *s, const double *y, const double *dy
     predicted += term;
     magnitude += fabs(term);
     reach += (fabs(y[j]) + dy[j]) * pfx_largest[j];
-    if (dy[j] > 0.0 && pfx_lower[j] < 0.0 && pfx_upper[j] > 0.0) {
+    if (dy[j] > 0.0 && pfx_sign[j] == 0.0) {
       extra += dy[j] * pfx_largest[j];
     }
   }
   for (j = 0; j < PFX_PARAMETERS; ++j) {
-    direction[j] = y[j] + (pfx_lower[j] >= 0.0 ? dy[j] : pfx_upper[j] <= 0.0 ? -dy[j] : 0.0);
+    direction[j] = y[j] + pfx_sign[j] * dy[j];
   }
   above = pfx_support(s, direction, (2 * channel) % PFX_SLOTS);
   for (j = 0; j < PFX_PARAMETERS; ++j) {
-    direction[j] = -y[j] + (pfx_lower[j] >= 0.0 ? dy[j] : pfx_upper[j] <= 0.0 ? -dy[j] : 0.0);
+    direction[j] = -y[j] + pfx_sign[j] * dy[j];
   }
   below = pfx_support(s, direction, (2 * channel + 1) % PFX_SLOTS);
   magnitude += extra + 2.0 * reach;

@@ -7,6 +7,7 @@
 #include <Eigen/LU>
 
 #include <wheelwright/bounds/half_space.hpp>
+#include <wheelwright/filter/motion_bound.hpp>
 #include <wheelwright/io/export_c.hpp>
 #include <wheelwright/model/differential_drive.hpp>
 #include <wheelwright/model/single_axis.hpp>
@@ -24,16 +25,31 @@ using testing_support::CDetector;
 using testing_support::Random;
 using testing_support::Seen;
 
+/// What a detector knows of the motion between samples.
+enum class Between {
+  nothing,       ///< not asked for
+  interpolated,  ///< no bound on the motion: only what efforts may do
+  mobility,      ///< by the model
+  limit,         ///< a limit on the accelerations
+  both,
+};
+
 /// One detector and the world that it watches.
 struct Case {
   Model model;
   FilterDesign design{.order = 2, .alpha = 9.0, .beta = 7.0};
   MotionKind motion = MotionKind::angle;
   Hold hold = Hold::first_order;
+  EffortChanges changes = EffortChanges::between;
   bool effort_unsigned = false;
   bool heading = false;  // measured
   bool noisy = true;     // bounds on the errors of the rows
-  double jitter = 0.0;   // share of the step
+  Between between = Between::interpolated;
+  double nominal = 0.01;  // s
+  double jitter = 0.0;    // share of the step
+  bool lost = false;      // single rows are missing, and steps of 1.6 steps
+  double gap = 0.3;       // s
+  Interval delay{0.0, 0.0};
   DetectorOptions options{};
   Eigen::Index half_spaces = 4;  // for each parameter
 };
@@ -42,6 +58,36 @@ Model drive(bool anisotropic, bool coulomb) {
   return DifferentialDrive{
       .wheel_radius = 0.1, .track_width = 0.4, .anisotropic_friction = anisotropic, .coulomb = coulomb}
       .model();
+}
+
+/// Both axes coupled through inertia and friction, as with a centre of mass beside the middle.
+Model coupled() {
+  Model m = drive(false, true);
+  m.parameters.push_back(m.parameters.front());
+  m.parameters.back().name = m.parameters.back().physical = "beside";
+  const std::size_t j = m.p() - 1;
+  m.terms.push_back({.output = 0, .parameter = j, .kind = Term::Kind::acceleration, .coordinate = 1, .scale = -0.05});
+  m.terms.push_back({.output = 1, .parameter = j, .kind = Term::Kind::acceleration, .coordinate = 0, .scale = -0.05});
+  m.terms.push_back({.output = 0, .parameter = j, .kind = Term::Kind::speed, .coordinate = 1, .scale = 0.03});
+  m.terms.push_back({.output = 1, .parameter = j, .kind = Term::Kind::speed, .coordinate = 0, .scale = -0.3});
+  return m;
+}
+
+/// Three axes, each for itself.
+Model three_axes() {
+  Model m = SingleAxis{}.model();
+  m.joints.resize(3, m.joints.front());
+  m.motion = Eigen::Vector3d(1.0, 0.5, -2.0).asDiagonal();
+  m.input = Eigen::Vector3d(1.0, 3.0, 0.7).asDiagonal();
+  m.terms.clear();
+  m.outputs = {"one", "two", "three"};
+  m.output_units.resize(3, m.output_units.front());
+  m.coordinates = {"x", "y", "z"};
+  for (std::size_t i = 0; i < 3; ++i) {
+    m.terms.push_back({.output = i, .parameter = 0, .kind = Term::Kind::acceleration, .coordinate = i});
+    m.terms.push_back({.output = i, .parameter = 1, .coordinate = i, .scale = 0.2 + double(i)});
+  }
+  return m;
 }
 
 /// What the world has: around 0.4; an offset may have either sign.
@@ -73,8 +119,10 @@ Detector detector_of(const Case& c) {
   Measurement m;
   m.motion = c.motion;
   m.hold = c.hold;
+  m.changes = c.changes;
   m.effort_unsigned = c.effort_unsigned;
-  m.nominal_step = 0.01;
+  m.nominal_step = c.nominal;
+  m.delay = c.delay;
   m.count = c.motion == MotionKind::mean_speed ? 2.0 * 3.141592653589793 / (4096.0 * 0.01) : 0.0;
   m.heading_column = c.heading ? "theta" : "";
   for (const Joint& joint : c.model.joints) {
@@ -86,8 +134,19 @@ Detector detector_of(const Case& c) {
     const SensorErrors sensors{.motion = c.motion == MotionKind::speed ? 0.01 : 2e-4, .effort = 0.01, .heading = 0.01};
     errors = propagate(c.model, c.design, m, sensors);
   }
+  const Polytope set = set_of(c);
+  errors.between_samples = c.between != Between::nothing;
+  if (c.between == Between::mobility || c.between == Between::both) {
+    const Eigen::VectorXd effort = errors.motion.effort;
+    errors.motion = motion_bound(c.model, set.hull().sides);
+    EXPECT_GT(errors.motion.mobility.size(), 0);
+    errors.motion.effort = effort;
+  }
+  if (c.between == Between::limit || c.between == Between::both) {
+    errors.motion.limit = Eigen::VectorXd::LinSpaced(static_cast<Eigen::Index>(c.model.coordinates.size()), 0.6, 3.0);
+  }
   const Eigen::VectorXd estimate = truth(c) * 1.02;
-  return Detector(RegressorFilter(c.model, c.design, m, errors), ThresholdRule(set_of(c), estimate, c.options.set),
+  return Detector(RegressorFilter(c.model, c.design, m, errors), ThresholdRule(set, estimate, c.options.set),
                   c.options);
 }
 
@@ -98,14 +157,17 @@ struct World {
 
   void rows(std::size_t count, std::vector<double>& t, std::vector<double>& samples) {
     const std::size_t joints = case_.model.joints.size(), coordinates = case_.model.coordinates.size();
+    const bool uneven = case_.lost && case_.motion != MotionKind::mean_speed;
     t.clear();
     samples.clear();
     std::vector<double> speed(coordinates), acceleration(coordinates), joint(joints),
         none(std::max(joints, coordinates));
     for (std::size_t k = 0; k < count; ++k, ++row_) {
-      const double h = row_ % 700 == 699   ? 0.3
-                       : row_ % 911 == 910 ? 0.0
-                                           : 0.01 * (1.0 + case_.jitter * random_.symmetric());
+      const double h = row_ % 700 == 699                 ? case_.gap
+                       : row_ % 911 == 910               ? 0.0
+                       : case_.lost && row_ % 331 == 330 ? 0.02
+                       : uneven && row_ % 43 == 42       ? 0.016
+                                                         : 0.01 * (1.0 + case_.jitter * random_.symmetric());
       now_ += h;
       Eigen::VectorXd w(static_cast<Eigen::Index>(joints)), dw(w.size());
       const bool resting = row_ % 600 >= 500;
@@ -231,6 +293,103 @@ TEST_F(ExportC, DecidesAsTheLibraryWithEveryFunctionTerm) {
               "plain axis");
 }
 
+constexpr FilterDesign kFirstOrder{.order = 1, .alpha = 20.0, .beta = 11.0};
+
+TEST_F(ExportC, DecidesAsTheLibraryAboutWhatHappensBetweenAngles) {
+  expect_same({.model = drive(false, false), .between = Between::mobility, .jitter = 0.3, .lost = true},
+              "linear efforts that may change, uneven steps, lost rows");
+  expect_same({.model = drive(false, true), .hold = Hold::zero_order, .between = Between::mobility, .lost = true},
+              "any effort of a step, dry friction through reversals");
+  expect_same({.model = drive(true, true),
+               .hold = Hold::zero_order,
+               .changes = EffortChanges::at_samples,
+               .between = Between::both,
+               .jitter = 0.2},
+              "held efforts, functions of heading and joints, a limit as well");
+  expect_same({.model = drive(true, true),
+               .changes = EffortChanges::at_samples,
+               .heading = true,
+               .between = Between::mobility,
+               .lost = true},
+              "linear efforts, measured heading");
+  expect_same({.model = coupled(), .between = Between::mobility, .lost = true, .options = of_set(kBox)},
+              "coupled coordinates");
+  expect_same({.model = three_axes(), .between = Between::mobility, .jitter = 0.2}, "three coordinates");
+  expect_same({.model = drive(false, true), .between = Between::limit}, "a limit");
+  expect_same({.model = drive(false, true), .between = Between::nothing, .lost = true}, "no bounds, lost rows");
+  expect_same({.model = drive(false, false), .noisy = false, .nominal = 0.0, .jitter = 0.2}, "no known step");
+}
+
+TEST_F(ExportC, DecidesAsTheLibraryAboutWhatHappensBetweenMeanSpeeds) {
+  constexpr auto kMean = MotionKind::mean_speed;
+  constexpr auto kHeld = Hold::zero_order;
+  constexpr auto kStamps = EffortChanges::at_samples;
+  expect_same({.model = drive(true, true), .motion = kMean, .between = Between::mobility, .lost = true}, "linear");
+  expect_same({.model = drive(false, true), .motion = kMean, .changes = kStamps, .between = Between::mobility},
+              "linear, at samples");
+  expect_same({.model = drive(false, true),
+               .motion = kMean,
+               .hold = kHeld,
+               .effort_unsigned = true,
+               .between = Between::mobility},
+              "held, any effort of a step");
+  expect_same({.model = drive(false, false),
+               .motion = kMean,
+               .hold = kHeld,
+               .changes = kStamps,
+               .between = Between::both,
+               .lost = true,
+               .options = of_set(kBox)},
+              "held, at samples");
+  expect_same({.model = drive(false, false), .motion = kMean, .between = Between::nothing}, "no bounds");
+}
+
+TEST_F(ExportC, DecidesAsTheLibraryAboutWhatHappensBetweenSpeeds) {
+  constexpr auto kSpeed = MotionKind::speed;
+  for (const FilterDesign& design : {kFirstOrder, FilterDesign{.order = 2, .alpha = 9.0, .beta = 7.0}}) {
+    SCOPED_TRACE(design.order);
+    expect_same({.model = drive(true, true),
+                 .design = design,
+                 .motion = kSpeed,
+                 .between = Between::mobility,
+                 .jitter = 0.1,
+                 .lost = true},
+                "linear, odometry");
+    expect_same({.model = SingleAxis{.coulomb = true, .offset = true}.model(),
+                 .design = design,
+                 .motion = kSpeed,
+                 .hold = Hold::zero_order,
+                 .between = Between::mobility,
+                 .lost = true},
+                "held, any effort of a step, dry friction through reversals");
+    expect_same({.model = coupled(),
+                 .design = design,
+                 .motion = kSpeed,
+                 .hold = Hold::zero_order,
+                 .changes = EffortChanges::at_samples,
+                 .between = Between::mobility,
+                 .options = of_set(kBox)},
+                "held, at samples, coupled coordinates");
+    expect_same({.model = three_axes(), .design = design, .motion = kSpeed, .between = Between::limit}, "a limit");
+  }
+}
+
+// Nothing bounds the motion in a step that is longer than the robot's friction needs to stop it.
+TEST_F(ExportC, StartsAnewAfterAStepThatIsTooLong) {
+  Case c{.model = drive(false, true),
+         .design = kFirstOrder,
+         .motion = MotionKind::speed,
+         .between = Between::mobility,
+         .nominal = 0.0,
+         .gap = 1.5};
+  expect_same(c, "speeds");
+  c.model = SingleAxis{}.model();
+  c.motion = MotionKind::angle;
+  c.design = {};
+  c.noisy = false;
+  expect_same(c, "angles");
+}
+
 TEST_F(ExportC, DecidesAsTheLibraryWithEveryRule) {
   Case c{.model = drive(false, true)};
   c.options.persistence = Persistence{.k = 3, .n = 5};
@@ -295,7 +454,7 @@ TEST_F(ExportC, CallsNothingButWhatItStates) {
   }
   std::istringstream called(undefined);
   while (called >> word) {
-    EXPECT_THAT((std::vector<std::string>{"exp", "cos", "sin", "sincos", "round", "memset", "_GLOBAL_OFFSET_TABLE_"}),
+    EXPECT_THAT((std::vector<std::string>{"exp", "cos", "sin", "sincos", "round", "memset", "memcpy", "_GLOBAL_OFFSET_TABLE_"}),
                 ::testing::Contains(word));
   }
 }
@@ -306,6 +465,10 @@ TEST_F(ExportC, SaysWhatItCannotWrite) {
     EXPECT_THAT(testing::input_error([&] { static_cast<void>(c_header(detector, {.name = name})); }),
                 HasSubstr("export: name '" + name + "': expected a prefix"));
   }
+  Case late{.model = drive(false, false)};
+  late.delay = {0.0, 0.01};
+  EXPECT_THAT(testing::input_error([&] { static_cast<void>(c_header(detector_of(late))); }),
+              HasSubstr("late by 0 to 0.01 s, which has no C form"));
   Case own{.model = SingleAxis{.offset = true}.model()};
   own.model.terms.back().function = [](const MotionState& state) { return TermValue{state.speed[0], 0.0}; };
   const Detector other = detector_of(own);
@@ -326,6 +489,48 @@ TEST_F(ExportC, KeepsItsCommentClosed) {
 }
 
 class SlowExportC : public ExportC {};
+
+TEST_F(SlowExportC, EveryCombinationHasTheSameBits) {
+  const std::vector<Model> models = {drive(false, false), drive(true, true),
+                                     SingleAxis{.coulomb = true, .offset = true}.model(), coupled()};
+  struct Kind {
+    MotionKind motion;
+    FilterDesign design;
+  };
+  const FilterDesign second{.order = 2, .alpha = 9.0, .beta = 7.0};
+  std::size_t number = 0, outside = 0;
+  for (const Model& model : models) {
+    for (const Kind& kind : {Kind{MotionKind::angle, second}, Kind{MotionKind::mean_speed, second},
+                             Kind{MotionKind::speed, second}, Kind{MotionKind::speed, kFirstOrder}}) {
+      for (const Hold hold : {Hold::zero_order, Hold::first_order}) {
+        for (const EffortChanges changes : {EffortChanges::at_samples, EffortChanges::between}) {
+          for (const Between between : {Between::nothing, Between::interpolated, Between::mobility, Between::limit,
+                                        Between::both}) {
+            const std::size_t k = number++;
+            Case c{.model = model, .design = kind.design, .motion = kind.motion, .hold = hold, .changes = changes};
+            c.between = between;
+            c.noisy = k % 7 != 3;
+            c.effort_unsigned = k % 5 == 4;
+            c.heading = model.heading_used && k % 3 == 1;
+            c.jitter = kind.motion == MotionKind::mean_speed ? 0.0 : 0.3 * double(k % 2);
+            c.lost = k % 11 < 6;
+            c.options = of_set(kBox);
+            if (k % 13 == 0) {
+              c.options.mu = Eigen::VectorXd::Constant(static_cast<Eigen::Index>(model.n()), 0.02);
+            }
+            SCOPED_TRACE(k);
+            const Seen seen = same(c, 2, 1500, "-O1");
+            EXPECT_EQ(seen.different, 0u);
+            EXPECT_GT(seen.valid, seen.rows / 4);
+            outside += seen.outside;
+          }
+        }
+      }
+    }
+  }
+  EXPECT_EQ(number, 320u);
+  EXPECT_GT(outside, 10000u);
+}
 
 TEST_F(SlowExportC, AMillionSamplesHaveTheSameBits) {
   const Seen polytope =

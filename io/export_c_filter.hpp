@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// RegressorFilter as C99, with only what one model and one measurement need.
+#pragma once
+
+#include <cstddef>
+#include <initializer_list>
+#include <string>
+#include <vector>
+
+#include <wheelwright/filter/regressor_filter.hpp>
+
+namespace wheelwright::c_text {
+
+/// Writes the parts of a header that stand for a filter. Each gives text with `pfx` for the prefix (export_c_text.hpp).
+///
+/// The C has the library's operations in the library's order. Left out is what adds an exact zero, multiplies by one, or
+/// is never looked at; sums of constants alone are done here.
+class FilterWriter {
+ public:
+  /// `bounds`: whether dY and dy are wanted. Throws InputError where the filter has no C form.
+  FilterWriter(const RegressorFilter& filter, bool bounds);
+
+  /// The numbers of the filter, as macros.
+  [[nodiscard]] std::string constants() const;
+  /// The kernel; types of a sample, a step, and of what the recursion remembers.
+  [[nodiscard]] std::string types() const;
+  /// Members of the state.
+  [[nodiscard]] std::string state() const;
+  /// Functions up to pfx_filter, which takes a sample and says whether there is a row, pfx_row, which gives it, and
+  /// pfx_forget, after which the next sample starts a segment.
+  [[nodiscard]] std::string functions() const;
+
+  /// Lines of the header's comment: how efforts are taken, when a segment ends, what of libm is called.
+  [[nodiscard]] std::string effort_words() const;
+  [[nodiscard]] std::string segment_words() const;
+  [[nodiscard]] std::string libm_words() const;
+
+ private:
+  enum class Function { along_x, along_y, signs_sum, signs_difference, sign_of_speed, one };
+  struct FunctionTerm {
+    std::size_t term;
+    Function function;
+  };
+  class Text;
+
+  [[nodiscard]] static Function function_of(const Model& model, const Term& term);
+  [[nodiscard]] bool uses(std::initializer_list<Function> any) const;
+  void conversions(Text& out) const;
+  void read(Text& out) const;
+  void evaluate(Text& out) const;
+  void solve(Text& out) const;
+  void enclose(Text& out) const;
+  void describe(Text& out) const;
+  void measure_effort(Text& out) const;
+  void change(Text& out) const;
+  void curve(Text& out) const;
+  void advance_angles(Text& out) const;
+  void advance_speeds(Text& out) const;
+  void advance(Text& out) const;
+  void filter(Text& out) const;
+  void row(Text& out) const;
+
+  const RegressorFilter& filter_;
+  const Model& model_;
+  const Measurement& measurement_;
+  const SignalErrors& errors_;
+  FilterKernel kernel_;
+  std::vector<FunctionTerm> functions_;
+
+  // kind of motion; whether signals enter at samples
+  bool angle_ = false, mean_ = false, nodes_ = false;
+  // efforts
+  bool held_ = false, between_ = false;
+  // dY and dy are wanted; they hold what happens between samples
+  bool bounds_ = false, bounded_ = false;
+  // which bounds on accelerations there are; whether any
+  bool mobile_ = false, limited_ = false, moved_ = false;
+  // a function looks at it; it has a column
+  bool heading_ = false, measured_heading_ = false;
+  // a function looks at joints
+  bool joints_ = false;
+  // there are terms of speeds, of accelerations
+  bool viscous_ = false, inertial_ = false;
+  // parabola through efforts; all efforts of a step; two halves of a step that differ
+  bool linear_ = false, hull_ = false, split_ = false;
+  // efforts differ within a step; by how much is wanted; it goes into dy
+  bool ranging_ = false, change_ = false, doubt_ = false;
+  // the error of interpolated motion goes into dY
+  bool interpolated_ = false;
+  // error of a segment's first slope; weight of its first node; area of the kernel
+  bool first_error_ = false, start_ = false, area_ = false;
+  // lost rows are known from the length of a step
+  bool lost_ = false;
+  // of a step's mean
+  bool speed_error_ = false, joint_error_ = false;
+  std::size_t samples_ = 2;            // that are remembered
+  std::size_t ahead_ = 0;              // of which this many are ahead of the step
+  Eigen::MatrixXd rate_, joint_from_;  // of StepEnclosure
+};
+
+}  // namespace wheelwright::c_text
