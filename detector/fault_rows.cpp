@@ -171,6 +171,7 @@ void FaultFilter::begin(std::size_t onset) {
   if (fault_.held_effort) {
     held_ = motion_->rows.Y.middleRows(static_cast<Eigen::Index>(onset) * n, n) / design_.static_gain();
   }
+  fresh_ = fault_.profile.jumps() && kernel_.nodes();
   if (fault_.profile.jumps()) {
     // Motion beyond v, and what is seen, are there at once: their derivatives have an impulse.
     const std::size_t p = model_->p(), size = model_->n() * p;
@@ -191,6 +192,7 @@ void FaultFilter::begin(std::size_t onset) {
 
 void FaultFilter::begin_broken(std::size_t first) {
   begin(first);
+  fresh_ = false;
   std::fill(cascades_.begin(), cascades_.end(), KernelState{});
 }
 
@@ -237,10 +239,18 @@ bool FaultFilter::next() {
   const Eigen::VectorXd joints0 = motion_->joint_speed.col(a), joints1 = motion_->joint_speed.col(b);
   const Eigen::VectorXd acceleration = (v1 - v0) / h, moved_rate = (after.moved - before_.moved) / h,
                         seen_rate = (after.seen - before_.seen) / h;
-  const FaultSignals begin = signature(fault_, *model_,
-                                       {before_.profile, v0, joints0, motion_->heading[k_], acceleration, before_.moved,
-                                        moved_rate, before_.seen, seen_rate, before_.joint_seen},
-                                       held_);
+  // The step that ends at the onset of a jump is still healthy.
+  const bool healthy = fresh_ && k_ == onset_;
+  const Eigen::VectorXd none = Eigen::VectorXd::Zero(v0.size());
+  const FaultSignals begin =
+      healthy ? signature(fault_, *model_,
+                          {0.0, v0, joints0, motion_->heading[k_], acceleration, none, moved_rate, none, seen_rate,
+                           joints0},
+                          held_)
+              : signature(fault_, *model_,
+                          {before_.profile, v0, joints0, motion_->heading[k_], acceleration, before_.moved, moved_rate,
+                           before_.seen, seen_rate, before_.joint_seen},
+                          held_);
   const FaultSignals end = signature(fault_, *model_,
                                      {after.profile, v1, joints1, motion_->heading[k_ + 1], acceleration, after.moved,
                                       moved_rate, after.seen, seen_rate, after.joint_seen},

@@ -97,6 +97,7 @@ class FaultFilter final : public FaultRows {
   std::vector<KernelState> cascades_;  // g1, g2, s, c one after the other
   FaultSignals filtered_;
   std::size_t onset_ = 0, k_ = 0, end_ = 0;
+  bool fresh_ = false;  // the fault jumps at the onset, between two steps
 };
 
 /// The same at an operating point: coordinate speeds `v` and accelerations `a` that stay for as long as the filter

@@ -174,7 +174,7 @@ class Writer {
     line(" *   }}");
     line(" *");
     line(" * Samples must be finite numbers. {}", written_.segment_words());
-    line(" * pfx_restart does so at once.");
+    line(" * pfx_restart restarts the detector at once.");
     if (measurement_.motion == MotionKind::mean_speed) {
       line(" * A decision is about the interval of the sample before, whose effort the last one has made known.");
     }

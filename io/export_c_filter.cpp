@@ -8,8 +8,8 @@
 #include <string_view>
 #include <utility>
 
-#include <Eigen/QR>
 #include <fmt/format.h>
+#include <Eigen/QR>
 
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/core/limits.hpp>
@@ -56,9 +56,8 @@ Eigen::MatrixXd friction_rate(const Model& model, const MotionBound& bound) {
 
 Eigen::MatrixXd joints_from_coordinates(const Model& model) {
   const Eigen::MatrixXd inverse = model.motion.completeOrthogonalDecomposition().pseudoInverse();
-  const bool determined = (inverse * model.motion - Eigen::MatrixXd::Identity(inverse.rows(), inverse.rows()))
-                              .cwiseAbs()
-                              .maxCoeff() < 1e-9;
+  const bool determined =
+      (inverse * model.motion - Eigen::MatrixXd::Identity(inverse.rows(), inverse.rows())).cwiseAbs().maxCoeff() < 1e-9;
   return determined ? Eigen::MatrixXd(kOutward * inverse.cwiseAbs())
                     : Eigen::MatrixXd::Constant(inverse.rows(), inverse.cols(), kInfinity);
 }
@@ -133,8 +132,8 @@ FilterWriter::FilterWriter(const RegressorFilter& filter, bool bounds)
   change_ = ranging_ && (mobile_ || (doubt_ && (hull_ || !nodes_)));
   interpolated_ = bounds_ && moved_ && viscous_;
   lost_ = measurement_.longest_step() > 0.0;
-  first_error_ = bounds_ && nodes_ && errors_.joint_sample > 0.0 && lost_ && inertial_ &&
-                 any_not_zero(errors_.speed_sample);
+  first_error_ =
+      bounds_ && nodes_ && errors_.joint_sample > 0.0 && lost_ && inertial_ && any_not_zero(errors_.speed_sample);
   start_ = nodes_ && (first_error_ || interpolated_ || lost_);
   area_ = bounds_ && bounded_ && any_not_zero(errors_.output);
   joint_error_ = joints_;
@@ -173,9 +172,8 @@ FilterWriter::Function FilterWriter::function_of(const Model& model, const Term&
 }
 
 bool FilterWriter::uses(std::initializer_list<Function> any) const {
-  return std::any_of(functions_.begin(), functions_.end(), [&](const FunctionTerm& f) {
-    return std::find(any.begin(), any.end(), f.function) != any.end();
-  });
+  return std::any_of(functions_.begin(), functions_.end(),
+                     [&](const FunctionTerm& f) { return std::find(any.begin(), any.end(), f.function) != any.end(); });
 }
 
 std::string FilterWriter::effort_words() const {
@@ -185,11 +183,11 @@ std::string FilterWriter::effort_words() const {
 
 std::string FilterWriter::segment_words() const {
   if (!lost_) {
-    return "A time that does not increase restarts the filter.";
+    return "A time that does not increase restarts the detector.";
   }
   return fmt::format(
       "A time that does not increase, or a gap of more than five steps of {:.6g} s, restarts the\n"
-      " * detector; after a step of more than {:.6g} s (lost rows) the filter has to settle anew{}.",
+      " * detector; after a step of more than {:.6g} s (rows are lost) the filter has to settle anew{}.",
       measurement_.nominal_step, measurement_.longest_step(),
       mobile_ && !limited_ && viscous_ ? ", as it has after a step\n * that is too long for the robot's friction" : "");
 }
@@ -230,7 +228,7 @@ std::string FilterWriter::constants() const {
 
 std::string FilterWriter::types() const {
   Text out;
-  out.put(!nodes_                         ? (filter_.design().order == 1 ? kFirstOrderKernel : kSpeedKernel)
+  out.put(!nodes_                           ? (filter_.design().order == 1 ? kFirstOrderKernel : kSpeedKernel)
           : measurement_.nominal_step > 0.0 ? kSmoothKernel
                                             : kNodeKernel);
   out.put("\n");
@@ -251,13 +249,16 @@ std::string FilterWriter::types() const {
   out.line_if(uses({Function::along_x}), "  double along_x; /* square of its cosine */");
   out.line_if(uses({Function::along_y}), "  double along_y; /* square of its sine */");
   out.line_if(moved_, "  double acceleration[PFX_COORDINATES]; /* its size is at most this in the step */");
-  out.line_if(!functions_.empty(), "  double term[{0}], term_error[{0}]; /* functions of the motion, at every instant */",
+  out.line_if(!functions_.empty(),
+              "  double term[{0}], term_error[{0}]; /* functions of the motion, at every instant */",
               functions_.size());
   out.line("  double falling[PFX_CHANNELS]{}; /* effort, with weights that fall from 1 to 0{} */",
            split_ ? ", rising[PFX_CHANNELS]" : "", split_ ? ", rise from 0 to 1" : " (and rise)");
   out.line_if(mobile_, "  double effort[PFX_CHANNELS]; /* its largest size */");
   out.line_if(change_, "  double change[PFX_CHANNELS]; /* half the range of efforts in the step */");
-  out.put("} pfx_span;\n\n/* What the recursion remembers: zeros at the start of a segment. */\ntypedef struct pfx_memory {\n");
+  out.put(
+      "} pfx_span;\n\n/* What the recursion remembers: zeros at the start of a segment. */\ntypedef struct pfx_memory "
+      "{\n");
   out.line_if(viscous_, "  pfx_cascade motion[PFX_COORDINATES]; /* driven by the speeds */");
   out.line_if(inertial_, "  pfx_cascade slope[PFX_COORDINATES]; /* driven by their derivatives */");
   out.line("  pfx_cascade torque[PFX_CHANNELS];");
@@ -302,14 +303,19 @@ void FilterWriter::conversions(Text& out) const {
     out.put("\nstatic inline double pfx_signum(double x)\n{\n  return (double)(x > 0.0) - (double)(x < 0.0);\n}\n");
   }
   if (change_ || hull_) {
-    out.put("\nstatic inline double pfx_min(double a, double b)\n{\n  return b < a ? b : a;\n}\n"
-            "\nstatic inline double pfx_max(double a, double b)\n{\n  return a < b ? b : a;\n}\n");
+    out.put(
+        "\nstatic inline double pfx_min(double a, double b)\n{\n  return b < a ? b : a;\n}\n"
+        "\nstatic inline double pfx_max(double a, double b)\n{\n  return a < b ? b : a;\n}\n");
   }
-  out.put("\n/* From joints to coordinates. */\nstatic inline void pfx_coordinates(const double *joint, double *speed)\n{\n");
+  out.put(
+      "\n/* From joints to coordinates. */\nstatic inline void pfx_coordinates(const double *joint, double "
+      "*speed)\n{\n");
   for (std::size_t c = 0; c < model_.coordinates.size(); ++c) {
     out.line("  speed[{}] = {}; /* {} */", c, combination(model_.motion, c, "joint"), plain(model_.coordinates[c]));
   }
-  out.put("}\n\n/* From joints to channels. */\nstatic inline void pfx_channels(const double *joint, double *channel)\n{\n");
+  out.put(
+      "}\n\n/* From joints to channels. */\nstatic inline void pfx_channels(const double *joint, double "
+      "*channel)\n{\n");
   for (std::size_t i = 0; i < model_.n(); ++i) {
     out.line("  channel[{}] = {}; /* {} */", i, combination(model_.input, i, "joint"), plain(model_.outputs[i]));
   }
@@ -333,7 +339,8 @@ void FilterWriter::read(Text& out) const {
   out.line("  s->samples += s->samples < 3;");
   out.line("  now->t = t;");
   out.line("  for (i = 0; i < PFX_JOINTS; ++i) {{");
-  out.line("    now->joint[i] = {};", measurement_.count > 0.0 ? "round(input[i] / PFX_COUNT) * PFX_COUNT" : "input[i]");
+  out.line("    now->joint[i] = {};",
+           measurement_.count > 0.0 ? "round(input[i] / PFX_COUNT) * PFX_COUNT" : "input[i]");
   if (measurement_.effort_unsigned) {
     out.line("    /* Only the size of the effort is known; its sign is that of the motion. */");
     out.line("    now->effort[i] = fabs(input[PFX_JOINTS + i]) *");
@@ -358,14 +365,15 @@ void FilterWriter::evaluate(Text& out) const {
     return moved_ ? fmt::format("PFX_UP * (p->speed_error[{0}] + half * p->acceleration[{0}])", c)
                   : fmt::format("p->speed_error[{}]", c);
   };
-  out.put("\n/* Functions of the motion, and by how much each can be wrong, for every instant of the step. */\n"
-          "static inline void pfx_evaluate(pfx_span *p)\n{\n");
+  out.put(
+      "\n/* Functions of the motion, and by how much each can be wrong, for every instant of the step. */\n"
+      "static inline void pfx_evaluate(pfx_span *p)\n{\n");
   out.line_if(moved_ && (first_speed || joints_in_doubt), "  const double half = 0.5 * p->length;");
   out.line_if(first_speed, "  const double speed_error = {};", widened(0));
   if (heading_) {
-    const std::string turned = turning < 0 ? ""
-                                           : fmt::format(" + PFX_UP * half * (fabs(p->speed[{}]) +\n      {})", turning,
-                                                         widened(turning));
+    const std::string turned =
+        turning < 0 ? ""
+                    : fmt::format(" + PFX_UP * half * (fabs(p->speed[{}]) +\n      {})", turning, widened(turning));
     out.line("  const double heading_error = {}{};", hex(errors_.heading), turned);
     out.line("  const double share_error = heading_error < 1.0 ? heading_error : 1.0;");
   }
@@ -436,11 +444,14 @@ void FilterWriter::evaluate(Text& out) const {
 void FilterWriter::solve(Text& out) const {
   const MotionBound& motion = errors_.motion;
   const std::size_t coordinates = model_.coordinates.size();
-  out.put("\n/* Bounds on accelerations: the inverse inertia, and that times viscous friction, over the feasible set. */\n");
+  out.put(
+      "\n/* Bounds on accelerations: the inverse inertia, and that times viscous friction, over the feasible set. "
+      "*/\n");
   out.line("static const double pfx_mobility[PFX_COORDINATES][PFX_CHANNELS] = {};", numbers(motion.mobility));
   out.line_if(viscous_, "static const double pfx_rate[PFX_COORDINATES][PFX_COORDINATES] = {};", numbers(rate_));
-  out.put("\n/* Bounds the accelerations in the step by all forces; 0 where it is too long for the robot's friction. */\n"
-          "static inline int pfx_solve(const pfx_span *p, double *next)\n{\n");
+  out.put(
+      "\n/* Bounds the accelerations in the step by all forces; 0 where it is too long for the robot's friction. */\n"
+      "static inline int pfx_solve(const pfx_span *p, double *next)\n{\n");
   out.line_if(viscous_, "  const double half = 0.5 * p->length;");
   out.line("  double force[PFX_CHANNELS];");
   out.line("  int c, i;");
@@ -452,10 +463,10 @@ void FilterWriter::solve(Text& out) const {
     if (term.kind == Term::Kind::acceleration) {
       continue;
     }
-    const std::string size =
-        term.kind == Term::Kind::speed
-            ? fmt::format("{0}(fabs(p->speed[{1}]) + p->speed_error[{1}])", times(std::abs(term.scale)), term.coordinate)
-            : fmt::format("(fabs(p->term[{0}]) + p->term_error[{0}])", k);
+    const std::string size = term.kind == Term::Kind::speed
+                                 ? fmt::format("{0}(fabs(p->speed[{1}]) + p->speed_error[{1}])",
+                                               times(std::abs(term.scale)), term.coordinate)
+                                 : fmt::format("(fabs(p->term[{0}]) + p->term_error[{0}])", k);
     k += term.kind == Term::Kind::function ? 1 : 0;
     out.line("  force[{}] += {} * {}; /* {} */", term.output,
              hex(motion.largest[static_cast<Eigen::Index>(term.parameter)]),
@@ -518,8 +529,9 @@ void FilterWriter::enclose(Text& out) const {
   }
   const bool functions = !functions_.empty();
   const char* evaluated = functions ? "  pfx_evaluate(p);\n" : "";
-  out.put("\n/* Bounds the accelerations in the step; 0 where that cannot be done. */\n"
-          "static inline int pfx_enclose(pfx_span *p)\n{\n");
+  out.put(
+      "\n/* Bounds the accelerations in the step; 0 where that cannot be done. */\n"
+      "static inline int pfx_enclose(pfx_span *p)\n{\n");
   out.line_if(limited_, "  static const double limit[PFX_COORDINATES] = {};",
               limited_ ? numbers(errors_.motion.limit) : "");
   if (!mobile_) {
@@ -620,11 +632,12 @@ void FilterWriter::describe(Text& out) const {
   const bool next = mean_ && (hull_ ? true : !held_ && (!between_ || change_));
   const bool step_error = nodes_ && errors_.joint_sample > 0.0;
   const bool before = !mean_ || !lost_ || measured_heading_ || held_ || change_ || split_;
-  out.put("\n/* The step between two samples, as far as they tell; 0 where no bounds on its motion can be given. */\n"
-          "static inline int pfx_describe(pfx_state *s)\n{\n");
-  out.line("  const pfx_sample *now = &s->sample[{}]{};", ahead_,
-           (before ? fmt::format(", *before = &s->sample[{}]", ahead_ + 1) : "") +
-               (next ? ", *next = &s->sample[0]" : ""));
+  out.put(
+      "\n/* The step between two samples, as far as they tell; 0 where no bounds on its motion can be given. */\n"
+      "static inline int pfx_describe(pfx_state *s)\n{\n");
+  out.line(
+      "  const pfx_sample *now = &s->sample[{}]{};", ahead_,
+      (before ? fmt::format(", *before = &s->sample[{}]", ahead_ + 1) : "") + (next ? ", *next = &s->sample[0]" : ""));
   out.line_if(odometry, "  const pfx_span *last = &s->span[!s->newest];");
   out.line("  pfx_span *p = &s->span[s->newest];");
   out.line("  double joint_speed[PFX_JOINTS], falling[PFX_JOINTS]{}{};", split_ ? ", rising[PFX_JOINTS]" : "",
@@ -632,7 +645,7 @@ void FilterWriter::describe(Text& out) const {
   out.line("  int i;");
   out.line("  p->length = {};", mean_ && lost_ ? "PFX_NOMINAL" : "now->t - before->t");
   out.line("  for (i = 0; i < PFX_JOINTS; ++i) {{");
-  out.line("    joint_speed[i] = {};", angle_   ? "(now->joint[i] - before->joint[i]) / p->length"
+  out.line("    joint_speed[i] = {};", angle_  ? "(now->joint[i] - before->joint[i]) / p->length"
                                        : mean_ ? "now->joint[i]"
                                                : "0.5 * (before->joint[i] + now->joint[i])");
   out.line_if(joints_, "    p->joint_speed[i] = joint_speed[i];");
@@ -641,7 +654,8 @@ void FilterWriter::describe(Text& out) const {
   if (speed_error_ || joint_error_) {
     const std::string nominal = hex(measurement_.nominal_step);
     const auto error = [&](double sample) {
-      return step_error ? fmt::format("{} / p->length * {}", lost_ ? "PFX_NOMINAL" : nominal, hex(sample)) : hex(sample);
+      return step_error ? fmt::format("{} / p->length * {}", lost_ ? "PFX_NOMINAL" : nominal, hex(sample))
+                        : hex(sample);
     };
     for (std::size_t c = 0; speed_error_ && c < model_.coordinates.size(); ++c) {
       out.line("  p->speed_error[{}] = {};", c, error(errors_.speed_sample[static_cast<Eigen::Index>(c)]));
@@ -652,9 +666,10 @@ void FilterWriter::describe(Text& out) const {
     if (measured_heading_) {
       out.line("  p->heading = 0.5 * (before->heading + now->heading);");
     } else if (odometry) {
-      out.line("  p->heading = s->instants == {0} ? 0.0 : last->heading + 0.5 * (last->length * last->speed[{1}] +\n"
-               "      p->length * p->speed[{1}]);",
-               nodes_ ? 0 : 1, model_.heading_coordinate);
+      out.line(
+          "  p->heading = s->instants == {0} ? 0.0 : last->heading + 0.5 * (last->length * last->speed[{1}] +\n"
+          "      p->length * p->speed[{1}]);",
+          nodes_ ? 0 : 1, model_.heading_coordinate);
     } else {
       out.line("  p->heading = 0.0;");
     }
@@ -712,8 +727,9 @@ void FilterWriter::curve(Text& out) const {
     return;
   }
   if (mean_) {
-    out.put("\n/* What makes the efforts around the last node differ from a line, h seconds long. */\n"
-            "static inline void pfx_curve(const pfx_state *s, double h, double *doubt)\n{\n");
+    out.put(
+        "\n/* What makes the efforts around the last node differ from a line, h seconds long. */\n"
+        "static inline void pfx_curve(const pfx_state *s, double h, double *doubt)\n{\n");
     out.line("  double bend[PFX_JOINTS];");
     out.line("  int i;");
     out.line("  for (i = 0; i < PFX_JOINTS; ++i) {{");
@@ -729,13 +745,15 @@ void FilterWriter::curve(Text& out) const {
   }
   out.put("\n/* Curvature of a parabola through the last three efforts, a and b seconds apart, times what it corrects");
   out.put(doubt_ ? ",\n * and its size times what is in doubt. */\n" : ". */\n");
-  out.line("static inline void pfx_curve(const pfx_state *s, double a, double b, double corrected, double *curve{})\n{{",
-           doubt_ ? ",\n                             double covered, double *doubt" : "");
+  out.line(
+      "static inline void pfx_curve(const pfx_state *s, double a, double b, double corrected, double *curve{})\n{{",
+      doubt_ ? ",\n                             double covered, double *doubt" : "");
   out.line("  double bend[PFX_JOINTS];");
   out.line("  int i;");
   out.line("  for (i = 0; i < PFX_JOINTS; ++i) {{");
   out.line("    const double middle = s->sample[1].effort[i];");
-  out.line("    bend[i] = 2.0 * ((s->sample[0].effort[i] - middle) / b - (middle - s->sample[2].effort[i]) / a) / (a + b);");
+  out.line(
+      "    bend[i] = 2.0 * ((s->sample[0].effort[i] - middle) / b - (middle - s->sample[2].effort[i]) / a) / (a + b);");
   out.line("  }}");
   out.line("  pfx_channels(bend, curve);");
   out.line("  for (i = 0; i < PFX_CHANNELS; ++i) {{");
@@ -755,8 +773,9 @@ void FilterWriter::curve(Text& out) const {
 
 void FilterWriter::advance_angles(Text& out) const {
   const char* rising = split_ ? "rising" : "falling";
-  out.put("\n/* The node between the last two steps, and the way to the end of the last. */\n"
-          "static inline void pfx_advance(pfx_state *s)\n{\n");
+  out.put(
+      "\n/* The node between the last two steps, and the way to the end of the last. */\n"
+      "static inline void pfx_advance(pfx_state *s)\n{\n");
   out.line("  const pfx_span *p = &s->span[s->newest], *last = &s->span[!s->newest];");
   out.line("  const pfx_weights *w = &s->weights;");
   out.line("  const double h = p->length, before = last->length;");
@@ -779,11 +798,13 @@ void FilterWriter::advance_angles(Text& out) const {
   out.line("  for (i = 0; i < PFX_COORDINATES; ++i) {{");
   out.line_if(viscous_, "    pfx_take(&m->motion[i], w, 0.5 * (before * last->speed[i] + h * p->speed[i]));");
   out.line_if(inertial_, "    pfx_take(&m->slope[i], w, p->speed[i] - last->speed[i]);");
-  out.line_if(interpolated_,
-              "    pfx_majorant_take(&m->motion_doubt[i], w->decay, PFX_BETA * h, p->acceleration[i] * pfx_cube(h) / 12.0);");
+  out.line_if(
+      interpolated_,
+      "    pfx_majorant_take(&m->motion_doubt[i], w->decay, PFX_BETA * h, p->acceleration[i] * pfx_cube(h) / 12.0);");
   out.line("  }}");
   out.line("  for (i = 0; i < PFX_CHANNELS; ++i) {{");
-  out.line("    pfx_take(&m->torque[i], w, before * last->{}[i] + h * p->falling[i]{});", rising, curved ? " - curve[i]" : "");
+  out.line("    pfx_take(&m->torque[i], w, before * last->{}[i] + h * p->falling[i]{});", rising,
+           curved ? " - curve[i]" : "");
   if (bent) {
     out.line("    pfx_take(&m->torque_doubt[i], w, doubt[i]);");
   } else if (doubt_) {
@@ -793,7 +814,8 @@ void FilterWriter::advance_angles(Text& out) const {
   if (!functions_.empty()) {
     out.line("  for (i = 0; i < {}; ++i) {{", functions_.size());
     out.line("    pfx_take(&m->term[i], w, 0.5 * (before * last->term[i] + h * p->term[i]));");
-    out.line_if(bounds_, "    pfx_take(&m->term_error[i], w, 0.5 * (before * last->term_error[i] + h * p->term_error[i]));");
+    out.line_if(bounds_,
+                "    pfx_take(&m->term_error[i], w, 0.5 * (before * last->term_error[i] + h * p->term_error[i]));");
     out.line("  }}");
   }
   out.line_if(area_, "  pfx_take(&m->area, w, 0.5 * (before + h));");
@@ -868,8 +890,9 @@ void FilterWriter::filter(Text& out) const {
   out.put("\n/* The next sample starts a segment. */\nstatic inline void pfx_forget(pfx_state *s)\n{\n");
   out.line("  s->samples = s->instants = 0;");
   out.line_if(nodes_ && lost_, "  s->after_loss = 0;");
-  out.put("}\n\n/* Takes one sample; whether there is a row. */\n"
-          "static inline int pfx_filter(pfx_state *s, double t, const double *input)\n{\n");
+  out.put(
+      "}\n\n/* Takes one sample; whether there is a row. */\n"
+      "static inline int pfx_filter(pfx_state *s, double t, const double *input)\n{\n");
   out.line("  const pfx_span *p;");
   out.line_if(nodes_, "  double since;");
   out.line("  int i;");
@@ -910,8 +933,7 @@ void FilterWriter::filter(Text& out) const {
     out.line("    s->at_rest = 1;");
     out.line("    for (i = 0; i < PFX_COORDINATES; ++i) {{");
     out.line("      s->at_rest = s->at_rest && fabs(p->speed[i]) <= 0.0;");
-    out.line_if(interpolated_,
-                "      s->memory.first_doubt[i] = p->acceleration[i] * p->length * p->length / 12.0;");
+    out.line_if(interpolated_, "      s->memory.first_doubt[i] = p->acceleration[i] * p->length * p->length / 12.0;");
     out.line("    }}");
     out.line("    s->t0 = s->t;");
     out.line("    return 0;");
@@ -942,7 +964,8 @@ void FilterWriter::row(Text& out) const {
   const bool start = bounds_ && (first_error_ || (interpolated_ && nodes_));
   out.line_if(start, "  const double start = pfx_value(&m->start);");
   if (first_error_) {
-    out.line("  /* The kernel rises from 0 to the weight of the first node: the slope of that has errors of its own. */");
+    out.line(
+        "  /* The kernel rises from 0 to the weight of the first node: the slope of that has errors of its own. */");
     out.line("  const double first = start > 0.0 ? start * PFX_NOMINAL / m->first_length : 0.0;");
   }
   if (area_) {
@@ -971,9 +994,10 @@ void FilterWriter::row(Text& out) const {
     const double constant = speed ? errors_.speed[c] : errors_.acceleration[c];
     std::string error = hex(constant);
     if (speed && interpolated_) {
-      error += nodes_ ? fmt::format(" + (PFX_SLOPE * pfx_majorant_value(&m->motion_doubt[{0}]) +\n"
-                                    "      start * m->first_doubt[{0}])",
-                                    term.coordinate)
+      error += nodes_ ? fmt::format(
+                            " + (PFX_SLOPE * pfx_majorant_value(&m->motion_doubt[{0}]) +\n"
+                            "      start * m->first_doubt[{0}])",
+                            term.coordinate)
                       : fmt::format(" + pfx_value(&m->motion_doubt[{}])", term.coordinate);
     } else if (!speed && first_error_) {
       error += fmt::format(" + first * {}", hex(errors_.speed_sample[c]));

@@ -14,8 +14,8 @@ namespace wheelwright::c_text {
 
 /// Writes the parts of a header that stand for a filter. Each gives text with `pfx` for the prefix (export_c_text.hpp).
 ///
-/// The C has the library's operations in the library's order. Left out is what adds an exact zero, multiplies by one, or
-/// is never looked at; sums of constants alone are done here.
+/// The C has the library's operations in the library's order. Left out is what adds an exact zero, multiplies by one,
+/// or is never looked at; sums of constants alone are done here.
 class FilterWriter {
  public:
   /// `bounds`: whether dY and dy are wanted. Throws InputError where the filter has no C form.

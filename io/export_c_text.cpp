@@ -84,7 +84,8 @@ typedef struct pfx_decision {
 } pfx_decision;
 )";
 
-const std::string_view kSmoothKernel = R"(/* One filtered signal: sums of impulses with the weights exp(-beta x), x exp(-beta x) and exp(-gamma x), x their age. */
+const std::string_view kSmoothKernel =
+    R"(/* One filtered signal: sums of impulses with the weights exp(-beta x), x exp(-beta x) and exp(-gamma x), x their age. */
 typedef struct pfx_cascade {
   double z1, z2, fast;
 } pfx_cascade;
@@ -119,7 +120,8 @@ static inline double pfx_value(const pfx_cascade *c)
 }
 )";
 
-const std::string_view kNodeKernel = R"(/* One filtered signal: sums of impulses with the weights exp(-beta x) and x exp(-beta x), x their age. */
+const std::string_view kNodeKernel =
+    R"(/* One filtered signal: sums of impulses with the weights exp(-beta x) and x exp(-beta x), x their age. */
 typedef struct pfx_cascade {
   double z1, z2;
 } pfx_cascade;
@@ -249,7 +251,8 @@ static inline double pfx_value(const pfx_cascade *c)
 }
 )";
 
-const std::string_view kMajorant = R"(/* Sum of impulses with the weight (1 - x + x^2 / 2) exp(-x), x beta times their age: bounds what the slope of the kernel
+const std::string_view kMajorant =
+    R"(/* Sum of impulses with the weight (1 - x + x^2 / 2) exp(-x), x beta times their age: bounds what the slope of the kernel
  * makes of them. */
 typedef struct pfx_majorant {
   double s0, s1, s2;

@@ -2,8 +2,8 @@
 /// \file
 /// The parts of an exported detector that are the same for every model, as C99.
 ///
-/// `pfx` stands for the user's prefix, `PFX` for the same in capitals. Each part mirrors one piece of the library operation
-/// by operation; whoever changes one changes the other (tests/io/export_c_test.cpp compares every bit).
+/// `pfx` stands for the user's prefix, `PFX` for the same in capitals. Each part mirrors one piece of the library
+/// operation by operation; whoever changes one changes the other (tests/io/export_c_test.cpp compares every bit).
 #pragma once
 
 #include <cstddef>

@@ -87,7 +87,7 @@ bounds|bounds/slab_rows.cpp|s/: add_up(Y\[k\], dY\[k\])/: Y[k] + dY[k]/
 bounds|bounds/polytope.cpp|s/total = bound == 0.0 ? total : round_up(total + bound)/total += bound/
 bounds|bounds/polytope.cpp|s/round_up(best + round_up(margin \* (1.0 + 64.0 \* kEpsilon)))/best/
 bounds|bounds/polytope.cpp|s/gamma \* block.vertices->points/0.0 * block.vertices->points/
-bounds|bounds/polytope.cpp|s/sum = round_up(sum + round_up(a\[j\] \* (.*)));/sum += a[j] * \1;/
+bounds|bounds/polytope.cpp|s/sum = round_up(sum + round_up(\(a.*\)));/sum += \1;/
 bounds|bounds/support_table.cpp|s/slack += std::abs(a_\[k\]) \* doubt\[k\]/slack += 0.0/
 bounds|bounds/support_table.cpp|s/slack += cost/slack += 0.0/
 bounds|bounds/support_table.cpp|s/(p + 2.0) \* kEpsilon \* magnitude/0.0/

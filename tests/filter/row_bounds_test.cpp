@@ -80,7 +80,6 @@ std::string words(const Case& c) {
 struct Outcome {
   long rows = 0, beyond = 0;
   double worst = 0.0;        // largest error over bound
-  double between = 0.0;      // largest share of a bound that is not the sensors'
 };
 
 Outcome watch(const Case& c, unsigned seed) {
@@ -131,11 +130,9 @@ Outcome watch(const Case& c, unsigned seed) {
     }
     return c.h;
   };
-  double half = 0.0;
   if (c.motion == MotionKind::mean_speed) {
     plant.run(0.5 * c.h, effort, effort);
     before = plant.x;
-    half = 0.5 * c.h;
   }
   const auto give = [&](double motion, double acting) {
     const std::array<double, 2> sample{motion, acting + noise(sensors.effort)};
@@ -143,9 +140,6 @@ Outcome watch(const Case& c, unsigned seed) {
       return;
     }
     const FilteredRow& row = filter.row();
-    for (Eigen::Index j = 0; j < theta.size(); ++j) {
-      outcome.between = std::max(outcome.between, 0.0);
-    }
     const double error = std::abs(row.y[0] - row.Y.row(0).dot(theta));
     const double bound = row.dy[0] + row.dY.row(0).dot(theta);
     outcome.beyond += error > bound ? 1 : 0;
@@ -156,8 +150,6 @@ Outcome watch(const Case& c, unsigned seed) {
   for (int k = 0; k < 3000; ++k) {
     if (c.motion == MotionKind::mean_speed) {
       // Stamp t in the middle; the effort of the stamp acts over [t, t + h), or changes to it a moment after.
-      const double after_half = half;
-      static_cast<void>(after_half);
       const double next = command(t + c.h);
       // From t + h/2 to t + h with the old effort, then to t + 3h/2 with the new one.
       const double switch_at = c.commands == Commands::between ? 0.5 * c.h * (0.5 + 0.5 * unit(rng)) : 0.5 * c.h;

@@ -57,16 +57,26 @@ Eigen::MatrixXd jacobian(const NistProblem& problem, const NistModel& model) {
   return J;
 }
 
-// The last Gauss-Newton step is a linear least-squares problem. Certified values have 11 digits. Lanczos1 has exact data: its residuals are rounding (certified rss 1.4e-25), so that
-// its standard deviations are too.
-void expect_certified(const NistProblem& problem, const NistModel& model, const Found& found) {
+// The last Gauss-Newton step is a linear least-squares problem. Certified values have 11 digits. Where the search is over
+// all parameters it ends as soon as the cost is flat to rounding: residuals r of data y are known to ε‖y‖, the cost ‖r‖²/2
+// relatively to η = 2ε(1 + ‖y‖/‖r‖), and ‖Jδ‖² <= η‖r‖² leaves |δ_j| <= √(η(m − p)) standard deviations; ten times that
+// allows for steps that become shorter by a constant factor only. Lanczos1 has exact data: its residuals are rounding
+// (certified rss 1.4e-25), so that its standard deviations are too.
+void expect_certified(const NistProblem& problem, const NistModel& model, const Found& found, bool by_cost = false) {
   EXPECT_EQ(found.fit.end, SearchEnd::converged);
   const Eigen::VectorXd y = model.log_response ? Eigen::VectorXd(problem.y.array().log()) : problem.y;
-  const NistLimits limits = nist_limits(jacobian(problem, model), problem, y.norm(), 0.5e-10);
+  NistLimits limits = nist_limits(jacobian(problem, model), problem, y.norm(), 0.5e-10);
   const double freedom = static_cast<double>(problem.y.size() - problem.certified.size());
+  if (by_cost) {
+    const double eta = 2.0 * kEpsilon * (1.0 + y.norm() / (problem.residual_sd * std::sqrt(freedom)));
+    const Eigen::VectorXd flat = 10.0 * std::sqrt(eta * freedom) * problem.certified_sd;
+    limits.estimate += flat;
+    limits.sd += flat;
+  }
   for (Eigen::Index j = 0; j < problem.certified.size(); ++j) {
     EXPECT_LE(std::abs(found.b[j] - problem.certified[j]), limits.estimate[j]) << j;
-    EXPECT_LE(limits.estimate[j], 1e-5 * std::abs(problem.certified[j])) << j;  // which says something
+    // Which says something.
+    EXPECT_LE(limits.estimate[j], (by_cost ? 1e-4 : 1e-5) * std::abs(problem.certified[j])) << j;
     if (problem.name != "Lanczos1") {
       EXPECT_LE(std::abs(found.sd[j] - problem.certified_sd[j]), limits.sd[j]) << j;
     }
@@ -74,11 +84,6 @@ void expect_certified(const NistProblem& problem, const NistModel& model, const 
   if (problem.name != "Lanczos1") {
     EXPECT_LE(std::abs(std::sqrt(found.fit.weighted_rss / freedom) - problem.residual_sd), limits.residual_sd);
   }
-  if (std::getenv("NISTP"))
-    fprintf(stderr, "%s %g lim %g | sd %g lim %g\n", problem.name.c_str(), digits(found.b, problem.certified),
-            -std::log10((limits.estimate.array() / problem.certified.array().abs()).maxCoeff()),
-            digits(found.sd, problem.certified_sd),
-            -std::log10((limits.sd.array() / problem.certified_sd.array()).maxCoeff()));
   for (const ShapeState state : found.fit.state) {
     EXPECT_EQ(state, ShapeState::identified);
   }
@@ -102,7 +107,7 @@ TEST_P(Nist, IsSolvedWithAllParametersNonlinear) {
   // The sum of squares of BoxBOD falls from its far start towards b2 → ∞ (it is one of the problems made for that).
   const std::size_t first = problem.name == "BoxBOD" ? 1 : 0;
   for (std::size_t s = first; s < problem.starts.size(); ++s) {
-    expect_certified(problem, GetParam(), solve(problem, false, false, problem.starts[s], GetParam()));
+    expect_certified(problem, GetParam(), solve(problem, false, false, problem.starts[s], GetParam()), true);
   }
 }
 
