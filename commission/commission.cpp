@@ -318,13 +318,12 @@ std::string withdrawal(const Commissioning& result) {
   return text;
 }
 
-// Where the proof of emptiness leans on an upper end of the tool's own default prior: what to write into the robot file.
+// Where least squares lies beyond the tool's own default prior: what to write into the robot file.
 std::string default_prior_in_the_way(const Setting& s, const Commissioning& result) {
-  for (const WeightedRow& weighted : result.feasible.contradiction) {
-    const RowOrigin& origin = weighted.row.origin;
-    if (origin.is_prior && weighted.multiplier > 0.0 && origin.side == Side::upper &&
-        !s.prior_declared[origin.parameter]) {
-      const Parameter& p = s.model.parameters[origin.parameter];
+  for (std::size_t j = 0; j < result.parameters.size(); ++j) {
+    const std::optional<double>& estimate = result.parameters[j].estimate;
+    if (estimate && !s.prior_declared[j] && *estimate > s.prior.sides[j].upper) {
+      const Parameter& p = s.model.parameters[j];
       return fmt::format(
           "no {0} within the tool's own default prior, at most {1:.3g} {2}, explains the log: check the units of efforts "
           "and motion, or, where the robot is that large, write `prior: {{{0}: [lower, upper]}}` into the robot file",

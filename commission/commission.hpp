@@ -88,7 +88,7 @@ struct Commissioning {
   FoldOptions folds;
   double minimax = 0.0;     ///< where the set is empty: by how much the bounds n̄ on the effort would have to be
                             ///< raised for it not to be (those on the motion kept); else 0
-  std::optional<double> effort_shift;  ///< s, by which the efforts seem late beyond the middle of what is declared
+  std::optional<double> effort_shift;  ///< s, by which the efforts seem late against the motion
   std::vector<LogContradiction> contradictions;  ///< found whatever the status; one that withdraws leaves no model
   Box prior;                ///< in which the set was sought
   SignalErrors row_errors;  ///< dY and dy of the rows that the set is made of: OutputNoise::learning in `output`

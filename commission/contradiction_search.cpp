@@ -213,10 +213,10 @@ void find_uneven_efforts(const Setting& s, const std::vector<JointFit>& joints, 
                          "same, and `gap` tells it"});
 }
 
-// θ at shift 0 on the rows of `model`.
-Eigen::VectorXd unshifted(const TimeShiftedRows& model, const Eigen::VectorXd& weights) {
+// θ with the rows of `model` shifted by `shift`.
+Eigen::VectorXd at_shift(const TimeShiftedRows& model, double shift, const Eigen::VectorXd& weights) {
   SeparableValues at;
-  model.evaluate(Eigen::VectorXd::Zero(1), false, at);
+  model.evaluate(Eigen::VectorXd::Constant(1, shift), false, at);
   Eigen::VectorXd y = model.response();
   for (Eigen::Index r = 0; r < y.size(); ++r) {
     const double w = weights[r % weights.size()];
@@ -227,7 +227,7 @@ Eigen::VectorXd unshifted(const TimeShiftedRows& model, const Eigen::VectorXd& w
 }
 
 std::string shift_words(const Setting& s, const EffortTiming& timing) {
-  const double late = timing.delay + 0.5 * (s.robot.effort_delay.lower + s.robot.effort_delay.upper);
+  const double late = timing.delay;
   const double half = std::abs(std::abs(timing.delay / s.survey.median_step) - 0.5);
   const std::string declare = fmt::format(
       "where the shift is constant and known, declare it, as a range that holds it: `effort: {{delay: [{:.3g}, {:.3g}]}}` in "
@@ -251,11 +251,15 @@ void find_latency(const Setting& s, const std::optional<EffortTiming>& timing, s
   out.push_back({.kind = Kind::effort_timing,
                  .subject = s.measurement.effort_columns.front(),
                  .value = timing->delay,
-                 .limit = timing->declared + kLeastShift * s.survey.median_step,
-                 .sentence = fmt::format("the efforts come {:.3g} ± {:.1g} ms {} the motion, {:.2g} steps of the log",
+                 .limit = kLeastShift * s.survey.median_step,
+                 .sentence = fmt::format("the efforts come {:.3g} ± {:.1g} ms {} the motion, {:.2g} steps of the log{}",
                                          1e3 * std::abs(timing->delay), 2e3 * timing->standard_error,
                                          timing->delay > 0.0 ? "after" : "before",
-                                         std::abs(timing->delay) / s.survey.median_step),
+                                         std::abs(timing->delay) / s.survey.median_step,
+                                         timing->allowed.lower == 0.0 && timing->allowed.upper == 0.0
+                                             ? ""
+                                             : fmt::format(", where {:.3g} to {:.3g} ms are allowed",
+                                                           1e3 * timing->allowed.lower, 1e3 * timing->allowed.upper)),
                  .next = shift_words(s, *timing)});
 }
 
@@ -298,9 +302,11 @@ void find_wrong_signs(const Setting& s, const Fit& fit, std::vector<LogContradic
 
 // Least squares on each half of the log's rows.
 void find_uneven_halves(LogSource& log, const Setting& s, const Fit& fit, std::vector<LogContradiction>& out) {
-  if (fit.choice.candidates.empty() || fit.choice.chosen > 0 || fit.choice.in_doubt) {
-    return;  // least squares is biased by noise, and by how much depends on the driving
+  const Eigen::VectorXd& bias = fit.choice.predicted_bias;  // of least squares, which depends on the driving
+  if (fit.choice.candidates.empty() || fit.choice.in_doubt || bias.size() == 0 || !bias.allFinite()) {
+    return;
   }
+  const double biased = 2.0 * bias.cwiseAbs().maxCoeff();  // standard errors that two halves may differ by
   const std::size_t middle = s.survey.rows / 2;
   RegressionStream rows = make_rows(log, s, s.declared);
   RegressionBlock block;
@@ -341,7 +347,7 @@ void find_uneven_halves(LogSource& log, const Setting& s, const Fit& fit, std::v
     const double error = std::hypot(residuals[0].standard_error[at], residuals[1].standard_error[at]);
     const bool shown = !excluded[j] && excitation[0][j].state != Excitation::not_excited &&
                        excitation[1][j].state != Excitation::not_excited;
-    const double sure = certain(std::min(residuals[0].freedom, residuals[1].freedom)) * error;
+    const double sure = (certain(std::min(residuals[0].freedom, residuals[1].freedom)) + biased) * error;
     if (!shown || !(std::abs(a - b) > sure)) {
       continue;
     }
@@ -368,9 +374,11 @@ std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& s, cons
   if (s.measurement.effort_unsigned) {
     return std::nullopt;
   }
+  Setting as_logged = s;  // a declared delay is compared with what is found, not taken away before
+  as_logged.measurement.delay = {0.0, 0.0};
   RegressionBlock rows;
   {
-    RegressionStream stream = make_rows(log, s);
+    RegressionStream stream = make_rows(log, as_logged);
     RegressionBlock block;
     std::vector<RegressionBlock> parts;
     std::size_t instants = 0;
@@ -408,13 +416,16 @@ std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& s, cons
       return cost_curve(model, Eigen::VectorXd::Zero(1), 0, shift, shift + 1e-9, 2, fit.weights).front().weighted_rss;
     };
     EffortTiming timing{.delay = found.shape[0], .standard_error = found.standard_error[0], .freedom = found.freedom};
-    const bool moving = s.measurement.hold == Hold::zero_order && s.robot.effort_changes == EffortChanges::between;
-    timing.declared = 0.5 * (s.robot.effort_delay.upper - s.robot.effort_delay.lower) +
-                      (moving ? 0.5 * s.survey.median_step : 0.0);
-    const double without = rss(0.0);
+    timing.allowed = s.measurement.delay;
+    const bool held = s.measurement.hold == Hold::zero_order;
+    if (held && s.measurement.changes == EffortChanges::between && s.declared.between_samples) {
+      timing.allowed.upper += s.survey.median_step;
+    }
+    const double nearest = std::clamp(timing.delay, timing.allowed.lower, timing.allowed.upper);
+    const double without = rss(nearest);
     timing.residual_ratio = without > 0.0 ? std::sqrt(found.weighted_rss / without) : 1.0;
-    timing.mirror_ratio = without > 0.0 ? std::sqrt(rss(-timing.delay) / without) : 1.0;
-    const Eigen::VectorXd moved = (found.linear - unshifted(model, fit.weights)).cwiseAbs();
+    timing.mirror_ratio = without > 0.0 ? std::sqrt(rss(2.0 * nearest - timing.delay) / without) : 1.0;
+    const Eigen::VectorXd moved = (found.linear - at_shift(model, nearest, fit.weights)).cwiseAbs();
     for (std::size_t j = 0; j < s.model.p(); ++j) {
       const auto at = static_cast<Eigen::Index>(j);
       const double error = fit.residuals.standard_error[at];
@@ -429,7 +440,7 @@ std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& s, cons
 }
 
 bool is_latency(const EffortTiming& timing, double step) {
-  const double shift = std::max(0.0, std::abs(timing.delay) - timing.declared);
+  const double shift = timing.beyond();
   return shift > kLeastShift * step && shift > certain(timing.freedom) * timing.standard_error && timing.mirror_ratio > kMirror &&
          (timing.residual_ratio < kLowersResidual || timing.moved > kMovesParameter);
 }

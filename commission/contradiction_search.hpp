@@ -3,6 +3,7 @@
 /// The search for contradictions: efforts that measure nothing or come late, wrong signs, halves and wheels that disagree.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <optional>
 #include <vector>
@@ -10,6 +11,7 @@
 #include <wheelwright/commission/contradictions.hpp>
 #include <wheelwright/commission/fit.hpp>
 #include <wheelwright/commission/setting.hpp>
+#include <wheelwright/core/interval.hpp>
 #include <wheelwright/core/log.hpp>
 
 namespace wheelwright {
@@ -18,14 +20,17 @@ struct Commissioning;
 
 /// A constant shift in time between effort and motion, by least squares over filtered rows (TimeShiftedRows).
 struct EffortTiming {
-  double delay = 0.0;           ///< s, beyond the middle of what is declared; > 0: the logged effort comes late
-  double declared = 0.0;        ///< s, half of the range that is declared: of effort.delay, and of a step where held
-                                ///< efforts may change between samples
+  double delay = 0.0;           ///< s; > 0: the logged effort comes late
   double standard_error = 0.0;  ///< s, honest under autocorrelated residuals
   double freedom = 1.0;         ///< degrees of freedom of its Student's t
-  double residual_ratio = 1.0;  ///< rms residual with the shift over that without
-  double mirror_ratio = 1.0;    ///< the same with the shift's sign turned: a true shift makes it larger than 1
-  double moved = 0.0;           ///< largest change of a parameter by the shift, in its standard errors
+  Interval allowed{};           ///< s, what is taken as given: effort.delay; where bounds are declared and held efforts may
+                                ///< change between samples, up to a step more
+  double residual_ratio = 1.0;  ///< rms residual with the shift over that with the nearest one that is allowed
+  double mirror_ratio = 1.0;    ///< the same as far on the other side of that: above 1 for a true shift
+  double moved = 0.0;           ///< largest change of a parameter from the one to the other, in its standard errors
+
+  /// s, how far the shift lies outside of what is allowed; 0 inside.
+  [[nodiscard]] double beyond() const { return std::max({0.0, allowed.lower - delay, delay - allowed.upper}); }
 };
 
 /// The shift that explains the first `most_rows` rows of `log` best, at most `longest` either way; nothing where none is
@@ -33,7 +38,7 @@ struct EffortTiming {
 [[nodiscard]] std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& setting, const Fit& fit,
                                                         double longest = 0.2, std::size_t most_rows = 60000);
 
-/// Whether `timing` is a latency that a model must not be made with: beyond what is declared, told from that at a risk of
+/// Whether `timing` is a latency that a model must not be made with: beyond what is allowed, told from that at a risk of
 /// 1e-8 (Student's t) and further from it than a quarter of `step` (s), of an effect that is not symmetric in the sign of the shift (interpolation averages noise,
 /// which lowers the residual for a shift either way), and one that either lowers the residual by 1 % or more or moves a
 /// parameter by two standard errors. Healthy logs with even steps showed 0.09 steps at most.

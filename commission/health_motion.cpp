@@ -305,10 +305,10 @@ void check_delay(const HealthView& view, const Setting& s, const Fit& fit, std::
   const bool large = matters && std::abs(delay) > 0.75 * view.step;
   LogFinding f{.id = "time.effort_delay",
                .topic = FindingTopic::time,
-               .severity = is_latency(*timing, view.step) ? FindingSeverity::fatal
-                           : large                        ? FindingSeverity::warning
-                           : matters                      ? FindingSeverity::notice
-                                                          : FindingSeverity::fine};
+               .severity = view.robot_given && is_latency(*timing, view.step) ? FindingSeverity::fatal
+                           : large                                            ? FindingSeverity::warning
+                           : matters                                          ? FindingSeverity::notice
+                                                                              : FindingSeverity::fine};
   f.columns = s.measurement.effort_columns;
   f.value = delay;
   f.unit = std::string("s");

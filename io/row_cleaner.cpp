@@ -96,19 +96,21 @@ void RowCleaner::unwrap(double& theta, bool new_segment, std::size_t number) {
 
 void RowCleaner::unwrap(WheelAngle& wheel, double& angle, bool new_segment, std::size_t number) {
   constexpr double turn = 2.0 * std::numbers::pi, small = 0.5 * std::numbers::pi, slack = 1e-3;
+  constexpr std::size_t few = 3;
   const double step = angle - wheel.before;
   wheel.least = std::min(wheel.least, angle);
   wheel.most = std::max(wheel.most, angle);
   if (new_segment) {
     wheel.turns = 0.0;
   } else if (std::abs(step) > std::numbers::pi && std::abs(std::abs(step) - turn) < small &&
-             wheel.largest_step < small && wheel.most - wheel.least <= turn + slack) {
+             wheel.steps >= few && wheel.largest_step < small && wheel.most - wheel.least <= turn + slack) {
     wheel.turns -= std::copysign(1.0, step);
     if (report_ != nullptr && report_->angle_wraps.count++ == 0) {
       report_->angle_wraps.first = at(number) + ", column " + names_[wheel.index];
     }
   } else {
     wheel.largest_step = std::max(wheel.largest_step, std::abs(step));
+    ++wheel.steps;
   }
   wheel.before = angle;
   angle += wheel.turns * turn;

@@ -39,8 +39,8 @@ class RowCleaner {
 
   /// Decides by its time what a row is whose values are finite and within limits(), and unwraps its angles in place: the
   /// heading wherever it jumps by more than π, a wheel angle (phi_r, phi_l) where it jumps by nearly a turn and cannot but
-  /// be wrapped: all its values so far lie within one turn, and every other step, and this one with the turn taken away,
-  /// is below π/2.
+  /// be wrapped: all its values so far lie within one turn, and every other step (three at least), and this one with the
+  /// turn taken away, is below π/2.
   RowOutcome place(std::span<double> row, std::size_t number);
 
   /// The same for any row: one that has a value which is not finite is dropped. Throws InputError, naming the column,
@@ -67,6 +67,7 @@ class RowCleaner {
     double turns = 0.0;   // to add
     double least = std::numeric_limits<double>::infinity(), most = -least;
     double largest_step = 0.0;  // that is not a wrap
+    std::size_t steps = 0;      // that are none
   };
 
   void unwrap(double& theta, bool new_segment, std::size_t number);

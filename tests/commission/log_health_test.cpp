@@ -187,13 +187,9 @@ TEST_F(LogHealthTest, LateEffortsAreTimed) {
 }
 
 TEST_F(LogHealthTest, AWrappedWheelAngleIsFatal) {
-  log.names[*TableSource(log).find("omega_r")] = "phi_r";
-  log.names[*TableSource(log).find("omega_l")] = "phi_l";
   for (const char* name : {"phi_r", "phi_l"}) {
-    double angle = 0.0;
-    for (double& value : log.column(name)) {
-      angle += 0.01 * value;
-      value = std::remainder(angle, 2.0 * std::numbers::pi);
+    for (double& angle : log.column(name)) {
+      angle = std::remainder(angle, 2.0 * std::numbers::pi);
     }
   }
   expect("signals.wrapped", kFatal);
@@ -208,13 +204,13 @@ TEST_F(LogHealthTest, AnglesThatWereUnwrappedOnReadingAreTold) {
 
 TEST_F(LogHealthTest, APoseFromTheWheelsIsTold) {
   const double r = 0.0975, c = r / 0.381;
-  const std::vector<double>&right = log.column("omega_r"), &left = log.column("omega_l");
+  const std::vector<double>&right = log.column("phi_r"), &left = log.column("phi_l");
   std::vector<double>&x = log.column("x"), &y = log.column("y"), &theta = log.column("theta");
   for (std::size_t k = 1; k < log.rows(); ++k) {
-    const double h = log.t[k] - log.t[k - 1];
-    theta[k] = theta[k - 1] + c * h * (right[k] - left[k]);
-    x[k] = x[k - 1] + 0.5 * r * h * (right[k] + left[k]) * std::cos(theta[k - 1]);
-    y[k] = y[k - 1] + 0.5 * r * h * (right[k] + left[k]) * std::sin(theta[k - 1]);
+    const double a = right[k] - right[k - 1], b = left[k] - left[k - 1];
+    theta[k] = theta[k - 1] + c * (a - b);
+    x[k] = x[k - 1] + 0.5 * r * (a + b) * std::cos(theta[k - 1]);
+    y[k] = y[k - 1] + 0.5 * r * (a + b) * std::sin(theta[k - 1]);
   }
   expect("signals.pose_repeats_wheels", kWarning);
 }

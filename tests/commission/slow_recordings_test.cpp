@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include <wheelwright/commission/commission.hpp>
+#include <wheelwright/commission/contradiction_search.hpp>
 #include <wheelwright/commission/identification.hpp>
 #include <wheelwright/commission/trace.hpp>
 #include <wheelwright/core/error.hpp>
@@ -130,9 +131,10 @@ TEST_F(SlowRecordings, IntervalsOfTheAxisHoldAllPublishedValues) {
   EXPECT_LT(commissioned.validation[0].nrmse, 0.05);
 }
 
-TEST_F(SlowRecordings, EveryRobotOfTheFleetGivesAModel) {
+// Not every one of these robots is healthy; the current of one side of run 16 is zero throughout.
+TEST_F(SlowRecordings, EveryRobotOfTheFleetGivesAModelOrSaysWhatContradictsIt) {
   const Robot robot = read_robot(root / "data/regbot.yaml");
-  int runs = 0;
+  int runs = 0, contradicted = 0;
   for (const auto& entry : fs::directory_iterator(root / "data/regbot_fleet")) {
     if (entry.path().extension() != ".csv") {
       continue;
@@ -141,11 +143,57 @@ TEST_F(SlowRecordings, EveryRobotOfTheFleetGivesAModel) {
     const std::string name = entry.path().filename();
     CsvLog log({entry.path()});
     const Commissioning result = commission(log, robot);
-    EXPECT_TRUE(result.status == Commissioning::Status::done || result.status == Commissioning::Status::partial)
-        << name << ": " << result.message;
-    EXPECT_NO_THROW(make_detector(result.model)) << name;
+    const bool withdrawn = std::ranges::any_of(result.contradictions, &LogContradiction::withdraws);
+    EXPECT_EQ(result.status == Commissioning::Status::contradicted, withdrawn) << name << ": " << result.message;
+    if (withdrawn) {
+      ++contradicted;
+      EXPECT_TRUE(result.model.facets.empty()) << name;
+    } else {
+      EXPECT_TRUE(result.status == Commissioning::Status::done || result.status == Commissioning::Status::partial)
+          << name << ": " << result.message;
+      EXPECT_NO_THROW(static_cast<void>(make_detector(result.model))) << name;
+    }
+    if (name == "run_16.csv") {
+      ASSERT_FALSE(result.contradictions.empty());
+      EXPECT_EQ(result.contradictions.front().kind, LogContradiction::Kind::effort_constant);
+      EXPECT_EQ(result.contradictions.front().subject, "current_r");
+    }
   }
   EXPECT_GT(runs, 0);
+  EXPECT_LE(5 * contradicted, runs);
+}
+
+// Healthy robots of another physics engine: nothing is said against any of them, and every one late by a sample is told.
+TEST_F(SlowRecordings, NoHealthyBaselineIsContradictedAndEveryLateOneIs) {
+  int cases = 0;
+  for (const char* world : {"withheld-dev", "withheld-train"}) {
+    for (const auto& entry : fs::directory_iterator(root / world)) {
+      if (!fs::exists(entry.path() / "baseline.csv.gz")) {
+        continue;
+      }
+      ++cases;
+      const std::string name = entry.path().filename();
+      const Robot robot = read_robot(entry.path() / "robot.yaml");
+      CsvLog file({entry.path() / "baseline.csv.gz"});
+      LogTable table = read_all(file);
+      TableSource log(table);
+      const Setting setting = settle(log, robot);
+      const Fit fit = fit_log(log, setting, Part::everything, 1e-3);
+      const SignalFindings healthy = contradictions_in_log(log, setting, fit);
+      EXPECT_TRUE(healthy.contradictions.empty()) << name << ": " << healthy.contradictions.front().sentence;
+      ASSERT_TRUE(healthy.timing.has_value()) << name;
+      for (const char* effort : {"tau_r", "tau_l"}) {
+        std::vector<double>& tau = table.column(effort);
+        std::rotate(tau.begin(), tau.end() - 1, tau.end());
+      }
+      const auto timing = effort_timing(log, setting, fit_log(log, setting, Part::everything, 1e-3));
+      ASSERT_TRUE(timing.has_value()) << name;
+      EXPECT_TRUE(is_latency(*timing, setting.survey.median_step)) << name;
+      const double step = setting.survey.median_step;
+      EXPECT_NEAR(timing->delay - healthy.timing->delay, step, 0.05 * step) << name;
+    }
+  }
+  EXPECT_GE(cases, 24);
 }
 
 }  // namespace
