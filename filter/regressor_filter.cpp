@@ -183,7 +183,7 @@ void RegressorFilter::measure_motion(const Sample& now, const Sample& before) {
 }
 
 // All values that may act between `begin` and `end` where logged efforts are late by anything in the declared range.
-void RegressorFilter::effort_of_range(std::size_t age, double begin, double end) {
+void RegressorFilter::effort_of_range(double begin, double end) {
   const double from = begin + measurement_.delay.lower, to = end + measurement_.delay.upper;
   low_.setConstant(kInfinity);
   high_.setConstant(-kInfinity);
@@ -220,7 +220,7 @@ bool RegressorFilter::measure_effort(std::size_t age) {
   if (hull) {
     if (ranged_) {
       const double shift = mean ? 0.5 * step_.length : 0.0;
-      effort_of_range(age, before.t + shift, now.t + shift);
+      effort_of_range(before.t + shift, now.t + shift);
     } else {
       low_ = before.effort.cwiseMin(now.effort);
       high_ = before.effort.cwiseMax(now.effort);
