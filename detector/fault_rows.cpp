@@ -23,7 +23,8 @@ struct Instant {
   const Eigen::VectorXd& seen;          // s S v
   const Eigen::VectorXd& seen_rate;
   const Eigen::VectorXd& joint_seen;  // joint speeds that a reading of `seen` shows, 0 where it stands still
-  bool only_changes = false;          // the fault sets in here: it has what changes, and nothing of what was before
+  bool sets_in = false;               // the fault sets in between the steps about this instant ...
+  bool only_changes = false;          // ... and this is the step before: it has what changes, nothing of what was before
 };
 
 // Joint speeds of coordinate speeds; what is rounding beside the others is 0.
@@ -57,9 +58,9 @@ Parts parts_of(const Term& term, const FaultType& fault, const Instant& at) {
   }
   switch (term.kind) {
     case Term::Kind::acceleration:
-      // What encoders show jumps with the ground's share of a step; efforts go on from where they were.
-      parts.ground = at.acceleration[c];
-      parts.healthy = at.only_changes ? 0.0 : parts.ground;
+      // Encoders jump where the robot's own speed goes on: such a jump is no acceleration that the ground could share.
+      parts.ground = at.sets_in ? 0.0 : at.acceleration[c];
+      parts.healthy = at.only_changes ? 0.0 : at.acceleration[c];
       // Motion across the heading, d to the left, takes w2 d from the forward acceleration.
       parts.moved = at.moved_rate[c] - (c == 0 && fault.lateral != 0.0 ? at.profile * fault.lateral * at.v[1] : 0.0);
       parts.seen = at.seen_rate[c];
@@ -253,11 +254,11 @@ bool FaultFilter::next() {
   const FaultSignals begin =
       signature(fault_, *model_,
                 {before_.profile, v0, joints0, motion_->heading[k_], acceleration, before_.moved, moved_rate, before_.seen,
-                 seen_rate, before_.joint_seen, healthy},
+                 seen_rate, before_.joint_seen, healthy, healthy},
                 held_);
   const FaultSignals end = signature(fault_, *model_,
                                      {after.profile, v1, joints1, motion_->heading[k_ + 1], acceleration, after.moved,
-                                      moved_rate, after.seen, seen_rate, after.joint_seen},
+                                      moved_rate, after.seen, seen_rate, after.joint_seen, healthy},
                                      held_);
   filter(begin, end, shares, motion_->step[k_ + 1]);
   before_ = after;
