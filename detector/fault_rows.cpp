@@ -58,8 +58,7 @@ Parts parts_of(const Term& term, const FaultType& fault, const Instant& at) {
   }
   switch (term.kind) {
     case Term::Kind::acceleration:
-      // Encoders jump where the robot's own speed goes on: such a jump is no acceleration that the ground could share.
-      parts.ground = at.sets_in ? 0.0 : at.acceleration[c];
+      parts.ground = at.acceleration[c];
       parts.healthy = at.only_changes ? 0.0 : at.acceleration[c];
       // Motion across the heading, d to the left, takes w2 d from the forward acceleration.
       parts.moved = at.moved_rate[c] - (c == 0 && fault.lateral != 0.0 ? at.profile * fault.lateral * at.v[1] : 0.0);
@@ -93,6 +92,7 @@ FaultSignals signature(const FaultType& fault, const Model& model, const Instant
   FaultSignals out = FaultSignals::none(model);
   const auto n = static_cast<Eigen::Index>(model.n());
   const double s = at.profile;
+  // Where a fault sets in encoders jump and the robot's own speed goes on: no acceleration that the ground could share.
   for (const Term& term : model.terms) {
     const Parts parts = parts_of(term, fault, at);
     const auto k = static_cast<Eigen::Index>(term.output), j = static_cast<Eigen::Index>(term.parameter);
@@ -103,7 +103,7 @@ FaultSignals signature(const FaultType& fault, const Model& model, const Instant
         out.g1(i, j) += s * fault.effort(i, k) * parts.healthy;
         out.g2(i, j) += s * fault.effort(i, k) * parts.moved;
       }
-      if (fault.ground.size() > 0) {
+      if (fault.ground.size() > 0 && !(at.sets_in && term.kind == Term::Kind::acceleration)) {
         out.g1(i, j) += s * fault.ground(i, k) * parts.ground;
         out.g2(i, j) += s * fault.ground(i, k) * parts.moved;
       }
