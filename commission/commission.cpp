@@ -433,7 +433,7 @@ Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionO
     for (const OutputNoise& o : result.noise) {
       minimax.weights.push_back(std::max(o.bound, std::numeric_limits<double>::min()));
     }
-    SignalErrors without_output = s.declared;
+    SignalErrors without_output = result.row_errors;
     without_output.output.setZero();
     RegressionStream bare = make_rows(log, s, without_output);
     result.minimax = minimax_fit(bare, s.prior, minimax).upper;

@@ -23,6 +23,8 @@ struct Instant {
   const Eigen::VectorXd& seen;          // s S v
   const Eigen::VectorXd& seen_rate;
   const Eigen::VectorXd& joint_seen;  // joint speeds that a reading of `seen` shows, 0 where it stands still
+  bool sets_in = false;               // the fault sets in between the steps about this instant ...
+  bool only_changes = false;          // ... and this is the step before: it has what changes, nothing of what was before
 };
 
 // Joint speeds of coordinate speeds; what is rounding beside the others is 0.
@@ -51,9 +53,14 @@ struct Parts {
 Parts parts_of(const Term& term, const FaultType& fault, const Instant& at) {
   const auto c = static_cast<Eigen::Index>(term.coordinate);
   Parts parts;
+  if (at.only_changes && term.kind != Term::Kind::acceleration) {
+    return parts;
+  }
   switch (term.kind) {
     case Term::Kind::acceleration:
-      parts.healthy = parts.ground = at.acceleration[c];
+      // Encoders jump where the robot's own speed goes on: such a jump is no acceleration that the ground could share.
+      parts.ground = at.sets_in ? 0.0 : at.acceleration[c];
+      parts.healthy = at.only_changes ? 0.0 : at.acceleration[c];
       // Motion across the heading, d to the left, takes w2 d from the forward acceleration.
       parts.moved = at.moved_rate[c] - (c == 0 && fault.lateral != 0.0 ? at.profile * fault.lateral * at.v[1] : 0.0);
       parts.seen = at.seen_rate[c];
@@ -104,6 +111,9 @@ FaultSignals signature(const FaultType& fault, const Model& model, const Instant
     if (fault.theta.size() > 0) {
       out.c[k] += s * fault.theta[j] * parts.healthy;
     }
+  }
+  if (at.only_changes) {
+    return out;
   }
   if (fault.held_effort) {
     out.g1 -= s * fault.effort * held;
@@ -241,19 +251,14 @@ bool FaultFilter::next() {
                         seen_rate = (after.seen - before_.seen) / h;
   // The step that ends at the onset of a jump is still healthy.
   const bool healthy = fresh_ && k_ == onset_;
-  const Eigen::VectorXd none = Eigen::VectorXd::Zero(v0.size());
   const FaultSignals begin =
-      healthy ? signature(fault_, *model_,
-                          {0.0, v0, joints0, motion_->heading[k_], acceleration, none, moved_rate, none, seen_rate,
-                           joints0},
-                          held_)
-              : signature(fault_, *model_,
-                          {before_.profile, v0, joints0, motion_->heading[k_], acceleration, before_.moved, moved_rate,
-                           before_.seen, seen_rate, before_.joint_seen},
-                          held_);
+      signature(fault_, *model_,
+                {before_.profile, v0, joints0, motion_->heading[k_], acceleration, before_.moved, moved_rate, before_.seen,
+                 seen_rate, before_.joint_seen, healthy, healthy},
+                held_);
   const FaultSignals end = signature(fault_, *model_,
                                      {after.profile, v1, joints1, motion_->heading[k_ + 1], acceleration, after.moved,
-                                      moved_rate, after.seen, seen_rate, after.joint_seen},
+                                      moved_rate, after.seen, seen_rate, after.joint_seen, healthy},
                                      held_);
   filter(begin, end, shares, motion_->step[k_ + 1]);
   before_ = after;

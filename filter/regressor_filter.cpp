@@ -183,13 +183,16 @@ void RegressorFilter::measure_motion(const Sample& now, const Sample& before) {
 }
 
 // All values that may act between `begin` and `end` where logged efforts are late by anything in the declared range.
-void RegressorFilter::effort_of_range(std::size_t age, double begin, double end) {
+void RegressorFilter::effort_of_range(double begin, double end) {
   const double from = begin + measurement_.delay.lower, to = end + measurement_.delay.upper;
-  low_ = high_ = sample(age).effort;
-  for (std::size_t k = 0; k < std::min(samples_, ring_.size()); ++k) {
-    const bool after = k > 0 && sample(k).t >= to && sample(k - 1).t > to && sample(k).t > to;
+  low_.setConstant(kInfinity);
+  high_.setConstant(-kInfinity);
+  // From the last stamp before the range to the first behind it: a value may change right after its stamp, or before it.
+  const std::size_t held = std::min(samples_, ring_.size());
+  for (std::size_t k = 0; k < held; ++k) {
+    const bool behind = sample(k).t > to && k + 1 < held && sample(k + 1).t >= to;
     const bool gone = k > 0 && sample(k - 1).t <= from;
-    if (after || gone) {
+    if (behind || gone) {
       continue;
     }
     for (Eigen::Index j = 0; j < low_.size(); ++j) {
@@ -217,7 +220,7 @@ bool RegressorFilter::measure_effort(std::size_t age) {
   if (hull) {
     if (ranged_) {
       const double shift = mean ? 0.5 * step_.length : 0.0;
-      effort_of_range(age, before.t + shift, now.t + shift);
+      effort_of_range(before.t + shift, now.t + shift);
     } else {
       low_ = before.effort.cwiseMin(now.effort);
       high_ = before.effort.cwiseMax(now.effort);

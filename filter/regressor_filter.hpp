@@ -123,7 +123,7 @@ class RegressorFilter {
   bool describe(std::size_t age);
   void measure_motion(const Sample& now, const Sample& before);
   bool measure_effort(std::size_t age);
-  void effort_of_range(std::size_t age, double begin, double end);
+  void effort_of_range(double begin, double end);
   [[nodiscard]] bool effort_is_covered(double end) const;
   void to_outputs(const Eigen::VectorXd& joint, Eigen::VectorXd& output) const;
   void begin();

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/io/json_number.hpp>
+#include <wheelwright/io/estimators_json.hpp>
 #include <wheelwright/io/json_vector.hpp>
 #include <wheelwright/io/model_words.hpp>
 #include <wheelwright/io/warrant_json.hpp>
@@ -20,7 +21,6 @@ using Status = KinematicCommissioning::Status;
 constexpr Words<Status, 4> kKinematicStatusWords{
     {{Status::done, "done"}, {Status::partial, "partial"}, {Status::absent, "absent"}, {Status::nothing, "nothing"}}};
 
-Json numbers(const Eigen::VectorXd& v) { return std::vector<double>(v.begin(), v.end()); }
 
 Json box_json(const Box& box) {
   Json sides = Json::array();

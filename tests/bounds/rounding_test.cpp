@@ -4,6 +4,8 @@
 // tools/mutate_rounding.sh takes the steps away one by one, and these tests have to notice.
 #include <cmath>
 #include <functional>
+#include <memory>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -26,20 +28,22 @@ using exact::Rational;
 using exact::rational;
 using testing_rows::Random;
 
-/// A small set far from the origin: `groups` of q parameters each that no row couples with another.
+/// A small set far from the origin: `groups` of q parameters each that no row couples with another. Thin: a large one,
+/// a hundred million times as long as it is thick.
 struct Far {
   std::vector<HalfSpace> rows;
   Box box;
-  std::vector<double> centre;
+  std::vector<double> centre, across;
   std::vector<std::vector<std::vector<Rational>>> vertices;  // of each group
   std::size_t q = 0;
+  bool slim = false;
 
-  Far(std::uint64_t seed, std::size_t groups, std::size_t parameters) : q(parameters) {
+  Far(std::uint64_t seed, std::size_t groups, std::size_t parameters, bool thin = false) : q(parameters), slim(thin) {
     Random random(seed);
     const std::size_t p = groups * q;
-    const double size = std::pow(10.0, -6.0 * random.unit());
+    const double size = std::pow(10.0, thin ? 3.0 : -6.0 * random.unit());
     for (std::size_t j = 0; j < p; ++j) {
-      centre.push_back(300.0 * random.symmetric());
+      centre.push_back((thin ? 1e-6 : 300.0) * random.symmetric());
       box.sides.push_back({centre[j] - 4.0 * size, centre[j] + 4.0 * size});
     }
     for (std::size_t g = 0; g < groups; ++g) {
@@ -48,11 +52,17 @@ struct Far {
       for (std::size_t j = 0; j < q; ++j) {
         part.sides.push_back(box.sides[g * q + j]);
       }
+      std::vector<double> normal = random.vector(q);
+      across.insert(across.end(), normal.begin(), normal.end());
       for (int r = 0; r < 8 && q > 1; ++r) {
+        const bool wide = !thin || r > 3;
         HalfSpace small{Eigen::VectorXd(static_cast<Eigen::Index>(q)), 0.0, {}};
-        HalfSpace row{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(p)), size * (0.5 + random.unit()), {}};
+        HalfSpace row{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(p)),
+                      size * (wide ? 1.0 : 1e-8) * (0.5 + random.unit()),
+                      {}};
         for (std::size_t j = 0; j < q; ++j) {
-          const double a = random.symmetric();
+          const double a =
+              wide ? random.symmetric() : (r % 2 == 0 ? 1.0 : -1.0) * (normal[j] + 1e-10 * random.symmetric());
           small.a[static_cast<Eigen::Index>(j)] = row.a[static_cast<Eigen::Index>(g * q + j)] = a;
           row.b += a * centre[g * q + j];
         }
@@ -64,15 +74,21 @@ struct Far {
     }
   }
 
-  // Across the centre half of the time: a·θ is then near zero and its terms are not.
-  [[nodiscard]] std::vector<double> direction(Random& random, bool across) const {
+  // Across the set half of the time: a·θ is then near zero and its terms are not.
+  [[nodiscard]] std::vector<double> direction(Random& random, bool cancels) const {
     std::vector<double> a = random.vector(centre.size());
+    if (slim && cancels) {
+      for (std::size_t j = 0; j < a.size(); ++j) {
+        a[j] = across[j] + 1e-10 * a[j];
+      }
+      return a;
+    }
     double along = 0.0, square = 0.0;
     for (std::size_t j = 0; j < a.size(); ++j) {
       along += a[j] * centre[j];
       square += centre[j] * centre[j];
     }
-    for (std::size_t j = 0; across && j < a.size(); ++j) {
+    for (std::size_t j = 0; cancels && j < a.size(); ++j) {
       a[j] -= centre[j] * along / square;
     }
     return a;
@@ -98,10 +114,10 @@ struct Far {
 
 using Support = std::function<double(const std::vector<double>&)>;
 
-void expect_outward(const std::function<Support(const Far&)>& support_of) {
+void expect_outward(const std::function<Support(const Far&)>& support_of, bool thin = false) {
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
     for (const auto& [groups, q] : {std::pair<std::size_t, std::size_t>{1, 2}, {1, 3}, {2, 2}, {3, 1}, {1, 1}}) {
-      const Far far(seed, groups, q);
+      const Far far(seed, groups, q, thin);
       const Support support = support_of(far);
       Random random(seed + 100);
       for (int k = 0; k < 60; ++k) {
@@ -128,6 +144,16 @@ TEST(Rounding, SupportOfATable) {
   }
 }
 
+TEST(Rounding, SupportOfATableAcrossAThinSet) {
+  expect_outward(
+      [](const Far& far) -> Support {
+        auto table =
+            std::make_shared<SupportTable>(SupportTable::make(Polytope(far.rows, far.box), {.slots = 1}).value());
+        return [table](const std::vector<double>& a) { return table->support(a); };
+      },
+      true);
+}
+
 TEST(Rounding, SupportOfAWalk) {
   for (const std::size_t budget : {0, 64}) {
     expect_outward([budget](const Far& far) -> Support {
@@ -136,6 +162,27 @@ TEST(Rounding, SupportOfAWalk) {
       return [walk](const std::vector<double>& a) { return walk->support(a); };
     });
   }
+}
+
+TEST(Rounding, SupportOfAWalkAcrossAThinSet) {
+  expect_outward(
+      [](const Far& far) -> Support {
+        auto walk =
+            std::make_shared<SupportWalk>(Polytope(far.rows, far.box), SupportWalkOptions{.slots = 1, .few = 0});
+        return [walk](const std::vector<double>& a) { return walk->support(a); };
+      },
+      true);
+}
+
+// A block without a list of vertices has the support of its sides.
+TEST(Rounding, SupportOfSidesAlone) {
+  expect_outward([](const Far& far) -> Support {
+    Polytope::Block block;
+    for (std::size_t j = 0; j < far.centre.size(); ++j) {
+      block.parameters.push_back(j);
+    }
+    return [block, box = far.box](const std::vector<double>& a) { return support_of_vertices(block, box, a); };
+  });
 }
 
 TEST(Rounding, SupportOfAWalkThatLooksThroughItsVertices) {

@@ -37,6 +37,7 @@ struct Viscous {
     measurement.motion_columns = {"v"};
     measurement.effort_columns = {"u"};
     measurement.nominal_step = 0.01;
+    measurement.changes = EffortChanges::at_samples;
     LogTable table;
     table.names = {"v", "u"};
     table.columns = {speeds, std::vector<double>(speeds.size(), 0.0)};

@@ -55,6 +55,7 @@ inline Commissioning done() {
               .largest_step = 0.012,
               .largest_speed = {12.0, 11.5},
               .largest_acceleration = {8.0, 9.0},
+              .sharpest_change = {9.0, 11.0},
               .reversals = {4.0, 6.0}};
   OutputNoise noise;
   noise.bound = 0.05;
