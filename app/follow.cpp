@@ -18,7 +18,7 @@
 namespace wheelwright::app {
 namespace {
 
-constexpr double kMerge = 0.5;             // s, as detect() on a whole log
+constexpr double kMerge = 0.5;            // s, as detect() on a whole log
 constexpr std::size_t kMostTimes = 1000;  // rows from which the step is taken
 
 // Positions of the columns `names`; nothing, and `missing` says which, where there are not all of them.

@@ -169,19 +169,22 @@ std::string why_undecided(const CommissionedModel& model, std::size_t rows, doub
   std::string text = "no instant was decided, so that nothing is known of faults: ";
   for (const auto& [factor, unit] : {std::pair{1e3, "ms"}, std::pair{1e6, "µs"}, std::pair{1e9, "ns"}}) {
     if (ratio > 0.2 * factor && ratio < 5.0 * factor) {
-      return text + fmt::format("the rows are {:.4g} s apart, {:.3g} times as far as those that the model was commissioned "
-                                "on ({:.4g} s); is their time in {}? It has to be in s",
-                                step, ratio, nominal, unit);
+      return text + fmt::format(
+                        "the rows are {:.4g} s apart, {:.3g} times as far as those that the model was commissioned "
+                        "on ({:.4g} s); is their time in {}? It has to be in s",
+                        step, ratio, nominal, unit);
     }
   }
   if (ratio > sparser) {
-    return text + fmt::format("the rows are {:.4g} s apart, {:.3g} times as far as those that the model was commissioned on "
-                              "({:.4g} s): log faster, or commission on a log like this one",
-                              step, ratio, nominal);
+    return text + fmt::format(
+                      "the rows are {:.4g} s apart, {:.3g} times as far as those that the model was commissioned on "
+                      "({:.4g} s): log faster, or commission on a log like this one",
+                      step, ratio, nominal);
   }
-  return text + fmt::format("{} row{} {:.4g} s apart are too few, or too often interrupted, for the filter, which settles in "
-                            "{:.3g} s",
-                            rows, rows == 1 ? "" : "s", step, model.filter.settle / model.filter.beta);
+  return text + fmt::format(
+                    "{} row{} {:.4g} s apart are too few, or too often interrupted, for the filter, which settles in "
+                    "{:.3g} s",
+                    rows, rows == 1 ? "" : "s", step, model.filter.settle / model.filter.beta);
 }
 
 std::string summary(const Detection& d, const CommissionedModel& model) {

@@ -70,7 +70,8 @@ Assumption assumed_delay(const Commissioning& r) {
   Assumption a{.id = "effort_delay",
                .declared_by = "effort.delay",
                .test = "no constant shift beyond the declared one explains the log better"};
-  const auto latency = std::ranges::find(r.contradictions, LogContradiction::Kind::effort_timing, &LogContradiction::kind);
+  const auto latency =
+      std::ranges::find(r.contradictions, LogContradiction::Kind::effort_timing, &LogContradiction::kind);
   if (latency != r.contradictions.end()) {
     a.verdict = AssumptionVerdict::fails;
     a.detail = latency->sentence;
@@ -204,8 +205,8 @@ Assumption lost_rows(const Measurement& m, const Survey& survey) {
                .test = "the shortest steps of the log tell two steps from one"};
   const bool apart = m.motion == MotionKind::mean_speed || m.shortest_step <= 0.0 || 2.0 * m.shortest_step > longest;
   a.verdict = longest > 0.0 && apart ? AssumptionVerdict::holds : AssumptionVerdict::not_tested;
-  a.detail = fmt::format("a step longer than {:.3g} s begins anew; the longest is {:.3g} s, the median {:.3g} s{}", longest,
-                         survey.largest_step, survey.median_step,
+  a.detail = fmt::format("a step longer than {:.3g} s begins anew; the longest is {:.3g} s, the median {:.3g} s{}",
+                         longest, survey.largest_step, survey.median_step,
                          apart ? "" : ", and steps vary so much that one missing row would not show");
   return a;
 }

@@ -100,8 +100,8 @@ Bounded refined_set(LogSource& log, const Setting& s, Part part, SignalErrors er
     SignalErrors sharper = errors;
     sharper.motion = bound;
     OutlierResult next = set_of(log, s, part, sharper, outliers);
-    const bool better = next.set.status != FeasibleSet::Status::nonempty ||
-                        widths(next.set.hull, best.result.set.hull) < kWorthAnother;
+    const bool better =
+        next.set.status != FeasibleSet::Status::nonempty || widths(next.set.hull, best.result.set.hull) < kWorthAnother;
     best.result = std::move(next);
     best.learning = bound;
     if (!better) {
@@ -246,11 +246,12 @@ void describe_assumptions(const Setting& s, Commissioning& result) {
   } else if (s.measurement.motion == MotionKind::speed && s.filter.order == 2) {
     notes.push_back(
         s.measurement.unused_count > 0.0
-            ? fmt::format("wheel speeds are whole multiples of {:.4g} rad/s; they were taken as samples of the speed with "
-                          "the declared `wheel_speed` noise: write `encoder_counts_per_turn: {:.0f}` into the robot file "
-                          "if they are differenced counts",
-                          s.measurement.unused_count,
-                          2.0 * 3.14159265358979323846 / (s.measurement.unused_count * s.measurement.nominal_step))
+            ? fmt::format(
+                  "wheel speeds are whole multiples of {:.4g} rad/s; they were taken as samples of the speed with "
+                  "the declared `wheel_speed` noise: write `encoder_counts_per_turn: {:.0f}` into the robot file "
+                  "if they are differenced counts",
+                  s.measurement.unused_count,
+                  2.0 * 3.14159265358979323846 / (s.measurement.unused_count * s.measurement.nominal_step))
             : "wheel speeds are not differenced encoder counts: they were taken as samples of the speed");
   }
   if (!s.noise_complete) {
@@ -325,7 +326,8 @@ std::string default_prior_in_the_way(const Setting& s, const Commissioning& resu
     if (estimate && !s.prior_declared[j] && *estimate > s.prior.sides[j].upper) {
       const Parameter& p = s.model.parameters[j];
       return fmt::format(
-          "no {0} within the tool's own default prior, at most {1:.3g} {2}, explains the log: check the units of efforts "
+          "no {0} within the tool's own default prior, at most {1:.3g} {2}, explains the log: check the units of "
+          "efforts "
           "and motion, or, where the robot is that large, write `prior: {{{0}: [lower, upper]}}` into the robot file",
           p.physical, p.prior.upper, p.physical_unit);
     }
@@ -374,8 +376,7 @@ std::string status_message(const Setting& s, const Commissioning& result) {
           result.minimax,
           why.empty() ? "a fault, an effect that the model lacks, or noise bounds that are too small" : why);
     }
-    case Commissioning::Status::contradicted:
-      return "no model: " + withdrawal(result);
+    case Commissioning::Status::contradicted: return "no model: " + withdrawal(result);
   }
   return {};
 }

@@ -66,10 +66,10 @@ struct ParameterResult {
 struct Commissioning {
   /// What became of the log.
   enum class Status {
-    done,     ///< a model came out
-    partial,  ///< a model came out, but some parameters are not excited: their bounds are the prior's
-    empty,    ///< no θ explains the log within the declared noise: see contradiction; no model
-    nothing,  ///< no parameter is excited: no model
+    done,          ///< a model came out
+    partial,       ///< a model came out, but some parameters are not excited: their bounds are the prior's
+    empty,         ///< no θ explains the log within the declared noise: see contradiction; no model
+    nothing,       ///< no parameter is excited: no model
     contradicted,  ///< a set came out, but the log contradicts what it stands on: see contradictions; no model
   };
   Status status = Status::done;
@@ -86,11 +86,11 @@ struct Commissioning {
   double condition = 0.0;
   std::vector<OutputValidation> validation;  ///< on held-out blocks, of a model made from the other blocks
   FoldOptions folds;
-  double minimax = 0.0;     ///< where the set is empty: by how much the bounds n̄ on the effort would have to be
-                            ///< raised for it not to be (those on the motion kept); else 0
-  std::optional<double> effort_shift;  ///< s, by which the efforts seem late against the motion
+  double minimax = 0.0;  ///< where the set is empty: by how much the bounds n̄ on the effort would have to be
+                         ///< raised for it not to be (those on the motion kept); else 0
+  std::optional<double> effort_shift;            ///< s, by which the efforts seem late against the motion
   std::vector<LogContradiction> contradictions;  ///< found whatever the status; one that withdraws leaves no model
-  Box prior;                ///< in which the set was sought
+  Box prior;                                     ///< in which the set was sought
   SignalErrors row_errors;  ///< dY and dy of the rows that the set is made of: OutputNoise::learning in `output`
   std::vector<std::size_t> dropped;     ///< rows of the log whose instants the set leaves out as outliers
   FeasibleSet feasible;                 ///< the set, its hull, certificates

@@ -21,16 +21,17 @@ namespace {
 
 using Kind = LogContradiction::Kind;
 
-constexpr double kRiskOfWithdrawal = 1e-8;  // two-sided, of Student's t: a model is withdrawn in error once in 10⁸ looks
-constexpr double kMaterial = 0.1;           // of the weighted effort: a wrong sign below it is a note
-constexpr double kLeastShift = 0.25;    // of a step: interpolation between samples leaves up to a tenth of one
+constexpr double kRiskOfWithdrawal =
+    1e-8;                                // two-sided, of Student's t: a model is withdrawn in error once in 10⁸ looks
+constexpr double kMaterial = 0.1;        // of the weighted effort: a wrong sign below it is a note
+constexpr double kLeastShift = 0.25;     // of a step: interpolation between samples leaves up to a tenth of one
 constexpr double kMovesParameter = 2.0;  // standard errors
 constexpr double kLowersResidual = 0.99;
-constexpr double kMirror = 1.001;        // a true shift is worse than none with its sign turned
-constexpr double kUnrelated = 0.05;      // share of an effort's variation that motion must explain of it
-constexpr double kManyStepsOff = 0.2;    // of a step: how near half a step a shift must be to be one
-constexpr double kMuchRaised = 3.0;      // factor on an estimated noise bound
-constexpr double kWheelsDiffer = 1.15;   // ratio of the masses that two wheels show: worth a note
+constexpr double kMirror = 1.001;          // a true shift is worse than none with its sign turned
+constexpr double kUnrelated = 0.05;        // share of an effort's variation that motion must explain of it
+constexpr double kManyStepsOff = 0.2;      // of a step: how near half a step a shift must be to be one
+constexpr double kMuchRaised = 3.0;        // factor on an estimated noise bound
+constexpr double kWheelsDiffer = 1.15;     // ratio of the masses that two wheels show: worth a note
 constexpr double kWheelsContradict = 1.8;  // the same: a unit, a gear or a sensor is wrong
 constexpr double kManyOutside = 0.01;      // of the held-out instants
 constexpr std::size_t kFewestHalf = 200;   // instants of a half from which on it is looked at
@@ -72,8 +73,8 @@ void find_constant_efforts(LogSource& log, const Setting& s, std::vector<LogCont
       out.push_back({.kind = Kind::effort_constant,
                      .subject = name,
                      .value = efforts[j].least,
-                     .sentence = fmt::format("{} is {:.6g} in every row although {} changes: no force is measured", name,
-                                             efforts[j].least, s.measurement.motion_columns[j]),
+                     .sentence = fmt::format("{} is {:.6g} in every row although {} changes: no force is measured",
+                                             name, efforts[j].least, s.measurement.motion_columns[j]),
                      .next = "check that the sensor is connected and that the right column is read (--map)"});
     }
   }
@@ -81,9 +82,9 @@ void find_constant_efforts(LogSource& log, const Setting& s, std::vector<LogCont
 
 // The effort of each joint by itself, on all that the motion offers: what the rows say of it.
 struct JointFit {
-  double explained = 1.0;      // share of its square
-  Eigen::VectorXd estimate;    // of each column
-  Eigen::VectorXd error;       // standard errors
+  double explained = 1.0;    // share of its square
+  Eigen::VectorXd estimate;  // of each column
+  Eigen::VectorXd error;     // standard errors
   double freedom = 1.0;
 };
 
@@ -113,8 +114,8 @@ RegressionBlock joint_rows(const RegressionBlock& block, const Eigen::RowVectorX
     const auto at = static_cast<Eigen::Index>(k);
     rows.y[at] = share.dot(block.y.segment(at * n, n));
     for (std::size_t c = 0; c < columns.size(); ++c) {
-      rows.Y(at, static_cast<Eigen::Index>(c)) = block.Y(at * n + static_cast<Eigen::Index>(columns[c].first),
-                                                         static_cast<Eigen::Index>(columns[c].second));
+      rows.Y(at, static_cast<Eigen::Index>(c)) =
+          block.Y(at * n + static_cast<Eigen::Index>(columns[c].first), static_cast<Eigen::Index>(columns[c].second));
     }
   }
   return rows;
@@ -169,14 +170,15 @@ void find_unrelated_efforts(const Setting& s, const std::vector<JointFit>& joint
     const std::string& name = s.measurement.effort_columns[j];
     const bool told = std::ranges::any_of(out, [&](const LogContradiction& c) { return c.subject == name; });
     if (!told && joints[j].explained < kUnrelated) {
-      out.push_back({.kind = Kind::effort_unrelated,
-                     .subject = name,
-                     .value = joints[j].explained,
-                     .limit = kUnrelated,
-                     .sentence = fmt::format("{} does not depend on the motion: all of it together explains {:.2g} % of "
-                                             "this effort",
-                                             name, 100.0 * std::max(0.0, joints[j].explained)),
-                     .next = "check that the sensor is connected and that the right column is read (--map)"});
+      out.push_back(
+          {.kind = Kind::effort_unrelated,
+           .subject = name,
+           .value = joints[j].explained,
+           .limit = kUnrelated,
+           .sentence = fmt::format("{} does not depend on the motion: all of it together explains {:.2g} % of "
+                                   "this effort",
+                                   name, 100.0 * std::max(0.0, joints[j].explained)),
+           .next = "check that the sensor is connected and that the right column is read (--map)"});
     }
   }
 }
@@ -197,7 +199,8 @@ void find_uneven_efforts(const Setting& s, const std::vector<JointFit>& joints, 
   const double right = joints[0].estimate[at], left = joints[1].estimate[at];
   const double least = std::min(right, left), most = std::max(right, left);
   const double error = std::hypot(joints[0].error[at], joints[1].error[at]);
-  if (!(least > 0.0) || most < kWheelsDiffer * least || most - least < certain(std::min(joints[0].freedom, joints[1].freedom)) * error) {
+  if (!(least > 0.0) || most < kWheelsDiffer * least ||
+      most - least < certain(std::min(joints[0].freedom, joints[1].freedom)) * error) {
     return;
   }
   const auto& names = s.measurement.effort_columns;
@@ -230,7 +233,8 @@ std::string shift_words(const Setting& s, const EffortTiming& timing) {
   const double late = timing.delay;
   const double half = std::abs(std::abs(timing.delay / s.survey.median_step) - 0.5);
   const std::string declare = fmt::format(
-      "where the shift is constant and known, declare it, as a range that holds it: `effort: {{delay: [{:.3g}, {:.3g}]}}` in "
+      "where the shift is constant and known, declare it, as a range that holds it: `effort: {{delay: [{:.3g}, "
+      "{:.3g}]}}` in "
       "the robot file",
       late - 5.0 * timing.standard_error, late + 5.0 * timing.standard_error);
   if (timing.delay < 0.0 && s.measurement.hold == Hold::first_order && half < kManyStepsOff) {
@@ -248,19 +252,19 @@ void find_latency(const Setting& s, const std::optional<EffortTiming>& timing, s
   if (!timing || !is_latency(*timing, s.survey.median_step)) {
     return;
   }
-  out.push_back({.kind = Kind::effort_timing,
-                 .subject = s.measurement.effort_columns.front(),
-                 .value = timing->delay,
-                 .limit = kLeastShift * s.survey.median_step,
-                 .sentence = fmt::format("the efforts come {:.3g} ± {:.1g} ms {} the motion, {:.2g} steps of the log{}",
-                                         1e3 * std::abs(timing->delay), 2e3 * timing->standard_error,
-                                         timing->delay > 0.0 ? "after" : "before",
-                                         std::abs(timing->delay) / s.survey.median_step,
-                                         timing->allowed.lower == 0.0 && timing->allowed.upper == 0.0
-                                             ? ""
-                                             : fmt::format(", where {:.3g} to {:.3g} ms are allowed",
-                                                           1e3 * timing->allowed.lower, 1e3 * timing->allowed.upper)),
-                 .next = shift_words(s, *timing)});
+  out.push_back(
+      {.kind = Kind::effort_timing,
+       .subject = s.measurement.effort_columns.front(),
+       .value = timing->delay,
+       .limit = kLeastShift * s.survey.median_step,
+       .sentence = fmt::format("the efforts come {:.3g} ± {:.1g} ms {} the motion, {:.2g} steps of the log{}",
+                               1e3 * std::abs(timing->delay), 2e3 * timing->standard_error,
+                               timing->delay > 0.0 ? "after" : "before", std::abs(timing->delay) / s.survey.median_step,
+                               timing->allowed.lower == 0.0 && timing->allowed.upper == 0.0
+                                   ? ""
+                                   : fmt::format(", where {:.3g} to {:.3g} ms are allowed", 1e3 * timing->allowed.lower,
+                                                 1e3 * timing->allowed.upper)),
+       .next = shift_words(s, *timing)});
 }
 
 // A parameter as people know it: name, value and unit.
@@ -441,8 +445,8 @@ std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& s, cons
 
 bool is_latency(const EffortTiming& timing, double step) {
   const double shift = timing.beyond();
-  return shift > kLeastShift * step && shift > certain(timing.freedom) * timing.standard_error && timing.mirror_ratio > kMirror &&
-         (timing.residual_ratio < kLowersResidual || timing.moved > kMovesParameter);
+  return shift > kLeastShift * step && shift > certain(timing.freedom) * timing.standard_error &&
+         timing.mirror_ratio > kMirror && (timing.residual_ratio < kLowersResidual || timing.moved > kMovesParameter);
 }
 
 SignalFindings contradictions_in_log(LogSource& log, const Setting& s, const Fit& fit) {
@@ -470,18 +474,19 @@ std::vector<LogContradiction> contradictions_in_result(const Commissioning& resu
     const Interval& prior = s.prior.sides[j];
     const InWords w = in_words(s, j);
     if (raised > kMuchRaised && p.estimate && !prior.contains(*p.estimate)) {
-      found.push_back(
-          {.kind = Kind::prior_edge,
-           .subject = p.parameter.physical,
-           .value = raised,
-           .limit = kMuchRaised,
-           .sentence = fmt::format("{} is {:.4g} {} by least squares, outside its prior [{:.4g}, {:.4g}]{}; within it the "
-                                   "noise would have to be {:.3g} times as large",
-                                   w.name, w.value(*p.estimate), w.unit, w.value(prior.lower), w.value(prior.upper),
-                                   s.prior_declared[j] ? "" : ", the tool's own wide default", raised),
-           .next = fmt::format("check units and signs; where they are right, give the robot's own bounds: `prior: {{{}: "
-                               "[…, …]}}` in the robot file",
-                               p.parameter.physical)});
+      found.push_back({.kind = Kind::prior_edge,
+                       .subject = p.parameter.physical,
+                       .value = raised,
+                       .limit = kMuchRaised,
+                       .sentence = fmt::format(
+                           "{} is {:.4g} {} by least squares, outside its prior [{:.4g}, {:.4g}]{}; within it the "
+                           "noise would have to be {:.3g} times as large",
+                           w.name, w.value(*p.estimate), w.unit, w.value(prior.lower), w.value(prior.upper),
+                           s.prior_declared[j] ? "" : ", the tool's own wide default", raised),
+                       .next = fmt::format(
+                           "check units and signs; where they are right, give the robot's own bounds: `prior: {{{}: "
+                           "[…, …]}}` in the robot file",
+                           p.parameter.physical)});
     }
     if (!p.estimate || p.estimate_inside || !p.standard_error) {
       continue;
@@ -508,16 +513,17 @@ std::vector<LogContradiction> contradictions_in_result(const Commissioning& resu
       continue;
     }
     const double share = static_cast<double>(v.outside) / static_cast<double>(v.instants);
-    found.push_back({.kind = Kind::held_out_outside,
-                     .withdraws = s.noise_complete || share > kManyOutside,
-                     .subject = s.model.outputs[i],
-                     .value = share,
-                     .limit = s.noise_complete ? 0.0 : kManyOutside,
-                     .sentence = fmt::format("{} of {} instants that were held out ({:.2g} %) leave the thresholds of the "
-                                             "{} channel",
-                                             v.outside, v.instants, 100.0 * share, s.model.outputs[i]),
-                     .next = "the log is not of one healthy robot in one kind of driving: look at these moments, drive "
-                             "longer, or declare the sensors' noise"});
+    found.push_back(
+        {.kind = Kind::held_out_outside,
+         .withdraws = s.noise_complete || share > kManyOutside,
+         .subject = s.model.outputs[i],
+         .value = share,
+         .limit = s.noise_complete ? 0.0 : kManyOutside,
+         .sentence = fmt::format("{} of {} instants that were held out ({:.2g} %) leave the thresholds of the "
+                                 "{} channel",
+                                 v.outside, v.instants, 100.0 * share, s.model.outputs[i]),
+         .next = "the log is not of one healthy robot in one kind of driving: look at these moments, drive "
+                 "longer, or declare the sensors' noise"});
   }
   return found;
 }

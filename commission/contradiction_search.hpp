@@ -23,8 +23,8 @@ struct EffortTiming {
   double delay = 0.0;           ///< s; > 0: the logged effort comes late
   double standard_error = 0.0;  ///< s, honest under autocorrelated residuals
   double freedom = 1.0;         ///< degrees of freedom of its Student's t
-  Interval allowed{};           ///< s, what is taken as given: effort.delay; where bounds are declared and held efforts may
-                                ///< change between samples, up to a step more
+  Interval allowed{};  ///< s, what is taken as given: effort.delay; where bounds are declared and held efforts may
+                       ///< change between samples, up to a step more
   double residual_ratio = 1.0;  ///< rms residual with the shift over that with the nearest one that is allowed
   double mirror_ratio = 1.0;    ///< the same as far on the other side of that: above 1 for a true shift
   double moved = 0.0;           ///< largest change of a parameter from the one to the other, in its standard errors
@@ -56,7 +56,7 @@ struct SignalFindings {
 
 /// What a finished commissioning says against itself: best guesses outside their set, held-out rows outside the
 /// thresholds, a noise bound that had to be raised by `raised` for the prior box to explain the log.
-[[nodiscard]] std::vector<LogContradiction> contradictions_in_result(const Commissioning& result, const Setting& setting,
-                                                                  double raised);
+[[nodiscard]] std::vector<LogContradiction> contradictions_in_result(const Commissioning& result,
+                                                                     const Setting& setting, double raised);
 
 }  // namespace wheelwright

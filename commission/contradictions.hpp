@@ -23,12 +23,12 @@ struct LogContradiction {
     held_out_outside,  ///< driving that was held out leaves the thresholds
   };
   Kind kind = Kind::effort_constant;
-  bool withdraws = true;  ///< no model is published; false: a note beside a model
-  std::string subject{};  ///< the parameter, column or output that it is about
-  double value = 0.0;     ///< what was found: s, share, factor, or the parameter's unit
-  double limit = 0.0;     ///< what it was compared with, same unit
-  std::string sentence{}; ///< what was found, with its numbers
-  std::string next{};     ///< what to do about it
+  bool withdraws = true;   ///< no model is published; false: a note beside a model
+  std::string subject{};   ///< the parameter, column or output that it is about
+  double value = 0.0;      ///< what was found: s, share, factor, or the parameter's unit
+  double limit = 0.0;      ///< what it was compared with, same unit
+  std::string sentence{};  ///< what was found, with its numbers
+  std::string next{};      ///< what to do about it
 };
 
 /// Name for files: "effort_constant" and so on.

@@ -16,8 +16,8 @@
 namespace wheelwright {
 namespace {
 
-constexpr double kSome = 0.02;             // share of the rows that makes a manoeuvre count
-constexpr double kUnusedRisk = 1e-3;       // for fit_log; not used further
+constexpr double kSome = 0.02;        // share of the rows that makes a manoeuvre count
+constexpr double kUnusedRisk = 1e-3;  // for fit_log; not used further
 
 LogFinding about_motion(const char* id, FindingSeverity severity, std::string sentence, std::string next, double value,
                         std::string unit) {

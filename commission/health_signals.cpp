@@ -272,10 +272,9 @@ void check_resolution(const HealthView& view, const Column& c, const std::vector
       sample.push_back(is_angle ? (*c.values)[k] - (*c.values)[k - 1] : (*c.values)[k]);
     }
   }
-  const auto encoder = view.robot.model == "single_axis" || !(view.step > 0.0)
-                           ? std::nullopt
-                       : is_angle ? find_encoder_of_angles(sample)
-                                  : find_encoder(sample, view.step);
+  const auto encoder = view.robot.model == "single_axis" || !(view.step > 0.0) ? std::nullopt
+                       : is_angle                                              ? find_encoder_of_angles(sample)
+                                                                               : find_encoder(sample, view.step);
   if (!encoder) {
     return;
   }
@@ -391,12 +390,13 @@ void check_rest(const HealthView& view, const std::vector<Column>& columns, std:
 // Wheel angles that come back every turn.
 void check_wrapped(const HealthView& view, const ReaderCounts& reader, std::vector<LogFinding>& out) {
   if (reader.unwrapped > 0) {
-    out.push_back(about("signals.wrapped", FindingSeverity::notice, "",
-                        fmt::format("Wheel angles jump back by a whole turn {} times: they are wrapped at 2π, and were "
-                                    "unwrapped on reading.",
-                                    reader.unwrapped),
-                        "Log angles that go on, where the driver has them: a wrapped one is lost where rows are missing.",
-                        static_cast<double>(reader.unwrapped), "1"));
+    out.push_back(
+        about("signals.wrapped", FindingSeverity::notice, "",
+              fmt::format("Wheel angles jump back by a whole turn {} times: they are wrapped at 2π, and were "
+                          "unwrapped on reading.",
+                          reader.unwrapped),
+              "Log angles that go on, where the driver has them: a wrapped one is lost where rows are missing.",
+              static_cast<double>(reader.unwrapped), "1"));
   }
   for (const JointView& j : view.joints) {
     if (j.angle == nullptr || view.model.joints.size() != 2) {
@@ -411,10 +411,10 @@ void check_wrapped(const HealthView& view, const ReaderCounts& reader, std::vect
     }
     const auto [least, most] = std::ranges::minmax(*j.angle);
     if (jumps > 0 && most - least <= kTurn + 1e-3) {
-      out.push_back(about("signals.wrapped", FindingSeverity::fatal, j.angle_name,
-                          fmt::format("{} never leaves one turn and jumps by one {} times: it is wrapped at 2π.",
-                                      j.angle_name, jumps),
-                          "Unwrap it: an angle has to go on counting.", static_cast<double>(jumps), "1"));
+      out.push_back(about(
+          "signals.wrapped", FindingSeverity::fatal, j.angle_name,
+          fmt::format("{} never leaves one turn and jumps by one {} times: it is wrapped at 2π.", j.angle_name, jumps),
+          "Unwrap it: an angle has to go on counting.", static_cast<double>(jumps), "1"));
     }
   }
 }

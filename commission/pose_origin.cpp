@@ -15,9 +15,9 @@ namespace wheelwright {
 namespace {
 
 constexpr std::size_t kFewestPoseWindows = 8;
-constexpr double kExactHeading = 1e-6;    // rad
-constexpr double kExactWay = 1e-5;        // m
-constexpr double kLeastChange = 1e-2;     // rad or m, rms in a window: less says nothing
+constexpr double kExactHeading = 1e-6;  // rad
+constexpr double kExactWay = 1e-5;      // m
+constexpr double kLeastChange = 1e-2;   // rad or m, rms in a window: less says nothing
 constexpr double kOfTheCounts = 1.0 / 3.0;
 constexpr double kOfTheRounding = 1.2;
 constexpr double kWholeTurn = 2.0 * std::numbers::pi;
@@ -165,11 +165,14 @@ PoseOrigin pose_origin(LogSource& log, const OdometryMeasurement& m, double wind
   };
   if (const auto rest = least(headings)) {
     origin.heading_rest = *rest;
-    const double count = m.count > 0.0 ? m.count * m.nominal_step : counts_per_turn > 0.0 ? kWholeTurn / counts_per_turn : 0.0;
+    const double count = m.count > 0.0           ? m.count * m.nominal_step
+                         : counts_per_turn > 0.0 ? kWholeTurn / counts_per_turn
+                                                 : 0.0;
     // Half a count at both ends of a window and both wheels, times a gain that is about a third: an independent heading.
     const double by_counts = count / (3.0 * std::sqrt(3.0));
     const double rounding = decimals.quantum() / std::sqrt(6.0);
-    origin.heading_repeats = *rest < kExactHeading || (*rest <= kOfTheRounding * rounding && *rest < kOfTheCounts * by_counts);
+    origin.heading_repeats =
+        *rest < kExactHeading || (*rest <= kOfTheRounding * rounding && *rest < kOfTheCounts * by_counts);
   }
   if (const auto rest = m.position ? least(ways) : std::nullopt) {
     origin.position_rest = *rest;
@@ -177,7 +180,8 @@ PoseOrigin pose_origin(LogSource& log, const OdometryMeasurement& m, double wind
   }
   if (origin.heading_repeats) {
     origin.sentence = fmt::format(
-        "{} wheel odometry over again, not measured independently: a combination of the wheel angles leaves {:.2g} rad of "
+        "{} wheel odometry over again, not measured independently: a combination of the wheel angles leaves {:.2g} rad "
+        "of "
         "the heading over {:.3g} s, less than any sensor of its own would",
         m.position ? "the pose is" : "the heading is", origin.heading_rest, window);
   } else if (origin.position_repeats) {

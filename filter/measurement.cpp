@@ -10,9 +10,9 @@
 namespace wheelwright {
 namespace {
 
-constexpr std::size_t kMostSpeeds = 200000;  // enough to find an encoder; longer logs are not searched further
+constexpr std::size_t kMostSpeeds = 200000;   // enough to find an encoder; longer logs are not searched further
 constexpr double kHalf = 0.5 * (1.0 - 1e-6);  // of a quantum: what rounding to it makes wrong, as printed
-constexpr double kEvenSteps = 0.02;          // steps further apart than this share are not one sampling interval
+constexpr double kEvenSteps = 0.02;           // steps further apart than this share are not one sampling interval
 
 std::string join(const std::vector<std::string>& words) {
   std::string out;

@@ -36,7 +36,7 @@ struct Measurement {
   double unused_count = 0.0;  ///< speed: what `count` would be if the declared bound of the speeds did not stand above
                               ///< it, rad/s (0: nothing was found)
 
-  EffortCorrection correction{};  ///< of the efforts, before anything else is made of them
+  EffortCorrection correction{};                   ///< of the efforts, before anything else is made of them
   EffortChanges changes = EffortChanges::between;  ///< what an effort may do between two samples, beside `hold`
   Interval delay{0.0, 0.0};                        ///< s, holds the constant time by which logged efforts are late
 

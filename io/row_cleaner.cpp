@@ -102,8 +102,8 @@ void RowCleaner::unwrap(WheelAngle& wheel, double& angle, bool new_segment, std:
   wheel.most = std::max(wheel.most, angle);
   if (new_segment) {
     wheel.turns = 0.0;
-  } else if (std::abs(step) > std::numbers::pi && std::abs(std::abs(step) - turn) < small &&
-             wheel.steps >= few && wheel.largest_step < small && wheel.most - wheel.least <= turn + slack) {
+  } else if (std::abs(step) > std::numbers::pi && std::abs(std::abs(step) - turn) < small && wheel.steps >= few &&
+             wheel.largest_step < small && wheel.most - wheel.least <= turn + slack) {
     wheel.turns -= std::copysign(1.0, step);
     if (report_ != nullptr && report_->angle_wraps.count++ == 0) {
       report_->angle_wraps.first = at(number) + ", column " + names_[wheel.index];

@@ -208,7 +208,8 @@ TEST_F(Results, FitTheirSchemas) {
   EXPECT_EQ(read_json(path("partial/model.json")).at("status"), "partial");
   EXPECT_EQ(misfit("model.schema.json", "partial/model.json"), "");
 
-  put("estimated.yaml", "model: differential_drive\nwheel_radius: 0.0975\ntrack_width: 0.381\nnoise: estimate\n"
+  put("estimated.yaml",
+      "model: differential_drive\nwheel_radius: 0.0975\ntrack_width: 0.381\nnoise: estimate\n"
       "effort: {kind: torque, hold: zero_order}\n");
   EXPECT_EQ(run("commission line.csv --robot estimated.yaml --out estimated").code, 0);
   EXPECT_EQ(misfit("model.schema.json", "estimated/model.json"), "");

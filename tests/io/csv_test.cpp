@@ -269,7 +269,8 @@ TEST_F(Csv, WheelAnglesWrappedAtATurnAreUnwrappedAndCounted) {
     const LogTable table = read(text);
     for (std::size_t k = 1; k < table.rows(); ++k) {
       ASSERT_NEAR(table.column("phi_r")[k] - table.column("phi_r")[k - 1], 0.3, 1e-8) << k;
-      const double left = 40.0 * (std::sin(0.02 * static_cast<double>(k)) - std::sin(0.02 * static_cast<double>(k - 1)));
+      const double left =
+          40.0 * (std::sin(0.02 * static_cast<double>(k)) - std::sin(0.02 * static_cast<double>(k - 1)));
       ASSERT_NEAR(table.column("phi_l")[k] - table.column("phi_l")[k - 1], left, 1e-8) << k;
     }
     EXPECT_GE(report.angle_wraps.count, 30u);

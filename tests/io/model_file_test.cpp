@@ -239,9 +239,8 @@ TEST_F(ModelFileErrors, EveryMissingKeyIsNamed) {
       }
       // What a detector does without is the record of how it came about, and the second residual.
       const std::vector<std::string> record = {
-          "software", "status", "message", "noise",  "parameters", "physical",  "identification", "validation",
-          "data",     "notes",  "delay",   "chosen", "curve",      "kinematic", "warrant",        "assumptions",
-          "contradictions"};
+          "software", "status", "message", "noise", "parameters", "physical", "identification", "validation",    "data",
+          "notes",    "delay",  "chosen",  "curve", "kinematic",  "warrant",  "assumptions",    "contradictions"};
       EXPECT_THAT(record, ::testing::Contains(member.key()));
     }
   }
