@@ -147,8 +147,8 @@ Setting settle(LogSource& log, const Robot& robot, const SettingOptions& options
                             .confidence = options.confidence,
                             .rows = static_cast<double>(s.survey.rows),
                             .largest_step = s.survey.largest_step});
-    s.declared.motion.limit = coordinate_limit(
-        s.model, acceleration_limit(s.robot, s.survey, s.measurement.motion, budget.sensors.motion));
+    s.declared.motion.limit =
+        coordinate_limit(s.model, acceleration_limit(s.robot, s.survey, s.measurement.motion, budget.sensors.motion));
   }
   return s;
 }

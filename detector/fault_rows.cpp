@@ -24,7 +24,7 @@ struct Instant {
   const Eigen::VectorXd& seen_rate;
   const Eigen::VectorXd& joint_seen;  // joint speeds that a reading of `seen` shows, 0 where it stands still
   bool sets_in = false;               // the fault sets in between the steps about this instant ...
-  bool only_changes = false;          // ... and this is the step before: it has what changes, nothing of what was before
+  bool only_changes = false;  // ... and this is the step before: it has what changes, nothing of what was before
 };
 
 // Joint speeds of coordinate speeds; what is rounding beside the others is 0.
@@ -251,11 +251,10 @@ bool FaultFilter::next() {
                         seen_rate = (after.seen - before_.seen) / h;
   // The step that ends at the onset of a jump is still healthy.
   const bool healthy = fresh_ && k_ == onset_;
-  const FaultSignals begin =
-      signature(fault_, *model_,
-                {before_.profile, v0, joints0, motion_->heading[k_], acceleration, before_.moved, moved_rate, before_.seen,
-                 seen_rate, before_.joint_seen, healthy, healthy},
-                held_);
+  const FaultSignals begin = signature(fault_, *model_,
+                                       {before_.profile, v0, joints0, motion_->heading[k_], acceleration, before_.moved,
+                                        moved_rate, before_.seen, seen_rate, before_.joint_seen, healthy, healthy},
+                                       held_);
   const FaultSignals end = signature(fault_, *model_,
                                      {after.profile, v1, joints1, motion_->heading[k_ + 1], acceleration, after.moved,
                                       moved_rate, after.seen, seen_rate, after.joint_seen, healthy},

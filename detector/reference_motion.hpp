@@ -19,17 +19,17 @@ namespace wheelwright {
 /// between them, with the means over these steps). What follows from it is about a robot that drives just so; efforts of the log it was read from play no
 /// part.
 struct ReferenceMotion {
-  std::vector<std::size_t> sample;          ///< K rows of the log
-  std::vector<double> t;                    ///< K times of these rows, s
-  std::vector<double> instant;              ///< K times of the instants, s
-  std::vector<double> step;                 ///< K lengths of the steps that end there, s (speeds: 0 for a segment's first)
-  MotionKind kind = MotionKind::speed;      ///< what the motion was read from
-  double nominal_step = 0.0;                ///< of the measurement, s
-  Eigen::MatrixXd speed;                    ///< coordinates × K, v
-  Eigen::MatrixXd joint_speed;              ///< joints × K
-  Eigen::MatrixXd joint_angle;              ///< joints × K, integral of joint_speed over the segment
-  std::vector<double> heading;              ///< K, rad
-  std::vector<bool> settled;                ///< K: whether a detector decides at this instant
+  std::vector<std::size_t> sample;      ///< K rows of the log
+  std::vector<double> t;                ///< K times of these rows, s
+  std::vector<double> instant;          ///< K times of the instants, s
+  std::vector<double> step;             ///< K lengths of the steps that end there, s (speeds: 0 for a segment's first)
+  MotionKind kind = MotionKind::speed;  ///< what the motion was read from
+  double nominal_step = 0.0;            ///< of the measurement, s
+  Eigen::MatrixXd speed;                ///< coordinates × K, v
+  Eigen::MatrixXd joint_speed;          ///< joints × K
+  Eigen::MatrixXd joint_angle;          ///< joints × K, integral of joint_speed over the segment
+  std::vector<double> heading;          ///< K, rad
+  std::vector<bool> settled;            ///< K: whether a detector decides at this instant
   std::vector<std::size_t> segment_starts;  ///< ascending instants at which a segment begins
   RegressionBlock rows;                     ///< K instants: Y_f of the motion, with the bounds dY, dy of the sensors
 

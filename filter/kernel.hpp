@@ -80,9 +80,7 @@ class FilterKernel {
 
   /// The filtered signal now.
   [[nodiscard]] double value(const KernelState& s) const {
-    return order_ == 1 ? gain_ * s.z1
-           : smooth_   ? gain_ * (slow_ * s.z2 - quick_ * (s.z1 - s.fast))
-                       : gain_ * s.z2;
+    return order_ == 1 ? gain_ * s.z1 : smooth_ ? gain_ * (slow_ * s.z2 - quick_ * (s.z1 - s.fast)) : gain_ * s.z2;
   }
 
  private:

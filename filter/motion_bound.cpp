@@ -117,9 +117,8 @@ StepMotion::StepMotion(const Model& model) {
   speed = speed_error = acceleration = Eigen::VectorXd::Zero(coordinates);
   joint_speed = joint_error = Eigen::VectorXd::Zero(joints);
   effort = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(model.n()));
-  values.resize(static_cast<std::size_t>(
-      std::count_if(model.terms.begin(), model.terms.end(),
-                    [](const Term& term) { return term.kind == Term::Kind::function; })));
+  values.resize(static_cast<std::size_t>(std::count_if(
+      model.terms.begin(), model.terms.end(), [](const Term& term) { return term.kind == Term::Kind::function; })));
 }
 
 StepEnclosure::StepEnclosure(const Model& model, MotionBound bound) : bound_(std::move(bound)) {
@@ -129,9 +128,8 @@ StepEnclosure::StepEnclosure(const Model& model, MotionBound bound) : bound_(std
   next_ = speed_error_ = Eigen::VectorXd::Zero(coordinates);
   joint_error_ = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(model.joints.size()));
   const Eigen::MatrixXd inverse = model.motion.completeOrthogonalDecomposition().pseudoInverse();
-  const bool determined = (inverse * model.motion - Eigen::MatrixXd::Identity(inverse.rows(), inverse.rows()))
-                              .cwiseAbs()
-                              .maxCoeff() < 1e-9;
+  const bool determined =
+      (inverse * model.motion - Eigen::MatrixXd::Identity(inverse.rows(), inverse.rows())).cwiseAbs().maxCoeff() < 1e-9;
   joint_from_ = determined ? Eigen::MatrixXd(kUp * inverse.cwiseAbs())
                            : Eigen::MatrixXd::Constant(inverse.rows(), inverse.cols(), kInfinity);
   if (bound_.mobility.size() > 0) {

@@ -32,16 +32,16 @@ struct MotionBound {
 
 /// One step between two samples, as far as its samples tell.
 struct StepMotion {
-  double length = 0.0;           ///< s
-  Eigen::VectorXd speed;         ///< per coordinate, mean over the step
-  Eigen::VectorXd speed_error;   ///< bound on its error, what the samples are wrong by
-  Eigen::VectorXd joint_speed;   ///< per joint
-  Eigen::VectorXd joint_error;   ///< per joint
-  Eigen::VectorXd effort;        ///< per output: largest |u| in the step, errors included
-  double heading = 0.0;          ///< rad, in its middle
-  double heading_error = 0.0;    ///< rad
-  Eigen::VectorXd acceleration;  ///< per coordinate: |q̈| is at most this in the step; what enclose() finds
-  std::vector<TermValue> values; ///< of the model's function terms, in their order, for every instant of the step
+  double length = 0.0;            ///< s
+  Eigen::VectorXd speed;          ///< per coordinate, mean over the step
+  Eigen::VectorXd speed_error;    ///< bound on its error, what the samples are wrong by
+  Eigen::VectorXd joint_speed;    ///< per joint
+  Eigen::VectorXd joint_error;    ///< per joint
+  Eigen::VectorXd effort;         ///< per output: largest |u| in the step, errors included
+  double heading = 0.0;           ///< rad, in its middle
+  double heading_error = 0.0;     ///< rad
+  Eigen::VectorXd acceleration;   ///< per coordinate: |q̈| is at most this in the step; what enclose() finds
+  std::vector<TermValue> values;  ///< of the model's function terms, in their order, for every instant of the step
 
   StepMotion() = default;
   /// Room for the signals of `model`.
@@ -71,8 +71,8 @@ class StepEnclosure {
   void force(const Model& model, const StepMotion& step) const;
 
   MotionBound bound_;
-  Eigen::MatrixXd rate_;         // coordinates × coordinates: mobility times the largest viscous friction
-  Eigen::MatrixXd joint_from_;   // joints × coordinates: |joint acceleration| from |coordinate acceleration|
+  Eigen::MatrixXd rate_;        // coordinates × coordinates: mobility times the largest viscous friction
+  Eigen::MatrixXd joint_from_;  // joints × coordinates: |joint acceleration| from |coordinate acceleration|
   mutable Eigen::VectorXd force_, next_, speed_error_, joint_error_;
 };
 

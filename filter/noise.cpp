@@ -39,8 +39,10 @@ Energies impulse_energies(const FilterDesign& d, MotionKind motion, Hold hold, d
     if (hold == Hold::zero_order) {
       kernel.take(effort, angles ? 0.5 * h * (sample[1] + sample[2]) : h * sample[1]);
     } else {
-      const double linear = 0.5 * h * (angles ? (sample[0] + 4.0 * sample[1] + sample[2]) / 3.0 : sample[0] + sample[1]);
-      const double curved = changes == EffortChanges::between ? h * (sample[0] - 2.0 * sample[1] + sample[2]) / 12.0 : 0.0;
+      const double linear =
+          0.5 * h * (angles ? (sample[0] + 4.0 * sample[1] + sample[2]) / 3.0 : sample[0] + sample[1]);
+      const double curved =
+          changes == EffortChanges::between ? h * (sample[0] - 2.0 * sample[1] + sample[2]) / 12.0 : 0.0;
       kernel.take(effort, linear - curved);
     }
     const double a = kernel.value(slope), v = kernel.value(speed), u = kernel.value(effort);

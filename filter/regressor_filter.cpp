@@ -296,10 +296,10 @@ bool RegressorFilter::describe(std::size_t age) {
   if (measurement_.heading_column.empty()) {
     const bool first = instants_ == (angles_ ? 0U : 1U);
     const auto c = static_cast<Eigen::Index>(std::max(model_.heading_coordinate, 0));
-    step_.heading = first || model_.heading_coordinate < 0
-                        ? 0.0
-                        : step_before_.heading +
-                              0.5 * (length_before_ * step_before_.speed[c] + length_ * step_.speed[c]);
+    step_.heading =
+        first || model_.heading_coordinate < 0
+            ? 0.0
+            : step_before_.heading + 0.5 * (length_before_ * step_before_.speed[c] + length_ * step_.speed[c]);
   } else {
     step_.heading = 0.5 * (before.heading + now.heading);
   }
@@ -391,8 +391,8 @@ void RegressorFilter::follow_speeds() {
   if (linear && !ranged_) {
     if (instants_ > 2) {
       const bool even = std::abs(h - length_before_) <= kAlike * h;
-      curve_effort(length_before_, h, sample(2).effort, sample(1).effort, sample(0).effort,
-                   even ? cube(h) / 12.0 : 0.0, cube(h) / 12.0);
+      curve_effort(length_before_, h, sample(2).effort, sample(1).effort, sample(0).effort, even ? cube(h) / 12.0 : 0.0,
+                   cube(h) / 12.0);
     } else {
       curve_doubt_ = h * effort_change_;
     }
@@ -499,7 +499,8 @@ bool RegressorFilter::settled() const {
     return true;
   }
   // 2n̄/h of the first step, times the weight of its end, against sup |f₂ * n̈|.
-  return after_loss_ && since * design_.beta >= 1.0 && kernel_.value(start_) / (kernel_.gain() * first_length_) <= 1.0 + std::exp(-2.0);
+  return after_loss_ && since * design_.beta >= 1.0 &&
+         kernel_.value(start_) / (kernel_.gain() * first_length_) <= 1.0 + std::exp(-2.0);
 }
 
 void RegressorFilter::write_row() {
@@ -508,7 +509,8 @@ void RegressorFilter::write_row() {
   const bool bounded = errors_.between_samples;
   // The kernel rises from 0 to the weight of the first node: the slope of that has errors of its own.
   const double start = angles_ ? kernel_.value(start_) : 0.0;
-  const double first = start > 0.0 && errors_.joint_sample > 0.0 ? start * measurement_.nominal_step / first_length_ : 0.0;
+  const double first =
+      start > 0.0 && errors_.joint_sample > 0.0 ? start * measurement_.nominal_step / first_length_ : 0.0;
   for (const Term& term : model_.terms) {
     if (term.kind == Term::Kind::function) {
       continue;

@@ -146,7 +146,7 @@ class RegressorFilter {
 
   std::vector<Sample> ring_;
   std::size_t newest_ = 0;
-  std::size_t samples_ = 0;    // of this segment
+  std::size_t samples_ = 0;  // of this segment
   std::size_t instants_ = 0;
   bool after_loss_ = false;  // the segment begins after lost rows
   bool at_rest_ = false;     // the segment begins at standstill
@@ -160,13 +160,13 @@ class RegressorFilter {
   StepMotion step_, step_before_;
   StepEffort effort_, effort_before_;
   Eigen::VectorXd curve_, curve_doubt_;  // of the efforts about the node
-  std::vector<KernelState> motion_;          // driven by the coordinates' speeds
-  std::vector<KernelState> slope_;           // driven by their derivatives
+  std::vector<KernelState> motion_;      // driven by the coordinates' speeds
+  std::vector<KernelState> slope_;       // driven by their derivatives
   std::vector<KernelState> torque_, torque_doubt_;
-  std::vector<KernelState> motion_doubt_;          // speeds: error of the trapezoidal rule
-  std::vector<SlopeMajorant> slope_doubt_;     // angles: the same, by the slope of the kernel
-  std::vector<double> first_doubt_;            // of a segment's first step, where the kernel rises from 0
-  KernelState area_, start_;                   // of a constant 1, and of the first node alone
+  std::vector<KernelState> motion_doubt_;   // speeds: error of the trapezoidal rule
+  std::vector<SlopeMajorant> slope_doubt_;  // angles: the same, by the slope of the kernel
+  std::vector<double> first_doubt_;         // of a segment's first step, where the kernel rises from 0
+  KernelState area_, start_;                // of a constant 1, and of the first node alone
   double first_length_ = 0.0;
   std::vector<FunctionTerm> functions_;
   Eigen::VectorXd low_, high_, scratch_, effort_change_;

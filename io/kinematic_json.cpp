@@ -7,8 +7,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/io/json_number.hpp>
 #include <wheelwright/io/estimators_json.hpp>
+#include <wheelwright/io/json_number.hpp>
 #include <wheelwright/io/json_vector.hpp>
 #include <wheelwright/io/model_words.hpp>
 #include <wheelwright/io/warrant_json.hpp>
@@ -20,7 +20,6 @@ using Status = KinematicCommissioning::Status;
 
 constexpr Words<Status, 4> kKinematicStatusWords{
     {{Status::done, "done"}, {Status::partial, "partial"}, {Status::absent, "absent"}, {Status::nothing, "nothing"}}};
-
 
 Json box_json(const Box& box) {
   Json sides = Json::array();

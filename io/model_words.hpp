@@ -8,12 +8,11 @@
 
 namespace wheelwright {
 
-inline constexpr Words<Commissioning::Status, 5> kStatusWords{
-    {{Commissioning::Status::done, "done"},
-     {Commissioning::Status::partial, "partial"},
-     {Commissioning::Status::empty, "empty"},
-     {Commissioning::Status::nothing, "nothing"},
-     {Commissioning::Status::contradicted, "contradicted"}}};
+inline constexpr Words<Commissioning::Status, 5> kStatusWords{{{Commissioning::Status::done, "done"},
+                                                               {Commissioning::Status::partial, "partial"},
+                                                               {Commissioning::Status::empty, "empty"},
+                                                               {Commissioning::Status::nothing, "nothing"},
+                                                               {Commissioning::Status::contradicted, "contradicted"}}};
 inline constexpr Words<Excitation, 3> kExcitationWords{{{Excitation::identified, "identified"},
                                                         {Excitation::indistinct, "indistinct"},
                                                         {Excitation::not_excited, "not_excited"}}};

@@ -162,8 +162,7 @@ void bind_commission(py::module_& m) {
           "done, partial (bounds of some parameters are the prior's), empty (no theta explains the log), nothing, or "
           "contradicted (the log contradicts what a model takes for granted: contradictions)")
       .def_property_readonly(
-          "contradictions",
-          [](const CommissionObject& c) { return to_python(c.json().at("contradictions")); },
+          "contradictions", [](const CommissionObject& c) { return to_python(c.json().at("contradictions")); },
           "list of dicts: id, withdraws, subject, value, limit, sentence, next")
       .def_property_readonly("message", [](const CommissionObject& c) { return c.result->message; })
       .def_property_readonly("notes", [](const CommissionObject& c) { return c.result->notes; })

@@ -48,7 +48,7 @@ struct Plant {
   void slide(double h, double a, double b, double s) {
     if (h <= 0.0) return;
     const double l = f / m, k = (b - a) / h, e = -std::expm1(-l * h) / l;  // e = ∫ e^{−ls}
-    const double p = (a - s * c) / f - k / (f * l), q = k / f;               // v = p + q t + (v0 − p)e^{−lt}
+    const double p = (a - s * c) / f - k / (f * l), q = k / f;             // v = p + q t + (v0 − p)e^{−lt}
     x += p * h + 0.5 * q * h * h + (v - p) * e;
     v = p + q * h + (v - p) * std::exp(-l * h);
   }
@@ -67,7 +67,7 @@ struct Case {
   double dry = 0.0;            // share of the effort
   int order = 2;
   double beta = 20.0;
-  double noise = 1.0;          // share of its bound
+  double noise = 1.0;  // share of its bound
 };
 
 std::string words(const Case& c) {
@@ -79,7 +79,7 @@ std::string words(const Case& c) {
 
 struct Outcome {
   long rows = 0, beyond = 0;
-  double worst = 0.0;        // largest error over bound
+  double worst = 0.0;  // largest error over bound
 };
 
 Outcome watch(const Case& c, unsigned seed) {
@@ -216,15 +216,23 @@ std::vector<Case> cases() {
             continue;
           }
           all.push_back({.motion = motion, .commands = commands, .clock = clock, .time_constant = constant});
-          all.push_back({.motion = motion, .commands = commands, .clock = clock, .time_constant = constant,
-                         .period = 0.15});
+          all.push_back(
+              {.motion = motion, .commands = commands, .clock = clock, .time_constant = constant, .period = 0.15});
           if (commands != Commands::linear) {
-            all.push_back({.motion = motion, .commands = commands, .clock = clock, .time_constant = constant,
-                           .period = 0.4, .dry = 0.3});
+            all.push_back({.motion = motion,
+                           .commands = commands,
+                           .clock = clock,
+                           .time_constant = constant,
+                           .period = 0.4,
+                           .dry = 0.3});
           }
           if (motion == MotionKind::speed) {
-            all.push_back({.motion = motion, .commands = commands, .clock = clock, .time_constant = constant,
-                           .period = 0.4, .order = 1});
+            all.push_back({.motion = motion,
+                           .commands = commands,
+                           .clock = clock,
+                           .time_constant = constant,
+                           .period = 0.4,
+                           .order = 1});
           }
         }
       }
