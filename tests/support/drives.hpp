@@ -34,6 +34,7 @@ inline Scenario exact_drive(Shown shown, Hold hold) {
   s.robot.wheel_radius = 0.0975;
   s.robot.track_width = 0.381;
   s.robot.hold = hold;
+  s.robot.effort_changes = EffortChanges::at_samples;
   s.robot.parameters = kFour;
   s.robot.filter.beta = 8.0;
   s.parameters = {.mass = 21.0, .yaw_inertia = 0.9, .viscous_x = 4.0, .viscous_y = 4.0, .viscous_yaw = 0.5};
