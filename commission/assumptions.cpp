@@ -42,6 +42,12 @@ RowsVerdict rows_verdict(const Commissioning& r) {
                         "fails",
                         outside, instants)};
   }
+  const auto doubt = std::ranges::find_if(r.contradictions, [](const LogContradiction& c) {
+    return c.demotes && c.kind != LogContradiction::Kind::effort_timing;
+  });
+  if (doubt != r.contradictions.end()) {
+    return {AssumptionVerdict::fails, doubt->sentence};
+  }
   if (instants == 0 || std::ranges::any_of(r.noise, learnt)) {
     return {AssumptionVerdict::not_tested, instants == 0
                                                ? "no row was held out"

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <utility>
 
 #include <fmt/format.h>
@@ -12,6 +13,7 @@
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/commission/physical.hpp>
 #include <wheelwright/core/error.hpp>
+#include <wheelwright/core/limits.hpp>
 #include <wheelwright/identify/noise_level.hpp>
 #include <wheelwright/identify/time_shift.hpp>
 #include <wheelwright/identify/variable_projection.hpp>
@@ -78,6 +80,49 @@ void find_constant_efforts(LogSource& log, const Setting& s, std::vector<LogCont
                      .next = "check that the sensor is connected and that the right column is read (--map)"});
     }
   }
+}
+
+void find_wrapped_angles(LogSource& log, const Setting& s, std::vector<LogContradiction>& out) {
+  constexpr double kHalfTurn = std::numbers::pi;
+  constexpr double kMoves = 0.25;  // of a half turn: at most this much otherwise between two rows
+  if (s.measurement.motion != MotionKind::angle) {
+    return;
+  }
+  const std::vector<ColumnRange> ranges = ranges_of(log, s.measurement.motion_columns);
+  for (std::size_t j = 0; j < ranges.size(); ++j) {
+    const std::string& name = s.measurement.motion_columns[j];
+    if (ranges[j].most - ranges[j].least > 2.0 * kHalfTurn * (1.0 + 1e-6)) {
+      continue;
+    }
+    const std::size_t column = *log.find(name);
+    double last = std::numeric_limits<double>::quiet_NaN(), least_jump = kInfinity, most_move = 0.0;
+    std::size_t jumps = 0;
+    LogBlock block;
+    log.rewind();
+    while (log.next(block)) {
+      for (const double value : block.columns[column]) {
+        const double moved = std::abs(value - last);
+        if (moved > kHalfTurn) {
+          ++jumps;
+          least_jump = std::min(least_jump, moved);
+        } else if (moved <= kHalfTurn) {
+          most_move = std::max(most_move, moved);
+        }
+        last = value;
+      }
+    }
+    if (jumps > 0 && most_move < kMoves * kHalfTurn) {
+      out.push_back({.kind = Kind::angle_wrapped,
+                     .subject = name,
+                     .value = least_jump,
+                     .limit = kHalfTurn,
+                     .sentence = fmt::format("{} stays within one turn and jumps by {:.3g} rad and more between two "
+                                             "rows, {} times: it is wrapped",
+                                             name, least_jump, jumps),
+                     .next = "unwrap the angle (numpy.unwrap) before commissioning; files are unwrapped on reading"});
+    }
+  }
+  log.rewind();
 }
 
 // The effort of each joint by itself, on all that the motion offers: what the rows say of it.
@@ -380,31 +425,11 @@ std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& s, cons
   }
   Setting as_logged = s;  // a declared delay is compared with what is found, not taken away before
   as_logged.measurement.delay = {0.0, 0.0};
-  RegressionBlock rows;
-  {
-    RegressionStream stream = make_rows(log, as_logged);
-    RegressionBlock block;
-    std::vector<RegressionBlock> parts;
-    std::size_t instants = 0;
-    stream.rewind();
-    while (instants < most_rows && stream.next(block)) {
-      instants += block.instants();
-      parts.push_back(block);
-    }
-    log.rewind();
-    rows.resize(instants, s.model.n(), s.model.p());
-    std::size_t first = 0;
-    for (const RegressionBlock& part : parts) {
-      const auto at = static_cast<Eigen::Index>(first * s.model.n());
-      std::ranges::copy(part.sample, rows.sample.begin() + static_cast<std::ptrdiff_t>(first));
-      std::ranges::copy(part.t, rows.t.begin() + static_cast<std::ptrdiff_t>(first));
-      rows.Y.middleRows(at, part.rows()) = part.Y;
-      rows.y.segment(at, part.rows()) = part.y;
-      first += part.instants();
-    }
-    rows.dY.setZero();
-    rows.dy.setZero();
-  }
+  RegressionStream stream = make_rows(log, as_logged);
+  RegressionBlock rows = first_rows(stream, most_rows);
+  log.rewind();
+  rows.dY.setZero();
+  rows.dy.setZero();
   if (rows.instants() < kFewestHalf) {
     return std::nullopt;
   }
@@ -422,8 +447,11 @@ std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& s, cons
     EffortTiming timing{.delay = found.shape[0], .standard_error = found.standard_error[0], .freedom = found.freedom};
     timing.allowed = s.measurement.delay;
     const bool held = s.measurement.hold == Hold::zero_order;
-    if (held && s.measurement.changes == EffortChanges::between && s.declared.between_samples) {
+    const bool ranged = timing.allowed.lower != 0.0 || timing.allowed.upper != 0.0;
+    // As the rows' own hull: a value may come into force up to a step before its stamp; a measured one lies between two.
+    if (s.declared.between_samples && (ranged || (held && s.measurement.changes == EffortChanges::between))) {
       timing.allowed.upper += s.survey.median_step;
+      timing.allowed.lower -= held ? 0.0 : s.survey.median_step;
     }
     const double nearest = std::clamp(timing.delay, timing.allowed.lower, timing.allowed.upper);
     const double without = rss(nearest);
@@ -452,6 +480,7 @@ bool is_latency(const EffortTiming& timing, double step) {
 SignalFindings contradictions_in_log(LogSource& log, const Setting& s, const Fit& fit) {
   SignalFindings findings;
   std::vector<LogContradiction>& found = findings.contradictions;
+  find_wrapped_angles(log, s, found);
   find_constant_efforts(log, s, found);
   const std::vector<JointFit> joints = fit_joints(log, s);
   find_unrelated_efforts(s, joints, found);
@@ -526,6 +555,86 @@ std::vector<LogContradiction> contradictions_in_result(const Commissioning& resu
                  "longer, or declare the sensors' noise"});
   }
   return found;
+}
+
+namespace {
+
+// How far least squares, of which the explanations are, goes beyond what a finding is about; and for which parameter.
+struct Reach {
+  std::size_t parameter = 0;
+  double size = 0.0;
+};
+
+std::optional<Reach> reach_of(const LogContradiction& c, const Commissioning& result, const Fit& fit) {
+  for (std::size_t j = 0; j < result.parameters.size(); ++j) {
+    const ParameterResult& p = result.parameters[j];
+    if (p.parameter.physical == c.subject && p.standard_error) {
+      const double estimate = fit.squares.estimate[static_cast<Eigen::Index>(j)];
+      return Reach{j, c.kind == Kind::wrong_sign ? -estimate : std::max(p.lower - estimate, estimate - p.upper)};
+    }
+  }
+  return std::nullopt;
+}
+
+bool is_weighed(const LogContradiction& c) {
+  return c.kind == Kind::effort_timing || (c.withdraws && (c.kind == Kind::wrong_sign || c.kind == Kind::estimate_outside));
+}
+
+}  // namespace
+
+bool wants_weighing(const Commissioning& result, const Setting& s) {
+  return s.noise_complete && std::ranges::any_of(result.contradictions, is_weighed);
+}
+
+void weigh_contradictions(Commissioning& result, const Setting& s, const Fit& fit,
+                          const std::optional<EffortTiming>& timing, const Explained& explained) {
+  const auto weigh = [](LogContradiction& c, double size, double chance, double doubt, double noise) {
+    c.withdraws = size > chance + doubt + noise;
+    c.demotes = !c.withdraws && size > chance + doubt;
+  };
+  const auto p = static_cast<Eigen::Index>(s.model.p());
+  for (LogContradiction& c : result.contradictions) {
+    if (!is_weighed(c)) {
+      continue;
+    }
+    if (c.kind == Kind::effort_timing) {
+      if (timing) {
+        const double chance = std::max(certain(timing->freedom) * timing->standard_error, kLeastShift * s.survey.median_step);
+        weigh(c, timing->beyond(), chance, explained.in_doubt[p], explained.noise[p]);
+      }
+    } else if (const auto reach = reach_of(c, result, fit)) {
+      const auto at = static_cast<Eigen::Index>(reach->parameter);
+      weigh(c, reach->size, certain(result.residuals.freedom) * *result.parameters[reach->parameter].standard_error,
+            explained.in_doubt[at], explained.noise[at]);
+    }
+  }
+  std::erase_if(result.contradictions, [](const LogContradiction& c) {
+    return c.kind == Kind::effort_timing && !c.withdraws && !c.demotes;
+  });
+}
+
+void weigh_unrelated_efforts(LogSource& log, const Setting& s, const SignalErrors& errors, const Box& box,
+                             std::vector<LogContradiction>& contradictions) {
+  const auto unrelated = [](const LogContradiction& c) { return c.kind == Kind::effort_unrelated; };
+  if (!s.noise_complete || std::ranges::none_of(contradictions, unrelated)) {
+    return;
+  }
+  Eigen::VectorXd largest(static_cast<Eigen::Index>(box.sides.size()));
+  for (std::size_t j = 0; j < box.sides.size(); ++j) {
+    largest[static_cast<Eigen::Index>(j)] = magnitude(box.sides[j]);
+  }
+  double effort = 0.0, error = 0.0;
+  RegressionStream rows = make_rows(log, s, errors);
+  RegressionBlock block;
+  rows.rewind();
+  while (rows.next(block)) {
+    effort += block.y.squaredNorm();
+    error += (block.dY * largest + block.dy).squaredNorm();
+  }
+  log.rewind();
+  if (error >= effort) {
+    std::erase_if(contradictions, unrelated);
+  }
 }
 
 }  // namespace wheelwright

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <wheelwright/commission/contradictions.hpp>
+#include <wheelwright/commission/evidence.hpp>
 #include <wheelwright/commission/fit.hpp>
 #include <wheelwright/commission/setting.hpp>
 #include <wheelwright/core/interval.hpp>
@@ -50,7 +51,7 @@ struct SignalFindings {
   std::optional<EffortTiming> timing;  ///< nothing where no shift is told, or was not looked for
 };
 
-/// Constant and unrelated efforts; where there are none, timing, wrong signs, wheels and halves that disagree. Walks `log`
+/// Wrapped angles, constant and unrelated efforts; where there are none, timing, wrong signs, wheels and halves that disagree. Walks `log`
 /// a few times.
 [[nodiscard]] SignalFindings contradictions_in_log(LogSource& log, const Setting& setting, const Fit& fit);
 
@@ -58,5 +59,19 @@ struct SignalFindings {
 /// thresholds, a noise bound that had to be raised by `raised` for the prior box to explain the log.
 [[nodiscard]] std::vector<LogContradiction> contradictions_in_result(const Commissioning& result,
                                                                      const Setting& setting, double raised);
+
+/// Weighs what statistics found in a log of declared noise against `explained`: Kind::effort_timing (`timing`),
+/// Kind::wrong_sign and Kind::estimate_outside keep LogContradiction::withdraws only beyond all of it, are
+/// LogContradiction::demotes beyond what is in doubt, and a shift below that is dropped.
+void weigh_contradictions(Commissioning& result, const Setting& setting, const Fit& fit,
+                          const std::optional<EffortTiming>& timing, const Explained& explained);
+
+/// Whether weigh_contradictions() would change anything.
+[[nodiscard]] bool wants_weighing(const Commissioning& result, const Setting& setting);
+
+/// Drops Kind::effort_unrelated where the declared errors of the rows (`errors`, with parameters in `box`) are together as
+/// large as the efforts themselves.
+void weigh_unrelated_efforts(LogSource& log, const Setting& setting, const SignalErrors& errors, const Box& box,
+                             std::vector<LogContradiction>& contradictions);
 
 }  // namespace wheelwright

@@ -6,6 +6,7 @@ namespace wheelwright {
 std::string_view to_string(LogContradiction::Kind kind) {
   switch (kind) {
     case LogContradiction::Kind::effort_constant: return "effort_constant";
+    case LogContradiction::Kind::angle_wrapped: return "angle_wrapped";
     case LogContradiction::Kind::effort_unrelated: return "effort_unrelated";
     case LogContradiction::Kind::effort_timing: return "effort_timing";
     case LogContradiction::Kind::wheels_disagree: return "wheels_disagree";

@@ -13,6 +13,7 @@ struct LogContradiction {
   /// What contradicts what.
   enum class Kind {
     effort_constant,   ///< an effort has one value in every row although its joint moves
+    angle_wrapped,     ///< an angle jumps by a whole turn between two rows
     effort_unrelated,  ///< an effort that motion does not explain at all
     effort_timing,     ///< efforts late or early against the motion, beyond what is declared
     wheels_disagree,   ///< the efforts of two joints do not show one and the same mass
@@ -24,6 +25,7 @@ struct LogContradiction {
   };
   Kind kind = Kind::effort_constant;
   bool withdraws = true;   ///< no model is published; false: a note beside a model
+  bool demotes = false;    ///< chance does not explain it, noise of the worst shape would: nothing is called guaranteed
   std::string subject{};   ///< the parameter, column or output that it is about
   double value = 0.0;      ///< what was found: s, share, factor, or the parameter's unit
   double limit = 0.0;      ///< what it was compared with, same unit

@@ -23,18 +23,19 @@ FaultMargin::Sums FaultMargin::at(const FaultRow& row, double kappa, double side
   acting_.resize(p);
   seen_.resize(p);
   error_.resize(p);
-  double predicted = 0.0, reach = 2.0 * row.dy + std::abs(kappa * row.c);
+  double predicted = 0.0, doubt = row.doubt, reach = 2.0 * row.dy + std::abs(kappa * row.c);
   for (std::size_t j = 0; j < p; ++j) {
     acting_[j] = row.y[j] + side * kappa * row.g1[j] + kappa * kappa * row.g2[j];
     seen_[j] = row.y[j] + side * kappa * row.s[j];
     error_[j] = errors * row.dY[j];
+    doubt += row.range.empty() ? 0.0 : row.range[j] * largest_size(rule_.set().hull().sides[j]);
     const double term = seen_[j] * rule_.estimate()[static_cast<Eigen::Index>(j)];
     predicted += term;
     reach += std::abs(term) +
              (std::abs(acting_[j]) + std::abs(seen_[j]) + error_[j]) * largest_size(rule_.set().hull().sides[j]);
   }
   // Ten sums of p + 4 terms, here and in the detector: Higham 2002, section 3.1.
-  return {predicted, 10.0 * static_cast<double>(p + 4) * std::numeric_limits<double>::epsilon() * reach};
+  return {predicted, doubt, 10.0 * static_cast<double>(p + 4) * std::numeric_limits<double>::epsilon() * reach};
 }
 
 double FaultMargin::certain_excess(const FaultRow& row, double kappa, double side, std::size_t channel,
@@ -42,7 +43,7 @@ double FaultMargin::certain_excess(const FaultRow& row, double kappa, double sid
   const Sums sums = at(row, kappa, side, 2.0);
   const Interval acting = rule_.prediction(acting_, 2 * channel);
   const Threshold allowed = rule_.at(seen_, error_, row.dy, 2 * channel + 1);
-  const double added = side * kappa * row.c, doubt = 2.0 * kappa * row.doubt + sums.rounding;
+  const double added = side * kappa * row.c, doubt = 2.0 * kappa * sums.doubt + sums.rounding;
   return direction == Direction::up ? acting.lower + added - row.dy - (allowed.upper + sums.predicted) - doubt
                                     : allowed.lower + sums.predicted - (acting.upper + added + row.dy) - doubt;
 }
@@ -52,7 +53,7 @@ double FaultMargin::possible_excess(const FaultRow& row, double kappa, double si
   const Sums sums = at(row, kappa, side, 1.0 - share);
   const Interval acting = rule_.prediction(acting_, 2 * channel);
   const Threshold allowed = rule_.at(seen_, error_, row.dy, 2 * channel + 1);
-  const double added = side * kappa * row.c, doubt = 2.0 * kappa * row.doubt + sums.rounding;
+  const double added = side * kappa * row.c, doubt = 2.0 * kappa * sums.doubt + sums.rounding;
   return direction == Direction::up ? acting.upper + added + share * row.dy - (allowed.upper + sums.predicted) + doubt
                                     : allowed.lower + sums.predicted - (acting.lower + added - share * row.dy) + doubt;
 }
@@ -115,7 +116,7 @@ double FaultMargin::largest_hidden(const FaultRow& row, double largest, double s
   double curvature = 0.0;          // |g2 θ|, at most
   for (std::size_t j = 0; j < row.y.size(); ++j) {
     const double size = largest_size(rule_.set().hull().sides[j]);
-    slope += std::abs(row.s[j]) * size;
+    slope += (std::abs(row.s[j]) + (row.range.empty() ? 0.0 : 2.0 * row.range[j])) * size;
     curvature += std::abs(row.g2[j]) * size;
   }
   double hidden = largest;

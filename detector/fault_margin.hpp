@@ -59,7 +59,7 @@ class FaultMargin {
   enum class Direction { up, down };  // over u, under l
 
   struct Sums {
-    double predicted, rounding;  // seen θ̂; of everything compared
+    double predicted, doubt, rounding;  // seen θ̂; per unit of κ, of the row and for all θ; of everything compared
   };
   [[nodiscard]] Sums at(const FaultRow& row, double kappa, double side, double errors);
   [[nodiscard]] double certain_excess(const FaultRow& row, double kappa, double side, std::size_t channel,

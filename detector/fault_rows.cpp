@@ -142,6 +142,29 @@ FaultFilter::FaultFilter(FaultType fault, const Model& model, const FilterDesign
   validate(design_);
   kernel_ = FilterKernel(design_, motion.kind, motion.nominal_step);
   cascades_.resize(model.n() * (3 * model.p() + 1));
+  const auto n = static_cast<Eigen::Index>(model.n());
+  to_joints_ = model.input.completeOrthogonalDecomposition().pseudoInverse();
+  gain_only_ = fault_.effort.size() > 0 && fault_.motion.size() == 0 && fault_.ground.size() == 0 &&
+               fault_.slip.size() == 0 && fault_.seen.size() == 0 && fault_.theta.size() == 0 &&
+               fault_.offset.size() == 0 && fault_.lateral == 0.0;
+  gain_ = Eigen::VectorXd::Ones(n);
+  if (gain_only_) {
+    const Eigen::MatrixXd joints = (to_joints_ * fault_.effort * model.input).cwiseAbs();
+    const Eigen::MatrixXd input = model.input.cwiseAbs();
+    const Eigen::MatrixXd widened = input * joints;
+    for (Eigen::Index i = 0; i < n; ++i) {
+      gain_[i] = 0.0;
+      for (Eigen::Index m = 0; m < input.cols(); ++m) {
+        // A joint that does not reach this output by itself has no range here: the largest of the others stands for it.
+        const double own = input(i, m) > 0.0 ? input(i, m) : input.row(i).maxCoeff();
+        gain_[i] = std::max(gain_[i], widened(i, m) / own);
+      }
+    }
+  }
+  last_ = FaultSignals::none(model);
+  widened_.resize(model.n() * (model.p() + 1));
+  range_ = last_.g1;
+  widened_c_ = last_.c;
 }
 
 FaultFilter::Point FaultFilter::point(std::size_t k) const {
@@ -175,7 +198,11 @@ void FaultFilter::begin(std::size_t onset) {
   end_ = next == motion_->segment_starts.end() ? motion_->instants() : *next;
   onset_ = k_ = onset;
   std::fill(cascades_.begin(), cascades_.end(), KernelState{});
-  filtered_ = FaultSignals::none(*model_);
+  filtered_ = last_ = FaultSignals::none(*model_);
+  std::fill(widened_.begin(), widened_.end(), KernelState{});
+  range_.setZero();
+  widened_c_.setZero();
+  row_range_ = range_;
   before_ = point(onset);
   const auto n = static_cast<Eigen::Index>(model_->n());
   if (fault_.held_effort) {
@@ -222,6 +249,43 @@ void FaultFilter::filter(const FaultSignals& begin, const FaultSignals& end, con
   advance(begin.c, end.c, filtered_.c);
 }
 
+// Half of what the efforts that the fault adds change by, in every step in which a sample counts, as if from the first.
+void FaultFilter::widen(const FaultSignals& begin, const FaultSignals& end, bool sets_in, double h) {
+  if (motion_->effort_reach == 0) {
+    return;
+  }
+  const Eigen::MatrixXd input = model_->input.cwiseAbs();
+  const double steps = static_cast<double>(motion_->effort_reach);
+  const auto change = [&](const auto& signals) {
+    const auto from = signals(last_), first = signals(begin), last = signals(end);
+    // What a gain does beyond its onset is in gain_.
+    using Joints = Eigen::MatrixXd;
+    const Joints jump = (to_joints_ * (first - from)).cwiseAbs(), on = (to_joints_ * (last - first)).cwiseAbs();
+    return Joints(0.5 * steps * h * (input * (gain_only_ ? (sets_in ? Joints(jump + on) : Joints(0.0 * on)) : jump + on)));
+  };
+  const Eigen::MatrixXd g = change([](const FaultSignals& s) { return s.g1; }) +
+                            change([](const FaultSignals& s) { return s.g2; });
+  const Eigen::MatrixXd c = change([](const FaultSignals& s) { return s.c; });
+  std::size_t at = 0;
+  const auto advance = [&](double by) {
+    KernelState& state = widened_[at++];
+    state.z1 += by;
+    state.z2 += steps * h * by;
+    state.fast += by;
+    kernel_.take(state, 0.0);
+    return kernel_.value(state);
+  };
+  for (Eigen::Index i = 0; i < g.rows(); ++i) {
+    for (Eigen::Index j = 0; j < g.cols(); ++j) {
+      range_(i, j) = advance(g(i, j));
+    }
+  }
+  for (Eigen::Index i = 0; i < c.rows(); ++i) {
+    widened_c_[i] = advance(c(i, 0));
+  }
+  last_ = end;
+}
+
 FaultSignals FaultFilter::state(double KernelState::*part) const {
   FaultSignals out = FaultSignals::none(*model_);
   std::size_t at = 0;
@@ -260,8 +324,14 @@ bool FaultFilter::next() {
                                       moved_rate, after.seen, seen_rate, after.joint_seen, healthy},
                                      held_);
   filter(begin, end, shares, motion_->step[k_ + 1]);
+  widen(begin, end, k_ == onset_ || healthy, std::max(h, motion_->step[k_ + 1]));
   before_ = after;
   ++k_;
+  const auto n = static_cast<Eigen::Index>(model_->n());
+  row_range_ = range_;
+  if (motion_->between_dY.rows() > 0) {
+    row_range_ += gain_.asDiagonal() * motion_->between_dY.middleRows(static_cast<Eigen::Index>(k_) * n, n);
+  }
   return true;
 }
 
@@ -274,7 +344,9 @@ FaultRow FaultFilter::row(std::size_t i) const {
           {filtered_.s.row(r).data(), p},
           {motion_->rows.dY.row(at).data(), p},
           filtered_.c[r],
-          motion_->rows.dy[at]};
+          motion_->rows.dy[at],
+          widened_c_[r] + (gain_only_ && motion_->between_dy.size() > 0 ? gain_[r] * motion_->between_dy[at] : 0.0),
+          {row_range_.row(r).data(), p}};
 }
 
 SettledRows settled_rows(const FaultType& fault, const Model& model, const FilterDesign& design,

@@ -18,8 +18,9 @@ namespace wheelwright {
 ///
 ///     τ_f = (y + κ g1 + κ² g2) θ + κ c + e,     regressor as seen: y + κ s + δ,
 ///
-/// |e| <= n̄ = dy, |δ| <= Δ = dY entry by entry. All spans have p entries. Where this is not all, `doubt` bounds, per
-/// unit of |κ|, by how much τ_f, and the threshold, may be elsewhere for every θ in the set.
+/// |e| <= n̄ = dy, |δ| <= Δ = dY entry by entry. All spans have p entries. Where this is not all, `doubt` + Σ `range`_j|θ_j|
+/// bounds, per unit of |κ|, by how much τ_f, and the threshold, may be elsewhere for every θ in the set: `range` is empty or
+/// has p entries.
 struct FaultRow {
   std::span<const double> y;  ///< of the healthy motion, exact
   std::span<const double> g1;
@@ -29,6 +30,7 @@ struct FaultRow {
   double c = 0.0;
   double dy = 0.0;  ///< n̄
   double doubt = 0.0;
+  std::span<const double> range{};
 };
 
 /// What a fault adds to the unfiltered equation at one instant, matrices n × p.
@@ -61,6 +63,11 @@ class FaultRows {
 /// of noise. At
 /// the onset of a step the robot's own speed goes on (its mass sees to that) and what the encoders show jumps; the
 /// reading of an effort changes with no more than its gain.
+///
+/// What the efforts that a fault adds widen in the rows of a faulty log (the hull of efforts that change between samples,
+/// accelerations between samples) is FaultRow::range and FaultRow::doubt: a fault of an effort's gain widens it by as much
+/// as the efforts, any other by what its own efforts change from sample to sample and, in dY, at most as much as the
+/// efforts.
 class FaultFilter final : public FaultRows {
  public:
   /// Throws InvalidArgument where `fault` does not fit `model`. `model` and `motion` are kept by reference.
@@ -86,6 +93,7 @@ class FaultFilter final : public FaultRows {
   };
   [[nodiscard]] Point point(std::size_t k) const;
   void filter(const FaultSignals& begin, const FaultSignals& end, const std::array<double, 2>& shares, double h);
+  void widen(const FaultSignals& begin, const FaultSignals& end, bool sets_in, double h);
 
   FaultType fault_;
   const Model* model_;
@@ -96,6 +104,14 @@ class FaultFilter final : public FaultRows {
   Point before_;
   std::vector<KernelState> cascades_;  // g1, g2, s, c one after the other
   FaultSignals filtered_;
+  bool gain_only_ = false;      // a fault of an effort's gain, and nothing else
+  Eigen::VectorXd gain_;        // per output: by how much it widens what is in doubt of efforts
+  Eigen::MatrixXd to_joints_;   // efforts of the joints from those of the outputs
+  FaultSignals last_;           // the signature before this step
+  std::vector<KernelState> widened_;  // n × p of range_, then n of c
+  RowMatrix range_;
+  Eigen::VectorXd widened_c_;
+  RowMatrix row_range_;  // range_ and what grows in dY
   std::size_t onset_ = 0, k_ = 0, end_ = 0;
   bool fresh_ = false;  // the fault jumps at the onset, between two steps
 };

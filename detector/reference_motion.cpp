@@ -2,10 +2,25 @@
 #include <wheelwright/detector/reference_motion.hpp>
 
 #include <algorithm>
+#include <cmath>
 
 #include <wheelwright/core/check.hpp>
 
 namespace wheelwright {
+namespace {
+
+std::size_t effort_reach(const Measurement& m, const SignalErrors& errors) {
+  if (!errors.between_samples) {
+    return 0;
+  }
+  const std::size_t about = m.motion == MotionKind::mean_speed ? 1 : 0;
+  if (m.delay.lower != 0.0 || m.delay.upper != 0.0) {
+    return about + 2 + static_cast<std::size_t>(std::ceil(m.delay.width() / m.nominal_step));
+  }
+  return m.changes == EffortChanges::at_samples ? 0 : about + (m.hold == Hold::zero_order ? 1 : 3);
+}
+
+}  // namespace
 
 ReferenceMotion read_reference(LogSource& log, RegressorFilter filter) {
   std::vector<std::size_t> pick;
@@ -30,6 +45,16 @@ ReferenceMotion read_reference(LogSource& log, RegressorFilter filter) {
   const bool nodes = filter.measurement().motion != MotionKind::speed;
   motion.kind = filter.measurement().motion;
   motion.nominal_step = filter.measurement().nominal_step;
+  motion.effort_reach = effort_reach(filter.measurement(), filter.errors());
+  const SignalErrors& errors = filter.errors();
+  RowMatrix sensors = RowMatrix::Zero(static_cast<Eigen::Index>(n), static_cast<Eigen::Index>(p));
+  for (const Term& term : filter.model().terms) {
+    if (term.kind != Term::Kind::function) {
+      const auto c = static_cast<Eigen::Index>(term.coordinate);
+      sensors(static_cast<Eigen::Index>(term.output), static_cast<Eigen::Index>(term.parameter)) +=
+          std::abs(term.scale) * (term.kind == Term::Kind::speed ? errors.speed[c] : errors.acceleration[c]);
+    }
+  }
   std::size_t seen = 0;
   while (log.next(block)) {
     for (std::size_t k = 0; k < block.rows(); ++k) {
@@ -82,6 +107,11 @@ ReferenceMotion read_reference(LogSource& log, RegressorFilter filter) {
   motion.rows.dY = Eigen::Map<const RowMatrix>(regressor_error.data(), rows, columns);
   motion.rows.y = Eigen::Map<const Eigen::VectorXd>(y.data(), rows);
   motion.rows.dy = Eigen::Map<const Eigen::VectorXd>(dy.data(), rows);
+  motion.between_dY = errors.between_samples ? (motion.rows.dY - sensors.replicate(k, 1)).cwiseMax(0.0).eval()
+                                             : RowMatrix::Zero(rows, columns).eval();
+  motion.between_dy = errors.between_samples
+                          ? (motion.rows.dy - errors.output.replicate(k, 1)).cwiseMax(0.0).eval()
+                          : Eigen::VectorXd::Zero(rows).eval();
   return motion;
 }
 

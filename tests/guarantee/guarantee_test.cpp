@@ -103,7 +103,11 @@ void expect_kept(const std::string& what, Make make) {
       alarms += v.alarms;
       decisions += v.decisions;
     }
-    broken += v.violation(c.broken == Broken::none) ? 1 : 0;
+    if (v.violation(c.broken == Broken::none)) {
+      ++broken;
+      ADD_FAILURE() << what << ", robot " << seed << ": " << name(v.end) << ", outside '" << v.outside << "', "
+                    << v.alarms << " alarms: " << v.message;
+    }
   }
   const std::string counts = fmt::format(
       "{}: of {} robots {} guaranteed, {} empty, {} no guarantee; truth outside {}, false alarms in {} ({} of {} "

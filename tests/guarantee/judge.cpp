@@ -21,10 +21,6 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-bool declared_only(const Commissioning& result) {
-  return std::ranges::all_of(result.noise, [](const OutputNoise& n) { return n.origin == NoiseOrigin::declared; });
-}
-
 void check_truth(const Scene& scene, const Commissioning& result, Verdict& verdict) {
   std::vector<Wide> theta;
   for (const ParameterResult& p : result.parameters) {
@@ -197,7 +193,7 @@ Verdict judge(const Case& c, const JudgeOptions& options) {
       case Commissioning::Status::done:
       case Commissioning::Status::partial: break;
     }
-    verdict.end = declared_only(result) ? Verdict::End::guaranteed : Verdict::End::learnt;
+    verdict.end = result.model.warrant == Warrant::guaranteed ? Verdict::End::guaranteed : Verdict::End::learnt;
     check_truth(scene, result, verdict);
     const auto watching = std::chrono::steady_clock::now();
     watch(scene.watched, result.model, verdict);

@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/commission/evidence.hpp>
+
+#include <algorithm>
+#include <vector>
+
+#include <Eigen/QR>
+
+#include <wheelwright/commission/noise_budget.hpp>
+#include <wheelwright/filter/error_influence.hpp>
+
+namespace wheelwright {
+namespace {
+
+// −d(Yθ)/dt, row by row, by central differences; zero at the ends of segments.
+Eigen::VectorXd shift_column(const RegressionBlock& rows, const Eigen::VectorXd& theta) {
+  const Eigen::VectorXd torque = rows.Y * theta;
+  Eigen::VectorXd column = Eigen::VectorXd::Zero(torque.size());
+  const auto n = static_cast<Eigen::Index>(rows.outputs);
+  for (std::size_t k = 1; k + 1 < rows.instants(); ++k) {
+    if (rows.sample[k + 1] != rows.sample[k - 1] + 2) {
+      continue;
+    }
+    const auto at = static_cast<Eigen::Index>(k) * n;
+    column.segment(at, n) =
+        (torque.segment(at - n, n) - torque.segment(at + n, n)) / (rows.t[k + 1] - rows.t[k - 1]);
+  }
+  return column;
+}
+
+}  // namespace
+
+RegressionBlock first_rows(RegressionSource& rows, std::size_t most) {
+  std::vector<RegressionBlock> parts;
+  RegressionBlock block, all;
+  std::size_t instants = 0;
+  rows.rewind();
+  while (instants < most && rows.next(block)) {
+    instants += block.instants();
+    parts.push_back(block);
+  }
+  rows.rewind();
+  all.resize(instants, rows.outputs(), rows.parameters());
+  std::size_t first = 0;
+  for (const RegressionBlock& part : parts) {
+    const auto at = static_cast<Eigen::Index>(first * rows.outputs());
+    std::ranges::copy(part.sample, all.sample.begin() + static_cast<std::ptrdiff_t>(first));
+    std::ranges::copy(part.t, all.t.begin() + static_cast<std::ptrdiff_t>(first));
+    all.Y.middleRows(at, part.rows()) = part.Y;
+    all.dY.middleRows(at, part.rows()) = part.dY;
+    all.y.segment(at, part.rows()) = part.y;
+    all.dy.segment(at, part.rows()) = part.dy;
+    first += part.instants();
+  }
+  return all;
+}
+
+Explained explained_by_errors(LogSource& log, const Setting& s, const Fit& fit, const SignalErrors& errors,
+                              const Box& box, std::size_t most_rows) {
+  const auto p = static_cast<Eigen::Index>(s.model.p());
+  Explained result{Eigen::VectorXd::Zero(p + 1), Eigen::VectorXd::Zero(p + 1)};
+  if (!s.noise_complete) {
+    return result;
+  }
+  SignalErrors between = errors;
+  between.acceleration.setZero();
+  between.speed.setZero();
+  between.output.setZero();
+  RegressionStream stream = make_rows(log, s, between);
+  const RegressionBlock rows = first_rows(stream, most_rows);
+  log.rewind();
+  if (rows.instants() == 0) {
+    return result;
+  }
+  Eigen::VectorXd theta(p), largest(p);
+  for (Eigen::Index j = 0; j < p; ++j) {
+    const Interval& side = box.sides[static_cast<std::size_t>(j)];
+    theta[j] = side.centre();
+    largest[j] = magnitude(side);
+  }
+  // Weighted columns of all that is estimated; what is not excited stays out.
+  RowMatrix A(rows.rows(), p + 1);
+  A.leftCols(p) = rows.Y;
+  A.col(p) = shift_column(rows, theta);
+  Eigen::VectorXd weight(rows.rows());
+  for (Eigen::Index r = 0; r < rows.rows(); ++r) {
+    weight[r] = fit.weights[r % fit.weights.size()];
+  }
+  A.array().colwise() *= weight.array();
+  std::vector<Eigen::Index> kept;
+  for (Eigen::Index j = 0; j < p; ++j) {
+    if (fit.excitation[static_cast<std::size_t>(j)].state != Excitation::not_excited && A.col(j).squaredNorm() > 0.0) {
+      kept.push_back(j);
+    }
+  }
+  const auto fitted = static_cast<Eigen::Index>(kept.size());
+  if (fitted == 0) {
+    return result;
+  }
+  Eigen::MatrixXd columns(rows.rows(), fitted);
+  for (Eigen::Index j = 0; j < fitted; ++j) {
+    columns.col(j) = A.col(kept[static_cast<std::size_t>(j)]);
+  }
+  const Eigen::VectorXd scale = columns.colwise().norm().cwiseInverse();
+  columns *= scale.asDiagonal();
+  const Eigen::MatrixXd gram = columns.transpose() * columns;
+  const auto solver = gram.completeOrthogonalDecomposition();
+  RowMatrix g(rows.rows(), fitted + 1);
+  g.leftCols(fitted) = columns * solver.pseudoInverse() * scale.asDiagonal();
+  const Eigen::VectorXd shift = A.col(p);
+  const Eigen::VectorXd left = shift - columns * solver.solve(columns.transpose() * shift);
+  const double square = left.squaredNorm();
+  g.col(fitted) = square > 0.0 ? (left / square).eval() : Eigen::VectorXd::Zero(rows.rows()).eval();
+  g.array().colwise() *= weight.array();
+
+  const Eigen::VectorXd doubt = rows.dY * largest + rows.dy;
+  const Eigen::VectorXd in_doubt = g.cwiseAbs().transpose() * doubt;
+  ErrorInfluence influence(s.model, s.filter, s.measurement, noise_budget(s.robot, s.measurement).sensors, theta,
+                           fitted + 1);
+  influence.add(rows, g);
+  for (Eigen::Index j = 0; j < fitted; ++j) {
+    result.in_doubt[kept[static_cast<std::size_t>(j)]] = in_doubt[j];
+    result.noise[kept[static_cast<std::size_t>(j)]] = influence.value()[j];
+  }
+  result.in_doubt[p] = in_doubt[fitted];
+  result.noise[p] = influence.value()[fitted];
+  return result;
+}
+
+}  // namespace wheelwright

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// What declared errors and unknown motion between samples can explain of a finding, before it counts against a robot.
+#pragma once
+
+#include <cstddef>
+
+#include <Eigen/Core>
+
+#include <wheelwright/commission/fit.hpp>
+#include <wheelwright/commission/setting.hpp>
+#include <wheelwright/core/interval.hpp>
+#include <wheelwright/core/log.hpp>
+#include <wheelwright/filter/noise.hpp>
+
+namespace wheelwright {
+
+/// By how much an estimate may be off without any assumption being broken, to first order.
+struct Explained {
+  Eigen::VectorXd in_doubt;  ///< by what motion, friction and efforts may do between samples, and by signs that samples
+                             ///< leave open: that moves least squares whatever the noise is like
+  Eigen::VectorXd noise;     ///< by noise inside its declared bounds with the worst of all shapes and signs
+};
+
+/// Explained for least squares' estimate of each parameter (p entries) and of a constant shift of the efforts (the last
+/// entry, s), over the first `most_rows` rows of `log`. `errors` are those of the rows that made the set, `box` its hull.
+/// Zeros where noise is not declared. Walks the log once.
+[[nodiscard]] Explained explained_by_errors(LogSource& log, const Setting& setting, const Fit& fit,
+                                            const SignalErrors& errors, const Box& box,
+                                            std::size_t most_rows = 60000);
+
+/// The first instants of `rows`, at least `most` of them where there are so many.
+[[nodiscard]] RegressionBlock first_rows(RegressionSource& rows, std::size_t most);
+
+}  // namespace wheelwright
