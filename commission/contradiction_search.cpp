@@ -177,7 +177,7 @@ std::vector<JointFit> fit_joints(LogSource& log, const Setting& s) {
   }
   const auto columns = side_by_side(s.model);
   std::vector<LeastSquares> sums(joints, LeastSquares(columns.size()));
-  RegressionStream rows = make_rows(log, s);
+  RegressionStream rows = make_rows(log, s, errors_of_fit(s));
   RegressionBlock block;
   const auto each = [&](auto&& visit) {
     rows.rewind();
@@ -357,7 +357,7 @@ void find_uneven_halves(LogSource& log, const Setting& s, const Fit& fit, std::v
   }
   const double biased = 2.0 * bias.cwiseAbs().maxCoeff();  // standard errors that two halves may differ by
   const std::size_t middle = s.survey.rows / 2;
-  RegressionStream rows = make_rows(log, s, s.declared);
+  RegressionStream rows = make_rows(log, s, errors_of_fit(s));
   RegressionBlock block;
   const auto each = [&](auto&& visit) {
     rows.rewind();
@@ -425,7 +425,7 @@ std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& s, cons
   }
   Setting as_logged = s;  // a declared delay is compared with what is found, not taken away before
   as_logged.measurement.delay = {0.0, 0.0};
-  RegressionStream stream = make_rows(log, as_logged);
+  RegressionStream stream = make_rows(log, as_logged, errors_of_fit(s));
   RegressionBlock rows = first_rows(stream, most_rows);
   log.rewind();
   rows.dY.setZero();

@@ -66,10 +66,12 @@ Explained explained_by_errors(LogSource& log, const Setting& s, const Fit& fit, 
   between.acceleration.setZero();
   between.speed.setZero();
   between.output.setZero();
-  RegressionStream stream = make_rows(log, s, between);
-  const RegressionBlock rows = first_rows(stream, most_rows);
+  RegressionStream fitted_stream = make_rows(log, s, errors_of_fit(s));
+  const RegressionBlock rows = first_rows(fitted_stream, most_rows);
+  RegressionStream bounded_stream = make_rows(log, s, between);
+  const RegressionBlock bounded = first_rows(bounded_stream, most_rows);
   log.rewind();
-  if (rows.instants() == 0) {
+  if (rows.instants() == 0 || bounded.sample != rows.sample) {
     return result;
   }
   Eigen::VectorXd theta(p), largest(p);
@@ -113,7 +115,8 @@ Explained explained_by_errors(LogSource& log, const Setting& s, const Fit& fit, 
   g.col(fitted) = square > 0.0 ? (left / square).eval() : Eigen::VectorXd::Zero(rows.rows()).eval();
   g.array().colwise() *= weight.array();
 
-  const Eigen::VectorXd doubt = rows.dY * largest + rows.dy;
+  const Eigen::VectorXd doubt = (bounded.dY + (bounded.Y - rows.Y).cwiseAbs()) * largest + bounded.dy +
+                                (bounded.y - rows.y).cwiseAbs();
   const Eigen::VectorXd in_doubt = g.cwiseAbs().transpose() * doubt;
   ErrorInfluence influence(s.model, s.filter, s.measurement, noise_budget(s.robot, s.measurement).sensors, theta,
                            fitted + 1);

@@ -81,7 +81,7 @@ double t_quantile(const ResidualSummary& summary) {
 }  // namespace
 
 RegressionMoments log_moments(LogSource& log, const Setting& s, Part part) {
-  const RegressorFilter filter(s.model, s.filter, s.measurement);
+  const RegressorFilter filter(s.model, s.filter, s.measurement, errors_of_fit(s));
   const auto commands = commanded_motion(log, s.model);
   if (commands && !s.commands_are_noisy) {
     InstrumentStream stream(log, filter, *commands);
@@ -91,6 +91,12 @@ RegressionMoments log_moments(LogSource& log, const Setting& s, Part part) {
   RegressionStream stream(log, filter);
   FoldedSource rows(stream, part, s.survey.rows, s.folds);
   return moments(rows);
+}
+
+SignalErrors errors_of_fit(const Setting& s) {
+  SignalErrors errors = s.declared;
+  errors.between_samples = false;
+  return errors;
 }
 
 Fit fit_log(LogSource& log, const Setting& s, Part part, double risk) {
@@ -103,7 +109,7 @@ Fit fit_log(LogSource& log, const Setting& s, Part part, double risk) {
   Fit fit;
   fit.weights = efficient_weights(evidence.rows);
   fit.factor = LeastSquares(s.model.p(), fit.weights);
-  RegressionStream stream = make_rows(log, s, s.declared);
+  RegressionStream stream = make_rows(log, s, errors_of_fit(s));
   FoldedSource rows(stream, part, s.survey.rows, s.folds);
   RegressionBlock block;
   rows.rewind();

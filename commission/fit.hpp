@@ -28,6 +28,10 @@ struct Fit {
   Eigen::VectorXd plausible;                  ///< per output, largest_plausible_error; empty where noise is declared
 };
 
+/// Errors of the rows that are fitted: efforts and motion between samples as most likely, not in the middle of what is
+/// possible; signs are left open where noise of the samples leaves them so.
+[[nodiscard]] SignalErrors errors_of_fit(const Setting& setting);
+
 /// Fits `part` of `log`. `risk` is for Fit::plausible.
 [[nodiscard]] Fit fit_log(LogSource& log, const Setting& setting, Part part, double risk);
 
