@@ -125,6 +125,62 @@ void find_wrapped_angles(LogSource& log, const Setting& s, std::vector<LogContra
   log.rewind();
 }
 
+// A sample against the line through its neighbours, drawn over the stamps and over row numbers.
+void find_scattered_stamps(LogSource& log, const Setting& s, std::vector<LogContradiction>& out) {
+  constexpr double kEven = 0.02;     // relative: steps that differ by less are even
+  constexpr double kSmoother = 0.5;  // rms over row numbers over that over stamps
+  std::vector<std::size_t> pick;
+  for (const std::string& column : s.measurement.motion_columns) {
+    pick.push_back(*log.find(column));
+  }
+  const double longest = s.measurement.longest_step();
+  std::vector<double> before(pick.size()), middle(pick.size());
+  double t_before = 0.0, t_middle = 0.0, by_stamp = 0.0, by_row = 0.0;
+  std::size_t known = 0, looked = 0;
+  LogBlock block;
+  log.rewind();
+  while (log.next(block)) {
+    for (std::size_t k = 0; k < block.rows(); ++k) {
+      const double t = block.t[k];
+      const bool starts = std::ranges::binary_search(block.segment_starts, k) ||
+                          (known > 0 && longest > 0.0 && t - t_middle > longest);
+      known = starts ? 0 : known;
+      if (known >= 2) {
+        const double a = t_middle - t_before, b = t - t_middle;
+        if (std::abs(a - b) > kEven * (a + b)) {
+          ++looked;
+          for (std::size_t c = 0; c < pick.size(); ++c) {
+            const double value = block.columns[pick[c]][k];
+            const double stamp = middle[c] - (before[c] * b + value * a) / (a + b);
+            const double row = middle[c] - 0.5 * (before[c] + value);
+            by_stamp += stamp * stamp;
+            by_row += row * row;
+          }
+        }
+      }
+      for (std::size_t c = 0; c < pick.size(); ++c) {
+        before[c] = middle[c];
+        middle[c] = block.columns[pick[c]][k];
+      }
+      t_before = t_middle;
+      t_middle = t;
+      ++known;
+    }
+  }
+  log.rewind();
+  const double ratio = by_stamp > 0.0 ? std::sqrt(by_row / by_stamp) : 1.0;
+  if (looked >= kFewestHalf && ratio < kSmoother) {
+    out.push_back({.kind = Kind::stamps_scatter,
+                   .subject = "t",
+                   .value = ratio,
+                   .limit = kSmoother,
+                   .sentence = fmt::format("the motion is {:.2g} times as rough over the stamps as over the row numbers: "
+                                           "the samples are even, their stamps scatter",
+                                           1.0 / std::max(ratio, std::numeric_limits<double>::min())),
+                   .next = "stamp samples where they are taken, or number them: times that go up by the cycle's length"});
+  }
+}
+
 // The effort of each joint by itself, on all that the motion offers: what the rows say of it.
 struct JointFit {
   double explained = 1.0;    // share of its square
@@ -349,6 +405,49 @@ void find_wrong_signs(const Setting& s, const Fit& fit, std::vector<LogContradic
   }
 }
 
+// Least squares with dry friction in a model that has none.
+void find_dry_friction(LogSource& log, const Setting& s, std::vector<LogContradiction>& out) {
+  if (!s.noise_complete || s.measurement.effort_unsigned) {
+    return;
+  }
+  Setting wide = s;
+  wide.robot.parameters = possible_parameters(s.robot);
+  wide.model = make_model(wide.robot);
+  const auto is_dry = [](const Parameter& p) { return p.physical == "coulomb"; };
+  if (std::ranges::any_of(s.model.parameters, is_dry) || std::ranges::none_of(wide.model.parameters, is_dry)) {
+    return;
+  }
+  const auto at = static_cast<Eigen::Index>(std::ranges::find_if(wide.model.parameters, is_dry) -
+                                            wide.model.parameters.begin());
+  RegressionStream rows = make_rows(log, wide, errors_of_fit(wide));
+  const Eigen::VectorXd weights = efficient_weights(moments(rows));
+  rows.rewind();
+  const LeastSquaresFit fit = least_squares(rows, weights);
+  ResidualStatistics statistics(fit.estimate, weights);
+  RegressionBlock block;
+  rows.rewind();
+  while (rows.next(block)) {
+    statistics.add(block);
+  }
+  log.rewind();
+  const ResidualSummary summary = statistics.summary(fit.inverse_gram);
+  const double estimate = fit.estimate[at], error = summary.standard_error[at];
+  if (!(estimate > certain(summary.freedom) * error)) {
+    return;
+  }
+  const InWords w = in_words(wide, static_cast<std::size_t>(at));
+  out.push_back({.kind = Kind::dry_friction,
+                 .withdraws = false,
+                 .demotes = true,
+                 .subject = "coulomb",
+                 .value = w.value(estimate),
+                 .limit = w.value(certain(summary.freedom) * error),
+                 .sentence = fmt::format("the efforts follow the sign of the motion as by dry friction of {:.3g} ± {:.2g} "
+                                         "{}, which the model does not have",
+                                         w.value(estimate), 2.0 * std::abs(w.scale) * error, w.unit),
+                 .next = "give the model `coulomb` (`parameters:` in the robot file)"});
+}
+
 // Least squares on each half of the log's rows.
 void find_uneven_halves(LogSource& log, const Setting& s, const Fit& fit, std::vector<LogContradiction>& out) {
   const Eigen::VectorXd& bias = fit.choice.predicted_bias;  // of least squares, which depends on the driving
@@ -481,6 +580,7 @@ SignalFindings contradictions_in_log(LogSource& log, const Setting& s, const Fit
   SignalFindings findings;
   std::vector<LogContradiction>& found = findings.contradictions;
   find_wrapped_angles(log, s, found);
+  find_scattered_stamps(log, s, found);
   find_constant_efforts(log, s, found);
   const std::vector<JointFit> joints = fit_joints(log, s);
   find_unrelated_efforts(s, joints, found);
@@ -488,6 +588,7 @@ SignalFindings contradictions_in_log(LogSource& log, const Setting& s, const Fit
     findings.timing = effort_timing(log, s, fit);
     find_latency(s, findings.timing, found);
     find_wrong_signs(s, fit, found);
+    find_dry_friction(log, s, found);
     find_uneven_efforts(s, joints, found);
     find_uneven_halves(log, s, fit, found);
   }

@@ -14,10 +14,12 @@ struct LogContradiction {
   enum class Kind {
     effort_constant,   ///< an effort has one value in every row although its joint moves
     angle_wrapped,     ///< an angle jumps by a whole turn between two rows
+    stamps_scatter,    ///< the motion is smoother over row numbers than over the stamps: these scatter, the samples do not
     effort_unrelated,  ///< an effort that motion does not explain at all
     effort_timing,     ///< efforts late or early against the motion, beyond what is declared
     wheels_disagree,   ///< the efforts of two joints do not show one and the same mass
     wrong_sign,        ///< a quantity that cannot be negative is, significantly
+    dry_friction,      ///< the efforts follow the sign of the motion, and the model has no dry friction
     prior_edge,        ///< only a far larger noise lets the prior explain the log
     estimate_outside,  ///< the best guess lies outside the set, with its whole interval
     halves_disagree,   ///< the two halves of the log give different robots
