@@ -125,10 +125,14 @@ void find_wrapped_angles(LogSource& log, const Setting& s, std::vector<LogContra
   log.rewind();
 }
 
-// A sample against the line through its neighbours, drawn over the stamps and over row numbers.
+// A sample against the line through its neighbours, drawn over the stamps and over row numbers. Of angles: the speed of a
+// motor that follows its controller at once may well be a function of the controller's cycle.
 void find_scattered_stamps(LogSource& log, const Setting& s, std::vector<LogContradiction>& out) {
   constexpr double kEven = 0.02;     // relative: steps that differ by less are even
   constexpr double kSmoother = 0.5;  // rms over row numbers over that over stamps
+  if (s.measurement.motion != MotionKind::angle) {
+    return;
+  }
   std::vector<std::size_t> pick;
   for (const std::string& column : s.measurement.motion_columns) {
     pick.push_back(*log.find(column));
@@ -537,7 +541,9 @@ std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& s, cons
     VariableProjectionOptions options = model.options();
     options.weights = fit.weights;
     const SeparableFit found = variable_projection(model, options);
-    if (found.end != SearchEnd::converged || found.state[0] != ShapeState::identified) {
+    constexpr double kInside = 0.97;  // of the range that is searched: its end is no answer
+    if (found.end != SearchEnd::converged || found.state[0] != ShapeState::identified ||
+        std::abs(found.shape[0]) > kInside * longest) {
       return std::nullopt;
     }
     const auto rss = [&](double shift) {
