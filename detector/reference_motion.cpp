@@ -85,7 +85,7 @@ ReferenceMotion read_reference(LogSource& log, RegressorFilter filter) {
       motion.instant.push_back(filter.instant());
       motion.step.push_back(length);
       motion.heading.push_back(filter.heading());
-      motion.settled.push_back(settled);
+      motion.settled.push_back(settled && !filter.rests_on_standstill());
       append(speed, filter.speed());
       append(joint_speed, before);
       append(joint_angle, angle);

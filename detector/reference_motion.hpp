@@ -29,7 +29,7 @@ struct ReferenceMotion {
   Eigen::MatrixXd joint_speed;          ///< joints × K
   Eigen::MatrixXd joint_angle;          ///< joints × K, integral of joint_speed over the segment
   std::vector<double> heading;          ///< K, rad
-  std::vector<bool> settled;            ///< K: whether a detector decides at this instant
+  std::vector<bool> settled;            ///< K: whether a detector decides at this instant, whatever the noise
   std::vector<std::size_t> segment_starts;  ///< ascending instants at which a segment begins
   RegressionBlock rows;                     ///< K instants: Y_f of the motion, with the bounds dY, dy of the sensors
   RowMatrix between_dY;                     ///< of dY what motion may do between samples: it grows with the efforts; empty: nothing

@@ -92,6 +92,10 @@ class RegressorFilter {
   /// Heading at that instant, rad: measured where there is a column for it, else odometry from the segment's start. In the
   /// middle of the step for angles and mean speeds.
   [[nodiscard]] double heading() const { return heading_; }
+  /// Whether row() is there only because the segment began at standstill, exactly: other noise might have hidden that.
+  [[nodiscard]] bool rests_on_standstill() const {
+    return angles_ && at_rest_ && (t_ - t0_) * design_.beta < design_.settle && errors_.joint_sample > 0.0;
+  }
   /// Length of the last step, s.
   [[nodiscard]] double step_length() const { return length_; }
 
