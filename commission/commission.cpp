@@ -475,7 +475,7 @@ Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionO
   for (LogContradiction& found : contradictions_in_result(result, s, bounded.raised)) {
     result.contradictions.push_back(std::move(found));
   }
-  weigh_unrelated_efforts(log, s, result.row_errors, result.feasible.hull, result.contradictions);
+  weigh_efforts(log, s, result.row_errors, result.feasible.hull, result.contradictions);
   if (wants_weighing(result, s)) {
     weigh_contradictions(result, s, fit, signals.timing,
                          explained_by_errors(log, s, fit, result.row_errors, result.feasible.hull));

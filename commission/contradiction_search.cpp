@@ -720,10 +720,12 @@ void weigh_contradictions(Commissioning& result, const Setting& s, const Fit& fi
   });
 }
 
-void weigh_unrelated_efforts(LogSource& log, const Setting& s, const SignalErrors& errors, const Box& box,
-                             std::vector<LogContradiction>& contradictions) {
-  const auto unrelated = [](const LogContradiction& c) { return c.kind == Kind::effort_unrelated; };
-  if (!s.noise_complete || std::ranges::none_of(contradictions, unrelated)) {
+void weigh_efforts(LogSource& log, const Setting& s, const SignalErrors& errors, const Box& box,
+                   std::vector<LogContradiction>& contradictions) {
+  const auto of_efforts = [](const LogContradiction& c) {
+    return c.kind == Kind::effort_unrelated || (c.kind == Kind::wheels_disagree && c.withdraws);
+  };
+  if (!s.noise_complete || std::ranges::none_of(contradictions, of_efforts)) {
     return;
   }
   Eigen::VectorXd largest(static_cast<Eigen::Index>(box.sides.size()));
@@ -739,8 +741,16 @@ void weigh_unrelated_efforts(LogSource& log, const Setting& s, const SignalError
     error += (block.dY * largest + block.dy).squaredNorm();
   }
   log.rewind();
-  if (error >= effort) {
-    std::erase_if(contradictions, unrelated);
+  const double share = effort > 0.0 ? std::sqrt(error / effort) : kInfinity;
+  for (LogContradiction& c : contradictions) {
+    // Errors of this share can make (1 − share)/(1 + share) of equal masses.
+    if (c.kind == Kind::wheels_disagree && share >= (c.value - 1.0) / (c.value + 1.0)) {
+      c.demotes = c.demotes || c.withdraws;
+      c.withdraws = false;
+    }
+  }
+  if (share >= 1.0) {
+    std::erase_if(contradictions, [](const LogContradiction& c) { return c.kind == Kind::effort_unrelated; });
   }
 }
 

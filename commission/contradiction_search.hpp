@@ -69,9 +69,10 @@ void weigh_contradictions(Commissioning& result, const Setting& setting, const F
 /// Whether weigh_contradictions() would change anything.
 [[nodiscard]] bool wants_weighing(const Commissioning& result, const Setting& setting);
 
-/// Drops Kind::effort_unrelated where the declared errors of the rows (`errors`, with parameters in `box`) are together as
-/// large as the efforts themselves.
-void weigh_unrelated_efforts(LogSource& log, const Setting& setting, const SignalErrors& errors, const Box& box,
-                             std::vector<LogContradiction>& contradictions);
+/// Weighs what says that an effort is wrong against the declared errors of the rows (`errors`, with parameters in `box`):
+/// Kind::effort_unrelated is dropped where these are as large as the efforts, Kind::wheels_disagree only demotes where they
+/// are large enough for it.
+void weigh_efforts(LogSource& log, const Setting& setting, const SignalErrors& errors, const Box& box,
+                   std::vector<LogContradiction>& contradictions);
 
 }  // namespace wheelwright
