@@ -51,6 +51,7 @@ SignalErrors with_noise(const Setting& s, const std::vector<OutputNoise>& noise,
 // dynamics with the parameters of the set before, as long as that brings something.
 struct Bounded {
   OutlierResult result;
+  std::vector<EarlierSet> earlier;
   MotionBound learning;  // of the rows that the set is made of
   MotionBound driving;   // for driving to come: what was seen in this log is no limit of that
   double raised = 1.0;   // factor on an estimated noise bound without which the prior box explains nothing
@@ -102,6 +103,7 @@ Bounded refined_set(LogSource& log, const Setting& s, Part part, SignalErrors er
     OutlierResult next = set_of(log, s, part, sharper, outliers);
     const bool better =
         next.set.status != FeasibleSet::Status::nonempty || widths(next.set.hull, best.result.set.hull) < kWorthAnother;
+    best.earlier.push_back({std::move(best.result.set), std::move(best.result.dropped)});
     best.result = std::move(next);
     best.learning = bound;
     if (!better) {
@@ -419,6 +421,7 @@ Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionO
   Bounded bounded = bounded_set(log, s, Part::everything, result.noise, options.outliers, result.notes);
   result.feasible = std::move(bounded.result.set);
   result.dropped = std::move(bounded.result.dropped);
+  result.earlier = std::move(bounded.earlier);
   result.prior = s.prior;
   result.row_errors = with_noise(s, result.noise, For::learning);
   result.row_errors.motion = bounded.learning;

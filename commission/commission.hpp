@@ -62,6 +62,13 @@ struct ParameterResult {
   Warrant warrant = Warrant::extrapolated;  ///< of lower and upper
 };
 
+/// A set on the way to the one that is published: its parameters bound the motion between the samples of the rows that
+/// the next set is made of.
+struct EarlierSet {
+  FeasibleSet set;
+  std::vector<std::size_t> dropped;  ///< rows of the log whose instants it leaves out as outliers
+};
+
 /// The result of commissioning.
 struct Commissioning {
   /// What became of the log.
@@ -94,6 +101,8 @@ struct Commissioning {
   SignalErrors row_errors;  ///< dY and dy of the rows that the set is made of: OutputNoise::learning in `output`
   std::vector<std::size_t> dropped;     ///< rows of the log whose instants the set leaves out as outliers
   FeasibleSet feasible;                 ///< the set, its hull, certificates
+  std::vector<EarlierSet> earlier;      ///< what it was sharpened from, pass by pass: the first one stands on the limit of
+                                        ///< the accelerations alone; none where nothing bounds the motion by the model
   KinematicCommissioning kinematic;     ///< of the kinematic residual; its model is also CommissionedModel::kinematic
   double polytope_over_box = 1.0;       ///< median width of [l, u]: polytope over box, held out, worst output
   std::vector<std::string> notes;       ///< what was repaired or chosen, for people

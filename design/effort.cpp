@@ -20,7 +20,7 @@ EffortModel::EffortModel(const DesignSubject& subject)
   }
 }
 
-Eigen::VectorXd EffortModel::largest(const Eigen::VectorXd& v, const Eigen::VectorXd& a, double heading) const {
+Eigen::MatrixXd EffortModel::per_parameter(const Eigen::VectorXd& v, const Eigen::VectorXd& a, double heading) const {
   const Eigen::VectorXd joint = joint_of_coordinate_ * v;
   const Eigen::VectorXd none = Eigen::VectorXd::Zero(std::max(v.size(), joint.size()));
   const auto view = [](const Eigen::VectorXd& x, Eigen::Index n) {
@@ -32,8 +32,16 @@ Eigen::VectorXd EffortModel::largest(const Eigen::VectorXd& v, const Eigen::Vect
   state.joint_speed = view(joint, joint.size());
   state.joint_error = view(none, joint.size());
   state.heading = heading;
-  const Eigen::MatrixXd per_parameter = input_inverse_ * regressor(subject_->model, state, view(a, a.size()));
-  return (per_parameter * centre_).cwiseAbs() + per_parameter.cwiseAbs() * half_;
+  return input_inverse_ * regressor(subject_->model, state, view(a, a.size()));
+}
+
+Eigen::VectorXd EffortModel::largest(const Eigen::VectorXd& v, const Eigen::VectorXd& a, double heading) const {
+  const Eigen::MatrixXd rows = per_parameter(v, a, heading);
+  return (rows * centre_).cwiseAbs() + rows.cwiseAbs() * half_;
+}
+
+Eigen::VectorXd EffortModel::believed(const Eigen::VectorXd& v, const Eigen::VectorXd& a, double heading) const {
+  return per_parameter(v, a, heading) * subject_->theta;
 }
 
 }  // namespace wheelwright

@@ -19,7 +19,12 @@ class EffortModel {
   /// Largest |effort| of each joint at speeds `v` (m/s, rad/s), accelerations `a` and heading (rad).
   [[nodiscard]] Eigen::VectorXd largest(const Eigen::VectorXd& v, const Eigen::VectorXd& a, double heading) const;
 
+  /// Effort of each joint there for θ as believed.
+  [[nodiscard]] Eigen::VectorXd believed(const Eigen::VectorXd& v, const Eigen::VectorXd& a, double heading) const;
+
  private:
+  [[nodiscard]] Eigen::MatrixXd per_parameter(const Eigen::VectorXd& v, const Eigen::VectorXd& a, double heading) const;
+
   const DesignSubject* subject_;
   Eigen::MatrixXd input_inverse_, joint_of_coordinate_;
   Eigen::VectorXd centre_, half_;

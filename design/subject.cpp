@@ -12,6 +12,7 @@
 #include <wheelwright/commission/survey.hpp>
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/error.hpp>
+#include <wheelwright/design/effort.hpp>
 #include <wheelwright/design/plan.hpp>
 #include <wheelwright/filter/regression_stream.hpp>
 
@@ -33,11 +34,12 @@ std::optional<double> nominal_parameter(const Robot& robot, const Model& model, 
                         ": VALUE} in the robot file (" + parameter.physical_unit + "; a rough value will do)");
 }
 
-SignalErrors worst_case_errors(const DesignSubject& subject, const NoiseBudget& budget) {
-  return propagate(subject.model, subject.filter, subject.measurement, budget.sensors);
+SignalErrors worst_case_errors(const DesignSubject& subject, const Measurement& measurement,
+                               const NoiseBudget& budget) {
+  return propagate(subject.model, subject.filter, measurement, budget.sensors);
 }
 
-// The planned log: motion as the sensors see it without noise, efforts left at zero.
+// The planned log: motion as the sensors see it without noise, efforts as the robot that is believed in needs them.
 LogTable planned_log(const Plan& plan, const DesignSubject& subject) {
   const Measurement& m = subject.measurement;
   const Eigen::MatrixXd joint = joint_speeds(plan, subject.model);
@@ -64,6 +66,22 @@ LogTable planned_log(const Plan& plan, const DesignSubject& subject) {
       angle += plan.step * between;
     }
   }
+  // A held effort acts in the step that begins with its sample.
+  const EffortModel model(subject);
+  const bool held = m.hold == Hold::zero_order;
+  for (std::size_t k = 0; k < rows; ++k) {
+    const auto at = static_cast<Eigen::Index>(k), next = std::min(at + 1, plan.speed.cols() - 1);
+    const bool in_step = next > at && (held || mean);
+    Eigen::VectorXd v = plan.speed.col(at), a = plan.acceleration.col(at);
+    if (in_step) {
+      a = (plan.speed.col(next) - v) / plan.step;
+      v = 0.5 * (v + plan.speed.col(next));
+    }
+    const Eigen::VectorXd effort = model.believed(v, a, plan.pose(2, at));
+    for (std::size_t i = 0; i < joints; ++i) {
+      log.columns[joints + i][k] = effort[static_cast<Eigen::Index>(i)];
+    }
+  }
   if (!m.heading_column.empty()) {
     for (std::size_t k = 0; k < rows; ++k) {
       log.columns.back()[k] = plan.pose(2, static_cast<Eigen::Index>(k));
@@ -72,19 +90,39 @@ LogTable planned_log(const Plan& plan, const DesignSubject& subject) {
   return log;
 }
 
+// How the planned log is read: its own steps, speeds that need not be whole counts.
+Measurement planned_measurement(const Plan& plan, const DesignSubject& subject) {
+  Measurement m = subject.measurement;
+  m.shortest_step *= m.nominal_step > 0.0 ? plan.step / m.nominal_step : 0.0;
+  m.nominal_step = plan.step;
+  m.count = 0.0;
+  return m;
+}
+
+// `errors` of logs with the subject's steps as those of logs with the plan's.
+SignalErrors with_steps_of(const Plan& plan, const DesignSubject& subject, SignalErrors errors) {
+  if (subject.measurement.motion != MotionKind::speed && subject.measurement.nominal_step > 0.0) {
+    const double longer = plan.step / subject.measurement.nominal_step;
+    errors.joint_sample /= longer;
+    errors.speed_sample /= longer;
+  }
+  return errors;
+}
+
 // The filter of a planned log, with the errors that its sensors will make.
-RegressorFilter planned_filter(LogSource& log, const DesignSubject& subject) {
+RegressorFilter planned_filter(LogSource& log, const Plan& plan, const DesignSubject& subject) {
+  const Measurement measurement = planned_measurement(plan, subject);
   SignalErrors errors;
   if (subject.errors) {
-    errors = *subject.errors;
+    errors = with_steps_of(plan, subject, *subject.errors);
   } else {
     const NoiseBudget budget = noise_budget(subject.robot, subject.measurement);
-    errors = worst_case_errors(subject, budget);
-    errors.motion.limit =
-        coordinate_limit(subject.model, acceleration_limit(subject.robot, survey(log, subject.measurement),
-                                                           subject.measurement.motion, budget.sensors.motion));
+    errors = worst_case_errors(subject, measurement, budget);
+    errors.motion.limit = coordinate_limit(
+        subject.model,
+        acceleration_limit(subject.robot, survey(log, measurement), measurement.motion, budget.sensors.motion));
   }
-  return RegressorFilter(subject.model, subject.filter, subject.measurement, errors);
+  return RegressorFilter(subject.model, subject.filter, measurement, errors);
 }
 
 }  // namespace
@@ -113,9 +151,9 @@ DesignSubject subject_of(const CommissionedModel& model) {
   }
   // A model from the statistical mode has smaller bounds than the worst case.
   const NoiseBudget budget = noise_budget(subject.robot, subject.measurement);
-  const bool worst_case =
-      budget.complete &&
-      (worst_case_errors(subject, budget).output.array() <= model.errors.output.array() * (1.0 + 1e-9)).all();
+  const bool worst_case = budget.complete && (worst_case_errors(subject, subject.measurement, budget).output.array() <=
+                                              model.errors.output.array() * (1.0 + 1e-9))
+                                                 .all();
   if (!worst_case) {
     subject.errors = model.errors;
   }
@@ -170,7 +208,7 @@ DesignSubject subject_of(const Robot& robot, double step, const FilterDesign& fi
 RegressionBlock planned_rows(const Plan& plan, const DesignSubject& subject) {
   const LogTable log = planned_log(plan, subject);
   TableSource source(log);
-  RegressionStream stream(source, planned_filter(source, subject));
+  RegressionStream stream(source, planned_filter(source, plan, subject));
   RegressionBlock rows = read_all(stream);
   rows.y = rows.Y * subject.theta;
   return rows;
@@ -179,7 +217,7 @@ RegressionBlock planned_rows(const Plan& plan, const DesignSubject& subject) {
 ReferenceMotion planned_motion(const Plan& plan, const DesignSubject& subject) {
   const LogTable log = planned_log(plan, subject);
   TableSource source(log);
-  return read_reference(source, planned_filter(source, subject));
+  return read_reference(source, planned_filter(source, plan, subject));
 }
 
 }  // namespace wheelwright

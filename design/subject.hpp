@@ -50,7 +50,8 @@ struct DesignSubject {
 [[nodiscard]] DesignSubject subject_of(const Robot& robot, double step, const FilterDesign& filter = {2, 10.0, 10.0});
 
 /// The rows that commissioning would make of a log driven exactly along `plan`, without noise: Y_f of the planned
-/// motion, y = Y_f θ°, and the error bounds dY, dy that the sensors' noise gives.
+/// motion, y = Y_f θ°, and the error bounds dY, dy that the sensors' noise gives, and what θ° needs of efforts may do between
+/// samples. A plan may have other steps than the log to come: it is then read as a log with these steps.
 [[nodiscard]] RegressionBlock planned_rows(const Plan& plan, const DesignSubject& subject);
 
 /// The same drive as a reference motion for faults, with the error bounds of its rows.

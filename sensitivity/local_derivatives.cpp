@@ -8,51 +8,14 @@
 #include <fmt/format.h>
 
 #include <wheelwright/core/check.hpp>
-#include <wheelwright/core/limits.hpp>
+#include <wheelwright/sensitivity/bound_rates.hpp>
 #include <wheelwright/sensitivity/local_inputs.hpp>
 #include <wheelwright/sensitivity/row_rates.hpp>
 
 namespace wheelwright {
 namespace {
 
-constexpr double kAgree = 1e-6;  // left and right derivative, relative
-
-// A lower side at 0 that holds a bound: below it, errors of the rows' columns count with the other sign.
-bool sign_opens(const HullOptimum& optimum, const Box& box, std::size_t j) {
-  return box.sides[j].lower == 0.0 && std::ranges::any_of(optimum.active, [&](const WeightedRow& active) {
-           const RowOrigin& origin = active.row.origin;
-           return origin.is_prior && origin.parameter == j && origin.side == Side::lower;
-         });
-}
-
-bool agree(const OneSided& d, double noise) {
-  return std::abs(d.left - d.right) <= kAgree * std::max(std::abs(d.left), std::abs(d.right)) + noise;
-}
-
-struct Derived {
-  OneSided value;
-  std::string why_not;
-};
-
-Derived derive(const HullOptima& optima, const HullOptimum& optimum, const RowRates& rates, double noise,
-               const std::string& name) {
-  if (!optimum.found) {
-    return {{kNan, kNan}, why_not_regular(optimum, name)};
-  }
-  if (!rates.trouble.empty()) {
-    return {{kNan, kNan}, rates.trouble};
-  }
-  Derived result{bound_derivative(optima, optimum, rates.left, rates.right), {}};
-  if (!agree(result.value, noise)) {
-    result.why_not = why_not_regular(optimum, name);
-    if (result.why_not.empty()) {
-      result.why_not = "a row that holds the bound has a kink, or comes to couple parameters that the log keeps apart";
-    }
-  }
-  return result;
-}
-
-ParameterDerivative join(const Derived& lower, const Derived& upper, const LocalInput& input, double width) {
+ParameterDerivative join(const BoundRate& lower, const BoundRate& upper, const LocalInput& input, double width) {
   ParameterDerivative d;
   d.lower = lower.value;
   d.upper = upper.value;
@@ -105,20 +68,18 @@ LocalSensitivity local_derivatives(LogSource& log, const Commissioning& c, const
     result.notes.emplace_back("the feasible set is empty: there are no bounds whose derivatives could be taken");
     return result;
   }
-  if (c.feasible.sign_parts > 1 || c.feasible.convexified) {
+  const auto is_union = [](const FeasibleSet& set) { return set.sign_parts > 1 || set.convexified; };
+  if (is_union(c.feasible) || std::ranges::any_of(c.earlier, is_union, &EarlierSet::set)) {
     result.notes.emplace_back(
         "signs of parameters with noisy columns are open: the set is a union of parts, and derivatives of its bounds "
         "are not offered");
     return result;
   }
   const RobotAt at{c.model.robot, c.model.filter};
-  HullOptima optima = hull_optima(*c.feasible.polytope, c.prior);
-  {
-    RegressionStream rows = rows_of(log, c, at, options.confidence);
-    add_active_rows(optima, rows, c.dropped);
-  }
-  const LogRows wanted = active_rows(optima);
-  result.notes.emplace_back("instants, columns, parameters and outliers left out are held as commissioning chose them");
+  const std::vector<BoundPass> passes = bound_passes(log, c, options.confidence);
+  const HullOptima& optima = passes.back().optima;
+  result.notes.emplace_back(
+      "instants, columns, parameters, outliers left out and the number of passes are held as commissioning chose them");
   if (!noise_is_declared(c)) {
     result.notes.emplace_back(
         "noise is estimated from the log: the rows' error bounds are held fixed, how the estimate itself follows an "
@@ -129,42 +90,13 @@ LocalSensitivity local_derivatives(LogSource& log, const Commissioning& c, const
   for (const std::string& name : names) {
     const LocalInput input = local_input(at, model, name);
     LocalDerivative derivative{input.name, input.unit, input.value, {}};
-    const double step = options.step * std::abs(input.value);
-    LogRows before, after;
-    Box prior_before, prior_after;
-    if (!input.prior) {
-      check::that(step > 0.0, "input " + name, "a value other than 0");
-      const RobotAt low = with_input(at, input, input.value - step), high = with_input(at, input, input.value + step);
-      before = rows_at(log, c, low, options.confidence, wanted);
-      after = rows_at(log, c, high, options.confidence, wanted);
-      prior_before = prior_of(low.robot);
-      prior_after = prior_of(high.robot);
-    }
+    const BoundRates rates = bound_rates(log, c, passes, input, options.step, options.confidence);
     for (std::size_t j = 0; j < model.p(); ++j) {
-      const double width = result.upper[j] - result.lower[j];
-      const double noise = 1e-9 * width / (input.value != 0.0 ? std::abs(input.value) : 1.0);
-      const auto derived = [&](const HullOptimum& optimum) {
-        if (!input.prior) {
-          return derive(optima, optimum,
-                        row_rates(optima, optimum, input, step, before, prior_before, after, prior_after), noise,
-                        result.parameters[j]);
-        }
-        const auto of = std::ranges::find(model.parameters, input.prior->parameter, &Parameter::physical);
-        const auto k = static_cast<std::size_t>(of - model.parameters.begin());
-        Derived d = derive(optima, optimum, prior_rates(optimum, *input.prior, of->per_physical, k), noise,
-                           result.parameters[j]);
-        if (name.ends_with(".lower") && sign_opens(optimum, c.prior, k)) {
-          d.value.left = kNan;
-          d.why_not =
-              fmt::format("the prior's lower side of {} is 0 and is met: below it, a sign is open", of->physical);
-        }
-        return d;
-      };
-      derivative.parameters.push_back(join(derived(optima.lower[j]), derived(optima.upper[j]), input, width));
+      derivative.parameters.push_back(join(rates.lower[j], rates.upper[j], input, result.upper[j] - result.lower[j]));
     }
     result.inputs.push_back(std::move(derivative));
   }
-  result.optima = std::move(optima);
+  result.optima = optima;
   log.rewind();
   return result;
 }

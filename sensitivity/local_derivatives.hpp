@@ -3,9 +3,9 @@
 /// What a bound gains or loses per unit of an input of the robot file: exact, at the point where one stands.
 ///
 /// The rows that hold a bound are smooth functions of an input; their multipliers turn the rows' rates into the bound's
-/// (hull_derivatives.hpp). No linear program over the log is solved again: per input, the log is walked twice, for all
-/// bounds at once. Everything that commissioning chose from the log stays as it chose it: columns, filter (but for the
-/// input itself), parameters, instants, outliers left out.
+/// (hull_derivatives.hpp), pass by pass of commissioning (bound_rates.hpp). No linear program over the log is solved again:
+/// per input and pass, the log is walked twice, for all bounds at once. Everything that commissioning chose from the log
+/// stays as it chose it: columns, filter (but for the input itself), parameters, instants, outliers left out, passes.
 #pragma once
 
 #include <optional>

@@ -16,15 +16,15 @@ constexpr double kNoise = 1e-6;   // of a rate, in sizes of the set per relative
 constexpr double kJump = 1e3;     // beyond this, in the same unit, a row jumps
 
 // The active half-space `row` where the input has been moved; nothing where it is gone.
-std::optional<HalfSpace> moved(const HalfSpace& row, const LogRows& rows, const Box& prior) {
+std::optional<HalfSpace> moved(const HalfSpace& row, const RowsBeside& beside) {
   HalfSpace result = row;
   if (row.origin.is_prior) {
-    const Interval& side = prior.sides[row.origin.parameter];
+    const Interval& side = beside.prior.sides[row.origin.parameter];
     result.b = row.origin.side == Side::upper ? side.upper : -side.lower;
     return result;
   }
-  const auto at = rows.find({row.origin.sample, row.origin.output});
-  if (at == rows.end()) {
+  const auto at = beside.rows.find({row.origin.sample, row.origin.output});
+  if (at == beside.rows.end()) {
     return std::nullopt;
   }
   return row.origin.side == Side::upper ? at->second.upper : at->second.lower;
@@ -42,7 +42,18 @@ bool noise_is_declared(const Commissioning& c) {
 
 Box prior_of(const Robot& robot) { return Box{prior_box(robot, make_model(robot)).bounds}; }
 
-RegressionStream rows_of(LogSource& log, const Commissioning& c, const RobotAt& at, double confidence) {
+MotionBound motion_at(const Commissioning& c, const RobotAt& at, std::span<const Interval> sides) {
+  const Model model = make_model(at.robot);
+  const Measurement& measurement = c.model.measurement;
+  MotionBound bound = sides.empty() ? MotionBound{} : motion_bound(model, sides);
+  bound.limit = coordinate_limit(
+      model, acceleration_limit(at.robot, c.survey, measurement.motion,
+                                noise_budget(at.robot, measurement).sensors.motion));
+  return bound;
+}
+
+RegressionStream rows_of(LogSource& log, const Commissioning& c, const RobotAt& at, const MotionBound& motion,
+                         double confidence) {
   const Model model = make_model(at.robot);
   const Measurement& measurement = c.model.measurement;
   SignalErrors errors = c.row_errors;
@@ -52,9 +63,8 @@ RegressionStream rows_of(LogSource& log, const Commissioning& c, const RobotAt& 
                         .confidence = confidence,
                         .rows = static_cast<double>(c.survey.rows),
                         .largest_step = c.survey.largest_step});
-    // What happens between samples is bounded as it was when the set was made.
     const Eigen::VectorXd effort = errors.motion.effort;
-    errors.motion = c.row_errors.motion;
+    errors.motion = motion;
     errors.motion.effort = effort;
   }
   FilterDesign filter = at.filter;
@@ -63,9 +73,8 @@ RegressionStream rows_of(LogSource& log, const Commissioning& c, const RobotAt& 
   return RegressionStream(log, RegressorFilter(model, filter, measurement, errors));
 }
 
-LogRows rows_at(LogSource& log, const Commissioning& c, const RobotAt& at, double confidence, const LogRows& wanted) {
-  const SlabRows slabs(prior_of(at.robot));
-  RegressionStream rows = rows_of(log, c, at, confidence);
+LogRows pick_rows(RegressionSource& rows, const Box& prior, const LogRows& wanted) {
+  const SlabRows slabs(prior);
   LogRows found;
   RegressionBlock block;
   rows.rewind();
@@ -84,12 +93,13 @@ LogRows rows_at(LogSource& log, const Commissioning& c, const RobotAt& at, doubl
 
 LogRows active_rows(const HullOptima& optima) {
   LogRows rows;
-  for (const auto* side : {&optima.lower, &optima.upper}) {
-    for (const HullOptimum& optimum : *side) {
+  for (const auto* bounds : {&optima.lower, &optima.upper}) {
+    for (const HullOptimum& optimum : *bounds) {
       for (const WeightedRow& active : optimum.active) {
         const RowOrigin& origin = active.row.origin;
         if (!origin.is_prior) {
-          rows[{origin.sample, origin.output}];
+          RowSides& both = rows[{origin.sample, origin.output}];
+          (origin.side == Side::upper ? both.upper : both.lower) = active.row;
         }
       }
     }
@@ -97,12 +107,12 @@ LogRows active_rows(const HullOptima& optima) {
   return rows;
 }
 
-RowRates row_rates(const HullOptima& optima, const HullOptimum& optimum, const LocalInput& input, double step,
-                   const LogRows& before, const Box& prior_before, const LogRows& after, const Box& prior_after) {
+RowRates row_rates(const HullOptima& optima, const HullOptimum& optimum, double reach, double step,
+                   const RowsBeside& below, const RowsBeside& above, bool curved) {
   RowRates rates;
   const Polytope::Block& block = optima.set.blocks()[optimum.block];
   for (const WeightedRow& active : optimum.active) {
-    const auto low = moved(active.row, before, prior_before), high = moved(active.row, after, prior_after);
+    const auto low = moved(active.row, below), high = moved(active.row, above);
     if (!low || !high) {
       rates.trouble = row_in_words(active.row.origin) + " is there on one side of the value only";
       return rates;
@@ -114,33 +124,18 @@ RowRates row_rates(const HullOptima& optima, const HullOptimum& optimum, const L
       const double a = active.row.a[static_cast<Eigen::Index>(block.parameters[k])];
       size = std::hypot(size, a * block.coordinates.transform.row(static_cast<Eigen::Index>(k)).norm());
     }
-    const double scale = size / std::abs(input.value);
-    if (std::abs(g_left - g_right) <= kSmooth * (std::abs(g_left) + std::abs(g_right)) + kNoise * scale) {
+    const double scale = size / reach;
+    const double curvature = curved ? kSmooth * (std::abs(g_left) + std::abs(g_right)) : 0.0;
+    if (std::abs(g_left - g_right) <= curvature + kNoise * scale) {
       rates.left.push_back(rate(*low, *high, 2.0 * step));
       rates.right.push_back(rates.left.back());
-    } else if (std::abs(g_left - g_right) > kJump * scale) {
+    } else if (!active.row.origin.is_prior && std::abs(g_left - g_right) > kJump * scale) {
       rates.trouble = row_in_words(active.row.origin) + " jumps";
       return rates;
     } else {
       rates.left.push_back(left);
       rates.right.push_back(right);
     }
-  }
-  return rates;
-}
-
-RowRates prior_rates(const HullOptimum& optimum, const PriorRate& prior, double per_physical, std::size_t parameter) {
-  RowRates rates;
-  for (const WeightedRow& active : optimum.active) {
-    const RowOrigin& origin = active.row.origin;
-    RowRate left, right;
-    if (origin.is_prior && origin.parameter == parameter) {
-      const bool upper = origin.side == Side::upper;
-      left.b = per_physical * (upper ? prior.upper_left : -prior.lower_left);
-      right.b = per_physical * (upper ? prior.upper_right : -prior.lower_right);
-    }
-    rates.left.push_back(std::move(left));
-    rates.right.push_back(std::move(right));
   }
   return rates;
 }

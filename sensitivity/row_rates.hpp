@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <map>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -24,6 +25,12 @@ struct RowSides {
 /// Some rows of a log, by sample and output.
 using LogRows = std::map<std::pair<std::size_t, std::size_t>, RowSides>;
 
+/// Rows and prior where an input has been moved.
+struct RowsBeside {
+  LogRows rows;
+  Box prior;
+};
+
 /// How the active rows of an optimum move, to both sides of an input's value; one rate for each.
 struct RowRates {
   std::vector<RowRate> left, right;
@@ -36,27 +43,28 @@ struct RowRates {
 /// The prior box of θ.
 [[nodiscard]] Box prior_of(const Robot& robot);
 
+/// How fast the motion of the robot `at` can change between samples, for rows that stand on declared noise: by the limit
+/// of its accelerations and, where there are `sides` (p), by the dynamics with all parameters inside them.
+[[nodiscard]] MotionBound motion_at(const Commissioning& commissioning, const RobotAt& at,
+                                    std::span<const Interval> sides);
+
 /// The rows of `log` for the robot and filter `at`, all else as `commissioning` chose it: the same columns and instants;
-/// errors are propagated anew where noise is declared, else they stay. `confidence` as CommissionOptions has it.
+/// errors are propagated anew where noise is declared, with `motion` between samples, else they stay. `confidence` as
+/// CommissionOptions has it.
 [[nodiscard]] RegressionStream rows_of(LogSource& log, const Commissioning& commissioning, const RobotAt& at,
-                                       double confidence);
+                                       const MotionBound& motion, double confidence);
 
-/// The half-spaces that the rows named in `wanted` are for `at`; those that are not there are left out.
-[[nodiscard]] LogRows rows_at(LogSource& log, const Commissioning& commissioning, const RobotAt& at, double confidence,
-                              const LogRows& wanted);
+/// The half-spaces that the rows named in `wanted` are in the box `prior`; those that are not there are left out.
+[[nodiscard]] LogRows pick_rows(RegressionSource& rows, const Box& prior, const LogRows& wanted);
 
-/// The names of all rows that are active at an optimum.
+/// The rows of the log that are active at an optimum, with the sides that are.
 [[nodiscard]] LogRows active_rows(const HullOptima& optima);
 
 /// Rates of the active rows of `optimum` by differences, from their half-spaces at the input's value and by `step` below
-/// and above it: central where a row is smooth, one-sided where it has a kink there. None where a row jumps or is gone.
-[[nodiscard]] RowRates row_rates(const HullOptima& optima, const HullOptimum& optimum, const LocalInput& input,
-                                 double step, const LogRows& before, const Box& prior_before, const LogRows& after,
-                                 const Box& prior_after);
-
-/// Rates where only the sides of the prior of one parameter move: `parameter` its number, `per_physical` the unit of θ in
-/// that of the physical quantity.
-[[nodiscard]] RowRates prior_rates(const HullOptimum& optimum, const PriorRate& prior, double per_physical,
-                                   std::size_t parameter);
+/// and above it: central where a row is smooth, one-sided where it has a kink there. None where a row of the log jumps or
+/// is gone; `reach` is a large change of the input, by which that is judged. Rates to both sides that differ by less than
+/// 1e-3 of them are a curvature where `curved`, else a kink too.
+[[nodiscard]] RowRates row_rates(const HullOptima& optima, const HullOptimum& optimum, double reach, double step,
+                                 const RowsBeside& below, const RowsBeside& above, bool curved);
 
 }  // namespace wheelwright

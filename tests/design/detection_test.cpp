@@ -123,11 +123,11 @@ TEST(Detection, WhatCannotBeCertainHasASlope) {
   const DesignSubject subject = subject_of(p.model);
   std::vector<InspectedFault> faults = radii(p.model);
   faults.resize(1);
-  // Too slow for any radius of this range to be certain: the faster plan is nearer to it.
+  // Too slow, ahead and in turning, for any radius of this range to be certain: the faster plan is nearer to it.
   faults[0].fault.range = {0.0, 0.02};
   const ThresholdRule rule(Polytope(p.model.facets, p.model.box), p.model.estimate);
   const PlanObjective objective = certain_detection(subject, rule, faults);
-  const Plan slow = plan_of(FigureEight{0.05, 6.0}, subject, 6.0, 0.02),
+  const Plan slow = plan_of(FigureEight{0.05, 12.0}, subject, 6.0, 0.02),
              fast = plan_of(FigureEight{0.2, 6.0}, subject, 6.0, 0.02);
   EXPECT_EQ(promised_faults(slow, subject, rule, faults)[0].smallest, kInfinity);
   EXPECT_GT(objective(slow), 1e6);
@@ -168,7 +168,8 @@ TEST(Detection, OnlyFaultsThatAreThereInFullAreInspected) {
   EXPECT_LT(promised(p, plan, {}, {find_fault(catalogue, "encoder_frozen_left"), 1.0}), kInfinity);
 }
 
-// Slip that was there before the drive adds its friction, and no impulse of the mass: c(1 − e^{−βt}(1 + βt)) for order 2.
+// Slip that was there before the drive adds its friction, and no impulse of the mass: the sum over the samples of the
+// smoothed f₂ (kernel.hpp), f₂ * γe^{−γx} = α²γ/(γ − β)·(x e^{−βx} − (e^{−βx} − e^{−γx})/(γ − β)).
 TEST(Detection, AFaultThatWasThereBeforeDoesNotJump) {
   const Prepared p = prepared();
   const DesignSubject subject = subject_of(p.model);
@@ -177,12 +178,18 @@ TEST(Detection, AFaultThatWasThereBeforeDoesNotJump) {
   FaultFilter rows(find_fault(fault_catalogue(p.model.model, p.model.estimate), "matched"), subject.model, f, motion);
   rows.begin_broken(0);
   ASSERT_EQ(f.order, 2);
+  ASSERT_NE(motion.kind, MotionKind::speed);
+  const double h = 0.02, gamma = 2.0 / h, apart = gamma - f.beta;
+  double sum = 0.0;
   while (rows.next()) {
-    const double x = f.beta * (motion.instant[rows.instant()] - motion.instant.front());
+    const double x = motion.instant[rows.instant()] - motion.instant.front();
+    sum += h * f.alpha * f.alpha * gamma / apart *
+           (x * std::exp(-f.beta * x) - (std::exp(-f.beta * x) - std::exp(-gamma * x)) / apart);
     const FaultRow row = rows.row(0);
     EXPECT_EQ(row.g1[0], 0.0);
-    EXPECT_NEAR(row.g1[2], f.static_gain() * (1.0 - std::exp(-x) * (1.0 + x)), 1e-9);
+    EXPECT_NEAR(row.g1[2], sum, 1e-9);
   }
+  EXPECT_NEAR(sum, f.static_gain(), 1e-3);
 }
 
 TEST(Detection, SaysWhichFaultCannotBeInspected) {

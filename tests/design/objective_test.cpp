@@ -82,6 +82,43 @@ TEST(Promise, PlannedRowsAreWithoutResidualAndCarryTheDeclaredNoise) {
   EXPECT_GT(rows.dY.maxCoeff(), 0.0);
 }
 
+// What efforts may do between two samples is planned for, by the efforts that the plan needs.
+TEST(Promise, EffortsThatChangeBetweenSamplesCost) {
+  Robot robot = small_robot();
+  robot.effort_changes = EffortChanges::between;
+  const DesignSubject known = subject(), doubtful = subject_of(robot, 0.02);
+  const Plan plan = plan_of({0.4, 6.0}, known, 12.0, 0.02);
+  const RegressionBlock a = planned_rows(plan, known), b = planned_rows(plan, doubtful);
+  ASSERT_EQ(a.instants(), b.instants());
+  EXPECT_TRUE(((b.dy - a.dy).array() >= 0.0).all());
+  EXPECT_GT((b.dy - a.dy).maxCoeff(), 0.1 * a.dy.minCoeff());
+  const Box promised = promised_bounds(a, known), less = promised_bounds(b, doubtful);
+  for (std::size_t j = 0; j < 4; ++j) {
+    EXPECT_LT(promised.sides[j].upper - promised.sides[j].lower, less.sides[j].upper - less.sides[j].lower) << j;
+  }
+}
+
+// A plan may be looked at with longer steps than the log to come will have: the rows are those of the same motion.
+TEST(Promise, ACoarserLookSeesTheSameMotion) {
+  const DesignSubject s = subject_of(small_robot(), 0.005);
+  const RegressionBlock fine = planned_rows(plan_of({0.4, 6.0}, s, 12.0, 0.005), s),
+                        coarse = planned_rows(plan_of({0.4, 6.0}, s, 12.0, 0.02), s);
+  ASSERT_GT(coarse.instants(), 500U);
+  const double scale = fine.Y.cwiseAbs().maxCoeff();
+  std::size_t k = 0, compared = 0;
+  for (std::size_t c = 0; c < coarse.instants(); ++c) {
+    while (k + 1 < fine.instants() && fine.t[k] < coarse.t[c] - 1e-9) {
+      ++k;
+    }
+    if (std::abs(fine.t[k] - coarse.t[c]) < 1e-9) {
+      const auto i = static_cast<Eigen::Index>(2 * c), j = static_cast<Eigen::Index>(2 * k);
+      EXPECT_LT((coarse.Y.middleRows(i, 2) - fine.Y.middleRows(j, 2)).cwiseAbs().maxCoeff(), 0.1 * scale);
+      ++compared;
+    }
+  }
+  EXPECT_GT(compared, 500U);
+}
+
 TEST(Promise, CriteriaOfWidths) {
   const Eigen::Vector3d widths(1.0, 4.0, 16.0);
   EXPECT_NEAR(combined(widths, WidthCriterion::geometric_mean), 4.0, 1e-12);

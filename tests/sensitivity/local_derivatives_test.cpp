@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include <wheelwright/commission/setting.hpp>
+#include <wheelwright/commission/commission.hpp>
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/sensitivity/local_derivatives.hpp>
 
@@ -58,15 +58,13 @@ Robot with(Robot robot, const std::string& input, double x) {
   return robot;
 }
 
-// Both bounds of all parameters, by setting everything anew.
+// Both bounds of all parameters, by commissioning anew.
 std::vector<double> bounds(LogSource& log, const Robot& robot) {
-  const Setting setting = settle(log, robot);
-  RegressionStream rows = make_rows(log, setting, setting.declared);
-  const FeasibleSet set = feasible_set(rows, setting.prior);
-  EXPECT_EQ(set.status, FeasibleSet::Status::nonempty);
+  const Commissioning result = commission(log, robot);
+  EXPECT_EQ(result.status, Commissioning::Status::done) << result.message;
   std::vector<double> all;
-  for (const Interval& side : set.hull.sides) {
-    all.insert(all.end(), {side.lower, side.upper});
+  for (const ParameterResult& p : result.parameters) {
+    all.insert(all.end(), {p.lower, p.upper});
   }
   return all;
 }
