@@ -21,8 +21,9 @@ namespace wheelwright {
 /// f₂ * τ: Model::input · efforts as the log holds them (held or linear), one signal per output.
 [[nodiscard]] std::vector<Eigen::VectorXd> filtered_outputs(const Drive& drive, double beta);
 
-/// The base regressor f₂ * Y, [parameter][output]; an empty vector stands for a signal of zeros. Equal to the rows of
-/// RegressorFilter (order 2, α = β) on the same evenly sampled log.
+/// The base regressor f₂ * Y, [parameter][output]; an empty vector stands for a signal of zeros. RegressorFilter (order 2,
+/// α = β) weighs the same motion by means of f₂, so that the rows differ by (βh)² in relation; for angles its instants are
+/// half a step later.
 [[nodiscard]] std::vector<std::vector<Eigen::VectorXd>> filtered_regressor(const Drive& drive, double beta);
 
 /// Rows after `memory`/β from the start of their segment, whose filter has forgotten what was before.

@@ -35,7 +35,7 @@ Measurement read_measurement(const JsonPlace& place, const Model& model, const R
   m.effort_unsigned = place.at("effort_unsigned").boolean();
   m.count = place.at("count").number();
   m.nominal_step = place.at("nominal_step").number();
-  m.shortest_step = place.has("shortest_step") ? place.at("shortest_step").number() : 0.0;
+  m.shortest_step = place.at("shortest_step").number();
   m.changes = robot.effort_changes;
   m.delay = robot.effort_delay;
   m.correction = effort_correction(robot);
@@ -45,12 +45,12 @@ Measurement read_measurement(const JsonPlace& place, const Model& model, const R
   return m;
 }
 
-/// What bounds motion and efforts between samples: nothing in models that were written before there was such a thing.
+/// What bounds motion and efforts between samples; null where nothing does.
 void read_between_samples(const JsonPlace& place, const Model& model, SignalErrors& errors) {
-  if (!place.has("between_samples") || place.at("between_samples").value().is_null()) {
+  const JsonPlace between = place.at("between_samples");
+  if (between.value().is_null()) {
     return;
   }
-  const JsonPlace between = place.at("between_samples");
   errors.between_samples = true;
   MotionBound& bound = errors.motion;
   bound.limit = vector_at(between.at("acceleration"));

@@ -102,8 +102,10 @@ TEST(Recovery, CommissioningGivesTheSameAndBoundsTheTruth) {
         const double theta = truth[static_cast<Eigen::Index>(j)];
         ASSERT_TRUE(p.estimate.has_value());
         EXPECT_NEAR(*p.estimate, theta, 1e-3 * theta) << p.parameter.name;
-        EXPECT_LE(p.lower, theta) << p.parameter.name << " of log " << static_cast<int>(shown) << static_cast<int>(hold);
-        EXPECT_GE(p.upper, theta) << p.parameter.name << " of log " << static_cast<int>(shown) << static_cast<int>(hold);
+        EXPECT_LE(p.lower, theta) << p.parameter.name << " of log " << static_cast<int>(shown)
+                                  << static_cast<int>(hold);
+        EXPECT_GE(p.upper, theta) << p.parameter.name << " of log " << static_cast<int>(shown)
+                                  << static_cast<int>(hold);
       }
     }
   }
