@@ -146,8 +146,8 @@ void find_scattered_stamps(LogSource& log, const Setting& s, std::vector<LogCont
   while (log.next(block)) {
     for (std::size_t k = 0; k < block.rows(); ++k) {
       const double t = block.t[k];
-      const bool starts = std::ranges::binary_search(block.segment_starts, k) ||
-                          (known > 0 && longest > 0.0 && t - t_middle > longest);
+      const bool starts =
+          std::ranges::binary_search(block.segment_starts, k) || (known > 0 && longest > 0.0 && t - t_middle > longest);
       known = starts ? 0 : known;
       if (known >= 2) {
         const double a = t_middle - t_before, b = t - t_middle;
@@ -174,14 +174,15 @@ void find_scattered_stamps(LogSource& log, const Setting& s, std::vector<LogCont
   log.rewind();
   const double ratio = by_stamp > 0.0 ? std::sqrt(by_row / by_stamp) : 1.0;
   if (looked >= kFewestHalf && ratio < kSmoother) {
-    out.push_back({.kind = Kind::stamps_scatter,
-                   .subject = "t",
-                   .value = ratio,
-                   .limit = kSmoother,
-                   .sentence = fmt::format("the motion is {:.2g} times as rough over the stamps as over the row numbers: "
-                                           "the samples are even, their stamps scatter",
-                                           1.0 / std::max(ratio, std::numeric_limits<double>::min())),
-                   .next = "stamp samples where they are taken, or number them: times that go up by the cycle's length"});
+    out.push_back(
+        {.kind = Kind::stamps_scatter,
+         .subject = "t",
+         .value = ratio,
+         .limit = kSmoother,
+         .sentence = fmt::format("the motion is {:.2g} times as rough over the stamps as over the row numbers: "
+                                 "the samples are even, their stamps scatter",
+                                 1.0 / std::max(ratio, std::numeric_limits<double>::min())),
+         .next = "stamp samples where they are taken, or number them: times that go up by the cycle's length"});
   }
 }
 
@@ -421,8 +422,8 @@ void find_dry_friction(LogSource& log, const Setting& s, std::vector<LogContradi
   if (std::ranges::any_of(s.model.parameters, is_dry) || std::ranges::none_of(wide.model.parameters, is_dry)) {
     return;
   }
-  const auto at = static_cast<Eigen::Index>(std::ranges::find_if(wide.model.parameters, is_dry) -
-                                            wide.model.parameters.begin());
+  const auto at =
+      static_cast<Eigen::Index>(std::ranges::find_if(wide.model.parameters, is_dry) - wide.model.parameters.begin());
   RegressionStream rows = make_rows(log, wide, errors_of_fit(wide));
   const Eigen::VectorXd weights = efficient_weights(moments(rows));
   rows.rewind();
@@ -440,16 +441,17 @@ void find_dry_friction(LogSource& log, const Setting& s, std::vector<LogContradi
     return;
   }
   const InWords w = in_words(wide, static_cast<std::size_t>(at));
-  out.push_back({.kind = Kind::dry_friction,
-                 .withdraws = false,
-                 .demotes = true,
-                 .subject = "coulomb",
-                 .value = w.value(estimate),
-                 .limit = w.value(certain(summary.freedom) * error),
-                 .sentence = fmt::format("the efforts follow the sign of the motion as by dry friction of {:.3g} ± {:.2g} "
-                                         "{}, which the model does not have",
-                                         w.value(estimate), 2.0 * std::abs(w.scale) * error, w.unit),
-                 .next = "give the model `coulomb` (`parameters:` in the robot file)"});
+  out.push_back(
+      {.kind = Kind::dry_friction,
+       .withdraws = false,
+       .demotes = true,
+       .subject = "coulomb",
+       .value = w.value(estimate),
+       .limit = w.value(certain(summary.freedom) * error),
+       .sentence = fmt::format("the efforts follow the sign of the motion as by dry friction of {:.3g} ± {:.2g} "
+                               "{}, which the model does not have",
+                               w.value(estimate), 2.0 * std::abs(w.scale) * error, w.unit),
+       .next = "give the model `coulomb` (`parameters:` in the robot file)"});
 }
 
 // Least squares on each half of the log's rows.
@@ -684,7 +686,8 @@ std::optional<Reach> reach_of(const LogContradiction& c, const Commissioning& re
 }
 
 bool is_weighed(const LogContradiction& c) {
-  return c.kind == Kind::effort_timing || (c.withdraws && (c.kind == Kind::wrong_sign || c.kind == Kind::estimate_outside));
+  return c.kind == Kind::effort_timing ||
+         (c.withdraws && (c.kind == Kind::wrong_sign || c.kind == Kind::estimate_outside));
 }
 
 }  // namespace
@@ -706,7 +709,8 @@ void weigh_contradictions(Commissioning& result, const Setting& s, const Fit& fi
     }
     if (c.kind == Kind::effort_timing) {
       if (timing) {
-        const double chance = std::max(certain(timing->freedom) * timing->standard_error, kLeastShift * s.survey.median_step);
+        const double chance =
+            std::max(certain(timing->freedom) * timing->standard_error, kLeastShift * s.survey.median_step);
         weigh(c, timing->beyond(), chance, explained.in_doubt[p], explained.noise[p]);
       }
     } else if (const auto reach = reach_of(c, result, fit)) {
@@ -715,9 +719,8 @@ void weigh_contradictions(Commissioning& result, const Setting& s, const Fit& fi
             explained.in_doubt[at], explained.noise[at]);
     }
   }
-  std::erase_if(result.contradictions, [](const LogContradiction& c) {
-    return c.kind == Kind::effort_timing && !c.withdraws && !c.demotes;
-  });
+  std::erase_if(result.contradictions,
+                [](const LogContradiction& c) { return c.kind == Kind::effort_timing && !c.withdraws && !c.demotes; });
 }
 
 void weigh_efforts(LogSource& log, const Setting& s, const SignalErrors& errors, const Box& box,

@@ -12,9 +12,9 @@ namespace wheelwright {
 struct LogContradiction {
   /// What contradicts what.
   enum class Kind {
-    effort_constant,   ///< an effort has one value in every row although its joint moves
-    angle_wrapped,     ///< an angle jumps by a whole turn between two rows
-    stamps_scatter,    ///< the motion is smoother over row numbers than over the stamps: these scatter, the samples do not
+    effort_constant,  ///< an effort has one value in every row although its joint moves
+    angle_wrapped,    ///< an angle jumps by a whole turn between two rows
+    stamps_scatter,  ///< the motion is smoother over row numbers than over the stamps: these scatter, the samples do not
     effort_unrelated,  ///< an effort that motion does not explain at all
     effort_timing,     ///< efforts late or early against the motion, beyond what is declared
     wheels_disagree,   ///< the efforts of two joints do not show one and the same mass

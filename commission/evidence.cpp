@@ -22,8 +22,7 @@ Eigen::VectorXd shift_column(const RegressionBlock& rows, const Eigen::VectorXd&
       continue;
     }
     const auto at = static_cast<Eigen::Index>(k) * n;
-    column.segment(at, n) =
-        (torque.segment(at - n, n) - torque.segment(at + n, n)) / (rows.t[k + 1] - rows.t[k - 1]);
+    column.segment(at, n) = (torque.segment(at - n, n) - torque.segment(at + n, n)) / (rows.t[k + 1] - rows.t[k - 1]);
   }
   return column;
 }
@@ -115,8 +114,8 @@ Explained explained_by_errors(LogSource& log, const Setting& s, const Fit& fit, 
   g.col(fitted) = square > 0.0 ? (left / square).eval() : Eigen::VectorXd::Zero(rows.rows()).eval();
   g.array().colwise() *= weight.array();
 
-  const Eigen::VectorXd doubt = (bounded.dY + (bounded.Y - rows.Y).cwiseAbs()) * largest + bounded.dy +
-                                (bounded.y - rows.y).cwiseAbs();
+  const Eigen::VectorXd doubt =
+      (bounded.dY + (bounded.Y - rows.Y).cwiseAbs()) * largest + bounded.dy + (bounded.y - rows.y).cwiseAbs();
   const Eigen::VectorXd in_doubt = g.cwiseAbs().transpose() * doubt;
   ErrorInfluence influence(s.model, s.filter, s.measurement, noise_budget(s.robot, s.measurement).sensors, theta,
                            fitted + 1);

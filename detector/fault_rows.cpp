@@ -261,10 +261,11 @@ void FaultFilter::widen(const FaultSignals& begin, const FaultSignals& end, bool
     // What a gain does beyond its onset is in gain_.
     using Joints = Eigen::MatrixXd;
     const Joints jump = (to_joints_ * (first - from)).cwiseAbs(), on = (to_joints_ * (last - first)).cwiseAbs();
-    return Joints(0.5 * steps * h * (input * (gain_only_ ? (sets_in ? Joints(jump + on) : Joints(0.0 * on)) : jump + on)));
+    return Joints(0.5 * steps * h *
+                  (input * (gain_only_ ? (sets_in ? Joints(jump + on) : Joints(0.0 * on)) : jump + on)));
   };
-  const Eigen::MatrixXd g = change([](const FaultSignals& s) { return s.g1; }) +
-                            change([](const FaultSignals& s) { return s.g2; });
+  const Eigen::MatrixXd g =
+      change([](const FaultSignals& s) { return s.g1; }) + change([](const FaultSignals& s) { return s.g2; });
   const Eigen::MatrixXd c = change([](const FaultSignals& s) { return s.c; });
   std::size_t at = 0;
   const auto advance = [&](double by) {

@@ -104,10 +104,10 @@ class FaultFilter final : public FaultRows {
   Point before_;
   std::vector<KernelState> cascades_;  // g1, g2, s, c one after the other
   FaultSignals filtered_;
-  bool gain_only_ = false;      // a fault of an effort's gain, and nothing else
-  Eigen::VectorXd gain_;        // per output: by how much it widens what is in doubt of efforts
-  Eigen::MatrixXd to_joints_;   // efforts of the joints from those of the outputs
-  FaultSignals last_;           // the signature before this step
+  bool gain_only_ = false;            // a fault of an effort's gain, and nothing else
+  Eigen::VectorXd gain_;              // per output: by how much it widens what is in doubt of efforts
+  Eigen::MatrixXd to_joints_;         // efforts of the joints from those of the outputs
+  FaultSignals last_;                 // the signature before this step
   std::vector<KernelState> widened_;  // n × p of range_, then n of c
   RowMatrix range_;
   Eigen::VectorXd widened_c_;

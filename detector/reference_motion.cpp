@@ -109,9 +109,8 @@ ReferenceMotion read_reference(LogSource& log, RegressorFilter filter) {
   motion.rows.dy = Eigen::Map<const Eigen::VectorXd>(dy.data(), rows);
   motion.between_dY = errors.between_samples ? (motion.rows.dY - sensors.replicate(k, 1)).cwiseMax(0.0).eval()
                                              : RowMatrix::Zero(rows, columns).eval();
-  motion.between_dy = errors.between_samples
-                          ? (motion.rows.dy - errors.output.replicate(k, 1)).cwiseMax(0.0).eval()
-                          : Eigen::VectorXd::Zero(rows).eval();
+  motion.between_dy = errors.between_samples ? (motion.rows.dy - errors.output.replicate(k, 1)).cwiseMax(0.0).eval()
+                                             : Eigen::VectorXd::Zero(rows).eval();
   return motion;
 }
 

@@ -32,9 +32,9 @@ struct ReferenceMotion {
   std::vector<bool> settled;            ///< K: whether a detector decides at this instant, whatever the noise
   std::vector<std::size_t> segment_starts;  ///< ascending instants at which a segment begins
   RegressionBlock rows;                     ///< K instants: Y_f of the motion, with the bounds dY, dy of the sensors
-  RowMatrix between_dY;                     ///< of dY what motion may do between samples: it grows with the efforts; empty: nothing
-  Eigen::VectorXd between_dy;               ///< of dy what efforts may do between samples, alike
-  std::size_t effort_reach = 0;             ///< steps in which an effort's sample counts for dy; 0: efforts are known
+  RowMatrix between_dY;        ///< of dY what motion may do between samples: it grows with the efforts; empty: nothing
+  Eigen::VectorXd between_dy;  ///< of dy what efforts may do between samples, alike
+  std::size_t effort_reach = 0;  ///< steps in which an effort's sample counts for dy; 0: efforts are known
 
   /// Number of instants K.
   [[nodiscard]] std::size_t instants() const { return t.size(); }

@@ -53,8 +53,9 @@ void ErrorInfluence::count(double h) {
   rate_ = speed_ * now_ - acceleration_ * (later_ - now_) / h;
   const RowMatrix effort = input_.transpose() * now_;
   const RowMatrix motion = motion_.transpose() * (angles_ ? RowMatrix(rate_later_ - rate_) : RowMatrix(h * rate_));
-  value_ += (sensors_.effort * h * effort.cwiseAbs().colwise().sum() + sensors_.motion * motion.cwiseAbs().colwise().sum())
-                .transpose();
+  value_ +=
+      (sensors_.effort * h * effort.cwiseAbs().colwise().sum() + sensors_.motion * motion.cwiseAbs().colwise().sum())
+          .transpose();
 }
 
 void ErrorInfluence::add(const RegressionBlock& rows, const RowMatrix& g) {

@@ -46,9 +46,8 @@ MotionBound motion_at(const Commissioning& c, const RobotAt& at, std::span<const
   const Model model = make_model(at.robot);
   const Measurement& measurement = c.model.measurement;
   MotionBound bound = sides.empty() ? MotionBound{} : motion_bound(model, sides);
-  bound.limit = coordinate_limit(
-      model, acceleration_limit(at.robot, c.survey, measurement.motion,
-                                noise_budget(at.robot, measurement).sensors.motion));
+  bound.limit = coordinate_limit(model, acceleration_limit(at.robot, c.survey, measurement.motion,
+                                                           noise_budget(at.robot, measurement).sensors.motion));
   return bound;
 }
 
