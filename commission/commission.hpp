@@ -99,13 +99,13 @@ struct Commissioning {
   std::vector<LogContradiction> contradictions;  ///< found whatever the status; one that withdraws leaves no model
   Box prior;                                     ///< in which the set was sought
   SignalErrors row_errors;  ///< dY and dy of the rows that the set is made of: OutputNoise::learning in `output`
-  std::vector<std::size_t> dropped;     ///< rows of the log whose instants the set leaves out as outliers
-  FeasibleSet feasible;                 ///< the set, its hull, certificates
-  std::vector<EarlierSet> earlier;      ///< what it was sharpened from, pass by pass: the first one stands on the limit of
-                                        ///< the accelerations alone; none where nothing bounds the motion by the model
-  KinematicCommissioning kinematic;     ///< of the kinematic residual; its model is also CommissionedModel::kinematic
-  double polytope_over_box = 1.0;       ///< median width of [l, u]: polytope over box, held out, worst output
-  std::vector<std::string> notes;       ///< what was repaired or chosen, for people
+  std::vector<std::size_t> dropped;  ///< rows of the log whose instants the set leaves out as outliers
+  FeasibleSet feasible;              ///< the set, its hull, certificates
+  std::vector<EarlierSet> earlier;   ///< what it was sharpened from, pass by pass: the first one stands on the limit of
+                                     ///< the accelerations alone; none where nothing bounds the motion by the model
+  KinematicCommissioning kinematic;  ///< of the kinematic residual; its model is also CommissionedModel::kinematic
+  double polytope_over_box = 1.0;    ///< median width of [l, u]: polytope over box, held out, worst output
+  std::vector<std::string> notes;    ///< what was repaired or chosen, for people
   std::vector<Assumption> assumptions;  ///< everything that is taken as given, with what the log says of it
 };
 

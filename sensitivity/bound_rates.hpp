@@ -24,8 +24,9 @@ namespace wheelwright {
 
 /// One pass of a commissioning.
 struct BoundPass {
-  HullOptima optima;            ///< of its set
-  std::vector<Interval> sides;  ///< hull of the set before (p), by which its rows bound the motion; empty: the first pass
+  HullOptima optima;  ///< of its set
+  std::vector<Interval>
+      sides;  ///< hull of the set before (p), by which its rows bound the motion; empty: the first pass
 };
 
 /// The derivative of one bound with respect to an input.
