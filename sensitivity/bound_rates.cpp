@@ -16,6 +16,10 @@ namespace wheelwright {
 namespace {
 
 constexpr double kAgree = 1e-6;  // left and right derivative, relative
+constexpr const char* kBefore = "a set before, which bounds the motion between samples: ";
+
+// What is wrong with the set of a pass before, said once however many passes ago that was.
+std::string of_set_before(const std::string& why) { return why.starts_with(kBefore) ? why : kBefore + why; }
 
 // An input a step below and above its value.
 struct Beside {
@@ -119,7 +123,7 @@ BoundRate derive(const HullOptima& optima, const HullOptimum& optimum, const Row
   if (!agree(result.value, noise)) {
     result.why_not = why_not_regular(optimum, name);
     if (result.why_not.empty() && !kink_before.empty()) {
-      result.why_not = "the set before, which bounds the motion between samples, has a kink: " + kink_before;
+      result.why_not = of_set_before(kink_before);
     } else if (result.why_not.empty()) {
       result.why_not = "a row that holds the bound has a kink, or comes to couple parameters that the log keeps apart";
     }
@@ -128,8 +132,7 @@ BoundRate derive(const HullOptima& optima, const HullOptimum& optimum, const Row
 }
 
 BoundRates unknown(std::size_t p, const std::string& why) {
-  const std::vector<BoundRate> all(
-      p, {{kNan, kNan}, "the motion between samples is bounded by the set before, where " + why});
+  const std::vector<BoundRate> all(p, {{kNan, kNan}, of_set_before(why)});
   return {all, all};
 }
 

@@ -12,6 +12,7 @@ namespace wheelwright {
 namespace {
 
 constexpr double kSmooth = 1e-3;  // forward and backward rates of a row, relative
+constexpr double kBent = 0.1;     // their difference, in rates of the row's parts per relative change of the input
 constexpr double kNoise = 1e-6;   // of a rate, in sizes of the set per relative change of the input
 constexpr double kJump = 1e3;     // beyond this, in the same unit, a row jumps
 
@@ -124,8 +125,10 @@ RowRates row_rates(const HullOptima& optima, const HullOptimum& optimum, double 
       size = std::hypot(size, a * block.coordinates.transform.row(static_cast<Eigen::Index>(k)).norm());
     }
     const double scale = size / reach;
-    const double curvature = curved ? kSmooth * (std::abs(g_left) + std::abs(g_right)) : 0.0;
-    if (std::abs(g_left - g_right) <= curvature + kNoise * scale) {
+    const double parts = std::abs(left.b) + left.a.cwiseAbs().dot(optimum.at.cwiseAbs());
+    const double curvature = kBent * step / reach * parts;
+    const double overlooked = curved ? kSmooth * (std::abs(g_left) + std::abs(g_right)) : 0.0;
+    if (std::abs(g_left - g_right) <= curvature + overlooked + kNoise * scale) {
       rates.left.push_back(rate(*low, *high, 2.0 * step));
       rates.right.push_back(rates.left.back());
     } else if (!active.row.origin.is_prior && std::abs(g_left - g_right) > kJump * scale) {

@@ -115,6 +115,7 @@ TEST(LocalDerivatives, EqualDifferencesOfCommissioningWithMeasuredSpeeds) {
       {.inputs = {"declared.wheel_speed", "declared.effort", "filter.alpha", "filter.beta", "wheel_radius",
                   "track_width", "prior.mass.upper", "prior.viscous_yaw.lower", "prior.viscous_yaw.upper"}});
   ASSERT_EQ(local.inputs.size(), 9U);
+  EXPECT_FALSE(result.earlier.empty());
   // 9 inputs × 4 parameters × 2 bounds.
   EXPECT_GE(compare(log, s.robot, local, 1e-5), 64);
   EXPECT_TRUE(not_differentiable(local).empty()) << not_differentiable(local).front();
@@ -131,6 +132,7 @@ TEST(LocalDerivatives, EqualDifferencesOfCommissioningWithEncoders) {
   const LocalSensitivity local = local_derivatives(
       log, result,
       {.inputs = {"encoder_counts_per_turn", "declared.effort", "filter.beta", "wheel_radius", "track_width"}});
+  EXPECT_FALSE(result.earlier.empty());
   EXPECT_GE(compare(log, s.robot, local, 1e-5), 30);
 }
 
