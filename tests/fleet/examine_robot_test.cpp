@@ -129,6 +129,7 @@ TEST(ExamineRobot, APriorOfTheFleetTightensTheNextRobot) {
   ASSERT_TRUE(prior.exists) << prior.message;
   Scenario scenario = noisy_drive(999, 3.0);
   scenario.parameters.mass = 20.1;
+  scenario.robot.effort_changes = EffortChanges::between;  // a weak log: when its commands change is not known
   Robot informed = scenario.robot;
   for (const PooledParameter& p : prior.parameters) {
     if (p.included) {
