@@ -125,13 +125,15 @@ NextDrive next_drive(LogSource& log, LogSource* baseline, const Robot& robot, co
 std::string in_words(std::string text, const std::vector<Effect>& catalogue) {
   const auto of_a_name = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_'; };
   std::string out;
+  bool quoted = false;
   for (std::size_t at = 0; at < text.size();) {
+    quoted = quoted != (text[at] == '`');
     std::size_t end = at;
     while (end < text.size() && of_a_name(text[end])) {
       ++end;
     }
     const std::string word = text.substr(at, end - at);
-    const bool effect = std::ranges::find(catalogue, word, &Effect::name) != catalogue.end();
+    const bool effect = !quoted && std::ranges::find(catalogue, word, &Effect::name) != catalogue.end();
     out += effect ? report::effect_noun(word) : word;
     if (effect && text.compare(end, 3, " + ") == 0) {
       out += " with ";

@@ -32,6 +32,7 @@ struct NextDrive {
                                   const DiagnoseOptions& options);
 
 /// `text` with every name of an effect in it said in words: "dry friction with a delay of the torque" for "coulomb + delay".
+/// What stands in backticks is for a file, and stays.
 [[nodiscard]] std::string in_words(std::string text, const std::vector<Effect>& catalogue);
 
 }  // namespace wheelwright::app

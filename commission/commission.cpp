@@ -147,6 +147,41 @@ Bounded bounded_set(LogSource& log, const Setting& s, Part part, std::vector<Out
   }
 }
 
+// By how much the efforts' bounds of `empty` must be raised for a set, up to kClose. The minimax fit of its rows does not say:
+// with more noise there is a first set, whose dynamics bound the motion between samples more narrowly and may leave none.
+double needed_noise(LogSource& log, const Setting& s, const Commissioning& empty, std::size_t outliers) {
+  constexpr double kClose = 5e-4, kApart = 1.3;
+  constexpr int kMost = 40;
+  const auto explained = [&](double factor) {
+    SignalErrors errors = with_noise(s, empty.noise, For::learning);
+    errors.output *= factor;
+    errors.motion.effort *= factor;
+    return refined_set(log, s, Part::everything, std::move(errors), outliers).result.set.status ==
+           FeasibleSet::Status::nonempty;
+  };
+  MinimaxOptions options;
+  options.excluded_samples = empty.dropped;
+  for (Eigen::Index i = 0; i < empty.row_errors.output.size(); ++i) {
+    options.weights.push_back(std::max(empty.row_errors.output[i], std::numeric_limits<double>::min()));
+  }
+  SignalErrors without_output = empty.row_errors;
+  without_output.output.setZero();
+  RegressionStream bare = make_rows(log, s, without_output);
+  const double fit = minimax_fit(bare, s.prior, options).upper;
+  // The first rows are met again with any noise.
+  const bool no_less = outliers == 0 && empty.row_errors.motion.mobility.size() == 0;
+  double lower = no_less ? std::max(1.0, fit) : 1.0, upper = std::max(lower, fit) * (1.0 + kClose);
+  for (int k = 0; k < kMost && !explained(upper); ++k) {
+    lower = upper;
+    upper *= kApart;
+  }
+  while (upper > lower * (1.0 + kClose)) {
+    const double middle = std::sqrt(lower * upper);
+    (explained(middle) ? upper : lower) = middle;
+  }
+  return upper;
+}
+
 Eigen::VectorXd best_guess(const Fit& fit, const Polytope& set) {
   Eigen::VectorXd guess = fit.estimate;
   for (std::size_t j = 0; j < fit.excitation.size(); ++j) {
@@ -433,14 +468,7 @@ Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionO
 
   if (result.feasible.status == FeasibleSet::Status::empty) {
     tell(options, "measuring the contradiction", 0.7);
-    MinimaxOptions minimax;
-    for (const OutputNoise& o : result.noise) {
-      minimax.weights.push_back(std::max(o.bound, std::numeric_limits<double>::min()));
-    }
-    SignalErrors without_output = result.row_errors;
-    without_output.output.setZero();
-    RegressionStream bare = make_rows(log, s, without_output);
-    result.minimax = minimax_fit(bare, s.prior, minimax).upper;
+    result.minimax = needed_noise(log, s, result, options.outliers);
     result.status = Commissioning::Status::empty;
     result.message = status_message(s, result);
     return result;

@@ -94,7 +94,7 @@ struct Commissioning {
   std::vector<OutputValidation> validation;  ///< on held-out blocks, of a model made from the other blocks
   FoldOptions folds;
   double minimax = 0.0;  ///< where the set is empty: by how much the bounds n̄ on the effort would have to be
-                         ///< raised for it not to be (those on the motion kept); else 0
+                         ///< raised for it not to be (those on the motion kept), up to 0.05 %; else 0
   std::optional<double> effort_shift;            ///< s, by which the efforts seem late against the motion
   std::vector<LogContradiction> contradictions;  ///< found whatever the status; one that withdraws leaves no model
   Box prior;                                     ///< in which the set was sought
@@ -118,7 +118,7 @@ struct CommissionOptions {
   double confidence = 0.999;                     ///< statistical noise mode
   KinematicCommissionOptions kinematic;  ///< of the kinematic residual; folds, extrapolation and persistence are
                                          ///< those of these options
-  std::size_t outliers = 0;              ///< instants that the feasible set may leave out
+  std::size_t outliers = 0;              ///< instants that the feasible set may leave out (θ̂ stands on all of them)
   Persistence persistence;
   std::function<void(std::string_view stage, double share)> progress;  ///< told of every stage; may be empty
 };

@@ -351,7 +351,12 @@ std::string shift_words(const Setting& s, const EffortTiming& timing) {
   if (timing.delay > 0.0 && s.measurement.hold == Hold::zero_order && half < kManyStepsOff) {
     return "that is half a step, as with efforts that are measured and not held (`hold: first_order`); " + declare;
   }
-  return "stamp efforts and motion by one clock where they are measured; " + declare;
+  std::string what = "stamp efforts and motion by one clock where they are measured";
+  const bool dry = std::ranges::any_of(s.model.parameters, [](const Parameter& p) { return p.physical == "coulomb"; });
+  if (timing.delay < 0.0 && !dry) {
+    what += "; dry friction that the model lacks looks like it too, and `gap` tells it";
+  }
+  return what + "; " + declare;
 }
 
 void find_latency(const Setting& s, const std::optional<EffortTiming>& timing, std::vector<LogContradiction>& out) {
