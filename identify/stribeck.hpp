@@ -16,8 +16,8 @@ namespace wheelwright {
 /// efforts to outputs) and f the torque filter: p + 1 linear parameters, the last is c (N·m at each joint), and the shape
 /// ω_s (rad/s, or m/s for a joint that is driven straight).
 ///
-/// The joint speeds are those that RegressorFilter forms, g is linear between them, and the recursion is its own
-/// (filter/exact.hpp), so that the column is treated as every other term of Y_f. A model with Coulomb friction already
+/// The recursion is RegressorFilter's own (filter/kernel.hpp). Measured speeds give g at the samples, linear between them as
+/// measured efforts are; angles and mean speeds give g of each step's mean speed, as every other function of the motion. A model with Coulomb friction already
 /// in Y keeps it: c is what is added at low speed. Without slow driving ω_s is flat (ShapeState::flat).
 class StribeckRows final : public SeparableModel {
  public:

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cmath>
+#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -228,34 +230,57 @@ double size_at_1_7(double omega) {
 TermValue both(const MotionState& s) { return {size_at_1_7(s.joint_speed[0]) + size_at_1_7(s.joint_speed[1]), 0.0}; }
 TermValue unlike(const MotionState& s) { return {size_at_1_7(s.joint_speed[0]) - size_at_1_7(s.joint_speed[1]), 0.0}; }
 
-// The column at one ω_s is what RegressorFilter makes of a model that has this friction as a term.
+// The column at ω_s = 1.7 is `expected` and stands beside the plain rows; its slope is that of differences.
+void expect_column(const StribeckRows& rows, const RegressionBlock& plain, const Eigen::VectorXd& expected) {
+  SeparableValues at;
+  ASSERT_TRUE(rows.evaluate(Eigen::VectorXd::Constant(1, 1.7), true, at));
+  ASSERT_EQ(at.columns.rows(), expected.size());
+  EXPECT_LT((at.columns.leftCols(plain.Y.cols()) - plain.Y).cwiseAbs().maxCoeff(), 1e-13);
+  EXPECT_LT((at.columns.rightCols(1) - expected).cwiseAbs().maxCoeff(), 1e-13);
+  constexpr double kStep = 1e-6;
+  SeparableValues before, after;
+  ASSERT_TRUE(rows.evaluate(Eigen::VectorXd::Constant(1, 1.7 - kStep), false, before));
+  ASSERT_TRUE(rows.evaluate(Eigen::VectorXd::Constant(1, 1.7 + kStep), false, after));
+  const Eigen::MatrixXd slope = (after.columns - before.columns) / (2.0 * kStep);
+  EXPECT_LT((at.columns_by[0] - slope).cwiseAbs().maxCoeff(), 1e-8);
+}
+
+// With angles, the column at one ω_s is what RegressorFilter makes of a model that has this friction as a term.
 TEST(Stribeck, ItsColumnIsThatOfTheRegressorFilter) {
-  for (const Shown shown : {Shown::speeds, Shown::angles}) {
-    const Scenario scenario = exact_drive(shown, Hold::first_order);
-    const RegressorFilter plain = filter_of(scenario);
-    Model model = plain.model();
-    model.parameters.push_back(
-        {.name = "stribeck", .unit = "N·m", .physical = "stribeck", .physical_unit = "N·m", .prior = {}, .excite = {}});
-    const std::size_t last = model.p() - 1;
-    model.terms.push_back(
-        {.output = 0, .parameter = last, .kind = Term::Kind::function, .scale = model.input(0, 0), .function = both});
-    model.terms.push_back(
-        {.output = 1, .parameter = last, .kind = Term::Kind::function, .scale = model.input(1, 0), .function = unlike});
-    Simulation simulation(scenario);
-    RegressionStream stream(simulation, RegressorFilter(model, plain.design(), plain.measurement()));
-    const RegressionBlock expected = read_all(stream);
-    const StribeckRows rows(simulation, plain);
-    SeparableValues at;
-    ASSERT_TRUE(rows.evaluate(Eigen::VectorXd::Constant(1, 1.7), true, at));
-    ASSERT_EQ(at.columns.rows(), expected.Y.rows());
-    EXPECT_LT((at.columns - expected.Y).cwiseAbs().maxCoeff(), 1e-13);
-    constexpr double kStep = 1e-6;
-    SeparableValues before, after;
-    ASSERT_TRUE(rows.evaluate(Eigen::VectorXd::Constant(1, 1.7 - kStep), false, before));
-    ASSERT_TRUE(rows.evaluate(Eigen::VectorXd::Constant(1, 1.7 + kStep), false, after));
-    const Eigen::MatrixXd slope = (after.columns - before.columns) / (2.0 * kStep);
-    EXPECT_LT((at.columns_by[0] - slope).cwiseAbs().maxCoeff(), 1e-8);
+  const Scenario scenario = exact_drive(Shown::angles, Hold::first_order);
+  const RegressorFilter plain = filter_of(scenario);
+  Model model = plain.model();
+  model.parameters.push_back(
+      {.name = "stribeck", .unit = "N·m", .physical = "stribeck", .physical_unit = "N·m", .prior = {}, .excite = {}});
+  const std::size_t last = model.p() - 1;
+  model.terms.push_back(
+      {.output = 0, .parameter = last, .kind = Term::Kind::function, .scale = model.input(0, 0), .function = both});
+  model.terms.push_back(
+      {.output = 1, .parameter = last, .kind = Term::Kind::function, .scale = model.input(1, 0), .function = unlike});
+  Simulation simulation(scenario);
+  RegressionStream stream(simulation, RegressorFilter(model, plain.design(), plain.measurement()));
+  const RegressionBlock with_term = read_all(stream);
+  RegressionStream plain_stream(simulation, plain);
+  const RegressionBlock rows = read_all(plain_stream);
+  expect_column(StribeckRows(simulation, plain), rows, with_term.Y.col(static_cast<Eigen::Index>(last)));
+}
+
+// With measured speeds it is what RegressorFilter makes of efforts of this size at the samples.
+TEST(Stribeck, ItsColumnIsThatOfEffortsOfItsSize) {
+  const Scenario scenario = exact_drive(Shown::speeds, Hold::first_order);
+  const RegressorFilter plain = filter_of(scenario);
+  Simulation simulation(scenario);
+  LogTable log = read_all(simulation);
+  RegressionStream plain_stream(simulation, plain);
+  const RegressionBlock rows = read_all(plain_stream);
+  for (const char side : {'r', 'l'}) {
+    std::ranges::transform(log.column(std::string("omega_") + side), log.column(std::string("tau_") + side).begin(),
+                           size_at_1_7);
   }
+  TableSource of_its_size(log);
+  RegressionStream stream(of_its_size, plain);
+  const RegressionBlock friction = read_all(stream);
+  expect_column(StribeckRows(simulation, plain), rows, friction.y);
 }
 
 TEST(Stribeck, FastDrivingLeavesItsSpeedFlat) {
