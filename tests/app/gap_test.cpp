@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // `wheelwright gap`, as a user runs it: a simulated robot whose bearings are dry, its plain robot file, a healthy log.
+#include <algorithm>
+
 #include "app/program.hpp"
 
 #include <wheelwright/io/robot_file.hpp>
@@ -32,7 +34,7 @@ class Gap : public testing::ProgramTest {
   }
 };
 
-TEST_F(Gap, ADryBearingIsNamedAndTheImprovedRobotFileTightensThresholds) {
+TEST_F(Gap, ADryBearingIsNamedAndTheImprovedRobotFileIsNotContradicted) {
   // Left open, commissioning would choose a model with dry friction by itself.
   put("robot.yaml", bytes(path("robot.yaml")) + "parameters: [mass, yaw_inertia, viscous_linear, viscous_yaw]\n");
   drive("healthy", "robot.yaml", 1);
@@ -58,17 +60,28 @@ TEST_F(Gap, ADryBearingIsNamedAndTheImprovedRobotFileTightensThresholds) {
   EXPECT_THAT(bytes(path("gap/robot_improved.yaml")), HasSubstr("# robot.yaml with what"));
   ASSERT_EQ(read_robot(path("gap/robot_improved.yaml")).effects.size(), 1U);
   drive("improved", "gap/robot_improved.yaml", 3, "", 5);
-  const auto width = [&](const std::string& robot) {
-    const Outcome done = run("commission real.csv --robot " + robot + " --out model --quiet");
-    EXPECT_EQ(done.code, 0) << done.err;
-    const Json model = read_json(path("model/model.json"));
-    double sum = 0.0;
-    for (const Json& channel : model.at("validation").at("outputs")) {
-      sum += channel.at("width_over_torque_rms").get<double>();
-    }
-    return sum;
-  };
-  EXPECT_LT(width("gap/robot_improved.yaml"), 0.8 * width("robot.yaml"));
+  // The log contradicts the plain robot, and says how one gets on; the improved one explains it.
+  const Outcome plain = run("commission real.csv --robot robot.yaml --out plain --quiet");
+  EXPECT_EQ(plain.code, 1);
+  const Json none = read_json(path("plain/model.json"));
+  EXPECT_EQ(none.at("status"), "empty");
+  EXPECT_THAT(none.at("message").get<std::string>(), HasSubstr("`gap`"));
+  EXPECT_THAT(none.at("validation").at("outputs"), IsEmpty());
+  const Outcome done = run("commission real.csv --robot gap/robot_improved.yaml --out model --quiet");
+  EXPECT_EQ(done.code, 0) << done.err;
+  const Json model = read_json(path("model/model.json"));
+  EXPECT_EQ(model.at("status"), "done");
+  EXPECT_THAT(model.at("contradictions"), IsEmpty());
+  ASSERT_EQ(model.at("validation").at("outputs").size(), 2U);
+  for (const Json& channel : model.at("validation").at("outputs")) {
+    EXPECT_GT(channel.at("width_over_torque_rms").get<double>(), 0.0);
+    EXPECT_EQ(channel.at("false_alarms"), 0);
+  }
+  const auto of_dry_friction = [](const Json& p) { return p.at("name") == "coulomb"; };
+  const auto bounds = std::ranges::find_if(model.at("parameters"), of_dry_friction);
+  ASSERT_NE(bounds, model.at("parameters").end());
+  EXPECT_LE(bounds->at("lower"), kCoulomb);
+  EXPECT_GE(bounds->at("upper"), kCoulomb);
 }
 
 TEST_F(Gap, AHealthyRobotHasNone) {
