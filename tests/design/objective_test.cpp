@@ -18,7 +18,12 @@ namespace {
 
 using testing_support::small_robot;
 
-DesignSubject subject() { return subject_of(small_robot(), 0.02); }
+// Efforts that change at samples: what acts between two of them is known.
+DesignSubject subject() {
+  Robot robot = small_robot();
+  robot.effort_changes = EffortChanges::at_samples;
+  return subject_of(robot, 0.02);
+}
 
 TEST(Promise, RowsOfOneParameterEachHaveAClosedForm) {
   DesignSubject s = subject();
@@ -84,9 +89,7 @@ TEST(Promise, PlannedRowsAreWithoutResidualAndCarryTheDeclaredNoise) {
 
 // What efforts may do between two samples is planned for, by the efforts that the plan needs.
 TEST(Promise, EffortsThatChangeBetweenSamplesCost) {
-  Robot robot = small_robot();
-  robot.effort_changes = EffortChanges::between;
-  const DesignSubject known = subject(), doubtful = subject_of(robot, 0.02);
+  const DesignSubject known = subject(), doubtful = subject_of(small_robot(), 0.02);
   const Plan plan = plan_of({0.4, 6.0}, known, 12.0, 0.02);
   const RegressionBlock a = planned_rows(plan, known), b = planned_rows(plan, doubtful);
   ASSERT_EQ(a.instants(), b.instants());

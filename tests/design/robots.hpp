@@ -17,7 +17,6 @@ inline Robot small_robot() {
   r.wheel_radius = 0.0975;
   r.track_width = 0.381;
   r.hold = Hold::zero_order;
-  r.effort_changes = EffortChanges::at_samples;
   r.parameters = std::vector<std::string>{"mass", "yaw_inertia", "viscous_linear", "viscous_yaw"};
   r.nominal = {{"mass", 19.0}, {"yaw_inertia", 1.0}, {"viscous_linear", 3.0}, {"viscous_yaw", 0.4}};
   r.noise.wheel_speed.value = 0.02;
