@@ -2,7 +2,9 @@
 // Logs that contradict what a model takes for granted: each has a name and a sentence, and leaves no model.
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <random>
+#include <string>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -96,6 +98,59 @@ TEST(AnsweredContradiction, AnEffortOfNoiseAloneDependsOnNoMotion) {
   expect_no_model(result);
   ASSERT_NE(find(result, Kind::effort_unrelated), nullptr);
   EXPECT_EQ(find(result, Kind::effort_unrelated)->subject, "tau_r");
+}
+
+TEST(AnsweredContradiction, AnArrayOfWrappedAnglesWantsUnwrapping) {
+  const Scenario s = learnt_drive(4);
+  LogTable table = simulate(s);
+  ASSERT_EQ(find(commissioned(table, s.robot), Kind::angle_wrapped), nullptr);
+  constexpr double kTurn = 2.0 * std::numbers::pi;
+  for (const std::string& name : {"phi_r", "phi_l"}) {
+    for (double& angle : table.column(name)) {
+      angle -= kTurn * std::floor(angle / kTurn);
+    }
+  }
+  const Commissioning result = commissioned(table, s.robot);
+  expect_no_model(result);
+  ASSERT_NE(find(result, Kind::angle_wrapped), nullptr);
+  EXPECT_THAT(find(result, Kind::angle_wrapped)->next, HasSubstr("unwrap"));
+}
+
+// The samples stay where they are; only what is written beside them is wrong.
+TEST(AnsweredContradiction, StampsThatScatterAreNoUnevenSampling) {
+  const Scenario s = learnt_drive(5);
+  LogTable table = simulate(s);
+  std::mt19937_64 rng(5);
+  std::uniform_real_distribution<double> scatter(-0.002, 0.002);
+  for (double& t : table.t) {
+    t += scatter(rng);
+  }
+  const Commissioning result = commissioned(table, s.robot);
+  expect_no_model(result);
+  ASSERT_NE(find(result, Kind::stamps_scatter), nullptr);
+}
+
+// Noise of one sign all the way is inside its bounds: dry friction is told of, and nothing is called guaranteed.
+TEST(AnsweredContradiction, DryFrictionInsideTheDeclaredNoiseTakesTheGuarantee) {
+  Scenario s = noisy_drive(6, 30.0);
+  s.robot.noise.effort.value = 0.05;
+  const Commissioning without = commissioned(simulate(s), s.robot);
+  EXPECT_EQ(find(without, Kind::dry_friction), nullptr);
+  EXPECT_EQ(without.model.warrant, Warrant::guaranteed);
+  LogTable table = simulate(s);
+  const std::vector<double> right = table.column("phi_r"), left = table.column("phi_l");
+  const auto add_friction = [](std::vector<double>& tau, const std::vector<double>& angle) {
+    for (std::size_t k = 1; k < tau.size(); ++k) {
+      const double moved = angle[k] - angle[k - 1];
+      tau[k] += moved > 0.0 ? 0.015 : moved < 0.0 ? -0.015 : 0.0;
+    }
+  };
+  add_friction(table.column("tau_r"), right);
+  add_friction(table.column("tau_l"), left);
+  const Commissioning with = commissioned(table, s.robot);
+  ASSERT_NE(find(with, Kind::dry_friction), nullptr) << with.message;
+  EXPECT_FALSE(find(with, Kind::dry_friction)->withdraws);
+  EXPECT_EQ(with.model.warrant, Warrant::extrapolated);
 }
 
 TEST(AnsweredContradiction, TorquesOneSampleLateOrEarlyAreTold) {
