@@ -58,7 +58,7 @@ const std::string_view kCompiler = R"(#include <math.h>
 #include <string.h>
 
 #if defined(__FAST_MATH__)
-#error "the thresholds are guaranteed bounds: do not compile them with -ffast-math"
+#error "the thresholds are rounded outward: do not compile them with -ffast-math"
 #endif
 #if defined(__clang__) || !defined(__GNUC__)
 #pragma STDC FP_CONTRACT OFF
