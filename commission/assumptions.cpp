@@ -97,6 +97,22 @@ Assumption assumed_delay(const Commissioning& r) {
   return a;
 }
 
+Assumption assumed_clocks(const Commissioning& r) {
+  Assumption a{.id = "clocks",
+               .statement = "Stamps are those of the instants of measurement, of motion and effort by one clock.",
+               .declared_by = {}};
+  if (r.model.measurement.motion == MotionKind::angle) {
+    a.test = "the angles are no smoother over row numbers than over their stamps";
+  }
+  const auto scatter =
+      std::ranges::find(r.contradictions, LogContradiction::Kind::stamps_scatter, &LogContradiction::kind);
+  if (scatter != r.contradictions.end()) {
+    a.verdict = AssumptionVerdict::fails;
+    a.detail = scatter->sentence;
+  }
+  return a;
+}
+
 Assumption assumed_speeds(const Measurement& m) {
   Assumption a{.id = "speed_kind", .declared_by = "speed_source, encoder_counts_per_turn"};
   switch (m.motion) {
@@ -298,13 +314,8 @@ std::string_view verdict_word(AssumptionVerdict verdict) {
 std::vector<Assumption> assumptions_of(const Commissioning& result) {
   const RowsVerdict rows = rows_verdict(result);
   const Robot& robot = result.model.robot;
-  std::vector<Assumption> list = {
-      assumed_hold(robot),
-      assumed_delay(result),
-      {.id = "clocks",
-       .statement = "Stamps are those of the instants of measurement, of motion and effort by one clock.",
-       .declared_by = {}},
-      assumed_speeds(result.model.measurement)};
+  std::vector<Assumption> list = {assumed_hold(robot), assumed_delay(result), assumed_clocks(result),
+                                  assumed_speeds(result.model.measurement)};
   add_noise_bounds(list, result, rows);
   list.push_back(model_shape(result, rows));
   list.push_back(constant_parameters(rows));
