@@ -105,7 +105,7 @@ TEST(AnsweredContradiction, AnArrayOfWrappedAnglesWantsUnwrapping) {
   LogTable table = simulate(s);
   ASSERT_EQ(find(commissioned(table, s.robot), Kind::angle_wrapped), nullptr);
   constexpr double kTurn = 2.0 * std::numbers::pi;
-  for (const std::string& name : {"phi_r", "phi_l"}) {
+  for (const char* name : {"phi_r", "phi_l"}) {
     for (double& angle : table.column(name)) {
       angle -= kTurn * std::floor(angle / kTurn);
     }
