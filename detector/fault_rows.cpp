@@ -2,6 +2,8 @@
 #include <wheelwright/detector/fault_rows.hpp>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <utility>
 
 #include <Eigen/QR>
@@ -20,18 +22,23 @@ struct Instant {
   const Eigen::VectorXd& acceleration;  // v̇
   const Eigen::VectorXd& moved;         // s u, u = K v + a: motion beyond v
   const Eigen::VectorXd& moved_rate;    // its derivative
+  const Eigen::VectorXd& joint_moved;   // of the joints
   const Eigen::VectorXd& seen;          // s S v
   const Eigen::VectorXd& seen_rate;
-  const Eigen::VectorXd& joint_seen;  // joint speeds that a reading of `seen` shows, 0 where it stands still
+  const Eigen::VectorXd& joint_seen;  // of the joints
   bool sets_in = false;               // the fault sets in between the steps about this instant ...
   bool only_changes = false;  // ... and this is the step before: it has what changes, nothing of what was before
 };
 
 // Joint speeds of coordinate speeds; what is rounding beside the others is 0.
-Eigen::VectorXd joints_of(const Model& model, const Eigen::VectorXd& v) {
-  const Eigen::MatrixXd inverse = model.motion.completeOrthogonalDecomposition().pseudoInverse();
+Eigen::VectorXd joints_of(const Eigen::MatrixXd& inverse, const Eigen::VectorXd& v) {
   const double floor = 1e-12 * (inverse.cwiseAbs() * v.cwiseAbs()).maxCoeff();
   return (inverse * v).unaryExpr([floor](double x) { return std::abs(x) <= floor ? 0.0 : x; });
+}
+
+// Joint speeds from coordinate speeds.
+Eigen::MatrixXd inverse_of(const Model& model) {
+  return model.motion.completeOrthogonalDecomposition().pseudoInverse();
 }
 
 double evaluate(const Term& term, const Eigen::VectorXd& v, const Eigen::VectorXd& joints, double heading) {
@@ -45,10 +52,27 @@ double evaluate(const Term& term, const Eigen::VectorXd& v, const Eigen::VectorX
       .value;
 }
 
-// A term of Y: healthy, without what dry friction in the wheels has, of the motion beyond v, of the motion seen.
+// A term of Y: healthy, without what dry friction in the wheels has, of the motion beyond v (times κ, times κ²), of the
+// motion seen.
 struct Parts {
-  double healthy = 0.0, ground = 0.0, moved = 0.0, seen = 0.0;
+  double healthy = 0.0, ground = 0.0, moved = 0.0, moved_twice = 0.0, seen = 0.0;
 };
+
+// What motion beyond v, κ times `by`, adds to a function: κ `once` + κ² `twice` through κ = ±1/2.
+struct Growth {
+  double once = 0.0, twice = 0.0;
+};
+
+Growth growth(const Term& term, const Eigen::VectorXd& v, const Eigen::VectorXd& joints, double heading,
+              const Eigen::VectorXd& by, const Eigen::VectorXd& joints_by) {
+  if (by.isZero(0.0) && joints_by.isZero(0.0)) {
+    return {};
+  }
+  const double now = evaluate(term, v, joints, heading),
+               more = evaluate(term, v + 0.5 * by, joints + 0.5 * joints_by, heading),
+               less = evaluate(term, v - 0.5 * by, joints - 0.5 * joints_by, heading);
+  return {more - less, 2.0 * ((more - now) + (less - now))};
+}
 
 Parts parts_of(const Term& term, const FaultType& fault, const Instant& at) {
   const auto c = static_cast<Eigen::Index>(term.coordinate);
@@ -73,9 +97,14 @@ Parts parts_of(const Term& term, const FaultType& fault, const Instant& at) {
       const Eigen::VectorXd rest = Eigen::VectorXd::Zero(at.v.size());
       parts.healthy = evaluate(term, at.v, at.joint_speed, at.heading);
       parts.ground = parts.healthy - evaluate(term, rest, at.joint_speed, at.heading);
-      parts.moved = evaluate(term, at.v + at.moved, at.joint_speed, at.heading) - parts.healthy;
-      if (fault.seen.size() > 0) {
-        parts.seen = evaluate(term, at.v + at.seen, at.joint_seen, at.heading) - parts.healthy;
+      const Growth beyond = growth(term, at.v, at.joint_speed, at.heading, at.moved, at.joint_moved);
+      parts.moved = beyond.once;
+      parts.moved_twice = beyond.twice;
+      if (fault.seen.size() > 0 && fault.whole) {
+        // An encoder that stands still shows no sign.
+        parts.seen = evaluate(term, at.v + at.seen, at.joint_speed + at.joint_seen, at.heading) - parts.healthy;
+      } else if (fault.seen.size() > 0) {
+        parts.seen = growth(term, at.v, at.joint_speed, at.heading, at.seen, at.joint_seen).once;
       }
       break;
     }
@@ -83,6 +112,7 @@ Parts parts_of(const Term& term, const FaultType& fault, const Instant& at) {
   parts.healthy *= term.scale;
   parts.ground *= term.scale;
   parts.moved *= term.scale;
+  parts.moved_twice *= term.scale;
   parts.seen *= term.scale;
   return parts;
 }
@@ -97,6 +127,7 @@ FaultSignals signature(const FaultType& fault, const Model& model, const Instant
     const Parts parts = parts_of(term, fault, at);
     const auto k = static_cast<Eigen::Index>(term.output), j = static_cast<Eigen::Index>(term.parameter);
     out.g1(k, j) += parts.moved;
+    out.g2(k, j) += parts.moved_twice;
     out.s(k, j) += parts.seen;
     for (Eigen::Index i = 0; i < n; ++i) {
       if (fault.effort.size() > 0) {
@@ -131,6 +162,53 @@ FaultSignals FaultSignals::none(const Model& model) {
   return {RowMatrix::Zero(n, p), RowMatrix::Zero(n, p), RowMatrix::Zero(n, p), Eigen::VectorXd::Zero(n)};
 }
 
+bool polynomial(const FaultType& fault, const Model& model) {
+  if (fault.held_effort) {
+    return false;
+  }
+  const auto size = static_cast<Eigen::Index>(model.coordinates.size());
+  const Eigen::MatrixXd K = fault.motion.size() > 0 ? fault.motion : Eigen::MatrixXd::Zero(size, size),
+                        S = fault.seen.size() > 0 ? fault.seen : Eigen::MatrixXd::Zero(size, size);
+  const Eigen::VectorXd a = fault.slip.size() > 0 ? fault.slip : Eigen::VectorXd::Zero(size);
+  const Eigen::MatrixXd inverse = inverse_of(model);
+  const bool gain = fault.effort.size() > 0 || fault.ground.size() > 0;
+  const Interval range{fault.kappa(fault.range.lower), fault.kappa(fault.range.upper)};
+  constexpr double kHeading = 0.7, kTolerance = 1e-9;
+  constexpr std::array<double, 3> kSpeeds = {0.01, 0.3, 5.0};        // m/s, rad/s
+  constexpr std::array<double, 3> kTurns = {-0.6, 0.1, 1.7};         // of the other coordinates, over the first
+  constexpr std::array<double, 4> kShares = {0.05, 0.3, 0.7, 0.95};  // of the range
+  for (const Term& term : model.terms) {
+    if (term.kind != Term::Kind::function) {
+      continue;
+    }
+    for (std::size_t k = 0; k < kSpeeds.size() * kTurns.size(); ++k) {
+      Eigen::VectorXd v = Eigen::VectorXd::Constant(size, kSpeeds[k / kTurns.size()]);
+      v.tail(size - 1) *= kTurns[k % kTurns.size()];
+      const Eigen::VectorXd joints = joints_of(inverse, v), moved = K * v + a, seen = S * v,
+                            still = Eigen::VectorXd::Zero(joints.size());
+      const double now = evaluate(term, v, joints, kHeading);
+      const auto follows = [&](const Eigen::VectorXd& by, const Eigen::VectorXd& joints_by, bool twice) {
+        const Growth g = growth(term, v, joints, kHeading, by, joints_by);
+        const double scale = std::abs(now) + std::abs(g.once) + std::abs(g.twice);
+        bool good = twice || std::abs(g.twice) <= kTolerance * scale;
+        for (const double share : kShares) {
+          for (const double kappa : {share * range.lower, share * range.upper}) {
+            const double value = evaluate(term, v + kappa * by, joints + kappa * joints_by, kHeading);
+            const double expected = now + kappa * g.once + kappa * kappa * g.twice;
+            good = good && std::abs(value - expected) <= kTolerance * scale * (1.0 + kappa * kappa);
+          }
+        }
+        return good;
+      };
+      if (!follows(moved, fault.of_reading ? joints_of(inverse, moved) : still, !gain) ||
+          !(fault.whole || follows(seen, joints_of(inverse, seen), false))) {
+        return false;
+      }
+    }
+  }
+  return true;
+}
+
 FaultFilter::FaultFilter(FaultType fault, const Model& model, const FilterDesign& design, const ReferenceMotion& motion)
     : fault_(std::move(fault)),
       model_(&model),
@@ -140,9 +218,11 @@ FaultFilter::FaultFilter(FaultType fault, const Model& model, const FilterDesign
       filtered_(FaultSignals::none(model)) {
   validate(fault_, model);
   validate(design_);
+  exact_ = polynomial(fault_, model);
   kernel_ = FilterKernel(design_, motion.kind, motion.nominal_step);
   cascades_.resize(model.n() * (3 * model.p() + 1));
   const auto n = static_cast<Eigen::Index>(model.n());
+  from_motion_ = inverse_of(model);
   to_joints_ = model.input.completeOrthogonalDecomposition().pseudoInverse();
   gain_only_ = fault_.effort.size() > 0 && fault_.motion.size() == 0 && fault_.ground.size() == 0 &&
                fault_.slip.size() == 0 && fault_.seen.size() == 0 && fault_.theta.size() == 0 &&
@@ -161,6 +241,14 @@ FaultFilter::FaultFilter(FaultType fault, const Model& model, const FilterDesign
       }
     }
   }
+  const auto norm = [](const Eigen::MatrixXd& matrix) {
+    return matrix.size() > 0 ? matrix.cwiseAbs().rowwise().sum().maxCoeff() : 0.0;
+  };
+  most_kappa_ = std::max(std::abs(fault_.kappa(fault_.range.lower)), std::abs(fault_.kappa(fault_.range.upper)));
+  proportional_ = fault_.slip.size() == 0 && fault_.theta.size() == 0 && fault_.offset.size() == 0 &&
+                  fault_.lateral == 0.0 && !fault_.held_effort;
+  const double gains = norm(fault_.effort) + norm(fault_.ground), motions = norm(fault_.motion);
+  growth_ = gains + motions + most_kappa_ * gains * motions;
   last_ = FaultSignals::none(model);
   widened_.resize(model.n() * (model.p() + 1));
   range_ = last_.g1;
@@ -174,21 +262,22 @@ FaultFilter::Point FaultFilter::point(std::size_t k) const {
                         motion_->joint_angle(joint, i) - motion_->joint_angle(joint, static_cast<Eigen::Index>(onset_)),
                         motion_->joint_speed(joint, i));
   const Eigen::VectorXd v = motion_->speed.col(i);
-  Point point{s, Eigen::VectorXd::Zero(v.size()), Eigen::VectorXd::Zero(v.size()), {}};
+  Point point{s, Eigen::VectorXd::Zero(v.size()), {}, Eigen::VectorXd::Zero(v.size()), {}};
   if (fault_.motion.size() > 0) {
     point.moved += s * fault_.motion * v;
   }
   if (fault_.slip.size() > 0) {
     point.moved += s * fault_.slip;
   }
-  point.joint_seen = motion_->joint_speed.col(i);
   if (fault_.seen.size() > 0) {
     point.seen += s * fault_.seen * v;
-    // Dry friction looks at signs, which a scale leaves as they are; an encoder that stands still shows none.
-    if (fault_.whole) {
-      point.joint_seen = joints_of(*model_, v + point.seen);
-    }
   }
+  const Eigen::VectorXd none = Eigen::VectorXd::Zero(motion_->joint_speed.rows());
+  point.joint_moved = fault_.of_reading ? joints_of(from_motion_, point.moved) : none;
+  point.joint_seen = fault_.seen.size() == 0 ? none
+                     : fault_.whole
+                         ? Eigen::VectorXd(joints_of(from_motion_, v + point.seen) - motion_->joint_speed.col(i))
+                         : joints_of(from_motion_, point.seen);
   return point;
 }
 
@@ -202,6 +291,7 @@ void FaultFilter::begin(std::size_t onset) {
   std::fill(widened_.begin(), widened_.end(), KernelState{});
   range_.setZero();
   widened_c_.setZero();
+  added_ = 0.0;
   row_range_ = range_;
   before_ = point(onset);
   const auto n = static_cast<Eigen::Index>(model_->n());
@@ -287,6 +377,15 @@ void FaultFilter::widen(const FaultSignals& begin, const FaultSignals& end, bool
   last_ = end;
 }
 
+// The largest effort of any output per unit of κ, for every θ of the set.
+double FaultFilter::most_added(const FaultSignals& signals) const {
+  Eigen::VectorXd sum = signals.c.cwiseAbs();
+  if (motion_->largest.size() == signals.g1.cols()) {
+    sum += (signals.g1.cwiseAbs() + most_kappa_ * signals.g2.cwiseAbs()) * motion_->largest;
+  }
+  return sum.maxCoeff();
+}
+
 FaultSignals FaultFilter::state(double KernelState::*part) const {
   FaultSignals out = FaultSignals::none(*model_);
   std::size_t at = 0;
@@ -316,13 +415,14 @@ bool FaultFilter::next() {
                         seen_rate = (after.seen - before_.seen) / h;
   // The step that ends at the onset of a jump is still healthy.
   const bool healthy = fresh_ && k_ == onset_;
-  const FaultSignals begin = signature(fault_, *model_,
-                                       {before_.profile, v0, joints0, motion_->heading[k_], acceleration, before_.moved,
-                                        moved_rate, before_.seen, seen_rate, before_.joint_seen, healthy, healthy},
-                                       held_);
+  const FaultSignals begin =
+      signature(fault_, *model_,
+                {before_.profile, v0, joints0, motion_->heading[k_], acceleration, before_.moved, moved_rate,
+                 before_.joint_moved, before_.seen, seen_rate, before_.joint_seen, healthy, healthy},
+                held_);
   const FaultSignals end = signature(fault_, *model_,
                                      {after.profile, v1, joints1, motion_->heading[k_ + 1], acceleration, after.moved,
-                                      moved_rate, after.seen, seen_rate, after.joint_seen, healthy},
+                                      moved_rate, after.joint_moved, after.seen, seen_rate, after.joint_seen, healthy},
                                      held_);
   filter(begin, end, shares, motion_->step[k_ + 1]);
   widen(begin, end, k_ == onset_ || healthy, std::max(h, motion_->step[k_ + 1]));
@@ -330,8 +430,17 @@ bool FaultFilter::next() {
   ++k_;
   const auto n = static_cast<Eigen::Index>(model_->n());
   row_range_ = range_;
-  if (motion_->between_dY.rows() > 0) {
-    row_range_ += gain_.asDiagonal() * motion_->between_dY.middleRows(static_cast<Eigen::Index>(k_) * n, n);
+  const Eigen::Index first = static_cast<Eigen::Index>(k_) * n;
+  if (motion_->between_dY.rows() > 0 && proportional_) {
+    const Eigen::VectorXd by = gain_only_ ? gain_ : Eigen::VectorXd::Constant(n, growth_);
+    row_range_ += by.asDiagonal() * motion_->between_dY.middleRows(first, n);
+  } else if (motion_->effort_dY.rows() > 0) {
+    for (const FaultSignals* at : {&begin, &end}) {
+      added_ = std::max(added_, most_added(*at));
+    }
+    if (added_ > 0.0) {
+      row_range_ += added_ * motion_->effort_dY.middleRows(first, n);
+    }
   }
   return true;
 }
@@ -355,7 +464,8 @@ SettledRows settled_rows(const FaultType& fault, const Model& model, const Filte
   validate(fault, model);
   const auto c = static_cast<Eigen::Index>(model.coordinates.size());
   check::that(v.size() == c && a.size() == c, "operating point", "one speed and one acceleration for each coordinate");
-  const Eigen::VectorXd joints = joints_of(model, v);
+  const Eigen::MatrixXd inverse = inverse_of(model);
+  const Eigen::VectorXd joints = joints_of(inverse, v);
   Eigen::VectorXd moved = Eigen::VectorXd::Zero(c), moved_rate = moved, seen = moved, seen_rate = moved;
   if (fault.motion.size() > 0) {
     moved += fault.motion * v;
@@ -368,6 +478,11 @@ SettledRows settled_rows(const FaultType& fault, const Model& model, const Filte
     seen += fault.seen * v;
     seen_rate += fault.seen * a;
   }
+  const Eigen::VectorXd still = Eigen::VectorXd::Zero(joints.size());
+  const Eigen::VectorXd joint_moved = fault.of_reading ? joints_of(inverse, moved) : still;
+  const Eigen::VectorXd joint_seen = fault.seen.size() == 0 ? still
+                                     : fault.whole          ? Eigen::VectorXd(joints_of(inverse, v + seen) - joints)
+                                                            : joints_of(inverse, seen);
   SettledRows rows;
   const std::vector<double> joint_list(joints.data(), joints.data() + joints.size()),
       speed_list(v.data(), v.data() + v.size()), none(std::max(joint_list.size(), speed_list.size()), 0.0);
@@ -375,10 +490,9 @@ SettledRows settled_rows(const FaultType& fault, const Model& model, const Filte
       design.static_gain() *
       regressor(model, {speed_list, {none.data(), speed_list.size()}, joint_list, {none.data(), joint_list.size()}},
                 {a.data(), static_cast<std::size_t>(a.size())});
-  rows.signature = signature(
-      fault, model,
-      {1.0, v, joints, 0.0, a, moved, moved_rate, seen, seen_rate, fault.whole ? joints_of(model, v + seen) : joints},
-      rows.Y / design.static_gain());
+  rows.signature =
+      signature(fault, model, {1.0, v, joints, 0.0, a, moved, moved_rate, joint_moved, seen, seen_rate, joint_seen},
+                rows.Y / design.static_gain());
   rows.signature.g1 *= design.static_gain();
   rows.signature.g2 *= design.static_gain();
   rows.signature.s *= design.static_gain();

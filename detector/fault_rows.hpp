@@ -48,6 +48,8 @@ class FaultRows {
   virtual ~FaultRows() = default;
   /// Number of outputs.
   [[nodiscard]] virtual std::size_t outputs() const = 0;
+  /// Whether rows are those polynomials for every size in the fault's range. Where they are not, nothing is certain.
+  [[nodiscard]] virtual bool exact() const { return true; }
   /// Sets the fault in at instant `onset` of the motion.
   virtual void begin(std::size_t onset) = 0;
   /// Goes on to the next instant; false at the end of the segment.
@@ -58,22 +60,30 @@ class FaultRows {
   [[nodiscard]] virtual FaultRow row(std::size_t i) const = 0;
 };
 
+/// Whether the signature of `fault` for `model` is a polynomial of κ as FaultRow has it, over the fault's whole range.
+/// Functions of the motion have to be at most quadratic in what the fault adds to it (dry friction, which only looks at
+/// signs, and drag are; Stribeck friction is not), linear where it is only seen, and constant in it where the fault
+/// changes an effort's gain too. A reading that stands still at an unknown value is none. Tried at some motions.
+[[nodiscard]] bool polynomial(const FaultType& fault, const Model& model);
+
 /// Rows of the torque residual: filters a fault's signature along a reference motion, with the filter's own kernel: what
 /// happens between two instants counts as RegressorFilter counts it. Products with the fault's profile need no derivative
 /// of noise. At
 /// the onset of a step the robot's own speed goes on (its mass sees to that) and what the encoders show jumps; the
 /// reading of an effort changes with no more than its gain.
 ///
-/// What the efforts that a fault adds widen in the rows of a faulty log (the hull of efforts that change between samples,
-/// accelerations between samples) is FaultRow::range and FaultRow::doubt: a fault of an effort's gain widens it by as much
-/// as the efforts, any other by what its own efforts change from sample to sample and, in dY, at most as much as the
-/// efforts.
+/// What the efforts that a fault adds widen in the rows of a faulty log is FaultRow::range and FaultRow::doubt. The hull of
+/// efforts that change between samples: an effort's gain widens it by as much as the efforts do, any other fault by what
+/// its own efforts change from sample to sample. The motion between samples, in dY: faults that multiply efforts by as
+/// much as they multiply them, any other by ReferenceMotion::effort_dY times the largest effort that it has added since
+/// the onset, for every θ of the set.
 class FaultFilter final : public FaultRows {
  public:
   /// Throws InvalidArgument where `fault` does not fit `model`. `model` and `motion` are kept by reference.
   FaultFilter(FaultType fault, const Model& model, const FilterDesign& design, const ReferenceMotion& motion);
 
   [[nodiscard]] std::size_t outputs() const override { return model_->n(); }
+  [[nodiscard]] bool exact() const override { return exact_; }
   void begin(std::size_t onset) override;
   /// The same for a fault that was there before instant `first`, at which the filter begins: nothing jumps.
   void begin_broken(std::size_t first);
@@ -89,10 +99,11 @@ class FaultFilter final : public FaultRows {
   // The fault and the motion at one instant: s(t), what moves (s u) and what is seen (s S v) beyond v.
   struct Point {
     double profile = 0.0;
-    Eigen::VectorXd moved, seen, joint_seen;
+    Eigen::VectorXd moved, joint_moved, seen, joint_seen;
   };
   [[nodiscard]] Point point(std::size_t k) const;
   void filter(const FaultSignals& begin, const FaultSignals& end, const std::array<double, 2>& shares, double h);
+  [[nodiscard]] double most_added(const FaultSignals& signals) const;
   void widen(const FaultSignals& begin, const FaultSignals& end, bool sets_in, double h);
 
   FaultType fault_;
@@ -104,10 +115,16 @@ class FaultFilter final : public FaultRows {
   Point before_;
   std::vector<KernelState> cascades_;  // g1, g2, s, c one after the other
   FaultSignals filtered_;
-  bool gain_only_ = false;            // a fault of an effort's gain, and nothing else
-  Eigen::VectorXd gain_;              // per output: by how much it widens what is in doubt of efforts
-  Eigen::MatrixXd to_joints_;         // efforts of the joints from those of the outputs
-  FaultSignals last_;                 // the signature before this step
+  bool exact_ = true;
+  bool gain_only_ = false;       // a fault of an effort's gain, and nothing else
+  Eigen::VectorXd gain_;         // per output: by how much it widens what is in doubt of efforts
+  Eigen::MatrixXd from_motion_;  // speeds of the joints from those of the coordinates
+  Eigen::MatrixXd to_joints_;    // efforts of the joints from those of the outputs
+  FaultSignals last_;            // the signature before this step
+  bool proportional_ = false;    // its efforts are multiples of the healthy ones
+  double growth_ = 0.0;          // by how many of them, per unit of κ
+  double most_kappa_ = 0.0;
+  double added_ = 0.0;                // largest effort per unit of κ since the onset
   std::vector<KernelState> widened_;  // n × p of range_, then n of c
   RowMatrix range_;
   Eigen::VectorXd widened_c_;

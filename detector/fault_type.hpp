@@ -66,6 +66,7 @@ struct FaultType {
   bool held_effort = false;  ///< a reading that stands still: H Y is taken away and H times its filtered value at the
                              ///< onset over the filter's static gain put in its place: a picture of it, no promise
                              ///< (margins.hpp)
+  bool of_reading = false;  ///< K is of what encoders show: the joints' own speeds share in it, and dry friction's sign
   FaultProfile profile{};
 
   /// κ of a magnitude.

@@ -508,7 +508,7 @@ Isolation isolate(const ReferenceMotion& motion, const RegressorFilter& filter, 
     validate(finding.fault, filter.model());
     if (stands_still(finding.fault)) {
       judge_reading(setting, finding);
-    } else if (OnsetRows::knows(finding.fault) && setting.window.end >= setting.window.begin + 4) {
+    } else if (OnsetRows::knows(finding.fault, filter.model()) && setting.window.end >= setting.window.begin + 4) {
       Search(setting, finding).run();
     }
   });

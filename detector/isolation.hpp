@@ -50,7 +50,7 @@ struct FaultFinding {
   enum class Verdict {
     consistent,   ///< not excluded
     excluded,     ///< proved: no size, onset, θ and noise explains the window
-    not_examined  ///< its rows are not known (a bump of unknown phase, a fault of a user's own kind)
+    not_examined  ///< its rows are not known (a bump of unknown phase, OnsetRows::knows())
   };
   FaultType fault;
   Verdict verdict = Verdict::not_examined;

@@ -126,7 +126,7 @@ OnsetMargin margin_at(const ReferenceMotion& motion, const FaultMargins& margins
     }
     for (std::size_t i = 0; i < n; ++i) {
       const FaultRow row = rows.row(i);
-      if (fault.held_effort) {  // at which value nobody knows beforehand
+      if (!rows.exact()) {
         hidden = 0.0;
         continue;
       }

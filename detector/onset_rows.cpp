@@ -20,6 +20,22 @@ void raise(FaultSignals& to, const FaultSignals& from) {
   to.c = to.c.cwiseMax(from.c.cwiseAbs());
 }
 
+// What is seen, as a fault of motion in κ' = κ/(1 + κ); its range is in κ' too.
+FaultType of_motion(const FaultType& fault) {
+  FaultType out = fault;
+  out.motion = -fault.seen;
+  out.seen.resize(0, 0);
+  out.of_reading = true;
+  const auto reduced = [&](double magnitude) {
+    const double kappa = fault.kappa(magnitude);
+    return kappa / (1.0 + kappa);
+  };
+  out.range = {reduced(fault.range.lower), reduced(fault.range.upper)};
+  out.per_kappa = 1.0;
+  out.share_lost = false;
+  return out;
+}
+
 bool drifts(const FaultType& fault) { return fault.profile.kind == FaultProfile::Kind::drift; }
 
 Eigen::MatrixXd or_zero(const Eigen::MatrixXd& matrix, std::size_t size) {
@@ -29,17 +45,19 @@ Eigen::MatrixXd or_zero(const Eigen::MatrixXd& matrix, std::size_t size) {
 
 }  // namespace
 
-bool OnsetRows::knows(const FaultType& fault) {
+bool OnsetRows::knows(const FaultType& fault, const Model& model) {
   if (fault.profile.kind != FaultProfile::Kind::step && !drifts(fault)) {
     return false;
   }
   if (fault.seen.size() == 0) {
-    return true;
+    FaultType known = fault;
+    known.held_effort = false;
+    return polynomial(known, model);
   }
   const bool alone = fault.motion.size() == 0 && fault.slip.size() == 0 && fault.lateral == 0.0 &&
                      fault.effort.size() == 0 && fault.ground.size() == 0 && fault.offset.size() == 0 &&
                      fault.theta.size() == 0 && !fault.whole && !drifts(fault);
-  return alone &&
+  return alone && polynomial(of_motion(fault), model) &&
          (fault.seen * fault.seen - fault.seen).cwiseAbs().maxCoeff() <= 1e-12 * fault.seen.cwiseAbs().maxCoeff();
 }
 
@@ -57,11 +75,10 @@ OnsetRows::OnsetRows(const FaultType& fault, const Model& model, const FilterDes
       end_(end),
       gain_(std::pow(design.alpha, design.order)),
       bound_{FaultSignals::none(model), FaultSignals::none(model), FaultSignals::none(model)} {
-  check::that(knows(fault), "fault '" + fault.name + "'", "a step or a drift");
+  check::that(knows(fault, model), "fault '" + fault.name + "'", "a step or a drift");
   check::that(first < end && end <= motion.instants(), "instants", "a range of the motion");
   if (encoder_) {
-    fault_.motion = -fault_.seen;
-    fault_.seen.resize(0, 0);
+    fault_ = of_motion(fault_);
   }
   fault_.held_effort = false;
   step_ = fault_;
@@ -197,29 +214,37 @@ OnsetRow OnsetRows::row(std::size_t k, std::size_t i) const {
   const Eigen::MatrixXd K = or_zero(fault_.motion, model_->coordinates.size()).cwiseAbs();
   const Eigen::MatrixXd H =
       or_zero(fault_.effort, model_->n()).cwiseAbs() + or_zero(fault_.ground, model_->n()).cwiseAbs();
-  const Eigen::VectorXd acceleration = K * errors_->acceleration, speed = K * errors_->speed,
-                        sample = K * errors_->speed_sample;
+  // What an entry of the row can be wrong by, motion between samples and all.
+  const auto own_error = [&](const Term& term) {
+    return motion_->rows.dY(static_cast<Eigen::Index>(k * model_->n() + term.output),
+                            static_cast<Eigen::Index>(term.parameter));
+  };
+  Eigen::VectorXd of_acceleration = errors_->acceleration, of_speed = errors_->speed;
+  for (const Term& term : model_->terms) {
+    if (term.kind != Term::Kind::function && term.scale != 0.0) {
+      double& most =
+          (term.kind == Term::Kind::speed ? of_speed : of_acceleration)[static_cast<Eigen::Index>(term.coordinate)];
+      most = std::max(most, own_error(term) / std::abs(term.scale));
+    }
+  }
+  const Eigen::VectorXd acceleration = K * of_acceleration, speed = K * of_speed, sample = K * errors_->speed_sample;
   for (const Term& term : model_->terms) {
     const auto o = static_cast<Eigen::Index>(term.output), j = static_cast<Eigen::Index>(term.parameter),
                c = static_cast<Eigen::Index>(term.coordinate);
     const double scale = std::abs(term.scale);
     // Errors of this entry, and of its motion part: filtered, and what the cut at t_s adds.
-    double own = 0.0, moved = 0.0, own_cut = 0.0, moved_cut = 0.0;
+    double own = own_error(term), moved = 0.0, own_cut = 0.0, moved_cut = 0.0;
     switch (term.kind) {
       case Term::Kind::acceleration:
-        own = scale * errors_->acceleration[c];
-        moved = scale * (acceleration[c] +
-                         (c == 0 && fault_.lateral != 0.0 ? std::abs(fault_.lateral) * errors_->speed[1] : 0.0));
+        moved = scale *
+                (acceleration[c] + (c == 0 && fault_.lateral != 0.0 ? std::abs(fault_.lateral) * of_speed[1] : 0.0));
         own_cut = scale * onset_error * errors_->speed_sample[c];
         moved_cut = scale * onset_error * sample[c];
         break;
-      case Term::Kind::speed:
-        own = scale * errors_->speed[c];
-        moved = scale * speed[c];
-        break;
+      case Term::Kind::speed: moved = scale * speed[c]; break;
       case Term::Kind::function:
         // Functions of the motion are at most proportional to it, or do not depend on it but by signs.
-        own = 2.0 * motion_->rows.dY(static_cast<Eigen::Index>(k * model_->n()) + o, j);
+        own *= 2.0;
         moved = fault_.motion.size() > 0 || fault_.slip.size() > 0
                     ? scale * design_.static_gain() * (sample.maxCoeff() + errors_->heading * (1.0 + K.maxCoeff()))
                     : 0.0;
@@ -233,6 +258,11 @@ OnsetRow OnsetRows::row(std::size_t k, std::size_t i) const {
     if (o == at && fault_.theta.size() > 0) {
       out.ec += std::abs(fault_.theta[j]) * (own + own_cut);
     }
+  }
+  // An effort that reads too much says too little of what the robot may do between samples.
+  if (fault_.offset.size() > 0 && motion_->effort_dY.rows() > 0) {
+    out.e1 +=
+        fault_.offset.cwiseAbs().maxCoeff() * motion_->effort_dY.row(static_cast<Eigen::Index>(k * model_->n() + i));
   }
   if (drifts(fault_)) {
     out.e1 += uncertain_ * step.g1.row(at).cwiseAbs();

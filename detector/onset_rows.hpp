@@ -11,7 +11,8 @@
 /// state beyond the one of an onset at t_s itself. They are bounded by what onsets at the instants of [t_a, t_s] leave
 /// there, times kTransition: that is what covers a step between two samples, whose interval mixes both sides.
 ///
-/// Errors. Let |ĝ1 − g1| <= e1, |ĝ2 − g2| <= e2, |ĉ − c| <= e_c. The kernel of f₂*(s n̈) for a step s is that of f₂*n̈ cut off
+/// Errors. Where motion between samples counts, Δ is the row's own dY, from the efforts as they were logged: a faulty
+/// robot's motion may be what they say, or what they say less the offset that the fault adds (effort_dY). Let |ĝ1 − g1| <= e1, |ĝ2 − g2| <= e2, |ĉ − c| <= e_c. The kernel of f₂*(s n̈) for a step s is that of f₂*n̈ cut off
 /// at t − t_s: its derivatives' total variations do not grow by that, but for the error n_v(t_s) of the speed itself, with
 /// weight f₂(t − t_s), as at the start of a segment (noise.hpp). So with Δ the bounds of the healthy columns
 ///
@@ -51,9 +52,9 @@ class OnsetRows {
   /// Times the states that onsets between two samples may leave.
   static constexpr double kTransition = 2.0;
 
-  /// Whether the fault's rows are known: a step or a drift whose S, if any, has S² = S and comes alone, and that does not
-  /// stand for a reading that stands still.
-  [[nodiscard]] static bool knows(const FaultType& fault);
+  /// Whether the fault's rows are known: a step or a drift whose S, if any, has S² = S and comes alone, that does not
+  /// stand for a reading that stands still, and whose signature is a polynomial of κ (polynomial()).
+  [[nodiscard]] static bool knows(const FaultType& fault, const Model& model);
 
   /// For the instants [first, end) of `motion`, of one segment. References are kept. `errors` are those of the rows.
   OnsetRows(const FaultType& fault, const Model& model, const FilterDesign& design, MotionKind kind,

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <wheelwright/core/check.hpp>
 
@@ -20,9 +21,7 @@ std::size_t effort_reach(const Measurement& m, const SignalErrors& errors) {
   return m.changes == EffortChanges::at_samples ? 0 : about + (m.hold == Hold::zero_order ? 1 : 3);
 }
 
-}  // namespace
-
-ReferenceMotion read_reference(LogSource& log, RegressorFilter filter) {
+ReferenceMotion walk(LogSource& log, RegressorFilter filter) {
   std::vector<std::size_t> pick;
   for (const auto& name : filter.measurement().columns()) {
     const auto column = log.find(name);
@@ -111,6 +110,30 @@ ReferenceMotion read_reference(LogSource& log, RegressorFilter filter) {
                                              : RowMatrix::Zero(rows, columns).eval();
   motion.between_dy = errors.between_samples ? (motion.rows.dy - errors.output.replicate(k, 1)).cwiseMax(0.0).eval()
                                              : Eigen::VectorXd::Zero(rows).eval();
+  return motion;
+}
+
+}  // namespace
+
+ReferenceMotion read_reference(LogSource& log, const RegressorFilter& filter) {
+  ReferenceMotion motion = walk(log, filter);
+  const SignalErrors& errors = filter.errors();
+  const double most =
+      motion.rows.y.size() > 0 ? motion.rows.y.cwiseAbs().maxCoeff() / filter.design().static_gain() : 0.0;
+  motion.effort_dY = RowMatrix::Zero(motion.rows.dY.rows(), motion.rows.dY.cols());
+  if (errors.between_samples && errors.motion.mobility.size() > 0 && most > 0.0) {
+    SignalErrors more = errors;
+    more.motion.effort = errors.motion.effort.array() + most;
+    const ReferenceMotion wider =
+        walk(log, RegressorFilter(filter.model(), filter.design(), filter.measurement(), more));
+    // A step that is too long for the larger effort has no rows: then nothing is known of the smaller one's growth.
+    if (wider.rows.dY.rows() == motion.rows.dY.rows()) {
+      motion.effort_dY = (wider.rows.dY - motion.rows.dY).cwiseMax(0.0) / most;
+    } else {
+      motion.effort_dY.setConstant(std::numeric_limits<double>::infinity());
+    }
+  }
+  motion.largest = errors.motion.largest;
   return motion;
 }
 

@@ -34,6 +34,8 @@ struct ReferenceMotion {
   RegressionBlock rows;                     ///< K instants: Y_f of the motion, with the bounds dY, dy of the sensors
   RowMatrix between_dY;        ///< of dY what motion may do between samples: it grows with the efforts; empty: nothing
   Eigen::VectorXd between_dy;  ///< of dy what efforts may do between samples, alike
+  RowMatrix effort_dY;         ///< by how much between_dY grows for each unit that every output's effort is larger by
+  Eigen::VectorXd largest;     ///< sup |θ_j| over the set of the filter's MotionBound; empty where it has none
   std::size_t effort_reach = 0;  ///< steps in which an effort's sample counts for dy; 0: efforts are known
 
   /// Number of instants K.
@@ -46,8 +48,8 @@ struct ReferenceMotion {
   }
 };
 
-/// The motion of `log` as `filter` reads it, whose error bounds the rows get. Walks the log once and holds it. Throws
-/// InvalidArgument when the log lacks a column of the filter's measurement.
-[[nodiscard]] ReferenceMotion read_reference(LogSource& log, RegressorFilter filter);
+/// The motion of `log` as `filter` reads it, whose error bounds the rows get. Walks the log (twice where efforts bound the
+/// motion between samples) and holds it. Throws InvalidArgument when the log lacks a column of the filter's measurement.
+[[nodiscard]] ReferenceMotion read_reference(LogSource& log, const RegressorFilter& filter);
 
 }  // namespace wheelwright

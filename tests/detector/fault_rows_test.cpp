@@ -254,6 +254,59 @@ TEST(FaultRows, SettleToZetaOfThePaper) {
   }
 }
 
+// v|v|, e^{−ω²} sgn ω and sgn v as further terms of the drive's first output.
+Model with_term(Model model, const TermFunction& function) {
+  model.terms.push_back({.output = 0, .parameter = 0, .kind = Term::Kind::function, .function = function});
+  return model;
+}
+TermValue drag(const MotionState& s) { return {s.speed[0] * std::abs(s.speed[0]), 0.0}; }
+TermValue stribeck(const MotionState& s) {
+  return {std::exp(-s.joint_speed[0] * s.joint_speed[0]) * std::copysign(1.0, s.joint_speed[0]), 0.0};
+}
+TermValue sign_of_speed(const MotionState& s) {
+  return {static_cast<double>((s.speed[0] > 0.0) - (s.speed[0] < 0.0)), 0.0};
+}
+
+TEST(FaultRows, ArePolynomialsWhereFunctionsOfTheMotionAre) {
+  const Model plain = prepared(Shown::angles, 100.0).model;
+  const auto known = [&](const Model& model, const char* fault) { return polynomial(find_fault(plain, fault), model); };
+  for (const char* fault : {"wheel_radius", "wheel_slip_right", "encoder_scale_left", "payload_lost", "matched"}) {
+    EXPECT_TRUE(known(plain, fault)) << fault;
+  }
+  const Model dragged = with_term(plain, drag);
+  EXPECT_TRUE(known(dragged, "wheel_slip_right"));      // κ and κ²
+  EXPECT_FALSE(known(dragged, "wheel_radius"));         // κ³: the effort's gain, too
+  EXPECT_FALSE(known(dragged, "encoder_scale_right"));  // κ² of what is only seen
+  EXPECT_FALSE(known(dragged, "matched"));              // |v + κ|
+  EXPECT_TRUE(known(dragged, "effort_loss_right"));
+  const Model sticky = with_term(plain, stribeck);
+  EXPECT_FALSE(known(sticky, "encoder_scale_right"));
+  EXPECT_TRUE(known(sticky, "wheel_slip_right"));  // the wheel itself turns as it is seen to
+  const Model dry = with_term(plain, sign_of_speed);
+  EXPECT_TRUE(known(dry, "wheel_radius"));
+  EXPECT_FALSE(known(dry, "matched"));
+  EXPECT_FALSE(known(plain, "effort_stuck_right"));
+}
+
+TEST(FaultRows, HoldFunctionsOfTheMotionToTheSecondOrder) {
+  const Prepared s = prepared(Shown::angles, 100.0);
+  const Eigen::Vector2d v(0.4, 0.0), a(0.0, 0.0);
+  const FaultType radius = find_fault(s.model, "wheel_slip_right");
+  const auto added = [&](const TermFunction& function, double kappa) {
+    const SettledRows with = settled_rows(radius, with_term(s.model, function), s.design, v, a),
+                      without = settled_rows(radius, s.model, s.design, v, a);
+    return (kappa * (with.signature.g1 - without.signature.g1) +
+            kappa * kappa * (with.signature.g2 - without.signature.g2))(0, 0) /
+           s.design.static_gain();
+  };
+  for (const double kappa : {-0.9, 0.3, 0.8}) {
+    const double moved = 0.4 * (1.0 - 0.5 * kappa);  // half of the way is the right wheel's
+    EXPECT_NEAR(added(drag, kappa), moved * moved - 0.16, 1e-14) << kappa;
+    EXPECT_EQ(added(sign_of_speed, kappa), 0.0) << kappa;
+    EXPECT_EQ(added(stribeck, kappa), 0.0) << kappa;
+  }
+}
+
 TEST(FaultRows, RefuseFaultsThatMakeNoSense) {
   const Prepared s = prepared(Shown::angles, 100.0);
   FaultType fault = find_fault(s.model, "wheel_radius");
