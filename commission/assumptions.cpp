@@ -242,6 +242,14 @@ Assumption motion_between_samples(const Commissioning& r) {
         "In the commissioning log no wheel accelerates between two samples more than {:g} times as much as its samples "
         "show; in driving to come the dynamics bound it.",
         kBeyondSamples);
+    const SignalErrors& errors = r.model.errors;
+    if (errors.between_samples && errors.motion.mobility.size() == 0) {
+      a.test = "the set bounds the inertia from below";
+      a.verdict = AssumptionVerdict::fails;
+      a.detail =
+          "it holds robots whose dynamics bound nothing, so that driving to come was taken to be no livelier than the "
+          "log: accelerate more, or declare `limits: {acceleration: …}` or a lower bound in `prior:`";
+    }
     return a;
   }
   a.statement = fmt::format("No wheel ever accelerates by more than {:g} rad/s² (m/s²).", limit->second);

@@ -153,6 +153,15 @@ TEST(Assumptions, ADeclaredAccelerationIsHeldAgainstTheSamples) {
   EXPECT_EQ(of(assumptions_of(c), "motion_between_samples").verdict, Verdict::not_tested);
 }
 
+TEST(Assumptions, DynamicsThatBoundNothingAreNoGuaranteeForDrivingToCome) {
+  Commissioning c;
+  c.model.errors.between_samples = true;
+  c.model.errors.motion.limit = Eigen::VectorXd::Ones(1);
+  EXPECT_EQ(of(assumptions_of(c), "motion_between_samples").verdict, Verdict::fails);
+  c.model.errors.motion.mobility = Eigen::MatrixXd::Ones(1, 1);
+  EXPECT_EQ(of(assumptions_of(c), "motion_between_samples").verdict, Verdict::not_tested);
+}
+
 // Steps that vary by more than a third hide a missing row: two short ones are shorter than a long one.
 TEST(Assumptions, WhereStepsVaryTooMuchAMissingRowDoesNotShow) {
   Commissioning c;
