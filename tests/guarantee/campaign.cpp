@@ -10,6 +10,7 @@
 #include <fstream>
 #include <functional>
 #include <map>
+#include <optional>
 #include <set>
 #include <stdexcept>
 #include <string>
@@ -93,8 +94,13 @@ std::string line_of(std::uint64_t number, const Options& options) {
   line["alarms"] = v.alarms;
   line["events"] = v.events;
   line["first_alarm"] = v.first_alarm;
-  line["faults"] = v.faults;
-  line["missed"] = v.missed;
+  const auto each = [&](std::size_t FaultTally::*count) {
+    return std::vector<std::size_t>{v.faults[0].*count, v.faults[1].*count, v.faults[2].*count};
+  };
+  line["faults"] = each(&FaultTally::certain);
+  line["missed"] = each(&FaultTally::missed);
+  line["isolated"] = each(&FaultTally::isolated);
+  line["excluded"] = each(&FaultTally::excluded);
   line["seconds"] = v.commission_seconds + v.watch_seconds;
   if (v.end != Verdict::End::guaranteed) {
     line["message"] = v.message;
@@ -213,11 +219,21 @@ int run(const Options& options) {
 
 // ---- summary -------------------------------------------------------------------------------------------------------
 
+// Of all kinds of faults, or of one.
+std::size_t total(const Json& j, const char* field, std::optional<std::size_t> kind = std::nullopt) {
+  const Json counts = j.value(field, Json::array());
+  std::size_t sum = 0;
+  for (std::size_t k = 0; k < counts.size(); ++k) {
+    sum += !kind || *kind == k ? counts[k].get<std::size_t>() : 0;
+  }
+  return sum;
+}
+
 struct Tally {
   std::size_t cases = 0, guaranteed = 0, learnt = 0, empty = 0, refused = 0, lost = 0;
   std::size_t outside = 0, alarm_robots = 0;
   double alarms = 0.0, watched = 0.0;
-  std::size_t faults = 0, missed = 0;
+  std::size_t faults = 0, missed = 0, isolated = 0, excluded = 0;
   std::vector<double> widths, ratios;
 
   void add(const Json& j) {
@@ -233,8 +249,10 @@ struct Tally {
       alarm_robots += j.at("alarms").get<double>() > 0.0 ? 1 : 0;
       alarms += j.at("alarms").get<double>();
       watched += j.at("decisions").get<double>();
-      faults += j.value("faults", std::size_t{0});
-      missed += j.value("missed", std::size_t{0});
+      faults += total(j, "faults");
+      missed += total(j, "missed");
+      isolated += total(j, "isolated");
+      excluded += total(j, "excluded");
       widths.push_back(j.at("width"));
       if (j.at("oracle").get<double>() > 0.0) {
         ratios.push_back(j.at("width").get<double>() / j.at("oracle").get<double>());
@@ -262,15 +280,17 @@ std::string bucket(double x, const std::vector<double>& edges, const char* unit)
 }
 
 void print_table(const char* title, const std::map<std::string, Tally>& rows) {
-  fmt::print("\n{:<24} {:>6} {:>10} {:>6} {:>6} {:>7} {:>5} | {:>7} {:>7} {:>9} {:>11} | {:>6} {:>6} | {:>8} {:>7}\n",
-             title, "cases", "guaranteed", "learnt", "empty", "refused", "lost", "outside", "alarmed", "alarms",
-             "decisions", "faults", "missed", "width", "/oracle");
+  fmt::print(
+      "\n{:<24} {:>6} {:>10} {:>6} {:>6} {:>7} {:>5} | {:>7} {:>7} {:>9} {:>11} | {:>6} {:>6} {:>8} {:>8} | {:>8} "
+      "{:>7}\n",
+      title, "cases", "guaranteed", "learnt", "empty", "refused", "lost", "outside", "alarmed", "alarms", "decisions",
+      "faults", "missed", "isolated", "excluded", "width", "/oracle");
   for (const auto& [value, t] : rows) {
     fmt::print(
-        "{:<24} {:>6} {:>10} {:>6} {:>6} {:>7} {:>5} | {:>7} {:>7} {:>9.0f} {:>11.0f} | {:>6} {:>6} | {:>8.3g} "
-        "{:>7.3g}\n",
+        "{:<24} {:>6} {:>10} {:>6} {:>6} {:>7} {:>5} | {:>7} {:>7} {:>9.0f} {:>11.0f} | {:>6} {:>6} {:>8} {:>8} | "
+        "{:>8.3g} {:>7.3g}\n",
         value, t.cases, t.guaranteed, t.learnt, t.empty, t.refused, t.lost, t.outside, t.alarm_robots, t.alarms,
-        t.watched, t.faults, t.missed, median(t.widths), median(t.ratios));
+        t.watched, t.faults, t.missed, t.isolated, t.excluded, median(t.widths), median(t.ratios));
   }
 }
 
@@ -307,6 +327,7 @@ int summary(const std::vector<std::string>& files) {
   std::vector<std::map<std::string, Tally>> tables(dimensions.size());
   std::map<std::string, Tally> broken;
   Tally kept;
+  std::array<std::array<std::size_t, 4>, 3> by_fault{};
   for (const std::string& file : files) {
     std::ifstream in(file);
     if (!in) {
@@ -323,6 +344,12 @@ int summary(const std::vector<std::string>& files) {
         continue;
       }
       kept.add(json);
+      for (std::size_t k = 0; k < by_fault.size(); ++k) {
+        constexpr std::array<const char*, 4> kCounts = {"faults", "missed", "isolated", "excluded"};
+        for (std::size_t f = 0; f < kCounts.size(); ++f) {
+          by_fault[k][f] += total(json, kCounts[f], k);
+        }
+      }
       for (std::size_t d = 0; d < dimensions.size(); ++d) {
         tables[d][dimensions[d].second(json)].add(json);
       }
@@ -330,25 +357,34 @@ int summary(const std::vector<std::string>& files) {
   }
   fmt::print(
       "Logs that keep to what their robot file declares. outside: the truth is not in the published set; alarmed: "
-      "robots "
-      "with a\nfalse alarm; empty: called impossible; lost: timed out or crashed; faults: of a "
-      "size that margins call certain; width: median "
-      "of (upper − lower) / truth\nof the mass; /oracle: median of that over the width for exact rows with the "
-      "sensors' "
-      "worst case only.\n");
+      "robots with "
+      "a\nfalse alarm; empty: called impossible; lost: timed out or crashed; faults: of a size that margins call "
+      "certain; "
+      "isolated:\nalarms looked into; excluded: of them, with the true fault, its size or time ruled out; width: "
+      "median of "
+      "(upper − lower) /\ntruth of the mass; /oracle: median of that over the width for exact rows with the sensors' "
+      "worst "
+      "case only.\n");
   for (std::size_t d = 0; d < dimensions.size(); ++d) {
     print_table(dimensions[d].first, tables[d]);
+  }
+  fmt::print("\n{:<24} {:>7} {:>7} {:>9} {:>9}\n", "fault of a certain size", "tried", "missed", "isolated",
+             "excluded");
+  constexpr std::array<const char*, 3> kFaults = {"effort_loss", "effort_bias", "encoder_scale"};
+  for (std::size_t k = 0; k < kFaults.size(); ++k) {
+    fmt::print("{:<24} {:>7} {:>7} {:>9} {:>9}\n", kFaults[k], by_fault[k][0], by_fault[k][1], by_fault[k][2],
+               by_fault[k][3]);
   }
   fmt::print(
       "\nLogs that break an assumption that their robot file declares: wanted is the truth inside, or no model (empty, "
       "refused).\nAlarms on such a log are no false alarms in the strict sense.\n");
   print_table("broken", broken);
-  const std::size_t promises = kept.outside + kept.alarm_robots + kept.missed + kept.lost;
+  const std::size_t promises = kept.outside + kept.alarm_robots + kept.missed + kept.excluded + kept.lost;
   fmt::print(
       "\nOf {} logs that keep to their assumptions: truth outside {}, robots with a false alarm {}, certain faults "
-      "missed "
-      "{} of {}, lost {}; called impossible {}. Decisions: {:.3g}.\n",
-      kept.cases, kept.outside, kept.alarm_robots, kept.missed, kept.faults, kept.lost, kept.empty, kept.watched);
+      "missed {} of {}, true faults excluded {} of {}, lost {}; called impossible {}. Decisions: {:.3g}.\n",
+      kept.cases, kept.outside, kept.alarm_robots, kept.missed, kept.faults, kept.excluded, kept.isolated, kept.lost,
+      kept.empty, kept.watched);
   constexpr std::size_t kMostImpossible = 100;  // one in
   return promises == 0 && kMostImpossible * kept.empty <= kept.cases ? 0 : 1;
 }

@@ -118,6 +118,24 @@ void expect_kept(const std::string& what, Make make) {
   EXPECT_EQ(broken, 0u) << counts;
 }
 
+// Every robot of `make`, broken: faults of a size that margins call certain are seen, and stay among what is possible.
+template <typename Make>
+void expect_faults(const std::string& what, Make make) {
+  FaultTally all;
+  for (std::uint64_t seed = 1; seed <= kRobots; ++seed) {
+    const Verdict v = judge(make(seed), {.faults = true});
+    for (const FaultTally& each : v.faults) {
+      all.certain += each.certain;
+      all.isolated += each.isolated;
+    }
+    EXPECT_EQ(v.missed(), 0u) << what << ", robot " << seed;
+    EXPECT_EQ(v.excluded(), 0u) << what << ", robot " << seed;
+  }
+  fmt::print("{}: {} certain faults, {} alarms looked into\n", what, all.certain, all.isolated);
+  EXPECT_GE(all.certain, 4 * kRobots) << what;
+  EXPECT_GE(all.isolated, kRobots) << what;
+}
+
 // ---- the simulator itself ------------------------------------------------------------------------------------------
 
 // Coulomb friction of two wheels by small steps.
@@ -336,6 +354,45 @@ TEST(DryFriction, ReversalsBetweenSamples) {
     c.effort_bound = 0.001 * c.learn.reach[0];
     return c;
   });
+}
+
+TEST(Faults, OfAnAxisWithDryFriction) {
+  expect_faults("broken axes with dry friction", [](std::uint64_t seed) {
+    Case c = ordinary(3 * seed, 100.0, 5.0);
+    dry(c, 0.2);
+    c.sense = seed % 2 == 0 ? Sense::speed : Sense::angle;
+    c.motion_bound = c.sense == Sense::speed ? 1e-3 : 1e-5;
+    c.effort_bound = 0.001 * c.learn.reach[0];
+    return c;
+  });
+}
+
+TEST(Faults, WhereCommandsChangeBetweenSamples) {
+  expect_faults("broken robots whose commands change between samples", [](std::uint64_t seed) {
+    Case c = ordinary(seed, 200.0, 1.0);
+    c.changes = Changes::between;
+    c.controller_rate = 60.0;
+    c.motion_bound = 1e-5;
+    c.effort_bound = 0.001 * c.learn.reach[0];
+    return c;
+  });
+}
+
+TEST(Faults, OfLogsWithUnevenSteps) {
+  expect_faults("broken robots with uneven steps", [](std::uint64_t seed) {
+    Case c = ordinary(seed, 50.0, 1.0);
+    c.stamps = seed % 2 == 0 ? Stamps::jittered : Stamps::two_three;
+    c.jitter = seed % 2 == 0 ? 0.2 : 0.0;
+    c.motion_bound = 1e-5;
+    c.effort_bound = 0.001 * c.learn.reach[0];
+    return c;
+  });
+}
+
+// Set so wide that it holds robots without inertia: the motion that was seen in the log is no bound of a livelier one.
+TEST(BetweenSamples, NothingIsGuaranteedWhereDynamicsBoundNothing) {
+  const Verdict v = judge(random_case(3, 393));
+  EXPECT_EQ(v.end, Verdict::End::learnt) << name(v.end);
 }
 
 TEST(WholeTurnsAMinute, AreNoEncoder) {

@@ -5,12 +5,16 @@
 #include <chrono>
 #include <cmath>
 #include <exception>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include <wheelwright/bounds/feasible_set.hpp>
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/commission/margin_survey.hpp>
+#include <wheelwright/commission/trace.hpp>
 #include <wheelwright/core/regression.hpp>
+#include <wheelwright/detector/isolation.hpp>
 
 namespace wheelwright::guarantee {
 namespace {
@@ -129,41 +133,78 @@ void watch(const LogTable& log, const CommissionedModel& model, Verdict& verdict
   }
 }
 
-// Losses of effort of sizes that margins call certain within a window, at a few onsets: each has to be seen.
+// Whether a detector alarms between `onset` and `end`.
+bool sees(const CommissionedModel& model, const LogTable& log, double onset, double end) {
+  Detector detector = make_detector(model);
+  const std::vector<std::string> names = model.measurement.columns();
+  std::vector<double> sample(names.size());
+  bool seen = false;
+  for (std::size_t k = 0; k < log.rows() && log.t[k] <= end; ++k) {
+    for (std::size_t i = 0; i < names.size(); ++i) sample[i] = log.column(names[i])[k];
+    const bool alarm = detector.step(log.t[k], sample).fault;
+    seen = seen || (alarm && log.t[k] >= onset);
+  }
+  return seen;
+}
+
+// Whether what is said of the first alarm leaves the fault possible, of its size and at its time.
+bool isolated(const CommissionedModel& model, const LogTable& log, const FaultType& fault, const Breakdown& truth) {
+  TableSource source(log);
+  const Detection detection = detect(source, make_detector(model));
+  if (detection.events.empty() || detection.events.front().start < truth.onset) {
+    return true;  // a false alarm is told elsewhere
+  }
+  const Event& event = detection.events.front();
+  const RegressorFilter filter(model.model, model.filter, model.measurement, model.errors);
+  const ReferenceMotion motion = read_reference(source, filter);
+  const Isolation isolation =
+      isolate(motion, filter, Polytope(model.facets, model.box), {fault}, event.start, event.alarm);
+  const FaultFinding& found = isolation.findings.front();
+  return found.verdict == FaultFinding::Verdict::consistent &&
+         (!found.magnitude || found.magnitude->contains(truth.size)) &&
+         (found.onset.contains(truth.onset) || (found.earlier && truth.onset < found.onset.lower));
+}
+
+// Faults of sizes that margins call certain within a window: each has to be seen, and must not be excluded.
 void try_faults(const Case& c, const Scene& scene, const CommissionedModel& model, Verdict& verdict) {
+  using Kind = Breakdown::Kind;
   constexpr double kWindowSteps = 100.0;
   constexpr std::size_t kOnsets = 6;
+  constexpr std::size_t kMostLooked = 30000;  // rows in which the first alarm is looked for once more
   const double window = kWindowSteps / c.rate;
+  const std::string side = c.truth.axis ? "" : "_right";
+  const std::vector<std::pair<std::string, Kind>> kinds = {{"effort_loss" + side, Kind::effort_loss},
+                                                           {"effort_bias" + side, Kind::effort_bias},
+                                                           {"encoder_scale" + side, Kind::encoder_scale}};
   TableSource log(scene.watched);
   MarginSurveyOptions options;
   options.margins.windows = {window};
   options.margins.onset_step = (scene.watched.t.back() - scene.watched.t.front()) / static_cast<double>(kOnsets);
   options.margins.most_onsets = kOnsets;
-  options.faults = {c.truth.axis ? "effort_loss" : "effort_loss_right"};
+  for (const auto& [fault, kind] : kinds) options.faults.push_back(fault);
   options.map_points = 0;
   const MarginSurvey survey = survey_margins(log, model, options);
   for (const ResidualMargins& residual : survey.residuals) {
     for (const FaultMargins& fault : residual.margins) {
+      const auto kind =
+          std::find_if(kinds.begin(), kinds.end(), [&](const auto& k) { return k.first == fault.fault.name; });
+      bool looked = false;
       for (const OnsetMargin& onset : fault.onsets) {
-        if (residual.name != "torque" || fault.side < 0.0 || onset.certain.empty() ||
-            !(onset.certain[0] < fault.largest())) {
+        if (residual.name != "torque" || onset.certain.empty() || !(onset.certain[0] < fault.largest())) {
           continue;
         }
-        const LogTable faulty = watch_fault(c, {.onset = onset.t, .share = onset.certain[0]});
-        const auto sees = [&](const LogTable& table) {
-          Detector detector = make_detector(model);
-          const std::vector<std::string> names = model.measurement.columns();
-          std::vector<double> sample(names.size());
-          bool seen = false;
-          for (std::size_t k = 0; k < table.rows() && table.t[k] <= onset.t + window + 2.0 / c.rate; ++k) {
-            for (std::size_t i = 0; i < names.size(); ++i) sample[i] = table.column(names[i])[k];
-            const bool alarm = detector.step(table.t[k], sample).fault;
-            seen = seen || (alarm && table.t[k] >= onset.t);
-          }
-          return seen;
-        };
-        ++verdict.faults;
-        verdict.missed += sees(faulty) ? 0 : 1;
+        const Breakdown breakdown{kind->second, onset.t, fault.side * onset.certain[0]};
+        const LogTable broken = watch_broken(c, breakdown);
+        FaultTally& tally = verdict.faults[static_cast<std::size_t>(kind->second)];
+        const double end = onset.t + window + 2.0 / c.rate;
+        const bool seen = sees(model, broken, onset.t, end);
+        ++tally.certain;
+        tally.missed += seen ? 0 : 1;
+        if (seen && !looked && broken.rows() <= kMostLooked) {
+          looked = true;
+          ++tally.isolated;
+          tally.excluded += isolated(model, broken, fault.fault, breakdown) ? 0 : 1;
+        }
       }
     }
   }
@@ -198,8 +239,8 @@ Verdict judge(const Case& c, const JudgeOptions& options) {
     const auto watching = std::chrono::steady_clock::now();
     watch(scene.watched, result.model, verdict);
     verdict.watch_seconds = seconds_since(watching);
-    const bool steps = c.changes == Changes::at_samples && c.lost == 0.0 && c.sense != Sense::mean_speed;
-    if (options.faults && steps && c.broken == Broken::none && verdict.end == Verdict::End::guaranteed) {
+    const bool whole = c.lost == 0.0 && c.sense != Sense::mean_speed;
+    if (options.faults && whole && c.broken == Broken::none && verdict.end == Verdict::End::guaranteed) {
       try_faults(c, scene, result.model, verdict);
     }
     if (options.oracle && c.truth.coulomb == 0.0 && result.model.filter.order == 2) {

@@ -12,7 +12,8 @@ constexpr int kCuts = 8;           // of a piece, between which a wheel stops at
 constexpr int kMostEvents = 4000;  // in one piece
 constexpr int kHalvings = 200;
 constexpr double kRounding = 1e-13;         // of a wheel's speed, against the faster one
-constexpr double kLeast = 1e-12;            // of what is left of a piece, between two events
+constexpr double kLeast = 1e-12;            // of what is left of a piece, between two events; doubled from one to the
+                                            // next where rounding lets none of the ways last
 constexpr double kBreakaway = 1.0 + 1e-12;  // sticking over sliding friction: keeps rounding from deciding
 
 }  // namespace
@@ -164,7 +165,7 @@ void Plant::advance(double h, const Pair& effort, const Pair& slope) {
     take(after(h, effort, slope));
     return;
   }
-  double left = h;
+  double left = h, least = kLeast;
   Pair now = effort;
   for (int events = 0; left > 0.0; ++events) {
     if (events > kMostEvents) {
@@ -191,7 +192,8 @@ void Plant::advance(double h, const Pair& effort, const Pair& slope) {
       }
       (holds(after(middle, now, slope)) ? good : bad) = middle;
     }
-    bad = std::max(bad, kLeast * left);
+    least = good > 0.0 ? kLeast : std::min(1.0, 2.0 * least);
+    bad = std::max(bad, least * left);
     Sides sides = after(bad, now, slope);
     for (std::size_t j = 0; j < joints_; ++j) {
       if (slipping_[j] != 0 && sides.speed[j] * slipping_[j] < 0.0) {

@@ -2,7 +2,9 @@
 #include "scene.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <optional>
 
 #include "dice.hpp"
 
@@ -140,9 +142,9 @@ std::vector<std::string> columns(const Case& c) {
 
 // What else there is to a recording.
 struct Extra {
-  Scene* exact = nullptr;      // takes the exact speeds
-  std::uint64_t take = 0;      // of the same drive, with errors of its own
-  const Loss* loss = nullptr;  // a fault
+  Scene* exact = nullptr;                // takes the exact speeds
+  std::uint64_t take = 0;                // of the same drive, with errors of its own
+  const Breakdown* breakdown = nullptr;  // what breaks
 };
 
 // One drive and its log; `stray` grows to what a smooth effort strays from linear between stamps.
@@ -215,6 +217,10 @@ LogTable record(const Case& c, const Order& order, Noise noise, std::size_t rows
   log.columns.assign(2 * joints, std::vector<double>(n));
   const double count = c.counts ? kTurn / *c.counts : 0.0;
   const double offset = dice.share();  // of the angles from a count
+  const auto breaks = [&](std::size_t j, std::size_t k) {
+    return extra.breakdown != nullptr && j == 0 && kept[k] >= extra.breakdown->onset;
+  };
+  std::array<std::optional<double>, 2> whole;  // angles from which a broken encoder counts
   double widest = 0.0;
   for (const Pair& e : h.effort) widest = std::max({widest, std::abs(e[0]), std::abs(e[1])});
   for (std::size_t k = 0; k < n; ++k) {
@@ -222,11 +228,17 @@ LogTable record(const Case& c, const Order& order, Noise noise, std::size_t rows
       const double of_turn = turn && j == 1 ? -1.0 : 1.0;
       double& motion = log.columns[j][k];
       const double off = kWithin * c.motion_bound * error(noise, dice, of_turn * sides.motion[k]);
+      double angle = h.angle[at(k, true)][j], speed = h.speed[at(k, true)][j];
+      if (breaks(j, k) && extra.breakdown->kind == Breakdown::Kind::encoder_scale) {
+        whole[j] = whole[j].value_or(angle);
+        angle += extra.breakdown->size * (angle - *whole[j]);
+        speed += extra.breakdown->size * speed;
+      }
       switch (c.sense) {
-        case Sense::angle: motion = h.angle[at(k, true)][j] + off; break;
-        case Sense::encoder: motion = std::round(h.angle[at(k, true)][j] / count + offset) * count; break;
-        case Sense::speed: motion = h.speed[at(k, true)][j] + off; break;
-        case Sense::whole_rpm: motion = std::round(h.speed[at(k, true)][j] / (kTurn / 60.0)) * (kTurn / 60.0); break;
+        case Sense::angle: motion = angle + off; break;
+        case Sense::encoder: motion = std::round(angle / count + offset) * count; break;
+        case Sense::speed: motion = speed + off; break;
+        case Sense::whole_rpm: motion = std::round(speed / (kTurn / 60.0)) * (kTurn / 60.0); break;
         case Sense::mean_speed: {
           const double counted = std::floor(h.angle[at(k, true)][j] / count + offset) -
                                  std::floor(h.angle[at(k, false)][j] / count + offset);
@@ -244,8 +256,10 @@ LogTable record(const Case& c, const Order& order, Noise noise, std::size_t rows
         when = k > 0 ? kept[k - 1] : 0.0;
       }
       double effort = h.effort_at(when)[j];
-      if (extra.loss != nullptr && j == 0 && kept[k] >= extra.loss->onset) {
-        effort /= 1.0 - extra.loss->share;
+      if (breaks(j, k) && extra.breakdown->kind == Breakdown::Kind::effort_loss) {
+        effort /= 1.0 - extra.breakdown->size;
+      } else if (breaks(j, k) && extra.breakdown->kind == Breakdown::Kind::effort_bias) {
+        effort += extra.breakdown->size;
       }
       effort += kWithin * c.effort_bound * error(noise, dice, of_turn * sides.effort[k]);
       if (c.broken == Broken::clipped_effort) {
@@ -350,9 +364,9 @@ Scene play(const Case& c, bool exact) {
   return s;
 }
 
-LogTable watch_fault(const Case& c, const Loss& loss) {
+LogTable watch_broken(const Case& c, const Breakdown& breakdown) {
   double unused = 0.0;
-  return record(c, c.watch, c.noise_watch, c.watch_rows, 2, unused, {.take = 1, .loss = &loss});
+  return record(c, c.watch, c.noise_watch, c.watch_rows, 2, unused, {.take = 1, .breakdown = &breakdown});
 }
 
 void reach_for(const Truth& t, double angle, Order& order) {

@@ -110,15 +110,20 @@ struct Scene {
 /// Plays `c`; `exact`: with the exact speeds.
 [[nodiscard]] Scene play(const Case& c, bool exact = false);
 
-/// A share of the right wheel's (or the axis's) effort that is lost from a time on, while the logged one is as large as
-/// it takes to drive all the same.
-struct Loss {
+/// What breaks in the second drive, of the right wheel (or the axis), from a time on.
+struct Breakdown {
+  enum class Kind {
+    effort_loss,  ///< a share `size` in [0, 1) is lost, while the logged effort is as large as it takes to drive all the same
+    effort_bias,    ///< the effort reads `size` too much
+    encoder_scale,  ///< the motion reads 1 + `size` times what it is, angles from where they are
+  };
+  Kind kind = Kind::effort_loss;
   double onset = 0.0;  ///< s
-  double share = 0.0;  ///< in [0, 1)
+  double size = 0.0;
 };
 
-/// The second drive once more, with that fault and sensor errors of its own.
-[[nodiscard]] LogTable watch_fault(const Case& c, const Loss& loss);
+/// The second drive once more, broken, and with sensor errors of its own.
+[[nodiscard]] LogTable watch_broken(const Case& c, const Breakdown& breakdown);
 
 /// Case `number` of the campaign `seed`: everything follows from these two.
 [[nodiscard]] Case random_case(std::uint64_t seed, std::uint64_t number);
