@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include <wheelwright/commission/assumptions.hpp>
 #include <wheelwright/commission/margin_words.hpp>
 #include <wheelwright/commission/physical.hpp>
 #include <wheelwright/identify/noise_level.hpp>
@@ -32,7 +33,7 @@ std::string parameter_table(const Commissioning& r) {
   const auto scales = physical_scales(robot, r.model.model);
   const double t = student_quantile(0.95, std::max(r.residuals.freedom, 1.0));
   std::string text = fmt::format("  {:<20} {:>11}   {} interval   ± 95 % statistical\n", "parameter", "estimate",
-                                 warrant_word(r.model.warrant));
+                                 warrant_word(interval_warrant(r)));
   for (std::size_t j = 0; j < r.parameters.size(); ++j) {
     const ParameterResult& p = r.parameters[j];
     const PhysicalScale s = scales ? (*scales)[j] : PhysicalScale{};
@@ -52,7 +53,7 @@ std::string parameter_table(const Commissioning& r) {
     text +=
         "  (physical values need the motor's constants in the robot file: motor: {torque_constant, gear_ratio, …})\n";
   }
-  text += fmt::format("  {}\n  {}\n", warrant_meaning(r.model.warrant), statistical_remark());
+  text += fmt::format("  {}\n  {}\n", warrant_meaning(interval_warrant(r)), statistical_remark());
   return text;
 }
 

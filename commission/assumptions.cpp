@@ -12,6 +12,8 @@
 namespace wheelwright {
 namespace {
 
+constexpr const char* kMotionInDriving = "motion_in_driving";
+
 constexpr const char* kRowsExplained =
     "some parameters explain every row within its bound, and none of the held-out rows "
     "leaves the threshold that was made without it";
@@ -240,16 +242,8 @@ Assumption motion_between_samples(const Commissioning& r) {
   if (limit == r.model.robot.limits.end()) {
     a.statement = fmt::format(
         "In the commissioning log no wheel accelerates between two samples more than {:g} times as much as its samples "
-        "show; in driving to come the dynamics bound it.",
+        "show.",
         kBeyondSamples);
-    const SignalErrors& errors = r.model.errors;
-    if (errors.between_samples && errors.motion.mobility.size() == 0) {
-      a.test = "the set bounds the inertia from below";
-      a.verdict = AssumptionVerdict::fails;
-      a.detail =
-          "it holds robots whose dynamics bound nothing, so that driving to come was taken to be no livelier than the "
-          "log: accelerate more, or declare `limits: {acceleration: …}` or a lower bound in `prior:`";
-    }
     return a;
   }
   a.statement = fmt::format("No wheel ever accelerates by more than {:g} rad/s² (m/s²).", limit->second);
@@ -267,6 +261,18 @@ Assumption motion_between_samples(const Commissioning& r) {
   a.verdict = shown <= limit->second ? AssumptionVerdict::holds : AssumptionVerdict::fails;
   a.detail = fmt::format("the samples show {:.3g}", shown);
   return a;
+}
+
+Assumption motion_in_driving(const Commissioning& r) {
+  return {.id = kMotionInDriving,
+          .statement = "In driving to come the dynamics bound what motion does between two samples.",
+          .declared_by = "limits.acceleration",
+          .test = "no robot of the set is without inertia",
+          .verdict = r.model.errors.motion.mobility.size() > 0 ? AssumptionVerdict::holds : AssumptionVerdict::fails,
+          .detail = r.model.errors.motion.mobility.size() > 0
+                        ? ""
+                        : "some are: driving was taken to be no livelier than four times the log; accelerate more, or "
+                          "declare `limits: {acceleration: …}` or a lower bound of the inertia in `prior:`"};
 }
 
 Assumption assumed_prior(const Commissioning& r) {
@@ -329,6 +335,9 @@ std::vector<Assumption> assumptions_of(const Commissioning& result) {
   list.push_back(constant_parameters(rows));
   list.push_back(lost_rows(result.model.measurement, result.survey));
   list.push_back(motion_between_samples(result));
+  if (result.model.errors.between_samples && !robot.limits.contains("acceleration")) {
+    list.push_back(motion_in_driving(result));
+  }
   list.push_back(assumed_prior(result));
   add_limits(list, robot);
   if (robot.model == "differential_drive") {
@@ -346,12 +355,20 @@ std::vector<Assumption> assumptions_of(const Commissioning& result) {
 
 void settle_warrants(Commissioning& result) {
   result.assumptions = assumptions_of(result);
-  const bool contradicted = std::ranges::any_of(
-      result.assumptions, [](const Assumption& assumption) { return assumption.verdict == AssumptionVerdict::fails; });
+  bool contradicted = false, driving_contradicted = false;
+  for (const Assumption& assumption : result.assumptions) {
+    if (assumption.verdict == AssumptionVerdict::fails) {
+      (assumption.id == kMotionInDriving ? driving_contradicted : contradicted) = true;
+    }
+  }
   result.model.assumptions = result.assumptions;
-  result.model.warrant = settle_outputs(result.noise, result.validation, result.noise_mode, contradicted);
+  const Warrant set = settle_outputs(result.noise, result.validation, result.noise_mode, contradicted);
   for (ParameterResult& parameter : result.parameters) {
-    parameter.warrant = result.model.warrant;
+    parameter.warrant = set;
+  }
+  result.model.warrant = driving_contradicted ? weaker(set, Warrant::extrapolated) : set;
+  for (OutputValidation& each : result.validation) {
+    each.warrant = result.model.warrant;
   }
   KinematicCommissioning& kinematic = result.kinematic;
   const Warrant warrant = settle_outputs(kinematic.noise, kinematic.validation, NoiseMode::worst_case, contradicted);
@@ -363,6 +380,10 @@ void settle_warrants(Commissioning& result) {
       (*model)->warrant = warrant;
     }
   }
+}
+
+Warrant interval_warrant(const Commissioning& result) {
+  return result.parameters.empty() ? result.model.warrant : result.parameters.front().warrant;
 }
 
 }  // namespace wheelwright

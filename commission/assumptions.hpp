@@ -40,7 +40,11 @@ struct Assumption {
 [[nodiscard]] std::vector<Assumption> assumptions_of(const Commissioning& result);
 
 /// Fills in Commissioning::assumptions (and those of its model), and the warrant of every number: that of the noise it
-/// stands on; extrapolated where an assumption fails.
+/// stands on; extrapolated where an assumption fails. Where only that of driving to come fails, intervals of parameters
+/// stay what they are.
 void settle_warrants(Commissioning& result);
+
+/// Of the parameters' intervals; that of the model, which thresholds share, where there are none.
+[[nodiscard]] Warrant interval_warrant(const Commissioning& result);
 
 }  // namespace wheelwright

@@ -292,7 +292,7 @@ void FaultFilter::begin(std::size_t onset) {
   range_.setZero();
   widened_c_.setZero();
   added_ = 0.0;
-  row_range_ = range_;
+  row_range_ = row_dY_ = range_;
   before_ = point(onset);
   const auto n = static_cast<Eigen::Index>(model_->n());
   if (fault_.held_effort) {
@@ -429,8 +429,9 @@ bool FaultFilter::next() {
   before_ = after;
   ++k_;
   const auto n = static_cast<Eigen::Index>(model_->n());
-  row_range_ = range_;
   const Eigen::Index first = static_cast<Eigen::Index>(k_) * n;
+  row_range_ = range_;
+  row_dY_ = motion_->rows.dY.middleRows(first, n);
   if (motion_->between_dY.rows() > 0 && proportional_) {
     const Eigen::VectorXd by = gain_only_ ? gain_ : Eigen::VectorXd::Constant(n, growth_);
     row_range_ += by.asDiagonal() * motion_->between_dY.middleRows(first, n);
@@ -440,6 +441,7 @@ bool FaultFilter::next() {
     }
     if (added_ > 0.0) {
       row_range_ += added_ * motion_->effort_dY.middleRows(first, n);
+      row_dY_ += motion_->effort_doubt.middleRows(first, n);
     }
   }
   return true;
@@ -452,7 +454,7 @@ FaultRow FaultFilter::row(std::size_t i) const {
           {filtered_.g1.row(r).data(), p},
           {filtered_.g2.row(r).data(), p},
           {filtered_.s.row(r).data(), p},
-          {motion_->rows.dY.row(at).data(), p},
+          {row_dY_.row(r).data(), p},
           filtered_.c[r],
           motion_->rows.dy[at],
           widened_c_[r] + (gain_only_ && motion_->between_dy.size() > 0 ? gain_[r] * motion_->between_dy[at] : 0.0),

@@ -76,7 +76,7 @@ class FaultRows {
 /// efforts that change between samples: an effort's gain widens it by as much as the efforts do, any other fault by what
 /// its own efforts change from sample to sample. The motion between samples, in dY: faults that multiply efforts by as
 /// much as they multiply them, any other by ReferenceMotion::effort_dY times the largest effort that it has added since
-/// the onset, for every θ of the set.
+/// the onset, for every θ of the set, and by ReferenceMotion::effort_doubt.
 class FaultFilter final : public FaultRows {
  public:
   /// Throws InvalidArgument where `fault` does not fit `model`. `model` and `motion` are kept by reference.
@@ -129,6 +129,7 @@ class FaultFilter final : public FaultRows {
   RowMatrix range_;
   Eigen::VectorXd widened_c_;
   RowMatrix row_range_;  // range_ and what grows in dY
+  RowMatrix row_dY_;     // with functions in doubt
   std::size_t onset_ = 0, k_ = 0, end_ = 0;
   bool fresh_ = false;  // the fault jumps at the onset, between two steps
 };

@@ -2,6 +2,7 @@
 #include <wheelwright/detector/isolation.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -25,6 +26,7 @@ constexpr double kNarrower = 0.9;       // a turn that leaves more than this of 
 constexpr double kRowRounding = 1e-12;  // of a row's coefficients, relative to all that is added in it
 constexpr int kTurns = 12;              // of narrowing
 constexpr int kHalvings = 24;           // of an interval of sizes
+constexpr std::size_t kLeft = 3;        // parts of what is left of an onset, for each output
 constexpr double kStillJoint = 1e-9;    // rad/s, of a reading that stands still
 
 // Instants of the motion that are looked at.
@@ -94,7 +96,7 @@ class Search {
         fault_(finding.fault),
         n_(setting.filter.model().n()),
         p_(static_cast<Eigen::Index>(setting.filter.model().p())),
-        variables_(p_ + 1 + static_cast<Eigen::Index>(2 * n_)) {
+        variables_(p_ + 1 + static_cast<Eigen::Index>(kLeft * n_)) {
     if (fault_.held_effort) {
       // What it stands at is not known: an offset of any size in place of the effort.
       Eigen::Index column = 0;
@@ -280,19 +282,20 @@ class Search {
     return kappa;
   }
 
-  // Variables: θ, d, A of all outputs, B of all outputs, as shares of their bounds but for θ.
+  // Variables: θ, d, A, B and C of every output, as shares of their bounds but for θ.
   std::optional<Interval> program(const Interval& kappa) {
     const double middle = kappa.centre(), eta = round_up(std::max(kappa.upper - middle, middle - kappa.lower));
     const double size = std::max(std::abs(kappa.lower), std::abs(kappa.upper));
     const double reach = free_offset_ ? offset_bound() : eta;
     Box box = in_.set.hull();
     box.sides.push_back({-1.0, 1.0});
-    Eigen::VectorXd level(static_cast<Eigen::Index>(n_)), ramp = level;
+    std::vector<std::array<double, kLeft>> left(n_);
     for (std::size_t i = 0; i < n_; ++i) {
-      const auto at = static_cast<Eigen::Index>(i);
-      level[at] = rows_->level_bound(i, size, in_.largest) + (free_offset_ ? reach * std::abs(fault_.offset[at]) : 0.0);
-      ramp[at] = rows_->ramp_bound(i, size, in_.largest) +
-                 (free_offset_ ? reach * std::abs(fault_.offset[at]) * in_.filter.design().beta : 0.0);
+      left[i] = rows_->left_bounds(i, size, in_.largest);
+      if (free_offset_) {
+        const auto more = rows_->left_bounds(reach * std::abs(fault_.offset[static_cast<Eigen::Index>(i)]));
+        for (std::size_t part = 0; part < kLeft; ++part) left[i][part] += more[part];
+      }
     }
     box.sides.resize(static_cast<std::size_t>(variables_), {-1.0, 1.0});
     std::vector<HalfSpace> all = facets();
@@ -310,7 +313,7 @@ class Search {
         if (row.faulty) {
           const double tangent = g.g1[j] + 2.0 * middle * g.g2[j];
           value += middle * g.g1[j] + middle * middle * g.g2[j];
-          error += size * g.e1[j] + size * size * g.e2[j];
+          error += g.e0[j] + size * g.e1[j] + size * size * g.e2[j];
           slope += tangent * in_.centre[j];
           dy += eta * std::abs(tangent) * in_.half[j] + eta * eta * std::abs(g.g2[j]) * in_.largest[j];
           sum += size * (std::abs(g.g1[j]) + size * std::abs(g.g2[j])) * in_.largest[j];
@@ -320,15 +323,20 @@ class Search {
         sum += (std::abs(data.Y(row.at, j)) + error) * in_.largest[j];
       }
       if (row.faulty) {
-        const auto i = static_cast<Eigen::Index>(row.output);
-        const auto own = static_cast<std::size_t>(p_ + 1 + i);
+        const std::size_t own = static_cast<std::size_t>(p_ + 1) + kLeft * row.output;
         y -= middle * c;
         dy += size * g.ec;
         a[static_cast<std::size_t>(p_)] = free_offset_ ? reach * g.c : eta * (slope + c);
-        a[own] = g.level * level[i];
-        a[own + n_] = g.ramp * ramp[i];
-        sum +=
-            std::abs(size * c) + std::abs(a[static_cast<std::size_t>(p_)]) + std::abs(a[own]) + std::abs(a[own + n_]);
+        sum += std::abs(size * c) + std::abs(a[static_cast<std::size_t>(p_)]);
+        for (std::size_t part = 0; part < kLeft; ++part) {
+          const double most = g.left[part] * left[row.output][part];
+          if (most <= kRowRounding * sum) {
+            dy += most;  // forgotten: no variable of a linear program that it would only trouble
+          } else {
+            a[own + part] = most;
+            sum += most;
+          }
+        }
       }
       HalfSpace upper, lower;
       slabs.half_spaces(a, da, y, dy + kRowRounding * sum, {}, upper, lower);

@@ -5,13 +5,13 @@
 /// A fault of size κ that set in in [T_a, T_b] explains the rows of a window when one θ of the feasible set P satisfies all
 /// of them, before and after (onset_rows.hpp), in all outputs:
 ///
-///     |τ_f − (y + κ g1 + κ² g2) θ − κ c − w A − (t − t_s) w B| <= n̄ + (Δ + |κ| e1 + κ² e2)|θ| + |κ| e_c.
+///     |τ_f − (y + κ g1 + κ² g2) θ − κ c − w₁A − w₂B − w₃C| <= n̄ + (Δ + |κ| e1 + κ² e2)|θ| + |κ| e_c.
 ///
 /// For κ in [κ_m − η, κ_m + η], κ = κ_m + d, and a middle θ_c of P this is, with G = g1 + 2κ_m g2,
 ///
-///     |τ_f − (y + κ_m g1 + κ_m² g2) θ − κ_m c − d (Gθ_c + c) − w A − …| <= … + η |G||θ − θ_c| + η² |g2||θ|,
+///     |τ_f − (y + κ_m g1 + κ_m² g2) θ − κ_m c − d (Gθ_c + c) − w₁A − …| <= … + η |G||θ − θ_c| + η² |g2||θ|,
 ///
-/// since dGθ = dGθ_c + dG(θ − θ_c): linear in (θ, d, A, B), with all that is left out bounded over the box of P. The linear
+/// since dGθ = dGθ_c + dG(θ − θ_c): linear in (θ, d, A, B, C), with all that is left out bounded over the box of P. The linear
 /// program's bounds on d, certified (certificate.hpp), make [κ_m − η, κ_m + η] narrower, again and again; what does not get
 /// narrower is cut in two. A program proved infeasible excludes the piece. The intervals of onsets are cut in two alike.
 ///

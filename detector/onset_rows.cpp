@@ -83,6 +83,10 @@ OnsetRows::OnsetRows(const FaultType& fault, const Model& model, const FilterDes
   fault_.held_effort = false;
   step_ = fault_;
   step_.profile = {};
+  way_.assign(end - first, 0.0);
+  for (std::size_t k = first + 1; k < end; ++k) {
+    way_[k - first] = way_[k - first - 1] + motion.step[k];
+  }
   state_.assign(end - first, {FaultSignals::none(model), FaultSignals::none(model), FaultSignals::none(model)});
   state_[0].z1.g1 = state_[0].fast.g1 = jump(first);
   take(step_);
@@ -118,12 +122,7 @@ RowMatrix OnsetRows::jump(std::size_t k) const {
 
 // The state at instant `at` of a step that set in at `from`.
 OnsetRows::State OnsetRows::left(std::size_t from, std::size_t at) const {
-  // For angles the step before an instant was counted on the way there, for speeds on the way on.
-  double x = 0.0;
-  for (std::size_t k = from + 1; k <= at; ++k) {
-    x += motion_->step[k];
-  }
-  const double decay = std::exp(-design_.beta * x);
+  const double x = way(from, at), decay = std::exp(-design_.beta * x);
   const State& now = state_[at - first_];
   State before = state_[from - first_];
   const RowMatrix impulse = jump(from);
@@ -197,19 +196,19 @@ OnsetRow OnsetRows::row(std::size_t k, std::size_t i) const {
   const auto at = static_cast<Eigen::Index>(i), p = static_cast<Eigen::Index>(model_->p());
   const FaultSignals step = filtered(k);
   const FaultSignals& signals = drifts(fault_) ? drifting_[k - s_] : step;
-  const double x = motion_->instant[k] - motion_->instant[s_], decay = std::exp(-design_.beta * x);
+  const double x = way(s_, k), decay = std::exp(-design_.beta * x);
   const double newest = angles_ ? kernel_.gain() * kernel_.slow() * x * decay : 0.0;
   const double onset_error = drifts(fault_) ? newest + design_.static_gain() / fault_.profile.rise : newest;
 
-  OnsetRow out{signals.g1.row(at),
+  OnsetRow out{{},
+               signals.g1.row(at),
                signals.g2.row(at),
                Eigen::RowVectorXd::Zero(p),
                Eigen::RowVectorXd::Zero(p),
                signals.c[at],
                0.0,
-               gain_ * decay,
-               0.0};
-  out.ramp = design_.order == 2 ? out.level * x : 0.0;
+               {gain_ * decay, design_.order == 2 ? gain_ * decay * x : 0.0,
+                kernel_.apart() > 0.0 ? gain_ * std::exp(-kernel_.gamma() * x) : 0.0}};
 
   const Eigen::MatrixXd K = or_zero(fault_.motion, model_->coordinates.size()).cwiseAbs();
   const Eigen::MatrixXd H =
@@ -260,9 +259,11 @@ OnsetRow OnsetRows::row(std::size_t k, std::size_t i) const {
     }
   }
   // An effort that reads too much says too little of what the robot may do between samples.
+  out.e0 = Eigen::RowVectorXd::Zero(p);
   if (fault_.offset.size() > 0 && motion_->effort_dY.rows() > 0) {
-    out.e1 +=
-        fault_.offset.cwiseAbs().maxCoeff() * motion_->effort_dY.row(static_cast<Eigen::Index>(k * model_->n() + i));
+    const auto row = static_cast<Eigen::Index>(k * model_->n() + i);
+    out.e1 += fault_.offset.cwiseAbs().maxCoeff() * motion_->effort_dY.row(row);
+    out.e0 = motion_->effort_doubt.row(row);
   }
   if (drifts(fault_)) {
     out.e1 += uncertain_ * step.g1.row(at).cwiseAbs();
@@ -272,24 +273,27 @@ OnsetRow OnsetRows::row(std::size_t k, std::size_t i) const {
   return out;
 }
 
-// A doubt δ in the state at t_s is worth, x later, at most gain γ/(γ − β) e^{−βx} (|δz2| + x|δz1| + (|δz1| + |δfast|)/(γ − β)).
-double OnsetRows::level_bound(std::size_t i, double kappa, const Eigen::VectorXd& largest) const {
+// What is left of δ in the state is γ/(γ − β) (e^{−βx}(δz2 + x δz1) − (e^{−βx} δz1 − e^{−γx} δfast)/(γ − β)).
+std::array<double, 3> OnsetRows::left_bounds(std::size_t i, double kappa, const Eigen::VectorXd& largest) const {
   const auto at = static_cast<Eigen::Index>(i);
   const auto size = [&](const FaultSignals& z) {
-    return kappa * (z.g1.row(at).dot(largest) + z.c[at]) + kappa * kappa * z.g2.row(at).dot(largest);
+    return kTransition * (kappa * (z.g1.row(at).dot(largest) + z.c[at]) + kappa * kappa * z.g2.row(at).dot(largest));
   };
   if (design_.order == 1) {
-    return kTransition * size(bound_.z1);
+    return {size(bound_.z1), 0.0, 0.0};
   }
-  return kTransition * kernel_.slow() * (size(bound_.z2) + kernel_.apart() * (size(bound_.z1) + size(bound_.fast)));
+  const double slow = kernel_.slow(), quick = slow * kernel_.apart();
+  return {slow * size(bound_.z2) + quick * size(bound_.z1), slow * size(bound_.z1), quick * size(bound_.fast)};
 }
 
-double OnsetRows::ramp_bound(std::size_t i, double kappa, const Eigen::VectorXd& largest) const {
-  const auto at = static_cast<Eigen::Index>(i);
-  return design_.order == 1 ? 0.0
-                            : kTransition * kernel_.slow() *
-                                  (kappa * (bound_.z1.g1.row(at).dot(largest) + bound_.z1.c[at]) +
-                                   kappa * kappa * bound_.z1.g2.row(at).dot(largest));
+std::array<double, 3> OnsetRows::left_bounds(double effort) const {
+  const double memory = 1.0 / design_.beta;
+  if (design_.order == 1) {
+    return {memory * effort, 0.0, 0.0};
+  }
+  const double slow = kernel_.slow(), quick = slow * kernel_.apart();
+  const double short_memory = quick > 0.0 ? 1.0 / kernel_.gamma() : 0.0;
+  return {(slow * memory * memory + quick * memory) * effort, slow * memory * effort, quick * short_memory * effort};
 }
 
 }  // namespace wheelwright

@@ -5,20 +5,22 @@
 /// A log's motion is the healthy encoders', measured: v + n. With the signature filtered from it, from the instant t_s
 /// on (fault_rows.hpp), a row at t > t_s reads, for a fault that set in at any T in [t_a, t_b], t_b < t_s,
 ///
-///     τ_f = (y + κ g1 + κ² g2) θ + κ c + w(t) A + (t − t_s) w(t) B + e,     w(t) = α² e^{−β(t − t_s)}  (order 1: α …, B = 0):
+///     τ_f = (y + κ g1 + κ² g2) θ + κ c + α² (e^{−βx} A + x e^{−βx} B + e^{−γx} C) + e,     x = t − t_s,
 ///
-/// the filter is linear, so what happened in [T, t_s] lives on in its state at t_s alone. A and B, for each output, are that
-/// state beyond the one of an onset at t_s itself. They are bounded by what onsets at the instants of [t_a, t_s] leave
-/// there, times kTransition: that is what covers a step between two samples, whose interval mixes both sides.
+/// (order 1: α e^{−βx} A): the filter is linear, so what happened in [T, t_s] lives on in its state at t_s alone
+/// (kernel.hpp). A, B and C, for each output, are that state beyond the one of an onset at t_s itself. They are bounded by
+/// what onsets at the instants of [t_a, t_s] leave there, times kTransition: that is what covers a step between two
+/// samples, whose interval mixes both sides.
 ///
 /// Errors. Where motion between samples counts, Δ is the row's own dY, from the efforts as they were logged: a faulty
-/// robot's motion may be what they say, or what they say less the offset that the fault adds (effort_dY). Let |ĝ1 − g1| <= e1, |ĝ2 − g2| <= e2, |ĉ − c| <= e_c. The kernel of f₂*(s n̈) for a step s is that of f₂*n̈ cut off
-/// at t − t_s: its derivatives' total variations do not grow by that, but for the error n_v(t_s) of the speed itself, with
-/// weight f₂(t − t_s), as at the start of a segment (noise.hpp). So with Δ the bounds of the healthy columns
+/// robot's motion may be what they say, or what they say less the offset that the fault adds (effort_dY, effort_doubt). Let
+/// |ĝ1 − g1| <= e1, |ĝ2 − g2| <= e2, |ĉ − c| <= e_c. The kernel of f₂*(s n̈) for a step s is that of f₂*n̈ cut off at x: its
+/// derivatives' total variations do not grow by that, but for the error n_v(t_s) of the speed itself, with weight f₂(x),
+/// as at the start of a segment (noise.hpp). So with Δ the bounds of the healthy columns
 ///
-///     gains H, G:  e1 = |H + G| (Δ + |scale| f₂(t − t_s) n_v)           (n_v for angles only)
+///     gains H, G:  e1 = |H + G| (Δ + |scale| f₂(x) n_v)           (n_v for angles only)
 ///     motion K:    e1 = |K| Δ of acceleration and speed: f * d/dt(s K n) has no term at t_s
-///     both:        e2 = |H + G| (|K| Δ + |scale| f₂(t − t_s) |K| n_v)
+///     both:        e2 = |H + G| (|K| Δ + |scale| f₂(x) |K| n_v)
 ///     across d:    e1 = |d| Δ of the yaw rate           θ-change ϑ:  e_c = (Δ + …) |ϑ|.
 ///
 /// A drift s = (t − T)/rise is a mixture of steps; that T is known to t_s − t_a only adds (t_s − t_a)/rise of the step's
@@ -28,6 +30,7 @@
 /// of motion with K = −S in κ'.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <optional>
 #include <vector>
@@ -40,10 +43,10 @@ namespace wheelwright {
 
 /// One output at one instant under a hypothesis.
 struct OnsetRow {
-  Eigen::RowVectorXd g1, g2, e1, e2;  ///< p entries; 0 before the onset
+  Eigen::RowVectorXd e0;              ///< p entries: |δ| is larger by this, whatever κ
+  Eigen::RowVectorXd g1, g2, e1, e2;  ///< p entries
   double c = 0.0, ec = 0.0;
-  double level = 0.0;  ///< w(t)
-  double ramp = 0.0;   ///< (t − t_s) w(t); 0 for order 1
+  std::array<double, 3> left{};  ///< weights of A, B and C
 };
 
 /// Rows of one fault for one onset interval after the other.
@@ -67,9 +70,10 @@ class OnsetRows {
   [[nodiscard]] std::size_t start() const { return s_; }
   /// Row of output `i` at instant k > start().
   [[nodiscard]] OnsetRow row(std::size_t k, std::size_t i) const;
-  /// |A| and |B| of output `i` are at most this for |θ_j| <= largest_j and |κ| <= `kappa`.
-  [[nodiscard]] double level_bound(std::size_t i, double kappa, const Eigen::VectorXd& largest) const;
-  [[nodiscard]] double ramp_bound(std::size_t i, double kappa, const Eigen::VectorXd& largest) const;
+  /// |A|, |B| and |C| of output `i` are at most this for |θ_j| <= largest_j and |κ| <= `kappa`.
+  [[nodiscard]] std::array<double, 3> left_bounds(std::size_t i, double kappa, const Eigen::VectorXd& largest) const;
+  /// The same of an effort that was never larger than `effort` before t_s.
+  [[nodiscard]] std::array<double, 3> left_bounds(double effort) const;
 
   /// Whether κ of the rows is κ' of a fault of the encoders.
   [[nodiscard]] bool encoder() const { return encoder_; }
@@ -81,6 +85,7 @@ class OnsetRows {
   [[nodiscard]] RowMatrix jump(std::size_t k) const;
   [[nodiscard]] State left(std::size_t from, std::size_t at) const;
   [[nodiscard]] FaultSignals filtered(std::size_t k) const;
+  [[nodiscard]] double way(std::size_t from, std::size_t to) const { return way_[to - first_] - way_[from - first_]; }
   void take(const FaultType& fault);
 
   FaultType fault_, step_;
@@ -92,6 +97,7 @@ class OnsetRows {
   const ReferenceMotion* motion_;
   std::size_t first_, end_, s_ = 0;
   double gain_, uncertain_ = 0.0;       // α^order; share of a drift that the onset leaves open
+  std::vector<double> way_;             // s of steps from first_ to each instant, as the filter counts them
   std::vector<State> state_;            // of an onset at first_, per instant
   std::vector<FaultSignals> drifting_;  // filtered, of a drift from s_ on
   State bound_;                         // entry by entry

@@ -3,12 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/limits.hpp>
 
 namespace wheelwright {
 namespace {
+
+constexpr double kBeyondEfforts = 3.0;  // efforts of a broken robot, in units of those that the rows can be due to
 
 std::size_t effort_reach(const Measurement& m, const SignalErrors& errors) {
   if (!errors.between_samples) {
@@ -118,22 +120,36 @@ ReferenceMotion walk(LogSource& log, RegressorFilter filter) {
 ReferenceMotion read_reference(LogSource& log, const RegressorFilter& filter) {
   ReferenceMotion motion = walk(log, filter);
   const SignalErrors& errors = filter.errors();
+  const RegressionBlock& rows = motion.rows;
+  motion.largest = errors.motion.largest;
+  motion.effort_dY = motion.effort_doubt = RowMatrix::Zero(rows.dY.rows(), rows.dY.cols());
+  if (!errors.between_samples || errors.motion.mobility.size() == 0 || rows.y.size() == 0) {
+    return motion;
+  }
   const double most =
-      motion.rows.y.size() > 0 ? motion.rows.y.cwiseAbs().maxCoeff() / filter.design().static_gain() : 0.0;
-  motion.effort_dY = RowMatrix::Zero(motion.rows.dY.rows(), motion.rows.dY.cols());
-  if (errors.between_samples && errors.motion.mobility.size() > 0 && most > 0.0) {
-    SignalErrors more = errors;
-    more.motion.effort = errors.motion.effort.array() + most;
-    const ReferenceMotion wider =
-        walk(log, RegressorFilter(filter.model(), filter.design(), filter.measurement(), more));
-    // A step that is too long for the larger effort has no rows: then nothing is known of the smaller one's growth.
-    if (wider.rows.dY.rows() == motion.rows.dY.rows()) {
-      motion.effort_dY = (wider.rows.dY - motion.rows.dY).cwiseMax(0.0) / most;
-    } else {
-      motion.effort_dY.setConstant(std::numeric_limits<double>::infinity());
+      rows.y.cwiseAbs().maxCoeff() + rows.dy.maxCoeff() + ((rows.Y.cwiseAbs() + rows.dY) * motion.largest).maxCoeff();
+  motion.most_effort = kBeyondEfforts * most / filter.design().static_gain();
+  SignalErrors more = errors;
+  more.motion.effort = errors.motion.effort.array() + motion.most_effort;
+  const ReferenceMotion wider = walk(log, RegressorFilter(filter.model(), filter.design(), filter.measurement(), more));
+  if (!(motion.most_effort > 0.0) || wider.rows.dY.rows() != rows.dY.rows()) {
+    // A step that is too long for efforts like these has no rows: nothing is known of it.
+    motion.effort_dY.setConstant(motion.most_effort > 0.0 ? kInfinity : 0.0);
+    return motion;
+  }
+  const RowMatrix growth = (wider.rows.dY - rows.dY).cwiseMax(0.0);
+  const RowMatrix doubt = growth + (wider.rows.Y - rows.Y).cwiseAbs();
+  motion.effort_dY = growth / motion.most_effort;
+  for (const Term& term : filter.model().terms) {
+    if (term.kind == Term::Kind::function) {
+      for (Eigen::Index k = static_cast<Eigen::Index>(term.output); k < doubt.rows();
+           k += static_cast<Eigen::Index>(filter.model().n())) {
+        const auto j = static_cast<Eigen::Index>(term.parameter);
+        motion.effort_doubt(k, j) = doubt(k, j);
+        motion.effort_dY(k, j) = 0.0;
+      }
     }
   }
-  motion.largest = errors.motion.largest;
   return motion;
 }
 

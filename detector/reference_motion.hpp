@@ -34,8 +34,13 @@ struct ReferenceMotion {
   RegressionBlock rows;                     ///< K instants: Y_f of the motion, with the bounds dY, dy of the sensors
   RowMatrix between_dY;        ///< of dY what motion may do between samples: it grows with the efforts; empty: nothing
   Eigen::VectorXd between_dy;  ///< of dy what efforts may do between samples, alike
-  RowMatrix effort_dY;         ///< by how much between_dY grows for each unit that every output's effort is larger by
-  Eigen::VectorXd largest;     ///< sup |θ_j| over the set of the filter's MotionBound; empty where it has none
+  double most_effort = 0.0;    ///< three times the efforts that the rows can be due to, for every θ of the set
+  RowMatrix effort_dY;  ///< by how much between_dY grows for each unit that every output's effort is larger by, up to
+                        ///< most_effort; functions of the motion left out
+  RowMatrix
+      effort_doubt;  ///< of functions of the motion: what they may be beside Y and dY where efforts are larger by up to
+                     ///< most_effort (a speed whose sign is in doubt then)
+  Eigen::VectorXd largest;       ///< sup |θ_j| over the set of the filter's MotionBound; empty where it has none
   std::size_t effort_reach = 0;  ///< steps in which an effort's sample counts for dy; 0: efforts are known
 
   /// Number of instants K.

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/commission/assumptions.hpp>
 #include <wheelwright/report/parameter_table.hpp>
 
 #include <algorithm>
@@ -128,7 +129,7 @@ std::string parameter_table(const Commissioning& result, const TimeAxis& axis) {
       "</th><th scope=\"col\" class=\"n\">estimate</th><th scope=\"col\" class=\"n\">{}</th>"
       "<th scope=\"col\" class=\"n\">95 % statistical</th><th scope=\"col\" class=\"n\">centre</th>{}"
       "<th scope=\"col\">intervals</th><th scope=\"col\">bound set by</th></tr></thead><tbody>\n",
-      warrant_badge(result.model.warrant), with_nominal ? "<th scope=\"col\" class=\"n\">nominal</th>" : "");
+      warrant_badge(interval_warrant(result)), with_nominal ? "<th scope=\"col\" class=\"n\">nominal</th>" : "");
   for (std::size_t j = 0; j < views.size(); ++j) {
     out += rows_of(views[j], result.parameters[j], with_nominal, result, axis);
   }

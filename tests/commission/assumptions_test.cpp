@@ -153,13 +153,17 @@ TEST(Assumptions, ADeclaredAccelerationIsHeldAgainstTheSamples) {
   EXPECT_EQ(of(assumptions_of(c), "motion_between_samples").verdict, Verdict::not_tested);
 }
 
-TEST(Assumptions, DynamicsThatBoundNothingAreNoGuaranteeForDrivingToCome) {
-  Commissioning c;
-  c.model.errors.between_samples = true;
-  c.model.errors.motion.limit = Eigen::VectorXd::Ones(1);
-  EXPECT_EQ(of(assumptions_of(c), "motion_between_samples").verdict, Verdict::fails);
-  c.model.errors.motion.mobility = Eigen::MatrixXd::Ones(1, 1);
-  EXPECT_EQ(of(assumptions_of(c), "motion_between_samples").verdict, Verdict::not_tested);
+// Intervals stand on the log, thresholds on driving to come.
+TEST(Assumptions, DynamicsThatBoundNothingLeaveThresholdsExtrapolated) {
+  Commissioning c = commissioned(noisy_drive(1));
+  ASSERT_EQ(c.model.warrant, Warrant::guaranteed);
+  EXPECT_EQ(of(c.assumptions, "motion_in_driving").verdict, Verdict::holds);
+  c.model.errors.motion.mobility.resize(0, 0);
+  settle_warrants(c);
+  EXPECT_EQ(of(c.assumptions, "motion_in_driving").verdict, Verdict::fails);
+  EXPECT_EQ(c.model.warrant, Warrant::extrapolated);
+  EXPECT_EQ(c.validation.front().warrant, Warrant::extrapolated);
+  EXPECT_EQ(interval_warrant(c), Warrant::guaranteed);
 }
 
 // Steps that vary by more than a third hide a missing row: two short ones are shorter than a long one.

@@ -230,7 +230,7 @@ std::size_t total(const Json& j, const char* field, std::optional<std::size_t> k
 }
 
 struct Tally {
-  std::size_t cases = 0, guaranteed = 0, learnt = 0, empty = 0, refused = 0, lost = 0;
+  std::size_t cases = 0, guaranteed = 0, intervals = 0, learnt = 0, empty = 0, refused = 0, lost = 0;
   std::size_t outside = 0, alarm_robots = 0;
   double alarms = 0.0, watched = 0.0;
   std::size_t faults = 0, missed = 0, isolated = 0, excluded = 0;
@@ -240,12 +240,19 @@ struct Tally {
     ++cases;
     const std::string end = j.at("end");
     guaranteed += end == "guaranteed" ? 1 : 0;
+    intervals += end == "intervals" ? 1 : 0;
     learnt += end == "learnt" ? 1 : 0;
     empty += end == "empty" ? 1 : 0;
     refused += end == "refused" ? 1 : 0;
     lost += end == "timed_out" || end == "crashed" ? 1 : 0;
-    if (end == "guaranteed") {
+    if (end == "guaranteed" || end == "intervals") {
       outside += !j.at("outside").get<std::string>().empty() || j.at("facet_cuts").get<bool>() ? 1 : 0;
+      widths.push_back(j.at("width"));
+      if (j.at("oracle").get<double>() > 0.0) {
+        ratios.push_back(j.at("width").get<double>() / j.at("oracle").get<double>());
+      }
+    }
+    if (end == "guaranteed") {
       alarm_robots += j.at("alarms").get<double>() > 0.0 ? 1 : 0;
       alarms += j.at("alarms").get<double>();
       watched += j.at("decisions").get<double>();
@@ -253,10 +260,6 @@ struct Tally {
       missed += total(j, "missed");
       isolated += total(j, "isolated");
       excluded += total(j, "excluded");
-      widths.push_back(j.at("width"));
-      if (j.at("oracle").get<double>() > 0.0) {
-        ratios.push_back(j.at("width").get<double>() / j.at("oracle").get<double>());
-      }
     }
   }
 };
@@ -281,16 +284,18 @@ std::string bucket(double x, const std::vector<double>& edges, const char* unit)
 
 void print_table(const char* title, const std::map<std::string, Tally>& rows) {
   fmt::print(
-      "\n{:<24} {:>6} {:>10} {:>6} {:>6} {:>7} {:>5} | {:>7} {:>7} {:>9} {:>11} | {:>6} {:>6} {:>8} {:>8} | {:>8} "
+      "\n{:<24} {:>6} {:>10} {:>9} {:>6} {:>6} {:>7} {:>5} | {:>7} {:>7} {:>9} {:>11} | {:>6} {:>6} {:>8} {:>8} | "
+      "{:>8} "
       "{:>7}\n",
-      title, "cases", "guaranteed", "learnt", "empty", "refused", "lost", "outside", "alarmed", "alarms", "decisions",
-      "faults", "missed", "isolated", "excluded", "width", "/oracle");
+      title, "cases", "guaranteed", "intervals", "learnt", "empty", "refused", "lost", "outside", "alarmed", "alarms",
+      "decisions", "faults", "missed", "isolated", "excluded", "width", "/oracle");
   for (const auto& [value, t] : rows) {
     fmt::print(
-        "{:<24} {:>6} {:>10} {:>6} {:>6} {:>7} {:>5} | {:>7} {:>7} {:>9.0f} {:>11.0f} | {:>6} {:>6} {:>8} {:>8} | "
+        "{:<24} {:>6} {:>10} {:>9} {:>6} {:>6} {:>7} {:>5} | {:>7} {:>7} {:>9.0f} {:>11.0f} | {:>6} {:>6} {:>8} {:>8} "
+        "| "
         "{:>8.3g} {:>7.3g}\n",
-        value, t.cases, t.guaranteed, t.learnt, t.empty, t.refused, t.lost, t.outside, t.alarm_robots, t.alarms,
-        t.watched, t.faults, t.missed, t.isolated, t.excluded, median(t.widths), median(t.ratios));
+        value, t.cases, t.guaranteed, t.intervals, t.learnt, t.empty, t.refused, t.lost, t.outside, t.alarm_robots,
+        t.alarms, t.watched, t.faults, t.missed, t.isolated, t.excluded, median(t.widths), median(t.ratios));
   }
 }
 
@@ -356,7 +361,8 @@ int summary(const std::vector<std::string>& files) {
     }
   }
   fmt::print(
-      "Logs that keep to what their robot file declares. outside: the truth is not in the published set; alarmed: "
+      "Logs that keep to what their robot file declares. intervals: only they are guaranteed, thresholds are not; "
+      "outside: the truth is not in the published set; alarmed: "
       "robots with "
       "a\nfalse alarm; empty: called impossible; lost: timed out or crashed; faults: of a size that margins call "
       "certain; "

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include <wheelwright/bounds/feasible_set.hpp>
+#include <wheelwright/commission/assumptions.hpp>
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/commission/margin_survey.hpp>
 #include <wheelwright/commission/trace.hpp>
@@ -213,7 +214,7 @@ void try_faults(const Case& c, const Scene& scene, const CommissionedModel& mode
 }  // namespace
 
 const char* name(Verdict::End end) {
-  static constexpr const char* kNames[] = {"guaranteed", "learnt", "empty", "refused"};
+  static constexpr const char* kNames[] = {"guaranteed", "intervals", "learnt", "empty", "refused"};
   return kNames[static_cast<std::size_t>(end)];
 }
 
@@ -234,7 +235,9 @@ Verdict judge(const Case& c, const JudgeOptions& options) {
       case Commissioning::Status::done:
       case Commissioning::Status::partial: break;
     }
-    verdict.end = result.model.warrant == Warrant::guaranteed ? Verdict::End::guaranteed : Verdict::End::learnt;
+    verdict.end = result.model.warrant == Warrant::guaranteed       ? Verdict::End::guaranteed
+                  : interval_warrant(result) == Warrant::guaranteed ? Verdict::End::intervals
+                                                                    : Verdict::End::learnt;
     check_truth(scene, result, verdict);
     const auto watching = std::chrono::steady_clock::now();
     watch(scene.watched, result.model, verdict);

@@ -24,6 +24,7 @@ struct Verdict {
   /// How commissioning ended.
   enum class End {
     guaranteed,  ///< a model that stands on the declared bounds
+    intervals,   ///< a model whose intervals stand on them, and thresholds do not
     learnt,      ///< a model that stands on bounds estimated from the log: no guarantee is given
     empty,       ///< "no parameters explain the log", or it contradicts what its bounds stand on
     refused,     ///< no model, for another reason
@@ -51,6 +52,9 @@ struct Verdict {
   /// impossible. `kept`: whether the log keeps to its assumptions. Where it does not, only a guaranteed set without the
   /// truth counts: a model that does not fit its log may be called impossible, and alarms tell of the same thing.
   [[nodiscard]] bool violation(bool kept) const {
+    if (end == End::intervals) {
+      return truth_outside();
+    }
     return end == End::guaranteed ? truth_outside() || ((alarms > 0 || missed() > 0 || excluded() > 0) && kept)
                                   : end == End::empty && kept;
   }
