@@ -24,6 +24,7 @@ constexpr double kMemory = 12.0;        // of the filter, in units of 1/β
 constexpr double kFresh = 2.0;          // of this, in the same units, an onset is still to be seen
 constexpr double kNarrower = 0.9;       // a turn that leaves more than this of an interval is the last
 constexpr double kRowRounding = 1e-12;  // of a row's coefficients, relative to all that is added in it
+constexpr double kForgotten = 1e-3;     // of a row's error: less than this of what an onset left is counted as error
 constexpr int kTurns = 12;              // of narrowing
 constexpr int kHalvings = 24;           // of an interval of sizes
 constexpr std::size_t kLeft = 3;        // parts of what is left of an onset, for each output
@@ -330,8 +331,8 @@ class Search {
         sum += std::abs(size * c) + std::abs(a[static_cast<std::size_t>(p_)]);
         for (std::size_t part = 0; part < kLeft; ++part) {
           const double most = g.left[part] * left[row.output][part];
-          if (most <= kRowRounding * sum) {
-            dy += most;  // forgotten: no variable of a linear program that it would only trouble
+          if (most <= std::max(kForgotten * dy, kRowRounding * sum)) {
+            dy += most;
           } else {
             a[own + part] = most;
             sum += most;
