@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Least squares by normal equations, and instrumental variables, at p = 8 on a million rows in memory: next to a bare read of
+// Least squares by moments, with its covariance, and instrumental variables, at p = 8 on a million rows in memory: next to a bare read of
 // the same numbers, and to LAPACK's dgels (to which its copy of the matrix, which it destroys, is charged).
 #include <cmath>
 #include <cstdint>
@@ -10,7 +10,6 @@
 #include <fmt/format.h>
 
 #include <wheelwright/identify/estimate.hpp>
-#include <wheelwright/identify/normal_equations.hpp>
 
 #include "bench.hpp"
 
@@ -63,21 +62,26 @@ Eigen::VectorXd dgels(const Eigen::MatrixXd& Y, const Eigen::VectorXd& y) {
 }
 #endif
 
-std::vector<Measurement> normal() {
+Eigen::VectorXd by_moments(const RegressionBlock& block) {
+  RegressionMoments sums(1, kParameters);
+  sums.add(block);
+  return ordinary_least_squares(sums).theta;
+}
+
+std::vector<Measurement> moments() {
   const RegressionBlock block = rows(kParameters);
-  const auto ours = [&] { keep(normal_equations(block).estimate); };
+  const auto ours = [&] { keep(by_moments(block)); };
   std::vector<Measurement> result;
   const auto against = [&](const std::string& peer, const std::function<void()>& theirs, std::string remark) {
     const auto [seconds, peer_seconds] = interleaved_medians(ours, theirs, kRepetitions);
-    result.push_back(
-        {"identify/normal_equations", kRows, kParameters, 1, seconds, peer, peer_seconds, std::move(remark)});
+    result.push_back({"identify/moments", kRows, kParameters, 1, seconds, peer, peer_seconds, std::move(remark)});
   };
   against(
       "bare read", [&] { keep(block.Y.sum() + block.y.sum()); }, "Y and y, 72 MB");
 #ifdef WHEELWRIGHT_LAPACK
   const Eigen::MatrixXd Y = block.Y;
   const Eigen::VectorXd theirs = dgels(Y, block.y);
-  const Eigen::VectorXd difference = normal_equations(block).estimate - theirs;
+  const Eigen::VectorXd difference = by_moments(block) - theirs;
   against(
       "lapack dgels", [&] { keep(dgels(Y, block.y)); },
       fmt::format("largest relative difference {:.1e}", (difference.array() / theirs.array()).abs().maxCoeff()));
@@ -94,12 +98,12 @@ std::vector<Measurement> instruments() {
     keep(instrumental_variables(sums).theta);
   };
   const auto [seconds, peer_seconds] = interleaved_medians(
-      ours, [&] { keep(normal_equations(block).estimate); }, kRepetitions);
-  return {{"identify/instrumental_variables", kRows, kParameters, 1, seconds, "identify/normal_equations", peer_seconds,
+      ours, [&] { keep(by_moments(block)); }, kRepetitions);
+  return {{"identify/instrumental_variables", kRows, kParameters, 1, seconds, "identify/moments", peer_seconds,
            "covariance under autocorrelation included"}};
 }
 
-const bool registered_normal = register_bench("identify/normal_equations", normal);
+const bool registered_moments = register_bench("identify/moments", moments);
 const bool registered_instruments = register_bench("identify/instrumental_variables", instruments);
 
 }  // namespace

@@ -56,8 +56,7 @@ QUESTIONS = """## Licence questions
 - **Ceres** is linked statically (Debian's CMake package gives that) and brings CHOLMOD of SuiteSparse, linked dynamically,
   parts of which are under GPL-2.0-or-later. Wheelwright is a work of its own under Apache-2.0, which GPL-3.0 admits; who
   ships the program *together with* that CHOLMOD follows the GPL for the whole. The detector (`Wheelwright::detector` and what is below it) links neither Ceres nor NLopt.
-- **CLP** is under EPL-1.0, which does not go together with the GPL in one distributed program. Only
-  `Wheelwright::consistency` links it; the program and the Python package do not.
+- **CLP** is under EPL-1.0, which does not go together with the GPL in one distributed program. Only benchmarks link it.
 - **GLPK and QSopt_ex** (GPL) are linked by benchmarks and tests, which are not packaged.
 - **SQLite** is in the public domain; `blessing` is what SPDX calls that.
 """

@@ -2,10 +2,9 @@
 // Laws of a set of parameters, for every kind of set.
 #include <gtest/gtest.h>
 
-#include <wheelwright/bounds/ellipsoid.hpp>
 #include <wheelwright/bounds/feasible_set.hpp>
-#include <wheelwright/bounds/zonotope.hpp>
 
+#include "bounds/parameter_set.hpp"
 #include "bounds/rows.hpp"
 
 namespace wheelwright::laws_test {
@@ -49,48 +48,11 @@ Eigen::VectorXd vector(Random& random, std::size_t p) {
   return Eigen::Map<const Eigen::VectorXd>(x.data(), static_cast<Eigen::Index>(p));
 }
 
-struct MakeEllipsoid {
-  static Ellipsoid make(std::uint64_t seed, std::size_t p, double shrink) {
-    Random random(seed);
-    const Eigen::VectorXd centre = vector(random, p);
-    Eigen::MatrixXd shape(p, p);
-    for (Eigen::Index k = 0; k < shape.cols(); ++k) {
-      shape.col(k) = vector(random, p);
-    }
-    return {centre, shrink * shape};
-  }
-};
-
-struct MakeZonotope {
-  static Zonotope make(std::uint64_t seed, std::size_t p, double shrink) {
-    Random random(seed);
-    const Eigen::VectorXd centre = vector(random, p);
-    Eigen::MatrixXd generators(p, 2 * p + 1);
-    for (Eigen::Index k = 0; k < generators.cols(); ++k) {
-      generators.col(k) = shrink * vector(random, p);
-    }
-    return {centre, generators};
-  }
-};
-
-struct MakeOuterEllipsoid {
-  static Ellipsoid make(std::uint64_t seed, std::size_t p, double shrink) {
-    return outer_ellipsoid(MakePolytope<4096>::make(seed, p, shrink));
-  }
-};
-
-struct MakeOuterZonotope {
-  static Zonotope make(std::uint64_t seed, std::size_t p, double shrink) {
-    return outer_zonotope(MakePolytope<4096>::make(seed, p, shrink));
-  }
-};
-
-static_assert(ParameterSet<Box> && ParameterSet<Polytope> && ParameterSet<Ellipsoid> && ParameterSet<Zonotope>);
+static_assert(ParameterSet<Box> && ParameterSet<Polytope>);
 
 template <class Maker>
 class SupportFunction : public ::testing::Test {};
-using Makers = ::testing::Types<MakeBox, MakePolytope<4096>, MakePolytope<0>,  // the latter works by linear programs
-                                MakeEllipsoid, MakeZonotope, MakeOuterEllipsoid, MakeOuterZonotope>;
+using Makers = ::testing::Types<MakeBox, MakePolytope<4096>, MakePolytope<0>>;  // the latter works by linear programs
 TYPED_TEST_SUITE(SupportFunction, Makers);
 
 /// Relative to the size of the set in both directions, as h alone may be near zero; facets may be shifted by 1e-10.
@@ -135,13 +97,7 @@ TYPED_TEST(SupportFunction, is_positively_homogeneous) {
   }
 }
 
-// Not those built around others: the outer set of a subset need not be a subset.
-template <class Maker>
-class NestedSets : public ::testing::Test {};
-using NestedMakers = ::testing::Types<MakeBox, MakePolytope<4096>, MakePolytope<0>, MakeEllipsoid, MakeZonotope>;
-TYPED_TEST_SUITE(NestedSets, NestedMakers);
-
-TYPED_TEST(NestedSets, have_nested_support_functions) {
+TYPED_TEST(SupportFunction, is_smaller_for_a_subset) {
   for (std::size_t p = 1; p <= 5; ++p) {
     const auto large = TypeParam::make(p, p, 1.0);
     const auto small = TypeParam::make(p, p, 0.5);
@@ -211,21 +167,13 @@ TYPED_TEST(SupportFunction, gives_widths_that_no_direction_reverses) {
     const auto set = TypeParam::make(p, p, 1.0);
     Random random(p);
     Eigen::MatrixXd directions(p, 20);
-    double sum = 0.0;
     for (Eigen::Index k = 0; k < directions.cols(); ++k) {
       directions.col(k) = vector(random, p);
       const Eigen::VectorXd opposite = -directions.col(k);
       const double across = width(set, std::span<const double>(directions.col(k).data(), p));
       EXPECT_GE(across, 0.0);
       EXPECT_EQ(across, width(set, std::span<const double>(opposite.data(), p)));
-      sum += across;
     }
-    EXPECT_NEAR(mean_width(set, directions), sum / 20.0, 1e-12 * sum);
-    const Looseness same = looseness(set, set, directions);
-    EXPECT_EQ(same.median, 1.0);
-    EXPECT_EQ(same.worst, 1.0);
-    EXPECT_THROW(static_cast<void>(mean_width(set, Eigen::MatrixXd::Ones(static_cast<Eigen::Index>(p) + 1, 1))),
-                 InvalidArgument);
   }
 }
 

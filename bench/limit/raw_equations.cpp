@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/detector/raw_equations.hpp>
+#include "limit/raw_equations.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/detector/separation.hpp>
+#include "limit/separation.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/detector/consistency.hpp>
+#include "limit/consistency.hpp"
 
 #include <algorithm>
 #include <cmath>

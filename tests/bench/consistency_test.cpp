@@ -8,8 +8,8 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/detector/consistency.hpp>
 #include <wheelwright/detector/margins.hpp>
+#include "limit/consistency.hpp"
 
 #include "detector/detectability.hpp"
 

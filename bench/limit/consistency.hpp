@@ -50,9 +50,9 @@
 
 #include <wheelwright/bounds/polytope.hpp>
 #include <wheelwright/detector/fault_type.hpp>
-#include <wheelwright/detector/raw_equations.hpp>
 #include <wheelwright/detector/reference_motion.hpp>
-#include <wheelwright/detector/separation.hpp>
+#include "limit/raw_equations.hpp"
+#include "limit/separation.hpp"
 
 namespace wheelwright {
 
