@@ -4,11 +4,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <memory>
 #include <numbers>
 #include <optional>
 
-#include <ceres/ceres.h>
+#include <ceres/cost_function.h>
+#include <ceres/manifold.h>
+#include <ceres/problem.h>
+#include <ceres/solver.h>
 #include <Eigen/Dense>
 
 #include <wheelwright/core/check.hpp>
@@ -41,43 +43,63 @@ struct Window {
 
 double wrapped(double angle) { return std::remainder(angle, 2.0 * std::numbers::pi); }
 
-// Where the robot is at the poses' stamps less δ, by the midpoint rule between wheel-speed samples (θ exactly):
-// θ, x, y of each pose.
-template <typename T>
-std::vector<std::array<T, 3>> predict(const Window& w, const KinematicOptions& o, const T* shared, const T* start) {
-  using std::cos;
-  using std::sin;
-  const T right = 1.0 + shared[kAsymmetry];
-  const T left = 1.0 - shared[kAsymmetry];
-  const T forward = 0.5 * o.wheel_radius * shared[kScale];
-  const T turning = o.wheel_radius / o.track_width * shared[kTurn];
-  const T ahead = o.track_width * shared[kOffset];
-  const auto moved = [&](std::array<T, 3> at, std::size_t k, const T& step) {
-    const T half = 0.5 * step / (w.t[k + 1] - w.t[k]);  // of the way to the next sample, at the middle of the step
-    const T omega_r = w.right[k] + half * (w.right[k + 1] - w.right[k]);
-    const T omega_l = w.left[k] + half * (w.left[k + 1] - w.left[k]);
-    const T turn = step * turning * (right * omega_r - left * omega_l);
-    const T way = step * forward * (right * omega_r + left * omega_l);
-    const T heading = at[0] + 0.5 * turn;
-    at[0] += turn;
-    at[1] += way * cos(heading);
-    at[2] += way * sin(heading);
+// A pose and its derivatives by the shared unknowns and by the pose that the window starts from.
+constexpr int kUnknowns = kShared + 3;
+using Gradient = Eigen::Matrix<double, kUnknowns, 1>;
+struct Place {
+  double theta = 0.0, x = 0.0, y = 0.0;
+  Gradient by_theta = Gradient::Unit(kShared), by_x = Gradient::Unit(kShared + 1), by_y = Gradient::Unit(kShared + 2);
+};
+
+// Where the robot is at the poses' stamps less δ, by the midpoint rule between wheel-speed samples (θ exactly).
+std::vector<Place> predict(const Window& w, const KinematicOptions& o, const double* shared, const double* start) {
+  const double right = 1.0 + shared[kAsymmetry], left = 1.0 - shared[kAsymmetry];
+  const double per_forward = 0.5 * o.wheel_radius, forward = per_forward * shared[kScale];
+  const double per_turning = o.wheel_radius / o.track_width, turning = per_turning * shared[kTurn];
+  const double ahead = o.track_width * shared[kOffset];
+  // `by_delay`: of the step.
+  const auto moved = [&](Place at, std::size_t k, double step, double by_delay) {
+    const double slope_r = 0.5 * (w.right[k + 1] - w.right[k]) / (w.t[k + 1] - w.t[k]);
+    const double slope_l = 0.5 * (w.left[k + 1] - w.left[k]) / (w.t[k + 1] - w.t[k]);
+    const double omega_r = w.right[k] + step * slope_r, omega_l = w.left[k] + step * slope_l;
+    const double difference = right * omega_r - left * omega_l, sum = right * omega_r + left * omega_l;
+    const double turn = step * turning * difference, way = step * forward * sum;
+    Gradient by_turn = Gradient::Zero(), by_way = Gradient::Zero();
+    by_turn[kTurn] = step * per_turning * difference;
+    by_turn[kAsymmetry] = step * turning * (omega_r + omega_l);
+    by_turn[kDelay] = by_delay * turning * (difference + step * (right * slope_r - left * slope_l));
+    by_way[kScale] = step * per_forward * sum;
+    by_way[kAsymmetry] = step * forward * (omega_r - omega_l);
+    by_way[kDelay] = by_delay * forward * (sum + step * (right * slope_r + left * slope_l));
+    const double heading = at.theta + 0.5 * turn, c = std::cos(heading), s = std::sin(heading);
+    const Gradient by_heading = at.by_theta + 0.5 * by_turn;
+    at.theta += turn;
+    at.x += way * c;
+    at.y += way * s;
+    at.by_theta += by_turn;
+    at.by_x += c * by_way - way * s * by_heading;
+    at.by_y += s * by_way + way * c * by_heading;
     return at;
   };
-  std::vector<std::array<T, 3>> poses;
-  poses.reserve(w.poses.size());
-  std::array<T, 3> at = {start[0], start[1], start[2]};
+  std::vector<Place> places;
+  places.reserve(w.poses.size());
+  Place at{.theta = start[0], .x = start[1], .y = start[2]};
   std::size_t k = 0;
   for (const Pose& pose : w.poses) {
-    const T end = pose.t - shared[kDelay];
+    const double end = pose.t - shared[kDelay];
     for (; k + 2 < w.t.size() && end >= w.t[k + 1]; ++k) {
-      at = moved(at, k, T(w.t[k + 1] - w.t[k]));
+      at = moved(at, k, w.t[k + 1] - w.t[k], 0.0);
     }
-    poses.push_back(moved(at, k, end - w.t[k]));
-    poses.back()[1] += ahead * cos(poses.back()[0]);
-    poses.back()[2] += ahead * sin(poses.back()[0]);
+    Place& seen = places.emplace_back(moved(at, k, end - w.t[k], -1.0));
+    const double c = std::cos(seen.theta), s = std::sin(seen.theta);
+    seen.x += ahead * c;
+    seen.y += ahead * s;
+    seen.by_x -= ahead * s * seen.by_theta;
+    seen.by_y += ahead * c * seen.by_theta;
+    seen.by_x[kOffset] += o.track_width * c;
+    seen.by_y[kOffset] += o.track_width * s;
   }
-  return poses;
+  return places;
 }
 
 struct Spreads {
@@ -87,46 +109,66 @@ struct Spreads {
 
 // Residuals of a window over their spreads: θ, x, y of each pose, or θ alone. With a finite `huber` each is drawn in so
 // that its square is Huber's loss (position: of the distance).
-struct WindowError {
-  const Window* window;
-  const KinematicOptions* options;
-  Spreads spreads;
-  bool position;
-  double huber;
-
-  template <typename T>
-  [[nodiscard]] T drawn_in(const T& squared) const {
-    using std::sqrt;
-    return squared > huber * huber ? T(sqrt((2.0 * huber * sqrt(squared) - huber * huber) / squared)) : T(1.0);
+class WindowCost final : public ceres::CostFunction {
+ public:
+  WindowCost(const Window& window, const KinematicOptions& options, Spreads spreads, bool position, double huber)
+      : window_(&window), options_(&options), spreads_(spreads), position_(position), huber_(huber) {
+    *mutable_parameter_block_sizes() = {kShared, 3};
+    set_num_residuals(static_cast<int>(window.poses.size() * (position ? 3 : 1)));
   }
-  template <typename T>
-  bool operator()(T const* const* parameters, T* residual) const {
-    const auto poses = predict(*window, *options, parameters[0], parameters[1]);
-    for (std::size_t k = 0; k < poses.size(); ++k) {
-      const Pose& measured = window->poses[k];
-      const T turn = (poses[k][0] - measured.theta) / spreads.heading;
-      *residual++ = turn * drawn_in(T(turn * turn));
-      if (position) {
-        const T dx = (poses[k][1] - measured.x) / spreads.position;
-        const T dy = (poses[k][2] - measured.y) / spreads.position;
-        const T factor = drawn_in(T(dx * dx + dy * dy));
-        *residual++ = dx * factor;
-        *residual++ = dy * factor;
+
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+    const std::vector<Place> places = predict(*window_, *options_, parameters[0], parameters[1]);
+    int row = 0;
+    const auto write = [&](double residual, const Gradient& gradient) {
+      residuals[row] = residual;
+      if (jacobians != nullptr && jacobians[0] != nullptr) {
+        std::copy_n(gradient.data(), +kShared, jacobians[0] + kShared * row);
+      }
+      if (jacobians != nullptr && jacobians[1] != nullptr) {
+        std::copy_n(gradient.data() + kShared, 3, jacobians[1] + 3 * row);
+      }
+      ++row;
+    };
+    for (std::size_t k = 0; k < places.size(); ++k) {
+      const Pose& measured = window_->poses[k];
+      const double turn = (places[k].theta - measured.theta) / spreads_.heading;
+      const Gradient by_turn = places[k].by_theta / spreads_.heading;
+      const Drawn of_turn = drawn_in(turn * turn);
+      write(turn * of_turn.factor, (of_turn.factor + 2.0 * turn * turn * of_turn.slope) * by_turn);
+      if (position_) {
+        const double dx = (places[k].x - measured.x) / spreads_.position;
+        const double dy = (places[k].y - measured.y) / spreads_.position;
+        const Gradient by_x = places[k].by_x / spreads_.position, by_y = places[k].by_y / spreads_.position;
+        const Drawn drawn = drawn_in(dx * dx + dy * dy);
+        const Gradient by_factor = 2.0 * drawn.slope * (dx * by_x + dy * by_y);
+        write(dx * drawn.factor, drawn.factor * by_x + dx * by_factor);
+        write(dy * drawn.factor, drawn.factor * by_y + dy * by_factor);
       }
     }
     return true;
   }
+
+ private:
+  // √(Huber's loss of s over s), and its derivative by s.
+  struct Drawn {
+    double factor = 1.0, slope = 0.0;
+  };
+  [[nodiscard]] Drawn drawn_in(double squared) const {
+    if (!(squared > huber_ * huber_)) {
+      return {};
+    }
+    const double size = std::sqrt(squared), share = huber_ / size;  // factor² = 2 share − share²
+    const double factor = std::sqrt(2.0 * share - share * share);
+    return {factor, 0.5 * (share * share - share) / (squared * factor)};
+  }
+
+  const Window* window_;
+  const KinematicOptions* options_;
+  Spreads spreads_;
+  bool position_;
+  double huber_;
 };
-
-using WindowCost = ceres::DynamicAutoDiffCostFunction<WindowError, kShared + 3>;
-
-std::unique_ptr<WindowCost> window_cost(const WindowError& error) {
-  auto cost = std::make_unique<WindowCost>(new WindowError(error));
-  cost->AddParameterBlock(kShared);
-  cost->AddParameterBlock(3);
-  cost->SetNumResiduals(static_cast<int>(error.window->poses.size() * (error.position ? 3 : 1)));
-  return cost;
-}
 
 void validate(const KinematicOptions& o) {
   check::positive(o.wheel_radius, "wheel_radius");
@@ -209,7 +251,7 @@ class Fit {
     auto* order = new ceres::ParameterBlockOrdering;
     for (Window& w : windows_) {
       order->AddElementToGroup(w.start.data(), 0);
-      problem.AddResidualBlock(window_cost({&w, options_, spreads_, position_, options_->huber}).release(), nullptr,
+      problem.AddResidualBlock(new WindowCost(w, *options_, spreads_, position_, options_->huber), nullptr,
                                shared_.data(), w.start.data());
     }
     order->AddElementToGroup(shared_.data(), 1);
@@ -263,9 +305,9 @@ class Fit {
     for (const Window& w : windows_) {
       const auto poses = predict(w, *options_, shared_.data(), w.start.data());
       for (std::size_t k = 0; k < poses.size(); ++k) {
-        heading.push_back(poses[k][0] - w.poses[k].theta);
-        position.push_back(poses[k][1] - w.poses[k].x);
-        position.push_back(poses[k][2] - w.poses[k].y);
+        heading.push_back(poses[k].theta - w.poses[k].theta);
+        position.push_back(poses[k].x - w.poses[k].x);
+        position.push_back(poses[k].y - w.poses[k].y);
       }
     }
     // Exact data would leave nothing to divide by.
@@ -294,14 +336,14 @@ class Fit {
       Eigen::Matrix3d C = Eigen::Matrix3d::Zero();
       SharedVector score = SharedVector::Zero();
       Eigen::Vector3d own = Eigen::Vector3d::Zero();
-      const auto cost = window_cost({&w, options_, spreads_, position_, kInfinity});
-      const int rows = cost->num_residuals();
+      const WindowCost cost(w, *options_, spreads_, position_, kInfinity);
+      const int rows = cost.num_residuals();
       Eigen::VectorXd residual(rows);
       Eigen::Matrix<double, Eigen::Dynamic, kShared, Eigen::RowMajor> J(rows, +kShared);
       Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor> S(rows, 3);
       const std::array<const double*, 2> at = {shared_.data(), w.start.data()};
       std::array<double*, 2> jacobians = {J.data(), S.data()};
-      cost->Evaluate(at.data(), residual.data(), jacobians.data());
+      cost.Evaluate(at.data(), residual.data(), jacobians.data());
       const auto add = [&](int first, int n) {
         const Eigen::VectorXd r = residual.segment(first, n);
         const auto Jk = J.middleRows(first, n);
