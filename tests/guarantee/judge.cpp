@@ -167,20 +167,22 @@ bool isolated(const CommissionedModel& model, const LogTable& log, const FaultTy
 }
 
 // Faults of sizes that margins call certain within a window: each has to be seen, and must not be excluded.
-void try_faults(const Case& c, const Scene& scene, const CommissionedModel& model, Verdict& verdict) {
+void try_faults(Case c, const CommissionedModel& model, Verdict& verdict) {
   using Kind = Breakdown::Kind;
   constexpr double kWindowSteps = 100.0;
   constexpr std::size_t kOnsets = 6;
-  constexpr std::size_t kMostLooked = 30000;  // rows in which the first alarm is looked for once more
+  constexpr std::size_t kMostRows = 5000;  // of the drive
   const double window = kWindowSteps / c.rate;
   const std::string side = c.truth.axis ? "" : "_right";
   const std::vector<std::pair<std::string, Kind>> kinds = {{"effort_loss" + side, Kind::effort_loss},
                                                            {"effort_bias" + side, Kind::effort_bias},
                                                            {"encoder_scale" + side, Kind::encoder_scale}};
-  TableSource log(scene.watched);
+  c.watch_rows = std::min(c.watch_rows, kMostRows);
+  const LogTable healthy = play(c).watched;
+  TableSource log(healthy);
   MarginSurveyOptions options;
   options.margins.windows = {window};
-  options.margins.onset_step = (scene.watched.t.back() - scene.watched.t.front()) / static_cast<double>(kOnsets);
+  options.margins.onset_step = (healthy.t.back() - healthy.t.front()) / static_cast<double>(kOnsets);
   options.margins.most_onsets = kOnsets;
   for (const auto& [fault, kind] : kinds) options.faults.push_back(fault);
   options.map_points = 0;
@@ -201,7 +203,7 @@ void try_faults(const Case& c, const Scene& scene, const CommissionedModel& mode
         const bool seen = sees(model, broken, onset.t, end);
         ++tally.certain;
         tally.missed += seen ? 0 : 1;
-        if (seen && !looked && broken.rows() <= kMostLooked) {
+        if (seen && !looked) {
           looked = true;
           ++tally.isolated;
           tally.excluded += isolated(model, broken, fault.fault, breakdown) ? 0 : 1;
@@ -244,7 +246,7 @@ Verdict judge(const Case& c, const JudgeOptions& options) {
     verdict.watch_seconds = seconds_since(watching);
     const bool whole = c.lost == 0.0 && c.sense != Sense::mean_speed;
     if (options.faults && whole && c.broken == Broken::none && verdict.end == Verdict::End::guaranteed) {
-      try_faults(c, scene, result.model, verdict);
+      try_faults(c, result.model, verdict);
     }
     if (options.oracle && c.truth.coulomb == 0.0 && result.model.filter.order == 2) {
       verdict.oracle = oracle_width(c, scene, result);

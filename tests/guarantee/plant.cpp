@@ -192,7 +192,7 @@ void Plant::advance(double h, const Pair& effort, const Pair& slope) {
       }
       (holds(after(middle, now, slope)) ? good : bad) = middle;
     }
-    least = good > 0.0 ? kLeast : std::min(1.0, 2.0 * least);
+    least = good > least * left ? kLeast : std::min(1.0, 2.0 * least);
     bad = std::max(bad, least * left);
     Sides sides = after(bad, now, slope);
     for (std::size_t j = 0; j < joints_; ++j) {
