@@ -173,7 +173,7 @@ Case random_case(std::uint64_t seed, std::uint64_t number) {
   // no kink lies between two of them.
   const bool shown = c.changes == Changes::at_samples ? c.stamps == Stamps::even : c.changes != Changes::linear;
   if (c.broken == Broken::none && dice.chance(0.1) && shown) {
-    c.delay = std::min(dice.decade(0.001, 0.02), 3.0 / c.rate);
+    c.delay = std::min(dice.decade(0.001, 0.02), 2.9 / c.rate);
     c.delay_declared = true;
   }
   c.declare_parameters = c.truth.coulomb > 0.0 || dice.chance(0.5);
