@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 #include <Eigen/LU>
@@ -17,6 +18,8 @@ constexpr double kPivot = 1e-10;       // smallest pivot
 constexpr double kGoodPivot = 1e-7;    // below this the inverse is made afresh before it is believed
 constexpr std::size_t kRefactor = 24;  // exchanges after which the inverse is made afresh
 constexpr double kAccurate = 1e-13;    // residual of the basis' equations that needs no fresh inverse
+constexpr double kRounding = 4.0;      // violations of rows over that of a row of the basis, both by rounding
+constexpr double kCoarse = 1e-3;       // of the optimum, what that must not come to
 constexpr double kOnBox = 1e-9;        // multiplier of a side of the box that matters
 
 }  // namespace
@@ -197,17 +200,18 @@ LinearProgram::Outcome LinearProgram::dual(const double* c) {
   bool bland = careful_;
   std::size_t still = 0;
   slack_known_ = false;
+  double feasible = kFeasible;
   for (std::size_t step = 0; step < 400 + 40 * p_; ++step) {
     if (since_factored_ >= kRefactor && !renew(c)) {
       return Outcome::stuck;
     }
     int entering = 0;
-    double violation = kFeasible;
+    double violation = feasible;
     if (count_ > 0) {
       if (bland) {
         kernels::best().slack(view(), x_.data(), slack_.data());
         for (std::size_t i = 0; i < count_; ++i) {
-          if (slack_[i] < -kFeasible) {
+          if (slack_[i] < -feasible) {
             violation = -slack_[i];
             entering = static_cast<int>(i);
             break;
@@ -221,15 +225,29 @@ LinearProgram::Outcome LinearProgram::dual(const double* c) {
         }
       }
     }
-    for (std::size_t j = 0; j < p_ && !(bland && violation > kFeasible); ++j) {
+    for (std::size_t j = 0; j < p_ && !(bland && violation > feasible); ++j) {
       const double below = lower_[j] - x_[j], above = x_[j] - upper_[j];
       if (std::max(below, above) > violation * (1.0 + 1e-12)) {
         violation = std::max(below, above);
         entering = -1 - static_cast<int>(2 * j + (above > below ? 1 : 0));
       }
     }
-    if (!(violation > kFeasible)) {
+    if (!(violation > feasible)) {
       return Outcome::optimal;
+    }
+    if (std::find(basis_.begin(), basis_.end(), entering) != basis_.end()) {
+      // A row of the basis is met but for rounding: what it shows of that, no row can be better than.
+      if (since_factored_ > 0) {
+        since_factored_ = kRefactor;
+        continue;
+      }
+      feasible = kRounding * violation;
+      const double steepest =
+          std::accumulate(lambda_.begin(), lambda_.end(), 1.0, [](double sum, double l) { return sum + std::abs(l); });
+      if (feasible * steepest > kCoarse) {
+        return Outcome::stuck;
+      }
+      continue;
     }
     for (std::size_t j = 0; j < p_; ++j) {
       row_[j] = coefficient(entering, j);

@@ -264,12 +264,13 @@ Assumption motion_between_samples(const Commissioning& r) {
 }
 
 Assumption motion_in_driving(const Commissioning& r) {
+  const bool bounded = r.model.errors.motion.mobility.size() > 0;
   return {.id = kMotionInDriving,
           .statement = "In driving to come the dynamics bound what motion does between two samples.",
           .declared_by = "limits.acceleration",
           .test = "no robot of the set is without inertia",
-          .verdict = r.model.errors.motion.mobility.size() > 0 ? AssumptionVerdict::holds : AssumptionVerdict::fails,
-          .detail = r.model.errors.motion.mobility.size() > 0
+          .verdict = bounded ? AssumptionVerdict::holds : AssumptionVerdict::fails,
+          .detail = bounded
                         ? ""
                         : "some are: driving was taken to be no livelier than four times the log; accelerate more, or "
                           "declare `limits: {acceleration: …}` or a lower bound of the inertia in `prior:`"};

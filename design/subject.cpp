@@ -217,7 +217,9 @@ RegressionBlock planned_rows(const Plan& plan, const DesignSubject& subject) {
 ReferenceMotion planned_motion(const Plan& plan, const DesignSubject& subject) {
   const LogTable log = planned_log(plan, subject);
   TableSource source(log);
-  return read_reference(source, planned_filter(source, plan, subject));
+  ReferenceMotion motion = read_reference(source, planned_filter(source, plan, subject));
+  motion.measured = false;
+  return motion;
 }
 
 }  // namespace wheelwright

@@ -18,6 +18,7 @@ constexpr double kDropout = 0.1;             // s
 constexpr double kBump = 30.0 * pi / 180.0;  // rad of the wheel's turn
 constexpr double kMostRadius = 0.5;          // share of the radius
 constexpr double kMostLost = 0.95;           // share of an effort or of counts
+constexpr double kMostLostOfSign = 0.5;      // of counts where functions need a speed's sign: slower, it is in doubt
 
 // What acts on one joint alone, seen in coordinates or outputs: A E_j A⁻¹.
 Eigen::MatrixXd of_joint(const Eigen::MatrixXd& map, std::size_t joint) {
@@ -73,11 +74,14 @@ void add_efforts(std::vector<FaultType>& all, const Model& model, const WheelSid
 }
 
 void add_encoders(std::vector<FaultType>& all, const Model& model, const WheelSide& side) {
+  const bool functions = std::any_of(model.terms.begin(), model.terms.end(),
+                                     [](const Term& term) { return term.kind == Term::Kind::function; });
+  const double most_lost = functions ? kMostLostOfSign : kMostLost;
   const Eigen::MatrixXd own = of_joint(model.motion, side.joint);
   all.push_back({.name = "encoder_scale" + side.suffix,
                  .sentence = side.words + " encoder counts too much (negative: too little)",
                  .unit = "1",
-                 .range = {-kMostLost, 1.0},
+                 .range = {-most_lost, 1.0},
                  .seen = own});
   all.push_back({.name = "encoder_frozen" + side.suffix,
                  .sentence = side.words + " encoder stands still",

@@ -17,22 +17,24 @@ double largest_size(const Interval& side) { return std::max(std::abs(side.lower)
 
 }  // namespace
 
-// The regressor that acts, the one that is seen, and its error bound times `errors`.
+// The regressor that acts, the one that is seen, and its error bound times `errors`. An error of y itself is in both, so
+// that it counts by how far two θ of the set are apart.
 FaultMargin::Sums FaultMargin::at(const FaultRow& row, double kappa, double side, double errors) {
   const std::size_t p = row.y.size();
   acting_.resize(p);
   seen_.resize(p);
   error_.resize(p);
-  double predicted = 0.0, doubt = row.doubt, reach = 2.0 * row.dy + std::abs(kappa * row.c);
+  double predicted = 0.0, doubt = kappa * row.doubt, reach = 2.0 * row.dy + std::abs(kappa * row.c);
   for (std::size_t j = 0; j < p; ++j) {
     acting_[j] = row.y[j] + side * kappa * row.g1[j] + kappa * kappa * row.g2[j];
     seen_[j] = row.y[j] + side * kappa * row.s[j];
     error_[j] = errors * row.dY[j];
-    doubt += row.range.empty() ? 0.0 : row.range[j] * largest_size(rule_.set().hull().sides[j]);
+    const Interval side_of = rule_.set().hull().sides[j];
+    doubt += row.range.empty() ? 0.0 : kappa * row.range[j] * largest_size(side_of);
+    doubt += row.read.empty() ? 0.0 : row.read[j] * side_of.width();
     const double term = seen_[j] * rule_.estimate()[static_cast<Eigen::Index>(j)];
     predicted += term;
-    reach += std::abs(term) +
-             (std::abs(acting_[j]) + std::abs(seen_[j]) + error_[j]) * largest_size(rule_.set().hull().sides[j]);
+    reach += std::abs(term) + (std::abs(acting_[j]) + std::abs(seen_[j]) + error_[j]) * largest_size(side_of);
   }
   // Ten sums of p + 4 terms, here and in the detector: Higham 2002, section 3.1.
   return {predicted, doubt, 10.0 * static_cast<double>(p + 4) * std::numeric_limits<double>::epsilon() * reach};
@@ -43,7 +45,7 @@ double FaultMargin::certain_excess(const FaultRow& row, double kappa, double sid
   const Sums sums = at(row, kappa, side, 2.0);
   const Interval acting = rule_.prediction(acting_, 2 * channel);
   const Threshold allowed = rule_.at(seen_, error_, row.dy, 2 * channel + 1);
-  const double added = side * kappa * row.c, doubt = 2.0 * kappa * sums.doubt + sums.rounding;
+  const double added = side * kappa * row.c, doubt = sums.doubt + sums.rounding;
   return direction == Direction::up ? acting.lower + added - row.dy - (allowed.upper + sums.predicted) - doubt
                                     : allowed.lower + sums.predicted - (acting.upper + added + row.dy) - doubt;
 }
@@ -53,7 +55,7 @@ double FaultMargin::possible_excess(const FaultRow& row, double kappa, double si
   const Sums sums = at(row, kappa, side, 1.0 - share);
   const Interval acting = rule_.prediction(acting_, 2 * channel);
   const Threshold allowed = rule_.at(seen_, error_, row.dy, 2 * channel + 1);
-  const double added = side * kappa * row.c, doubt = 2.0 * kappa * sums.doubt + sums.rounding;
+  const double added = side * kappa * row.c, doubt = sums.doubt + sums.rounding;
   return direction == Direction::up ? acting.upper + added + share * row.dy - (allowed.upper + sums.predicted) + doubt
                                     : allowed.lower + sums.predicted - (acting.lower + added - share * row.dy) + doubt;
 }
@@ -112,11 +114,11 @@ std::optional<double> FaultMargin::smallest_certain(const FaultRow& row, double 
 
 double FaultMargin::largest_hidden(const FaultRow& row, double largest, double side, double share,
                                    std::size_t channel) {
-  double slope = 2.0 * row.doubt;  // of the threshold and of doubt, per unit of κ, at most
-  double curvature = 0.0;          // |g2 θ|, at most
+  double slope = row.doubt;  // of the threshold and of doubt, per unit of κ, at most
+  double curvature = 0.0;    // |g2 θ|, at most
   for (std::size_t j = 0; j < row.y.size(); ++j) {
     const double size = largest_size(rule_.set().hull().sides[j]);
-    slope += (std::abs(row.s[j]) + (row.range.empty() ? 0.0 : 2.0 * row.range[j])) * size;
+    slope += (std::abs(row.s[j]) + (row.range.empty() ? 0.0 : row.range[j])) * size;
     curvature += std::abs(row.g2[j]) * size;
   }
   double hidden = largest;

@@ -12,7 +12,8 @@
 /// single θ and fixed regressor the difference f of both sides is a quadratic in κ with f(0) <= 0 (no false alarm). If
 /// g2 θ >= 0 it is convex and crosses zero once, upwards. If not it is concave, and {f > 0} is an interval, which holds κ̄
 /// or is of no interest. The certain sizes are the intersection over θ; where s is not 0 the threshold's h is convex in κ
-/// and g2 is 0 (validate(FaultType)), so f is concave. A row's doubt takes 2κ·doubt from f, which changes none of this.
+/// and g2 is 0 (validate(FaultType)), so f is concave. What is in doubt of a row (FaultRow::doubt, range, read) takes a
+/// constant and a multiple of κ from f, which changes none of this.
 ///
 /// An instant shows a fault **possibly** when some θ in P and some noise of at most q times the bounds carry it over the
 /// threshold. With q = 1 every fault does: the threshold is tight, fault-free residuals reach it. With q = 0 it is the
@@ -59,7 +60,7 @@ class FaultMargin {
   enum class Direction { up, down };  // over u, under l
 
   struct Sums {
-    double predicted, doubt, rounding;  // seen θ̂; per unit of κ, of the row and for all θ; of everything compared
+    double predicted, doubt, rounding;  // seen θ̂; of the row, for all θ; of everything compared
   };
   [[nodiscard]] Sums at(const FaultRow& row, double kappa, double side, double errors);
   [[nodiscard]] double certain_excess(const FaultRow& row, double kappa, double side, std::size_t channel,

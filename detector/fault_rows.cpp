@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 #include <Eigen/QR>
@@ -39,6 +40,33 @@ Eigen::VectorXd joints_of(const Eigen::MatrixXd& inverse, const Eigen::VectorXd&
 // Joint speeds from coordinate speeds.
 Eigen::MatrixXd inverse_of(const Model& model) {
   return model.motion.completeOrthogonalDecomposition().pseudoInverse();
+}
+
+Eigen::MatrixXd or_zero(const Eigen::MatrixXd& matrix, std::size_t size) {
+  const auto n = static_cast<Eigen::Index>(size);
+  return matrix.size() > 0 ? matrix : Eigen::MatrixXd::Zero(n, n);
+}
+
+// What a fault whose profile is at `s` adds to the speeds v, and to those of the joints.
+ExtraMotion extra_motion(const FaultType& fault, const Eigen::MatrixXd& inverse, const Eigen::VectorXd& v,
+                         const Eigen::VectorXd& joints, double s) {
+  ExtraMotion extra{Eigen::VectorXd::Zero(v.size()), Eigen::VectorXd::Zero(joints.size()),
+                    Eigen::VectorXd::Zero(v.size()), Eigen::VectorXd::Zero(joints.size())};
+  if (fault.motion.size() > 0) {
+    extra.moved += s * fault.motion * v;
+  }
+  if (fault.slip.size() > 0) {
+    extra.moved += s * fault.slip;
+  }
+  if (fault.of_reading) {
+    extra.joint_moved = joints_of(inverse, extra.moved);
+  }
+  if (fault.seen.size() > 0) {
+    extra.seen += s * fault.seen * v;
+    extra.joint_seen =
+        fault.whole ? Eigen::VectorXd(joints_of(inverse, v + extra.seen) - joints) : joints_of(inverse, extra.seen);
+  }
+  return extra;
 }
 
 double evaluate(const Term& term, const Eigen::VectorXd& v, const Eigen::VectorXd& joints, double heading) {
@@ -209,6 +237,110 @@ bool polynomial(const FaultType& fault, const Model& model) {
   return true;
 }
 
+SignatureErrors::SignatureErrors(const FaultType& fault, const Model& model, const FilterDesign& design,
+                                 const ReferenceMotion& motion)
+    : model_(&model),
+      reference_(&motion),
+      design_(design),
+      kernel_(design, motion.kind, motion.nominal_step),
+      motion_(or_zero(fault.motion, model.coordinates.size()).cwiseAbs()),
+      effort_(or_zero(fault.effort, model.n()).cwiseAbs() + or_zero(fault.ground, model.n()).cwiseAbs()),
+      seen_(or_zero(fault.seen, model.coordinates.size()).cwiseAbs()),
+      theta_(fault.theta.cwiseAbs()),
+      lateral_(std::abs(fault.lateral)),
+      moves_(fault.motion.size() > 0 || fault.slip.size() > 0),
+      whole_(fault.whole && fault.seen.size() > 0) {
+  const SignalErrors& errors = motion.errors;
+  double shortest = motion.nominal_step;
+  for (const double step : motion.step) {
+    shortest = step > 0.0 ? std::min(shortest, step) : shortest;
+  }
+  sample_ = shorter(shortest) * errors.speed_sample;
+  slope_ = Eigen::VectorXd::Zero(errors.speed.size());
+  if (fault.profile.kind == FaultProfile::Kind::drift) {
+    slope_ = errors.speed / fault.profile.rise;
+  } else if (fault.profile.kind == FaultProfile::Kind::bump && motion.joint_speed.size() > 0) {
+    const double fastest = motion.joint_speed.row(static_cast<Eigen::Index>(fault.profile.joint)).cwiseAbs().maxCoeff();
+    slope_ =
+        design.static_gain() * std::numbers::pi / fault.profile.arc * fastest * shorter(shortest) * errors.speed_sample;
+  }
+  begin(0);
+}
+
+// By how much the error of a mean speed is larger than in a nominal step.
+double SignatureErrors::shorter(double step) const {
+  const bool means = reference_->kind != MotionKind::speed && reference_->nominal_step > 0.0 && step > 0.0;
+  return means ? std::max(1.0, reference_->nominal_step / step) : 1.0;
+}
+
+void SignatureErrors::begin(std::size_t onset) {
+  const std::vector<double>& step = reference_->step;
+  const double next = onset + 1 < step.size() ? step[onset + 1] : 0.0;
+  onset_ = std::max(shorter(onset < step.size() ? step[onset] : 0.0), shorter(next)) * reference_->errors.speed_sample;
+}
+
+SignatureErrors::Row SignatureErrors::row(std::size_t k, std::size_t i, double since) const {
+  const SignalErrors& errors = reference_->errors;
+  const auto n = static_cast<Eigen::Index>(model_->n());
+  const auto dY = reference_->rows.dY.middleRows(static_cast<Eigen::Index>(k) * n, n);
+  const bool angles = reference_->kind != MotionKind::speed;
+  const double decay = std::exp(-design_.beta * since);
+  const double newest = angles ? kernel_.gain() * (design_.order == 1 ? decay : kernel_.slow() * since * decay) : 0.0;
+  const Eigen::VectorXd cut = newest * onset_ + slope_;
+  const auto at = static_cast<Eigen::Index>(i), p = static_cast<Eigen::Index>(model_->p());
+  const auto own_error = [&](const Term& term) {
+    return dY(static_cast<Eigen::Index>(term.output), static_cast<Eigen::Index>(term.parameter));
+  };
+  Eigen::VectorXd of_acceleration = errors.acceleration, of_speed = errors.speed;
+  for (const Term& term : model_->terms) {
+    if (term.kind != Term::Kind::function && term.scale != 0.0) {
+      double& most =
+          (term.kind == Term::Kind::speed ? of_speed : of_acceleration)[static_cast<Eigen::Index>(term.coordinate)];
+      most = std::max(most, own_error(term) / std::abs(term.scale));
+    }
+  }
+  const Eigen::VectorXd acceleration = motion_ * of_acceleration, speed = motion_ * of_speed,
+                        sample = motion_ * sample_;
+  Row out{Eigen::RowVectorXd::Zero(p), Eigen::RowVectorXd::Zero(p), Eigen::RowVectorXd::Zero(p)};
+  for (const Term& term : model_->terms) {
+    const auto o = static_cast<Eigen::Index>(term.output), j = static_cast<Eigen::Index>(term.parameter),
+               c = static_cast<Eigen::Index>(term.coordinate);
+    const double scale = std::abs(term.scale);
+    // Errors of this entry, of its motion part and of what is seen: filtered, and what the cut at the onset adds.
+    double own = own_error(term), moved = 0.0, seen = 0.0, own_cut = 0.0, moved_cut = 0.0;
+    switch (term.kind) {
+      case Term::Kind::acceleration:
+        moved = scale * (acceleration[c] + (c == 0 && lateral_ > 0.0 ? lateral_ * of_speed[1] : 0.0));
+        seen = scale * seen_.row(c).dot(of_acceleration);
+        own_cut = scale * cut[c];
+        moved_cut = scale * motion_.row(c).dot(cut);
+        break;
+      case Term::Kind::speed:
+        moved = scale * speed[c];
+        seen = scale * seen_.row(c).dot(of_speed);
+        break;
+      case Term::Kind::function: {
+        // Functions of the motion are at most proportional to it, or do not depend on it but by signs.
+        const auto beyond = [&](const Eigen::MatrixXd& share, const Eigen::VectorXd& error) {
+          return scale * design_.static_gain() * (error.maxCoeff() + errors.heading * (1.0 + share.maxCoeff()));
+        };
+        moved = moves_ ? beyond(motion_, sample) : 0.0;
+        seen = whole_ ? own : seen_.isZero(0.0) ? 0.0 : beyond(seen_, seen_ * sample_);
+        own *= 2.0;
+        break;
+      }
+    }
+    if (o == at) {
+      out.e1[j] += moved;
+      out.es[j] += seen;
+      out.ec += theta_.size() > 0 ? theta_[j] * (own + own_cut) : 0.0;
+    }
+    out.e1[j] += effort_(at, o) * (own + own_cut);
+    out.e2[j] += effort_(at, o) * (moved + moved_cut);
+  }
+  return out;
+}
+
 FaultFilter::FaultFilter(FaultType fault, const Model& model, const FilterDesign& design, const ReferenceMotion& motion)
     : fault_(std::move(fault)),
       model_(&model),
@@ -218,7 +350,6 @@ FaultFilter::FaultFilter(FaultType fault, const Model& model, const FilterDesign
       filtered_(FaultSignals::none(model)) {
   validate(fault_, model);
   validate(design_);
-  exact_ = polynomial(fault_, model);
   kernel_ = FilterKernel(design_, motion.kind, motion.nominal_step);
   cascades_.resize(model.n() * (3 * model.p() + 1));
   const auto n = static_cast<Eigen::Index>(model.n());
@@ -241,14 +372,19 @@ FaultFilter::FaultFilter(FaultType fault, const Model& model, const FilterDesign
       }
     }
   }
-  const auto norm = [](const Eigen::MatrixXd& matrix) {
-    return matrix.size() > 0 ? matrix.cwiseAbs().rowwise().sum().maxCoeff() : 0.0;
+  const auto norm = [](const Eigen::MatrixXd& back, const Eigen::MatrixXd& matrix, const Eigen::MatrixXd& joints) {
+    return matrix.size() > 0 ? (back * matrix * joints).cwiseAbs().rowwise().sum().maxCoeff() : 0.0;
   };
   most_kappa_ = std::max(std::abs(fault_.kappa(fault_.range.lower)), std::abs(fault_.kappa(fault_.range.upper)));
   proportional_ = fault_.slip.size() == 0 && fault_.theta.size() == 0 && fault_.offset.size() == 0 &&
                   fault_.lateral == 0.0 && !fault_.held_effort;
-  const double gains = norm(fault_.effort) + norm(fault_.ground), motions = norm(fault_.motion);
+  const double gains = norm(to_joints_, fault_.effort, model.input) + norm(to_joints_, fault_.ground, model.input);
+  const double motions =
+      norm(from_motion_, fault_.motion, model.motion) + norm(from_motion_, fault_.seen, model.motion);
   growth_ = gains + motions + most_kappa_ * gains * motions;
+  if (motion.measured) {
+    read_errors_.emplace(fault_, model, design_, motion);
+  }
   last_ = FaultSignals::none(model);
   widened_.resize(model.n() * (model.p() + 1));
   range_ = last_.g1;
@@ -261,24 +397,7 @@ FaultFilter::Point FaultFilter::point(std::size_t k) const {
       fault_.profile.at(motion_->instant[k] - motion_->instant[onset_],
                         motion_->joint_angle(joint, i) - motion_->joint_angle(joint, static_cast<Eigen::Index>(onset_)),
                         motion_->joint_speed(joint, i));
-  const Eigen::VectorXd v = motion_->speed.col(i);
-  Point point{s, Eigen::VectorXd::Zero(v.size()), {}, Eigen::VectorXd::Zero(v.size()), {}};
-  if (fault_.motion.size() > 0) {
-    point.moved += s * fault_.motion * v;
-  }
-  if (fault_.slip.size() > 0) {
-    point.moved += s * fault_.slip;
-  }
-  if (fault_.seen.size() > 0) {
-    point.seen += s * fault_.seen * v;
-  }
-  const Eigen::VectorXd none = Eigen::VectorXd::Zero(motion_->joint_speed.rows());
-  point.joint_moved = fault_.of_reading ? joints_of(from_motion_, point.moved) : none;
-  point.joint_seen = fault_.seen.size() == 0 ? none
-                     : fault_.whole
-                         ? Eigen::VectorXd(joints_of(from_motion_, v + point.seen) - motion_->joint_speed.col(i))
-                         : joints_of(from_motion_, point.seen);
-  return point;
+  return {s, extra_motion(fault_, from_motion_, motion_->speed.col(i), motion_->joint_speed.col(i), s)};
 }
 
 void FaultFilter::begin(std::size_t onset) {
@@ -286,12 +405,15 @@ void FaultFilter::begin(std::size_t onset) {
   const auto next = std::upper_bound(motion_->segment_starts.begin(), motion_->segment_starts.end(), onset);
   end_ = next == motion_->segment_starts.end() ? motion_->instants() : *next;
   onset_ = k_ = onset;
+  if (read_errors_) {
+    read_errors_->begin(onset);
+  }
   std::fill(cascades_.begin(), cascades_.end(), KernelState{});
   filtered_ = last_ = FaultSignals::none(*model_);
   std::fill(widened_.begin(), widened_.end(), KernelState{});
   range_.setZero();
   widened_c_.setZero();
-  added_ = 0.0;
+  added_ = since_ = 0.0;
   row_range_ = row_dY_ = range_;
   before_ = point(onset);
   const auto n = static_cast<Eigen::Index>(model_->n());
@@ -310,8 +432,8 @@ void FaultFilter::begin(std::size_t onset) {
       if (term.kind == Term::Kind::acceleration) {
         const std::size_t at = term.output * p + term.parameter;
         const auto c = static_cast<Eigen::Index>(term.coordinate);
-        jump(cascades_[at], term.scale * before_.moved[c]);
-        jump(cascades_[2 * size + at], term.scale * before_.seen[c]);
+        jump(cascades_[at], term.scale * before_.extra.moved[c]);
+        jump(cascades_[2 * size + at], term.scale * before_.extra.seen[c]);
       }
     }
   }
@@ -411,37 +533,53 @@ bool FaultFilter::next() {
   const Point after = point(k_ + 1);
   const Eigen::VectorXd v0 = motion_->speed.col(a), v1 = motion_->speed.col(b);
   const Eigen::VectorXd joints0 = motion_->joint_speed.col(a), joints1 = motion_->joint_speed.col(b);
-  const Eigen::VectorXd acceleration = (v1 - v0) / h, moved_rate = (after.moved - before_.moved) / h,
-                        seen_rate = (after.seen - before_.seen) / h;
+  const Eigen::VectorXd acceleration = (v1 - v0) / h, moved_rate = (after.extra.moved - before_.extra.moved) / h,
+                        seen_rate = (after.extra.seen - before_.extra.seen) / h;
   // The step that ends at the onset of a jump is still healthy.
   const bool healthy = fresh_ && k_ == onset_;
   const FaultSignals begin =
       signature(fault_, *model_,
-                {before_.profile, v0, joints0, motion_->heading[k_], acceleration, before_.moved, moved_rate,
-                 before_.joint_moved, before_.seen, seen_rate, before_.joint_seen, healthy, healthy},
+                {before_.profile, v0, joints0, motion_->heading[k_], acceleration, before_.extra.moved, moved_rate,
+                 before_.extra.joint_moved, before_.extra.seen, seen_rate, before_.extra.joint_seen, healthy, healthy},
                 held_);
-  const FaultSignals end = signature(fault_, *model_,
-                                     {after.profile, v1, joints1, motion_->heading[k_ + 1], acceleration, after.moved,
-                                      moved_rate, after.joint_moved, after.seen, seen_rate, after.joint_seen, healthy},
-                                     held_);
+  const FaultSignals end =
+      signature(fault_, *model_,
+                {after.profile, v1, joints1, motion_->heading[k_ + 1], acceleration, after.extra.moved, moved_rate,
+                 after.extra.joint_moved, after.extra.seen, seen_rate, after.extra.joint_seen, healthy},
+                held_);
   filter(begin, end, shares, motion_->step[k_ + 1]);
   widen(begin, end, k_ == onset_ || healthy, std::max(h, motion_->step[k_ + 1]));
   before_ = after;
   ++k_;
   const auto n = static_cast<Eigen::Index>(model_->n());
   const Eigen::Index first = static_cast<Eigen::Index>(k_) * n;
-  row_range_ = range_;
-  row_dY_ = motion_->rows.dY.middleRows(first, n);
+  row_range_ = 2.0 * range_;
+  row_doubt_ = 2.0 * widened_c_;
+  row_dY_ = motion_->any_dY.middleRows(first, n);
+  if (fault_.seen.size() > 0 && motion_->effort_doubt.rows() > 0) {
+    row_dY_ += motion_->effort_doubt.middleRows(first, n);
+  }
   if (motion_->between_dY.rows() > 0 && proportional_) {
     const Eigen::VectorXd by = gain_only_ ? gain_ : Eigen::VectorXd::Constant(n, growth_);
-    row_range_ += by.asDiagonal() * motion_->between_dY.middleRows(first, n);
+    row_range_ += 2.0 * by.asDiagonal() * motion_->between_dY.middleRows(first, n);
   } else if (motion_->effort_dY.rows() > 0) {
     for (const FaultSignals* at : {&begin, &end}) {
       added_ = std::max(added_, most_added(*at));
     }
     if (added_ > 0.0) {
-      row_range_ += added_ * motion_->effort_dY.middleRows(first, n);
+      row_range_ += 2.0 * added_ * motion_->effort_dY.middleRows(first, n);
       row_dY_ += motion_->effort_doubt.middleRows(first, n);
+    }
+  }
+  if (gain_only_ && motion_->between_dy.size() > 0) {
+    row_doubt_ += 2.0 * gain_.cwiseProduct(motion_->between_dy.segment(first, n));
+  }
+  if (read_errors_) {
+    since_ += motion_->step[k_];
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const SignatureErrors::Row e = read_errors_->row(k_, static_cast<std::size_t>(i), since_);
+      row_range_.row(i) += e.e1 + most_kappa_ * e.e2 + e.es;
+      row_doubt_[i] += e.ec;
     }
   }
   return true;
@@ -450,15 +588,19 @@ bool FaultFilter::next() {
 FaultRow FaultFilter::row(std::size_t i) const {
   const std::size_t p = model_->p();
   const auto at = static_cast<Eigen::Index>(k_ * model_->n() + i), r = static_cast<Eigen::Index>(i);
-  return {{motion_->rows.Y.row(at).data(), p},
-          {filtered_.g1.row(r).data(), p},
-          {filtered_.g2.row(r).data(), p},
-          {filtered_.s.row(r).data(), p},
-          {row_dY_.row(r).data(), p},
-          filtered_.c[r],
-          motion_->rows.dy[at],
-          widened_c_[r] + (gain_only_ && motion_->between_dy.size() > 0 ? gain_[r] * motion_->between_dy[at] : 0.0),
-          {row_range_.row(r).data(), p}};
+  FaultRow row{.y = {motion_->rows.Y.row(at).data(), p},
+               .g1 = {filtered_.g1.row(r).data(), p},
+               .g2 = {filtered_.g2.row(r).data(), p},
+               .s = {filtered_.s.row(r).data(), p},
+               .dY = {row_dY_.row(r).data(), p},
+               .c = filtered_.c[r],
+               .dy = motion_->any_dy[at],
+               .doubt = row_doubt_[r],
+               .range = {row_range_.row(r).data(), p}};
+  if (motion_->measured) {
+    row.read = {motion_->rows.dY.row(at).data(), p};
+  }
+  return row;
 }
 
 SettledRows settled_rows(const FaultType& fault, const Model& model, const FilterDesign& design,
@@ -468,23 +610,14 @@ SettledRows settled_rows(const FaultType& fault, const Model& model, const Filte
   check::that(v.size() == c && a.size() == c, "operating point", "one speed and one acceleration for each coordinate");
   const Eigen::MatrixXd inverse = inverse_of(model);
   const Eigen::VectorXd joints = joints_of(inverse, v);
-  Eigen::VectorXd moved = Eigen::VectorXd::Zero(c), moved_rate = moved, seen = moved, seen_rate = moved;
+  const ExtraMotion extra = extra_motion(fault, inverse, v, joints, 1.0);
+  Eigen::VectorXd moved_rate = Eigen::VectorXd::Zero(c), seen_rate = moved_rate;
   if (fault.motion.size() > 0) {
-    moved += fault.motion * v;
     moved_rate += fault.motion * a;
   }
-  if (fault.slip.size() > 0) {
-    moved += fault.slip;
-  }
   if (fault.seen.size() > 0) {
-    seen += fault.seen * v;
     seen_rate += fault.seen * a;
   }
-  const Eigen::VectorXd still = Eigen::VectorXd::Zero(joints.size());
-  const Eigen::VectorXd joint_moved = fault.of_reading ? joints_of(inverse, moved) : still;
-  const Eigen::VectorXd joint_seen = fault.seen.size() == 0 ? still
-                                     : fault.whole          ? Eigen::VectorXd(joints_of(inverse, v + seen) - joints)
-                                                            : joints_of(inverse, seen);
   SettledRows rows;
   const std::vector<double> joint_list(joints.data(), joints.data() + joints.size()),
       speed_list(v.data(), v.data() + v.size()), none(std::max(joint_list.size(), speed_list.size()), 0.0);
@@ -492,9 +625,10 @@ SettledRows settled_rows(const FaultType& fault, const Model& model, const Filte
       design.static_gain() *
       regressor(model, {speed_list, {none.data(), speed_list.size()}, joint_list, {none.data(), joint_list.size()}},
                 {a.data(), static_cast<std::size_t>(a.size())});
-  rows.signature =
-      signature(fault, model, {1.0, v, joints, 0.0, a, moved, moved_rate, joint_moved, seen, seen_rate, joint_seen},
-                rows.Y / design.static_gain());
+  rows.signature = signature(
+      fault, model,
+      {1.0, v, joints, 0.0, a, extra.moved, moved_rate, extra.joint_moved, extra.seen, seen_rate, extra.joint_seen},
+      rows.Y / design.static_gain());
   rows.signature.g1 *= design.static_gain();
   rows.signature.g2 *= design.static_gain();
   rows.signature.s *= design.static_gain();

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -18,11 +19,11 @@ namespace wheelwright {
 ///
 ///     τ_f = (y + κ g1 + κ² g2) θ + κ c + e,     regressor as seen: y + κ s + δ,
 ///
-/// |e| <= n̄ = dy, |δ| <= Δ = dY entry by entry. All spans have p entries. Where this is not all, `doubt` + Σ `range`_j|θ_j|
-/// bounds, per unit of |κ|, by how much τ_f, and the threshold, may be elsewhere for every θ in the set: `range` is empty or
-/// has p entries.
+/// |e| <= n̄ = dy, |δ| <= Δ = dY entry by entry. All spans have p entries. Where this is not all, τ_f and the threshold
+/// together may be elsewhere by |κ| (`doubt` + Σ `range`_j|θ_j|) for every θ in the set, and y by `read`: both are empty or
+/// have p entries.
 struct FaultRow {
-  std::span<const double> y;  ///< of the healthy motion, exact
+  std::span<const double> y;  ///< of the healthy motion
   std::span<const double> g1;
   std::span<const double> g2;
   std::span<const double> s;
@@ -31,6 +32,13 @@ struct FaultRow {
   double dy = 0.0;  ///< n̄
   double doubt = 0.0;
   std::span<const double> range{};
+  std::span<const double> read{};
+};
+
+/// What a fault adds to the motion at one instant: of the coordinates, and of the joints.
+struct ExtraMotion {
+  Eigen::VectorXd moved, joint_moved;  ///< of the robot
+  Eigen::VectorXd seen, joint_seen;    ///< of what encoders show
 };
 
 /// What a fault adds to the unfiltered equation at one instant, matrices n × p.
@@ -66,6 +74,55 @@ class FaultRows {
 /// changes an effort's gain too. A reading that stands still at an unknown value is none. Tried at some motions.
 [[nodiscard]] bool polynomial(const FaultType& fault, const Model& model);
 
+/// By how much a measured motion's errors carry a signature that is filtered from its onset on away from that of the motion
+/// itself. The kernel of f₂*(s n̈) for a step s is that of f₂*n̈ cut off at the time x since the onset: its derivatives' total
+/// variations do not grow by that, but for the error n_v of the speed at the onset, with weight f₂(x), as at the start of a
+/// segment (noise.hpp). So with Δ the bounds of the healthy columns
+///
+///     gains H, G:  e1 = |H + G| (Δ + |scale| f₂(x) n_v)           (n_v for angles only)
+///     motion K:    e1 = |K| Δ of acceleration and speed: f * d/dt(s K n) has no term at the onset
+///     both:        e2 = |H + G| (|K| Δ + |scale| f₂(x) |K| n_v)
+///     across d:    e1 = |d| Δ of the yaw rate           θ-change ϑ:  e_c = (Δ + …) |ϑ|
+///     seen S:      e_s = |S| Δ.
+///
+/// where n_v is that of the step at the onset (shorter steps of angles have larger errors). Where s does not jump, the
+/// fastest that it changes times Δ of the speed is added to f₂(x) n_v, for a bump times the static gain and n_v.
+class SignatureErrors {
+ public:
+  /// Of one output at one instant.
+  struct Row {
+    Eigen::RowVectorXd e1, e2, es;  ///< |ĝ1 − g1|, |ĝ2 − g2|, |ŝ − s|: p entries
+    double ec = 0.0;                ///< |ĉ − c|
+  };
+
+  /// `model` and `motion` are kept by reference.
+  SignatureErrors(const FaultType& fault, const Model& model, const FilterDesign& design,
+                  const ReferenceMotion& motion);
+
+  /// Filters from instant `onset` of the motion on.
+  void begin(std::size_t onset);
+  /// Largest error of the coordinates' speeds at the onset.
+  [[nodiscard]] const Eigen::VectorXd& at_onset() const { return onset_; }
+
+  /// Of output `i` at instant `k` of the motion, `since` s (of the filter's steps) after the onset.
+  [[nodiscard]] Row row(std::size_t k, std::size_t i, double since) const;
+
+ private:
+  [[nodiscard]] double shorter(double step) const;
+
+  const Model* model_;
+  const ReferenceMotion* reference_;
+  FilterDesign design_;
+  FilterKernel kernel_;
+  Eigen::MatrixXd motion_, effort_, seen_;  // |K|, |H| + |G|, |S|
+  Eigen::VectorXd theta_;
+  double lateral_ = 0.0;
+  Eigen::VectorXd onset_;   // n_v there
+  Eigen::VectorXd sample_;  // n_v of the shortest step
+  Eigen::VectorXd slope_;   // per coordinate: what changes of s add where it does not jump
+  bool moves_ = false, whole_ = false;
+};
+
 /// Rows of the torque residual: filters a fault's signature along a reference motion, with the filter's own kernel: what
 /// happens between two instants counts as RegressorFilter counts it. Products with the fault's profile need no derivative
 /// of noise. At
@@ -74,16 +131,19 @@ class FaultRows {
 ///
 /// What the efforts that a fault adds widen in the rows of a faulty log is FaultRow::range and FaultRow::doubt. The hull of
 /// efforts that change between samples: an effort's gain widens it by as much as the efforts do, any other fault by what
-/// its own efforts change from sample to sample. The motion between samples, in dY: faults that multiply efforts by as
-/// much as they multiply them, any other by ReferenceMotion::effort_dY times the largest effort that it has added since
+/// its own efforts change from sample to sample. The motion between samples, in dY: faults that multiply efforts,
+/// or the speeds that are seen, by as much as they multiply them, any other by ReferenceMotion::effort_dY times the largest effort that it has added since
 /// the onset, for every θ of the set, and by ReferenceMotion::effort_doubt.
+///
+/// The signature of a measured motion has its errors (SignatureErrors); that a bump's angles are the measured ones is not
+/// counted.
 class FaultFilter final : public FaultRows {
  public:
   /// Throws InvalidArgument where `fault` does not fit `model`. `model` and `motion` are kept by reference.
   FaultFilter(FaultType fault, const Model& model, const FilterDesign& design, const ReferenceMotion& motion);
 
   [[nodiscard]] std::size_t outputs() const override { return model_->n(); }
-  [[nodiscard]] bool exact() const override { return exact_; }
+  [[nodiscard]] bool exact() const override { return polynomial(fault_, *model_); }
   void begin(std::size_t onset) override;
   /// The same for a fault that was there before instant `first`, at which the filter begins: nothing jumps.
   void begin_broken(std::size_t first);
@@ -99,7 +159,7 @@ class FaultFilter final : public FaultRows {
   // The fault and the motion at one instant: s(t), what moves (s u) and what is seen (s S v) beyond v.
   struct Point {
     double profile = 0.0;
-    Eigen::VectorXd moved, joint_moved, seen, joint_seen;
+    ExtraMotion extra;
   };
   [[nodiscard]] Point point(std::size_t k) const;
   void filter(const FaultSignals& begin, const FaultSignals& end, const std::array<double, 2>& shares, double h);
@@ -115,7 +175,6 @@ class FaultFilter final : public FaultRows {
   Point before_;
   std::vector<KernelState> cascades_;  // g1, g2, s, c one after the other
   FaultSignals filtered_;
-  bool exact_ = true;
   bool gain_only_ = false;       // a fault of an effort's gain, and nothing else
   Eigen::VectorXd gain_;         // per output: by how much it widens what is in doubt of efforts
   Eigen::MatrixXd from_motion_;  // speeds of the joints from those of the coordinates
@@ -128,7 +187,10 @@ class FaultFilter final : public FaultRows {
   std::vector<KernelState> widened_;  // n × p of range_, then n of c
   RowMatrix range_;
   Eigen::VectorXd widened_c_;
-  RowMatrix row_range_;  // range_ and what grows in dY
+  std::optional<SignatureErrors> read_errors_;  // of a measured motion
+  Eigen::VectorXd row_doubt_;
+  double since_ = 0.0;   // steps since the onset, s
+  RowMatrix row_range_;  // range_, what grows in dY and the signature's errors
   RowMatrix row_dY_;     // with functions in doubt
   std::size_t onset_ = 0, k_ = 0, end_ = 0;
   bool fresh_ = false;  // the fault jumps at the onset, between two steps

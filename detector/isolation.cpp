@@ -106,8 +106,7 @@ class Search {
       fault_.held_effort = false;
       free_offset_ = true;
     }
-    rows_.emplace(fault_, in_.filter.model(), in_.filter.design(), in_.filter.measurement().motion, in_.filter.errors(),
-                  in_.motion, in_.window.first, in_.window.end);
+    rows_.emplace(fault_, in_.filter.model(), in_.filter.design(), in_.motion, in_.window.first, in_.window.end);
   }
 
   void run() {
@@ -140,8 +139,7 @@ class Search {
       return;
     }
     finding_.verdict = FaultFinding::Verdict::consistent;
-    // Rows say what happened up to their times; instants may lie half a step before them.
-    finding_.onset = {in_.motion.t[first_ > in_.window.first ? first_ - 1 : first_], in_.motion.t[last_]};
+    finding_.onset = {in_.motion.instant[first_ > in_.window.first ? first_ - 1 : first_], in_.motion.instant[last_]};
     if (!fault_.whole) {
       const auto size = [&](double kappa) {
         return fault_.magnitude(rows_->encoder() ? kappa / (1.0 - kappa) : kappa);
@@ -467,7 +465,7 @@ void judge_reading(const Setting& in, FaultFinding& finding) {
         from <= w.outside && stop > k &&
         (ends ? in.motion.instant[stop - 1] - in.motion.instant[k] >= long_enough || stop == w.end : stop == w.end);
     if (fits) {
-      const Interval onset{in.motion.t[from], in.motion.t[std::min(w.outside, stop - 1)]};
+      const Interval onset{in.motion.instant[from], in.motion.instant[std::min(w.outside, stop - 1)]};
       finding.onset = finding.verdict == FaultFinding::Verdict::consistent
                           ? Interval{finding.onset.lower, std::max(finding.onset.upper, onset.upper)}
                           : onset;

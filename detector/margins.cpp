@@ -27,7 +27,7 @@ std::vector<std::size_t> choose_onsets(const ReferenceMotion& motion, const Marg
     next = begins ? -kInfinity : next;
     const auto after = std::upper_bound(motion.segment_starts.begin(), motion.segment_starts.end(), k);
     const std::size_t last = (after == motion.segment_starts.end() ? motion.instants() : *after) - 1;
-    const bool room = k + 2 <= last && motion.t[last] - motion.t[k] > options.windows.front();
+    const bool room = k + 2 <= last && motion.t[last] - motion.instant[k] > options.windows.front();
     if (motion.settled[k] && room && motion.t[k] >= next) {
       onsets.push_back(k);
       next = motion.t[k] + step;
@@ -45,7 +45,7 @@ std::vector<ManoeuvreKind> kinds_of(const ReferenceMotion& motion, const std::ve
     const auto after = std::upper_bound(motion.segment_starts.begin(), motion.segment_starts.end(), onset);
     const std::size_t end = after == motion.segment_starts.end() ? motion.instants() : *after;
     std::size_t last = onset + 1;
-    while (last + 1 < end && motion.t[last + 1] - motion.t[onset] <= length) {
+    while (last + 1 < end && motion.t[last + 1] - motion.instant[onset] <= length) {
       ++last;
     }
     kinds.push_back(kind_of(motion, onset, last + 1));
@@ -97,7 +97,7 @@ OnsetMargin margin_at(const ReferenceMotion& motion, const FaultMargins& margins
   const double largest = std::abs(fault.kappa(margins.side * margins.largest()));
   OnsetMargin result;
   result.instant = onset;
-  result.t = motion.t[onset];
+  result.t = motion.instant[onset];
   result.by_channel.resize(n);
   std::vector<ChannelBest> channels(n, ChannelBest(options.persistence, largest, fault.whole));
   double hidden = largest, window_hidden = largest;
@@ -116,6 +116,7 @@ OnsetMargin margin_at(const ReferenceMotion& motion, const FaultMargins& margins
       window_hidden = hidden;
     }
   };
+  const bool exact = rows.exact();
   rows.begin(onset);
   while (window < options.windows.size() && rows.next()) {
     const std::size_t k = rows.instant();
@@ -126,7 +127,7 @@ OnsetMargin margin_at(const ReferenceMotion& motion, const FaultMargins& margins
     }
     for (std::size_t i = 0; i < n; ++i) {
       const FaultRow row = rows.row(i);
-      if (!rows.exact()) {
+      if (!exact) {
         hidden = 0.0;
         continue;
       }

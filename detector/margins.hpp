@@ -38,7 +38,7 @@ struct MarginOptions {
 /// the fault's range. A window that runs past the end of the segment has no value.
 struct OnsetMargin {
   std::size_t instant = 0;  ///< of the motion
-  double t = 0.0;           ///< s
+  double t = 0.0;           ///< of the onset, s: rows that the filter has later know of it
   ManoeuvreKind kind = ManoeuvreKind::standstill;
   std::vector<double> certain;                  ///< per window that fits: every size from here up to the range's end
                                                 ///< raises an alarm within it, whatever θ in P and noise

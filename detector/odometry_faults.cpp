@@ -116,6 +116,7 @@ OdometryReference read_odometry(LogSource& log, OdometryFilter filter, const Mod
     }
   }
   motion.speed = model.motion * motion.joint_speed;
+  motion.measured = true;
   motion.rows.outputs = n;
   motion.rows.parameters = p;
   motion.rows.sample = motion.sample;
@@ -155,9 +156,12 @@ OdometryFaultRows::OdometryFaultRows(const FaultType& fault, const Model& model,
     radius_[w] = measurement_.position ? largest(hull.sides[w]) : 0.0;
     yaw_gain_[w] = hull.sides[gains + w];
   }
+  const auto share = [](const Eigen::Matrix2d& joint) { return joint.cwiseAbs().rowwise().sum().maxCoeff(); };
+  read_share_ = share(joint_motion_) + share(joint_seen_);
   const auto n = static_cast<Eigen::Index>(n_), p = static_cast<Eigen::Index>(p_);
   rows_ = {RowMatrix::Zero(n, p), RowMatrix::Zero(n, p), RowMatrix::Zero(n, p), Eigen::VectorXd::Zero(n)};
   doubt_ = Eigen::VectorXd::Zero(n);
+  range_ = rows_.g1;
 }
 
 void OdometryFaultRows::begin(std::size_t onset) {
@@ -244,19 +248,29 @@ void OdometryFaultRows::write() {
     rows_.s(i, column + 1) = -(end.turn_shown[1] - begin.turn_shown[1]);
     rows_.c[i] = end.slipped_turn - begin.slipped_turn;
   }
+  if (motion.measured) {
+    const auto n = static_cast<Eigen::Index>(n_);
+    const auto dY = motion.rows.dY.middleRows(static_cast<Eigen::Index>(k_) * n, n);
+    range_ = (read_share_ * dY.rowwise().maxCoeff()).replicate(1, dY.cols());
+  }
 }
 
 FaultRow OdometryFaultRows::row(std::size_t i) const {
   const RegressionBlock& rows = reference_->motion.rows;
   const auto at = static_cast<Eigen::Index>(k_ * n_ + i), r = static_cast<Eigen::Index>(i);
-  return {{rows.Y.row(at).data(), p_},
-          {rows_.g1.row(r).data(), p_},
-          {rows_.g2.row(r).data(), p_},
-          {rows_.s.row(r).data(), p_},
-          {rows.dY.row(at).data(), p_},
-          rows_.c[r],
-          rows.dy[at],
-          doubt_[r]};
+  FaultRow row{.y = {rows.Y.row(at).data(), p_},
+               .g1 = {rows_.g1.row(r).data(), p_},
+               .g2 = {rows_.g2.row(r).data(), p_},
+               .s = {rows_.s.row(r).data(), p_},
+               .dY = {rows.dY.row(at).data(), p_},
+               .c = rows_.c[r],
+               .dy = rows.dy[at],
+               .doubt = 2.0 * doubt_[r],
+               .range = {range_.row(r).data(), p_}};
+  if (reference_->motion.measured) {
+    row.read = row.dY;
+  }
+  return row;
 }
 
 }  // namespace wheelwright

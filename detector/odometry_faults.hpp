@@ -29,7 +29,7 @@ struct OdometryReference {
 /// Rows of the kinematic residual after a fault's onset. With q_j what a wheel truly rolls beyond what its encoder would
 /// show without a fault in step j (s K in joints, times its way) and σ_j what the encoder shows beyond it (s S), the
 /// displacement is Σ E_j (Δφ + κ q) r/2 + κ Σ (E_j s a_1 + E_j⊥ s d) h, seen as Σ E_j (Δφ + κ σ) r/2, and alike for the
-/// turn. Efforts play no part. E_j are the directions of the healthy drive: where a fault turns the robot by up to κ η
+/// turn. Efforts play no part. A measured way has the encoders' errors, and so have K and S of it. E_j are the directions of the healthy drive: where a fault turns the robot by up to κ η
 /// within a window, rows are in doubt by κ η times the way driven.
 class OdometryFaultRows final : public FaultRows {
  public:
@@ -63,6 +63,7 @@ class OdometryFaultRows final : public FaultRows {
   Eigen::Matrix2d joint_motion_ = Eigen::Matrix2d::Zero(), joint_seen_ = Eigen::Matrix2d::Zero();  // K, S in joints
   double along_ = 0.0, turning_ = 0.0;                                                             // a_1, a_2
   double most_kappa_ = 0.0;
+  double read_share_ = 0.0;         // of the encoders' errors in K and S of what they show
   std::array<double, 2> radius_{};  // at most
   std::array<Interval, 2> yaw_gain_{};
   std::size_t n_ = 0, p_ = 0;
@@ -70,6 +71,7 @@ class OdometryFaultRows final : public FaultRows {
   std::size_t onset_ = 0, k_ = 0, end_ = 0;
   FaultSignals rows_;
   Eigen::VectorXd doubt_;
+  RowMatrix range_;
 };
 
 }  // namespace wheelwright

@@ -38,11 +38,6 @@ FaultType of_motion(const FaultType& fault) {
 
 bool drifts(const FaultType& fault) { return fault.profile.kind == FaultProfile::Kind::drift; }
 
-Eigen::MatrixXd or_zero(const Eigen::MatrixXd& matrix, std::size_t size) {
-  const auto n = static_cast<Eigen::Index>(size);
-  return matrix.size() > 0 ? matrix : Eigen::MatrixXd::Zero(n, n);
-}
-
 }  // namespace
 
 bool OnsetRows::knows(const FaultType& fault, const Model& model) {
@@ -61,15 +56,14 @@ bool OnsetRows::knows(const FaultType& fault, const Model& model) {
          (fault.seen * fault.seen - fault.seen).cwiseAbs().maxCoeff() <= 1e-12 * fault.seen.cwiseAbs().maxCoeff();
 }
 
-OnsetRows::OnsetRows(const FaultType& fault, const Model& model, const FilterDesign& design, MotionKind kind,
-                     const SignalErrors& errors, const ReferenceMotion& motion, std::size_t first, std::size_t end)
-    : fault_(fault),
+OnsetRows::OnsetRows(const FaultType& fault, const Model& model, const FilterDesign& design,
+                     const ReferenceMotion& motion, std::size_t first, std::size_t end)
+    : fault_(fault.seen.size() > 0 ? of_motion(fault) : fault),
       model_(&model),
       design_(design),
       kernel_(design, motion.kind, motion.nominal_step),
-      angles_(kind != MotionKind::speed),
+      errors_(fault_, model, design, motion),
       encoder_(fault.seen.size() > 0),
-      errors_(&errors),
       motion_(&motion),
       first_(first),
       end_(end),
@@ -77,9 +71,6 @@ OnsetRows::OnsetRows(const FaultType& fault, const Model& model, const FilterDes
       bound_{FaultSignals::none(model), FaultSignals::none(model), FaultSignals::none(model)} {
   check::that(knows(fault, model), "fault '" + fault.name + "'", "a step or a drift");
   check::that(first < end && end <= motion.instants(), "instants", "a range of the motion");
-  if (encoder_) {
-    fault_ = of_motion(fault_);
-  }
   fault_.held_effort = false;
   step_ = fault_;
   step_.profile = {};
@@ -135,6 +126,7 @@ OnsetRows::State OnsetRows::left(std::size_t from, std::size_t at) const {
 void OnsetRows::between(std::size_t a, std::size_t b) {
   check::that(a >= first_ && a < b && b + 1 < end_, "onset", "instants of the motion");
   s_ = b + 1;
+  errors_.begin(s_);
   bound_ = {FaultSignals::none(*model_), FaultSignals::none(*model_), FaultSignals::none(*model_)};
   const std::size_t from = a > first_ ? a - 1 : a;
   const RowMatrix counted = jump(s_);
@@ -147,7 +139,10 @@ void OnsetRows::between(std::size_t a, std::size_t b) {
     raise(bound_.fast, state.fast);
   }
   // The speed's own error in the impulse.
-  const Eigen::VectorXd error = or_zero(fault_.motion, model_->coordinates.size()).cwiseAbs() * errors_->speed_sample;
+  Eigen::VectorXd error = Eigen::VectorXd::Zero(motion_->speed.rows());
+  if (fault_.motion.size() > 0) {
+    error = fault_.motion.cwiseAbs() * errors_.at_onset();
+  }
   for (const Term& term : model_->terms) {
     if (term.kind == Term::Kind::acceleration) {
       const auto i = static_cast<Eigen::Index>(term.output), j = static_cast<Eigen::Index>(term.parameter);
@@ -197,67 +192,16 @@ OnsetRow OnsetRows::row(std::size_t k, std::size_t i) const {
   const FaultSignals step = filtered(k);
   const FaultSignals& signals = drifts(fault_) ? drifting_[k - s_] : step;
   const double x = way(s_, k), decay = std::exp(-design_.beta * x);
-  const double newest = angles_ ? kernel_.gain() * kernel_.slow() * x * decay : 0.0;
-  const double onset_error = drifts(fault_) ? newest + design_.static_gain() / fault_.profile.rise : newest;
-
+  const SignatureErrors::Row errors = errors_.row(k, i, x);
   OnsetRow out{{},
                signals.g1.row(at),
                signals.g2.row(at),
-               Eigen::RowVectorXd::Zero(p),
-               Eigen::RowVectorXd::Zero(p),
+               errors.e1,
+               errors.e2,
                signals.c[at],
-               0.0,
+               errors.ec,
                {gain_ * decay, design_.order == 2 ? gain_ * decay * x : 0.0,
                 kernel_.apart() > 0.0 ? gain_ * std::exp(-kernel_.gamma() * x) : 0.0}};
-
-  const Eigen::MatrixXd K = or_zero(fault_.motion, model_->coordinates.size()).cwiseAbs();
-  const Eigen::MatrixXd H =
-      or_zero(fault_.effort, model_->n()).cwiseAbs() + or_zero(fault_.ground, model_->n()).cwiseAbs();
-  // What an entry of the row can be wrong by, motion between samples and all.
-  const auto own_error = [&](const Term& term) {
-    return motion_->rows.dY(static_cast<Eigen::Index>(k * model_->n() + term.output),
-                            static_cast<Eigen::Index>(term.parameter));
-  };
-  Eigen::VectorXd of_acceleration = errors_->acceleration, of_speed = errors_->speed;
-  for (const Term& term : model_->terms) {
-    if (term.kind != Term::Kind::function && term.scale != 0.0) {
-      double& most =
-          (term.kind == Term::Kind::speed ? of_speed : of_acceleration)[static_cast<Eigen::Index>(term.coordinate)];
-      most = std::max(most, own_error(term) / std::abs(term.scale));
-    }
-  }
-  const Eigen::VectorXd acceleration = K * of_acceleration, speed = K * of_speed, sample = K * errors_->speed_sample;
-  for (const Term& term : model_->terms) {
-    const auto o = static_cast<Eigen::Index>(term.output), j = static_cast<Eigen::Index>(term.parameter),
-               c = static_cast<Eigen::Index>(term.coordinate);
-    const double scale = std::abs(term.scale);
-    // Errors of this entry, and of its motion part: filtered, and what the cut at t_s adds.
-    double own = own_error(term), moved = 0.0, own_cut = 0.0, moved_cut = 0.0;
-    switch (term.kind) {
-      case Term::Kind::acceleration:
-        moved = scale *
-                (acceleration[c] + (c == 0 && fault_.lateral != 0.0 ? std::abs(fault_.lateral) * of_speed[1] : 0.0));
-        own_cut = scale * onset_error * errors_->speed_sample[c];
-        moved_cut = scale * onset_error * sample[c];
-        break;
-      case Term::Kind::speed: moved = scale * speed[c]; break;
-      case Term::Kind::function:
-        // Functions of the motion are at most proportional to it, or do not depend on it but by signs.
-        own *= 2.0;
-        moved = fault_.motion.size() > 0 || fault_.slip.size() > 0
-                    ? scale * design_.static_gain() * (sample.maxCoeff() + errors_->heading * (1.0 + K.maxCoeff()))
-                    : 0.0;
-        break;
-    }
-    if (o == at) {
-      out.e1[j] += moved;
-    }
-    out.e1[j] += H(at, o) * (own + own_cut);
-    out.e2[j] += H(at, o) * (moved + moved_cut);
-    if (o == at && fault_.theta.size() > 0) {
-      out.ec += std::abs(fault_.theta[j]) * (own + own_cut);
-    }
-  }
   // An effort that reads too much says too little of what the robot may do between samples.
   out.e0 = Eigen::RowVectorXd::Zero(p);
   if (fault_.offset.size() > 0 && motion_->effort_dY.rows() > 0) {

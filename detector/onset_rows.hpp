@@ -12,16 +12,9 @@
 /// what onsets at the instants of [t_a, t_s] leave there, times kTransition: that is what covers a step between two
 /// samples, whose interval mixes both sides.
 ///
-/// Errors. Where motion between samples counts, Δ is the row's own dY, from the efforts as they were logged: a faulty
-/// robot's motion may be what they say, or what they say less the offset that the fault adds (effort_dY, effort_doubt). Let
-/// |ĝ1 − g1| <= e1, |ĝ2 − g2| <= e2, |ĉ − c| <= e_c. The kernel of f₂*(s n̈) for a step s is that of f₂*n̈ cut off at x: its
-/// derivatives' total variations do not grow by that, but for the error n_v(t_s) of the speed itself, with weight f₂(x),
-/// as at the start of a segment (noise.hpp). So with Δ the bounds of the healthy columns
-///
-///     gains H, G:  e1 = |H + G| (Δ + |scale| f₂(x) n_v)           (n_v for angles only)
-///     motion K:    e1 = |K| Δ of acceleration and speed: f * d/dt(s K n) has no term at t_s
-///     both:        e2 = |H + G| (|K| Δ + |scale| f₂(x) |K| n_v)
-///     across d:    e1 = |d| Δ of the yaw rate           θ-change ϑ:  e_c = (Δ + …) |ϑ|.
+/// Errors |ĝ1 − g1| <= e1, |ĝ2 − g2| <= e2, |ĉ − c| <= e_c: SignatureErrors. Where motion between samples counts, Δ is the
+/// row's own dY, from the efforts as they were logged: a faulty robot's motion may be what they say, or what they say less
+/// the offset that the fault adds (effort_dY, effort_doubt).
 ///
 /// A drift s = (t − T)/rise is a mixture of steps; that T is known to t_s − t_a only adds (t_s − t_a)/rise of the step's
 /// signature to e1 and e_c, and twice that to e2.
@@ -36,8 +29,6 @@
 #include <vector>
 
 #include <wheelwright/detector/fault_rows.hpp>
-#include <wheelwright/filter/measurement.hpp>
-#include <wheelwright/filter/noise.hpp>
 
 namespace wheelwright {
 
@@ -59,9 +50,9 @@ class OnsetRows {
   /// stand for a reading that stands still, and whose signature is a polynomial of κ (polynomial()).
   [[nodiscard]] static bool knows(const FaultType& fault, const Model& model);
 
-  /// For the instants [first, end) of `motion`, of one segment. References are kept. `errors` are those of the rows.
-  OnsetRows(const FaultType& fault, const Model& model, const FilterDesign& design, MotionKind kind,
-            const SignalErrors& errors, const ReferenceMotion& motion, std::size_t first, std::size_t end);
+  /// For the instants [first, end) of `motion`, of one segment. References are kept.
+  OnsetRows(const FaultType& fault, const Model& model, const FilterDesign& design, const ReferenceMotion& motion,
+            std::size_t first, std::size_t end);
 
   /// The onset lies between instants `a` and `b` > a, b + 1 < end. Rows before `a` are healthy, rows of instants in
   /// [a, b + 1] are not spoken of.
@@ -92,8 +83,8 @@ class OnsetRows {
   const Model* model_;
   FilterDesign design_;
   FilterKernel kernel_;
-  bool angles_, encoder_;
-  const SignalErrors* errors_;
+  SignatureErrors errors_;
+  bool encoder_;
   const ReferenceMotion* motion_;
   std::size_t first_, end_, s_ = 0;
   double gain_, uncertain_ = 0.0;       // α^order; share of a drift that the onset leaves open

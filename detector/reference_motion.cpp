@@ -47,15 +47,8 @@ ReferenceMotion walk(LogSource& log, RegressorFilter filter) {
   motion.kind = filter.measurement().motion;
   motion.nominal_step = filter.measurement().nominal_step;
   motion.effort_reach = effort_reach(filter.measurement(), filter.errors());
-  const SignalErrors& errors = filter.errors();
-  RowMatrix sensors = RowMatrix::Zero(static_cast<Eigen::Index>(n), static_cast<Eigen::Index>(p));
-  for (const Term& term : filter.model().terms) {
-    if (term.kind != Term::Kind::function) {
-      const auto c = static_cast<Eigen::Index>(term.coordinate);
-      sensors(static_cast<Eigen::Index>(term.output), static_cast<Eigen::Index>(term.parameter)) +=
-          std::abs(term.scale) * (term.kind == Term::Kind::speed ? errors.speed[c] : errors.acceleration[c]);
-    }
-  }
+  motion.errors = filter.errors();
+  motion.measured = true;
   std::size_t seen = 0;
   while (log.next(block)) {
     for (std::size_t k = 0; k < block.rows(); ++k) {
@@ -108,10 +101,6 @@ ReferenceMotion walk(LogSource& log, RegressorFilter filter) {
   motion.rows.dY = Eigen::Map<const RowMatrix>(regressor_error.data(), rows, columns);
   motion.rows.y = Eigen::Map<const Eigen::VectorXd>(y.data(), rows);
   motion.rows.dy = Eigen::Map<const Eigen::VectorXd>(dy.data(), rows);
-  motion.between_dY = errors.between_samples ? (motion.rows.dY - sensors.replicate(k, 1)).cwiseMax(0.0).eval()
-                                             : RowMatrix::Zero(rows, columns).eval();
-  motion.between_dy = errors.between_samples ? (motion.rows.dy - errors.output.replicate(k, 1)).cwiseMax(0.0).eval()
-                                             : Eigen::VectorXd::Zero(rows).eval();
   return motion;
 }
 
@@ -120,30 +109,70 @@ ReferenceMotion walk(LogSource& log, RegressorFilter filter) {
 ReferenceMotion read_reference(LogSource& log, const RegressorFilter& filter) {
   ReferenceMotion motion = walk(log, filter);
   const SignalErrors& errors = filter.errors();
+  const Model& model = filter.model();
   const RegressionBlock& rows = motion.rows;
   motion.largest = errors.motion.largest;
-  motion.effort_dY = motion.effort_doubt = RowMatrix::Zero(rows.dY.rows(), rows.dY.cols());
-  if (!errors.between_samples || errors.motion.mobility.size() == 0 || rows.y.size() == 0) {
+  motion.any_dY = rows.dY;
+  motion.any_dy = rows.dy;
+  motion.between_dY = motion.effort_dY = motion.effort_doubt = RowMatrix::Zero(rows.dY.rows(), rows.dY.cols());
+  motion.between_dy = Eigen::VectorXd::Zero(rows.dy.size());
+  if (!errors.between_samples || rows.y.size() == 0) {
     return motion;
   }
-  const double most =
-      rows.y.cwiseAbs().maxCoeff() + rows.dy.maxCoeff() + ((rows.Y.cwiseAbs() + rows.dY) * motion.largest).maxCoeff();
-  motion.most_effort = kBeyondEfforts * most / filter.design().static_gain();
-  SignalErrors more = errors;
-  more.motion.effort = errors.motion.effort.array() + motion.most_effort;
-  const ReferenceMotion wider = walk(log, RegressorFilter(filter.model(), filter.design(), filter.measurement(), more));
-  if (!(motion.most_effort > 0.0) || wider.rows.dY.rows() != rows.dY.rows()) {
+  const auto walk_with = [&](const SignalErrors& wider) {
+    return walk(log, RegressorFilter(model, filter.design(), filter.measurement(), wider)).rows;
+  };
+  // Readings of one motion are two bounds apart: of a size and of half a range of efforts, of speeds.
+  SignalErrors apart = errors;
+  apart.speed_sample *= 2.0;
+  apart.joint_sample *= 2.0;
+  apart.heading *= 2.0;
+  apart.motion.effort *= 5.0;
+  apart.output *= motion.effort_reach > 0 ? 3.0 : 1.0;
+  const RegressionBlock any = walk_with(apart);
+  const auto known = [&](const RegressionBlock& block) { return block.dY.rows() == rows.dY.rows(); };
+  if (!known(any)) {
     // A step that is too long for efforts like these has no rows: nothing is known of it.
+    motion.any_dY.setConstant(kInfinity);
+    return motion;
+  }
+  motion.any_dY = any.dY + (any.Y - rows.Y).cwiseAbs();
+  motion.any_dy = any.dy;
+  motion.between_dY = motion.any_dY;
+  for (const Term& term : model.terms) {
+    if (term.kind == Term::Kind::function) {
+      continue;
+    }
+    const auto c = static_cast<Eigen::Index>(term.coordinate);
+    const double sensor =
+        std::abs(term.scale) * (term.kind == Term::Kind::speed ? errors.speed[c] : errors.acceleration[c]);
+    for (auto k = static_cast<Eigen::Index>(term.output); k < rows.dY.rows();
+         k += static_cast<Eigen::Index>(model.n())) {
+      double& between = motion.between_dY(k, static_cast<Eigen::Index>(term.parameter));
+      between = std::max(0.0, between - sensor);
+    }
+  }
+  motion.between_dy = (any.dy - errors.output.replicate(static_cast<Eigen::Index>(motion.instants()), 1)).cwiseMax(0.0);
+  if (errors.motion.mobility.size() == 0) {
+    return motion;
+  }
+  const double most = rows.y.cwiseAbs().maxCoeff() + any.dy.maxCoeff() +
+                      ((rows.Y.cwiseAbs() + motion.any_dY) * motion.largest).maxCoeff();
+  motion.most_effort = kBeyondEfforts * most / filter.design().static_gain();
+  SignalErrors more = apart;
+  more.motion.effort.array() += motion.most_effort;
+  const RegressionBlock wider = walk_with(more);
+  if (!(motion.most_effort > 0.0) || !known(wider)) {
     motion.effort_dY.setConstant(motion.most_effort > 0.0 ? kInfinity : 0.0);
     return motion;
   }
-  const RowMatrix growth = (wider.rows.dY - rows.dY).cwiseMax(0.0);
-  const RowMatrix doubt = growth + (wider.rows.Y - rows.Y).cwiseAbs();
+  const RowMatrix growth = (wider.dY - any.dY).cwiseMax(0.0);
+  const RowMatrix doubt = growth + (wider.Y - any.Y).cwiseAbs();
   motion.effort_dY = growth / motion.most_effort;
-  for (const Term& term : filter.model().terms) {
+  for (const Term& term : model.terms) {
     if (term.kind == Term::Kind::function) {
-      for (Eigen::Index k = static_cast<Eigen::Index>(term.output); k < doubt.rows();
-           k += static_cast<Eigen::Index>(filter.model().n())) {
+      for (auto k = static_cast<Eigen::Index>(term.output); k < doubt.rows();
+           k += static_cast<Eigen::Index>(model.n())) {
         const auto j = static_cast<Eigen::Index>(term.parameter);
         motion.effort_doubt(k, j) = doubt(k, j);
         motion.effort_dY(k, j) = 0.0;

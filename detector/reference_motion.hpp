@@ -16,8 +16,8 @@
 namespace wheelwright {
 
 /// The motion of a drive at the instants of the filter (the samples; for angles and mean speeds the ends of the steps
-/// between them, with the means over these steps). What follows from it is about a robot that drives just so; efforts of the log it was read from play no
-/// part.
+/// between them, with the means over these steps). What follows from it is about every robot whose drive, read by these
+/// sensors, may look just so; efforts of the log it was read from play no part.
 struct ReferenceMotion {
   std::vector<std::size_t> sample;      ///< K rows of the log
   std::vector<double> t;                ///< K times of these rows, s
@@ -32,8 +32,12 @@ struct ReferenceMotion {
   std::vector<bool> settled;            ///< K: whether a detector decides at this instant, whatever the noise
   std::vector<std::size_t> segment_starts;  ///< ascending instants at which a segment begins
   RegressionBlock rows;                     ///< K instants: Y_f of the motion, with the bounds dY, dy of the sensors
-  RowMatrix between_dY;        ///< of dY what motion may do between samples: it grows with the efforts; empty: nothing
-  Eigen::VectorXd between_dy;  ///< of dy what efforts may do between samples, alike
+  SignalErrors errors;                      ///< of the filter
+  bool measured = false;   ///< rows and signals have the sensors' errors already; a planned motion has none
+  RowMatrix any_dY;        ///< dY, and dy, of any log that these sensors may write of the drive: what bounds the
+  Eigen::VectorXd any_dy;  ///< motion between samples is read from efforts and speeds that are noisy themselves
+  RowMatrix between_dY;    ///< of any_dY what motion may do between samples: it grows with the efforts; empty: nothing
+  Eigen::VectorXd between_dy;  ///< of any_dy what efforts may do between samples, alike
   double most_effort = 0.0;    ///< three times the efforts that the rows can be due to, for every θ of the set
   RowMatrix effort_dY;  ///< by how much between_dY grows for each unit that every output's effort is larger by, up to
                         ///< most_effort; functions of the motion left out
@@ -53,8 +57,8 @@ struct ReferenceMotion {
   }
 };
 
-/// The motion of `log` as `filter` reads it, whose error bounds the rows get. Walks the log (twice where efforts bound the
-/// motion between samples) and holds it. Throws InvalidArgument when the log lacks a column of the filter's measurement.
+/// The motion of `log` as `filter` reads it, whose error bounds the rows get. Walks the log (three times where efforts bound
+/// the motion between samples) and holds it. Throws InvalidArgument when the log lacks a column of the filter's measurement.
 [[nodiscard]] ReferenceMotion read_reference(LogSource& log, const RegressorFilter& filter);
 
 }  // namespace wheelwright

@@ -102,6 +102,19 @@ def recorded_runs():
                   [f"{case}_commission"])
 
 
+def with_needs(runs, names):
+    """The runs of these names and all that they need, in the order of `runs`."""
+    by_name, wanted, open_names = {r.name: r for r in runs}, set(), list(names)
+    while open_names:
+        name = open_names.pop()
+        if name not in by_name:
+            sys.exit(f"freeze: no run '{name}'; there are {', '.join(sorted(by_name))}")
+        if name not in wanted:
+            wanted.add(name)
+            open_names += by_name[name].needs
+    return [r for r in runs if r.name in wanted]
+
+
 def without_volatile(value):
     if isinstance(value, dict):
         return {k: without_volatile(v) for k, v in value.items() if k not in VOLATILE}
@@ -172,16 +185,13 @@ def main():
     options = parser.parse_args()
     runs = list(shipped_runs())
     if options.quick:
-        runs = [r for r in runs if r.quick]
+        runs = with_needs(runs, [r.name for r in runs if r.quick])
     elif (SHARED / "data").is_dir():
         runs += recorded_runs()
     else:
         print("freeze: no shared recordings here: shipped and simulated logs only", file=sys.stderr)
     if options.only:
-        wanted, by_name = set(options.only), {r.name: r for r in runs}
-        for name in list(wanted):
-            wanted |= set(by_name[name].needs)
-        runs = [r for r in runs if r.name in wanted]
+        runs = with_needs(runs, options.only)
     results = all_results(runs, options.program.resolve(), options.jobs, options.words)
     if options.write:
         options.write.write_text(json.dumps(results, indent=1) + "\n")

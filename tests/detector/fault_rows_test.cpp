@@ -307,6 +307,94 @@ TEST(FaultRows, HoldFunctionsOfTheMotionToTheSecondOrder) {
   }
 }
 
+// By how much the rows of a motion read with noise leave those of the motion itself, over the bounds that they state.
+double read_error(const FaultType& fault, const Model& model, const FilterDesign& design, const ReferenceMotion& motion,
+                  const ReferenceMotion& noisy) {
+  FaultFilter exact(fault, model, design, motion), read(fault, model, design, noisy);
+  SignatureErrors errors(fault, model, design, noisy);
+  const std::size_t onset = onset_of(motion, kOnset);
+  errors.begin(onset);
+  exact.begin(onset);
+  read.begin(onset);
+  double worst = 0.0, since = 0.0;
+  constexpr double kRounding = 1e-12;
+  while (exact.next() && read.next()) {
+    since += noisy.step[read.instant()];
+    for (std::size_t i = 0; i < model.n(); ++i) {
+      const FaultRow a = exact.row(i), b = read.row(i);
+      const SignatureErrors::Row e = errors.row(read.instant(), i, since);
+      for (std::size_t j = 0; j < model.p(); ++j) {
+        const auto k = static_cast<Eigen::Index>(j);
+        const auto over = [&](double difference, double bound) {
+          worst = std::max(worst, std::abs(difference) / (bound + kRounding));
+        };
+        over(a.y[j] - b.y[j], b.read[j]);
+        over(a.g1[j] - b.g1[j], e.e1[k]);
+        over(a.g2[j] - b.g2[j], e.e2[k]);
+        over(a.s[j] - b.s[j], e.es[k]);
+      }
+      worst = std::max(worst, std::abs(a.c - b.c) / (e.ec + kRounding));
+    }
+  }
+  return worst;
+}
+
+TEST(FaultRows, OfAMotionReadWithNoiseStateTheirErrors) {
+  constexpr double kBound = 1e-3;  // rad, rad/s
+  for (const Shown shown : {Shown::angles, Shown::speeds}) {
+    for (const bool uneven : {false, true}) {
+      Prepared s = prepared(shown, 200.0);
+      Simulation simulation(s.scenario);
+      LogTable log = read_all(simulation);
+      const auto thin = [&](std::vector<double>& column) {  // steps of 5, or of 2 and 3, of the simulation's samples
+        std::size_t to = 0;
+        for (std::size_t k = 0; k < column.size(); ++k) {
+          if (k % 5 == 0 || (uneven && k % 5 == 2)) column[to++] = column[k];
+        }
+        column.resize(to);
+      };
+      thin(log.t);
+      std::for_each(log.columns.begin(), log.columns.end(), thin);
+      TableSource source(log);
+      const Measurement measurement = find_measurement(source, s.scenario.robot, s.model, s.design.order);
+      SensorErrors sensors;
+      sensors.motion = kBound;
+      const RegressorFilter filter(s.model, s.design, measurement, propagate(s.model, s.design, measurement, sensors));
+      const ReferenceMotion motion = read_reference(source, filter);
+      double most = 0.0;
+      for (int pattern = 0; pattern < 4; ++pattern) {
+        LogTable noisy = log;
+        std::uint64_t random = 88172645463325252u;
+        for (std::size_t k = 0; k < noisy.rows(); ++k) {
+          for (std::size_t c = 0; c < 2; ++c) {
+            random ^= random << 13;
+            random ^= random >> 7;
+            random ^= random << 17;
+            const bool up = pattern == 0   ? (random >> 32) % 2 == 0
+                            : pattern == 1 ? k % 2 == c
+                            : pattern == 2 ? noisy.t[k] >= kOnset - 1e-9
+                                           : std::sin(8.0 * noisy.t[k]) > 0.0;
+            noisy.column(measurement.columns()[c])[k] += up ? kBound : -kBound;
+          }
+        }
+        TableSource noisy_source(noisy);
+        const ReferenceMotion read = read_reference(noisy_source, filter);
+        for (const FaultType& fault : fault_catalogue(s.model, s.theta)) {
+          if (fault.held_effort || fault.profile.kind == FaultProfile::Kind::bump) {
+            continue;
+          }
+          const double error = read_error(fault, s.model, s.design, motion, read);
+          EXPECT_LE(error, 1.0) << fault.name << (shown == Shown::angles ? ", angles, " : ", speeds, ")
+                                << (uneven ? "uneven, " : "even, ") << pattern;
+          most = std::max(most, error);
+        }
+      }
+      // What is bounded is also reached, nearly.
+      EXPECT_GT(most, 0.5);
+    }
+  }
+}
+
 TEST(FaultRows, RefuseFaultsThatMakeNoSense) {
   const Prepared s = prepared(Shown::angles, 100.0);
   FaultType fault = find_fault(s.model, "wheel_radius");

@@ -376,10 +376,9 @@ int summary(const std::vector<std::string>& files) {
   }
   fmt::print("\n{:<24} {:>7} {:>7} {:>9} {:>9}\n", "fault of a certain size", "tried", "missed", "isolated",
              "excluded");
-  constexpr std::array<const char*, 3> kFaults = {"effort_loss", "effort_bias", "encoder_scale"};
-  for (std::size_t k = 0; k < kFaults.size(); ++k) {
-    fmt::print("{:<24} {:>7} {:>7} {:>9} {:>9}\n", kFaults[k], by_fault[k][0], by_fault[k][1], by_fault[k][2],
-               by_fault[k][3]);
+  for (std::size_t k = 0; k < by_fault.size(); ++k) {
+    fmt::print("{:<24} {:>7} {:>7} {:>9} {:>9}\n", name(static_cast<Breakdown::Kind>(k)), by_fault[k][0],
+               by_fault[k][1], by_fault[k][2], by_fault[k][3]);
   }
   fmt::print(
       "\nLogs that break an assumption that their robot file declares: wanted is the truth inside, or no model (empty, "

@@ -88,6 +88,11 @@ void dry(Case& c, double share) {
   reach_for(c.truth, 0.3, c.watch);
 }
 
+void fine_sensors(Case& c) {
+  c.motion_bound = 1e-5;
+  c.effort_bound = 0.001 * c.learn.reach[0];
+}
+
 // Every robot of `make`: counts, and none of them a broken promise.
 template <typename Make>
 void expect_kept(const std::string& what, Make make) {
@@ -352,8 +357,7 @@ TEST(DryFriction, ReversalsBetweenSamples) {
   expect_kept("dry friction, reversals", [](std::uint64_t seed) {
     Case c = ordinary(seed, 100.0, 10.0);
     dry(c, 0.3);
-    c.motion_bound = 1e-5;
-    c.effort_bound = 0.001 * c.learn.reach[0];
+    fine_sensors(c);
     return c;
   });
 }
@@ -374,8 +378,7 @@ TEST(Faults, WhereCommandsChangeBetweenSamples) {
     Case c = ordinary(seed, 200.0, 1.0);
     c.changes = Changes::between;
     c.controller_rate = 60.0;
-    c.motion_bound = 1e-5;
-    c.effort_bound = 0.001 * c.learn.reach[0];
+    fine_sensors(c);
     return c;
   });
 }
@@ -385,8 +388,7 @@ TEST(Faults, OfLogsWithUnevenSteps) {
     Case c = ordinary(seed, 50.0, 1.0);
     c.stamps = seed % 2 == 0 ? Stamps::jittered : Stamps::two_three;
     c.jitter = seed % 2 == 0 ? 0.2 : 0.0;
-    c.motion_bound = 1e-5;
-    c.effort_bound = 0.001 * c.learn.reach[0];
+    fine_sensors(c);
     return c;
   });
 }

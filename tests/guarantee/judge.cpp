@@ -169,14 +169,13 @@ bool isolated(const CommissionedModel& model, const LogTable& log, const FaultTy
 // Faults of sizes that margins call certain within a window: each has to be seen, and must not be excluded.
 void try_faults(Case c, const CommissionedModel& model, Verdict& verdict) {
   using Kind = Breakdown::Kind;
+  constexpr std::array<Kind, 3> kKinds = {Kind::effort_loss, Kind::effort_bias, Kind::encoder_scale};
   constexpr double kWindowSteps = 100.0;
   constexpr std::size_t kOnsets = 6;
   constexpr std::size_t kMostRows = 5000;  // of the drive
   const double window = kWindowSteps / c.rate;
   const std::string side = c.truth.axis ? "" : "_right";
-  const std::vector<std::pair<std::string, Kind>> kinds = {{"effort_loss" + side, Kind::effort_loss},
-                                                           {"effort_bias" + side, Kind::effort_bias},
-                                                           {"encoder_scale" + side, Kind::encoder_scale}};
+  const auto fault_of = [&](Kind kind) { return name(kind) + side; };
   c.watch_rows = std::min(c.watch_rows, kMostRows);
   const LogTable healthy = play(c).watched;
   TableSource log(healthy);
@@ -184,21 +183,21 @@ void try_faults(Case c, const CommissionedModel& model, Verdict& verdict) {
   options.margins.windows = {window};
   options.margins.onset_step = (healthy.t.back() - healthy.t.front()) / static_cast<double>(kOnsets);
   options.margins.most_onsets = kOnsets;
-  for (const auto& [fault, kind] : kinds) options.faults.push_back(fault);
+  for (const Kind kind : kKinds) options.faults.push_back(fault_of(kind));
   options.map_points = 0;
   const MarginSurvey survey = survey_margins(log, model, options);
   for (const ResidualMargins& residual : survey.residuals) {
     for (const FaultMargins& fault : residual.margins) {
-      const auto kind =
-          std::find_if(kinds.begin(), kinds.end(), [&](const auto& k) { return k.first == fault.fault.name; });
+      const Kind kind =
+          *std::find_if(kKinds.begin(), kKinds.end(), [&](Kind k) { return fault_of(k) == fault.fault.name; });
       bool looked = false;
       for (const OnsetMargin& onset : fault.onsets) {
         if (residual.name != "torque" || onset.certain.empty() || !(onset.certain[0] < fault.largest())) {
           continue;
         }
-        const Breakdown breakdown{kind->second, onset.t, fault.side * onset.certain[0]};
+        const Breakdown breakdown{kind, onset.t, fault.side * onset.certain[0]};
         const LogTable broken = watch_broken(c, breakdown);
-        FaultTally& tally = verdict.faults[static_cast<std::size_t>(kind->second)];
+        FaultTally& tally = verdict.faults[static_cast<std::size_t>(kind)];
         const double end = onset.t + window + 2.0 / c.rate;
         const bool seen = sees(model, broken, onset.t, end);
         ++tally.certain;

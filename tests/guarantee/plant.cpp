@@ -13,7 +13,8 @@ constexpr int kMostEvents = 4000;  // in one piece
 constexpr int kHalvings = 200;
 constexpr double kRounding = 1e-13;         // of a wheel's speed, against the faster one
 constexpr double kLeast = 1e-12;            // of what is left of a piece, between two events; doubled from one to the
-                                            // next where rounding lets none of the ways last
+                                            // next where rounding lets none of the ways last ...
+constexpr double kLasts = 1e-6;             // ... for so much of it
 constexpr double kBreakaway = 1.0 + 1e-12;  // sticking over sliding friction: keeps rounding from deciding
 
 }  // namespace
@@ -192,7 +193,7 @@ void Plant::advance(double h, const Pair& effort, const Pair& slope) {
       }
       (holds(after(middle, now, slope)) ? good : bad) = middle;
     }
-    least = good > least * left ? kLeast : std::min(1.0, 2.0 * least);
+    least = good > kLasts * left ? kLeast : std::min(1.0, 2.0 * least);
     bad = std::max(bad, least * left);
     Sides sides = after(bad, now, slope);
     for (std::size_t j = 0; j < joints_; ++j) {

@@ -183,6 +183,10 @@ Case random_case(std::uint64_t seed, std::uint64_t number) {
   return c;
 }
 
+const char* name(Breakdown::Kind x) {
+  static constexpr const char* kNames[] = {"effort_loss", "effort_bias", "encoder_scale"};
+  return kNames[static_cast<std::size_t>(x)];
+}
 const char* name(Stamps x) {
   static constexpr const char* kNames[] = {"even", "jittered", "two_three", "tenth_twice"};
   return kNames[static_cast<std::size_t>(x)];

@@ -131,6 +131,7 @@ struct Breakdown {
 /// Sets the efforts' reach of `order` so that wheels swing by about `angle` rad at its bandwidth, dry friction overcome.
 void reach_for(const Truth& truth, double angle, Order& order);
 
+[[nodiscard]] const char* name(Breakdown::Kind x);
 [[nodiscard]] const char* name(Stamps x);
 [[nodiscard]] const char* name(Sense x);
 [[nodiscard]] const char* name(Noise x);
