@@ -5,6 +5,7 @@
 #include <utility>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/statistics.hpp>
 
 namespace wheelwright {
 
@@ -37,9 +38,7 @@ double median_step(const std::vector<double>& t) {
   for (std::size_t k = 0; k < steps.size(); ++k) {
     steps[k] = t[k + 1] - t[k];
   }
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return *middle;
+  return median(std::move(steps));
 }
 
 LogTable slice(const LogTable& table, std::size_t first, std::size_t last) {
@@ -161,9 +160,7 @@ double JoinedSource::median_step() const {
   for (const LogSource* source : sources_) {
     steps.push_back(source->median_step());
   }
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return *middle;
+  return median(std::move(steps));
 }
 
 LogTable read_all(LogSource& source) {

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <Eigen/Eigenvalues>
+#include <Eigen/SVD>
+
+#include "linear_algebra.hpp"
+
+namespace wheelwright {
+
+EigenPairs symmetric_eigen(const Eigen::MatrixXd& symmetric) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(symmetric);
+  return {solver.eigenvalues(), solver.eigenvectors()};
+}
+
+std::optional<EigenPairs> generalized_eigen(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B) {
+  if (!CholeskyFactors(B).positive()) {  // the solver would not tell
+    return std::nullopt;
+  }
+  const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> solver(A, B);
+  if (solver.info() != Eigen::Success) {
+    return std::nullopt;
+  }
+  return EigenPairs{solver.eigenvalues(), solver.eigenvectors()};
+}
+
+std::optional<Eigen::VectorXd> generalized_eigenvalues(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B) {
+  if (!CholeskyFactors(B).positive()) {
+    return std::nullopt;
+  }
+  const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> solver(A, B, Eigen::EigenvaluesOnly);
+  return solver.info() == Eigen::Success ? std::optional(solver.eigenvalues()) : std::nullopt;
+}
+
+SingularValues singular_values(const Eigen::MatrixXd& A) {
+  const Eigen::JacobiSVD<Eigen::MatrixXd, Eigen::FullPivHouseholderQRPreconditioner> svd(
+      A, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  return {svd.matrixU(), svd.matrixV(), svd.singularValues()};
+}
+
+}  // namespace wheelwright

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Order statistics, and quantiles and tail probabilities of the distributions of classical tests.
+///
+/// Tail probabilities are computed as such, not as 1 minus the other tail: small risks keep their digits. Degrees of
+/// freedom are > 0 and finite (Student's may be infinite: the normal distribution), probabilities inside (0, 1), and
+/// other arguments where the variable can be, infinity included; else InvalidArgument.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+namespace wheelwright {
+
+/// The value of this rank, 0 the smallest. `rank` is less than the number of values.
+[[nodiscard]] double order_statistic(std::vector<double> values, std::size_t rank);
+
+/// The median of `values`, of two middle ones the larger. At least one value.
+[[nodiscard]] double median(std::vector<double> values);
+
+/// What a normal variable of mean 0 and deviation 1 exceeds with probability `risk`.
+[[nodiscard]] double normal_upper_quantile(double risk);
+
+/// The probability that a chi-squared variable exceeds `x`.
+[[nodiscard]] double chi_squared_tail(double freedom, double x);
+/// What a chi-squared variable stays below with probability `p`.
+[[nodiscard]] double chi_squared_quantile(double freedom, double p);
+[[nodiscard]] double chi_squared_median(double freedom);
+
+/// The probability that Student's variable exceeds `t`.
+[[nodiscard]] double student_tail(double freedom, double t);
+/// What Student's variable stays below with probability `p`.
+[[nodiscard]] double student_quantile_below(double freedom, double p);
+/// The factor of a two-sided interval: |Student's variable| stays below it with probability `confidence`.
+[[nodiscard]] double student_quantile(double confidence, double freedom);
+
+/// The probability that Fisher's variable with freedoms `above` and `below` exceeds `x`.
+[[nodiscard]] double fisher_tail(double above, double below, double x);
+/// What Fisher's variable exceeds with probability `risk`.
+[[nodiscard]] double fisher_upper_quantile(double above, double below, double risk);
+
+}  // namespace wheelwright
