@@ -11,6 +11,7 @@
 #include "commands.hpp"
 #include "common.hpp"
 #include "model_check.hpp"
+#include "options.hpp"
 
 namespace wheelwright::app {
 namespace check_command {

@@ -16,8 +16,8 @@
 
 #include "commands.hpp"
 #include "common.hpp"
+#include "options.hpp"
 #include "progress.hpp"
-#include "units.hpp"
 
 namespace wheelwright::app {
 namespace choose_command {

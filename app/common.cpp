@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "common.hpp"
 
-#include <charconv>
 #include <cstdio>
-#include <map>
 #include <system_error>
 
 #include <fmt/format.h>
-#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/io/atomic_file.hpp>
@@ -17,75 +14,6 @@
 #include <wheelwright/report/raw_signals.hpp>
 
 namespace wheelwright::app {
-
-void add_common(CLI::App& command, CommonOptions& options) {
-  command.add_option("--out", options.out, "Write results and report.html into this directory")->type_name("DIR");
-  command.add_flag("--json", options.json, "Print the result as JSON on standard output, and nothing else there");
-  command.add_option("--threads", options.threads, "Use at most N threads; results do not depend on it")
-      ->type_name("N")
-      ->check(CLI::Range(1, 1024))
-      ->capture_default_str();
-  command.add_option("--seed", options.seed, "Seed of everything random")->type_name("N")->capture_default_str();
-  command.add_flag("--quiet", options.quiet, "No progress and no summary; errors are still told");
-}
-
-void add_footer(CLI::App& command, const char* text) { command.footer(text); }
-
-void add_map(CLI::App& command, CommonOptions& options) {
-  command
-      .add_option(
-          "--map", options.map,
-          "Read the log column NAME from the file's column COLUMN, or from a bag's TOPIC.FIELD (repeatable), e.g. "
-          "--map omega_r=wheel_2 or --map omega_r=/joint_states.velocity[right_wheel]")
-      ->type_name("NAME=COLUMN")
-      ->expected(1)
-      ->allow_extra_args(false)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-  command
-      .add_option("--msg-path", options.msg_path,
-                  "Directory with definitions of messages (PKG/msg/TYPE.msg), for bags that do not bring their own "
-                  "(repeatable)")
-      ->type_name("DIR")
-      ->expected(1)
-      ->allow_extra_args(false)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-}
-
-void add_persistence(CLI::App& command, std::optional<Persistence>& persistence, const std::string& otherwise) {
-  command
-      .add_option_function<std::string>(
-          "--persistence",
-          [&persistence](const std::string& text) {
-            Persistence rule;
-            const char* const end = text.data() + text.size();
-            const auto k = std::from_chars(text.data(), end, rule.k);
-            const bool slash = k.ec == std::errc() && k.ptr != end && *k.ptr == '/';
-            const auto n = std::from_chars(slash ? k.ptr + 1 : end, end, rule.n);
-            if (!slash || n.ec != std::errc() || n.ptr != end || rule.k < 1 || rule.k > rule.n || rule.n > 64) {
-              throw CLI::ValidationError("--persistence '" + text + "': expected K/N with 1 <= K <= N <= 64, e.g. 3/5",
-                                         CLI::ExitCodes::ValidationError);
-            }
-            persistence = rule;
-          },
-          "Raise an alarm when K of the last N instants are outside (default: " + otherwise + ")")
-      ->type_name("K/N");
-}
-
-void add_set(CLI::App& command, ParameterSetKind& set) {
-  command.add_option("--set", set, "Threshold from the feasible set itself (polytope) or from its box")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, ParameterSetKind>{
-                                              {"polytope", ParameterSetKind::polytope}, {"box", ParameterSetKind::box}})
-                      .description("{polytope,box}"))
-      ->type_name("SET");
-}
-
-void add_test(CLI::App& command, Test& test) {
-  command.add_option("--test", test, "Compare with [l, u] (two_sided) or with rho as the paper does (symmetric)")
-      ->transform(CLI::CheckedTransformer(
-                      std::map<std::string, Test>{{"two_sided", Test::two_sided}, {"symmetric", Test::symmetric}})
-                      .description("{two_sided,symmetric}"))
-      ->type_name("TEST");
-}
 
 std::string software() { return std::string("wheelwright ") + WHEELWRIGHT_VERSION; }
 

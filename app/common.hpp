@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What all commands share: options, exit codes, where results go.
+/// What all commands share: exit codes, where results go.
 #pragma once
 
 #include <cstdint>
@@ -16,10 +16,6 @@
 #include <wheelwright/report/context.hpp>
 
 #include "commands.hpp"
-
-namespace CLI {
-class App;
-}
 
 namespace wheelwright::app {
 
@@ -42,34 +38,6 @@ struct CommonOptions {
   std::vector<std::filesystem::path> msg_path;  ///< directories with definitions of messages
   std::string command_line;                     ///< as the user gave it
 };
-
-/// Adds the common options to `command`.
-void add_common(CLI::App& command, CommonOptions& options);
-/// What stands below the options in the help of `command`.
-void add_footer(CLI::App& command, const char* text);
-
-/// The end of every registration: the common options, the examples, and what runs the command. `Arguments` has a member
-/// `common`.
-template <typename Arguments>
-[[nodiscard]] Run finish(CLI::App& command, std::shared_ptr<Arguments> arguments, const char* examples,
-                         int (*run)(const Arguments&)) {
-  add_common(command, arguments->common);
-  add_footer(command, examples);
-  return [arguments, run](const std::string& command_line) {
-    arguments->common.command_line = command_line;
-    return run(*arguments);
-  };
-}
-/// Adds --map and --msg-path to a command that reads logs.
-void add_map(CLI::App& command, CommonOptions& options);
-
-/// Adds --persistence K/N; `persistence` stays empty where it is not given. `otherwise` says what holds then.
-void add_persistence(CLI::App& command, std::optional<Persistence>& persistence, const std::string& otherwise);
-
-/// Adds --set polytope|box.
-void add_set(CLI::App& command, ParameterSetKind& set);
-/// Adds --test two_sided|symmetric.
-void add_test(CLI::App& command, Test& test);
 
 /// Name and version of the program.
 [[nodiscard]] std::string software();

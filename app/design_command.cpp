@@ -22,6 +22,7 @@
 #include "commands.hpp"
 #include "common.hpp"
 #include "design_result.hpp"
+#include "options.hpp"
 #include "progress.hpp"
 #include "rivals.hpp"
 #include "units.hpp"

@@ -16,6 +16,7 @@
 #include "common.hpp"
 #include "failure_page.hpp"
 #include "follow.hpp"
+#include "options.hpp"
 #include "series.hpp"
 #include "summary.hpp"
 

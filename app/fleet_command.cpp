@@ -20,6 +20,7 @@
 
 #include "commands.hpp"
 #include "common.hpp"
+#include "options.hpp"
 #include "progress.hpp"
 #include "run_items.hpp"
 

@@ -25,9 +25,9 @@
 #include "common.hpp"
 #include "gap_summary.hpp"
 #include "next_manoeuvre.hpp"
+#include "options.hpp"
 #include "progress.hpp"
 #include "rivals.hpp"
-#include "units.hpp"
 
 namespace wheelwright::app {
 namespace gap_command {

@@ -17,6 +17,7 @@
 #include "common.hpp"
 #include "failure_page.hpp"
 #include "identify_summary.hpp"
+#include "options.hpp"
 #include "progress.hpp"
 
 namespace wheelwright::app {

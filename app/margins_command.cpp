@@ -18,8 +18,8 @@
 #include "commands.hpp"
 #include "common.hpp"
 #include "failure_page.hpp"
+#include "options.hpp"
 #include "progress.hpp"
-#include "units.hpp"
 
 namespace wheelwright::app {
 namespace margins_command {

@@ -15,7 +15,7 @@
 
 #include "commands.hpp"
 #include "common.hpp"
-#include "units.hpp"
+#include "options.hpp"
 
 namespace wheelwright::app {
 namespace robot_command {

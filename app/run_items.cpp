@@ -12,7 +12,6 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <CLI/CLI.hpp>
 
 #include <wheelwright/io/suggest.hpp>
 #include <wheelwright/io/xxh64.hpp>
@@ -27,20 +26,6 @@ using Opening = SqliteResults::Opening;
 
 constexpr const char* kResults = "results.sqlite";
 constexpr std::size_t kNamed = 5;  // items that a message names
-
-// "I/N", or nothing.
-std::optional<Shard> parsed(std::string_view text) {
-  const char* const end = text.data() + text.size();
-  Shard shard;
-  const auto i = std::from_chars(text.data(), end, shard.index);
-  const bool slash = i.ec == std::errc() && i.ptr != end && *i.ptr == '/';
-  const auto n = std::from_chars(slash ? i.ptr + 1 : end, end, shard.count);
-  if (!slash || n.ec != std::errc() || n.ptr != end || shard.index < 1 || shard.index > shard.count) {
-    return std::nullopt;
-  }
-  --shard.index;
-  return shard;
-}
 
 void check_together(const CommonOptions& common, const ScaleOptions& scale) {
   const char* const given = scale.shard ? "--shard" : scale.merge ? "--merge" : scale.fresh ? "--fresh" : nullptr;
@@ -77,7 +62,7 @@ std::vector<std::pair<fs::path, Shard>> shards_in(const fs::path& directory) {
     const std::string name = entry.path().filename().string();
     std::smatch match;
     if (std::regex_match(name, match, pattern)) {
-      if (const std::optional<Shard> shard = parsed(match[1].str() + "/" + match[2].str())) {
+      if (const std::optional<Shard> shard = shard_of(match[1].str() + "/" + match[2].str())) {
         shards.emplace_back(entry.path(), *shard);
       }
     }
@@ -119,22 +104,17 @@ void check_complete(SqliteResults& results, const std::vector<std::pair<fs::path
 
 }  // namespace
 
-void add_scale_options(CLI::App& command, ScaleOptions& options) {
-  command
-      .add_option_function<std::string>(
-          "--shard",
-          [&options](const std::string& text) {
-            options.shard = parsed(text);
-            if (!options.shard) {
-              throw CLI::ValidationError("--shard '" + text + "': expected I/N with 1 <= I <= N, e.g. 3/7",
-                                         CLI::ExitCodes::ValidationError);
-            }
-          },
-          "Evaluate the Ith of N parts only, into its own file in --out; --merge takes the parts together")
-      ->type_name("I/N");
-  command.add_flag("--merge", options.merge, "Take together what the shards in --out evaluated; evaluate nothing");
-  command.add_flag("--fresh", options.fresh,
-                   "Throw away what an earlier run left in --out, instead of going on with it");
+std::optional<Shard> shard_of(std::string_view text) {
+  const char* const end = text.data() + text.size();
+  Shard shard;
+  const auto i = std::from_chars(text.data(), end, shard.index);
+  const bool slash = i.ec == std::errc() && i.ptr != end && *i.ptr == '/';
+  const auto n = std::from_chars(slash ? i.ptr + 1 : end, end, shard.count);
+  if (!slash || n.ec != std::errc() || n.ptr != end || shard.index < 1 || shard.index > shard.count) {
+    return std::nullopt;
+  }
+  --shard.index;
+  return shard;
 }
 
 ItemsRun run_items(const ItemsToRun& items, const CommonOptions& common, const ScaleOptions& scale,

@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include <wheelwright/io/result_store.hpp>
 #include <wheelwright/sensitivity/work.hpp>
@@ -24,8 +25,8 @@ struct ScaleOptions {
   bool fresh = false;
 };
 
-/// Adds --shard I/N, --merge and --fresh.
-void add_scale_options(CLI::App& command, ScaleOptions& options);
+/// "I/N" with 1 <= I <= N as a shard; nothing for anything else.
+[[nodiscard]] std::optional<Shard> shard_of(std::string_view text);
 
 /// What is to be evaluated.
 struct ItemsToRun {

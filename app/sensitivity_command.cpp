@@ -17,6 +17,7 @@
 
 #include "commands.hpp"
 #include "common.hpp"
+#include "options.hpp"
 #include "progress.hpp"
 #include "run_items.hpp"
 #include "study_summary.hpp"

@@ -13,6 +13,7 @@
 #include "common.hpp"
 #include "completion.hpp"
 #include "manual.hpp"
+#include "options.hpp"
 
 namespace wheelwright::app {
 namespace {

@@ -11,6 +11,7 @@
 #include <wheelwright/commission/assumptions.hpp>
 #include <wheelwright/commission/margin_words.hpp>
 #include <wheelwright/commission/physical.hpp>
+#include <wheelwright/core/statistics.hpp>
 #include <wheelwright/identify/noise_level.hpp>
 #include <wheelwright/io/warrant_json.hpp>
 

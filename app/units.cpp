@@ -8,7 +8,6 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <CLI/CLI.hpp>
 
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/io/number.hpp>
@@ -99,21 +98,8 @@ double quantity(std::string_view text, std::string_view unit, std::string_view o
                                : names.size() > 1
                                    ? fmt::format("a number in {}, or one with a unit: {}", si, listed(names))
                                    : "a number in " + si;
-  throw InputError(fmt::format("{}{}{}: expected {}", option, option.empty() ? "" : ": ", shown(text), expected));
-}
-
-CLI::Validator in_unit(const std::string& unit) {
-  CLI::Validator out(
-      [unit](std::string& text) {
-        try {
-          text = number_text(quantity(text, unit));
-          return std::string();
-        } catch (const InputError& error) {
-          return std::string(error.what());
-        }
-      },
-      "", "unit");
-  return out;
+  throw InputError(
+      fmt::format("{}{}{}: expected {}", option, option.empty() ? "" : ": ", wheelwright::shown(text), expected));
 }
 
 }  // namespace wheelwright::app

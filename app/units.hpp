@@ -3,12 +3,7 @@
 /// Quantities with units on the command line.
 #pragma once
 
-#include <string>
 #include <string_view>
-
-namespace CLI {
-class Validator;
-}
 
 namespace wheelwright::app {
 
@@ -18,8 +13,5 @@ namespace wheelwright::app {
 /// anything else, infinite and NaN included. Units that are not in this list take themselves only.
 /// The message begins with `option` ("--size coulomb=1s") where there is one.
 [[nodiscard]] double quantity(std::string_view text, std::string_view unit, std::string_view option = {});
-
-/// Makes an option take such quantities: what the option itself converts is the number in `unit`.
-[[nodiscard]] CLI::Validator in_unit(const std::string& unit);
 
 }  // namespace wheelwright::app

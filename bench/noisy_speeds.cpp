@@ -20,6 +20,7 @@
 
 #include <wheelwright/commission/fit.hpp>
 #include <wheelwright/commission/setting.hpp>
+#include <wheelwright/core/statistics.hpp>
 #include <wheelwright/identify/noise_level.hpp>
 #include <wheelwright/sim/simulation.hpp>
 

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/bounds/coordinates.hpp>
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
+#include <wheelwright/core/linear_algebra.hpp>
 
 namespace wheelwright {
 
@@ -16,11 +15,10 @@ Coordinates whitened(const Box& box, const Eigen::MatrixXd& information) {
   }
   const Eigen::VectorXd scale = full.diagonal().cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd correlation = scale.asDiagonal() * full * scale.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(correlation);
-  const Eigen::VectorXd roots = eigen.eigenvalues().cwiseMax(1e-14).cwiseSqrt().cwiseInverse();
+  const EigenPairs eigen = symmetric_eigen(correlation);
+  const Eigen::VectorXd roots = eigen.values.cwiseMax(1e-14).cwiseSqrt().cwiseInverse();
   const std::vector<double> centre = box.centre();
-  return {Eigen::Map<const Eigen::VectorXd>(centre.data(), p),
-          scale.asDiagonal() * eigen.eigenvectors() * roots.asDiagonal()};
+  return {Eigen::Map<const Eigen::VectorXd>(centre.data(), p), scale.asDiagonal() * eigen.vectors * roots.asDiagonal()};
 }
 
 Eigen::VectorXd extent(const Box& box, const Coordinates& coordinates) {
@@ -31,7 +29,7 @@ Eigen::VectorXd extent(const Box& box, const Coordinates& coordinates) {
     const double centre = coordinates.centre[j];
     farthest[j] = std::max(std::abs(side.upper - centre), std::abs(side.lower - centre));
   }
-  return coordinates.transform.inverse().cwiseAbs() * farthest;
+  return inverse(coordinates.transform).cwiseAbs() * farthest;
 }
 
 }  // namespace wheelwright

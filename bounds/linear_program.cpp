@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/bounds/linear_program.hpp>
 #include <wheelwright/core/limits.hpp>
+#include <wheelwright/core/linear_algebra.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -99,7 +100,7 @@ bool LinearProgram::refactor() {
     }
   }
   Eigen::Map<Eigen::MatrixXd> inverse(inverse_.data(), p, p);
-  inverse = rows.partialPivLu().inverse();
+  inverse = LuFactors(rows).inverse();
   // One step of Newton's iteration halves the digits that are missing.
   inverse += inverse * (Eigen::MatrixXd::Identity(p, p) - rows * inverse);
   factored_ = inverse.allFinite() && inverse.cwiseAbs().maxCoeff() < 1e13;

@@ -12,6 +12,7 @@
 
 #include <wheelwright/core/interval.hpp>
 #include <wheelwright/core/limits.hpp>
+#include <wheelwright/core/linear_algebra.hpp>
 
 namespace wheelwright {
 namespace {
@@ -63,7 +64,7 @@ Eigen::VectorXd meet(const Facets& facets, const Eigen::MatrixXd& normals, const
     columns.col(k) = normals.col(facets[static_cast<std::size_t>(k)]);
     rhs[k] = b[facets[static_cast<std::size_t>(k)]];
   }
-  return columns.transpose().partialPivLu().solve(rhs);
+  return LuFactors(columns.transpose()).solve(rhs);
 }
 
 /// Vertices of { z : normalsᵀ z <= b }, whose last p + 1 columns are a simplex around it that must not remain.
@@ -160,7 +161,7 @@ bool enclose(const std::vector<Vertex>& vertices, std::span<const HalfSpace> row
       basis.row(k) = a.col(f).transpose();
       rhs[k] = shifted[f];
     }
-    const Eigen::MatrixXd inverse = coordinates.transform * (basis * coordinates.transform).inverse();
+    const Eigen::MatrixXd inverse = coordinates.transform * wheelwright::inverse(basis * coordinates.transform);
     Eigen::VectorXd theta = coordinates.centre + coordinates.transform * vertices[v].z;
     theta += inverse * (rhs - basis * theta);
     const Eigen::VectorXd residual = rhs - basis * theta;

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 #
-# wheelwright_room(NAME [FOLDER room] [PROGRAM_ONLY] HEADERS h... [SOURCES s...] [USES room...] [LINK lib...] [LINK_PRIVATE lib...])
+# wheelwright_room(NAME [FOLDER room] [PROGRAM_ONLY] [WORDS] HEADERS h... [SOURCES s...] [HOT s...] [USES room...] [LINK lib...] [LINK_PRIVATE lib...])
 #
 # One target per room: wheelwright_NAME, alias Wheelwright::NAME. Headers are seen as <wheelwright/NAME/x.hpp>
 # through one symbolic link per room in the build tree, which is also the base of the installed FILE_SET. FOLDER is for a
 # part of a room that has a target of its own, since it links what the rest should not: its headers are the room's.
-# PROGRAM_ONLY serves our own programs and is not installed.
+# PROGRAM_ONLY serves our own programs and is not installed. WORDS says and writes what others found: in a release it is
+# optimised for the time of compilation (wheelwright_words), but for the sources named after HOT.
 
 # Of what names none: the rooms are `development`.
 set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME program)
@@ -16,8 +17,13 @@ if(CMAKE_UNITY_BUILD)
   list(APPEND WHEELWRIGHT_WARNINGS $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
 endif()
 
+# The last -O counts. Results do not depend on it: no fused operations, no -ffast-math.
+function(wheelwright_words target)
+  target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)
+endfunction()
+
 function(wheelwright_room name)
-  cmake_parse_arguments(ROOM "PROGRAM_ONLY" "FOLDER" "HEADERS;SOURCES;USES;LINK;LINK_PRIVATE" ${ARGN})
+  cmake_parse_arguments(ROOM "PROGRAM_ONLY;WORDS" "FOLDER" "HEADERS;SOURCES;HOT;USES;LINK;LINK_PRIVATE" ${ARGN})
   if(NOT ROOM_FOLDER)
     set(ROOM_FOLDER ${name})
   endif()
@@ -32,6 +38,10 @@ function(wheelwright_room name)
     add_library(${target} ${ROOM_SOURCES})
     # No fused multiply-add: batch and streaming, and every machine, give the same digits.
     target_compile_options(${target} PRIVATE ${WHEELWRIGHT_WARNINGS} -ffp-contract=off)
+    if(ROOM_WORDS)
+      wheelwright_words(${target})
+      set_source_files_properties(${ROOM_HOT} PROPERTIES COMPILE_OPTIONS $<$<CONFIG:Release>:-O3>)
+    endif()
   else()
     set(scope INTERFACE)
     add_library(${target} INTERFACE)

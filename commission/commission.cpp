@@ -117,7 +117,6 @@ Bounded refined_set(LogSource& log, const Setting& s, Part part, SignalErrors er
 // just above the minimax fit.
 Bounded bounded_set(LogSource& log, const Setting& s, Part part, std::vector<OutputNoise>& noise, std::size_t outliers,
                     std::vector<std::string>& notes) {
-  constexpr double kAboveMinimax = 1.05;
   double raised = 1.0;
   for (int attempt = 0;; ++attempt) {
     Bounded bounded = refined_set(log, s, part, with_noise(s, noise, For::learning), outliers);
@@ -135,7 +134,14 @@ Bounded bounded_set(LogSource& log, const Setting& s, Part part, std::vector<Out
     }
     RegressionStream bare = make_rows(log, s, s.declared);
     FoldedSource bare_folded(bare, part, s.survey.rows, s.folds);
-    const double factor = raised = kAboveMinimax * minimax_fit(bare_folded, s.prior, options).upper;
+    const double factor = raised = noise_that_leaves_a_set(minimax_fit(bare_folded, s.prior, options), [&](double by) {
+      std::vector<OutputNoise> more = noise;
+      for (OutputNoise& o : more) {
+        o.learning *= by;
+      }
+      return refined_set(log, s, part, with_noise(s, more, For::learning), outliers).result.set.status ==
+             FeasibleSet::Status::nonempty;
+    });
     notes.push_back(
         fmt::format("the estimated noise bound was raised by {:.3g}: within the prior box no parameters "
                     "explain the log with less",

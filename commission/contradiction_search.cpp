@@ -8,12 +8,13 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <Eigen/QR>
 
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/commission/physical.hpp>
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/core/limits.hpp>
+#include <wheelwright/core/linear_algebra.hpp>
+#include <wheelwright/core/statistics.hpp>
 #include <wheelwright/identify/noise_level.hpp>
 #include <wheelwright/identify/time_shift.hpp>
 #include <wheelwright/identify/variable_projection.hpp>
@@ -232,7 +233,7 @@ std::vector<JointFit> fit_joints(LogSource& log, const Setting& s) {
   if (s.model.input.rows() != s.model.input.cols() || joints < 2 || s.measurement.effort_unsigned) {
     return {};
   }
-  const Eigen::MatrixXd shares = s.model.input.fullPivHouseholderQr().inverse();
+  const Eigen::MatrixXd shares = inverse(s.model.input);
   if (!shares.allFinite()) {
     return {};
   }

@@ -11,6 +11,7 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/core/limits.hpp>
+#include <wheelwright/core/statistics.hpp>
 #include <wheelwright/detector/margins.hpp>
 
 namespace wheelwright {
@@ -67,12 +68,6 @@ void set_onsets(ReferenceMotion& motion, const LogTable& log, const TrialOptions
   motion.settled = std::move(onsets);
 }
 
-double median_of(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 StatedMargin margin_of(const FaultMargins& margins, double asked, const std::vector<double>& windows) {
   StatedMargin result{.fault = margins.fault.name, .unit = margins.fault.unit, .side = margins.side, .asked = asked};
   std::vector<double> sizes, delays;
@@ -88,8 +83,8 @@ StatedMargin margin_of(const FaultMargins& margins, double asked, const std::vec
   check::that(!sizes.empty(), "log", "driving that is longer than the window, after the filter has settled");
   result.onsets = sizes.size();
   result.worst = *std::max_element(sizes.begin(), sizes.end());
-  result.median = median_of(std::move(sizes));
-  result.delay = median_of(std::move(delays));
+  result.median = median(std::move(sizes));
+  result.delay = median(std::move(delays));
   return result;
 }
 

@@ -4,9 +4,8 @@
 #include <algorithm>
 #include <vector>
 
-#include <Eigen/QR>
-
 #include <wheelwright/commission/noise_budget.hpp>
+#include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/filter/error_influence.hpp>
 
 namespace wheelwright {
@@ -105,11 +104,11 @@ Explained explained_by_errors(LogSource& log, const Setting& s, const Fit& fit, 
   const Eigen::VectorXd scale = columns.colwise().norm().cwiseInverse();
   columns *= scale.asDiagonal();
   const Eigen::MatrixXd gram = columns.transpose() * columns;
-  const auto solver = gram.completeOrthogonalDecomposition();
+  const Eigen::MatrixXd inverse = pseudo_inverse(gram);
   RowMatrix g(rows.rows(), fitted + 1);
-  g.leftCols(fitted) = columns * solver.pseudoInverse() * scale.asDiagonal();
+  g.leftCols(fitted) = columns * inverse * scale.asDiagonal();
   const Eigen::VectorXd shift = A.col(p);
-  const Eigen::VectorXd left = shift - columns * solver.solve(columns.transpose() * shift);
+  const Eigen::VectorXd left = shift - columns * (inverse * (columns.transpose() * shift));
   const double square = left.squaredNorm();
   g.col(fitted) = square > 0.0 ? (left / square).eval() : Eigen::VectorXd::Zero(rows.rows()).eval();
   g.array().colwise() *= weight.array();

@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/limits.hpp>
+#include <wheelwright/core/linear_algebra.hpp>
+#include <wheelwright/core/statistics.hpp>
 #include <wheelwright/filter/noise.hpp>
 #include <wheelwright/filter/regression_stream.hpp>
 #include <wheelwright/identify/estimate.hpp>
@@ -222,12 +224,13 @@ FilterValue FilterEvaluation::predicted_error(const Fit& f) const {
     const Eigen::VectorXd scale = G.diagonal()(kept).cwiseSqrt().cwiseInverse();
     const Eigen::MatrixXd all = scale.asDiagonal() * G(kept, kept) * scale.asDiagonal();
     const Eigen::MatrixXd noise = scale.asDiagonal() * added(kept, kept) * scale.asDiagonal();
-    const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> share(noise, all, Eigen::EigenvaluesOnly);
-    if (!(share.eigenvalues().maxCoeff() < kMostNoise)) {
+    const std::optional<Eigen::VectorXd> share = generalized_eigenvalues(noise, all);
+    if (!(share && share->maxCoeff() < kMostNoise)) {
       return value;
     }
     const Eigen::VectorXd theta = scale.cwiseInverse().asDiagonal() * f.estimate.theta(kept);
-    bias(kept) = -options_.bias_left * (scale.asDiagonal() * (all - noise).ldlt().solve(noise * theta));
+    bias(kept) =
+        -options_.bias_left * (scale.asDiagonal() * LdltFactors(all - noise).solve(Eigen::VectorXd(noise * theta)));
   }
   value.parts = (f.estimate.standard_error.array().square() + bias.array().square()).sqrt();
   std::vector<bool> counts = excluded_;

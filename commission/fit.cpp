@@ -5,6 +5,7 @@
 #include <cmath>
 #include <optional>
 
+#include <wheelwright/core/statistics.hpp>
 #include <wheelwright/identify/instruments.hpp>
 #include <wheelwright/identify/noise_level.hpp>
 

@@ -10,6 +10,7 @@
 #include <wheelwright/commission/physical.hpp>
 #include <wheelwright/commission/setting.hpp>
 #include <wheelwright/core/error.hpp>
+#include <wheelwright/core/statistics.hpp>
 #include <wheelwright/identify/direction_words.hpp>
 #include <wheelwright/identify/information_over_time.hpp>
 
@@ -38,9 +39,8 @@ double quantile(std::vector<double> values, double q) {
   if (values.empty()) {
     return 0.0;
   }
-  const auto at = values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
+  const auto rank = static_cast<std::size_t>(q * static_cast<double>(values.size() - 1));
+  return order_statistic(std::move(values), rank);
 }
 
 void one_way(const char* id, const char* what, const char* plus, const char* minus, double p, double m,

@@ -13,6 +13,7 @@
 #include <wheelwright/commission/health_view.hpp>
 #include <wheelwright/commission/pose_origin.hpp>
 #include <wheelwright/core/error.hpp>
+#include <wheelwright/core/statistics.hpp>
 #include <wheelwright/identify/kinematic_calibration.hpp>
 
 namespace wheelwright {
@@ -179,8 +180,7 @@ std::optional<double> straight_ratio(const std::vector<Window>& windows) {
   if (ratios.size() < kFewest) {
     return std::nullopt;
   }
-  std::ranges::nth_element(ratios, ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2));
-  return ratios[ratios.size() / 2];
+  return median(std::move(ratios));
 }
 
 // Way along the heading in each window, step by step: position noise cancels but for the ends.

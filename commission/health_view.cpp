@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/statistics.hpp>
 
 namespace wheelwright {
 namespace {
@@ -70,9 +71,8 @@ double top_of(std::vector<double> values) {
     return 0.0;
   }
   std::ranges::transform(values, values.begin(), [](double v) { return std::abs(v); });
-  const auto at = values.begin() + static_cast<std::ptrdiff_t>(0.99 * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
+  const auto rank = static_cast<std::size_t>(0.99 * static_cast<double>(values.size() - 1));
+  return order_statistic(std::move(values), rank);
 }
 
 }  // namespace

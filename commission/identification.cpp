@@ -6,12 +6,12 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <Eigen/Eigenvalues>
 
 #include <wheelwright/commission/noise_budget.hpp>
 #include <wheelwright/commission/physical.hpp>
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/error.hpp>
+#include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/identify/noise_level.hpp>
 #include <wheelwright/identify/physical_consistency.hpp>
 #include <wheelwright/identify/stribeck.hpp>
@@ -181,10 +181,10 @@ ConstrainedFit nearest_consistent(const Fit& fit, const std::vector<LinearConstr
     const Eigen::VectorXd scale = covariance.diagonal().cwiseSqrt();
     const Eigen::MatrixXd correlation =
         scale.cwiseInverse().asDiagonal() * covariance * scale.cwiseInverse().asDiagonal();
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(correlation);
-    const Eigen::VectorXd lengths = eigen.eigenvalues().cwiseMax(1e-12).cwiseSqrt().cwiseInverse();
+    const EigenPairs eigen = symmetric_eigen(correlation);
+    const Eigen::VectorXd lengths = eigen.values.cwiseMax(1e-12).cwiseSqrt().cwiseInverse();
     precision(in, in) =
-        lengths.asDiagonal() * eigen.eigenvectors().transpose() * Eigen::MatrixXd(scale.cwiseInverse().asDiagonal());
+        lengths.asDiagonal() * eigen.vectors.transpose() * Eigen::MatrixXd(scale.cwiseInverse().asDiagonal());
   }
   RegressionBlock rows;
   rows.resize(static_cast<std::size_t>(p), 1, static_cast<std::size_t>(p));

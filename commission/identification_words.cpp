@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include <wheelwright/core/statistics.hpp>
 #include <wheelwright/identify/noise_level.hpp>
 
 namespace wheelwright {

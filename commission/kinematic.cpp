@@ -12,6 +12,7 @@
 #include <wheelwright/commission/noise_budget.hpp>
 #include <wheelwright/commission/pose_origin.hpp>
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/statistics.hpp>
 #include <wheelwright/identify/least_squares.hpp>
 #include <wheelwright/identify/residual_statistics.hpp>
 
@@ -21,7 +22,6 @@ namespace {
 using Status = KinematicCommissioning::Status;
 
 constexpr double kOdometryConfidence = 0.95;  // of the statistical intervals
-constexpr double kAboveMinimax = 1.05;        // a raised bound over the smallest that explains the log
 constexpr std::size_t kFewestWindows = 8;
 
 // What is settled before a fit.
@@ -243,7 +243,15 @@ BoundedSet bounded_set(const Frame& s, Part part, std::vector<OutputNoise>& nois
     }
     OdometryStream bare = make_rows(s, {});
     FoldedSource bare_rows(bare, part, s.log_rows, s.folds);
-    result.raise = kAboveMinimax * minimax_fit(bare_rows, s.prior, options).upper;
+    result.raise = noise_that_leaves_a_set(minimax_fit(bare_rows, s.prior, options), [&](double by) {
+      std::vector<OutputNoise> more = noise;
+      for (OutputNoise& o : more) {
+        o.learning *= by;
+      }
+      OdometryStream louder = make_rows(s, with_noise(s, more, Purpose::learning));
+      FoldedSource all(louder, part, s.log_rows, s.folds);
+      return feasible_set(all, s.prior).status == FeasibleSet::Status::nonempty;
+    });
     for (OutputNoise& o : noise) {
       o.learning *= result.raise;
       o.bound = std::max(o.bound, o.learning);

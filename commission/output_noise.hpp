@@ -3,6 +3,9 @@
 /// The bound on what an output's residual can be without a fault, and where it comes from.
 #pragma once
 
+#include <functional>
+
+#include <wheelwright/bounds/minimax.hpp>
 #include <wheelwright/core/warrant.hpp>
 #include <wheelwright/identify/noise_level.hpp>
 
@@ -23,5 +26,9 @@ struct OutputNoise {
   ExtrapolatedBound how;  ///< how `bound` came about, meaningful where estimated
   Warrant warrant = Warrant::extrapolated;  ///< of both bounds
 };
+
+/// The factor by which estimated bounds must grow for a set to be left, and a little more. `fit`, in units of the bounds,
+/// tells it where it converged; else it is bisected between what `fit` proved, by `leaves_a_set`.
+[[nodiscard]] double noise_that_leaves_a_set(const MinimaxFit& fit, const std::function<bool(double)>& leaves_a_set);
 
 }  // namespace wheelwright

@@ -9,7 +9,9 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <Eigen/Dense>
+#include <Eigen/Core>
+
+#include <wheelwright/core/linear_algebra.hpp>
 
 namespace wheelwright {
 namespace {
@@ -68,7 +70,7 @@ class Combination {
     if (rows_.size() < kFewestPoseWindows || std::sqrt(square_ / n) < kLeastChange) {
       return std::nullopt;
     }
-    const Eigen::Vector2d c = gram_.completeOrthogonalDecomposition().solve(moment_);
+    const Eigen::Vector2d c = minimum_norm_solution(gram_, moment_);
     double sum = 0.0;
     for (const auto& [right, left, value] : rows_) {
       const double e = value - c[0] * right - c[1] * left;

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include <wheelwright/core/statistics.hpp>
+
 namespace wheelwright {
 namespace {
 
@@ -28,10 +30,7 @@ class Thinned {
     if (kept_.empty()) {
       return 0.0;
     }
-    std::vector<double> values = kept_;
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
+    return wheelwright::median(kept_);
   }
 
  private:

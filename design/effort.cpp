@@ -3,14 +3,14 @@
 
 #include <vector>
 
-#include <Eigen/QR>
+#include <wheelwright/core/linear_algebra.hpp>
 
 namespace wheelwright {
 
 EffortModel::EffortModel(const DesignSubject& subject)
     : subject_(&subject),
-      input_inverse_(subject.model.input.completeOrthogonalDecomposition().pseudoInverse()),
-      joint_of_coordinate_(subject.model.motion.completeOrthogonalDecomposition().pseudoInverse()),
+      input_inverse_(pseudo_inverse(subject.model.input)),
+      joint_of_coordinate_(pseudo_inverse(subject.model.motion)),
       centre_(subject.theta.size()),
       half_(subject.theta.size()) {
   for (Eigen::Index j = 0; j < centre_.size(); ++j) {

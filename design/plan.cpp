@@ -6,9 +6,8 @@
 #include <string>
 #include <vector>
 
-#include <Eigen/QR>
-
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/design/effort.hpp>
 
 namespace wheelwright {
@@ -53,7 +52,7 @@ double space_use(const Plan& plan, const MotionLimits& limits) {
 
 LimitUse limit_use(const Plan& plan, const DesignSubject& subject, const MotionLimits& limits) {
   LimitUse use;
-  const Eigen::MatrixXd inverse = subject.model.motion.completeOrthogonalDecomposition().pseudoInverse();
+  const Eigen::MatrixXd inverse = pseudo_inverse(subject.model.motion);
   use.speed = (inverse * plan.speed).cwiseAbs().maxCoeff() / limits.joint_speed;
   if (limits.joint_acceleration) {
     use.acceleration = (inverse * plan.acceleration).cwiseAbs().maxCoeff() / *limits.joint_acceleration;
@@ -70,9 +69,7 @@ LimitUse limit_use(const Plan& plan, const DesignSubject& subject, const MotionL
   return use;
 }
 
-Eigen::MatrixXd joint_speeds(const Plan& plan, const Model& model) {
-  return model.motion.completeOrthogonalDecomposition().pseudoInverse() * plan.speed;
-}
+Eigen::MatrixXd joint_speeds(const Plan& plan, const Model& model) { return pseudo_inverse(model.motion) * plan.speed; }
 
 LogTable command_table(const Plan& plan, const Model& model) {
   const bool wheels = model.name == "differential_drive" && model.joints.size() == 2;

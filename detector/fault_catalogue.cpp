@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/detector/fault_type.hpp>
 
 #include <algorithm>
 #include <numbers>
-
-#include <Eigen/QR>
 
 #include <wheelwright/core/check.hpp>
 
@@ -22,7 +21,7 @@ constexpr double kMostLostOfSign = 0.5;      // of counts where functions need a
 
 // What acts on one joint alone, seen in coordinates or outputs: A E_j A⁻¹.
 Eigen::MatrixXd of_joint(const Eigen::MatrixXd& map, std::size_t joint) {
-  const Eigen::MatrixXd inverse = map.completeOrthogonalDecomposition().pseudoInverse();
+  const Eigen::MatrixXd inverse = pseudo_inverse(map);
   const auto j = static_cast<Eigen::Index>(joint);
   return map.col(j) * inverse.row(j);
 }

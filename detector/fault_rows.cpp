@@ -7,9 +7,8 @@
 #include <numbers>
 #include <utility>
 
-#include <Eigen/QR>
-
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/linear_algebra.hpp>
 
 namespace wheelwright {
 namespace {
@@ -38,9 +37,7 @@ Eigen::VectorXd joints_of(const Eigen::MatrixXd& inverse, const Eigen::VectorXd&
 }
 
 // Joint speeds from coordinate speeds.
-Eigen::MatrixXd inverse_of(const Model& model) {
-  return model.motion.completeOrthogonalDecomposition().pseudoInverse();
-}
+Eigen::MatrixXd inverse_of(const Model& model) { return pseudo_inverse(model.motion); }
 
 Eigen::MatrixXd or_zero(const Eigen::MatrixXd& matrix, std::size_t size) {
   const auto n = static_cast<Eigen::Index>(size);
@@ -354,7 +351,7 @@ FaultFilter::FaultFilter(FaultType fault, const Model& model, const FilterDesign
   cascades_.resize(model.n() * (3 * model.p() + 1));
   const auto n = static_cast<Eigen::Index>(model.n());
   from_motion_ = inverse_of(model);
-  to_joints_ = model.input.completeOrthogonalDecomposition().pseudoInverse();
+  to_joints_ = pseudo_inverse(model.input);
   gain_only_ = fault_.effort.size() > 0 && fault_.motion.size() == 0 && fault_.ground.size() == 0 &&
                fault_.slip.size() == 0 && fault_.seen.size() == 0 && fault_.theta.size() == 0 &&
                fault_.offset.size() == 0 && fault_.lateral == 0.0;

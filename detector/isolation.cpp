@@ -7,14 +7,13 @@
 #include <limits>
 #include <utility>
 
-#include <Eigen/QR>
-
 #include <wheelwright/bounds/certificate.hpp>
 #include <wheelwright/bounds/infeasibility.hpp>
 #include <wheelwright/bounds/linear_program.hpp>
 #include <wheelwright/bounds/slab_rows.hpp>
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/for_all.hpp>
+#include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/detector/onset_rows.hpp>
 
 namespace wheelwright {
@@ -439,7 +438,7 @@ class Search {
 // An encoder whose reading stands still, from somewhere on or for a time: judged by the reading.
 void judge_reading(const Setting& in, FaultFinding& finding) {
   const Model& model = in.filter.model();
-  const Eigen::MatrixXd inverse = model.motion.completeOrthogonalDecomposition().pseudoInverse();
+  const Eigen::MatrixXd inverse = pseudo_inverse(model.motion);
   const Eigen::VectorXd share = (inverse * finding.fault.seen * model.motion).diagonal();
   Eigen::Index joint = 0;
   if (!(share.minCoeff(&joint) < -0.5)) {

@@ -5,9 +5,8 @@
 #include <limits>
 #include <utility>
 
-#include <Eigen/QR>
-
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/linear_algebra.hpp>
 
 namespace wheelwright {
 namespace {
@@ -19,7 +18,7 @@ RowMatrix settled_errors(const Model& model, const FilterDesign& design, const S
   if (errors.acceleration.size() == 0) {
     return dY;
   }
-  const Eigen::VectorXd joints = model.motion.completeOrthogonalDecomposition().pseudoInverse() * v;
+  const Eigen::VectorXd joints = pseudo_inverse(model.motion) * v;
   const std::vector<double> speed(v.begin(), v.end()), joint_speed(joints.begin(), joints.end()),
       speed_error(errors.speed_sample.begin(), errors.speed_sample.end()),
       joint_error(joint_speed.size(), errors.joint_sample);

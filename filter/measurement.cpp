@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/statistics.hpp>
 #include <wheelwright/filter/encoder.hpp>
 
 namespace wheelwright {
@@ -58,9 +59,8 @@ double shortest_step_of(LogSource& log) {
   if (steps.empty()) {
     return 0.0;
   }
-  const auto at = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 100);
-  std::nth_element(steps.begin(), at, steps.end());
-  return *at;
+  const std::size_t rank = steps.size() / 100;
+  return order_statistic(std::move(steps), rank);
 }
 
 SpeedSample sample_speeds(LogSource& log, const std::vector<std::string>& columns) {

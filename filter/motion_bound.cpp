@@ -7,10 +7,9 @@
 #include <utility>
 #include <vector>
 
-#include <Eigen/QR>
-
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/limits.hpp>
+#include <wheelwright/core/linear_algebra.hpp>
 
 namespace wheelwright {
 namespace {
@@ -127,7 +126,7 @@ StepEnclosure::StepEnclosure(const Model& model, MotionBound bound) : bound_(std
   force_ = Eigen::VectorXd::Zero(n);
   next_ = speed_error_ = Eigen::VectorXd::Zero(coordinates);
   joint_error_ = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(model.joints.size()));
-  const Eigen::MatrixXd inverse = model.motion.completeOrthogonalDecomposition().pseudoInverse();
+  const Eigen::MatrixXd inverse = pseudo_inverse(model.motion);
   const bool determined =
       (inverse * model.motion - Eigen::MatrixXd::Identity(inverse.rows(), inverse.rows())).cwiseAbs().maxCoeff() < 1e-9;
   joint_from_ = determined ? Eigen::MatrixXd(kUp * inverse.cwiseAbs())

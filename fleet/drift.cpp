@@ -6,9 +6,7 @@
 #include <limits>
 #include <map>
 
-#include <boost/math/distributions/chi_squared.hpp>
-#include <boost/math/distributions/students_t.hpp>
-
+#include <wheelwright/core/statistics.hpp>
 #include <wheelwright/fleet/holm.hpp>
 
 namespace wheelwright {
@@ -101,10 +99,10 @@ std::map<std::size_t, Repeats> repeats_of(std::span<const ParameterDrift> drift)
     }
     Ratios& r = ratios[d.column];
     if (d.freedom > 0.0) {
-      r.line.push_back(d.chi_square / boost::math::median(boost::math::chi_squared(d.freedom)));
+      r.line.push_back(d.chi_square / chi_squared_median(d.freedom));
       r.line_freedom += d.freedom;
     }
-    r.mean.push_back(d.chi_mean / boost::math::median(boost::math::chi_squared(d.freedom + 1.0)));
+    r.mean.push_back(d.chi_mean / chi_squared_median(d.freedom + 1.0));
     r.mean_freedom += d.freedom + 1.0;
   }
   std::map<std::size_t, Repeats> out;
@@ -114,9 +112,8 @@ std::map<std::size_t, Repeats> repeats_of(std::span<const ParameterDrift> drift)
     if (!line && values.size() < fewest_pairs) {
       continue;
     }
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    out[column] = {std::max(1.0, *middle), worth_of_a_median * (line ? r.line_freedom : r.mean_freedom)};
+    out[column] = {std::max(1.0, median(std::move(values))),
+                   worth_of_a_median * (line ? r.line_freedom : r.mean_freedom)};
   }
   return out;
 }
@@ -178,9 +175,9 @@ void judge_drift(std::vector<ParameterDrift>& drift) {
     d.slope_error *= std::sqrt(known.ratio);
     const double z = std::abs(d.slope) / d.slope_error;
     const double doubt = 1.0 / d.own_freedom + (known.freedom > 0.0 ? 1.0 / known.freedom : 0.0);
-    const boost::math::students_t law(doubt > 0.0 ? 1.0 / doubt : std::numeric_limits<double>::infinity());
-    d.p = 2.0 * boost::math::cdf(boost::math::complement(law, z));
-    const double factor = boost::math::quantile(law, 0.975);
+    const double freedom = doubt > 0.0 ? 1.0 / doubt : std::numeric_limits<double>::infinity();
+    d.p = 2.0 * student_tail(freedom, z);
+    const double factor = student_quantile_below(freedom, 0.975);
     d.lower = d.slope - factor * d.slope_error;
     d.upper = d.slope + factor * d.slope_error;
     p.push_back(d.p);

@@ -7,6 +7,8 @@
 
 #include <fmt/format.h>
 
+#include <wheelwright/core/statistics.hpp>
+
 namespace wheelwright {
 namespace {
 
@@ -60,11 +62,9 @@ double FleetSpread::quantile(double share) const {
   if (values.empty()) {
     return std::numeric_limits<double>::quiet_NaN();
   }
-  std::vector<double> sorted = values;
   const auto rank =
-      static_cast<std::size_t>(std::clamp(share, 0.0, 1.0) * static_cast<double>(sorted.size() - 1) + 0.5);
-  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(rank), sorted.end());
-  return sorted[rank];
+      static_cast<std::size_t>(std::clamp(share, 0.0, 1.0) * static_cast<double>(values.size() - 1) + 0.5);
+  return order_statistic(values, rank);
 }
 
 std::size_t FleetResult::robots_outside() const {

@@ -10,7 +10,7 @@
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/limits.hpp>
-#include <wheelwright/fleet/median.hpp>
+#include <wheelwright/core/statistics.hpp>
 
 namespace wheelwright {
 namespace {

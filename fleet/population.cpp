@@ -6,11 +6,9 @@
 #include <map>
 #include <set>
 
-#include <boost/math/distributions/students_t.hpp>
-
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/statistics.hpp>
 #include <wheelwright/fleet/holm.hpp>
-#include <wheelwright/fleet/median.hpp>
 
 namespace wheelwright {
 namespace {
@@ -24,10 +22,9 @@ Interval central_range(const FleetColumn& column, double share) {
     lower.push_back(e.lower);
     upper.push_back(e.upper);
   }
-  const auto cut = static_cast<std::ptrdiff_t>(0.5 * (1.0 - share) * static_cast<double>(lower.size()));
-  std::nth_element(lower.begin(), lower.begin() + cut, lower.end());
-  std::nth_element(upper.begin(), upper.end() - 1 - cut, upper.end());
-  return {lower[static_cast<std::size_t>(cut)], *(upper.end() - 1 - cut)};
+  const auto cut = static_cast<std::size_t>(0.5 * (1.0 - share) * static_cast<double>(lower.size()));
+  const std::size_t last = upper.size() - 1;
+  return {order_statistic(std::move(lower), cut), order_statistic(std::move(upper), last - cut)};
 }
 
 // Share of the robots that are not outside which are certainly below, or certainly above, whichever is larger.
@@ -43,9 +40,7 @@ double certainly_beyond(const FleetColumn& column, const FleetEntry& robot, cons
   return all == 0 ? 0.0 : static_cast<double>(std::max(below, above)) / static_cast<double>(all);
 }
 
-double two_sided(double t, double freedom) {
-  return 2.0 * boost::math::cdf(boost::math::complement(boost::math::students_t(freedom), std::abs(t)));
-}
+double two_sided(double t, double freedom) { return 2.0 * student_tail(freedom, std::abs(t)); }
 
 struct Shown {
   std::vector<const FleetEntry*> entries;

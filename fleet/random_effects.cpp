@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/statistics.hpp>
 
 namespace wheelwright {
 namespace {
@@ -48,9 +49,7 @@ class Fit {
     range_ = *high - *low;
     const double size = std::max(std::abs(*low), std::abs(*high));
     floor_ = std::max(1e-24 * size * size, std::numeric_limits<double>::min());
-    std::vector<double> sorted = x_;
-    std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
-    centre_ = sorted[sorted.size() / 2];
+    centre_ = median(x_);
   }
 
   RandomEffects solve() {

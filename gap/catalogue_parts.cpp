@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-#include <Eigen/LU>
+#include <wheelwright/core/linear_algebra.hpp>
 
 namespace wheelwright::catalogue {
 namespace {
@@ -113,7 +113,7 @@ std::vector<Eigen::VectorXd> inertial_efforts(const Drive& drive) {
                                                              drive.coordinates[term.coordinate].smooth_acceleration;
     }
   }
-  const Eigen::MatrixXd inverse = drive.model.input.inverse();
+  const Eigen::MatrixXd inverse = wheelwright::inverse(drive.model.input);
   std::vector<Eigen::VectorXd> joints;
   for (Eigen::Index j = 0; j < inverse.rows(); ++j) {
     joints.push_back(outputs * inverse.row(j).transpose());

@@ -6,11 +6,11 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <boost/math/distributions/normal.hpp>
 
 #include <wheelwright/bounds/feasible_set.hpp>
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/regression.hpp>
+#include <wheelwright/core/statistics.hpp>
 #include <wheelwright/gap/drive_filter.hpp>
 
 namespace wheelwright {
@@ -62,8 +62,7 @@ Contradictions find_contradictions(const Drive& drive, double beta, const Mask& 
     out.statement = "No row of the log could be used.";
     return out;
   }
-  out.factor = boost::math::quantile(boost::math::complement(
-      boost::math::normal(), (1.0 - options.confidence) / (2.0 * instants * static_cast<double>(n))));
+  out.factor = normal_upper_quantile((1.0 - options.confidence) / (2.0 * instants * static_cast<double>(n)));
   for (const double floor : floors) {
     out.bounds.push_back(out.factor * check::positive(floor, "find_contradictions: floor"));
   }

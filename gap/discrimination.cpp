@@ -6,11 +6,9 @@
 #include <numbers>
 #include <utility>
 
-#include <Eigen/LU>
-#include <Eigen/QR>
-
 #include <wheelwright/commission/noise_budget.hpp>
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/filter/noise.hpp>
 #include <wheelwright/gap/drive_filter.hpp>
 #include <wheelwright/gap/signed_least_squares.hpp>
@@ -43,7 +41,7 @@ void add_effort(const Column& column, double factor, double step, Eigen::MatrixX
 
 // The drive as it is when `rival` is true: efforts that look at efforts settle in a second pass.
 Drive driven_with(Drive drive, const Rival& rival, const std::vector<Effect>& catalogue) {
-  const Eigen::MatrixXd inverse = drive.model.input.inverse();
+  const Eigen::MatrixXd inverse = wheelwright::inverse(drive.model.input);
   for (int pass = 0; pass < 2; ++pass) {
     Eigen::MatrixXd total = Eigen::MatrixXd::Zero(drive.rows(), static_cast<Eigen::Index>(drive.model.n()));
     for (const RivalCause& cause : rival.causes) {
@@ -81,8 +79,8 @@ class Rows {
         }
       }
     }
-    const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(base);
-    base_ = qr.householderQ() * Eigen::MatrixXd::Identity(size(), qr.rank());
+    const PivotedQr qr(base);
+    base_ = qr.Q(qr.rank());
   }
 
   // What `column` adds, with what θ can make up for taken away.

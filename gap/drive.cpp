@@ -10,6 +10,8 @@
 #include <Eigen/LU>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/linear_algebra.hpp>
+#include <wheelwright/core/statistics.hpp>
 
 namespace wheelwright {
 namespace {
@@ -205,9 +207,7 @@ double noise_by_differences(const Eigen::VectorXd& x) {
   for (Eigen::Index k = 3; k < x.size(); ++k) {
     magnitude.push_back(std::abs(x[k] - 3.0 * x[k - 1] + 3.0 * x[k - 2] - x[k - 3]));
   }
-  const auto middle = magnitude.begin() + static_cast<std::ptrdiff_t>(magnitude.size() / 2);
-  std::ranges::nth_element(magnitude, middle);
-  return *middle / (0.6744897501960817 * std::sqrt(20.0));
+  return median(std::move(magnitude)) / (0.6744897501960817 * std::sqrt(20.0));
 }
 
 Mask find_rest(const Drive& drive, const JointSignals& joint, double shortest) {
@@ -453,8 +453,8 @@ void predict_efforts(Drive& drive, const Eigen::VectorXd& theta) {
   check::that(theta.size() == static_cast<Eigen::Index>(model.p()) && theta.allFinite(), "predict_efforts theta",
               "p finite numbers");
   check::that(model.input.rows() == model.input.cols(), "Model::input", "a square matrix");
-  const Eigen::FullPivLU<Eigen::MatrixXd> input(model.input);
-  check::that(input.isInvertible(), "Model::input", "a regular matrix");
+  const RankRevealingLu input(model.input);
+  check::that(input.invertible(), "Model::input", "a regular matrix");
   Eigen::MatrixXd output = Eigen::MatrixXd::Zero(drive.rows(), static_cast<Eigen::Index>(model.n()));
   std::vector<double> speed(drive.coordinates.size()), joint(drive.joints.size());
   const std::vector<double> zeros(std::max(speed.size(), joint.size()), 0.0);

@@ -6,8 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include <boost/math/distributions/students_t.hpp>
-
+#include <wheelwright/core/statistics.hpp>
 #include <wheelwright/gap/causes_model.hpp>
 
 namespace wheelwright {
@@ -180,7 +179,7 @@ FittedCauses fit_causes(const PreparedGap& prepared, const GapProblem& problem, 
 
   FittedCauses fitted;
   fitted.freedom = static_cast<double>(gram.blocks()) - 1.0;
-  const double t = boost::math::quantile(boost::math::students_t(fitted.freedom), 0.975);
+  const double t = student_quantile_below(fitted.freedom, 0.975);
   fitted.theta = prepared.theta;
   fitted.theta_error = Eigen::VectorXd::Zero(prepared.theta.size());
   for (std::size_t k = 0; k < theta.size(); ++k) {

@@ -7,10 +7,9 @@
 #include <string_view>
 #include <utility>
 
-#include <Eigen/Cholesky>
-
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/error.hpp>
+#include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/model/effect_law.hpp>
 
 namespace wheelwright {
@@ -357,8 +356,8 @@ class Improvement {
     }
     // What was not found (0) stays so.
     const bool both = coefficient(0) != 0.0 && coefficient(1) != 0.0;
-    const Eigen::Vector2d found =
-        both ? Eigen::Vector2d(A.ldlt().solve(b)) : Eigen::Vector2d(b.cwiseQuotient(A.diagonal()));
+    const Eigen::Vector2d found = both ? Eigen::Vector2d(LdltFactors(A).solve(Eigen::VectorXd(b)))
+                                       : Eigen::Vector2d(b.cwiseQuotient(A.diagonal()));
     set("k", coefficient(0) != 0.0 ? found[0] : 0.0);
     set("R_b", coefficient(1) != 0.0 ? found[1] * unit_ : 0.0);
   }

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/statistics.hpp>
 
 namespace wheelwright {
 namespace {
@@ -62,9 +63,7 @@ double noise_of(const Drive& drive, const Signal& signal) {
   if (size.empty()) {
     return 0.0;
   }
-  const auto middle = size.begin() + static_cast<std::ptrdiff_t>(size.size() / 2);
-  std::ranges::nth_element(size, middle);
-  return std::max(*middle / (0.6744897501960817 * std::sqrt(20.0)), resolution / std::sqrt(12.0));
+  return std::max(median(std::move(size)) / (0.6744897501960817 * std::sqrt(20.0)), resolution / std::sqrt(12.0));
 }
 
 double rms_of(const Signal& signal) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include <wheelwright/core/statistics.hpp>
 #include <wheelwright/gap/drive_filter.hpp>
 
 namespace wheelwright {
@@ -22,10 +23,8 @@ double by_third_differences(const Drive& drive, const Eigen::VectorXd& signal) {
   if (sizes.empty()) {
     return 0.0;
   }
-  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
-  std::nth_element(sizes.begin(), middle, sizes.end());
   constexpr double kMedianOfNormal = 0.6744897501960817;
-  return *middle / kMedianOfNormal / std::sqrt(20.0);
+  return median(std::move(sizes)) / kMedianOfNormal / std::sqrt(20.0);
 }
 
 // Energies of impulse responses: what unit white noise becomes.

@@ -4,9 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/QR>
-
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/linear_algebra.hpp>
 
 namespace wheelwright {
 namespace {
@@ -48,7 +47,7 @@ Drive planned_drive(const Plan& plan, const DesignSubject& subject) {
   }
   drive.t = Eigen::VectorXd::LinSpaced(plan.samples(), 0.0, plan.t(plan.samples() - 1));
   drive.segment_starts = {0};
-  const Eigen::MatrixXd inverse = model.motion.completeOrthogonalDecomposition().pseudoInverse();
+  const Eigen::MatrixXd inverse = pseudo_inverse(model.motion);
   const Eigen::MatrixXd speed = inverse * plan.speed, acceleration = inverse * plan.acceleration;
   for (Eigen::Index j = 0; j < speed.rows(); ++j) {
     JointSignals joint;

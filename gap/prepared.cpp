@@ -5,10 +5,8 @@
 #include <cmath>
 #include <utility>
 
-#include <Eigen/LU>
-#include <Eigen/QR>
-
 #include <wheelwright/core/error.hpp>
+#include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/filter/measurement.hpp>
 #include <wheelwright/gap/catalogue.hpp>
 #include <wheelwright/gap/drive_filter.hpp>
@@ -265,7 +263,7 @@ std::vector<FittedEffect> robots_own(const std::vector<FittedEffect>& healthy) {
 }
 
 void expect_efforts(Drive& drive, const Eigen::VectorXd& theta, const std::vector<FittedEffect>& causes) {
-  const Eigen::MatrixXd inverse = drive.model.input.inverse();
+  const Eigen::MatrixXd inverse = wheelwright::inverse(drive.model.input);
   Eigen::MatrixXd outputs = Eigen::MatrixXd::Zero(drive.rows(), static_cast<Eigen::Index>(drive.model.n()));
   for (const FittedEffect& cause : causes) {
     if (cause.effect.unit_coefficient) {

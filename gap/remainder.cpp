@@ -3,7 +3,7 @@
 
 #include <limits>
 
-#include <Eigen/Cholesky>
+#include <wheelwright/core/linear_algebra.hpp>
 
 namespace wheelwright {
 namespace {
@@ -31,7 +31,7 @@ Eigen::MatrixXd remainder(const BlockGram& gram, const std::vector<std::size_t>&
   A = unit.asDiagonal() * A * unit.asDiagonal();
   A.diagonal().array() += 1e-10;
   const Eigen::MatrixXd c = unit.asDiagonal() * products(gram, on, of);
-  rest -= c.transpose() * A.ldlt().solve(c);
+  rest -= c.transpose() * LdltFactors(A).solve(c);
   return rest;
 }
 

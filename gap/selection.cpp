@@ -7,9 +7,8 @@
 #include <numeric>
 #include <random>
 
-#include <boost/math/distributions/normal.hpp>
-
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/statistics.hpp>
 #include <wheelwright/gap/confidence_set.hpp>
 #include <wheelwright/gap/remainder.hpp>
 
@@ -75,7 +74,7 @@ class Selector {
       : table_(table), kinds_(kinds), floor_(floor_error), options_(options) {
     const auto tried = static_cast<double>(std::max<std::size_t>(kinds.size(), 1));
     level_ = options.significance / (2.0 * tried);  // two tests of each
-    critical_ = boost::math::quantile(boost::math::complement(boost::math::normal(), level_));
+    critical_ = normal_upper_quantile(level_);
     moves_theta_only_.assign(kinds.size(), true);
     for (std::size_t c = 0; c < table.candidates.size(); ++c) {
       if (beyond_theta(table, c) > options.contained) {

@@ -10,6 +10,7 @@
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/core/for_all.hpp>
+#include <wheelwright/core/statistics.hpp>
 #include <wheelwright/gap/improved_robot.hpp>
 #include <wheelwright/gap/kinematic_rows.hpp>
 #include <wheelwright/gap/noise_floor.hpp>

@@ -9,6 +9,7 @@
 #include <unsupported/Eigen/FFT>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/statistics.hpp>
 
 namespace wheelwright {
 namespace {
@@ -58,8 +59,7 @@ double median_step(const Eigen::VectorXd& t) {
   for (std::size_t k = 0; k < steps.size(); ++k) {
     steps[k] = t[static_cast<Eigen::Index>(k) + 1] - t[static_cast<Eigen::Index>(k)];
   }
-  std::nth_element(steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2), steps.end());
-  return steps[steps.size() / 2];
+  return median(std::move(steps));
 }
 
 }  // namespace

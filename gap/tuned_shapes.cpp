@@ -5,8 +5,7 @@
 #include <cmath>
 #include <span>
 
-#include <Eigen/QR>
-
+#include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/design/search.hpp>
 #include <wheelwright/gap/causes_model.hpp>
 
@@ -60,8 +59,7 @@ Eigen::VectorXd tuned(const CausesModel& model, const TuneOptions& options) {
     SeparableValues at;
     model.evaluate(shape_at(x), false, at);
     const Eigen::VectorXd y = model.response() - at.offset;
-    const Eigen::HouseholderQR<Eigen::MatrixXd> qr(at.columns);
-    const Eigen::VectorXd rotated = qr.householderQ().adjoint() * y;
+    const Eigen::VectorXd rotated = QrFactors(at.columns).rotate(y);
     return rotated.tail(rotated.size() - at.columns.cols()).squaredNorm() / static_cast<double>(y.size());
   };
   std::vector<double> start;

@@ -10,11 +10,10 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <boost/math/distributions/chi_squared.hpp>
-#include <boost/math/distributions/students_t.hpp>
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/limits.hpp>
+#include <wheelwright/core/statistics.hpp>
 #include <wheelwright/gap/drive_filter.hpp>
 #include <wheelwright/gap/permutation.hpp>
 #include <wheelwright/gap/spectrum.hpp>
@@ -119,8 +118,7 @@ double band_p_value(double power, double mean, double variance) {
     return 1.0;
   }
   const double freedom = 2.0 * mean * mean / variance;
-  return boost::math::cdf(
-      boost::math::complement(boost::math::chi_squared(freedom), std::max(0.0, freedom * power / mean)));
+  return chi_squared_tail(freedom, std::max(0.0, freedom * power / mean));
 }
 
 std::vector<double> holm(const std::vector<double>& p) {
@@ -162,8 +160,7 @@ double mean_p_value(const Eigen::VectorXd& excess, double floor_square, double e
   if (!(variance > 0.0) || !(covariance.freedom >= 1.0)) {
     return mean > 0.0 ? 0.0 : 1.0;
   }
-  return boost::math::cdf(
-      boost::math::complement(boost::math::students_t(covariance.freedom), mean / std::sqrt(variance)));
+  return student_tail(covariance.freedom, mean / std::sqrt(variance));
 }
 
 void add_regimes(std::vector<GapShare>& out, const Drive& drive, const std::vector<Regime>& all,

@@ -9,6 +9,7 @@
 #include <Eigen/LU>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/identify/block_length.hpp>
 #include <wheelwright/identify/score_blocks.hpp>
 
@@ -100,8 +101,8 @@ BlockBootstrap block_bootstrap(const RegressionMoments& moments, const BlockBoot
       A_sum += A.col(start);
       c_sum += c.col(start);
     }
-    const Eigen::PartialPivLU<Eigen::MatrixXd> lu(A_sum.reshaped(q, q));
-    if (!(lu.rcond() > kSingularResample)) {
+    const LuFactors lu(A_sum.reshaped(q, q));
+    if (!(lu.reciprocal_condition() > kSingularResample)) {
       ++result.singular;
       continue;
     }

@@ -4,13 +4,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/LU>
-#include <Eigen/QR>
-
 #include <fmt/format.h>
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/limits.hpp>
+#include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/identify/nonnegative_least_squares.hpp>
 
 namespace wheelwright {
@@ -57,8 +55,7 @@ struct Scaled {
     const Eigen::Index p = R.cols();
     Eigen::MatrixXd stack(2 * p, p + 1);
     stack << R, c, strength * Eigen::MatrixXd::Identity(p, p), Eigen::VectorXd::Zero(p);
-    const Eigen::HouseholderQR<Eigen::MatrixXd> qr(stack);
-    const Eigen::MatrixXd folded = qr.matrixQR().topRows(p).triangularView<Eigen::Upper>();
+    const Eigen::MatrixXd folded = QrFactors(stack).R().topRows(p);
     R = folded.leftCols(p);
     c = folded.col(p);
   }
@@ -75,17 +72,17 @@ struct Equality {
       multiplier.resize(0);
       return;
     }
-    const Eigen::HouseholderQR<Eigen::MatrixXd> qr(A.transpose());
-    const Eigen::MatrixXd Q = qr.householderQ();
-    const Eigen::MatrixXd L = qr.matrixQR().topRows(m).triangularView<Eigen::Upper>().transpose();
-    const Eigen::VectorXd held = L.triangularView<Eigen::Lower>().solve(b);
+    const QrFactors qr(A.transpose());
+    const Eigen::MatrixXd Q = qr.Q();
+    const Eigen::MatrixXd U = qr.R();
+    const Eigen::VectorXd held = solve_lower(U.transpose(), b);
     x = Q.leftCols(m) * held;
     if (m < p) {
       const Eigen::MatrixXd moving = s.R * Q.rightCols(p - m);
-      x += Q.rightCols(p - m) * moving.colPivHouseholderQr().solve(s.c - s.R * x);
+      x += Q.rightCols(p - m) * least_squares_solution(moving, s.c - s.R * x);
     }
     const Eigen::VectorXd pull = 2.0 * s.R.transpose() * (s.c - s.R * x);
-    multiplier = L.transpose().triangularView<Eigen::Upper>().solve(Q.leftCols(m).transpose() * pull);
+    multiplier = solve_upper(U, Q.leftCols(m).transpose() * pull);
   }
 };
 
@@ -125,8 +122,7 @@ ConstrainedFit constrained_least_squares(const LeastSquares& rows, const std::ve
   // vector from the cone of the columns of [−R⁻ᵀAᵀ; h].
   std::vector<Eigen::Index> working;
   if (m > 0) {
-    const Eigen::MatrixXd G =
-        -s.R.transpose().triangularView<Eigen::Lower>().solve(s.A.transpose()).transpose();  // m × p
+    const Eigen::MatrixXd G = -solve_lower(s.R.transpose(), s.A.transpose()).transpose();  // m × p
     const Eigen::VectorXd h = -G * s.c - s.b;
     const double reach = std::max(h.cwiseAbs().maxCoeff() / G.rowwise().norm().maxCoeff(), 1e-300);
     Eigen::MatrixXd E(p + 1, m);

@@ -4,10 +4,8 @@
 #include <cmath>
 #include <numbers>
 
-#include <boost/math/distributions/chi_squared.hpp>
-#include <boost/math/distributions/normal.hpp>
-
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/statistics.hpp>
 
 namespace wheelwright {
 
@@ -21,7 +19,6 @@ std::string_view to_string(NoiseLaw law) {
 }
 
 ErrorBound bound_of_sd(double sd, double relative_sd, const ErrorBoundOptions& options) {
-  namespace bm = boost::math;
   check::non_negative(sd, "standard deviation");
   check::non_negative(relative_sd, "relative standard error");
   check::that(options.risk > 0.0 && options.risk < 1.0, "risk", "a number inside (0, 1)");
@@ -31,13 +28,11 @@ ErrorBound bound_of_sd(double sd, double relative_sd, const ErrorBoundOptions& o
   if (relative_sd > 0.0) {
     const double freedom = 2.0 / (relative_sd * relative_sd);
     const double risk = options.law == NoiseLaw::uniform ? options.risk : 0.5 * options.risk;
-    result.sd_limit = sd * std::sqrt(freedom / bm::quantile(bm::chi_squared(freedom), risk));
+    result.sd_limit = sd * std::sqrt(freedom / chi_squared_quantile(freedom, risk));
   }
   switch (options.law) {
     case NoiseLaw::uniform: result.factor = std::numbers::sqrt3; break;
-    case NoiseLaw::gaussian:
-      result.factor = bm::quantile(bm::complement(bm::normal(), 0.25 * options.risk / options.horizon));
-      break;
+    case NoiseLaw::gaussian: result.factor = normal_upper_quantile(0.25 * options.risk / options.horizon); break;
     case NoiseLaw::any_variance: result.factor = std::sqrt(2.0 * options.horizon / options.risk); break;
   }
   result.bound = result.factor * result.sd_limit;

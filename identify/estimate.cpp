@@ -5,10 +5,11 @@
 #include <cmath>
 #include <limits>
 
-#include <Eigen/Dense>
-#include <boost/math/distributions/fisher_f.hpp>
+#include <Eigen/Core>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/linear_algebra.hpp>
+#include <wheelwright/core/statistics.hpp>
 #include <wheelwright/identify/block_sums.hpp>
 
 namespace wheelwright {
@@ -49,22 +50,22 @@ class Equations {
       }
     }
     const Eigen::MatrixXd scaled = rows_.asDiagonal() * A(kept, kept) * columns_.asDiagonal();
-    lu_.compute(q > 0 ? scaled : Eigen::MatrixXd::Identity(1, 1));
-    solvable_ = q > 0 && scaled.allFinite() && lu_.rcond() > kSingular;
+    lu_.emplace(q > 0 ? scaled : Eigen::MatrixXd(Eigen::MatrixXd::Identity(1, 1)));
+    solvable_ = q > 0 && scaled.allFinite() && lu_->reciprocal_condition() > kSingular;
   }
   [[nodiscard]] bool solvable() const { return solvable_; }
   // Solution for the right-hand sides b (p × any), p × any with zeros for parameters that were left out.
   [[nodiscard]] Eigen::MatrixXd solve(const Eigen::MatrixXd& b) const {
     Eigen::MatrixXd x = Eigen::MatrixXd::Zero(b.rows(), b.cols());
     const Eigen::MatrixXd right = rows_.asDiagonal() * b(*kept_, Eigen::all);
-    x(*kept_, Eigen::all) = columns_.asDiagonal() * lu_.solve(right);
+    x(*kept_, Eigen::all) = columns_.asDiagonal() * lu_->solve(right);
     return x;
   }
 
  private:
   const std::vector<Eigen::Index>* kept_;
   Eigen::VectorXd rows_, columns_;
-  Eigen::PartialPivLU<Eigen::MatrixXd> lu_;
+  std::optional<LuFactors> lu_;
   bool solvable_ = false;
 };
 
@@ -180,9 +181,8 @@ Estimate bias_compensated(const RegressionMoments& moments, const RowNoise& nois
   if (enough) {
     // Share of signal in every direction: eigenvalues of the signal relative to the whole.
     const Eigen::MatrixXd whole = total.YY(kept, kept);
-    const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> shares(signal(kept, kept), whole,
-                                                                           Eigen::EigenvaluesOnly);
-    enough = shares.info() == Eigen::Success && shares.eigenvalues().head(q).minCoeff() >= kLeastShare;
+    const std::optional<Eigen::VectorXd> shares = generalized_eigenvalues(signal(kept, kept), whole);
+    enough = shares && shares->head(q).minCoeff() >= kLeastShare;
   }
   if (!enough) {
     return unusable(Estimator::bias_compensated, moments.parameters(),
@@ -223,10 +223,10 @@ Estimate total_least_squares(const RegressionMoments& moments, const RowNoise& n
   C.topLeftCorner(q, q) = instants * per_instant.YY(kept, kept);
   C(q, q) = instants * per_instant.yy;
   const Eigen::VectorXd scale = column_sizes(A).unaryExpr([](double s) { return s > 0.0 ? 1.0 / s : 1.0; });
-  const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> solver(scale.asDiagonal() * C * scale.asDiagonal(),
-                                                                         scale.asDiagonal() * A * scale.asDiagonal());
-  const bool solved = q > 0 && solver.info() == Eigen::Success && solver.eigenvalues()[q] > 0.0;
-  const double lambda = solved ? 1.0 / solver.eigenvalues()[q] : 0.0;
+  const std::optional<Eigen::VectorXd> ratios =
+      generalized_eigenvalues(scale.asDiagonal() * C * scale.asDiagonal(), scale.asDiagonal() * A * scale.asDiagonal());
+  const bool solved = q > 0 && ratios && (*ratios)[q] > 0.0;
+  const double lambda = solved ? 1.0 / (*ratios)[q] : 0.0;
   const Eigen::MatrixXd corrected = total.YY - lambda * instants * per_instant.YY;
   const Equations equations(corrected, column_sizes(total.YY), column_sizes(total.YY), kept);
   if (!solved || !equations.solvable()) {
@@ -263,16 +263,18 @@ Eigen::VectorXd instrument_strength(const RegressionMoments& moments, const Esti
   const Eigen::MatrixXd YY = of_Y.asDiagonal() * total.YY(kept, kept) * of_Y.asDiagonal();
   const Eigen::MatrixXd ZY = of_Z.asDiagonal() * total.ZY(kept, kept) * of_Y.asDiagonal();
   const Eigen::MatrixXd ZZ = of_Z.asDiagonal() * total.ZZ(kept, kept) * of_Z.asDiagonal();
-  const Eigen::LDLT<Eigen::MatrixXd> of_YY(YY), of_ZZ(ZZ);
-  if (kept.empty() || of_YY.info() != Eigen::Success || of_ZZ.info() != Eigen::Success || of_YY.rcond() < kSingular ||
-      of_ZZ.rcond() < kSingular) {
+  if (kept.empty()) {
+    return strength;
+  }
+  const LdltFactors of_YY(YY), of_ZZ(ZZ);
+  if (of_YY.reciprocal_condition() < kSingular || of_ZZ.reciprocal_condition() < kSingular) {
     return strength;
   }
   const Eigen::MatrixXd explained = ZY.transpose() * of_ZZ.solve(ZY);
-  const Eigen::LDLT<Eigen::MatrixXd> of_explained(explained);
-  const auto identity = Eigen::MatrixXd::Identity(YY.rows(), YY.cols());
+  const LdltFactors of_explained(explained);
+  const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(YY.rows(), YY.cols());
   const Eigen::MatrixXd whole = of_YY.solve(identity);
-  if (of_explained.info() != Eigen::Success || of_explained.rcond() < kSingular) {
+  if (of_explained.reciprocal_condition() < kSingular) {
     for (const Eigen::Index j : kept) {
       strength[j] = 0.0;
     }
@@ -338,10 +340,9 @@ ContrastTest contrast_test(const Estimate& first, const Estimate& second, const 
   const Eigen::VectorXd scale = covariance.matrix.diagonal()(tested).cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd correlation = scale.asDiagonal() * covariance.matrix(tested, tested) * scale.asDiagonal();
   const Eigen::VectorXd d = scale.asDiagonal() * test.difference(tested);
-  const Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver(correlation);
-  const double t2 = d.dot(solver.solve(d));
+  const double t2 = d.dot(Eigen::VectorXd(minimum_norm_solution(correlation, d)));
   test.statistic = std::max(0.0, t2 * (B - q + 1.0) / (B * q));
-  test.p_value = boost::math::cdf(boost::math::complement(boost::math::fisher_f(q, B - q + 1.0), test.statistic));
+  test.p_value = fisher_tail(q, B - q + 1.0, test.statistic);
   return test;
 }
 

@@ -6,11 +6,9 @@
 #include <limits>
 
 #include <fmt/format.h>
-#include <Eigen/Eigenvalues>
-#include <Eigen/QR>
-#include <Eigen/SVD>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/linear_algebra.hpp>
 
 namespace wheelwright {
 namespace {
@@ -133,10 +131,10 @@ void find_noise(const IdentifiabilityInput& input, const ScaledDirections& scale
   const Eigen::MatrixXd noise = V.transpose() * size.asDiagonal() * input.noise * size.asDiagonal() * V;
   Eigen::MatrixXd excess = -kClearOfNoise * kClearOfNoise * noise;
   excess.diagonal() += result.singular_values.head(result.rank).cwiseAbs2();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(excess);
-  for (Eigen::Index k = 0; k < excess.rows() && eigen.eigenvalues()[k] <= 0.0; ++k) {
+  const EigenPairs eigen = symmetric_eigen(excess);
+  for (Eigen::Index k = 0; k < excess.rows() && eigen.values[k] <= 0.0; ++k) {
     --result.noise_rank;
-    const Eigen::VectorXd z = V * eigen.eigenvectors().col(k);
+    const Eigen::VectorXd z = V * eigen.vectors.col(k);
     UnseenDirection unseen;
     unseen.why = Unseen::noise;
     unseen.direction = z.cwiseProduct(size) / z.cwiseAbs().maxCoeff();
@@ -164,14 +162,14 @@ void find_precision(const IdentifiabilityInput& input, Identifiability& result) 
     return;
   }
   const Eigen::VectorXd one_over = input.size(kept).cwiseInverse();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(
-      Eigen::MatrixXd(one_over.asDiagonal() * input.covariance(kept, kept) * one_over.asDiagonal()));
-  for (Eigen::Index k = 0; k < eigen.eigenvalues().size(); ++k) {
+  const EigenPairs eigen =
+      symmetric_eigen(one_over.asDiagonal() * input.covariance(kept, kept) * one_over.asDiagonal());
+  for (Eigen::Index k = 0; k < eigen.values.size(); ++k) {
     Eigen::VectorXd u = Eigen::VectorXd::Zero(p);
-    u(kept) = eigen.eigenvectors().col(k);
+    u(kept) = eigen.vectors.col(k);
     KnownCombination combination;
     combination.coefficients = largest_part_one(u.cwiseQuotient(input.size), input.size, kTakesPart);
-    combination.relative_error = std::sqrt(std::max(0.0, eigen.eigenvalues()[k]));
+    combination.relative_error = std::sqrt(std::max(0.0, eigen.values[k]));
     combination.words = combination_in_words(combination.coefficients, input.parameters, input.size, kTakesPart);
     result.known.push_back(combination);
   }
@@ -206,12 +204,10 @@ IdentifiabilityInput identifiability_input(const RegressionMoments& moments, con
   const Eigen::MatrixXd G = moments.total(weights).YY;
   const Eigen::VectorXd length = G.diagonal().unaryExpr([](double d) { return d > 0.0 ? std::sqrt(d) : 1.0; });
   const Eigen::VectorXd one_over = length.cwiseInverse();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(
-      Eigen::MatrixXd(one_over.asDiagonal() * G * one_over.asDiagonal()));
+  const EigenPairs eigen = symmetric_eigen(one_over.asDiagonal() * G * one_over.asDiagonal());
   IdentifiabilityInput input;
   input.parameters = std::move(parameters);
-  input.factor = eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal() * eigen.eigenvectors().transpose() *
-                 length.asDiagonal();
+  input.factor = eigen.values.cwiseMax(0.0).cwiseSqrt().asDiagonal() * eigen.vectors.transpose() * length.asDiagonal();
   input.from_gram = true;
   input.instants = moments.instants();
   return input;
@@ -239,11 +235,10 @@ Identifiability identifiability(const IdentifiabilityInput& input) {
     }
   }
   Identifiability result;
-  const Eigen::JacobiSVD<Eigen::MatrixXd, Eigen::FullPivHouseholderQRPreconditioner> svd(
-      scaled.R, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  scaled.V = svd.matrixV();
+  const SingularValues svd = singular_values(scaled.R);
+  scaled.V = svd.V;
   result.singular_values = Eigen::VectorXd::Zero(p);
-  result.singular_values.head(svd.singularValues().size()) = svd.singularValues();
+  result.singular_values.head(svd.values.size()) = svd.values;
   const double largest = result.singular_values[0];
   const double smallest = result.singular_values[p - 1];
   result.condition = smallest > 0.0 ? largest / smallest : std::numeric_limits<double>::infinity();

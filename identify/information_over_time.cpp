@@ -5,9 +5,8 @@
 #include <cmath>
 #include <numeric>
 
-#include <Eigen/Eigenvalues>
-
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/linear_algebra.hpp>
 
 namespace wheelwright {
 namespace {
@@ -51,22 +50,20 @@ InformationOverTime information_over_time(const RegressionMoments& moments, cons
     G += gram;
   }
   const Eigen::VectorXd one_over = G.diagonal().unaryExpr([](double d) { return d > 0.0 ? 1.0 / std::sqrt(d) : 0.0; });
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(
-      Eigen::MatrixXd(one_over.asDiagonal() * G * one_over.asDiagonal()));
-  const Eigen::VectorXd inverse = eigen.eigenvalues().unaryExpr(
-      [&](double value) { return value > kNoInformation * eigen.eigenvalues()[p - 1] ? 1.0 / value : 0.0; });
+  const EigenPairs eigen = symmetric_eigen(one_over.asDiagonal() * G * one_over.asDiagonal());
+  const Eigen::VectorXd inverse = eigen.values.unaryExpr(
+      [&](double value) { return value > kNoInformation * eigen.values[p - 1] ? 1.0 / value : 0.0; });
   const auto W = static_cast<Eigen::Index>(result.windows.size());
 
   for (Eigen::Index j = 0; j < p; ++j) {
     ParameterInformation& info = result.parameters[static_cast<std::size_t>(j)];
     info.share = info.cumulative = Eigen::VectorXd::Zero(W);
-    const Eigen::VectorXd row = eigen.eigenvectors().row(j).transpose();
+    const Eigen::VectorXd row = eigen.vectors.row(j).transpose();
     const double confounded = (inverse.array() == 0.0).select(row.array().square(), 0.0).sum();
     if (!(one_over[j] > 0.0) || confounded > kConfounded * kConfounded) {
       continue;
     }
-    const Eigen::VectorXd column =
-        one_over.cwiseProduct(eigen.eigenvectors() * inverse.cwiseProduct(row)) * one_over[j];
+    const Eigen::VectorXd column = one_over.cwiseProduct(eigen.vectors * inverse.cwiseProduct(row)) * one_over[j];
     const Eigen::VectorXd d = column / column[j];
     for (Eigen::Index k = 0; k < W; ++k) {
       info.share[k] = std::max(0.0, d.dot(grams[static_cast<std::size_t>(k)] * d));

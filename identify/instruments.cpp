@@ -7,6 +7,7 @@
 #include <Eigen/LU>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/linear_algebra.hpp>
 
 namespace wheelwright {
 namespace {
@@ -27,8 +28,11 @@ Eigen::MatrixXd inertia(const Model& model, const Eigen::VectorXd& theta) {
 }
 
 bool invertible(const Eigen::MatrixXd& m) {
-  return m.rows() == m.cols() && m.allFinite() && m.fullPivLu().isInvertible() &&
-         m.fullPivLu().rcond() > kSingularCross;
+  if (m.rows() != m.cols() || !m.allFinite()) {
+    return false;
+  }
+  const RankRevealingLu lu(m);
+  return lu.invertible() && lu.reciprocal_condition() > kSingularCross;
 }
 
 Measurement of_instruments(const Measurement& rows, const std::vector<std::string>& motion) {
@@ -61,8 +65,8 @@ bool MotionSimulation::possible(const Model& model, const Eigen::VectorXd& theta
 MotionSimulation::MotionSimulation(Model model, Eigen::VectorXd theta, Hold hold)
     : model_(std::move(model)), theta_(std::move(theta)), hold_(hold) {
   check::that(possible(model_, theta_), "motion simulation", "a model whose inertia can be inverted");
-  inverse_inertia_ = inertia(model_, theta_).inverse();
-  joints_from_coordinates_ = model_.motion.inverse();
+  inverse_inertia_ = inverse(inertia(model_, theta_));
+  joints_from_coordinates_ = inverse(model_.motion);
 }
 
 void MotionSimulation::restart(double t, const Eigen::VectorXd& speed, const Eigen::VectorXd& effort) {

@@ -11,10 +11,12 @@
 #include <ceres/manifold.h>
 #include <ceres/problem.h>
 #include <ceres/solver.h>
-#include <Eigen/Dense>
+#include <Eigen/Core>
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/limits.hpp>
+#include <wheelwright/core/linear_algebra.hpp>
+#include <wheelwright/core/statistics.hpp>
 #include <wheelwright/identify/block_sums.hpp>
 #include <wheelwright/identify/noise_level.hpp>
 
@@ -231,10 +233,8 @@ std::vector<Window> cut(const LogTable& log, const KinematicOptions& o, bool pos
 }
 
 double robust_spread(std::vector<double> residuals) {
-  const auto middle = residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2);
   for (double& r : residuals) r = std::abs(r);
-  std::nth_element(residuals.begin(), middle, residuals.end());
-  return kMadToSigma * *middle;
+  return kMadToSigma * median(std::move(residuals));
 }
 
 class Fit {
@@ -372,9 +372,9 @@ class Fit {
       if (!position_) {
         C.bottomRightCorner<2, 2>().setIdentity();
       }
-      const Eigen::CompleteOrthogonalDecomposition<Eigen::Matrix3d> start(C);
-      info.window.push_back(A - B * start.solve(B.transpose()));
-      info.score.push_back(score - B * start.solve(own));
+      const Eigen::Matrix3d start = pseudo_inverse(C);
+      info.window.push_back(A - B * start * B.transpose());
+      info.score.push_back(score - B * start * own);
       info.total += info.window.back();
     }
     return info;
@@ -412,12 +412,12 @@ Spread spread_of(const Fit& fit, const Fit::Information& info) {
     H = info.total(pick, pick);
     const Eigen::VectorXd scale = H.diagonal().cwiseSqrt();
     const Eigen::MatrixXd unit = scale.cwiseInverse().asDiagonal() * H * scale.cwiseInverse().asDiagonal();
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(unit);
-    if (pick.empty() || eigen.eigenvalues()[0] > kRankTolerance) {
+    const EigenPairs eigen = symmetric_eigen(unit);
+    if (pick.empty() || eigen.values[0] > kRankTolerance) {
       break;
     }
     Eigen::Index worst = 0;
-    eigen.eigenvectors().col(0).cwiseAbs().maxCoeff(&worst);
+    eigen.vectors.col(0).cwiseAbs().maxCoeff(&worst);
     pick.erase(pick.begin() + worst);
   }
   const auto m = static_cast<Eigen::Index>(pick.size());
@@ -428,9 +428,9 @@ Spread spread_of(const Fit& fit, const Fit::Information& info) {
   Eigen::MatrixXd apart = Eigen::MatrixXd::Zero(m, m);  // covariance of the sum if windows were independent
   for (std::size_t k = 0; k < info.score.size(); ++k) {
     const Eigen::MatrixXd without = H - Eigen::MatrixXd(info.window[k](pick, pick));
-    const Eigen::LDLT<Eigen::MatrixXd> solver(without);
+    const LdltFactors solver(without);
     Eigen::VectorXd score = info.score[k](pick);
-    if (solver.isPositive()) {
+    if (solver.positive()) {
       score = H * solver.solve(score);
     }
     scores.add(score);
@@ -441,12 +441,11 @@ Spread spread_of(const Fit& fit, const Fit::Information& info) {
   const Eigen::VectorXd unit = H.diagonal().cwiseSqrt();
   const Eigen::MatrixXd more =
       unit.cwiseInverse().asDiagonal() * (apart - spread.matrix) * unit.cwiseInverse().asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(more);
-  spread.matrix +=
-      unit.asDiagonal() *
-      (eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).asDiagonal() * eigen.eigenvectors().transpose()) *
-      unit.asDiagonal();
-  const Eigen::MatrixXd inverse = H.ldlt().solve(Eigen::MatrixXd::Identity(m, m));
+  const EigenPairs eigen = symmetric_eigen(more);
+  spread.matrix += unit.asDiagonal() *
+                   (eigen.vectors * eigen.values.cwiseMax(0.0).asDiagonal() * eigen.vectors.transpose()) *
+                   unit.asDiagonal();
+  const Eigen::MatrixXd inverse = LdltFactors(H).solve(Eigen::MatrixXd(Eigen::MatrixXd::Identity(m, m)));
   const Eigen::MatrixXd covariance = inverse * spread.matrix * inverse;
   for (Eigen::Index a = 0; a < m; ++a) {
     s.known[static_cast<std::size_t>(pick[static_cast<std::size_t>(a)])] = true;

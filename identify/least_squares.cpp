@@ -5,10 +5,8 @@
 #include <cmath>
 #include <limits>
 
-#include <Eigen/QR>
-#include <Eigen/SVD>
-
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/linear_algebra.hpp>
 
 namespace wheelwright {
 namespace {
@@ -34,9 +32,7 @@ void LeastSquares::fold() const {
   if (filled_ == columns) {
     return;
   }
-  Eigen::HouseholderQR<Eigen::Ref<Eigen::MatrixXd>> qr(stack_);
-  stack_.topRows(columns).triangularView<Eigen::StrictlyLower>().setZero();
-  stack_.bottomRows(kBatch).setZero();
+  triangularize(stack_);
   filled_ = columns;
 }
 
@@ -96,8 +92,8 @@ LeastSquaresFit LeastSquares::solve(const std::vector<bool>& excluded) const {
     s = s > 0.0 ? s : 1.0;
   }
   const Eigen::MatrixXd scaled = R * scale.cwiseInverse().asDiagonal();
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(scaled, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::VectorXd& sigma = svd.singularValues();
+  const SingularValues svd = singular_values(scaled);
+  const Eigen::VectorXd& sigma = svd.values;
   Eigen::VectorXd inverse = Eigen::VectorXd::Zero(p);
   for (Eigen::Index j = 0; j < p; ++j) {
     if (sigma[j] > kRankTolerance * sigma[0] && sigma[j] > 0.0) {
@@ -106,8 +102,7 @@ LeastSquaresFit LeastSquares::solve(const std::vector<bool>& excluded) const {
     }
   }
   fit.condition = sigma[p - 1] > 0.0 ? sigma[0] / sigma[p - 1] : std::numeric_limits<double>::infinity();
-  const Eigen::MatrixXd pseudo =
-      scale.cwiseInverse().asDiagonal() * svd.matrixV() * inverse.asDiagonal() * svd.matrixU().transpose();
+  const Eigen::MatrixXd pseudo = scale.cwiseInverse().asDiagonal() * svd.V * inverse.asDiagonal() * svd.U.transpose();
   fit.estimate = pseudo * c;
   fit.inverse_gram = pseudo * pseudo.transpose();
   fit.partial_rms = Eigen::VectorXd::Zero(p);
@@ -117,9 +112,8 @@ LeastSquaresFit LeastSquares::solve(const std::vector<bool>& excluded) const {
     } else {
       Eigen::MatrixXd others(p, p - 1);
       others << R.leftCols(j), R.rightCols(p - 1 - j);
-      const Eigen::VectorXd explained =
-          p == 1 ? Eigen::VectorXd(Eigen::VectorXd::Zero(p))
-                 : Eigen::VectorXd(others * others.completeOrthogonalDecomposition().solve(R.col(j)));
+      const Eigen::VectorXd explained = p == 1 ? Eigen::VectorXd(Eigen::VectorXd::Zero(p))
+                                               : Eigen::VectorXd(others * minimum_norm_solution(others, R.col(j)));
       fit.partial_rms[j] = (R.col(j) - explained).norm() / root;
     }
   }

@@ -11,6 +11,7 @@
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/limits.hpp>
+#include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/identify/least_squares.hpp>
 
 namespace wheelwright {
@@ -59,10 +60,10 @@ Eigen::MatrixXd whitening(const RegressionBlock& rows, const Eigen::VectorXd& sc
   const Eigen::VectorXd rms = fit.column_rms.unaryExpr([](double r) { return r > 0.0 ? r : 1.0; });
   const Eigen::MatrixXd scaled =
       rms.asDiagonal() * fit.inverse_gram * rms.asDiagonal() * static_cast<double>(fit.instants);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled);
+  const EigenPairs eigen = symmetric_eigen(scaled);
   const Eigen::Index kept = fit.rank;
-  return rms.cwiseInverse().asDiagonal() * eigen.eigenvectors().rightCols(kept) *
-         eigen.eigenvalues().tail(kept).cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  return rms.cwiseInverse().asDiagonal() * eigen.vectors.rightCols(kept) *
+         eigen.values.tail(kept).cwiseMax(0.0).cwiseSqrt().asDiagonal();
 }
 
 MEstimate run(const RegressionBlock& rows, const Eigen::VectorXd& scales, const LossFunction& loss,
@@ -154,11 +155,11 @@ bool find_box(const std::vector<LinearConstraint>& constraints, Eigen::Index p, 
       return false;
     }
   }
-  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(directions.transpose());
+  const PivotedQr qr(directions.transpose());
   if (qr.rank() < m) {
     return false;
   }
-  const Eigen::MatrixXd Q = qr.householderQ();
+  const Eigen::MatrixXd Q = qr.Q();
   box.B.resize(p, p);
   box.B << directions, Q.rightCols(p - m).transpose();
   box.lower = Eigen::VectorXd::Constant(p, -kInfinity);
@@ -173,7 +174,7 @@ bool find_box(const std::vector<LinearConstraint>& constraints, Eigen::Index p, 
 MEstimate m_estimate(const RegressionBlock& rows, const Eigen::VectorXd& scales, const LossFunction& loss,
                      const Eigen::VectorXd& start, const BoxCoordinates& box) {
   const Eigen::VectorXd z = (box.B * start).cwiseMax(box.lower).cwiseMin(box.upper);
-  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> B(box.B);
+  const PivotedQr B(box.B);
   const Eigen::VectorXd origin = B.solve(z);
   return run(rows, scales, loss, origin, B.inverse(), box.lower - z, box.upper - z);
 }

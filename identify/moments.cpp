@@ -4,9 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/QR>
-
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/linear_algebra.hpp>
 
 namespace wheelwright {
 namespace {
@@ -189,7 +188,7 @@ Eigen::VectorXd efficient_weights(const RegressionMoments& moments) {
   const double instants = std::max(1.0, static_cast<double>(moments.instants()));
   for (std::size_t i = 0; i < moments.outputs(); ++i) {
     const MomentSums s = moments.of_output(i);
-    const Eigen::VectorXd theta = s.YY.completeOrthogonalDecomposition().solve(s.Yy);
+    const Eigen::VectorXd theta = minimum_norm_solution(s.YY, s.Yy);
     const double rms = std::sqrt(std::max(0.0, s.yy - s.Yy.dot(theta)) / instants);
     const double scale = std::sqrt(s.yy / instants);
     // A perfect fit has no scale of its own.

@@ -4,12 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include <boost/math/distributions/chi_squared.hpp>
-#include <boost/math/distributions/fisher_f.hpp>
-#include <boost/math/distributions/normal.hpp>
-#include <boost/math/distributions/students_t.hpp>
-
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/statistics.hpp>
 
 namespace wheelwright {
 
@@ -18,12 +14,9 @@ ExtrapolatedBound extrapolate(const OutputResidual& residual, std::size_t instan
   check::that(options.risk > 0.0 && options.risk < 1.0, "extrapolation risk", "a number inside (0, 1)");
   check::positive(options.horizon, "extrapolation horizon");
   check::that(instants > 0, "extrapolation", "at least one instant");
-  namespace bm = boost::math;
   const double n = std::max(residual.effective_instants, 1.0);
-  const double spread = std::sqrt(n / bm::quantile(bm::chi_squared(n), options.risk));
-  const auto z = [&](double count) {
-    return bm::quantile(bm::complement(bm::normal(), std::min(0.25, options.risk / (2.0 * count))));
-  };
+  const double spread = std::sqrt(n / chi_squared_quantile(n, options.risk));
+  const auto z = [&](double count) { return normal_upper_quantile(std::min(0.25, options.risk / (2.0 * count))); };
   const auto seen = static_cast<double>(instants);
   ExtrapolatedBound result;
   result.bound = residual.rms * spread * z(seen * std::max(options.horizon, 1.0));
@@ -42,8 +35,7 @@ Eigen::VectorXd largest_plausible_error(RegressionSource& rows, const Eigen::Vec
                                         const ResidualSummary& summary, double risk) {
   check::that(risk > 0.0 && risk < 1.0, "risk", "a number inside (0, 1)");
   const auto p = static_cast<double>(theta.size());
-  const double f =
-      boost::math::quantile(boost::math::complement(boost::math::fisher_f(p, std::max(summary.freedom, 1.0)), risk));
+  const double f = fisher_upper_quantile(p, std::max(summary.freedom, 1.0), risk);
   const Eigen::MatrixXd scaled = p * f * summary.covariance;
   Eigen::VectorXd largest = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(rows.outputs()));
   RegressionBlock block;
@@ -57,12 +49,6 @@ Eigen::VectorXd largest_plausible_error(RegressionSource& rows, const Eigen::Vec
     }
   }
   return largest;
-}
-
-double student_quantile(double confidence, double freedom) {
-  check::that(confidence > 0.0 && confidence < 1.0, "confidence", "a number inside (0, 1)");
-  check::positive(freedom, "degrees of freedom");
-  return boost::math::quantile(boost::math::students_t(freedom), 0.5 + 0.5 * confidence);
 }
 
 }  // namespace wheelwright

@@ -43,7 +43,4 @@ struct ExtrapolatedBound {
 [[nodiscard]] Eigen::VectorXd largest_plausible_error(RegressionSource& rows, const Eigen::VectorXd& theta,
                                                       const ResidualSummary& summary, double risk);
 
-/// Two-sided Student-t quantile: P(|T| <= q) = `confidence` with `freedom` degrees of freedom.
-[[nodiscard]] double student_quantile(double confidence, double freedom);
-
 }  // namespace wheelwright

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/statistics.hpp>
 #include <wheelwright/identify/noise_level.hpp>
 
 namespace wheelwright {

@@ -7,10 +7,8 @@
 #include <optional>
 #include <utility>
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/QR>
-
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/identify/block_sums.hpp>
 #include <wheelwright/identify/m_estimate.hpp>
 
@@ -217,17 +215,17 @@ class Gathering {
     }
     Eigen::MatrixXd face = Eigen::MatrixXd::Identity(p, p);
     if (holding.cols() > 0) {
-      const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(holding);
-      face = Eigen::MatrixXd(qr.householderQ()).rightCols(p - qr.rank());
+      const PivotedQr qr(holding);
+      face = qr.Q().rightCols(p - qr.rank());
     }
     if (face.cols() == 0) {
       return Eigen::MatrixXd::Zero(p, p);
     }
     const Eigen::MatrixXd moving = scale.asDiagonal() * face;
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(moving.transpose() * bread_ * moving);
+    const EigenPairs eigen = symmetric_eigen(moving.transpose() * bread_ * moving);
     const Eigen::VectorXd inverse =
-        eigen.eigenvalues().unaryExpr([](double value) { return value > 1e-12 ? 1.0 / value : 0.0; });
-    return moving * eigen.eigenvectors() * inverse.asDiagonal() * eigen.eigenvectors().transpose() * moving.transpose();
+        eigen.values.unaryExpr([](double value) { return value > 1e-12 ? 1.0 / value : 0.0; });
+    return moving * eigen.vectors * inverse.asDiagonal() * eigen.vectors.transpose() * moving.transpose();
   }
 
   LossFunction loss_;

@@ -7,6 +7,7 @@
 #include <Eigen/LU>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/linear_algebra.hpp>
 
 namespace wheelwright {
 namespace {
@@ -98,10 +99,10 @@ ScoreBlocks score_blocks(const RegressionMoments& moments, const EstimatorOption
     s.reason = "there is nothing to estimate";
     return s;
   }
-  const Eigen::PartialPivLU<Eigen::MatrixXd> lu(s.total_A);
-  const Eigen::PartialPivLU<Eigen::MatrixXd> shape_lu(s.shape);
-  s.solvable = s.total_A.allFinite() && s.total_c.allFinite() && lu.rcond() > kSingularScore &&
-               shape_lu.rcond() > kSingularScore;
+  const LuFactors lu(s.total_A);
+  const LuFactors shape_lu(s.shape);
+  s.solvable = s.total_A.allFinite() && s.total_c.allFinite() && lu.reciprocal_condition() > kSingularScore &&
+               shape_lu.reciprocal_condition() > kSingularScore;
   if (!s.solvable) {
     s.reason =
         with_z ? "the instruments do not tell the parameters apart" : "the log does not tell the parameters apart";

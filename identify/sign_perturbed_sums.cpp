@@ -6,12 +6,9 @@
 #include <functional>
 #include <random>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
-
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/limits.hpp>
+#include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/identify/block_length.hpp>
 #include <wheelwright/identify/score_blocks.hpp>
 
@@ -30,10 +27,8 @@ struct Ellipsoid {
 };
 
 Ellipsoid ellipsoid(const Eigen::MatrixXd& Q, const Eigen::VectorXd& b) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(Eigen::MatrixXd::Identity(b.size(), b.size()) -
-                                                             Q.transpose() * Q);
-  Ellipsoid e{eigen.eigenvectors(), eigen.eigenvalues(), eigen.eigenvectors().transpose() * (Q.transpose() * b),
-              b.squaredNorm(), false};
+  const EigenPairs eigen = symmetric_eigen(Eigen::MatrixXd::Identity(b.size(), b.size()) - Q.transpose() * Q);
+  Ellipsoid e{eigen.vectors, eigen.values, eigen.vectors.transpose() * (Q.transpose() * b), b.squaredNorm(), false};
   e.bounded = e.lambda.allFinite() && e.lambda.minCoeff() > kFlat;
   return e;
 }
@@ -112,12 +107,12 @@ SignPerturbedSums::SignPerturbedSums(const RegressionMoments& moments, const Sig
   order_.resize(m_);
   std::generate(order_.begin(), order_.end(), std::ref(generator));
 
-  const Eigen::LLT<Eigen::MatrixXd> P(groups.shape);
-  c_ = P.matrixL().solve(groups.c * signs);
+  const CholeskyFactors P(groups.shape);
+  c_ = P.solve_lower(groups.c * signs);
   A_ = groups.A * signs;
   const Eigen::Index q = c_.rows();
   for (Eigen::Index j = 0; j < q; ++j) {
-    A_.middleRows(j * q, q) = P.matrixL().solve(Eigen::MatrixXd(A_.middleRows(j * q, q)));
+    A_.middleRows(j * q, q) = P.solve_lower(A_.middleRows(j * q, q));
   }
 }
 
@@ -155,7 +150,7 @@ SignPerturbedBounds SignPerturbedSums::bounds() const {
   }
   const Eigen::Index q = c_.rows();
   const Eigen::MatrixXd root = A_.col(0).reshaped(q, q);  // z = root (ψ − ψ̂) = −S_0
-  const Eigen::MatrixXd K = root.inverse();
+  const Eigen::MatrixXd K = inverse(root);
   std::vector<double> norms;
   std::vector<std::vector<double>> up(static_cast<std::size_t>(q)), down(static_cast<std::size_t>(q));
   for (Eigen::Index i = 1; i < c_.cols(); ++i) {

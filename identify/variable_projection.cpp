@@ -7,10 +7,12 @@
 #include <optional>
 
 #include <ceres/ceres.h>
-#include <Eigen/Dense>
+#include <Eigen/Core>
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/limits.hpp>
+#include <wheelwright/core/linear_algebra.hpp>
+#include <wheelwright/core/statistics.hpp>
 #include <wheelwright/identify/block_sums.hpp>
 #include <wheelwright/identify/noise_level.hpp>
 
@@ -23,7 +25,7 @@ constexpr double kHopeless = 1e6;  // half width of an interval over the estimat
 struct Projection {
   SeparableValues at;
   Eigen::VectorXd scale;  // lengths of the columns
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr;
+  PivotedQr qr;
   int rank = 0;
   Eigen::VectorXd linear, residual;
 
@@ -32,20 +34,16 @@ struct Projection {
     if (at.columns.cols() == 0) {
       return v;
     }
-    Eigen::VectorXd c = qr.householderQ().adjoint() * v;
+    Eigen::VectorXd c = qr.rotate(v);
     c.head(rank).setZero();
-    return qr.householderQ() * c;
+    return qr.rotate_back(c);
   }
   // (Φ⁺)ᵀ v
   [[nodiscard]] Eigen::VectorXd pseudo_transposed(const Eigen::VectorXd& v) const {
-    const Eigen::VectorXd permuted = qr.colsPermutation().transpose() * v.cwiseQuotient(scale);
+    const Eigen::VectorXd permuted = v.cwiseQuotient(scale)(qr.order().head(rank));
     Eigen::VectorXd c = Eigen::VectorXd::Zero(at.columns.rows());
-    c.head(rank) = qr.matrixR()
-                       .topLeftCorner(rank, rank)
-                       .template triangularView<Eigen::Upper>()
-                       .transpose()
-                       .solve(permuted.head(rank));
-    return qr.householderQ() * c;
+    c.head(rank) = solve_lower(qr.R(rank).transpose(), permuted);
+    return qr.rotate_back(c);
   }
 };
 
@@ -99,8 +97,7 @@ class Problem {
     }
     p.scale = p.at.columns.colwise().norm();
     for (double& s : p.scale) s = s > 0.0 ? s : 1.0;
-    p.qr.setThreshold(rank_tolerance_);
-    p.qr.compute(p.at.columns * p.scale.cwiseInverse().asDiagonal());
+    p.qr = PivotedQr(p.at.columns * p.scale.cwiseInverse().asDiagonal(), rank_tolerance_);
     p.rank = static_cast<int>(p.qr.rank());
     p.linear = p.qr.solve(p.residual).cwiseQuotient(p.scale);
     // One step of refinement: shapes at which columns are nearly alike (sums of exponentials) want it.
@@ -277,21 +274,16 @@ Eigen::MatrixXd inverse_gram(const Eigen::MatrixXd& J, double tolerance, std::ve
     scale[j] = length > 0.0 ? length : 1.0;
     K.col(j) = J.col(pick[static_cast<std::size_t>(j)]) / scale[j];
   }
-  const Eigen::HouseholderQR<Eigen::MatrixXd> plain(K);
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr;
-  qr.setThreshold(tolerance);
-  qr.compute(Eigen::MatrixXd(plain.matrixQR().topRows(std::min(m, K.rows())).template triangularView<Eigen::Upper>()));
+  const PivotedQr qr(QrFactors(K).R(), tolerance);
   const Eigen::Index rank = qr.rank();
   if (rank < m) {
     for (Eigen::Index j = rank; j < m; ++j) {
-      used[static_cast<std::size_t>(pick[static_cast<std::size_t>(qr.colsPermutation().indices()[j])])] = false;
+      used[static_cast<std::size_t>(pick[static_cast<std::size_t>(qr.order()[j])])] = false;
     }
     return inverse_gram(J, tolerance, used);
   }
-  const Eigen::MatrixXd root =
-      qr.colsPermutation() * Eigen::MatrixXd(qr.matrixR().topLeftCorner(m, m).template triangularView<Eigen::Upper>())
-                                 .triangularView<Eigen::Upper>()
-                                 .solve(Eigen::MatrixXd::Identity(m, m));
+  Eigen::MatrixXd root(m, m);
+  root(qr.order(), Eigen::all) = solve_upper(qr.R(m), Eigen::MatrixXd::Identity(m, m));
   const Eigen::MatrixXd gram = root * root.transpose();
   for (Eigen::Index a = 0; a < m; ++a) {
     for (Eigen::Index b = 0; b < m; ++b) {

@@ -9,10 +9,10 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <Eigen/QR>
 
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/core/limits.hpp>
+#include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/io/export_c_text.hpp>
 #include <wheelwright/model/differential_drive.hpp>
 #include <wheelwright/model/single_axis.hpp>
@@ -55,7 +55,7 @@ Eigen::MatrixXd friction_rate(const Model& model, const MotionBound& bound) {
 }
 
 Eigen::MatrixXd joints_from_coordinates(const Model& model) {
-  const Eigen::MatrixXd inverse = model.motion.completeOrthogonalDecomposition().pseudoInverse();
+  const Eigen::MatrixXd inverse = pseudo_inverse(model.motion);
   const bool determined =
       (inverse * model.motion - Eigen::MatrixXd::Identity(inverse.rows(), inverse.rows())).cwiseAbs().maxCoeff() < 1e-9;
   return determined ? Eigen::MatrixXd(kOutward * inverse.cwiseAbs())

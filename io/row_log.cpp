@@ -9,6 +9,7 @@
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/error.hpp>
+#include <wheelwright/core/statistics.hpp>
 
 namespace wheelwright {
 namespace {
@@ -21,9 +22,7 @@ double middle_of(std::vector<double>& steps) {
   if (steps.empty()) {
     return 0.0;
   }
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return *middle;
+  return median(std::move(steps));
 }
 
 RowLog::RowLog(std::vector<std::unique_ptr<RowFile>> files, RowLogOptions options)

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include <wheelwright/commission/physical.hpp>
+#include <wheelwright/core/statistics.hpp>
 #include <wheelwright/identify/noise_level.hpp>
 #include <wheelwright/report/page.hpp>
 #include <wheelwright/report/parameter_view.hpp>

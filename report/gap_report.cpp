@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include <wheelwright/core/statistics.hpp>
 #include <wheelwright/gap/where.hpp>
 #include <wheelwright/report/chart.hpp>
 #include <wheelwright/report/gap_drawings.hpp>
@@ -114,9 +115,7 @@ std::vector<std::size_t> breaks_of(const Eigen::VectorXd& t) {
   if (steps.empty()) {
     return out;
   }
-  std::vector<double> sorted = steps;
-  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
-  const double usual = sorted[sorted.size() / 2];
+  const double usual = median(steps);
   for (std::size_t k = 0; k < steps.size(); ++k) {
     if (steps[k] > 5.0 * usual || steps[k] < 0.0) {
       out.push_back(k + 1);

@@ -9,6 +9,7 @@
 #include <limits>
 
 #include <wheelwright/core/error.hpp>
+#include <wheelwright/core/statistics.hpp>
 
 namespace wheelwright::report {
 namespace {
@@ -104,9 +105,8 @@ double tick_for(std::span<const double> t, const std::vector<bool>& starts) {
   }
   double tick = 1e-6;
   if (!steps.empty()) {
-    const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-    std::nth_element(steps.begin(), middle, steps.end());
-    while (*middle > 0.0 && *middle < 100.0 * tick && tick > 1e-12) {
+    const double usual = median(std::move(steps));
+    while (usual > 0.0 && usual < 100.0 * tick && tick > 1e-12) {
       tick *= 0.1;
     }
   }

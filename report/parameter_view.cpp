@@ -6,6 +6,7 @@
 #include <utility>
 
 #include <wheelwright/commission/physical.hpp>
+#include <wheelwright/core/statistics.hpp>
 #include <wheelwright/report/text.hpp>
 
 namespace wheelwright::report {

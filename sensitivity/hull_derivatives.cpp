@@ -6,13 +6,13 @@
 #include <limits>
 
 #include <fmt/format.h>
-#include <Eigen/LU>
 
 #include <wheelwright/bounds/block_parts.hpp>
 #include <wheelwright/bounds/linear_program.hpp>
 #include <wheelwright/bounds/slab_rows.hpp>
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/limits.hpp>
+#include <wheelwright/core/linear_algebra.hpp>
 
 namespace wheelwright {
 namespace {
@@ -76,8 +76,8 @@ void locate(const HullOptima& optima, HullOptimum& optimum) {
     rows.row(r) = block.normals.col(facet).transpose();
     offsets[r] = block.offsets[facet];
   }
-  const Eigen::FullPivLU<Eigen::MatrixXd> lu(rows), transposed(rows.transpose());
-  if (!lu.isInvertible()) {
+  const RankRevealingLu lu(rows), transposed(rows.transpose());
+  if (!lu.invertible()) {
     return;
   }
   const Eigen::VectorXd lambda = transposed.solve(c);

@@ -7,10 +7,10 @@
 #include <random>
 
 #include <fmt/format.h>
-#include <boost/math/distributions/students_t.hpp>
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/limits.hpp>
+#include <wheelwright/core/statistics.hpp>
 
 namespace wheelwright {
 namespace {
@@ -85,7 +85,7 @@ ElementaryEffects summary(const std::vector<double>& effects, double confidence)
     const auto n = static_cast<double>(out.effects);
     out.deviation = std::sqrt((e - out.mean).square().sum() / (n - 1.0));
     out.standard_error = std::sqrt((e.abs() - out.mean_absolute).square().sum() / (n - 1.0) / n);
-    const double t = boost::math::quantile(boost::math::students_t(n - 1.0), 0.5 + 0.5 * confidence);
+    const double t = student_quantile(confidence, n - 1.0);
     out.lower = std::max(0.0, out.mean_absolute - t * out.standard_error);
     out.upper = out.mean_absolute + t * out.standard_error;
   }

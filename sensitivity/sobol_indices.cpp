@@ -7,9 +7,9 @@
 #include <limits>
 
 #include <fmt/format.h>
-#include <boost/math/distributions/students_t.hpp>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/statistics.hpp>
 #include <wheelwright/sensitivity/sobol_points.hpp>
 
 namespace wheelwright {
@@ -128,7 +128,7 @@ SobolIndices indices_of(const Eigen::ArrayXd& values, Eigen::Index inputs, const
     without.col(r) = rest.indices();
   }
   const double freedom = static_cast<double>(count - 1);
-  const double t = boost::math::quantile(boost::math::students_t(freedom), 0.5 + 0.5 * options.confidence);
+  const double t = student_quantile(options.confidence, freedom);
   const Eigen::ArrayXd estimate = all.indices();
   const auto index = [&](Eigen::Index j) {
     const Eigen::ArrayXd row = without.row(j);

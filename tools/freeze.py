@@ -5,6 +5,8 @@
     tools/freeze.py --program build/bin/wheelwright --write before.json     # all runs, shared recordings too
     tools/freeze.py --program build/bin/wheelwright --against before.json   # ends with 1 where a result differs
     tools/freeze.py --program build/bin/wheelwright --quick --against tools/behaviour.json   # what CI runs
+    tools/freeze.py --program build/bin/wheelwright --against before.json --keep now         # and leave the results
+    tools/freeze.py --numbers before now   # two such folders: the largest relative difference of any number in a file
 
 Every run gets an exit code, a hash of what it prints with --json or to the standard output, and one of each JSON file,
 CSV file, header and robot file that it writes; of pages and plain words only with --words. JSON is hashed without the
@@ -72,7 +74,7 @@ def shipped_runs():
     yield Run("design_detection", ["design", "--model", model, "--for", "detection", "--fault", "wheel_radius=0.03",
                                    *LIMITS, "--out", "r"], ["commission"])
     yield Run("design_discrimination", ["design", "--robot", ROBOT, "--for", "discrimination", "--between", "coulomb",
-                                        "--between", "caster_drag", "--size", "coulomb=0.2", "--out", "r"])
+                                        "--between", "caster_drag", "--size", "coulomb=0.2", *LIMITS, "--out", "r"])
     yield Run("choose", ["choose", HEALTHY, "--robot", ROBOT, "--fault", "wheel_radius=0.05", "--out", "r"])
     yield Run("sensitivity", ["sensitivity", STUDY, "--out", "r"])
     yield Run("gap", ["gap", "../simulate_pose/log.csv", "--robot", ROBOT, "--baseline", HEALTHY, "--out", "r"],
@@ -85,10 +87,10 @@ def recorded_runs():
     for name, log in (("emps", "emps/emps.csv"), ("warthog", "warthog/current.csv"), ("regbot", "regbot_fleet/run_00.csv")):
         robot = str(data / f"{name}.yaml")
         for command in ("commission", "identify", "doctor", "gap"):
+            if (name, command) == ("regbot", "gap"):  # six seconds, of which nothing is left to compare
+                continue
             yield Run(f"{name}_{command}", [command, str(data / log), "--robot", robot, "--out", "r"])
     yield Run("regbot_fleet", ["fleet", str(data / "regbot_fleet"), "--robot", str(data / "regbot.yaml"), "--out", "r"])
-    yield Run("warthog_pose", ["commission", str(data / "warthog/warthog_pose.csv"), "--robot",
-                               str(data / "warthog.yaml"), "--out", "r"])
     cases = SHARED / "withheld-dev"
     for case in ("case_000", "case_007", "case_014", "case_021", "case_030", "case_038"):
         folder = cases / case
@@ -148,14 +150,16 @@ def results_of(run, program, folder, words):
     return found
 
 
-def all_results(runs, program, jobs, words):
+def all_results(runs, program, jobs, words, keep):
     results, waiting = {}, list(runs)
-    with tempfile.TemporaryDirectory() as folder, concurrent.futures.ThreadPoolExecutor(jobs) as pool:
-        going = {}
+    if keep:
+        keep.mkdir(parents=True)
+    with tempfile.TemporaryDirectory() as temporary, concurrent.futures.ThreadPoolExecutor(jobs) as pool:
+        going, folder = {}, (keep or pathlib.Path(temporary)).resolve()
         while waiting or going:
             for run in [r for r in waiting if all(n in results for n in r.needs)]:
                 waiting.remove(run)
-                going[pool.submit(results_of, run, program, pathlib.Path(folder), words)] = run
+                going[pool.submit(results_of, run, program, folder, words)] = run
             for future in concurrent.futures.wait(going, return_when=concurrent.futures.FIRST_COMPLETED).done:
                 run = going.pop(future)
                 results[run.name] = future.result()
@@ -173,16 +177,48 @@ def differences(before, now):
         yield f"{name}: not among the results to compare with"
 
 
+def largest_difference(old, new, where=""):
+    """(relative difference, where) of the numbers of two JSON values; infinite where they differ otherwise."""
+    number = (int, float)
+    if isinstance(old, number) and isinstance(new, number) and not isinstance(old, bool) and not isinstance(new, bool):
+        return (0.0 if old == new else abs(old - new) / max(abs(old), abs(new)), where)
+    if isinstance(old, dict) and isinstance(new, dict) and set(old) == set(new):
+        return max((largest_difference(old[k], new[k], f"{where}.{k}") for k in old if k not in VOLATILE),
+                   default=(0.0, where))
+    if isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
+        return max((largest_difference(a, b, f"{where}[{k}]") for k, (a, b) in enumerate(zip(old, new))),
+                   default=(0.0, where))
+    return (0.0 if old == new else float("inf"), where)
+
+
+def compare_numbers(before, now):
+    for path in sorted(now.rglob("*.json")):
+        name = path.relative_to(now)
+        if not (before / name).is_file():
+            print(f"{name}: not among the earlier ones")
+            continue
+        size, where = largest_difference(json.loads((before / name).read_text()), json.loads(path.read_text()))
+        if size > 0.0:
+            print(f"{name}: {size:.1e} at {where}")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--program", required=True, type=pathlib.Path)
+    parser.add_argument("--program", type=pathlib.Path)
     parser.add_argument("--quick", action="store_true", help="a minute's worth, without shared recordings")
     parser.add_argument("--words", action="store_true", help="pages and printed words, too")
     parser.add_argument("--write", type=pathlib.Path)
     parser.add_argument("--against", type=pathlib.Path)
     parser.add_argument("--only", action="append", help="runs of these names, with what they need")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
+    parser.add_argument("--keep", type=pathlib.Path, help="a new folder for the results themselves")
+    parser.add_argument("--numbers", nargs=2, type=pathlib.Path, metavar=("BEFORE", "NOW"))
     options = parser.parse_args()
+    if options.numbers:
+        compare_numbers(*options.numbers)
+        return 0
+    if not options.program:
+        parser.error("--program is missing")
     runs = list(shipped_runs())
     if options.quick:
         runs = with_needs(runs, [r.name for r in runs if r.quick])
@@ -192,7 +228,7 @@ def main():
         print("freeze: no shared recordings here: shipped and simulated logs only", file=sys.stderr)
     if options.only:
         runs = with_needs(runs, options.only)
-    results = all_results(runs, options.program.resolve(), options.jobs, options.words)
+    results = all_results(runs, options.program.resolve(), options.jobs, options.words, options.keep)
     if options.write:
         options.write.write_text(json.dumps(results, indent=1) + "\n")
     failed = [f"{n}: {r['error']}" for n, r in results.items() if "error" in r]

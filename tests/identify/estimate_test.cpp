@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/core/statistics.hpp>
 #include <wheelwright/identify/estimate.hpp>
 
 #include <cmath>

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <wheelwright/core/error.hpp>
+#include <wheelwright/core/statistics.hpp>
 #include <wheelwright/identify/least_squares.hpp>
 #include <wheelwright/identify/noise_level.hpp>
 

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/core/statistics.hpp>
 #include <wheelwright/identify/regions.hpp>
 
 #include <gtest/gtest.h>

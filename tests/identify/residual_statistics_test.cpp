@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <wheelwright/core/statistics.hpp>
 #include <wheelwright/identify/noise_level.hpp>
 #include <wheelwright/identify/residual_statistics.hpp>
 

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/core/statistics.hpp>
 #include <wheelwright/identify/sign_perturbed_sums.hpp>
 
 #include <cmath>

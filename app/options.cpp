@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "options.hpp"
+
+#include <charconv>
+#include <map>
+
+#include <CLI/CLI.hpp>
+
+#include <wheelwright/core/error.hpp>
+#include <wheelwright/io/number.hpp>
+
+#include "units.hpp"
+
+namespace wheelwright::app {
+
+void add_common(CLI::App& command, CommonOptions& options) {
+  command.add_option("--out", options.out, "Write results and report.html into this directory")->type_name("DIR");
+  command.add_flag("--json", options.json, "Print the result as JSON on standard output, and nothing else there");
+  command.add_option("--threads", options.threads, "Use at most N threads; results do not depend on it")
+      ->type_name("N")
+      ->check(CLI::Range(1, 1024))
+      ->capture_default_str();
+  command.add_option("--seed", options.seed, "Seed of everything random")->type_name("N")->capture_default_str();
+  command.add_flag("--quiet", options.quiet, "No progress and no summary; errors are still told");
+}
+
+void add_footer(CLI::App& command, const char* text) { command.footer(text); }
+
+void add_map(CLI::App& command, CommonOptions& options) {
+  command
+      .add_option(
+          "--map", options.map,
+          "Read the log column NAME from the file's column COLUMN, or from a bag's TOPIC.FIELD (repeatable), e.g. "
+          "--map omega_r=wheel_2 or --map omega_r=/joint_states.velocity[right_wheel]")
+      ->type_name("NAME=COLUMN")
+      ->expected(1)
+      ->allow_extra_args(false)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  command
+      .add_option("--msg-path", options.msg_path,
+                  "Directory with definitions of messages (PKG/msg/TYPE.msg), for bags that do not bring their own "
+                  "(repeatable)")
+      ->type_name("DIR")
+      ->expected(1)
+      ->allow_extra_args(false)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+}
+
+void add_persistence(CLI::App& command, std::optional<Persistence>& persistence, const std::string& otherwise) {
+  command
+      .add_option_function<std::string>(
+          "--persistence",
+          [&persistence](const std::string& text) {
+            Persistence rule;
+            const char* const end = text.data() + text.size();
+            const auto k = std::from_chars(text.data(), end, rule.k);
+            const bool slash = k.ec == std::errc() && k.ptr != end && *k.ptr == '/';
+            const auto n = std::from_chars(slash ? k.ptr + 1 : end, end, rule.n);
+            if (!slash || n.ec != std::errc() || n.ptr != end || rule.k < 1 || rule.k > rule.n || rule.n > 64) {
+              throw CLI::ValidationError("--persistence '" + text + "': expected K/N with 1 <= K <= N <= 64, e.g. 3/5",
+                                         CLI::ExitCodes::ValidationError);
+            }
+            persistence = rule;
+          },
+          "Raise an alarm when K of the last N instants are outside (default: " + otherwise + ")")
+      ->type_name("K/N");
+}
+
+void add_set(CLI::App& command, ParameterSetKind& set) {
+  command.add_option("--set", set, "Threshold from the feasible set itself (polytope) or from its box")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, ParameterSetKind>{
+                                              {"polytope", ParameterSetKind::polytope}, {"box", ParameterSetKind::box}})
+                      .description("{polytope,box}"))
+      ->type_name("SET");
+}
+
+void add_test(CLI::App& command, Test& test) {
+  command.add_option("--test", test, "Compare with [l, u] (two_sided) or with rho as the paper does (symmetric)")
+      ->transform(CLI::CheckedTransformer(
+                      std::map<std::string, Test>{{"two_sided", Test::two_sided}, {"symmetric", Test::symmetric}})
+                      .description("{two_sided,symmetric}"))
+      ->type_name("TEST");
+}
+
+void add_scale_options(CLI::App& command, ScaleOptions& options) {
+  command
+      .add_option_function<std::string>(
+          "--shard",
+          [&options](const std::string& text) {
+            options.shard = shard_of(text);
+            if (!options.shard) {
+              throw CLI::ValidationError("--shard '" + text + "': expected I/N with 1 <= I <= N, e.g. 3/7",
+                                         CLI::ExitCodes::ValidationError);
+            }
+          },
+          "Evaluate the Ith of N parts only, into its own file in --out; --merge takes the parts together")
+      ->type_name("I/N");
+  command.add_flag("--merge", options.merge, "Take together what the shards in --out evaluated; evaluate nothing");
+  command.add_flag("--fresh", options.fresh,
+                   "Throw away what an earlier run left in --out, instead of going on with it");
+}
+
+CLI::Validator in_unit(const std::string& unit) {
+  CLI::Validator out(
+      [unit](std::string& text) {
+        try {
+          text = number_text(quantity(text, unit));
+          return std::string();
+        } catch (const InputError& error) {
+          return std::string(error.what());
+        }
+      },
+      "", "unit");
+  return out;
+}
+
+}  // namespace wheelwright::app

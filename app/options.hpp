@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Options that several commands have.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include <wheelwright/detector/row_detector.hpp>
+
+#include "common.hpp"
+#include "run_items.hpp"
+
+namespace CLI {
+class App;
+class Validator;
+}
+
+namespace wheelwright::app {
+
+/// Adds the common options to `command`.
+void add_common(CLI::App& command, CommonOptions& options);
+/// What stands below the options in the help of `command`.
+void add_footer(CLI::App& command, const char* text);
+
+/// The end of every registration: the common options, the examples, and what runs the command. `Arguments` has a member
+/// `common`.
+template <typename Arguments>
+[[nodiscard]] Run finish(CLI::App& command, std::shared_ptr<Arguments> arguments, const char* examples,
+                         int (*run)(const Arguments&)) {
+  add_common(command, arguments->common);
+  add_footer(command, examples);
+  return [arguments, run](const std::string& command_line) {
+    arguments->common.command_line = command_line;
+    return run(*arguments);
+  };
+}
+/// Adds --map and --msg-path to a command that reads logs.
+void add_map(CLI::App& command, CommonOptions& options);
+
+/// Adds --persistence K/N; `persistence` stays empty where it is not given. `otherwise` says what holds then.
+void add_persistence(CLI::App& command, std::optional<Persistence>& persistence, const std::string& otherwise);
+
+/// Adds --set polytope|box.
+void add_set(CLI::App& command, ParameterSetKind& set);
+/// Adds --test two_sided|symmetric.
+void add_test(CLI::App& command, Test& test);
+
+/// Makes an option take quantities with units: what the option itself converts is the number in `unit` (quantity()).
+[[nodiscard]] CLI::Validator in_unit(const std::string& unit);
+
+/// Adds --shard I/N, --merge and --fresh.
+void add_scale_options(CLI::App& command, ScaleOptions& options);
+
+}  // namespace wheelwright::app
