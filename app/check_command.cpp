@@ -5,7 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/io/model_file.hpp>
+#include <wheelwright/results/model_file.hpp>
 
 #include "check_words.hpp"
 #include "commands.hpp"

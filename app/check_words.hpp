@@ -25,7 +25,7 @@ struct CheckedFiles {
 /// The answer, a short table and what is not proved, for a terminal.
 [[nodiscard]] std::string summary(const ModelCheck& check, const ModelClaims& claims);
 
-/// The same as JSON (io/check.schema.json).
+/// The same as JSON (results/check.schema.json).
 [[nodiscard]] Json to_json(const ModelCheck& check, const ModelClaims& claims, const LogReport& data,
                            const CheckedFiles& files);
 

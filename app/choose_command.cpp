@@ -9,10 +9,10 @@
 
 #include <wheelwright/commission/detector_choice.hpp>
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/io/choice_json.hpp>
-#include <wheelwright/io/model_file.hpp>
-#include <wheelwright/io/robot_file.hpp>
 #include <wheelwright/report/commission_report.hpp>
+#include <wheelwright/results/choice_json.hpp>
+#include <wheelwright/results/model_file.hpp>
+#include <wheelwright/robots/robot_file.hpp>
 
 #include "commands.hpp"
 #include "common.hpp"

@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include <wheelwright/io/suggest.hpp>
+#include <wheelwright/files/suggest.hpp>
 
 namespace wheelwright::app {
 namespace {

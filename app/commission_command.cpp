@@ -8,11 +8,11 @@
 
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/commission/trace.hpp>
-#include <wheelwright/io/atomic_file.hpp>
-#include <wheelwright/io/model_file.hpp>
-#include <wheelwright/io/robot_file.hpp>
+#include <wheelwright/files/atomic_file.hpp>
 #include <wheelwright/report/chart.hpp>
 #include <wheelwright/report/commission_report.hpp>
+#include <wheelwright/results/model_file.hpp>
+#include <wheelwright/robots/robot_file.hpp>
 
 #include "commands.hpp"
 #include "common.hpp"

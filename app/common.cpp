@@ -7,9 +7,9 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/io/atomic_file.hpp>
-#include <wheelwright/io/log_columns.hpp>
-#include <wheelwright/io/suggest.hpp>
+#include <wheelwright/files/atomic_file.hpp>
+#include <wheelwright/files/suggest.hpp>
+#include <wheelwright/logs/log_columns.hpp>
 #include <wheelwright/model/robot.hpp>
 #include <wheelwright/report/raw_signals.hpp>
 

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include <wheelwright/detector/row_detector.hpp>
-#include <wheelwright/io/json_file.hpp>
-#include <wheelwright/io/log_file.hpp>
+#include <wheelwright/files/json_file.hpp>
+#include <wheelwright/logs/log_file.hpp>
 #include <wheelwright/report/context.hpp>
 
 #include "commands.hpp"

@@ -10,14 +10,14 @@
 #include <wheelwright/design/detection.hpp>
 #include <wheelwright/design/manoeuvre.hpp>
 #include <wheelwright/design/stages.hpp>
+#include <wheelwright/files/number.hpp>
 #include <wheelwright/gap/catalogue.hpp>
 #include <wheelwright/gap/discrimination_design.hpp>
 #include <wheelwright/gap/planned_drive.hpp>
-#include <wheelwright/io/csv.hpp>
-#include <wheelwright/io/model_file.hpp>
-#include <wheelwright/io/number.hpp>
-#include <wheelwright/io/robot_file.hpp>
+#include <wheelwright/logs/csv.hpp>
 #include <wheelwright/report/design_report.hpp>
+#include <wheelwright/results/model_file.hpp>
+#include <wheelwright/robots/robot_file.hpp>
 
 #include "commands.hpp"
 #include "common.hpp"

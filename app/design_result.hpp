@@ -7,8 +7,8 @@
 
 #include <wheelwright/design/detection.hpp>
 #include <wheelwright/design/manoeuvre.hpp>
+#include <wheelwright/files/json_file.hpp>
 #include <wheelwright/gap/discrimination_design.hpp>
-#include <wheelwright/io/json_file.hpp>
 
 namespace wheelwright::app {
 

@@ -8,9 +8,9 @@
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/commission/trace.hpp>
-#include <wheelwright/io/model_file.hpp>
 #include <wheelwright/report/chart.hpp>
 #include <wheelwright/report/detect_report.hpp>
+#include <wheelwright/results/model_file.hpp>
 
 #include "commands.hpp"
 #include "common.hpp"

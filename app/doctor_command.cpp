@@ -7,10 +7,10 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/commission/log_health.hpp>
-#include <wheelwright/io/health_json.hpp>
-#include <wheelwright/io/robot_file.hpp>
+#include <wheelwright/doctor/log_health.hpp>
 #include <wheelwright/report/health_report.hpp>
+#include <wheelwright/results/health_json.hpp>
+#include <wheelwright/robots/robot_file.hpp>
 
 #include "commands.hpp"
 #include "common.hpp"

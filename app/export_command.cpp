@@ -5,10 +5,10 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/io/atomic_file.hpp>
-#include <wheelwright/io/export_c.hpp>
-#include <wheelwright/io/model_file.hpp>
-#include <wheelwright/io/warrant_json.hpp>
+#include <wheelwright/export/export_c.hpp>
+#include <wheelwright/files/atomic_file.hpp>
+#include <wheelwright/results/model_file.hpp>
+#include <wheelwright/results/warrant_json.hpp>
 
 #include "commands.hpp"
 #include "common.hpp"

@@ -9,14 +9,14 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/fleet/examine_robot.hpp>
-#include <wheelwright/fleet/fleet_result.hpp>
-#include <wheelwright/io/atomic_file.hpp>
-#include <wheelwright/io/fleet_json.hpp>
-#include <wheelwright/io/fleet_list.hpp>
-#include <wheelwright/io/pooled_prior_file.hpp>
-#include <wheelwright/io/robot_file.hpp>
+#include <wheelwright/files/atomic_file.hpp>
 #include <wheelwright/report/fleet_report.hpp>
+#include <wheelwright/results/fleet_json.hpp>
+#include <wheelwright/results/pooled_prior_file.hpp>
+#include <wheelwright/robots/fleet_list.hpp>
+#include <wheelwright/robots/robot_file.hpp>
+#include <wheelwright/study/examine_robot.hpp>
+#include <wheelwright/study/fleet_result.hpp>
 
 #include "commands.hpp"
 #include "common.hpp"

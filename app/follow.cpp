@@ -11,7 +11,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/io/csv.hpp>
+#include <wheelwright/logs/csv.hpp>
 
 #include "summary.hpp"
 

@@ -7,19 +7,19 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include <wheelwright/files/atomic_file.hpp>
+#include <wheelwright/files/suggest.hpp>
 #include <wheelwright/gap/catalogue.hpp>
 #include <wheelwright/gap/diagnose.hpp>
 #include <wheelwright/gap/fresh_log.hpp>
 #include <wheelwright/gap/naive.hpp>
 #include <wheelwright/gap/prepared.hpp>
-#include <wheelwright/io/atomic_file.hpp>
-#include <wheelwright/io/csv.hpp>
-#include <wheelwright/io/gap_json.hpp>
-#include <wheelwright/io/robot_file.hpp>
-#include <wheelwright/io/suggest.hpp>
+#include <wheelwright/logs/csv.hpp>
 #include <wheelwright/report/commission_report.hpp>
 #include <wheelwright/report/gap_report.hpp>
 #include <wheelwright/report/gap_words.hpp>
+#include <wheelwright/results/gap_json.hpp>
+#include <wheelwright/robots/robot_file.hpp>
 
 #include "commands.hpp"
 #include "common.hpp"

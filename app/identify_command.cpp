@@ -6,12 +6,12 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/commission/identification.hpp>
-#include <wheelwright/commission/identification_words.hpp>
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/io/identification_json.hpp>
-#include <wheelwright/io/robot_file.hpp>
+#include <wheelwright/inference/identification.hpp>
+#include <wheelwright/inference/identification_words.hpp>
 #include <wheelwright/report/identify_report.hpp>
+#include <wheelwright/results/identification_json.hpp>
+#include <wheelwright/robots/robot_file.hpp>
 
 #include "commands.hpp"
 #include "common.hpp"

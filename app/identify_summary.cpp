@@ -9,8 +9,8 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/commission/identification_words.hpp>
 #include <wheelwright/identify/noise_level.hpp>
+#include <wheelwright/inference/identification_words.hpp>
 
 namespace wheelwright::app {
 namespace {

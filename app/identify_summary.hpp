@@ -5,7 +5,7 @@
 
 #include <string>
 
-#include <wheelwright/commission/identification.hpp>
+#include <wheelwright/inference/identification.hpp>
 
 namespace wheelwright::app {
 

@@ -10,9 +10,9 @@
 
 #include <wheelwright/commission/margin_survey.hpp>
 #include <wheelwright/commission/margin_words.hpp>
-#include <wheelwright/io/margins_json.hpp>
-#include <wheelwright/io/model_file.hpp>
 #include <wheelwright/report/margins_report.hpp>
+#include <wheelwright/results/margins_json.hpp>
+#include <wheelwright/results/model_file.hpp>
 
 #include "columns.hpp"
 #include "commands.hpp"

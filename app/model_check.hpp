@@ -9,7 +9,7 @@
 
 #include <wheelwright/bounds/check_certificate.hpp>
 #include <wheelwright/core/log.hpp>
-#include <wheelwright/io/model_file.hpp>
+#include <wheelwright/results/model_file.hpp>
 
 namespace wheelwright::app {
 

@@ -7,7 +7,7 @@
 #include <CLI/CLI.hpp>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/io/number.hpp>
+#include <wheelwright/files/number.hpp>
 
 #include "units.hpp"
 

@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-#include <wheelwright/sensitivity/work.hpp>
+#include <wheelwright/study/work.hpp>
 
 namespace wheelwright::app {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/sensitivity/work_on_ranks.hpp>
+#include <wheelwright/study/work_on_ranks.hpp>
 
 #include "ranks.hpp"
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include <wheelwright/core/log.hpp>
-#include <wheelwright/io/model_file.hpp>
+#include <wheelwright/results/model_file.hpp>
 
 namespace wheelwright::app {
 

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include <wheelwright/files/json_file.hpp>
 #include <wheelwright/gap/discrimination.hpp>
-#include <wheelwright/io/json_file.hpp>
 
 namespace wheelwright::app {
 

@@ -6,12 +6,12 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/io/atomic_file.hpp>
-#include <wheelwright/io/robot_file.hpp>
-#include <wheelwright/io/robot_origin.hpp>
-#include <wheelwright/io/ros2_control.hpp>
-#include <wheelwright/io/sdf.hpp>
-#include <wheelwright/io/urdf.hpp>
+#include <wheelwright/files/atomic_file.hpp>
+#include <wheelwright/robots/robot_file.hpp>
+#include <wheelwright/robots/robot_origin.hpp>
+#include <wheelwright/robots/ros2_control.hpp>
+#include <wheelwright/robots/sdf.hpp>
+#include <wheelwright/robots/urdf.hpp>
 
 #include "commands.hpp"
 #include "common.hpp"

@@ -13,8 +13,8 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/io/suggest.hpp>
-#include <wheelwright/io/xxh64.hpp>
+#include <wheelwright/files/suggest.hpp>
+#include <wheelwright/files/xxh64.hpp>
 
 #include "ranks.hpp"
 

@@ -11,8 +11,8 @@
 #include <string>
 #include <string_view>
 
-#include <wheelwright/io/result_store.hpp>
-#include <wheelwright/sensitivity/work.hpp>
+#include <wheelwright/results/result_store.hpp>
+#include <wheelwright/study/work.hpp>
 
 #include "common.hpp"
 

@@ -7,13 +7,13 @@
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/commission/commission.hpp>
-#include <wheelwright/io/robot_file.hpp>
-#include <wheelwright/io/study_file.hpp>
-#include <wheelwright/io/study_json.hpp>
-#include <wheelwright/io/xxh64.hpp>
+#include <wheelwright/files/xxh64.hpp>
 #include <wheelwright/report/sensitivity_report.hpp>
-#include <wheelwright/sensitivity/local_derivatives.hpp>
-#include <wheelwright/sensitivity/study.hpp>
+#include <wheelwright/results/study_file.hpp>
+#include <wheelwright/results/study_json.hpp>
+#include <wheelwright/robots/robot_file.hpp>
+#include <wheelwright/study/local_derivatives.hpp>
+#include <wheelwright/study/study.hpp>
 
 #include "commands.hpp"
 #include "common.hpp"

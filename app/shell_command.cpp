@@ -5,8 +5,8 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include <wheelwright/io/atomic_file.hpp>
-#include <wheelwright/io/suggest.hpp>
+#include <wheelwright/files/atomic_file.hpp>
+#include <wheelwright/files/suggest.hpp>
 
 #include "command_tree.hpp"
 #include "commands.hpp"

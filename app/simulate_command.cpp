@@ -5,9 +5,9 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/io/csv.hpp>
-#include <wheelwright/io/json_file.hpp>
-#include <wheelwright/io/scenario_file.hpp>
+#include <wheelwright/files/json_file.hpp>
+#include <wheelwright/logs/csv.hpp>
+#include <wheelwright/robots/scenario_file.hpp>
 #include <wheelwright/sim/simulation.hpp>
 
 #include "commands.hpp"

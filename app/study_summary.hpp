@@ -6,8 +6,8 @@
 #include <optional>
 #include <string>
 
-#include <wheelwright/sensitivity/local_derivatives.hpp>
-#include <wheelwright/sensitivity/study.hpp>
+#include <wheelwright/study/local_derivatives.hpp>
+#include <wheelwright/study/study.hpp>
 
 namespace wheelwright::app {
 

@@ -9,7 +9,7 @@
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/commission/event_isolation.hpp>
 #include <wheelwright/commission/trace.hpp>
-#include <wheelwright/io/json_file.hpp>
+#include <wheelwright/files/json_file.hpp>
 
 namespace wheelwright::app {
 
@@ -50,7 +50,7 @@ void add_isolation(Json& detection, const std::vector<Isolation>& isolations);
 /// One event in a line.
 [[nodiscard]] std::string event_line(const Event& event, const CommissionedModel& model);
 
-/// A detection as JSON (io/detection.schema.json). `model_file` and `log` say what was used.
+/// A detection as JSON (results/detection.schema.json). `model_file` and `log` say what was used.
 [[nodiscard]] Json to_json(const Detection& detection, const CommissionedModel& model, const std::string& model_file,
                            const std::string& log);
 

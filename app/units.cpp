@@ -10,8 +10,8 @@
 #include <fmt/format.h>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/io/number.hpp>
-#include <wheelwright/io/suggest.hpp>
+#include <wheelwright/files/number.hpp>
+#include <wheelwright/files/suggest.hpp>
 
 namespace wheelwright::app {
 namespace {

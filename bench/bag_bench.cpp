@@ -10,10 +10,10 @@
 #include <fmt/format.h>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/io/bag.hpp>
-#include <wheelwright/io/bag_write.hpp>
-#include <wheelwright/io/ros_extractor.hpp>
-#include <wheelwright/io/ros_write.hpp>
+#include <wheelwright/logs/bag.hpp>
+#include <wheelwright/logs/bag_write.hpp>
+#include <wheelwright/logs/ros_extractor.hpp>
+#include <wheelwright/logs/ros_write.hpp>
 
 #include "bench.hpp"
 #include "temporary_file.hpp"
@@ -78,7 +78,7 @@ Measurement measure(const char* word, const char* ending, McapCompression compre
   const auto [seconds, peer_seconds] = interleaved_medians([&] { read_messages(file.path, true); },
                                                            [&] { read_messages(file.path, false); }, repetitions);
   const auto size = static_cast<double>(std::filesystem::file_size(file.path));
-  return {fmt::format("io/bag {}", word),
+  return {fmt::format("logs/bag {}", word),
           messages,
           0,
           1,
@@ -94,7 +94,7 @@ std::vector<Measurement> bag_against_undecoded() {
           measure("mcap lz4", "mcap", McapCompression::lz4), measure("db3", "db3", McapCompression::none)};
 }
 
-const bool registered = register_bench("io/bag", bag_against_undecoded);
+const bool registered = register_bench("logs/bag", bag_against_undecoded);
 
 }  // namespace
 }  // namespace wheelwright::bench::bag_bench

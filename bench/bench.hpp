@@ -13,7 +13,7 @@ namespace wheelwright::bench {
 
 /// One line of output.
 struct Measurement {
-  std::string name;           ///< room and subject, e.g. "io/csv"
+  std::string name;           ///< room and subject, e.g. "logs/csv"
   std::size_t rows = 0;       ///< rows of the problem
   int p = 0;                  ///< number of parameters, 0 where there are none
   int threads = 1;            ///< threads used
@@ -33,7 +33,7 @@ struct Benchmark {
 [[nodiscard]] std::vector<Benchmark>& benchmarks();
 
 /// Registers `run` under `name`; to initialise a variable with, at namespace scope:
-///     const bool registered = register_bench("io/csv", csv_against_bare_read);
+///     const bool registered = register_bench("logs/csv", csv_against_bare_read);
 bool register_bench(std::string name, std::function<std::vector<Measurement>()> run);
 
 /// Median times (s) of `ours` and of `peer`, called in turn `repetitions` times each after one call of each that is not

@@ -10,8 +10,8 @@
 #include <fmt/format.h>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/io/atomic_file.hpp>
-#include <wheelwright/io/csv.hpp>
+#include <wheelwright/files/atomic_file.hpp>
+#include <wheelwright/logs/csv.hpp>
 
 #include "bench.hpp"
 #include "temporary_file.hpp"
@@ -73,13 +73,13 @@ std::vector<Measurement> csv_against_bare_read() {
   const TemporaryFile file("csv");
   write_log(file.path);
   CsvLog log({file.path});
-  return {measure("io/csv walk", file.path, [&] { walk(log); }), measure("io/csv open and walk", file.path, [&] {
+  return {measure("logs/csv walk", file.path, [&] { walk(log); }), measure("logs/csv open and walk", file.path, [&] {
             CsvLog fresh({file.path});
             walk(fresh);
           })};
 }
 
-const bool registered = register_bench("io/csv", csv_against_bare_read);
+const bool registered = register_bench("logs/csv", csv_against_bare_read);
 
 }  // namespace
 }  // namespace wheelwright::bench::csv_bench

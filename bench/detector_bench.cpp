@@ -19,9 +19,9 @@
 #include <wheelwright/bounds/support_table.hpp>
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/detector/detector.hpp>
+#include <wheelwright/export/export_c.hpp>
 #include <wheelwright/filter/measurement.hpp>
 #include <wheelwright/filter/regression_stream.hpp>
-#include <wheelwright/io/export_c.hpp>
 #include <wheelwright/sim/simulation.hpp>
 
 #include "bench.hpp"

@@ -21,8 +21,8 @@
 #include <wheelwright/commission/trace.hpp>
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/filter/regression_stream.hpp>
-#include <wheelwright/io/csv.hpp>
-#include <wheelwright/io/robot_file.hpp>
+#include <wheelwright/logs/csv.hpp>
+#include <wheelwright/robots/robot_file.hpp>
 
 using namespace wheelwright;
 

@@ -31,8 +31,8 @@
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/detector/margins.hpp>
-#include <wheelwright/io/csv.hpp>
-#include <wheelwright/io/robot_file.hpp>
+#include <wheelwright/logs/csv.hpp>
+#include <wheelwright/robots/robot_file.hpp>
 #include <wheelwright/sim/simulation.hpp>
 #include "limit/consistency.hpp"
 

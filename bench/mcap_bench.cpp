@@ -12,8 +12,8 @@
 #include <fmt/format.h>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/io/mcap_reader.hpp>
-#include <wheelwright/io/mcap_writer.hpp>
+#include <wheelwright/logs/mcap_reader.hpp>
+#include <wheelwright/logs/mcap_writer.hpp>
 
 #include "bench.hpp"
 #include "temporary_file.hpp"
@@ -84,7 +84,7 @@ Measurement measure(const char* word, McapCompression compression) {
   const auto [seconds, peer_seconds] =
       interleaved_medians([&] { read_messages(file.path); }, [&] { read_bare(file.path); }, repetitions);
   const auto size = static_cast<double>(std::filesystem::file_size(file.path));
-  return {fmt::format("io/mcap {}", word),
+  return {fmt::format("logs/mcap {}", word),
           messages,
           0,
           1,
@@ -100,7 +100,7 @@ std::vector<Measurement> mcap_against_bare_read() {
           measure("lz4", McapCompression::lz4)};
 }
 
-const bool registered = register_bench("io/mcap", mcap_against_bare_read);
+const bool registered = register_bench("logs/mcap", mcap_against_bare_read);
 
 }  // namespace
 }  // namespace wheelwright::bench::mcap_bench

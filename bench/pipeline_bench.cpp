@@ -25,7 +25,7 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/filter/regression_stream.hpp>
 #include <wheelwright/identify/least_squares.hpp>
-#include <wheelwright/io/csv.hpp>
+#include <wheelwright/logs/csv.hpp>
 #include <wheelwright/sim/simulation.hpp>
 
 #include "bench.hpp"

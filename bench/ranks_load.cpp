@@ -13,8 +13,8 @@
 
 #include <sys/resource.h>
 
-#include <wheelwright/io/result_store.hpp>
-#include <wheelwright/sensitivity/work_on_ranks.hpp>
+#include <wheelwright/results/result_store.hpp>
+#include <wheelwright/study/work_on_ranks.hpp>
 
 namespace {
 

@@ -11,8 +11,8 @@
 #include <fmt/format.h>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/io/result_store.hpp>
-#include <wheelwright/sensitivity/work.hpp>
+#include <wheelwright/results/result_store.hpp>
+#include <wheelwright/study/work.hpp>
 
 #include "bench.hpp"
 #include "temporary_file.hpp"
@@ -48,7 +48,7 @@ std::vector<Measurement> sharing() {
       keep(counter.bytes);
     };
     const auto [ours, peer] = interleaved_medians(shared, bare, repetitions);
-    measurements.push_back({"sensitivity/work", shared_items, 0, static_cast<int>(threads), ours, "a loop", peer,
+    measurements.push_back({"study/work", shared_items, 0, static_cast<int>(threads), ours, "a loop", peer,
                             fmt::format("{:.0f} ns/item", 1e9 * ours / shared_items)});
   }
   return measurements;
@@ -78,14 +78,14 @@ std::vector<Measurement> keeping() {
       }
     };
     const auto [ours, peer] = interleaved_medians(store, flushed, repetitions);
-    measurements.push_back({"io/result_store", kept_items, 0, 1, ours, "flushed file", peer,
+    measurements.push_back({"results/store", kept_items, 0, 1, ours, "flushed file", peer,
                             fmt::format("{} bytes, {:.1f} us/put", size, 1e6 * ours / kept_items)});
   }
   return measurements;
 }
 
-const bool registered_sharing = register_bench("sensitivity/work", sharing);
-const bool registered_keeping = register_bench("io/result_store", keeping);
+const bool registered_sharing = register_bench("study/work", sharing);
+const bool registered_keeping = register_bench("results/store", keeping);
 
 }  // namespace
 }  // namespace wheelwright::bench::work_bench

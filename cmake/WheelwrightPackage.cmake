@@ -24,7 +24,7 @@ set(names wheelwright libwheelwright-dev)
 
 install(DIRECTORY examples/scenarios DESTINATION share/doc/wheelwright/examples COMPONENT program)
 install(FILES examples/healthy.csv.gz examples/robot.yaml DESTINATION share/doc/wheelwright/examples COMPONENT program)
-file(GLOB schemas CONFIGURE_DEPENDS io/*.schema.json)
+file(GLOB schemas CONFIGURE_DEPENDS results/*.schema.json)
 install(FILES ${schemas} DESTINATION share/wheelwright/schemas COMPONENT program)
 
 if(TARGET wheelwright_python)

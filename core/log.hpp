@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The table of a log, in blocks: what `io` hands out and `filter` takes in.
+/// The table of a log, in blocks: what `logs` hands out and `filter` takes in.
 #pragma once
 
 #include <cstddef>

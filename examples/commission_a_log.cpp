@@ -14,7 +14,7 @@
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/commission/physical.hpp>
 #include <wheelwright/commission/trace.hpp>
-#include <wheelwright/io/scenario_file.hpp>
+#include <wheelwright/robots/scenario_file.hpp>
 #include <wheelwright/sim/simulation.hpp>
 
 using namespace wheelwright;

@@ -17,7 +17,7 @@
 #include <wheelwright/gap/catalogue.hpp>
 #include <wheelwright/gap/catalogue_parts.hpp>
 #include <wheelwright/gap/diagnose.hpp>
-#include <wheelwright/io/scenario_file.hpp>
+#include <wheelwright/robots/scenario_file.hpp>
 #include <wheelwright/sim/simulation.hpp>
 
 using namespace wheelwright;

@@ -6,9 +6,9 @@
 #include <utility>
 #include <vector>
 
-#include <wheelwright/io/row_cleaner.hpp>
-#include <wheelwright/io/row_log.hpp>
-#include <wheelwright/io/xxh64.hpp>
+#include <wheelwright/files/xxh64.hpp>
+#include <wheelwright/logs/row_cleaner.hpp>
+#include <wheelwright/logs/row_log.hpp>
 
 #include "arrays.hpp"
 

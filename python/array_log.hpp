@@ -7,8 +7,8 @@
 
 #include <pybind11/pybind11.h>
 
-#include <wheelwright/io/csv_header.hpp>
-#include <wheelwright/io/recorded_log.hpp>
+#include <wheelwright/logs/csv_header.hpp>
+#include <wheelwright/logs/recorded_log.hpp>
 
 namespace wheelwright::python {
 

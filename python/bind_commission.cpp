@@ -7,10 +7,11 @@
 #include <pybind11/stl/filesystem.h>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/io/log_file.hpp>
-#include <wheelwright/io/model_file.hpp>
-#include <wheelwright/io/model_words.hpp>
-#include <wheelwright/io/warrant_json.hpp>
+#include <wheelwright/logs/log_file.hpp>
+#include <wheelwright/results/model_file.hpp>
+#include <wheelwright/results/model_words.hpp>
+#include <wheelwright/results/warrant_json.hpp>
+#include <wheelwright/robots/robot_file.hpp>
 
 #include "../app/common.hpp"
 #include "../app/summary.hpp"
@@ -205,7 +206,7 @@ void bind_commission(py::module_& m) {
           "summary", [](const CommissionObject& c) { return app::summary(*c.result); }, "what the command line prints")
       .def(
           "to_dict", [](const CommissionObject& c) { return to_python(c.json()); },
-          "The content of model.json (io/model.schema.json).")
+          "The content of model.json (results/model.schema.json).")
       .def(
           "save", [](const CommissionObject& c, const std::filesystem::path& path) { write_json(path, c.json()); },
           py::arg("path"), "Writes model.json, whole or not at all.")

@@ -282,7 +282,7 @@ void bind_detector(py::module_& m) {
       .def_property_readonly("summary", &DetectionObject::summary)
       .def(
           "to_dict", [](const DetectionObject& d) { return to_python(d.json()); },
-          "The content of detection.json (io/detection.schema.json).")
+          "The content of detection.json (results/detection.schema.json).")
       .def(
           "save", [](const DetectionObject& d, const std::filesystem::path& path) { write_json(path, d.json()); },
           py::arg("path"), "Writes detection.json, whole or not at all.");

@@ -6,12 +6,13 @@
 #include <pybind11/stl/filesystem.h>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/commission/identification.hpp>
 #include <wheelwright/commission/setting.hpp>
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/identify/least_squares.hpp>
-#include <wheelwright/io/identification_json.hpp>
-#include <wheelwright/io/log_file.hpp>
+#include <wheelwright/inference/identification.hpp>
+#include <wheelwright/logs/log_file.hpp>
+#include <wheelwright/results/identification_json.hpp>
+#include <wheelwright/robots/robot_file.hpp>
 
 #include "../app/common.hpp"
 #include "../app/identify_summary.hpp"
@@ -207,7 +208,7 @@ void bind_filter(py::module_& m) {
       .def_property_readonly("notes", [](const IdentificationObject& i) { return i.result.notes; })
       .def(
           "to_dict", [](const IdentificationObject& i) { return to_python(i.json()); },
-          "The content of identification.json (io/identification.schema.json).")
+          "The content of identification.json (results/identification.schema.json).")
       .def(
           "save", [](const IdentificationObject& i, const std::filesystem::path& path) { write_json(path, i.json()); },
           py::arg("path"), "Writes identification.json, whole or not at all.");

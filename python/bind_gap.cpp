@@ -7,13 +7,14 @@
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/files/suggest.hpp>
 #include <wheelwright/gap/catalogue.hpp>
 #include <wheelwright/gap/diagnose.hpp>
 #include <wheelwright/gap/fresh_log.hpp>
-#include <wheelwright/io/gap_json.hpp>
-#include <wheelwright/io/log_file.hpp>
-#include <wheelwright/io/suggest.hpp>
+#include <wheelwright/logs/log_file.hpp>
 #include <wheelwright/report/gap_words.hpp>
+#include <wheelwright/results/gap_json.hpp>
+#include <wheelwright/robots/robot_file.hpp>
 
 #include "../app/common.hpp"
 #include "../app/next_manoeuvre.hpp"
@@ -224,7 +225,7 @@ void bind_gap(py::module_& m) {
           "wheel-speed commands of the drive that would tell the causes apart, by name; None where there is none")
       .def(
           "to_dict", [](const DiagnosisObject& d) { return to_python(d.json); },
-          "The content of gap.json (io/gap.schema.json).")
+          "The content of gap.json (results/gap.schema.json).")
       .def(
           "save", [](const DiagnosisObject& d, const std::filesystem::path& path) { write_json(path, d.json); },
           py::arg("path"), "Writes gap.json, whole or not at all.")

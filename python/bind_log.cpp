@@ -7,10 +7,10 @@
 #include <pybind11/stl/filesystem.h>
 
 #include <wheelwright/core/check.hpp>
-#include <wheelwright/io/csv.hpp>
-#include <wheelwright/io/log_columns.hpp>
-#include <wheelwright/io/log_file.hpp>
-#include <wheelwright/io/suggest.hpp>
+#include <wheelwright/files/suggest.hpp>
+#include <wheelwright/logs/csv.hpp>
+#include <wheelwright/logs/log_columns.hpp>
+#include <wheelwright/logs/log_file.hpp>
 
 #include "../app/common.hpp"
 #include "array_log.hpp"

@@ -10,7 +10,7 @@
 #include <wheelwright/commission/margin_survey.hpp>
 #include <wheelwright/commission/margin_words.hpp>
 #include <wheelwright/core/check.hpp>
-#include <wheelwright/io/margins_json.hpp>
+#include <wheelwright/results/margins_json.hpp>
 
 #include "../app/common.hpp"
 #include "arrays.hpp"
@@ -166,7 +166,7 @@ void bind_margins(py::module_& m) {
           "sentences", [](const MarginsObject& o) { return margin_sentences(o.survey); }, "for people")
       .def(
           "to_dict", [](const MarginsObject& o) { return to_python(o.json()); },
-          "The content of margins.json (io/margins.schema.json).")
+          "The content of margins.json (results/margins.schema.json).")
       .def(
           "save", [](const MarginsObject& o, const std::filesystem::path& path) { write_json(path, o.json()); },
           py::arg("path"), "Writes margins.json, whole or not at all.");

@@ -4,7 +4,7 @@
 #include <pybind11/stl/filesystem.h>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/io/robot_file.hpp>
+#include <wheelwright/robots/robot_file.hpp>
 
 #include "module.hpp"
 

@@ -17,8 +17,8 @@
 #include <wheelwright/bounds/feasible_set.hpp>
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/core/log.hpp>
-#include <wheelwright/io/json_file.hpp>
-#include <wheelwright/io/recorded_log.hpp>
+#include <wheelwright/files/json_file.hpp>
+#include <wheelwright/logs/recorded_log.hpp>
 #include <wheelwright/model/robot.hpp>
 
 namespace wheelwright::python {

@@ -14,9 +14,9 @@
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/io/atomic_file.hpp>
-#include <wheelwright/io/csv.hpp>
-#include <wheelwright/io/json_file.hpp>
+#include <wheelwright/files/atomic_file.hpp>
+#include <wheelwright/files/json_file.hpp>
+#include <wheelwright/logs/csv.hpp>
 #include <wheelwright/reality/case.hpp>
 
 namespace {

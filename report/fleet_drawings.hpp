@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <string>
 
-#include <wheelwright/fleet/fleet_result.hpp>
+#include <wheelwright/study/fleet_result.hpp>
 
 namespace wheelwright::report {
 

@@ -5,8 +5,8 @@
 
 #include <string>
 
-#include <wheelwright/fleet/fleet_result.hpp>
 #include <wheelwright/report/context.hpp>
+#include <wheelwright/study/fleet_result.hpp>
 
 namespace wheelwright {
 

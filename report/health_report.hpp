@@ -5,7 +5,7 @@
 
 #include <string>
 
-#include <wheelwright/commission/log_health.hpp>
+#include <wheelwright/doctor/log_health.hpp>
 #include <wheelwright/report/context.hpp>
 
 namespace wheelwright {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/commission/identification.hpp>
+#include <wheelwright/inference/identification.hpp>
 #include <wheelwright/report/time_axis.hpp>
 
 namespace wheelwright::report {

@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-#include <wheelwright/commission/identification_words.hpp>
+#include <wheelwright/inference/identification_words.hpp>
 #include <wheelwright/report/identify_sections.hpp>
 #include <wheelwright/report/page.hpp>
 #include <wheelwright/report/signals.hpp>

@@ -8,9 +8,9 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/commission/identification_words.hpp>
 #include <wheelwright/core/statistics.hpp>
 #include <wheelwright/identify/noise_level.hpp>
+#include <wheelwright/inference/identification_words.hpp>
 #include <wheelwright/report/identify_drawings.hpp>
 #include <wheelwright/report/page.hpp>
 #include <wheelwright/report/text.hpp>

@@ -9,10 +9,10 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/sensitivity/grid.hpp>
-#include <wheelwright/sensitivity/morris.hpp>
-#include <wheelwright/sensitivity/one_at_a_time.hpp>
-#include <wheelwright/sensitivity/sobol_indices.hpp>
+#include <wheelwright/study/grid.hpp>
+#include <wheelwright/study/morris.hpp>
+#include <wheelwright/study/one_at_a_time.hpp>
+#include <wheelwright/study/sobol_indices.hpp>
 
 namespace wheelwright::report {
 

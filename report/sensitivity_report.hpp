@@ -8,8 +8,8 @@
 #include <vector>
 
 #include <wheelwright/report/context.hpp>
-#include <wheelwright/sensitivity/local_derivatives.hpp>
-#include <wheelwright/sensitivity/study.hpp>
+#include <wheelwright/study/local_derivatives.hpp>
+#include <wheelwright/study/study.hpp>
 
 namespace wheelwright {
 

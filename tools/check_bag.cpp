@@ -15,10 +15,10 @@
 #include <fmt/format.h>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/io/bag.hpp>
-#include <wheelwright/io/bag_write.hpp>
-#include <wheelwright/io/ros_extractor.hpp>
-#include <wheelwright/io/ros_write.hpp>
+#include <wheelwright/logs/bag.hpp>
+#include <wheelwright/logs/bag_write.hpp>
+#include <wheelwright/logs/ros_extractor.hpp>
+#include <wheelwright/logs/ros_write.hpp>
 
 namespace {
 

@@ -12,50 +12,53 @@ import sys
 import tempfile
 from pathlib import Path
 
-# Room -> rooms whose headers it may include (its own apart). None: all of them.
-WALK = ["core", "model", "filter", "bounds", "identify", "detector", "commission", "design", "gap", "sensitivity", "fleet"]
+# Room -> rooms whose headers it may include, its own apart (None: all of them). A room looks down, never up; the rooms of
+# a storey stand in the order in which they may see each other.
+GROUND = ["core", "model", "filter", "bounds", "detector"]
+DOORS = ["files", "logs", "sim", "robots"]
+FIRST = ["identify", "commission", "inference", "doctor"]
+SECOND = ["design", "gap", "study"]
+ROOF = ["results", "export", "report"]
+HOUSE = GROUND + DOORS + FIRST + SECOND + ROOF
+PURE = set(HOUSE) - {"files", "logs", "robots", "results", "export"}
 
 
-def before(room):
-    return set(WALK[: WALK.index(room)])
+def below(room):
+    """What stands before `room` and opens no file: who computes is handed what was read."""
+    return set(HOUSE[: HOUSE.index(room)]) & (PURE if room in PURE else set(HOUSE))
 
 
 MAY_INCLUDE = {
-    "core": set(),
-    "model": {"core"},
-    "filter": {"core", "model"},
+    **{room: below(room) for room in HOUSE},
     "bounds": {"core"},
-    "identify": {"core", "filter"},
-    "detector": {"core", "model", "filter", "bounds"},
-    "commission": before("commission"),
-    "design": before("design"),
-    "gap": before("gap") | {"sim"},
-    "sensitivity": before("sensitivity") | {"sim"},
-    "fleet": before("fleet"),
+    "files": {"core"},
+    "logs": {"core", "files"},
     "sim": {"core", "model"},
-    "io": set(WALK) | {"sim"},  # its scenario is a struct that comes from a file (docs/decisions.md, 14)
-    "report": set(WALK),
+    "identify": {"core", "model", "filter"},
+    "commission": set(GROUND) | {"identify"},
+    "inference": set(GROUND) | {"identify", "commission"},
+    "doctor": set(GROUND) | {"identify", "commission", "inference"},
+    "export": set(GROUND) | {"files", "robots"},
     "app": None,
     "python": None,
-    "reality": {"core", "io"},
+    "reality": {"core", "files", "logs"},
     "tests": None,
     "examples": None,
     "bench": None,
 }
 
-# Only `io` opens files; results are functions of their arguments (seeds are arguments).
-PURE = set(WALK) | {"sim", "report"}
+# Results are functions of their arguments (seeds are arguments); doors and roof open files.
 BANNED_HEADERS = {
-    "fstream": "only io opens files",
+    "fstream": "only doors and results open files",
     "iostream": "results are returned, not printed",
-    "filesystem": "only io opens files",
+    "filesystem": "only doors and results open files",
     "chrono": "no clock here",
     "ctime": "no clock here",
     "time.h": "no clock here",
 }
 # One file each, and why; no time that passes enters a result.
 EXCEPTIONS = {
-    ("sensitivity/item_team.cpp", "chrono"): "MPI's own waits keep a processor busy: it sleeps between looks",
+    ("study/item_team.cpp", "chrono"): "MPI's own waits keep a processor busy: it sleeps between looks",
 }
 BANNED_CODE = {
     r"\bstd::random_device\b": "generators are seeded and local",
@@ -63,16 +66,16 @@ BANNED_CODE = {
     r"\bstd::(?:time|clock)\s*\(": "no clock here",
     r"\bstd::(?:cout|cerr|clog)\b": "results are returned, not printed",
     r"\bf?printf\s*\(": "results are returned, not printed",
-    r"\bfopen\s*\(": "only io opens files",
+    r"\bfopen\s*\(": "only doors and results open files",
 }
 
 # Third-party headers that belong to some rooms only: pattern -> (rooms, why).
 OUTSIDE = {
-    r"ceres/|nlopt": ({"identify", "design", "gap"}, "solvers stay where they are used"),
+    r"ceres/|nlopt": ({"identify", "inference", "design", "gap"}, "solvers stay where they are used"),
     r"[Cc]lp|[Cc]oin": (set(), "CLP is a peer in bench"),
-    r"mpi\.h$": ({"sensitivity"}, "one room shares work out"),
-    r"yaml-cpp/": ({"io", "app"}, "files are read in io"),
-    r"nlohmann/": ({"io", "app", "report"}, "files are read in io"),
+    r"mpi\.h$": ({"study"}, "one room shares work out"),
+    r"yaml-cpp/": ({"files", "logs", "robots", "results", "app"}, "text is read at the doors"),
+    r"nlohmann/": ({"files", "logs", "robots", "results", "app", "report"}, "text is read at the doors"),
 }
 SOLVERS_IN_SOURCES_ONLY = r"ceres/|nlopt|[Cc]lp|[Cc]oin|mpi\.h$"
 
@@ -115,7 +118,7 @@ def check_code(room, relative, text, report):
                 report(relative, number, f"{room}/ may not include {header}")
         if room in PURE and header in BANNED_HEADERS and (relative.as_posix(), header) not in EXCEPTIONS:
             report(relative, number, f"<{header}> in {room}/: {BANNED_HEADERS[header]}")
-        if room in WALK or room in ("sim", "io", "report"):
+        if room in HOUSE:
             for pattern, (rooms, why) in OUTSIDE.items():
                 if re.match(pattern, header) and room not in rooms:
                     report(relative, number, f"<{header}> in {room}/: {why}")
@@ -175,7 +178,7 @@ def check(root):
                 report(relative, number, f"names {named.group(0)}, a path of one machine")
         if path.suffix in (".hpp", ".cpp"):
             check_code(room, relative, text, report)
-        if path.suffix == ".hpp" and room in set(WALK) | {"sim", "io", "report"}:
+        if path.suffix == ".hpp" and room in HOUSE:
             check_types(relative, text, types, report)
         if path.name == "CMakeLists.txt" and room in MAY_INCLUDE:
             check_links(room, relative, text, report)
@@ -188,24 +191,24 @@ def self_test():
     clean = {
         "core/a.hpp": head + "#include <vector>\n// a random comment on rand() and std::cout\nstruct A {\n};\n",
         "bounds/b.hpp": head + "#include <wheelwright/core/a.hpp>\nstruct A;\nstruct B {};\nstruct B<2> {};\n",
-        "io/c.cpp": spdx + "#include <fstream>\n#include <wheelwright/bounds/b.hpp>\n",
-        "identify/robust.cpp": spdx + "#include <ceres/ceres.h>\n",
-        "sensitivity/item_team.cpp": spdx + "#include <chrono>\n#include <mpi.h>\n",
+        "files/c.cpp": spdx + "#include <fstream>\n#include <wheelwright/core/a.hpp>\n",
+        "inference/robust.cpp": spdx + "#include <ceres/ceres.h>\n",
+        "study/item_team.cpp": spdx + "#include <chrono>\n#include <mpi.h>\n",
         "detector/CMakeLists.txt": "# SPDX-License-Identifier: Apache-2.0\nwheelwright_room(detector\n  USES core filter\n  LINK x)\n",
         "docs/framework.md": "framework/works on http://host/working and a/" + "work\n",
     }
     violations = {
         "upward include": ("bounds/x.hpp", head + "#include <wheelwright/filter/f.hpp>\n"),
-        "sim in report": ("report/x.cpp", spdx + "#include <wheelwright/sim/s.hpp>\n"),
-        "report in io": ("io/x.cpp", spdx + "#include <wheelwright/report/s.hpp>\n"),
-        "io in report": ("report/x.cpp", spdx + "#include <wheelwright/io/s.hpp>\n"),
+        "commission in identify": ("identify/x.cpp", spdx + "#include <wheelwright/commission/s.hpp>\n"),
+        "roof in a door": ("logs/x.cpp", spdx + "#include <wheelwright/report/s.hpp>\n"),
+        "door in report": ("report/x.cpp", spdx + "#include <wheelwright/robots/s.hpp>\n"),
         "linked upwards": ("filter/CMakeLists.txt", "# SPDX-License-Identifier: Apache-2.0\nwheelwright_room(filter\n  USES core bounds)\n"),
         "file opened": ("commission/x.cpp", spdx + "#include <fstream>\n"),
         "printing": ("filter/x.cpp", spdx + "void f() { std::cout << 1; }\n"),
         "clock": ("identify/x.cpp", spdx + "#include <chrono>\n"),
-        "another clock": ("sensitivity/item_team.hpp", head + "#include <chrono>\n"),
-        "MPI in a header": ("sensitivity/x.hpp", head + "#include <mpi.h>\n"),
-        "MPI elsewhere": ("io/x.cpp", spdx + "#include <mpi.h>\n"),
+        "another clock": ("study/item_team.hpp", head + "#include <chrono>\n"),
+        "MPI in a header": ("study/x.hpp", head + "#include <mpi.h>\n"),
+        "MPI elsewhere": ("logs/x.cpp", spdx + "#include <mpi.h>\n"),
         "device": ("sim/x.cpp", spdx + "std::random_device device;\n"),
         "rand": ("sim/x.cpp", spdx + "int f() { return rand(); }\n"),
         "solver in header": ("identify/x.hpp", head + "#include <nlopt.hpp>\n"),

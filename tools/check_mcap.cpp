@@ -11,8 +11,8 @@
 #include <fmt/format.h>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/io/mcap_reader.hpp>
-#include <wheelwright/io/mcap_writer.hpp>
+#include <wheelwright/logs/mcap_reader.hpp>
+#include <wheelwright/logs/mcap_writer.hpp>
 
 namespace {
 

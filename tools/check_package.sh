@@ -22,10 +22,10 @@ cmake_minimum_required(VERSION 3.25)
 project(Stranger LANGUAGES CXX)
 find_package(Wheelwright 0.1 REQUIRED COMPONENTS io)
 add_executable(stranger stranger.cpp)
-target_link_libraries(stranger PRIVATE Wheelwright::io)
+target_link_libraries(stranger PRIVATE Wheelwright::results)
 END
 cat > "$root/packages/stranger.cpp" <<'END'
-#include <wheelwright/io/model_file.hpp>
+#include <wheelwright/results/model_file.hpp>
 int main(int, char** words) { return wheelwright::read_model(words[1]).model.n() == 2 ? 0 : 1; }
 END
 cat > "$root/packages/check.sh" <<'END'

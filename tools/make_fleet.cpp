@@ -18,9 +18,9 @@
 
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/core/log.hpp>
-#include <wheelwright/io/atomic_file.hpp>
-#include <wheelwright/io/log_write.hpp>
-#include <wheelwright/io/robot_file.hpp>
+#include <wheelwright/files/atomic_file.hpp>
+#include <wheelwright/logs/log_write.hpp>
+#include <wheelwright/robots/robot_file.hpp>
 #include <wheelwright/sim/simulation.hpp>
 
 namespace {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // wheelwright export: the header of a commissioned model decides as `wheelwright detect` does, and bad wishes are told.
-#include <wheelwright/io/csv.hpp>
-#include <wheelwright/io/model_file.hpp>
+#include <wheelwright/logs/csv.hpp>
+#include <wheelwright/results/model_file.hpp>
 
 #include "app/program.hpp"
 #include "support/c_detector.hpp"

@@ -4,7 +4,7 @@
 
 #include "app/program.hpp"
 
-#include <wheelwright/io/robot_file.hpp>
+#include <wheelwright/robots/robot_file.hpp>
 
 namespace wheelwright::gap_test {
 namespace {

@@ -16,10 +16,10 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/io/byte_source.hpp>
-#include <wheelwright/io/json_file.hpp>
+#include <wheelwright/files/byte_source.hpp>
+#include <wheelwright/files/json_file.hpp>
 
-#include "io/scratch.hpp"
+#include "support/scratch.hpp"
 #include "support/skip.hpp"
 
 namespace wheelwright::testing {
@@ -100,11 +100,11 @@ class ProgramTest : public ScratchTest {
     return names;
   }
 
-  /// Whether FILE fits io/SCHEMA, as an independent validator sees it; its complaints, or nothing where it fits.
+  /// Whether FILE fits results/SCHEMA, as an independent validator sees it; its complaints, or nothing where it fits.
   std::string misfit(const std::string& schema, const std::string& file) const {
     const std::string complaints = (directory_ / "complaints").string();
     const std::string command = "/usr/bin/python3 '" WHEELWRIGHT_SOURCE_DIR "/tests/app/validate.py' '" +
-                                (std::filesystem::path(WHEELWRIGHT_SOURCE_DIR) / "io" / schema).string() + "' '" +
+                                (std::filesystem::path(WHEELWRIGHT_SOURCE_DIR) / "results" / schema).string() + "' '" +
                                 path(file).string() + "' > '" + complaints + "' 2>&1";
     return std::system(command.c_str()) == 0 ? "" : "does not fit: " + bytes(complaints);
   }

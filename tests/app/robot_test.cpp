@@ -2,9 +2,9 @@
 // wheelwright robot: where the file goes, what stands in it, and what is never written over.
 #include "app/program.hpp"
 
-#include <wheelwright/io/robot_file.hpp>
+#include <wheelwright/robots/robot_file.hpp>
 
-#include "io/robot_samples.hpp"
+#include "robots/robot_samples.hpp"
 
 namespace wheelwright::robot_test {
 namespace {

@@ -10,7 +10,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "io/scratch.hpp"
+#include "support/scratch.hpp"
 
 namespace wheelwright::app {
 namespace {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What convert, export, design and robot write fits its schema, and the schemas refuse what is not there.
 #include "app/program.hpp"
-#include "io/robot_samples.hpp"
+#include "robots/robot_samples.hpp"
 
 namespace wheelwright::schemas_test {
 namespace {

@@ -10,11 +10,11 @@
 
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/commission/contradiction_search.hpp>
-#include <wheelwright/commission/identification.hpp>
 #include <wheelwright/commission/trace.hpp>
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/io/csv.hpp>
-#include <wheelwright/io/robot_file.hpp>
+#include <wheelwright/inference/identification.hpp>
+#include <wheelwright/logs/csv.hpp>
+#include <wheelwright/robots/robot_file.hpp>
 
 #include "support/skip.hpp"
 

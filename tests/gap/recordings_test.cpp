@@ -10,8 +10,8 @@
 #include <gtest/gtest.h>
 
 #include <wheelwright/gap/diagnose.hpp>
-#include <wheelwright/io/csv.hpp>
-#include <wheelwright/io/robot_file.hpp>
+#include <wheelwright/logs/csv.hpp>
+#include <wheelwright/robots/robot_file.hpp>
 
 #include "support/skip.hpp"
 

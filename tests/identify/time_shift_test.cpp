@@ -7,8 +7,8 @@
 #include <gtest/gtest.h>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/identify/stribeck.hpp>
 #include <wheelwright/identify/time_shift.hpp>
+#include <wheelwright/inference/stribeck.hpp>
 
 #include "support/drives.hpp"
 #include "support/random.hpp"

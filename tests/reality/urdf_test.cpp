@@ -8,11 +8,11 @@
 #include <mujoco/mujoco.h>
 #include <Eigen/Core>
 
-#include <wheelwright/io/robot_origin.hpp>
-#include <wheelwright/io/urdf.hpp>
+#include <wheelwright/robots/robot_origin.hpp>
+#include <wheelwright/robots/urdf.hpp>
 
-#include "io/robot_samples.hpp"
-#include "io/scratch.hpp"
+#include "robots/robot_samples.hpp"
+#include "support/scratch.hpp"
 
 namespace wheelwright::urdf_test {
 namespace {

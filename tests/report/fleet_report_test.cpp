@@ -5,7 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "fleet/fleets.hpp"
+#include "study/fleets.hpp"
 
 namespace wheelwright::fleet_report_test {
 namespace {

@@ -11,7 +11,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/commission/identification_words.hpp>
+#include <wheelwright/inference/identification_words.hpp>
 #include <wheelwright/report/commission_report.hpp>
 #include <wheelwright/report/design_report.hpp>
 #include <wheelwright/report/detect_report.hpp>

@@ -7,10 +7,10 @@
 #include <gtest/gtest.h>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/io/scenario_file.hpp>
+#include <wheelwright/robots/scenario_file.hpp>
 #include <wheelwright/sim/simulation.hpp>
 
-#include "io/scratch.hpp"
+#include "support/scratch.hpp"
 
 namespace wheelwright::scenario_file_test {
 namespace {

@@ -1,0 +1,408 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/export/export_c.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <limits>
+#include <string_view>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include <wheelwright/core/error.hpp>
+#include <wheelwright/core/limits.hpp>
+#include <wheelwright/export/export_c_filter.hpp>
+#include <wheelwright/export/export_c_text.hpp>
+
+namespace wheelwright {
+namespace {
+
+using c_text::hex;
+using c_text::list;
+using c_text::plain;
+using c_text::replace_all;
+
+void check_name(const std::string& name) {
+  constexpr std::array<std::string_view, 12> kTaken = {"double", "int",   "void",  "static", "inline", "struct",
+                                                       "for",    "while", "const", "if",     "exp",    "round"};
+  const auto letter = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); };
+  const auto part = [&](char c) { return letter(c) || (c >= '0' && c <= '9') || c == '_'; };
+  if (name.empty() || name.size() > 40 || !letter(name.front()) || !std::all_of(name.begin(), name.end(), part) ||
+      std::find(kTaken.begin(), kTaken.end(), name) != kTaken.end()) {
+    throw InputError("export: name '" + name +
+                     "': expected a prefix of C names: a letter, then letters, digits and _, at most 40");
+  }
+}
+
+std::string unit_of(const std::string& column) {
+  const auto starts = [&](std::string_view word) { return column.rfind(word, 0) == 0; };
+  return starts("phi_")         ? "rad"
+         : starts("omega_")     ? "rad/s"
+         : starts("tau_")       ? "N*m"
+         : starts("current_")   ? "A"
+         : starts("voltage_")   ? "V"
+         : column == "theta"    ? "rad"
+         : column == "position" ? "m (rotary: rad)"
+         : column == "velocity" ? "m/s (rotary: rad/s)"
+         : column == "effort"   ? "N (rotary: N*m)"
+                                : "unit of the log";
+}
+
+/// Writes one header.
+class Writer {
+ public:
+  Writer(const Detector& detector, const CExportOptions& options)
+      : detector_(detector),
+        options_(options),
+        filter_(detector.filter()),
+        model_(filter_.model()),
+        measurement_(filter_.measurement()),
+        rule_(detector.threshold()),
+        written_(filter_, thresholds()) {
+    check_name(options.name);
+    if (thresholds() && rule_.kind() == ParameterSetKind::polytope && !rule_.table()) {
+      throw InputError(
+          fmt::format("export: the feasible set has too many vertices for a table (more than {} in one group of "
+                      "parameters, or it is too flat); export its box instead (--set box)",
+                      SupportTableOptions{}.vertices));
+    }
+  }
+
+  std::string text() {
+    comment();
+    put("#ifndef PFX_H\n#define PFX_H\n\n");
+    put(c_text::kCompiler);
+    put("\n#ifdef __cplusplus\nextern \"C\" {\n#endif\n\n");
+    constants();
+    put("\n");
+    put(c_text::kTypes);
+    put("\n");
+    put(written_.types());
+    state();
+    if (thresholds()) {
+      tables();
+    }
+    put(written_.functions());
+    if (thresholds()) {
+      put("\n");
+      put(c_text::kHull);
+      if (polytope()) {
+        if (!rule_.table()->graphs().empty()) {
+          put("\n");
+          put(c_text::kFollow);
+        }
+      }
+      support();
+      put("\n");
+      put(c_text::kThreshold);
+    }
+    put("\n");
+    put(c_text::kPersistence);
+    interface();
+    put("\n#ifdef __cplusplus\n}\n#endif\n\n#endif\n");
+    std::string upper = options_.name;
+    for (char& c : upper) {
+      c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+    }
+    replace_all(text_, "PFX", upper);
+    replace_all(text_, "pfx", options_.name);
+    return std::move(text_);
+  }
+
+ private:
+  void put(std::string_view text) { text_ += text; }
+  template <typename... Arguments>
+  void line(fmt::format_string<Arguments...> format, Arguments&&... arguments) {
+    text_ += fmt::format(format, std::forward<Arguments>(arguments)...) + "\n";
+  }
+
+  [[nodiscard]] bool thresholds() const { return !detector_.options().mu; }
+  [[nodiscard]] bool polytope() const { return rule_.kind() == ParameterSetKind::polytope; }
+  [[nodiscard]] std::size_t slots() const { return std::min(2 * model_.n(), ThresholdRule::kSlots); }
+  [[nodiscard]] bool two_sided() const { return detector_.options().test == Test::two_sided; }
+  void comment() {
+    const auto columns = measurement_.columns();
+    line("/* {}.h: on-line fault detector.", options_.name);
+    line(" *");
+    if (!options_.software.empty())
+      line(" * Written by {}{}; do not edit.", plain(options_.software),
+           options_.source.empty() ? "" : " from " + plain(options_.source));
+    line(" * Robot: {} ({}).", plain(options_.robot.empty() ? "unnamed" : options_.robot), plain(model_.name));
+    line(" * Filter: order {}, alpha = {} 1/s, beta = {} 1/s.", filter_.design().order, filter_.design().alpha,
+         filter_.design().beta);
+    line(" * Effort: {}.", written_.effort_words());
+    line(" * Residual: filtered effort minus what the model expects (a kinematic residual is not part of this file).");
+    const Persistence persistence = detector_.options().persistence.value_or(Persistence{});
+    line(" * Decision: {}, alarm at {} of {} instants outside.",
+         !thresholds() ? "constant thresholds"
+         : polytope()  ? (two_sided() ? "two-sided, threshold from the feasible set"
+                                      : "symmetric, threshold from the feasible set")
+         : two_sided() ? "two-sided, threshold from the box of parameters"
+                       : "symmetric, threshold from the box of parameters",
+         persistence.k, persistence.n);
+    line(" * Channels:");
+    for (std::size_t i = 0; i < model_.n(); ++i) {
+      line(" *   {}: {} (with torque as effort: {})", i, plain(model_.outputs[i]), plain(model_.output_units[i]));
+    }
+    line(" * Parameters:");
+    for (std::size_t j = 0; j < model_.p(); ++j) {
+      const Interval& side = rule_.set().hull().sides[j];
+      line(" *   {}: {} = {:.6g}, in [{:.6g}, {:.6g}] (with torque as effort: {})", j, plain(model_.parameters[j].name),
+           rule_.estimate()[static_cast<Eigen::Index>(j)], side.lower, side.upper, plain(model_.parameters[j].unit));
+    }
+    line(" *");
+    line(" * Use, for one sample after the other, t in seconds:");
+    line(" *");
+    line(" *   pfx_state state;");
+    line(" *   pfx_init(&state);");
+    line(" *   for (;;) {{");
+    line(" *     double t = now(), sample[PFX_INPUTS];");
+    for (std::size_t c = 0; c < columns.size(); ++c) {
+      const bool heading = c + 1 == columns.size() && !measurement_.heading_column.empty();
+      line(" *     sample[{}] = {};  // {}{}{}", c, plain(columns[c]), unit_of(columns[c]),
+           c < model_.joints.size() && measurement_.motion == MotionKind::mean_speed
+               ? ", encoder counts over the sampling interval divided by it, t its middle"
+               : "",
+           heading ? ", unwrapped" : "");
+    }
+    line(" *     pfx_decision decision;");
+    line(" *     pfx_step(&state, t, sample, &decision);");
+    line(" *     if (decision.fault) stop();");
+    line(" *   }}");
+    line(" *");
+    line(" * Samples must be finite numbers. {}", written_.segment_words());
+    line(" * pfx_restart restarts the detector at once.");
+    if (measurement_.motion == MotionKind::mean_speed) {
+      line(" * A decision is about the interval of the sample before, whose effort the last one has made known.");
+    }
+    line(" *");
+    line(
+        " * C99, or C++17 for its hexadecimal numbers. No heap, no mutable static data, no recursion, bounded work; a "
+        "state");
+    line(" * belongs to one thread at a time. Of libm: {}.", written_.libm_words());
+    line(
+        " * Every operation is that of the C++ library, in the same order: compiled with -ffp-contract=off (gcc "
+        "otherwise");
+    line(
+        " * fuses multiplications and additions where the processor can) and with the same libm, all numbers have the "
+        "same");
+    line(" * bits. With another libm they differ by the rounding of its functions.");
+    line(" */");
+  }
+
+  void constants() {
+    const Persistence persistence = detector_.options().persistence.value_or(Persistence{});
+    line("#define PFX_INPUTS {}     /* numbers of a sample */", measurement_.columns().size());
+    line("#define PFX_JOINTS {}", model_.joints.size());
+    line("#define PFX_COORDINATES {}", model_.coordinates.size());
+    line("#define PFX_CHANNELS {}", model_.n());
+    line("#define PFX_PARAMETERS {}", model_.p());
+    put(written_.constants());
+    line("#define PFX_PERSISTENCE_K {}", persistence.k);
+    line("#define PFX_PERSISTENCE_N {}", persistence.n);
+    line("#define PFX_PERSISTENCE_MASK 0x{:x}ULL", persistence.n == 64 ? ~0ULL : (1ULL << persistence.n) - 1);
+    if (!thresholds()) {
+      return;
+    }
+    const auto p = static_cast<double>(model_.p());
+    line("#define PFX_SLOTS {}        /* directions that are followed from one sample to the next */", slots());
+    line("#define PFX_ROUNDING {} /* relative, of residual and threshold */", hex(4.0 * (p + 4.0) * kEpsilon));
+    line("#define PFX_HULL_ROUNDING {}", hex(4.0 * (p + 1.0) * kEpsilon));
+    line("#define PFX_HULL_UNDERFLOW {}", hex(2.0 * p * std::numeric_limits<double>::min()));
+    if (polytope()) {
+      const auto& graphs = rule_.table()->graphs();
+      std::size_t largest = 1;
+      for (const VertexGraph& graph : graphs) {
+        largest = std::max(largest, graph.parameters.size());
+      }
+      line("#define PFX_SLACK {}", hex(1.0 + (p + 6.0) * kEpsilon));
+      line("#define PFX_SUM {}", hex((p + 2.0) * kEpsilon));
+      line("#define PFX_TINY {}", hex(std::numeric_limits<double>::min()));
+      if (!graphs.empty()) {
+        line("#define PFX_GROUPS {}       /* of parameters that bound each other */", graphs.size());
+        line("#define PFX_LARGEST_GROUP {}", largest);
+        line("#define PFX_EDGES {}       /* most edges walked for one direction and group */",
+             rule_.table()->options().budget);
+        line("#define PFX_TIGHT {}", hex(SupportTable::kTight));
+      }
+    }
+  }
+
+  void state() {
+    put("\n/* What the detector remembers; all of it is set by pfx_init. */\ntypedef struct pfx_state {\n");
+    line("  int started; /* a sample was seen */");
+    put(written_.state());
+    line("  unsigned long long window[PFX_CHANNELS]; /* of the persistence */");
+    if (thresholds() && polytope() && !rule_.table()->graphs().empty()) {
+      line("  unsigned short place[PFX_GROUPS][PFX_SLOTS]; /* the vertex that was best last time */");
+    }
+    put("} pfx_state;\n");
+  }
+
+  void tables() {
+    const auto& sides = rule_.set().hull().sides;
+    const std::size_t p = model_.p();
+    put("\n/* Parameters: estimate, and the interval hull of the feasible set. */\n");
+    line("static const double pfx_estimate[PFX_PARAMETERS] = {};",
+         list(p, [&](std::size_t j) { return hex(rule_.estimate()[static_cast<Eigen::Index>(j)]); }));
+    line("static const double pfx_lower[PFX_PARAMETERS] = {};",
+         list(p, [&](std::size_t j) { return hex(sides[j].lower); }));
+    line("static const double pfx_upper[PFX_PARAMETERS] = {};",
+         list(p, [&](std::size_t j) { return hex(sides[j].upper); }));
+    line("static const double pfx_largest[PFX_PARAMETERS] = {};",
+         list(p, [&](std::size_t j) { return hex(std::max(std::abs(sides[j].lower), std::abs(sides[j].upper))); }));
+    line("static const double pfx_sign[PFX_PARAMETERS] = {}; /* 0 where it is open */", list(p, [&](std::size_t j) {
+           return std::string(sides[j].lower >= 0.0 ? "1.0" : sides[j].upper <= 0.0 ? "-1.0" : "0.0");
+         }));
+    if (!polytope()) {
+      return;
+    }
+    const auto& graphs = rule_.table()->graphs();
+    for (std::size_t g = 0; g < graphs.size(); ++g) {
+      const VertexGraph& graph = graphs[g];
+      const std::size_t q = graph.parameters.size(), stride = q * q + 4 * q;
+      line(
+          "\n/* Group {} of parameters: the {} vertices of its feasible set, and where their edges lead (pfx_follow). "
+          "*/",
+          g, graph.vertices());
+      line("static const unsigned char pfx_index{}[{}] = {};", g, q,
+           list(q, [&](std::size_t k) { return std::to_string(graph.parameters[k]); }));
+      line("static const double pfx_half{}[{}] = {};", g, q,
+           list(q, [&](std::size_t k) { return hex(graph.half[k]); }));
+      line("static const unsigned short pfx_next{}[{}] = {};", g, graph.neighbours.size(),
+           list(graph.neighbours.size(), [&](std::size_t k) { return std::to_string(graph.neighbours[k]); }));
+      line("static const double pfx_vertices{}[{}] = {{", g, graph.numbers.size());
+      for (std::size_t v = 0; v < graph.vertices(); ++v) {
+        std::string row = list(stride, [&](std::size_t k) { return hex(graph.numbers[v * stride + k]); });
+        line(" {},", std::string_view(row).substr(1, row.size() - 2));
+      }
+      put("};\n");
+    }
+  }
+
+  void support() {
+    put("\n/* Largest a.theta over the feasible set, rounded outward; slot: which direction is followed. */\n"
+        "static inline double pfx_support(pfx_state *s, const double *a, int slot)\n{\n");
+    if (!polytope()) {
+      line("  (void)s;");
+      line("  (void)slot;");
+      line("  return pfx_support_of_hull(a);");
+      put("}\n");
+      return;
+    }
+    const auto& graphs = rule_.table()->graphs();
+    line("  const double hull = pfx_support_of_hull(a);");
+    line("  double value = 0.0, magnitude = 0.0, slack = 0.0, bound;");
+    if (graphs.empty()) {
+      line("  (void)s;");
+      line("  (void)slot;");
+    }
+    for (const std::size_t j : rule_.table()->singles()) {
+      line("  {{");
+      line("    const double product = a[{0}] * (a[{0}] > 0.0 ? pfx_upper[{0}] : pfx_lower[{0}]);", j);
+      line("    value += product;");
+      line("    magnitude += fabs(product);");
+      line("  }}");
+    }
+    for (std::size_t g = 0; g < graphs.size(); ++g) {
+      line(
+          "  pfx_follow(pfx_vertices{0}, pfx_next{0}, pfx_index{0}, pfx_half{0}, {1}, a, &s->place[{0}][slot], &value,",
+          g, graphs[g].parameters.size());
+      line("             &magnitude, &slack);");
+    }
+    line("  bound = value + (slack * PFX_SLACK + (PFX_SUM * magnitude + PFX_TINY));");
+    line("  return hull < bound ? hull : bound;");
+    put("}\n");
+  }
+
+  void interface() {
+    put("\n/* ---- What is called from outside ---- */\n\n"
+        "/* Forgets all samples: the next one starts a segment. */\n"
+        "static inline void pfx_restart(pfx_state *s)\n{\n");
+    line("  int i;");
+    line("  s->started = 0;");
+    line("  pfx_forget(s);");
+    line("  for (i = 0; i < PFX_CHANNELS; ++i) {{");
+    line("    s->window[i] = 0;");
+    line("  }}");
+    put("}\n\n/* To be called once, before all else. */\nstatic inline void pfx_init(pfx_state *s)\n{\n");
+    line("  memset(s, 0, sizeof *s);");
+    line("  pfx_restart(s);");
+    put("}\n\n/* Takes the sample at time t (s) and decides. */\n"
+        "static inline void pfx_step(pfx_state *s, double t, const double sample[PFX_INPUTS], pfx_decision "
+        "*decision)\n{\n");
+    line("  double y[PFX_CHANNELS][PFX_PARAMETERS], torque[PFX_CHANNELS];");
+    if (thresholds()) {
+      line("  double dy[PFX_CHANNELS][PFX_PARAMETERS], torque_error[PFX_CHANNELS];");
+    }
+    line("  int valid, i, j;");
+    line("  if (s->started && (!(t > s->sample[0].t){})) {{",
+         measurement_.nominal_step > 0.0 ? " || t - s->sample[0].t > PFX_GAP" : "");
+    line("    pfx_restart(s);");
+    line("  }}");
+    line("  s->started = 1;");
+    line("  valid = pfx_filter(s, t, sample);");
+    line("  decision->valid = valid;");
+    line("  decision->fault = 0;");
+    line("  if (valid) {{");
+    line("    pfx_row(s, y, {}torque{});", thresholds() ? "dy, " : "", thresholds() ? ", torque_error" : "");
+    line("  }}");
+    line("  for (i = 0; i < PFX_CHANNELS; ++i) {{");
+    if (!thresholds()) {
+      line("    static const double estimate[PFX_PARAMETERS] = {};",
+           list(model_.p(), [&](std::size_t j) { return hex(rule_.estimate()[static_cast<Eigen::Index>(j)]); }));
+      line("    static const double constant[PFX_CHANNELS] = {};", list(model_.n(), [&](std::size_t i) {
+             return hex((*detector_.options().mu)[static_cast<Eigen::Index>(i)]);
+           }));
+    }
+    line("    pfx_channel *c = &decision->channel[i];");
+    line("    double size;");
+    line("    c->predicted = 0.0;");
+    line("    if (!valid) {{");
+    line("      c->residual = c->lower = c->upper = c->dead_zone = 0.0;");
+    line("      c->outside = c->alarm = 0;");
+    line("      continue;");
+    line("    }}");
+    line("    for (j = 0; j < PFX_PARAMETERS; ++j) {{");
+    line("      c->predicted += y[i][j] * {}[j];", thresholds() ? "pfx_estimate" : "estimate");
+    line("    }}");
+    line("    c->residual = torque[i] - c->predicted;");
+    if (thresholds()) {
+      line("    pfx_threshold(s, y[i], dy[i], torque_error[i], i, &c->lower, &c->upper);");
+    } else {
+      line("    c->lower = -constant[i];");
+      line("    c->upper = constant[i];");
+    }
+    line("    size = fabs(c->residual);");
+    if (two_sided()) {
+      line("    c->outside = c->residual < c->lower || c->residual > c->upper;");
+      line("    c->dead_zone = c->outside ? size : 0.0;");
+    } else {
+      line("    c->dead_zone = size > (c->upper > -c->lower ? c->upper : -c->lower) ? size : 0.0;");
+      line("    c->outside = c->dead_zone > 0.0;");
+    }
+    line("    c->alarm = pfx_persistent(&s->window[i], c->outside);");
+    line("    decision->fault = decision->fault || c->alarm;");
+    line("  }}");
+    put("}\n");
+  }
+
+  const Detector& detector_;
+  const CExportOptions& options_;
+  const RegressorFilter& filter_;
+  const Model& model_;
+  const Measurement& measurement_;
+  const ThresholdRule& rule_;
+  const c_text::FilterWriter written_;
+  std::string text_;
+};
+
+}  // namespace
+
+std::string c_header(const Detector& detector, const CExportOptions& options) {
+  return Writer(detector, options).text();
+}
+
+}  // namespace wheelwright

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Enumerations as the words that stand for them in files, both ways.
+#pragma once
+
+#include <array>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include <wheelwright/files/json_file.hpp>
+
+namespace wheelwright {
+
+/// A table of words, one for each value.
+template <typename Value, std::size_t n>
+using Words = std::array<std::pair<Value, std::string_view>, n>;
+
+/// The word for `value`, which must be in the table.
+template <typename Value, std::size_t n>
+[[nodiscard]] std::string word_of(const Words<Value, n>& words, Value value) {
+  for (const auto& [v, word] : words) {
+    if (v == value) {
+      return std::string(word);
+    }
+  }
+  return {};
+}
+
+/// The value of the word at `place`. Throws InputError, listing the words, where it is none of them.
+template <typename Value, std::size_t n>
+[[nodiscard]] Value value_of(const Words<Value, n>& words, const JsonPlace& place) {
+  const std::string text = place.text();
+  std::string known;
+  for (const auto& [value, word] : words) {
+    if (word == text) {
+      return value;
+    }
+    known += (known.empty() ? "" : ", ") + std::string(word);
+  }
+  place.fail("one of " + known);
+}
+
+}  // namespace wheelwright

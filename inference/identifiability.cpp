@@ -1,0 +1,255 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/inference/identifiability.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include <wheelwright/core/check.hpp>
+#include <wheelwright/core/linear_algebra.hpp>
+
+namespace wheelwright {
+namespace {
+
+constexpr double kRoundings = 64.0;    // ε of a row
+constexpr double kClearOfNoise = 3.0;  // as in excitation.hpp
+constexpr double kTakesPart = 0.1;     // of a direction's largest scaled entry
+constexpr double kDependent = 1e-6;    // of a regrouping coefficient, scaled
+constexpr double kEqualRest = 0.5;     // of the longest rest of a column
+
+std::vector<Eigen::Index> members_of(const Eigen::VectorXd& scaled, double least) {
+  std::vector<Eigen::Index> members;
+  const double most = scaled.cwiseAbs().maxCoeff();
+  for (Eigen::Index j = 0; j < scaled.size(); ++j) {
+    if (std::abs(scaled[j]) >= least * most && most > 0.0) {
+      members.push_back(j);
+    }
+  }
+  return members;
+}
+
+std::vector<std::string> names_of(const std::vector<Eigen::Index>& members,
+                                  const std::vector<ParameterWords>& parameters) {
+  std::vector<std::string> names;
+  for (const Eigen::Index j : members) {
+    names.push_back(parameters[static_cast<std::size_t>(j)].name);
+  }
+  return names;
+}
+
+// The first `rank` columns that a pivoted QR takes, in the order of the parameters.
+std::vector<Eigen::Index> base_columns(Eigen::MatrixXd rest, int rank) {
+  std::vector<Eigen::Index> base;
+  for (int k = 0; k < rank; ++k) {
+    const Eigen::VectorXd lengths = rest.colwise().norm();
+    Eigen::Index pivot = 0;
+    while (lengths[pivot] < kEqualRest * lengths.maxCoeff()) {
+      ++pivot;
+    }
+    base.push_back(pivot);
+    const Eigen::VectorXd axis = rest.col(pivot).normalized();
+    for (int twice = 0; twice < 2; ++twice) {
+      rest -= axis * (axis.transpose() * rest).eval();
+    }
+    rest.col(pivot).setZero();
+  }
+  std::sort(base.begin(), base.end());
+  return base;
+}
+
+struct ScaledDirections {
+  Eigen::MatrixXd R;       // columns of length one
+  Eigen::VectorXd length;  // of the columns before
+  Eigen::MatrixXd V;       // right singular vectors
+};
+
+void find_base(const IdentifiabilityInput& input, const ScaledDirections& scaled, Identifiability& result) {
+  const auto p = static_cast<Eigen::Index>(input.parameters.size());
+  result.base = base_columns(scaled.R, result.rank);
+  std::vector<Eigen::Index> others;
+  for (Eigen::Index j = 0; j < p; ++j) {
+    if (!std::binary_search(result.base.begin(), result.base.end(), j)) {
+      others.push_back(j);
+    }
+  }
+  const Eigen::MatrixXd R1 = scaled.R(Eigen::all, result.base);
+  Eigen::MatrixXd beta =
+      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(result.base.size()), static_cast<Eigen::Index>(others.size()));
+  if (beta.size() > 0) {
+    beta = R1.colPivHouseholderQr().solve(Eigen::MatrixXd(scaled.R(Eigen::all, others)));
+    beta = (beta.array().abs() < kDependent).select(0.0, beta);
+  }
+  const Eigen::VectorXd size = scaled.length.unaryExpr([](double s) { return s > 0.0 ? 1.0 / s : 1.0; });
+  for (Eigen::Index i = 0; i < beta.rows(); ++i) {
+    const Eigen::Index b = result.base[static_cast<std::size_t>(i)];
+    KnownCombination combination;
+    combination.coefficients = Eigen::VectorXd::Unit(p, b);
+    for (Eigen::Index k = 0; k < beta.cols(); ++k) {
+      const Eigen::Index d = others[static_cast<std::size_t>(k)];
+      combination.coefficients[d] = beta(i, k) * scaled.length[d] / scaled.length[b];
+    }
+    combination.words = combination_in_words(combination.coefficients, input.parameters, size, kDependent);
+    result.seen.push_back(std::move(combination));
+  }
+  for (Eigen::Index k = 0; k < beta.cols(); ++k) {
+    const Eigen::Index d = others[static_cast<std::size_t>(k)];
+    UnseenDirection unseen;
+    unseen.direction = Eigen::VectorXd::Unit(p, d);
+    unseen.members = {d};
+    std::vector<std::string> combinations;
+    for (Eigen::Index i = 0; i < beta.rows(); ++i) {
+      if (beta(i, k) != 0.0) {
+        const Eigen::Index b = result.base[static_cast<std::size_t>(i)];
+        unseen.direction[b] = -result.seen[static_cast<std::size_t>(i)].coefficients[d];
+        unseen.members.push_back(b);
+        combinations.push_back(result.seen[static_cast<std::size_t>(i)].words);
+      }
+    }
+    std::sort(unseen.members.begin(), unseen.members.end());
+    if (!(scaled.length[d] > 0.0)) {
+      unseen.why = Unseen::not_moved;
+      unseen.words = input.parameters[static_cast<std::size_t>(d)].name + ": its motion never occurs in the log";
+    } else {
+      unseen.words = fmt::format("{} cannot be told apart here: only {} {} seen",
+                                 names_in_words(names_of(unseen.members, input.parameters)),
+                                 names_in_words(combinations), combinations.size() == 1 ? "is" : "are");
+    }
+    unseen.manoeuvres = missing_manoeuvres(unseen.members, input.parameters);
+    result.unseen.push_back(std::move(unseen));
+  }
+}
+
+void find_noise(const IdentifiabilityInput& input, const ScaledDirections& scaled, Identifiability& result) {
+  result.noise_rank = result.rank;
+  if (input.noise.size() == 0 || result.rank == 0) {
+    return;
+  }
+  const Eigen::VectorXd size = scaled.length.unaryExpr([](double s) { return s > 0.0 ? 1.0 / s : 1.0; });
+  const Eigen::MatrixXd V = scaled.V.leftCols(result.rank);
+  const Eigen::MatrixXd noise = V.transpose() * size.asDiagonal() * input.noise * size.asDiagonal() * V;
+  Eigen::MatrixXd excess = -kClearOfNoise * kClearOfNoise * noise;
+  excess.diagonal() += result.singular_values.head(result.rank).cwiseAbs2();
+  const EigenPairs eigen = symmetric_eigen(excess);
+  for (Eigen::Index k = 0; k < excess.rows() && eigen.values[k] <= 0.0; ++k) {
+    --result.noise_rank;
+    const Eigen::VectorXd z = V * eigen.vectors.col(k);
+    UnseenDirection unseen;
+    unseen.why = Unseen::noise;
+    unseen.direction = z.cwiseProduct(size) / z.cwiseAbs().maxCoeff();
+    unseen.members = members_of(z, kTakesPart);
+    unseen.words = fmt::format("sensor noise alone would show as much: the log says nothing sure about {}",
+                               combination_in_words(largest_part_one(z.cwiseQuotient(size), size, kTakesPart),
+                                                    input.parameters, size, kTakesPart));
+    unseen.manoeuvres = missing_manoeuvres(unseen.members, input.parameters);
+    result.unseen.push_back(std::move(unseen));
+  }
+}
+
+void find_precision(const IdentifiabilityInput& input, Identifiability& result) {
+  if (input.covariance.size() == 0 || input.size.size() == 0) {
+    return;
+  }
+  const auto p = static_cast<Eigen::Index>(input.parameters.size());
+  std::vector<Eigen::Index> kept;
+  for (Eigen::Index j = 0; j < p; ++j) {
+    if (input.covariance(j, j) > 0.0) {
+      kept.push_back(j);
+    }
+  }
+  if (kept.empty()) {
+    return;
+  }
+  const Eigen::VectorXd one_over = input.size(kept).cwiseInverse();
+  const EigenPairs eigen =
+      symmetric_eigen(one_over.asDiagonal() * input.covariance(kept, kept) * one_over.asDiagonal());
+  for (Eigen::Index k = 0; k < eigen.values.size(); ++k) {
+    Eigen::VectorXd u = Eigen::VectorXd::Zero(p);
+    u(kept) = eigen.vectors.col(k);
+    KnownCombination combination;
+    combination.coefficients = largest_part_one(u.cwiseQuotient(input.size), input.size, kTakesPart);
+    combination.relative_error = std::sqrt(std::max(0.0, eigen.values[k]));
+    combination.words = combination_in_words(combination.coefficients, input.parameters, input.size, kTakesPart);
+    result.known.push_back(combination);
+  }
+  for (auto worst = result.known.rbegin(); worst != result.known.rend() && worst->relative_error > 1.0; ++worst) {
+    UnseenDirection unseen;
+    unseen.why = Unseen::imprecise;
+    const Eigen::VectorXd u = worst->coefficients.cwiseProduct(input.size);
+    unseen.direction = u.cwiseProduct(input.size) / u.cwiseAbs().maxCoeff();
+    unseen.members = members_of(u, kTakesPart);
+    unseen.standard_error = std::sqrt(worst->coefficients.dot(input.covariance * worst->coefficients));
+    unseen.words =
+        fmt::format("the log says little about {}: its standard error is {:.2g}", worst->words, unseen.standard_error);
+    unseen.manoeuvres = missing_manoeuvres(unseen.members, input.parameters);
+    result.unseen.push_back(std::move(unseen));
+  }
+}
+
+}  // namespace
+
+IdentifiabilityInput identifiability_input(const LeastSquares& rows, std::vector<ParameterWords> parameters) {
+  const Eigen::MatrixXd factor = rows.factor();
+  const Eigen::Index p = factor.cols() - 1;
+  IdentifiabilityInput input;
+  input.parameters = std::move(parameters);
+  input.factor = factor.topLeftCorner(p, p);
+  input.instants = rows.instants();
+  return input;
+}
+
+IdentifiabilityInput identifiability_input(const RegressionMoments& moments, const Eigen::VectorXd& weights,
+                                           std::vector<ParameterWords> parameters) {
+  const Eigen::MatrixXd G = moments.total(weights).YY;
+  const Eigen::VectorXd length = G.diagonal().unaryExpr([](double d) { return d > 0.0 ? std::sqrt(d) : 1.0; });
+  const Eigen::VectorXd one_over = length.cwiseInverse();
+  const EigenPairs eigen = symmetric_eigen(one_over.asDiagonal() * G * one_over.asDiagonal());
+  IdentifiabilityInput input;
+  input.parameters = std::move(parameters);
+  input.factor = eigen.values.cwiseMax(0.0).cwiseSqrt().asDiagonal() * eigen.vectors.transpose() * length.asDiagonal();
+  input.from_gram = true;
+  input.instants = moments.instants();
+  return input;
+}
+
+Identifiability identifiability(const IdentifiabilityInput& input) {
+  const auto p = static_cast<Eigen::Index>(input.parameters.size());
+  const auto square_or_empty = [&](const Eigen::MatrixXd& m) {
+    return m.size() == 0 || (m.rows() == p && m.cols() == p && m.allFinite());
+  };
+  check::that(p > 0, "parameters", "at least 1");
+  check::that(input.factor.cols() == p && input.factor.rows() > 0 && input.factor.allFinite(), "factor",
+              "a finite matrix with one column for each parameter");
+  check::that(square_or_empty(input.noise), "noise", "a finite p × p matrix, or none");
+  check::that(square_or_empty(input.covariance), "covariance", "a finite p × p matrix, or none");
+  check::that(input.size.size() == 0 || (input.size.size() == p && (input.size.array() > 0.0).all()), "size",
+              "a number > 0 for each parameter, or none");
+
+  ScaledDirections scaled;
+  scaled.length = input.factor.colwise().norm();
+  scaled.R = input.factor;
+  for (Eigen::Index j = 0; j < p; ++j) {
+    if (scaled.length[j] > 0.0) {
+      scaled.R.col(j) /= scaled.length[j];
+    }
+  }
+  Identifiability result;
+  const SingularValues svd = singular_values(scaled.R);
+  scaled.V = svd.V;
+  result.singular_values = Eigen::VectorXd::Zero(p);
+  result.singular_values.head(svd.values.size()) = svd.values;
+  const double largest = result.singular_values[0];
+  const double smallest = result.singular_values[p - 1];
+  result.condition = smallest > 0.0 ? largest / smallest : std::numeric_limits<double>::infinity();
+  const double rounding = kRoundings * static_cast<double>(p) * 0x1.0p-53 *
+                          std::sqrt(static_cast<double>(std::max<std::size_t>(input.instants, 1)));
+  result.tolerance = input.from_gram ? std::sqrt(rounding) : rounding;
+  result.rank = static_cast<int>((result.singular_values.array() > result.tolerance * largest).count());
+  find_base(input, scaled, result);
+  find_noise(input, scaled, result);
+  find_precision(input, result);
+  return result;
+}
+
+}  // namespace wheelwright

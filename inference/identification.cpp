@@ -1,0 +1,341 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/inference/identification.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include <wheelwright/commission/noise_budget.hpp>
+#include <wheelwright/commission/physical.hpp>
+#include <wheelwright/core/check.hpp>
+#include <wheelwright/core/error.hpp>
+#include <wheelwright/core/linear_algebra.hpp>
+#include <wheelwright/identify/noise_level.hpp>
+#include <wheelwright/identify/time_shift.hpp>
+#include <wheelwright/inference/physical_consistency.hpp>
+#include <wheelwright/inference/stribeck.hpp>
+
+namespace wheelwright {
+namespace {
+
+constexpr double kMostBias = 0.5;  // standard errors, by noise of the motion: more could pass for a lag
+constexpr double kRisk = 1e-3;     // of Fit::plausible, which is not looked at here
+constexpr double kSlowestStribeck = 0.01, kFastestStribeck = 0.5;  // of the largest joint speed
+
+std::string motion_unit(const Setting& s) {
+  const bool linear = s.robot.model == "single_axis";  // its own unit: m or rad
+  return s.measurement.motion == MotionKind::angle ? (linear ? "m or rad" : "rad") : (linear ? "per s" : "rad/s");
+}
+
+// What the robot file or the encoder says of a motion column.
+std::optional<KnownNoise> known_motion_noise(const Setting& s) {
+  const auto bound = motion_error(s.robot, s.measurement);
+  if (!bound) {
+    return std::nullopt;
+  }
+  const bool counts = s.measurement.count > 0.0 || s.robot.encoder_counts_per_turn;
+  const bool of_angles = s.measurement.motion != MotionKind::speed;
+  const bool linear = s.robot.model == "single_axis";
+  return KnownNoise{*bound, of_angles ? (linear ? "m or rad" : "rad") : motion_unit(s),
+                    of_angles && counts ? "half an encoder count" : "as declared"};
+}
+
+std::vector<ColumnNoise> find_noise(LogSource& log, const Setting& s) {
+  std::vector<std::string> columns = s.measurement.motion_columns;
+  columns.insert(columns.end(), s.measurement.effort_columns.begin(), s.measurement.effort_columns.end());
+  const std::vector<DifferenceNoise> differences = difference_noise(log, columns);
+  const Standstill standstill = standstill_noise(log, standstill_signs(log, s.model), columns);
+  std::vector<ColumnNoise> noise;
+  for (std::size_t c = 0; c < columns.size(); ++c) {
+    ColumnNoise of_column;
+    of_column.column = columns[c];
+    const bool motion = c < s.measurement.motion_columns.size();
+    const bool axis = s.robot.model == "single_axis";
+    of_column.unit = motion ? motion_unit(s) : output_unit(s.robot, axis ? s.model.output_units.front() : "N·m");
+    if (motion) {
+      of_column.known = known_motion_noise(s);
+    } else if (s.robot.noise.effort.value) {
+      of_column.known = KnownNoise{*s.robot.noise.effort.value, of_column.unit, "as declared"};
+    }
+    of_column.evidence.differences = differences[c];
+    of_column.evidence.standstill = standstill.columns[c];
+    of_column.choice = choose_noise(of_column.evidence);
+    noise.push_back(std::move(of_column));
+  }
+  return noise;
+}
+
+std::vector<PhysicalQuantity> quantities(const Model& model) {
+  std::vector<PhysicalQuantity> list;
+  for (const Parameter& p : model.parameters) {
+    list.push_back({p.physical, p.per_physical, p.physical_unit});
+  }
+  return list;
+}
+
+std::vector<ParameterWords> parameter_words(const Setting& s, bool physical) {
+  std::vector<ParameterWords> list;
+  for (const Parameter& p : s.model.parameters) {
+    std::string name = physical ? p.physical : p.name;
+    if (physical) {
+      std::ranges::replace(name, '_', ' ');
+    }
+    list.push_back(
+        {std::move(name), physical ? p.physical_unit : parameter_unit(s.robot, p), p.excite, kind_of(p.physical)});
+  }
+  return list;
+}
+
+// From θ_L to physical quantities: θ_L,j = (physical quantity + offset)/scale.
+void to_physical(IdentifiabilityInput& input, const std::vector<PhysicalScale>& scales) {
+  Eigen::VectorXd scale(static_cast<Eigen::Index>(scales.size()));
+  for (std::size_t j = 0; j < scales.size(); ++j) {
+    scale[static_cast<Eigen::Index>(j)] = scales[j].scale;
+  }
+  const Eigen::VectorXd per = scale.cwiseInverse();
+  input.factor = input.factor * per.asDiagonal();
+  if (input.noise.size() > 0) {
+    input.noise = per.asDiagonal() * input.noise * per.asDiagonal();
+  }
+  if (input.covariance.size() > 0) {
+    input.covariance = scale.asDiagonal() * input.covariance * scale.asDiagonal();
+  }
+  input.size = input.size.cwiseProduct(scale.cwiseAbs());
+}
+
+Identifiability judge(const Setting& s, const Fit& fit, const RegressionMoments& moments) {
+  const auto scales = physical_scales(s.robot, s.model);
+  IdentifiabilityInput input = identifiability_input(fit.factor, parameter_words(s, scales.has_value()));
+  const auto p = static_cast<Eigen::Index>(s.model.p());
+  if (const auto noise = row_noise(s)) {
+    input.noise = Eigen::MatrixXd::Zero(p, p);
+    for (std::size_t i = 0; i < noise->YY.size(); ++i) {
+      const double w = fit.weights[static_cast<Eigen::Index>(i)];
+      input.noise += static_cast<double>(moments.instants()) * w * w * noise->YY[i];
+    }
+  }
+  input.covariance = fit.residuals.covariance;
+  input.size = fit.estimate.cwiseAbs();
+  for (Eigen::Index j = 0; j < p; ++j) {
+    const Interval& prior = s.prior.sides[static_cast<std::size_t>(j)];
+    const bool known = s.prior_declared[static_cast<std::size_t>(j)] || !(input.size[j] > 0.0);
+    input.size[j] = known ? 0.5 * (prior.upper - prior.lower) : input.size[j];
+    if (!(input.size[j] > 0.0)) {
+      input.size[j] = 1.0;
+    }
+  }
+  if (scales) {
+    to_physical(input, *scales);
+  }
+  return identifiability(input);
+}
+
+// The shape at its best and along all that was searched; `reference` is the weighted rss without it.
+ShapeFinding finding(std::string name, std::string unit, const SeparableModel& model, VariableProjectionOptions options,
+                     const Fit& fit, double reference, std::size_t points) {
+  options.weights = fit.weights;
+  const SeparableFit found = variable_projection(model, options);
+  const auto ratio = [&](double rss) { return reference > 0.0 ? std::sqrt(rss / reference) : 1.0; };
+  ShapeFinding f;
+  f.name = std::move(name);
+  f.unit = std::move(unit);
+  f.searched = {options.lower[0], options.upper[0]};
+  f.converged = found.end == SearchEnd::converged;
+  if (found.end != SearchEnd::failed) {
+    f.state = found.state[0];
+    f.estimate = found.shape[0];
+    f.standard_error = found.standard_error[0];
+    f.freedom = found.freedom;
+    f.residual_ratio = ratio(found.weighted_rss);
+    f.curve.push_back({f.estimate, f.residual_ratio});
+  }
+  for (const CostPoint& point : cost_curve(model, Eigen::VectorXd::Constant(1, f.searched.lower), 0, f.searched.lower,
+                                           f.searched.upper, points, fit.weights)) {
+    f.curve.push_back({point.shape, ratio(point.weighted_rss)});
+  }
+  std::ranges::stable_sort(f.curve, {}, &ShapePoint::shape);
+  return f;
+}
+
+// Weighted residual sum of squares of `model` with its shape held at `shape`.
+double rss_at(const SeparableModel& model, double shape, const Fit& fit) {
+  const Eigen::VectorXd at = Eigen::VectorXd::Constant(1, shape);
+  return cost_curve(model, at, 0, shape, shape + 1e-9, 2, fit.weights).front().weighted_rss;
+}
+
+// The physically consistent θ nearest to the chosen estimate, in the metric of its covariance. Parameters that are not
+// excited stay at zero.
+ConstrainedFit nearest_consistent(const Fit& fit, const std::vector<LinearConstraint>& constraints) {
+  const auto p = fit.estimate.size();
+  Eigen::MatrixXd precision = Eigen::MatrixXd::Identity(p, p);
+  std::vector<Eigen::Index> in;
+  for (Eigen::Index j = 0; j < p; ++j) {
+    if (fit.residuals.standard_error[j] > 0.0 && std::isfinite(fit.residuals.standard_error[j])) {
+      in.push_back(j);
+    }
+  }
+  if (!in.empty()) {
+    const Eigen::MatrixXd covariance = fit.residuals.covariance(in, in);
+    const Eigen::VectorXd scale = covariance.diagonal().cwiseSqrt();
+    const Eigen::MatrixXd correlation =
+        scale.cwiseInverse().asDiagonal() * covariance * scale.cwiseInverse().asDiagonal();
+    const EigenPairs eigen = symmetric_eigen(correlation);
+    const Eigen::VectorXd lengths = eigen.values.cwiseMax(1e-12).cwiseSqrt().cwiseInverse();
+    precision(in, in) =
+        lengths.asDiagonal() * eigen.vectors.transpose() * Eigen::MatrixXd(scale.cwiseInverse().asDiagonal());
+  }
+  RegressionBlock rows;
+  rows.resize(static_cast<std::size_t>(p), 1, static_cast<std::size_t>(p));
+  rows.Y = precision;
+  rows.y = precision * fit.estimate;
+  LeastSquares metric(static_cast<std::size_t>(p));
+  metric.add(rows);
+  return constrained_least_squares(metric, constraints, fit.residuals.covariance);
+}
+
+void find_shapes(LogSource& log, const Setting& s, const Fit& fit, const IdentificationOptions& options,
+                 Identification& result) {
+  RegressionStream stream = make_rows(log, s);
+  const RegressionBlock rows = read_all(stream);
+  const auto look = [&](const char* name, TimeEffect effect, double lower) {
+    try {
+      const TimeShiftedRows model(rows, effect, lower, options.longest_delay);
+      result.shapes.push_back(
+          finding(name, "s", model, model.options(), fit, rss_at(model, 0.0, fit), options.curve_points));
+    } catch (const InvalidArgument& error) {
+      result.notes.push_back(fmt::format("{} was not looked for: {}", name, error.what()));
+    }
+  };
+  look("delay", TimeEffect::delay, -options.longest_delay);
+  look("effort_lag", TimeEffect::effort_lag, 0.0);
+  look("actuator_lag", TimeEffect::actuator_lag, 0.0);
+  const double fastest = *std::ranges::max_element(s.survey.largest_speed);
+  if (fastest > 0.0) {
+    const StribeckRows model(log, RegressorFilter(s.model, s.filter, s.measurement));
+    VariableProjectionOptions search;
+    search.lower = Eigen::VectorXd::Constant(1, kSlowestStribeck * fastest);
+    search.upper = Eigen::VectorXd::Constant(1, kFastestStribeck * fastest);
+    const char* unit = s.robot.model == "single_axis" ? "m/s or rad/s" : "rad/s";
+    result.shapes.push_back(
+        finding("stribeck_speed", unit, model, search, fit, fit.squares.weighted_rss, options.curve_points));
+  }
+}
+
+bool shows_kinematics(const LogSource& log, const Robot& robot) {
+  return robot.model != "single_axis" && log.find("theta") && log.find("omega_r") && log.find("omega_l");
+}
+
+bool has_effort(const LogSource& log, const Robot& robot, const Model& model) {
+  return std::ranges::any_of(model.joints, [&](const Joint& joint) {
+    return log
+        .find(robot.effort == EffortKind::torque    ? joint.torque
+              : robot.effort == EffortKind::current ? joint.current
+                                                    : joint.voltage)
+        .has_value();
+  });
+}
+
+void calibrate(LogSource& log, const Robot& robot, Identification& result) {
+  if (!shows_kinematics(log, robot)) {
+    return;
+  }
+  KinematicOptions options;
+  options.wheel_radius = robot.wheel_radius;
+  options.track_width = robot.track_width;
+  const bool position = log.find("x").has_value() && log.find("y").has_value();
+  options.radius = options.axle_offset = position;
+  try {
+    result.kinematics = calibrate_kinematics(read_all(log), options);
+  } catch (const InvalidArgument& error) {
+    result.notes.push_back(fmt::format("the kinematics were not calibrated: {}", error.what()));
+  }
+  log.rewind();
+}
+
+}  // namespace
+
+Identification identify(LogSource& log, const Robot& robot, const IdentificationOptions& options) {
+  check::that(options.curve_points >= 2, "curve_points", "at least 2");
+  Identification result;
+  result.confidence = options.confidence;
+  const auto tell = [&](std::string_view stage, double share) {
+    if (options.progress) {
+      options.progress(stage, share);
+    }
+  };
+  if (const Model model = make_model(robot); !has_effort(log, robot, model) && shows_kinematics(log, robot)) {
+    tell("kinematics", 0.1);
+    result.effort = false;
+    result.setting.robot = robot;
+    result.setting.model = model;
+    result.notes.emplace_back("the log has no efforts: mass, inertia and friction were not looked for");
+    calibrate(log, robot, result);
+    return result;
+  }
+  SettingOptions settle_options = options.setting;
+  settle_options.progress = options.progress;
+  result.setting = settle(log, robot, settle_options);
+  const Setting& s = result.setting;
+  result.notes = s.notes;
+
+  tell("identifying", 0.25);
+  result.fit = fit_log(log, s, Part::everything, kRisk);
+  tell("noise of the sensors", 0.4);
+  result.noise = find_noise(log, s);
+
+  tell("robust and constrained fits", 0.5);
+  const std::vector<LinearConstraint> constraints = physical_consistency(quantities(s.model), s.robot.footprint_radius);
+  result.constrained = nearest_consistent(result.fit, constraints);
+  RegressionStream rows = make_rows(log, s);
+  RobustOptions robust;
+  robust.constraints = constraints;
+  result.robust = robust_fit(rows, robust);
+
+  tell("confidence regions", 0.65);
+  const RegressionMoments moments = log_moments(log, s, Part::everything);
+  if (!result.fit.choice.candidates.empty() && result.fit.choice.best().usable) {
+    RegionOptions regions;
+    regions.confidence = options.confidence;
+    regions.bootstrap.seed = regions.sign_perturbed.seed = options.seed;
+    regions.bootstrap.estimator.weights = regions.sign_perturbed.estimator.weights = result.fit.weights;
+    std::vector<bool> excluded;
+    for (const ExcitationFinding& finding : result.fit.excitation) {
+      excluded.push_back(finding.state == Excitation::not_excited);
+    }
+    regions.bootstrap.estimator.excluded = regions.sign_perturbed.estimator.excluded = excluded;
+    result.regions = compare_regions(moments, result.fit.choice.best(), regions);
+  }
+  tell("what the log can tell", 0.75);
+  result.identifiability = judge(s, result.fit, moments);
+  InformationOptions information;
+  information.weights = result.fit.weights;
+  result.information = information_over_time(moments, information);
+
+  const EstimatorChoice& choice = result.fit.choice;
+  const bool noisy =
+      choice.in_doubt || choice.predicted_bias.size() == 0 || choice.predicted_bias.cwiseAbs().maxCoeff() > kMostBias;
+  if (noisy) {
+    result.notes.push_back(
+        "the robust fit does without instruments and shares the bias of least squares by noise of the motion");
+  }
+  if (options.shapes && noisy) {
+    result.notes.push_back(
+        "delay, lags and Stribeck speed were not looked for: noise of the motion would pass for a lag");
+  } else if (options.shapes && s.survey.rows <= options.most_rows) {
+    tell("delays and lags", 0.85);
+    find_shapes(log, s, result.fit, options, result);
+  } else if (options.shapes) {
+    result.notes.push_back(
+        fmt::format("delay, lags and Stribeck speed were not looked for: the log has {} rows, more than {}",
+                    s.survey.rows, options.most_rows));
+  }
+  tell("kinematics", 0.95);
+  calibrate(log, robot, result);
+  log.rewind();
+  tell("done", 1.0);
+  return result;
+}
+
+}  // namespace wheelwright

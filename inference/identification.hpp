@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Everything that a log of fault-free driving says about the parameters, without bounds and thresholds: how they are
+/// best estimated, how sure that is, what the log cannot tell, and what the model leaves out.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <wheelwright/commission/fit.hpp>
+#include <wheelwright/commission/setting.hpp>
+#include <wheelwright/core/interval.hpp>
+#include <wheelwright/identify/variable_projection.hpp>
+#include <wheelwright/inference/identifiability.hpp>
+#include <wheelwright/inference/information_over_time.hpp>
+#include <wheelwright/inference/kinematic_calibration.hpp>
+#include <wheelwright/inference/noise_choice.hpp>
+#include <wheelwright/inference/regions.hpp>
+#include <wheelwright/inference/robust.hpp>
+
+namespace wheelwright {
+
+/// Noise that needs no finding.
+struct KnownNoise {
+  double bound = 0.0;  ///< |n| <= bound
+  std::string unit;    ///< of the bound: rad also for mean speeds, whose noise is that of the angles behind them
+  std::string origin;  ///< "as declared" or "half an encoder count"
+};
+
+/// Noise of one column of the log.
+struct ColumnNoise {
+  std::string column;
+  std::string unit;
+  NoiseEvidence evidence;
+  NoiseChoice choice;               ///< found in the log
+  std::optional<KnownNoise> known;  ///< goes before what was found, wherever the column is an angle or made of angles
+};
+
+/// One point of a curve: what the residual would be with the shape held there.
+struct ShapePoint {
+  double shape = 0.0;
+  double residual_ratio = 1.0;  ///< as ShapeFinding's; NaN where the model is not defined
+};
+
+/// One more quantity that enters nonlinearly, added alone to the model.
+struct ShapeFinding {
+  std::string name;  ///< delay, effort_lag, actuator_lag or stribeck_speed
+  std::string unit;
+  ShapeState state = ShapeState::flat;
+  bool converged = false;
+  double estimate = 0.0;
+  double standard_error = 0.0;
+  double freedom = 0.0;           ///< of Student's t
+  double residual_ratio = 1.0;    ///< residual rms with it over that without, same rows: 1 where it explains nothing
+  Interval searched;              ///< where it was looked for
+  std::vector<ShapePoint> curve;  ///< over all that was searched, ascending
+};
+
+/// What is done, and how far.
+struct IdentificationOptions {
+  SettingOptions setting;
+  double confidence = 0.95;        ///< of the regions
+  std::uint64_t seed = 1;          ///< of bootstrap and signs
+  bool shapes = true;              ///< whether delay, lags and Stribeck speed are looked for
+  std::size_t curve_points = 25;   ///< of each shape's curve, at least 2
+  std::size_t most_rows = 200000;  ///< instants above which they are not: the rows are held in memory
+  double longest_delay = 0.2;      ///< s, searched to both sides for delays, upwards for lags
+  std::function<void(std::string_view stage, double share)> progress;  ///< may be empty
+};
+
+/// The result.
+struct Identification {
+  bool effort =
+      true;  ///< the log has efforts: without, only `kinematics`, `setting`'s robot and model, and notes are given
+  double confidence = 0.95;
+  Setting setting;
+  Fit fit;
+  std::vector<ColumnNoise> noise;   ///< motion columns, then effort columns
+  RobustFit robust;                 ///< Huber's loss, physically consistent
+  ConstrainedFit constrained;       ///< physically consistent θ nearest to the chosen estimate, by its covariance
+  RegionComparison regions;         ///< of the chosen estimate; empty where no parameter is excited
+  Identifiability identifiability;  ///< of the physical quantities where physical_scales() has them, else of θ_L
+  InformationOverTime information;
+  std::vector<ShapeFinding> shapes;  ///< empty where they were not looked for: least squares must be unbiased for that
+  std::optional<KinematicCalibration> kinematics;  ///< where the log has a pose
+  std::vector<std::string> notes;                  ///< what was assumed, left out or could not be done
+};
+
+/// Identifies on the whole of `log`, in several walks. A log of wheel speeds and pose without efforts gives kinematics
+/// only. Throws InputError or InvalidArgument for a log or robot that cannot be used at all.
+[[nodiscard]] Identification identify(LogSource& log, const Robot& robot, const IdentificationOptions& options = {});
+
+}  // namespace wheelwright

@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/inference/m_estimate.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+#include <ceres/ceres.h>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/QR>
+
+#include <wheelwright/core/check.hpp>
+#include <wheelwright/core/limits.hpp>
+#include <wheelwright/core/linear_algebra.hpp>
+#include <wheelwright/identify/least_squares.hpp>
+
+namespace wheelwright {
+namespace {
+
+/// All rows at once: residual root((y − Y(θ0 + Tz))/s).
+class Roots final : public ceres::CostFunction {
+ public:
+  Roots(const RegressionBlock& rows, const Eigen::VectorXd& scales, const LossFunction& loss,
+        const Eigen::VectorXd& origin, const Eigen::MatrixXd& T)
+      : loss_(loss), u_(rows.y - rows.Y * origin), slope_(-rows.Y * T) {
+    for (Eigen::Index row = 0; row < u_.size(); ++row) {
+      const double s = scales[row % scales.size()];
+      u_[row] /= s;
+      slope_.row(row) /= s;
+    }
+    set_num_residuals(static_cast<int>(u_.size()));
+    mutable_parameter_block_sizes()->push_back(static_cast<int>(T.cols()));
+  }
+
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+    const Eigen::Map<const Eigen::VectorXd> z(parameters[0], slope_.cols());
+    const bool wanted = jacobians != nullptr && jacobians[0] != nullptr;
+    for (Eigen::Index row = 0; row < u_.size(); ++row) {
+      const LossFunction::Root root = loss_.root(u_[row] + slope_.row(row).dot(z));
+      residuals[row] = root.value;
+      if (wanted) {
+        Eigen::Map<Eigen::RowVectorXd>(jacobians[0] + row * slope_.cols(), slope_.cols()) =
+            root.slope * slope_.row(row);
+      }
+    }
+    return true;
+  }
+
+ private:
+  LossFunction loss_;
+  Eigen::VectorXd u_;
+  RowMatrix slope_;
+};
+
+/// θ = θ0 + Tz: columns of YT/s are orthonormal up to √N, directions without rows are left out.
+Eigen::MatrixXd whitening(const RegressionBlock& rows, const Eigen::VectorXd& scales) {
+  LeastSquares gram(rows.parameters, scales.cwiseInverse());
+  gram.add(rows);
+  const LeastSquaresFit fit = gram.solve();
+  const Eigen::VectorXd rms = fit.column_rms.unaryExpr([](double r) { return r > 0.0 ? r : 1.0; });
+  const Eigen::MatrixXd scaled =
+      rms.asDiagonal() * fit.inverse_gram * rms.asDiagonal() * static_cast<double>(fit.instants);
+  const EigenPairs eigen = symmetric_eigen(scaled);
+  const Eigen::Index kept = fit.rank;
+  return rms.cwiseInverse().asDiagonal() * eigen.vectors.rightCols(kept) *
+         eigen.values.tail(kept).cwiseMax(0.0).cwiseSqrt().asDiagonal();
+}
+
+MEstimate run(const RegressionBlock& rows, const Eigen::VectorXd& scales, const LossFunction& loss,
+              const Eigen::VectorXd& origin, const Eigen::MatrixXd& T, const Eigen::VectorXd& lower,
+              const Eigen::VectorXd& upper) {
+  check::that(rows.instants() > 0 && static_cast<std::size_t>(scales.size()) == rows.outputs, "m-estimate",
+              "rows, and a scale for each output");
+  check::that((scales.array() > 0.0).all() && scales.allFinite(), "scales", "finite numbers > 0");
+  check::that(origin.size() == rows.Y.cols() && origin.allFinite(), "start", "a finite value for each parameter");
+  check::positive(loss.c, "tuning constant");
+  if (T.cols() == 0) {
+    return {origin, true, "no direction is determined by the rows"};
+  }
+  Eigen::VectorXd z = Eigen::VectorXd::Zero(T.cols());
+  ceres::Problem problem;
+  problem.AddParameterBlock(z.data(), static_cast<int>(z.size()));
+  problem.AddResidualBlock(new Roots(rows, scales, loss, origin, T), nullptr, z.data());
+  for (Eigen::Index j = 0; j < lower.size(); ++j) {
+    if (std::isfinite(lower[j])) {
+      problem.SetParameterLowerBound(z.data(), static_cast<int>(j), lower[j]);
+    }
+    if (std::isfinite(upper[j])) {
+      problem.SetParameterUpperBound(z.data(), static_cast<int>(j), upper[j]);
+    }
+  }
+  ceres::Solver::Options options;
+  options.linear_solver_type = lower.size() == 0 ? ceres::DENSE_NORMAL_CHOLESKY : ceres::DENSE_QR;
+  options.max_num_iterations = 200;
+  options.function_tolerance = 1e-15;
+  options.gradient_tolerance = 1e-12;
+  options.parameter_tolerance = 1e-12;
+  options.num_threads = 1;
+  options.logging_type = ceres::SILENT;
+  options.minimizer_progress_to_stdout = false;
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, &problem, &summary);
+  MEstimate result;
+  result.theta = origin + T * z;
+  result.converged = summary.termination_type == ceres::CONVERGENCE;
+  result.message = summary.message;
+  if (!result.theta.allFinite()) {
+    result = {origin, false, "Ceres left the finite numbers: " + summary.message};
+  }
+  return result;
+}
+
+}  // namespace
+
+MEstimate m_estimate(const RegressionBlock& rows, const Eigen::VectorXd& scales, const LossFunction& loss,
+                     const Eigen::VectorXd& start) {
+  return run(rows, scales, loss, start, whitening(rows, scales), {}, {});
+}
+
+bool find_box(const std::vector<LinearConstraint>& constraints, Eigen::Index p, BoxCoordinates& box) {
+  constexpr double parallel = 1e-12;
+  Eigen::MatrixXd directions(0, p);
+  std::vector<double> lower, upper;
+  for (const LinearConstraint& constraint : constraints) {
+    const double length = constraint.a.norm();
+    const Eigen::RowVectorXd a = constraint.a.transpose() / length;
+    Eigen::Index at = 0;
+    double sign = 1.0;
+    for (; at < directions.rows(); ++at) {
+      sign = a.dot(directions.row(at)) < 0.0 ? -1.0 : 1.0;
+      if ((a - sign * directions.row(at)).norm() <= parallel) {
+        break;
+      }
+    }
+    if (at == directions.rows()) {
+      sign = 1.0;
+      directions.conservativeResize(at + 1, Eigen::NoChange);
+      directions.row(at) = a;
+      lower.push_back(-kInfinity);
+      upper.push_back(kInfinity);
+    }
+    const auto k = static_cast<std::size_t>(at);
+    if (sign > 0.0) {
+      upper[k] = std::min(upper[k], constraint.b / length);
+    } else {
+      lower[k] = std::max(lower[k], -constraint.b / length);
+    }
+  }
+  const Eigen::Index m = directions.rows();
+  if (m > p || m == 0) {
+    return false;
+  }
+  for (std::size_t k = 0; k < lower.size(); ++k) {
+    if (!(lower[k] < upper[k])) {
+      return false;
+    }
+  }
+  const PivotedQr qr(directions.transpose());
+  if (qr.rank() < m) {
+    return false;
+  }
+  const Eigen::MatrixXd Q = qr.Q();
+  box.B.resize(p, p);
+  box.B << directions, Q.rightCols(p - m).transpose();
+  box.lower = Eigen::VectorXd::Constant(p, -kInfinity);
+  box.upper = Eigen::VectorXd::Constant(p, kInfinity);
+  for (Eigen::Index k = 0; k < m; ++k) {
+    box.lower[k] = lower[static_cast<std::size_t>(k)];
+    box.upper[k] = upper[static_cast<std::size_t>(k)];
+  }
+  return true;
+}
+
+MEstimate m_estimate(const RegressionBlock& rows, const Eigen::VectorXd& scales, const LossFunction& loss,
+                     const Eigen::VectorXd& start, const BoxCoordinates& box) {
+  const Eigen::VectorXd z = (box.B * start).cwiseMax(box.lower).cwiseMin(box.upper);
+  const PivotedQr B(box.B);
+  const Eigen::VectorXd origin = B.solve(z);
+  return run(rows, scales, loss, origin, B.inverse(), box.lower - z, box.upper - z);
+}
+
+}  // namespace wheelwright

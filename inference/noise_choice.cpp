@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/inference/noise_choice.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+namespace wheelwright {
+namespace {
+
+constexpr double kUncorrelated = 0.2;
+constexpr double kClearlyLarger = 3.0;
+
+struct Level {
+  NoiseMethod method;
+  double sd, relative_sd;
+};
+
+// Whether a is the larger by more than chance.
+bool exceeds(const Level& a, const Level& b) {
+  return 2.0 * std::log(a.sd / b.sd) > kClearlyLarger * std::hypot(a.relative_sd, b.relative_sd);
+}
+
+std::string_view assumption_of(NoiseMethod method) {
+  switch (method) {
+    case NoiseMethod::none: break;
+    case NoiseMethod::standstill: return "the noise in motion is that at rest";
+    case NoiseMethod::repeats: return "everything but the sensors' noise repeats";
+    case NoiseMethod::differences: return "noise independent from sample to sample";
+  }
+  return "";
+}
+
+NoiseChoice chosen(const Level& level, NoiseMeaning meaning, std::string reason, const ErrorBoundOptions& options) {
+  NoiseChoice choice;
+  choice.method = level.method;
+  choice.meaning = meaning;
+  choice.sd = level.sd;
+  choice.relative_sd = level.relative_sd;
+  choice.bound = bound_of_sd(level.sd, level.relative_sd, options);
+  choice.assumption = assumption_of(level.method);
+  choice.reason = std::move(reason);
+  return choice;
+}
+
+}  // namespace
+
+std::string_view to_string(NoiseMethod method) {
+  switch (method) {
+    case NoiseMethod::none: return "none";
+    case NoiseMethod::standstill: return "standstill";
+    case NoiseMethod::repeats: return "repeats";
+    case NoiseMethod::differences: return "differences";
+  }
+  return "";
+}
+
+NoiseChoice choose_noise(const NoiseEvidence& evidence, const ErrorBoundOptions& options) {
+  using Kind = DifferenceNoise::Kind;
+  std::optional<Level> rest, repeats, differences;
+  if (evidence.standstill && evidence.standstill->kind == StandstillNoise::Kind::noisy) {
+    rest = Level{NoiseMethod::standstill, evidence.standstill->sd, evidence.standstill->relative_sd};
+  }
+  if (evidence.repeats && evidence.repeats->sd > 0.0) {
+    repeats = Level{NoiseMethod::repeats, evidence.repeats->sd, evidence.repeats->relative_sd};
+  }
+  const Kind kind = evidence.differences ? evidence.differences->kind : Kind::too_short;
+  if (kind == Kind::white || kind == Kind::rough) {
+    differences = Level{NoiseMethod::differences, evidence.differences->sd, evidence.differences->relative_sd};
+  }
+  const bool repeats_are_noise = repeats && !evidence.repeats->autocorrelation.empty() &&
+                                 std::abs(evidence.repeats->autocorrelation.front()) < kUncorrelated;
+  const auto at_rest = [&](std::string reason, NoiseMeaning meaning) {
+    NoiseChoice choice = chosen(*rest, meaning, std::move(reason), options);
+    choice.bound.bound = std::max(choice.bound.bound, evidence.standstill->bound.bound);
+    return choice;
+  };
+  if (kind == Kind::white) {
+    if (repeats_are_noise && exceeds(*repeats, *differences)) {
+      return chosen(*repeats, NoiseMeaning::estimate,
+                    "two runs differ by more than differences show, without correlation in time", options);
+    }
+    if (rest && exceeds(*rest, *differences)) {
+      return at_rest("standstill shows more than differences do: slow noise, which differences do not see",
+                     NoiseMeaning::estimate);
+    }
+    return chosen(*differences, NoiseMeaning::estimate,
+                  fmt::format("differences of orders {} to {} agree, as white noise in motion makes them",
+                              evidence.differences->level_from, DifferenceNoise::kOrders),
+                  options);
+  }
+  const std::string_view not_white = kind == Kind::smooth  ? "differences do not settle (fast motion or slow noise)"
+                                     : kind == Kind::rough ? "differences grow (differenced angles)"
+                                     : kind == Kind::none  ? "differences show nothing"
+                                                           : "too few even steps for differences";
+  if (repeats_are_noise) {
+    return chosen(*repeats, NoiseMeaning::estimate,
+                  fmt::format("{}; two runs differ without correlation in time", not_white), options);
+  }
+  if (rest) {
+    return at_rest(
+        fmt::format("{}; {}", not_white, repeats ? "two runs differ by more than noise" : "there is no second run"),
+        NoiseMeaning::lower_limit);
+  }
+  if (repeats) {
+    return chosen(*repeats, NoiseMeaning::upper_limit, fmt::format("{}; two runs differ by more than noise", not_white),
+                  options);
+  }
+  if (differences) {
+    return chosen(*differences, NoiseMeaning::upper_limit,
+                  "differences grow (differenced angles), and there is nothing to compare with", options);
+  }
+  NoiseChoice nothing;
+  const bool constant = evidence.standstill && evidence.standstill->kind == StandstillNoise::Kind::constant;
+  nothing.reason = fmt::format("{}{}", not_white, constant ? "; constant at rest, as an encoder is" : "");
+  return nothing;
+}
+
+}  // namespace wheelwright

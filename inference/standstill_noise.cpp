@@ -1,0 +1,296 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/inference/standstill_noise.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include <wheelwright/core/check.hpp>
+#include <wheelwright/identify/residual_statistics.hpp>
+
+namespace wheelwright {
+namespace {
+
+constexpr double kZero = 1e-9;  // of a command's largest value
+
+std::vector<std::size_t> find_all(const LogSource& log, const std::vector<std::string>& names) {
+  std::vector<std::size_t> found;
+  for (const auto& name : names) {
+    const auto column = log.find(name);
+    check::that(column.has_value(), "log", "a column '" + name + "'");
+    found.push_back(*column);
+  }
+  return found;
+}
+
+// Every row of the log: visit(block, row, whether a segment starts).
+template <typename Visit>
+void walk(LogSource& log, Visit visit) {
+  LogBlock block;
+  log.rewind();
+  while (log.next(block)) {
+    std::size_t segment = 0;
+    for (std::size_t k = 0; k < block.rows(); ++k) {
+      const bool starts = segment < block.segment_starts.size() && block.segment_starts[segment] == k;
+      segment += starts ? 1 : 0;
+      visit(block, k, starts);
+    }
+  }
+  log.rewind();
+}
+
+// Rows of a stretch that may be a standstill: time, the motion's columns, the measured columns.
+struct Stretch {
+  std::vector<double> t;
+  std::vector<std::vector<double>> motion, values;
+
+  void clear() {
+    t.clear();
+    for (auto* columns : {&motion, &values}) {
+      for (auto& c : *columns) {
+        c.clear();
+      }
+    }
+  }
+};
+
+double mean(const std::vector<double>& x, std::size_t first, std::size_t last) {
+  double sum = 0.0;
+  for (std::size_t k = first; k < last; ++k) {
+    sum += x[k];
+  }
+  return sum / static_cast<double>(last - first);
+}
+
+class StandstillGathering {
+ public:
+  StandstillGathering(LogSource& log, const StandstillSigns& signs, const std::vector<std::string>& columns,
+                      const StandstillOptions& options)
+      : options_(options),
+        commands_(find_all(log, signs.commands)),
+        by_angle_(signs.speeds.empty() && !signs.angles.empty()),
+        motion_(find_all(log, by_angle_ ? signs.angles : signs.speeds)),
+        picked_(find_all(log, columns)),
+        zero_(commands_.size(), 0.0),
+        largest_(motion_.size(), 0.0),
+        statistics_(Eigen::VectorXd::Zero(1), Eigen::VectorXd::Ones(static_cast<Eigen::Index>(columns.size()))),
+        means_(columns.size()),
+        neighbours_(columns.size(), 0.0),
+        squares_(columns.size(), 0.0) {
+    check::that(!commands_.empty() || !motion_.empty(), "standstill signs", "commands, speeds or angles");
+    stretch_.motion.resize(motion_.size());
+    stretch_.values.resize(picked_.size());
+  }
+
+  // First walk: the largest commands and speeds.
+  void size_up(const LogBlock& block, std::size_t k, bool starts) {
+    for (std::size_t c = 0; c < commands_.size(); ++c) {
+      zero_[c] = std::max(zero_[c], kZero * std::abs(block.columns[commands_[c]][k]));
+    }
+    before_.resize(motion_.size());
+    for (std::size_t m = 0; m < motion_.size(); ++m) {
+      const double now = block.columns[motion_[m]][k];
+      const double speed = !by_angle_ ? now : starts ? 0.0 : (now - before_[m]) / (block.t[k] - time_before_);
+      largest_[m] = std::max(largest_[m], std::abs(speed));
+      before_[m] = now;
+    }
+    time_before_ = block.t[k];
+  }
+
+  // Second walk.
+  void take(const LogBlock& block, std::size_t k, bool starts) {
+    const bool rests = at_rest(block, k);
+    if (starts || !rests || (!stretch_.t.empty() && block.t[k] - stretch_.t.front() > options_.piece)) {
+      finish();
+    }
+    // Where an angle leaves its place, another stretch may begin at once.
+    if (commanded(block, k) || (!rests && !by_angle_)) {
+      return;
+    }
+    stretch_.t.push_back(block.t[k]);
+    for (std::size_t m = 0; m < motion_.size(); ++m) {
+      stretch_.motion[m].push_back(block.columns[motion_[m]][k]);
+    }
+    for (std::size_t c = 0; c < picked_.size(); ++c) {
+      stretch_.values[c].push_back(block.columns[picked_[c]][k]);
+    }
+  }
+
+  void finish() {
+    judge();
+    stretch_.clear();
+  }
+
+  [[nodiscard]] Standstill result() const {
+    Standstill out;
+    out.columns.resize(picked_.size());
+    out.stretches = stretches_;
+    out.samples = samples_;
+    out.seconds = seconds_;
+    const std::string signs = fmt::format("{}{}{}", commands_.empty() ? "" : "commands at zero",
+                                          commands_.empty() || motion_.empty() ? "" : ", ",
+                                          motion_.empty() ? ""
+                                          : by_angle_     ? "angles at rest"
+                                                          : "speeds near zero");
+    out.recognised = stretches_ > 0 ? fmt::format("{} for at least {} s", signs, options_.least_time)
+                                    : fmt::format("no stretch of {} s with {}", options_.least_time, signs);
+    if (stretches_ == 0) {
+      return out;
+    }
+    const ResidualSummary summary = statistics_.summary(Eigen::MatrixXd::Identity(1, 1));
+    for (std::size_t c = 0; c < picked_.size(); ++c) {
+      out.columns[c] = column(c, summary);
+    }
+    return out;
+  }
+
+ private:
+  [[nodiscard]] bool commanded(const LogBlock& block, std::size_t k) const {
+    for (std::size_t c = 0; c < commands_.size(); ++c) {
+      if (std::abs(block.columns[commands_[c]][k]) > zero_[c]) {
+        return true;
+      }
+    }
+    return false;
+  }
+
+  [[nodiscard]] bool at_rest(const LogBlock& block, std::size_t k) const {
+    if (commanded(block, k)) {
+      return false;
+    }
+    for (std::size_t m = 0; m < motion_.size(); ++m) {
+      const double now = block.columns[motion_[m]][k];
+      // An angle may not leave its place by what the mean speed allows within the shortest stretch.
+      if (by_angle_ ? !stretch_.t.empty() &&
+                          std::abs(now - stretch_.motion[m].front()) > options_.slow * largest_[m] * options_.least_time
+                    : std::abs(now) > options_.near * largest_[m]) {
+        return false;
+      }
+    }
+    return true;
+  }
+
+  // The stretch without its ends, if it is a standstill, goes into the statistics.
+  void judge() {
+    if (stretch_.t.empty()) {
+      return;
+    }
+    const auto& t = stretch_.t;
+    const auto at = [&](double time) {
+      return static_cast<std::size_t>(std::lower_bound(t.begin(), t.end(), time) - t.begin());
+    };
+    const std::size_t first = at(t.front() + options_.trim);
+    const std::size_t last = at(t.back() - options_.trim);
+    if (last < first + 8 || t[last - 1] - t[first] < options_.least_time) {
+      return;
+    }
+    const std::size_t middle = (first + last) / 2;
+    for (std::size_t m = 0; m < motion_.size() && !by_angle_; ++m) {
+      for (const double half : {mean(stretch_.motion[m], first, middle), mean(stretch_.motion[m], middle, last)}) {
+        if (std::abs(half) > options_.slow * largest_[m]) {
+          return;
+        }
+      }
+    }
+    RegressionBlock rows;
+    rows.resize(last - first, picked_.size(), 1);
+    rows.Y.setZero();
+    for (std::size_t c = 0; c < picked_.size(); ++c) {
+      const auto& x = stretch_.values[c];
+      const double centre = mean(x, first, last);
+      means_[c].push_back(centre);
+      double before = 0.0;
+      for (std::size_t k = first; k < last; ++k) {
+        const double deviation = x[k] - centre;
+        rows.y[static_cast<Eigen::Index>((k - first) * picked_.size() + c)] = deviation;
+        neighbours_[c] += k > first ? deviation * before : 0.0;
+        squares_[c] += deviation * deviation;
+        before = deviation;
+      }
+    }
+    for (std::size_t k = first; k < last; ++k) {
+      rows.sample[k - first] = samples_ + k - first;
+      rows.t[k - first] = t[k];
+    }
+    statistics_.add(rows);
+    lengths_.push_back(static_cast<double>(last - first));
+    ++stretches_;
+    samples_ += last - first;
+    seconds_ += t[last - 1] - t[first];
+  }
+
+  [[nodiscard]] StandstillNoise column(std::size_t c, const ResidualSummary& summary) const {
+    StandstillNoise noise;
+    const auto count = static_cast<double>(samples_);
+    for (std::size_t s = 0; s < stretches_; ++s) {
+      noise.offset += lengths_[s] * means_[c][s] / count;
+    }
+    for (std::size_t s = 0; s < stretches_ && stretches_ > 1; ++s) {
+      noise.offset_spread += std::pow(means_[c][s] - noise.offset, 2.0) / static_cast<double>(stretches_ - 1);
+    }
+    noise.offset_spread = std::sqrt(noise.offset_spread);
+    OutputResidual rest = summary.outputs[c];
+    // Rounding of the mean is no noise.
+    if (!(rest.largest > 1e-12 * std::abs(noise.offset))) {
+      noise.kind = StandstillNoise::Kind::constant;
+      return noise;
+    }
+    noise.kind = StandstillNoise::Kind::noisy;
+    // A mean was taken off each stretch: of white noise, one degree of freedom.
+    const double unbiased = std::sqrt(count / (count - static_cast<double>(stretches_)));
+    rest.rms *= unbiased;
+    noise.sd = rest.rms;
+    noise.relative_sd = std::sqrt(2.0 / rest.effective_instants);
+    noise.correlation = neighbours_[c] / squares_[c];
+    noise.largest = rest.largest;
+    noise.bound = extrapolate(rest, samples_, options_.extrapolation);
+    return noise;
+  }
+
+  StandstillOptions options_;
+  std::vector<std::size_t> commands_;
+  bool by_angle_;
+  std::vector<std::size_t> motion_, picked_;
+  std::vector<double> zero_, largest_, before_;
+  double time_before_ = 0.0;
+  Stretch stretch_;
+  ResidualStatistics statistics_;
+  std::vector<std::vector<double>> means_;
+  std::vector<double> lengths_, neighbours_, squares_;
+  std::size_t stretches_ = 0, samples_ = 0;
+  double seconds_ = 0.0;
+};
+
+}  // namespace
+
+StandstillSigns standstill_signs(const LogSource& log, const Model& model) {
+  const auto columns = [&](std::string Joint::*name) {
+    std::vector<std::string> found;
+    for (const Joint& joint : model.joints) {
+      if ((joint.*name).empty() || !log.find(joint.*name)) {
+        return std::vector<std::string>{};
+      }
+      found.push_back(joint.*name);
+    }
+    return found;
+  };
+  return {.commands = columns(&Joint::command), .speeds = columns(&Joint::speed), .angles = columns(&Joint::angle)};
+}
+
+Standstill standstill_noise(LogSource& log, const StandstillSigns& signs, const std::vector<std::string>& columns,
+                            const StandstillOptions& options) {
+  check::positive(options.least_time, "least_time");
+  check::non_negative(options.trim, "trim");
+  check::positive(options.near, "near");
+  check::positive(options.slow, "slow");
+  check::that(options.piece >= options.least_time + 2.0 * options.trim, "piece", "a whole stretch with its ends");
+  check::that(!columns.empty(), "columns", "at least one");
+  StandstillGathering gathering(log, signs, columns, options);
+  walk(log, [&](const LogBlock& block, std::size_t k, bool starts) { gathering.size_up(block, k, starts); });
+  walk(log, [&](const LogBlock& block, std::size_t k, bool starts) { gathering.take(block, k, starts); });
+  gathering.finish();
+  return gathering.result();
+}
+
+}  // namespace wheelwright

@@ -1,0 +1,326 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/logs/bag.hpp>
+
+#include <algorithm>
+#include <cctype>
+#include <map>
+#include <system_error>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include <wheelwright/core/check.hpp>
+#include <wheelwright/files/byte_source.hpp>
+#include <wheelwright/files/suggest.hpp>
+#include <wheelwright/logs/bag_parts.hpp>
+#include <wheelwright/logs/bag_source.hpp>
+#include <wheelwright/logs/bag_unpacker.hpp>
+#include <wheelwright/logs/ros_extractor.hpp>
+
+namespace wheelwright {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Files one behind the other.
+class Bag final : public BagReader {
+ public:
+  Bag(const std::vector<fs::path>& paths, const BagOptions& options) : hashed_(options.hashed) {
+    for (const fs::path& directory : options.msg_path) {
+      definitions_.push_back(ros_definitions_from(directory));
+    }
+    for (const fs::path& path : paths) {
+      add(path);
+    }
+    reports_ = opened_;
+  }
+
+  [[nodiscard]] const std::vector<BagTopic>& topics() const override { return topics_; }
+
+  bool next(BagMessage& message) override {
+    while (at_ < files_.size()) {
+      open(at_);
+      while (source_->next(message)) {
+        topics_known();
+        message.topic = places_[message.topic];
+        BagTopic& topic = topics_[message.topic];
+        if (topic.encoding == "cdr" && bag::is_packed(message.data) && !unpack(message, topic)) {
+          continue;
+        }
+        ++topic.messages;
+        return true;
+      }
+      close();
+    }
+    return false;
+  }
+
+  void rewind() override {
+    if (source_ && open_ == 0) {
+      source_->rewind();
+    } else {
+      source_.reset();
+    }
+    at_ = 0;
+    reports_ = opened_;
+    unpacked_wrong_ = 0;
+    for (BagTopic& topic : topics_) {
+      topic.messages = 0;
+    }
+  }
+
+  [[nodiscard]] const std::vector<BagReport>& reports() const override {
+    refresh();
+    return reports_;
+  }
+
+ private:
+  struct File {
+    fs::path path;
+    std::string metadata;                   ///< of the last file of a directory
+    std::optional<std::uint64_t> promised;  ///< by them, for the files since `first`
+    std::size_t first = 0;
+  };
+
+  /// Adds the files of one argument, and looks into each.
+  void add(const fs::path& path) {
+    const bag::Parts parts = bag::parts_of(path);
+    const std::size_t first = files_.size();
+    std::vector<std::string> losses = parts.losses;
+    for (const bag::Part& part : parts.files) {
+      try {
+        look_into(part);
+      } catch (const InputError& error) {
+        if (part.demanded) {
+          throw;
+        }
+        losses.emplace_back(error.what());
+      }
+    }
+    if (files_.size() == first) {
+      throw InputError(fmt::format("{}: none of its {} files can be read: {}", path.string(), parts.files.size(),
+                                   losses.empty() ? "" : losses.back()));
+    }
+    files_.back().metadata = parts.metadata;
+    files_.back().promised = parts.promised;
+    files_.back().first = first;
+    auto& own = opened_[first].losses;
+    own.insert(own.begin(), losses.begin(), losses.end());
+  }
+
+  void look_into(const bag::Part& part) {
+    if (!files_.empty() && bag::content_of(part.path) == bag::Content::zstd) {
+      // It would have to be unpacked twice: its topics are known when it is its turn.
+      files_.push_back({part.path, {}, {}, 0});
+      opened_.push_back({part.path.string(),
+                         bag::storage_ending(part.path) == "db3" ? "sqlite3" : "mcap",
+                         fs::file_size(part.path),
+                         "",
+                         0,
+                         {}});
+      return;
+    }
+    auto source = bag::open_source(part.path, hashed_ && files_.empty());
+    BagReport report = source->report();
+    report.losses.clear();
+    files_.push_back({part.path, {}, {}, 0});
+    opened_.push_back(std::move(report));
+    std::swap(source_, source);
+    places_.clear();
+    open_ = files_.size() - 1;
+    topics_known();
+    if (open_ > 0) {
+      std::swap(source_, source);
+      places_.clear();
+      open_ = 0;
+      topics_known();
+    }
+  }
+
+  void open(std::size_t file) {
+    if (source_ && open_ == file) {
+      return;
+    }
+    places_.clear();
+    source_ = bag::open_source(files_[file].path, hashed_);
+    open_ = file;
+    topics_known();
+  }
+
+  /// Takes over the report of the file that is open, behind what was known before it was read.
+  void refresh() const {
+    if (!source_ || open_ != at_ || at_ >= files_.size()) {
+      return;
+    }
+    BagReport report = source_->report();
+    report.messages -= unpacked_wrong_;
+    std::vector<std::string> losses = opened_[at_].losses;
+    losses.insert(losses.end(), report.losses.begin(), report.losses.end());
+    if (unpacked_wrong_ > 0) {
+      losses.push_back(
+          fmt::format("{}: {} messages packed with zstd could not be unpacked and are left out, the first {}",
+                      report.path, unpacked_wrong_, first_wrong_));
+    }
+    report.losses = std::move(losses);
+    reports_[at_] = std::move(report);
+  }
+
+  void close() {
+    refresh();
+    const File& file = files_[at_];
+    if (file.promised) {
+      std::uint64_t messages = 0;
+      for (std::size_t k = file.first; k <= at_; ++k) {
+        messages += reports_[k].messages;
+      }
+      if (messages != *file.promised) {
+        reports_[at_].losses.push_back(fmt::format("{}: {} messages were read from its files; it says {}",
+                                                   file.metadata, messages, *file.promised));
+      }
+    }
+    unpacked_wrong_ = 0;
+    ++at_;
+    if (files_.size() > 1) {
+      source_.reset();
+    }
+  }
+
+  /// Takes over topics of the file that is open which are new.
+  void topics_known() {
+    const auto& own = source_->topics();
+    while (places_.size() < own.size()) {
+      const bag::SourceTopic& topic = own[places_.size()];
+      const auto same = std::find_if(topics_.begin(), topics_.end(), [&](const BagTopic& other) {
+        return other.name == topic.name && other.type == topic.type && other.encoding == topic.encoding;
+      });
+      if (same == topics_.end()) {
+        places_.push_back(topics_.size());
+        topics_.push_back(described(topic, places_.size() - 1));
+      } else {
+        places_.push_back(static_cast<std::size_t>(same - topics_.begin()));
+      }
+    }
+  }
+
+  BagTopic described(const bag::SourceTopic& topic, std::size_t place) {
+    BagTopic found{topic.name, topic.type, topic.encoding, {}, {}, 0};
+    if (topic.encoding != "cdr") {
+      found.no_definition = fmt::format("its messages are in {}: only cdr can be read", shown(topic.encoding));
+      return found;
+    }
+    if (topic.schema_encoding == "ros2msg" && !topic.schema.empty()) {
+      try {
+        found.definition = parse_ros_definition(topic.type, topic.schema);
+        found.definition->origin = "the recording";
+        return found;
+      } catch (const InputError& error) {
+        found.no_definition = fmt::format("its definition in the recording is damaged ({})", error.what());
+      }
+    } else if (topic.schema_encoding == "ros2idl") {
+      found.no_definition = "its definition in the recording is IDL, which is not read";
+    } else {
+      found.no_definition = "the recording has no definition of it";
+    }
+    try {
+      for (const RosDefinitions& directory : definitions_) {
+        if ((found.definition = directory.find(topic.type))) {
+          break;
+        }
+      }
+    } catch (const InputError& error) {
+      found.no_definition += fmt::format(", and its file cannot be used ({})", error.what());
+      return found;
+    }
+    if (!found.definition) {
+      found.definition = bundled(topic.type, place);
+    }
+    if (found.definition) {
+      found.no_definition.clear();
+    } else {
+      found.no_definition += fmt::format(
+          ", and {} is not bundled: expected the directory of its .msg file as --msg-path", shown(topic.type));
+    }
+    return found;
+  }
+
+  /// The bundled form that fits the first message, where there are several and there is one.
+  std::optional<RosDefinition> bundled(const std::string& type, std::size_t place) {
+    auto forms = bundled_ros_forms(type);
+    if (forms.empty()) {
+      return std::nullopt;
+    }
+    if (forms.size() > 1) {
+      if (auto data = source_->first_message(place)) {
+        if (const auto unpacked = bag::is_packed(*data) ? unpacker_.unpack(*data) : std::nullopt) {
+          data = std::string(*unpacked);
+        }
+        for (RosDefinition& form : forms) {
+          if (RosExtractor(form, {}).read(*data, {})) {
+            return std::move(form);
+          }
+        }
+      }
+    }
+    return std::move(forms.front());
+  }
+
+  bool unpack(BagMessage& message, const BagTopic& topic) {
+    if (const auto data = unpacker_.unpack(message.data)) {
+      message.data = *data;
+      return true;
+    }
+    if (unpacked_wrong_++ == 0) {
+      first_wrong_ = fmt::format("on {} at {}", topic.name, bag::shown_time(message.log_time));
+    }
+    return false;
+  }
+
+  bool hashed_;
+  std::vector<RosDefinitions> definitions_;
+  std::vector<File> files_;
+  std::vector<BagReport> opened_;  ///< as they were before reading
+
+  std::unique_ptr<bag::Source> source_;
+  std::size_t open_ = 0;             ///< the file of source_
+  std::vector<std::size_t> places_;  ///< of its topics in topics_
+  std::size_t at_ = 0;               ///< the file that is being read
+  std::vector<BagTopic> topics_;
+  mutable std::vector<BagReport> reports_;
+  bag::MessageUnpacker unpacker_;
+  std::uint64_t unpacked_wrong_ = 0;
+  std::string first_wrong_;
+};
+
+}  // namespace
+
+bool is_bag(const fs::path& path) {
+  std::error_code error;
+  if (fs::is_directory(path, error)) {
+    for (fs::directory_iterator at(path, error), end; !error && at != end; at.increment(error)) {
+      if (at->path().filename() == "metadata.yaml" || !bag::storage_ending(at->path().filename()).empty()) {
+        return true;
+      }
+    }
+    return false;
+  }
+  try {
+    switch (bag::content_of(path)) {
+      case bag::Content::mcap:
+      case bag::Content::sqlite: return true;
+      case bag::Content::zstd: break;
+      default: return false;
+    }
+    std::string head(16, '\0');
+    head.resize(open_bytes(path)->read(head.data(), head.size()));
+    return head.starts_with("\x89MCAP") || head.starts_with("SQLite format 3");
+  } catch (const InputError&) {
+    return false;
+  }
+}
+
+std::unique_ptr<BagReader> open_bag(const std::vector<fs::path>& paths, const BagOptions& options) {
+  check::that(!paths.empty(), "open_bag", "at least one path");
+  return std::make_unique<Bag>(paths, options);
+}
+
+}  // namespace wheelwright

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Recordings of rosbag2, message by message, whichever way they are stored.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <wheelwright/logs/ros_definition.hpp>
+
+namespace wheelwright {
+
+/// A stream of messages of one type.
+struct BagTopic {
+  std::string name;                         ///< e.g. "/joint_states"
+  std::string type;                         ///< "pkg/msg/Type"
+  std::string encoding;                     ///< of its messages; only "cdr" can be read
+  std::optional<RosDefinition> definition;  ///< of the recording, else of BagOptions::msg_path, else bundled
+  std::string no_definition;                ///< why there is none, and what to do; empty where there is one
+  std::uint64_t messages = 0;               ///< handed out so far
+};
+
+/// One message.
+struct BagMessage {
+  std::size_t topic = 0;      ///< its place in BagReader::topics()
+  std::int64_t log_time = 0;  ///< when it was recorded, ns
+  std::string_view data;      ///< borrowed until the next call of next() or rewind()
+};
+
+/// What reading one file gave; final when the file has been read to its end.
+struct BagReport {
+  std::string path;                 ///< as it was given, or found in the directory that was given
+  std::string storage;              ///< "mcap" or "sqlite3"
+  std::uint64_t bytes = 0;          ///< of the file
+  std::string hash;                 ///< "xxh64:…" of the file (Xxh64::text) where BagOptions::hashed
+  std::uint64_t messages = 0;       ///< handed out
+  std::vector<std::string> losses;  ///< what could not be read, one sentence each, with file and place
+};
+
+/// How to read recordings.
+struct BagOptions {
+  std::vector<std::filesystem::path> msg_path = {};  ///< directories with definitions: see ros_definitions_from()
+  bool hashed = false;                               ///< whether BagReport::hash is wanted
+};
+
+/// Reads files one behind the other. Nothing is written beside them.
+class BagReader {
+ public:
+  virtual ~BagReader() = default;
+
+  /// Those met so far, which may become more while reading; places stay. A name with two types is two topics.
+  [[nodiscard]] virtual const std::vector<BagTopic>& topics() const = 0;
+  /// The next message in the order of the files and of the recording in them, which need not be that of time; false at
+  /// the end. Damage is no error but is reported; throws InputError, naming the file, when the disk cannot be read.
+  virtual bool next(BagMessage& message) = 0;
+  /// Back to the first message, with fresh reports; topics stay, their counts begin again.
+  virtual void rewind() = 0;
+  /// One for each file, in the order of reading.
+  [[nodiscard]] virtual const std::vector<BagReport>& reports() const = 0;
+};
+
+/// Whether `path` looks like a recording: an MCAP file or an SQLite database by its first bytes, plain or in zstd, or a
+/// directory with a metadata.yaml or with such a file (*.mcap, *.db3, *.mcap.zstd, *.db3.zstd). False where it cannot be
+/// read.
+[[nodiscard]] bool is_bag(const std::filesystem::path& path);
+
+/// Opens recordings: files, or directories as rosbag2 writes them, whose metadata.yaml says which files in which order
+/// (where it is missing or cannot be read: all that are there, "_2" before "_10"). Several continue one stream, in the
+/// order given.
+///
+/// Files packed with zstd, and a database with a journal beside it (a recording that was not closed), are read from a
+/// copy in the system's directory for temporary files, which is gone afterwards. Messages packed with zstd one by one are
+/// unpacked. A file of a directory that is missing or of no use is a loss while others can be read.
+///
+/// Throws InputError, naming the file, when it is missing or no recording, when a directory has none, and for a
+/// BagOptions::msg_path as ros_definitions_from() does; InvalidArgument when `paths` is empty.
+[[nodiscard]] std::unique_ptr<BagReader> open_bag(const std::vector<std::filesystem::path>& paths,
+                                                  const BagOptions& options = {});
+
+}  // namespace wheelwright

@@ -1,0 +1,330 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/logs/bag_columns.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <string_view>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include <wheelwright/core/error.hpp>
+#include <wheelwright/files/suggest.hpp>
+#include <wheelwright/logs/log_columns.hpp>
+#include <wheelwright/logs/ros_extractor.hpp>
+
+namespace wheelwright {
+namespace {
+
+constexpr std::string_view quaternion = "xyzw";
+
+std::vector<std::string> yaw_fields(const std::string& orientation) {
+  std::vector<std::string> fields;
+  for (const char c : quaternion) {
+    fields.push_back(fmt::format("{}.{}", orientation, c));
+  }
+  return fields;
+}
+
+/// Words of a name: split at what is no letter, and before a capital behind a small letter.
+std::vector<std::string> words_of(const std::string& name) {
+  std::vector<std::string> words(1);
+  char before = '_';
+  for (const char c : name) {
+    const auto u = static_cast<unsigned char>(c);
+    if (std::isalpha(u) == 0) {
+      words.emplace_back();
+    } else {
+      if (std::isupper(u) != 0 && std::islower(static_cast<unsigned char>(before)) != 0) {
+        words.emplace_back();
+      }
+      words.back() += static_cast<char>(std::tolower(u));
+    }
+    before = c;
+  }
+  std::erase(words, "");
+  return words;
+}
+
+bool has_word(const std::vector<std::string>& words, std::string_view word) {
+  return std::ranges::find(words, word) != words.end();
+}
+
+bool contains(std::string_view text, std::string_view part) { return text.find(part) != std::string_view::npos; }
+
+/// What could be read, and how gladly: of two offers of a column the one with the smaller rank is taken.
+struct Offer {
+  std::size_t topic = 0;
+  BagColumn column;
+  int rank = 0;
+};
+
+class Chooser {
+ public:
+  Chooser(const std::vector<BagTopicView>& topics, const CsvOptions& options, const std::string& path)
+      : topics_(topics), options_(options), path_(path) {}
+
+  BagChoice choose() {
+    for (std::size_t k = 0; k < topics_.size(); ++k) {
+      list_fields(k);
+    }
+    for (const auto& [name, field] : options_.map) {
+      take_mapped(name, field);
+    }
+    for (std::size_t k = 0; k < topics_.size(); ++k) {
+      offer_from(k);
+    }
+    take_offers();
+    order_sources();
+    return std::move(choice_);
+  }
+
+ private:
+  [[nodiscard]] const BagTopic& topic(std::size_t k) const { return *topics_[k].topic; }
+
+  void list_fields(std::size_t k) {
+    if (!topic(k).definition) {
+      return;
+    }
+    for (const std::string& field : numeric_paths(*topic(k).definition)) {
+      choice_.header.push_back(topic(k).name + "." + field);
+    }
+  }
+
+  void take(std::size_t k, BagColumn column) {
+    taken_.push_back(column.name);
+    const auto source = std::ranges::find(choice_.sources, k, &BagSource::topic);
+    if (source != choice_.sources.end()) {
+      source->columns.push_back(std::move(column));
+    } else {
+      choice_.sources.push_back({k, {std::move(column)}});
+    }
+  }
+
+  void take_mapped(const std::string& name, const std::string& field) {
+    std::optional<std::size_t> found;
+    for (std::size_t k = 0; k < topics_.size(); ++k) {
+      const std::string& own = topic(k).name;
+      const bool fits = field.size() > own.size() && field.starts_with(own) && field[own.size()] == '.';
+      if (fits && (!found || own.size() > topic(*found).name.size())) {
+        found = k;
+      }
+    }
+    if (!found) {
+      std::vector<std::string> names;
+      for (const BagTopicView& view : topics_) {
+        names.push_back(view.topic->name);
+      }
+      throw InputError(
+          fmt::format("{}: --map {}={}: no topic begins this field: expected TOPIC.FIELD with a topic of {}", path_,
+                      name, field, listed(names)));
+    }
+    const BagTopic& own = topic(*found);
+    if (!own.definition) {
+      throw InputError(fmt::format("{}: --map {}={}: the messages of {} ({}) cannot be read: {}", path_, name, field,
+                                   own.name, own.type, own.no_definition));
+    }
+    std::string path = field.substr(own.name.size() + 1);
+    const bool yaw = path == "yaw" || path.ends_with(".yaw");
+    check_element(*found, name, path);
+    const std::vector<std::string> numbers = numeric_paths(*own.definition);
+    std::vector<std::string> fields{path};
+    if (yaw && std::ranges::find(numbers, path) == numbers.end()) {
+      fields = yaw_fields(path.substr(0, path.size() - 4));
+    }
+    take(*found, {name, std::move(fields)});
+  }
+
+  /// Throws where the path's element is named and the topic's first message does not name it.
+  void check_element(std::size_t k, const std::string& name, const std::string& path) const {
+    const std::size_t open = path.find('['), close = path.find(']');
+    const std::vector<std::string>& names = topics_[k].names;
+    if (names.empty() || open == std::string::npos || close == std::string::npos || close < open) {
+      return;
+    }
+    const std::string element = path.substr(open + 1, close - open - 1);
+    const bool index = !element.empty() && element.find_first_not_of("0123456789") == std::string::npos;
+    if (!index && std::ranges::find(names, element) == names.end()) {
+      throw InputError(fmt::format("{}: --map {}={}.{}: the messages name no {}: expected one of {}{}", path_, name,
+                                   topic(k).name, path, shown(element), listed(names), did_you_mean(element, names)));
+    }
+  }
+
+  void offer(std::size_t k, std::string name, std::vector<std::string> fields, int rank) {
+    if (!options_.only || std::ranges::find(*options_.only, name) != options_.only->end()) {
+      offers_.push_back({k, {std::move(name), std::move(fields)}, rank});
+    }
+  }
+
+  void offer_from(std::size_t k) {
+    const BagTopic& own = topic(k);
+    if (!own.definition || topics_[k].silent) {
+      return;
+    }
+    const std::string& type = own.type;
+    if (type == "sensor_msgs/msg/JointState") {
+      offer_joints(k);
+    } else if (type == "geometry_msgs/msg/PoseStamped") {
+      offer_pose(k, "pose", 1);
+    } else if (type == "geometry_msgs/msg/PoseWithCovarianceStamped") {
+      offer_pose(k, "pose.pose", 1);
+    } else if (type == "nav_msgs/msg/Odometry") {
+      offer_odometry(k);
+    } else if (type == "sensor_msgs/msg/Imu") {
+      offer(k, "gyro_z", {"angular_velocity.z"}, 1);
+      offer(k, "accel_x", {"linear_acceleration.x"}, 1);
+    } else if (!is_of_ros(type)) {
+      for (const std::string& field : numeric_paths(*own.definition)) {
+        const LogColumn* column = contains(field, ".") || contains(field, "[") ? nullptr : recognise_log_column(field);
+        if (column != nullptr && column->name != "t") {
+          offer(k, column->name, {field}, 0);
+        }
+      }
+    }
+  }
+
+  static bool is_of_ros(const std::string& type) {
+    constexpr std::array<std::string_view, 12> packages = {
+        "std_msgs",        "builtin_interfaces", "geometry_msgs",   "sensor_msgs",
+        "nav_msgs",        "tf2_msgs",           "trajectory_msgs", "control_msgs",
+        "diagnostic_msgs", "rosgraph_msgs",      "stereo_msgs",     "visualization_msgs"};
+    return std::ranges::any_of(packages, [&](std::string_view package) {
+      return type.size() > package.size() && type.starts_with(package) && type[package.size()] == '/';
+    });
+  }
+
+  void offer_pose(std::size_t k, const std::string& pose, int rank) {
+    offer(k, "x", {pose + ".position.x"}, rank);
+    offer(k, "y", {pose + ".position.y"}, rank);
+    offer(k, "theta", yaw_fields(pose + ".orientation"), rank);
+  }
+
+  void offer_odometry(std::size_t k) {
+    const std::string name = plain_name(topic(k).name);
+    if (contains(name, "wheel") || contains(name, "controller") || contains(name, "encoder")) {
+      choice_.notes.push_back(fmt::format(
+          "{} ({}) was not taken as the pose: by its name it is computed from the wheels, which is no independent "
+          "measurement; --map x={}.pose.pose.position.x and the like take it",
+          topic(k).name, topic(k).type, topic(k).name));
+      return;
+    }
+    const bool reference = contains(name, "truth") || contains(name, "mocap") || contains(name, "vicon") ||
+                           contains(name, "optitrack") || contains(name, "slam");
+    offer_pose(k, "pose.pose", reference ? 1 : 2);
+  }
+
+  void offer_joints(std::size_t k) {
+    const BagTopicView& view = topics_[k];
+    const auto filled = [&](std::string_view array) {
+      return std::ranges::find(view.filled, array) != view.filled.end();
+    };
+    const auto give = [&](const std::string& joint, const std::string& angle, const std::string& speed,
+                          const std::string& effort) {
+      for (const auto& [array, column] : {std::pair("position", angle), {"velocity", speed}, {"effort", effort}}) {
+        if (filled(array)) {
+          offer(k, column, {fmt::format("{}[{}]", array, joint)}, 1);
+        }
+      }
+    };
+    if (view.names.size() == 1) {
+      give(view.names.front(), "position", "velocity", "effort");
+      return;
+    }
+    std::vector<std::string> wheels;
+    std::ranges::copy_if(view.names, std::back_inserter(wheels),
+                         [](const std::string& name) { return contains(plain_name(name), "wheel"); });
+    const std::vector<std::string>& joints = wheels.empty() ? view.names : wheels;
+    for (const std::string side : {"r", "l"}) {
+      std::vector<std::string> of_side;
+      std::ranges::copy_if(joints, std::back_inserter(of_side),
+                           [&](const std::string& name) { return side_of_joint(name) == side; });
+      if (of_side.size() == 1) {
+        give(of_side.front(), "phi_" + side, "omega_" + side, "tau_" + side);
+      } else if (of_side.size() > 1) {
+        choice_.notes.push_back(
+            fmt::format("{} has {} {} joints ({}): none was taken; --map omega_{}={}.velocity[{}] "
+                        "and the like choose one",
+                        view.topic->name, of_side.size(), side == "r" ? "right" : "left", listed(of_side), side,
+                        view.topic->name, of_side.front()));
+      }
+    }
+  }
+
+  void take_offers() {
+    std::vector<std::string> names;
+    for (const Offer& offer : offers_) {
+      if (std::ranges::find(names, offer.column.name) == names.end() &&
+          std::ranges::find(taken_, offer.column.name) == taken_.end()) {
+        names.push_back(offer.column.name);
+      }
+    }
+    for (const std::string& name : names) {
+      int best = offers_.front().rank;
+      std::vector<const Offer*> rivals;
+      for (const Offer& offer : offers_) {
+        if (offer.column.name != name || (!rivals.empty() && offer.rank > best)) {
+          continue;
+        }
+        if (rivals.empty() || offer.rank < best) {
+          rivals.clear();
+          best = offer.rank;
+        }
+        rivals.push_back(&offer);
+      }
+      if (rivals.size() == 1) {
+        take(rivals.front()->topic, rivals.front()->column);
+        continue;
+      }
+      std::vector<std::string> places;
+      for (const Offer* offer : rivals) {
+        places.push_back(topic(offer->topic).name);
+      }
+      choice_.notes.push_back(fmt::format(
+          "{} was left out since several topics have it ({}): --map {}={}.{} takes one", name, listed(places), name,
+          places.front(),
+          rivals.front()->column.is_yaw()
+              ? rivals.front()->column.fields.front().substr(0, rivals.front()->column.fields.front().size() - 1) +
+                    "yaw"
+              : rivals.front()->column.fields.front()));
+    }
+  }
+
+  /// Efforts before motion before the rest; in doubt the topic with more columns, then the one that is listed first.
+  void order_sources() {
+    const auto weight = [](const BagSource& source) {
+      int sum = 0;
+      for (const BagColumn& column : source.columns) {
+        sum += row_weight(column.name);
+      }
+      return sum;
+    };
+    std::ranges::stable_sort(choice_.sources, [&](const BagSource& a, const BagSource& b) {
+      return weight(a) != weight(b) ? weight(a) > weight(b) : a.topic < b.topic;
+    });
+  }
+
+  const std::vector<BagTopicView>& topics_;
+  const CsvOptions& options_;
+  const std::string& path_;
+  BagChoice choice_;
+  std::vector<Offer> offers_;
+  std::vector<std::string> taken_;
+};
+
+}  // namespace
+
+std::string side_of_joint(const std::string& name) {
+  const std::vector<std::string> words = words_of(name);
+  const std::string plain = plain_name(name);
+  const bool right = has_word(words, "right") || has_word(words, "r") || contains(plain, "right");
+  const bool left = has_word(words, "left") || has_word(words, "l") || contains(plain, "left");
+  return right == left ? "" : right ? "r" : "l";
+}
+
+BagChoice choose_bag_columns(const std::vector<BagTopicView>& topics, const CsvOptions& options,
+                             const std::string& path) {
+  return Chooser(topics, options, path).choose();
+}
+
+}  // namespace wheelwright

@@ -1,0 +1,397 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/logs/bag_log.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include <wheelwright/core/error.hpp>
+#include <wheelwright/files/suggest.hpp>
+#include <wheelwright/logs/bag.hpp>
+#include <wheelwright/logs/bag_clock.hpp>
+#include <wheelwright/logs/bag_columns.hpp>
+#include <wheelwright/logs/log_columns.hpp>
+#include <wheelwright/logs/ros_extractor.hpp>
+#include <wheelwright/logs/stream_aligner.hpp>
+
+namespace wheelwright {
+namespace {
+
+constexpr std::int64_t one_second = 1'000'000'000;
+constexpr std::int64_t wall_clock = 100'000'000 * one_second;
+constexpr std::size_t first_messages = 2000;
+constexpr std::size_t looked_at = 20000;  ///< messages at least, for topics that a recording without index has
+
+constexpr std::array<const char*, 3> joint_arrays = {"position", "velocity", "effort"};
+
+/// Everything about a bag that one looks at before its rows are read.
+struct BagPlan {
+  std::filesystem::path path;
+  BagOptions options;
+  BagChoice choice;
+  std::vector<std::string> topics;         ///< name of each topic
+  std::vector<RosDefinition> definitions;  ///< of each source's messages: a reader may know its topics only later
+  BagClocks clocks;                        ///< of each source
+};
+
+/// The names and filled arrays of the first message of every topic that has them.
+std::vector<BagTopicView> view_topics(BagReader& bag) {
+  std::map<std::size_t, BagTopicView> met;
+  BagMessage message;
+  std::size_t read = 0;
+  while ((read < looked_at || met.size() < bag.topics().size()) && bag.next(message)) {
+    ++read;
+    const BagTopic& topic = bag.topics()[message.topic];
+    auto [entry, is_new] = met.try_emplace(message.topic);
+    if (!is_new || topic.type != "sensor_msgs/msg/JointState" || !topic.definition) {
+      continue;
+    }
+    entry->second.names = read_names(*topic.definition, message.data).value_or(std::vector<std::string>{});
+    std::vector<std::string> paths;
+    for (const char* array : joint_arrays) {
+      paths.push_back(std::string(array) + "[0]");
+    }
+    RosExtractor extractor(*topic.definition, paths);
+    std::array<double, joint_arrays.size()> values{};
+    if (extractor.read(message.data, values)) {
+      for (std::size_t k = 0; k < values.size(); ++k) {
+        if (!std::isnan(values[k])) {
+          entry->second.filled.emplace_back(joint_arrays[k]);
+        }
+      }
+    }
+  }
+  std::vector<BagTopicView> views;
+  for (std::size_t k = 0; k < bag.topics().size(); ++k) {
+    const auto view = met.find(k);
+    views.push_back(view != met.end() ? view->second : BagTopicView{});
+    views.back().silent = view == met.end();
+    views.back().topic = &bag.topics()[k];
+  }
+  return views;
+}
+
+/// Times of the first messages of each source's topic.
+std::vector<TopicTimes> first_times(BagReader& bag, const std::vector<BagSource>& sources) {
+  std::vector<TopicTimes> times;
+  std::vector<RosExtractor> extractors;
+  for (const BagSource& source : sources) {
+    times.push_back({bag.topics()[source.topic].name, {}, {}});
+    extractors.emplace_back(*bag.topics()[source.topic].definition, std::vector<std::string>{});
+  }
+  BagMessage message;
+  bag.rewind();
+  while (std::ranges::any_of(times, [](const TopicTimes& t) { return t.stamps.size() < first_messages; }) &&
+         bag.next(message)) {
+    const auto source = std::ranges::find(sources, message.topic, &BagSource::topic);
+    const auto k = static_cast<std::size_t>(source - sources.begin());
+    if (source == sources.end() || times[k].stamps.size() >= first_messages || !extractors[k].read(message.data, {})) {
+      continue;
+    }
+    times[k].log_times.push_back(message.log_time);
+    times[k].stamps.push_back(extractors[k].stamp());
+  }
+  return times;
+}
+
+/// Rotation about the vertical of a quaternion (x, y, z, w) that turns forward to where it points, rad.
+double yaw_of(const double* q) {
+  return std::atan2(2.0 * (q[3] * q[2] + q[0] * q[1]), q[3] * q[3] + q[0] * q[0] - q[1] * q[1] - q[2] * q[2]);
+}
+
+/// What the walk reads from one topic.
+struct Reading {
+  std::size_t topic = 0;
+  std::vector<BagColumn> columns;
+  std::vector<std::size_t> slots;  ///< of each column in the row
+  TopicClock clock;
+  std::optional<RosExtractor> extractor;
+  std::vector<double> numbers;  ///< as extracted
+  std::vector<double> values;   ///< one for each column
+  std::size_t messages = 0;     ///< of the topic so far
+  std::size_t damaged = 0;
+  std::size_t unstamped = 0;
+  std::string first_damage;
+};
+
+class BagWalk final : public RowWalk {
+ public:
+  BagWalk(const BagPlan& plan, const std::vector<std::string>& names, double longest_step, LogReport* report,
+          std::int64_t origin)
+      : plan_(plan), names_(names), cleaner_(names, report), row_(names.size() + 1), origin_(origin) {
+    BagOptions options = plan.options;
+    options.hashed = report != nullptr;
+    bag_ = open_bag({plan.path}, options);
+    cleaner_.set_longest_step(longest_step);
+    std::vector<AlignedStream> streams;
+    for (std::size_t k = 0; k < plan.choice.sources.size(); ++k) {
+      add_reading(plan.choice.sources[k], plan.definitions[k], plan.clocks.clocks[k], streams);
+    }
+    if (readings_.empty()) {
+      throw InputError(plan.path.string() + ": none of the wanted columns is in it");
+    }
+    cleaner_.begin_file(fmt::format("{}: {}, message ", plan.path.string(), plan.topics[readings_.front().topic]));
+    aligner_.emplace(names.size(), std::move(streams));
+  }
+
+  bool next(RowOutcome& outcome) override {
+    std::int64_t time = 0;
+    while (!aligner_->pop(time, std::span(row_).subspan(1))) {
+      if (finished_) {
+        return false;
+      }
+      read_on();
+    }
+    row_[0] = static_cast<double>(time - origin_) / static_cast<double>(one_second);
+    ++number_;
+    if (const std::string* missing = uncovered()) {
+      cleaner_.count(&LogReport::uncovered, number_, *missing);
+      outcome = RowOutcome::dropped;
+    } else {
+      outcome = cleaner_.clean(row_, number_);
+    }
+    return true;
+  }
+
+  [[nodiscard]] double t() const override { return cleaner_.t(); }
+  [[nodiscard]] const double* values() const override { return row_.data() + 1; }
+
+  void describe(LogFileReport& file) const override {
+    for (const BagReport& of : bag_->reports()) {
+      file.format = of.storage;
+      file.bytes += of.bytes;
+      file.hash += (file.hash.empty() ? "" : " ") + of.hash;
+      file.notes.insert(file.notes.end(), of.losses.begin(), of.losses.end());
+    }
+    file.time_origin = static_cast<double>(origin_ / one_second);
+    file.header = plan_.choice.header;
+    for (const std::string& field : plan_.choice.header) {
+      if (!is_used(field)) {
+        file.ignored.push_back(field);
+      }
+    }
+    file.notes.insert(file.notes.end(), plan_.choice.notes.begin(), plan_.choice.notes.end());
+    file.notes.insert(file.notes.end(), plan_.clocks.notes.begin(), plan_.clocks.notes.end());
+    for (std::size_t k = 0; k < readings_.size(); ++k) {
+      describe(readings_[k], k, file);
+    }
+    for (std::size_t k = plan_.topics.size(); k < bag_->topics().size(); ++k) {
+      file.notes.push_back(fmt::format(
+          "{} begins so late that it was not looked at for columns; begin the recording anew, or cut it, to use it",
+          bag_->topics()[k].name));
+    }
+  }
+
+ private:
+  void add_reading(const BagSource& source, const RosDefinition& definition, const TopicClock& clock,
+                   std::vector<AlignedStream>& streams) {
+    Reading reading;
+    reading.topic = source.topic;
+    reading.clock = clock;
+    AlignedStream stream;
+    std::vector<std::string> fields;
+    for (const BagColumn& column : source.columns) {
+      const auto name = std::ranges::find(names_, column.name);
+      if (name == names_.end()) {
+        continue;
+      }
+      reading.columns.push_back(column);
+      fields.insert(fields.end(), column.fields.begin(), column.fields.end());
+      reading.slots.push_back(static_cast<std::size_t>(name - names_.begin()));
+      stream.angle.push_back(column.is_yaw());
+    }
+    if (reading.columns.empty()) {
+      return;
+    }
+    stream.columns = reading.slots;
+    stream.longest_gap = static_cast<std::int64_t>(gap_factor * static_cast<double>(clock.median_step));
+    stream.time_error = clock.jitter;
+    reading.extractor.emplace(definition, fields);
+    reading.numbers.resize(fields.size());
+    reading.values.resize(reading.columns.size());
+    readings_.push_back(std::move(reading));
+    streams.push_back(std::move(stream));
+  }
+
+  /// Takes in the next message that matters.
+  void read_on() {
+    BagMessage message;
+    if (!bag_->next(message)) {
+      aligner_->finish();
+      finished_ = true;
+      return;
+    }
+    const auto found = std::ranges::find(readings_, message.topic, &Reading::topic);
+    if (found == readings_.end()) {
+      return;
+    }
+    Reading& reading = *found;
+    ++reading.messages;
+    if (!reading.extractor->read(message.data, reading.numbers)) {
+      if (reading.damaged++ == 0) {
+        reading.first_damage = fmt::format("message {}: {}", reading.messages, reading.extractor->error());
+      }
+      return;
+    }
+    std::int64_t time = message.log_time;
+    if (reading.clock.stamped) {
+      const std::optional<std::int64_t> stamp = reading.extractor->stamp();
+      if (!stamp && !reading.clock.zero_is_time) {
+        ++reading.unstamped;
+        return;
+      }
+      time = stamp.value_or(0);
+    }
+    const double* number = reading.numbers.data();
+    for (std::size_t k = 0; k < reading.columns.size(); ++k) {
+      reading.values[k] = reading.columns[k].is_yaw() ? yaw_of(number) : *number;
+      number += reading.columns[k].fields.size();
+    }
+    aligner_->push(static_cast<std::size_t>(found - readings_.begin()), time + reading.clock.shift, reading.values);
+  }
+
+  /// A column of another topic that has no value in this row.
+  [[nodiscard]] const std::string* uncovered() const {
+    for (std::size_t r = 1; r < readings_.size(); ++r) {
+      for (const std::size_t slot : readings_[r].slots) {
+        if (std::isnan(row_[slot + 1])) {
+          return &names_[slot];
+        }
+      }
+    }
+    return nullptr;
+  }
+
+  [[nodiscard]] bool is_used(const std::string& field) const {
+    return std::ranges::any_of(readings_, [&](const Reading& reading) {
+      const std::string& topic = plan_.topics[reading.topic];
+      return std::ranges::any_of(reading.columns, [&](const BagColumn& column) {
+        return std::ranges::any_of(column.fields, [&](const std::string& own) {
+          const std::string plain = fmt::format("{}.{}", topic, own.substr(0, own.find('[')));
+          return field == fmt::format("{}.{}", topic, own) || field == plain + "[]";
+        });
+      });
+    });
+  }
+
+  void describe(const Reading& reading, std::size_t stream, LogFileReport& file) const {
+    const std::string& topic = plan_.topics[reading.topic];
+    if (reading.damaged > 0) {
+      file.notes.push_back(fmt::format("{} of {} messages of {} could not be read and were left out (first: {})",
+                                       reading.damaged, reading.messages, topic, reading.first_damage));
+    }
+    if (reading.unstamped > 0) {
+      file.notes.push_back(
+          fmt::format("{} of {} messages of {} have no time stamp, unlike the others, and were left out",
+                      reading.unstamped, reading.messages, topic));
+    }
+    if (const std::size_t stale = aligner_->stale(stream); stale > 0) {
+      file.notes.push_back(fmt::format("{} of {} messages of {} are not later than the one before and were left out",
+                                       stale, reading.messages, topic));
+    }
+    if (stream == 0) {
+      return;
+    }
+    for (const std::size_t slot : reading.slots) {
+      file.interpolated.push_back({names_[slot], topic, aligner_->error()[slot]});
+    }
+  }
+
+  const BagPlan& plan_;
+  const std::vector<std::string>& names_;
+  RowCleaner cleaner_;
+  std::vector<double> row_;  ///< time, then the columns
+  std::int64_t origin_;
+  std::unique_ptr<BagReader> bag_;
+  std::vector<Reading> readings_;
+  std::optional<StreamAligner> aligner_;
+  std::size_t number_ = 0;
+  bool finished_ = false;
+};
+
+class BagFile final : public RowFile {
+ public:
+  BagFile(const std::filesystem::path& path, const LogOptions& options, TimeOrigin origin)
+      : plan_{.path = path,
+              .options = {.msg_path = options.msg_path, .hashed = false},
+              .choice = {},
+              .topics = {},
+              .definitions = {},
+              .clocks = {}},
+        origin_(std::move(origin)) {
+    const auto bag = open_bag({path}, plan_.options);
+    const std::vector<BagTopicView> views = view_topics(*bag);
+    plan_.choice = choose_bag_columns(views, options, path.string());
+    for (const BagTopic& topic : bag->topics()) {
+      plan_.topics.push_back(topic.name);
+    }
+    if (plan_.choice.sources.empty()) {
+      throw InputError(nothing_in(*bag, options));
+    }
+    for (const BagSource& source : plan_.choice.sources) {
+      plan_.definitions.push_back(*bag->topics()[source.topic].definition);
+    }
+    const std::vector<TopicTimes> times = first_times(*bag, plan_.choice.sources);
+    plan_.clocks = bag_clocks(times);
+    for (const BagSource& source : plan_.choice.sources) {
+      for (const BagColumn& column : source.columns) {
+        names_.push_back(column.name);
+      }
+    }
+    if (!origin_->has_value()) {
+      const TopicTimes& rows = times.front();
+      const bool stamped = plan_.clocks.clocks.front().stamped;
+      const std::int64_t first = rows.stamps.empty() ? 0
+                                 : stamped           ? rows.stamps.front().value_or(0)
+                                                     : rows.log_times.front();
+      *origin_ = first > wall_clock ? first / one_second * one_second : 0;
+    }
+  }
+
+  [[nodiscard]] std::string path() const override { return plan_.path.string(); }
+  [[nodiscard]] const std::vector<std::string>& columns() const override { return names_; }
+  [[nodiscard]] std::unique_ptr<RowWalk> open(const std::vector<std::string>& names, double longest_step,
+                                              LogReport* report) override {
+    return std::make_unique<BagWalk>(plan_, names, longest_step, report, origin_->value());
+  }
+
+ private:
+  [[nodiscard]] std::string nothing_in(const BagReader& bag, const LogOptions& options) const {
+    std::string message = plan_.path.string() + ": no topic has a column of a log";
+    if (bag.topics().empty()) {
+      return message + ": there is no message in it";
+    }
+    message += ": it has";
+    for (const BagTopic& topic : bag.topics()) {
+      message += fmt::format("{} {} ({}{})", &topic == &bag.topics().front() ? "" : ",", topic.name, topic.type,
+                             topic.definition ? "" : ": " + topic.no_definition);
+    }
+    for (const std::string& note : plan_.choice.notes) {
+      message += "; " + note;
+    }
+    if (options.msg_path.empty() &&
+        std::ranges::any_of(bag.topics(), [](const BagTopic& topic) { return !topic.definition; })) {
+      message += "; --msg-path DIR says where definitions are";
+    }
+    return message +
+           "; --map NAME=TOPIC.FIELD takes any numeric field, e.g. --map omega_r=/joints.velocity[right_wheel]";
+  }
+
+  BagPlan plan_;
+  std::vector<std::string> names_;
+  TimeOrigin origin_;
+};
+
+}  // namespace
+
+std::unique_ptr<RowFile> bag_file(const std::filesystem::path& path, const LogOptions& options,
+                                  const TimeOrigin& origin) {
+  return std::make_unique<BagFile>(path, options, origin);
+}
+
+}  // namespace wheelwright

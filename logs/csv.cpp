@@ -1,0 +1,406 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/logs/csv.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <span>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include <wheelwright/core/check.hpp>
+#include <wheelwright/files/line_reader.hpp>
+#include <wheelwright/logs/csv_rows.hpp>
+#include <wheelwright/logs/csv_streams.hpp>
+#include <wheelwright/logs/stream_aligner.hpp>
+
+namespace wheelwright {
+namespace {
+
+constexpr std::size_t rows_looked_at = 5000;  ///< rows at the beginning of a file, for columns with rates of their own
+
+/// Content lines of one file behind its header.
+struct FileWalk {
+  FileWalk(const std::filesystem::path& path, bool hashed) : lines(open_bytes(path, hashed), path.string()) {}
+
+  bool next(std::string_view& line) {
+    while (lines.next(line)) {
+      if (is_csv_content(line)) {
+        return true;
+      }
+    }
+    return false;
+  }
+
+  LineReader lines;
+};
+
+CsvHeader header_of(FileWalk& walk, const CsvOptions& options, const std::string& path) {
+  std::string_view line;
+  if (!walk.next(line)) {
+    throw InputError(path + ": no header line: expected the names of the columns, then rows");
+  }
+  return read_csv_header(line, options, fmt::format("{}:{}", path, walk.lines.number()));
+}
+
+/// Names (time apart) of what `header` has, in the order of its fields.
+std::vector<std::string> names_of(const CsvHeader& header) {
+  std::vector<std::pair<std::size_t, std::string>> by_field;
+  for (const auto& [name, field] : header.found) {
+    if (name != "t") {
+      by_field.emplace_back(field, name);
+    }
+  }
+  std::sort(by_field.begin(), by_field.end());
+  std::vector<std::string> names;
+  for (auto& entry : by_field) {
+    names.push_back(std::move(entry.second));
+  }
+  return names;
+}
+
+std::vector<std::string> fields_without(const CsvHeader& header, const std::vector<std::string>& names) {
+  std::vector<std::string> ignored;
+  for (std::size_t k = 0; k < header.fields.size(); ++k) {
+    const bool used = std::any_of(header.found.begin(), header.found.end(), [&](const auto& found) {
+      return found.second == k &&
+             (found.first == "t" || std::find(names.begin(), names.end(), found.first) != names.end());
+    });
+    if (!used) {
+      ignored.push_back(header.fields[k]);
+    }
+  }
+  return ignored;
+}
+
+void describe_file(const FileWalk& lines, const CsvHeader& header, const std::vector<std::string>& names,
+                   LogFileReport& file) {
+  const ByteSource& source = lines.lines.source();
+  file.format = "csv";
+  file.packing = source.packing();
+  file.bytes = source.file_bytes();
+  file.hash = source.hash();
+  file.header = header.fields;
+  file.ignored = fields_without(header, names);
+}
+
+/// A table with one clock.
+class CsvWalk final : public RowWalk {
+ public:
+  CsvWalk(const std::filesystem::path& path, const CsvOptions& options, const std::vector<std::string>& names,
+          double longest_step, LogReport* report)
+      : names_(names), rows_(names, report), lines_(path, report != nullptr) {
+    rows_.set_longest_step(longest_step);
+    header_ = header_of(lines_, options, path.string());
+    rows_.begin_file(header_, path.string());
+  }
+
+  bool next(RowOutcome& outcome) override {
+    std::string_view line;
+    if (!lines_.next(line)) {
+      return false;
+    }
+    outcome = rows_.read(line, lines_.lines.number(), lines_.lines.terminated());
+    return true;
+  }
+  [[nodiscard]] double t() const override { return rows_.t(); }
+  [[nodiscard]] const double* values() const override { return rows_.values(); }
+  void describe(LogFileReport& file) const override { describe_file(lines_, header_, names_, file); }
+
+ private:
+  const std::vector<std::string>& names_;
+  CsvRowReader rows_;
+  FileWalk lines_;
+  CsvHeader header_;
+};
+
+/// A table whose columns are filled in different rows: brought to the rows of the first stream.
+class MergedCsvWalk final : public RowWalk {
+ public:
+  MergedCsvWalk(const std::filesystem::path& path, const CsvOptions& options, const std::vector<std::string>& names,
+                const std::vector<CsvStream>& streams, double longest_step, LogReport* report)
+      : names_(names),
+        streams_(streams),
+        rows_(names, report),
+        cleaner_(names, report),
+        lines_(path, report != nullptr),
+        row_(names.size() + 1) {
+    header_ = header_of(lines_, options, path.string());
+    rows_.begin_file(header_, path.string());
+    rows_.let_miss(std::vector<bool>(names.size(), true));
+    cleaner_.set_longest_step(longest_step);
+    cleaner_.begin_file(path.string() + ":");
+    std::vector<AlignedStream> aligned;
+    for (const CsvStream& stream : streams_) {
+      AlignedStream of;
+      of.columns = stream.columns;
+      for (const std::size_t c : stream.columns) {
+        of.angle.push_back(names[c] == "theta");
+      }
+      of.longest_gap = static_cast<std::int64_t>(gap_factor * static_cast<double>(stream.median_step));
+      aligned.push_back(std::move(of));
+    }
+    aligner_.emplace(names.size(), std::move(aligned));
+  }
+
+  bool next(RowOutcome& outcome) override {
+    std::int64_t ns = 0;
+    while (!aligner_->pop(ns, std::span(row_).subspan(1))) {
+      std::string_view line;
+      if (finished_) {
+        return false;
+      }
+      if (!lines_.next(line)) {
+        aligner_->finish();
+        finished_ = true;
+      } else if (!take(line)) {
+        outcome = RowOutcome::dropped;
+        return true;
+      }
+    }
+    row_[0] = waiting_.front().t;
+    const std::size_t number = waiting_.front().number;
+    waiting_.pop_front();
+    for (std::size_t c = 0; c < names_.size(); ++c) {
+      if (std::isnan(row_[c + 1])) {
+        cleaner_.count(&LogReport::uncovered, number, names_[c]);
+        outcome = RowOutcome::dropped;
+        return true;
+      }
+    }
+    outcome = cleaner_.place(row_, number);
+    return true;
+  }
+
+  [[nodiscard]] double t() const override { return cleaner_.t(); }
+  [[nodiscard]] const double* values() const override { return row_.data() + 1; }
+  void describe(LogFileReport& file) const override {
+    describe_file(lines_, header_, names_, file);
+    for (std::size_t s = 1; s < streams_.size(); ++s) {
+      for (const std::size_t c : streams_[s].columns) {
+        file.interpolated.push_back({names_[c],
+                                     fmt::format("the rows that have it (a share of {:.2g})", streams_[s].filled),
+                                     aligner_->error()[c]});
+      }
+      if (const std::size_t stale = aligner_->stale(s); stale > 0) {
+        file.notes.push_back(fmt::format("{} samples of {} are not later than the one before and were left out", stale,
+                                         names_[streams_[s].columns.front()]));
+      }
+    }
+  }
+
+ private:
+  struct Waiting {
+    double t = 0.0;
+    std::size_t number = 0;
+  };
+
+  /// Hands the samples of a line to the aligner; false when the line, or its part of the first stream, is dropped.
+  bool take(std::string_view line) {
+    const std::size_t number = lines_.lines.number();
+    if (!rows_.read_numbers(line, number, lines_.lines.terminated())) {
+      return false;
+    }
+    const std::span<const double> values = rows_.row();
+    const std::int64_t ns = std::llround(values[0] * 1e9);
+    bool whole = true;
+    for (std::size_t s = 0; s < streams_.size(); ++s) {
+      sample_.clear();
+      std::size_t missing = 0;
+      for (const std::size_t c : streams_[s].columns) {
+        sample_.push_back(values[c + 1]);
+        missing += std::isnan(values[c + 1]) ? 1 : 0;
+      }
+      if (missing == 0) {
+        aligner_->push(s, ns, sample_);
+        if (s == 0) {
+          waiting_.push_back({values[0], number});
+        }
+      } else if (s == 0 && missing < sample_.size()) {
+        cleaner_.count(&LogReport::empty, number);
+        whole = false;
+      }
+    }
+    return whole;
+  }
+
+  const std::vector<std::string>& names_;
+  std::vector<CsvStream> streams_;
+  CsvRowReader rows_;
+  RowCleaner cleaner_;
+  FileWalk lines_;
+  CsvHeader header_;
+  std::optional<StreamAligner> aligner_;
+  std::deque<Waiting> waiting_;  ///< rows of the first stream that are in the aligner
+  std::vector<double> row_;      ///< time, then the columns
+  std::vector<double> sample_;
+  bool finished_ = false;
+};
+
+class CsvFile final : public RowFile {
+ public:
+  CsvFile(std::filesystem::path path, CsvOptions options) : path_(std::move(path)), options_(std::move(options)) {
+    FileWalk lines(path_, false);
+    names_ = names_of(header_of(lines, options_, path_.string()));
+  }
+
+  [[nodiscard]] std::string path() const override { return path_.string(); }
+  [[nodiscard]] const std::vector<std::string>& columns() const override { return names_; }
+  [[nodiscard]] std::unique_ptr<RowWalk> open(const std::vector<std::string>& names, double longest_step,
+                                              LogReport* report) override {
+    if (looked_for_ != names) {
+      look_for_streams(names);
+    }
+    if (streams_.size() > 1) {
+      return std::make_unique<MergedCsvWalk>(path_, options_, names, streams_, longest_step, report);
+    }
+    return std::make_unique<CsvWalk>(path_, options_, names, longest_step, report);
+  }
+
+ private:
+  /// Streams of the first rows. What is wrong with one of them is left to the walk, which says so.
+  void look_for_streams(const std::vector<std::string>& names) {
+    CsvRowReader rows(names, nullptr);
+    FileWalk lines(path_, false);
+    rows.begin_file(header_of(lines, options_, path_.string()), path_.string());
+    rows.let_miss(std::vector<bool>(names.size(), true));
+    CsvStreamFinder finder(names);
+    std::string_view line;
+    try {
+      for (std::size_t k = 0; k < rows_looked_at && lines.next(line); ++k) {
+        if (rows.read_numbers(line, lines.lines.number(), lines.lines.terminated())) {
+          finder.add(rows.row()[0], rows.row().data() + 1);
+        }
+      }
+      streams_ = finder.streams();
+    } catch (const InputError&) {
+      streams_.clear();
+    }
+    std::size_t found = 0;
+    for (const CsvStream& stream : streams_) {
+      found += stream.columns.size();
+    }
+    if (found < names.size()) {
+      streams_.clear();
+    }
+    looked_for_ = names;
+  }
+
+  std::filesystem::path path_;
+  CsvOptions options_;
+  std::vector<std::string> names_;
+  std::vector<std::string> looked_for_;
+  std::vector<CsvStream> streams_;
+};
+
+std::vector<std::unique_ptr<RowFile>> csv_files(const std::vector<std::filesystem::path>& paths,
+                                                const CsvOptions& options) {
+  check::that(!paths.empty(), "paths", "at least one file");
+  check::that(options.block_rows > 0, "block_rows", "at least 1");
+  std::vector<std::unique_ptr<RowFile>> files;
+  for (const auto& path : paths) {
+    files.push_back(csv_file(path, options));
+  }
+  return files;
+}
+
+}  // namespace
+
+std::unique_ptr<RowFile> csv_file(const std::filesystem::path& path, const CsvOptions& options) {
+  return std::make_unique<CsvFile>(path, options);
+}
+
+CsvLog::CsvLog(const std::vector<std::filesystem::path>& paths, const CsvOptions& options)
+    : RowLog(csv_files(paths, options), {options.block_rows, options.min_rows}) {}
+
+struct CsvRowParser::Impl {
+  CsvHeader header;
+  std::vector<std::string> names;
+  LogReport report;
+  std::unique_ptr<CsvRowReader> rows;
+  std::vector<double> steps;  ///< the first ones, while the median step is being learnt
+  bool learning = false;
+  std::size_t line_number = 1;
+  double start = 0.0;
+
+  static constexpr std::size_t fewest_steps = 20;
+  static constexpr std::size_t most_steps = 101;
+
+  void learn(double step) {
+    steps.push_back(step);
+    if (steps.size() >= fewest_steps) {
+      std::vector<double> sorted = steps;
+      use_median_step(middle_of(sorted));
+    }
+    learning = steps.size() < most_steps;
+  }
+
+  void use_median_step(double step) {
+    report.median_step = step;
+    rows->set_longest_step(gap_factor * step);
+  }
+};
+
+CsvRowParser::CsvRowParser(std::string_view header, const CsvOptions& options, double median_step, std::string name)
+    : impl_(std::make_unique<Impl>()) {
+  check::non_negative(median_step, "median_step");
+  if (header.starts_with("\xEF\xBB\xBF")) {
+    header.remove_prefix(3);
+  }
+  while (header.ends_with('\n') || header.ends_with('\r')) {
+    header.remove_suffix(1);
+  }
+  impl_->header = read_csv_header(header, options, name + ":1");
+  impl_->names = names_of(impl_->header);
+  impl_->rows = std::make_unique<CsvRowReader>(impl_->names, &impl_->report);
+  impl_->rows->begin_file(impl_->header, std::move(name));
+  impl_->learning = median_step == 0.0;
+  if (!impl_->learning) {
+    impl_->use_median_step(median_step);
+  }
+}
+
+CsvRowParser::~CsvRowParser() = default;
+CsvRowParser::CsvRowParser(CsvRowParser&&) noexcept = default;
+CsvRowParser& CsvRowParser::operator=(CsvRowParser&&) noexcept = default;
+
+const std::vector<std::string>& CsvRowParser::columns() const { return impl_->names; }
+const LogReport& CsvRowParser::report() const { return impl_->report; }
+
+bool CsvRowParser::parse(std::string_view line, LogBlock& block) {
+  Impl& own = *impl_;
+  ++own.line_number;
+  while (line.ends_with('\n') || line.ends_with('\r')) {
+    line.remove_suffix(1);
+  }
+  if (!is_csv_content(line)) {
+    return false;
+  }
+  const double before = own.rows->t();
+  const RowOutcome outcome = own.rows->read(line, own.line_number, true);
+  if (outcome == RowOutcome::dropped) {
+    return false;
+  }
+  block.first_row = own.report.rows - 1;
+  block.t.assign(1, own.rows->t());
+  block.columns.resize(own.names.size());
+  for (std::size_t c = 0; c < own.names.size(); ++c) {
+    block.columns[c].assign(1, own.rows->values()[c]);
+  }
+  block.segment_starts.clear();
+  if (outcome == RowOutcome::new_segment) {
+    block.segment_starts.push_back(0);
+    ++own.report.segments;
+  } else {
+    own.report.seconds += own.rows->t() - before;
+    if (own.learning) {
+      own.learn(own.rows->t() - before);
+    }
+  }
+  return true;
+}
+
+}  // namespace wheelwright

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// One line of a CSV log → one clean row (row_cleaner.hpp).
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <wheelwright/logs/csv_header.hpp>
+#include <wheelwright/logs/row_cleaner.hpp>
+
+namespace wheelwright {
+
+/// The cleaning of a log, row by row; the same for whole files and for a live stream.
+class CsvRowReader {
+ public:
+  /// `names` are the columns to read, time apart. What is met is counted in `report` where that is not null.
+  CsvRowReader(std::vector<std::string> names, LogReport* report);
+
+  /// Begins a file (and with it a segment) with this header. Throws InputError when two of the columns are one field,
+  /// or a name is not in the header.
+  void begin_file(const CsvHeader& header, std::string path);
+
+  /// Steps longer than `seconds` are gaps.
+  void set_longest_step(double seconds) { cleaner_.set_longest_step(seconds); }
+
+  /// Reads one line that has content. A line that is not `terminated` may be cut off: it is then dropped where
+  /// otherwise it would be an error. Throws InputError (and keeps the state of before) for text instead of a number, a
+  /// wrong number of fields, and a value beyond LogColumn::limit.
+  RowOutcome read(std::string_view line, std::size_t line_number, bool terminated);
+
+  /// Columns (marks in the order of `names`) that may be missing: an empty or NaN field of theirs is then NaN, and no
+  /// reason to drop the row. For read_numbers().
+  void let_miss(std::vector<bool> columns);
+
+  /// The first half of read(): false where the row was dropped (and counted); else row() has its numbers as they are
+  /// written, neither sorted into segments nor unwrapped, and it is not counted.
+  bool read_numbers(std::string_view line, std::size_t line_number, bool terminated);
+  /// Time and values of the last line.
+  [[nodiscard]] std::span<const double> row() const { return values_; }
+
+  /// Time of the last row, s.
+  [[nodiscard]] double t() const { return cleaner_.t(); }
+  /// Values of the last row, in the order of `names`.
+  [[nodiscard]] const double* values() const { return values_.data() + 1; }
+
+ private:
+  enum class Fault { none, empty, not_finite, limit, text };
+  struct Defect {
+    Fault fault = Fault::none;
+    std::size_t field = 0;
+    std::string_view text;
+  };
+
+  std::size_t read_fields(std::string_view line, Defect& defect);
+  const char* read_odd_field(const char* p, const char* end, std::size_t field, double& value, Defect& defect);
+  [[nodiscard]] std::string describe(const Defect& defect) const;
+  [[nodiscard]] bool may_miss(std::size_t value) const { return !missable_.empty() && missable_[value]; }
+
+  std::vector<std::string> names_;
+  RowCleaner cleaner_;
+
+  std::string path_;
+  std::vector<std::string> fields_;
+  std::vector<int> slots_;  ///< field -> index in values_, or −1
+  char separator_ = ',';
+  std::vector<double> values_;  ///< time, then the columns
+  std::vector<bool> missable_;  ///< of each value; empty: none
+};
+
+}  // namespace wheelwright

@@ -1,0 +1,410 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/logs/hdf5_log.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <map>
+#include <numeric>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include <wheelwright/core/error.hpp>
+#include <wheelwright/files/suggest.hpp>
+#include <wheelwright/logs/hdf5_handles.hpp>
+#include <wheelwright/logs/log_columns.hpp>
+#include <wheelwright/logs/mcap_file.hpp>
+
+namespace wheelwright {
+namespace {
+
+using hdf5::Handle;
+
+constexpr std::string_view signature("\x89HDF\r\n\x1a\n", 8);
+constexpr std::size_t rows_at_once = 8192;
+constexpr std::size_t most_datasets = 100000;
+
+/// One column that a file has: a dataset, or a member of one of a compound type.
+struct Source {
+  std::string path;    ///< of the dataset
+  std::string member;  ///< empty for a plain dataset
+  std::string unit;
+  hsize_t rows = 0;
+
+  [[nodiscard]] std::string name() const { return member.empty() ? path.substr(path.rfind('/') + 1) : member; }
+  [[nodiscard]] std::string shown() const { return member.empty() ? path : path + "." + member; }
+  /// Where its companions are: the group, or the dataset of members.
+  [[nodiscard]] std::string home() const { return member.empty() ? path.substr(0, path.rfind('/') + 1) : path; }
+};
+
+Handle open_file(const std::filesystem::path& path) {
+  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+  Handle file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
+  if (!file) {
+    throw InputError(path.string() +
+                     ": the HDF5 library cannot open it: expected a whole HDF5 file, closed by its writer");
+  }
+  return file;
+}
+
+bool is_number(hid_t type) {
+  const H5T_class_t kind = H5Tget_class(type);
+  return kind == H5T_INTEGER || kind == H5T_FLOAT || kind == H5T_ENUM;
+}
+
+/// The text of attribute `units` or `unit`; empty where there is none.
+std::string unit_of(hid_t dataset) {
+  for (const char* name : {"units", "unit"}) {
+    if (H5Aexists(dataset, name) <= 0) {
+      continue;
+    }
+    const Handle attribute(H5Aopen(dataset, name, H5P_DEFAULT), H5Aclose);
+    const Handle type(attribute ? H5Aget_type(attribute.get()) : -1, H5Tclose);
+    if (!type || H5Tget_class(type.get()) != H5T_STRING || H5Tis_variable_str(type.get()) < 0) {
+      continue;
+    }
+    const Handle space(H5Aget_space(attribute.get()), H5Sclose);
+    if (!space || H5Sget_simple_extent_npoints(space.get()) != 1) {
+      continue;
+    }
+    if (H5Tis_variable_str(type.get()) > 0) {
+      char* text = nullptr;
+      if (H5Aread(attribute.get(), type.get(), static_cast<void*>(&text)) < 0 || text == nullptr) {
+        continue;
+      }
+      const std::string unit(text);
+      H5free_memory(text);
+      return unit;
+    }
+    const std::size_t size = H5Tget_size(type.get());
+    std::string unit(std::min<std::size_t>(size, 4096), '\0');
+    if (size <= unit.size() && H5Aread(attribute.get(), type.get(), unit.data()) >= 0) {
+      return unit.substr(0, std::min(unit.find('\0'), unit.size()));
+    }
+  }
+  return {};
+}
+
+/// Lists what a dataset offers.
+void list_dataset(hid_t file, const std::string& path, std::vector<Source>& sources) {
+  const Handle dataset(H5Dopen2(file, path.c_str(), H5P_DEFAULT), H5Dclose);
+  const Handle space(dataset ? H5Dget_space(dataset.get()) : -1, H5Sclose);
+  const Handle type(dataset ? H5Dget_type(dataset.get()) : -1, H5Tclose);
+  if (!space || !type || H5Sget_simple_extent_ndims(space.get()) != 1) {
+    return;
+  }
+  hsize_t rows = 0;
+  H5Sget_simple_extent_dims(space.get(), &rows, nullptr);
+  if (is_number(type.get())) {
+    sources.push_back({path, "", unit_of(dataset.get()), rows});
+  } else if (H5Tget_class(type.get()) == H5T_COMPOUND) {
+    const int members = H5Tget_nmembers(type.get());
+    for (int k = 0; k < members; ++k) {
+      const auto index = static_cast<unsigned>(k);
+      const Handle member(H5Tget_member_type(type.get(), index), H5Tclose);
+      char* name = H5Tget_member_name(type.get(), index);
+      if (member && name != nullptr && is_number(member.get())) {
+        sources.push_back({path, name, "", rows});
+      }
+      H5free_memory(name);
+    }
+  }
+}
+
+/// All columns of a file, in the order of their paths.
+std::vector<Source> list_sources(hid_t file) {
+  std::vector<std::string> paths;
+  const auto visit = [](hid_t, const char* name, const H5O_info_t* info, void* to) -> herr_t {
+    auto& found = *static_cast<std::vector<std::string>*>(to);
+    if (info->type == H5O_TYPE_DATASET) {
+      found.push_back(std::string("/") + name);
+    }
+    return found.size() < most_datasets ? 0 : 1;
+  };
+  H5Ovisit2(file, H5_INDEX_NAME, H5_ITER_INC, visit, &paths, H5O_INFO_BASIC);
+  std::vector<Source> sources;
+  for (const std::string& path : paths) {
+    list_dataset(file, path, sources);
+  }
+  return sources;
+}
+
+/// Values of one column, read in pieces.
+class ColumnReader {
+ public:
+  ColumnReader(hid_t file, const Source& source, std::string where)
+      : where_(std::move(where)),
+        rows_(source.rows),
+        dataset_(H5Dopen2(file, source.path.c_str(), H5P_DEFAULT), H5Dclose) {
+    if (source.member.empty()) {
+      type_ = Handle(H5Tcopy(H5T_NATIVE_DOUBLE), H5Tclose);
+    } else {
+      type_ = Handle(H5Tcreate(H5T_COMPOUND, sizeof(double)), H5Tclose);
+      H5Tinsert(type_.get(), source.member.c_str(), 0, H5T_NATIVE_DOUBLE);
+    }
+  }
+
+  /// The value of `row`; rows are asked for in ascending order.
+  double at(hsize_t row) {
+    if (row >= first_ + values_.size()) {
+      fill(row);
+    }
+    return values_[static_cast<std::size_t>(row - first_)];
+  }
+
+ private:
+  void fill(hsize_t row) {
+    const hsize_t count = std::min<hsize_t>(rows_at_once, rows_ - row);
+    values_.resize(static_cast<std::size_t>(count));
+    first_ = row;
+    const Handle space(dataset_ ? H5Dget_space(dataset_.get()) : -1, H5Sclose);
+    const Handle memory(H5Screate_simple(1, &count, nullptr), H5Sclose);
+    if (!space || H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, &row, nullptr, &count, nullptr) < 0 ||
+        H5Dread(dataset_.get(), type_.get(), memory.get(), space.get(), H5P_DEFAULT, values_.data()) < 0) {
+      throw InputError(
+          fmt::format("{}: rows {} to {} cannot be read: the file is damaged, or packed by a filter that is "
+                      "not installed",
+                      where_, row + 1, row + count));
+    }
+  }
+
+  std::string where_;
+  hsize_t rows_;
+  Handle dataset_;
+  Handle type_;
+  std::vector<double> values_;
+  hsize_t first_ = 0;
+};
+
+/// Which column of the file is which of the log.
+struct Choice {
+  std::map<std::string, Source> found;  ///< name, `t` among them
+  std::vector<std::string> header;
+  std::vector<std::string> notes;
+};
+
+class DatasetChooser {
+ public:
+  DatasetChooser(const std::string& path, const LogOptions& options, std::vector<Source> sources)
+      : path_(path), options_(options), sources_(std::move(sources)) {}
+
+  Choice choose() {
+    for (const Source& source : sources_) {
+      choice_.header.push_back(source.shown());
+    }
+    const std::string home = home_of_time();
+    for (const auto& [name, place] : options_.map) {
+      take(name, named(place, home, name));
+    }
+    for (const Source& source : sources_) {
+      if (source.home() == home) {
+        recognise(source);
+      }
+    }
+    for (const std::string& name : options_.extra) {
+      take(name, named(name, home, name));
+    }
+    same_length();
+    return std::move(choice_);
+  }
+
+ private:
+  static const LogColumn* meaning_of(const Source& source) {
+    return recognise_log_column(source.unit.empty() ? source.name() : source.name() + " [" + source.unit + "]");
+  }
+
+  [[nodiscard]] std::string home_of_time() {
+    if (const auto mapped = options_.map.find("t"); mapped != options_.map.end()) {
+      for (const Source& source : sources_) {
+        if (source.shown() == mapped->second || source.name() == mapped->second) {
+          return source.home();
+        }
+      }
+    }
+    std::vector<std::string> homes;
+    for (const Source& source : sources_) {
+      const LogColumn* column = meaning_of(source);
+      if (column != nullptr && column->name == "t" && std::ranges::find(homes, source.home()) == homes.end()) {
+        homes.push_back(source.home());
+      }
+    }
+    if (homes.empty()) {
+      throw InputError(fmt::format(
+          "{}: no dataset of times: expected one called t, time or the like (in s) beside the columns, or --map "
+          "t=/GROUP/DATASET: the file has {}",
+          path_, choice_.header.empty() ? "no one-dimensional numeric dataset" : listed(choice_.header)));
+    }
+    if (homes.size() > 1) {
+      choice_.notes.push_back(
+          fmt::format("there are several logs in it ({}); the first was read, --map t=… takes another", listed(homes)));
+    }
+    return homes.front();
+  }
+
+  [[nodiscard]] Source named(const std::string& place, const std::string& home, const std::string& name) const {
+    for (const bool anywhere : {false, true}) {
+      for (const Source& source : sources_) {
+        const bool here = source.home() == home && source.name() == place;
+        if (anywhere ? source.shown() == place || source.shown() == "/" + place : here) {
+          return source;
+        }
+      }
+    }
+    throw InputError(fmt::format("{}: no dataset {} for column {}: the file has {}{}", path_, wheelwright::shown(place),
+                                 name, listed(choice_.header), did_you_mean(place, choice_.header)));
+  }
+
+  void take(const std::string& name, Source source) { choice_.found.insert_or_assign(name, std::move(source)); }
+
+  void recognise(const Source& source) {
+    const LogColumn* column = meaning_of(source);
+    if (column == nullptr) {
+      if (const LogColumn* by_name = recognise_log_column(source.name()); by_name != nullptr && !source.unit.empty()) {
+        choice_.notes.push_back(fmt::format("{} was not taken as {}: its unit is {}, expected {}", source.shown(),
+                                            by_name->name, wheelwright::shown(source.unit), by_name->unit));
+      }
+      return;
+    }
+    const std::string& name = column->name;
+    if (options_.map.contains(name) ||
+        (options_.only && name != "t" && std::ranges::find(*options_.only, name) == options_.only->end())) {
+      return;
+    }
+    if (const auto other = choice_.found.find(name); other != choice_.found.end()) {
+      throw InputError(fmt::format("{}: {} and {} both mean {}: expected one, or --map {}=…", path_,
+                                   other->second.shown(), source.shown(), name, name));
+    }
+    take(name, source);
+  }
+
+  void same_length() const {
+    const Source& time = choice_.found.at("t");
+    for (const auto& [name, source] : choice_.found) {
+      if (source.rows != time.rows) {
+        throw InputError(fmt::format("{}: {} has {} values and {} has {}: expected as many values as times", path_,
+                                     source.shown(), source.rows, time.shown(), time.rows));
+      }
+    }
+  }
+
+  const std::string& path_;
+  const LogOptions& options_;
+  std::vector<Source> sources_;
+  Choice choice_;
+};
+
+class Hdf5Walk final : public RowWalk {
+ public:
+  Hdf5Walk(const std::filesystem::path& path, const Choice& choice, const std::vector<std::string>& names,
+           double longest_step, LogReport* report)
+      : path_(path),
+        choice_(choice),
+        names_(names),
+        cleaner_(names, report),
+        row_(names.size() + 1),
+        hashed_(report != nullptr),
+        file_(open_file(path)),
+        rows_(choice.found.at("t").rows) {
+    cleaner_.set_longest_step(longest_step);
+    cleaner_.begin_file(path.string() + ": row ");
+    open_column("t");
+    for (const std::string& name : names) {
+      open_column(name);
+    }
+  }
+
+  bool next(RowOutcome& outcome) override {
+    if (next_ == rows_) {
+      return false;
+    }
+    for (std::size_t k = 0; k < columns_.size(); ++k) {
+      row_[k] = columns_[k].at(next_);
+    }
+    ++next_;
+    outcome = cleaner_.clean(row_, static_cast<std::size_t>(next_));
+    return true;
+  }
+  [[nodiscard]] double t() const override { return cleaner_.t(); }
+  [[nodiscard]] const double* values() const override { return row_.data() + 1; }
+  void describe(LogFileReport& file) const override {
+    mcap::WindowedFile bytes(path_, hashed_);
+    bytes.leave(bytes.size());
+    file.format = "hdf5";
+    file.packing = "";
+    file.bytes = bytes.size();
+    file.hash = bytes.hash();
+    file.header = choice_.header;
+    file.notes = choice_.notes;
+    for (const std::string& column : choice_.header) {
+      const bool used = std::ranges::any_of(choice_.found, [&](const auto& found) {
+        return found.second.shown() == column &&
+               (found.first == "t" || std::ranges::find(names_, found.first) != names_.end());
+      });
+      if (!used) {
+        file.ignored.push_back(column);
+      }
+    }
+  }
+
+ private:
+  void open_column(const std::string& name) {
+    const Source& source = choice_.found.at(name);
+    columns_.emplace_back(file_.get(), source, fmt::format("{}: {}", path_.string(), source.shown()));
+  }
+
+  std::filesystem::path path_;
+  const Choice& choice_;
+  const std::vector<std::string>& names_;
+  RowCleaner cleaner_;
+  std::vector<double> row_;
+  bool hashed_;
+  Handle file_;
+  hsize_t rows_;
+  hsize_t next_ = 0;
+  std::vector<ColumnReader> columns_;
+};
+
+class Hdf5File final : public RowFile {
+ public:
+  Hdf5File(std::filesystem::path path, const LogOptions& options) : path_(std::move(path)) {
+    const Handle file = open_file(path_);
+    choice_ = DatasetChooser(path_.string(), options, list_sources(file.get())).choose();
+    for (const auto& [name, source] : choice_.found) {
+      if (name != "t") {
+        names_.push_back(name);
+      }
+    }
+  }
+
+  [[nodiscard]] std::string path() const override { return path_.string(); }
+  [[nodiscard]] const std::vector<std::string>& columns() const override { return names_; }
+  [[nodiscard]] std::unique_ptr<RowWalk> open(const std::vector<std::string>& names, double longest_step,
+                                              LogReport* report) override {
+    return std::make_unique<Hdf5Walk>(path_, choice_, names, longest_step, report);
+  }
+
+ private:
+  std::filesystem::path path_;
+  Choice choice_;
+  std::vector<std::string> names_;
+};
+
+}  // namespace
+
+bool is_hdf5(const std::filesystem::path& path) {
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"), std::fclose);
+  std::array<char, signature.size()> head{};
+  return file && std::fread(head.data(), 1, head.size(), file.get()) == head.size() &&
+         std::string_view(head.data(), head.size()) == signature;
+}
+
+std::unique_ptr<RowFile> hdf5_file(const std::filesystem::path& path, const LogOptions& options) {
+  return std::make_unique<Hdf5File>(path, options);
+}
+
+}  // namespace wheelwright

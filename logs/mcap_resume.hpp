@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Where an MCAP file can be read again behind a place that is damaged.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string_view>
+
+#include <wheelwright/logs/mcap_file.hpp>
+
+namespace wheelwright::mcap {
+
+/// The data section of a file.
+struct DataSection {
+  std::uint64_t end = 0;      ///< where it ends, or the file
+  bool cut_off = false;       ///< the file has no footer: records may go beyond the end
+  std::size_t max_bytes = 0;  ///< longest record that is looked for
+};
+
+/// Whether a record of a data section may begin at `offset`: the end of the section, or an opcode with a length that
+/// fits (in a file that is cut off also a known opcode with a length within max_bytes). Bytes at random look like that
+/// in one case of 10⁹ or less, but for the last eight bytes of a file that is cut off.
+[[nodiscard]] bool begins_record(WindowedFile& file, const DataSection& section, std::uint64_t offset);
+
+/// Whether a record whose own length is damaged may begin at `offset`: a message on a channel for which `messages` holds,
+/// or the data end record at the end of the section. Bytes at random look like that in one case of 10⁵ or less.
+[[nodiscard]] bool begins_damaged_record(WindowedFile& file, const DataSection& section, std::uint64_t offset,
+                                         const std::function<bool(std::uint16_t)>& messages);
+
+/// End of the record at `offset` whose head says that its content has `length` bytes, and whose content says that it
+/// has `known` (more where fields were added that this reader does not know). When the two differ, the one behind which
+/// a record begins is right, the content's before the head's; nothing when neither is.
+[[nodiscard]] std::optional<std::uint64_t> settled_end(WindowedFile& file, const DataSection& section,
+                                                       std::uint64_t offset, std::uint64_t length, std::uint64_t known);
+
+/// The first offset >= `from` at which reading can go on, or the end of the section: a chunk record whose two lengths
+/// agree and whose compression is known; where `messages` is given, also a message record of at most max_bytes on a
+/// channel for which it holds, with two more records behind it. Leaves behind what it has searched.
+[[nodiscard]] std::uint64_t find_record(WindowedFile& file, const DataSection& section, std::uint64_t from,
+                                        const std::function<bool(std::uint16_t)>& messages);
+
+}  // namespace wheelwright::mcap

@@ -1,0 +1,297 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/results/fleet_json.hpp>
+
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <wheelwright/files/number.hpp>
+#include <wheelwright/files/words.hpp>
+#include <wheelwright/results/warrant_json.hpp>
+
+namespace wheelwright {
+namespace {
+
+constexpr Words<RobotStatus, 5> status_words = {{{RobotStatus::commissioned, "commissioned"},
+                                                 {RobotStatus::partial, "partial"},
+                                                 {RobotStatus::contradicted, "contradicted"},
+                                                 {RobotStatus::nothing, "nothing"},
+                                                 {RobotStatus::unreadable, "unreadable"}}};
+
+Json maybe(const std::optional<double>& x) { return x ? Json(*x) : Json(nullptr); }
+
+std::optional<double> maybe(const JsonPlace& object, std::string_view key) {
+  return object.has(key) ? std::optional(object.at(key).number()) : std::nullopt;
+}
+
+Json log_json(const LogRecord& log) {
+  Json parameters = Json::array();
+  for (const RecordedParameter& p : log.parameters) {
+    parameters.push_back({{"name", p.name},
+                          {"unit", p.unit},
+                          {"is_prior_key", p.is_prior_key},
+                          {"estimate", maybe(p.estimate)},
+                          {"standard_error", maybe(p.standard_error)},
+                          {"freedom", maybe(p.freedom)},
+                          {"lower", p.lower},
+                          {"upper", p.upper},
+                          {"lower_is_prior", p.lower_is_prior},
+                          {"upper_is_prior", p.upper_is_prior},
+                          {"prior", {p.prior.lower, p.prior.upper}},
+                          {"warrant", warrant_word(p.warrant)}});
+  }
+  return {{"log", log.log},
+          {"when", log.when},
+          {"status", word_of(status_words, log.status)},
+          {"message", log.message},
+          {"seconds", log.seconds},
+          {"rows", log.rows},
+          {"parameters", std::move(parameters)}};
+}
+
+LogRecord log_from(const JsonPlace& at) {
+  LogRecord log{.log = at.at("log").text(),
+                .when = at.at("when").number(),
+                .status = value_of(status_words, at.at("status")),
+                .message = at.at("message").text(),
+                .seconds = at.at("seconds").number(),
+                .rows = at.at("rows").count()};
+  const JsonPlace parameters = at.at("parameters");
+  for (std::size_t j = 0; j < parameters.size(); ++j) {
+    const JsonPlace p = parameters.at(j);
+    log.parameters.push_back({.name = p.at("name").text(),
+                              .unit = p.at("unit").text(),
+                              .is_prior_key = p.at("is_prior_key").boolean(),
+                              .estimate = maybe(p, "estimate"),
+                              .standard_error = maybe(p, "standard_error"),
+                              .freedom = maybe(p, "freedom"),
+                              .lower = p.at("lower").number(),
+                              .upper = p.at("upper").number(),
+                              .lower_is_prior = p.at("lower_is_prior").boolean(),
+                              .upper_is_prior = p.at("upper_is_prior").boolean(),
+                              .prior = {p.at("prior").at(std::size_t{0}).number(), p.at("prior").at(1).number()},
+                              .warrant = warrant_at(p, Warrant::extrapolated)});
+  }
+  return log;
+}
+
+Json population_json(const FleetResult& fleet) {
+  Json list = Json::array();
+  for (const ParameterPopulation& p : fleet.population.parameters) {
+    const FleetColumn& column = fleet.table.columns[p.column];
+    Json entry = {{"parameter", column.name},
+                  {"unit", column.unit},
+                  {"warrant", warrant_word(column.warrant)},
+                  {"robots", p.shown},
+                  {"described", p.described}};
+    if (p.described) {
+      entry["centre"] = p.fit.centre;
+      entry["centre_standard_error"] = p.fit.centre_error;
+      entry["spread"] = p.fit.spread;
+      entry["typical_standard_error"] = p.typical_error;
+      entry["central"] = {p.central.lower, p.central.upper};
+    }
+    list.push_back(std::move(entry));
+  }
+  return list;
+}
+
+Json outside_json(const FleetResult& fleet) {
+  Json list = Json::array();
+  for (const RobotOutside& o : fleet.population.outside) {
+    list.push_back({{"robot", fleet.table.robots[o.robot]},
+                    {"parameter", fleet.table.columns[o.column].name},
+                    {"estimate", o.value},
+                    {"deviations", o.deviations},
+                    {"p_value", o.p},
+                    {"adjusted_p_value", o.adjusted_p},
+                    {"certain", o.certain},
+                    {"warrant", warrant_word(fleet.table.columns[o.column].warrant)},
+                    {"certainly_beyond", o.certainly_beyond}});
+  }
+  return list;
+}
+
+Json drift_json(const FleetResult& fleet) {
+  Json list = Json::array();
+  for (const ParameterDrift& d : fleet.drift) {
+    if (!d.drifts(fleet.drift_level)) {
+      continue;
+    }
+    Json entry = {{"robot", fleet.table.robots[d.robot]},
+                  {"parameter", fleet.table.columns[d.column].name},
+                  {"unit", fleet.table.columns[d.column].unit},
+                  {"logs", d.logs},
+                  {"per", d.dated ? "week" : "log"},
+                  {"warrant", warrant_word(fleet.table.columns[d.column].warrant)},
+                  {"certain", nullptr},
+                  {"trend", nullptr}};
+    if (d.certain != 0.0) {
+      entry["certain"] = {{"least_change", d.certain}, {"from", d.certain_from}, {"to", d.certain_to}};
+    }
+    if (d.has_trend) {
+      entry["trend"] = {{"slope", d.slope}, {"standard_error", d.slope_error}, {"lower", d.lower}, {"upper", d.upper},
+                        {"p_value", d.p},   {"adjusted_p_value", d.adjusted_p}};
+    }
+    list.push_back(std::move(entry));
+  }
+  return list;
+}
+
+Json spread_json(const FleetSpread& spread, const FleetResult& fleet) {
+  return {{"name", spread.name},
+          {"unit", spread.unit},
+          {"robots", spread.values.size()},
+          {"smallest", spread.quantile(0.0)},
+          {"median", spread.quantile(0.5)},
+          {"largest", spread.quantile(1.0)},
+          {"largest_robot", spread.values.empty() ? Json(nullptr) : Json(fleet.table.robots[spread.largest_robot])}};
+}
+
+Json prior_json(const FleetResult& fleet) {
+  const PooledPrior& prior = fleet.prior;
+  Json json = {{"exists", prior.exists},     {"message", prior.message},     {"asked", prior.asked},
+               {"coverage", prior.coverage}, {"learning", prior.learning},   {"scored", prior.scored},
+               {"rank", prior.rank},         {"boundless", prior.boundless}, {"needed", prior.needed},
+               {"parameters", Json::array()}};
+  for (const PooledParameter& p : prior.parameters) {
+    const bool boxed = prior.exists && p.included;
+    json["parameters"].push_back({{"parameter", fleet.table.columns[p.column].name},
+                                  {"unit", fleet.table.columns[p.column].unit},
+                                  {"included", boxed},
+                                  {"reason", p.reason},
+                                  {"hidden", p.hidden},
+                                  {"before", {p.before.lower, p.before.upper}},
+                                  {"box", boxed ? Json({p.box.lower, p.box.upper}) : Json(nullptr)}});
+  }
+  return json;
+}
+
+std::string csv_field(const std::string& text) {
+  if (text.find_first_of(",\"\r\n") == std::string::npos) {
+    return text;
+  }
+  std::string out = "\"";
+  for (const char c : text) {
+    out += c == '"' ? std::string("\"\"") : std::string(1, c);
+  }
+  return out + "\"";
+}
+
+}  // namespace
+
+std::string record_text(const RobotRecord& record) {
+  Json json = {{"robot", record.robot}, {"dated", record.dated}, {"commissioning", log_json(record.commissioning)}};
+  json["outputs"] = Json::array();
+  for (const RecordedOutput& o : record.outputs) {
+    json["outputs"].push_back({{"name", o.name},
+                               {"unit", o.unit},
+                               {"median_width", o.median_width},
+                               {"instants", o.instants},
+                               {"false_alarms", o.false_alarms}});
+  }
+  json["smallest_radius_change"] = maybe(record.smallest_radius_change);
+  json["checks"] = Json::array();
+  for (const CheckRecord& c : record.checks) {
+    json["checks"].push_back({{"log", log_json(c.log)},
+                              {"checked", c.checked},
+                              {"not_checked", c.not_checked},
+                              {"events", c.events},
+                              {"first", maybe(c.first)},
+                              {"instants", c.instants},
+                              {"outside_share", c.outside_share}});
+  }
+  json["notes"] = record.notes;
+  json["findings"] = record.findings;
+  return json_text(json, -1);
+}
+
+RobotRecord record_from_text(std::string_view text, const std::string& where) {
+  const Json json = parse_json(text, where);
+  const JsonPlace at(json, where);
+  RobotRecord record{.robot = at.at("robot").text(),
+                     .dated = at.at("dated").boolean(),
+                     .commissioning = log_from(at.at("commissioning"))};
+  const JsonPlace outputs = at.at("outputs");
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    const JsonPlace o = outputs.at(i);
+    record.outputs.push_back({.name = o.at("name").text(),
+                              .unit = o.at("unit").text(),
+                              .median_width = o.at("median_width").number(),
+                              .instants = o.at("instants").count(),
+                              .false_alarms = o.at("false_alarms").count()});
+  }
+  record.smallest_radius_change = maybe(at, "smallest_radius_change");
+  const JsonPlace checks = at.at("checks");
+  for (std::size_t i = 0; i < checks.size(); ++i) {
+    const JsonPlace c = checks.at(i);
+    record.checks.push_back({.log = log_from(c.at("log")),
+                             .checked = c.at("checked").boolean(),
+                             .not_checked = c.at("not_checked").text(),
+                             .events = c.at("events").count(),
+                             .first = maybe(c, "first"),
+                             .instants = c.at("instants").count(),
+                             .outside_share = c.at("outside_share").number()});
+  }
+  record.notes = at.at("notes").texts();
+  record.findings = at.at("findings").texts();
+  return record;
+}
+
+Json to_json(const FleetResult& fleet, const std::string& list, const std::string& software) {
+  Json json = {{"schema", kFleetSchema}, {"software", software}, {"list", list}, {"sentences", sentences(fleet)}};
+  Json status = Json::object();
+  for (const auto& [value, word] : status_words) {
+    status[std::string(word)] = fleet.count(value);
+  }
+  json["robots"] = {{"all", fleet.table.robots.size()},
+                    {"status", std::move(status)},
+                    {"outside", fleet.robots_outside()},
+                    {"drifting", fleet.robots_drifting()},
+                    {"drifting_for_certain", fleet.robots_drifting_for_certain()},
+                    {"alarmed", fleet.robots_alarmed()}};
+  json["logs"] = fleet.logs;
+  json["seconds"] = fleet.seconds;
+  json["population"] = population_json(fleet);
+  json["outside"] = outside_json(fleet);
+  json["drift"] = drift_json(fleet);
+  json["alarms"] = Json::array();
+  for (const FleetAlarm& a : fleet.alarms) {
+    json["alarms"].push_back({{"robot", fleet.table.robots[a.robot]},
+                              {"log", a.log},
+                              {"events", a.events},
+                              {"first", a.first},
+                              {"outside_share", a.outside_share}});
+  }
+  json["failed"] = Json::array();
+  for (const FleetFinding& f : fleet.failed) {
+    json["failed"].push_back({{"robot", fleet.table.robots[f.robot]}, {"log", f.log}, {"reason", f.text}});
+  }
+  json["thresholds"] = Json::array();
+  for (const FleetSpread& spread : fleet.widths) {
+    json["thresholds"].push_back(spread_json(spread, fleet));
+  }
+  json["smallest_radius_change"] = spread_json(fleet.smallest, fleet);
+  json["pooled_prior"] = prior_json(fleet);
+  return json;
+}
+
+std::string fleet_csv_header() {
+  return "robot,status,parameter,unit,estimate,standard_error,lower,upper,lower_is_prior,upper_is_prior,warrant\n";
+}
+
+std::string fleet_csv_rows(const RobotRecord& record) {
+  const std::string begin = csv_field(record.robot) + "," + word_of(status_words, record.commissioning.status) + ",";
+  const auto text = [](const std::optional<double>& x) { return x ? number_text(*x) : std::string(); };
+  std::string out;
+  for (const RecordedParameter& p : record.commissioning.parameters) {
+    out += begin + fmt::format("{},{},{},{},{},{},{:d},{:d},{}\n", p.name, p.unit, text(p.estimate),
+                               text(p.standard_error), number_text(p.lower), number_text(p.upper), p.lower_is_prior,
+                               p.upper_is_prior, warrant_word(p.warrant));
+  }
+  return out.empty() ? begin + ",,,,,,,,\n" : out;
+}
+
+}  // namespace wheelwright

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// gap.json: the result of `wheelwright gap`; and the residuals behind it as a table.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <wheelwright/files/json_file.hpp>
+#include <wheelwright/gap/diagnosis.hpp>
+
+namespace wheelwright {
+
+/// Name of the format: the value of its key `schema`.
+inline constexpr const char* kGapSchema = "wheelwright/gap/1";
+
+/// A manoeuvre that would tell the causes apart.
+struct NextManoeuvre {
+  std::string file;      ///< with the wheel-speed commands
+  std::string sentence;  ///< what it is and what it promises
+};
+
+/// What a diagnosis was made of, and where its parts are.
+struct GapFiles {
+  std::string robot;              ///< the robot file as it was named
+  std::vector<std::string> logs;  ///< the logs as they were named
+  std::string baseline;           ///< empty: none
+  std::string residuals;          ///< file of write_residuals(); empty: none
+  std::optional<NextManoeuvre> next_manoeuvre;
+  std::string software;  ///< name and version
+};
+
+/// Name of a verdict in files: "no_gap", "explained", "ambiguous", "unexplained".
+[[nodiscard]] const char* name_of(GapVerdict verdict);
+
+/// The diagnosis as JSON (results/gap.schema.json). Of `where`, the channels, the frequency bands and the regimes that are
+/// findings (is_finding) are written; its series are not: see write_residuals().
+[[nodiscard]] Json to_json(const Diagnosis& diagnosis, const GapFiles& files);
+
+/// Writes `series` as CSV with the header space,channel,unit,t,signal,nominal,refitted,after,floor: one line per row and
+/// channel, seven significant digits (time: microseconds); a signal that a series lacks is empty. The file appears whole
+/// or not at all. Throws InputError when it cannot be written.
+void write_residuals(const std::filesystem::path& path, const std::vector<ResidualSeries>& series);
+
+}  // namespace wheelwright

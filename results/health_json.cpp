@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/results/health_json.hpp>
+
+#include <cmath>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+namespace wheelwright {
+namespace {
+
+Json finding_json(const LogFinding& finding) {
+  Json when = Json::array();
+  for (const Interval& stretch : finding.when) {
+    when.push_back({stretch.lower, stretch.upper});
+  }
+  return {{"id", finding.id},
+          {"topic", to_string(finding.topic)},
+          {"severity", to_string(finding.severity)},
+          {"sentence", finding.sentence},
+          {"next", finding.next},
+          {"columns", finding.columns},
+          {"value", std::isfinite(finding.value) ? Json(finding.value) : Json(nullptr)},
+          {"unit", finding.unit},
+          {"when", std::move(when)},
+          {"stretches", finding.stretches}};
+}
+
+}  // namespace
+
+ReaderCounts reader_counts(const LogReport& report) {
+  return {.rows_read = report.rows_read,
+          .incomplete = report.empty.count + report.not_finite.count,
+          .duplicates = report.duplicates.count,
+          .truncated = report.truncated.count,
+          .unwrapped = report.angle_wraps.count};
+}
+
+Json to_json(const LogHealth& health, const HealthFiles& files) {
+  Json findings = Json::array();
+  for (const LogFinding& finding : health.findings) {
+    findings.push_back(finding_json(finding));
+  }
+  return {{"schema", kHealthSchema},
+          {"software", files.software},
+          {"robot", files.robot.empty() ? Json(nullptr) : Json(files.robot)},
+          {"logs", files.logs},
+          {"verdict", to_string(health.verdict)},
+          {"sentence", health.sentence},
+          {"assumed", health.assumed},
+          {"rows", health.rows},
+          {"segments", health.segments},
+          {"seconds", health.seconds},
+          {"median_step", health.median_step},
+          {"findings", std::move(findings)}};
+}
+
+}  // namespace wheelwright

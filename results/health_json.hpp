@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// doctor.json: the result of `wheelwright doctor`; and what a reader counted, as the examination takes it.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <wheelwright/doctor/log_health.hpp>
+#include <wheelwright/files/json_file.hpp>
+#include <wheelwright/logs/csv_report.hpp>
+
+namespace wheelwright {
+
+/// Name of the format: the value of its key `schema`.
+inline constexpr const char* kHealthSchema = "wheelwright/doctor/1";
+
+/// What was examined.
+struct HealthFiles {
+  std::string robot;              ///< the robot file as it was named; empty: none
+  std::vector<std::string> logs;  ///< the logs as they were named
+  std::string software;           ///< name and version
+};
+
+/// What the reader of CSV logs dropped.
+[[nodiscard]] ReaderCounts reader_counts(const LogReport& report);
+
+/// The examination as JSON (results/doctor.schema.json), findings in their order.
+[[nodiscard]] Json to_json(const LogHealth& health, const HealthFiles& files);
+
+}  // namespace wheelwright

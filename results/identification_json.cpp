@@ -1,0 +1,346 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/results/identification_json.hpp>
+
+#include <cmath>
+
+#include <nlohmann/json.hpp>
+
+#include <wheelwright/commission/physical.hpp>
+#include <wheelwright/files/words.hpp>
+#include <wheelwright/inference/identification_words.hpp>
+#include <wheelwright/results/estimators_json.hpp>
+#include <wheelwright/results/model_words.hpp>
+#include <wheelwright/robots/robot_file.hpp>
+
+namespace wheelwright {
+namespace {
+
+constexpr Words<IdentificationStanding, 3> kStandingWords{{{IdentificationStanding::good, "good"},
+                                                           {IdentificationStanding::caution, "caution"},
+                                                           {IdentificationStanding::bad, "bad"}}};
+constexpr Words<NoiseMeaning, 4> kMeaningWords{{{NoiseMeaning::estimate, "estimate"},
+                                                {NoiseMeaning::upper_limit, "upper_limit"},
+                                                {NoiseMeaning::lower_limit, "lower_limit"},
+                                                {NoiseMeaning::unknown, "unknown"}}};
+constexpr Words<RobustStatus, 3> kRobustWords{{{RobustStatus::converged, "converged"},
+                                               {RobustStatus::not_converged, "not_converged"},
+                                               {RobustStatus::infeasible, "infeasible"}}};
+constexpr Words<ConstrainedStatus, 3> kConstrainedWords{{{ConstrainedStatus::solved, "solved"},
+                                                         {ConstrainedStatus::undetermined, "undetermined"},
+                                                         {ConstrainedStatus::infeasible, "infeasible"}}};
+constexpr Words<Unseen, 4> kUnseenWords{{{Unseen::not_moved, "not_moved"},
+                                         {Unseen::not_separated, "not_separated"},
+                                         {Unseen::noise, "noise"},
+                                         {Unseen::imprecise, "imprecise"}}};
+constexpr Words<ShapeState, 4> kShapeWords{{{ShapeState::identified, "identified"},
+                                            {ShapeState::at_lower, "at_lower"},
+                                            {ShapeState::at_upper, "at_upper"},
+                                            {ShapeState::flat, "flat"}}};
+constexpr Words<KinematicState, 3> kKinematicWords{{{KinematicState::identified, "identified"},
+                                                    {KinematicState::not_identified, "not_identified"},
+                                                    {KinematicState::fixed, "fixed"}}};
+
+using Scales = std::optional<std::vector<PhysicalScale>>;
+
+// θ as physical quantities; null where there is no scale or no θ.
+Json physical(const Eigen::VectorXd& theta, const Scales& scales) {
+  if (!scales || static_cast<std::size_t>(theta.size()) != scales->size()) {
+    return nullptr;
+  }
+  Json list = Json::array();
+  for (std::size_t j = 0; j < scales->size(); ++j) {
+    list.push_back((*scales)[j].scale * theta[static_cast<Eigen::Index>(j)] - (*scales)[j].offset);
+  }
+  return list;
+}
+
+Json parameters_json(const Identification& r, const Scales& scales) {
+  Json list = Json::array();
+  const Fit& fit = r.fit;
+  for (std::size_t j = 0; j < fit.excitation.size(); ++j) {
+    const auto at = static_cast<Eigen::Index>(j);
+    const Parameter& p = r.setting.model.parameters[j];
+    const bool given = fit.excitation[j].state != Excitation::not_excited;
+    const double error = fit.residuals.standard_error.size() > at ? fit.residuals.standard_error[at] : NAN;
+    Json entry = {{"name", p.name},
+                  {"unit", parameter_unit(r.setting.robot, p)},
+                  {"excitation", word_of(kExcitationWords, fit.excitation[j].state)},
+                  {"reason", fit.excitation[j].reason},
+                  {"estimate", given ? Json(fit.estimate[at]) : Json(nullptr)},
+                  {"standard_error", given ? Json(error) : Json(nullptr)},
+                  {"physical", nullptr}};
+    if (scales) {
+      const PhysicalScale& s = (*scales)[j];
+      entry["physical"] = {{"name", p.physical},
+                           {"unit", p.physical_unit},
+                           {"scale", s.scale},
+                           {"offset", s.offset},
+                           {"estimate", given ? Json(s.scale * fit.estimate[at] - s.offset) : Json(nullptr)},
+                           {"standard_error", given ? Json(std::abs(s.scale) * error) : Json(nullptr)}};
+    }
+    list.push_back(entry);
+  }
+  return list;
+}
+
+Json estimators_json(const EstimatorChoice& choice) {
+  if (choice.candidates.empty()) {
+    return nullptr;
+  }
+  Json json = {{"chosen", to_string(choice.best().estimator)},
+               {"reason", choice.reason},
+               {"in_doubt", choice.in_doubt},
+               {"predicted_bias", nullptr},
+               {"endogeneity_test", endogeneity_json(choice)},
+               {"candidates", candidates_json(choice)}};
+  if (choice.predicted_bias.size() > 0) {
+    json["predicted_bias"] = numbers(choice.predicted_bias);
+  }
+  return json;
+}
+
+Json regions_json(const RegionComparison& regions, const Scales& scales) {
+  Json methods = Json::array();
+  for (const RegionRow& row : regions.rows) {
+    methods.push_back({{"method", to_string(row.method)},
+                       {"available", row.available},
+                       {"all_at_once", row.all_at_once},
+                       {"confidence", row.confidence},
+                       {"promise", row.promise},
+                       {"remark", row.remark},
+                       {"lower", row.available ? numbers(row.lower) : Json(nullptr)},
+                       {"upper", row.available ? numbers(row.upper) : Json(nullptr)},
+                       {"physical_lower", row.available ? physical(row.lower, scales) : Json(nullptr)},
+                       {"physical_upper", row.available ? physical(row.upper, scales) : Json(nullptr)}});
+  }
+  return {{"bootstrap_seconds", regions.bootstrap_seconds},
+          {"sign_seconds", regions.sign_seconds},
+          {"sign_groups", regions.sign_groups},
+          {"methods", methods}};
+}
+
+Json active_json(const std::vector<ActiveConstraint>& active) {
+  Json list = Json::array();
+  for (const ActiveConstraint& a : active) {
+    list.push_back({{"words", a.words},
+                    {"multiplier", a.multiplier},
+                    {"excess", a.excess},
+                    {"excess_in_errors", a.excess_in_errors}});
+  }
+  return list;
+}
+
+Json robust_json(const RobustFit& fit, const Setting& s, const Scales& scales) {
+  if (fit.instants == 0) {
+    return nullptr;
+  }
+  Json json = {{"loss", "huber"},
+               {"status", word_of(kRobustWords, fit.status)},
+               {"estimate", numbers(fit.estimate)},
+               {"physical", physical(fit.estimate, scales)},
+               {"standard_error", numbers(fit.standard_error)},
+               {"freedom", fit.freedom},
+               {"outputs", Json::array()},
+               {"episodes", Json::array()},
+               {"active", active_json(fit.active)}};
+  for (std::size_t i = 0; i < fit.outputs.size(); ++i) {
+    const OutputWeights& w = fit.outputs[i];
+    json["outputs"].push_back({{"output", s.model.outputs[i]},
+                               {"unit", output_unit(s.robot, s.model.output_units[i])},
+                               {"scale", w.scale},
+                               {"down_weighted", w.down_weighted},
+                               {"gaussian_share", w.gaussian_share}});
+  }
+  for (const Episode& e : fit.episodes) {
+    json["episodes"].push_back({{"output", s.model.outputs[e.output]},
+                                {"first", e.first_time},
+                                {"last", e.last_time},
+                                {"instants", e.instants},
+                                {"worst_row", e.worst_sample},
+                                {"worst_time", e.worst_time},
+                                {"worst", e.worst}});
+  }
+  return json;
+}
+
+Json constrained_json(const ConstrainedFit& fit, const Scales& scales) {
+  if (fit.estimate.size() == 0 && fit.active.empty()) {
+    return nullptr;
+  }
+  return {{"status", word_of(kConstrainedWords, fit.status)},
+          {"estimate", numbers(fit.estimate)},
+          {"physical", physical(fit.estimate, scales)},
+          {"free_estimate", numbers(fit.free_estimate)},
+          {"active", active_json(fit.active)}};
+}
+
+Json noise_json(const std::vector<ColumnNoise>& noise) {
+  Json list = Json::array();
+  for (const ColumnNoise& n : noise) {
+    Json entry = {{"column", n.column},
+                  {"known", nullptr},
+                  {"found",
+                   {{"method", to_string(n.choice.method)},
+                    {"meaning", word_of(kMeaningWords, n.choice.meaning)},
+                    {"unit", n.unit},
+                    {"sd", n.choice.sd},
+                    {"relative_sd", n.choice.relative_sd},
+                    {"bound", n.choice.bound.bound},
+                    {"assumption", n.choice.assumption},
+                    {"reason", n.choice.reason}}}};
+    if (n.known) {
+      entry["known"] = {{"bound", n.known->bound}, {"unit", n.known->unit}, {"origin", n.known->origin}};
+    }
+    list.push_back(entry);
+  }
+  return list;
+}
+
+Json combinations_json(const std::vector<KnownCombination>& list) {
+  Json json = Json::array();
+  for (const KnownCombination& c : list) {
+    json.push_back(
+        {{"words", c.words}, {"coefficients", numbers(c.coefficients)}, {"relative_error", c.relative_error}});
+  }
+  return json;
+}
+
+Json identifiability_json(const Identifiability& i, bool physical_words) {
+  if (i.singular_values.size() == 0) {
+    return nullptr;
+  }
+  Json unseen = Json::array();
+  for (const UnseenDirection& u : i.unseen) {
+    unseen.push_back({{"why", word_of(kUnseenWords, u.why)},
+                      {"words", u.words},
+                      {"manoeuvres", u.manoeuvres},
+                      {"direction", numbers(u.direction)},
+                      {"parameters", std::vector<std::size_t>(u.members.begin(), u.members.end())}});
+  }
+  return {{"coordinates", physical_words ? "physical" : "theta"},
+          {"rank", i.rank},
+          {"noise_rank", i.noise_rank},
+          {"condition", i.condition},
+          {"singular_values", numbers(i.singular_values)},
+          {"tolerance", i.tolerance},
+          {"base", std::vector<std::size_t>(i.base.begin(), i.base.end())},
+          {"seen", combinations_json(i.seen)},
+          {"unseen", unseen},
+          {"known", combinations_json(i.known)}};
+}
+
+Json information_json(const InformationOverTime& information) {
+  Json windows = Json::array(), parameters = Json::array();
+  for (const MomentBlock& w : information.windows) {
+    windows.push_back({w.first, w.last});
+  }
+  for (const ParameterInformation& p : information.parameters) {
+    Json spans = Json::array();
+    for (const auto& [first, last] : p.spans) {
+      spans.push_back({first, last});
+    }
+    parameters.push_back(
+        {{"information", p.information}, {"seconds", p.seconds}, {"spans", spans}, {"share", numbers(p.share)}});
+  }
+  return {{"coverage", InformationOptions{}.coverage}, {"windows", windows}, {"parameters", parameters}};
+}
+
+Json shapes_json(const std::vector<ShapeFinding>& shapes) {
+  Json list = Json::array();
+  for (const ShapeFinding& f : shapes) {
+    Json curve = Json::array();
+    for (const ShapePoint& point : f.curve) {
+      curve.push_back({point.shape, point.residual_ratio});
+    }
+    const bool told = f.converged && f.state == ShapeState::identified;
+    list.push_back({{"name", f.name},
+                    {"unit", f.unit},
+                    {"state", word_of(kShapeWords, f.state)},
+                    {"converged", f.converged},
+                    {"matters", matters(f)},
+                    {"words", in_words(f)},
+                    {"estimate", f.estimate},
+                    {"standard_error", told ? Json(f.standard_error) : Json(nullptr)},
+                    {"freedom", f.freedom},
+                    {"residual_ratio", f.residual_ratio},
+                    {"searched", {f.searched.lower, f.searched.upper}},
+                    {"curve", curve}});
+  }
+  return list;
+}
+
+Json kinematics_json(const std::optional<KinematicCalibration>& k) {
+  if (!k) {
+    return nullptr;
+  }
+  const auto quantity = [](const KinematicQuantity& q, const char* unit) -> Json {
+    return {{"unit", unit},           {"state", word_of(kKinematicWords, q.state)},
+            {"estimate", q.estimate}, {"standard_error", q.standard_error},
+            {"lower", q.lower},       {"upper", q.upper},
+            {"reason", q.reason}};
+  };
+  return {{"converged", k->converged},
+          {"windows", k->windows},
+          {"poses", k->poses},
+          {"held_poses", k->held_poses},
+          {"outlying_poses", k->outlying_poses},
+          {"radius_right", quantity(k->radius_right, "m")},
+          {"radius_left", quantity(k->radius_left, "m")},
+          {"track_width", quantity(k->track_width, "m")},
+          {"track_at_nominal_radius", quantity(k->track_at_nominal_radius, "m")},
+          {"radius_scale", quantity(k->radius_scale, "1")},
+          {"asymmetry", quantity(k->asymmetry, "1")},
+          {"axle_offset", quantity(k->axle_offset, "m")},
+          {"heading_spread", k->heading_spread},
+          {"position_spread", k->position_spread}};
+}
+
+Json data_json(const Survey& survey, const LogReport& data) {
+  Json files = Json::array();
+  for (const LogFileReport& f : data.files) {
+    files.push_back({{"path", f.path}, {"hash", f.hash}, {"bytes", f.bytes}, {"rows", f.rows}});
+  }
+  return {{"files", files},
+          {"rows", survey.rows},
+          {"segments", survey.segments},
+          {"seconds", survey.seconds},
+          {"median_step", survey.median_step},
+          {"repairs", sentences(data)}};
+}
+
+}  // namespace
+
+Json to_json(const Identification& r, const LogReport& data, const std::string& software, std::uint64_t seed) {
+  const Setting& s = r.setting;
+  const Scales scales = physical_scales(s.robot, s.model);
+  const FilterDesign& f = s.filter;
+  return {{"schema", kIdentificationSchema},
+          {"software", software},
+          {"seed", seed},
+          {"confidence", r.confidence},
+          {"standing", word_of(kStandingWords, standing(r))},
+          {"message", verdict(r)},
+          {"findings", findings(r)},
+          {"next", next_steps(r)},
+          {"robot", to_json(s.robot)},
+          {"filter", r.effort ? Json{{"order", f.order},
+                                     {"alpha", f.alpha},
+                                     {"beta", f.beta},
+                                     {"delay", f.delay()},
+                                     {"chosen", !s.filter_choice.curve.empty()}}
+                              : Json(nullptr)},
+          {"parameters", parameters_json(r, scales)},
+          {"estimators", estimators_json(r.fit.choice)},
+          {"regions", regions_json(r.regions, scales)},
+          {"robust", robust_json(r.robust, s, scales)},
+          {"constrained", constrained_json(r.constrained, scales)},
+          {"noise", noise_json(r.noise)},
+          {"identifiability", identifiability_json(r.identifiability, scales.has_value())},
+          {"information", information_json(r.information)},
+          {"shapes", shapes_json(r.shapes)},
+          {"kinematics", kinematics_json(r.kinematics)},
+          {"data", data_json(s.survey, data)},
+          {"notes", r.notes}};
+}
+
+}  // namespace wheelwright

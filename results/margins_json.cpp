@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/results/margins_json.hpp>
+
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include <wheelwright/commission/margin_words.hpp>
+#include <wheelwright/files/json_number.hpp>
+#include <wheelwright/results/warrant_json.hpp>
+
+namespace wheelwright {
+namespace {
+
+Json sizes_json(const std::vector<double>& sizes) {
+  Json list = Json::array();
+  for (const double size : sizes) {
+    list.push_back(or_null(size));
+  }
+  return list;
+}
+
+const char* name_of(ManoeuvreKind kind) {
+  switch (kind) {
+    case ManoeuvreKind::standstill: return "standstill";
+    case ManoeuvreKind::cruising: return "cruising";
+    case ManoeuvreKind::accelerating: return "accelerating";
+    case ManoeuvreKind::turning: return "turning";
+    case ManoeuvreKind::spinning: return "spinning";
+  }
+  return "";
+}
+
+Json summary_json(const FaultMargins& margins, const MarginSurvey& survey, const std::vector<std::string>& outputs) {
+  Json list = Json::array();
+  for (const auto& [kind, count] : survey.manoeuvres) {
+    for (std::size_t w = 0; w < survey.windows.size(); ++w) {
+      const MarginSummary all = summarise(margins, w, kind);
+      if (all.onsets == 0) {
+        continue;
+      }
+      Json channels = Json::object();
+      for (std::size_t i = 0; i < outputs.size(); ++i) {
+        channels[outputs[i]] = or_null(summarise(margins, w, kind, i).worst);
+      }
+      list.push_back({{"manoeuvre", name_of(kind)},
+                      {"window", survey.windows[w]},
+                      {"onsets", all.onsets},
+                      {"certain_at", all.certain},
+                      {"best", or_null(all.best)},
+                      {"median", or_null(all.median)},
+                      {"worst", or_null(all.worst)},
+                      {"worst_by_output", std::move(channels)}});
+    }
+  }
+  return list;
+}
+
+Json onsets_json(const FaultMargins& margins) {
+  Json list = Json::array();
+  for (const OnsetMargin& onset : margins.onsets) {
+    list.push_back({{"t", onset.t},
+                    {"manoeuvre", name_of(onset.kind)},
+                    {"certain", sizes_json(onset.certain)},
+                    {"hidden", or_null(onset.hidden)}});
+  }
+  return list;
+}
+
+Json map_json(const OperatingMap& map) {
+  Json smallest = Json::array();
+  for (Eigen::Index a = 0; a < map.smallest.rows(); ++a) {
+    Json row = Json::array();
+    for (Eigen::Index b = 0; b < map.smallest.cols(); ++b) {
+      row.push_back(or_null(map.smallest(a, b)));
+    }
+    smallest.push_back(std::move(row));
+  }
+  return {{"first", map.plane.x}, {"second", map.plane.y}, {"smallest", std::move(smallest)}};
+}
+
+Json fault_json(const FaultMargins& margins, const MarginSurvey& survey, const ResidualMargins& residual) {
+  Json json = {{"fault", margins.fault.name},
+               {"sentence", margins.fault.sentence},
+               {"unit", margins.fault.unit},
+               {"side", margins.side > 0.0 ? "positive" : "negative"},
+               {"whole", margins.fault.whole},
+               {"largest", margins.largest()},
+               {"summary", summary_json(margins, survey, residual.outputs)},
+               {"onsets", onsets_json(margins)}};
+  for (const FaultMaps& maps : residual.maps) {
+    if (maps.fault == margins.fault.name && maps.side == margins.side) {
+      json["map"] = {{"speeds", map_json(maps.speeds)}, {"accelerations", map_json(maps.accelerations)}};
+    }
+  }
+  return json;
+}
+
+}  // namespace
+
+Json to_json(const MarginSurvey& survey, const std::string& model, const std::string& log,
+             const std::string& software) {
+  Json json = {{"schema", kMarginsSchema},
+               {"software", software},
+               {"model", model},
+               {"log", log},
+               {"seconds", survey.seconds},
+               {"windows", survey.windows},
+               {"persistence", {{"k", survey.persistence.k}, {"n", survey.persistence.n}}},
+               {"noise_share", survey.noise_share},
+               {"without_kinematic", survey.without_kinematic},
+               {"sentences", margin_sentences(survey)}};
+  json["manoeuvres"] = Json::array();
+  for (const auto& [kind, count] : survey.manoeuvres) {
+    json["manoeuvres"].push_back({{"manoeuvre", name_of(kind)}, {"onsets", count}});
+  }
+  json["residuals"] = Json::array();
+  for (const ResidualMargins& residual : survey.residuals) {
+    Json faults = Json::array();
+    for (const FaultMargins& margins : residual.margins) {
+      faults.push_back(fault_json(margins, survey, residual));
+    }
+    json["residuals"].push_back({{"residual", residual.name},
+                                 {"warrant", warrant_word(residual.warrant)},
+                                 {"outputs", residual.outputs},
+                                 {"blind", residual.blind},
+                                 {"faults", std::move(faults)}});
+  }
+  json["assumptions"] = assumptions_json(survey.assumptions);
+  return json;
+}
+
+}  // namespace wheelwright

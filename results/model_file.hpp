@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// model.json: the result of commissioning, and the model that a detector reads back from it.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include <wheelwright/commission/commission.hpp>
+#include <wheelwright/files/json_file.hpp>
+#include <wheelwright/logs/csv_report.hpp>
+
+namespace wheelwright {
+
+/// Name of the format: the value of its key `schema`.
+inline constexpr const char* kModelSchema = "wheelwright/model/1";
+
+/// The whole result as JSON (results/model.schema.json). `data` says which log it came from, `software` is name and version.
+[[nodiscard]] Json to_json(const Commissioning& result, const LogReport& data, const std::string& software);
+
+/// Reads the on-line part of a model.json back. Throws InputError, naming file and key, when it is no such file, when
+/// it holds no model (its status says why), or when a number is missing or impossible.
+[[nodiscard]] CommissionedModel read_model(const std::filesystem::path& path);
+
+/// The same from JSON; `file` is for messages.
+[[nodiscard]] CommissionedModel model_from_json(const Json& json, const std::string& file);
+
+/// A row of a log, or a side of the prior box, and its multiplier in a proof, as model.json names them.
+struct NamedRow {
+  RowOrigin origin;
+  double multiplier = 0.0;
+};
+
+/// A published bound and its proof.
+struct PublishedBound {
+  double value = 0.0;
+  std::vector<NamedRow> proof;
+};
+
+/// What a model.json says of θ, and all that is needed to prove it again from the log: what `wheelwright check`
+/// verifies.
+struct ModelClaims {
+  Robot robot;
+  Model model;
+  Measurement measurement;
+  FilterDesign filter;
+  SignalErrors errors;              ///< of the rows of the log: Commissioning::row_errors
+  std::vector<NoiseOrigin> origin;  ///< of errors.output, one for each output
+  Box prior;                        ///< in which the set was sought
+  FeasibleSet::Status set = FeasibleSet::Status::nonempty;
+  std::vector<PublishedBound> lower, upper;  ///< of each parameter
+  std::vector<NamedRow> contradiction;       ///< where the set is empty
+  std::vector<HalfSpace> facets;             ///< of the set, with their origins; else none
+  Box hull;                                  ///< of the set; the prior where it is empty
+  std::map<std::string, Interval> physical;  ///< bounds by physical name; none where there is no scale
+  std::vector<std::size_t> dropped;          ///< rows left out as outliers
+  std::size_t sign_parts = 1;                ///< FeasibleSet::sign_parts
+  std::vector<LogFileReport> files;          ///< path, hash, bytes and rows of each file of the log
+  std::size_t rows = 0;                      ///< of the log
+  std::size_t segments = 0;                  ///< of the log
+  Warrant warrant = Warrant::extrapolated;   ///< of the bounds, as the model states it
+  std::vector<Assumption> assumptions;       ///< that it took; none of a model from before it listed them
+};
+
+/// Reads the claims of a model.json, also of one that holds no model. Throws InputError, naming file and key, when it
+/// is no such file, when it has no certificates (it was written before there were any), or when a number is missing or
+/// impossible. Multipliers are read as they stand: to judge them is the checker's work.
+[[nodiscard]] ModelClaims read_claims(const std::filesystem::path& path);
+
+/// The same from JSON; `file` is for messages.
+[[nodiscard]] ModelClaims claims_from_json(const Json& json, const std::string& file);
+
+}  // namespace wheelwright

@@ -1,0 +1,305 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+
+#include <nlohmann/json.hpp>
+
+#include <wheelwright/commission/physical.hpp>
+#include <wheelwright/files/json_number.hpp>
+#include <wheelwright/results/estimators_json.hpp>
+#include <wheelwright/results/kinematic_json.hpp>
+#include <wheelwright/results/model_file.hpp>
+#include <wheelwright/results/model_words.hpp>
+#include <wheelwright/results/warrant_json.hpp>
+#include <wheelwright/robots/robot_file.hpp>
+
+namespace wheelwright {
+namespace {
+
+constexpr std::size_t kMostVertices = 256;
+
+Json origin_json(const RowOrigin& origin, const Model& model) {
+  if (origin.is_prior) {
+    return {{"prior", model.parameters[origin.parameter].name}, {"side", word_of(kSideWords, origin.side)}};
+  }
+  return {{"row", origin.sample},
+          {"t", origin.t},
+          {"output", model.outputs[origin.output]},
+          {"side", word_of(kSideWords, origin.side)}};
+}
+
+// The rows that prove a bound with their multipliers; the check needs no more.
+Json proof_json(const std::vector<WeightedRow>& rows, const Model& model) {
+  Json list = Json::array();
+  for (const WeightedRow& weighted : rows) {
+    if (weighted.multiplier > 0.0) {
+      Json row = origin_json(weighted.row.origin, model);
+      row["multiplier"] = weighted.multiplier;
+      list.push_back(row);
+    }
+  }
+  return list;
+}
+
+// What bounds motion and efforts between samples; null where the rows do not hold it.
+Json between_samples_json(const SignalErrors& errors) {
+  if (!errors.between_samples) {
+    return nullptr;
+  }
+  Json mobility = Json::array();
+  for (Eigen::Index c = 0; c < errors.motion.mobility.rows(); ++c) {
+    mobility.push_back(numbers(Eigen::VectorXd(errors.motion.mobility.row(c))));
+  }
+  return {{"acceleration", numbers(errors.motion.limit)},
+          {"mobility", std::move(mobility)},
+          {"largest", numbers(errors.motion.largest)},
+          {"effort", numbers(errors.motion.effort)}};
+}
+
+// What the motion in the rows can be wrong by; what the effort can is said elsewhere.
+Json motion_errors_json(const SignalErrors& errors) {
+  return {{"acceleration", numbers(errors.acceleration)},
+          {"speed", numbers(errors.speed)},
+          {"speed_sample", numbers(errors.speed_sample)},
+          {"joint_sample", errors.joint_sample},
+          {"heading", errors.heading},
+          {"between_samples", between_samples_json(errors)}};
+}
+
+Json filter_json(const FilterDesign& filter, const FilterChoice& choice) {
+  Json json = {{"order", filter.order},   {"alpha", filter.alpha},   {"beta", filter.beta},
+               {"settle", filter.settle}, {"delay", filter.delay()}, {"chosen", !choice.curve.empty()}};
+  for (const FilterCandidate& c : choice.curve) {
+    json["curve"].push_back({{"beta", c.design.beta}, {"criterion", c.criterion}});
+  }
+  return json;
+}
+
+Json measurement_json(const Measurement& m) {
+  return {{"motion", word_of(kMotionWords, m.motion)},
+          {"motion_columns", m.motion_columns},
+          {"effort_columns", m.effort_columns},
+          {"heading_column", m.heading_column},
+          {"hold", word_of(kHoldWords, m.hold)},
+          {"effort_unsigned", m.effort_unsigned},
+          {"count", m.count},
+          {"nominal_step", m.nominal_step},
+          {"shortest_step", m.shortest_step}};
+}
+
+Json noise_json(const Commissioning& r, const Model& model) {
+  Json json = {{"mode", word_of(kNoiseModeWords, r.noise_mode)}, {"outputs", Json::array()}};
+  for (std::size_t i = 0; i < r.noise.size(); ++i) {
+    const OutputNoise& n = r.noise[i];
+    Json output = {{"output", model.outputs[i]},
+                   {"unit", output_unit(r.model.robot, model.output_units[i])},
+                   {"origin", word_of(kNoiseOriginWords, n.origin)},
+                   {"bound", n.bound},
+                   {"learning", n.learning},
+                   {"warrant", warrant_word(n.warrant)}};
+    if (n.origin == NoiseOrigin::estimated) {
+      output["over_rms"] = n.how.over_rms;
+      output["over_largest"] = n.how.over_largest;
+      output["heavy_tail"] = n.how.heavy_tail;
+    }
+    json["outputs"].push_back(output);
+  }
+  json["motion"] = motion_errors_json(r.row_errors);
+  return json;
+}
+
+Json parameter_json(const Commissioning& r, std::size_t j, const Robot& robot, const Model& model) {
+  const ParameterResult& p = r.parameters[j];
+  const auto proof = [&](const std::vector<CertifiedBound>& bounds) {
+    return j < bounds.size() ? proof_json(bounds[j].binding, model) : Json::array();
+  };
+  return {{"name", p.parameter.name},
+          {"unit", parameter_unit(robot, p.parameter)},
+          {"estimate", or_null(p.estimate)},
+          {"lower", p.lower},
+          {"upper", p.upper},
+          {"warrant", warrant_word(p.warrant)},
+          {"standard_error", or_null(p.standard_error)},
+          {"chebyshev_centre", p.chebyshev},
+          {"excitation", word_of(kExcitationWords, p.excitation)},
+          {"reason", p.reason},
+          {"lower_is_prior", p.lower_is_prior},
+          {"upper_is_prior", p.upper_is_prior},
+          {"estimate_inside", p.estimate_inside},
+          {"binding_samples", {{"lower", proof(r.feasible.lower)}, {"upper", proof(r.feasible.upper)}}}};
+}
+
+Json physical_json(const Commissioning& r, const Robot& robot, const Model& model) {
+  const auto scales = physical_scales(robot, model);
+  if (!scales) {
+    return nullptr;
+  }
+  Json json = Json::object();
+  for (std::size_t j = 0; j < r.parameters.size(); ++j) {
+    const ParameterResult& p = r.parameters[j];
+    const PhysicalScale& s = (*scales)[j];
+    const auto physical = [&](double theta) { return s.scale * theta - s.offset; };
+    const Interval scaled = Interval{s.scale, s.scale} * Interval{p.lower, p.upper} - Interval{s.offset, s.offset};
+    Json entry = {{"unit", p.parameter.physical_unit},
+                  {"estimate", p.estimate ? Json(physical(*p.estimate)) : Json(nullptr)},
+                  {"lower", scaled.lower},
+                  {"upper", scaled.upper},
+                  {"warrant", warrant_word(p.warrant)},
+                  {"standard_error", p.standard_error ? Json(s.scale * *p.standard_error) : Json(nullptr)}};
+    if (const auto nominal = robot.nominal.find(p.parameter.physical); nominal != robot.nominal.end()) {
+      entry["nominal"] = nominal->second;
+    }
+    json[p.parameter.physical] = entry;
+  }
+  return json;
+}
+
+Json identification_json(const Commissioning& r) {
+  Json json = {{"rank", r.rank}, {"condition", r.condition}, {"freedom", r.residuals.freedom}};
+  const EstimatorChoice& choice = r.estimators;
+  if (choice.candidates.empty()) {
+    return json;
+  }
+  json["estimator"] = to_string(choice.best().estimator);
+  json["reason"] = choice.reason;
+  json["in_doubt"] = choice.in_doubt;
+  if (const Json test = endogeneity_json(choice); !test.is_null()) {
+    json["endogeneity_test"] = test;
+  }
+  json["candidates"] = candidates_json(choice);
+  return json;
+}
+
+Json set_json(const Commissioning& r, const Model& model) {
+  Json json = {{"status", r.feasible.status == FeasibleSet::Status::nonempty ? "nonempty" : "empty"},
+               {"rows", r.feasible.rows},
+               {"passes", r.feasible.passes},
+               {"sign_parts", r.feasible.sign_parts},
+               {"convexified", r.feasible.convexified},
+               {"dropped", r.dropped}};
+  for (const Interval& side : r.prior.sides) {
+    json["prior"].push_back({side.lower, side.upper});
+  }
+  if (!r.feasible.polytope) {
+    json["contradiction"] = proof_json(r.feasible.contradiction, model);
+    json["noise_factor_needed"] = r.minimax;
+    return json;
+  }
+  Json a = Json::array(), b = Json::array(), origin = Json::array();
+  for (const HalfSpace& facet : r.feasible.polytope->facets()) {
+    a.push_back(numbers(facet.a));
+    b.push_back(facet.b);
+    origin.push_back(origin_json(facet.origin, model));
+  }
+  json["A"] = a;
+  json["b"] = b;
+  json["origin"] = origin;
+  for (const Interval& side : r.feasible.hull.sides) {
+    json["hull"].push_back({side.lower, side.upper});
+  }
+  if (r.feasible.polytope->has_vertices() && r.feasible.polytope->vertex_count() <= kMostVertices) {
+    json["blocks"] = Json::array();
+    for (const Polytope::Block& block : r.feasible.polytope->blocks()) {
+      Json vertices = Json::array();
+      const Eigen::MatrixXd points = block.vertices ? block.vertices->points : Eigen::MatrixXd();
+      for (Eigen::Index k = 0; k < points.cols(); ++k) {
+        vertices.push_back(numbers(points.col(k)));
+      }
+      json["blocks"].push_back({{"parameters", block.parameters}, {"vertices", vertices}});
+    }
+  }
+  return json;
+}
+
+Json validation_json(const Commissioning& r, const Model& model) {
+  Json outputs = Json::array();
+  for (std::size_t i = 0; i < r.validation.size(); ++i) {
+    const OutputValidation& v = r.validation[i];
+    const auto share = [&](double width) { return v.torque_rms > 0.0 ? width / v.torque_rms : 0.0; };
+    outputs.push_back({{"output", model.outputs[i]},
+                       {"warrant", warrant_word(v.warrant)},
+                       {"instants", v.instants},
+                       {"coverage", v.coverage},
+                       {"coverage_noise_free", v.coverage_noise_free},
+                       {"false_alarms", v.outside},
+                       {"nrmse", v.nrmse},
+                       {"utilisation", v.utilisation},
+                       {"torque_rms", v.torque_rms},
+                       {"residual_rms", v.residual_rms},
+                       {"width_over_torque_rms", share(v.median_width)},
+                       {"box_width_over_torque_rms", share(v.median_width_box)},
+                       {"smallest_certain_kappa", v.smallest_kappa}});
+  }
+  return {{"blocks", r.folds.blocks},
+          {"held_out_every", r.folds.hold_out_every},
+          {"purge", r.folds.purge},
+          {"outputs", outputs}};
+}
+
+Json contradictions_json(const Commissioning& r) {
+  Json list = Json::array();
+  for (const LogContradiction& c : r.contradictions) {
+    list.push_back({{"id", to_string(c.kind)},
+                    {"withdraws", c.withdraws},
+                    {"subject", c.subject},
+                    {"value", c.value},
+                    {"limit", c.limit},
+                    {"sentence", c.sentence},
+                    {"next", c.next}});
+  }
+  return list;
+}
+
+Json data_json(const Commissioning& r, const LogReport& data) {
+  Json files = Json::array();
+  for (const LogFileReport& f : data.files) {
+    files.push_back({{"path", f.path}, {"hash", f.hash}, {"bytes", f.bytes}, {"rows", f.rows}});
+  }
+  return {{"files", files},
+          {"rows", r.survey.rows},
+          {"segments", r.survey.segments},
+          {"seconds", r.survey.seconds},
+          {"median_step", r.survey.median_step},
+          {"largest_step", r.survey.largest_step},
+          {"repairs", sentences(data)}};
+}
+
+}  // namespace
+
+Json to_json(const Commissioning& r, const LogReport& data, const std::string& software) {
+  const CommissionedModel& m = r.model;
+  const bool has_model = !m.facets.empty() && r.status != Commissioning::Status::nothing;
+  Json json = {{"schema", kModelSchema},
+               {"software", software},
+               {"status", word_of(kStatusWords, r.status)},
+               {"message", r.message},
+               {"warrant", warrant_word(m.warrant)},
+               {"robot", to_json(m.robot)},
+               {"filter", filter_json(m.filter, r.filter_choice)},
+               {"measurement", measurement_json(m.measurement)},
+               {"noise", noise_json(r, m.model)},
+               {"parameters", Json::array()}};
+  for (std::size_t j = 0; j < r.parameters.size(); ++j) {
+    json["parameters"].push_back(parameter_json(r, j, m.robot, m.model));
+  }
+  json["physical"] = physical_json(r, m.robot, m.model);
+  json["identification"] = identification_json(r);
+  json["feasible_set"] = set_json(r, m.model);
+  if (has_model) {
+    Json bounds = motion_errors_json(m.errors);
+    bounds["output"] = numbers(m.errors.output);
+    json["detector"] = {{"estimate", numbers(m.estimate)},
+                        {"error_bounds", std::move(bounds)},
+                        {"persistence", {{"k", m.persistence.k}, {"n", m.persistence.n}}}};
+  }
+  json["validation"] = validation_json(r, m.model);
+  if (auto kinematic = kinematic_json(r.kinematic, r.folds)) {
+    json["kinematic"] = std::move(*kinematic);
+  }
+  json["contradictions"] = contradictions_json(r);
+  json["data"] = data_json(r, data);
+  json["assumptions"] = assumptions_json(r.assumptions);
+  json["notes"] = r.notes;
+  return json;
+}
+
+}  // namespace wheelwright

@@ -1,0 +1,296 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/robots/robot_file.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+#include <nlohmann/json.hpp>
+
+#include <wheelwright/files/byte_source.hpp>
+#include <wheelwright/files/suggest.hpp>
+#include <wheelwright/files/yaml_place.hpp>
+#include <wheelwright/robots/effects_file.hpp>
+
+namespace wheelwright {
+namespace {
+
+constexpr std::size_t longest_robot_file = std::size_t{1} << 20;
+constexpr double longest_radius = 10.0;  // m: beyond this the file means millimetres
+constexpr double longest_track = 100.0;  // m
+constexpr double longest_delay = 1.0;    // s: beyond this the file means milliseconds
+
+using Names = std::vector<std::string>;
+
+/// A file is read key by key; what depends on the model is read once that is known.
+struct RobotReader {
+  YamlPlace root;
+  Robot robot;
+  Names physical;
+
+  static bool drive(const Robot& robot) { return robot.model == "differential_drive"; }
+
+  void read() {
+    const auto members =
+        root.members({"name", "model", "wheel_radius", "track_width", "footprint", "lever_arm", "friction",
+                      "parameters", "effort", "nominal", "prior", "noise", "filter", "encoder_counts_per_turn",
+                      "speed_source", "limits", "kinematic", "motor", "effects"});
+    for (const auto& [key, place] : members) {
+      read_basics(key, place);
+    }
+    physical = !drive(robot) ? Names{"inertia", "viscous", "coulomb", "offset"}
+               : robot.anisotropic_friction
+                   ? Names{"mass", "yaw_inertia", "viscous_x", "viscous_y", "viscous_yaw", "coulomb"}
+                   : Names{"mass", "yaw_inertia", "viscous_linear", "viscous_yaw", "coulomb"};
+    for (const auto& [key, place] : members) {
+      read_geometry(key, place);
+      read_knowledge(key, place);
+      read_measurement(key, place);
+    }
+    demand_geometry();
+  }
+
+  void read_basics(const std::string& key, const YamlPlace& place) {
+    if (key == "name") {
+      robot.name = place.text();
+    } else if (key == "model") {
+      const Names models = {"differential_drive", "single_axis"};
+      robot.model = models[place.choice(models)];
+    } else if (key == "friction") {
+      robot.anisotropic_friction = place.choice({"isotropic", "anisotropic"}) == 1;
+    }
+  }
+
+  void read_geometry(const std::string& key, const YamlPlace& place) {
+    const bool geometry =
+        key == "wheel_radius" || key == "track_width" || key == "footprint" || key == "lever_arm" || key == "friction";
+    if (geometry && !drive(robot)) {
+      place.say(key + ": the model single_axis has no " + key + ": expected it with differential_drive only");
+    }
+    if (key == "wheel_radius") {
+      robot.wheel_radius = place.number("metres, > 0 and at most 10",
+                                        [](double value) { return value > 0.0 && value <= longest_radius; });
+    } else if (key == "track_width") {
+      robot.track_width = place.number("metres, > 0 and at most 100",
+                                       [](double value) { return value > 0.0 && value <= longest_track; });
+    } else if (key == "footprint") {
+      for (const auto& [name, value] : place.members({"radius"})) {
+        robot.footprint_radius = value.number("metres, > 0 and at most 100",
+                                              [](double number) { return number > 0.0 && number <= longest_track; });
+      }
+      if (!robot.footprint_radius) {
+        place.fail("the key radius");
+      }
+    } else if (key == "lever_arm") {
+      robot.lever_arm_is_track = place.choice({"half_track", "track"}) == 1;
+    }
+  }
+
+  static double physical_value(const std::string& name, const YamlPlace& place, std::string_view expected) {
+    return name == "offset" ? place.number("a number", [](double) { return true; })
+                            : place.number(expected, [](double value) { return value >= 0.0; });
+  }
+
+  void read_knowledge(const std::string& key, const YamlPlace& place) {
+    if (key == "nominal") {
+      for (const auto& [name, value] : place.members(physical)) {
+        const bool inert = name == "mass" || name == "yaw_inertia" || name == "inertia";
+        robot.nominal[name] = inert ? value.positive() : physical_value(name, value, "a number >= 0");
+      }
+    } else if (key == "prior") {
+      for (const auto& [name, value] : place.members(physical)) {
+        const std::string expected =
+            name == "offset" ? "two numbers [lo, hi] with lo <= hi" : "two numbers [lo, hi] with 0 <= lo <= hi";
+        const auto ends = value.elements(expected);
+        if (ends.size() != 2) {
+          value.fail(expected);
+        }
+        const Interval interval{physical_value(name, ends[0], expected), physical_value(name, ends[1], expected)};
+        if (interval.lower > interval.upper) {
+          ends[1].fail(expected);
+        }
+        robot.prior[name] = interval;
+      }
+    } else if (key == "parameters") {
+      robot.parameters.emplace();
+      for (const YamlPlace& element : place.elements("a list of " + listed(physical))) {
+        const std::string name = physical[element.choice(physical)];
+        if (std::find(robot.parameters->begin(), robot.parameters->end(), name) != robot.parameters->end()) {
+          element.fail("each name once");
+        }
+        robot.parameters->push_back(name);
+      }
+      if (robot.parameters->empty()) {
+        place.fail("at least one of " + listed(physical));
+      }
+    } else if (key == "kinematic") {
+      for (const auto& [name, value] : place.members({"window"})) {
+        robot.kinematic_window = value.positive();
+      }
+    } else if (key == "limits") {
+      for (const auto& [name, value] : place.members({"effort", "speed", "acceleration"})) {
+        robot.limits[name] = value.positive();
+      }
+    } else if (key == "motor") {
+      read_motor(place);
+    } else if (key == "effects") {
+      read_effects(place, robot);
+    }
+  }
+
+  void read_motor(const YamlPlace& place) {
+    Motor motor;
+    for (const auto& [name, value] : place.members({"torque_constant", "resistance", "back_emf", "gear_ratio"})) {
+      const double number = value.positive();
+      if (name == "torque_constant") {
+        motor.torque_constant = number;
+      } else if (name == "resistance") {
+        motor.resistance = number;
+      } else if (name == "back_emf") {
+        motor.back_emf = number;
+      } else {
+        motor.gear_ratio = number;
+      }
+    }
+    robot.motor = motor;
+  }
+
+  void read_measurement(const std::string& key, const YamlPlace& place) {
+    if (key == "effort") {
+      for (const auto& [name, value] : place.members({"kind", "hold", "unsigned", "changes", "delay"})) {
+        if (name == "kind") {
+          robot.effort = static_cast<EffortKind>(value.choice({"torque", "current", "voltage"}));
+        } else if (name == "hold") {
+          robot.hold = static_cast<Hold>(value.choice({"zero_order", "first_order"}));
+        } else if (name == "changes") {
+          robot.effort_changes = static_cast<EffortChanges>(value.choice({"between", "at_samples"}));
+        } else if (name == "delay") {
+          robot.effort_delay = delay(value);
+        } else {
+          robot.effort_unsigned = value.boolean();
+        }
+      }
+    } else if (key == "noise") {
+      read_noise(place);
+    } else if (key == "filter") {
+      read_filter(place);
+    } else if (key == "encoder_counts_per_turn") {
+      robot.encoder_counts_per_turn = place.positive();
+    } else if (key == "speed_source") {
+      robot.speed_source = static_cast<SpeedSource>(place.choice({"auto", "encoder_difference", "measured"}));
+    }
+  }
+
+  static Interval delay(const YamlPlace& place) {
+    const std::string_view expected = "seconds between -1 and 1, or two such numbers [lo, hi] with lo <= hi";
+    const auto seconds = [&](const YamlPlace& end) {
+      return end.number(expected, [](double value) { return std::abs(value) <= longest_delay; });
+    };
+    if (place.is_scalar()) {
+      const double both = seconds(place);
+      return {both, both};
+    }
+    const auto ends = place.elements(expected);
+    if (ends.size() != 2) {
+      place.fail(expected);
+    }
+    const Interval interval{seconds(ends[0]), seconds(ends[1])};
+    if (interval.lower > interval.upper) {
+      ends[1].fail(expected);
+    }
+    return interval;
+  }
+
+  void read_noise(const YamlPlace& place) {
+    if (place.is_scalar()) {
+      place.demand("estimate");
+      return;
+    }
+    for (const auto& [name, value] : place.members({"wheel_speed", "wheel_angle", "effort", "position", "heading"})) {
+      NoiseBound& bound = name == "wheel_speed"   ? robot.noise.wheel_speed
+                          : name == "wheel_angle" ? robot.noise.wheel_angle
+                          : name == "effort"      ? robot.noise.effort
+                          : name == "position"    ? robot.noise.position
+                                                  : robot.noise.heading;
+      if (!(value.is_scalar() && value.text() == "estimate")) {
+        bound.value = value.number("a bound >= 0, or estimate", [](double number) { return number >= 0.0; });
+      }
+    }
+  }
+
+  void read_filter(const YamlPlace& place) {
+    if (place.is_scalar()) {
+      place.demand("auto");
+      return;
+    }
+    for (const auto& [name, value] : place.members({"order", "alpha", "beta"})) {
+      if (value.is_scalar() && value.text() == "auto") {
+        continue;
+      }
+      if (name == "order") {
+        robot.filter.order = static_cast<int>(
+            value.number("1, 2 or auto", [](double number) { return number == 1.0 || number == 2.0; }));
+      } else {
+        const double rate = value.number("a rate > 0 in 1/s, or auto", [](double number) { return number > 0.0; });
+        (name == "alpha" ? robot.filter.alpha : robot.filter.beta) = rate;
+      }
+    }
+  }
+
+  void demand_geometry() const {
+    if (drive(robot) && robot.wheel_radius == 0.0) {
+      root.say("no key wheel_radius: expected it (m) for the model differential_drive");
+    }
+    if (drive(robot) && robot.track_width == 0.0) {
+      root.say("no key track_width: expected it (m) for the model differential_drive");
+    }
+  }
+};
+
+Robot read_from(const YamlPlace& root) {
+  RobotReader reader{root, {}, {}};
+  reader.read();
+  return reader.robot;
+}
+
+}  // namespace
+
+Robot parse_robot(std::string_view text, const std::string& file) { return read_from(YamlPlace::parse(text, file)); }
+
+Robot read_robot(const std::filesystem::path& path) {
+  return parse_robot(read_bytes(path, longest_robot_file), path.string());
+}
+
+Robot robot_from_json(const Json& object, const std::string& where) {
+  // JSON is YAML: one reader, one set of rules.
+  return read_from(YamlPlace::parse(json_text(object), where, false));
+}
+
+Robot with_interpolation_errors(Robot robot, const LogReport& report) {
+  const SensorNoise declared = robot.noise;
+  for (const LogFileReport& file : report.files) {
+    for (const Interpolation& of : file.interpolated) {
+      const auto widen = [&](NoiseBound SensorNoise::*kind) {
+        if (const std::optional<double> bound = (declared.*kind).value) {
+          double& widened = *(robot.noise.*kind).value;
+          widened = std::max(widened, *bound + of.error);
+        }
+      };
+      const std::string& name = of.column;
+      if (name.starts_with("omega") || name == "velocity") {
+        widen(&SensorNoise::wheel_speed);
+      } else if (name.starts_with("phi")) {
+        widen(&SensorNoise::wheel_angle);
+      } else if (name.starts_with("tau") || name.starts_with("current") || name.starts_with("voltage") ||
+                 name == "effort") {
+        widen(&SensorNoise::effort);
+      } else if (name == "x" || name == "y" || name == "position") {
+        widen(&SensorNoise::position);
+      } else if (name == "theta") {
+        widen(&SensorNoise::heading);
+      }
+    }
+  }
+  return robot;
+}
+
+}  // namespace wheelwright

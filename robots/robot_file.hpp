@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Robot files (YAML) ↔ Robot ↔ JSON.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+#include <wheelwright/files/json_file.hpp>
+#include <wheelwright/logs/csv_report.hpp>
+#include <wheelwright/model/robot.hpp>
+
+namespace wheelwright {
+
+/// Reads a robot file. Its keys, all optional but those that the model needs (wheel_radius and track_width for
+/// differential_drive):
+///
+///     name, model: differential_drive | single_axis, wheel_radius (m), track_width (m), lever_arm: half_track | track,
+///     friction: isotropic | anisotropic, parameters: [physical names], effort: {kind: torque | current | voltage,
+///     hold: zero_order | first_order, unsigned: bool, changes: between | at_samples, delay: s | [lo, hi]},
+///     nominal: {physical name: value}, prior: {physical name: [lo, hi]},
+///     noise: estimate | {wheel_speed, wheel_angle, effort, position, heading: bound | estimate},
+///     filter: auto | {order: 1 | 2, alpha, beta: 1/s}, encoder_counts_per_turn, speed_source: auto |
+///     encoder_difference | measured, limits: {effort, speed, acceleration}, motor: {torque_constant, resistance,
+///     back_emf, gear_ratio}, effects: [{effect: name, parameter: value | [lo, hi], ...}] (model/effect_law.hpp)
+///
+/// Physical names: mass, yaw_inertia, viscous_linear, viscous_yaw, coulomb (differential_drive; viscous_x and viscous_y instead
+/// of viscous_linear where the friction is anisotropic); inertia, viscous, coulomb, offset (single_axis).
+/// Throws InputError, naming file, line, key, value and what was expected, for unknown or repeated keys, wrong types
+/// and impossible values.
+[[nodiscard]] Robot read_robot(const std::filesystem::path& path);
+
+/// The same from text; `file` is for messages.
+[[nodiscard]] Robot parse_robot(std::string_view text, const std::string& file);
+
+/// The text of a robot file from which parse_robot makes the same Robot.
+[[nodiscard]] std::string robot_yaml(const Robot& robot);
+
+/// Writes a robot file from which read_robot makes the same Robot; whole or not at all.
+void write_robot(const std::filesystem::path& path, const Robot& robot);
+
+/// The robot as a JSON object with the keys of the robot file (schema: results/robot.schema.json).
+[[nodiscard]] Json to_json(const Robot& robot);
+
+/// The Robot of such an object. `where` ("model.json: /robot") is for messages; InputError as read_robot, without
+/// lines.
+[[nodiscard]] Robot robot_from_json(const Json& object, const std::string& where);
+
+/// The robot with the interpolation errors of `report` (LogFileReport::interpolated) added to the noise bounds that it
+/// declares; an estimated bound sees them in the log itself.
+[[nodiscard]] Robot with_interpolation_errors(Robot robot, const LogReport& report);
+
+}  // namespace wheelwright

@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/study/bound_rates.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include <wheelwright/core/check.hpp>
+#include <wheelwright/core/limits.hpp>
+#include <wheelwright/filter/motion_bound.hpp>
+
+namespace wheelwright {
+namespace {
+
+constexpr double kAgree = 1e-6;  // left and right derivative, relative
+constexpr const char* kBefore = "a set before, which bounds the motion between samples: ";
+
+// What is wrong with the set of a pass before, said once however many passes ago that was.
+std::string of_set_before(const std::string& why) { return why.starts_with(kBefore) ? why : kBefore + why; }
+
+// An input a step below and above its value.
+struct Beside {
+  double reach = 0.0, step = 0.0;
+  RobotAt below, above;
+  Box prior_below, prior_above;
+};
+
+Beside beside(const Commissioning& c, const LocalInput& input, double relative_step) {
+  const RobotAt at{c.model.robot, c.model.filter};
+  Beside b{std::abs(input.value), 0.0, at, at, c.prior, c.prior};
+  if (!input.prior) {
+    b.step = relative_step * b.reach;
+    check::that(b.step > 0.0, "input " + input.name, "a value other than 0");
+    b.below = with_input(at, input, input.value - b.step);
+    b.above = with_input(at, input, input.value + b.step);
+    b.prior_below = prior_of(b.below.robot);
+    b.prior_above = prior_of(b.above.robot);
+    return b;
+  }
+  const PriorRate& rate = *input.prior;
+  const auto& parameters = c.model.model.parameters;
+  const auto of = std::ranges::find(parameters, rate.parameter, &Parameter::physical);
+  const auto j = static_cast<std::size_t>(of - parameters.begin());
+  if (b.reach == 0.0) {
+    b.reach = c.prior.sides[j].width() / of->per_physical;
+  }
+  b.step = relative_step * b.reach;
+  const double per_step = of->per_physical * b.step;
+  b.prior_below.sides[j].lower -= per_step * rate.lower_left;
+  b.prior_below.sides[j].upper -= per_step * rate.upper_left;
+  b.prior_above.sides[j].lower += per_step * rate.lower_right;
+  b.prior_above.sides[j].upper += per_step * rate.upper_right;
+  return b;
+}
+
+// The hull of the set before beside the input's value.
+struct MovedSides {
+  std::vector<Interval> below, above;
+  std::string trouble{};  // why it is not known
+  std::string kink{};     // why a side that matters has no derivative, but one to each side
+};
+
+bool differ(const MotionBound& a, const MotionBound& b) {
+  return a.mobility.size() != b.mobility.size() ||
+         (a.mobility.size() > 0 && (a.mobility != b.mobility || a.largest != b.largest));
+}
+
+MovedSides moved_sides(const Model& model, const std::vector<Interval>& sides, const BoundRates& rates, double step) {
+  MovedSides moved{sides, sides};
+  const MotionBound bound = motion_bound(model, sides);
+  for (std::size_t j = 0; j < sides.size(); ++j) {
+    const auto move = [&](double Interval::*side, double outward, const BoundRate& rate) {
+      std::vector<Interval> wider = sides;
+      wider[j].*side += outward * (1e-3 * magnitude(sides[j]) + kTiny);
+      if (!differ(bound, motion_bound(model, wider))) {
+        return;
+      }
+      if (std::isnan(rate.value.left) || std::isnan(rate.value.right)) {
+        moved.trouble = rate.why_not;
+        return;
+      }
+      if (moved.kink.empty()) {
+        moved.kink = rate.why_not;
+      }
+      moved.below[j].*side -= step * rate.value.left;
+      moved.above[j].*side += step * rate.value.right;
+    };
+    move(&Interval::lower, -1.0, rates.lower[j]);
+    move(&Interval::upper, 1.0, rates.upper[j]);
+  }
+  return moved;
+}
+
+// The parameter whose prior's lower side is 0, holds a bound, and goes down: below 0 errors of the rows' column count with
+// the other sign. p where there is none.
+std::size_t opened_sign(const HullOptimum& optimum, const Box& at, const Box& moved) {
+  for (const WeightedRow& active : optimum.active) {
+    const RowOrigin& origin = active.row.origin;
+    if (origin.is_prior && origin.side == Side::lower && at.sides[origin.parameter].lower == 0.0 &&
+        moved.sides[origin.parameter].lower < 0.0) {
+      return origin.parameter;
+    }
+  }
+  return at.dimension();
+}
+
+bool agree(const OneSided& d, double noise) {
+  return std::abs(d.left - d.right) <= kAgree * std::max(std::abs(d.left), std::abs(d.right)) + noise;
+}
+
+BoundRate derive(const HullOptima& optima, const HullOptimum& optimum, const RowRates& rates, double noise,
+                 const std::string& name, const std::string& kink_before) {
+  if (!optimum.found) {
+    return {{kNan, kNan}, why_not_regular(optimum, name)};
+  }
+  if (!rates.trouble.empty()) {
+    return {{kNan, kNan}, rates.trouble};
+  }
+  BoundRate result{bound_derivative(optima, optimum, rates.left, rates.right)};
+  if (!agree(result.value, noise)) {
+    result.why_not = why_not_regular(optimum, name);
+    if (result.why_not.empty() && !kink_before.empty()) {
+      result.why_not = of_set_before(kink_before);
+    } else if (result.why_not.empty()) {
+      result.why_not = "a row that holds the bound has a kink, or comes to couple parameters that the log keeps apart";
+    }
+  }
+  return result;
+}
+
+BoundRates unknown(std::size_t p, const std::string& why) {
+  const std::vector<BoundRate> all(p, {{kNan, kNan}, of_set_before(why)});
+  return {all, all};
+}
+
+}  // namespace
+
+std::vector<BoundPass> bound_passes(LogSource& log, const Commissioning& c, double confidence) {
+  const RobotAt at{c.model.robot, c.model.filter};
+  std::vector<BoundPass> passes;
+  std::vector<Interval> sides;
+  const auto add = [&](const FeasibleSet& set, const std::vector<std::size_t>& dropped) {
+    BoundPass pass{hull_optima(*set.polytope, c.prior), std::exchange(sides, set.hull.sides)};
+    RegressionStream rows = rows_of(log, c, at, motion_at(c, at, pass.sides), confidence);
+    add_active_rows(pass.optima, rows, dropped);
+    passes.push_back(std::move(pass));
+  };
+  for (const EarlierSet& earlier : c.earlier) {
+    add(earlier.set, earlier.dropped);
+  }
+  add(c.feasible, c.dropped);
+  return passes;
+}
+
+BoundRates bound_rates(LogSource& log, const Commissioning& c, const std::vector<BoundPass>& passes,
+                       const LocalInput& input, double step, double confidence) {
+  const Model& model = c.model.model;
+  const Beside b = beside(c, input, step);
+  BoundRates rates;
+  for (const BoundPass& pass : passes) {
+    const HullOptima& optima = pass.optima;
+    RowsBeside below{{}, b.prior_below}, above{{}, b.prior_above};
+    std::string kink;
+    if (input.prior && pass.sides.empty()) {
+      below.rows = above.rows = active_rows(optima);
+    } else {
+      MovedSides moved;
+      if (!pass.sides.empty()) {
+        moved = moved_sides(model, pass.sides, rates, b.step);
+      }
+      if (!moved.trouble.empty()) {
+        rates = unknown(model.p(), moved.trouble);
+        continue;
+      }
+      kink = moved.kink;
+      const LogRows wanted = active_rows(optima);
+      const auto rows_beside = [&](const RobotAt& at, const std::vector<Interval>& sides, const Box& prior) {
+        RegressionStream rows = rows_of(log, c, at, motion_at(c, at, sides), confidence);
+        // An input of the prior moves its sides only: the signs that rows count with stay.
+        return pick_rows(rows, input.prior ? c.prior : prior, wanted);
+      };
+      below.rows = rows_beside(b.below, moved.below, b.prior_below);
+      above.rows = rows_beside(b.above, moved.above, b.prior_above);
+    }
+    const auto derived = [&](const HullOptimum& optimum, std::size_t j) {
+      const Interval& hull = optima.set.hull().sides[j];
+      const double noise = 1e-9 * (hull.upper - hull.lower) / b.reach;
+      BoundRate rate = derive(optima, optimum, row_rates(optima, optimum, b.reach, b.step, below, above, kink.empty()),
+                              noise, model.parameters[j].name, kink);
+      const auto open = [&](const Box& moved, double& side) {
+        if (const std::size_t k = opened_sign(optimum, c.prior, moved); k < model.p()) {
+          side = kNan;
+          rate.why_not = fmt::format("the prior's lower side of {} is 0 and is met: below it, a sign is open",
+                                     model.parameters[k].physical);
+        }
+      };
+      open(b.prior_below, rate.value.left);
+      open(b.prior_above, rate.value.right);
+      return rate;
+    };
+    BoundRates next;
+    for (std::size_t j = 0; j < model.p(); ++j) {
+      next.lower.push_back(derived(optima.lower[j], j));
+      next.upper.push_back(derived(optima.upper[j], j));
+    }
+    rates = std::move(next);
+  }
+  return rates;
+}
+
+}  // namespace wheelwright

@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/study/population.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include <wheelwright/core/check.hpp>
+#include <wheelwright/core/statistics.hpp>
+#include <wheelwright/study/holm.hpp>
+
+namespace wheelwright {
+namespace {
+
+constexpr std::size_t most_left_out = 200;
+
+// Values from the (1 − share)/2 quantile of the lower bounds to the other one of the upper bounds, taken outward.
+Interval central_range(const FleetColumn& column, double share) {
+  std::vector<double> lower, upper;
+  for (const FleetEntry& e : column.entries) {
+    lower.push_back(e.lower);
+    upper.push_back(e.upper);
+  }
+  const auto cut = static_cast<std::size_t>(0.5 * (1.0 - share) * static_cast<double>(lower.size()));
+  const std::size_t last = upper.size() - 1;
+  return {order_statistic(std::move(lower), cut), order_statistic(std::move(upper), last - cut)};
+}
+
+// Share of the robots that are not outside which are certainly below, or certainly above, whichever is larger.
+double certainly_beyond(const FleetColumn& column, const FleetEntry& robot, const std::set<std::size_t>& strangers) {
+  std::size_t below = 0, above = 0, all = 0;
+  for (const FleetEntry& e : column.entries) {
+    if (!strangers.contains(e.robot)) {
+      ++all;
+      below += e.upper < robot.lower ? 1 : 0;
+      above += e.lower > robot.upper ? 1 : 0;
+    }
+  }
+  return all == 0 ? 0.0 : static_cast<double>(std::max(below, above)) / static_cast<double>(all);
+}
+
+double two_sided(double t, double freedom) { return 2.0 * student_tail(freedom, std::abs(t)); }
+
+struct Shown {
+  std::vector<const FleetEntry*> entries;
+  std::vector<double> values, errors;
+};
+
+Shown shown_of(const FleetColumn& column) {
+  Shown shown;
+  for (const FleetEntry& e : column.entries) {
+    if (std::isfinite(e.estimate) && e.standard_error >= 0.0 && std::isfinite(e.standard_error)) {
+      shown.entries.push_back(&e);
+      shown.values.push_back(e.estimate);
+      shown.errors.push_back(e.standard_error);
+    }
+  }
+  return shown;
+}
+
+}  // namespace
+
+Population describe_population(const FleetTable& table, const PopulationOptions& options) {
+  check::that(options.level > 0.0 && options.level < 1.0, "level", "in (0, 1)");
+  check::that(options.central > 0.0 && options.central < 1.0, "central", "in (0, 1)");
+  check::that(options.fewest >= 4, "fewest", "at least 4");
+  Population population;
+  std::vector<RobotOutside> candidates;
+  std::vector<std::size_t> which;  // index of each candidate in p
+  std::vector<double> p;
+  for (std::size_t j = 0; j < table.columns.size(); ++j) {
+    const FleetColumn& column = table.columns[j];
+    const Shown shown = shown_of(column);
+    ParameterPopulation& parameter = population.parameters.emplace_back();
+    parameter.column = j;
+    parameter.shown = shown.entries.size();
+    parameter.described = parameter.shown >= options.fewest;
+    if (!parameter.described) {
+      continue;
+    }
+    parameter.fit = fit_random_effects(shown.values, shown.errors);
+    parameter.typical_error = median(shown.errors);
+    parameter.central = central_range(column, options.central);
+    for (std::size_t i = 0; i < shown.entries.size(); ++i) {
+      const RandomEffects others =
+          shown.entries.size() <= most_left_out ? fit_random_effects(shown.values, shown.errors, i) : parameter.fit;
+      const double s = shown.errors[i];
+      const double sd = std::sqrt(s * s + others.spread * others.spread + others.centre_error * others.centre_error);
+      const double t = sd > 0.0 ? (shown.values[i] - others.centre) / sd : 0.0;
+      const double own = sd > 0.0 ? s * s / (sd * sd) : 0.0;
+      p.push_back(two_sided(t, 1.0 / (1.0 / others.freedom + own * own / shown.entries[i]->freedom)));
+      if (p.back() <= options.level) {
+        which.push_back(p.size() - 1);
+        candidates.push_back(
+            {.robot = shown.entries[i]->robot, .column = j, .value = shown.values[i], .deviations = t, .p = p.back()});
+      }
+    }
+  }
+  population.tests = p.size();
+  const std::vector<double> adjusted = holm(p);
+  std::map<std::size_t, std::set<std::size_t>> strangers;  // of each column
+  for (std::size_t k = 0; k < candidates.size(); ++k) {
+    if (adjusted[which[k]] > options.level) {
+      continue;
+    }
+    population.outside.push_back(candidates[k]);
+    population.outside.back().adjusted_p = adjusted[which[k]];
+    strangers[candidates[k].column].insert(candidates[k].robot);
+  }
+  for (RobotOutside& outside : population.outside) {
+    const FleetColumn& column = table.columns[outside.column];
+    const auto entry = std::lower_bound(column.entries.begin(), column.entries.end(), outside.robot,
+                                        [](const FleetEntry& e, std::size_t robot) { return e.robot < robot; });
+    outside.certainly_beyond = certainly_beyond(column, *entry, strangers[outside.column]);
+    outside.certain = outside.certainly_beyond >= 0.5 * (1.0 + options.central);
+  }
+  std::stable_sort(population.outside.begin(), population.outside.end(), [](const auto& a, const auto& b) {
+    return a.adjusted_p != b.adjusted_p ? a.adjusted_p < b.adjusted_p : std::abs(a.deviations) > std::abs(b.deviations);
+  });
+  return population;
+}
+
+}  // namespace wheelwright

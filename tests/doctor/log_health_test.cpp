@@ -1,0 +1,415 @@
+// SPDX-License-Identifier: Apache-2.0
+// Each defect, put alone into a sound simulated log, is named; the sound log has nothing to warn of.
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <functional>
+#include <numbers>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <wheelwright/doctor/log_health.hpp>
+#include <wheelwright/logs/csv.hpp>
+#include <wheelwright/results/health_json.hpp>
+#include <wheelwright/robots/robot_file.hpp>
+#include <wheelwright/sim/simulation.hpp>
+
+#include "support/kinematic_drives.hpp"
+#include "support/skip.hpp"
+
+namespace wheelwright::log_health_test {
+namespace {
+
+using testing_support::posed_drive;
+
+std::string told(const LogHealth& health, FindingSeverity least) {
+  std::string text;
+  for (const LogFinding& f : health.findings) {
+    if (f.severity >= least) {
+      text += std::string(to_string(f.severity)) + " " + f.id + ": " + f.sentence + "\n";
+    }
+  }
+  return text;
+}
+
+// A drive of 24 s with angles, speeds, torques, pose and gyro.
+Scenario sound_scenario() {
+  Scenario s = posed_drive(3, 24.0);
+  s.sensors.speeds = true;
+  s.sensors.wheel_speed = 0.02;
+  s.robot.noise.wheel_speed.value = 0.02;
+  s.robot.nominal = {{"mass", 20.0}, {"yaw_inertia", 1.0}, {"viscous_linear", 4.0}, {"viscous_yaw", 0.5}};
+  return s;
+}
+
+LogTable with_gyro(LogTable log, const Robot& robot) {
+  std::vector<double> gyro;
+  for (std::size_t k = 0; k < log.rows(); ++k) {
+    gyro.push_back(robot.wheel_radius / robot.track_width * (log.column("omega_r")[k] - log.column("omega_l")[k]));
+  }
+  log.names.emplace_back("gyro_z");
+  log.columns.push_back(gyro);
+  return log;
+}
+
+class LogHealthTest : public ::testing::Test {
+ protected:
+  const Scenario scenario = sound_scenario();
+  const Robot robot = scenario.robot;
+  LogTable log = with_gyro(simulate(scenario), robot);
+
+  void scale(const std::vector<std::string>& columns, double factor) {
+    for (const std::string& name : columns) {
+      std::ranges::transform(log.column(name), log.column(name).begin(), [&](double v) { return factor * v; });
+    }
+  }
+  // Only every `nth` value is new.
+  void hold(const std::string& column, std::size_t nth) {
+    std::vector<double>& values = log.column(column);
+    for (std::size_t k = 0; k < values.size(); ++k) {
+      values[k] = values[k - k % nth];
+    }
+  }
+  void drop(const std::function<bool(std::size_t)>& row) {
+    LogTable kept;
+    kept.names = log.names;
+    kept.columns.resize(log.columns.size());
+    for (std::size_t k = 0; k < log.rows(); ++k) {
+      if (!row(k)) {
+        kept.t.push_back(log.t[k]);
+        for (std::size_t c = 0; c < log.columns.size(); ++c) {
+          kept.columns[c].push_back(log.columns[c][k]);
+        }
+      }
+    }
+    log = kept;
+  }
+  void remove(const std::vector<std::string>& columns) {
+    for (const std::string& name : columns) {
+      const auto at = std::ranges::find(log.names, name) - log.names.begin();
+      log.names.erase(log.names.begin() + at);
+      log.columns.erase(log.columns.begin() + at);
+    }
+  }
+  // The finding `id` is there with at least this severity.
+  LogFinding expect(const std::string& id, FindingSeverity severity, bool with_robot = true) {
+    const LogHealth health = examine(log, with_robot ? std::optional(robot) : std::nullopt);
+    const LogFinding* found = health.find(id);
+    if (found == nullptr) {
+      ADD_FAILURE() << "no " << id << " in\n" << told(health, FindingSeverity::fine);
+      return {};
+    }
+    EXPECT_GE(found->severity, severity) << found->sentence;
+    EXPECT_FALSE(found->next.empty()) << found->sentence;
+    EXPECT_EQ(health.verdict == LogVerdict::unusable, health.count(FindingSeverity::fatal) > 0)
+        << told(health, FindingSeverity::warning);
+    return *found;
+  }
+};
+
+constexpr auto kNotice = FindingSeverity::notice;
+constexpr auto kWarning = FindingSeverity::warning;
+constexpr auto kFatal = FindingSeverity::fatal;
+
+TEST_F(LogHealthTest, ASoundLogHasNoWarning) {
+  for (const bool with_robot : {true, false}) {
+    const LogHealth health = examine(log, with_robot ? std::optional(robot) : std::nullopt);
+    EXPECT_EQ(health.verdict, LogVerdict::commission);
+    EXPECT_EQ(told(health, kWarning), "");
+    EXPECT_EQ(health.assumed.empty(), with_robot);
+  }
+}
+
+TEST_F(LogHealthTest, JitterIsMeasured) {
+  Scenario shaken = sound_scenario();
+  shaken.time_jitter = 0.4;  // uniform shifts u of a period: steps 1 + u' − u scatter by 0.4·√(2/3)
+  log = simulate(shaken);
+  const LogFinding found = expect("time.jitter", kWarning);
+  EXPECT_NEAR(found.value, 0.4 * std::sqrt(2.0 / 3.0), 0.05);
+}
+
+TEST_F(LogHealthTest, MissingSamplesAreCountedAndPlaced) {
+  drop([](std::size_t k) { return k > 1000 && k < 2000 && k % 10 == 0; });
+  const LogFinding found = expect("time.missing_samples", kWarning);
+  EXPECT_NEAR(found.value, 99.0 / 2401.0, 1e-3);
+  ASSERT_FALSE(found.when.empty());
+  EXPECT_GE(found.when.front().lower, 10.0);
+  EXPECT_LE(found.when.back().upper, 20.0);
+}
+
+TEST_F(LogHealthTest, GapsResetsAndDroppedRowsAreTold) {
+  log.segment_starts = {0, 1000, 2000};
+  for (std::size_t k = 1000; k < log.rows(); ++k) {
+    log.t[k] += k < 2000 ? 8.0 : -15.0;
+  }
+  const LogFinding gap = expect("time.gaps", kWarning);
+  EXPECT_EQ(gap.stretches, 1U);
+  EXPECT_NEAR(gap.value, 8.01, 1e-6);
+  expect("time.resets", kNotice);
+  const LogHealth counted =
+      examine(log, robot, {.rows_read = 4500, .incomplete = 200, .duplicates = 299, .truncated = 0});
+  ASSERT_NE(counted.find("time.duplicates"), nullptr);
+  EXPECT_NEAR(counted.find("time.duplicates")->value, 299.0 / 4500.0, 1e-12);
+  EXPECT_NE(counted.find("time.incomplete_rows"), nullptr);
+}
+
+TEST_F(LogHealthTest, CoarseTimeStampsAreNotJitter) {
+  Scenario odd = sound_scenario();
+  odd.rate = 300.0;  // steps of 3 1/3 ms, stamped in ms
+  odd.duration = 10.0;
+  log = simulate(odd);
+  std::ranges::transform(log.t, log.t.begin(), [](double t) { return std::round(1000.0 * t) / 1000.0; });
+  EXPECT_NEAR(expect("time.coarse_stamps", kNotice).value, 1e-3, 1e-9);
+}
+
+TEST_F(LogHealthTest, TimeInMilliseconds) {
+  std::ranges::transform(log.t, log.t.begin(), [](double t) { return 1000.0 * t; });
+  expect("units.time", kFatal);
+}
+
+TEST_F(LogHealthTest, AShortLogIsShort) {
+  log = slice(log, 0, 700);
+  expect("time.length", kWarning);
+  log = slice(log, 0, 30);
+  expect("time.length", kFatal);
+}
+
+TEST_F(LogHealthTest, LateEffortsAreTimed) {
+  constexpr std::size_t kLate = 5;
+  for (const char* name : {"tau_r", "tau_l"}) {
+    std::vector<double>& tau = log.column(name);
+    std::rotate(tau.begin(), tau.end() - kLate, tau.end());
+  }
+  const LogFinding found = expect("time.effort_delay", kFatal);
+  EXPECT_NEAR(found.value, 0.05, 0.005);
+}
+
+TEST_F(LogHealthTest, AWrappedWheelAngleIsFatal) {
+  for (const char* name : {"phi_r", "phi_l"}) {
+    for (double& angle : log.column(name)) {
+      angle = std::remainder(angle, 2.0 * std::numbers::pi);
+    }
+  }
+  expect("signals.wrapped", kFatal);
+}
+
+TEST_F(LogHealthTest, AnglesThatWereUnwrappedOnReadingAreTold) {
+  const LogHealth read = examine(log, std::nullopt, {.rows_read = log.rows(), .unwrapped = 93});
+  ASSERT_NE(read.find("signals.wrapped"), nullptr);
+  EXPECT_EQ(read.find("signals.wrapped")->severity, FindingSeverity::notice);
+  EXPECT_THAT(read.find("signals.wrapped")->sentence, ::testing::HasSubstr("93 times"));
+}
+
+TEST_F(LogHealthTest, APoseFromTheWheelsIsTold) {
+  const double r = 0.0975, c = r / 0.381;
+  const std::vector<double>&right = log.column("phi_r"), &left = log.column("phi_l");
+  std::vector<double>&x = log.column("x"), &y = log.column("y"), &theta = log.column("theta");
+  for (std::size_t k = 1; k < log.rows(); ++k) {
+    const double a = right[k] - right[k - 1], b = left[k] - left[k - 1];
+    theta[k] = theta[k - 1] + c * (a - b);
+    x[k] = x[k - 1] + 0.5 * r * (a + b) * std::cos(theta[k - 1]);
+    y[k] = y[k - 1] + 0.5 * r * (a + b) * std::sin(theta[k - 1]);
+  }
+  expect("signals.pose_repeats_wheels", kWarning);
+}
+
+TEST_F(LogHealthTest, ALatePoseIsTimed) {
+  constexpr std::size_t kLate = 10;
+  for (const char* name : {"x", "y", "theta"}) {
+    std::vector<double>& column = log.column(name);
+    std::copy_backward(column.begin(), column.end() - kLate, column.end());
+  }
+  EXPECT_NEAR(expect("time.pose_delay", kWarning).value, 0.1, 0.02);
+}
+
+TEST_F(LogHealthTest, ADeadColumnIsFatalAndAStuckStretchIsPlaced) {
+  std::vector<double>& speed = log.column("omega_l");
+  std::fill(speed.begin() + 1500, speed.begin() + 1700, speed[1500]);
+  const LogFinding found = expect("signals.stuck", kWarning);
+  EXPECT_THAT(found.columns, ::testing::ElementsAre("omega_l"));
+  ASSERT_EQ(found.stretches, 1U);
+  EXPECT_NEAR(found.when[0].lower, 15.0, 1e-9);
+  EXPECT_NEAR(found.when[0].upper, 16.99, 1e-9);
+  std::ranges::fill(log.column("tau_l"), 0.0);
+  expect("signals.constant", kFatal);
+}
+
+TEST_F(LogHealthTest, RepeatedSamplesGiveTheRateOfTheSensor) {
+  hold("omega_r", 4);
+  hold("omega_l", 4);
+  EXPECT_NEAR(expect("signals.stale", kWarning).value, 4.0, 0.2);
+}
+
+TEST_F(LogHealthTest, SaturationIsFoundWithAndWithoutADeclaredLimit) {
+  double most = 0.0;
+  for (const double tau : log.column("tau_r")) {
+    most = std::max(most, std::abs(tau));
+  }
+  for (double& tau : log.column("tau_r")) {
+    tau = std::clamp(tau, -0.4 * most, 0.4 * most);
+  }
+  const LogFinding found = expect("signals.saturation", kWarning);
+  EXPECT_GT(found.stretches, 0U);
+  Robot limited = robot;
+  limited.limits["effort"] = 0.4 * most;
+  const LogHealth health = examine(log, limited);
+  ASSERT_NE(health.find("signals.saturation"), nullptr);
+  EXPECT_THAT(health.find("signals.saturation")->columns, ::testing::ElementsAre("tau_r"));
+}
+
+TEST_F(LogHealthTest, TheEncoderIsFound) {
+  const LogHealth health = examine(log);
+  ASSERT_NE(health.find("signals.encoder"), nullptr);
+  EXPECT_DOUBLE_EQ(health.find("signals.encoder")->value, 4096.0);
+  Robot wrong = robot;
+  wrong.encoder_counts_per_turn = 1000.0;
+  const LogHealth contradicted = examine(log, wrong);
+  EXPECT_EQ(contradicted.find("signals.encoder")->severity, kWarning);
+}
+
+TEST_F(LogHealthTest, CoarseAndNoisyEfforts) {
+  for (const char* name : {"tau_r", "tau_l"}) {
+    for (double& tau : log.column(name)) {
+      tau = 0.5 * std::round(tau / 0.5);
+    }
+  }
+  expect("signals.coarse", kWarning);
+  Scenario noisy = sound_scenario();
+  noisy.sensors.effort = 1.5;
+  noisy.robot.noise.effort.value = 1.5;
+  log = simulate(noisy);
+  expect("signals.noise", kWarning);
+}
+
+TEST_F(LogHealthTest, MissingManoeuvresAreNamed) {
+  Scenario straight = sound_scenario();
+  straight.trajectory = {.kind = Trajectory::Kind::straight, .speed = 0.6, .yaw_rate = 0.0, .period = 8.0};
+  log = simulate(straight);
+  expect("motion.turning", kWarning);
+  const LogFinding missing = expect("motion.excitation", kWarning);
+  EXPECT_THAT(missing.sentence, ::testing::HasSubstr("yaw"));
+  expect("signals.standstill", kNotice);
+  Scenario circle = sound_scenario();
+  circle.trajectory = {.kind = Trajectory::Kind::circle, .speed = 0.6, .yaw_rate = 0.8, .period = 8.0};
+  log = simulate(circle);
+  EXPECT_THAT(expect("motion.turning", kWarning).next, ::testing::HasSubstr("right"));
+  expect("motion.speeds", kNotice);
+}
+
+TEST_F(LogHealthTest, WheelSpeedsInOtherUnits) {
+  remove({"phi_r", "phi_l"});
+  const LogTable sound = log;
+  struct Unit {
+    double factor;
+    const char* name;
+  };
+  for (const Unit& unit : {Unit{180.0 / std::numbers::pi, "deg/s"}, Unit{30.0 / std::numbers::pi, "rpm"}}) {
+    log = sound;
+    scale({"omega_r", "omega_l"}, unit.factor);
+    const LogFinding found = expect("units.wheel_speed", kFatal);
+    EXPECT_THAT(found.sentence, ::testing::HasSubstr(unit.name));
+    EXPECT_NEAR(found.value / unit.factor, 1.0, 0.02);
+  }
+}
+
+TEST_F(LogHealthTest, AnglesAndSpeedsThatDisagree) {
+  scale({"omega_l"}, 180.0 / std::numbers::pi);
+  EXPECT_THAT(expect("units.angle_and_speed", kFatal, false).sentence, ::testing::HasSubstr("deg/s"));
+}
+
+TEST_F(LogHealthTest, PoseInOtherUnits) {
+  const LogTable sound = log;
+  scale({"x", "y"}, 1000.0);
+  EXPECT_THAT(expect("units.position", kFatal).sentence, ::testing::HasSubstr("mm"));
+  log = sound;
+  scale({"theta"}, 180.0 / std::numbers::pi);
+  expect("units.heading", kFatal);
+  expect("units.heading", kFatal, false);
+  log = sound;
+  scale({"gyro_z"}, 180.0 / std::numbers::pi);
+  expect("units.gyro", kFatal);
+}
+
+TEST_F(LogHealthTest, GeometryThatDoesNotFit) {
+  Robot diameter = robot;
+  diameter.wheel_radius *= 2.0;
+  diameter.track_width *= 2.0;
+  EXPECT_THAT(examine(log, diameter).find("units.wheel_radius")->next, ::testing::HasSubstr("diameter"));
+  Robot narrow = robot;
+  narrow.track_width *= 0.6;
+  EXPECT_EQ(examine(log, narrow).find("units.track_width")->severity, kWarning);
+}
+
+TEST_F(LogHealthTest, SignsAndSides) {
+  const LogTable sound = log;
+  for (const char* side : {"r", "l"}) {
+    log = sound;
+    scale({std::string("omega_") + side, std::string("phi_") + side}, -1.0);
+    EXPECT_THAT(expect("units.wheel_sign", kFatal, false).columns, ::testing::Contains(std::string("omega_") + side));
+  }
+  log = sound;
+  std::swap(log.column("omega_r"), log.column("omega_l"));
+  std::swap(log.column("phi_r"), log.column("phi_l"));
+  EXPECT_THAT(expect("units.sides", kFatal).sentence, ::testing::HasSubstr("turns the other way"));
+  log = sound;
+  scale({"omega_r", "phi_r", "omega_l", "phi_l"}, -1.0);
+  EXPECT_THAT(expect("units.sides", kFatal).sentence, ::testing::HasSubstr("Both wheels"));
+  log = sound;
+  scale({"gyro_z"}, -1.0);
+  EXPECT_THAT(expect("units.sides", kFatal).columns, ::testing::ElementsAre("gyro_z"));
+  log = sound;
+  scale({"theta"}, -1.0);
+  expect("units.heading_sign", kFatal);
+}
+
+TEST_F(LogHealthTest, EffortsInOtherUnitsSignsAndSides) {
+  const LogTable sound = log;
+  scale({"tau_r", "tau_l"}, 1000.0);
+  EXPECT_THAT(expect("units.effort", kFatal).sentence, ::testing::HasSubstr("mN·m"));
+  log = sound;
+  scale({"tau_l"}, -1.0);
+  EXPECT_THAT(expect("units.effort_sign", kFatal).columns, ::testing::Contains("tau_l"));
+  log = sound;
+  std::swap(log.column("tau_r"), log.column("tau_l"));
+  expect("units.effort_sides", kFatal);
+  log = sound;
+  for (const char* name : {"tau_r", "tau_l"}) {
+    std::ranges::transform(log.column(name), log.column(name).begin(), [](double v) { return std::abs(v); });
+  }
+  expect("units.effort_unsigned", kFatal);
+}
+
+TEST_F(LogHealthTest, WithoutEffortsOnlyKinematicsAreLeft) {
+  remove({"tau_r", "tau_l"});
+  EXPECT_EQ(examine(log, robot).verdict, LogVerdict::identify_only);
+  remove({"x", "y", "theta", "gyro_z"});
+  EXPECT_EQ(examine(log, robot).verdict, LogVerdict::unusable);
+}
+
+TEST_F(LogHealthTest, AnEmptyLogIsNoAccident) {
+  const LogHealth health = examine(LogTable{});
+  EXPECT_EQ(health.verdict, LogVerdict::unusable);
+  EXPECT_GT(health.count(kFatal), 0U);
+}
+
+// Recordings of real machines, where they lie beside the project.
+TEST(LogHealthRecordings, NoneIsFatal) {
+  const std::filesystem::path data = std::filesystem::path(WHEELWRIGHT_SHARED_DIR) / "data";
+  if (testing_support::skip_without_recordings(data)) {
+    return;
+  }
+  for (const auto& [robot, log] :
+       {std::pair{"emps.yaml", "emps/emps.csv"}, std::pair{"warthog.yaml", "warthog/current.csv"},
+        std::pair{"warthog.yaml", "warthog/warthog_pose.csv"}, std::pair{"husky.yaml", "warthog/husky_pose.csv"},
+        std::pair{"regbot.yaml", "regbot_fleet/run_00.csv"}}) {
+    CsvLog file({data / log});
+    const LogHealth health = examine(read_all(file), read_robot(data / robot), reader_counts(file.report()));
+    EXPECT_EQ(told(health, kFatal), "") << log;
+    EXPECT_NE(health.verdict, LogVerdict::unusable) << log;
+  }
+}
+
+}  // namespace
+}  // namespace wheelwright::log_health_test

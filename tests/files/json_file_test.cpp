@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/files/json_file.hpp>
+
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <random>
+#include <string>
+
+#include <nlohmann/json.hpp>
+
+#include "support/scratch.hpp"
+
+namespace wheelwright::json_file_test {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using testing::input_error;
+
+class JsonFile : public testing::ScratchTest {};
+
+TEST_F(JsonFile, NumbersReadBackExactly) {
+  std::mt19937_64 random(5);
+  Json numbers = Json::array();
+  std::vector<double> expected;
+  for (int k = 0; k < 20000; ++k) {
+    const double value = std::bit_cast<double>(random());
+    if (std::isfinite(value)) {
+      numbers.push_back(value);
+      expected.push_back(value);
+    }
+  }
+  write_json(path("n.json"), {{"numbers", numbers}});
+  const Json read = read_json(path("n.json"));
+  EXPECT_EQ(JsonPlace(read, "n.json").at("numbers").numbers(), expected);
+}
+
+TEST_F(JsonFile, NanAndInfinityAreNull) {
+  write_json(path("n.json"), {{"a", NAN}, {"b", INFINITY}, {"c", 1.5}});
+  const std::string text = bytes(path("n.json"));
+  EXPECT_THAT(text, HasSubstr("\"a\": null"));
+  EXPECT_THAT(text, HasSubstr("\"b\": null"));
+  const Json read = read_json(path("n.json"));
+  const JsonPlace root(read, "n.json");
+  EXPECT_TRUE(std::isnan(root.at("a").number_or_nan()));
+  EXPECT_EQ(root.at("c").number_or_nan(), 1.5);
+  EXPECT_FALSE(root.has("a"));
+  EXPECT_TRUE(root.has("c"));
+  EXPECT_THAT(root.keys(), ElementsAre("a", "b", "c"));
+}
+
+TEST_F(JsonFile, NothingIsLeftWhenWritingFails) {
+  EXPECT_THAT(input_error([&] { write_json(path("no/n.json"), Json::object()); }),
+              AllOf(HasSubstr("n.json"), HasSubstr("expected a file name in an existing, writable directory")));
+  EXPECT_EQ(files(), 0u);
+  write_json(path("n.json"), Json::object());
+  write_json(path("n.json"), {{"a", 1}});
+  EXPECT_EQ(files(), 1u);
+}
+
+TEST_F(JsonFile, ErrorsNameTheirPlace) {
+  const Json value = parse_json(R"({"parameters": [{"lower": "abc", "n": -1, "on": 1, "list": [1, null]}]})", "m.json");
+  const JsonPlace entry = JsonPlace(value, "m.json").at("parameters").at(std::size_t{0});
+  EXPECT_THAT(input_error([&] { (void)entry.at("lower").number(); }),
+              HasSubstr("m.json: /parameters/0/lower: '\"abc\"': expected a number"));
+  EXPECT_THAT(input_error([&] { (void)entry.at("lowr"); }),
+              AllOf(HasSubstr("m.json: /parameters/0: no member 'lowr'"), HasSubstr("did you mean 'lower'?")));
+  EXPECT_THAT(input_error([&] { (void)entry.at("n").count(); }), HasSubstr("/n: '-1': expected an integer >= 0"));
+  EXPECT_THAT(input_error([&] { (void)entry.at("on").boolean(); }), HasSubstr("/on: '1': expected true or false"));
+  EXPECT_THAT(input_error([&] { (void)entry.at("on").text(); }), HasSubstr("expected a string"));
+  EXPECT_THAT(input_error([&] { (void)entry.at("list").numbers(); }),
+              HasSubstr("/parameters/0/list/1: 'null': expected a number"));
+  EXPECT_THAT(input_error([&] { (void)entry.at("list").at(std::size_t{2}); }), HasSubstr("at least 3 elements"));
+  EXPECT_THAT(input_error([&] { (void)entry.at(std::size_t{0}); }), HasSubstr("expected an array"));
+}
+
+TEST_F(JsonFile, TextThatIsNoJson) {
+  EXPECT_THAT(input_error([&] { (void)parse_json("{\n  \"a\": 1,\n  b: 2\n}", "m.json"); }),
+              AllOf(HasSubstr("m.json:3:3"), HasSubstr("expected JSON")));
+  EXPECT_THAT(input_error([&] { (void)parse_json("{\"a\": 1", "m.json"); }), HasSubstr("m.json:1:"));
+  EXPECT_THAT(input_error([&] { (void)parse_json("{\"a\": 1e999}", "m.json"); }), HasSubstr("m.json"));
+  EXPECT_THAT(input_error([&] { (void)parse_json(std::string(100000, '['), "m.json"); }), HasSubstr("nested"));
+  EXPECT_THAT(input_error([&] { (void)read_json(path("absent.json")); }), HasSubstr("absent.json: no such file"));
+}
+
+}  // namespace
+}  // namespace wheelwright::json_file_test

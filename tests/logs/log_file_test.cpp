@@ -1,0 +1,382 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/logs/log_file.hpp>
+#include <wheelwright/robots/robot_file.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <random>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <wheelwright/core/error.hpp>
+#include <wheelwright/logs/bag_write.hpp>
+#include <wheelwright/logs/log_write.hpp>
+#include <wheelwright/logs/ros_definition.hpp>
+#include <wheelwright/logs/ros_write.hpp>
+
+#include <hdf5.h>
+
+#include "support/scratch.hpp"
+
+namespace wheelwright::log_file_test {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using testing::input_error;
+using ::testing::UnorderedElementsAre;
+
+constexpr std::int64_t ms = 1'000'000;
+
+// A drive of 20 s at 100 Hz with a pause, in whole microseconds, with every kind of column.
+LogTable drive() {
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> noise;
+  LogTable table;
+  table.names = {"omega_r", "omega_l", "tau_r",   "tau_l",     "x",        "y",
+                 "theta",   "gyro_z",  "accel_x", "current_r", "voltage_l"};
+  table.columns.resize(table.names.size());
+  for (std::int64_t k = 0; k < 2000; ++k) {
+    table.t.push_back(static_cast<double>(10'000 * k + (k < 700 ? 0 : 1'500'000)) / 1e6);
+    for (auto& column : table.columns) {
+      column.push_back(noise(random));
+    }
+    table.columns[6].back() = 3.0 * std::sin(0.4 * table.t.back());
+  }
+  table.segment_starts = {0, 700};
+  return table;
+}
+
+class LogFile : public testing::ScratchTest {
+ protected:
+  std::filesystem::path write(const std::string& name, const LogTable& table, const LogWriteOptions& options = {}) {
+    TableSource source(table);
+    const auto writer = create_log(path(name), table.names, options);
+    LogBlock block;
+    while (source.next(block)) {
+      writer->write(block);
+    }
+    writer->commit();
+    return path(name);
+  }
+
+  LogTable read(const std::vector<std::filesystem::path>& paths, const LogOptions& options = {}) {
+    const auto log = open_log(paths, options);
+    report = log->report();
+    return read_all(*log);
+  }
+
+  LogReport report;
+};
+
+void expect_same(const LogTable& read, const LogTable& written, double theta) {
+  EXPECT_EQ(read.t, written.t);
+  EXPECT_EQ(read.segment_starts, written.segment_starts);
+  ASSERT_EQ(read.names.size(), written.names.size());
+  for (const std::string& name : written.names) {
+    if (name != "theta" || theta == 0.0) {
+      EXPECT_EQ(read.column(name), written.column(name)) << name;
+      continue;
+    }
+    for (std::size_t k = 0; k < written.rows(); ++k) {
+      ASSERT_NEAR(read.column(name)[k], written.column(name)[k], theta);
+    }
+  }
+}
+
+TEST_F(LogFile, EveryFormatGivesBackWhatWasWritten) {
+  const LogTable table = drive();
+  for (const std::string name : {"a.csv", "a.csv.gz", "a.csv.zst", "a.h5", "a.hdf5"}) {
+    expect_same(read({write(name, table)}), table, 0.0);
+    EXPECT_TRUE(report.clean()) << name;
+  }
+  for (const McapCompression packing : {McapCompression::none, McapCompression::zstd, McapCompression::lz4}) {
+    LogWriteOptions options;
+    options.compression = packing;
+    expect_same(read({write("a" + std::to_string(static_cast<int>(packing)) + ".mcap", table, options)}), table, 1e-14);
+    EXPECT_TRUE(report.clean());
+    EXPECT_EQ(report.files.at(0).format, "mcap");
+  }
+  expect_same(read({write("a.db3", table)}), table, 1e-14);
+  EXPECT_EQ(report.files.at(0).format, "sqlite3");
+  expect_same(read({write("bag", table)}), table, 1e-14);
+}
+
+TEST_F(LogFile, AnAxisGoesThroughABagToo) {
+  LogTable table = drive();
+  table.names = {"position", "velocity", "effort"};
+  table.columns.resize(3);
+  expect_same(read({write("axis.mcap", table)}), table, 0.0);
+}
+
+TEST_F(LogFile, FormatsMayBeMixedAndKeepTheColumnsThatAllHave) {
+  const LogTable table = drive();
+  LogTable fewer = table;
+  fewer.names.resize(4);
+  fewer.columns.resize(4);
+  const LogTable both = read({write("a.mcap", table), write("b.csv", fewer), write("c.h5", table)});
+  EXPECT_EQ(both.rows(), 3 * table.rows());
+  EXPECT_THAT(both.names, UnorderedElementsAre("omega_r", "omega_l", "tau_r", "tau_l"));
+  EXPECT_EQ(both.segment_starts.size(), 6U);
+}
+
+TEST_F(LogFile, TimesOfAWallClockAreCountedFromAWholeSecondAndKeepTheirNanoseconds) {
+  const LogTable table = drive();
+  LogWriteOptions options;
+  options.time_origin = 1'763'769'600.0;
+  expect_same(read({write("a.mcap", table, options)}), table, 1e-14);
+  EXPECT_EQ(report.files.at(0).time_origin, options.time_origin);
+  EXPECT_THAT(sentences(report), Contains(HasSubstr("times are counted from 1763769600 s")));
+}
+
+TEST_F(LogFile, OnlyWantedColumnsAreRead) {
+  const LogTable table = drive();
+  LogOptions options;
+  options.only = {{"tau_r", "theta"}};
+  for (const std::string name : {"a.csv", "a.h5", "a.mcap"}) {
+    const LogTable some = read({write(name, table)}, options);
+    EXPECT_EQ(some.names.size(), 2U) << name;
+    EXPECT_EQ(some.column("tau_r"), table.column("tau_r")) << name;
+  }
+}
+
+// Wheels at 200 Hz and a pose at 47 Hz whose stamps are 1 ms off the wheels', recorded late.
+class TwoTopics : public LogFile {
+ protected:
+  static double x_at(double t) { return 0.8 * std::sin(1.3 * t); }
+  static double theta_at(double t) { return 4.0 * std::sin(0.7 * t) + 2.0 * t; }
+
+  std::filesystem::path record(const std::string& name, double pose_from, double pose_to, std::int64_t pose_clock = 0) {
+    BagWriter bag(path(name));
+    const auto add = [&](const std::string& topic, const char* type) {
+      return bag.add_topic(topic, type, ros_definition_text(*bundled_ros_definition(type)));
+    };
+    const std::size_t joints = add("/joint_states", RosJointState::type), poses = add("/pose", RosPoseStamped::type);
+    RosEncoder encoder;
+    RosJointState joint;
+    joint.name = {"left_wheel", "right_wheel"};
+    RosPoseStamped pose;
+    std::int64_t next_pose = ms;
+    const std::int64_t start = 1'700'000'000'000 * ms;
+    for (std::int64_t at = 0; at < 10'000 * ms; at += 5 * ms) {
+      for (; next_pose < at; next_pose += 1000 * ms / 47) {
+        const double t = 1e-9 * static_cast<double>(next_pose);
+        if (t < pose_from || t > pose_to) {
+          continue;
+        }
+        pose.header.stamp = start + next_pose + pose_clock;
+        pose.pose.position[0] = x_at(t);
+        pose.pose.orientation = {0.0, 0.0, std::sin(0.5 * theta_at(t)), std::cos(0.5 * theta_at(t))};
+        bag.write(poses, start + next_pose + 3 * ms, encoder.encode(pose));
+      }
+      joint.header.stamp = start + at;
+      joint.velocity = {1.0, 2.0 + 1e-9 * static_cast<double>(at)};
+      joint.effort = {0.1, 0.2};
+      bag.write(joints, start + at + 2 * ms, encoder.encode(joint));
+    }
+    bag.commit();
+    return path(name);
+  }
+};
+
+TEST_F(TwoTopics, OtherTopicsComeToTheTimesOfTheWheelsWithinTheirBound) {
+  const LogTable table = read({record("two.mcap", 0.0, 20.0)});
+  ASSERT_EQ(report.files[0].interpolated.size(), 3U);
+  const double bound = report.files[0].interpolated[0].error, heading = report.files[0].interpolated[2].error;
+  EXPECT_LE(bound, 1.125001 * 0.8 * 1.3 * 1.3 / (47.0 * 47.0 * 8.0));
+  double worst = 0.0, worst_heading = 0.0;
+  for (std::size_t k = 0; k < table.rows(); ++k) {
+    EXPECT_NEAR(table.column("omega_r")[k], 2.0 + table.t[k], 1e-9);
+    worst = std::max(worst, std::abs(table.column("x")[k] - x_at(table.t[k])));
+    worst_heading =
+        std::max(worst_heading,
+                 std::abs(std::remainder(table.column("theta")[k] - theta_at(table.t[k]), 2.0 * std::numbers::pi)));
+  }
+  EXPECT_LE(worst, bound);
+  EXPECT_LE(worst_heading, heading);
+  for (std::size_t k = 1; k < table.rows(); ++k) {
+    ASSERT_LT(std::abs(table.column("theta")[k] - table.column("theta")[k - 1]), 0.1) << "unwrapped";
+  }
+  EXPECT_LE(report.uncovered.count, 9U) << "before the first pose and behind the last";
+  EXPECT_EQ(report.rows + report.uncovered.count, report.rows_read);
+
+  Robot robot;
+  robot.noise.position.value = 0.002;
+  const Robot widened = with_interpolation_errors(robot, report);
+  EXPECT_DOUBLE_EQ(*widened.noise.position.value, 0.002 + bound);
+  EXPECT_FALSE(widened.noise.heading.value) << "an estimate stays one";
+}
+
+TEST_F(TwoTopics, RowsWithoutAPoseAreDroppedAndCountedNotMadeUp) {
+  const LogTable table = read({record("two.mcap", 2.0, 5.0)});
+  EXPECT_GE(table.t.front(), 2.0);
+  EXPECT_LE(table.t.back(), 5.0);
+  EXPECT_EQ(report.uncovered.count, 2000U - table.rows());
+  EXPECT_THAT(report.uncovered.first, AllOf(HasSubstr("two.mcap: /joint_states, message 1"), HasSubstr("column x")));
+  LogOptions wheels;
+  wheels.only = {{"omega_r", "tau_r"}};
+  EXPECT_EQ(read({path("two.mcap")}, wheels).rows(), 2000U) << "a pose that is not wanted does no harm";
+}
+
+TEST_F(TwoTopics, AnotherClockIsBroughtToThatOfTheWheels) {
+  const LogTable table = read({record("two.mcap", 0.0, 20.0, -1'600'000'000'000 * ms)});
+  EXPECT_THAT(report.files[0].notes, Contains(HasSubstr("/pose: its time stamps are of another clock")));
+  for (std::size_t k = 0; k < table.rows(); ++k) {
+    // The two topics are recorded 2 and 3 ms late: that difference is what the shift cannot know.
+    ASSERT_NEAR(table.column("x")[k], x_at(table.t[k] - 1e-3), 2e-4);
+  }
+}
+
+TEST_F(LogFile, WhatIsNoLogIsSaid) {
+  LogOptions options;
+  const auto error = [&](const std::filesystem::path& file) {
+    return input_error([&] { (void)open_log({file}, options); });
+  };
+  {
+    BagWriter bag(path("chatter.mcap"));
+    const std::size_t topic =
+        bag.add_topic("/chatter", "geometry_msgs/msg/TwistStamped",
+                      ros_definition_text(*bundled_ros_definition("geometry_msgs/msg/TwistStamped")));
+    RosEncoder encoder;
+    bag.write(topic, 5, encoder.encode(RosTwistStamped{}));
+    bag.commit();
+  }
+  EXPECT_THAT(error(path("chatter.mcap")),
+              AllOf(HasSubstr("chatter.mcap: no topic has a column of a log"),
+                    HasSubstr("/chatter (geometry_msgs/msg/TwistStamped)"), HasSubstr("--map NAME=TOPIC.FIELD")));
+  LogTable table = drive();
+  table.names[0] = "a";
+  write("a.h5", table);
+  options.map = {{"omega_r", "b"}};
+  EXPECT_THAT(error(path("a.h5")), HasSubstr("a.h5: no dataset 'b' for column omega_r: the file has /log/a"));
+  EXPECT_THAT(input_error([&] { (void)create_log(path("a.xlsx"), {"x"}); }), HasSubstr("a.xlsx: unknown ending"));
+  std::filesystem::create_directory(path("empty"));
+  EXPECT_THAT(error(path("empty")),
+              HasSubstr("empty: is a directory: expected a file, or a directory with a recording"));
+  EXPECT_THROW((void)open_log({}), InvalidArgument);
+}
+
+TEST_F(LogFile, ADatasetInAnotherUnitIsNotTakenAndThatIsSaid) {
+  const std::filesystem::path file = write("a.h5", drive());
+  {
+    const hid_t opened = H5Fopen(file.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+    const hid_t dataset = H5Dopen2(opened, "/log/omega_r", H5P_DEFAULT);
+    H5Adelete(dataset, "units");
+    const hid_t type = H5Tcopy(H5T_C_S1), space = H5Screate(H5S_SCALAR);
+    H5Tset_size(type, 5);
+    const hid_t unit = H5Acreate2(dataset, "units", type, space, H5P_DEFAULT, H5P_DEFAULT);
+    EXPECT_GE(H5Awrite(unit, type, "deg/s"), 0);
+    H5Aclose(unit);
+    H5Sclose(space);
+    H5Tclose(type);
+    H5Dclose(dataset);
+    H5Fclose(opened);
+  }
+  EXPECT_EQ(read({file}).names.size(), drive().names.size() - 1);
+  EXPECT_THAT(report.files[0].notes,
+              Contains(HasSubstr("/log/omega_r was not taken as omega_r: its unit is 'deg/s', expected rad/s")));
+  LogOptions options;
+  options.map = {{"omega_r", "omega_r"}};
+  EXPECT_EQ(read({file}, options).names.size(), drive().names.size()) << "asked for by name, it is";
+}
+
+TEST_F(LogFile, AFailedWriteLeavesNothing) {
+  LogTable table = drive();
+  for (const std::string name : {"a.csv", "a.h5", "a.mcap", "a.db3", "bag"}) {
+    {
+      const auto writer = create_log(path(name), table.names);
+      LogBlock block;
+      TableSource source(table);
+      source.next(block);
+      block.columns[0][3] = NAN;
+      EXPECT_THROW(writer->write(block), InvalidArgument) << name;
+    }
+    EXPECT_EQ(files(), 0U) << name;
+  }
+}
+
+// A recording that was cut off gives the rows before the cut; one with wrong bytes gives rows or a message. Neither is
+// silent about it.
+TEST_F(LogFile, DamagedRecordingsAreReadAsFarAsTheyGo) {
+  const LogTable table = drive();
+  std::mt19937_64 random(12);
+  for (const std::string ending : {"mcap", "db3"}) {
+    const std::string content = bytes(write("whole." + ending, table));
+    const std::string name = "damaged." + ending;
+    std::size_t salvaged = 0;
+    for (int trial = 0; trial < 100; ++trial) {
+      std::string damaged = content;
+      const bool cut = trial % 2 == 0;
+      if (cut) {
+        damaged.resize(8 + random() % (damaged.size() - 8));
+      } else {
+        for (int k = 0; k < 1 + trial / 10; ++k) {
+          damaged[random() % damaged.size()] ^= static_cast<char>(1 + random() % 255);
+        }
+      }
+      put(name, damaged);
+      try {
+        const LogTable some = read({path(name)});
+        if (cut) {
+          ++salvaged;
+          ASSERT_FALSE(report.files[0].notes.empty()) << damaged.size();
+          ASSERT_LE(some.rows(), table.rows());
+          const std::vector<double>& whole = table.column("tau_r");
+          ASSERT_TRUE(std::ranges::equal(some.column("tau_r"), std::span(whole).first(some.rows()))) << damaged.size();
+        }
+      } catch (const InputError& error) {
+        EXPECT_THAT(error.what(), HasSubstr(name));
+      }
+    }
+    EXPECT_GT(salvaged, 5U) << ending;
+  }
+}
+
+TEST_F(LogFile, ATopicWithoutMessagesTakesNoRows) {
+  BagWriter bag(path("silent.mcap"));
+  const auto add = [&](const std::string& topic, const char* type) {
+    return bag.add_topic(topic, type, ros_definition_text(*bundled_ros_definition(type)));
+  };
+  const std::size_t joints = add("/joint_states", RosJointState::type);
+  add("/mocap", RosPoseStamped::type);
+  RosEncoder encoder;
+  RosJointState joint;
+  joint.name = {"left", "right"};
+  joint.velocity = {1.0, 2.0};
+  for (int k = 1; k <= 50; ++k) {
+    joint.header.stamp = k * 10 * ms;
+    bag.write(joints, joint.header.stamp, encoder.encode(joint));
+  }
+  bag.commit();
+  EXPECT_EQ(read({path("silent.mcap")}).rows(), 50U);
+}
+
+// Damaged HDF5 files are read, or refused with the file's name: the library may not crash on them.
+TEST_F(LogFile, DamagedHdf5IsReadOrRefused) {
+  LogTable table = drive();
+  const std::filesystem::path whole = write("whole.h5", table);
+  const std::string content = bytes(whole);
+  std::mt19937_64 random(11);
+  for (int trial = 0; trial < 200; ++trial) {
+    std::string damaged = content;
+    if (trial % 2 == 0) {
+      damaged.resize(8 + random() % (damaged.size() - 8));
+    } else {
+      for (int k = 0; k < 1 + trial / 20; ++k) {
+        damaged[8 + random() % (damaged.size() - 8)] = static_cast<char>(random());
+      }
+    }
+    put("damaged.h5", damaged);
+    try {
+      read({path("damaged.h5")});
+    } catch (const InputError& error) {
+      EXPECT_THAT(error.what(), HasSubstr("damaged.h5"));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace wheelwright::log_file_test

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+// The kinematic section of model.json gives back the detector that was commissioned, bit for bit.
+#include <wheelwright/results/kinematic_json.hpp>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include <wheelwright/core/error.hpp>
+#include <wheelwright/results/model_file.hpp>
+#include <wheelwright/robots/robot_file.hpp>
+
+#include "support/kinematic_drives.hpp"
+
+namespace wheelwright::kinematic_json_test {
+namespace {
+
+using ::testing::HasSubstr;
+using testing_support::posed_drive;
+
+Commissioning commissioned(const Scenario& s) {
+  Simulation log(s);
+  CommissionOptions options;
+  options.persistence = {2, 3};
+  return commission(log, s.robot, options);
+}
+
+CommissionedModel there_and_back(const Commissioning& result) {
+  return model_from_json(parse_json(json_text(to_json(result, {}, "test")), "model.json"), "model.json");
+}
+
+void expect_same_decisions(const KinematicModel& a, const KinematicModel& b, const LogTable& log) {
+  KinematicDetector one = make_detector(a), other = make_detector(b);
+  std::size_t valid = 0;
+  for (std::size_t k = 0; k < log.rows(); ++k) {
+    std::vector<double> sample;
+    for (const std::string& name : a.measurement.columns()) {
+      sample.push_back(log.column(name)[k]);
+    }
+    const Decision &d = one.step(log.t[k], sample), &e = other.step(log.t[k], sample);
+    ASSERT_EQ(d.valid, e.valid);
+    for (std::size_t i = 0; d.valid && i < d.channels.size(); ++i) {
+      ASSERT_EQ(d.channels[i].residual, e.channels[i].residual);
+      ASSERT_EQ(d.channels[i].threshold.lower, e.channels[i].threshold.lower);
+      ASSERT_EQ(d.channels[i].threshold.upper, e.channels[i].threshold.upper);
+    }
+    valid += d.valid ? 1 : 0;
+  }
+  EXPECT_GT(valid, 100u);
+}
+
+TEST(KinematicJson, GivesTheDetectorBackBitForBit) {
+  for (const bool declared : {true, false}) {
+    Scenario s = posed_drive(3, 12.0);
+    if (!declared) {
+      s.robot.noise.heading.value.reset();
+    }
+    const Commissioning result = commissioned(s);
+    ASSERT_TRUE(result.model.kinematic.has_value()) << result.kinematic.message;
+    const CommissionedModel back = there_and_back(result);
+    ASSERT_TRUE(back.kinematic.has_value());
+    EXPECT_EQ(back.kinematic->window, result.model.kinematic->window);
+    EXPECT_EQ(back.kinematic->persistence.k, 2u);
+    EXPECT_EQ(back.kinematic->persistence.n, 3u);
+    expect_same_decisions(*result.model.kinematic, *back.kinematic, simulate(s));
+  }
+}
+
+TEST(KinematicJson, IsNotThereWithoutAPose) {
+  Scenario s = posed_drive(3, 12.0);
+  s.sensors.pose = false;
+  const Commissioning result = commissioned(s);
+  EXPECT_FALSE(to_json(result, {}, "test").contains("kinematic"));
+  EXPECT_FALSE(there_and_back(result).kinematic.has_value());
+}
+
+TEST(KinematicJson, SaysWhyThereIsNoModel) {
+  Scenario s = posed_drive(3, 12.0);
+  s.robot.kinematic_window = 50.0;
+  const Commissioning result = commissioned(s);
+  const Json json = to_json(result, {}, "test");
+  EXPECT_EQ(json.at("kinematic").at("status"), "nothing");
+  EXPECT_THAT(json.at("kinematic").at("message").get<std::string>(), HasSubstr("too few windows"));
+  EXPECT_FALSE(there_and_back(result).kinematic.has_value());
+}
+
+TEST(KinematicJson, RefusesWhatIsImpossible) {
+  const Commissioning result = commissioned(posed_drive(3, 12.0));
+  const Json good = to_json(result, {}, "test");
+  const auto expect_refused = [&](const char* pointer, const Json& value, const char* word) {
+    Json json = good;
+    json.at("kinematic")[Json::json_pointer(pointer)] = value;
+    try {
+      static_cast<void>(model_from_json(json, "model.json"));
+      ADD_FAILURE() << pointer << " was taken";
+    } catch (const InputError& error) {
+      EXPECT_THAT(error.what(), HasSubstr(word));
+    }
+  };
+  expect_refused("/window", -1.0, "window");
+  expect_refused("/window", "long", "/kinematic/window");
+  expect_refused("/detector/error_bounds/heading", -0.1, "heading");
+  expect_refused("/detector/estimate", Json::array({1.0}), "4 numbers");
+  expect_refused("/measurement/motion", "steps", "mean_speed");
+  expect_refused("/measurement/heading", false, "kinematic");
+  expect_refused("/feasible_set/hull/0", Json::array({2.0, 1.0}), "lower <= upper");
+}
+
+TEST(KinematicJson, TheRobotFileMayGiveTheWindow) {
+  const Robot robot = parse_robot(
+      "model: differential_drive\nwheel_radius: 0.1\ntrack_width: 0.4\nkinematic: {window: 0.7}\n", "robot.yaml");
+  EXPECT_EQ(robot.kinematic_window, 0.7);
+  EXPECT_EQ(robot_from_json(to_json(robot), "robot").kinematic_window, 0.7);
+  EXPECT_THROW(static_cast<void>(parse_robot("model: differential_drive\nwheel_radius: 0.1\ntrack_width: 0.4\n"
+                                             "kinematic: {window: 0}\n",
+                                             "robot.yaml")),
+               InputError);
+}
+
+}  // namespace
+}  // namespace wheelwright::kinematic_json_test

@@ -1,0 +1,275 @@
+// SPDX-License-Identifier: Apache-2.0
+// What URDF, SDF and controllers' files cannot be used for: each message names file, line and element.
+#include <functional>
+#include <regex>
+
+#include <nlohmann/json.hpp>
+
+#include <wheelwright/robots/robot_file.hpp>
+#include <wheelwright/robots/robot_origin.hpp>
+#include <wheelwright/robots/ros2_control.hpp>
+#include <wheelwright/robots/sdf.hpp>
+#include <wheelwright/robots/urdf.hpp>
+
+#include "robots/robot_samples.hpp"
+#include "support/scratch.hpp"
+
+namespace wheelwright::robot_origin_errors_test {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using testing::input_error;
+using testing::SampleRobot;
+
+std::string sample_text(const std::string& more = "") {
+  const SampleRobot sample;
+  return sample_urdf(sample, usual_frames(sample), more);
+}
+
+RobotWithOrigins from_urdf(const std::string& text, const RobotHints& hints = {}) {
+  const RobotTree tree = parse_urdf(text, "robot.urdf");
+  return robot_from(&tree, nullptr, hints);
+}
+
+RobotWithOrigins from_sdf(const std::string& text) {
+  const RobotTree tree = parse_sdf(text, "robot.sdf");
+  return robot_from(&tree, nullptr);
+}
+
+/// `text` with the first `from` behind `anchor` written as `to`.
+std::string changed(std::string text, const std::string& anchor, const std::string& from, const std::string& to) {
+  const std::size_t at = text.find(from, text.find(anchor));
+  EXPECT_NE(at, std::string::npos) << from;
+  return at == std::string::npos ? text : text.replace(at, from.size(), to);
+}
+
+std::string refused(const std::string& anchor, const std::string& from, const std::string& to) {
+  return input_error([&] { from_urdf(changed(sample_text(), anchor, from, to)); });
+}
+
+std::string urdf_error(const std::string& text, const std::string& file) {
+  return input_error([&] { static_cast<void>(parse_urdf(text, file)); });
+}
+
+std::string sdf_error(const std::string& text, const std::string& file) {
+  return input_error([&] { static_cast<void>(parse_sdf(text, file)); });
+}
+
+std::string yaml_error(const std::string& text, const std::string& file, const std::string& controller = {}) {
+  return input_error([&] { static_cast<void>(parse_ros2_control(text, file, controller)); });
+}
+
+TEST(RobotOriginErrors, ValuesThatNoBodyHas) {
+  EXPECT_EQ(refused("base_link\">", "mass value=\"10\"", "mass value=\"-3\""),
+            "robot.urdf:6: <inertial> of link 'base_link': mass -3: expected a mass > 0 in kg");
+  EXPECT_THAT(refused("base_link\">", "mass value=\"10\"", "mass value=\"0\""), HasSubstr("robot.urdf:6: <inertial>"));
+  EXPECT_THAT(refused("base_link\">", "mass value=\"10\"", "mass value=\"nan\""),
+              HasSubstr("robot.urdf:8: <mass> of link 'base_link': value 'nan': expected a finite number"));
+  EXPECT_THAT(refused("base_link\">", "mass value=\"10\"", "mass value=\"ten\""), HasSubstr("robot.urdf:8: <mass>"));
+  EXPECT_THAT(refused("base_link\">", "<mass value=\"10\"/>", ""),
+              HasSubstr("robot.urdf:6: <inertial> of link 'base_link': holds no <mass>"));
+  // A box of 0.4 by 0.3 by 0.2: ixx of 10 is larger than the others' sum.
+  EXPECT_THAT(refused("base_link\">", "ixx=\"0.1", "ixx=\"9.1"),
+              AllOf(HasSubstr("robot.urdf:6: <inertial>"), HasSubstr("larger than the sum of the others")));
+  EXPECT_THAT(refused("base_link\">", "ixx=\"", "ixx=\"-"), HasSubstr("expected none below 0"));
+  EXPECT_THAT(refused("base_link\">", "ixy=\"0\"", ""),
+              HasSubstr("robot.urdf:9: <inertia> of link 'base_link': has no attribute ixy"));
+  EXPECT_THAT(refused("base_link\">", "xyz=\"", "xyz=\"1 "),
+              AllOf(HasSubstr("robot.urdf:7: <origin>"), HasSubstr("expected 3 finite numbers")));
+}
+
+TEST(RobotOriginErrors, LinksWithoutAMass) {
+  const std::string camera =
+      "<link name=\"camera\"><visual><geometry><box size=\"1 1 1\"/></geometry></visual></link>\n<joint name=\"c\" "
+      "type=\"fixed\"><parent link=\"base_link\"/><child link=\"camera\"/></joint>";
+  EXPECT_THAT(input_error([&] { from_urdf(sample_text(camera)); }),
+              AllOf(HasSubstr("link 'camera': has a shape and no <inertial>"), HasSubstr("--massless camera")));
+  RobotHints hints;
+  hints.massless = {"camera"};
+  EXPECT_EQ(from_urdf(sample_text(camera), hints).robot.nominal, from_urdf(sample_text()).robot.nominal);
+  hints.massless = {"camra"};
+  EXPECT_THAT(input_error([&] { from_urdf(sample_text(camera), hints); }), HasSubstr("did you mean 'camera'?"));
+  hints.massless = {"mast"};
+  EXPECT_THAT(input_error([&] { from_urdf(sample_text(), hints); }), HasSubstr("<inertial> of link 'mast'"));
+}
+
+TEST(RobotOriginErrors, WheelsThatDoNotRoll) {
+  EXPECT_THAT(refused("left_wheel", "<cylinder radius=\"0.05\"", "<cylinder radius=\"0\""),
+              HasSubstr("<cylinder> of link 'left_wheel': radius 0"));
+  EXPECT_THAT(refused("left_wheel", "<cylinder radius=\"0.05\"", "<cylinder radius=\"0.0501\""),
+              AllOf(HasSubstr("link 'left_wheel': radius 0.0501 m, and 0.05 m at robot.urdf:"),
+                    HasSubstr("wheel_radius_asymmetric")));
+  EXPECT_THAT(refused("left_wheel", "<collision><origin xyz=\"", "<collision><origin xyz=\"0.1"),
+              HasSubstr("off the axis of robot.urdf:34: joint 'left_wheel_joint'"));
+  EXPECT_THAT(refused("left_wheel_joint", "axis xyz=\"", "axis xyz=\"1"), HasSubstr("only one joint"));
+}
+
+TEST(RobotOriginErrors, WheelsThatAreNotFound) {
+  RobotHints hints;
+  hints.left = {"left_weel_joint"};
+  hints.right = {"right_wheel_joint"};
+  EXPECT_THAT(input_error([&] { from_urdf(sample_text(), hints); }),
+              AllOf(HasSubstr("--left and --right: robot.urdf:2"), HasSubstr("did you mean 'left_wheel_joint'?")));
+  hints.left = {"mast_joint"};
+  EXPECT_THAT(input_error([&] { from_urdf(sample_text(), hints); }), HasSubstr("joint 'mast_joint': is 'fixed'"));
+  hints.left = {"right_wheel_joint"};
+  EXPECT_THAT(input_error([&] { from_urdf(sample_text(), hints); }), HasSubstr("is both wheels"));
+  std::swap(hints.left, hints.right);
+  hints.right = {"left_wheel_joint"};
+  EXPECT_THAT(input_error([&] { from_urdf(sample_text(), hints); }),
+              HasSubstr("expected the left one at the larger y"));
+  hints.right.clear();
+  EXPECT_THAT(input_error([&] { from_urdf(sample_text(), hints); }), HasSubstr("one side only"));
+  // Neither continuous nor named: the joints that turn are listed.
+  EXPECT_THAT(refused("left_wheel_joint", "continuous", "revolute"),
+              AllOf(HasSubstr("only one joint"), HasSubstr("left_wheel_joint (robot.urdf:"), HasSubstr("--left")));
+}
+
+TEST(RobotOriginErrors, MoreWheelsThanTwo) {
+  const auto further = [](const std::string& name, double x, double y) {
+    return fmt::format(
+        "<link name=\"{0}\"/><joint name=\"{0}_joint\" type=\"continuous\"><parent link=\"base_link\"/><child "
+        "link=\"{0}\"/><origin xyz=\"{1} {2} 0.05\"/><axis xyz=\"0 1 0\"/></joint>\n",
+        name, x, y);
+  };
+  EXPECT_THAT(
+      input_error([&] {
+        from_urdf(sample_text(further("front_left_wheel", 0.3, 0.19) + further("front_right_wheel", 0.3, -0.19)));
+      }),
+      AllOf(HasSubstr("4 joints may be driven wheels"), HasSubstr("front_right_wheel_joint"), HasSubstr("skid_steer"),
+            HasSubstr("--left")));
+  EXPECT_THAT(input_error([&] { from_urdf(sample_text(further("third_wheel", 0.3, 0.0))); }),
+              AllOf(HasSubstr("3 joints may be driven wheels"), HasSubstr("third_wheel_joint (robot.urdf:")));
+  // What does not say wheel, or says caster, is none.
+  EXPECT_NO_THROW(from_urdf(sample_text(further("caster_wheel", 0.3, 0.0) + further("brush", 0.2, 0.0))));
+  const std::string skid =
+      "<gazebo><plugin name=\"d\" filename=\"libgazebo_ros_skid_steer_drive.so\"></plugin></gazebo>";
+  EXPECT_THAT(input_error([&] { from_urdf(sample_text(skid)); }), HasSubstr("more than two wheels"));
+}
+
+TEST(RobotOriginErrors, FilesOfAnotherKind) {
+  EXPECT_THAT(
+      urdf_error("<robot xmlns:xacro=\"x\" name=\"a\">\n<xacro:include filename=\"b\"/></robot>", "robot.urdf.xacro"),
+      AllOf(HasSubstr("robot.urdf.xacro:2: <xacro:include> is xacro"), HasSubstr("expanded first")));
+  EXPECT_THAT(urdf_error("<robot name=\"${n}\"/>", "a.urdf"), HasSubstr("a.urdf:1: '${n}' is xacro"));
+  EXPECT_THAT(urdf_error("<sdf version=\"1.7\"/>", "a.urdf"), HasSubstr("is no URDF"));
+  EXPECT_THAT(sdf_error("<robot name=\"a\"/>", "a.sdf"), HasSubstr("is no SDF"));
+  EXPECT_THAT(urdf_error("<robot>\n<link>", "a.urdf"), HasSubstr("a.urdf:2"));
+  EXPECT_THAT(urdf_error("", "a.urdf"), HasSubstr("a.urdf:1"));
+  EXPECT_THAT(urdf_error("<robot/><robot/>", "a.urdf"), HasSubstr("a second root element"));
+}
+
+TEST(RobotOriginErrors, LinksThatMakeNoTree) {
+  EXPECT_THAT(refused("mast_joint", "<child link=\"mast\"/>", "<child link=\"left_wheel\"/>"),
+              HasSubstr("joint 'left_wheel_joint': its child 'left_wheel' is that of"));
+  EXPECT_THAT(refused("mast_joint", "<parent link=\"base_link\"/>", "<parent link=\"mast\"/>"),
+              HasSubstr("ring of joints"));
+  EXPECT_THAT(refused("mast_joint", "<parent link=\"base_link\"/>", "<parent link=\"base_lnk\"/>"),
+              HasSubstr("did you mean 'base_link'?"));
+  EXPECT_THAT(refused("<link", "<link name=\"base_footprint\"/>", "<link name=\"mast\"/>"),
+              HasSubstr("has the name of robot.urdf:3"));
+}
+
+TEST(RobotOriginErrors, SdfThatLeavesSomethingOut) {
+  const SampleRobot sample;
+  const auto refused_sdf = [&](const std::string& from, const std::string& to) {
+    return input_error([&] { from_sdf(changed(sample_sdf(sample, usual_frames(sample)), "<sdf", from, to)); });
+  };
+  EXPECT_THAT(refused_sdf("<mass>10</mass>", ""), HasSubstr("<inertial> of link 'base_link': holds no <mass>"));
+  EXPECT_THAT(refused_sdf("relative_to=\"holder\"", "relative_to=\"holdr\""), HasSubstr("did you mean 'holder'?"));
+  EXPECT_THAT(refused_sdf("<frame name=\"holder\">", "<frame name=\"holder\" attached_to=\"mast\">"),
+              HasSubstr("relative to itself"));
+  EXPECT_THAT(refused_sdf("<frame", "<include><uri>model://x</uri></include><frame"),
+              HasSubstr("robot.sdf:4: <include>"));
+  EXPECT_THAT(refused_sdf("<parent>base_link", "<parent>world"), HasSubstr("holds the robot to the world"));
+  EXPECT_THAT(refused_sdf("version=\"1.7\"", "version=\"1.2\""), HasSubstr("expected 1.4 or later"));
+}
+
+TEST(RobotOriginErrors, ControllersThatCannotBeUsed) {
+  const auto refused_yaml = [](const std::string& from, const std::string& to) {
+    return input_error([&] {
+      const DriveFacts facts =
+          parse_ros2_control(changed(testing::sample_controller, "controller_manager", from, to), "control.yaml");
+      static_cast<void>(robot_from(nullptr, &facts));
+    });
+  };
+  EXPECT_THAT(refused_yaml("wheel_radius: 0.05", "wheel_radius: 0.0"), HasSubstr("control.yaml:12: "));
+  EXPECT_THAT(refused_yaml("wheel_radius: 0.05", "wheel_radius: five"), HasSubstr("wheel_radius: 'five'"));
+  EXPECT_THAT(refused_yaml("wheel_radius: 0.05", "left_wheel_radius_multiplier: 1.1"),
+              HasSubstr("left_wheel_radius_multiplier 1.1 against 1 of the other side"));
+  EXPECT_THAT(refused_yaml("    wheel_radius: 0.05\n", ""), HasSubstr("give --wheel-radius"));
+  EXPECT_THAT(refused_yaml("[\"left_wheel_joint\"]", "[a, b]"), HasSubstr("skid_steer"));
+  EXPECT_THAT(refused_yaml("left_wheel_joint", "$(var prefix)left"), HasSubstr("put in by a launch file"));
+  EXPECT_THAT(refused_yaml("    publish_rate: 50.0", "    linear: {x: {max_velocity: 1.0}}"),
+              HasSubstr("dotted and nested"));
+  EXPECT_THAT(yaml_error("a: {b: 1}\n", "c.yaml"), HasSubstr("c.yaml: no diff_drive_controller"));
+  const std::string two = "one: {wheel_radius: 0.1}\ntwo: {wheel_radius: 0.2}\n";
+  EXPECT_THAT(yaml_error(two, "c.yaml"), AllOf(HasSubstr("one, two"), HasSubstr("--controller NAME")));
+  EXPECT_EQ(parse_ros2_control(two, "c.yaml", "two").wheel_radius->value, 0.2);
+  EXPECT_THAT(yaml_error(two, "c.yaml", "tow"), HasSubstr("did you mean 'two'?"));
+}
+
+std::string mutated(std::string text, std::mt19937_64& random, const std::string& spice) {
+  if (random() % 5 == 0) {
+    text.resize(random() % (text.size() + 1));
+  }
+  for (std::uint64_t left = 1 + random() % 3; left > 0 && !text.empty(); --left) {
+    const std::size_t at = random() % text.size();
+    switch (random() % 5) {
+      case 0: text[at] = static_cast<char>(random()); break;
+      case 1: text.erase(at, 1 + random() % 12); break;
+      case 2: text.insert(at, 1, spice[random() % spice.size()]); break;
+      case 3: text.insert(at, text.substr(random() % text.size(), random() % 60)); break;
+      default: text[at] = spice[random() % spice.size()];
+    }
+  }
+  return text;
+}
+
+// Either a robot whose file reads back, or a message with the place: the file, and its line where the text has lines.
+void fuzz(const std::string& good, const std::string& spice, const std::string& file, std::uint64_t seed,
+          const std::function<RobotWithOrigins(const std::string&)>& read) {
+  std::mt19937_64 random(seed);
+  const std::regex place(file + "(:[0-9]+)?: ");
+  int robots = 0, refusals = 0, lines = 0;
+  for (int k = 0; k < 400; ++k) {
+    const std::string text = mutated(good, random, spice);
+    try {
+      const RobotWithOrigins made = read(text);
+      ASSERT_EQ(to_json(parse_robot(robot_yaml(made), "made.yaml")), to_json(made.robot)) << text;
+      ++robots;
+    } catch (const InputError& error) {
+      std::smatch found;
+      const std::string message = error.what();
+      ASSERT_TRUE(std::regex_search(message, found, place)) << message << "\n" << text;
+      lines += found[1].matched ? 1 : 0;
+      ++refusals;
+    }
+  }
+  EXPECT_GE(robots, 10);
+  EXPECT_GT(refusals, 100);
+  EXPECT_GT(lines, refusals / 2);
+}
+
+TEST(RobotOriginFuzz, Urdf) {
+  fuzz(sample_text("<transmission name=\"t\"><joint name=\"left_wheel_joint\"/></transmission>\n"),
+       "<>/\"'= -+.e0123456789na&;${}", "robot.urdf", 1, [](const std::string& text) { return from_urdf(text); });
+}
+
+TEST(RobotOriginFuzz, Sdf) {
+  const SampleRobot sample;
+  fuzz(sample_sdf(sample, usual_frames(sample), "<plugin name=\"p\" filename=\"diff_drive\"/>"),
+       "<>/\"'= -+.e0123456789na&;", "robot.sdf", 2, [](const std::string& text) { return from_sdf(text); });
+}
+
+TEST(RobotOriginFuzz, Controller) {
+  fuzz(testing::sample_controller, ":{}[],\"'# \n-+.e0123456789na&*!|>%@", "control.yaml", 3,
+       [](const std::string& text) {
+         const DriveFacts facts = parse_ros2_control(text, "control.yaml");
+         return robot_from(nullptr, &facts);
+       });
+}
+
+}  // namespace
+}  // namespace wheelwright::robot_origin_errors_test
