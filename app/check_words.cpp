@@ -7,12 +7,12 @@
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/commission/physical.hpp>
-#include <wheelwright/files/json_number.hpp>
+#include <wheelwright/files/json.hpp>
+#include <wheelwright/report/data_sections.hpp>
 #include <wheelwright/report/page.hpp>
 #include <wheelwright/report/text.hpp>
-#include <wheelwright/report/warrant_section.hpp>
+#include <wheelwright/results/model_json.hpp>
 #include <wheelwright/results/model_words.hpp>
-#include <wheelwright/results/warrant_json.hpp>
 
 #include "common.hpp"
 

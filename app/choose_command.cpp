@@ -10,7 +10,7 @@
 #include <wheelwright/commission/detector_choice.hpp>
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/report/commission_report.hpp>
-#include <wheelwright/results/choice_json.hpp>
+#include <wheelwright/results/margins_json.hpp>
 #include <wheelwright/results/model_file.hpp>
 #include <wheelwright/robots/robot_file.hpp>
 

@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include <wheelwright/files/suggest.hpp>
+#include <wheelwright/files/words.hpp>
 
 namespace wheelwright::app {
 namespace {

@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/commission/commission.hpp>
-#include <wheelwright/commission/trace.hpp>
+#include <wheelwright/commission/detector_walk.hpp>
 #include <wheelwright/files/atomic_file.hpp>
 #include <wheelwright/report/chart.hpp>
 #include <wheelwright/report/commission_report.hpp>

@@ -8,10 +8,10 @@
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/files/atomic_file.hpp>
-#include <wheelwright/files/suggest.hpp>
+#include <wheelwright/files/words.hpp>
 #include <wheelwright/logs/log_columns.hpp>
 #include <wheelwright/model/robot.hpp>
-#include <wheelwright/report/raw_signals.hpp>
+#include <wheelwright/report/signals.hpp>
 
 namespace wheelwright::app {
 

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include <wheelwright/detector/row_detector.hpp>
-#include <wheelwright/files/json_file.hpp>
+#include <wheelwright/files/json.hpp>
 #include <wheelwright/logs/log_file.hpp>
 #include <wheelwright/report/context.hpp>
 

@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/files/suggest.hpp>
+#include <wheelwright/files/words.hpp>
 
 namespace wheelwright::app {
 namespace {

@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/logs/log_write.hpp>
+#include <wheelwright/logs/log_file.hpp>
 
 #include "commands.hpp"
 #include "common.hpp"

@@ -11,9 +11,9 @@
 #include <wheelwright/design/manoeuvre.hpp>
 #include <wheelwright/design/stages.hpp>
 #include <wheelwright/files/number.hpp>
-#include <wheelwright/gap/catalogue.hpp>
 #include <wheelwright/gap/discrimination_design.hpp>
-#include <wheelwright/gap/planned_drive.hpp>
+#include <wheelwright/gap/effect.hpp>
+#include <wheelwright/gap/further_drive.hpp>
 #include <wheelwright/logs/csv.hpp>
 #include <wheelwright/report/design_report.hpp>
 #include <wheelwright/results/model_file.hpp>

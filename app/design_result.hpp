@@ -7,7 +7,7 @@
 
 #include <wheelwright/design/detection.hpp>
 #include <wheelwright/design/manoeuvre.hpp>
-#include <wheelwright/files/json_file.hpp>
+#include <wheelwright/files/json.hpp>
 #include <wheelwright/gap/discrimination_design.hpp>
 
 namespace wheelwright::app {

@@ -7,7 +7,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/commission/trace.hpp>
+#include <wheelwright/commission/detector_walk.hpp>
 #include <wheelwright/report/chart.hpp>
 #include <wheelwright/report/detect_report.hpp>
 #include <wheelwright/results/model_file.hpp>

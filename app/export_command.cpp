@@ -8,7 +8,7 @@
 #include <wheelwright/export/export_c.hpp>
 #include <wheelwright/files/atomic_file.hpp>
 #include <wheelwright/results/model_file.hpp>
-#include <wheelwright/results/warrant_json.hpp>
+#include <wheelwright/results/model_json.hpp>
 
 #include "commands.hpp"
 #include "common.hpp"

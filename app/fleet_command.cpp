@@ -12,7 +12,6 @@
 #include <wheelwright/files/atomic_file.hpp>
 #include <wheelwright/report/fleet_report.hpp>
 #include <wheelwright/results/fleet_json.hpp>
-#include <wheelwright/results/pooled_prior_file.hpp>
 #include <wheelwright/robots/fleet_list.hpp>
 #include <wheelwright/robots/robot_file.hpp>
 #include <wheelwright/study/examine_robot.hpp>

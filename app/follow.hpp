@@ -7,7 +7,7 @@
 #include <ostream>
 
 #include <wheelwright/commission/commission.hpp>
-#include <wheelwright/logs/csv_header.hpp>
+#include <wheelwright/logs/csv_format.hpp>
 
 #include "common.hpp"
 

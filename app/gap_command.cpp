@@ -8,10 +8,9 @@
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/files/atomic_file.hpp>
-#include <wheelwright/files/suggest.hpp>
-#include <wheelwright/gap/catalogue.hpp>
+#include <wheelwright/files/words.hpp>
 #include <wheelwright/gap/diagnose.hpp>
-#include <wheelwright/gap/fresh_log.hpp>
+#include <wheelwright/gap/effect.hpp>
 #include <wheelwright/gap/naive.hpp>
 #include <wheelwright/gap/prepared.hpp>
 #include <wheelwright/logs/csv.hpp>

@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/files/json_file.hpp>
+#include <wheelwright/files/json.hpp>
 
 #include "units.hpp"
 

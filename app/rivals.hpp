@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/files/json_file.hpp>
+#include <wheelwright/files/json.hpp>
 #include <wheelwright/gap/discrimination.hpp>
 
 namespace wheelwright::app {

@@ -7,11 +7,11 @@
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/files/atomic_file.hpp>
+#include <wheelwright/robots/controller_file.hpp>
+#include <wheelwright/robots/robot_description.hpp>
 #include <wheelwright/robots/robot_file.hpp>
 #include <wheelwright/robots/robot_origin.hpp>
-#include <wheelwright/robots/ros2_control.hpp>
 #include <wheelwright/robots/sdf.hpp>
-#include <wheelwright/robots/urdf.hpp>
 
 #include "commands.hpp"
 #include "common.hpp"

@@ -13,7 +13,7 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/files/suggest.hpp>
+#include <wheelwright/files/words.hpp>
 #include <wheelwright/files/xxh64.hpp>
 
 #include "ranks.hpp"

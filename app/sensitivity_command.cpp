@@ -9,7 +9,6 @@
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/files/xxh64.hpp>
 #include <wheelwright/report/sensitivity_report.hpp>
-#include <wheelwright/results/study_file.hpp>
 #include <wheelwright/results/study_json.hpp>
 #include <wheelwright/robots/robot_file.hpp>
 #include <wheelwright/study/local_derivatives.hpp>

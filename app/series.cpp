@@ -5,7 +5,7 @@
 #include <vector>
 
 #include <wheelwright/commission/detector_walk.hpp>
-#include <wheelwright/logs/log_write.hpp>
+#include <wheelwright/logs/log_file.hpp>
 
 namespace wheelwright::app {
 namespace {

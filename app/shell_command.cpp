@@ -6,7 +6,7 @@
 #include <CLI/CLI.hpp>
 
 #include <wheelwright/files/atomic_file.hpp>
-#include <wheelwright/files/suggest.hpp>
+#include <wheelwright/files/words.hpp>
 
 #include "command_tree.hpp"
 #include "commands.hpp"

@@ -5,7 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/files/json_file.hpp>
+#include <wheelwright/files/json.hpp>
 #include <wheelwright/logs/csv.hpp>
 #include <wheelwright/robots/scenario_file.hpp>
 #include <wheelwright/sim/simulation.hpp>

@@ -13,7 +13,7 @@
 #include <wheelwright/commission/physical.hpp>
 #include <wheelwright/core/statistics.hpp>
 #include <wheelwright/identify/noise_level.hpp>
-#include <wheelwright/results/warrant_json.hpp>
+#include <wheelwright/results/model_json.hpp>
 
 #include "common.hpp"
 

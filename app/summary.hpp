@@ -7,9 +7,8 @@
 #include <string>
 
 #include <wheelwright/commission/commission.hpp>
-#include <wheelwright/commission/event_isolation.hpp>
-#include <wheelwright/commission/trace.hpp>
-#include <wheelwright/files/json_file.hpp>
+#include <wheelwright/commission/detector_walk.hpp>
+#include <wheelwright/files/json.hpp>
 
 namespace wheelwright::app {
 

@@ -7,8 +7,8 @@
 #include <random>
 
 #include <wheelwright/core/check.hpp>
-#include <wheelwright/filter/exact.hpp>
-#include <wheelwright/sim/noise.hpp>
+#include <wheelwright/filter/kernel.hpp>
+#include <wheelwright/sim/plant.hpp>
 
 namespace wheelwright::bench {
 namespace {

@@ -18,7 +18,7 @@
 
 #include <wheelwright/bounds/minimax.hpp>
 #include <wheelwright/commission/commission.hpp>
-#include <wheelwright/commission/trace.hpp>
+#include <wheelwright/commission/detector_walk.hpp>
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/filter/regression_stream.hpp>
 #include <wheelwright/logs/csv.hpp>

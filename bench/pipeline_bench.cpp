@@ -21,7 +21,7 @@
 #include <Eigen/QR>
 
 #include <wheelwright/commission/commission.hpp>
-#include <wheelwright/commission/trace.hpp>
+#include <wheelwright/commission/detector_walk.hpp>
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/filter/regression_stream.hpp>
 #include <wheelwright/identify/least_squares.hpp>

@@ -8,7 +8,7 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/bounds/half_space.hpp>
+#include <wheelwright/bounds/slab_rows.hpp>
 
 namespace wheelwright {
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Boxes of parameters and their support function.
+/// Boxes of parameters, their support function, and coordinates in which a set is round.
 #pragma once
 
 #include <algorithm>
@@ -9,6 +9,8 @@
 #include <limits>
 #include <span>
 #include <vector>
+
+#include <Eigen/Core>
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/interval.hpp>
@@ -96,5 +98,19 @@ inline void check_finite(const Box& box, const char* what) {
   }
   return result;
 }
+
+/// Affine coordinates z of parameters in which a set has a size of about one: θ = centre + transform z.
+struct Coordinates {
+  Eigen::VectorXd centre;     ///< θ at z = 0
+  Eigen::MatrixXd transform;  ///< p × p, regular
+};
+
+/// Coordinates about the centre of `box` with Tᵀ (information + D⁻²) T ≈ 1, D the half-widths of the box: whitened
+/// where `information` (p × p, symmetric, positive semi-definite, units 1/θ²) says something, as wide as the box
+/// elsewhere.
+[[nodiscard]] Coordinates whitened(const Box& box, const Eigen::MatrixXd& information);
+
+/// Half-widths of a box about the origin of z that contains `box` (to rounding).
+[[nodiscard]] Eigen::VectorXd extent(const Box& box, const Coordinates& coordinates);
 
 }  // namespace wheelwright

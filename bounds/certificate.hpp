@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
+/// Certificates: rigorous bounds from the approximate multipliers of a linear program.
+///
 /// Rigorous bounds from the approximate multipliers of a linear program.
 ///
 /// Neumaier and Shcherbina 2004, "Safe bounds in linear and mixed-integer linear programming", Math. Program. 99: for
@@ -12,11 +14,19 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
 #include <wheelwright/bounds/box.hpp>
-#include <wheelwright/bounds/half_space.hpp>
+#include <wheelwright/bounds/slab_rows.hpp>
 
 namespace wheelwright {
+
+/// λ >= 0 with Aᵀλ = a as nearly as 113 bits allow, for p half-spaces that meet in a vertex: nearly collinear columns make
+/// λ large, and its last place as a double is then worth more than the width of the set. `split`: every multiplier as two
+/// rows, the double below it and the rest; else rounded to nearest. Negative multipliers are left out. `basis` is returned
+/// with its multipliers; empty where the half-spaces are dependent.
+[[nodiscard]] std::vector<WeightedRow> refined_multipliers(std::span<const HalfSpace* const> basis,
+                                                           std::span<const double> a, bool split);
 
 /// An upper bound of max { a·θ : θ in box, row·θ <= row.b for every row }, proved by the multipliers (those that are
 /// not > 0 are left out). `a` and the rows have as many entries as `box` has sides, all finite.

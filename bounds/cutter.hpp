@@ -8,7 +8,7 @@
 #include <vector>
 
 #include <wheelwright/bounds/cutting_planes.hpp>
-#include <wheelwright/bounds/slab_columns.hpp>
+#include <wheelwright/bounds/interval_hull.hpp>
 #include <wheelwright/bounds/slab_rows.hpp>
 
 namespace wheelwright {

@@ -7,7 +7,6 @@
 #include <numeric>
 
 #include <wheelwright/bounds/certificate.hpp>
-#include <wheelwright/bounds/refined_multipliers.hpp>
 
 namespace wheelwright {
 namespace {

@@ -9,7 +9,7 @@
 
 #include <wheelwright/bounds/infeasibility.hpp>
 #include <wheelwright/bounds/linear_program.hpp>
-#include <wheelwright/bounds/row_bank.hpp>
+#include <wheelwright/bounds/slab_rows.hpp>
 
 namespace wheelwright {
 

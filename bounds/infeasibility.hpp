@@ -8,8 +8,7 @@
 #include <vector>
 
 #include <wheelwright/bounds/box.hpp>
-#include <wheelwright/bounds/coordinates.hpp>
-#include <wheelwright/bounds/half_space.hpp>
+#include <wheelwright/bounds/slab_rows.hpp>
 
 namespace wheelwright {
 

@@ -12,7 +12,6 @@
 #include <wheelwright/bounds/infeasibility.hpp>
 #include <wheelwright/bounds/linear_program.hpp>
 #include <wheelwright/bounds/slab_rows.hpp>
-#include <wheelwright/bounds/spread_sample.hpp>
 #include <wheelwright/bounds/survey.hpp>
 #include <wheelwright/core/limits.hpp>
 

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include <wheelwright/bounds/box.hpp>
-#include <wheelwright/bounds/half_space.hpp>
-#include <wheelwright/bounds/slab_columns.hpp>
+#include <wheelwright/bounds/interval_hull.hpp>
+#include <wheelwright/bounds/slab_rows.hpp>
 #include <wheelwright/core/regression.hpp>
 
 namespace wheelwright {

@@ -1,16 +1,78 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// From rows of a regression with bounded errors to half-spaces of parameters (theory: errors in variables).
+/// Half-spaces of parameters from rows of a regression with bounded errors (theory: errors in variables), and their storage.
 #pragma once
 
+#include <cstddef>
 #include <span>
 #include <vector>
 
+#include <Eigen/Core>
+
 #include <wheelwright/bounds/box.hpp>
-#include <wheelwright/bounds/half_space.hpp>
 #include <wheelwright/core/regression.hpp>
 
 namespace wheelwright {
+
+/// Which of the two inequalities of a slab, or of a side of the prior box, a half-space is.
+enum class Side {
+  upper,  ///< Yθ <= y + dy, or θ_j <= upper
+  lower,  ///< Yθ >= y − dy, or θ_j >= lower
+};
+
+/// Where a half-space comes from: one row of the regression, or one side of the prior box.
+struct RowOrigin {
+  bool is_prior = false;      ///< a side of the prior box; `parameter` says which
+  std::size_t parameter = 0;  ///< parameter of a side of the prior box
+  std::size_t sample = 0;     ///< row number in the log (RegressionBlock::sample)
+  double t = 0.0;             ///< time of that row, s
+  std::size_t output = 0;     ///< output (channel) of the row
+  Side side = Side::upper;    ///< which inequality
+  friend bool operator==(const RowOrigin&, const RowOrigin&) = default;
+};
+
+/// { θ : a·θ <= b }.
+struct HalfSpace {
+  Eigen::VectorXd a;  ///< p coefficients
+  double b = 0.0;     ///< right-hand side, unit of the output
+  RowOrigin origin;   ///< where it comes from
+};
+
+/// A half-space and its multiplier in a linear combination of constraints.
+struct WeightedRow {
+  HalfSpace row;            ///< the constraint a·θ <= b
+  double multiplier = 0.0;  ///< λ >= 0
+};
+
+/// Half-spaces a·θ <= b of `parameters` coefficients each, one after the other.
+struct RowBank {
+  std::size_t parameters = 0;      ///< p
+  std::vector<double> a;           ///< n × p, row after row
+  std::vector<double> b;           ///< n
+  std::vector<RowOrigin> origins;  ///< n
+
+  /// Number of half-spaces n.
+  [[nodiscard]] std::size_t size() const { return b.size(); }
+  /// The coefficients of half-space `i`.
+  [[nodiscard]] std::span<const double> normal(std::size_t i) const { return {a.data() + i * parameters, parameters}; }
+  /// Adds one half-space.
+  void add(std::span<const double> normal, double bound, const RowOrigin& origin) {
+    a.insert(a.end(), normal.begin(), normal.end());
+    b.push_back(bound);
+    origins.push_back(origin);
+  }
+  /// Half-space `i` by itself.
+  [[nodiscard]] HalfSpace at(std::size_t i) const {
+    return {Eigen::Map<const Eigen::VectorXd>(a.data() + i * parameters, static_cast<Eigen::Index>(parameters)), b[i],
+            origins[i]};
+  }
+  /// Forgets all, keeps the memory.
+  void clear() {
+    a.clear();
+    b.clear();
+    origins.clear();
+  }
+};
 
 /// Turns the row |y − Y°θ| <= dy, |Y° − Y| <= dY into the two half-spaces it means for θ in a prior box:
 ///

@@ -9,7 +9,7 @@
 #include <fmt/format.h>
 
 #include <wheelwright/bounds/outliers.hpp>
-#include <wheelwright/commission/contradiction_search.hpp>
+#include <wheelwright/commission/contradictions.hpp>
 #include <wheelwright/commission/fit.hpp>
 #include <wheelwright/commission/setting.hpp>
 #include <wheelwright/core/check.hpp>

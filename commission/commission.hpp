@@ -14,16 +14,14 @@
 #include <wheelwright/commission/assumptions.hpp>
 #include <wheelwright/commission/contradictions.hpp>
 #include <wheelwright/commission/filter_choice.hpp>
-#include <wheelwright/commission/folds.hpp>
 #include <wheelwright/commission/kinematic.hpp>
-#include <wheelwright/commission/output_noise.hpp>
+#include <wheelwright/commission/noise_budget.hpp>
 #include <wheelwright/commission/survey.hpp>
 #include <wheelwright/commission/validation.hpp>
 #include <wheelwright/core/log.hpp>
 #include <wheelwright/detector/detector.hpp>
 #include <wheelwright/identify/estimator_choice.hpp>
-#include <wheelwright/identify/excitation.hpp>
-#include <wheelwright/identify/residual_statistics.hpp>
+#include <wheelwright/identify/least_squares.hpp>
 #include <wheelwright/model/robot.hpp>
 
 namespace wheelwright {

@@ -1,10 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Findings that contradict what a commissioned model takes for granted: each is an answer, some leave no model.
+/// Contradictions: findings that contradict what a commissioned model takes for granted, and the search for them.
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
+
+#include <wheelwright/commission/evidence.hpp>
+#include <wheelwright/commission/fit.hpp>
+#include <wheelwright/commission/setting.hpp>
+#include <wheelwright/core/interval.hpp>
+#include <wheelwright/core/log.hpp>
 
 namespace wheelwright {
 
@@ -37,5 +47,63 @@ struct LogContradiction {
 
 /// Name for files: "effort_constant" and so on.
 [[nodiscard]] std::string_view to_string(LogContradiction::Kind kind);
+
+struct Commissioning;
+
+/// A constant shift in time between effort and motion, by least squares over filtered rows (TimeShiftedRows).
+struct EffortTiming {
+  double delay = 0.0;           ///< s; > 0: the logged effort comes late
+  double standard_error = 0.0;  ///< s, honest under autocorrelated residuals
+  double freedom = 1.0;         ///< degrees of freedom of its Student's t
+  Interval allowed{};  ///< s, what is taken as given: effort.delay; where bounds are declared and held efforts may
+                       ///< change between samples, up to a step more
+  double residual_ratio = 1.0;  ///< rms residual with the shift over that with the nearest one that is allowed
+  double mirror_ratio = 1.0;    ///< the same as far on the other side of that: above 1 for a true shift
+  double moved = 0.0;           ///< largest change of a parameter from the one to the other, in its standard errors
+
+  /// s, how far the shift lies outside of what is allowed; 0 inside.
+  [[nodiscard]] double beyond() const { return std::max({0.0, allowed.lower - delay, delay - allowed.upper}); }
+};
+
+/// The shift that explains the first `most_rows` rows of `log` best, at most `longest` either way; nothing where none is
+/// told (flat, at the end of what is searched, segments too short, unsigned efforts).
+[[nodiscard]] std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& setting, const Fit& fit,
+                                                        double longest = 0.2, std::size_t most_rows = 60000);
+
+/// Whether `timing` is a latency that a model must not be made with: beyond what is allowed, told from that at a risk of
+/// 1e-8 (Student's t) and further from it than a quarter of `step` (s), of an effect that is not symmetric in the sign of the shift (interpolation averages noise,
+/// which lowers the residual for a shift either way), and one that either lowers the residual by 1 % or more or moves a
+/// parameter by two standard errors. Healthy logs with even steps showed 0.09 steps at most.
+[[nodiscard]] bool is_latency(const EffortTiming& timing, double step);
+
+/// What the signals of a log say before any set is made.
+struct SignalFindings {
+  std::vector<LogContradiction> contradictions;
+  std::optional<EffortTiming> timing;  ///< nothing where no shift is told, or was not looked for
+};
+
+/// Wrapped angles, constant and unrelated efforts; where there are none, timing, wrong signs, wheels and halves that disagree. Walks `log`
+/// a few times.
+[[nodiscard]] SignalFindings contradictions_in_log(LogSource& log, const Setting& setting, const Fit& fit);
+
+/// What a finished commissioning says against itself: best guesses outside their set, held-out rows outside the
+/// thresholds, a noise bound that had to be raised by `raised` for the prior box to explain the log.
+[[nodiscard]] std::vector<LogContradiction> contradictions_in_result(const Commissioning& result,
+                                                                     const Setting& setting, double raised);
+
+/// Weighs what statistics found in a log of declared noise against `explained`: Kind::effort_timing (`timing`),
+/// Kind::wrong_sign and Kind::estimate_outside keep LogContradiction::withdraws only beyond all of it, are
+/// LogContradiction::demotes beyond what is in doubt, and a shift below that is dropped.
+void weigh_contradictions(Commissioning& result, const Setting& setting, const Fit& fit,
+                          const std::optional<EffortTiming>& timing, const Explained& explained);
+
+/// Whether weigh_contradictions() would change anything.
+[[nodiscard]] bool wants_weighing(const Commissioning& result, const Setting& setting);
+
+/// Weighs what says that an effort is wrong against the declared errors of the rows (`errors`, with parameters in `box`):
+/// Kind::effort_unrelated is dropped where these are as large as the efforts, Kind::wheels_disagree only demotes where they
+/// are large enough for it.
+void weigh_efforts(LogSource& log, const Setting& setting, const SignalErrors& errors, const Box& box,
+                   std::vector<LogContradiction>& contradictions);
 
 }  // namespace wheelwright

@@ -14,7 +14,7 @@
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/core/log.hpp>
 #include <wheelwright/detector/events.hpp>
-#include <wheelwright/filter/design.hpp>
+#include <wheelwright/filter/measurement.hpp>
 #include <wheelwright/filter/noise.hpp>
 #include <wheelwright/model/robot.hpp>
 

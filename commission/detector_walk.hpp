@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// A log through a detector, instant by instant.
+/// A log through a commissioned detector: instant by instant, as a thinned trace, and its events with the faults that remain possible.
 #pragma once
 
 #include <cstddef>
 #include <string>
 #include <vector>
 
+#include <wheelwright/commission/commission.hpp>
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/log.hpp>
+#include <wheelwright/detector/detector.hpp>
+#include <wheelwright/detector/isolation.hpp>
+#include <wheelwright/detector/kinematic_detector.hpp>
 #include <wheelwright/detector/row_detector.hpp>
 
 namespace wheelwright {
@@ -52,5 +56,67 @@ std::size_t walk_detector(LogSource& log, AnyDetector& detector, const At& at) {
   log.rewind();
   return rows;
 }
+
+/// One output over time. All vectors have the length of Trace::t.
+struct OutputTrace {
+  std::vector<double> torque;         ///< τ_f
+  std::vector<double> predicted;      ///< Y_f θ̂
+  std::vector<double> residual_low;   ///< smallest ε of the bin
+  std::vector<double> residual_high;  ///< largest ε of the bin
+  std::vector<double> lower;          ///< l where ε comes nearest to it in the bin
+  std::vector<double> upper;          ///< u where ε comes nearest to it in the bin
+};
+
+/// A thinned walk of a detector over a log. A bin in which ε leaves [l, u] shows that it does.
+struct Trace {
+  std::vector<double> t;  ///< time at the middle of each bin, s
+  std::vector<OutputTrace> outputs;
+  std::vector<std::size_t> breaks;  ///< indices of `t` at which a new segment starts
+};
+
+/// What a detector said of a whole log.
+struct Detection {
+  std::vector<Event> events;
+  std::size_t rows = 0;              ///< rows of the log
+  std::size_t instants = 0;          ///< instants with a decision
+  double seconds = 0.0;              ///< time under watch, s
+  std::vector<std::size_t> outside;  ///< per output, instants outside
+  std::vector<double> utilisation;   ///< per output, max |ε − middle| / half width
+  std::vector<double> nrmse;         ///< per output, rms ε / rms τ_f
+  Trace trace;
+};
+
+/// Options of detect().
+struct DetectionOptions {
+  std::size_t most_points = 6000;  ///< bins of the trace
+  double merge = 0.5;              ///< s: instants outside nearer than this are one event
+};
+
+/// Walks `log` through `detector` from its beginning. Throws InvalidArgument when the log lacks a column.
+[[nodiscard]] Detection detect(LogSource& log, Detector detector, const DetectionOptions& options = {});
+
+/// The same for the kinematic residual: OutputTrace::torque and predicted are then what the pose or gyro saw and what
+/// the wheels predict.
+[[nodiscard]] Detection detect(LogSource& log, KinematicDetector detector, const DetectionOptions& options = {});
+
+/// Options of isolate_events().
+struct EventIsolationOptions {
+  IsolationOptions isolation{};
+  std::size_t most_events = 8;  ///< the first ones; the others are left alone
+};
+
+/// Isolates the first events of `detection`, which came of walking `log` with the torque residual of `model`, against the
+/// catalogue of its robot. Walks the log once and holds the rows around these events. One result for each of them.
+[[nodiscard]] std::vector<Isolation> isolate_events(LogSource& log, const CommissionedModel& model,
+                                                    const Detection& detection,
+                                                    const EventIsolationOptions& options = {});
+
+/// A finding that is consistent, for people: "the right wheel's radius changes by the share 3.1 to 5.2 % since 12.4 to
+/// 12.6 s".
+[[nodiscard]] std::string sentence(const FaultFinding& finding);
+
+/// All findings in a sentence: "consistent with: …; …. Excluded: …. Not examined: …", or that nothing in the catalogue
+/// explains the data.
+[[nodiscard]] std::string sentence(const Isolation& isolation);
 
 }  // namespace wheelwright

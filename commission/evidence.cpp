@@ -6,7 +6,7 @@
 
 #include <wheelwright/commission/noise_budget.hpp>
 #include <wheelwright/core/linear_algebra.hpp>
-#include <wheelwright/filter/error_influence.hpp>
+#include <wheelwright/filter/noise.hpp>
 
 namespace wheelwright {
 namespace {

@@ -13,7 +13,6 @@
 #include <wheelwright/commission/filter_criterion.hpp>
 #include <wheelwright/commission/survey.hpp>
 #include <wheelwright/core/log.hpp>
-#include <wheelwright/filter/design.hpp>
 #include <wheelwright/filter/measurement.hpp>
 #include <wheelwright/model/model.hpp>
 

@@ -13,8 +13,8 @@
 #include <wheelwright/filter/noise.hpp>
 #include <wheelwright/filter/regression_stream.hpp>
 #include <wheelwright/identify/estimate.hpp>
+#include <wheelwright/identify/least_squares.hpp>
 #include <wheelwright/identify/noise_level.hpp>
-#include <wheelwright/identify/residual_statistics.hpp>
 
 namespace wheelwright {
 namespace {

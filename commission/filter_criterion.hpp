@@ -10,7 +10,6 @@
 #include <Eigen/Core>
 
 #include <wheelwright/core/log.hpp>
-#include <wheelwright/filter/design.hpp>
 #include <wheelwright/filter/measurement.hpp>
 #include <wheelwright/model/model.hpp>
 

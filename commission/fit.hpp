@@ -7,12 +7,10 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/commission/folds.hpp>
 #include <wheelwright/commission/setting.hpp>
+#include <wheelwright/commission/validation.hpp>
 #include <wheelwright/identify/estimator_choice.hpp>
-#include <wheelwright/identify/excitation.hpp>
 #include <wheelwright/identify/least_squares.hpp>
-#include <wheelwright/identify/residual_statistics.hpp>
 
 namespace wheelwright {
 

@@ -14,7 +14,6 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/statistics.hpp>
 #include <wheelwright/identify/least_squares.hpp>
-#include <wheelwright/identify/residual_statistics.hpp>
 
 namespace wheelwright {
 namespace {

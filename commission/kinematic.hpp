@@ -11,14 +11,13 @@
 #include <Eigen/Core>
 
 #include <wheelwright/bounds/feasible_set.hpp>
-#include <wheelwright/commission/folds.hpp>
-#include <wheelwright/commission/output_noise.hpp>
+#include <wheelwright/commission/noise_budget.hpp>
 #include <wheelwright/commission/survey.hpp>
 #include <wheelwright/commission/validation.hpp>
 #include <wheelwright/core/log.hpp>
 #include <wheelwright/detector/kinematic_detector.hpp>
-#include <wheelwright/filter/odometry_stream.hpp>
-#include <wheelwright/identify/excitation.hpp>
+#include <wheelwright/filter/regression_stream.hpp>
+#include <wheelwright/identify/least_squares.hpp>
 #include <wheelwright/model/robot.hpp>
 
 namespace wheelwright {

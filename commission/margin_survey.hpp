@@ -12,7 +12,6 @@
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/core/log.hpp>
 #include <wheelwright/detector/margins.hpp>
-#include <wheelwright/detector/operating_map.hpp>
 
 namespace wheelwright {
 

@@ -1,9 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/commission/noise_budget.hpp>
 
+#include <algorithm>
+#include <cmath>
 #include <numbers>
 
 namespace wheelwright {
+
+double noise_that_leaves_a_set(const MinimaxFit& fit, const std::function<bool(double)>& leaves_a_set) {
+  constexpr double kAbove = 1.05;
+  double lower = std::max(1.0, fit.lower), upper = fit.upper;
+  while (!fit.converged && upper > kAbove * lower) {
+    const double middle = std::sqrt(lower * upper);
+    (leaves_a_set(middle) ? upper : lower) = middle;
+  }
+  return kAbove * upper;
+}
 
 std::optional<double> motion_error(const Robot& robot, const Measurement& measurement) {
   const bool axis = robot.model == "single_axis";

@@ -1,19 +1,43 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Which errors of the rows stand on declared sensor bounds, and which must be estimated.
+/// Error bounds of the rows: declared by sensor bounds or estimated, and the bound of each output's residual.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include <wheelwright/bounds/minimax.hpp>
+#include <wheelwright/core/warrant.hpp>
 #include <wheelwright/filter/measurement.hpp>
 #include <wheelwright/filter/noise.hpp>
+#include <wheelwright/identify/noise_level.hpp>
 #include <wheelwright/model/model.hpp>
 #include <wheelwright/model/robot.hpp>
 
 namespace wheelwright {
+
+/// Where the noise bound ē of an output comes from.
+enum class NoiseOrigin {
+  declared,   ///< the sensors' declared bounds, propagated through the filter
+  estimated,  ///< extrapolated from the residuals of this log (noise_level.hpp), on top of what is declared
+};
+
+/// The bound on what y − Yθ (for the torque residual τ_f − Y_f θ) can be without a fault, in one output.
+struct OutputNoise {
+  NoiseOrigin origin = NoiseOrigin::estimated;
+  double bound = 0.0;     ///< for driving to come: n̄ with ē, what a detector's rows have as dy
+  double learning = 0.0;  ///< for the rows of this log, from which the feasible set is made; what was seen needs
+                          ///< no extrapolation, so it is the smaller of the two
+  ExtrapolatedBound how;  ///< how `bound` came about, meaningful where estimated
+  Warrant warrant = Warrant::extrapolated;  ///< of both bounds
+};
+
+/// The factor by which estimated bounds must grow for a set to be left, and a little more. `fit`, in units of the bounds,
+/// tells it where it converged; else it is bisected between what `fit` proved, by `leaves_a_set`.
+[[nodiscard]] double noise_that_leaves_a_set(const MinimaxFit& fit, const std::function<bool(double)>& leaves_a_set);
 
 /// The declared part of the noise.
 struct NoiseBudget {

@@ -1,16 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// θ_L in the words of a data sheet.
+/// θ_L in the words of a data sheet, and the choice of the dry-friction parameters.
 #pragma once
 
 #include <optional>
 #include <string>
 #include <vector>
 
+#include <wheelwright/commission/validation.hpp>
 #include <wheelwright/core/interval.hpp>
+#include <wheelwright/core/regression.hpp>
 #include <wheelwright/model/robot.hpp>
 
 namespace wheelwright {
+
+/// Root mean square errors on held-out blocks, relative to the torque, of the first `basic` parameters alone and of all.
+struct ParameterChoice {
+  double nrmse_basic = 0.0;
+  double nrmse_full = 0.0;
+  bool full = false;  ///< all parameters are worth having: the held-out error falls by more than a tenth
+};
+
+/// Fits both on the training blocks of `rows` and compares them on the held-out ones; two walks.
+[[nodiscard]] ParameterChoice choose_parameters(RegressionSource& rows, std::size_t basic, std::size_t log_rows,
+                                                const FoldOptions& folds);
 
 /// physical = scale · θ_L,j − offset.
 struct PhysicalScale {

@@ -7,11 +7,10 @@
 #include <fmt/format.h>
 
 #include <wheelwright/commission/noise_budget.hpp>
-#include <wheelwright/commission/parameter_choice.hpp>
+#include <wheelwright/commission/physical.hpp>
 #include <wheelwright/core/check.hpp>
-#include <wheelwright/identify/difference_noise.hpp>
 #include <wheelwright/identify/instruments.hpp>
-#include <wheelwright/identify/shared_noise.hpp>
+#include <wheelwright/identify/noise_level.hpp>
 #include <wheelwright/model/effect_law.hpp>
 
 namespace wheelwright {

@@ -12,8 +12,8 @@
 
 #include <wheelwright/bounds/box.hpp>
 #include <wheelwright/commission/filter_choice.hpp>
-#include <wheelwright/commission/folds.hpp>
 #include <wheelwright/commission/survey.hpp>
+#include <wheelwright/commission/validation.hpp>
 #include <wheelwright/core/log.hpp>
 #include <wheelwright/filter/measurement.hpp>
 #include <wheelwright/filter/noise.hpp>

@@ -8,8 +8,8 @@
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/limits.hpp>
+#include <wheelwright/detector/events.hpp>
 #include <wheelwright/detector/fault_margin.hpp>
-#include <wheelwright/detector/lasting.hpp>
 
 namespace wheelwright {
 namespace {

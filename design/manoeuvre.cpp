@@ -2,14 +2,103 @@
 #include <wheelwright/design/manoeuvre.hpp>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
 #include <span>
 #include <vector>
 
+#include <wheelwright/core/check.hpp>
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/design/search.hpp>
 #include <wheelwright/design/stages.hpp>
 
 namespace wheelwright {
+namespace {
+
+constexpr double kFirstZeroOfJ0 = 2.404825557695773;
+constexpr double kRamp = 1.0;        // s from rest, and to rest
+constexpr double kRestAtEnds = 0.1;  // s of standstill at both ends
+constexpr double kStep = 0.02;       // s, for the search
+
+struct Window {
+  double value = 0.0;
+  double rate = 0.0;
+};
+
+Window smooth_step(double t) {
+  if (t <= 0.0 || t >= kRamp) {
+    return {t <= 0.0 ? 0.0 : 1.0, 0.0};
+  }
+  const double s = t / kRamp;
+  return {s * s * (3.0 - 2.0 * s), 6.0 * s * (1.0 - s) / kRamp};
+}
+
+}  // namespace
+
+Plan plan_of(const FigureEight& eight, const DesignSubject& subject, double duration, double step) {
+  check::that(subject.model.name == "differential_drive", "figure eight: the model", "a differential drive");
+  check::positive(eight.period, "period");
+  const double w = 2.0 * std::numbers::pi / eight.period;
+  Plan plan;
+  plan.step = step;
+  const auto samples = static_cast<Eigen::Index>(std::floor(duration / step * (1.0 + 1e-12))) + 1;
+  plan.speed.resize(2, samples);
+  plan.acceleration.resize(2, samples);
+  for (Eigen::Index k = 0; k < samples; ++k) {
+    const double t = plan.t(k) - kRestAtEnds, left = duration - kRestAtEnds - plan.t(k);
+    const Window begin = smooth_step(t), end = smooth_step(left);
+    const Window window{begin.value * end.value, begin.rate * end.value - begin.value * end.rate};
+    const double yaw = kFirstZeroOfJ0 * w * std::cos(w * t), yaw_rate = -kFirstZeroOfJ0 * w * w * std::sin(w * t);
+    plan.speed.col(k) << eight.speed * window.value, yaw * window.value;
+    plan.acceleration.col(k) << eight.speed * window.rate, yaw_rate * window.value + yaw * window.rate;
+  }
+  integrate_pose(plan, subject.model);
+  return plan;
+}
+
+FigureEight best_figure_eight(const DesignSubject& subject, const MotionLimits& limits, const RowObjective& objective) {
+  return best_figure_eight(subject, limits, of_rows(objective, subject));
+}
+
+std::optional<FigureEight> find_figure_eight(const DesignSubject& subject, const MotionLimits& limits,
+                                             const PlanObjective& objective) {
+  validate(limits);
+  const auto within = [&](const FigureEight& eight) {
+    return limit_use(plan_of(eight, subject, limits.duration, kStep), subject, limits).largest() <= 1.0;
+  };
+  FigureEight best;
+  double least = std::numeric_limits<double>::infinity();
+  const double fastest = subject.robot.wheel_radius * limits.joint_speed;
+  for (double period = 0.25; period <= 2.0 * limits.duration; period *= 1.125) {
+    if (!within({0.0, period})) {
+      continue;
+    }
+    double low = 0.0, high = fastest;
+    for (int i = 0; i < 12; ++i) {
+      const double middle = 0.5 * (low + high);
+      (within({middle, period}) ? low : high) = middle;
+    }
+    for (const double share : {1.0, 0.85, 0.7, 0.5, 0.3}) {
+      const FigureEight eight{share * low, period};
+      const double value = objective(plan_of(eight, subject, limits.duration, kStep));
+      if (value < least) {
+        least = value;
+        best = eight;
+      }
+    }
+  }
+  return std::isfinite(least) ? std::optional(best) : std::nullopt;
+}
+
+FigureEight best_figure_eight(const DesignSubject& subject, const MotionLimits& limits,
+                              const PlanObjective& objective) {
+  const std::optional<FigureEight> best = find_figure_eight(subject, limits, objective);
+  if (!best) {
+    throw InvalidArgument("limits: no figure eight is within them: expected a higher limit or more time");
+  }
+  return *best;
+}
+
 namespace {
 
 // Straight at full speed and turning on the spot at full speed, by turns: what a person would try first.

@@ -6,11 +6,83 @@
 #include <string>
 #include <vector>
 
+#include <wheelwright/bounds/interval_hull.hpp>
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/linear_algebra.hpp>
-#include <wheelwright/design/effort.hpp>
 
 namespace wheelwright {
+
+EffortModel::EffortModel(const DesignSubject& subject)
+    : subject_(&subject),
+      input_inverse_(pseudo_inverse(subject.model.input)),
+      joint_of_coordinate_(pseudo_inverse(subject.model.motion)),
+      centre_(subject.theta.size()),
+      half_(subject.theta.size()) {
+  for (Eigen::Index j = 0; j < centre_.size(); ++j) {
+    const Interval& side = subject.effort_box.sides[static_cast<std::size_t>(j)];
+    centre_[j] = 0.5 * (side.lower + side.upper);
+    half_[j] = 0.5 * (side.upper - side.lower);
+  }
+}
+
+Eigen::MatrixXd EffortModel::per_parameter(const Eigen::VectorXd& v, const Eigen::VectorXd& a, double heading) const {
+  const Eigen::VectorXd joint = joint_of_coordinate_ * v;
+  const Eigen::VectorXd none = Eigen::VectorXd::Zero(std::max(v.size(), joint.size()));
+  const auto view = [](const Eigen::VectorXd& x, Eigen::Index n) {
+    return std::span<const double>(x.data(), static_cast<std::size_t>(n));
+  };
+  MotionState state;
+  state.speed = view(v, v.size());
+  state.speed_error = view(none, v.size());
+  state.joint_speed = view(joint, joint.size());
+  state.joint_error = view(none, joint.size());
+  state.heading = heading;
+  return input_inverse_ * regressor(subject_->model, state, view(a, a.size()));
+}
+
+Eigen::VectorXd EffortModel::largest(const Eigen::VectorXd& v, const Eigen::VectorXd& a, double heading) const {
+  const Eigen::MatrixXd rows = per_parameter(v, a, heading);
+  return (rows * centre_).cwiseAbs() + rows.cwiseAbs() * half_;
+}
+
+Eigen::VectorXd EffortModel::believed(const Eigen::VectorXd& v, const Eigen::VectorXd& a, double heading) const {
+  return per_parameter(v, a, heading) * subject_->theta;
+}
+
+MotionLimits limits_of(const Robot& robot) {
+  MotionLimits limits;
+  const auto find = [&robot](const char* name) -> std::optional<double> {
+    const auto found = robot.limits.find(name);
+    return found == robot.limits.end() ? std::nullopt : std::optional(found->second);
+  };
+  limits.joint_speed = find("speed").value_or(0.0);
+  limits.joint_acceleration = find("acceleration");
+  limits.effort = find("effort");
+  return limits;
+}
+
+void validate(const MotionLimits& limits) {
+  check::positive(limits.duration, "limits.duration");
+  check::positive(limits.joint_speed, "limits.joint_speed");
+  check::that(limits.joint_acceleration || limits.effort, "limits.joint_acceleration",
+              "a limit on the acceleration or on the effort");
+  if (limits.joint_acceleration) {
+    check::positive(*limits.joint_acceleration, "limits.joint_acceleration");
+  }
+  if (limits.effort) {
+    check::positive(*limits.effort, "limits.effort");
+  }
+  if (limits.radius) {
+    check::positive(*limits.radius, "limits.radius");
+  }
+  if (limits.box) {
+    for (const Interval& side : *limits.box) {
+      check::that(side.lower < 0.0 && side.upper > 0.0 && side.upper - side.lower < 1e9, "limits.box",
+                  "finite sides with the start, [0, 0], inside");
+    }
+  }
+}
+
 namespace {
 
 // θ of the next sample's heading and the chord driven, from the mean twist of a step.
@@ -101,6 +173,42 @@ LogTable command_table(const Plan& plan, const Model& model) {
   add("y", plan.pose.row(1));
   add("theta", plan.pose.row(2));
   return table;
+}
+
+Box promised_bounds(const RegressionBlock& rows, const DesignSubject& subject) {
+  RegressionTable table(rows);
+  return interval_hull(table, subject.prior).hull;
+}
+
+Eigen::VectorXd relative_widths(const Box& bounds, const DesignSubject& subject) {
+  Eigen::VectorXd widths(subject.theta.size());
+  for (Eigen::Index j = 0; j < widths.size(); ++j) {
+    const Interval& side = bounds.sides[static_cast<std::size_t>(j)];
+    const Interval& prior = subject.prior.sides[static_cast<std::size_t>(j)];
+    const double scale = subject.theta[j] != 0.0 ? std::abs(subject.theta[j]) : prior.upper - prior.lower;
+    widths[j] = scale > 0.0 ? (side.upper - side.lower) / scale : 0.0;
+  }
+  return widths;
+}
+
+double combined(const Eigen::VectorXd& widths, WidthCriterion criterion) {
+  switch (criterion) {
+    case WidthCriterion::geometric_mean: return std::exp(widths.array().max(1e-300).log().mean());
+    case WidthCriterion::mean: return widths.mean();
+    case WidthCriterion::largest: break;
+  }
+  return widths.maxCoeff();
+}
+
+PlanObjective of_rows(RowObjective objective, const DesignSubject& subject) {
+  return
+      [objective = std::move(objective), &subject](const Plan& plan) { return objective(planned_rows(plan, subject)); };
+}
+
+RowObjective narrow_bounds(const DesignSubject& subject, WidthCriterion criterion) {
+  return [&subject, criterion](const RegressionBlock& rows) {
+    return combined(relative_widths(promised_bounds(rows, subject), subject), criterion);
+  };
 }
 
 }  // namespace wheelwright

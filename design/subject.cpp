@@ -12,7 +12,6 @@
 #include <wheelwright/commission/survey.hpp>
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/design/effort.hpp>
 #include <wheelwright/design/plan.hpp>
 #include <wheelwright/filter/regression_stream.hpp>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Detectability along a drive: which faults will certainly be seen, how soon, and in which manoeuvre.
+/// Detectability along a drive: which faults will certainly be seen, how soon, in which manoeuvre, and where to drive for it.
 #pragma once
 
 #include <cstddef>
@@ -11,14 +11,34 @@
 #include <string_view>
 #include <vector>
 
+#include <Eigen/Core>
+
 #include <wheelwright/detector/events.hpp>
 #include <wheelwright/detector/fault_margin.hpp>
 #include <wheelwright/detector/fault_rows.hpp>
 #include <wheelwright/detector/fault_type.hpp>
-#include <wheelwright/detector/manoeuvre_kind.hpp>
 #include <wheelwright/detector/reference_motion.hpp>
+#include <wheelwright/filter/noise.hpp>
 
 namespace wheelwright {
+
+/// What a robot does for a while.
+enum class ManoeuvreKind {
+  standstill,
+  cruising,      ///< straight, or a single axis, at nearly constant speed
+  accelerating,  ///< straight, or a single axis
+  turning,       ///< forward and yaw motion
+  spinning,      ///< on the spot
+};
+
+/// In words, e.g. "cruising straight".
+[[nodiscard]] std::string_view words(ManoeuvreKind kind);
+
+/// What kind instants [first, last) of `motion` are of, by root mean squares over them: standstill below 3 % of the
+/// largest joint speed of the whole motion; of two joints, straight where their difference is below a tenth of their
+/// sum, spinning where their sum is below a tenth of their difference; accelerating where the joints' acceleration times
+/// the stretch's length is above half their speed.
+[[nodiscard]] ManoeuvreKind kind_of(const ReferenceMotion& motion, std::size_t first, std::size_t last);
 
 /// How a drive is asked about. Sizes of faults are magnitudes, in the unit of their type.
 struct MarginOptions {
@@ -83,5 +103,26 @@ using FaultRowsFactory = std::function<std::unique_ptr<FaultRows>(const FaultTyp
 [[nodiscard]] std::vector<FaultMargins> margins_along(const ReferenceMotion& motion,
                                                       const std::vector<FaultType>& faults, const ThresholdRule& rule,
                                                       const FaultRowsFactory& rows, const MarginOptions& options = {});
+
+/// A plane of operating points: two coordinates' speeds at no acceleration, or their accelerations while passing through
+/// the speeds `at`.
+struct OperatingPlane {
+  bool accelerations = false;  ///< the axes are accelerations
+  std::vector<double> x;       ///< of the first coordinate, m/s or m/s²
+  std::vector<double> y;       ///< of the second one, rad/s or rad/s²; a single value for models with one coordinate
+  Eigen::VectorXd at{};        ///< speeds, one for each coordinate, where the axes are accelerations
+};
+
+/// Smallest certain magnitude of a fault on one side at each point, x.size() × y.size(); infinite where none is certain.
+struct OperatingMap {
+  OperatingPlane plane;
+  Eigen::MatrixXd smallest;
+};
+
+/// The map of `fault` for a detector with thresholds `rule` whose rows have the errors `errors`, once the filter has
+/// settled at each point (settled_rows()). Throws InvalidArgument for empty axes.
+[[nodiscard]] OperatingMap operating_map(const FaultType& fault, double side, const Model& model,
+                                         const FilterDesign& design, const SignalErrors& errors,
+                                         const ThresholdRule& rule, OperatingPlane plane);
 
 }  // namespace wheelwright

@@ -4,15 +4,15 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/commission/contradiction_search.hpp>
+#include <wheelwright/commission/contradictions.hpp>
 #include <wheelwright/commission/fit.hpp>
 #include <wheelwright/commission/physical.hpp>
 #include <wheelwright/commission/setting.hpp>
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/core/statistics.hpp>
-#include <wheelwright/doctor/health_view.hpp>
+#include <wheelwright/doctor/log_health.hpp>
 #include <wheelwright/inference/direction_words.hpp>
-#include <wheelwright/inference/information_over_time.hpp>
+#include <wheelwright/inference/identifiability.hpp>
 
 namespace wheelwright {
 namespace {

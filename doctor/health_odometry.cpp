@@ -13,7 +13,7 @@
 #include <wheelwright/commission/pose_origin.hpp>
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/core/statistics.hpp>
-#include <wheelwright/doctor/health_view.hpp>
+#include <wheelwright/doctor/log_health.hpp>
 #include <wheelwright/inference/kinematic_calibration.hpp>
 
 namespace wheelwright {

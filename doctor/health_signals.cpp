@@ -9,9 +9,9 @@
 #include <fmt/format.h>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/doctor/health_view.hpp>
+#include <wheelwright/doctor/log_health.hpp>
 #include <wheelwright/filter/encoder.hpp>
-#include <wheelwright/identify/difference_noise.hpp>
+#include <wheelwright/identify/noise_level.hpp>
 #include <wheelwright/inference/standstill_noise.hpp>
 
 namespace wheelwright {

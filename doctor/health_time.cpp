@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/doctor/health_view.hpp>
+#include <wheelwright/doctor/log_health.hpp>
 
 namespace wheelwright {
 namespace {

@@ -2,10 +2,12 @@
 #include <wheelwright/doctor/log_health.hpp>
 
 #include <algorithm>
+#include <cmath>
 
 #include <fmt/format.h>
 
-#include <wheelwright/doctor/health_view.hpp>
+#include <wheelwright/core/check.hpp>
+#include <wheelwright/core/statistics.hpp>
 
 namespace wheelwright {
 namespace {
@@ -167,6 +169,193 @@ LogHealth examine(const LogTable& log, const std::optional<Robot>& robot, const 
   const bool reaches_bounds = log.rows() > 0 && check_motion(view, health.findings);
   conclude(view, reaches_bounds, health);
   return health;
+}
+
+namespace {
+
+constexpr std::size_t kHalfWindow = 5;  // rows to each side for a smooth speed
+constexpr double kMoves = 0.05;         // of the top speed
+
+bool has(const LogTable& log, const std::string& name) { return std::ranges::count(log.names, name) > 0; }
+
+const std::vector<double>* column_of(const LogTable& log, const std::string& name) {
+  const auto at = std::ranges::find(log.names, name);
+  return at == log.names.end() ? nullptr : &log.columns[static_cast<std::size_t>(at - log.names.begin())];
+}
+
+// Geometry one: excitation does not depend on it.
+Robot stand_in(const LogTable& log) {
+  Robot robot;
+  robot.name = "unknown";
+  const bool wheels = has(log, "omega_r") || has(log, "omega_l") || has(log, "phi_r") || has(log, "phi_l");
+  if (!wheels && (has(log, "position") || has(log, "velocity"))) {
+    robot.model = "single_axis";
+    return robot;
+  }
+  robot.wheel_radius = 1.0;
+  robot.track_width = 2.0;
+  const auto both = [&](const char* right, const char* left) { return has(log, right) && has(log, left); };
+  robot.effort = both("tau_r", "tau_l")           ? EffortKind::torque
+                 : both("current_r", "current_l") ? EffortKind::current
+                 : both("voltage_r", "voltage_l") ? EffortKind::voltage
+                                                  : EffortKind::torque;
+  return robot;
+}
+
+const std::string& effort_name(const Robot& robot, const Joint& joint) {
+  return robot.effort == EffortKind::torque    ? joint.torque
+         : robot.effort == EffortKind::current ? joint.current
+                                               : joint.voltage;
+}
+
+std::vector<double> smooth_speed(const HealthView& view, const JointView& joint) {
+  const std::vector<double>& t = view.log->t;
+  std::vector<double> out(t.size(), 0.0);
+  for (const auto& [first, last] : view.segments) {
+    for (std::size_t k = first; k < last; ++k) {
+      const std::size_t a = k < first + kHalfWindow ? first : k - kHalfWindow;
+      const std::size_t b = std::min(k + kHalfWindow, last - 1);
+      if (joint.angle != nullptr) {
+        out[k] = b > a ? ((*joint.angle)[b] - (*joint.angle)[a]) / (t[b] - t[a]) : 0.0;
+      } else {
+        double sum = 0.0;
+        for (std::size_t i = a; i <= b; ++i) {
+          sum += (*joint.speed)[i];
+        }
+        out[k] = sum / static_cast<double>(b - a + 1);
+      }
+    }
+  }
+  return out;
+}
+
+double top_of(std::vector<double> values) {
+  if (values.empty()) {
+    return 0.0;
+  }
+  std::ranges::transform(values, values.begin(), [](double v) { return std::abs(v); });
+  const auto rank = static_cast<std::size_t>(0.99 * static_cast<double>(values.size() - 1));
+  return order_statistic(std::move(values), rank);
+}
+
+}  // namespace
+
+const std::vector<double>* HealthView::column(const std::string& name) const { return column_of(*log, name); }
+
+bool HealthView::has_motion() const {
+  return std::ranges::all_of(joints, [](const JointView& j) { return j.angle != nullptr; }) ||
+         std::ranges::all_of(joints, [](const JointView& j) { return j.speed != nullptr; });
+}
+
+bool HealthView::has_effort() const {
+  return std::ranges::all_of(joints, [](const JointView& j) { return j.effort != nullptr; });
+}
+
+bool HealthView::one_sided(const JointView& joint) const {
+  const std::vector<double>& effort = *joint.effort;
+  const double most = effort.empty() ? 0.0 : *std::ranges::max_element(effort);
+  std::size_t negative = 0, back = 0;
+  for (std::size_t k = 0; k < effort.size(); ++k) {
+    negative += effort[k] < -0.05 * most ? 1U : 0U;
+    back += joint.smooth[k] < -0.1 * joint.top ? 1U : 0U;
+  }
+  return most > 0.0 && 200 * negative < effort.size() && 50 * back > effort.size();
+}
+
+HealthView make_view(const LogTable& log, const std::optional<Robot>& robot) {
+  HealthView view;
+  view.log = &log;
+  for (const auto& column : log.columns) {
+    check::that(column.size() == log.rows(), "log", "columns as long as its time");
+  }
+  view.robot_given = robot.has_value();
+  view.robot = robot ? *robot : stand_in(log);
+  view.model = make_model(view.robot);
+  view.step = median_step(log.t);
+  std::vector<std::size_t> starts = log.segment_starts;
+  if (starts.empty() || starts.front() != 0) {
+    starts.insert(starts.begin(), 0);
+  }
+  for (std::size_t s = 0; s < starts.size(); ++s) {
+    view.segments.emplace_back(starts[s], s + 1 < starts.size() ? starts[s + 1] : log.rows());
+  }
+  for (const Joint& joint : view.model.joints) {
+    JointView j;
+    j.angle_name = joint.angle;
+    j.speed_name = joint.speed;
+    j.effort_name = effort_name(view.robot, joint);
+    j.angle = view.column(j.angle_name);
+    j.speed = view.column(j.speed_name);
+    j.effort = view.column(j.effort_name);
+    view.joints.push_back(j);
+  }
+  view.moving.assign(log.rows(), false);
+  for (JointView& j : view.joints) {
+    if (!j.has_motion()) {
+      continue;
+    }
+    j.smooth = smooth_speed(view, j);
+    j.top = top_of(j.smooth);
+    for (std::size_t k = 0; k < log.rows(); ++k) {
+      view.moving[k] = view.moving[k] || std::abs(j.smooth[k]) > kMoves * j.top;
+    }
+  }
+  view.robot.effort_unsigned =
+      view.robot.effort_unsigned ||
+      (!view.robot_given && view.has_motion() && view.has_effort() &&
+       std::ranges::any_of(view.joints, [&](const JointView& j) { return view.one_sided(j); }));
+  return view;
+}
+
+void set_stretches(LogFinding& finding, const HealthView& view, const std::vector<bool>& flagged, double join) {
+  const std::vector<double>& t = view.log->t;
+  finding.when.clear();
+  finding.stretches = 0;
+  for (const auto& [first, last] : view.segments) {
+    bool open = false;
+    double from = 0.0, to = 0.0;
+    const auto close = [&] {
+      if (open && ++finding.stretches <= kMostStretches) {
+        finding.when.push_back({from, to});
+      }
+      open = false;
+    };
+    for (std::size_t k = first; k < last; ++k) {
+      if (!flagged[k]) {
+        continue;
+      }
+      if (open && t[k] - to > join) {
+        close();
+      }
+      from = open ? from : t[k];
+      to = t[k];
+      open = true;
+    }
+    close();
+  }
+}
+
+std::string unit_for_ratio(double ratio, bool rates) {
+  struct Known {
+    double ratio;
+    const char* unit;
+  };
+  constexpr Known kRates[] = {
+      {57.29577951308232, "deg/s"}, {9.549296585513721, "rpm"}, {0.15915494309189535, "turns/s"}};
+  constexpr Known kOthers[] = {
+      {57.29577951308232, "degrees"}, {1000.0, "thousandths"}, {100.0, "hundredths"}, {0.001, "thousands"}};
+  const auto fits = [&](const Known& k) { return std::abs(ratio / k.ratio - 1.0) < 0.1; };
+  for (const Known& k : kRates) {
+    if (rates && fits(k)) {
+      return k.unit;
+    }
+  }
+  for (const Known& k : kOthers) {
+    if (!rates && fits(k)) {
+      return k.unit;
+    }
+  }
+  return {};
 }
 
 }  // namespace wheelwright

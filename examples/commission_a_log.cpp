@@ -12,8 +12,8 @@
 #include <fmt/format.h>
 
 #include <wheelwright/commission/commission.hpp>
+#include <wheelwright/commission/detector_walk.hpp>
 #include <wheelwright/commission/physical.hpp>
-#include <wheelwright/commission/trace.hpp>
 #include <wheelwright/robots/scenario_file.hpp>
 #include <wheelwright/sim/simulation.hpp>
 

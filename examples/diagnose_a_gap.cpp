@@ -14,9 +14,8 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/gap/catalogue.hpp>
-#include <wheelwright/gap/catalogue_parts.hpp>
 #include <wheelwright/gap/diagnose.hpp>
+#include <wheelwright/gap/effect.hpp>
 #include <wheelwright/robots/scenario_file.hpp>
 #include <wheelwright/sim/simulation.hpp>
 

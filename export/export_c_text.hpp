@@ -51,10 +51,10 @@ extern const std::string_view kTypes;
 /// FilterKernel (filter/kernel.hpp) for nodes, smoothed and not: state, weights of a step, prepare, take, value.
 extern const std::string_view kSmoothKernel;
 extern const std::string_view kNodeKernel;
-/// exponential_moments() (filter/exact.hpp) as far as speeds need it, and FilterKernel for them: order 1 and 2.
+/// exponential_moments() (filter/kernel.hpp) as far as speeds need it, and FilterKernel for them: order 1 and 2.
 extern const std::string_view kFirstOrderKernel;
 extern const std::string_view kSpeedKernel;
-/// SlopeMajorant (filter/exact.hpp).
+/// SlopeMajorant (filter/kernel.hpp).
 extern const std::string_view kMajorant;
 /// Box::support, of the hull.
 extern const std::string_view kHull;

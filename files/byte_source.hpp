@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The bytes of a file, unpacked where it is packed.
+/// Byte streams of files, unpacked where they are packed, and their lines, in bounded memory.
 #pragma once
 
 #include <cstddef>
@@ -8,6 +8,8 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <string_view>
+#include <vector>
 
 namespace wheelwright {
 
@@ -32,5 +34,34 @@ class ByteSource {
 
 /// All bytes of `path`, unpacked. Throws InputError as open_bytes does, and when there are more than `limit`.
 [[nodiscard]] std::string read_bytes(const std::filesystem::path& path, std::size_t limit);
+
+/// Walks the lines of a ByteSource. Line ends are LF or CRLF; a UTF-8 byte order mark at the beginning is skipped.
+class LineReader {
+ public:
+  /// Takes `source` over; `path` is for messages.
+  LineReader(std::unique_ptr<ByteSource> source, std::string path);
+
+  /// Sets `line` to the next line, its end removed, and returns true; false at the end of the stream. `line` stays
+  /// valid until the next call. Throws InputError for a line of more than 2^18 bytes.
+  bool next(std::string_view& line);
+
+  /// Number of the line that was returned last; the first is 1.
+  [[nodiscard]] std::size_t number() const { return number_; }
+  /// Whether the line that was returned last had a line end (only the last of a file may lack it).
+  [[nodiscard]] bool terminated() const { return terminated_; }
+  /// The stream.
+  [[nodiscard]] const ByteSource& source() const { return *source_; }
+
+ private:
+  bool refill();
+
+  std::unique_ptr<ByteSource> source_;
+  std::string path_;
+  std::vector<char> buffer_;
+  std::size_t begin_ = 0;
+  std::size_t end_ = 0;
+  std::size_t number_ = 0;
+  bool terminated_ = false;
+};
 
 }  // namespace wheelwright

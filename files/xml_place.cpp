@@ -7,7 +7,7 @@
 #include <tinyxml2.h>
 
 #include <wheelwright/files/number.hpp>
-#include <wheelwright/files/suggest.hpp>
+#include <wheelwright/files/words.hpp>
 
 namespace wheelwright {
 namespace {

@@ -11,7 +11,7 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/files/file_place.hpp>
+#include <wheelwright/files/yaml_place.hpp>
 
 namespace wheelwright {
 

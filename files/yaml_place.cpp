@@ -9,7 +9,7 @@
 
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/files/number.hpp>
-#include <wheelwright/files/suggest.hpp>
+#include <wheelwright/files/words.hpp>
 
 namespace wheelwright {
 

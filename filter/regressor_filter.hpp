@@ -11,9 +11,7 @@
 #include <Eigen/Core>
 
 #include <wheelwright/core/regression.hpp>
-#include <wheelwright/filter/design.hpp>
 #include <wheelwright/filter/effort_correction.hpp>
-#include <wheelwright/filter/exact.hpp>
 #include <wheelwright/filter/kernel.hpp>
 #include <wheelwright/filter/measurement.hpp>
 #include <wheelwright/filter/motion_bound.hpp>

@@ -2,9 +2,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include <wheelwright/filter/exact.hpp>
-#include <wheelwright/gap/catalogue.hpp>
-#include <wheelwright/gap/catalogue_parts.hpp>
+#include <wheelwright/filter/kernel.hpp>
+#include <wheelwright/gap/effect.hpp>
 
 namespace wheelwright {
 namespace {

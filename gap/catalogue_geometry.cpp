@@ -2,8 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include <wheelwright/gap/catalogue.hpp>
-#include <wheelwright/gap/catalogue_parts.hpp>
+#include <wheelwright/gap/effect.hpp>
 #include <wheelwright/gap/kinematic_rows.hpp>
 
 namespace wheelwright {

@@ -5,7 +5,7 @@
 #include <limits>
 #include <optional>
 
-#include <wheelwright/gap/remainder.hpp>
+#include <wheelwright/gap/block_gram.hpp>
 
 namespace wheelwright {
 namespace {

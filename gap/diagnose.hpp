@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// From a log to a diagnosis of its sim-to-real gap, front to back.
+/// Diagnosis of a log's sim-to-real gap, front to back, and its trial on a fresh log.
 #pragma once
 
 #include <cstddef>
@@ -42,5 +42,12 @@ struct DiagnoseOptions {
 /// log or robot that cannot be used at all; what the data say is in the result.
 [[nodiscard]] Diagnosis diagnose(LogSource& log, LogSource* baseline, const Robot& robot,
                                  const DiagnoseOptions& options = {});
+
+/// What the model leaves of the filtered efforts of `fresh`, a log of the same robot that was not looked at: the nominal
+/// model (`before`), and the one with θ and causes as `found` has them (`after`, with the interval of a block bootstrap);
+/// nothing is fitted to it. With the filter of `found`, `options` and `baseline` as it was made with; nothing for a log
+/// without efforts. Throws as diagnose() does.
+[[nodiscard]] std::vector<ShrinkFigure> torque_on(LogSource& fresh, LogSource* baseline, const Robot& robot,
+                                                  const Diagnosis& found, const DiagnoseOptions& options = {});
 
 }  // namespace wheelwright

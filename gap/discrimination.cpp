@@ -10,7 +10,7 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/filter/noise.hpp>
-#include <wheelwright/gap/drive_filter.hpp>
+#include <wheelwright/gap/drive.hpp>
 #include <wheelwright/gap/signed_least_squares.hpp>
 
 namespace wheelwright {

@@ -11,7 +11,7 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/design/stages.hpp>
-#include <wheelwright/gap/planned_drive.hpp>
+#include <wheelwright/gap/further_drive.hpp>
 
 namespace wheelwright {
 namespace {

@@ -4,8 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <iterator>
+#include <string>
+#include <utility>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/linear_algebra.hpp>
 
 namespace wheelwright {
 namespace {
@@ -65,5 +69,196 @@ std::vector<std::vector<double>> shape_grid(const Effect& effect, const Drive& d
   }
   return grid;
 }
+
+}  // namespace wheelwright
+
+namespace wheelwright::catalogue {
+namespace {
+
+void add_to(Eigen::VectorXd& to, double factor, const Eigen::VectorXd& signal) {
+  if (signal.size() == 0 || factor == 0.0) {
+    return;
+  }
+  if (to.size() == 0) {
+    to = factor * signal;
+  } else {
+    to += factor * signal;
+  }
+}
+
+std::vector<Eigen::VectorXd> outputs_of(const Drive& drive, const std::vector<Eigen::VectorXd>& effort) {
+  std::vector<Eigen::VectorXd> outputs(drive.model.n());
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    for (std::size_t j = 0; j < effort.size(); ++j) {
+      add_to(outputs[i], drive.model.input(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)), effort[j]);
+    }
+  }
+  return outputs;
+}
+
+void add_all(std::vector<Eigen::VectorXd>& a, const std::vector<Eigen::VectorXd>& b) {
+  a.resize(std::max(a.size(), b.size()));
+  for (std::size_t i = 0; i < b.size(); ++i) {
+    add_to(a[i], 1.0, b[i]);
+  }
+}
+
+}  // namespace
+
+double deviation(const Eigen::VectorXd& signal) { return std::sqrt((signal.array() - signal.mean()).square().mean()); }
+
+Eigen::VectorXd soft_sign(const Eigen::VectorXd& signal, double width) {
+  return (signal / width).array().tanh().matrix();
+}
+
+double typical_speed(const Drive& drive) {
+  return std::max({deviation(drive.joints[0].smooth_speed), drive.count, 1e-12});
+}
+
+double sign_width(const Drive& drive) { return std::max(0.006 * typical_speed(drive), 0.4 * drive.count); }
+
+Eigen::VectorXd speed_sign(const Drive& drive, std::size_t joint) {
+  return soft_sign(drive.joints[joint].smooth_speed, sign_width(drive));
+}
+
+Column at_joints(const Drive& drive, const std::vector<Eigen::VectorXd>& effort) {
+  Column column;
+  column.effort = outputs_of(drive, effort);
+  return column;
+}
+
+Column rate_at_joints(const Drive& drive, const std::vector<Eigen::VectorXd>& effort) {
+  Column column;
+  column.effort_rate = outputs_of(drive, effort);
+  return column;
+}
+
+std::vector<Eigen::VectorXd> only(const Drive& drive, std::size_t joint, Eigen::VectorXd signal) {
+  std::vector<Eigen::VectorXd> signals(drive.joints.size());
+  signals[joint] = std::move(signal);
+  return signals;
+}
+
+Column unseen_motion(const Drive& drive, const std::vector<Eigen::VectorXd>& speed, bool friction) {
+  Column column;
+  column.effort.resize(drive.model.n());
+  column.effort_rate.resize(drive.model.n());
+  for (const Term& term : drive.model.terms) {
+    if (term.kind == Term::Kind::function || (term.kind == Term::Kind::speed && !friction)) {
+      continue;
+    }
+    auto& group = term.kind == Term::Kind::acceleration ? column.effort_rate : column.effort;
+    const double factor = drive.theta[static_cast<Eigen::Index>(term.parameter)] * term.scale;
+    add_to(group[term.output], factor, speed[term.coordinate]);
+  }
+  if (drive.two_wheels()) {
+    column.forward = speed[0];
+    column.yaw = speed[1];
+  }
+  return column;
+}
+
+Column unseen_rim_speeds(const Drive& drive, const Eigen::VectorXd& right, const Eigen::VectorXd& left, bool friction) {
+  Eigen::VectorXd forward, yaw;
+  add_to(forward, 0.5, right);
+  add_to(forward, 0.5, left);
+  add_to(yaw, 1.0 / drive.track_width, right);
+  add_to(yaw, -1.0 / drive.track_width, left);
+  return unseen_motion(drive, {forward, yaw}, friction);
+}
+
+std::vector<Eigen::VectorXd> inertial_efforts(const Drive& drive) {
+  const auto n = static_cast<Eigen::Index>(drive.model.n());
+  Eigen::MatrixXd outputs = Eigen::MatrixXd::Zero(drive.rows(), n);
+  for (const Term& term : drive.model.terms) {
+    if (term.kind == Term::Kind::acceleration) {
+      outputs.col(static_cast<Eigen::Index>(term.output)) += drive.theta[static_cast<Eigen::Index>(term.parameter)] *
+                                                             term.scale *
+                                                             drive.coordinates[term.coordinate].smooth_acceleration;
+    }
+  }
+  const Eigen::MatrixXd inverse = wheelwright::inverse(drive.model.input);
+  std::vector<Eigen::VectorXd> joints;
+  for (Eigen::Index j = 0; j < inverse.rows(); ++j) {
+    joints.push_back(outputs * inverse.row(j).transpose());
+  }
+  return joints;
+}
+
+Column base_column(const Drive& drive, std::string_view name) {
+  Column column;
+  column.effort.resize(drive.model.n());
+  column.effort_rate.resize(drive.model.n());
+  for (const Term& term : drive.model.terms) {
+    const Parameter& parameter = drive.model.parameters[term.parameter];
+    if (parameter.physical != name || term.kind == Term::Kind::function) {
+      continue;
+    }
+    auto& group = term.kind == Term::Kind::acceleration ? column.effort_rate : column.effort;
+    add_to(group[term.output], term.scale * parameter.per_physical, drive.coordinates[term.coordinate].speed);
+  }
+  return column;
+}
+
+void add(Column& a, const Column& b) {
+  add_all(a.effort, b.effort);
+  add_all(a.effort_rate, b.effort_rate);
+  add_to(a.forward, 1.0, b.forward);
+  add_to(a.lateral, 1.0, b.lateral);
+  add_to(a.yaw, 1.0, b.yaw);
+}
+
+ShapeParameter side() {
+  return {.name = "side_right0_left1", .unit = "1", .lower = 0.0, .upper = 1.0, .scan = 2, .discrete = true};
+}
+
+ShapeParameter side_or_opposite() {
+  return {.name = "right0_left1_opposite2", .unit = "1", .lower = 0.0, .upper = 2.0, .scan = 3, .discrete = true};
+}
+
+std::vector<Eigen::VectorXd> on_side(double side, const Eigen::VectorXd& right, const Eigen::VectorXd& left) {
+  const bool opposite = side > 1.5;
+  return {opposite || side < 0.5 ? right : Eigen::VectorXd(), opposite     ? Eigen::VectorXd(-left)
+                                                              : side < 0.5 ? Eigen::VectorXd()
+                                                                           : left};
+}
+
+Applicability needs_two_wheels(const Drive& drive) {
+  return drive.two_wheels() ? Applicability{} : Applicability{false, "the robot is not on two driven wheels"};
+}
+
+Applicability needs_heading(const Drive& drive) {
+  if (!drive.two_wheels()) {
+    return needs_two_wheels(drive);
+  }
+  return drive.has_heading() ? Applicability{} : Applicability{false, "the log has no heading"};
+}
+
+Applicability needs_no(const Drive& drive, std::string_view name) {
+  const auto same = [name](const Parameter& parameter) { return parameter.physical == name; };
+  return std::ranges::none_of(drive.model.parameters, same)
+             ? Applicability{}
+             : Applicability{false, "the base model has " + std::string(name) + " itself"};
+}
+
+}  // namespace wheelwright::catalogue
+
+namespace wheelwright {
+namespace {
+
+std::vector<Effect> catalogue_of(std::size_t joints) {
+  std::vector<Effect> all = friction_effects(joints);
+  for (auto* group : {&geometry_effects, &actuator_effects}) {
+    std::vector<Effect> more = group(joints);
+    all.insert(all.end(), std::make_move_iterator(more.begin()), std::make_move_iterator(more.end()));
+  }
+  return all;
+}
+
+}  // namespace
+
+std::vector<Effect> effect_catalogue() { return catalogue_of(2); }
+
+std::vector<Effect> effect_catalogue(const Model& model) { return catalogue_of(model.joints.size()); }
 
 }  // namespace wheelwright

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// An unmodelled effect as data: a user adds one by filling an Effect.
+/// Unmodelled effects as data, the parts that they are made of, and the catalogue.
 #pragma once
 
 #include <cstddef>
 #include <functional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <Eigen/Core>
@@ -100,5 +101,100 @@ void validate(const Effect& effect);
 
 /// Bounds of a shape on `drive`, in its unit: of its magnitude where it has both signs.
 [[nodiscard]] Interval shape_bounds(const ShapeParameter& shape, const Drive& drive);
+
+}  // namespace wheelwright
+
+namespace wheelwright::catalogue {
+
+/// Standard deviation of a signal.
+[[nodiscard]] double deviation(const Eigen::VectorXd& signal);
+
+/// sgn(signal), as tanh(signal/width).
+[[nodiscard]] Eigen::VectorXd soft_sign(const Eigen::VectorXd& signal, double width);
+
+/// Width for the sign of a joint's speed, rad/s: 0.6 % of the first joint's typical speed or 0.4 of a count.
+[[nodiscard]] double sign_width(const Drive& drive);
+
+/// Soft sign of the joint's smooth speed.
+[[nodiscard]] Eigen::VectorXd speed_sign(const Drive& drive, std::size_t joint);
+
+/// Typical speed of the joints (standard deviation of the first one's), rad/s; > 0.
+[[nodiscard]] double typical_speed(const Drive& drive);
+
+/// The column of additional efforts at the joints (empty ones stand for zeros): Model::input times them.
+[[nodiscard]] Column at_joints(const Drive& drive, const std::vector<Eigen::VectorXd>& effort);
+
+/// The column of the derivatives of such efforts.
+[[nodiscard]] Column rate_at_joints(const Drive& drive, const std::vector<Eigen::VectorXd>& effort);
+
+/// function(j) for every joint j.
+template <typename Function>
+[[nodiscard]] std::vector<Eigen::VectorXd> each_joint(const Drive& drive, const Function& function) {
+  std::vector<Eigen::VectorXd> signals;
+  for (std::size_t j = 0; j < drive.joints.size(); ++j) {
+    signals.push_back(function(j));
+  }
+  return signals;
+}
+
+/// A signal at one joint, empty ones at the others.
+[[nodiscard]] std::vector<Eigen::VectorXd> only(const Drive& drive, std::size_t joint, Eigen::VectorXd signal);
+
+/// The column of a robot whose coordinates move faster than its joints show, by `speed` (one signal per coordinate, empty
+/// for zeros): the base model's effort for that motion; for a robot on wheels also its body velocity. Without `friction` only
+/// its inertia: friction in the joints knows nothing of what they do not show. Terms of the base model that are functions
+/// of the motion are taken as they are.
+[[nodiscard]] Column unseen_motion(const Drive& drive, const std::vector<Eigen::VectorXd>& speed, bool friction);
+
+/// The same for wheels whose rims move faster by `right` and `left`, m/s.
+[[nodiscard]] Column unseen_rim_speeds(const Drive& drive, const Eigen::VectorXd& right, const Eigen::VectorXd& left,
+                                       bool friction);
+
+/// The joints' efforts of the base model's inertial terms on the smooth motion.
+[[nodiscard]] std::vector<Eigen::VectorXd> inertial_efforts(const Drive& drive);
+
+/// Base regressor column of the parameter with the physical name `name`, per physical unit; zeros where the model has
+/// none of this name. Terms that are functions of the motion are left out.
+[[nodiscard]] Column base_column(const Drive& drive, std::string_view name);
+
+/// a += b, signal by signal.
+void add(Column& a, const Column& b);
+
+/// The shape that chooses one of two joints: 0 or 1 (right, left).
+[[nodiscard]] ShapeParameter side();
+
+/// The shape of an effect of one wheel (0 right, 1 left) or of both with opposite signs (2).
+[[nodiscard]] ShapeParameter side_or_opposite();
+
+/// The signals of that shape: `right`, `left` or [right, −left]; empty where a wheel has none.
+[[nodiscard]] std::vector<Eigen::VectorXd> on_side(double side, const Eigen::VectorXd& right,
+                                                   const Eigen::VectorXd& left);
+
+/// Applies where a robot has two driven wheels.
+[[nodiscard]] Applicability needs_two_wheels(const Drive& drive);
+/// Applies where a robot has two driven wheels and the log a heading.
+[[nodiscard]] Applicability needs_heading(const Drive& drive);
+/// Applies where the base model has no parameter of the physical name `name`, which would be the same column.
+[[nodiscard]] Applicability needs_no(const Drive& drive, std::string_view name);
+
+}  // namespace wheelwright::catalogue
+
+namespace wheelwright {
+
+/// All effects and parametric causes for a robot on two driven wheels. Coefficients are of effect_catalogue's units: N·m
+/// at the wheel, m, rad, s, kg, relative changes; with current or voltage as effort, A or V stand for N·m.
+///
+/// Add to the vector, or take from it, as you like: nothing else knows what is in it.
+[[nodiscard]] std::vector<Effect> effect_catalogue();
+
+/// The same for the robot `model`: those with one joint have fewer effects, and one coefficient where wheels have two.
+[[nodiscard]] std::vector<Effect> effect_catalogue(const Model& model);
+
+/// Dry, viscous, load-dependent and drifting friction, drag, scrub and casters.
+[[nodiscard]] std::vector<Effect> friction_effects(std::size_t joints = 2);
+/// Masses out of place, slopes, wheels out of round, wheels of other radius, tracks of other width, slip, payload.
+[[nodiscard]] std::vector<Effect> geometry_effects(std::size_t joints = 2);
+/// Gains, biases, lags, delays, clocks, dead zones, saturation, backlash, batteries.
+[[nodiscard]] std::vector<Effect> actuator_effects(std::size_t joints = 2);
 
 }  // namespace wheelwright

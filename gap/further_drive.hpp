@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Another drive of a robot whose log was analysed: within what limits, and what it would tell.
+/// Planned drives of a robot whose log was analysed: within what limits, and what they would tell.
 #pragma once
 
 #include <optional>
@@ -8,16 +8,23 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/design/limits.hpp>
+#include <wheelwright/design/plan.hpp>
 #include <wheelwright/design/subject.hpp>
 #include <wheelwright/gap/block_gram.hpp>
 #include <wheelwright/gap/candidate.hpp>
 #include <wheelwright/gap/confusion.hpp>
 #include <wheelwright/gap/diagnosis.hpp>
+#include <wheelwright/gap/drive.hpp>
 #include <wheelwright/gap/prepared.hpp>
 #include <wheelwright/model/robot.hpp>
 
 namespace wheelwright {
+
+/// The drive along `plan` without noise: speeds and accelerations are the plan's own, smooth signals are the same exact
+/// ones, efforts those of the base model at the subject's θ° (inverse dynamics (20)), linear between instants, the pose
+/// the plan's. Wheels that are planned to stand still for 0.1 s rest. Throws InvalidArgument for a plan of fewer than
+/// three samples, or one of another number of coordinates than the model.
+[[nodiscard]] Drive planned_drive(const Plan& plan, const DesignSubject& subject);
 
 /// The robot with `theta`, for planning; without a measurement where the log has no efforts.
 [[nodiscard]] DesignSubject subject_of(const PreparedGap& prepared, const Robot& robot, const Eigen::VectorXd& theta);

@@ -10,7 +10,7 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/core/for_all.hpp>
-#include <wheelwright/gap/drive_filter.hpp>
+#include <wheelwright/gap/drive.hpp>
 
 namespace wheelwright {
 namespace {

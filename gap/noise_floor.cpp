@@ -6,7 +6,7 @@
 #include <vector>
 
 #include <wheelwright/core/statistics.hpp>
-#include <wheelwright/gap/drive_filter.hpp>
+#include <wheelwright/gap/drive.hpp>
 
 namespace wheelwright {
 namespace {

@@ -8,8 +8,8 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/filter/measurement.hpp>
-#include <wheelwright/gap/catalogue.hpp>
-#include <wheelwright/gap/drive_filter.hpp>
+#include <wheelwright/gap/drive.hpp>
+#include <wheelwright/gap/effect.hpp>
 #include <wheelwright/gap/noise_floor.hpp>
 #include <wheelwright/gap/selection.hpp>
 

@@ -9,11 +9,10 @@
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/for_all.hpp>
-#include <wheelwright/model/effect_geometry.hpp>
 #include <wheelwright/model/effect_law.hpp>
 #include <wheelwright/sim/drivetrain.hpp>
 #include <wheelwright/sim/plant.hpp>
-#include <wheelwright/sim/scenario.hpp>
+#include <wheelwright/sim/simulation.hpp>
 
 namespace wheelwright {
 namespace {

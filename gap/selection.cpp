@@ -9,8 +9,8 @@
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/statistics.hpp>
+#include <wheelwright/gap/block_gram.hpp>
 #include <wheelwright/gap/confidence_set.hpp>
-#include <wheelwright/gap/remainder.hpp>
 
 namespace wheelwright {
 namespace {

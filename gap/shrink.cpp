@@ -16,7 +16,7 @@
 #include <wheelwright/gap/noise_floor.hpp>
 #include <wheelwright/gap/signed_least_squares.hpp>
 #include <wheelwright/identify/noise_level.hpp>
-#include <wheelwright/sim/noise.hpp>
+#include <wheelwright/sim/plant.hpp>
 
 namespace wheelwright {
 namespace {

@@ -10,7 +10,7 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/core/statistics.hpp>
-#include <wheelwright/identify/block_sums.hpp>
+#include <wheelwright/identify/moments.hpp>
 
 namespace wheelwright {
 namespace {

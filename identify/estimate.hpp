@@ -32,7 +32,7 @@ struct Estimate {
   bool usable = false;             ///< whether the equations could be solved; if not, `reason` says why
   std::string reason;              ///< empty where usable
   Eigen::VectorXd theta;           ///< p
-  Eigen::MatrixXd covariance;      ///< p × p, allows for autocorrelation (block_sums.hpp)
+  Eigen::MatrixXd covariance;      ///< p × p, allows for autocorrelation (moments.hpp)
   Eigen::VectorXd standard_error;  ///< p
   double freedom = 0.0;            ///< of Student's t for intervals
   Eigen::MatrixXd influence;  ///< p × blocks: θ̂ − θ is nearly the sum of its columns, each from one block of time

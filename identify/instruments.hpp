@@ -21,7 +21,7 @@ struct InstrumentMotion {
   /// The two kinds.
   enum class Kind {
     commanded,  ///< logged commands: free of the sensors' noise unless they are feedback of the noisy motion itself, or of
-                ///< a pose made from it (shared_noise.hpp looks for the first)
+                ///< a pose made from it (noise_level.hpp looks for the first)
     simulated,  ///< the model with parameters `theta`, driven by the logged efforts. It does not see the noise of the
                 ///< motion, except through a controller that answers to it; it holds that of measured efforts, which
                 ///< biases inertias by the noise's share of the effort's power (an effort that is a command has none)

@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Least squares on filtered torque by sequential QR: θ̂_L of (30) without ever holding the rows.
+/// Least squares on filtered torque by sequential QR: θ̂_L of (30) without ever holding the rows; its residuals, its excitation.
 #pragma once
 
 #include <cstddef>
+#include <string>
 #include <vector>
 
 #include <Eigen/Core>
 
 #include <wheelwright/core/regression.hpp>
+#include <wheelwright/identify/moments.hpp>
 
 namespace wheelwright {
 
@@ -59,5 +61,70 @@ class LeastSquares {
 
 /// The fit to all of `rows`, one pass.
 [[nodiscard]] LeastSquaresFit least_squares(RegressionSource& rows, const Eigen::VectorXd& weights = {});
+
+/// Residuals of one output.
+struct OutputResidual {
+  double rms = 0.0;                 ///< root mean square of ε = y − Yθ̂
+  double torque_rms = 0.0;          ///< root mean square of y
+  double largest = 0.0;             ///< max |ε|
+  std::size_t largest_sample = 0;   ///< row of the log where it is
+  double largest_time = 0.0;        ///< its time, s
+  double kurtosis = 0.0;            ///< E ε⁴/(E ε²)²; 3 for Gaussian noise
+  double effective_instants = 0.0;  ///< number of independent Gaussian values that would know the variance as well
+};
+
+/// Residual statistics of a fit over a log.
+struct ResidualSummary {
+  std::vector<OutputResidual> outputs;  ///< one for each output
+  Eigen::MatrixXd covariance;           ///< p × p, of θ̂, under autocorrelated residuals
+  Eigen::VectorXd standard_error;       ///< p, roots of its diagonal
+  double freedom = 0.0;                 ///< degrees of freedom of its Student's t
+  std::size_t instants = 0;
+};
+
+/// Gathers residual statistics in one pass over the rows, in bounded memory.
+class ResidualStatistics {
+ public:
+  /// For residuals at `theta` (p) with the weights (one for each output) of the fit.
+  ResidualStatistics(Eigen::VectorXd theta, Eigen::VectorXd weights);
+  /// Adds instants [first, last) of `block`.
+  void add(const RegressionBlock& block, std::size_t first = 0, std::size_t last = static_cast<std::size_t>(-1));
+  /// The summary; `inverse_gram` is that of the fit. The covariance is the sandwich G⁻¹ Ω G⁻¹ with Ω the long-run
+  /// covariance of the scores w²Yᵀε (moments.hpp).
+  [[nodiscard]] ResidualSummary summary(const Eigen::MatrixXd& inverse_gram) const;
+
+ private:
+  Eigen::VectorXd theta_, weights_;
+  std::vector<OutputResidual> outputs_;
+  std::vector<double> squares_, fourth_, torque_squares_;
+  std::size_t instants_ = 0;
+  BlockSums scores_;   // p
+  BlockSums squared_;  // one for each output: ε²
+};
+
+/// What a log says about one parameter.
+enum class Excitation {
+  identified,   ///< the estimate can be used
+  indistinct,   ///< excited, but not told from zero at 95 %: the estimate is small, its interval holds zero
+  not_excited,  ///< the log says nothing about it: no number is given
+};
+
+/// The finding for one parameter.
+struct ExcitationFinding {
+  Excitation state = Excitation::identified;
+  double signal_rms = 0.0;  ///< what the parameter's column holds beyond the other columns (weighted units)
+  double noise_rms = 0.0;   ///< what sensor noise alone would put there (0: unknown)
+  std::string reason;       ///< one sentence for people, empty when identified
+};
+
+/// Judges each parameter. `noise_rms` (p, or empty): root mean square of sensor noise in each weighted column;
+/// `standard_error` (p) and its t quantile for 95 %.
+///
+/// not_excited: the column is nothing beyond the other columns (numerical rank), or holds less than three times what
+/// noise alone would put there. Least squares would still give a number with a small standard error: that number would
+/// be made of noise.
+[[nodiscard]] std::vector<ExcitationFinding> judge_excitation(const LeastSquaresFit& fit,
+                                                              const Eigen::VectorXd& standard_error, double t_quantile,
+                                                              const Eigen::VectorXd& noise_rms = {});
 
 }  // namespace wheelwright

@@ -90,7 +90,7 @@ struct SeparableFit {
 /// better conditioned (Golub and Pereyra 2003).
 ///
 /// The covariance is G⁻¹ΩG⁻¹ with G = JᵀJ of the joint Jacobian J = [∂(f + Φθ)/∂ω, Φ] and Ω the long-run covariance of
-/// the scores Jᵀr instant by instant (block_sums.hpp). Throws InvalidArgument on shapes that disagree, bounds that
+/// the scores Jᵀr instant by instant (moments.hpp). Throws InvalidArgument on shapes that disagree, bounds that
 /// cross, a start outside them, weights that are not positive, or no start and no finite bounds.
 [[nodiscard]] SeparableFit variable_projection(const SeparableModel& model, const VariableProjectionOptions& options);
 

@@ -3,15 +3,98 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <vector>
 
 #include <fmt/format.h>
+#include <Eigen/QR>
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/limits.hpp>
 #include <wheelwright/core/linear_algebra.hpp>
-#include <wheelwright/inference/nonnegative_least_squares.hpp>
 
 namespace wheelwright {
+namespace {
+
+struct ActiveSet {
+  const Eigen::MatrixXd& E;
+  const Eigen::VectorXd& f;
+  Eigen::VectorXd x;
+  std::vector<Eigen::Index> free;  // columns with x > 0
+
+  /// The unconstrained solution in the free columns; empty where they are dependent.
+  [[nodiscard]] Eigen::VectorXd solve() const {
+    if (free.empty()) {
+      return {};
+    }
+    const auto qr = E(Eigen::all, free).colPivHouseholderQr();
+    return qr.rank() == static_cast<Eigen::Index>(free.size()) ? qr.solve(f) : Eigen::VectorXd();
+  }
+
+  /// Moves towards `target` until an entry reaches 0, which leaves the free columns.
+  void move(const Eigen::VectorXd& target) {
+    double step = 1.0;
+    std::size_t blocking = free.size();
+    for (std::size_t k = 0; k < free.size(); ++k) {
+      const double now = x[free[k]], then = target[static_cast<Eigen::Index>(k)];
+      if (then <= 0.0 && now / (now - then) < step) {
+        step = now / (now - then);
+        blocking = k;
+      }
+    }
+    for (std::size_t k = 0; k < free.size(); ++k) {
+      x[free[k]] += step * (target[static_cast<Eigen::Index>(k)] - x[free[k]]);
+    }
+    for (std::size_t k = free.size(); k-- > 0;) {
+      if (k == blocking || !(x[free[k]] > 0.0)) {
+        x[free[k]] = 0.0;
+        free.erase(free.begin() + static_cast<std::ptrdiff_t>(k));
+      }
+    }
+  }
+};
+
+}  // namespace
+
+Eigen::VectorXd nonnegative_least_squares(const Eigen::MatrixXd& E, const Eigen::VectorXd& f) {
+  check::that(E.rows() == f.size() && E.allFinite() && f.allFinite(), "non-negative least squares",
+              "a finite right side with a value for each row of the matrix");
+  ActiveSet set{E, f, Eigen::VectorXd::Zero(E.cols()), {}};
+  const double tolerance = 64.0 * std::numeric_limits<double>::epsilon() * E.colwise().norm().maxCoeff() * f.norm();
+  std::vector<bool> barred(static_cast<std::size_t>(E.cols()), false);
+  // Each round ends with a smaller misfit, so that no set of free columns comes back; the limit stops rounding only.
+  for (Eigen::Index round = 0; round < 64 * (E.cols() + 1); ++round) {
+    const Eigen::VectorXd slope = E.transpose() * (f - E * set.x);
+    Eigen::Index best = -1;
+    for (Eigen::Index j = 0; j < E.cols(); ++j) {
+      if (!(set.x[j] > 0.0) && !barred[static_cast<std::size_t>(j)] && slope[j] > tolerance &&
+          (best < 0 || slope[j] > slope[best])) {
+        best = j;
+      }
+    }
+    if (best < 0) {
+      break;
+    }
+    set.free.push_back(best);
+    Eigen::VectorXd target = set.solve();
+    // A column that cannot move forward is a matter of rounding (or depends on the free ones): not again until x moves.
+    if (target.size() == 0 || !(target[target.size() - 1] > 0.0)) {
+      set.free.pop_back();
+      barred[static_cast<std::size_t>(best)] = true;
+      continue;
+    }
+    barred.assign(barred.size(), false);
+    while (!set.free.empty() && !(target.array() > 0.0).all()) {
+      set.move(target);
+      target = set.solve();
+    }
+    for (std::size_t k = 0; k < set.free.size(); ++k) {
+      set.x[set.free[k]] = target[static_cast<Eigen::Index>(k)];
+    }
+  }
+  return set.x;
+}
+
 namespace {
 
 /// The problem in scaled columns x = D⁻¹θ and constraints of unit length: min ‖Rx − c‖ subject to Ax <= b.
@@ -183,6 +266,92 @@ ConstrainedFit constrained_least_squares(const LeastSquares& rows, const std::ve
     }
   }
   return fit;
+}
+
+namespace {
+
+/// "viscous_linear" as people write it.
+std::string with_blanks(std::string name) {
+  for (char& c : name) {
+    c = c == '_' ? ' ' : c;
+  }
+  return name;
+}
+
+bool never_negative(const std::string& name) {
+  return name == "mass" || name == "yaw_inertia" || name == "inertia" || name == "coulomb" ||
+         name.starts_with("viscous");
+}
+
+/// sign · quantity_j <= bound.
+LinearConstraint one_sided(const std::vector<PhysicalQuantity>& parameters, std::size_t j, double sign, double bound) {
+  const auto at = static_cast<Eigen::Index>(j);
+  LinearConstraint constraint;
+  constraint.a = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(parameters.size()));
+  constraint.a[at] = sign / parameters[j].per_physical;
+  constraint.b = bound;
+  return constraint;
+}
+
+void check_scales(const std::vector<PhysicalQuantity>& parameters) {
+  check::that(!parameters.empty(), "parameters", "at least one");
+  for (const PhysicalQuantity& parameter : parameters) {
+    check::that(std::isfinite(parameter.per_physical) && parameter.per_physical != 0.0,
+                "per_physical of " + parameter.name, "a finite number other than 0");
+  }
+}
+
+}  // namespace
+
+std::vector<LinearConstraint> physical_consistency(const std::vector<PhysicalQuantity>& parameters,
+                                                   std::optional<double> footprint_radius) {
+  check_scales(parameters);
+  std::vector<LinearConstraint> constraints;
+  std::optional<std::size_t> mass, inertia;
+  for (std::size_t j = 0; j < parameters.size(); ++j) {
+    const std::string& name = parameters[j].name;
+    if (never_negative(name)) {
+      constraints.push_back(one_sided(parameters, j, -1.0, 0.0));
+      constraints.back().name = name + " = 0";
+      constraints.back().asks = "a negative " + with_blanks(name);
+    }
+    mass = name == "mass" ? j : mass;
+    inertia = name == "yaw_inertia" ? j : inertia;
+  }
+  if (footprint_radius) {
+    const double radius = check::positive(*footprint_radius, "footprint radius");
+    if (mass && inertia) {
+      LinearConstraint footprint = one_sided(parameters, *inertia, 1.0, 0.0);
+      footprint.a[static_cast<Eigen::Index>(*mass)] = -radius * radius / parameters[*mass].per_physical;
+      footprint.name = fmt::format("yaw_inertia = mass·R² with R = {} m", radius);
+      footprint.asks = "an inertia larger than the footprint allows";
+      constraints.push_back(footprint);
+    }
+  }
+  return constraints;
+}
+
+std::vector<LinearConstraint> bounds_on(const std::vector<PhysicalQuantity>& parameters,
+                                        const std::vector<std::optional<Interval>>& bounds) {
+  check_scales(parameters);
+  check::that(bounds.size() == parameters.size(), "bounds", "one for each parameter");
+  std::vector<LinearConstraint> constraints;
+  for (std::size_t j = 0; j < bounds.size(); ++j) {
+    if (!bounds[j]) {
+      continue;
+    }
+    check::that(bounds[j]->lower <= bounds[j]->upper, "bounds of " + parameters[j].name, "lower <= upper");
+    for (const double sign : {-1.0, 1.0}) {
+      const double end = sign < 0.0 ? bounds[j]->lower : bounds[j]->upper;
+      if (std::isfinite(end)) {
+        constraints.push_back(one_sided(parameters, j, sign, sign * end));
+        constraints.back().name = fmt::format("{} = {} {}", parameters[j].name, end, parameters[j].unit);
+        constraints.back().asks =
+            fmt::format("a {} {} than stated", sign < 0.0 ? "smaller" : "larger", with_blanks(parameters[j].name));
+      }
+    }
+  }
+  return constraints;
 }
 
 }  // namespace wheelwright

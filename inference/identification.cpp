@@ -14,7 +14,7 @@
 #include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/identify/noise_level.hpp>
 #include <wheelwright/identify/time_shift.hpp>
-#include <wheelwright/inference/physical_consistency.hpp>
+#include <wheelwright/inference/constrained.hpp>
 #include <wheelwright/inference/stribeck.hpp>
 
 namespace wheelwright {

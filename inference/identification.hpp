@@ -17,7 +17,6 @@
 #include <wheelwright/core/interval.hpp>
 #include <wheelwright/identify/variable_projection.hpp>
 #include <wheelwright/inference/identifiability.hpp>
-#include <wheelwright/inference/information_over_time.hpp>
 #include <wheelwright/inference/kinematic_calibration.hpp>
 #include <wheelwright/inference/noise_choice.hpp>
 #include <wheelwright/inference/regions.hpp>

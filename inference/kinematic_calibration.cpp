@@ -17,7 +17,7 @@
 #include <wheelwright/core/limits.hpp>
 #include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/core/statistics.hpp>
-#include <wheelwright/identify/block_sums.hpp>
+#include <wheelwright/identify/moments.hpp>
 #include <wheelwright/identify/noise_level.hpp>
 
 namespace wheelwright {

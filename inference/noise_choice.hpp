@@ -1,18 +1,54 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Which of several noise levels of a column to use, and why.
+/// Error bounds from standard deviations, and the choice among several noise levels of a column.
 #pragma once
 
 #include <optional>
 #include <string>
 #include <string_view>
 
-#include <wheelwright/identify/difference_noise.hpp>
-#include <wheelwright/inference/error_bound.hpp>
+#include <wheelwright/identify/noise_level.hpp>
 #include <wheelwright/inference/repeat_noise.hpp>
 #include <wheelwright/inference/standstill_noise.hpp>
 
 namespace wheelwright {
+
+/// What is assumed of the noise's distribution.
+enum class NoiseLaw {
+  uniform,       ///< on an interval, as rounding to decimals or counts is
+  gaussian,      ///< tails as light as a Gaussian's
+  any_variance,  ///< a finite variance and nothing else
+};
+
+/// Name for people and files: "uniform", …
+[[nodiscard]] std::string_view to_string(NoiseLaw law);
+
+/// What the bound is to hold for.
+struct ErrorBoundOptions {
+  NoiseLaw law = NoiseLaw::gaussian;
+  double horizon = 1e6;  ///< samples of one column that are all to obey it
+  double risk = 1e-3;    ///< probability that one of them does not, the standard deviation's own error included
+};
+
+/// A bound and how it came about: `bound` = `factor` · `sd_limit`.
+struct ErrorBound {
+  double bound = 0.0;     ///< n̄, unit of the standard deviation
+  double sd_limit = 0.0;  ///< upper confidence limit of the standard deviation, at risk/2 (risk for the uniform law)
+  double factor = 0.0;
+};
+
+/// n̄ = k·σ_u with σ_u = sd·√(ν/χ²_{ν, risk/2}) and ν = 2/relative_sd² the degrees of freedom of sd² (relative_sd is
+/// the standard error of sd² relative to it; 0 for an sd that is known), and by the law
+///
+///     uniform       k = √3: the end of the interval itself, whatever the horizon
+///     gaussian      k = z(risk/(4·horizon)), the upper quantile: both tails, union over the horizon
+///     any_variance  k = √(2·horizon/risk): Chebyshev, union over the horizon
+///
+/// A union needs no independence. The promise: future noise of the same law and size keeps |n| <= n̄ in all of the
+/// horizon's samples with probability 1 − risk. It is no guarantee: rare events that the sd has not seen (slip, a
+/// dropped message) obey no law. Throws InvalidArgument unless sd >= 0, relative_sd >= 0, horizon >= 1 and risk is
+/// inside (0, 1).
+[[nodiscard]] ErrorBound bound_of_sd(double sd, double relative_sd, const ErrorBoundOptions& options = {});
 
 /// How a noise level was found.
 enum class NoiseMethod { none, standstill, repeats, differences };
@@ -41,7 +77,7 @@ struct NoiseChoice {
   NoiseMeaning meaning = NoiseMeaning::unknown;
   double sd = 0.0;           ///< unit of the column
   double relative_sd = 0.0;  ///< standard error of sd², relative to it
-  ErrorBound bound;          ///< for the feasible sets (error_bound.hpp)
+  ErrorBound bound;          ///< for the feasible sets (noise_choice.hpp)
   std::string assumption;    ///< what the level assumes, e.g. "noise independent from sample to sample"
   std::string reason;        ///< one sentence: why this one
 };

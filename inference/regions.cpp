@@ -1,15 +1,187 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/inference/regions.hpp>
 
+#include <algorithm>
+#include <cmath>
+#include <functional>
 #include <limits>
+#include <random>
 
 #include <fmt/format.h>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/limits.hpp>
+#include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/core/statistics.hpp>
 #include <wheelwright/identify/noise_level.hpp>
+#include <wheelwright/inference/block_bootstrap.hpp>
 
 namespace wheelwright {
+namespace {
+
+constexpr double kLostVariance = 0.05;  // at the edges of groups whose length is chosen
+constexpr double kFlat = 1e-12;         // an ellipsoid's axis of a smaller eigenvalue is taken to be unbounded
+
+// {z : zᵀz <= ‖b − Qz‖²} as Σ λ_k u_k² + 2 g_k u_k <= d in the coordinates u = Uᵀz.
+struct Ellipsoid {
+  Eigen::MatrixXd U;
+  Eigen::VectorXd lambda, g;
+  double d = 0.0;
+  bool bounded = false;
+};
+
+Ellipsoid ellipsoid(const Eigen::MatrixXd& Q, const Eigen::VectorXd& b) {
+  const EigenPairs eigen = symmetric_eigen(Eigen::MatrixXd::Identity(b.size(), b.size()) - Q.transpose() * Q);
+  Ellipsoid e{eigen.vectors, eigen.values, eigen.vectors.transpose() * (Q.transpose() * b), b.squaredNorm(), false};
+  e.bounded = e.lambda.allFinite() && e.lambda.minCoeff() > kFlat;
+  return e;
+}
+
+// max zᵀz over the ellipsoid: by the S-lemma the minimum over ξ > 1/λ_min of ξd + Σ ξ²g²/(ξλ − 1), which is convex; its
+// derivative is bisected in log(ξλ_min − 1). Every ξ gives an upper bound.
+double largest_norm(const Ellipsoid& e) {
+  if (!e.bounded) {
+    return kInfinity;
+  }
+  const double least = e.lambda.minCoeff();
+  const auto value = [&](double xi) {
+    return xi * e.d + (xi * xi * e.g.array().square() / (xi * e.lambda.array() - 1.0)).sum();
+  };
+  const auto slope = [&](double xi) {
+    const Eigen::ArrayXd excess = xi * e.lambda.array() - 1.0;
+    return e.d + (e.g.array().square() * xi * (excess - 1.0) / excess.square()).sum();
+  };
+  const auto at = [&](double log_excess) { return (1.0 + std::exp(log_excess)) / least; };
+  double low = -25.0;
+  double high = 25.0;
+  double best = std::min(value(at(low)), value(at(high)));
+  for (int step = 0; step < 60; ++step) {
+    const double middle = 0.5 * (low + high);
+    best = std::min(best, value(at(middle)));
+    (slope(at(middle)) < 0.0 ? low : high) = middle;
+  }
+  return best;
+}
+
+double nth_largest(std::vector<double>& values, std::size_t n) {
+  const auto nth = values.begin() + static_cast<std::ptrdiff_t>(n - 1);
+  std::nth_element(values.begin(), nth, values.end(), std::greater<>());
+  return *nth;
+}
+
+}  // namespace
+
+SignPerturbedSums::SignPerturbedSums(const RegressionMoments& moments, const SignPerturbedOptions& options)
+    : m_(options.sums), parameters_(moments.parameters()) {
+  check::that(options.confidence > 0.0 && options.confidence < 1.0, "confidence", "between 0 and 1");
+  check::non_negative(options.seconds, "length of a group with one sign");
+  check::that(options.groups >= 1, "groups", "at least 1");
+  q_ = static_cast<std::size_t>(std::floor((1.0 - options.confidence) * static_cast<double>(m_) + 1e-9));
+  check::that(q_ >= 1, "sign-perturbed sums", "at least 1/(1 − confidence) of them");
+
+  const ScoreBlocks blocks = score_blocks(moments, options.estimator, options.instruments);
+  kept_ = blocks.kept;
+  usable_ = blocks.solvable;
+  reason_ = blocks.reason;
+  scale_ = blocks.scale;
+  psi_ = blocks.psi;
+  centre_ = blocks.unscaled(blocks.psi);
+  if (!usable_) {
+    return;
+  }
+  const Eigen::MatrixXd influence = blocks.inverse * blocks.scores(blocks.psi);
+  const std::size_t length = options.seconds > 0.0 ? blocks.lasting(options.seconds)
+                                                   : sign_group_length(influence, kLostVariance, options.groups);
+  edge_share_ = wheelwright::edge_share(influence, length);
+  const ScoreBlocks groups = grouped(blocks, length);
+  groups_ = groups.blocks();
+  group_seconds_ = groups.block_seconds;
+
+  std::mt19937_64 generator(options.seed);
+  const auto m = static_cast<Eigen::Index>(m_);
+  const auto G = static_cast<Eigen::Index>(groups_);
+  Eigen::MatrixXd signs = Eigen::MatrixXd::Ones(G, m);
+  for (Eigen::Index i = 1; i < m; ++i) {
+    std::uint64_t bits = 0;
+    for (Eigen::Index g = 0; g < G; ++g) {
+      bits = g % 64 == 0 ? generator() : bits >> 1U;
+      signs(g, i) = (bits & 1U) != 0 ? 1.0 : -1.0;
+    }
+  }
+  order_.resize(m_);
+  std::generate(order_.begin(), order_.end(), std::ref(generator));
+
+  const CholeskyFactors P(groups.shape);
+  c_ = P.solve_lower(groups.c * signs);
+  A_ = groups.A * signs;
+  const Eigen::Index q = c_.rows();
+  for (Eigen::Index j = 0; j < q; ++j) {
+    A_.middleRows(j * q, q) = P.solve_lower(A_.middleRows(j * q, q));
+  }
+}
+
+double SignPerturbedSums::probability() const { return 1.0 - static_cast<double>(q_) / static_cast<double>(m_); }
+
+bool SignPerturbedSums::contains(const Eigen::VectorXd& theta) const {
+  check::that(static_cast<std::size_t>(theta.size()) == parameters_, "θ", "one value for each parameter");
+  if (!usable_) {
+    return true;
+  }
+  const Eigen::VectorXd psi = Eigen::VectorXd(theta(kept_)).cwiseProduct(scale_);
+  const Eigen::Index q = c_.rows();
+  Eigen::MatrixXd S = c_;
+  for (Eigen::Index j = 0; j < q; ++j) {
+    S -= psi[j] * A_.middleRows(j * q, q);
+  }
+  const Eigen::VectorXd norms = S.colwise().squaredNorm();
+  std::size_t below = 0;  // sums that come before S_0
+  for (Eigen::Index i = 1; i < norms.size(); ++i) {
+    if (norms[i] < norms[0] || (norms[i] == norms[0] && order_[static_cast<std::size_t>(i)] < order_[0])) {
+      ++below;
+    }
+  }
+  return below + 1 <= m_ - q_;
+}
+
+SignPerturbedBounds SignPerturbedSums::bounds() const {
+  const auto p = static_cast<Eigen::Index>(parameters_);
+  SignPerturbedBounds result{Eigen::VectorXd::Zero(p), Eigen::VectorXd::Zero(p), Eigen::MatrixXd::Zero(p, p),
+                             kInfinity};
+  if (!usable_) {
+    result.lower(kept_).setConstant(-kInfinity);
+    result.upper(kept_).setConstant(kInfinity);
+    return result;
+  }
+  const Eigen::Index q = c_.rows();
+  const Eigen::MatrixXd root = A_.col(0).reshaped(q, q);  // z = root (ψ − ψ̂) = −S_0
+  const Eigen::MatrixXd K = inverse(root);
+  std::vector<double> norms;
+  std::vector<std::vector<double>> up(static_cast<std::size_t>(q)), down(static_cast<std::size_t>(q));
+  for (Eigen::Index i = 1; i < c_.cols(); ++i) {
+    const Eigen::MatrixXd A = A_.col(i).reshaped(q, q);
+    const Ellipsoid e = ellipsoid(A * K, c_.col(i) - A * psi_);
+    norms.push_back(largest_norm(e));
+    const Eigen::VectorXd centre = -e.g.cwiseQuotient(e.lambda);
+    const double size = e.d - e.g.dot(centre);
+    const Eigen::MatrixXd rows = K * e.U;
+    for (Eigen::Index j = 0; j < q; ++j) {
+      const double shift = rows.row(j).dot(centre);
+      const double reach = std::sqrt(size * (rows.row(j).transpose().array().square() / e.lambda.array()).sum());
+      up[static_cast<std::size_t>(j)].push_back(e.bounded ? shift + reach : kInfinity);
+      down[static_cast<std::size_t>(j)].push_back(e.bounded ? reach - shift : kInfinity);
+    }
+  }
+  result.radius = nth_largest(norms, q_);
+  for (Eigen::Index j = 0; j < q; ++j) {
+    const Eigen::Index at = kept_[static_cast<std::size_t>(j)];
+    result.upper[at] = (psi_[j] + nth_largest(up[static_cast<std::size_t>(j)], q_)) / scale_[j];
+    result.lower[at] = (psi_[j] - nth_largest(down[static_cast<std::size_t>(j)], q_)) / scale_[j];
+  }
+  const Eigen::MatrixXd scaled = root * scale_.asDiagonal();
+  result.H(kept_, kept_) = scaled.transpose() * scaled;
+  return result;
+}
+
 namespace {
 
 constexpr double kLargeEdges = 0.1;  // of the variance of a sum: a doubt worth a remark

@@ -6,8 +6,8 @@
 #include <limits>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/identify/least_squares.hpp>
 #include <wheelwright/identify/minimise_scalar.hpp>
-#include <wheelwright/identify/residual_statistics.hpp>
 
 namespace wheelwright {
 namespace {

@@ -9,7 +9,7 @@
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/linear_algebra.hpp>
-#include <wheelwright/identify/block_sums.hpp>
+#include <wheelwright/identify/moments.hpp>
 #include <wheelwright/inference/m_estimate.hpp>
 
 namespace wheelwright {

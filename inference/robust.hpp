@@ -11,14 +11,14 @@
 
 #include <wheelwright/core/regression.hpp>
 #include <wheelwright/inference/constrained.hpp>
-#include <wheelwright/inference/loss.hpp>
+#include <wheelwright/inference/m_estimate.hpp>
 
 namespace wheelwright {
 
 /// Choices of a robust fit.
 struct RobustOptions {
   Loss loss = Loss::huber;
-  double tuning = 0.0;                          ///< c of the loss; 0: the one of 95 % efficiency (loss.hpp)
+  double tuning = 0.0;                          ///< c of the loss; 0: the one of 95 % efficiency (m_estimate.hpp)
   std::vector<LinearConstraint> constraints{};  ///< aᵀθ <= b; empty: none
   std::size_t most_instants = 100000;  ///< instants held in memory, at least 8; of a longer log every 2nd, 4th, 8th …
                                        ///< is held, and the fit to those is finished by passes over all of them

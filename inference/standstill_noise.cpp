@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 
 #include <wheelwright/core/check.hpp>
-#include <wheelwright/identify/residual_statistics.hpp>
+#include <wheelwright/identify/least_squares.hpp>
 
 namespace wheelwright {
 namespace {

@@ -11,9 +11,8 @@
 #include <fmt/format.h>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/files/suggest.hpp>
+#include <wheelwright/files/words.hpp>
 #include <wheelwright/logs/bag.hpp>
-#include <wheelwright/logs/bag_clock.hpp>
 #include <wheelwright/logs/bag_columns.hpp>
 #include <wheelwright/logs/log_columns.hpp>
 #include <wheelwright/logs/ros_extractor.hpp>

@@ -2,11 +2,15 @@
 /// \file
 /// CSV logs: read in bounded memory and cleaned on the way, or row by row from a live stream; written.
 ///
+/// CSV logs: read in bounded memory and cleaned on the way, or row by row from a live stream; written.
+///
 /// A file has a header line with the names of its columns in any order (see log_columns.hpp for the spellings that are
 /// known), then one row a line. Separators , ; or tab; LF or CRLF; blank lines and lines that begin with # are skipped;
 /// plain text, gzip or zstd, told apart by the first bytes. Fields that are not used may hold anything.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -14,8 +18,8 @@
 #include <vector>
 
 #include <wheelwright/core/log.hpp>
-#include <wheelwright/logs/csv_header.hpp>
-#include <wheelwright/logs/csv_report.hpp>
+#include <wheelwright/logs/csv_format.hpp>
+#include <wheelwright/logs/recorded_log.hpp>
 #include <wheelwright/logs/row_log.hpp>
 
 namespace wheelwright {
@@ -26,7 +30,7 @@ class CsvLog final : public RowLog {
   /// Reads all of `paths` once, as RowLog does; columns() are those that all files have, in the order of the first. What
   /// is repaired and counted, and what is not:
   /// - a row with an empty, NaN or infinite used field, or with the time of the row before, is dropped;
-  /// - columns that more than a fifth of a file's first rows lack were sampled apart (csv_streams.hpp): they are brought to
+  /// - columns that more than a fifth of a file's first rows lack were sampled apart (csv.hpp): they are brought to
   ///   the times of the other rows as topics of a bag are (stream_aligner.hpp), and the report says so;
   /// - time that goes backwards, and a step of more than 5 × the median step, begin a new segment;
   /// - `theta` is unwrapped inside a segment, so that no step exceeds π;
@@ -71,5 +75,29 @@ class CsvRowParser {
 /// finds those that begin at a gap or a reset. Throws InvalidArgument when the columns differ in length, a value is not
 /// finite or a name is not fit for a header; InputError when the file cannot be written.
 void write_csv(const std::filesystem::path& path, const LogTable& table);
+
+/// Columns that are filled in the same rows.
+struct CsvStream {
+  std::vector<std::size_t> columns;  ///< indices in the names that were looked at
+  std::int64_t median_step = 0;      ///< ns, between the rows in which they are filled
+  double filled = 1.0;               ///< share of the rows in which they are
+};
+
+/// Finds the streams of a table, row by row. Columns missing in at most a fifth of the rows are one stream (a row in which
+/// one of them is missing has a defect); of the others, those that are filled in exactly the same rows are one.
+class CsvStreamFinder {
+ public:
+  explicit CsvStreamFinder(std::vector<std::string> names);
+  /// A row: its time (s) and the columns' values, NaN where missing.
+  void add(double t, const double* values);
+  /// The streams, the one that gives a log its rows first (row_weight). One stream: nothing is sampled apart. Columns that
+  /// were never filled are in none.
+  [[nodiscard]] std::vector<CsvStream> streams() const;
+
+ private:
+  std::vector<std::string> names_;
+  std::vector<double> t_;
+  std::vector<std::vector<bool>> filled_;  ///< of each column, in each row
+};
 
 }  // namespace wheelwright

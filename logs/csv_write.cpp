@@ -12,7 +12,7 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/files/atomic_file.hpp>
 #include <wheelwright/logs/csv.hpp>
-#include <wheelwright/logs/log_write.hpp>
+#include <wheelwright/logs/log_file.hpp>
 
 namespace wheelwright {
 namespace {

@@ -2,6 +2,8 @@
 /// \file
 /// HDF5 files as files of a log.
 ///
+/// HDF5 files as files of a log.
+///
 /// A log is a group with one-dimensional numeric datasets of the same length, one for each column (any names that
 /// log_columns.hpp knows; other datasets are ignored), or one dataset of a compound type whose members are the columns, as
 /// h5py writes structured arrays. A text attribute `units` (or `unit`) that is not the contract's keeps a dataset from
@@ -10,9 +12,43 @@
 
 #include <filesystem>
 #include <memory>
+#include <utility>
+
+#include <hdf5.h>
 
 #include <wheelwright/logs/log_file.hpp>
 #include <wheelwright/logs/row_log.hpp>
+
+namespace wheelwright::hdf5 {
+
+/// An identifier and the function that gives it back.
+class Handle {
+ public:
+  Handle() = default;
+  Handle(hid_t id, herr_t (*close)(hid_t)) : id_(id), close_(close) {}
+  Handle(Handle&& other) noexcept : id_(std::exchange(other.id_, -1)), close_(other.close_) {}
+  Handle& operator=(Handle&& other) noexcept {
+    std::swap(id_, other.id_);
+    std::swap(close_, other.close_);
+    return *this;
+  }
+  ~Handle() {
+    if (id_ >= 0) {
+      close_(id_);
+    }
+  }
+
+  /// Whether the library gave one.
+  explicit operator bool() const { return id_ >= 0; }
+  /// For the library's functions.
+  [[nodiscard]] hid_t get() const { return id_; }
+
+ private:
+  hid_t id_ = -1;
+  herr_t (*close_)(hid_t) = nullptr;
+};
+
+}  // namespace wheelwright::hdf5
 
 namespace wheelwright {
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/logs/log_file.hpp>
 
+#include <algorithm>
 #include <optional>
 #include <string>
 #include <utility>
@@ -30,6 +31,50 @@ std::unique_ptr<RecordedLog> open_log(const std::vector<std::filesystem::path>& 
     }
   }
   return std::make_unique<RowLog>(std::move(files), RowLogOptions{options.block_rows, options.min_rows});
+}
+
+void check_column_names(const std::vector<std::string>& names) {
+  for (const std::string& name : names) {
+    check::that(!name.empty() && name.find_first_of(",;\t\"\r\n#") == std::string::npos, "log column '" + name + "'",
+                "a name without separators, quotes, # and line ends");
+    check::that(std::ranges::count(names, name) == 1, "log column '" + name + "'", "each name once");
+  }
+}
+
+void check_block(const LogBlock& block, std::size_t columns) {
+  check::that(block.columns.size() == columns, "log", "one name for each column");
+  for (const double t : block.t) {
+    check::finite(t, "log time");
+  }
+  for (const auto& column : block.columns) {
+    check::that(column.size() == block.rows(), "log column", "as many values as there are times");
+    for (const double value : column) {
+      check::finite(value, "log column");
+    }
+  }
+}
+
+std::unique_ptr<LogWriter> create_log(const std::filesystem::path& path, const std::vector<std::string>& names,
+                                      const LogWriteOptions& options) {
+  check_column_names(names);
+  std::filesystem::path name = path;
+  if (name.extension() == ".gz" || name.extension() == ".zst") {
+    name.replace_extension();
+  }
+  const std::string ending = name.extension().string();
+  const bool packed = name != path;
+  if (ending == ".csv" || (packed && ending.empty())) {
+    return create_csv(path, names);
+  }
+  if (!packed && (ending == ".h5" || ending == ".hdf5")) {
+    return create_hdf5(path, names);
+  }
+  if (!packed && (ending == ".mcap" || ending == ".db3" || ending.empty())) {
+    return create_bag(path, names, options);
+  }
+  throw InputError(path.string() +
+                   ": unknown ending: expected .csv, .csv.gz, .csv.zst, .mcap, .db3, .h5, or a name "
+                   "without one for a bag directory");
 }
 
 }  // namespace wheelwright

@@ -11,14 +11,43 @@
 #include <fmt/format.h>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/files/suggest.hpp>
-#include <wheelwright/logs/mcap_file.hpp>
-#include <wheelwright/logs/mcap_packing.hpp>
-#include <wheelwright/logs/mcap_records.hpp>
-#include <wheelwright/logs/mcap_resume.hpp>
-#include <wheelwright/logs/mcap_summary.hpp>
+#include <wheelwright/files/words.hpp>
+#include <wheelwright/logs/mcap_format.hpp>
+#include <wheelwright/logs/mcap_recovery.hpp>
 
 namespace wheelwright {
+namespace {
+
+std::string counted(std::uint64_t count, const char* what) {
+  return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
+}
+
+}  // namespace
+
+std::vector<std::string> sentences(const McapReport& report) {
+  std::vector<std::string> lines;
+  for (const McapDamage& damage : report.damages) {
+    std::string line = fmt::format("{}: at byte {}: {}", report.path, damage.offset, damage.why);
+    if (damage.bytes > 0 || damage.messages) {
+      line += fmt::format(" ({}", counted(damage.bytes, "byte"));
+      line += damage.messages ? ", " + counted(*damage.messages, "message") + " lost)" : " not used)";
+    }
+    lines.push_back(std::move(line));
+  }
+  if (report.damage_count > report.damages.size()) {
+    lines.push_back(fmt::format("{}: {} more damaged places, {} in all", report.path,
+                                report.damage_count - report.damages.size(), counted(report.damaged_bytes, "byte")));
+  }
+  if (report.unknown.count > 0) {
+    lines.push_back(fmt::format("{}: at byte {}: {} of an unknown kind skipped ({})", report.path, report.unknown.first,
+                                counted(report.unknown.count, "record"), counted(report.unknown.bytes, "byte")));
+  }
+  if (report.finished && report.promised && *report.promised != report.messages) {
+    lines.push_back(fmt::format("{}: {} read; its statistics say {}", report.path, counted(report.messages, "message"),
+                                *report.promised));
+  }
+  return lines;
+}
 
 using mcap::Fields;
 using mcap::head_bytes;

@@ -9,8 +9,7 @@
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/files/atomic_file.hpp>
-#include <wheelwright/logs/mcap_packing.hpp>
-#include <wheelwright/logs/mcap_records.hpp>
+#include <wheelwright/logs/mcap_format.hpp>
 
 namespace wheelwright {
 

@@ -11,7 +11,7 @@
 #include <string>
 #include <string_view>
 
-#include <wheelwright/logs/mcap_types.hpp>
+#include <wheelwright/logs/mcap_format.hpp>
 
 namespace wheelwright {
 

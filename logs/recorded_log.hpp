@@ -1,16 +1,73 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// A log that was recorded in files, whatever their format.
+/// A log recorded in files of whatever format, and the report of what reading it found and repaired.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include <wheelwright/core/log.hpp>
-#include <wheelwright/logs/csv_report.hpp>
 
 namespace wheelwright {
+
+/// How often something was met, and where first.
+struct Occurrences {
+  std::size_t count = 0;
+  std::string first;  ///< "file:line" of the first, with column and value where they say more; empty when count is 0
+};
+
+/// A column whose values were interpolated between the samples of another clock.
+struct Interpolation {
+  std::string column;
+  std::string topic;   ///< which has the samples
+  double error = 0.0;  ///< largest interpolation error (StreamAligner::error), unit of the column
+};
+
+/// One file of a log.
+struct LogFileReport {
+  std::string path;                  ///< as it was given
+  std::string format = "csv";        ///< "csv", "mcap", "sqlite3" or "hdf5"
+  std::string packing;               ///< "plain", "gzip" or "zstd" (of MCAP: of its chunks)
+  std::uint64_t bytes = 0;           ///< size on disk
+  std::string hash;                  ///< "xxh64:…" of the bytes on disk (Xxh64::text)
+  std::vector<std::string> header;   ///< all columns that the file has, as it writes them
+  std::vector<std::string> ignored;  ///< those of them that are not used
+  std::size_t rows = 0;              ///< rows handed on
+  std::size_t segments = 0;          ///< segments that begin in this file
+  double seconds = 0.0;              ///< sum over the segments of last time − first time, s
+  double time_origin = 0.0;          ///< s, of the file's own clock: what its times are counted from
+  std::vector<Interpolation> interpolated;
+  std::vector<std::string> notes;  ///< what else was decided or lost, one sentence each
+};
+
+/// A whole log.
+struct LogReport {
+  std::vector<LogFileReport> files;
+  std::size_t rows = 0;       ///< rows handed on
+  std::size_t rows_read = 0;  ///< rows met; rows_read − rows = empty + not_finite + uncovered + duplicates +
+                              ///< truncated
+  std::size_t segments = 0;
+  double seconds = 0.0;      ///< sum of the files' seconds, s
+  double median_step = 0.0;  ///< median of at most the first 100 001 time steps > 0, s
+  Occurrences empty;         ///< rows dropped: a used field is empty (or NA, null, none)
+  Occurrences not_finite;    ///< rows dropped: a used field is NaN or infinite
+  Occurrences uncovered;     ///< rows dropped: another topic has no samples around their time
+  Occurrences duplicates;    ///< rows dropped: the same time as the row before
+  Occurrences truncated;     ///< last lines dropped that are cut off in the middle (at most one a file)
+  Occurrences resets;        ///< segments begun because time went backwards
+  Occurrences gaps;          ///< segments begun because a step is more than 5 × the median step
+  Occurrences wraps;         ///< jumps of `theta` by more than π that were unwrapped (no row is lost)
+  Occurrences angle_wraps;   ///< jumps of a wheel angle by a turn that were unwrapped (no row is lost)
+
+  /// Whether no row was dropped.
+  [[nodiscard]] bool clean() const { return rows == rows_read; }
+};
+
+/// The repairs of `report` in words, one sentence each, with count and first place; empty where there were none.
+[[nodiscard]] std::vector<std::string> sentences(const LogReport& report);
 
 /// A log read from files, which says what reading found.
 class RecordedLog : public LogSource {

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include <wheelwright/logs/ros_definition.hpp>
-#include <wheelwright/logs/ros_message_text.hpp>
 
 namespace wheelwright {
 namespace {

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
+#include <charconv>
 #include <memory>
 #include <string>
 #include <system_error>
@@ -12,7 +14,7 @@
 
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/files/byte_source.hpp>
-#include <wheelwright/logs/ros_message_text.hpp>
+#include <wheelwright/files/words.hpp>
 
 namespace wheelwright {
 namespace {
@@ -144,3 +146,295 @@ RosDefinitions ros_definitions_from(const std::filesystem::path& directory) {
 }
 
 }  // namespace wheelwright
+
+namespace wheelwright::ros {
+namespace {
+
+constexpr std::array<std::pair<std::string_view, RosKind>, 15> primitives = {{{"bool", RosKind::boolean},
+                                                                              {"byte", RosKind::uint8},
+                                                                              {"char", RosKind::uint8},
+                                                                              {"int8", RosKind::int8},
+                                                                              {"uint8", RosKind::uint8},
+                                                                              {"int16", RosKind::int16},
+                                                                              {"uint16", RosKind::uint16},
+                                                                              {"int32", RosKind::int32},
+                                                                              {"uint32", RosKind::uint32},
+                                                                              {"int64", RosKind::int64},
+                                                                              {"uint64", RosKind::uint64},
+                                                                              {"float32", RosKind::float32},
+                                                                              {"float64", RosKind::float64},
+                                                                              {"string", RosKind::string},
+                                                                              {"wstring", RosKind::wstring}}};
+
+bool blank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
+
+std::string_view trimmed(std::string_view text) {
+  while (!text.empty() && blank(text.front())) {
+    text.remove_prefix(1);
+  }
+  while (!text.empty() && blank(text.back())) {
+    text.remove_suffix(1);
+  }
+  return text;
+}
+
+/// What stands before the next blank; `text` is left with what is behind.
+std::string_view take_word(std::string_view& text) {
+  const auto end = static_cast<std::size_t>(std::find_if(text.begin(), text.end(), blank) - text.begin());
+  const std::string_view word = text.substr(0, end);
+  text = trimmed(text.substr(end));
+  return word;
+}
+
+bool is_name(std::string_view text) {
+  return !text.empty() && std::isalpha(static_cast<unsigned char>(text.front())) != 0 &&
+         std::all_of(text.begin(), text.end(),
+                     [](unsigned char c) { return (std::isalnum(c) != 0 && c < 128) || c == '_'; });
+}
+
+std::optional<std::uint32_t> whole(std::string_view text) {
+  std::uint32_t value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  return error == std::errc() && end == text.data() + text.size() && value > 0 ? std::optional(value) : std::nullopt;
+}
+
+/// Reads the lines of one type.
+struct LineReader {
+  const std::string& source;
+  std::string package;
+  std::size_t line = 0;
+  std::string_view text;
+
+  [[noreturn]] void fail(std::string_view expected) const {
+    throw InputError(fmt::format("{}: line {}: {}: expected {}", source, line, shown(text), expected));
+  }
+
+  /// Fills kind, shape and counts from "float64[<=3]", and the name of a message's type.
+  void type(std::string_view word, TextField& to) const {
+    RosField& field = to.field;
+    const std::size_t bracket = word.find('[');
+    const std::string_view base = word.substr(0, bracket);
+    if (bracket != std::string_view::npos) {
+      std::string_view inside = word.substr(bracket + 1);
+      if (inside.empty() || inside.back() != ']') {
+        fail("a ']' at the end of the type");
+      }
+      inside.remove_suffix(1);
+      const bool bounded = inside.starts_with("<=");
+      field.shape = inside.empty() || bounded ? RosShape::sequence : RosShape::array;
+      if (!inside.empty()) {
+        const auto count = whole(inside.substr(bounded ? 2 : 0));
+        if (!count) {
+          fail("a number of elements from 1 to 4294967295 between '[' and ']'");
+        }
+        field.count = *count;
+      }
+    }
+    const std::size_t bound = base.find("<=");
+    const std::string_view name = base.substr(0, bound);
+    const auto* const primitive =
+        std::find_if(primitives.begin(), primitives.end(), [&](const auto& known) { return known.first == name; });
+    if (bound != std::string_view::npos) {
+      const auto longest = whole(base.substr(bound + 2));
+      if (!longest || (name != "string" && name != "wstring")) {
+        fail("string<=N or wstring<=N with a number of characters from 1 to 4294967295");
+      }
+      field.longest = *longest;
+    }
+    if (primitive != primitives.end()) {
+      field.kind = primitive->second;
+      return;
+    }
+    field.kind = RosKind::message;
+    std::string_view rest = name;
+    std::size_t parts = 1;
+    for (std::size_t slash = rest.find('/'); slash != std::string_view::npos; slash = rest.find('/'), ++parts) {
+      if (!is_name(rest.substr(0, slash))) {
+        fail("a type such as float64, string or geometry_msgs/Pose");
+      }
+      rest.remove_prefix(slash + 1);
+    }
+    if (!is_name(rest) || parts > 3) {
+      fail("a type such as float64, string or geometry_msgs/Pose");
+    }
+    to.type = parts > 1 ? full_ros_name(name) : package + "/msg/" + std::string(name);
+  }
+
+  /// Appends the field of a line, where it has one.
+  void read(TextMessage& message) {
+    std::string_view rest = trimmed(text.substr(0, text.find('#')));
+    if (rest.empty()) {
+      return;
+    }
+    TextField item;
+    item.line = line;
+    item.text = std::string(text.substr(0, 200));
+    type(take_word(rest), item);
+    const auto end = static_cast<std::size_t>(
+        std::find_if(rest.begin(), rest.end(), [](char c) { return blank(c) || c == '='; }) - rest.begin());
+    const std::string_view name = rest.substr(0, end);
+    if (!is_name(name)) {
+      fail("a type and a name of letters, digits and '_'");
+    }
+    rest = trimmed(rest.substr(end));
+    if (rest.starts_with("=")) {
+      if (item.field.kind == RosKind::message || item.field.shape != RosShape::single) {
+        fail("a constant of a number or string type");
+      }
+      return;
+    }
+    item.field.name = std::string(name);
+    if (std::any_of(message.fields.begin(), message.fields.end(),
+                    [&](const TextField& other) { return other.field.name == name; })) {
+      fail("a name that is not there twice");
+    }
+    message.fields.push_back(std::move(item));
+  }
+};
+
+bool is_separator(std::string_view line) {
+  return line.size() >= 3 && line.find_first_not_of('=') == std::string_view::npos;
+}
+
+std::string package_of(std::string_view type_name) { return std::string(type_name.substr(0, type_name.find('/'))); }
+
+}  // namespace
+
+TextMessages read_messages(const std::string& type_name, std::string_view text, const std::string& source) {
+  TextMessages messages;
+  std::string name = type_name;
+  bool idl = false;
+  bool named = false;  // by a line "MSG: …"
+  bool expect_head = false;
+  LineReader reader{source, package_of(type_name), 0, {}};
+  TextMessage message{source, {}};
+  const auto close = [&] {
+    // The first part may be empty, and the type defined behind a separator of its own.
+    if (!idl && (named || !message.fields.empty() || !text.starts_with("==="))) {
+      messages.try_emplace(name, std::move(message));
+    }
+    message = {source, {}};
+  };
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t end = std::min(text.find('\n', at), text.size());
+    const std::string_view line = trimmed(text.substr(at, end - at));
+    at = end + 1;
+    ++reader.line;
+    reader.text = line;
+    if (expect_head) {
+      const std::size_t colon = line.find(':');
+      const std::string_view word = line.substr(0, colon);
+      if (colon == std::string_view::npos || (word != "MSG" && word != "IDL")) {
+        reader.fail("'MSG: pkg/Type' behind a line of '='");
+      }
+      idl = word == "IDL";
+      name = full_ros_name(trimmed(line.substr(colon + 1)));
+      if (name.find('/') == std::string::npos) {
+        reader.fail("'MSG: pkg/Type' behind a line of '='");
+      }
+      reader.package = package_of(name);
+      expect_head = false;
+      named = true;
+    } else if (is_separator(line)) {
+      close();
+      expect_head = true;
+    } else if (!idl) {
+      reader.read(message);
+    }
+  }
+  if (expect_head) {
+    reader.fail("'MSG: pkg/Type' behind a line of '='");
+  }
+  close();
+  return messages;
+}
+
+namespace {
+
+/// Follows the names from type to type.
+struct Assembler {
+  const TextMessages& known;
+  const std::function<const TextMessage*(const std::string&)>& more;
+  RosDefinition definition{};
+  std::map<std::string, std::size_t> places{};
+  std::vector<std::string> open{};  ///< types inside which we are
+
+  const TextMessage* text_of(const std::string& name) const {
+    const auto found = known.find(name);
+    return found != known.end() ? &found->second : more(name);
+  }
+
+  /// Adds a type and what it uses; its place.
+  std::size_t add(const std::string& name, const TextMessage& text) {
+    const std::size_t place = definition.messages.size();
+    places[name] = place;
+    definition.messages.push_back({name, {}});
+    open.push_back(name);
+    std::vector<RosField> fields;
+    for (const TextField& item : text.fields) {
+      const auto fail = [&](const std::string& why) {
+        throw InputError(fmt::format("{}: line {}: {}: {}", text.source, item.line, shown(item.text), why));
+      };
+      RosField field = item.field;
+      if (field.kind == RosKind::message) {
+        std::string type = item.type;
+        const TextMessage* used = text_of(type);
+        if (used == nullptr && type.ends_with("/Header")) {
+          type = "std_msgs/msg/Header";  // ROS 1 has it in every package
+          used = text_of(type);
+        }
+        if (used == nullptr) {
+          fail(fmt::format("the definition of {} is neither there nor bundled", type));
+        }
+        if (std::find(open.begin(), open.end(), type) != open.end()) {
+          fail(fmt::format("{} would contain itself", type));
+        }
+        if (open.size() >= RosDefinition::deepest) {
+          fail(fmt::format("types within types more than {} deep", RosDefinition::deepest));
+        }
+        const auto place_of = places.find(type);
+        field.message = place_of != places.end() ? place_of->second : add(type, *used);
+      }
+      fields.push_back(std::move(field));
+    }
+    if (fields.empty()) {
+      fields.push_back({"structure_needs_at_least_one_member"});
+    }
+    open.pop_back();
+    definition.messages[place].fields = std::move(fields);
+    return place;
+  }
+};
+
+/// Types within types from `place` on, itself counted; `known` has those that are counted already, 0 for others.
+std::size_t depth_of(const RosDefinition& definition, std::size_t place, std::vector<std::size_t>& known) {
+  if (known[place] == 0) {
+    std::size_t below = 0;
+    for (const RosField& field : definition.messages[place].fields) {
+      if (field.kind == RosKind::message) {
+        below = std::max(below, depth_of(definition, field.message, known));
+      }
+    }
+    known[place] = below + 1;
+  }
+  return known[place];
+}
+
+}  // namespace
+
+RosDefinition assemble(const std::string& type_name, const TextMessages& known,
+                       const std::function<const TextMessage*(const std::string&)>& more) {
+  Assembler assembler{known, more};
+  const TextMessage* const text = assembler.text_of(type_name);
+  if (text == nullptr) {
+    throw InputError(type_name + ": its definition is neither there nor bundled");
+  }
+  assembler.add(type_name, *text);
+  std::vector<std::size_t> depths(assembler.definition.messages.size());
+  if (depth_of(assembler.definition, 0, depths) > RosDefinition::deepest) {
+    throw InputError(fmt::format("{}: types within types more than {} deep", type_name, RosDefinition::deepest));
+  }
+  return std::move(assembler.definition);
+}
+
+}  // namespace wheelwright::ros

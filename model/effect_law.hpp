@@ -1,23 +1,78 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
+/// Unmodelled effects that a robot file can carry: parameters, regressor terms, geometry.
+///
 /// The effects that a robot file can carry, as data: what they are called, their parameters, and which part of the
 /// toolkit accounts for them.
 #pragma once
 
+#include <cstddef>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include <Eigen/Core>
+
 #include <wheelwright/core/interval.hpp>
+#include <wheelwright/model/model.hpp>
 #include <wheelwright/model/robot.hpp>
 
 namespace wheelwright {
 
+/// The wheels as the effects of a robot leave them.
+struct DriveGeometry {
+  Eigen::Vector2d radius = Eigen::Vector2d::Zero();         ///< [r_R, r_L], m
+  double track_width = 0.0;                                 ///< D, m
+  Eigen::Vector2d encoder_scale = Eigen::Vector2d::Ones();  ///< what an encoder shows per unit of what is
+};
+
+/// The geometry of a differential drive: `wheel_radius_asymmetric` r(1 ± ε) (right, left), `wheel_radius` r(1 + ε),
+/// `track_width` D(1 + ε), `encoder_scale` 1 + s_R, 1 + s_L. Without these effects that of the robot file.
+[[nodiscard]] DriveGeometry drive_geometry(const Robot& robot);
+
+/// Gives `model` (of a differential drive, made with the track width of the geometry) the robot's geometry: with r the
+/// nominal radius,
+///   v = [r_R/2 r_L/2; r_R/D −r_L/D] ω,   [r/r_R r/r_L; ℓ r/r_R −ℓ r/r_L] τ = Y θ_L,
+/// so that θ_L = r·[m, I, f1, f3] keeps its meaning; dry friction at the wheels follows the input matrix. The model is
+/// left as it is where the robot has no such effect.
+void apply_geometry(Model& model, const Robot& robot);
+
+/// Appends the parameters and terms of the robot's effects to `model`, which has the robot's geometry. With ℓ the model's
+/// lever arm, k = ℓ/(D/2), and [δs; δd] the additional effort of (15) per unit of the entry of θ_L; ±ℓ stands for the same at
+/// both wheels with the signs of the input matrix:
+///   coulomb_asymmetric   sgn ω_R (c_R), sgn ω_L (c_L), at the wheel
+///   stribeck             e^{−(ω/ω_s)²} sgn ω at both wheels, ω_s fixed
+///   viscous_asymmetric   v2 D/(2r) ; ℓ v1/r
+///   quadratic_drag       v1|v1| ; 0 (c) and 0 ; k v2|v2| (c2)
+///   com_longitudinal     −v2² ; k v1 v2, θ = r·m·a
+///   com_lateral          −v̇2 ; −k v̇1, θ = r·m·b
+///   torque_bias          1 at the right (b_R), the left wheel (b_L)
+///   slope                cos θ ; 0 (θ = r·m·g_x) and sin θ ; 0 (θ = r·m·g_y)
+///   caster_drag          v1/V ; k p² v2/V, V² = v1² + p² v2², p fixed
+///   lateral_scrub        0 ; k sgn v2
+/// and for a single axis stribeck and quadratic_drag of its one speed. `coulomb` is the model's own parameter, and
+/// `torque_bias` of a single axis its `offset`. A parameter that the robot file does not name has no entry.
+/// Where a sign is in doubt, by the error of the speed, the term is any number in [−1, 1].
+void add_effect_terms(Model& model, const Robot& robot);
+
+/// Adds dry friction of the parameter `parameter` at every joint: sgn ω_j times the column of the input matrix.
+void add_dry_friction(Model& model, std::size_t parameter);
+
+/// Whether the model parameter with the physical name `physical` is one of the robot's effects, and what the file says of
+/// the physical quantity: its interval; [v/3, 3v] for a single value v; for com_* and slope times the mass, which is that
+/// of the robot's prior, else [m/3, 3m] of the nominal m, else anything up to 10⁶ kg.
+[[nodiscard]] std::optional<Interval> effect_prior(const Robot& robot, const std::string& physical);
+
+/// The physical quantity that a simulator with the mass `mass` (kg) takes for the same parameter; nothing where it is of
+/// no effect.
+[[nodiscard]] std::optional<double> effect_truth(const Robot& robot, const std::string& physical, double mass);
+
 /// How an effect is accounted for when a log is read. A simulator takes them all.
 enum class EffectMechanism {
-  term,        ///< terms of Y, linear in the parameters, which are then bounded from the log (effect_terms.hpp)
+  term,        ///< terms of Y, linear in the parameters, which are then bounded from the log (effect_law.hpp)
   effort,      ///< a correction of the measured effort with fixed numbers, before the filter (effort_correction.hpp)
-  geometry,    ///< fixed numbers in the motion and input matrices (effect_geometry.hpp)
+  geometry,    ///< fixed numbers in the motion and input matrices (effect_law.hpp)
   simulation,  ///< in a simulator only
 };
 

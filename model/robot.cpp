@@ -7,9 +7,7 @@
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/model/differential_drive.hpp>
-#include <wheelwright/model/effect_geometry.hpp>
 #include <wheelwright/model/effect_law.hpp>
-#include <wheelwright/model/effect_terms.hpp>
 #include <wheelwright/model/single_axis.hpp>
 
 namespace wheelwright {

@@ -108,8 +108,8 @@ struct Robot {
 };
 
 /// The model of `robot` with the parameters that it requests (those it names in `parameters`, else the model's
-/// basic set) and those of its effects; geometry and effort map are those of the effects too (effect_terms.hpp,
-/// effect_geometry.hpp). The order: basic parameters, those of effects, optional ones. Throws InvalidArgument when the
+/// basic set) and those of its effects; geometry and effort map are those of the effects too (effect_law.hpp,
+/// effect_law.hpp). The order: basic parameters, those of effects, optional ones. Throws InvalidArgument when the
 /// robot's geometry, its requests or its effects make no sense.
 [[nodiscard]] Model make_model(const Robot& robot);
 

@@ -15,7 +15,7 @@ TermValue sign_of_speed(const MotionState& state) {
   return {v > 0.0 ? 1.0 : -1.0, 0.0};
 }
 
-TermValue one(const MotionState&) { return {1.0, 0.0}; }
+TermValue constant_term(const MotionState&) { return {1.0, 0.0}; }
 
 }  // namespace
 
@@ -42,7 +42,7 @@ Model SingleAxis::model() const {
   }
   if (offset) {
     add("offset", "N (rotary: N·m)", {-1e7, 1e7}, "move in both directions",
-        {.kind = Term::Kind::function, .function = one});
+        {.kind = Term::Kind::function, .function = constant_term});
   }
   return m;
 }

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include <wheelwright/files/xxh64.hpp>
-#include <wheelwright/logs/row_cleaner.hpp>
 #include <wheelwright/logs/row_log.hpp>
 
 #include "arrays.hpp"

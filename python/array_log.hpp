@@ -7,7 +7,7 @@
 
 #include <pybind11/pybind11.h>
 
-#include <wheelwright/logs/csv_header.hpp>
+#include <wheelwright/logs/csv_format.hpp>
 #include <wheelwright/logs/recorded_log.hpp>
 
 namespace wheelwright::python {

@@ -9,8 +9,8 @@
 
 #include <wheelwright/logs/log_file.hpp>
 #include <wheelwright/results/model_file.hpp>
+#include <wheelwright/results/model_json.hpp>
 #include <wheelwright/results/model_words.hpp>
-#include <wheelwright/results/warrant_json.hpp>
 #include <wheelwright/robots/robot_file.hpp>
 
 #include "../app/common.hpp"

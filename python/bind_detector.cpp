@@ -6,8 +6,7 @@
 #include <pybind11/stl/filesystem.h>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/commission/event_isolation.hpp>
-#include <wheelwright/commission/trace.hpp>
+#include <wheelwright/commission/detector_walk.hpp>
 #include <wheelwright/core/check.hpp>
 
 #include "../app/common.hpp"

@@ -2,7 +2,7 @@
 #include <optional>
 
 #include <wheelwright/core/check.hpp>
-#include <wheelwright/gap/catalogue.hpp>
+#include <wheelwright/gap/effect.hpp>
 
 #include "arrays.hpp"
 #include "effect_object.hpp"

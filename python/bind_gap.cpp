@@ -7,10 +7,9 @@
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/core/check.hpp>
-#include <wheelwright/files/suggest.hpp>
-#include <wheelwright/gap/catalogue.hpp>
+#include <wheelwright/files/words.hpp>
 #include <wheelwright/gap/diagnose.hpp>
-#include <wheelwright/gap/fresh_log.hpp>
+#include <wheelwright/gap/effect.hpp>
 #include <wheelwright/logs/log_file.hpp>
 #include <wheelwright/report/gap_words.hpp>
 #include <wheelwright/results/gap_json.hpp>

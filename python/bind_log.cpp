@@ -7,7 +7,7 @@
 #include <pybind11/stl/filesystem.h>
 
 #include <wheelwright/core/check.hpp>
-#include <wheelwright/files/suggest.hpp>
+#include <wheelwright/files/words.hpp>
 #include <wheelwright/logs/csv.hpp>
 #include <wheelwright/logs/log_columns.hpp>
 #include <wheelwright/logs/log_file.hpp>

@@ -17,7 +17,7 @@
 #include <wheelwright/bounds/feasible_set.hpp>
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/core/log.hpp>
-#include <wheelwright/files/json_file.hpp>
+#include <wheelwright/files/json.hpp>
 #include <wheelwright/logs/recorded_log.hpp>
 #include <wheelwright/model/robot.hpp>
 

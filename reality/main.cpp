@@ -15,7 +15,7 @@
 
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/files/atomic_file.hpp>
-#include <wheelwright/files/json_file.hpp>
+#include <wheelwright/files/json.hpp>
 #include <wheelwright/logs/csv.hpp>
 #include <wheelwright/reality/case.hpp>
 

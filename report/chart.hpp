@@ -1,17 +1,74 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
+/// The one time axis that all charts and tables of a page share.
+/// Series and times as text that a page unpacks (series.js): differences of integers, deflated, in base64.
 /// A chart over time, as data: the page's script draws it with uPlot.
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
-#include <wheelwright/report/time_axis.hpp>
-
 namespace wheelwright::report {
+
+/// Times of a page. They count from an origin where the log's clock is an epoch, so that digits are left for the driving.
+/// Where the log's time goes back (several runs in one log), its runs are laid end to end: a moment then no longer has
+/// one place on the axis.
+class TimeAxis {
+ public:
+  /// The axis for the times `t` (s) of a whole log, or of what is known of it: origin 0 unless the first one is beyond
+  /// ±10⁶ s.
+  explicit TimeAxis(const std::vector<double>& t = {});
+
+  /// s, subtracted from every time that is shown.
+  [[nodiscard]] double origin() const { return origin_; }
+  /// Whether the log's time goes back somewhere.
+  [[nodiscard]] bool repeats() const { return offsets_.size() > 1; }
+  /// Seconds since the origin.
+  [[nodiscard]] double shown(double t) const { return t - origin_; }
+  /// "12.345 s".
+  [[nodiscard]] std::string text(double t) const;
+  /// Places on the axis of the times `t` of one walk over the log; never decreasing.
+  [[nodiscard]] std::vector<double> lay(const std::vector<double>& t) const;
+
+ private:
+  double origin_ = 0.0;
+  std::vector<double> offsets_;  // of each run, s
+};
+
+/// A series on a grid of at most 10 000 steps: value = low + step · code, within half a step of what it was made from.
+/// Code 65 535 is a gap.
+///
+/// `text` is a zlib stream (RFC 1950) in base64 of 2n bytes: the low bytes of all n differences, then their high bytes.
+/// Differences of codes are taken `order` times modulo 2¹⁶ and stored as zigzag, 0, −1, 1, −2 … as 0, 1, 2, 3 …
+struct PackedSeries {
+  double low = 0.0;
+  double step = 0.0;
+  int order = 0;  ///< 0, 1 or 2
+  std::string text;
+};
+
+/// Packs `values` to 1/20 000 of their span, or of `span` where that is larger; what is not finite becomes a gap.
+[[nodiscard]] PackedSeries pack(std::span<const double> values, double span = 0.0);
+
+/// Times as integers: t = start + tick · k. A tick is a microsecond; less where the median step is below 100 µs, more where
+/// a step inside a segment exceeds 500 s.
+///
+/// Every segment begins with a jump {index, k}. `text` is a zlib stream in base64 of 4n bytes: second differences of k as
+/// 32-bit zigzag, all lowest bytes first; at a jump 0, and the step before it counts on.
+struct PackedTimes {
+  double start = 0.0;  ///< s
+  double tick = 1e-6;  ///< s
+  std::vector<std::pair<std::size_t, std::int64_t>> jumps;
+  std::string text;
+};
+
+/// Packs `t` (s, finite). `breaks`: ascending indices at which a segment starts; 0 may be among them.
+[[nodiscard]] PackedTimes pack_times(std::span<const double> t, const std::vector<std::size_t>& breaks);
 
 /// How a line is drawn. Styles differ in dash and width as well as in colour, so that they tell without colour.
 enum class Line {
@@ -62,7 +119,7 @@ inline constexpr std::size_t most_chart_points = 2'000'000;
 [[nodiscard]] std::string clock(std::string_view id, const std::vector<double>& t,
                                 const std::vector<std::size_t>& breaks, const TimeAxis& axis);
 
-/// The chart as a <figure> that holds its data, packed (packing.hpp): to 1/20 000 of each series' span, or of
+/// The chart as a <figure> that holds its data, packed (chart.hpp): to 1/20 000 of each series' span, or of
 /// ChartSeries::span.
 [[nodiscard]] std::string figure(const Chart& chart, const TimeAxis& axis);
 

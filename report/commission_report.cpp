@@ -9,14 +9,11 @@
 
 #include <wheelwright/report/commission_words.hpp>
 #include <wheelwright/report/data_sections.hpp>
-#include <wheelwright/report/estimator_table.hpp>
+#include <wheelwright/report/drawing.hpp>
 #include <wheelwright/report/page.hpp>
 #include <wheelwright/report/parameter_table.hpp>
-#include <wheelwright/report/parameter_view.hpp>
-#include <wheelwright/report/set_drawings.hpp>
 #include <wheelwright/report/signals.hpp>
 #include <wheelwright/report/text.hpp>
-#include <wheelwright/report/warrant_section.hpp>
 
 namespace wheelwright {
 

@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 
 #include <wheelwright/commission/margin_words.hpp>
-#include <wheelwright/report/parameter_view.hpp>
+#include <wheelwright/report/parameter_table.hpp>
 #include <wheelwright/report/text.hpp>
 
 namespace wheelwright::report {

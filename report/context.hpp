@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/commission/trace.hpp>
+#include <wheelwright/commission/detector_walk.hpp>
 #include <wheelwright/core/log.hpp>
 
 namespace wheelwright {

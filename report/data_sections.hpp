@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The tables of a commissioning report below the charts. All functions return HTML.
+/// Sections of a commissioning report: tables below the charts, assumptions and their warrant. All functions return HTML.
 #pragma once
 
 #include <string>
+#include <vector>
 
+#include <wheelwright/commission/assumptions.hpp>
 #include <wheelwright/commission/commission.hpp>
+#include <wheelwright/report/chart.hpp>
 #include <wheelwright/report/context.hpp>
-#include <wheelwright/report/time_axis.hpp>
 
 namespace wheelwright::report {
 
@@ -25,5 +27,14 @@ namespace wheelwright::report {
 
 /// Files, rows, segments, steps, repairs and notes.
 [[nodiscard]] std::string data_section(const Commissioning& result, const ReportContext& context, const TimeAxis& axis);
+
+/// The word as a badge, of another colour for each. HTML.
+[[nodiscard]] std::string warrant_badge(Warrant warrant);
+
+/// The badge and what the word means, as a paragraph. HTML.
+[[nodiscard]] std::string warrant_note(Warrant warrant);
+
+/// The assumptions with their verdicts, those that fail first, as a table; empty for none. HTML.
+[[nodiscard]] std::string assumptions_section(const std::vector<Assumption>& assumptions);
 
 }  // namespace wheelwright::report

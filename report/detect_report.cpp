@@ -6,12 +6,12 @@
 
 #include <fmt/format.h>
 
+#include <wheelwright/report/data_sections.hpp>
 #include <wheelwright/report/detect_words.hpp>
 #include <wheelwright/report/page.hpp>
-#include <wheelwright/report/parameter_view.hpp>
+#include <wheelwright/report/parameter_table.hpp>
 #include <wheelwright/report/signals.hpp>
 #include <wheelwright/report/text.hpp>
-#include <wheelwright/report/warrant_section.hpp>
 
 namespace wheelwright {
 

@@ -8,8 +8,7 @@
 #include <vector>
 
 #include <wheelwright/commission/commission.hpp>
-#include <wheelwright/commission/event_isolation.hpp>
-#include <wheelwright/commission/trace.hpp>
+#include <wheelwright/commission/detector_walk.hpp>
 #include <wheelwright/report/context.hpp>
 
 namespace wheelwright {

@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/report/parameter_view.hpp>
+#include <wheelwright/report/parameter_table.hpp>
 #include <wheelwright/report/text.hpp>
 
 namespace wheelwright::report {

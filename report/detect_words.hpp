@@ -7,9 +7,8 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/commission/event_isolation.hpp>
-#include <wheelwright/commission/trace.hpp>
-#include <wheelwright/report/time_axis.hpp>
+#include <wheelwright/commission/detector_walk.hpp>
+#include <wheelwright/report/chart.hpp>
 
 namespace wheelwright::report {
 

@@ -10,9 +10,8 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/gap/spectrum.hpp>
 #include <wheelwright/gap/where.hpp>
-#include <wheelwright/report/svg.hpp>
+#include <wheelwright/report/drawing.hpp>
 #include <wheelwright/report/text.hpp>
 
 namespace wheelwright::report {

@@ -17,7 +17,6 @@
 #include <wheelwright/report/page.hpp>
 #include <wheelwright/report/signals.hpp>
 #include <wheelwright/report/text.hpp>
-#include <wheelwright/report/time_axis.hpp>
 
 namespace wheelwright {
 

@@ -1,12 +1,51 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
+/// Drawings of an identification, as SVG.
+/// The parts of an identification's page. All functions return HTML; empty where the result has nothing of the kind.
 /// The page of an identification.
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include <wheelwright/inference/identification.hpp>
+#include <wheelwright/report/chart.hpp>
 #include <wheelwright/report/context.hpp>
+
+namespace wheelwright::report {
+
+/// One row of bars for each parameter (`names`, text): the share of its information in each window of the log, the
+/// fewest windows that carry most of it filled. Over log time; over windows in their order where the log's time goes
+/// back. Empty without windows or where no parameter has information.
+[[nodiscard]] std::string information_bars(const InformationOverTime& information,
+                                           const std::vector<std::string>& names, const TimeAxis& axis);
+
+/// The residual with a shape held at each value over the residual without it, the best one marked; empty for fewer than
+/// two points.
+[[nodiscard]] std::string shape_curve(const ShapeFinding& shape);
+
+/// Estimates by all estimators and intervals by all methods, one line each; what each promises; the test.
+[[nodiscard]] std::string comparison_section(const Identification& result);
+
+/// Rank and condition, directions that are not seen with their manoeuvres, combinations that are known best.
+[[nodiscard]] std::string identifiability_section(const Identification& result);
+
+/// Which seconds carry which parameter.
+[[nodiscard]] std::string information_section(const Identification& result, const TimeAxis& axis);
+
+/// Weights and worst episodes of the robust fit, active physical constraints.
+[[nodiscard]] std::string robust_section(const Identification& result, const TimeAxis& axis);
+
+/// Delay, lags and Stribeck speed, in words and with their curves.
+[[nodiscard]] std::string shapes_section(const Identification& result);
+
+/// Wheel radii and track width from the pose.
+[[nodiscard]] std::string kinematics_section(const Identification& result);
+
+/// Noise of each column, known or found.
+[[nodiscard]] std::string column_noise_section(const Identification& result);
+
+}  // namespace wheelwright::report
 
 namespace wheelwright {
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
+/// Drawings of detectability margins as SVG.
 /// The report of `wheelwright margins`.
 #pragma once
 
@@ -7,6 +8,19 @@
 
 #include <wheelwright/commission/margin_survey.hpp>
 #include <wheelwright/report/context.hpp>
+
+namespace wheelwright::report {
+
+/// Smallest certain size over the delay, both logarithmic: for each manoeuvre the median over its onsets, and the size
+/// that is certain at every one of them (thin). Empty where nothing is certain.
+[[nodiscard]] std::string delay_curves(const FaultMargins& margins, const MarginSurvey& survey);
+
+/// A map over the operating space: the darker a point, the smaller the certain size, on a logarithmic scale whose ends are
+/// written out; empty points show no certain size. Empty where no point has one.
+[[nodiscard]] std::string margin_map(const OperatingMap& map, const FaultType& fault, const std::string& x_label,
+                                     const std::string& y_label);
+
+}  // namespace wheelwright::report
 
 namespace wheelwright {
 

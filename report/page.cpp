@@ -3,8 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <wheelwright/report/data_sections.hpp>
 #include <wheelwright/report/text.hpp>
-#include <wheelwright/report/warrant_section.hpp>
 
 #include "report_assets.hpp"
 

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include <wheelwright/core/warrant.hpp>
+#include <wheelwright/report/chart.hpp>
 #include <wheelwright/report/context.hpp>
-#include <wheelwright/report/time_axis.hpp>
 
 namespace wheelwright::report {
 

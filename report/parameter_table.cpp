@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/commission/assumptions.hpp>
 #include <wheelwright/report/parameter_table.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <map>
 #include <utility>
@@ -10,13 +10,188 @@
 
 #include <fmt/format.h>
 
+#include <wheelwright/commission/assumptions.hpp>
+#include <wheelwright/commission/physical.hpp>
+#include <wheelwright/core/statistics.hpp>
+#include <wheelwright/identify/noise_level.hpp>
+#include <wheelwright/report/data_sections.hpp>
 #include <wheelwright/report/drawing.hpp>
 #include <wheelwright/report/page.hpp>
-#include <wheelwright/report/parameter_view.hpp>
 #include <wheelwright/report/text.hpp>
-#include <wheelwright/report/warrant_section.hpp>
 
 namespace wheelwright::report {
+namespace {
+
+Model model_of(const Commissioning& result) {
+  Model model;
+  for (const ParameterResult& r : result.parameters) {
+    model.parameters.push_back(r.parameter);
+  }
+  return model;
+}
+
+// θ_L = r·m is told as such.
+std::string label(const Parameter& parameter) {
+  return parameter.name == "r_" + parameter.physical ? "r·" + words(parameter.physical) : words(parameter.name);
+}
+
+// Interval that decides on the digits of a number: a prior bound is wide, and says nothing of what is known.
+std::pair<double, double> uncertainty(const ParameterView& v) {
+  if ((v.lower_is_prior || v.upper_is_prior) && v.estimate && v.spread) {
+    return {*v.estimate - *v.spread, *v.estimate + *v.spread};
+  }
+  return {v.lower, v.upper};
+}
+
+ParameterView theta_view(const Commissioning& result, const ParameterResult& r) {
+  ParameterView view{.name = label(r.parameter),
+                     .unit = parameter_unit(result.model.robot, r.parameter),
+                     .estimate = r.estimate,
+                     .spread = {},
+                     .lower = r.lower,
+                     .upper = r.upper,
+                     .centre = r.chebyshev,
+                     .nominal = {},
+                     .lower_is_prior = r.lower_is_prior,
+                     .upper_is_prior = r.upper_is_prior,
+                     .has_set = result.status != Commissioning::Status::empty,
+                     .warrant = r.warrant};
+  if (r.estimate && r.standard_error) {
+    view.spread = student_quantile(0.95, std::max(result.residuals.freedom, 1.0)) * *r.standard_error;
+  }
+  return view;
+}
+
+ParameterView physical_view(ParameterView view, const PhysicalScale& scale, const Parameter& parameter) {
+  const auto physical = [&](double theta) { return scale.scale * theta - scale.offset; };
+  view.name = words(parameter.physical);
+  view.unit = parameter.physical_unit;
+  view.lower = physical(view.lower);
+  view.upper = physical(view.upper);
+  view.centre = physical(view.centre);
+  if (view.estimate) {
+    view.estimate = physical(*view.estimate);
+  }
+  if (view.spread) {
+    view.spread = std::abs(scale.scale) * *view.spread;
+  }
+  if (scale.scale < 0.0) {
+    std::swap(view.lower, view.upper);
+    std::swap(view.lower_is_prior, view.upper_is_prior);
+  }
+  return view;
+}
+
+}  // namespace
+
+std::string estimate_text(const ParameterView& view) {
+  const auto [low, high] = uncertainty(view);
+  return view.estimate ? beside(*view.estimate, low, high) : "–";
+}
+
+std::string centre_text(const ParameterView& view) {
+  const auto [low, high] = uncertainty(view);
+  const bool known = view.has_set && !(view.lower_is_prior && view.upper_is_prior);
+  return known ? beside(view.centre, low, high) : "–";
+}
+
+bool physical_values_unknown(const Commissioning& result) {
+  return !physical_scales(result.model.robot, model_of(result)).has_value();
+}
+
+std::vector<ParameterViews> parameter_views(const Commissioning& result) {
+  const auto scales = physical_scales(result.model.robot, model_of(result));
+  std::vector<ParameterViews> views;
+  for (std::size_t j = 0; j < result.parameters.size(); ++j) {
+    const ParameterResult& r = result.parameters[j];
+    ParameterViews v{.theta = theta_view(result, r), .physical = {}};
+    if (scales) {
+      const PhysicalScale& scale = (*scales)[j];
+      const auto nominal = result.model.robot.nominal.find(r.parameter.physical);
+      const bool known = nominal != result.model.robot.nominal.end();
+      if (known) {
+        v.theta.nominal = (nominal->second + scale.offset) / scale.scale;
+      }
+      if (r.parameter.physical != r.parameter.name || scale.scale != 1.0 || scale.offset != 0.0) {
+        v.physical = physical_view(v.theta, scale, r.parameter);
+        v.physical->nominal = known ? std::optional(nominal->second) : std::nullopt;
+      }
+    }
+    views.push_back(std::move(v));
+  }
+  return views;
+}
+
+std::string output_name(const Model& model, std::size_t i) {
+  return i < model.outputs.size() ? words(model.outputs[i]) : "output " + std::to_string(i + 1);
+}
+
+std::string output_unit_of(const Robot& robot, const Model& model, std::size_t i) {
+  return i < model.output_units.size() ? output_unit(robot, model.output_units[i]) : std::string();
+}
+
+namespace {
+
+std::string heading(const EstimatorCandidate& c, bool chosen) {
+  std::string text = escape(words(to_string(c.estimate.estimator)));
+  if (!c.origin.empty()) {
+    text += "<br><small>" + escape(c.origin) + "</small>";
+  }
+  if (chosen) {
+    text += "<br><span class=\"tag\">taken</span>";
+  }
+  return fmt::format("<th scope=\"col\" class=\"n\">{}</th>", text);
+}
+
+std::string cell(const EstimatorCandidate& c, std::size_t j, const PhysicalScale& scale) {
+  const auto at = static_cast<Eigen::Index>(j);
+  const double error = c.estimate.usable ? std::abs(scale.scale) * c.estimate.standard_error[at] : 0.0;
+  if (!(error > 0.0)) {
+    return "<td class=\"n\">–</td>";
+  }
+  const double half = error * student_quantile(0.95, std::max(c.estimate.freedom, 1.0));
+  const double value = scale.scale * c.estimate.theta[at] - scale.offset;
+  return fmt::format("<td class=\"n\">{} ± {}</td>", beside(value, value - half, value + half), number(half, 2));
+}
+
+}  // namespace
+
+std::string estimator_table(const Commissioning& result) {
+  const EstimatorChoice& choice = result.estimators;
+  if (choice.candidates.empty() || result.parameters.empty()) {
+    return {};
+  }
+  const auto scales = physical_scales(result.model.robot, result.model.model);
+  const std::vector<ParameterViews> views = parameter_views(result);
+  std::string out = paragraph(escape(capital(choice.reason)) + ".");
+  out += "<div class=\"wide\"><table><thead><tr><th scope=\"col\">Parameter</th><th scope=\"col\">unit</th>";
+  for (std::size_t k = 0; k < choice.candidates.size(); ++k) {
+    out += heading(choice.candidates[k], k == choice.chosen);
+  }
+  out += "</tr></thead><tbody>\n";
+  for (std::size_t j = 0; j < views.size(); ++j) {
+    const PhysicalScale scale = scales ? (*scales)[j] : PhysicalScale{};
+    out += fmt::format("<tr><th scope=\"row\">{}</th><td class=\"unit\">{}</td>", escape(views[j].best().name),
+                       escape(views[j].best().unit));
+    for (const EstimatorCandidate& c : choice.candidates) {
+      out += cell(c, j, scale);
+    }
+    out += "</tr>\n";
+  }
+  out += "</tbody></table></div>\n";
+  out +=
+      "<p class=\"note\">± is half of the 95 % interval, which allows for autocorrelated residuals. Noise in the "
+      "measured motion pulls the least-squares estimates of inertias towards zero; instruments and bias compensation "
+      "do not have that bias.</p>\n";
+  std::vector<std::string> unusable;
+  for (const EstimatorCandidate& c : choice.candidates) {
+    if (!c.estimate.usable) {
+      unusable.push_back(capital(words(to_string(c.estimate.estimator))) + ": " + c.estimate.reason + ".");
+    }
+  }
+  return out + bullets(unusable);
+}
+
 namespace {
 
 constexpr double binding_margin = 1.0;  // s, shown on either side of a binding sample

@@ -9,7 +9,7 @@
 #include <fmt/format.h>
 
 #include <wheelwright/core/check.hpp>
-#include <wheelwright/report/svg.hpp>
+#include <wheelwright/report/drawing.hpp>
 #include <wheelwright/report/text.hpp>
 
 namespace wheelwright::report {

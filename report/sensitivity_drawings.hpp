@@ -9,9 +9,7 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/study/grid.hpp>
-#include <wheelwright/study/morris.hpp>
-#include <wheelwright/study/one_at_a_time.hpp>
+#include <wheelwright/study/screening.hpp>
 #include <wheelwright/study/sobol_indices.hpp>
 
 namespace wheelwright::report {

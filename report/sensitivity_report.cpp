@@ -7,11 +7,11 @@
 
 #include <fmt/format.h>
 
+#include <wheelwright/report/chart.hpp>
+#include <wheelwright/report/data_sections.hpp>
 #include <wheelwright/report/page.hpp>
 #include <wheelwright/report/sensitivity_drawings.hpp>
 #include <wheelwright/report/text.hpp>
-#include <wheelwright/report/time_axis.hpp>
-#include <wheelwright/report/warrant_section.hpp>
 
 namespace wheelwright {
 

@@ -3,15 +3,21 @@
 /// Charts of what was measured and of what the detector made of it.
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <vector>
 
-#include <wheelwright/commission/trace.hpp>
+#include <wheelwright/commission/detector_walk.hpp>
 #include <wheelwright/core/log.hpp>
 #include <wheelwright/model/robot.hpp>
 #include <wheelwright/report/chart.hpp>
 
 namespace wheelwright::report {
+
+/// The rows of `log` where these are `most` or fewer; else the smallest and the largest value of every column in each bin
+/// of consecutive rows, as two rows (one where a bin has a single row): at most `most` of them unless nearly every row
+/// starts a segment. Walks the log once, and holds 8 bytes a value of what it hands out.
+[[nodiscard]] LogTable raw_signals(LogSource& log, std::size_t most = most_chart_points);
 
 /// A point-wise smaller table that looks the same: of each bin of rows the smallest and largest value of every column, in
 /// the order in which they occurred. At most about `most` rows; bins do not cross segments. Tables that are short enough

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/results/fleet_json.hpp>
 
+#include <algorithm>
 #include <cmath>
+#include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
@@ -9,7 +11,7 @@
 
 #include <wheelwright/files/number.hpp>
 #include <wheelwright/files/words.hpp>
-#include <wheelwright/results/warrant_json.hpp>
+#include <wheelwright/results/model_json.hpp>
 
 namespace wheelwright {
 namespace {
@@ -292,6 +294,48 @@ std::string fleet_csv_rows(const RobotRecord& record) {
                                p.upper_is_prior, warrant_word(p.warrant));
   }
   return out.empty() ? begin + ",,,,,,,,\n" : out;
+}
+
+namespace {
+
+// `text` as comment lines of at most 100 bytes; line ends and control characters become blanks.
+std::string comment(std::string text) {
+  constexpr std::size_t most = 98;
+  std::ranges::replace_if(
+      text, [](char c) { return static_cast<unsigned char>(c) < 0x20; }, ' ');
+  std::string out;
+  std::string_view rest = text;
+  while (rest.size() > most) {
+    std::size_t cut = rest.rfind(' ', most);
+    cut = cut == std::string_view::npos || cut == 0 ? rest.size() : cut;
+    out += fmt::format("# {}\n", rest.substr(0, cut));
+    rest.remove_prefix(std::min(cut + 1, rest.size()));
+  }
+  return out + fmt::format("# {}\n", rest);
+}
+
+}  // namespace
+
+std::string pooled_prior_yaml(const FleetResult& fleet, const std::string& software) {
+  const PooledPrior& prior = fleet.prior;
+  std::string out = comment("Pooled prior of a fleet, by " + software + ": copy it into the next robot's file.");
+  out += comment((prior.exists ? "Coverage: " : "No box: ") + prior.message + ".");
+  if (prior.exists) {
+    out += comment(
+        "It is distribution-free (split conformal prediction on the robots' bounds); \"drawn alike\" means "
+        "exchangeable: the next robot is of the same kind, not one that was chosen for being different.");
+  }
+  std::string rows;
+  for (const PooledParameter& p : prior.parameters) {
+    const FleetColumn& column = fleet.table.columns[p.column];
+    if (prior.exists && p.included) {
+      rows += fmt::format("  {}: [{}, {}]  # {}\n", column.name, number_text(p.box.lower), number_text(p.box.upper),
+                          column.unit);
+    } else if (prior.exists) {
+      out += comment("Left out: " + column.name + ", " + p.reason + ".");
+    }
+  }
+  return out + (rows.empty() ? "prior: {}\n" : "prior:\n" + rows);
 }
 
 }  // namespace wheelwright

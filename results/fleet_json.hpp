@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Records of robots as lines of JSON, both ways; fleet.json and fleet.csv.
+/// Records of robots as lines of JSON, both ways; fleet.json, fleet.csv and pooled_prior.yaml.
 #pragma once
 
 #include <string>
 #include <string_view>
 
-#include <wheelwright/files/json_file.hpp>
+#include <wheelwright/files/json.hpp>
 #include <wheelwright/study/fleet_result.hpp>
 #include <wheelwright/study/robot_record.hpp>
 
@@ -31,5 +31,10 @@ inline constexpr const char* kFleetSchema = "wheelwright/fleet/1";
 
 /// The rows of one robot, one for each parameter of its commissioning; one with empty fields where it has none.
 [[nodiscard]] std::string fleet_csv_rows(const RobotRecord& record);
+
+/// The key `prior:` as a robot file takes it, with every included parameter in digits that read back exactly, below comments that
+/// state the coverage, what it rests on, and what is left out. Where there is no box, the comments say why and the mapping is
+/// empty.
+[[nodiscard]] std::string pooled_prior_yaml(const FleetResult& fleet, const std::string& software);
 
 }  // namespace wheelwright

@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/files/atomic_file.hpp>
-#include <wheelwright/files/json_number.hpp>
+#include <wheelwright/files/json.hpp>
 #include <wheelwright/gap/where.hpp>
 
 namespace wheelwright {

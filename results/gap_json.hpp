@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/files/json_file.hpp>
+#include <wheelwright/files/json.hpp>
 #include <wheelwright/gap/diagnosis.hpp>
 
 namespace wheelwright {

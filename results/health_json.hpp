@@ -7,8 +7,8 @@
 #include <vector>
 
 #include <wheelwright/doctor/log_health.hpp>
-#include <wheelwright/files/json_file.hpp>
-#include <wheelwright/logs/csv_report.hpp>
+#include <wheelwright/files/json.hpp>
+#include <wheelwright/logs/recorded_log.hpp>
 
 namespace wheelwright {
 

@@ -1,16 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// identification.json: the result of an identification.
+/// identification.json: the result of an identification; the choice of an estimator, alike in model.json.
 #pragma once
 
 #include <cstdint>
 #include <string>
 
-#include <wheelwright/files/json_file.hpp>
+#include <wheelwright/files/json.hpp>
+#include <wheelwright/identify/estimator_choice.hpp>
 #include <wheelwright/inference/identification.hpp>
-#include <wheelwright/logs/csv_report.hpp>
+#include <wheelwright/logs/recorded_log.hpp>
 
 namespace wheelwright {
+
+/// The numbers of `v` as an array.
+[[nodiscard]] Json numbers(const Eigen::VectorXd& v);
+
+/// All candidates of `choice`, in their order (definition estimator_candidate of model.schema.json).
+[[nodiscard]] Json candidates_json(const EstimatorChoice& choice);
+
+/// Durbin, Wu and Hausman's test (definition endogeneity_test); null where it was not made.
+[[nodiscard]] Json endogeneity_json(const EstimatorChoice& choice);
 
 /// Name of the format: the value of its key `schema`.
 inline constexpr const char* kIdentificationSchema = "wheelwright/identification/1";

@@ -7,11 +7,10 @@
 
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/files/json_number.hpp>
-#include <wheelwright/files/json_vector.hpp>
-#include <wheelwright/results/estimators_json.hpp>
+#include <wheelwright/files/json.hpp>
+#include <wheelwright/results/identification_json.hpp>
+#include <wheelwright/results/model_json.hpp>
 #include <wheelwright/results/model_words.hpp>
-#include <wheelwright/results/warrant_json.hpp>
 
 namespace wheelwright {
 namespace {

@@ -6,7 +6,7 @@
 #include <optional>
 
 #include <wheelwright/commission/kinematic.hpp>
-#include <wheelwright/files/json_file.hpp>
+#include <wheelwright/files/json.hpp>
 
 namespace wheelwright {
 

@@ -3,10 +3,10 @@
 
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/files/json_vector.hpp>
+#include <wheelwright/files/json.hpp>
 #include <wheelwright/results/kinematic_json.hpp>
+#include <wheelwright/results/model_json.hpp>
 #include <wheelwright/results/model_words.hpp>
-#include <wheelwright/results/warrant_json.hpp>
 #include <wheelwright/robots/robot_file.hpp>
 
 namespace wheelwright {

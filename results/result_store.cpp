@@ -8,8 +8,8 @@
 #include <fmt/format.h>
 
 #include <wheelwright/core/check.hpp>
-#include <wheelwright/files/suggest.hpp>
-#include <wheelwright/logs/bag_database.hpp>
+#include <wheelwright/files/words.hpp>
+#include <wheelwright/logs/database.hpp>
 
 namespace wheelwright {
 namespace {

@@ -1,13 +1,307 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/results/study_json.hpp>
 
+#include <algorithm>
+#include <cmath>
+#include <optional>
 #include <utility>
 
 #include <nlohmann/json.hpp>
-#include <wheelwright/files/json_number.hpp>
-#include <wheelwright/results/warrant_json.hpp>
+
+#include <wheelwright/core/error.hpp>
+#include <wheelwright/files/byte_source.hpp>
+#include <wheelwright/files/json.hpp>
+#include <wheelwright/files/yaml_place.hpp>
+#include <wheelwright/logs/log_file.hpp>
+#include <wheelwright/results/model_json.hpp>
+#include <wheelwright/robots/robot_file.hpp>
+#include <wheelwright/robots/scenario_file.hpp>
 
 namespace wheelwright {
+namespace {
+
+constexpr std::size_t kLongestFile = std::size_t{1} << 20;
+
+double number_at(const YamlPlace& place) {
+  return place.number("a number", [](double) { return true; });
+}
+
+double whole(const YamlPlace& place, double least, const std::string& expected) {
+  return place.number(expected, [&](double x) { return x >= least && x <= 9e15 && x == std::floor(x); });
+}
+
+Eigen::Index whole_from(const YamlPlace& place, int least) {
+  return static_cast<Eigen::Index>(whole(place, least, "a whole number of at least " + std::to_string(least)));
+}
+
+std::pair<double, double> two_numbers(const YamlPlace& place) {
+  const std::string expected = "two numbers [from, to], the first below the second";
+  const auto ends = place.elements(expected);
+  if (ends.size() != 2) {
+    place.fail(expected);
+  }
+  const std::pair<double, double> range = {number_at(ends[0]), number_at(ends[1])};
+  if (!(range.first < range.second)) {
+    place.fail(expected);
+  }
+  return range;
+}
+
+struct StudyReader {
+  std::string_view text;
+  const std::string& file;
+  const std::filesystem::path& folder;
+  StudyFile result = {};
+  std::optional<YamlPlace> inputs = {}, quantities = {}, methods = {};
+  std::uint64_t seed = 1;
+
+  void read() {
+    result.text = text;
+    std::optional<YamlPlace> scenario, log, robot;
+    for (const auto& [key, place] :
+         YamlPlace::parse(text, file)
+             .members({"name", "scenario", "log", "robot", "inputs", "quantities", "window", "methods", "seed"})) {
+      if (key == "name") {
+        result.study.name = place.text("a name");
+      } else if (key == "window") {
+        result.study.evaluate.window = place.positive();
+      } else if (key == "seed") {
+        seed = static_cast<std::uint64_t>(whole(place, 0.0, "a whole number >= 0"));
+      } else {
+        (key == "scenario"     ? scenario
+         : key == "log"        ? log
+         : key == "robot"      ? robot
+         : key == "inputs"     ? inputs
+         : key == "quantities" ? quantities
+                               : methods) = place;
+      }
+    }
+    if (scenario.has_value() == log.has_value()) {
+      throw InputError(file + (scenario ? ": both a scenario and a log: expected one of them"
+                                        : ": neither a scenario nor a log: expected one of them"));
+    }
+    if (log && !robot) {
+      throw InputError(file + ": no key robot: expected the robot file beside the log");
+    }
+    if (!inputs) {
+      throw InputError(file + ": no key inputs: expected what the study varies");
+    }
+    read_subject(scenario, log, robot);
+    read_inputs();
+    read_quantities();
+    read_methods();
+  }
+
+  std::filesystem::path source(const YamlPlace& place, const std::string& expected) {
+    result.sources.push_back(folder / place.text(expected));
+    return result.sources.back();
+  }
+
+  void read_subject(const std::optional<YamlPlace>& scenario, const std::optional<YamlPlace>& log,
+                    const std::optional<YamlPlace>& robot) {
+    StudyCase& subject = result.study.subject;
+    if (scenario) {
+      subject.scenario = read_scenario(source(*scenario, "a scenario file"));
+      subject.robot = subject.scenario->robot;
+    }
+    if (robot) {
+      subject.robot = read_robot(source(*robot, "a robot file"));
+    }
+    if (log) {
+      std::vector<std::filesystem::path> paths;
+      if (log->is_scalar()) {
+        paths.push_back(source(*log, "a log"));
+      } else {
+        for (const YamlPlace& each : log->elements("a log, or a list of logs")) {
+          paths.push_back(source(each, "a log"));
+        }
+      }
+      if (paths.empty()) {
+        log->fail("at least one log");
+      }
+      const std::unique_ptr<RecordedLog> opened = open_log(paths, {});
+      subject.robot = with_interpolation_errors(subject.robot, opened->report());
+      subject.log = std::make_shared<const LogTable>(read_all(*opened));
+    }
+  }
+
+  void read_inputs() {
+    const auto members = inputs->members();
+    if (members.empty()) {
+      inputs->fail("at least one input");
+    }
+    std::vector<std::string> names;
+    for (const auto& [name, place] : members) {
+      names.push_back(name);
+    }
+    try {
+      const std::string note = settle_filter(result.study.subject, names);
+      if (!note.empty()) {
+        result.notes.push_back(note);
+      }
+    } catch (const InvalidArgument& error) {
+      throw InputError(file + ": " + error.what());
+    }
+    for (const auto& [name, place] : members) {
+      try {
+        read_input(name, place);
+      } catch (const InvalidArgument& error) {
+        place.say(error.what());
+      }
+    }
+  }
+
+  void read_input(const std::string& name, const YamlPlace& place) {
+    StudyInput input;
+    input.name = name;
+    input.unit = unit_of_input(name);
+    std::optional<double> nominal = nominal_of_input(result.study.subject, name);
+    std::optional<std::pair<double, double>> range, relative;
+    if (place.is_mapping()) {
+      for (const auto& [key, value] : place.members({"range", "relative", "scale", "nominal"})) {
+        if (key == "range") {
+          range = two_numbers(value);
+        } else if (key == "relative") {
+          relative = two_numbers(value);
+        } else if (key == "scale") {
+          input.logarithmic = value.choice({"linear", "log"}) == 1;
+        } else {
+          nominal = number_at(value);
+        }
+      }
+    } else {
+      range = two_numbers(place);
+    }
+    if (range.has_value() == relative.has_value()) {
+      place.fail("either a range or a relative range");
+    }
+    if (relative) {
+      if (!nominal) {
+        place.fail("a range: " + name + " has no value that a relative one could count from");
+      }
+      range = {*nominal * (1.0 + relative->first), *nominal * (1.0 + relative->second)};
+      if (range->first > range->second) {
+        std::swap(range->first, range->second);
+      }
+    }
+    input.lower = range->first;
+    input.upper = range->second;
+    input.nominal =
+        nominal ? std::clamp(*nominal, input.lower, input.upper)
+                : (input.logarithmic ? std::sqrt(input.lower * input.upper) : 0.5 * (input.lower + input.upper));
+    validate(input);
+    for (const double end : {input.lower, input.upper}) {
+      StudyCase trial = result.study.subject;
+      set_input(trial, name, end);
+    }
+    if (nominal && std::abs(input.nominal - *nominal) > 1e-6 * std::abs(*nominal)) {
+      result.notes.push_back(name +
+                             " is varied in a range that does not hold its own value: where others are varied, it "
+                             "is at the end of the range nearest to that");
+    }
+    result.study.inputs.push_back(std::move(input));
+  }
+
+  void read_quantities() {
+    std::vector<std::string> names;
+    if (quantities) {
+      for (const YamlPlace& each : quantities->elements("a list of quantities")) {
+        names.push_back(each.text("the name of a quantity"));
+        try {
+          static_cast<void>(study_quantities({names.back()}, result.study.subject.robot));
+        } catch (const InvalidArgument& error) {
+          each.say(error.what());
+        }
+      }
+    }
+    try {
+      result.study.quantities = study_quantities(names, result.study.subject.robot);
+    } catch (const InvalidArgument& error) {
+      throw InputError(file + ": " + error.what());
+    }
+  }
+
+  void read_methods() {
+    StudyMethods& out = result.study.methods;
+    if (!methods) {
+      out.local = true;
+      out.one_at_a_time = 5;
+      return;
+    }
+    for (const auto& [key, place] : methods->members({"local", "one_at_a_time", "morris", "sobol", "grid"})) {
+      if (key == "local") {
+        out.local = place.boolean();
+      } else if (key == "one_at_a_time") {
+        out.one_at_a_time = 5;
+        for (const auto& [name, value] : place.members({"levels"})) {
+          out.one_at_a_time = whole_from(value, 2);
+        }
+      } else if (key == "morris") {
+        out.morris = MorrisOptions{};
+        out.morris->seed = seed;
+        for (const auto& [name, value] : place.members({"trajectories", "levels"})) {
+          (name == "levels" ? out.morris->levels : out.morris->trajectories) = whole_from(value, 2);
+        }
+      } else if (key == "sobol") {
+        read_sobol(place);
+      } else {
+        read_grid(place);
+      }
+    }
+    try {
+      static_cast<void>(design_of(result.study));
+    } catch (const InvalidArgument& error) {
+      methods->say(error.what());
+    }
+  }
+
+  void read_sobol(const YamlPlace& place) {
+    SobolOptions options;
+    options.seed = seed;
+    for (const auto& [name, value] : place.members({"points", "replicates", "confidence"})) {
+      if (name == "confidence") {
+        options.confidence = value.number("a number between 0 and 1", [](double x) { return x > 0.0 && x < 1.0; });
+      } else {
+        (name == "points" ? options.points : options.replicates) = whole_from(value, 2);
+      }
+    }
+    result.study.methods.sobol = options;
+  }
+
+  void read_grid(const YamlPlace& place) {
+    Grid grid;
+    grid.nominal = nominal_point(result.study.inputs);
+    grid.levels.assign(result.study.inputs.size(), 5);
+    for (const auto& [name, value] : place.members({"levels"})) {
+      if (!value.is_mapping()) {
+        grid.levels.assign(result.study.inputs.size(), whole_from(value, 2));
+        continue;
+      }
+      std::vector<std::string> names;
+      for (const StudyInput& input : result.study.inputs) {
+        names.push_back(input.name);
+      }
+      grid.levels.assign(result.study.inputs.size(), 1);
+      for (const auto& [input, levels] : value.members(names)) {
+        grid.levels[static_cast<std::size_t>(std::ranges::find(names, input) - names.begin())] = whole_from(levels, 1);
+      }
+    }
+    result.study.methods.grid = grid;
+  }
+};
+
+}  // namespace
+
+StudyFile read_study(const std::filesystem::path& path) {
+  return parse_study(read_bytes(path, kLongestFile), path.string(), path.parent_path());
+}
+
+StudyFile parse_study(std::string_view text, const std::string& file, const std::filesystem::path& folder) {
+  StudyReader reader{text, file, folder};
+  reader.read();
+  return std::move(reader.result);
+}
+
 namespace {
 
 Json inputs_json(const Study& study) {

@@ -1,17 +1,62 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// sensitivity.json: the result of `wheelwright sensitivity`.
+/// Study files (YAML) and sensitivity.json: the question and the result of `wheelwright sensitivity`.
 #pragma once
 
+#include <filesystem>
+#include <functional>
+#include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <vector>
 
-#include <wheelwright/files/json_file.hpp>
-#include <wheelwright/results/study_file.hpp>
+#include <wheelwright/core/log.hpp>
+#include <wheelwright/files/json.hpp>
+#include <wheelwright/model/robot.hpp>
 #include <wheelwright/study/local_derivatives.hpp>
 #include <wheelwright/study/study.hpp>
 
 namespace wheelwright {
+
+/// A study and what it was made of.
+struct StudyFile {
+  Study study;
+  std::string text;                              ///< the file as it is
+  std::vector<std::filesystem::path> sources{};  ///< scenario, logs and robot file, as far as it names them
+  std::vector<std::string> notes{};              ///< what was chosen, for people
+};
+
+/// Reads a study file. `scenario` or `log`, and `inputs`, are needed:
+///
+///     name: TEXT
+///     scenario: FILE                    driven anew at every point; or
+///     log: FILE | [FILE, ...]           recorded
+///     robot: FILE                       the robot file that is commissioned with; by default the scenario's robot
+///     inputs:                           names as study_input_kinds() has them
+///       NAME: [from, to]
+///       NAME: {range: [from, to] | relative: [from, to], scale: linear | log, nominal: x}
+///     quantities: [names]               as study_quantities() has them; by default its usual ones
+///     window: s                         of smallest_fault (1)
+///     methods:                          by default one_at_a_time, and local with it
+///       local: true | false
+///       one_at_a_time: {levels: 5}
+///       morris: {trajectories: 20, levels: 4}
+///       sobol: {points: 64, replicates: 8, confidence: 0.95}
+///       grid: {levels: 5} | {levels: {NAME: 5, ...}}     inputs that are not named stay nominal
+///     seed: 1                           of the designs
+///
+/// Files are relative to the study file. `relative` counts from the nominal value: [-0.02, 0.02] is from 2 % below it to
+/// 2 % above. The nominal value is the subject's own where it has one inside the range, else the nearest end or, without
+/// one, the middle of the range.
+///
+/// Throws InputError, naming file, line, key, value and what was expected, for unknown or repeated keys, wrong types and
+/// impossible values.
+[[nodiscard]] StudyFile read_study(const std::filesystem::path& path);
+
+/// The same from text; `file` is for messages, other files are looked for in `folder`.
+[[nodiscard]] StudyFile parse_study(std::string_view text, const std::string& file,
+                                    const std::filesystem::path& folder = {});
 
 /// Name of the format: the value of its key `schema`.
 inline constexpr const char* kSensitivitySchema = "wheelwright/sensitivity/1";

@@ -14,9 +14,8 @@
 
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/files/byte_source.hpp>
-#include <wheelwright/files/line_reader.hpp>
 #include <wheelwright/files/number.hpp>
-#include <wheelwright/files/suggest.hpp>
+#include <wheelwright/files/words.hpp>
 
 namespace wheelwright {
 namespace {

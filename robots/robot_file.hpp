@@ -7,8 +7,8 @@
 #include <string>
 #include <string_view>
 
-#include <wheelwright/files/json_file.hpp>
-#include <wheelwright/logs/csv_report.hpp>
+#include <wheelwright/files/json.hpp>
+#include <wheelwright/logs/recorded_log.hpp>
 #include <wheelwright/model/robot.hpp>
 
 namespace wheelwright {

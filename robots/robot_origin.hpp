@@ -10,7 +10,7 @@
 #include <vector>
 
 #include <wheelwright/model/robot.hpp>
-#include <wheelwright/robots/robot_tree.hpp>
+#include <wheelwright/robots/robot_description.hpp>
 
 namespace wheelwright {
 

@@ -14,8 +14,8 @@
 #include <wheelwright/files/byte_source.hpp>
 #include <wheelwright/files/yaml_place.hpp>
 #include <wheelwright/logs/csv.hpp>
-#include <wheelwright/robots/effects_file.hpp>
 #include <wheelwright/robots/robot_file.hpp>
+#include <wheelwright/robots/robot_keys.hpp>
 
 namespace wheelwright {
 namespace {

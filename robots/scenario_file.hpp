@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include <wheelwright/sim/scenario.hpp>
+#include <wheelwright/sim/simulation.hpp>
 
 namespace wheelwright {
 

@@ -7,10 +7,10 @@
 
 #include <wheelwright/files/byte_source.hpp>
 #include <wheelwright/files/number.hpp>
-#include <wheelwright/files/suggest.hpp>
+#include <wheelwright/files/words.hpp>
 #include <wheelwright/files/xml_place.hpp>
-#include <wheelwright/robots/drive_plugin.hpp>
-#include <wheelwright/robots/robot_shapes.hpp>
+#include <wheelwright/robots/controller_file.hpp>
+#include <wheelwright/robots/robot_description.hpp>
 #include <wheelwright/robots/sdf_frames.hpp>
 
 namespace wheelwright {

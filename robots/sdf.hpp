@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include <wheelwright/robots/robot_tree.hpp>
+#include <wheelwright/robots/robot_description.hpp>
 
 namespace wheelwright {
 

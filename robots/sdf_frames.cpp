@@ -3,8 +3,8 @@
 
 #include <numbers>
 
-#include <wheelwright/files/suggest.hpp>
-#include <wheelwright/robots/robot_shapes.hpp>
+#include <wheelwright/files/words.hpp>
+#include <wheelwright/robots/robot_description.hpp>
 
 namespace wheelwright {
 

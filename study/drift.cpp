@@ -7,7 +7,7 @@
 #include <map>
 
 #include <wheelwright/core/statistics.hpp>
-#include <wheelwright/study/holm.hpp>
+#include <wheelwright/study/population.hpp>
 
 namespace wheelwright {
 namespace {

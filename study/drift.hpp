@@ -9,7 +9,6 @@
 #include <span>
 #include <vector>
 
-#include <wheelwright/study/fleet_table.hpp>
 #include <wheelwright/study/robot_record.hpp>
 
 namespace wheelwright {

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <exception>
 
+#include <wheelwright/commission/detector_walk.hpp>
 #include <wheelwright/commission/physical.hpp>
-#include <wheelwright/commission/trace.hpp>
 
 namespace wheelwright {
 namespace {

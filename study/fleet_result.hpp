@@ -9,7 +9,6 @@
 #include <vector>
 
 #include <wheelwright/study/drift.hpp>
-#include <wheelwright/study/fleet_table.hpp>
 #include <wheelwright/study/pooled_prior.hpp>
 #include <wheelwright/study/population.hpp>
 #include <wheelwright/study/robot_record.hpp>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
+/// Inputs of a robot file near the value that they have: the robot and the filter beside it.
 /// What a bound gains or loses per unit of an input of the robot file: exact, at the point where one stands.
 ///
 /// The rows that hold a bound are smooth functions of an input; their multipliers turn the rows' rates into the bound's
@@ -15,9 +16,41 @@
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/core/log.hpp>
 #include <wheelwright/core/warrant.hpp>
+#include <wheelwright/filter/measurement.hpp>
+#include <wheelwright/model/robot.hpp>
 #include <wheelwright/study/hull_derivatives.hpp>
 
 namespace wheelwright {
+
+/// A commissioned robot and its filter: what an input changes.
+struct RobotAt {
+  Robot robot;
+  FilterDesign filter;
+};
+
+/// One side of a prior, as an input moves it.
+struct PriorRate {
+  std::string parameter;                       ///< physical name
+  double lower_left = 0.0, lower_right = 0.0;  ///< rates of the lower side, physical unit per unit of the input
+  double upper_left = 0.0, upper_right = 0.0;  ///< of the upper side
+};
+
+/// An input by its name.
+struct LocalInput {
+  std::string name;
+  std::string unit;
+  double value = 0.0;
+  std::optional<PriorRate> prior{};  ///< where it is a prior's: it moves sides only, and no row
+};
+
+/// The input `name` of `at`, whose model is `model`. Throws InvalidArgument where there is none, or it has no value.
+[[nodiscard]] LocalInput local_input(const RobotAt& at, const Model& model, const std::string& name);
+
+/// `at` with the input (not a prior's) at `x`. α follows β where the robot file gives none.
+[[nodiscard]] RobotAt with_input(RobotAt at, const LocalInput& input, double x);
+
+/// All inputs that `at` has a value for, priors left out.
+[[nodiscard]] std::vector<std::string> robot_inputs(const RobotAt& at);
 
 /// Options of local_derivatives().
 struct LocalOptions {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include <wheelwright/core/interval.hpp>
-#include <wheelwright/study/fleet_table.hpp>
+#include <wheelwright/study/robot_record.hpp>
 
 namespace wheelwright {
 

@@ -11,12 +11,9 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/study/grid.hpp>
-#include <wheelwright/study/morris.hpp>
-#include <wheelwright/study/one_at_a_time.hpp>
+#include <wheelwright/study/screening.hpp>
 #include <wheelwright/study/sobol_indices.hpp>
 #include <wheelwright/study/study_case.hpp>
-#include <wheelwright/study/study_input.hpp>
 #include <wheelwright/study/study_quantity.hpp>
 
 namespace wheelwright {

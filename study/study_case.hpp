@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
+/// What a study varies: a quantity with a range.
 /// One point of a study: a robot and the drive that it is commissioned from, with the study's inputs set.
 #pragma once
 
@@ -12,10 +13,29 @@
 
 #include <wheelwright/core/log.hpp>
 #include <wheelwright/model/robot.hpp>
-#include <wheelwright/sim/scenario.hpp>
-#include <wheelwright/study/study_input.hpp>
+#include <wheelwright/sim/simulation.hpp>
 
 namespace wheelwright {
+
+/// One input of a study. Designs live in the unit cube; value() says what a coordinate stands for.
+struct StudyInput {
+  std::string name;          ///< as the study file has it, e.g. "noise.wheel_speed"
+  std::string unit;          ///< empty for pure numbers
+  double lower = 0.0;        ///< value at 0
+  double upper = 1.0;        ///< value at 1
+  double nominal = 0.5;      ///< the value that it has where it is not varied, in [lower, upper]
+  bool logarithmic = false;  ///< equal ratios, instead of equal differences, are equally likely
+};
+
+/// Throws InvalidArgument, naming the input and the field, unless numbers are finite, lower < upper,
+/// lower <= nominal <= upper and, where logarithmic, lower > 0.
+void validate(const StudyInput& input);
+
+/// The value at `u` in [0, 1]; exactly `lower` at 0 and `upper` at 1.
+[[nodiscard]] double value(const StudyInput& input, double u);
+
+/// The coordinate of `x` in [lower, upper]: the inverse of value() to rounding.
+[[nodiscard]] double coordinate(const StudyInput& input, double x);
 
 /// A robot with a drive: a recorded log, or a scenario that is driven anew. Without inputs, what a study starts from.
 struct StudyCase {

@@ -58,7 +58,7 @@ BANNED_HEADERS = {
 }
 # One file each, and why; no time that passes enters a result.
 EXCEPTIONS = {
-    ("study/item_team.cpp", "chrono"): "MPI's own waits keep a processor busy: it sleeps between looks",
+    ("study/work_on_ranks.cpp", "chrono"): "MPI's own waits keep a processor busy: it sleeps between looks",
 }
 BANNED_CODE = {
     r"\bstd::random_device\b": "generators are seeded and local",
@@ -193,7 +193,7 @@ def self_test():
         "bounds/b.hpp": head + "#include <wheelwright/core/a.hpp>\nstruct A;\nstruct B {};\nstruct B<2> {};\n",
         "files/c.cpp": spdx + "#include <fstream>\n#include <wheelwright/core/a.hpp>\n",
         "inference/robust.cpp": spdx + "#include <ceres/ceres.h>\n",
-        "study/item_team.cpp": spdx + "#include <chrono>\n#include <mpi.h>\n",
+        "study/work_on_ranks.cpp": spdx + "#include <chrono>\n#include <mpi.h>\n",
         "detector/CMakeLists.txt": "# SPDX-License-Identifier: Apache-2.0\nwheelwright_room(detector\n  USES core filter\n  LINK x)\n",
         "docs/framework.md": "framework/works on http://host/working and a/" + "work\n",
     }
@@ -206,7 +206,7 @@ def self_test():
         "file opened": ("commission/x.cpp", spdx + "#include <fstream>\n"),
         "printing": ("filter/x.cpp", spdx + "void f() { std::cout << 1; }\n"),
         "clock": ("identify/x.cpp", spdx + "#include <chrono>\n"),
-        "another clock": ("study/item_team.hpp", head + "#include <chrono>\n"),
+        "another clock": ("study/work_on_ranks.hpp", head + "#include <chrono>\n"),
         "MPI in a header": ("study/x.hpp", head + "#include <mpi.h>\n"),
         "MPI elsewhere": ("logs/x.cpp", spdx + "#include <mpi.h>\n"),
         "device": ("sim/x.cpp", spdx + "std::random_device device;\n"),

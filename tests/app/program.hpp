@@ -17,7 +17,7 @@
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/files/byte_source.hpp>
-#include <wheelwright/files/json_file.hpp>
+#include <wheelwright/files/json.hpp>
 
 #include "support/scratch.hpp"
 #include "support/skip.hpp"

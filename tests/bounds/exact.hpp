@@ -10,8 +10,8 @@
 
 #include <boost/multiprecision/cpp_int.hpp>
 
-#include <wheelwright/bounds/half_space.hpp>
 #include <wheelwright/bounds/infeasibility.hpp>
+#include <wheelwright/bounds/slab_rows.hpp>
 
 namespace wheelwright::exact {
 

@@ -10,7 +10,7 @@
 #include <gtest/gtest.h>
 
 #include <wheelwright/commission/commission.hpp>
-#include <wheelwright/commission/contradiction_search.hpp>
+#include <wheelwright/commission/contradictions.hpp>
 
 #include "support/drives.hpp"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include <wheelwright/commission/output_noise.hpp>
+#include <wheelwright/commission/noise_budget.hpp>
 
 namespace wheelwright {
 namespace {

@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <wheelwright/commission/commission.hpp>
-#include <wheelwright/commission/trace.hpp>
+#include <wheelwright/commission/detector_walk.hpp>
 
 #include "support/kinematic_drives.hpp"
 

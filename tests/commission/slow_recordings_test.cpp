@@ -9,8 +9,8 @@
 #include <gtest/gtest.h>
 
 #include <wheelwright/commission/commission.hpp>
-#include <wheelwright/commission/contradiction_search.hpp>
-#include <wheelwright/commission/trace.hpp>
+#include <wheelwright/commission/contradictions.hpp>
+#include <wheelwright/commission/detector_walk.hpp>
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/inference/identification.hpp>
 #include <wheelwright/logs/csv.hpp>

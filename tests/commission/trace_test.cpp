@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <wheelwright/commission/commission.hpp>
-#include <wheelwright/commission/trace.hpp>
+#include <wheelwright/commission/detector_walk.hpp>
 #include <wheelwright/core/error.hpp>
 
 #include "support/drives.hpp"

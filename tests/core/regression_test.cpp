@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include <wheelwright/commission/folds.hpp>
+#include <wheelwright/commission/validation.hpp>
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/filter/regression_stream.hpp>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What is promised before the drive: closed forms, and that no noise within the bounds makes it wider.
-#include <wheelwright/design/objective.hpp>
+#include <wheelwright/design/plan.hpp>
 
 #include <cmath>
 #include <random>
@@ -9,7 +9,7 @@
 
 #include <wheelwright/bounds/interval_hull.hpp>
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/design/figure_eight.hpp>
+#include <wheelwright/design/manoeuvre.hpp>
 
 #include "design/robots.hpp"
 

@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/commission/trace.hpp>
+#include <wheelwright/commission/detector_walk.hpp>
 #include <wheelwright/detector/isolation.hpp>
 
 #include "detector/detectability.hpp"

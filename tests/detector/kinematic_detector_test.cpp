@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/filter/odometry_stream.hpp>
+#include <wheelwright/filter/regression_stream.hpp>
 
 #include "support/kinematic_drives.hpp"
 

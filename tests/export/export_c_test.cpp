@@ -6,7 +6,7 @@
 
 #include <Eigen/LU>
 
-#include <wheelwright/bounds/half_space.hpp>
+#include <wheelwright/bounds/slab_rows.hpp>
 #include <wheelwright/export/export_c.hpp>
 #include <wheelwright/filter/motion_bound.hpp>
 #include <wheelwright/model/differential_drive.hpp>

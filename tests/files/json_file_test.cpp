@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/files/json_file.hpp>
+#include <wheelwright/files/json.hpp>
 
 #include <bit>
 #include <cmath>

@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <wheelwright/core/log.hpp>
-#include <wheelwright/filter/error_influence.hpp>
+#include <wheelwright/filter/noise.hpp>
 #include <wheelwright/filter/regression_stream.hpp>
 
 #include "support/drives.hpp"

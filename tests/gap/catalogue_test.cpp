@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Oracle: inverse dynamics of prescribed smooth motions, written from the physics of each effect and not from the
 // catalogue's columns. With the true coefficient the column must take the residual away.
-#include <wheelwright/gap/catalogue.hpp>
+#include <wheelwright/gap/effect.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -13,7 +13,7 @@
 #include <gtest/gtest.h>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/gap/drive_filter.hpp>
+#include <wheelwright/gap/drive.hpp>
 #include <wheelwright/gap/kinematic_rows.hpp>
 
 namespace wheelwright::catalogue_test {

@@ -5,8 +5,8 @@
 #include <gtest/gtest.h>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/gap/contradictions.hpp>
-#include <wheelwright/gap/drive_filter.hpp>
+#include <wheelwright/gap/drive.hpp>
+#include <wheelwright/gap/regimes.hpp>
 #include <wheelwright/model/robot.hpp>
 
 #include "gap/made_up_drive.hpp"

@@ -12,7 +12,6 @@
 #include <gtest/gtest.h>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/gap/fresh_log.hpp>
 
 #include "gap/noisy_log.hpp"
 

@@ -12,10 +12,10 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/design/stages.hpp>
 #include <wheelwright/gap/block_gram.hpp>
-#include <wheelwright/gap/catalogue.hpp>
 #include <wheelwright/gap/discrimination_design.hpp>
-#include <wheelwright/gap/drive_filter.hpp>
-#include <wheelwright/gap/planned_drive.hpp>
+#include <wheelwright/gap/drive.hpp>
+#include <wheelwright/gap/effect.hpp>
+#include <wheelwright/gap/further_drive.hpp>
 
 #include "design/robots.hpp"
 

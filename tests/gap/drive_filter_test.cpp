@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Oracles: the convolution integral; RegressorFilter on the same log as the step goes to zero.
-#include <wheelwright/gap/drive_filter.hpp>
+#include <wheelwright/gap/drive.hpp>
 
 #include <array>
 #include <cmath>

@@ -7,7 +7,6 @@
 #include <gtest/gtest.h>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/gap/drive_filter.hpp>
 
 namespace wheelwright::drive_test {
 namespace {

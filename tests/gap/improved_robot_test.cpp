@@ -9,7 +9,6 @@
 
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/gap/improved_robot.hpp>
-#include <wheelwright/model/effect_geometry.hpp>
 #include <wheelwright/model/effect_law.hpp>
 
 #include "gap/simulated_gap.hpp"

@@ -8,7 +8,6 @@
 #include <random>
 
 #include <wheelwright/gap/drive.hpp>
-#include <wheelwright/gap/drive_filter.hpp>
 
 namespace wheelwright::gap_example {
 

@@ -10,7 +10,7 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/filter/measurement.hpp>
 #include <wheelwright/gap/block_gram.hpp>
-#include <wheelwright/gap/catalogue.hpp>
+#include <wheelwright/gap/effect.hpp>
 #include <wheelwright/gap/gap_rows.hpp>
 #include <wheelwright/sim/simulation.hpp>
 

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/gap/spectrum.hpp>
+#include <wheelwright/gap/where.hpp>
 
 namespace wheelwright::spectrum_test {
 namespace {

@@ -11,7 +11,7 @@
 #include <gtest/gtest.h>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/gap/drive_filter.hpp>
+#include <wheelwright/gap/drive.hpp>
 #include <wheelwright/gap/where.hpp>
 
 #include "gap/made_up_drive.hpp"

@@ -12,8 +12,8 @@
 #include <wheelwright/bounds/feasible_set.hpp>
 #include <wheelwright/commission/assumptions.hpp>
 #include <wheelwright/commission/commission.hpp>
+#include <wheelwright/commission/detector_walk.hpp>
 #include <wheelwright/commission/margin_survey.hpp>
-#include <wheelwright/commission/trace.hpp>
 #include <wheelwright/core/regression.hpp>
 #include <wheelwright/detector/isolation.hpp>
 

@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/identify/block_sums.hpp>
+#include <wheelwright/identify/moments.hpp>
 
 #include "support/random.hpp"
 

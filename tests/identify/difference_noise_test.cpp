@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/identify/difference_noise.hpp>
+#include <wheelwright/identify/noise_level.hpp>
 
 #include <cmath>
 #include <functional>

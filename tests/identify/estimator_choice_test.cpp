@@ -7,7 +7,6 @@
 #include <gtest/gtest.h>
 
 #include <wheelwright/identify/noise_level.hpp>
-#include <wheelwright/identify/shared_noise.hpp>
 
 #include "support/random.hpp"
 #include "support/rows.hpp"

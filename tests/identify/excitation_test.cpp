@@ -2,7 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <wheelwright/identify/excitation.hpp>
+#include <wheelwright/identify/least_squares.hpp>
 
 #include "support/random.hpp"
 #include "support/rows.hpp"

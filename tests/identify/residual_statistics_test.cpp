@@ -5,8 +5,8 @@
 #include <gtest/gtest.h>
 
 #include <wheelwright/core/statistics.hpp>
+#include <wheelwright/identify/least_squares.hpp>
 #include <wheelwright/identify/noise_level.hpp>
-#include <wheelwright/identify/residual_statistics.hpp>
 
 #include "support/random.hpp"
 #include "support/rows.hpp"

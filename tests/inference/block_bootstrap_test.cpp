@@ -8,7 +8,6 @@
 
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/identify/noise_level.hpp>
-#include <wheelwright/inference/block_length.hpp>
 
 #include "support/random.hpp"
 #include "support/rows.hpp"

@@ -10,8 +10,6 @@
 
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/inference/constrained.hpp>
-#include <wheelwright/inference/nonnegative_least_squares.hpp>
-#include <wheelwright/inference/physical_consistency.hpp>
 
 #include "support/random.hpp"
 #include "support/rows.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/inference/information_over_time.hpp>
+#include <wheelwright/inference/identifiability.hpp>
 
 #include <cmath>
 

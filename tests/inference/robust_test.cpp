@@ -10,8 +10,8 @@
 #include <boost/math/distributions/students_t.hpp>
 
 #include <wheelwright/core/error.hpp>
+#include <wheelwright/inference/constrained.hpp>
 #include <wheelwright/inference/m_estimate.hpp>
-#include <wheelwright/inference/physical_consistency.hpp>
 #include <wheelwright/inference/robust.hpp>
 
 #include "support/random.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/core/statistics.hpp>
-#include <wheelwright/inference/sign_perturbed_sums.hpp>
+#include <wheelwright/inference/regions.hpp>
 
 #include <cmath>
 #include <functional>

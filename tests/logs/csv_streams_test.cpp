@@ -7,7 +7,6 @@
 #include <fmt/format.h>
 
 #include <wheelwright/logs/csv.hpp>
-#include <wheelwright/logs/csv_streams.hpp>
 
 #include "support/scratch.hpp"
 

@@ -12,7 +12,6 @@
 
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/logs/bag_write.hpp>
-#include <wheelwright/logs/log_write.hpp>
 #include <wheelwright/logs/ros_definition.hpp>
 #include <wheelwright/logs/ros_write.hpp>
 

@@ -8,8 +8,8 @@
 #include <mujoco/mujoco.h>
 #include <Eigen/Core>
 
+#include <wheelwright/robots/robot_description.hpp>
 #include <wheelwright/robots/robot_origin.hpp>
-#include <wheelwright/robots/urdf.hpp>
 
 #include "robots/robot_samples.hpp"
 #include "support/scratch.hpp"

@@ -12,12 +12,12 @@
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/inference/identification_words.hpp>
+#include <wheelwright/report/chart.hpp>
 #include <wheelwright/report/commission_report.hpp>
 #include <wheelwright/report/design_report.hpp>
 #include <wheelwright/report/detect_report.hpp>
 #include <wheelwright/report/gap_report.hpp>
 #include <wheelwright/report/identify_report.hpp>
-#include <wheelwright/report/packing.hpp>
 #include <wheelwright/report/signals.hpp>
 
 #include "report/example.hpp"

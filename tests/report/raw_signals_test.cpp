@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/report/raw_signals.hpp>
+#include <wheelwright/report/signals.hpp>
 
 namespace wheelwright::raw_signals_test {
 namespace {

@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 
 #include <wheelwright/report/commission_report.hpp>
-#include <wheelwright/report/set_drawings.hpp>
+#include <wheelwright/report/drawing.hpp>
 
 #include "report/example.hpp"
 

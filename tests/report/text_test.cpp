@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/report/time_axis.hpp>
+#include <wheelwright/report/chart.hpp>
 
 namespace wheelwright::report {
 namespace {

@@ -8,9 +8,9 @@
 #include <gtest/gtest.h>
 
 #include <wheelwright/report/commission_report.hpp>
+#include <wheelwright/report/data_sections.hpp>
 #include <wheelwright/report/detect_report.hpp>
 #include <wheelwright/report/margins_report.hpp>
-#include <wheelwright/report/warrant_section.hpp>
 
 #include "report/example.hpp"
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Records of robots come back as they were, to the last bit.
 #include <wheelwright/results/fleet_json.hpp>
-#include <wheelwright/results/pooled_prior_file.hpp>
 
 #include <cmath>
 #include <limits>

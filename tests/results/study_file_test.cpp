@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/results/study_file.hpp>
+#include <wheelwright/results/study_json.hpp>
 
 #include <gtest/gtest.h>
 

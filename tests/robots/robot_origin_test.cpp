@@ -4,10 +4,10 @@
 
 #include <nlohmann/json.hpp>
 
+#include <wheelwright/robots/controller_file.hpp>
+#include <wheelwright/robots/robot_description.hpp>
 #include <wheelwright/robots/robot_file.hpp>
-#include <wheelwright/robots/ros2_control.hpp>
 #include <wheelwright/robots/sdf.hpp>
-#include <wheelwright/robots/urdf.hpp>
 
 #include "robots/robot_samples.hpp"
 #include "support/scratch.hpp"

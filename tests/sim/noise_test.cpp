@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/sim/noise.hpp>
+#include <wheelwright/sim/plant.hpp>
 
 namespace wheelwright::noise_test {
 namespace {

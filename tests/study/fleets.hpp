@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/study/fleet_table.hpp>
+#include <wheelwright/study/robot_record.hpp>
 
 #include "support/random.hpp"
 

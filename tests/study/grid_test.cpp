@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/study/grid.hpp>
+#include <wheelwright/study/screening.hpp>
 
 namespace wheelwright::grid_test {
 namespace {

@@ -10,8 +10,7 @@
 
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/core/limits.hpp>
-#include <wheelwright/study/grid.hpp>
-#include <wheelwright/study/morris.hpp>
+#include <wheelwright/study/screening.hpp>
 
 #include "study/test_functions.hpp"
 

@@ -8,7 +8,7 @@
 
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/core/limits.hpp>
-#include <wheelwright/study/one_at_a_time.hpp>
+#include <wheelwright/study/screening.hpp>
 
 #include "study/test_functions.hpp"
 

@@ -9,7 +9,6 @@
 #include <gtest/gtest.h>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/study/holm.hpp>
 
 #include "study/fleets.hpp"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Centre and spread: closed cases, recovery, and strange members that do not matter.
-#include <wheelwright/study/random_effects.hpp>
+#include <wheelwright/study/population.hpp>
 
 #include <cmath>
 #include <vector>

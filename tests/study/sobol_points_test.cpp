@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/study/sobol_points.hpp>
+#include <wheelwright/study/sobol_indices.hpp>
 
 namespace wheelwright::sobol_points_test {
 namespace {

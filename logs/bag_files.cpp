@@ -1,0 +1,254 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/logs/bag_files.hpp>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstddef>
+#include <cstdlib>
+#include <cstring>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <vector>
+
+#include <fmt/format.h>
+#include <yaml-cpp/yaml.h>
+#include <zstd.h>
+
+#include <wheelwright/core/error.hpp>
+#include <wheelwright/files/byte_source.hpp>
+#include <wheelwright/files/words.hpp>
+
+namespace wheelwright::bag {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Whether "x_2" comes before "x_10".
+bool natural_less(const std::string& a, const std::string& b) {
+  std::size_t i = 0, j = 0;
+  const auto digit = [](char c) { return c >= '0' && c <= '9'; };
+  const auto number = [&](const std::string& text, std::size_t& at) {
+    const std::size_t start = std::min(text.find_first_not_of('0', at), text.size());
+    for (at = start; at < text.size() && digit(text[at]);) {
+      ++at;
+    }
+    return std::string_view(text).substr(start, at - start);
+  };
+  while (i < a.size() && j < b.size()) {
+    if (digit(a[i]) && digit(b[j])) {
+      const auto x = number(a, i), y = number(b, j);
+      if (x != y) {
+        return x.size() != y.size() ? x.size() < y.size() : x < y;
+      }
+    } else if (a[i] != b[j]) {
+      return a[i] < b[j];
+    } else {
+      ++i;
+      ++j;
+    }
+  }
+  return a.size() - i < b.size() - j || (a.size() - i == b.size() - j && a < b);
+}
+
+}  // namespace
+
+std::string storage_ending(const fs::path& given) {
+  fs::path name = given;
+  if (name.extension() == ".zstd" || name.extension() == ".zst") {
+    name = name.stem();
+  }
+  return name.extension() == ".mcap" ? "mcap" : name.extension() == ".db3" ? "db3" : "";
+}
+
+Parts parts_of(const fs::path& path) {
+  Parts parts;
+  std::error_code error;
+  if (!fs::is_directory(path, error)) {
+    parts.files.push_back({path});
+    return parts;
+  }
+  const fs::path metadata = path / "metadata.yaml";
+  if (fs::exists(metadata, error)) {
+    parts.metadata = metadata.string();
+    try {
+      const Metadata read = read_metadata(metadata);
+      for (const std::string& name : read.files) {
+        const fs::path inside = path / fs::path(name).relative_path();
+        const fs::path beside = path / fs::path(name).filename();
+        parts.files.push_back({fs::exists(inside, error) ? inside : beside, read.files.size() == 1});
+      }
+      parts.promised = read.messages;
+      return parts;
+    } catch (const InputError& problem) {
+      parts.losses.push_back(fmt::format("{}; all files beside it are read", problem.what()));
+    }
+  }
+  std::vector<std::string> names, kinds;
+  for (fs::directory_iterator at(path, error), end; !error && at != end; at.increment(error)) {
+    const std::string kind = storage_ending(at->path().filename());
+    if (!kind.empty()) {
+      names.push_back(at->path().filename().string());
+      kinds.push_back(kind);
+    }
+  }
+  if (error) {
+    throw InputError(
+        fmt::format("{}: cannot be read ({}): expected the directory of a recording", path.string(), error.message()));
+  }
+  if (names.empty()) {
+    throw InputError(path.string() +
+                     ": holds no recording: expected *.mcap or *.db3, and the metadata.yaml of rosbag2");
+  }
+  if (std::adjacent_find(kinds.begin(), kinds.end(), std::not_equal_to<>()) != kinds.end()) {
+    throw InputError(path.string() +
+                     ": holds both *.mcap and *.db3 and no metadata.yaml that says which to read: expected "
+                     "the files by name");
+  }
+  std::sort(names.begin(), names.end(), natural_less);
+  for (const std::string& name : names) {
+    parts.files.push_back({path / name, names.size() == 1});
+  }
+  return parts;
+}
+
+namespace {
+
+constexpr std::size_t longest_metadata = std::size_t{1} << 26;
+
+[[noreturn]] void fail(const std::string& name, const YAML::Mark& mark, const std::string& what) {
+  throw InputError(mark.is_null() ? fmt::format("{}: {}", name, what)
+                                  : fmt::format("{}:{}: {}", name, mark.line + 1, what));
+}
+
+/// A text in quotes.
+std::string quoted(const std::string& text) {
+  YAML::Emitter out;
+  out << YAML::DoubleQuoted << text;
+  return out.c_str();
+}
+
+}  // namespace
+
+Metadata read_metadata(const std::filesystem::path& path) {
+  const std::string name = path.string();
+  const std::string text = read_bytes(path, longest_metadata);
+  try {
+    const YAML::Node information = YAML::Load(text)["rosbag2_bagfile_information"];
+    if (!information.IsDefined() || !information.IsMap()) {
+      fail(name, YAML::Mark::null_mark(), "no rosbag2_bagfile_information: expected the metadata of a recording");
+    }
+    Metadata metadata;
+    const YAML::Node files = information["relative_file_paths"];
+    if (!files.IsDefined() || !files.IsSequence() || files.size() == 0) {
+      fail(name, information.Mark(), "relative_file_paths: expected a list of at least one file");
+    }
+    for (const YAML::Node& file : files) {
+      if (!file.IsScalar() || file.Scalar().empty()) {
+        fail(name, file.Mark(), "relative_file_paths: expected the name of a file");
+      }
+      metadata.files.push_back(file.Scalar());
+    }
+    const YAML::Node count = information["message_count"];
+    std::uint64_t messages = 0;
+    if (count.IsDefined() && YAML::convert<std::uint64_t>::decode(count, messages)) {
+      metadata.messages = messages;
+    }
+    return metadata;
+  } catch (const YAML::Exception& error) {
+    fail(name, error.mark, error.msg);
+  }
+}
+
+std::string metadata_text(const WrittenBag& bag) {
+  const std::int64_t duration = bag.messages > 0 ? bag.last - bag.first : 0;
+  std::string topics;
+  for (const WrittenTopic& topic : bag.topics) {
+    topics += fmt::format(
+        "    - topic_metadata:\n        name: {}\n        type: {}\n        serialization_format: cdr\n"
+        "        offered_qos_profiles: {}\n      message_count: {}\n",
+        quoted(topic.name), quoted(topic.type), quoted(topic.qos), topic.messages);
+  }
+  return fmt::format(
+      "rosbag2_bagfile_information:\n  version: 5\n  storage_identifier: {0}\n  duration:\n    nanoseconds: {1}\n"
+      "  starting_time:\n    nanoseconds_since_epoch: {2}\n  message_count: {3}\n  topics_with_message_count:{4}\n{5}"
+      "  compression_format: \"\"\n  compression_mode: \"\"\n  relative_file_paths:\n    - {6}\n  files:\n"
+      "    - path: {6}\n      starting_time:\n        nanoseconds_since_epoch: {2}\n      duration:\n"
+      "        nanoseconds: {1}\n      message_count: {3}\n",
+      bag.storage, duration, bag.first, bag.messages, bag.topics.empty() ? " []" : "", topics, quoted(bag.file));
+}
+
+TemporaryDirectory::TemporaryDirectory() {
+  std::error_code error;
+  const std::filesystem::path parent = std::filesystem::temp_directory_path(error);
+  std::string pattern = (parent / "wheelwright-bag-XXXXXX").string();
+  if (error || ::mkdtemp(pattern.data()) == nullptr) {
+    throw InputError((error ? "TMPDIR" : parent.string()) + ": no directory for temporary files can be made there (" +
+                     (error ? error.message() : std::strerror(errno)) + "): expected TMPDIR to name a writable one");
+  }
+  path_ = pattern;
+}
+
+TemporaryDirectory::~TemporaryDirectory() {
+  std::error_code ignored;
+  std::filesystem::remove_all(path_, ignored);
+}
+
+namespace {
+
+constexpr std::size_t longest = std::size_t{1} << 29;
+
+struct Free {
+  void operator()(ZSTD_DStream* stream) const { ZSTD_freeDStream(stream); }
+};
+
+}  // namespace
+
+struct MessageUnpacker::Impl {
+  std::unique_ptr<ZSTD_DStream, Free> stream;
+  std::vector<char> bytes;
+};
+
+MessageUnpacker::MessageUnpacker() : impl_(std::make_unique<Impl>()) {}
+MessageUnpacker::~MessageUnpacker() = default;
+MessageUnpacker::MessageUnpacker(MessageUnpacker&&) noexcept = default;
+MessageUnpacker& MessageUnpacker::operator=(MessageUnpacker&&) noexcept = default;
+
+bool is_packed(std::string_view data) { return data.starts_with("\x28\xB5\x2F\xFD"); }
+
+std::optional<std::string_view> MessageUnpacker::unpack(std::string_view data) {
+  if (!impl_->stream) {
+    impl_->stream.reset(ZSTD_createDStream());
+    if (!impl_->stream) {
+      throw Error("zstd cannot start");
+    }
+    impl_->bytes.resize(4096);
+  }
+  ZSTD_DCtx_reset(impl_->stream.get(), ZSTD_reset_session_only);
+  ZSTD_inBuffer in{data.data(), data.size(), 0};
+  std::size_t filled = 0;
+  while (true) {
+    ZSTD_outBuffer out{impl_->bytes.data(), impl_->bytes.size(), filled};
+    const std::size_t status = ZSTD_decompressStream(impl_->stream.get(), &out, &in);
+    if (ZSTD_isError(status) != 0) {
+      return std::nullopt;
+    }
+    const bool room = out.pos < out.size;
+    filled = out.pos;
+    if (status == 0) {
+      return in.pos == in.size ? std::optional(std::string_view(impl_->bytes.data(), filled)) : std::nullopt;
+    }
+    if (room && in.pos == in.size) {
+      return std::nullopt;
+    }
+    if (!room) {
+      if (impl_->bytes.size() >= longest) {
+        return std::nullopt;
+      }
+      impl_->bytes.resize(std::min(longest, 2 * impl_->bytes.size()));
+    }
+  }
+}
+
+}  // namespace wheelwright::bag

@@ -1,0 +1,344 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/logs/csv_format.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include <wheelwright/core/error.hpp>
+#include <wheelwright/files/number.hpp>
+#include <wheelwright/files/words.hpp>
+#include <wheelwright/logs/log_columns.hpp>
+
+namespace wheelwright {
+namespace {
+
+std::string_view trimmed_field(std::string_view text) {
+  const std::size_t begin = text.find_first_not_of(" \t\r");
+  return begin == std::string_view::npos ? std::string_view()
+                                         : text.substr(begin, text.find_last_not_of(" \t\r") - begin + 1);
+}
+
+/// The one of , ; and tab that occurs most often outside quotes; the comma where none does.
+char find_separator(std::string_view line) {
+  constexpr std::string_view candidates = ",;\t";
+  std::size_t counts[3] = {0, 0, 0};
+  bool in_quotes = false;
+  for (const char c : line) {
+    in_quotes ^= c == '"';
+    const std::size_t k = candidates.find(c);
+    if (!in_quotes && k != std::string_view::npos) {
+      ++counts[k];
+    }
+  }
+  return candidates[static_cast<std::size_t>(std::max_element(counts, counts + 3) - counts)];
+}
+
+void check_is_text(std::string_view line, const std::string& place) {
+  const bool binary = std::any_of(
+      line.begin(), line.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20 && c != '\t' && c != '\r'; });
+  if (binary) {
+    throw InputError(place + ": binary data: expected a header line with the names of the columns");
+  }
+}
+
+void check_has_names(const std::vector<std::string>& fields, const std::string& place) {
+  const bool numbers = std::all_of(fields.begin(), fields.end(),
+                                   [](const std::string& f) { return f.empty() || to_number(f).has_value(); });
+  if (numbers) {
+    throw InputError(fmt::format("{}: {}: expected a header line with the names of the columns (t, omega_r, ...)",
+                                 place, shown(listed(fields))));
+  }
+}
+
+/// The field called `name`: exactly, else the only one whose plain name is the same.
+std::optional<std::size_t> find_field(const std::vector<std::string>& fields, std::string_view name) {
+  const auto exact = std::find(fields.begin(), fields.end(), name);
+  if (exact != fields.end()) {
+    return static_cast<std::size_t>(exact - fields.begin());
+  }
+  std::optional<std::size_t> found;
+  for (std::size_t k = 0; k < fields.size(); ++k) {
+    if (plain_name(fields[k]) == plain_name(name)) {
+      if (found) {
+        return std::nullopt;
+      }
+      found = k;
+    }
+  }
+  return found;
+}
+
+std::size_t demand_field(const std::vector<std::string>& fields, const std::string& name, const std::string& why,
+                         const std::string& place) {
+  if (const auto field = find_field(fields, name)) {
+    if (std::count(fields.begin(), fields.end(), name) > 1) {
+      throw InputError(fmt::format("{}: column {} stands there twice: expected one", place, shown(name)));
+    }
+    return *field;
+  }
+  throw InputError(fmt::format("{}: no column {} ({}): expected one of {}{}", place, shown(name), why, listed(fields),
+                               did_you_mean(name, fields)));
+}
+
+void recognise(CsvHeader& header, const CsvOptions& options, const std::string& place) {
+  std::map<std::string, std::vector<std::size_t>> candidates;
+  for (std::size_t k = 0; k < header.fields.size(); ++k) {
+    const bool taken =
+        std::any_of(header.found.begin(), header.found.end(), [&](const auto& f) { return f.second == k; });
+    const LogColumn* column = recognise_log_column(header.fields[k]);
+    if (taken || column == nullptr || header.found.contains(column->name)) {
+      continue;
+    }
+    if (column->name != "t" && options.only &&
+        std::find(options.only->begin(), options.only->end(), column->name) == options.only->end()) {
+      continue;
+    }
+    candidates[column->name].push_back(k);
+  }
+  for (auto& [name, fields] : candidates) {
+    const auto exact = [&, &wanted = name](std::size_t k) { return header.fields[k] == wanted; };
+    if (std::count_if(fields.begin(), fields.end(), exact) == 1) {
+      fields = {*std::find_if(fields.begin(), fields.end(), exact)};
+    }
+    if (fields.size() > 1) {
+      const std::string first = header.fields[fields[0]], second = header.fields[fields[1]];
+      throw InputError(fmt::format("{}: columns {} and {} both mean {}: expected one, or a choice by --map {}=COLUMN",
+                                   place, shown(first), shown(second), name, name));
+    }
+    header.found[name] = fields.front();
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> split_fields(std::string_view line, char separator) {
+  std::vector<std::string> fields(1);
+  bool in_quotes = false;
+  for (const char c : line) {
+    if (c == '"') {
+      in_quotes = !in_quotes;
+    }
+    if (c == separator && !in_quotes) {
+      fields.emplace_back();
+    } else {
+      fields.back() += c;
+    }
+  }
+  for (std::string& field : fields) {
+    field = trimmed_field(field);
+    if (field.size() >= 2 && field.front() == '"' && field.back() == '"') {
+      std::string inner;
+      for (std::size_t k = 1; k + 1 < field.size(); ++k) {
+        inner += field[k];
+        k += field[k] == '"' && field[k + 1] == '"' && k + 2 < field.size() ? 1 : 0;
+      }
+      field = trimmed_field(inner);
+    }
+  }
+  return fields;
+}
+
+CsvHeader read_csv_header(std::string_view line, const CsvOptions& options, const std::string& place) {
+  check_is_text(line, place);
+  CsvHeader header;
+  header.separator = find_separator(line);
+  header.fields = split_fields(line, header.separator);
+  check_has_names(header.fields, place);
+  for (const auto& [name, column] : options.map) {
+    header.found[name] = demand_field(header.fields, column, "which --map " + name + "=" + column + " names", place);
+  }
+  for (const std::string& name : options.extra) {
+    if (!header.found.contains(name)) {
+      header.found[name] = demand_field(header.fields, name, "which was asked for", place);
+    }
+  }
+  recognise(header, options, place);
+  if (!header.found.contains("t")) {
+    throw InputError(fmt::format("{}: no column for t (time, s): expected one of {}{}; see --map t=COLUMN", place,
+                                 listed(header.fields), did_you_mean("time", header.fields)));
+  }
+  return header;
+}
+
+bool is_csv_content(std::string_view line) {
+  const std::size_t first = line.find_first_not_of(" \t\r");
+  return first != std::string_view::npos && line[first] != '#';
+}
+
+namespace {
+
+/// Nothing, or one of the words NA, N/A, null and none in any case.
+bool means_missing(std::string_view text) {
+  constexpr std::array<std::string_view, 5> words = {"", "na", "n/a", "null", "none"};
+  return std::any_of(words.begin(), words.end(), [&](std::string_view word) {
+    return std::equal(word.begin(), word.end(), text.begin(), text.end(),
+                      [](char a, char b) { return a == std::tolower(static_cast<unsigned char>(b)); });
+  });
+}
+
+bool is_blank(char c) { return c == ' ' || c == '\t'; }
+
+}  // namespace
+
+CsvRowReader::CsvRowReader(std::vector<std::string> names, LogReport* report)
+    : names_(std::move(names)), cleaner_(names_, report), values_(names_.size() + 1) {}
+
+void CsvRowReader::begin_file(const CsvHeader& header, std::string path) {
+  cleaner_.begin_file(path + ":");
+  path_ = std::move(path);
+  fields_ = header.fields;
+  separator_ = header.separator;
+  slots_.assign(fields_.size(), -1);
+  const auto take = [&](const std::string& name, int slot) {
+    const auto found = header.found.find(name);
+    if (found == header.found.end()) {
+      throw InputError(fmt::format("{}: no column for {}: expected one of {}", path_, name, listed(fields_)));
+    }
+    int& of_field = slots_[found->second];
+    if (of_field >= 0) {
+      throw InputError(fmt::format("{}: column {} is taken for {} and for {}: expected a column for each", path_,
+                                   shown(fields_[found->second]),
+                                   of_field == 0 ? "t" : names_[static_cast<std::size_t>(of_field) - 1], name));
+    }
+    of_field = slot;
+  };
+  take("t", 0);
+  for (std::size_t c = 0; c < names_.size(); ++c) {
+    take(names_[c], static_cast<int>(c) + 1);
+  }
+}
+
+/// Reads the numbers of a line into values_; returns the number of fields. The first and gravest defect is kept.
+std::size_t CsvRowReader::read_fields(std::string_view line, Defect& defect) {
+  const char* p = line.data();
+  const char* const end = p + line.size();
+  const char separator = separator_;
+  const std::size_t known = slots_.size();
+  const std::vector<double>& limits = cleaner_.limits();
+  for (std::size_t field = 0;; ++field) {
+    const int slot = field < known ? slots_[field] : -1;
+    if (slot < 0) {
+      if (p != end && *p == '"') {
+        for (++p; p != end && *p != '"'; ++p) {
+        }
+      }
+      while (p != end && *p != separator) {
+        ++p;
+      }
+    } else {
+      while (p != end && *p == ' ') {
+        ++p;
+      }
+      const auto index = static_cast<std::size_t>(slot);
+      double& value = values_[index];
+      const char* q = parse_number(p, end, value);
+      if (q == nullptr || (q != end && *q != separator)) {
+        q = read_odd_field(p, end, field, value, defect);
+      } else if (!(std::abs(value) <= limits[index])) {
+        const Fault fault = std::isfinite(value) ? Fault::limit : may_miss(index) ? Fault::none : Fault::not_finite;
+        if (fault > defect.fault) {
+          defect = {fault, field, std::string_view(p, static_cast<std::size_t>(q - p))};
+        }
+      }
+      p = q;
+    }
+    if (p == end) {
+      return field + 1;
+    }
+    ++p;
+  }
+}
+
+/// A field that is not plainly a number between separators: blanks, quotes, nothing, or text. Returns its end.
+const char* CsvRowReader::read_odd_field(const char* p, const char* end, std::size_t field, double& value,
+                                         Defect& defect) {
+  const char* stop = p;
+  bool in_quotes = false;
+  for (; stop != end && (in_quotes || *stop != separator_); ++stop) {
+    in_quotes ^= *stop == '"';
+  }
+  const char* last = stop;
+  const auto trim = [&] {
+    while (p != last && is_blank(*p)) {
+      ++p;
+    }
+    while (p != last && is_blank(*(last - 1))) {
+      --last;
+    }
+  };
+  trim();
+  if (last - p >= 2 && *p == '"' && *(last - 1) == '"') {
+    ++p;
+    --last;
+    trim();
+  }
+  const std::string_view text(p, static_cast<std::size_t>(last - p));
+  Fault fault = Fault::none;
+  if (p == last || parse_number(p, last, value) != last) {
+    fault = means_missing(text) ? Fault::empty : Fault::text;
+  } else if (!std::isfinite(value)) {
+    fault = Fault::not_finite;
+  } else if (!(std::abs(value) <= cleaner_.limits()[static_cast<std::size_t>(slots_[field])])) {
+    fault = Fault::limit;
+  }
+  if ((fault == Fault::empty || fault == Fault::not_finite) && may_miss(static_cast<std::size_t>(slots_[field]))) {
+    value = std::numeric_limits<double>::quiet_NaN();
+    return stop;
+  }
+  if (fault > defect.fault) {
+    defect = {fault, field, text};
+  }
+  return stop;
+}
+
+void CsvRowReader::let_miss(std::vector<bool> columns) {
+  missable_ = std::move(columns);
+  missable_.insert(missable_.begin(), false);
+}
+
+RowOutcome CsvRowReader::read(std::string_view line, std::size_t line_number, bool terminated) {
+  return read_numbers(line, line_number, terminated) ? cleaner_.place(values_, line_number) : RowOutcome::dropped;
+}
+
+bool CsvRowReader::read_numbers(std::string_view line, std::size_t line_number, bool terminated) {
+  Defect defect;
+  const std::size_t fields = read_fields(line, defect);
+  const std::size_t known = slots_.size();
+  const bool extra_separator = fields == known + 1 && line.ends_with(separator_);
+  const bool nameless_last = fields + 1 == known && fields_.back().empty();
+  const bool countable = fields == known || extra_separator || nameless_last;
+  if (!terminated && ((!countable && fields < known) || defect.fault == Fault::text)) {
+    cleaner_.count(&LogReport::truncated, line_number);
+    return false;
+  }
+  if (!countable) {
+    throw InputError(fmt::format("{}: {} fields: expected {}, as the header has ({})", cleaner_.at(line_number), fields,
+                                 known, shown(line)));
+  }
+  if (defect.fault == Fault::text || defect.fault == Fault::limit) {
+    throw InputError(cleaner_.at(line_number) + ": " + describe(defect));
+  }
+  if (defect.fault != Fault::none) {
+    cleaner_.count(defect.fault == Fault::empty ? &LogReport::empty : &LogReport::not_finite, line_number,
+                   fields_[defect.field]);
+    return false;
+  }
+  return true;
+}
+
+std::string CsvRowReader::describe(const Defect& defect) const {
+  const std::string where = fmt::format("column {}: {}", shown(fields_[defect.field]), shown(defect.text));
+  if (defect.fault == Fault::text) {
+    const bool comma = defect.text.find(',') != std::string_view::npos;
+    return fmt::format("{}: expected a number{}", where, comma ? " with a decimal point" : "");
+  }
+  return fmt::format("{}: {}", where, cleaner_.expectation(static_cast<std::size_t>(slots_[defect.field])));
+}
+
+}  // namespace wheelwright

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// The CSV format: header line (separator, columns) and rows.
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <wheelwright/logs/row_log.hpp>
+
+namespace wheelwright {
+
+/// What to read from a CSV log.
+struct CsvOptions {
+  /// Contract name (or a name in `extra`) -> column of the file, for headers that no spelling covers
+  /// (`--map name=column`). It goes before everything else.
+  std::map<std::string, std::string> map;
+  /// Further columns to read under their own names; a file that lacks one is an error.
+  std::vector<std::string> extra;
+  /// Where given, only these contract columns are read (and those in `map` and `extra`), as far as the files have them;
+  /// otherwise every contract column that all files have. A defect in a column that is not read does no harm.
+  std::optional<std::vector<std::string>> only;
+  std::size_t block_rows = 4096;  ///< rows of a block, at least 1
+  std::size_t min_rows = 20;      ///< usable rows that a log must have
+};
+
+/// A header, understood.
+struct CsvHeader {
+  char separator = ',';
+  std::vector<std::string> fields;           ///< the columns as written, quotes and surrounding blanks removed
+  std::map<std::string, std::size_t> found;  ///< wanted name (`t` among them) -> field
+};
+
+/// Splits `line` at `separator`; quotes around a field are removed ("" inside them is one quote), and blanks around it.
+[[nodiscard]] std::vector<std::string> split_fields(std::string_view line, char separator);
+
+/// Reads the header `line`. `place` is "file:line" for messages. Throws InputError when it is binary or all numbers, a
+/// name of `map` or `extra` is not there, two fields mean the same column, or there is no time.
+[[nodiscard]] CsvHeader read_csv_header(std::string_view line, const CsvOptions& options, const std::string& place);
+
+/// Whether `line` is neither blank nor a comment (#).
+[[nodiscard]] bool is_csv_content(std::string_view line);
+
+/// The cleaning of a log, row by row; the same for whole files and for a live stream.
+class CsvRowReader {
+ public:
+  /// `names` are the columns to read, time apart. What is met is counted in `report` where that is not null.
+  CsvRowReader(std::vector<std::string> names, LogReport* report);
+
+  /// Begins a file (and with it a segment) with this header. Throws InputError when two of the columns are one field,
+  /// or a name is not in the header.
+  void begin_file(const CsvHeader& header, std::string path);
+
+  /// Steps longer than `seconds` are gaps.
+  void set_longest_step(double seconds) { cleaner_.set_longest_step(seconds); }
+
+  /// Reads one line that has content. A line that is not `terminated` may be cut off: it is then dropped where
+  /// otherwise it would be an error. Throws InputError (and keeps the state of before) for text instead of a number, a
+  /// wrong number of fields, and a value beyond LogColumn::limit.
+  RowOutcome read(std::string_view line, std::size_t line_number, bool terminated);
+
+  /// Columns (marks in the order of `names`) that may be missing: an empty or NaN field of theirs is then NaN, and no
+  /// reason to drop the row. For read_numbers().
+  void let_miss(std::vector<bool> columns);
+
+  /// The first half of read(): false where the row was dropped (and counted); else row() has its numbers as they are
+  /// written, neither sorted into segments nor unwrapped, and it is not counted.
+  bool read_numbers(std::string_view line, std::size_t line_number, bool terminated);
+  /// Time and values of the last line.
+  [[nodiscard]] std::span<const double> row() const { return values_; }
+
+  /// Time of the last row, s.
+  [[nodiscard]] double t() const { return cleaner_.t(); }
+  /// Values of the last row, in the order of `names`.
+  [[nodiscard]] const double* values() const { return values_.data() + 1; }
+
+ private:
+  enum class Fault { none, empty, not_finite, limit, text };
+  struct Defect {
+    Fault fault = Fault::none;
+    std::size_t field = 0;
+    std::string_view text;
+  };
+
+  std::size_t read_fields(std::string_view line, Defect& defect);
+  const char* read_odd_field(const char* p, const char* end, std::size_t field, double& value, Defect& defect);
+  [[nodiscard]] std::string describe(const Defect& defect) const;
+  [[nodiscard]] bool may_miss(std::size_t value) const { return !missable_.empty() && missable_[value]; }
+
+  std::vector<std::string> names_;
+  RowCleaner cleaner_;
+
+  std::string path_;
+  std::vector<std::string> fields_;
+  std::vector<int> slots_;  ///< field -> index in values_, or −1
+  char separator_ = ',';
+  std::vector<double> values_;  ///< time, then the columns
+  std::vector<bool> missable_;  ///< of each value; empty: none
+};
+
+}  // namespace wheelwright

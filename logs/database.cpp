@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/logs/database.hpp>
+
+#include <algorithm>
+#include <cctype>
+#include <cstdint>
+#include <system_error>
+
+#include <fmt/format.h>
+#include <sqlite3.h>
+
+#include <wheelwright/core/error.hpp>
+#include <wheelwright/logs/mcap_format.hpp>
+
+namespace wheelwright::bag {
+namespace {
+
+/// `path` as SQLite's "file:" address.
+std::string address(const std::filesystem::path& path) {
+  std::string text = "file:";
+  for (const char c : std::filesystem::absolute(path).string()) {
+    const auto byte = static_cast<unsigned char>(c);
+    text += std::isalnum(byte) != 0 || c == '/' || c == '.' || c == '_' || c == '-' ? std::string(1, c)
+                                                                                    : fmt::format("%{:02X}", byte);
+  }
+  return text;
+}
+
+}  // namespace
+
+void Statement::Close::operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
+
+Statement::Statement(sqlite3* database, std::string_view sql) {
+  sqlite3_stmt* statement = nullptr;
+  sqlite3_prepare_v2(database, sql.data(), static_cast<int>(sql.size()), &statement, nullptr);
+  statement_.reset(statement);
+}
+
+void Statement::set(int place, std::int64_t value) { sqlite3_bind_int64(statement_.get(), place, value); }
+
+void Statement::set(int place, std::string_view bytes, bool text) {
+  if (text) {
+    sqlite3_bind_text64(statement_.get(), place, bytes.data(), bytes.size(), SQLITE_STATIC, SQLITE_UTF8);
+  } else {
+    sqlite3_bind_blob64(statement_.get(), place, bytes.empty() ? "" : bytes.data(), bytes.size(), SQLITE_STATIC);
+  }
+}
+
+Statement::Result Statement::step() {
+  switch (sqlite3_step(statement_.get())) {
+    case SQLITE_ROW: return Result::row;
+    case SQLITE_DONE: return Result::done;
+    default: return Result::failed;
+  }
+}
+
+void Statement::reset() { sqlite3_reset(statement_.get()); }
+
+std::int64_t Statement::integer(int column) const { return sqlite3_column_int64(statement_.get(), column); }
+
+std::string_view Statement::text(int column) const {
+  const auto* const bytes = sqlite3_column_text(statement_.get(), column);
+  return bytes == nullptr ? std::string_view()
+                          : std::string_view(reinterpret_cast<const char*>(bytes),
+                                             static_cast<std::size_t>(sqlite3_column_bytes(statement_.get(), column)));
+}
+
+std::optional<std::string_view> Statement::blob(int column) const {
+  if (sqlite3_column_type(statement_.get(), column) != SQLITE_BLOB) {
+    return std::nullopt;
+  }
+  const auto* const bytes = static_cast<const char*>(sqlite3_column_blob(statement_.get(), column));
+  const auto size = static_cast<std::size_t>(sqlite3_column_bytes(statement_.get(), column));
+  return bytes == nullptr ? std::string_view() : std::string_view(bytes, size);
+}
+
+bool Statement::is_integer(int column) const { return sqlite3_column_type(statement_.get(), column) == SQLITE_INTEGER; }
+
+void Database::Close::operator()(sqlite3* database) const { sqlite3_close_v2(database); }
+
+Database::Database(const std::filesystem::path& path, const std::string& shown, Mode mode) {
+  const int flags = mode == Mode::unchanging ? SQLITE_OPEN_READONLY
+                    : mode == Mode::keeping  ? SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE
+                                             : SQLITE_OPEN_READWRITE;
+  const std::string name = path.empty() ? "" : address(path) + (mode == Mode::unchanging ? "?immutable=1" : "");
+  sqlite3* database = nullptr;
+  const int result = sqlite3_open_v2(name.c_str(), &database, flags | SQLITE_OPEN_URI | SQLITE_OPEN_NOMUTEX, nullptr);
+  database_.reset(database);
+  if (result != SQLITE_OK) {
+    throw InputError(fmt::format("{}: cannot be opened as an SQLite database ({})", shown, error()));
+  }
+  if (mode == Mode::writing) {
+    return;
+  }
+  if (mode == Mode::keeping) {
+    // Before the first look at the file: its write-ahead log then needs no memory shared between processes, which file
+    // systems of clusters lack.
+    run("PRAGMA locking_mode=EXCLUSIVE; PRAGMA trusted_schema=OFF; PRAGMA cell_size_check=ON;");
+    return;
+  }
+  // What a foreign file says is data: nothing of it is run. With a writable schema SQLite reads files that are cut off
+  // up to their last whole page; nothing is written.
+  sqlite3_db_config(database, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
+  sqlite3_db_config(database, SQLITE_DBCONFIG_ENABLE_TRIGGER, 0, nullptr);
+  sqlite3_db_config(database, SQLITE_DBCONFIG_ENABLE_VIEW, 0, nullptr);
+  run("PRAGMA writable_schema=ON; PRAGMA cell_size_check=ON; PRAGMA temp_store=MEMORY;");
+}
+
+bool Database::run(const std::string& sql) {
+  return sqlite3_exec(database_.get(), sql.c_str(), nullptr, nullptr, nullptr) == SQLITE_OK;
+}
+
+void Database::forget() { sqlite3_db_release_memory(database_.get()); }
+
+std::string Database::error() const { return sqlite3_errmsg(database_.get()); }
+
+bool Database::in_use() const {
+  const int code = sqlite3_errcode(database_.get());
+  return code == SQLITE_BUSY || code == SQLITE_LOCKED;
+}
+
+bool Database::close() { return sqlite3_close(database_.release()) == SQLITE_OK; }
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Bytes of the header of a database (SQLite, "Database File Format", section 1.3).
+constexpr std::size_t header_bytes = 100;
+
+/// A number of the header, which is big-endian.
+std::uint64_t number_at(const std::string& header, std::size_t at, std::size_t size) {
+  std::uint64_t value = 0;
+  for (std::size_t k = at; k < at + size; ++k) {
+    value = value << 8 | static_cast<unsigned char>(header[k]);
+  }
+  return value;
+}
+
+}  // namespace
+
+DatabaseFile::DatabaseFile(const fs::path& path, const std::string& shown) : path_(path) {
+  find_end(path, shown);
+  find_journals(path);
+}
+
+void DatabaseFile::find_end(const fs::path& original, const std::string& shown) {
+  mcap::WindowedFile file(original, false);
+  const std::uint64_t size = file.size();
+  const std::string header = file.peek(0, static_cast<std::size_t>(std::min<std::uint64_t>(header_bytes, size)));
+  if (header.size() < header_bytes) {
+    throw InputError(fmt::format(
+        "{}: at byte {}: the file ends inside the header of its database: nothing of it can be read", shown, size));
+  }
+  const std::uint64_t page = number_at(header, 16, 2) == 1 ? 65536 : number_at(header, 16, 2);
+  const std::uint64_t expected = number_at(header, 28, 4) * page;
+  const bool counted = number_at(header, 24, 4) == number_at(header, 92, 4);
+  if (page < 512 || (page & (page - 1)) != 0) {
+    return;  // SQLite will say that it is none
+  }
+  if (counted && expected > size) {
+    defect_ = fmt::format("at byte {}: the file ends here, and should have {} bytes: it was cut off", size, expected);
+  } else if (size % page != 0) {
+    defect_ = fmt::format("at byte {}: the file ends inside a page: it was cut off, or something follows it", size);
+  }
+  if (size % page != 0) {
+    copy(original, "bag.db3");
+    std::error_code error;
+    fs::resize_file(path_, size - size % page, error);
+    if (error) {
+      throw InputError(fmt::format("{}: cannot be cut to whole pages ({})", path_.string(), error.message()));
+    }
+  }
+}
+
+void DatabaseFile::find_journals(const fs::path& original) {
+  for (const char* const ending : {"-wal", "-journal"}) {
+    fs::path beside = original;
+    beside += ending;
+    std::error_code error;
+    const auto size = fs::file_size(beside, error);
+    if (!error && size > 0) {
+      if (!directory_) {
+        copy(original, "bag.db3");
+      }
+      const fs::path database = path_;
+      copy(beside, (std::string("bag.db3") + ending).c_str());
+      path_ = database;
+      journal_ = true;
+      defect_.clear();  // what is missing may be in the journal
+    }
+  }
+}
+
+void DatabaseFile::copy(const fs::path& from, const char* name) {
+  if (!directory_) {
+    directory_ = std::make_unique<TemporaryDirectory>();
+  }
+  path_ = directory_->path() / name;
+  std::error_code error;
+  fs::copy_file(from, path_, error);
+  if (error) {
+    throw InputError(
+        fmt::format("{}: cannot be copied to {} ({}): a recording that was not closed, or was cut off, is read "
+                    "from a copy; expected room there, or TMPDIR to name another directory",
+                    from.string(), path_.string(), error.message()));
+  }
+  fs::permissions(path_, fs::perms::owner_read | fs::perms::owner_write, fs::perm_options::add, error);
+}
+
+}  // namespace wheelwright::bag
