@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/detector/row_detector.hpp>
+#include <wheelwright/detector/detector.hpp>
 #include <wheelwright/files/json.hpp>
 #include <wheelwright/logs/log_file.hpp>
 #include <wheelwright/report/context.hpp>

@@ -94,7 +94,7 @@ MotionLimits limits_from(const Arguments& a, const Robot& robot) {
 }
 
 // NAME or NAME=SIZE of the catalogue; without any, the usual ones.
-std::vector<InspectedFault> inspected(const Arguments& a, const CommissionedModel& model) {
+std::vector<InspectedFault> inspected(const Arguments& a, const OnlineModel& model) {
   std::vector<InspectedFault> faults;
   const std::vector<InspectedFault> usual = usual_inspection(model);
   const std::vector<FaultType> catalogue = fault_catalogue(model.model, model.estimate, model.robot.effort);
@@ -181,7 +181,7 @@ int run(const Arguments& a) {
   }
   check_rivals(a);
   make_directory(a.common);
-  const std::optional<CommissionedModel> model = a.model.empty() ? std::nullopt : std::optional(read_model(a.model));
+  const std::optional<OnlineModel> model = a.model.empty() ? std::nullopt : std::optional(read_model(a.model));
   const DesignSubject subject = model ? subject_of(*model) : subject_of(read_robot(a.robot), 1.0 / a.rate);
   const MotionLimits limits = limits_from(a, subject.robot);
   Progress progress(a.common.quiet);

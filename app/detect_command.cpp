@@ -47,7 +47,7 @@ constexpr const char* kExamples =
     "Exit code: 0 no fault, 1 a fault was found, 2 bad input, or no instant of it could be decided.";
 
 int run(const Arguments& a) {
-  CommissionedModel model = read_model(a.model);
+  OnlineModel model = read_model(a.model);
   model.persistence = a.persistence.value_or(model.persistence);
   if (model.kinematic) {
     model.kinematic->persistence = a.persistence.value_or(model.kinematic->persistence);

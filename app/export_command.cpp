@@ -38,7 +38,7 @@ constexpr const char* kExamples =
     "  wheelwright export result/model.json --language c --set box --name left_robot > left_robot.h\n\n"
     "The file says how it is used. It decides as `wheelwright detect` does.";
 
-Json to_json(const Arguments& a, const CommissionedModel& model, const Detector& detector, const std::string& file,
+Json to_json(const Arguments& a, const OnlineModel& model, const TorqueDetector& detector, const std::string& file,
              const std::string& text) {
   Json result;
   result["schema"] = "wheelwright/export/1";
@@ -72,7 +72,7 @@ Json to_json(const Arguments& a, const CommissionedModel& model, const Detector&
 }
 
 int run(const Arguments& a) {
-  CommissionedModel model = read_model(a.model);
+  OnlineModel model = read_model(a.model);
   model.persistence = a.persistence.value_or(model.persistence);
   const Detector detector = make_detector(model, a.detector);
   const std::string text = c_header(

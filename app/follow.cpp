@@ -41,7 +41,7 @@ std::optional<std::vector<std::size_t>> pick_columns(const CsvRowParser& parser,
 template <typename AnyDetector>
 class Watch {
  public:
-  Watch(AnyDetector detector, std::vector<std::size_t> pick, const CommissionedModel& model)
+  Watch(AnyDetector detector, std::vector<std::size_t> pick, const OnlineModel& model)
       : detector_(std::move(detector)),
         pick_(std::move(pick)),
         model_(model),
@@ -72,7 +72,7 @@ class Watch {
  private:
   AnyDetector detector_;
   std::vector<std::size_t> pick_;
-  CommissionedModel model_;
+  OnlineModel model_;
   std::vector<double> sample_;
   EventRecorder recorder_;
   std::size_t decisions_ = 0;
@@ -80,7 +80,7 @@ class Watch {
 
 }  // namespace
 
-ExitCode follow(std::istream& in, std::ostream& out, Detector detector, const CommissionedModel& model,
+ExitCode follow(std::istream& in, std::ostream& out, TorqueDetector detector, const OnlineModel& model,
                 const DetectorOptions& options, const CsvOptions& reader, bool json) {
   std::string line;
   do {

@@ -18,7 +18,7 @@ namespace wheelwright::app {
 /// kDone, kNo where there was an event, or kBadInput where the torque residual was not decided at any row, with the reason
 /// on standard error. The kinematic residual is watched with `options` where the model and the rows have it; on
 /// standard error it is said when the rows lack its columns.
-ExitCode follow(std::istream& in, std::ostream& out, Detector detector, const CommissionedModel& model,
+ExitCode follow(std::istream& in, std::ostream& out, TorqueDetector detector, const OnlineModel& model,
                 const DetectorOptions& options, const CsvOptions& reader, bool json);
 
 }  // namespace wheelwright::app

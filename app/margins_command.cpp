@@ -74,7 +74,7 @@ std::string table(const MarginSurvey& survey, const ResidualMargins& residual) {
 }
 
 int run(const Arguments& a) {
-  const CommissionedModel model = read_model(a.model);
+  const OnlineModel model = read_model(a.model);
   make_directory(a.common);
   const auto opened = open_robot_log({a.log}, model.robot, a.common);
   RecordedLog& log = *opened;

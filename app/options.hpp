@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-#include <wheelwright/detector/row_detector.hpp>
+#include <wheelwright/detector/detector.hpp>
 
 #include "common.hpp"
 #include "run_items.hpp"

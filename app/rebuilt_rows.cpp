@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 
 #include <wheelwright/bounds/slab_rows.hpp>
-#include <wheelwright/filter/regression_stream.hpp>
+#include <wheelwright/filter/row_stream.hpp>
 
 namespace wheelwright::app {
 namespace {
@@ -33,7 +33,7 @@ RegressionBlock named_instants(const ModelClaims& claims, LogSource& log) {
   kept.resize(wanted.size(), claims.model.n(), claims.model.p());
   const auto n = static_cast<Eigen::Index>(claims.model.n());
   std::size_t count = 0;
-  RegressionStream rows(log, RegressorFilter(claims.model, claims.filter, claims.measurement, claims.errors));
+  TorqueRows rows(log, RegressorFilter(claims.model, claims.filter, claims.measurement, claims.errors));
   while (rows.next(block)) {
     for (std::size_t k = 0; k < block.instants(); ++k) {
       if (wanted.contains(block.sample[k])) {

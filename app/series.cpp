@@ -15,7 +15,7 @@ constexpr const char* kQuantities[] = {"residual", "lower", "upper", "rho", "out
 
 }  // namespace
 
-void write_series(const std::filesystem::path& path, LogSource& log, const CommissionedModel& model,
+void write_series(const std::filesystem::path& path, LogSource& log, const OnlineModel& model,
                   const DetectorOptions& options, double origin) {
   std::vector<std::string> names;
   for (const std::string& output : model.model.outputs) {

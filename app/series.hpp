@@ -7,7 +7,7 @@
 
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/core/log.hpp>
-#include <wheelwright/detector/row_detector.hpp>
+#include <wheelwright/detector/detector.hpp>
 
 namespace wheelwright::app {
 
@@ -15,7 +15,7 @@ namespace wheelwright::app {
 /// residual_OUTPUT, lower_OUTPUT, upper_OUTPUT, rho_OUTPUT, outside_OUTPUT and alarm_OUTPUT (0 or 1), in the format that
 /// the ending of `path` says (create_log); in a bag they are on the topic /residual. `origin` is
 /// LogFileReport::time_origin. Throws InputError as create_log does.
-void write_series(const std::filesystem::path& path, LogSource& log, const CommissionedModel& model,
+void write_series(const std::filesystem::path& path, LogSource& log, const OnlineModel& model,
                   const DetectorOptions& options, double origin);
 
 }  // namespace wheelwright::app

@@ -159,12 +159,12 @@ std::string summary(const Commissioning& r) {
   return text;
 }
 
-std::string event_line(const Event& e, const CommissionedModel& model) {
+std::string event_line(const Event& e, const OnlineModel& model) {
   return fmt::format("t = {:.3f} s: fault in the {} channel (first outside at {:.3f} s, {:.2f} times the threshold)",
                      e.alarm, model.model.outputs[e.output], e.start, e.peak_ratio);
 }
 
-std::string why_undecided(const CommissionedModel& model, std::size_t rows, double step) {
+std::string why_undecided(const OnlineModel& model, std::size_t rows, double step) {
   constexpr double sparser = 1.5;  // steps of the model, from which on sparseness is worth a word
   const double nominal = model.measurement.nominal_step;
   const double ratio = nominal > 0.0 ? step / nominal : 1.0;
@@ -189,7 +189,7 @@ std::string why_undecided(const CommissionedModel& model, std::size_t rows, doub
                     rows, rows == 1 ? "" : "s", step, model.filter.settle / model.filter.beta);
 }
 
-std::string summary(const Detection& d, const CommissionedModel& model) {
+std::string summary(const Detection& d, const OnlineModel& model) {
   std::string text;
   if (d.instants == 0) {
     return {};  // why_undecided() is told instead
@@ -215,7 +215,7 @@ std::string summary(const Detection& d, const CommissionedModel& model) {
   return text;
 }
 
-Json to_json(const Event& e, const CommissionedModel& model) {
+Json to_json(const Event& e, const OnlineModel& model) {
   return {{"output", model.model.outputs[e.output]},
           {"start", e.start},
           {"alarm", e.alarm},
@@ -227,8 +227,7 @@ Json to_json(const Event& e, const CommissionedModel& model) {
           {"start_row", e.start_sample}};
 }
 
-Json to_json(const Detection& d, const CommissionedModel& model, const std::string& model_file,
-             const std::string& log) {
+Json to_json(const Detection& d, const OnlineModel& model, const std::string& model_file, const std::string& log) {
   Json json = {{"schema", "wheelwright/detection/1"},
                {"software", software()},
                {"model", model_file},
@@ -286,8 +285,8 @@ void add_isolation(Json& json, const std::vector<Isolation>& isolations) {
   }
 }
 
-CommissionedModel with_kinematic_outputs(const CommissionedModel& model) {
-  CommissionedModel view = model;
+OnlineModel with_kinematic_outputs(const OnlineModel& model) {
+  OnlineModel view = model;
   view.robot.effort = EffortKind::torque;  // units are those of the pose
   view.model = model.kinematic ? kinematic_outputs(*model.kinematic) : Model{};
   view.persistence = model.kinematic ? model.kinematic->persistence : model.persistence;
@@ -295,7 +294,7 @@ CommissionedModel with_kinematic_outputs(const CommissionedModel& model) {
   return view;
 }
 
-std::string summary(const KinematicWatch& watch, const CommissionedModel& model) {
+std::string summary(const KinematicWatch& watch, const OnlineModel& model) {
   if (!watch.detection) {
     return "kinematic residual: not watched, " + watch.message + "\n";
   }
@@ -303,7 +302,7 @@ std::string summary(const KinematicWatch& watch, const CommissionedModel& model)
   if (d.instants == 0) {
     return "kinematic residual: no decision, the log is shorter than its window\n";
   }
-  const CommissionedModel view = with_kinematic_outputs(model);
+  const OnlineModel view = with_kinematic_outputs(model);
   std::string text = fmt::format(
       "kinematic residual: {} in {:.1f} s ({} instants)\n",
       d.events.empty() ? "no fault" : fmt::format("{} fault event{}", d.events.size(), d.events.size() == 1 ? "" : "s"),
@@ -323,10 +322,10 @@ std::string summary(const KinematicWatch& watch, const CommissionedModel& model)
   return text;
 }
 
-void add_kinematic(Json& json, const KinematicWatch& watch, const CommissionedModel& model) {
+void add_kinematic(Json& json, const KinematicWatch& watch, const OnlineModel& model) {
   const Detection none;
   const Detection& d = watch.detection ? *watch.detection : none;
-  const CommissionedModel view = with_kinematic_outputs(model);
+  const OnlineModel view = with_kinematic_outputs(model);
   const Json own = to_json(d, view, {}, {});
   for (const Json& output : own.at("outputs")) {
     json["outputs"].push_back(output);
@@ -343,7 +342,7 @@ void add_kinematic(Json& json, const KinematicWatch& watch, const CommissionedMo
                        {"seconds", d.seconds}};
 }
 
-KinematicWatch watch_kinematics(LogSource& log, const CommissionedModel& model, const DetectorOptions& options,
+KinematicWatch watch_kinematics(LogSource& log, const OnlineModel& model, const DetectorOptions& options,
                                 const DetectionOptions& detection) {
   if (!model.kinematic) {
     return {std::nullopt, "the log that the model was commissioned on had neither a usable pose nor a gyro"};

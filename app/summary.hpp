@@ -16,7 +16,7 @@ namespace wheelwright::app {
 [[nodiscard]] std::string summary(const Commissioning& result);
 
 /// What a detector said of a log, for a terminal.
-[[nodiscard]] std::string summary(const Detection& detection, const CommissionedModel& model);
+[[nodiscard]] std::string summary(const Detection& detection, const OnlineModel& model);
 
 /// What was said of the kinematic residual, beside what was said of the torque residual.
 struct KinematicWatch {
@@ -25,17 +25,17 @@ struct KinematicWatch {
 };
 
 /// The kinematic residual of `log`, where it and the model have one.
-[[nodiscard]] KinematicWatch watch_kinematics(LogSource& log, const CommissionedModel& model,
-                                              const DetectorOptions& options, const DetectionOptions& detection = {});
+[[nodiscard]] KinematicWatch watch_kinematics(LogSource& log, const OnlineModel& model, const DetectorOptions& options,
+                                              const DetectionOptions& detection = {});
 
 /// `model` with the outputs of its kinematic model in the place of its own, for summary, event_line, to_json and reports.
-[[nodiscard]] CommissionedModel with_kinematic_outputs(const CommissionedModel& model);
+[[nodiscard]] OnlineModel with_kinematic_outputs(const OnlineModel& model);
 
 /// What the kinematic residual showed, for a terminal.
-[[nodiscard]] std::string summary(const KinematicWatch& watch, const CommissionedModel& model);
+[[nodiscard]] std::string summary(const KinematicWatch& watch, const OnlineModel& model);
 
 /// Adds outputs and events of the kinematic residual to a detection as JSON; events stay in the order of their alarms.
-void add_kinematic(Json& detection, const KinematicWatch& watch, const CommissionedModel& model);
+void add_kinematic(Json& detection, const KinematicWatch& watch, const OnlineModel& model);
 
 /// What the first events are isolated to, for a terminal.
 [[nodiscard]] std::string summary(const std::vector<Isolation>& isolations, const Detection& detection);
@@ -44,16 +44,16 @@ void add_kinematic(Json& detection, const KinematicWatch& watch, const Commissio
 void add_isolation(Json& detection, const std::vector<Isolation>& isolations);
 
 /// Why a detector of `model` decided at no instant of `rows` rows with the median step `step` (s), with what to do about it.
-[[nodiscard]] std::string why_undecided(const CommissionedModel& model, std::size_t rows, double step);
+[[nodiscard]] std::string why_undecided(const OnlineModel& model, std::size_t rows, double step);
 
 /// One event in a line.
-[[nodiscard]] std::string event_line(const Event& event, const CommissionedModel& model);
+[[nodiscard]] std::string event_line(const Event& event, const OnlineModel& model);
 
 /// A detection as JSON (results/detection.schema.json). `model_file` and `log` say what was used.
-[[nodiscard]] Json to_json(const Detection& detection, const CommissionedModel& model, const std::string& model_file,
+[[nodiscard]] Json to_json(const Detection& detection, const OnlineModel& model, const std::string& model_file,
                            const std::string& log);
 
 /// One event as JSON.
-[[nodiscard]] Json to_json(const Event& event, const CommissionedModel& model);
+[[nodiscard]] Json to_json(const Event& event, const OnlineModel& model);
 
 }  // namespace wheelwright::app

@@ -21,7 +21,7 @@
 #include <wheelwright/detector/detector.hpp>
 #include <wheelwright/export/export_c.hpp>
 #include <wheelwright/filter/measurement.hpp>
-#include <wheelwright/filter/regression_stream.hpp>
+#include <wheelwright/filter/row_stream.hpp>
 #include <wheelwright/sim/simulation.hpp>
 
 #include "bench.hpp"
@@ -68,7 +68,7 @@ struct World {
     const wheelwright::Measurement measurement = find_measurement(log, scenario.robot, model, design.order);
     const SensorErrors sensors{.motion = 3.1415927 / 4096.0, .effort = 0.02};
     filter.emplace(model, design, measurement, propagate(model, design, measurement, sensors));
-    RegressionStream stream(log, *filter);
+    TorqueRows stream(log, *filter);
     Box prior;
     prior.sides = prior_box(scenario.robot, model).bounds;
     set = feasible_set(stream, prior).polytope.value();
@@ -83,10 +83,10 @@ struct World {
     }
   }
 
-  [[nodiscard]] Detector detector(DetectorOptions options) const {
+  [[nodiscard]] TorqueDetector detector(DetectorOptions options) const {
     return {*filter, ThresholdRule(*set, estimate, options.set), options};
   }
-  void run(Detector& detector) const {
+  void run(TorqueDetector& detector) const {
     detector.restart();
     for (std::size_t k = 0; k < rows; ++k) {
       keep(detector.step(t[k], {samples.data() + k * inputs, inputs}).fault);
@@ -97,7 +97,7 @@ struct World {
 /// The exported detector, compiled by `cc -O2` where there is one.
 class Exported {
  public:
-  Exported(const Detector& detector, std::size_t inputs) {
+  Exported(const TorqueDetector& detector, std::size_t inputs) {
     const auto folder =
         std::filesystem::temp_directory_path() / fmt::format("wheelwright-bench-{}", std::random_device{}());
     std::filesystem::create_directories(folder);

@@ -20,7 +20,7 @@
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/commission/detector_walk.hpp>
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/filter/regression_stream.hpp>
+#include <wheelwright/filter/row_stream.hpp>
 #include <wheelwright/logs/csv.hpp>
 #include <wheelwright/robots/robot_file.hpp>
 
@@ -40,9 +40,9 @@ struct Recipe {
   std::size_t outside = 0, instants = 0;
 };
 
-Recipe recipe(LogSource& learning, LogSource& watching, const CommissionedModel& model) {
+Recipe recipe(LogSource& learning, LogSource& watching, const OnlineModel& model) {
   const RegressorFilter bare(model.model, model.filter, model.measurement);
-  RegressionStream rows(learning, bare);
+  TorqueRows rows(learning, bare);
   const PriorBox prior = prior_box(model.robot, model.model);
   const Box box{prior.bounds};
   const auto n = static_cast<Eigen::Index>(model.model.n());
@@ -55,13 +55,13 @@ Recipe recipe(LogSource& learning, LogSource& watching, const CommissionedModel&
   }
   SignalErrors errors;
   errors.output = error;
-  RegressionStream bounded(learning, RegressorFilter(model.model, model.filter, model.measurement, errors));
+  TorqueRows bounded(learning, RegressorFilter(model.model, model.filter, model.measurement, errors));
   const FeasibleSet set = feasible_set(bounded, box);
   Recipe result;
   if (!set.polytope) {
     return result;
   }
-  RegressionStream test(watching, RegressorFilter(model.model, model.filter, model.measurement, errors));
+  TorqueRows test(watching, RegressorFilter(model.model, model.filter, model.measurement, errors));
   const auto validation = validate_on(test, ThresholdRule(*set.polytope, model.estimate));
   return {validation[0].median_width / validation[0].torque_rms, validation[0].outside, validation[0].instants};
 }
@@ -84,8 +84,8 @@ void study(const std::string& robot_file, const std::string& log_file) {
       continue;
     }
     const Detection detection = detect(watching, make_detector(result.model));
-    RegressionStream rows(watching, RegressorFilter(result.model.model, result.model.filter, result.model.measurement,
-                                                    result.model.errors));
+    TorqueRows rows(watching, RegressorFilter(result.model.model, result.model.filter, result.model.measurement,
+                                              result.model.errors));
     const OutputValidation v = validate_on(rows, ThresholdRule(*result.feasible.polytope, result.model.estimate))[0];
     const Recipe usual = recipe(learning, watching, result.model);
     fmt::print("| {} | {:.3f} | {:.3f} | {:.3f} | {} | {:.3f} | {} of {} |\n", label, v.nrmse,

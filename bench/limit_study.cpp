@@ -107,7 +107,7 @@ double median(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
-SensorErrors raw_errors(const CommissionedModel& m, const Robot& robot, const Measurement& measurement) {
+SensorErrors raw_errors(const OnlineModel& m, const Robot& robot, const Measurement& measurement) {
   SensorErrors errors;
   if (measurement.count > 0.0) {
     errors.motion = 0.5 * measurement.count * measurement.nominal_step;
@@ -133,7 +133,7 @@ struct Window {
   std::size_t onsets = 0;
 };
 
-void compare(const CommissionedModel& m, const Drive& drive, const LogTable& second, const Options& options,
+void compare(const OnlineModel& m, const Drive& drive, const LogTable& second, const Options& options,
              std::vector<Window>& windows, std::size_t& programs) {
   TableSource log(second);
   const ReferenceMotion filtered = read_reference(log, RegressorFilter(m.model, m.filter, m.measurement, m.errors));

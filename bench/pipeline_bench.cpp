@@ -23,7 +23,7 @@
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/commission/detector_walk.hpp>
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/filter/regression_stream.hpp>
+#include <wheelwright/filter/row_stream.hpp>
 #include <wheelwright/identify/least_squares.hpp>
 #include <wheelwright/logs/csv.hpp>
 #include <wheelwright/sim/simulation.hpp>
@@ -119,7 +119,7 @@ struct World {
 std::vector<Measurement> filter_rows() {
   const World w;
   TableSource log(w.table);
-  RegressionStream stream(log, w.filter());
+  TorqueRows stream(log, w.filter());
   RegressionBlock block;
   return {against(
       "filter/rows", World::rows, 4, [&] { walk(stream, block); }, "bare read", [&] { read_bare(w.table); })};
@@ -166,7 +166,7 @@ std::optional<double> numpy_seconds(const RegressionBlock& rows) {
 std::vector<Measurement> least_squares_peers() {
   const World w;
   TableSource log(w.table);
-  RegressionStream stream(log, w.filter());
+  TorqueRows stream(log, w.filter());
   RegressionTable rows(read_all(stream));
   const auto instants = rows.block().instants();
   const auto ours = [&] { keep(least_squares(rows).estimate); };
@@ -189,7 +189,7 @@ std::vector<Measurement> least_squares_peers() {
 std::vector<Measurement> bounds_set() {
   const World w;
   TableSource log(w.table);
-  RegressionStream stream(log, w.filter());
+  TorqueRows stream(log, w.filter());
   RegressionTable rows(read_all(stream));
   Box prior;
   prior.sides = prior_box(w.scenario.robot, w.result.model.model).bounds;

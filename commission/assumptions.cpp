@@ -322,10 +322,6 @@ Warrant settle_outputs(std::vector<OutputNoise>& noise, std::vector<OutputValida
 
 }  // namespace
 
-std::string_view verdict_word(AssumptionVerdict verdict) {
-  return verdict == AssumptionVerdict::holds ? "holds" : verdict == AssumptionVerdict::fails ? "fails" : "not tested";
-}
-
 std::vector<Assumption> assumptions_of(const Commissioning& result) {
   const RowsVerdict rows = rows_verdict(result);
   const Robot& robot = result.model.robot;

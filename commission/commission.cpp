@@ -13,7 +13,7 @@
 #include <wheelwright/commission/fit.hpp>
 #include <wheelwright/commission/setting.hpp>
 #include <wheelwright/core/check.hpp>
-#include <wheelwright/filter/regression_stream.hpp>
+#include <wheelwright/filter/row_stream.hpp>
 
 namespace wheelwright {
 namespace {
@@ -58,7 +58,7 @@ struct Bounded {
 };
 
 OutlierResult set_of(LogSource& log, const Setting& s, Part part, const SignalErrors& errors, std::size_t outliers) {
-  RegressionStream rows = make_rows(log, s, errors);
+  TorqueRows rows = make_rows(log, s, errors);
   FoldedSource folded(rows, part, s.survey.rows, s.folds);
   if (outliers > 0) {
     return feasible_set_with_outliers(folded, s.prior, {.most = outliers, .set = {}});
@@ -132,7 +132,7 @@ Bounded bounded_set(LogSource& log, const Setting& s, Part part, std::vector<Out
     for (const OutputNoise& o : noise) {
       options.weights.push_back(std::max(o.learning, std::numeric_limits<double>::min()));
     }
-    RegressionStream bare = make_rows(log, s, s.declared);
+    TorqueRows bare = make_rows(log, s, s.declared);
     FoldedSource bare_folded(bare, part, s.survey.rows, s.folds);
     const double factor = raised = noise_that_leaves_a_set(minimax_fit(bare_folded, s.prior, options), [&](double by) {
       std::vector<OutputNoise> more = noise;
@@ -172,7 +172,7 @@ double needed_noise(LogSource& log, const Setting& s, const Commissioning& empty
   }
   SignalErrors without_output = empty.row_errors;
   without_output.output.setZero();
-  RegressionStream bare = make_rows(log, s, without_output);
+  TorqueRows bare = make_rows(log, s, without_output);
   const double fit = minimax_fit(bare, s.prior, options).upper;
   // The first rows are met again with any noise.
   const bool no_less = outliers == 0 && empty.row_errors.motion.mobility.size() == 0;
@@ -243,8 +243,8 @@ std::vector<ParameterResult> parameter_results(const Setting& s, const Fit& fit,
   return results;
 }
 
-CommissionedModel described_model(const Setting& s, Persistence persistence) {
-  CommissionedModel model;
+OnlineModel described_model(const Setting& s, Persistence persistence) {
+  OnlineModel model;
   model.robot = s.robot;
   model.model = s.model;
   model.measurement = s.measurement;
@@ -253,7 +253,7 @@ CommissionedModel described_model(const Setting& s, Persistence persistence) {
   return model;
 }
 
-void finish_model(CommissionedModel& model, const Setting& s, const std::vector<OutputNoise>& noise, const Fit& fit,
+void finish_model(OnlineModel& model, const Setting& s, const std::vector<OutputNoise>& noise, const Fit& fit,
                   const FeasibleSet& set, const MotionBound& motion) {
   model.errors = with_noise(s, noise, For::driving);
   model.errors.motion = motion;
@@ -380,7 +380,7 @@ std::string default_prior_in_the_way(const Setting& s, const Commissioning& resu
 
 // A model that the log contradicts is not published.
 void withdraw(Commissioning& result) {
-  CommissionedModel& model = result.model;
+  OnlineModel& model = result.model;
   model.estimate.resize(0);
   model.facets.clear();
   model.box = {};
@@ -500,7 +500,7 @@ Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionO
   if (set.status == FeasibleSet::Status::nonempty) {
     SignalErrors errors = with_noise(s, noise, For::driving);
     errors.motion = learnt.driving;
-    RegressionStream unseen = make_rows(log, s, errors);
+    TorqueRows unseen = make_rows(log, s, errors);
     FoldedSource held_out(unseen, Part::held_out, s.survey.rows, s.folds);
     result.validation = validate_on(held_out, ThresholdRule(*set.polytope, best_guess(trained, *set.polytope)));
     result.polytope_over_box = 0.0;
@@ -532,12 +532,6 @@ Commissioning commission(LogSource& log, const Robot& robot, const CommissionOpt
   Commissioning result = commissioned(log, robot, options);
   settle_warrants(result);
   return result;
-}
-
-Detector make_detector(const CommissionedModel& model, DetectorOptions options) {
-  options.persistence = options.persistence.value_or(model.persistence);
-  return Detector(RegressorFilter(model.model, model.filter, model.measurement, model.errors),
-                  ThresholdRule(Polytope(model.facets, model.box), model.estimate, options.set), options);
 }
 
 }  // namespace wheelwright

@@ -19,28 +19,12 @@
 #include <wheelwright/commission/survey.hpp>
 #include <wheelwright/commission/validation.hpp>
 #include <wheelwright/core/log.hpp>
-#include <wheelwright/detector/detector.hpp>
+#include <wheelwright/detector/online_model.hpp>
 #include <wheelwright/identify/estimator_choice.hpp>
 #include <wheelwright/identify/least_squares.hpp>
 #include <wheelwright/model/robot.hpp>
 
 namespace wheelwright {
-
-/// Everything that a detector needs, and nothing else: the part of a commissioned model that is used on-line.
-struct CommissionedModel {
-  Robot robot;
-  Model model;
-  Measurement measurement;
-  FilterDesign filter;
-  SignalErrors errors;            ///< dY and dy of the rows, ē included
-  Eigen::VectorXd estimate;       ///< θ̂_L; for a parameter that the log does not show, the Chebyshev centre's value
-  std::vector<HalfSpace> facets;  ///< of the feasible set, p coefficients each
-  Box box;                        ///< finite box that bounds the set (the certified hull)
-  Persistence persistence;
-  std::optional<KinematicModel> kinematic{};  ///< of the kinematic residual, where the log had a pose or a gyro
-  Warrant warrant = Warrant::extrapolated;    ///< of set, hull and thresholds
-  std::vector<Assumption> assumptions{};      ///< that they stand on, with what the log said of each
-};
 
 /// What commissioning found about one parameter.
 struct ParameterResult {
@@ -78,8 +62,8 @@ struct Commissioning {
     contradicted,  ///< a set came out, but the log contradicts what it stands on: see contradictions; no model
   };
   Status status = Status::done;
-  std::string message;      ///< one sentence for people, with what to do next where that is needed
-  CommissionedModel model;  ///< without estimate, facets and box where the status gives no model
+  std::string message;  ///< one sentence for people, with what to do next where that is needed
+  OnlineModel model;    ///< without estimate, facets and box where the status gives no model
   std::vector<ParameterResult> parameters;
   Survey survey;
   std::vector<OutputNoise> noise;  ///< one for each output
@@ -101,7 +85,7 @@ struct Commissioning {
   FeasibleSet feasible;              ///< the set, its hull, certificates
   std::vector<EarlierSet> earlier;   ///< what it was sharpened from, pass by pass: the first one stands on the limit of
                                      ///< the accelerations alone; none where nothing bounds the motion by the model
-  KinematicCommissioning kinematic;  ///< of the kinematic residual; its model is also CommissionedModel::kinematic
+  KinematicCommissioning kinematic;  ///< of the kinematic residual; its model is also OnlineModel::kinematic
   double polytope_over_box = 1.0;    ///< median width of [l, u]: polytope over box, held out, worst output
   std::vector<std::string> notes;    ///< what was repaired or chosen, for people
   std::vector<Assumption> assumptions;  ///< everything that is taken as given, with what the log says of it
@@ -125,8 +109,5 @@ struct CommissionOptions {
 /// holds it. Throws InputError or InvalidArgument for a log or robot that cannot be used at all; what the data say,
 /// unwelcome or not, is in the result.
 [[nodiscard]] Commissioning commission(LogSource& log, const Robot& robot, const CommissionOptions& options = {});
-
-/// The detector of a commissioned model.
-[[nodiscard]] Detector make_detector(const CommissionedModel& model, DetectorOptions options = {});
 
 }  // namespace wheelwright

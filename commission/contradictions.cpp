@@ -258,7 +258,7 @@ std::vector<JointFit> fit_joints(LogSource& log, const Setting& s) {
   }
   const auto columns = side_by_side(s.model);
   std::vector<LeastSquares> sums(joints, LeastSquares(columns.size()));
-  RegressionStream rows = make_rows(log, s, errors_of_fit(s));
+  TorqueRows rows = make_rows(log, s, errors_of_fit(s));
   RegressionBlock block;
   const auto each = [&](auto&& visit) {
     rows.rewind();
@@ -449,7 +449,7 @@ void find_dry_friction(LogSource& log, const Setting& s, std::vector<LogContradi
   }
   const auto at =
       static_cast<Eigen::Index>(std::ranges::find_if(wide.model.parameters, is_dry) - wide.model.parameters.begin());
-  RegressionStream rows = make_rows(log, wide, errors_of_fit(wide));
+  TorqueRows rows = make_rows(log, wide, errors_of_fit(wide));
   const Eigen::VectorXd weights = efficient_weights(moments(rows));
   rows.rewind();
   const LeastSquaresFit fit = least_squares(rows, weights);
@@ -487,7 +487,7 @@ void find_uneven_halves(LogSource& log, const Setting& s, const Fit& fit, std::v
   }
   const double biased = 2.0 * bias.cwiseAbs().maxCoeff();  // standard errors that two halves may differ by
   const std::size_t middle = s.survey.rows / 2;
-  RegressionStream rows = make_rows(log, s, errors_of_fit(s));
+  TorqueRows rows = make_rows(log, s, errors_of_fit(s));
   RegressionBlock block;
   const auto each = [&](auto&& visit) {
     rows.rewind();
@@ -555,7 +555,7 @@ std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& s, cons
   }
   Setting as_logged = s;  // a declared delay is compared with what is found, not taken away before
   as_logged.measurement.delay = {0.0, 0.0};
-  RegressionStream stream = make_rows(log, as_logged, errors_of_fit(s));
+  TorqueRows stream = make_rows(log, as_logged, errors_of_fit(s));
   RegressionBlock rows = first_rows(stream, most_rows);
   log.rewind();
   rows.dY.setZero();
@@ -761,7 +761,7 @@ void weigh_efforts(LogSource& log, const Setting& s, const SignalErrors& errors,
     largest[static_cast<Eigen::Index>(j)] = magnitude(box.sides[j]);
   }
   double effort = 0.0, error = 0.0;
-  RegressionStream rows = make_rows(log, s, errors);
+  TorqueRows rows = make_rows(log, s, errors);
   RegressionBlock block;
   rows.rewind();
   while (rows.next(block)) {

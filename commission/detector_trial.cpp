@@ -90,7 +90,7 @@ StatedMargin margin_of(const FaultMargins& margins, double asked, const std::vec
 
 class Margins {
  public:
-  Margins(const LogTable& log, const CommissionedModel& model, const TrialOptions& options)
+  Margins(const LogTable& log, const OnlineModel& model, const TrialOptions& options)
       : model_(&model),
         options_(&options),
         catalogue_(fault_catalogue(model.model, model.estimate, model.robot.effort)),
@@ -134,7 +134,7 @@ class Margins {
   }
 
  private:
-  const CommissionedModel* model_;
+  const OnlineModel* model_;
   const TrialOptions* options_;
   std::vector<FaultType> catalogue_;
   ThresholdRule rule_;

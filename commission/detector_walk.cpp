@@ -118,9 +118,11 @@ class Binner {
   std::vector<bool> starts_;
 };
 
-// Walks the log through a detector of either residual, with `n` outputs.
-template <typename AnyDetector>
-Detection walk(LogSource& log, AnyDetector& detector, std::size_t n, const DetectionOptions& options) {
+}  // namespace
+
+template <RowFilter Filter>
+Detection detect(LogSource& log, Detector<Filter> detector, const DetectionOptions& options) {
+  const std::size_t n = detector.filter().outputs();
   Detection d;
   d.outside.assign(n, 0);
   d.utilisation.assign(n, 0.0);
@@ -152,15 +154,8 @@ Detection walk(LogSource& log, AnyDetector& detector, std::size_t n, const Detec
   return d;
 }
 
-}  // namespace
-
-Detection detect(LogSource& log, Detector detector, const DetectionOptions& options) {
-  return walk(log, detector, detector.filter().model().n(), options);
-}
-
-Detection detect(LogSource& log, KinematicDetector detector, const DetectionOptions& options) {
-  return walk(log, detector, static_cast<std::size_t>(detector.filter().row().y.size()), options);
-}
+template Detection detect(LogSource& log, TorqueDetector detector, const DetectionOptions& options);
+template Detection detect(LogSource& log, KinematicDetector detector, const DetectionOptions& options);
 
 namespace {
 
@@ -220,7 +215,7 @@ std::string names(const Isolation& isolation, Verdict verdict) {
 
 }  // namespace
 
-std::vector<Isolation> isolate_events(LogSource& log, const CommissionedModel& model, const Detection& detection,
+std::vector<Isolation> isolate_events(LogSource& log, const OnlineModel& model, const Detection& detection,
                                       const EventIsolationOptions& options) {
   const RegressorFilter filter(model.model, model.filter, model.measurement, model.errors);
   std::vector<Piece> pieces;

@@ -8,12 +8,9 @@
 #include <vector>
 
 #include <wheelwright/commission/commission.hpp>
-#include <wheelwright/core/check.hpp>
 #include <wheelwright/core/log.hpp>
 #include <wheelwright/detector/detector.hpp>
 #include <wheelwright/detector/isolation.hpp>
-#include <wheelwright/detector/kinematic_detector.hpp>
-#include <wheelwright/detector/row_detector.hpp>
 
 namespace wheelwright {
 
@@ -21,14 +18,10 @@ namespace wheelwright {
 /// `at(row, t, first, decision)` for every instant at which it decides: the row of the log, its time in s, whether it is
 /// the first such instant of its segment, and the Decision, valid during the call. Returns the number of rows and rewinds
 /// the log. Throws InvalidArgument when the log lacks a column.
-template <typename AnyDetector, typename At>
-std::size_t walk_detector(LogSource& log, AnyDetector& detector, const At& at) {
-  std::vector<std::size_t> pick;
-  for (const std::string& name : detector.filter().measurement().columns()) {
-    const auto column = log.find(name);
-    check::that(column.has_value(), "log", "a column '" + name + "', which the model was commissioned on");
-    pick.push_back(*column);
-  }
+template <RowFilter Filter, typename At>
+std::size_t walk_detector(LogSource& log, Detector<Filter>& detector, const At& at) {
+  const std::vector<std::size_t> pick =
+      positions_of(log, detector.filter().measurement().columns(), ", which the model was commissioned on");
   std::vector<double> sample(pick.size());
   std::size_t rows = 0;
   bool first = true;
@@ -92,12 +85,13 @@ struct DetectionOptions {
   double merge = 0.5;              ///< s: instants outside nearer than this are one event
 };
 
-/// Walks `log` through `detector` from its beginning. Throws InvalidArgument when the log lacks a column.
-[[nodiscard]] Detection detect(LogSource& log, Detector detector, const DetectionOptions& options = {});
+/// Walks `log` through `detector` from its beginning. Of the kinematic residual OutputTrace::torque and predicted are what
+/// the pose or gyro saw and what the wheels predict. Throws InvalidArgument when the log lacks a column.
+template <RowFilter Filter>
+[[nodiscard]] Detection detect(LogSource& log, Detector<Filter> detector, const DetectionOptions& options = {});
 
-/// The same for the kinematic residual: OutputTrace::torque and predicted are then what the pose or gyro saw and what
-/// the wheels predict.
-[[nodiscard]] Detection detect(LogSource& log, KinematicDetector detector, const DetectionOptions& options = {});
+extern template Detection detect(LogSource& log, TorqueDetector detector, const DetectionOptions& options);
+extern template Detection detect(LogSource& log, KinematicDetector detector, const DetectionOptions& options);
 
 /// Options of isolate_events().
 struct EventIsolationOptions {
@@ -107,7 +101,7 @@ struct EventIsolationOptions {
 
 /// Isolates the first events of `detection`, which came of walking `log` with the torque residual of `model`, against the
 /// catalogue of its robot. Walks the log once and holds the rows around these events. One result for each of them.
-[[nodiscard]] std::vector<Isolation> isolate_events(LogSource& log, const CommissionedModel& model,
+[[nodiscard]] std::vector<Isolation> isolate_events(LogSource& log, const OnlineModel& model,
                                                     const Detection& detection,
                                                     const EventIsolationOptions& options = {});
 

@@ -64,9 +64,9 @@ Explained explained_by_errors(LogSource& log, const Setting& s, const Fit& fit, 
   between.acceleration.setZero();
   between.speed.setZero();
   between.output.setZero();
-  RegressionStream fitted_stream = make_rows(log, s, errors_of_fit(s));
+  TorqueRows fitted_stream = make_rows(log, s, errors_of_fit(s));
   const RegressionBlock rows = first_rows(fitted_stream, most_rows);
-  RegressionStream bounded_stream = make_rows(log, s, between);
+  TorqueRows bounded_stream = make_rows(log, s, between);
   const RegressionBlock bounded = first_rows(bounded_stream, most_rows);
   log.rewind();
   if (rows.instants() == 0 || bounded.sample != rows.sample) {

@@ -10,7 +10,7 @@
 #include <fmt/format.h>
 
 #include <wheelwright/core/check.hpp>
-#include <wheelwright/filter/regression_stream.hpp>
+#include <wheelwright/filter/row_stream.hpp>
 #include <wheelwright/identify/least_squares.hpp>
 #include <wheelwright/identify/minimise_scalar.hpp>
 

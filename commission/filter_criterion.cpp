@@ -11,7 +11,7 @@
 #include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/core/statistics.hpp>
 #include <wheelwright/filter/noise.hpp>
-#include <wheelwright/filter/regression_stream.hpp>
+#include <wheelwright/filter/row_stream.hpp>
 #include <wheelwright/identify/estimate.hpp>
 #include <wheelwright/identify/least_squares.hpp>
 #include <wheelwright/identify/noise_level.hpp>

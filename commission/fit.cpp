@@ -89,7 +89,7 @@ RegressionMoments log_moments(LogSource& log, const Setting& s, Part part) {
     FoldedSource rows(stream, part, s.survey.rows, s.folds);
     return moments_with_instruments(rows);
   }
-  RegressionStream stream(log, filter);
+  TorqueRows stream(log, filter);
   FoldedSource rows(stream, part, s.survey.rows, s.folds);
   return moments(rows);
 }
@@ -110,7 +110,7 @@ Fit fit_log(LogSource& log, const Setting& s, Part part, double risk) {
   Fit fit;
   fit.weights = efficient_weights(evidence.rows);
   fit.factor = LeastSquares(s.model.p(), fit.weights);
-  RegressionStream stream = make_rows(log, s, errors_of_fit(s));
+  TorqueRows stream = make_rows(log, s, errors_of_fit(s));
   FoldedSource rows(stream, part, s.survey.rows, s.folds);
   RegressionBlock block;
   rows.rewind();

@@ -113,7 +113,7 @@ Frame settle(LogSource& log, const Robot& robot, const OdometryMeasurement& m, c
   return s;
 }
 
-OdometryStream make_rows(const Frame& s, const OdometryErrors& errors) {
+OdometryRows make_rows(const Frame& s, const OdometryErrors& errors) {
   return {*s.log, OdometryFilter(s.measurement, s.window, errors)};
 }
 
@@ -148,7 +148,7 @@ Eigen::VectorXd weights_of(const ResidualSummary& residuals) {
 // Least squares, weighted once more by its own residuals; parameters that the log does not show are held at their nominal
 // values, which the rows are measured from.
 std::optional<Fit> fit_rows(const Frame& s, Part part, double risk) {
-  OdometryStream stream = make_rows(s, s.declared);
+  OdometryRows stream = make_rows(s, s.declared);
   FoldedSource rows(stream, part, s.log_rows, s.folds);
   Fit fit;
   Eigen::VectorXd weights = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(rows.outputs()));
@@ -230,7 +230,7 @@ BoundedSet bounded_set(const Frame& s, Part part, std::vector<OutputNoise>& nois
       std::ranges::all_of(noise, [](const OutputNoise& o) { return o.origin == NoiseOrigin::estimated; });
   BoundedSet result;
   for (int attempt = 0;; ++attempt) {
-    OdometryStream stream = make_rows(s, with_noise(s, noise, Purpose::learning));
+    OdometryRows stream = make_rows(s, with_noise(s, noise, Purpose::learning));
     FoldedSource rows(stream, part, s.log_rows, s.folds);
     result.set = feasible_set(rows, s.prior);
     if (result.set.status == FeasibleSet::Status::nonempty || !all_estimated || attempt > 0) {
@@ -240,14 +240,14 @@ BoundedSet bounded_set(const Frame& s, Part part, std::vector<OutputNoise>& nois
     for (const OutputNoise& o : noise) {
       options.weights.push_back(std::max(o.learning, std::numeric_limits<double>::min()));
     }
-    OdometryStream bare = make_rows(s, {});
+    OdometryRows bare = make_rows(s, {});
     FoldedSource bare_rows(bare, part, s.log_rows, s.folds);
     result.raise = noise_that_leaves_a_set(minimax_fit(bare_rows, s.prior, options), [&](double by) {
       std::vector<OutputNoise> more = noise;
       for (OutputNoise& o : more) {
         o.learning *= by;
       }
-      OdometryStream louder = make_rows(s, with_noise(s, more, Purpose::learning));
+      OdometryRows louder = make_rows(s, with_noise(s, more, Purpose::learning));
       FoldedSource all(louder, part, s.log_rows, s.folds);
       return feasible_set(all, s.prior).status == FeasibleSet::Status::nonempty;
     });
@@ -270,7 +270,7 @@ Eigen::VectorXd best_guess(const Fit& fit, const Polytope& set) {
 
 // A declared bound differs from row to row: the largest is told.
 void tell_declared(const Frame& s, const Eigen::VectorXd& theta, std::vector<OutputNoise>& noise) {
-  OdometryStream rows = make_rows(s, s.declared);
+  OdometryRows rows = make_rows(s, s.declared);
   RegressionBlock block;
   rows.rewind();
   const auto n = static_cast<Eigen::Index>(noise.size());
@@ -354,7 +354,7 @@ void validate_held_out(const Frame& s, KinematicCommissioning& result) {
   if (set.status != FeasibleSet::Status::nonempty) {
     return;
   }
-  OdometryStream unseen = make_rows(s, with_noise(s, noise, Purpose::driving));
+  OdometryRows unseen = make_rows(s, with_noise(s, noise, Purpose::driving));
   FoldedSource held_out(unseen, Part::held_out, s.log_rows, s.folds);
   result.validation = validate_on(held_out, ThresholdRule(*set.polytope, best_guess(*fit, *set.polytope)));
 }
@@ -418,31 +418,18 @@ KinematicCommissioning commission_kinematics(LogSource& log, const Robot& robot,
       result.parameters, [](const KinematicParameter& p) { return p.excitation == Excitation::not_excited; });
   result.status = partial ? Status::partial : Status::done;
   const Polytope& set = *bounded.set.polytope;
-  result.model = KinematicModel{.measurement = s.measurement,
-                                .window = s.window,
-                                .errors = with_noise(s, result.noise, Purpose::driving),
-                                .estimate = best_guess(*fit, set),
-                                .facets = set.facets(),
-                                .box = bounded.set.hull,
-                                .persistence = options.persistence};
+  result.model = KinematicModel{{.estimate = best_guess(*fit, set),
+                                 .facets = set.facets(),
+                                 .box = bounded.set.hull,
+                                 .persistence = options.persistence},
+                                s.measurement,
+                                s.window,
+                                with_noise(s, result.noise, Purpose::driving)};
   tell_declared(s, result.model->estimate, result.noise);
   validate_held_out(s, result);
   result.message = message_of(s, result) + (origin.sentence.empty() ? "" : "; " + origin.sentence);
   log.rewind();
   return result;
-}
-
-KinematicDetector make_detector(const KinematicModel& model, DetectorOptions options) {
-  options.persistence = options.persistence.value_or(model.persistence);
-  return KinematicDetector(OdometryFilter(model.measurement, model.window, model.errors),
-                           ThresholdRule(Polytope(model.facets, model.box), model.estimate, options.set), options);
-}
-
-Model kinematic_outputs(const KinematicModel& model) {
-  Model names;
-  names.outputs = model.measurement.outputs();
-  names.output_units = model.measurement.output_units();
-  return names;
 }
 
 }  // namespace wheelwright

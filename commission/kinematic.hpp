@@ -15,24 +15,12 @@
 #include <wheelwright/commission/survey.hpp>
 #include <wheelwright/commission/validation.hpp>
 #include <wheelwright/core/log.hpp>
-#include <wheelwright/detector/kinematic_detector.hpp>
-#include <wheelwright/filter/regression_stream.hpp>
+#include <wheelwright/detector/online_model.hpp>
+#include <wheelwright/filter/row_stream.hpp>
 #include <wheelwright/identify/least_squares.hpp>
 #include <wheelwright/model/robot.hpp>
 
 namespace wheelwright {
-
-/// Everything that a detector of the kinematic residual needs.
-struct KinematicModel {
-  OdometryMeasurement measurement;
-  double window = 1.0;            ///< W, s
-  OdometryErrors errors;          ///< of the rows of driving to come
-  Eigen::VectorXd estimate;       ///< of OdometryMeasurement::parameters()
-  std::vector<HalfSpace> facets;  ///< of the feasible set
-  Box box;                        ///< its certified hull
-  Persistence persistence;
-  Warrant warrant = Warrant::extrapolated;  ///< of set, hull and thresholds
-};
 
 /// What commissioning found about one kinematic parameter.
 struct KinematicParameter {
@@ -95,11 +83,5 @@ struct KinematicCommissionOptions {
                                                            const std::optional<OdometryMeasurement>& measurement,
                                                            const Survey& survey,
                                                            const KinematicCommissionOptions& options = {});
-
-/// The detector of a commissioned kinematic model.
-[[nodiscard]] KinematicDetector make_detector(const KinematicModel& model, DetectorOptions options = {});
-
-/// Names and units of the outputs as a Model that has nothing else, for tables and charts.
-[[nodiscard]] Model kinematic_outputs(const KinematicModel& model);
 
 }  // namespace wheelwright

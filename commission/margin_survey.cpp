@@ -57,7 +57,7 @@ Eigen::VectorXd largest_accelerations(const ReferenceMotion& motion) {
 }
 
 std::vector<FaultMaps> maps_of(const std::vector<FaultMargins>& margins, const ReferenceMotion& motion,
-                               const CommissionedModel& model, const ThresholdRule& rule,
+                               const OnlineModel& model, const ThresholdRule& rule,
                                const MarginSurveyOptions& options) {
   std::vector<FaultMaps> maps(options.map_points > 1 ? margins.size() : 0);
   const Eigen::VectorXd speed = motion.speed.cwiseAbs().rowwise().maxCoeff();
@@ -80,7 +80,7 @@ std::vector<FaultMaps> maps_of(const std::vector<FaultMargins>& margins, const R
 
 }  // namespace
 
-MarginSurvey survey_margins(LogSource& log, const CommissionedModel& model, const MarginSurveyOptions& options) {
+MarginSurvey survey_margins(LogSource& log, const OnlineModel& model, const MarginSurveyOptions& options) {
   MarginSurvey survey;
   MarginOptions margins = options.margins;
   margins.persistence = options.persistence.value_or(model.persistence);

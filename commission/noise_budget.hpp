@@ -19,12 +19,6 @@
 
 namespace wheelwright {
 
-/// Where the noise bound ē of an output comes from.
-enum class NoiseOrigin {
-  declared,   ///< the sensors' declared bounds, propagated through the filter
-  estimated,  ///< extrapolated from the residuals of this log (noise_level.hpp), on top of what is declared
-};
-
 /// The bound on what y − Yθ (for the torque residual τ_f − Y_f θ) can be without a fault, in one output.
 struct OutputNoise {
   NoiseOrigin origin = NoiseOrigin::estimated;

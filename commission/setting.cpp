@@ -41,7 +41,7 @@ void settle_parameters(LogSource& log, Setting& s) {
   if (wide.model.p() == basic) {
     return;
   }
-  RegressionStream rows = make_rows(log, wide, {});
+  TorqueRows rows = make_rows(log, wide, {});
   const ParameterChoice choice = choose_parameters(rows, basic, s.survey.rows, s.folds);
   if (choice.full) {
     std::vector<std::string> added;
@@ -93,8 +93,8 @@ void refuse_simulated(const Robot& robot) {
 
 }  // namespace
 
-RegressionStream make_rows(LogSource& log, const Setting& s, const SignalErrors& errors) {
-  return RegressionStream(log, RegressorFilter(s.model, s.filter, s.measurement, errors));
+TorqueRows make_rows(LogSource& log, const Setting& s, const SignalErrors& errors) {
+  return TorqueRows(log, RegressorFilter(s.model, s.filter, s.measurement, errors));
 }
 
 Setting settle(LogSource& log, const Robot& robot, const SettingOptions& options) {

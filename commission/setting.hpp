@@ -17,7 +17,7 @@
 #include <wheelwright/core/log.hpp>
 #include <wheelwright/filter/measurement.hpp>
 #include <wheelwright/filter/noise.hpp>
-#include <wheelwright/filter/regression_stream.hpp>
+#include <wheelwright/filter/row_stream.hpp>
 #include <wheelwright/identify/estimate.hpp>
 #include <wheelwright/model/robot.hpp>
 
@@ -64,7 +64,7 @@ struct SettingOptions {
 [[nodiscard]] Setting settle(LogSource& log, const Robot& robot, const SettingOptions& options = {});
 
 /// The rows of `log` in this setting, with the error bounds `errors`.
-[[nodiscard]] RegressionStream make_rows(LogSource& log, const Setting& setting, const SignalErrors& errors = {});
+[[nodiscard]] TorqueRows make_rows(LogSource& log, const Setting& setting, const SignalErrors& errors = {});
 
 /// What the noise of the motion (at its limit, where only that is known) adds to the rows' moments (estimate.hpp), and
 /// the efforts' variance for total least squares where their noise is declared; nothing where it is not known at all.

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Guaranteed, extrapolated, statistical: what a published number stands on.
+/// Warrants (guaranteed, extrapolated, statistical) and the assumptions behind them: what a published number stands on.
 #pragma once
 
+#include <string>
 #include <string_view>
 
 namespace wheelwright {
@@ -47,5 +48,35 @@ enum class Warrant {
          : either(Warrant::statistical) ? Warrant::statistical
                                         : Warrant::guaranteed;
 }
+
+/// Where the noise bound ē of an output comes from.
+enum class NoiseOrigin {
+  declared,   ///< the sensors' declared bounds, propagated through the filter
+  estimated,  ///< extrapolated from the residuals of this log (noise_level.hpp), on top of what is declared
+};
+
+/// What a log says of an assumption.
+enum class AssumptionVerdict {
+  holds,       ///< the test found nothing against it
+  not_tested,  ///< no test, or the log does not decide: it is taken as given
+  fails,       ///< the log contradicts it: nothing is called guaranteed
+};
+
+/// "holds", "not tested" or "fails".
+[[nodiscard]] constexpr std::string_view verdict_word(AssumptionVerdict verdict) {
+  return verdict == AssumptionVerdict::holds ? "holds" : verdict == AssumptionVerdict::fails ? "fails" : "not tested";
+}
+
+/// Something that is taken as given.
+struct Assumption {
+  std::string id{};           ///< as in docs/assumptions.md, e.g. "effort_hold"
+  std::string statement{};    ///< what is taken as given of this robot, one sentence
+  std::string declared_by{};  ///< key of the robot file; empty where there is none
+  std::string test{};         ///< how the log is tested for it; empty where it is not
+  AssumptionVerdict verdict = AssumptionVerdict::not_tested;
+  std::string detail{};  ///< what the test found, in numbers; may be empty
+
+  friend bool operator==(const Assumption&, const Assumption&) = default;
+};
 
 }  // namespace wheelwright

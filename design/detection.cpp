@@ -111,9 +111,8 @@ PlanObjective certain_detection(const DesignSubject& subject, const ThresholdRul
   };
 }
 
-DetectionDesign design_for_detection(const CommissionedModel& model, const DesignSubject& subject,
-                                     const MotionLimits& limits, const std::vector<InspectedFault>& faults,
-                                     const DesignOptions& options) {
+DetectionDesign design_for_detection(const OnlineModel& model, const DesignSubject& subject, const MotionLimits& limits,
+                                     const std::vector<InspectedFault>& faults, const DesignOptions& options) {
   check_inspected(faults);
   const ThresholdRule rule(Polytope(model.facets, model.box), model.estimate);
   // What decides is the detector as it was commissioned: its thresholds allow for the errors of the model.
@@ -136,7 +135,7 @@ DetectionDesign design_for_detection(const CommissionedModel& model, const Desig
   return design;
 }
 
-std::vector<InspectedFault> usual_inspection(const CommissionedModel& model) {
+std::vector<InspectedFault> usual_inspection(const OnlineModel& model) {
   std::vector<InspectedFault> faults;
   for (const FaultType& fault : fault_catalogue(model.model, model.estimate, model.robot.effort)) {
     const bool radius =

@@ -58,13 +58,13 @@ struct DetectionDesign {
 
 /// design_manoeuvre() for certain detection of `faults` with the detector of `model` (its errors and its persistence), and
 /// the best figure eight beside it.
-[[nodiscard]] DetectionDesign design_for_detection(const CommissionedModel& model, const DesignSubject& subject,
+[[nodiscard]] DetectionDesign design_for_detection(const OnlineModel& model, const DesignSubject& subject,
                                                    const MotionLimits& limits,
                                                    const std::vector<InspectedFault>& faults,
                                                    const DesignOptions& options = {});
 
 /// What is inspected where nothing is asked for: wheel radii by 5 %, efforts lost by 20 %, encoders' scale by 5 %; for
 /// other models what there is of these.
-[[nodiscard]] std::vector<InspectedFault> usual_inspection(const CommissionedModel& model);
+[[nodiscard]] std::vector<InspectedFault> usual_inspection(const OnlineModel& model);
 
 }  // namespace wheelwright

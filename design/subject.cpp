@@ -13,7 +13,7 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/design/plan.hpp>
-#include <wheelwright/filter/regression_stream.hpp>
+#include <wheelwright/filter/row_stream.hpp>
 
 namespace wheelwright {
 namespace {
@@ -126,7 +126,7 @@ RegressorFilter planned_filter(LogSource& log, const Plan& plan, const DesignSub
 
 }  // namespace
 
-DesignSubject subject_of(const CommissionedModel& model) {
+DesignSubject subject_of(const OnlineModel& model) {
   DesignSubject subject;
   subject.robot = model.robot;
   subject.model = model.model;
@@ -207,7 +207,7 @@ DesignSubject subject_of(const Robot& robot, double step, const FilterDesign& fi
 RegressionBlock planned_rows(const Plan& plan, const DesignSubject& subject) {
   const LogTable log = planned_log(plan, subject);
   TableSource source(log);
-  RegressionStream stream(source, planned_filter(source, plan, subject));
+  TorqueRows stream(source, planned_filter(source, plan, subject));
   RegressionBlock rows = read_all(stream);
   rows.y = rows.Y * subject.theta;
   return rows;

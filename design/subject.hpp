@@ -40,7 +40,7 @@ struct DesignSubject {
 /// nominal value. Errors of the rows are worked out anew from declared noise, with the acceleration of the plan, where
 /// the model stands on declared noise in the worst case; else they are the model's.
 /// Throws InvalidArgument where a parameter is neither shown nor nominal.
-[[nodiscard]] DesignSubject subject_of(const CommissionedModel& model);
+[[nodiscard]] DesignSubject subject_of(const OnlineModel& model);
 
 /// Before any log: nominal values and declared noise; effort limits hold at the nominal values. A log is expected to be
 /// sampled every `step` seconds, with wheel angles where their noise or the encoder is known, else with speeds; a filter

@@ -1,31 +1,67 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/detector/detector.hpp>
 
-#include <utility>
-
-#include <wheelwright/core/check.hpp>
-
 namespace wheelwright {
+namespace {
 
-Detector::Detector(RegressorFilter filter, ThresholdRule threshold, DetectorOptions options)
-    : filter_(std::move(filter)), rows_(filter_.model().n(), std::move(threshold), std::move(options)) {
-  check::that(rows_.threshold().set().dimension() == filter_.model().p(), "feasible set",
-              "as many parameters as the filter's model has");
+constexpr double kGapSteps = 5.0;  // as logs are split: a longer step is a gap
+
+}  // namespace
+
+bool follows(double before, double t, double nominal) noexcept {
+  return t > before && !(nominal > 0.0 && t - before > kGapSteps * nominal);
 }
 
-void Detector::restart() {
-  started_ = false;
-  filter_.restart();
-  rows_.restart();
-}
-
-const Decision& Detector::step(double t, std::span<const double> sample) {
-  if (started_ && !follows(t_, t, filter_.measurement().nominal_step)) {
-    restart();
+RowDetector::RowDetector(std::size_t outputs, ThresholdRule threshold, DetectorOptions options)
+    : threshold_(std::move(threshold)), options_(std::move(options)) {
+  if (options_.mu) {
+    check::that(static_cast<std::size_t>(options_.mu->size()) == outputs && (options_.mu->array() >= 0.0).all(), "mu",
+                "one value >= 0 for each output");
   }
-  started_ = true;
-  t_ = t;
-  return filter_.step(t, sample) ? rows_.decide(filter_.row()) : rows_.nothing();
+  counters_.assign(outputs, PersistenceCounter(options_.persistence.value_or(Persistence{})));
+  decision_.channels.resize(outputs);
 }
+
+void RowDetector::restart() {
+  for (PersistenceCounter& counter : counters_) {
+    counter.reset();
+  }
+}
+
+const Decision& RowDetector::nothing() {
+  decision_.valid = false;
+  decision_.fault = false;
+  return decision_;
+}
+
+const Decision& RowDetector::decide(const FilteredRow& row) {
+  decision_.valid = true;
+  decision_.fault = false;
+  const auto p = static_cast<std::size_t>(row.Y.cols());
+  for (std::size_t i = 0; i < decision_.channels.size(); ++i) {
+    const auto at = static_cast<Eigen::Index>(i);
+    ChannelDecision& c = decision_.channels[i];
+    c.predicted = 0.0;
+    for (Eigen::Index j = 0; j < row.Y.cols(); ++j) {  // in this order: an exported detector gives the same digits
+      c.predicted += row.Y(at, j) * threshold_.estimate()[j];
+    }
+    c.residual = row.y[at] - c.predicted;
+    if (options_.mu) {
+      c.threshold = {-(*options_.mu)[at], (*options_.mu)[at]};
+    } else {
+      c.threshold = threshold_.at({row.Y.row(at).data(), p}, {row.dY.row(at).data(), p}, row.dy[at], i);
+    }
+    c.dead_zone = options_.test == Test::two_sided ? dead_zone(c.residual, c.threshold.lower, c.threshold.upper)
+                                                   : dead_zone(c.residual, c.threshold.rho());
+    c.outside = options_.test == Test::two_sided ? c.residual < c.threshold.lower || c.residual > c.threshold.upper
+                                                 : c.dead_zone > 0.0;
+    c.alarm = counters_[i].step(c.outside);
+    decision_.fault = decision_.fault || c.alarm;
+  }
+  return decision_;
+}
+
+template class Detector<RegressorFilter>;
+template class Detector<OdometryFilter>;
 
 }  // namespace wheelwright

@@ -14,7 +14,7 @@
 #include <fmt/format.h>
 
 #include <wheelwright/bounds/feasible_set.hpp>
-#include <wheelwright/filter/regression_stream.hpp>
+#include <wheelwright/filter/row_stream.hpp>
 #include <wheelwright/identify/least_squares.hpp>
 
 using namespace wheelwright;
@@ -79,8 +79,7 @@ int main() {
   const FilterDesign filter{.order = 2, .alpha = 5.0, .beta = 5.0};
   // Taking signals as linear between samples adds |ẍ| h²/8: to φ 1e-5 rad, to τ 2e-5 N·m, to sin φ 5e-5.
   const SensorErrors sensors{kAngleNoise + 1e-5, kTorqueNoise + 2e-5, kAngleNoise + 6e-5};
-  RegressionStream rows(source,
-                        RegressorFilter(model, filter, measurement, propagate(model, filter, measurement, sensors)));
+  TorqueRows rows(source, RegressorFilter(model, filter, measurement, propagate(model, filter, measurement, sensors)));
 
   const LeastSquaresFit fit = least_squares(rows);
   const FeasibleSet set = feasible_set(rows, Box{{{0.0, 1.0}, {0.0, 1.0}, {0.0, 10.0}}});

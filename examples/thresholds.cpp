@@ -15,7 +15,7 @@
 #include <fmt/format.h>
 
 #include <wheelwright/commission/commission.hpp>
-#include <wheelwright/filter/regression_stream.hpp>
+#include <wheelwright/filter/row_stream.hpp>
 #include <wheelwright/robots/scenario_file.hpp>
 #include <wheelwright/sim/simulation.hpp>
 
@@ -39,7 +39,7 @@ int main(int count, char** words) {
     return EXIT_FAILURE;
   }
   Simulation log(read_scenario(words[1]));
-  const CommissionedModel model = commission(log, log.scenario().robot).model;
+  const OnlineModel model = commission(log, log.scenario().robot).model;
   if (model.facets.empty()) {
     fmt::print(stderr, "the log made no model\n");
     return EXIT_FAILURE;
@@ -49,7 +49,7 @@ int main(int count, char** words) {
   const ThresholdRule box(set, model.estimate, ParameterSetKind::box);
 
   Simulation drive(read_scenario(words[2]));
-  RegressionStream stream(drive, RegressorFilter(model.model, model.filter, model.measurement, model.errors));
+  TorqueRows stream(drive, RegressorFilter(model.model, model.filter, model.measurement, model.errors));
   const RegressionBlock rows = read_all(stream);
   const std::size_t n = rows.outputs, p = rows.parameters;
 

@@ -53,7 +53,7 @@ std::string unit_of(const std::string& column) {
 /// Writes one header.
 class Writer {
  public:
-  Writer(const Detector& detector, const CExportOptions& options)
+  Writer(const TorqueDetector& detector, const CExportOptions& options)
       : detector_(detector),
         options_(options),
         filter_(detector.filter()),
@@ -389,7 +389,7 @@ class Writer {
     put("}\n");
   }
 
-  const Detector& detector_;
+  const TorqueDetector& detector_;
   const CExportOptions& options_;
   const RegressorFilter& filter_;
   const Model& model_;
@@ -401,7 +401,7 @@ class Writer {
 
 }  // namespace
 
-std::string c_header(const Detector& detector, const CExportOptions& options) {
+std::string c_header(const TorqueDetector& detector, const CExportOptions& options) {
   return Writer(detector, options).text();
 }
 

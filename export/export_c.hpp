@@ -26,6 +26,6 @@ struct CExportOptions {
 /// The detector counts as new: what it has seen is not exported. Throws InputError where `name` cannot be a prefix;
 /// where effects correct the efforts, or efforts are late by a stated time; where a term of the model is a function that
 /// this file does not know as C; and where the set has more vertices than a table takes (SupportTable).
-[[nodiscard]] std::string c_header(const Detector& detector, const CExportOptions& options = {});
+[[nodiscard]] std::string c_header(const TorqueDetector& detector, const CExportOptions& options = {});
 
 }  // namespace wheelwright

@@ -293,4 +293,69 @@ void OdometryFilter::write_turn(const Sample& begin, const Sample& end) {
   }
 }
 
+namespace {
+
+constexpr double kHeldShare = 0.2;  // of the steps in which a wheel moves
+
+// Whether the pose is a slower sensor's, repeated from row to row.
+bool is_held(LogSource& log, const OdometryMeasurement& m) {
+  std::vector<std::size_t> pose, motion;
+  for (const char* name : {"x", "y", "theta"}) {
+    if (const auto column = log.find(name); column && (m.position || std::string_view(name) == "theta")) {
+      pose.push_back(*column);
+    }
+  }
+  for (const auto& name : m.motion_columns) {
+    motion.push_back(*log.find(name));
+  }
+  std::size_t moving = 0, held = 0;
+  log.rewind();
+  LogBlock block;
+  while (log.next(block)) {
+    for (std::size_t k = 1; k < block.rows(); ++k) {
+      const auto same = [&](std::size_t c) { return block.columns[c][k] == block.columns[c][k - 1]; };
+      const auto still = [&](std::size_t c) {
+        return m.motion == MotionKind::angle ? same(c) : block.columns[c][k] == 0.0 && block.columns[c][k - 1] == 0.0;
+      };
+      if (!(still(motion[0]) && still(motion[1]))) {
+        ++moving;
+        bool all = true;
+        for (const std::size_t c : pose) {
+          all = all && same(c);
+        }
+        held += all ? 1 : 0;
+      }
+    }
+  }
+  log.rewind();
+  return moving > 0 && static_cast<double>(held) >= kHeldShare * static_cast<double>(moving);
+}
+
+}  // namespace
+
+std::optional<OdometryMeasurement> find_odometry(LogSource& log, const Robot& robot, const Model& model,
+                                                 const Measurement& torque) {
+  if (robot.model != "differential_drive" || model.joints.size() != 2) {
+    return std::nullopt;
+  }
+  OdometryMeasurement m;
+  m.heading = log.find("theta").has_value();
+  m.position = m.heading && log.find("x") && log.find("y");
+  m.gyro = log.find("gyro_z").has_value();
+  m.nominal_step = log.median_step();
+  if (!(m.heading || m.gyro) || !(m.nominal_step > 0.0)) {
+    return std::nullopt;
+  }
+  m.motion = torque.motion;
+  m.motion_columns = torque.motion_columns;
+  m.count = torque.count;
+  if (log.find(model.joints[0].angle) && log.find(model.joints[1].angle)) {
+    m.motion = MotionKind::angle;
+    m.motion_columns = {model.joints[0].angle, model.joints[1].angle};
+    m.count = 0.0;
+  }
+  m.held_pose = m.heading && is_held(log, m);
+  return m;
+}
+
 }  // namespace wheelwright

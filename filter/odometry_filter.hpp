@@ -10,8 +10,10 @@
 #include <string>
 #include <vector>
 
+#include <wheelwright/core/log.hpp>
 #include <wheelwright/filter/measurement.hpp>
 #include <wheelwright/filter/regressor_filter.hpp>
+#include <wheelwright/model/robot.hpp>
 
 namespace wheelwright {
 
@@ -103,6 +105,9 @@ class OdometryFilter {
   /// W, s.
   [[nodiscard]] double window() const { return window_; }
   [[nodiscard]] const OdometryMeasurement& measurement() const { return measurement_; }
+  /// Outputs and parameters of a row.
+  [[nodiscard]] std::size_t outputs() const { return static_cast<std::size_t>(row_.Y.rows()); }
+  [[nodiscard]] std::size_t parameters() const { return static_cast<std::size_t>(row_.Y.cols()); }
   [[nodiscard]] const OdometryErrors& errors() const { return errors_; }
 
  private:
@@ -153,5 +158,12 @@ class OdometryFilter {
   Sample now_;
   FilteredRow row_;
 };
+
+/// What `log` has for a kinematic residual of `robot`; nothing where the robot is no differential drive, or the log has
+/// neither the columns theta (with x and y or without) nor gyro_z. Angles are used where the log has them, else speeds in
+/// the way that `torque` (how the torque residual reads the log) found them. A pose is taken as held where it stays
+/// exactly the same over a fifth or more of the steps in which a wheel moves. Walks the log once where it has a pose.
+[[nodiscard]] std::optional<OdometryMeasurement> find_odometry(LogSource& log, const Robot& robot, const Model& model,
+                                                               const Measurement& torque);
 
 }  // namespace wheelwright

@@ -75,6 +75,9 @@ class RegressorFilter {
   [[nodiscard]] const Model& model() const { return model_; }
   [[nodiscard]] const FilterDesign& design() const { return design_; }
   [[nodiscard]] const Measurement& measurement() const { return measurement_; }
+  /// Outputs and parameters of a row.
+  [[nodiscard]] std::size_t outputs() const { return model_.n(); }
+  [[nodiscard]] std::size_t parameters() const { return model_.p(); }
   /// What dY and dy are made of; zeros where nothing was given.
   [[nodiscard]] const SignalErrors& errors() const { return errors_; }
 

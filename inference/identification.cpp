@@ -197,7 +197,7 @@ ConstrainedFit nearest_consistent(const Fit& fit, const std::vector<LinearConstr
 
 void find_shapes(LogSource& log, const Setting& s, const Fit& fit, const IdentificationOptions& options,
                  Identification& result) {
-  RegressionStream stream = make_rows(log, s);
+  TorqueRows stream = make_rows(log, s);
   const RegressionBlock rows = read_all(stream);
   const auto look = [&](const char* name, TimeEffect effect, double lower) {
     try {
@@ -288,7 +288,7 @@ Identification identify(LogSource& log, const Robot& robot, const Identification
   tell("robust and constrained fits", 0.5);
   const std::vector<LinearConstraint> constraints = physical_consistency(quantities(s.model), s.robot.footprint_radius);
   result.constrained = nearest_consistent(result.fit, constraints);
-  RegressionStream rows = make_rows(log, s);
+  TorqueRows rows = make_rows(log, s);
   RobustOptions robust;
   robust.constraints = constraints;
   result.robust = robust_fit(rows, robust);

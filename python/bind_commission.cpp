@@ -90,7 +90,7 @@ void bind_parameter(py::module_& m) {
 }
 
 ModelObject read(const std::filesystem::path& path) {
-  return {std::make_shared<const CommissionedModel>(read_model(path)), path.string()};
+  return {std::make_shared<const OnlineModel>(read_model(path)), path.string()};
 }
 
 void bind_model(py::module_& m) {

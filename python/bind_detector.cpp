@@ -56,7 +56,7 @@ struct RunObject {
 
 struct DetectorObject {
   ModelObject model;
-  Detector detector;
+  TorqueDetector detector;
 };
 
 // Fields of the last decision, as a robot would read them.
@@ -128,7 +128,7 @@ DetectionObject detect_in(LogObject& log, const ModelObject& given, const std::s
   LongWork work(std::move(progress));
   const DetectorOptions options = options_of(set, test, persistence);
   return work.run([&] {
-    auto model = std::make_shared<CommissionedModel>(*given.model);
+    auto model = std::make_shared<OnlineModel>(*given.model);
     model->persistence = options.persistence.value_or(model->persistence);
     if (model->kinematic) {
       model->kinematic->persistence = options.persistence.value_or(model->kinematic->persistence);

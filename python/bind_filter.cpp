@@ -37,9 +37,9 @@ std::unique_ptr<RegressionObject> filtered(LogObject& log, const RobotObject& ro
     auto out = std::make_unique<RegressionObject>();
     WatchedLog source(*log.source, work);
     if (model != nullptr) {
-      const CommissionedModel& m = *model->model;
+      const OnlineModel& m = *model->model;
       require_columns(*log.source, m.measurement.columns());
-      RegressionStream stream(source, RegressorFilter(m.model, m.filter, m.measurement, m.errors));
+      TorqueRows stream(source, RegressorFilter(m.model, m.filter, m.measurement, m.errors));
       out->rows = read_all(stream);
       out->model = m.model;
       out->filter = m.filter;
@@ -48,7 +48,7 @@ std::unique_ptr<RegressionObject> filtered(LogObject& log, const RobotObject& ro
       SettingOptions options;
       options.progress = work.teller();
       const Setting setting = settle(source, with_interpolation_errors(robot.robot, log.source->report()), options);
-      RegressionStream stream = make_rows(source, setting, setting.declared);
+      TorqueRows stream = make_rows(source, setting, setting.declared);
       out->rows = read_all(stream);
       out->model = setting.model;
       out->filter = setting.filter;

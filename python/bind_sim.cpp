@@ -77,7 +77,7 @@ WidthCriterion criterion_called(const std::string& name) {
                              : WidthCriterion::geometric_mean;
 }
 
-std::vector<InspectedFault> inspected(const std::map<std::string, double>& faults, const CommissionedModel& model) {
+std::vector<InspectedFault> inspected(const std::map<std::string, double>& faults, const OnlineModel& model) {
   if (faults.empty()) {
     return usual_inspection(model);
   }
@@ -126,7 +126,7 @@ std::unique_ptr<DesignObject> design(const std::variant<const ModelObject*, cons
       options.samples = 150;
       options.descents = 3;
       options.steps = 250;
-      const CommissionedModel& model = *std::get<0>(of)->model;
+      const OnlineModel& model = *std::get<0>(of)->model;
       const DetectionDesign made = design_for_detection(model, subject, limits, inspected(faults, model), options);
       out->json = app::to_json(made, limits);
       out->summary = app::summary(made);

@@ -5,7 +5,7 @@
 
 namespace wheelwright::python {
 
-DetectorRun run_detector(LogSource& log, Detector& detector, double merge) {
+DetectorRun run_detector(LogSource& log, TorqueDetector& detector, double merge) {
   DetectorRun run;
   run.outputs = detector.filter().model().n();
   EventRecorder recorder(run.outputs, merge);

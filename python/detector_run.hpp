@@ -23,6 +23,6 @@ struct DetectorRun {
 };
 
 /// Walks `log` through `detector` from its beginning, as detect() does. Throws InvalidArgument when the log lacks a column.
-[[nodiscard]] DetectorRun run_detector(LogSource& log, Detector& detector, double merge);
+[[nodiscard]] DetectorRun run_detector(LogSource& log, TorqueDetector& detector, double merge);
 
 }  // namespace wheelwright::python

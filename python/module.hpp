@@ -67,7 +67,7 @@ class LogWalk {
 
 /// A model that a detector can carry, and how its file was named (empty where it was commissioned in this process).
 struct ModelObject {
-  std::shared_ptr<const CommissionedModel> model;
+  std::shared_ptr<const OnlineModel> model;
   std::string path;
 };
 

@@ -63,7 +63,7 @@ std::vector<ChartMark> deciding_marks(const Commissioning& result, std::optional
 }
 
 std::string residual_section(const Commissioning& result, const Detection& own, const TimeAxis& axis) {
-  const CommissionedModel& m = result.model;
+  const OnlineModel& m = result.model;
   std::vector<std::vector<ChartMark>> marks;
   for (std::size_t i = 0; i < own.trace.outputs.size(); ++i) {
     marks.push_back(deciding_marks(result, i));

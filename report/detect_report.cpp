@@ -23,7 +23,7 @@ TimeAxis axis_for(const Detection& detection, const ReportContext& context) {
   return context.signals && context.signals->rows() > 0 ? TimeAxis(context.signals->t) : TimeAxis(detection.trace.t);
 }
 
-std::string event_table(const Detection& detection, const CommissionedModel& model, const TimeAxis& axis) {
+std::string event_table(const Detection& detection, const OnlineModel& model, const TimeAxis& axis) {
   if (detection.events.empty()) {
     return paragraph("None.");
   }
@@ -48,7 +48,7 @@ std::string event_table(const Detection& detection, const CommissionedModel& mod
              "1 is outside. A click on an event zooms all charts to it.</span>");
 }
 
-std::string output_table(const Detection& detection, const CommissionedModel& model) {
+std::string output_table(const Detection& detection, const OnlineModel& model) {
   std::vector<std::vector<Cell>> rows;
   for (std::size_t i = 0; i < detection.utilisation.size(); ++i) {
     const std::size_t outside = i < detection.outside.size() ? detection.outside[i] : 0;
@@ -63,15 +63,14 @@ std::string output_table(const Detection& detection, const CommissionedModel& mo
              "the threshold. NRMSE: rms of the residual over rms of the filtered effort.</span>");
 }
 
-std::string kinematic_section(const KinematicFindings& kinematic, const CommissionedModel& model,
-                              const TimeAxis& axis) {
+std::string kinematic_section(const KinematicFindings& kinematic, const OnlineModel& model, const TimeAxis& axis) {
   if (!kinematic.detection || !model.kinematic) {
     return paragraph("The kinematic residual was not watched: " +
                      escape(kinematic.message.empty() ? "the model has none" : kinematic.message) +
                      ". Slip across the heading, among others, does not show without it.");
   }
   const Detection& d = *kinematic.detection;
-  CommissionedModel names = model;
+  OnlineModel names = model;
   names.robot.effort = EffortKind::torque;
   names.model = kinematic_outputs(*model.kinematic);
   std::vector<std::vector<ChartMark>> marks(d.trace.outputs.size());
@@ -122,7 +121,7 @@ std::string isolation_section(const std::vector<Isolation>& isolations, const De
 
 }  // namespace
 
-std::string detect_report(const Detection& detection, const CommissionedModel& model, const ReportContext& context,
+std::string detect_report(const Detection& detection, const OnlineModel& model, const ReportContext& context,
                           const KinematicFindings& kinematic, const std::vector<Isolation>& isolations) {
   const TimeAxis axis = axis_for(detection, context);
   std::vector<std::vector<ChartMark>> marks(detection.trace.outputs.size());

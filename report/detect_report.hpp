@@ -23,7 +23,7 @@ struct KinematicFindings {
 /// inside [l, u] with the events shaded, prediction, raw signals, data, and the same of
 /// the kinematic residual. `isolations` belong to the first events, in their order. It loads nothing when opened; every name is escaped,
 /// every number is finite. `context.own_log` is not used.
-[[nodiscard]] std::string detect_report(const Detection& detection, const CommissionedModel& model,
+[[nodiscard]] std::string detect_report(const Detection& detection, const OnlineModel& model,
                                         const ReportContext& context, const KinematicFindings& kinematic = {},
                                         const std::vector<Isolation>& isolations = {});
 

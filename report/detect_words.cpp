@@ -17,7 +17,7 @@ double largest(const std::vector<double>& values) {
 }
 
 // "Of 60 s of driving 2.1 s contradict the fault-free model in the output sum and 0.3 s in difference."
-std::string contradicting(const Detection& detection, const CommissionedModel& model) {
+std::string contradicting(const Detection& detection, const OnlineModel& model) {
   std::vector<std::string> parts;
   for (std::size_t i = 0; i < detection.outside.size(); ++i) {
     if (detection.outside[i] > 0) {
@@ -60,7 +60,7 @@ std::string detect_verdict(const Detection& detection, std::size_t kinematic_eve
                      : fmt::format("{}: the robot did not behave like its model.", capital(plural(events, "event")));
 }
 
-std::vector<std::string> detect_words(const Detection& detection, const CommissionedModel& model,
+std::vector<std::string> detect_words(const Detection& detection, const OnlineModel& model,
                                       const std::vector<Isolation>& isolations, const TimeAxis& axis) {
   const std::string watched = fmt::format("{} instants were watched over {} of driving.", count(detection.instants),
                                           with_unit(number(detection.seconds, 4), "s"));

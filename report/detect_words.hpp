@@ -17,7 +17,7 @@ namespace wheelwright::report {
 
 /// What was watched; where there are events: the first and the clearest one, how much of the driving contradicts the
 /// fault-free model, what this means, and which faults of the catalogue the first event leaves possible. Text, not HTML.
-[[nodiscard]] std::vector<std::string> detect_words(const Detection& detection, const CommissionedModel& model,
+[[nodiscard]] std::vector<std::string> detect_words(const Detection& detection, const OnlineModel& model,
                                                     const std::vector<Isolation>& isolations, const TimeAxis& axis);
 
 }  // namespace wheelwright::report

@@ -245,7 +245,7 @@ std::string curves(const MarginSurvey& survey, const ResidualMargins& residual) 
              "size reads the other way round, too: how long a fault of that size can go unseen.</span>");
 }
 
-std::string maps(const ResidualMargins& residual, const CommissionedModel& model) {
+std::string maps(const ResidualMargins& residual, const OnlineModel& model) {
   std::string out;
   const auto& names = model.model.coordinates;
   const std::string first = names.front(), second = names.size() > 1 ? names[1] : "";
@@ -272,7 +272,7 @@ std::string maps(const ResidualMargins& residual, const CommissionedModel& model
 
 }  // namespace
 
-std::string margins_report(const MarginSurvey& survey, const CommissionedModel& model, const ReportContext& context) {
+std::string margins_report(const MarginSurvey& survey, const OnlineModel& model, const ReportContext& context) {
   const TimeAxis axis(context.signals ? context.signals->t : std::vector<double>{});
   PageContent content;
   content.title = context.title.empty() ? "What is certainly seen: " + model.robot.name : context.title;

@@ -26,7 +26,7 @@ namespace wheelwright {
 
 /// One self-contained page: what is certainly seen, in words, as a table by manoeuvre, as curves of size over delay, and
 /// as maps over the operating space.
-[[nodiscard]] std::string margins_report(const MarginSurvey& survey, const CommissionedModel& model,
+[[nodiscard]] std::string margins_report(const MarginSurvey& survey, const OnlineModel& model,
                                          const ReportContext& context);
 
 }  // namespace wheelwright

@@ -12,6 +12,7 @@
 #include <wheelwright/files/number.hpp>
 #include <wheelwright/files/words.hpp>
 #include <wheelwright/results/model_json.hpp>
+#include <wheelwright/robots/online_model_file.hpp>
 
 namespace wheelwright {
 namespace {

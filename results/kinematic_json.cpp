@@ -90,44 +90,7 @@ Json validation_json(const KinematicCommissioning& r, const OdometryMeasurement&
   return {{"blocks", folds.blocks}, {"held_out_every", folds.hold_out_every}, {"purge", window}, {"outputs", outputs}};
 }
 
-double bound_at(const JsonPlace& place) {
-  const double value = place.number();
-  if (!(value >= 0.0)) {
-    place.fail("a number >= 0");
-  }
-  return value;
-}
-
-OdometryMeasurement read_measurement(const JsonPlace& place) {
-  OdometryMeasurement m;
-  m.motion = value_of(kMotionWords, place.at("motion"));
-  m.motion_columns = place.at("motion_columns").texts();
-  m.position = place.at("position").boolean();
-  m.heading = place.at("heading").boolean();
-  m.gyro = place.at("gyro").boolean();
-  m.held_pose = place.at("held_pose").boolean();
-  m.count = place.at("count").number();
-  m.nominal_step = place.at("nominal_step").number();
-  return m;
-}
-
-/// What the numbers stand on; of a model from before it said so, what its noise tells.
-Warrant kinematic_warrant(const JsonPlace& place) {
-  const bool told = place.has("warrant") || !place.has("noise");
-  return warrant_at(place, !told && all_declared(place.at("noise")) ? Warrant::guaranteed : Warrant::extrapolated);
-}
-
 }  // namespace
-
-bool all_declared(const JsonPlace& noise) {
-  const JsonPlace outputs = noise.at("outputs");
-  for (std::size_t i = 0; i < outputs.size(); ++i) {
-    if (value_of(kNoiseOriginWords, outputs.at(i).at("origin")) != NoiseOrigin::declared) {
-      return false;
-    }
-  }
-  return outputs.size() > 0;
-}
 
 std::optional<Json> kinematic_json(const KinematicCommissioning& r, const FoldOptions& folds) {
   if (r.status == Status::absent) {
@@ -162,48 +125,6 @@ std::optional<Json> kinematic_json(const KinematicCommissioning& r, const FoldOp
                       {"persistence", {{"k", m.persistence.k}, {"n", m.persistence.n}}}};
   json["validation"] = validation_json(r, m.measurement, folds, m.window);
   return json;
-}
-
-std::optional<KinematicModel> kinematic_from_json(const JsonPlace& place) {
-  if (!place.has("detector")) {
-    return std::nullopt;
-  }
-  KinematicModel model;
-  model.measurement = read_measurement(place.at("measurement"));
-  model.window = place.at("window").number();
-  model.warrant = kinematic_warrant(place);
-  const std::size_t p = model.measurement.parameters().size(), n = model.measurement.outputs().size();
-  const JsonPlace detector = place.at("detector"), errors = detector.at("error_bounds"), set = place.at("feasible_set");
-  model.estimate = vector_at(detector.at("estimate"), p);
-  model.errors.motion = bound_at(errors.at("motion"));
-  model.errors.position = bound_at(errors.at("position"));
-  model.errors.heading = bound_at(errors.at("heading"));
-  model.errors.acceleration = bound_at(errors.at("acceleration"));
-  model.errors.yaw_gain = bound_at(errors.at("yaw_gain"));
-  model.errors.estimated = vector_at(errors.at("estimated"), n);
-  model.persistence = {detector.at("persistence").at("k").count(), detector.at("persistence").at("n").count()};
-  const JsonPlace a = set.at("A");
-  const Eigen::VectorXd b = vector_at(set.at("b"), a.size());
-  for (std::size_t k = 0; k < a.size(); ++k) {
-    model.facets.push_back({vector_at(a.at(k), p), b[static_cast<Eigen::Index>(k)], {}});
-  }
-  const JsonPlace hull = set.at("hull");
-  if (hull.size() != p) {
-    hull.fail("an array of " + std::to_string(p) + " intervals");
-  }
-  for (std::size_t j = 0; j < p; ++j) {
-    const Eigen::VectorXd side = vector_at(hull.at(j), 2);
-    if (!(side[0] <= side[1])) {
-      hull.at(j).fail("[lower, upper] with lower <= upper");
-    }
-    model.box.sides.push_back({side[0], side[1]});
-  }
-  try {
-    static_cast<void>(OdometryFilter(model.measurement, model.window, model.errors));
-  } catch (const InvalidArgument& error) {
-    throw InputError(place.where() + ": " + error.what());
-  }
-  return model;
 }
 
 }  // namespace wheelwright

@@ -15,20 +15,6 @@
 #include <wheelwright/robots/robot_file.hpp>
 
 namespace wheelwright {
-namespace {
-
-constexpr Words<Warrant, 3> kWarrantWords{{{Warrant::guaranteed, warrant_word(Warrant::guaranteed)},
-                                           {Warrant::extrapolated, warrant_word(Warrant::extrapolated)},
-                                           {Warrant::statistical, warrant_word(Warrant::statistical)}}};
-constexpr Words<AssumptionVerdict, 3> kVerdictWords{{{AssumptionVerdict::holds, "holds"},
-                                                     {AssumptionVerdict::not_tested, "not_tested"},
-                                                     {AssumptionVerdict::fails, "fails"}}};
-
-}  // namespace
-
-Warrant warrant_at(const JsonPlace& place, Warrant absent) {
-  return place.has("warrant") ? value_of(kWarrantWords, place.at("warrant")) : absent;
-}
 
 Json assumptions_json(const std::vector<Assumption>& assumptions) {
   Json list = Json::array();
@@ -39,24 +25,6 @@ Json assumptions_json(const std::vector<Assumption>& assumptions) {
                     {"test", a.test},
                     {"verdict", word_of(kVerdictWords, a.verdict)},
                     {"detail", a.detail}});
-  }
-  return list;
-}
-
-std::vector<Assumption> assumptions_at(const JsonPlace& place) {
-  std::vector<Assumption> list;
-  if (!place.has("assumptions")) {
-    return list;
-  }
-  const JsonPlace all = place.at("assumptions");
-  for (std::size_t k = 0; k < all.size(); ++k) {
-    const JsonPlace each = all.at(k);
-    list.push_back({.id = each.at("id").text(),
-                    .statement = each.at("statement").text(),
-                    .declared_by = each.at("declared_by").text(),
-                    .test = each.at("test").text(),
-                    .verdict = value_of(kVerdictWords, each.at("verdict")),
-                    .detail = each.at("detail").text()});
   }
   return list;
 }
@@ -314,7 +282,7 @@ Json data_json(const Commissioning& r, const LogReport& data) {
 }  // namespace
 
 Json to_json(const Commissioning& r, const LogReport& data, const std::string& software) {
-  const CommissionedModel& m = r.model;
+  const OnlineModel& m = r.model;
   const bool has_model = !m.facets.empty() && r.status != Commissioning::Status::nothing;
   Json json = {{"schema", kModelSchema},
                {"software", software},

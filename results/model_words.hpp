@@ -5,6 +5,7 @@
 
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/files/words.hpp>
+#include <wheelwright/robots/model_words.hpp>
 
 namespace wheelwright {
 
@@ -16,13 +17,6 @@ inline constexpr Words<Commissioning::Status, 5> kStatusWords{{{Commissioning::S
 inline constexpr Words<Excitation, 3> kExcitationWords{{{Excitation::identified, "identified"},
                                                         {Excitation::indistinct, "indistinct"},
                                                         {Excitation::not_excited, "not_excited"}}};
-inline constexpr Words<NoiseOrigin, 2> kNoiseOriginWords{
-    {{NoiseOrigin::declared, "declared"}, {NoiseOrigin::estimated, "estimated"}}};
-inline constexpr Words<NoiseMode, 2> kNoiseModeWords{
-    {{NoiseMode::worst_case, "worst_case"}, {NoiseMode::statistical, "statistical"}}};
-inline constexpr Words<MotionKind, 3> kMotionWords{
-    {{MotionKind::angle, "angle"}, {MotionKind::mean_speed, "mean_speed"}, {MotionKind::speed, "speed"}}};
-inline constexpr Words<Hold, 2> kHoldWords{{{Hold::zero_order, "zero_order"}, {Hold::first_order, "first_order"}}};
 inline constexpr Words<Side, 2> kSideWords{{{Side::upper, "upper"}, {Side::lower, "lower"}}};
 
 }  // namespace wheelwright

@@ -59,8 +59,8 @@ MotionBound motion_at(const Commissioning& c, const RobotAt& at, std::span<const
   return bound;
 }
 
-RegressionStream rows_of(LogSource& log, const Commissioning& c, const RobotAt& at, const MotionBound& motion,
-                         double confidence) {
+TorqueRows rows_of(LogSource& log, const Commissioning& c, const RobotAt& at, const MotionBound& motion,
+                   double confidence) {
   const Model model = make_model(at.robot);
   const Measurement& measurement = c.model.measurement;
   SignalErrors errors = c.row_errors;
@@ -77,7 +77,7 @@ RegressionStream rows_of(LogSource& log, const Commissioning& c, const RobotAt& 
   FilterDesign filter = at.filter;
   // The same instants, whatever β: an instant that stands on the edge stays.
   filter.settle *= filter.beta / c.model.filter.beta * (1.0 - 1e-9);
-  return RegressionStream(log, RegressorFilter(model, filter, measurement, errors));
+  return TorqueRows(log, RegressorFilter(model, filter, measurement, errors));
 }
 
 LogRows pick_rows(RegressionSource& rows, const Box& prior, const LogRows& wanted) {
@@ -280,7 +280,7 @@ std::vector<BoundPass> bound_passes(LogSource& log, const Commissioning& c, doub
   std::vector<Interval> sides;
   const auto add = [&](const FeasibleSet& set, const std::vector<std::size_t>& dropped) {
     BoundPass pass{hull_optima(*set.polytope, c.prior), std::exchange(sides, set.hull.sides)};
-    RegressionStream rows = rows_of(log, c, at, motion_at(c, at, pass.sides), confidence);
+    TorqueRows rows = rows_of(log, c, at, motion_at(c, at, pass.sides), confidence);
     add_active_rows(pass.optima, rows, dropped);
     passes.push_back(std::move(pass));
   };
@@ -314,7 +314,7 @@ BoundRates bound_rates(LogSource& log, const Commissioning& c, const std::vector
       kink = moved.kink;
       const LogRows wanted = active_rows(optima);
       const auto rows_beside = [&](const RobotAt& at, const std::vector<Interval>& sides, const Box& prior) {
-        RegressionStream rows = rows_of(log, c, at, motion_at(c, at, sides), confidence);
+        TorqueRows rows = rows_of(log, c, at, motion_at(c, at, sides), confidence);
         // An input of the prior moves its sides only: the signs that rows count with stay.
         return pick_rows(rows, input.prior ? c.prior : prior, wanted);
       };

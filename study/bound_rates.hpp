@@ -21,7 +21,7 @@
 
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/core/log.hpp>
-#include <wheelwright/filter/regression_stream.hpp>
+#include <wheelwright/filter/row_stream.hpp>
 #include <wheelwright/study/hull_derivatives.hpp>
 #include <wheelwright/study/local_derivatives.hpp>
 
@@ -61,8 +61,8 @@ struct RowRates {
 /// The rows of `log` for the robot and filter `at`, all else as `commissioning` chose it: the same columns and instants;
 /// errors are propagated anew where noise is declared, with `motion` between samples, else they stay. `confidence` as
 /// CommissionOptions has it.
-[[nodiscard]] RegressionStream rows_of(LogSource& log, const Commissioning& commissioning, const RobotAt& at,
-                                       const MotionBound& motion, double confidence);
+[[nodiscard]] TorqueRows rows_of(LogSource& log, const Commissioning& commissioning, const RobotAt& at,
+                                 const MotionBound& motion, double confidence);
 
 /// The half-spaces that the rows named in `wanted` are in the box `prior`; those that are not there are left out.
 [[nodiscard]] LogRows pick_rows(RegressionSource& rows, const Box& prior, const LogRows& wanted);

@@ -76,7 +76,7 @@ void take_events(CheckRecord& check, const std::vector<Event>& events) {
 }
 
 // The detector's walk. A kinematic residual is watched where the log has its columns.
-void watch(CheckRecord& check, LogSource& log, const CommissionedModel& model, const DetectorOptions& options) {
+void watch(CheckRecord& check, LogSource& log, const OnlineModel& model, const DetectorOptions& options) {
   const DetectionOptions thin{.most_points = 2};
   const Detection torque = detect(log, make_detector(model, options), thin);
   check.checked = true;
@@ -96,8 +96,7 @@ void watch(CheckRecord& check, LogSource& log, const CommissionedModel& model, c
   }
 }
 
-CheckRecord check_log(const FleetLog& log, const std::optional<CommissionedModel>& model,
-                      const ExamineOptions& options) {
+CheckRecord check_log(const FleetLog& log, const std::optional<OnlineModel>& model, const ExamineOptions& options) {
   CheckRecord check;
   check.not_checked = model ? "" : "the robot has no commissioned model";
   OpenedLog opened;
@@ -175,7 +174,7 @@ std::vector<RecordedParameter> recorded_parameters(const Commissioning& result) 
 
 RobotRecord examine_robot(const RobotLogs& logs, const ExamineOptions& options) {
   RobotRecord record{.robot = logs.robot, .dated = logs.dated, .commissioning = {}, .findings = logs.findings};
-  std::optional<CommissionedModel> model;
+  std::optional<OnlineModel> model;
   try {
     const OpenedLog opened = logs.commissioning.open();
     const Commissioning result = commission(*opened.log, opened.robot, options.commission);

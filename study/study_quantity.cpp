@@ -174,7 +174,7 @@ struct Thresholds {
   std::vector<double> mean, peak;  // one for each output
 };
 
-Thresholds thresholds_over(LogSource& log, const CommissionedModel& model) {
+Thresholds thresholds_over(LogSource& log, const OnlineModel& model) {
   Thresholds t{std::vector<double>(model.model.n(), 0.0), std::vector<double>(model.model.n(), 0.0)};
   std::size_t instants = 0;
   Detector detector = make_detector(model);
@@ -193,7 +193,7 @@ Thresholds thresholds_over(LogSource& log, const CommissionedModel& model) {
   return t;
 }
 
-MarginSurvey survey_faults(LogSource& log, const CommissionedModel& model, const std::vector<StudyQuantity>& quantities,
+MarginSurvey survey_faults(LogSource& log, const OnlineModel& model, const std::vector<StudyQuantity>& quantities,
                            const EvaluateOptions& options) {
   MarginSurveyOptions ask;
   ask.map_points = 0;

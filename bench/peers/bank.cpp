@@ -95,7 +95,7 @@ Bank::Bank(const Subject& subject, const std::vector<LogTable>& calibration)
       }
     }
   }
-  const CommissionedModel& m = subject.model;
+  const OnlineModel& m = subject.model;
   std::array<AxisModel, kOutputs> axes;
   for (std::size_t i = 0; i < kOutputs; ++i) {
     mean[i] /= count;
@@ -148,7 +148,7 @@ bool Bank::observe(const LogBlock& block, std::size_t k) {
   for (std::size_t c = 0; c < pick_.size(); ++c) {
     sample_[c] = block.columns[pick_[c]][k];
   }
-  const CommissionedModel& m = subject_->model;
+  const OnlineModel& m = subject_->model;
   now_.t = block.t[k];
   now_.valid = filter_.step(now_.t, sample_);
   statistical_filter_.step(now_.t, sample_);

@@ -6,7 +6,7 @@
 #include <string>
 
 #include <wheelwright/detector/margins.hpp>
-#include <wheelwright/filter/regression_stream.hpp>
+#include <wheelwright/filter/row_stream.hpp>
 #include <wheelwright/identify/least_squares.hpp>
 
 namespace wheelwright::peers {
@@ -44,8 +44,8 @@ Trajectory trajectory(Driving driving, Random& random) {
 }
 
 // Variance of what a least-squares fit leaves of each output of `log`.
-std::array<double, kOutputs> residual_variance(LogSource& log, const CommissionedModel& m) {
-  RegressionStream stream(log, RegressorFilter(m.model, m.filter, m.measurement, m.errors));
+std::array<double, kOutputs> residual_variance(LogSource& log, const OnlineModel& m) {
+  TorqueRows stream(log, RegressorFilter(m.model, m.filter, m.measurement, m.errors));
   const RegressionBlock rows = read_all(stream);
   LeastSquares squares(m.model.p());
   squares.add(rows);
@@ -138,7 +138,7 @@ Scenario make_drive(const Subject& subject, Driving driving, std::uint64_t seed,
 }
 
 std::vector<TriedFault> tried_faults(const Subject& subject, Driving driving, std::uint64_t seed) {
-  const CommissionedModel& m = subject.model;
+  const OnlineModel& m = subject.model;
   const std::vector<FaultType> catalogue = fault_catalogue(m.model, m.estimate);
   std::vector<TriedFault> tried;
   std::vector<FaultType> types;

@@ -30,9 +30,9 @@ inline constexpr std::array kDriving = {Driving::gentle, Driving::varied, Drivin
 
 /// A robot as its detectors know it.
 struct Subject {
-  Scenario scenario;              ///< sensors and θ°; noise is as large as declared
-  CommissionedModel model;        ///< facets, box and estimate are those of the regime
-  CommissionedModel statistical;  ///< the same with NoiseMode::statistical
+  Scenario scenario;        ///< sensors and θ°; noise is as large as declared
+  OnlineModel model;        ///< facets, box and estimate are those of the regime
+  OnlineModel statistical;  ///< the same with NoiseMode::statistical
   Regime regime = Regime::identified;
   Eigen::MatrixXd covariance;               ///< of θ̂; of a uniform θ in the box where it is uncertain
   std::array<double, kOutputs> variance{};  ///< of the residual of a least-squares fit to the learning log

@@ -19,7 +19,7 @@ class Export : public testing::ProgramTest {
  protected:
   /// The exported header in `folder` and the library's detector along the log of the fault that ships as a scenario.
   Seen seen(const std::string& header, const std::string& name, DetectorOptions options) const {
-    const CommissionedModel model = read_model(path("model/model.json"));
+    const OnlineModel model = read_model(path("model/model.json"));
     const auto columns = model.measurement.columns();
     Detector ours = make_detector(model, options);
     CDetector theirs(directory_, header, name, columns.size(), model.model.n());

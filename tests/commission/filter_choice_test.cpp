@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/filter/regression_stream.hpp>
+#include <wheelwright/filter/row_stream.hpp>
 #include <wheelwright/identify/estimate.hpp>
 
 #include "support/drives.hpp"
@@ -143,7 +143,7 @@ TEST(FilterChoice, PredictsTheErrorOfTheEstimate) {
       for (int run = 0; run < runs; ++run) {
         const LogTable log = world.noisy(10 + static_cast<std::uint64_t>(run), speed_noise, 0.2, 0.5);
         TableSource source(log);
-        RegressionStream rows(source, RegressorFilter(world.model, design, world.measurement));
+        TorqueRows rows(source, RegressorFilter(world.model, design, world.measurement));
         const RegressionMoments sums = moments(rows);
         const Estimate e = ordinary_least_squares(sums, {.weights = efficient_weights(sums), .excluded = {}});
         squares += (e.theta - world.theta()).cwiseAbs2() / runs;
@@ -213,7 +213,7 @@ TEST(FilterChoice, WidthHoldsEveryResidualOfTheLog) {
   FilterEvaluation evaluate(source, world.model, world.measurement, FilterCriterion::threshold_width,
                             options_for(FilterCriterion::threshold_width).for_criterion);
   const FilterValue value = evaluate({design}).front();
-  RegressionStream rows(source, RegressorFilter(world.model, design, world.measurement));
+  TorqueRows rows(source, RegressorFilter(world.model, design, world.measurement));
   const RegressionBlock all = read_all(rows);
   const Eigen::VectorXd residual = all.y - all.Y * world.theta();
   for (Eigen::Index i = 0; i < 2; ++i) {

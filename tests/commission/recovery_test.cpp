@@ -21,7 +21,7 @@ Eigen::VectorXd truth_of(const Scenario& s) { return true_parameters(s, make_mod
 // The estimate from the log of `driven`, read as `reader` says.
 Eigen::VectorXd identified(const Scenario& driven, const Scenario& reader, int order) {
   Simulation log(driven);
-  RegressionStream rows(log, filter_of(reader, {}, order));
+  TorqueRows rows(log, filter_of(reader, {}, order));
   return least_squares(rows).estimate;
 }
 

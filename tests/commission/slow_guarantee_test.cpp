@@ -74,7 +74,7 @@ struct Watch {
   std::size_t alarms = 0;
 };
 
-void watch(const CommissionedModel& model, const Scenario& drive, Watch& total) {
+void watch(const OnlineModel& model, const Scenario& drive, Watch& total) {
   Simulation log(drive);
   Detector detector = make_detector(model);
   ASSERT_TRUE(detector.threshold().set().has_vertices());

@@ -5,7 +5,7 @@
 
 #include <wheelwright/commission/validation.hpp>
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/filter/regression_stream.hpp>
+#include <wheelwright/filter/row_stream.hpp>
 
 #include "support/drives.hpp"
 #include "support/random.hpp"
@@ -37,7 +37,7 @@ struct Stream {
 
   std::unique_ptr<RegressionSource> make(std::size_t block_rows) {
     log = std::make_unique<TableSource>(table, block_rows);
-    return std::make_unique<RegressionStream>(*log, filter_of(noisy_drive(1, 10.0)));
+    return std::make_unique<TorqueRows>(*log, filter_of(noisy_drive(1, 10.0)));
   }
 };
 

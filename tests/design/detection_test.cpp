@@ -20,7 +20,7 @@ using testing_support::noisy_drive;
 
 struct Prepared {
   Scenario scenario;
-  CommissionedModel model;
+  OnlineModel model;
 };
 
 Prepared prepared() {
@@ -81,7 +81,7 @@ double first_alarm(const Prepared& p, const Plan& plan, const PromisedFault& fau
   return first;
 }
 
-std::vector<InspectedFault> radii(const CommissionedModel& model) {
+std::vector<InspectedFault> radii(const OnlineModel& model) {
   std::vector<InspectedFault> faults;
   for (const InspectedFault& each : usual_inspection(model)) {
     if (each.fault.name == "wheel_radius" || each.fault.name == "wheel_radius_right") {

@@ -21,7 +21,7 @@ namespace wheelwright::testing_support {
 /// A robot, commissioned.
 struct Commissioned {
   Scenario scenario;  ///< of the learning drive
-  CommissionedModel model;
+  OnlineModel model;
 };
 
 /// Another robot for every seed: masses, rates, encoders, noise, holds, filters. The noise reaches its declared bounds; for
@@ -132,7 +132,7 @@ struct Promise {
 /// The promise for the motion of a run in which the fault has this magnitude already (it changes the motion), or for the
 /// healthy motion where it is the reading of a sensor that breaks.
 inline Promise promise(const FaultyRun& run, double magnitude, double window, double share) {
-  const CommissionedModel& m = run.robot->model;
+  const OnlineModel& m = run.robot->model;
   FaultyRun reference = run;
   const LogTable table = log_of(reference, run.simulated ? magnitude : 0.0, false);
   TableSource log(table);

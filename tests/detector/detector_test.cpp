@@ -36,7 +36,7 @@ struct Known {
     }
     return ThresholdRule(Polytope({}, box), theta);
   }
-  [[nodiscard]] Detector detector(DetectorOptions options = {}) const {
+  [[nodiscard]] TorqueDetector detector(DetectorOptions options = {}) const {
     return Detector(filter_of(scenario), rule(), std::move(options));
   }
 };
@@ -111,7 +111,7 @@ TEST(Detector, AlarmsPersistInTheirChannel) {
 }
 
 // Steps through rows [first, last) of a log of angles, shifted by `shift` in time.
-Decision walk(Detector& detector, const LogTable& log, std::size_t first, std::size_t last, double shift,
+Decision walk(TorqueDetector& detector, const LogTable& log, std::size_t first, std::size_t last, double shift,
               std::size_t* invalid = nullptr) {
   Decision d;
   for (std::size_t k = first; k < last; ++k) {

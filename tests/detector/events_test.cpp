@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/detector/dead_zone.hpp>
+#include <wheelwright/detector/detector.hpp>
 #include <wheelwright/detector/events.hpp>
 
 #include "support/random.hpp"

@@ -27,10 +27,10 @@ using testing_support::random_run;
 
 using Verdict = FaultFinding::Verdict;
 
-RegressorFilter filter_of(const CommissionedModel& m) { return {m.model, m.filter, m.measurement, m.errors}; }
+RegressorFilter filter_of(const OnlineModel& m) { return {m.model, m.filter, m.measurement, m.errors}; }
 
 // What the detector's first alarm on `table` is isolated to; nothing where there is none. An alarm before `onset` fails.
-std::optional<Isolation> isolated(const CommissionedModel& m, const LogTable& table, double onset,
+std::optional<Isolation> isolated(const OnlineModel& m, const LogTable& table, double onset,
                                   const IsolationOptions& options = {}) {
   TableSource log(table);
   const Detection detection = detect(log, make_detector(m));
@@ -135,8 +135,8 @@ class PreciseRobot : public ::testing::Test {
     s.seed = 6;
     drive() = s;
   }
-  static CommissionedModel& model() {
-    static CommissionedModel m;
+  static OnlineModel& model() {
+    static OnlineModel m;
     return m;
   }
   static Scenario& drive() {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/detector/kinematic_detector.hpp>
+#include <wheelwright/detector/detector.hpp>
 
 #include <gtest/gtest.h>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/filter/regression_stream.hpp>
+#include <wheelwright/filter/row_stream.hpp>
 
 #include "support/kinematic_drives.hpp"
 
@@ -53,7 +53,7 @@ TEST(KinematicDetector, DecidesOnTheRowsOfTheStreamBitForBit) {
   const Known known;
   const LogTable log = simulate(known.scenario);
   TableSource source(log);
-  OdometryStream stream(source, known.filter());
+  OdometryRows stream(source, known.filter());
   const RegressionBlock rows = read_all(stream);
   const ThresholdRule rule = known.rule();
   KinematicDetector detector = known.detector();

@@ -126,7 +126,7 @@ TEST(OdometryFaults, LateralSlipOnAStraightLineIsForThePose) {
   const Commissioning result = commission(log, learning.robot);
   ASSERT_EQ(result.status, Commissioning::Status::done) << result.message;
   ASSERT_TRUE(result.model.kinematic) << result.kinematic.message;
-  const CommissionedModel& m = result.model;
+  const OnlineModel& m = result.model;
 
   Scenario straight = learning;
   straight.sensors = exact_drive(Shown::angles, Hold::zero_order).sensors;
@@ -203,7 +203,7 @@ void keep_promises(std::uint64_t first, std::uint64_t last, int& certain) {
     Simulation log(learning);
     const Commissioning result = commission(log, learning.robot);
     ASSERT_TRUE(result.model.kinematic) << "seed " << seed << ": " << result.kinematic.message;
-    const CommissionedModel& m = result.model;
+    const OnlineModel& m = result.model;
     const KinematicModel& k = *m.kinematic;
     for (const Simulated& kind : kinds) {
       const FaultType fault = find_fault(m.model, kind.name);

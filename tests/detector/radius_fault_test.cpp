@@ -29,7 +29,7 @@ double relative_error(Shown shown, Hold hold, double share, double rate) {
   set_radius_fault(s, share);
   const Eigen::VectorXd theta = true_parameters(s, make_model(s.robot));
   Simulation log(s);
-  RegressionStream rows(log, filter_of(s));
+  TorqueRows rows(log, filter_of(s));
   const RegressionBlock block = read_all(rows);
   const Eigen::VectorXd predicted = block.Y * theta, residual = block.y - predicted;
   const Eigen::VectorXd expected = kappa_of(share) * predicted;
@@ -62,8 +62,8 @@ TEST(RadiusFault, IsDetectedWhereItIsCertain) {
     faulty.trajectory = {.kind = Trajectory::Kind::multi_sine, .speed = 0.6, .yaw_rate = 1.2, .period = 9.0};
     set_radius_fault(faulty, share);
     Simulation log(faulty);
-    const CommissionedModel& model = result.model;
-    RegressionStream rows(log, RegressorFilter(model.model, model.filter, model.measurement, model.errors));
+    const OnlineModel& model = result.model;
+    TorqueRows rows(log, RegressorFilter(model.model, model.filter, model.measurement, model.errors));
     Detector detector = make_detector(model);
     const ThresholdRule& rule = detector.threshold();
     const RegressionBlock block = read_all(rows);

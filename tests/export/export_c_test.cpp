@@ -115,7 +115,7 @@ Polytope set_of(const Case& c) {
   return Polytope(rows, box);
 }
 
-Detector detector_of(const Case& c) {
+TorqueDetector detector_of(const Case& c) {
   Measurement m;
   m.motion = c.motion;
   m.hold = c.hold;

@@ -8,7 +8,7 @@
 
 #include <wheelwright/core/log.hpp>
 #include <wheelwright/filter/noise.hpp>
-#include <wheelwright/filter/regression_stream.hpp>
+#include <wheelwright/filter/row_stream.hpp>
 
 #include "support/drives.hpp"
 
@@ -23,7 +23,7 @@ class Influence : public ::testing::TestWithParam<Shown> {};
 
 RegressionBlock rows_of(const LogTable& table, const RegressorFilter& filter) {
   TableSource log(table);
-  RegressionStream stream(log, filter);
+  TorqueRows stream(log, filter);
   RegressionBlock all, block;
   stream.rewind();
   while (stream.next(block)) {

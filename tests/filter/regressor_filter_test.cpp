@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/filter/regression_stream.hpp>
+#include <wheelwright/filter/row_stream.hpp>
 
 #include <cmath>
 #include <random>
@@ -80,8 +80,8 @@ LogTable drive(MotionKind motion, double h, double seconds, Clock clock) {
 double worst_equation_error(MotionKind motion, int order, double h, Clock clock) {
   const LogTable log = drive(motion, h, 10.0, clock);
   TableSource source(log);
-  RegressionStream stream(source,
-                          RegressorFilter(kRobot.model(), {.order = order, .alpha = 6.0, .beta = 6.0}, wheels(motion)));
+  TorqueRows stream(source,
+                    RegressorFilter(kRobot.model(), {.order = order, .alpha = 6.0, .beta = 6.0}, wheels(motion)));
   const RegressionBlock rows = read_all(stream);
   double worst = 0.0;
   for (std::size_t k = 0; k < rows.instants(); ++k) {
@@ -120,12 +120,12 @@ INSTANTIATE_TEST_SUITE_P(
                     Kind{MotionKind::speed, 1, Clock::uneven}, Kind{MotionKind::speed, 2, Clock::uneven},
                     Kind{MotionKind::angle, 2, Clock::uneven}));
 
-TEST(RegressionStream, BatchAndStreamingGiveTheSameBits) {
+TEST(TorqueRows, BatchAndStreamingGiveTheSameBits) {
   for (const MotionKind motion : {MotionKind::angle, MotionKind::mean_speed, MotionKind::speed}) {
     const LogTable log = drive(motion, 0.01, 5.0, Clock::even);
     RegressorFilter online(kRobot.model(), {}, wheels(motion));
     TableSource small(log, 7), large(log, 100000);
-    RegressionStream a(small, online), b(large, online);
+    TorqueRows a(small, online), b(large, online);
     const RegressionBlock rows_a = read_all(a), rows_b = read_all(b);
     ASSERT_EQ(rows_a.instants(), rows_b.instants());
     EXPECT_EQ(rows_a.Y, rows_b.Y);
@@ -145,14 +145,14 @@ TEST(RegressionStream, BatchAndStreamingGiveTheSameBits) {
   }
 }
 
-TEST(RegressionStream, NothingIsFilteredAcrossASplit) {
+TEST(TorqueRows, NothingIsFilteredAcrossASplit) {
   const LogTable log = drive(MotionKind::speed, 0.01, 4.0, Clock::even);
   LogTable split = log;
   split.segment_starts = {0, 200};
   const LogTable second = slice(log, 200, log.rows());
   TableSource split_source(split), second_source(second);
   const RegressorFilter filter(kRobot.model(), {}, wheels(MotionKind::speed));
-  RegressionStream a(split_source, filter), b(second_source, filter);
+  TorqueRows a(split_source, filter), b(second_source, filter);
   const RegressionBlock rows_a = read_all(a), rows_b = read_all(b);
   const auto tail = rows_b.rows();
   EXPECT_EQ(RowMatrix(rows_a.Y.bottomRows(tail)), rows_b.Y);

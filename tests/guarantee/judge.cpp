@@ -110,7 +110,7 @@ double oracle_width(const Case& c, const Scene& scene, const Commissioning& resu
   return set.status == FeasibleSet::Status::nonempty ? (set.hull.sides[0].upper - set.hull.sides[0].lower) / mass : 0.0;
 }
 
-void watch(const LogTable& log, const CommissionedModel& model, Verdict& verdict) {
+void watch(const LogTable& log, const OnlineModel& model, Verdict& verdict) {
   Detector detector = make_detector(model);
   std::vector<const std::vector<double>*> columns;
   for (const std::string& column : model.measurement.columns()) {
@@ -135,7 +135,7 @@ void watch(const LogTable& log, const CommissionedModel& model, Verdict& verdict
 }
 
 // Whether a detector alarms between `onset` and `end`.
-bool sees(const CommissionedModel& model, const LogTable& log, double onset, double end) {
+bool sees(const OnlineModel& model, const LogTable& log, double onset, double end) {
   Detector detector = make_detector(model);
   const std::vector<std::string> names = model.measurement.columns();
   std::vector<double> sample(names.size());
@@ -149,7 +149,7 @@ bool sees(const CommissionedModel& model, const LogTable& log, double onset, dou
 }
 
 // Whether what is said of the first alarm leaves the fault possible, of its size and at its time.
-bool isolated(const CommissionedModel& model, const LogTable& log, const FaultType& fault, const Breakdown& truth) {
+bool isolated(const OnlineModel& model, const LogTable& log, const FaultType& fault, const Breakdown& truth) {
   TableSource source(log);
   const Detection detection = detect(source, make_detector(model));
   if (detection.events.empty() || detection.events.front().start < truth.onset) {
@@ -167,7 +167,7 @@ bool isolated(const CommissionedModel& model, const LogTable& log, const FaultTy
 }
 
 // Faults of sizes that margins call certain within a window: each has to be seen, and must not be excluded.
-void try_faults(Case c, const CommissionedModel& model, Verdict& verdict) {
+void try_faults(Case c, const OnlineModel& model, Verdict& verdict) {
   using Kind = Breakdown::Kind;
   constexpr std::array<Kind, 3> kKinds = {Kind::effort_loss, Kind::effort_bias, Kind::encoder_scale};
   constexpr double kWindowSteps = 100.0;

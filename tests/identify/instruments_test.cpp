@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/filter/regression_stream.hpp>
+#include <wheelwright/filter/row_stream.hpp>
 #include <wheelwright/model/single_axis.hpp>
 
 #include "support/drives.hpp"
@@ -37,7 +37,7 @@ TEST(InstrumentStream, GivesTheRowsOfTheLogAndOfTheCommandedMotion) {
   ASSERT_TRUE(motion);
   InstrumentStream stream(log, filter, *motion);
   const RegressionBlock both = read_all(stream);
-  RegressionStream plain(log, filter);
+  TorqueRows plain(log, filter);
   const RegressionBlock rows = read_all(plain);
   EXPECT_EQ(both.sample, rows.sample);
   EXPECT_EQ(both.Y.leftCols(4), rows.Y);
@@ -60,7 +60,7 @@ TEST(InstrumentStream, MatchesInstantsWhereTheFiltersSettleDifferently) {
   const RegressorFilter filter = filter_of(scenario);
   InstrumentStream stream(log, filter, *commanded_motion(log, filter.model()));
   const std::size_t instants = read_all(stream).instants();
-  RegressionStream plain(log, filter);
+  TorqueRows plain(log, filter);
   EXPECT_EQ(instants, read_all(plain).instants());
 }
 

@@ -174,7 +174,7 @@ TEST(TimeShift, DelayOfASimulatedDriveIsFound) {
     std::copy_backward(effort.begin(), effort.end() - 3, effort.end());
   }
   TableSource source(log);
-  RegressionStream stream(source, filter_of(scenario));
+  TorqueRows stream(source, filter_of(scenario));
   const TimeShiftedRows model(read_all(stream), TimeEffect::delay, -0.1, 0.1);
   const SeparableFit fit = variable_projection(model, model.options());
   const Eigen::VectorXd truth = true_parameters(scenario, make_model(scenario.robot));
@@ -258,9 +258,9 @@ TEST(Stribeck, ItsColumnIsThatOfTheRegressorFilter) {
   model.terms.push_back(
       {.output = 1, .parameter = last, .kind = Term::Kind::function, .scale = model.input(1, 0), .function = unlike});
   Simulation simulation(scenario);
-  RegressionStream stream(simulation, RegressorFilter(model, plain.design(), plain.measurement()));
+  TorqueRows stream(simulation, RegressorFilter(model, plain.design(), plain.measurement()));
   const RegressionBlock with_term = read_all(stream);
-  RegressionStream plain_stream(simulation, plain);
+  TorqueRows plain_stream(simulation, plain);
   const RegressionBlock rows = read_all(plain_stream);
   expect_column(StribeckRows(simulation, plain), rows, with_term.Y.col(static_cast<Eigen::Index>(last)));
 }
@@ -271,14 +271,14 @@ TEST(Stribeck, ItsColumnIsThatOfEffortsOfItsSize) {
   const RegressorFilter plain = filter_of(scenario);
   Simulation simulation(scenario);
   LogTable log = read_all(simulation);
-  RegressionStream plain_stream(simulation, plain);
+  TorqueRows plain_stream(simulation, plain);
   const RegressionBlock rows = read_all(plain_stream);
   for (const char side : {'r', 'l'}) {
     std::ranges::transform(log.column(std::string("omega_") + side), log.column(std::string("tau_") + side).begin(),
                            size_at_1_7);
   }
   TableSource of_its_size(log);
-  RegressionStream stream(of_its_size, plain);
+  TorqueRows stream(of_its_size, plain);
   const RegressionBlock friction = read_all(stream);
   expect_column(StribeckRows(simulation, plain), rows, friction.y);
 }

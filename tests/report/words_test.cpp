@@ -168,7 +168,7 @@ TEST(FailureReport, ShowsTheErrorAndTheRawSignals) {
 }
 
 TEST(DetectReport, SaysWhenAndWhereTheFirstEventCame) {
-  const CommissionedModel model = example::done().model;
+  const OnlineModel model = example::done().model;
   const std::string page = detect_report(example::detection(900, true), model, example::context(900));
   EXPECT_TRUE(example::holds(
       page, {"1 event", "first alarm came at 6.020\u00a0s in the output sum",

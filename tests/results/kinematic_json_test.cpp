@@ -25,7 +25,7 @@ Commissioning commissioned(const Scenario& s) {
   return commission(log, s.robot, options);
 }
 
-CommissionedModel there_and_back(const Commissioning& result) {
+OnlineModel there_and_back(const Commissioning& result) {
   return model_from_json(parse_json(json_text(to_json(result, {}, "test")), "model.json"), "model.json");
 }
 
@@ -57,7 +57,7 @@ TEST(KinematicJson, GivesTheDetectorBackBitForBit) {
     }
     const Commissioning result = commissioned(s);
     ASSERT_TRUE(result.model.kinematic.has_value()) << result.kinematic.message;
-    const CommissionedModel back = there_and_back(result);
+    const OnlineModel back = there_and_back(result);
     ASSERT_TRUE(back.kinematic.has_value());
     EXPECT_EQ(back.kinematic->window, result.model.kinematic->window);
     EXPECT_EQ(back.kinematic->persistence.k, 2u);

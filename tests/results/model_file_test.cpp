@@ -47,7 +47,7 @@ Commissioning commissioned(const Scenario& scenario) {
 }
 
 /// The bits of all numbers and flags of all decisions along `log`.
-std::vector<std::uint64_t> decisions(const CommissionedModel& model, const LogTable& log, DetectorOptions options) {
+std::vector<std::uint64_t> decisions(const OnlineModel& model, const LogTable& log, DetectorOptions options) {
   Detector detector = make_detector(model, options);
   std::vector<std::uint64_t> bits;
   std::vector<double> sample;
@@ -72,7 +72,7 @@ void expect_same_detector(const Scenario& scenario) {
   const Commissioning result = commissioned(scenario);
   ASSERT_FALSE(result.model.facets.empty()) << result.message;
   const std::string text = json_text(to_json(result, LogReport{}, "test"));
-  const CommissionedModel back = model_from_json(parse_json(text, "model.json"), "model.json");
+  const OnlineModel back = model_from_json(parse_json(text, "model.json"), "model.json");
 
   Scenario faulty = scenario;
   faulty.seed = 7;

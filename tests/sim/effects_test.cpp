@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 
 #include <wheelwright/filter/measurement.hpp>
-#include <wheelwright/filter/regression_stream.hpp>
+#include <wheelwright/filter/row_stream.hpp>
 #include <wheelwright/identify/least_squares.hpp>
 #include <wheelwright/model/effect_law.hpp>
 #include <wheelwright/sim/simulation.hpp>
@@ -61,7 +61,7 @@ Fit fit(const Scenario& driven, const Robot& robot) {
   Simulation log(driven);
   const Model model = make_model(robot);
   const FilterDesign design{.order = 2, .alpha = 8.0, .beta = 8.0};
-  RegressionStream rows(log, RegressorFilter(model, design, find_measurement(log, robot, model, 2)));
+  TorqueRows rows(log, RegressorFilter(model, design, find_measurement(log, robot, model, 2)));
   Fit result{least_squares(rows).estimate};
   RegressionBlock block;
   double squares = 0.0, count = 0.0;

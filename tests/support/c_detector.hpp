@@ -114,7 +114,7 @@ struct Seen {
 };
 
 /// Steps both through the same rows and counts decisions that differ in a bit.
-inline Seen compare(Detector& ours, CDetector& theirs, const std::vector<double>& t,
+inline Seen compare(TorqueDetector& ours, CDetector& theirs, const std::vector<double>& t,
                     const std::vector<double>& samples) {
   Seen seen;
   const std::size_t inputs = samples.size() / t.size();

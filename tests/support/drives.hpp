@@ -10,7 +10,7 @@
 
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/filter/measurement.hpp>
-#include <wheelwright/filter/regression_stream.hpp>
+#include <wheelwright/filter/row_stream.hpp>
 #include <wheelwright/sim/simulation.hpp>
 
 namespace wheelwright::testing_support {

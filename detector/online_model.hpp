@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// The on-line model: what a detector carries of a commissioned robot, and nothing else.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include <wheelwright/bounds/box.hpp>
+#include <wheelwright/bounds/slab_rows.hpp>
+#include <wheelwright/core/warrant.hpp>
+#include <wheelwright/detector/detector.hpp>
+#include <wheelwright/filter/measurement.hpp>
+#include <wheelwright/filter/noise.hpp>
+#include <wheelwright/filter/odometry_filter.hpp>
+#include <wheelwright/model/model.hpp>
+#include <wheelwright/model/robot.hpp>
+
+namespace wheelwright {
+
+/// What a fault-free log taught about the parameters of one residual, and when that residual raises an alarm.
+struct LearntSet {
+  Eigen::VectorXd estimate{};  ///< best guess; for a parameter that the log does not show, the Chebyshev centre's value
+  std::vector<HalfSpace> facets{};  ///< of the feasible set, p coefficients each
+  Box box{};                        ///< finite box that bounds the set (the certified hull)
+  Persistence persistence{};
+  Warrant warrant = Warrant::extrapolated;  ///< of set, hull and thresholds
+};
+
+/// The channel of the kinematic residual. The estimate is one of OdometryMeasurement::parameters().
+struct KinematicModel : LearntSet {
+  OdometryMeasurement measurement{};
+  double window = 1.0;      ///< W, s
+  OdometryErrors errors{};  ///< of the rows of driving to come
+};
+
+/// A commissioned robot as it is watched: the channel of the torque residual (the estimate is θ̂_L), and that of the
+/// kinematic residual where the log had a pose or a gyro.
+struct OnlineModel : LearntSet {
+  Robot robot{};
+  Model model{};
+  Measurement measurement{};
+  FilterDesign filter{};
+  SignalErrors errors{};  ///< dY and dy of the rows, ē included
+  std::optional<KinematicModel> kinematic{};
+  std::vector<Assumption> assumptions{};  ///< that the numbers stand on, with what the log said of each
+};
+
+/// The filter of a channel.
+[[nodiscard]] RegressorFilter make_filter(const OnlineModel& model);
+[[nodiscard]] OdometryFilter make_filter(const KinematicModel& model);
+
+/// The detector of a channel. Where `options` have no persistence it is the model's. Throws InvalidArgument for options
+/// that make no sense.
+[[nodiscard]] TorqueDetector make_detector(const OnlineModel& model, DetectorOptions options = {});
+[[nodiscard]] KinematicDetector make_detector(const KinematicModel& model, DetectorOptions options = {});
+
+/// Names and units of the outputs as a Model that has nothing else, for tables and charts.
+[[nodiscard]] Model kinematic_outputs(const KinematicModel& model);
+
+}  // namespace wheelwright

@@ -1,0 +1,263 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/robots/online_model_file.hpp>
+
+#include <algorithm>
+#include <string_view>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include <wheelwright/core/error.hpp>
+#include <wheelwright/model/robot.hpp>
+#include <wheelwright/robots/model_words.hpp>
+#include <wheelwright/robots/robot_file.hpp>
+
+namespace wheelwright {
+namespace {
+
+/// What bounds motion and efforts between samples; null where nothing does.
+void read_between_samples(const JsonPlace& place, const Model& model, SignalErrors& errors) {
+  const JsonPlace between = place.at("between_samples");
+  if (between.value().is_null()) {
+    return;
+  }
+  errors.between_samples = true;
+  MotionBound& bound = errors.motion;
+  bound.limit = vector_at(between.at("acceleration"));
+  bound.largest = vector_at(between.at("largest"));
+  bound.effort = vector_at(between.at("effort"), model.n());
+  const JsonPlace mobility = between.at("mobility");
+  const auto coordinates = static_cast<Eigen::Index>(model.coordinates.size());
+  if (mobility.size() > 0) {
+    bound.mobility.resize(coordinates, static_cast<Eigen::Index>(model.n()));
+    if (mobility.size() != model.coordinates.size()) {
+      mobility.fail("one row for each of the " + std::to_string(coordinates) + " coordinates, or none");
+    }
+    for (Eigen::Index c = 0; c < coordinates; ++c) {
+      bound.mobility.row(c) = vector_at(mobility.at(static_cast<std::size_t>(c)), model.n());
+    }
+  }
+  const auto fits = [](const Eigen::MatrixXd& values, std::size_t size) {
+    return (values.size() == 0 || static_cast<std::size_t>(values.size()) == size) && (values.array() >= 0.0).all();
+  };
+  if (!fits(bound.limit, model.coordinates.size()) || !fits(bound.mobility, model.coordinates.size() * model.n()) ||
+      !fits(bound.largest, bound.mobility.size() > 0 ? model.p() : 0) || !fits(bound.effort, model.n())) {
+    between.fail("bounds >= 0, acceleration for each coordinate, largest for each parameter where there is a mobility");
+  }
+}
+
+SignalErrors read_errors(const JsonPlace& place, const Model& model) {
+  SignalErrors errors = motion_errors_at(place, model);
+  errors.output = vector_at(place.at("output"), model.n());
+  return errors;
+}
+
+double bound_at(const JsonPlace& place) {
+  const double value = place.number();
+  if (!(value >= 0.0)) {
+    place.fail("a number >= 0");
+  }
+  return value;
+}
+
+OdometryMeasurement read_odometry(const JsonPlace& place) {
+  OdometryMeasurement m;
+  m.motion = value_of(kMotionWords, place.at("motion"));
+  m.motion_columns = place.at("motion_columns").texts();
+  m.position = place.at("position").boolean();
+  m.heading = place.at("heading").boolean();
+  m.gyro = place.at("gyro").boolean();
+  m.held_pose = place.at("held_pose").boolean();
+  m.count = place.at("count").number();
+  m.nominal_step = place.at("nominal_step").number();
+  return m;
+}
+
+/// What the numbers stand on; of a model from before it said so, what its noise tells.
+Warrant kinematic_warrant(const JsonPlace& place) {
+  const bool told = place.has("warrant") || !place.has("noise");
+  return warrant_at(place, !told && all_declared(place.at("noise")) ? Warrant::guaranteed : Warrant::extrapolated);
+}
+
+}  // namespace
+
+Warrant warrant_at(const JsonPlace& place, Warrant absent) {
+  return place.has("warrant") ? value_of(kWarrantWords, place.at("warrant")) : absent;
+}
+
+std::vector<Assumption> assumptions_at(const JsonPlace& place) {
+  std::vector<Assumption> list;
+  if (!place.has("assumptions")) {
+    return list;
+  }
+  const JsonPlace all = place.at("assumptions");
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    const JsonPlace each = all.at(k);
+    list.push_back({.id = each.at("id").text(),
+                    .statement = each.at("statement").text(),
+                    .declared_by = each.at("declared_by").text(),
+                    .test = each.at("test").text(),
+                    .verdict = value_of(kVerdictWords, each.at("verdict")),
+                    .detail = each.at("detail").text()});
+  }
+  return list;
+}
+
+FilterDesign filter_at(const JsonPlace& place) {
+  FilterDesign filter{.order = static_cast<int>(place.at("order").count()),
+                      .alpha = place.at("alpha").number(),
+                      .beta = place.at("beta").number(),
+                      .settle = place.at("settle").number()};
+  try {
+    validate(filter);
+  } catch (const InvalidArgument& error) {
+    throw InputError(place.where() + ": " + error.what());
+  }
+  return filter;
+}
+
+Measurement measurement_at(const JsonPlace& place, const Model& model, const Robot& robot) {
+  Measurement m;
+  m.motion = value_of(kMotionWords, place.at("motion"));
+  m.motion_columns = place.at("motion_columns").texts();
+  m.effort_columns = place.at("effort_columns").texts();
+  m.heading_column = place.at("heading_column").text();
+  m.hold = value_of(kHoldWords, place.at("hold"));
+  m.effort_unsigned = place.at("effort_unsigned").boolean();
+  m.count = place.at("count").number();
+  m.nominal_step = place.at("nominal_step").number();
+  m.shortest_step = place.at("shortest_step").number();
+  m.changes = robot.effort_changes;
+  m.delay = robot.effort_delay;
+  m.correction = effort_correction(robot);
+  if (m.motion_columns.size() != model.joints.size() || m.effort_columns.size() != model.joints.size()) {
+    place.fail("one motion column and one effort column for each joint of the model");
+  }
+  return m;
+}
+
+SignalErrors motion_errors_at(const JsonPlace& place, const Model& model) {
+  const auto optional_vector = [&](std::string_view key) {
+    const Eigen::VectorXd values = vector_at(place.at(key));
+    return values.size() == 0 ? values : vector_at(place.at(key), model.coordinates.size());
+  };
+  SignalErrors errors;
+  errors.acceleration = optional_vector("acceleration");
+  errors.speed = optional_vector("speed");
+  errors.speed_sample = optional_vector("speed_sample");
+  errors.joint_sample = place.at("joint_sample").number();
+  errors.heading = place.at("heading").number();
+  read_between_samples(place, model, errors);
+  return errors;
+}
+
+std::vector<HalfSpace> facets_at(const JsonPlace& place, std::size_t p) {
+  const JsonPlace a = place.at("A");
+  const Eigen::VectorXd b = vector_at(place.at("b"), a.size());
+  std::vector<HalfSpace> facets;
+  for (std::size_t k = 0; k < a.size(); ++k) {
+    facets.push_back({vector_at(a.at(k), p), b[static_cast<Eigen::Index>(k)], {}});
+  }
+  return facets;
+}
+
+Box box_at(const JsonPlace& place, std::size_t p) {
+  if (place.size() != p) {
+    place.fail("an array of " + std::to_string(p) + " intervals");
+  }
+  Box box;
+  for (std::size_t j = 0; j < p; ++j) {
+    const Eigen::VectorXd side = vector_at(place.at(j), 2);
+    if (!(side[0] <= side[1])) {
+      place.at(j).fail("[lower, upper] with lower <= upper");
+    }
+    box.sides.push_back({side[0], side[1]});
+  }
+  return box;
+}
+
+bool all_declared(const JsonPlace& noise) {
+  const JsonPlace outputs = noise.at("outputs");
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    if (value_of(kNoiseOriginWords, outputs.at(i).at("origin")) != NoiseOrigin::declared) {
+      return false;
+    }
+  }
+  return outputs.size() > 0;
+}
+
+Warrant model_warrant(const JsonPlace& root) {
+  if (root.has("warrant") || !root.has("noise")) {
+    return warrant_at(root, Warrant::extrapolated);
+  }
+  const bool worst_case = value_of(kNoiseModeWords, root.at("noise").at("mode")) == NoiseMode::worst_case;
+  return !all_declared(root.at("noise")) ? Warrant::extrapolated
+         : worst_case                    ? Warrant::guaranteed
+                                         : Warrant::statistical;
+}
+
+JsonPlace model_root(const Json& json, const std::string& file) {
+  JsonPlace root(json, file);
+  if (!root.has("schema") || root.at("schema").text() != kModelSchema) {
+    throw InputError(file + ": expected a model written by `wheelwright commission`, with \"schema\": \"" +
+                     kModelSchema + "\"");
+  }
+  return root;
+}
+
+std::optional<KinematicModel> kinematic_from_json(const JsonPlace& place) {
+  if (!place.has("detector")) {
+    return std::nullopt;
+  }
+  KinematicModel model;
+  model.measurement = read_odometry(place.at("measurement"));
+  model.window = place.at("window").number();
+  model.warrant = kinematic_warrant(place);
+  const std::size_t p = model.measurement.parameters().size(), n = model.measurement.outputs().size();
+  const JsonPlace detector = place.at("detector"), errors = detector.at("error_bounds"), set = place.at("feasible_set");
+  model.estimate = vector_at(detector.at("estimate"), p);
+  model.errors.motion = bound_at(errors.at("motion"));
+  model.errors.position = bound_at(errors.at("position"));
+  model.errors.heading = bound_at(errors.at("heading"));
+  model.errors.acceleration = bound_at(errors.at("acceleration"));
+  model.errors.yaw_gain = bound_at(errors.at("yaw_gain"));
+  model.errors.estimated = vector_at(errors.at("estimated"), n);
+  model.persistence = {detector.at("persistence").at("k").count(), detector.at("persistence").at("n").count()};
+  model.facets = facets_at(set, p);
+  model.box = box_at(set.at("hull"), p);
+  try {
+    static_cast<void>(make_filter(model));
+  } catch (const InvalidArgument& error) {
+    throw InputError(place.where() + ": " + error.what());
+  }
+  return model;
+}
+
+OnlineModel model_from_json(const Json& json, const std::string& file) {
+  const JsonPlace root = model_root(json, file);
+  if (!root.has("detector")) {
+    throw InputError(file + ": holds no model: " + root.at("message").text());
+  }
+  OnlineModel model;
+  model.robot = robot_from_json(root.at("robot").value(), root.at("robot").where());
+  model.model = make_model(model.robot);
+  const std::size_t p = model.model.p();
+  model.filter = filter_at(root.at("filter"));
+  model.measurement = measurement_at(root.at("measurement"), model.model, model.robot);
+  const JsonPlace detector = root.at("detector");
+  model.estimate = vector_at(detector.at("estimate"), p);
+  model.errors = read_errors(detector.at("error_bounds"), model.model);
+  model.persistence = {detector.at("persistence").at("k").count(), detector.at("persistence").at("n").count()};
+  model.facets = facets_at(root.at("feasible_set"), p);
+  model.box = box_at(root.at("feasible_set").at("hull"), p);
+  if (root.has("kinematic")) {
+    model.kinematic = kinematic_from_json(root.at("kinematic"));
+  }
+  model.warrant = model_warrant(root);
+  model.assumptions = assumptions_at(root);
+  return model;
+}
+
+OnlineModel read_model(const std::filesystem::path& path) { return model_from_json(read_json(path), path.string()); }
+
+}  // namespace wheelwright

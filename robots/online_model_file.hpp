@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// The on-line part of model.json, which `wheelwright commission` writes, read back.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <wheelwright/detector/online_model.hpp>
+#include <wheelwright/files/json.hpp>
+
+namespace wheelwright {
+
+/// Name of the format: the value of its key `schema`.
+inline constexpr const char* kModelSchema = "wheelwright/model/1";
+
+/// Reads the on-line part of a model.json back. Throws InputError, naming file and key, when it is no such file, when
+/// it holds no model (its status says why), or when a number is missing or impossible.
+[[nodiscard]] OnlineModel read_model(const std::filesystem::path& path);
+
+/// The same from JSON; `file` is for messages.
+[[nodiscard]] OnlineModel model_from_json(const Json& json, const std::string& file);
+
+/// Parts of model.json, for those who read more of it. All throw InputError, naming file and key.
+///
+/// The document's root, after a look at its schema.
+[[nodiscard]] JsonPlace model_root(const Json& json, const std::string& file);
+/// What the numbers of a model stand on; of a model from before it said so, what its noise tells.
+[[nodiscard]] Warrant model_warrant(const JsonPlace& root);
+/// The word of the member `warrant` of `place`; `absent` where there is none, as in files from before there was one.
+[[nodiscard]] Warrant warrant_at(const JsonPlace& place, Warrant absent);
+/// The list at the member `assumptions` of `place`; empty where there is none.
+[[nodiscard]] std::vector<Assumption> assumptions_at(const JsonPlace& place);
+[[nodiscard]] FilterDesign filter_at(const JsonPlace& place);
+[[nodiscard]] Measurement measurement_at(const JsonPlace& place, const Model& model, const Robot& robot);
+/// Bounds on the motion, those on the effort left out.
+[[nodiscard]] SignalErrors motion_errors_at(const JsonPlace& place, const Model& model);
+/// The members A and b.
+[[nodiscard]] std::vector<HalfSpace> facets_at(const JsonPlace& place, std::size_t p);
+[[nodiscard]] Box box_at(const JsonPlace& place, std::size_t p);
+/// The channel in the section `kinematic`; nothing where it holds no model.
+[[nodiscard]] std::optional<KinematicModel> kinematic_from_json(const JsonPlace& place);
+/// Whether each of the `outputs` of an object `noise` has the origin "declared", and there is one.
+[[nodiscard]] bool all_declared(const JsonPlace& noise);
+
+}  // namespace wheelwright
