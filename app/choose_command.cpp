@@ -127,7 +127,7 @@ int run(const Arguments& a) {
   Robot robot = read_robot(a.robot);
   const auto opened = open_robot_log(a.logs, robot, a.common);
   RecordedLog& log = *opened;
-  robot = with_interpolation_errors(robot, log.report());
+  robot = with_column_errors(robot, interpolation_errors(log.report()));
   require_columns(log, needed_columns(robot));
   Progress progress(a.common.quiet);
   options.trial.threads = static_cast<std::size_t>(a.common.threads);

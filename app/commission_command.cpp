@@ -52,7 +52,7 @@ int run(const Arguments& a) {
   Robot robot = read_robot(a.robot);
   const auto opened = open_robot_log(a.logs, robot, a.common);
   RecordedLog& log = *opened;
-  robot = with_interpolation_errors(robot, log.report());
+  robot = with_column_errors(robot, interpolation_errors(log.report()));
   ReportContext context = report_context(a.common, log.report(), log);
   Progress progress(a.common.quiet);
   CommissionOptions options;

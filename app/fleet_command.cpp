@@ -81,7 +81,7 @@ FleetLog log_of(const FleetListRobot& robot, const std::vector<FleetListLog>& lo
     const Robot declared = file.empty() ? *fleet : read_robot(file);
     std::unique_ptr<RecordedLog> log = open_robot_log(paths, declared, common);
     require_columns(*log, needed_columns(declared));
-    Robot robot_with_errors = with_interpolation_errors(declared, log->report());
+    Robot robot_with_errors = with_column_errors(declared, interpolation_errors(log->report()));
     return OpenedLog{std::move(log), std::move(robot_with_errors)};
   };
   return out;

@@ -142,7 +142,7 @@ int run(const Arguments& a) {
   RecordedLog& log = *opened;
   const auto baseline = a.baseline.empty() ? nullptr : open_robot_log(a.baseline, robot, a.common);
   RecordedLog* const healthy = baseline.get();
-  robot = with_interpolation_errors(robot, log.report());
+  robot = with_column_errors(robot, interpolation_errors(log.report()));
   ReportContext context = report_context(a.common, log.report(), log);
   context.seeds = {{"permutations, bootstrap and search", a.common.seed}};
   Progress progress(a.common.quiet);

@@ -7,7 +7,7 @@
 
 #include <wheelwright/files/json.hpp>
 #include <wheelwright/logs/csv.hpp>
-#include <wheelwright/robots/scenario_file.hpp>
+#include <wheelwright/results/scenario_file.hpp>
 #include <wheelwright/sim/simulation.hpp>
 
 #include "commands.hpp"

@@ -5,6 +5,8 @@ include(CMakePackageConfigHelpers)
 set(WHEELWRIGHT_CMAKE_DIR ${CMAKE_INSTALL_LIBDIR}/cmake/Wheelwright)
 install(EXPORT WheelwrightTargets NAMESPACE Wheelwright:: DESTINATION ${WHEELWRIGHT_CMAKE_DIR}
   COMPONENT development)
+get_property(WHEELWRIGHT_INSTALLED_ROOMS GLOBAL PROPERTY WHEELWRIGHT_ROOMS)
+list(TRANSFORM WHEELWRIGHT_INSTALLED_ROOMS REPLACE "^wheelwright_" "")
 configure_package_config_file(cmake/WheelwrightConfig.cmake.in ${CMAKE_BINARY_DIR}/WheelwrightConfig.cmake
   INSTALL_DESTINATION ${WHEELWRIGHT_CMAKE_DIR})
 # Below 1.0 a minor version may change the interface.

@@ -23,26 +23,22 @@ constexpr double kMuchUnexplained = 0.2;  // residual over effort, root mean squ
 std::vector<OutputNoise> output_noise(const Setting& s, const Fit& fit, const ExtrapolationOptions& options) {
   std::vector<OutputNoise> noise(s.model.n());
   for (std::size_t i = 0; i < noise.size(); ++i) {
-    OutputNoise& o = noise[i];
+    const auto at = static_cast<Eigen::Index>(i);
     if (s.noise_complete) {
-      o.origin = NoiseOrigin::declared;
-      o.learning = o.bound = s.declared.output[static_cast<Eigen::Index>(i)];
+      noise[i].origin = NoiseOrigin::declared;
+      noise[i].learning = noise[i].bound = s.declared.output[at];
     } else {
-      o.how = extrapolate(fit.residuals.outputs[i], fit.residuals.instants, options);
-      o.learning = fit.plausible[static_cast<Eigen::Index>(i)];
-      o.bound = std::max(o.how.bound, o.learning);
+      noise[i] = estimated_noise(fit.residuals.outputs[i], fit.residuals.instants, fit.plausible[at], options);
     }
   }
   return noise;
 }
 
-enum class For { learning, driving };
-
-SignalErrors with_noise(const Setting& s, const std::vector<OutputNoise>& noise, For use) {
+SignalErrors with_noise(const Setting& s, const std::vector<OutputNoise>& noise, RowUse use) {
   SignalErrors errors = s.declared;
   errors.output.resize(static_cast<Eigen::Index>(noise.size()));
   for (std::size_t i = 0; i < noise.size(); ++i) {
-    errors.output[static_cast<Eigen::Index>(i)] = use == For::learning ? noise[i].learning : noise[i].bound;
+    errors.output[static_cast<Eigen::Index>(i)] = use == RowUse::learning ? noise[i].learning : noise[i].bound;
   }
   return errors;
 }
@@ -113,44 +109,35 @@ Bounded refined_set(LogSource& log, const Setting& s, Part part, SignalErrors er
   return best;
 }
 
-// The feasible set; where an *estimated* bound is too small for the prior box (θ̂ may lie outside it), it is raised to
-// just above the minimax fit.
+// The feasible set; where estimated bounds are too small for the prior box (θ̂ may lie outside it), they are raised.
 Bounded bounded_set(LogSource& log, const Setting& s, Part part, std::vector<OutputNoise>& noise, std::size_t outliers,
                     std::vector<std::string>& notes) {
-  double raised = 1.0;
-  for (int attempt = 0;; ++attempt) {
-    Bounded bounded = refined_set(log, s, part, with_noise(s, noise, For::learning), outliers);
-    bounded.raised = raised;
+  const auto set_with = [&](const std::vector<OutputNoise>& bounds) {
+    return refined_set(log, s, part, with_noise(s, bounds, RowUse::learning), outliers);
+  };
+  const auto told = [&](Bounded bounded) {
     if (!bounded.result.dropped.empty()) {
       notes.push_back(fmt::format("{} instants were left out of the feasible set as outliers (at rows {})",
                                   bounded.result.dropped.size(), fmt::join(bounded.result.dropped, ", ")));
     }
-    if (bounded.result.set.status == FeasibleSet::Status::nonempty || s.noise_complete || attempt > 0) {
-      return bounded;
-    }
-    MinimaxOptions options;
-    for (const OutputNoise& o : noise) {
-      options.weights.push_back(std::max(o.learning, std::numeric_limits<double>::min()));
-    }
-    TorqueRows bare = make_rows(log, s, s.declared);
-    FoldedSource bare_folded(bare, part, s.survey.rows, s.folds);
-    const double factor = raised = noise_that_leaves_a_set(minimax_fit(bare_folded, s.prior, options), [&](double by) {
-      std::vector<OutputNoise> more = noise;
-      for (OutputNoise& o : more) {
-        o.learning *= by;
-      }
-      return refined_set(log, s, part, with_noise(s, more, For::learning), outliers).result.set.status ==
-             FeasibleSet::Status::nonempty;
-    });
-    notes.push_back(
-        fmt::format("the estimated noise bound was raised by {:.3g}: within the prior box no parameters "
-                    "explain the log with less",
-                    factor));
-    for (OutputNoise& o : noise) {
-      o.learning *= factor;
-      o.bound = std::max(o.bound, o.learning);
-    }
+    return bounded;
+  };
+  Bounded first = told(set_with(noise));
+  if (first.result.set.status == FeasibleSet::Status::nonempty || s.noise_complete) {
+    return first;
   }
+  TorqueRows bare = make_rows(log, s, s.declared);
+  FoldedSource bare_folded(bare, part, s.survey.rows, s.folds);
+  const double factor = raise_until_explained(noise, bare_folded, s.prior, [&](const std::vector<OutputNoise>& more) {
+    return set_with(more).result.set.status == FeasibleSet::Status::nonempty;
+  });
+  notes.push_back(
+      fmt::format("the estimated noise bound was raised by {:.3g}: within the prior box no parameters "
+                  "explain the log with less",
+                  factor));
+  Bounded raised = told(set_with(noise));
+  raised.raised = factor;
+  return raised;
 }
 
 // By how much the efforts' bounds of `empty` must be raised for a set, up to kClose. The minimax fit of its rows does not say:
@@ -159,7 +146,7 @@ double needed_noise(LogSource& log, const Setting& s, const Commissioning& empty
   constexpr double kClose = 5e-4, kApart = 1.3;
   constexpr int kMost = 40;
   const auto explained = [&](double factor) {
-    SignalErrors errors = with_noise(s, empty.noise, For::learning);
+    SignalErrors errors = with_noise(s, empty.noise, RowUse::learning);
     errors.output *= factor;
     errors.motion.effort *= factor;
     return refined_set(log, s, Part::everything, std::move(errors), outliers).result.set.status ==
@@ -186,16 +173,6 @@ double needed_noise(LogSource& log, const Setting& s, const Commissioning& empty
     (explained(middle) ? upper : lower) = middle;
   }
   return upper;
-}
-
-Eigen::VectorXd best_guess(const Fit& fit, const Polytope& set) {
-  Eigen::VectorXd guess = fit.estimate;
-  for (std::size_t j = 0; j < fit.excitation.size(); ++j) {
-    if (fit.excitation[j].state == Excitation::not_excited) {
-      guess[static_cast<Eigen::Index>(j)] = set.chebyshev_centre()[j];
-    }
-  }
-  return guess;
 }
 
 std::vector<RowOrigin> binding(const CertifiedBound& bound) {
@@ -255,9 +232,9 @@ OnlineModel described_model(const Setting& s, Persistence persistence) {
 
 void finish_model(OnlineModel& model, const Setting& s, const std::vector<OutputNoise>& noise, const Fit& fit,
                   const FeasibleSet& set, const MotionBound& motion) {
-  model.errors = with_noise(s, noise, For::driving);
+  model.errors = with_noise(s, noise, RowUse::driving);
   model.errors.motion = motion;
-  model.estimate = best_guess(fit, *set.polytope);
+  model.estimate = best_guess(fit.estimate, fit.excitation, *set.polytope);
   model.facets = set.polytope->facets();
   model.box = set.hull;
 }
@@ -464,7 +441,7 @@ Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionO
   result.dropped = std::move(bounded.result.dropped);
   result.earlier = std::move(bounded.earlier);
   result.prior = s.prior;
-  result.row_errors = with_noise(s, result.noise, For::learning);
+  result.row_errors = with_noise(s, result.noise, RowUse::learning);
   result.row_errors.motion = bounded.learning;
   result.parameters = parameter_results(s, fit, result.feasible);
   describe_assumptions(s, result);
@@ -498,11 +475,12 @@ Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionO
   const Bounded learnt = bounded_set(log, s, Part::training, noise, options.outliers, unused);
   const FeasibleSet& set = learnt.result.set;
   if (set.status == FeasibleSet::Status::nonempty) {
-    SignalErrors errors = with_noise(s, noise, For::driving);
+    SignalErrors errors = with_noise(s, noise, RowUse::driving);
     errors.motion = learnt.driving;
     TorqueRows unseen = make_rows(log, s, errors);
     FoldedSource held_out(unseen, Part::held_out, s.survey.rows, s.folds);
-    result.validation = validate_on(held_out, ThresholdRule(*set.polytope, best_guess(trained, *set.polytope)));
+    result.validation = validate_on(
+        held_out, ThresholdRule(*set.polytope, best_guess(trained.estimate, trained.excitation, *set.polytope)));
     result.polytope_over_box = 0.0;
     for (const OutputValidation& v : result.validation) {
       const double ratio = v.median_width_box > 0.0 ? v.median_width / v.median_width_box : 1.0;

@@ -166,4 +166,14 @@ Fit fit_log(LogSource& log, const Setting& s, Part part, double risk) {
   return fit;
 }
 
+Eigen::VectorXd best_guess(Eigen::VectorXd estimate, const std::vector<ExcitationFinding>& excitation,
+                           const Polytope& set) {
+  for (std::size_t j = 0; j < excitation.size(); ++j) {
+    if (excitation[j].state == Excitation::not_excited) {
+      estimate[static_cast<Eigen::Index>(j)] = set.chebyshev_centre()[j];
+    }
+  }
+  return estimate;
+}
+
 }  // namespace wheelwright

@@ -7,6 +7,7 @@
 
 #include <Eigen/Core>
 
+#include <wheelwright/bounds/polytope.hpp>
 #include <wheelwright/commission/setting.hpp>
 #include <wheelwright/commission/validation.hpp>
 #include <wheelwright/identify/estimator_choice.hpp>
@@ -35,5 +36,9 @@ struct Fit {
 
 /// Moments of `part` of `log`: with the commanded motion as instruments where it is logged.
 [[nodiscard]] RegressionMoments log_moments(LogSource& log, const Setting& setting, Part part);
+
+/// `estimate`, with the Chebyshev centre's value for each parameter that the log does not show.
+[[nodiscard]] Eigen::VectorXd best_guess(Eigen::VectorXd estimate, const std::vector<ExcitationFinding>& excitation,
+                                         const Polytope& set);
 
 }  // namespace wheelwright

@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/bounds/minimax.hpp>
+#include <wheelwright/commission/fit.hpp>
 #include <wheelwright/commission/noise_budget.hpp>
 #include <wheelwright/commission/pose_origin.hpp>
 #include <wheelwright/core/check.hpp>
@@ -37,7 +37,7 @@ struct Frame {
   std::size_t log_rows = 0;
 };
 
-struct Fit {
+struct OdometryFit {
   LeastSquaresFit squares;
   ResidualSummary residuals;
   std::vector<ExcitationFinding> excitation;
@@ -117,14 +117,12 @@ OdometryRows make_rows(const Frame& s, const OdometryErrors& errors) {
   return {*s.log, OdometryFilter(s.measurement, s.window, errors)};
 }
 
-enum class Purpose { learning, driving };
-
-OdometryErrors with_noise(const Frame& s, const std::vector<OutputNoise>& noise, Purpose use) {
+OdometryErrors with_noise(const Frame& s, const std::vector<OutputNoise>& noise, RowUse use) {
   Eigen::VectorXd estimated = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(noise.size()));
   for (std::size_t i = 0; i < noise.size(); ++i) {
     if (noise[i].origin == NoiseOrigin::estimated) {
       estimated[static_cast<Eigen::Index>(i)] =
-          std::max(use == Purpose::learning ? noise[i].learning : noise[i].bound, std::numeric_limits<double>::min());
+          std::max(use == RowUse::learning ? noise[i].learning : noise[i].bound, std::numeric_limits<double>::min());
     }
   }
   OdometryErrors errors = s.declared;
@@ -147,10 +145,10 @@ Eigen::VectorXd weights_of(const ResidualSummary& residuals) {
 
 // Least squares, weighted once more by its own residuals; parameters that the log does not show are held at their nominal
 // values, which the rows are measured from.
-std::optional<Fit> fit_rows(const Frame& s, Part part, double risk) {
+std::optional<OdometryFit> fit_rows(const Frame& s, Part part, double risk) {
   OdometryRows stream = make_rows(s, s.declared);
   FoldedSource rows(stream, part, s.log_rows, s.folds);
-  Fit fit;
+  OdometryFit fit;
   Eigen::VectorXd weights = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(rows.outputs()));
   for (int pass = 0; pass < 2; ++pass) {
     LeastSquares squares(rows.parameters(), weights);
@@ -191,7 +189,7 @@ std::optional<Fit> fit_rows(const Frame& s, Part part, double risk) {
 
 // A robot whose wheels slip in every turn (skid steer) is far from its geometry: sides of the prior box that least squares
 // leaves are moved outward until they hold it, with the same share to spare. Returns the names of these parameters.
-std::vector<std::string> widen(Frame& s, const Fit& fit, double share) {
+std::vector<std::string> widen(Frame& s, const OdometryFit& fit, double share) {
   std::vector<std::string> widened;
   const auto names = s.measurement.parameters();
   for (std::size_t j = 0; j < names.size(); ++j) {
@@ -209,63 +207,40 @@ std::vector<std::string> widen(Frame& s, const Fit& fit, double share) {
   return widened;
 }
 
-std::vector<OutputNoise> output_noise(const Frame& s, const Fit& fit) {
+std::vector<OutputNoise> output_noise(const Frame& s, const OdometryFit& fit) {
   std::vector<OutputNoise> noise(s.is_declared.size());
   for (std::size_t i = 0; i < noise.size(); ++i) {
-    OutputNoise& o = noise[i];
     if (s.is_declared[i]) {
-      o.origin = NoiseOrigin::declared;
-      continue;
+      noise[i].origin = NoiseOrigin::declared;
+    } else {
+      noise[i] = estimated_noise(fit.residuals.outputs[i], fit.residuals.instants,
+                                 fit.plausible[static_cast<Eigen::Index>(i)], s.extrapolation);
     }
-    o.how = extrapolate(fit.residuals.outputs[i], fit.residuals.instants, s.extrapolation);
-    o.learning = fit.plausible[static_cast<Eigen::Index>(i)];
-    o.bound = std::max(o.how.bound, o.learning);
   }
   return noise;
 }
 
-// The feasible set; an estimated bound that is too small for the prior box is raised to just above the minimax fit.
-BoundedSet bounded_set(const Frame& s, Part part, std::vector<OutputNoise>& noise) {
-  const bool all_estimated =
-      std::ranges::all_of(noise, [](const OutputNoise& o) { return o.origin == NoiseOrigin::estimated; });
-  BoundedSet result;
-  for (int attempt = 0;; ++attempt) {
-    OdometryRows stream = make_rows(s, with_noise(s, noise, Purpose::learning));
-    FoldedSource rows(stream, part, s.log_rows, s.folds);
-    result.set = feasible_set(rows, s.prior);
-    if (result.set.status == FeasibleSet::Status::nonempty || !all_estimated || attempt > 0) {
-      return result;
-    }
-    MinimaxOptions options;
-    for (const OutputNoise& o : noise) {
-      options.weights.push_back(std::max(o.learning, std::numeric_limits<double>::min()));
-    }
-    OdometryRows bare = make_rows(s, {});
-    FoldedSource bare_rows(bare, part, s.log_rows, s.folds);
-    result.raise = noise_that_leaves_a_set(minimax_fit(bare_rows, s.prior, options), [&](double by) {
-      std::vector<OutputNoise> more = noise;
-      for (OutputNoise& o : more) {
-        o.learning *= by;
-      }
-      OdometryRows louder = make_rows(s, with_noise(s, more, Purpose::learning));
-      FoldedSource all(louder, part, s.log_rows, s.folds);
-      return feasible_set(all, s.prior).status == FeasibleSet::Status::nonempty;
-    });
-    for (OutputNoise& o : noise) {
-      o.learning *= result.raise;
-      o.bound = std::max(o.bound, o.learning);
-    }
-  }
+FeasibleSet set_of(const Frame& s, Part part, const std::vector<OutputNoise>& noise) {
+  OdometryRows stream = make_rows(s, with_noise(s, noise, RowUse::learning));
+  FoldedSource rows(stream, part, s.log_rows, s.folds);
+  return feasible_set(rows, s.prior);
 }
 
-Eigen::VectorXd best_guess(const Fit& fit, const Polytope& set) {
-  Eigen::VectorXd guess = fit.squares.estimate;
-  for (std::size_t j = 0; j < fit.excitation.size(); ++j) {
-    if (fit.excitation[j].state == Excitation::not_excited) {
-      guess[static_cast<Eigen::Index>(j)] = set.chebyshev_centre()[j];
-    }
+// The feasible set; bounds that are too small for the prior box are raised, where all are estimated.
+BoundedSet bounded_set(const Frame& s, Part part, std::vector<OutputNoise>& noise) {
+  BoundedSet result{set_of(s, part, noise)};
+  const bool all_estimated = std::ranges::count(noise, NoiseOrigin::estimated, &OutputNoise::origin) ==
+                             static_cast<std::ptrdiff_t>(noise.size());
+  if (result.set.status == FeasibleSet::Status::nonempty || !all_estimated) {
+    return result;
   }
-  return guess;
+  OdometryRows bare = make_rows(s, {});
+  FoldedSource bare_rows(bare, part, s.log_rows, s.folds);
+  result.raise = raise_until_explained(noise, bare_rows, s.prior, [&](const std::vector<OutputNoise>& more) {
+    return set_of(s, part, more).status == FeasibleSet::Status::nonempty;
+  });
+  result.set = set_of(s, part, noise);
+  return result;
 }
 
 // A declared bound differs from row to row: the largest is told.
@@ -285,7 +260,7 @@ void tell_declared(const Frame& s, const Eigen::VectorXd& theta, std::vector<Out
   }
 }
 
-std::vector<KinematicParameter> parameters_of(const Frame& s, const Fit& fit, const Box& hull) {
+std::vector<KinematicParameter> parameters_of(const Frame& s, const OdometryFit& fit, const Box& hull) {
   const auto names = s.measurement.parameters(), units = s.measurement.parameter_units();
   std::vector<KinematicParameter> all;
   for (std::size_t j = 0; j < names.size(); ++j) {
@@ -354,9 +329,10 @@ void validate_held_out(const Frame& s, KinematicCommissioning& result) {
   if (set.status != FeasibleSet::Status::nonempty) {
     return;
   }
-  OdometryRows unseen = make_rows(s, with_noise(s, noise, Purpose::driving));
+  OdometryRows unseen = make_rows(s, with_noise(s, noise, RowUse::driving));
   FoldedSource held_out(unseen, Part::held_out, s.log_rows, s.folds);
-  result.validation = validate_on(held_out, ThresholdRule(*set.polytope, best_guess(*fit, *set.polytope)));
+  result.validation = validate_on(
+      held_out, ThresholdRule(*set.polytope, best_guess(fit->squares.estimate, fit->excitation, *set.polytope)));
 }
 
 }  // namespace
@@ -418,13 +394,13 @@ KinematicCommissioning commission_kinematics(LogSource& log, const Robot& robot,
       result.parameters, [](const KinematicParameter& p) { return p.excitation == Excitation::not_excited; });
   result.status = partial ? Status::partial : Status::done;
   const Polytope& set = *bounded.set.polytope;
-  result.model = KinematicModel{{.estimate = best_guess(*fit, set),
+  result.model = KinematicModel{{.estimate = best_guess(fit->squares.estimate, fit->excitation, set),
                                  .facets = set.facets(),
                                  .box = bounded.set.hull,
                                  .persistence = options.persistence},
                                 s.measurement,
                                 s.window,
-                                with_noise(s, result.noise, Purpose::driving)};
+                                with_noise(s, result.noise, RowUse::driving)};
   tell_declared(s, result.model->estimate, result.noise);
   validate_held_out(s, result);
   result.message = message_of(s, result) + (origin.sentence.empty() ? "" : "; " + origin.sentence);

@@ -3,9 +3,39 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 namespace wheelwright {
+
+OutputNoise estimated_noise(const OutputResidual& residual, std::size_t instants, double plausible,
+                            const ExtrapolationOptions& options) {
+  OutputNoise noise;
+  noise.how = extrapolate(residual, instants, options);
+  noise.learning = plausible;
+  noise.bound = std::max(noise.how.bound, plausible);
+  return noise;
+}
+
+double raise_until_explained(std::vector<OutputNoise>& noise, RegressionSource& rows, const Box& prior,
+                             const std::function<bool(const std::vector<OutputNoise>&)>& explained) {
+  MinimaxOptions options;
+  for (const OutputNoise& o : noise) {
+    options.weights.push_back(std::max(o.learning, std::numeric_limits<double>::min()));
+  }
+  const double factor = noise_that_leaves_a_set(minimax_fit(rows, prior, options), [&](double by) {
+    std::vector<OutputNoise> more = noise;
+    for (OutputNoise& o : more) {
+      o.learning *= by;
+    }
+    return explained(more);
+  });
+  for (OutputNoise& o : noise) {
+    o.learning *= factor;
+    o.bound = std::max(o.bound, o.learning);
+  }
+  return factor;
+}
 
 double noise_that_leaves_a_set(const MinimaxFit& fit, const std::function<bool(double)>& leaves_a_set) {
   constexpr double kAbove = 1.05;

@@ -9,10 +9,13 @@
 
 #include <Eigen/Core>
 
+#include <wheelwright/bounds/box.hpp>
 #include <wheelwright/bounds/minimax.hpp>
+#include <wheelwright/core/regression.hpp>
 #include <wheelwright/core/warrant.hpp>
 #include <wheelwright/filter/measurement.hpp>
 #include <wheelwright/filter/noise.hpp>
+#include <wheelwright/identify/least_squares.hpp>
 #include <wheelwright/identify/noise_level.hpp>
 #include <wheelwright/model/model.hpp>
 #include <wheelwright/model/robot.hpp>
@@ -28,6 +31,20 @@ struct OutputNoise {
   ExtrapolatedBound how;  ///< how `bound` came about, meaningful where estimated
   Warrant warrant = Warrant::extrapolated;  ///< of both bounds
 };
+
+/// Whether rows are those of the log that bounds were learnt from, or of driving to come.
+enum class RowUse { learning, driving };
+
+/// The bound of an output that is estimated: `how` from what its residual was, never below `plausible`, the largest error
+/// that the rows of the log can hold.
+[[nodiscard]] OutputNoise estimated_noise(const OutputResidual& residual, std::size_t instants, double plausible,
+                                          const ExtrapolationOptions& options);
+
+/// Raises estimated bounds that leave no set in `prior`, to just above the minimax fit of `rows` (which have none of them),
+/// and returns the factor. Where that fit did not converge the factor is bisected between what it proved, by `explained`:
+/// whether bounds leave a set.
+double raise_until_explained(std::vector<OutputNoise>& noise, RegressionSource& rows, const Box& prior,
+                             const std::function<bool(const std::vector<OutputNoise>&)>& explained);
 
 /// The factor by which estimated bounds must grow for a set to be left, and a little more. `fit`, in units of the bounds,
 /// tells it where it converged; else it is bisected between what `fit` proved, by `leaves_a_set`.

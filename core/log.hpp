@@ -107,4 +107,10 @@ class JoinedSource final : public LogSource {
 /// Reads all of `source` (from its beginning) into a table.
 [[nodiscard]] LogTable read_all(LogSource& source);
 
+/// A bound on an error of one column of a log, in its unit.
+struct ColumnError {
+  std::string column;
+  double bound = 0.0;
+};
+
 }  // namespace wheelwright

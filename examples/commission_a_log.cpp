@@ -14,7 +14,7 @@
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/commission/detector_walk.hpp>
 #include <wheelwright/commission/physical.hpp>
-#include <wheelwright/robots/scenario_file.hpp>
+#include <wheelwright/results/scenario_file.hpp>
 #include <wheelwright/sim/simulation.hpp>
 
 using namespace wheelwright;

@@ -14,7 +14,7 @@
 #include <fmt/format.h>
 
 #include <wheelwright/commission/commission.hpp>
-#include <wheelwright/robots/scenario_file.hpp>
+#include <wheelwright/results/scenario_file.hpp>
 #include <wheelwright/sim/simulation.hpp>
 
 namespace {

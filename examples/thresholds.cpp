@@ -16,7 +16,7 @@
 
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/filter/row_stream.hpp>
-#include <wheelwright/robots/scenario_file.hpp>
+#include <wheelwright/results/scenario_file.hpp>
 #include <wheelwright/sim/simulation.hpp>
 
 using namespace wheelwright;

@@ -11,6 +11,16 @@
 
 namespace wheelwright {
 
+std::vector<ColumnError> interpolation_errors(const LogReport& report) {
+  std::vector<ColumnError> errors;
+  for (const LogFileReport& file : report.files) {
+    for (const Interpolation& of : file.interpolated) {
+      errors.push_back({of.column, of.error});
+    }
+  }
+  return errors;
+}
+
 std::vector<std::string> sentences(const LogReport& report) {
   std::vector<std::string> out;
   const auto say = [&](const Occurrences& met, std::string_view one, std::string_view many, std::string_view rest) {

@@ -66,6 +66,9 @@ struct LogReport {
   [[nodiscard]] bool clean() const { return rows == rows_read; }
 };
 
+/// The interpolation errors of all columns of all files.
+[[nodiscard]] std::vector<ColumnError> interpolation_errors(const LogReport& report);
+
 /// The repairs of `report` in words, one sentence each, with count and first place; empty where there were none.
 [[nodiscard]] std::vector<std::string> sentences(const LogReport& report);
 

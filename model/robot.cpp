@@ -187,4 +187,30 @@ PriorBox prior_box(const Robot& robot, const Model& model) {
   return box;
 }
 
+Robot with_column_errors(Robot robot, const std::vector<ColumnError>& errors) {
+  const SensorNoise declared = robot.noise;
+  for (const ColumnError& of : errors) {
+    const auto widen = [&](NoiseBound SensorNoise::*kind) {
+      if (const std::optional<double> bound = (declared.*kind).value) {
+        double& widened = *(robot.noise.*kind).value;
+        widened = std::max(widened, *bound + of.bound);
+      }
+    };
+    const std::string& name = of.column;
+    if (name.starts_with("omega") || name == "velocity") {
+      widen(&SensorNoise::wheel_speed);
+    } else if (name.starts_with("phi")) {
+      widen(&SensorNoise::wheel_angle);
+    } else if (name.starts_with("tau") || name.starts_with("current") || name.starts_with("voltage") ||
+               name == "effort") {
+      widen(&SensorNoise::effort);
+    } else if (name == "x" || name == "y" || name == "position") {
+      widen(&SensorNoise::position);
+    } else if (name == "theta") {
+      widen(&SensorNoise::heading);
+    }
+  }
+  return robot;
+}
+
 }  // namespace wheelwright

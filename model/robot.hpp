@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <wheelwright/core/interval.hpp>
+#include <wheelwright/core/log.hpp>
 #include <wheelwright/model/model.hpp>
 
 namespace wheelwright {
@@ -129,5 +130,9 @@ struct PriorBox {
   std::vector<bool> declared;    ///< whether the bound came from the robot file
 };
 [[nodiscard]] PriorBox prior_box(const Robot& robot, const Model& model);
+
+/// The robot with `errors` (of interpolated columns) added to the noise bounds that it declares, the largest of each kind;
+/// an estimated bound sees them in the log itself.
+[[nodiscard]] Robot with_column_errors(Robot robot, const std::vector<ColumnError>& errors);
 
 }  // namespace wheelwright

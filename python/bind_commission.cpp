@@ -45,7 +45,7 @@ std::unique_ptr<CommissionObject> run(LogObject& log, const RobotObject& robot, 
     WatchedLog source(*log.source, work);
     auto out = std::make_unique<CommissionObject>();
     out->result = std::make_shared<const Commissioning>(
-        commission(source, with_interpolation_errors(robot.robot, log.source->report()), options));
+        commission(source, with_column_errors(robot.robot, interpolation_errors(log.source->report())), options));
     out->data = log.source->report();
     const auto p = static_cast<Eigen::Index>(out->result->parameters.size());
     out->estimate = out->standard_error = out->lower = out->upper = Eigen::VectorXd(p);

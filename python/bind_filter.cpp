@@ -47,7 +47,8 @@ std::unique_ptr<RegressionObject> filtered(LogObject& log, const RobotObject& ro
       require_columns(*log.source, app::needed_columns(robot.robot));
       SettingOptions options;
       options.progress = work.teller();
-      const Setting setting = settle(source, with_interpolation_errors(robot.robot, log.source->report()), options);
+      const Setting setting =
+          settle(source, with_column_errors(robot.robot, interpolation_errors(log.source->report())), options);
       TorqueRows stream = make_rows(source, setting, setting.declared);
       out->rows = read_all(stream);
       out->model = setting.model;
@@ -118,7 +119,7 @@ std::unique_ptr<IdentificationObject> identify_log(LogObject& log, const RobotOb
     }
     WatchedLog source(*log.source, work);
     auto out = std::make_unique<IdentificationObject>();
-    out->result = identify(source, with_interpolation_errors(robot.robot, given.report()), options);
+    out->result = identify(source, with_column_errors(robot.robot, interpolation_errors(given.report())), options);
     out->data = log.source->report();
     out->seed = seed;
     return out;

@@ -72,7 +72,7 @@ std::shared_ptr<DiagnosisObject> gap(LogObject& log, const RobotObject& robot, L
   return work.run([&] {
     const std::vector<std::string> needed = app::needed_columns(robot.robot);
     const LogWalk walk(log);
-    const Robot measured = with_interpolation_errors(robot.robot, log.source->report());
+    const Robot measured = with_column_errors(robot.robot, interpolation_errors(log.source->report()));
     require_columns(*log.source, needed);
     WatchedLog source(*log.source, work);
     std::optional<LogWalk> healthy_walk;

@@ -12,7 +12,7 @@
 #include <wheelwright/design/detection.hpp>
 #include <wheelwright/design/manoeuvre.hpp>
 #include <wheelwright/design/stages.hpp>
-#include <wheelwright/robots/scenario_file.hpp>
+#include <wheelwright/results/scenario_file.hpp>
 #include <wheelwright/sim/simulation.hpp>
 
 #include "../app/common.hpp"

@@ -14,8 +14,8 @@
 #include <wheelwright/files/yaml_place.hpp>
 #include <wheelwright/logs/log_file.hpp>
 #include <wheelwright/results/model_json.hpp>
+#include <wheelwright/results/scenario_file.hpp>
 #include <wheelwright/robots/robot_file.hpp>
-#include <wheelwright/robots/scenario_file.hpp>
 
 namespace wheelwright {
 namespace {
@@ -120,7 +120,7 @@ struct StudyReader {
         log->fail("at least one log");
       }
       const std::unique_ptr<RecordedLog> opened = open_log(paths, {});
-      subject.robot = with_interpolation_errors(subject.robot, opened->report());
+      subject.robot = with_column_errors(subject.robot, interpolation_errors(opened->report()));
       subject.log = std::make_shared<const LogTable>(read_all(*opened));
     }
   }

@@ -267,34 +267,6 @@ Robot robot_from_json(const Json& object, const std::string& where) {
   return read_from(YamlPlace::parse(json_text(object), where, false));
 }
 
-Robot with_interpolation_errors(Robot robot, const LogReport& report) {
-  const SensorNoise declared = robot.noise;
-  for (const LogFileReport& file : report.files) {
-    for (const Interpolation& of : file.interpolated) {
-      const auto widen = [&](NoiseBound SensorNoise::*kind) {
-        if (const std::optional<double> bound = (declared.*kind).value) {
-          double& widened = *(robot.noise.*kind).value;
-          widened = std::max(widened, *bound + of.error);
-        }
-      };
-      const std::string& name = of.column;
-      if (name.starts_with("omega") || name == "velocity") {
-        widen(&SensorNoise::wheel_speed);
-      } else if (name.starts_with("phi")) {
-        widen(&SensorNoise::wheel_angle);
-      } else if (name.starts_with("tau") || name.starts_with("current") || name.starts_with("voltage") ||
-                 name == "effort") {
-        widen(&SensorNoise::effort);
-      } else if (name == "x" || name == "y" || name == "position") {
-        widen(&SensorNoise::position);
-      } else if (name == "theta") {
-        widen(&SensorNoise::heading);
-      }
-    }
-  }
-  return robot;
-}
-
 namespace {
 
 Json noise_bound(const NoiseBound& bound) { return bound.value ? Json(*bound.value) : Json("estimate"); }

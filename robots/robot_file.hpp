@@ -8,7 +8,6 @@
 #include <string_view>
 
 #include <wheelwright/files/json.hpp>
-#include <wheelwright/logs/recorded_log.hpp>
 #include <wheelwright/model/robot.hpp>
 
 namespace wheelwright {
@@ -46,9 +45,5 @@ void write_robot(const std::filesystem::path& path, const Robot& robot);
 /// The Robot of such an object. `where` ("model.json: /robot") is for messages; InputError as read_robot, without
 /// lines.
 [[nodiscard]] Robot robot_from_json(const Json& object, const std::string& where);
-
-/// The robot with the interpolation errors of `report` (LogFileReport::interpolated) added to the noise bounds that it
-/// declares; an estimated bound sees them in the log itself.
-[[nodiscard]] Robot with_interpolation_errors(Robot robot, const LogReport& report);
 
 }  // namespace wheelwright

@@ -146,6 +146,27 @@ def check_links(room, relative, text, report):
             report(relative, number, f"{room}/ may not use {other}")
 
 
+def public_headers(root):
+    """room -> headers that its CMakeLists.txt installs; rooms without any are not in it."""
+    headers = {}
+    for room in HOUSE:
+        path = root / room / "CMakeLists.txt"
+        if path.is_file():
+            for listed in re.findall(r"\bHEADERS\s+((?:[\w.]+\.hpp\s*)+)", path.read_text(encoding="utf-8")):
+                headers.setdefault(room, set()).update(listed.split())
+    return headers
+
+
+def check_private(room, relative, text, public, report):
+    """Headers that are not installed are their own room's; tests and benchmarks may look into every room."""
+    if room in ("tests", "bench", "tools"):
+        return
+    for number, line in enumerate(text.splitlines(), 1):
+        ours = re.match(r'^\s*#\s*include\s*<wheelwright/(\w+)/([\w.]+)>', line)
+        if ours and ours.group(1) in public and ours.group(1) != room and ours.group(2) not in public[ours.group(1)]:
+            report(relative, number, f"{ours.group(1)}/{ours.group(2)} is private to its room")
+
+
 def check_types(relative, text, types, report):
     for match in TYPE.finditer(without_comments(text)):
         name = match.group(1) or match.group(2)
@@ -158,6 +179,7 @@ def check_types(relative, text, types, report):
 def check(root):
     findings = []
     types = {}
+    public = public_headers(Path(root))
     report = lambda path, line, message: findings.append(f"{path}:{line}: {message}")
     for path in files(root):
         relative = path.relative_to(root)
@@ -178,6 +200,7 @@ def check(root):
                 report(relative, number, f"names {named.group(0)}, a path of one machine")
         if path.suffix in (".hpp", ".cpp"):
             check_code(room, relative, text, report)
+            check_private(room, relative, text, public, report)
         if path.suffix == ".hpp" and room in HOUSE:
             check_types(relative, text, types, report)
         if path.name == "CMakeLists.txt" and room in MAY_INCLUDE:
@@ -195,14 +218,16 @@ def self_test():
         "inference/robust.cpp": spdx + "#include <ceres/ceres.h>\n",
         "study/work_on_ranks.cpp": spdx + "#include <chrono>\n#include <mpi.h>\n",
         "detector/CMakeLists.txt": "# SPDX-License-Identifier: Apache-2.0\nwheelwright_room(detector\n  USES core filter\n  LINK x)\n",
+        "filter/CMakeLists.txt": "# SPDX-License-Identifier: Apache-2.0\nwheelwright_room(filter\n  HEADERS a.hpp\n    b.hpp\n  SOURCES c.cpp)\n",
         "docs/framework.md": "framework/works on http://host/working and a/" + "work\n",
     }
     violations = {
-        "upward include": ("bounds/x.hpp", head + "#include <wheelwright/filter/f.hpp>\n"),
+        "upward include": ("bounds/x.hpp", head + "#include <wheelwright/filter/b.hpp>\n"),
         "commission in identify": ("identify/x.cpp", spdx + "#include <wheelwright/commission/s.hpp>\n"),
         "roof in a door": ("logs/x.cpp", spdx + "#include <wheelwright/report/s.hpp>\n"),
         "door in report": ("report/x.cpp", spdx + "#include <wheelwright/robots/s.hpp>\n"),
-        "linked upwards": ("filter/CMakeLists.txt", "# SPDX-License-Identifier: Apache-2.0\nwheelwright_room(filter\n  USES core bounds)\n"),
+        "private header": ("detector/y.cpp", spdx + "#include <wheelwright/filter/b.hpp>\n#include <wheelwright/filter/c.hpp>\n"),
+        "linked upwards": ("identify/CMakeLists.txt", "# SPDX-License-Identifier: Apache-2.0\nwheelwright_room(identify\n  USES core bounds)\n"),
         "file opened": ("commission/x.cpp", spdx + "#include <fstream>\n"),
         "printing": ("filter/x.cpp", spdx + "void f() { std::cout << 1; }\n"),
         "clock": ("identify/x.cpp", spdx + "#include <chrono>\n"),

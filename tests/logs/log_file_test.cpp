@@ -204,7 +204,7 @@ TEST_F(TwoTopics, OtherTopicsComeToTheTimesOfTheWheelsWithinTheirBound) {
 
   Robot robot;
   robot.noise.position.value = 0.002;
-  const Robot widened = with_interpolation_errors(robot, report);
+  const Robot widened = with_column_errors(robot, interpolation_errors(report));
   EXPECT_DOUBLE_EQ(*widened.noise.position.value, 0.002 + bound);
   EXPECT_FALSE(widened.noise.heading.value) << "an estimate stays one";
 }

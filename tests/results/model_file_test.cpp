@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/results/model_file.hpp>
-#include <wheelwright/robots/scenario_file.hpp>
+#include <wheelwright/results/scenario_file.hpp>
 #include <wheelwright/sim/simulation.hpp>
 
 #include "support/scratch.hpp"

@@ -6,8 +6,8 @@
 
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/model/effect_law.hpp>
+#include <wheelwright/results/scenario_file.hpp>
 #include <wheelwright/robots/robot_file.hpp>
-#include <wheelwright/robots/scenario_file.hpp>
 
 namespace wheelwright::effects_file_test {
 namespace {
