@@ -8,7 +8,7 @@
 #include <numeric>
 #include <utility>
 
-#include <Eigen/LU>
+#include <Eigen/Core>
 
 namespace wheelwright {
 namespace {

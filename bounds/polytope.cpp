@@ -9,7 +9,7 @@
 #include <random>
 #include <unordered_map>
 
-#include <Eigen/LU>
+#include <Eigen/Core>
 
 #include <wheelwright/bounds/block_parts.hpp>
 #include <wheelwright/bounds/certificate.hpp>

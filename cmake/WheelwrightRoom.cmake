@@ -5,8 +5,8 @@
 # One target per room: wheelwright_NAME, alias Wheelwright::NAME. Headers are seen as <wheelwright/NAME/x.hpp>
 # through one symbolic link per room in the build tree, which is also the base of the installed FILE_SET. FOLDER is for a
 # part of a room that has a target of its own, since it links what the rest should not: its headers are the room's.
-# PROGRAM_ONLY serves our own programs and is not installed. WORDS says and writes what others found: in a release it is
-# optimised for the time of compilation (wheelwright_words), but for the sources named after HOT.
+# PROGRAM_ONLY serves our own programs and is not installed. In a release WORDS, which says and writes what others found, is
+# optimised for the time of compilation (-O1), other rooms at -O2, and the sources named after HOT at -O3.
 
 # Of what names none: the rooms are `development`.
 set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME program)
@@ -40,8 +40,10 @@ function(wheelwright_room name)
     target_compile_options(${target} PRIVATE ${WHEELWRIGHT_WARNINGS} -ffp-contract=off)
     if(ROOM_WORDS)
       wheelwright_words(${target})
-      set_source_files_properties(${ROOM_HOT} PROPERTIES COMPILE_OPTIONS $<$<CONFIG:Release>:-O3>)
+    else()
+      target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O2>)
     endif()
+    set_source_files_properties(${ROOM_HOT} PROPERTIES COMPILE_OPTIONS $<$<CONFIG:Release>:-O3>)
   else()
     set(scope INTERFACE)
     add_library(${target} INTERFACE)

@@ -6,8 +6,8 @@
 set -eu
 cd "$(dirname "$0")/.."
 
-tools/setup.sh
-tools/build.sh release wheelwright
+tools/setup.sh program
+tools/build.sh program wheelwright
 program=build/bin/wheelwright
 mkdir -p out
 

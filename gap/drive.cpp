@@ -8,7 +8,7 @@
 #include <optional>
 #include <utility>
 
-#include <Eigen/LU>
+#include <Eigen/Core>
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/linear_algebra.hpp>

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include <Eigen/LU>
+#include <Eigen/Core>
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/linear_algebra.hpp>

@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include <Eigen/LU>
+#include <Eigen/Core>
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/linear_algebra.hpp>

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <Eigen/QR>
+#include <Eigen/Core>
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/limits.hpp>
@@ -27,7 +27,7 @@ struct ActiveSet {
     if (free.empty()) {
       return {};
     }
-    const auto qr = E(Eigen::all, free).colPivHouseholderQr();
+    const PivotedQr qr(E(Eigen::all, free));
     return qr.rank() == static_cast<Eigen::Index>(free.size()) ? qr.solve(f) : Eigen::VectorXd();
   }
 
@@ -151,7 +151,7 @@ struct Equality {
   Equality(const Scaled& s, const Eigen::MatrixXd& A, const Eigen::VectorXd& b) {
     const Eigen::Index p = s.R.cols(), m = A.rows();
     if (m == 0) {
-      x = s.R.colPivHouseholderQr().solve(s.c);
+      x = least_squares_solution(s.R, s.c);
       multiplier.resize(0);
       return;
     }

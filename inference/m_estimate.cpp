@@ -6,8 +6,6 @@
 #include <limits>
 
 #include <ceres/ceres.h>
-#include <Eigen/Eigenvalues>
-#include <Eigen/QR>
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/limits.hpp>

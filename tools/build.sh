@@ -9,15 +9,18 @@ cd "$(dirname "$0")/.."
 preset=${1:?usage: tools/build.sh PRESET [TARGET...]}
 shift
 
+# The program alone and everything share a directory: what the one has built the other need not. Everything stays.
 case $preset in
-  release) directory=build ;;
+  program | release) directory=build ;;
   *) directory=build-$preset ;;
 esac
+configured=$(cat "$directory/preset" 2>/dev/null || true)
 if command -v ccache >/dev/null; then
   export CMAKE_CXX_COMPILER_LAUNCHER="${CMAKE_CXX_COMPILER_LAUNCHER-ccache}"
 fi
-if [ ! -f "$directory/build.ninja" ]; then
+if [ ! -f "$directory/build.ninja" ] || { [ "$preset" != "$configured" ] && [ "$preset" != program ]; }; then
   cmake --preset "$preset"
+  echo "$preset" > "$directory/preset"
 fi
 jobs=$(nproc 2>/dev/null || echo 2)
 if [ $# -gt 0 ]; then

@@ -31,6 +31,7 @@ USES = {
     "documentation": "This documentation",
     "packaging": "Packages",
 }
+PROGRAM = ("library", "program", "report", "build")  # of what the first command installs
 DISTRIBUTED = ("library", "program", "report", "python")
 LINKED = {"headers": "headers, compiled in", "static": "statically", "shared": "dynamically", "embedded": "embedded", "run": "run, not linked"}
 # Ours, or part of the C library.
@@ -85,11 +86,16 @@ def cmake_files(root):
 
 
 def setup_packages(text):
-    """Debian packages of tools/setup.sh by option; "" is what it always installs."""
-    packages = {"": set(re.search(r'^packages="([^"]*)"', text, re.M).group(1).split())}
-    for option, words in re.findall(r'^\s*(--\w+)\) packages="\$packages ([^"]*)"', text, re.M):
+    """Debian packages of tools/setup.sh by option: those of the program, what "" adds to them, and an option to that."""
+    listed = lambda variable: set(re.search(rf'^{variable}="([^"]*)"', text, re.M).group(1).split())
+    packages = {"program": listed("packages"), "": listed("everything")}
+    for option, words in re.findall(r'^\s*(--\w+)\) everything="\$everything ([^"]*)"', text, re.M):
         packages[option] = set(words.split())
     return packages
+
+
+def setup_option(entry):
+    return entry.get("setup", "program" if entry["use"] in PROGRAM and not entry.get("optional") else "")
 
 
 def complaints(dependencies, in_library, in_build, setup, npm, page):
@@ -112,8 +118,8 @@ def complaints(dependencies, in_library, in_build, setup, npm, page):
         return out
     compare("cmake/WheelwrightDependencies.cmake", names(lambda entry: entry["use"] == "library"), in_library)
     compare("the build", names(lambda entry: True), in_build)
-    for option in sorted(set(setup) | {entry.get("setup", "") for entry in dependencies}):
-        listed = {name for entry in dependencies if entry.get("setup", "") == option for name in entry.get("packages", [])}
+    for option in sorted(set(setup) | {setup_option(entry) for entry in dependencies}):
+        listed = {name for entry in dependencies if setup_option(entry) == option for name in entry.get("packages", [])}
         compare(f"tools/setup.sh {option}".strip(), listed, setup.get(option, set()))
     compare("package.json", {f"{entry['npm']} {entry['version']}" for entry in dependencies if "npm" in entry},
             {f"{name} {version}" for name, version in npm.items()})
@@ -176,15 +182,15 @@ def gather(root):
 def self_test():
     assert named_in_cmake("find_package(A 3 REQUIRED)\n# find_package(B)\npkg_check_modules(C REQUIRED IMPORTED_TARGET c>=2)\n"
                           "find_library(D_LIBRARY d)\n") == {"A", "pkg:c", "d"}
-    assert setup_packages('packages="a b\n  c"\ncase x in\n  --ci) packages="$packages d" ;;\n') == {
-        "": {"a", "b", "c"}, "--ci": {"d"}}
+    assert setup_packages('packages="a b\n  c"\neverything="e"\ncase x in\n  --ci) everything="$everything d" ;;\n') == {
+        "program": {"a", "b", "c"}, "": {"e"}, "--ci": {"d"}}
     good = [{"name": "A", "packages": ["a"], "cmake": ["A"], "licence": "MIT", "version": "1", "use": "library",
              "linked": "headers", "for": "nothing"},
             {"name": "U", "npm": "u", "licence": "MIT", "version": "2", "use": "report", "linked": "embedded", "for": "charts"}]
     page = markdown(good)
-    right = (good, {"A"}, {"A"}, {"": {"a"}}, {"u": "2"}, page)
+    right = (good, {"A"}, {"A"}, {"program": {"a"}}, {"u": "2"}, page)
     assert complaints(*right) == []
-    for k, wrong in enumerate([good[:1], {"A", "B"}, set(), {"": {"a", "b"}}, {"u": "3"}, page + " "]):
+    for k, wrong in enumerate([good[:1], {"A", "B"}, set(), {"program": {"a", "b"}}, {"u": "3"}, page + " "]):
         assert complaints(*right[:k], wrong, *right[k + 1:]) != [], k
     assert complaints([{**good[0], "licence": "MIT", "use": "fun"}, good[1]], *right[1:]) != []
     assert [component["name"] for component in bill_of_materials(good, "0")["components"]] == ["A", "U"]

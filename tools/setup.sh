@@ -1,34 +1,37 @@
 #!/bin/sh
 # SPDX-License-Identifier: Apache-2.0
 #
-# Installs what the build needs and is not there yet. The second run does nothing.
+# Installs what is asked for and is not there yet. The second run does nothing.
 #
-#   tools/setup.sh         Debian packages for the program and the tests, and uPlot from npm
-#   tools/setup.sh --ci    the same and clang-format, clang-tidy and clang, which continuous integration uses, and what some
-#                          tests need that are skipped elsewhere: a browser, shells, man (half a minute, nearly all of it
-#                          Chromium's)
+#   tools/setup.sh program  Debian packages for the program, and uPlot from npm
+#   tools/setup.sh          the same and what tests, benchmarks, Python and the independent world need
+#   tools/setup.sh --ci     the same and clang-format, clang-tidy and clang, which continuous integration uses, and what some
+#                           tests need that are skipped elsewhere: a browser, shells, man (half a minute, nearly all of it
+#                           Chromium's)
 #   tools/setup.sh --docs, tools/setup.sh --packages
-#                          the same and what tools/docs.sh, tools/package.sh and tools/check_package.sh need
+#                           the same as without and what tools/docs.sh, tools/package.sh and tools/check_package.sh need
 set -eu
 cd "$(dirname "$0")/.."
 
-packages="g++ cmake ninja-build pkg-config python3
+packages="g++ cmake ninja-build pkg-config
   libeigen3-dev libfmt-dev libyaml-cpp-dev nlohmann-json3-dev zlib1g-dev libzstd-dev liblz4-dev libboost-dev
   libsqlite3-dev libfastcdr-dev libhdf5-dev libtinyxml2-dev
-  libceres-dev libnlopt-cxx-dev libnlopt-dev coinor-libclp-dev libtbb-dev
-  libopenmpi-dev openmpi-bin
-  libcli11-dev
+  libceres-dev libnlopt-cxx-dev libnlopt-dev libtbb-dev
+  libcli11-dev"
+everything="libopenmpi-dev openmpi-bin
   libgtest-dev libgmock-dev python3-jsonschema
-  libglpk-dev liblapack-dev libqsopt-ex-dev libmujoco-dev
-  pybind11-dev python3-dev python3-numpy"
+  coinor-libclp-dev libglpk-dev liblapack-dev libqsopt-ex-dev libmujoco-dev
+  pybind11-dev python3 python3-dev python3-numpy"
 case "${1:-}" in
+  program) everything= ;;
   '') ;;
-  --ci) packages="$packages clang clang-format clang-tidy python3-mypy python3-matplotlib
+  --ci) everything="$everything clang clang-format clang-tidy python3-mypy python3-matplotlib
     chromium zsh fish man-db groff-base" ;;
-  --docs) packages="$packages python3-sphinx python3-myst-parser python3-sphinxcontrib.bibtex doxygen graphviz" ;;
-  --packages) packages="$packages dpkg-dev file fakeroot lintian debootstrap" ;;
-  *) echo "usage: tools/setup.sh [--ci | --docs | --packages]" >&2; exit 2 ;;
+  --docs) everything="$everything python3-sphinx python3-myst-parser python3-sphinxcontrib.bibtex doxygen graphviz" ;;
+  --packages) everything="$everything dpkg-dev file fakeroot lintian debootstrap" ;;
+  *) echo "usage: tools/setup.sh [program | --ci | --docs | --packages]" >&2; exit 2 ;;
 esac
+packages="$packages $everything"
 
 # install PACKAGE...: the ones that dpkg does not have.
 install() {
