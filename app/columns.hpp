@@ -9,8 +9,8 @@
 
 namespace wheelwright::app {
 
-/// UTF-8 `text` filled with blanks to `width` columns, one blank at least where it is longer. Columns count what is seen: a
-/// dash is one column and three bytes.
+/// UTF-8 `text` filled with blanks to `width` columns, one blank at least where it is longer. Columns count what is
+/// seen: a dash is one column and three bytes.
 [[nodiscard]] inline std::string padded(std::string text, std::size_t width) {
   const auto columns = static_cast<std::size_t>(
       std::count_if(text.begin(), text.end(), [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));

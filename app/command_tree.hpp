@@ -55,8 +55,8 @@ struct ProgramWords {
 /// The first sentence of a description without its end: "Looks for faults in a log with a commissioned model".
 [[nodiscard]] std::string first_sentence(const std::string& description);
 
-/// What a user meant who gave `words` (without the program's name): "did you mean '--model' instead of '--modle'?"; empty where
-/// every word that begins with -- is an option and the first other one a command.
+/// What a user meant who gave `words` (without the program's name): "did you mean '--model' instead of '--modle'?";
+/// empty where every word that begins with -- is an option and the first other one a command.
 [[nodiscard]] std::string suggestion(const ProgramWords& program, const std::vector<std::string>& words);
 
 }  // namespace wheelwright::app

@@ -12,8 +12,9 @@
 
 namespace wheelwright::app {
 
-/// The result as JSON, schema "wheelwright/design/1": limits and their use, θ as believed, and bounds in the units of θ_L
-/// (promised; of the model, where there is one; of the figure eight, where there is one), with the physical half widths.
+/// The result as JSON, schema "wheelwright/design/1": limits and their use, θ as believed, and bounds in the units of
+/// θ_L (promised; of the model, where there is one; of the figure eight, where there is one), with the physical half
+/// widths.
 [[nodiscard]] Json to_json(const BoundsDesign& design, const DesignSubject& subject, const MotionLimits& limits);
 
 /// The result for a terminal.

@@ -14,10 +14,10 @@
 namespace wheelwright::app {
 
 /// Reads CSV rows from `in` until its end and writes an event to `out` at the instant its alarm is raised: a line of
-/// text, or with `json` one JSON object a line. A row that cannot be used is told on standard error and left out. Returns
-/// kDone, kNo where there was an event, or kBadInput where the torque residual was not decided at any row, with the reason
-/// on standard error. The kinematic residual is watched with `options` where the model and the rows have it; on
-/// standard error it is said when the rows lack its columns.
+/// text, or with `json` one JSON object a line. A row that cannot be used is told on standard error and left out.
+/// Returns kDone, kNo where there was an event, or kBadInput where the torque residual was not decided at any row, with
+/// the reason on standard error. The kinematic residual is watched with `options` where the model and the rows have it;
+/// on standard error it is said when the rows lack its columns.
 ExitCode follow(std::istream& in, std::ostream& out, TorqueDetector detector, const OnlineModel& model,
                 const DetectorOptions& options, const CsvOptions& reader, bool json);
 

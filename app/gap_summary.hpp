@@ -22,7 +22,8 @@ struct GapResults {
   std::vector<std::string> naive_effects;  ///< what it said
 };
 
-/// Verdict, causes with their intervals, what the healthy log had already, how far the gap shrinks, and what to do next.
+/// Verdict, causes with their intervals, what the healthy log had already, how far the gap shrinks, and what to do
+/// next.
 [[nodiscard]] std::string summary(const Diagnosis& diagnosis, const GapResults& results);
 
 }  // namespace wheelwright::app

@@ -22,8 +22,8 @@ struct NextDrive {
 
 /// Designs the drive for the credible set of `diagnosis`, the first few members of it: each fitted to the log again, of
 /// the robot and options that diagnosed it. Limits are those of the robot file; where it has none, what the log itself
-/// drove: speeds, accelerations, and with a pose the distance from the start. Four fifths of the effort are planned with, for
-/// the controller to have the rest. It lasts a third of the log, between 20 and 60 s.
+/// drove: speeds, accelerations, and with a pose the distance from the start. Four fifths of the effort are planned
+/// with, for the controller to have the rest. It lasts a third of the log, between 20 and 60 s.
 [[nodiscard]] NextDrive next_drive(LogSource& log, LogSource* baseline, const Robot& robot, const Diagnosis& diagnosis,
                                    const DiagnoseOptions& options);
 
@@ -31,8 +31,8 @@ struct NextDrive {
 [[nodiscard]] NextDrive what_next(LogSource& log, LogSource* baseline, const Robot& robot, Diagnosis& diagnosis,
                                   const DiagnoseOptions& options);
 
-/// `text` with every name of an effect in it said in words: "dry friction with a delay of the torque" for "coulomb + delay".
-/// What stands in backticks is for a file, and stays.
+/// `text` with every name of an effect in it said in words: "dry friction with a delay of the torque" for "coulomb +
+/// delay". What stands in backticks is for a file, and stays.
 [[nodiscard]] std::string in_words(std::string text, const std::vector<Effect>& catalogue);
 
 }  // namespace wheelwright::app

@@ -9,8 +9,8 @@
 
 namespace wheelwright::app {
 
-/// "  40 %  identifying (12 s, about 18 s left)": `seconds` have passed at the share [0, 1] of the work. What is left is told from
-/// a twentieth of the work and 2 s on: seconds·(1 − share)/share.
+/// "  40 %  identifying (12 s, about 18 s left)": `seconds` have passed at the share [0, 1] of the work. What is left
+/// is told from a twentieth of the work and 2 s on: seconds·(1 − share)/share.
 [[nodiscard]] std::string progress_line(std::string_view stage, double share, double seconds);
 
 /// One line that is rewritten, without colours; nothing where standard error is no terminal that can rewrite a line

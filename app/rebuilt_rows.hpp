@@ -15,8 +15,8 @@ namespace wheelwright::app {
 /// The rows of the log's regression that the claims of a model name, filtered again with the claimed filter and errors.
 class RebuiltRows {
  public:
-  /// Walks `log` once; keeps the named instants only. `claims` must outlive it. Throws InvalidArgument when the log lacks
-  /// a column.
+  /// Walks `log` once; keeps the named instants only. `claims` must outlive it. Throws InvalidArgument when the log
+  /// lacks a column.
   RebuiltRows(const ModelClaims& claims, LogSource& log);
 
   /// Whether a column is noisy and `box` leaves the sign of its parameter open: the rows then depend on the box.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The many items of a command: on threads, as one shard of several, or on the ranks of MPI, with results that outlive the
-/// process.
+/// The many items of a command: on threads, as one shard of several, or on the ranks of MPI, with results that outlive
+/// the process.
 #pragma once
 
 #include <cstddef>
@@ -33,7 +33,8 @@ struct ItemsToRun {
   Work work;
   /// StoredItems::key of each item. Messages name items by the beginning of their keys: begin with a name.
   std::function<std::string(std::size_t item)> key;
-  /// What every result depends on; run_items() adds the program's version. No option that changes no result (threads, shard).
+  /// What every result depends on; run_items() adds the program's version. No option that changes no result (threads,
+  /// shard).
   StoredPlan plan;
 };
 
@@ -45,10 +46,10 @@ struct ItemsRun {
   RunCount count = {};
 };
 
-/// Evaluates the items that are not in OUT/results.sqlite yet, on `common.threads` threads, and where mpirun started the
-/// program, on all its processes: rank 0 has the results. With --shard only the shard's, into OUT/shard-I-of-N.sqlite; says
-/// on standard output what was done. With --merge none: takes over all OUT/shard-*-of-*.sqlite. Without --out the results
-/// are gone with the process.
+/// Evaluates the items that are not in OUT/results.sqlite yet, on `common.threads` threads, and where mpirun started
+/// the program, on all its processes: rank 0 has the results. With --shard only the shard's, into
+/// OUT/shard-I-of-N.sqlite; says on standard output what was done. With --merge none: takes over all
+/// OUT/shard-*-of-*.sqlite. Without --out the results are gone with the process.
 ///
 /// Throws what an item throws; InputError as SqliteResults does, for options that do not go together, and where --merge
 /// leaves items missing: the message names them and the shards that evaluate them.

@@ -28,7 +28,8 @@ struct KinematicWatch {
 [[nodiscard]] KinematicWatch watch_kinematics(LogSource& log, const OnlineModel& model, const DetectorOptions& options,
                                               const DetectionOptions& detection = {});
 
-/// `model` with the outputs of its kinematic model in the place of its own, for summary, event_line, to_json and reports.
+/// `model` with the outputs of its kinematic model in the place of its own, for summary, event_line, to_json and
+/// reports.
 [[nodiscard]] OnlineModel with_kinematic_outputs(const OnlineModel& model);
 
 /// What the kinematic residual showed, for a terminal.
@@ -43,7 +44,8 @@ void add_kinematic(Json& detection, const KinematicWatch& watch, const OnlineMod
 /// Adds what its first events are isolated to to a detection as JSON, before add_kinematic().
 void add_isolation(Json& detection, const std::vector<Isolation>& isolations);
 
-/// Why a detector of `model` decided at no instant of `rows` rows with the median step `step` (s), with what to do about it.
+/// Why a detector of `model` decided at no instant of `rows` rows with the median step `step` (s), with what to do
+/// about it.
 [[nodiscard]] std::string why_undecided(const OnlineModel& model, std::size_t rows, double step);
 
 /// One event in a line.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The on-line detector: a whole step in C++ and as exported C, with the box and with the polytope, next to the same filter
-// with constant thresholds; the support function from the table next to the walk, and a threshold made of it.
+// The on-line detector: a whole step in C++ and as exported C, with the box and with the polytope, next to the same
+// filter with constant thresholds; the support function from the table next to the walk, and a threshold made of it.
 #include <dlfcn.h>
 
 #include <bit>

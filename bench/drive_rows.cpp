@@ -83,7 +83,8 @@ Instant instant(double v1, double v2, double heading) {
             0.0, 0.0}}};
 }
 
-/// Uniform on [−1, 1] with an exponential autocorrelation: an autoregressive Gaussian through its distribution function.
+/// Uniform on [−1, 1] with an exponential autocorrelation: an autoregressive Gaussian through its distribution
+/// function.
 class Coloured {
  public:
   explicit Coloured(std::uint64_t seed) : generator_(seed) {}

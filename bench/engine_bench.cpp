@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The engine of bounds/ against what an able user of CLP or GLPK would write (lp_peers.hpp), on rows of a simulated drive.
-// Answers are compared before times are: the certified hull must contain the peer's, and be no wider than its tolerance.
+// The engine of bounds/ against what an able user of CLP or GLPK would write (lp_peers.hpp), on rows of a simulated
+// drive. Answers are compared before times are: the certified hull must contain the peer's, and be no wider than its
+// tolerance.
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -167,8 +168,8 @@ std::vector<Measurement> walks() {
             walk, [&] { theirs = peer(along); }, 3);
         for (std::size_t k = 0; k < 2 * n; ++k) {
           const double width = theirs[k] + theirs[(k + n) % (2 * n)];
-          // Ours is a proved upper bound: it may be above a peer's value by rounding, and below by what the peer is wrong
-          // (its tolerance is absolute, and with noise u the set is tiny).
+          // Ours is a proved upper bound: it may be above a peer's value by rounding, and below by what the peer is
+          // wrong (its tolerance is absolute, and with noise u the set is tiny).
           if (!(ours[k] - theirs[k] <= 1e-6 * width)) {
             throw Error(
                 fmt::format("walk: direction {} is off by {:.3g} of the width", k, (ours[k] - theirs[k]) / width));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The whole gap diagnosis of a simulated drive with a healthy baseline log, next to what one would write first: least
-// squares by Eigen's QR on every row, for every effect at every shape and every pair, with random ten-fold cross-validation.
+// squares by Eigen's QR on every row, for every effect at every shape and every pair, with random ten-fold
+// cross-validation.
 #include <algorithm>
 #include <chrono>
 #include <cmath>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Least squares by moments, with its covariance, and instrumental variables, at p = 8 on a million rows in memory: next to
-// a bare read of the same numbers, and to LAPACK's dgels (to which its copy of the matrix, which it destroys, is charged).
+// Least squares by moments, with its covariance, and instrumental variables, at p = 8 on a million rows in memory: next
+// to a bare read of the same numbers, and to LAPACK's dgels (to which its copy of the matrix, which it destroys, is
+// charged).
 #include <cmath>
 #include <cstdint>
 #include <random>

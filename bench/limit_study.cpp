@@ -4,13 +4,13 @@
 ///
 /// Commissions on the first half of every log with the filter of first and of second order, asks along the second half
 /// for the smallest radius fault (both wheels shrink) that is certain to raise an alarm within 0.3, 1 and 3 s, and
-/// for the smallest that any test on the same raw samples could be certain of with the same feasible set. Prints one line
-/// of a Markdown table for each robot and order: medians over onsets.
+/// for the smallest that any test on the same raw samples could be certain of with the same feasible set. Prints one
+/// line of a Markdown table for each robot and order: medians over onsets.
 ///
 ///     wheelwright-limit [--simulated N] [--onsets N] [--before SECONDS] [DIR ...]
 ///
-/// DIR holds one directory per robot with robot.yaml and baseline.csv.gz. Simulated robots: seeds 1 to N; their noise is
-/// declared, and the raw samples obey the declared bounds. Where noise is not declared, an angle is wrong by half a
+/// DIR holds one directory per robot with robot.yaml and baseline.csv.gz. Simulated robots: seeds 1 to N; their noise
+/// is declared, and the raw samples obey the declared bounds. Where noise is not declared, an angle is wrong by half a
 /// count, and an effort by the bound that would give the commissioned ē through the filter in the worst case, were it
 /// the only error: the smallest over the outputs.
 #include <algorithm>

@@ -15,8 +15,8 @@ struct Violation {
   double amount = 0.0;  ///< |c − a·x| − 1
 };
 
-/// For each of the points (p numbers each, one after the other): the most violated of the n rows |c − a·x| <= 1, at most
-/// `most` of them, in no particular order, none violated by less than `tolerance`. `a` is p blocks of n; p <= 12.
+/// For each of the points (p numbers each, one after the other): the most violated of the n rows |c − a·x| <= 1, at
+/// most `most` of them, in no particular order, none violated by less than `tolerance`. `a` is p blocks of n; p <= 12.
 void most_violated(const double* a, const double* c, std::size_t n, std::size_t p, std::span<const double> points,
                    std::size_t most, double tolerance, std::vector<std::vector<Violation>>& found);
 

@@ -4,9 +4,9 @@
 ///
 /// Every function here *builds* a peer from the rows: it scales them and loads them into the library. What it returns
 /// *solves*: it can be called any number of times, begins without a basis each time, and returns the answer and nothing
-/// else. The two can so be timed apart. All peers get the rows in the same scaling (ScaledRows). Forms and algorithms are
-/// the fastest of those tried with N = 1e4 to 1e6 rows and p = 8. No answer is certified. Solving throws Error where a
-/// library does not reach an optimum. Peers refer to nothing of their arguments.
+/// else. The two can so be timed apart. All peers get the rows in the same scaling (ScaledRows). Forms and algorithms
+/// are the fastest of those tried with N = 1e4 to 1e6 rows and p = 8. No answer is certified. Solving throws Error
+/// where a library does not reach an optimum. Peers refer to nothing of their arguments.
 #pragma once
 
 #include <cstddef>

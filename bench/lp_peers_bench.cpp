@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The peers of bounds/ alone, next to a bare read of the columns: how long an able user of CLP or GLPK waits. Before any
-// time is taken, all of them have to agree on small problems.
+// The peers of bounds/ alone, next to a bare read of the columns: how long an able user of CLP or GLPK waits. Before
+// any time is taken, all of them have to agree on small problems.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>

@@ -3,9 +3,9 @@
 //
 //   wheelwright-noisy-speeds [SEEDS]     default 200
 //
-// A robot of 20 kg drives 60 s with multi-sines under feedback that does not see the noise; speeds are logged at 200 Hz with
-// white noise of 2 or 10 mm/s in v1 (and as much at the wheels' rims in turning), wheel torques with noise of 0.02 N·m,
-// white or autoregressive (0.98 a sample). First-order filter, β = 10 1/s. The robot file declares no noise.
+// A robot of 20 kg drives 60 s with multi-sines under feedback that does not see the noise; speeds are logged at 200 Hz
+// with white noise of 2 or 10 mm/s in v1 (and as much at the wheels' rims in turning), wheel torques with noise of 0.02
+// N·m, white or autoregressive (0.98 a sample). First-order filter, β = 10 1/s. The robot file declares no noise.
 #include <algorithm>
 #include <cmath>
 #include <cstdint>

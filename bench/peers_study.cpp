@@ -4,10 +4,10 @@
 /// limits were chosen in hindsight so that they raise no false alarm on the very logs of the study?
 ///
 /// Random robots drive gently, variedly and hard, in two regimes: parameters uncertain by 20 % (another θ in the box in
-/// every drive), and commissioned from a rich log. The first pass walks fault-free drives, and finds every peer's limits:
-/// the largest value it ever had, per robot, class of driving and output. The fault-free twins of all faulty drives are
-/// among them. The second breaks the robots, by multiples of the size that is certain for half of all onsets within 1 s.
-/// Prints Markdown.
+/// every drive), and commissioned from a rich log. The first pass walks fault-free drives, and finds every peer's
+/// limits: the largest value it ever had, per robot, class of driving and output. The fault-free twins of all faulty
+/// drives are among them. The second breaks the robots, by multiples of the size that is certain for half of all onsets
+/// within 1 s. Prints Markdown.
 ///
 ///     wheelwright-peers [--samples N] [--seed S] [--robots R] [--runs K]
 #include <algorithm>

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // mpirun -n RANKS wheelwright-ranks-load ITEMS BYTES MICROSECONDS THREADS [FILE]
 //
-// The load of the coordinator of run_work_on_ranks(): ITEMS items that sleep MICROSECONDS and have results of BYTES bytes,
-// on THREADS threads a rank, into memory or a store in FILE. Since items sleep, the processor time of a rank is that of
-// sharing out; rank 0's per item says how many items a second it can serve.
+// The load of the coordinator of run_work_on_ranks(): ITEMS items that sleep MICROSECONDS and have results of BYTES
+// bytes, on THREADS threads a rank, into memory or a store in FILE. Since items sleep, the processor time of a rank is
+// that of sharing out; rank 0's per item says how many items a second it can serve.
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>

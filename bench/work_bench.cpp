@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What sharing out costs an item that costs nothing, and what keeping a result costs against a file that is flushed behind
-// each (which survives a kill, too, but finds nothing again).
+// What sharing out costs an item that costs nothing, and what keeping a result costs against a file that is flushed
+// behind each (which survives a kill, too, but finds nothing again).
 #include <cstddef>
 #include <cstdio>
 #include <memory>

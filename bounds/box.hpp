@@ -33,8 +33,8 @@ struct Box {
       sum += term;
       magnitude += std::abs(term);
     }
-    // Rounding of p products and p sums is at most (p + 1)·2⁻⁵³·Σ|term| plus an underflow each (Higham 2002, section 3.1);
-    // eight times that covers the rounding of the bound itself.
+    // Rounding of p products and p sums is at most (p + 1)·2⁻⁵³·Σ|term| plus an underflow each (Higham 2002, section
+    // 3.1); eight times that covers the rounding of the bound itself.
     constexpr double epsilon = std::numeric_limits<double>::epsilon();
     const double p = static_cast<double>(sides.size());
     return magnitude == 0.0 && is_zero(a)

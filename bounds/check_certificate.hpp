@@ -2,9 +2,9 @@
 /// \file
 /// The checker of certificates: whether multipliers prove a bound, in exact rational arithmetic.
 ///
-/// Whoever doubts a certificate need trust nothing but this file and Boost.Multiprecision: no solver takes part, nothing
-/// is rounded before the comparison, every double is the rational number that it is. For any λ >= 0 and any θ in the
-/// box with row·θ <= b for every row (Neumaier and Shcherbina 2004; Farkas where a = 0),
+/// Whoever doubts a certificate need trust nothing but this file and Boost.Multiprecision: no solver takes part,
+/// nothing is rounded before the comparison, every double is the rational number that it is. For any λ >= 0 and any θ
+/// in the box with row·θ <= b for every row (Neumaier and Shcherbina 2004; Farkas where a = 0),
 ///
 ///     a·θ <= λ·b + Σ_j max { r_j θ_j : θ_j in side j },   r = a − Aᵀλ,
 ///

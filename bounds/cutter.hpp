@@ -23,10 +23,10 @@ struct CutterOptions {
 /// { θ in prior : all rows }, held as a product over independent blocks of parameters, with the few half-spaces of each
 /// that matter.
 ///
-/// A row is first compared with a box around the set held so far: most rows of a long log are implied by it and cost one
-/// look. The others are kept until the hull of the set has become small, since most are implied then; the rest is tried
-/// one by one against the facets (CuttingPlanes::add). For the interval hull alone they are put aside, and those that a
-/// corner of the hull violates are cut in until there are none.
+/// A row is first compared with a box around the set held so far: most rows of a long log are implied by it and cost
+/// one look. The others are kept until the hull of the set has become small, since most are implied then; the rest is
+/// tried one by one against the facets (CuttingPlanes::add). For the interval hull alone they are put aside, and those
+/// that a corner of the hull violates are cut in until there are none.
 class Cutter {
  public:
   /// `blocks` are groups of parameters that no row couples, `information` (p × p) as in CuttingPlanes.
@@ -38,8 +38,8 @@ class Cutter {
   bool offer(const SlabColumns& columns, const std::vector<char>& used = {});
   /// Moves the hull to where the rows kept so far put it; false once the set is proved empty.
   bool tighten();
-  /// Ends: all rows kept are cut in or dropped. False where the set is proved empty. Without facets: where `again()`, the
-  /// rows must all be offered once more.
+  /// Ends: all rows kept are cut in or dropped. False where the set is proved empty. Without facets: where `again()`,
+  /// the rows must all be offered once more.
   bool finish();
 
   /// Without facets: rows were passed over that may cut what was held later, so that another pass is needed.

@@ -347,8 +347,8 @@ void CuttingPlanes::add(const RowBank& candidates) {
   if (is_empty() || left.empty()) {
     return;
   }
-  // Neighbours in time have nearly the same normal, or its opposite: one side after the other, so that one vertex serves
-  // many of them.
+  // Neighbours in time have nearly the same normal, or its opposite: one side after the other, so that one vertex
+  // serves many of them.
   const Eigen::VectorXd one_side =
       coordinates_.transform.transpose() *
       Eigen::Map<const Eigen::VectorXd>(candidates.normal(left.front()).data(), z_lower_.size());

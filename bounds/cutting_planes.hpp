@@ -41,8 +41,8 @@ class CuttingPlanes {
   /// A box of θ around the set, to rounding.
   [[nodiscard]] Box outer_box() const;
 
-  /// Adds those of `candidates` that cut: first the rows most violated where one of the z or θ is largest or smallest, until
-  /// none is violated there; then, one linear program each, what cuts between these vertices.
+  /// Adds those of `candidates` that cut: first the rows most violated where one of the z or θ is largest or smallest,
+  /// until none is violated there; then, one linear program each, what cuts between these vertices.
   void add(const RowBank& candidates);
   /// Adds only rows that move a vertex where one of the z or θ is largest or smallest, until `candidates` move none:
   /// enough for the interval hull of the set of `rows` and `candidates`, though not for the set. How many were added.

@@ -71,8 +71,8 @@ class ColumnPacker {
 
   /// For n outputs and p parameters.
   ColumnPacker(std::size_t outputs, std::size_t parameters);
-  /// Walks `source` from its beginning and hands every 8192 instants, output by output, to `sink`. Instants whose number
-  /// is in `excluded` (ascending) are left out. False where the sink ended the walk.
+  /// Walks `source` from its beginning and hands every 8192 instants, output by output, to `sink`. Instants whose
+  /// number is in `excluded` (ascending) are left out. False where the sink ended the walk.
   bool walk(RegressionSource& source, const std::vector<std::size_t>& excluded, const Sink& sink);
   /// The same for one block in memory.
   bool walk(const RegressionBlock& block, const Sink& sink);

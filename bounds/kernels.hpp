@@ -61,13 +61,13 @@ struct Table {
   /// receives a_i·d. value +infinity where there is none.
   Found (*first_blocking)(const Rows& rows, const double* slack, const double* d, double pivot, double* along);
   /// Numbers of the rows without |y − Y·centre| + Σ|Y_j| half_j <= floor + dy + Σ dY_j least_j, ascending; how many.
-  /// With `oblique`, unless null, rows with |y − Y·c| + Σ|(YT)_k| half_k <= floor + dy + Σ dY_j least_j for its box are left
-  /// out too. Rows that hold a NaN are among them. `found` has room for n. `peaks`, unless null: p + 1 numbers that are raised to
-  /// the largest |Y_j| of all rows, and to the largest |y|.
+  /// With `oblique`, unless null, rows with |y − Y·c| + Σ|(YT)_k| half_k <= floor + dy + Σ dY_j least_j for its box are
+  /// left out too. Rows that hold a NaN are among them. `found` has room for n. `peaks`, unless null: p + 1 numbers
+  /// that are raised to the largest |Y_j| of all rows, and to the largest |y|.
   std::size_t (*scan)(const Slabs& slabs, const double* centre, const double* half, const double* least,
                       const Oblique* oblique, double floor, std::uint32_t* found, double* peaks);
-  /// Numbers of the rows without |y − Y·x| <= dy + Σ dY_j |x_j| for all of the `count` points x (p numbers each, one point
-  /// after the other; p <= 32), ascending; how many. Rows that hold a NaN are among them. `found` has room for n.
+  /// Numbers of the rows without |y − Y·x| <= dy + Σ dY_j |x_j| for all of the `count` points x (p numbers each, one
+  /// point after the other; p <= 32), ascending; how many. Rows that hold a NaN are among them. `found` has room for n.
   std::size_t (*violated)(const Slabs& slabs, const double* points, std::size_t count, std::uint32_t* found);
 };
 

@@ -34,9 +34,9 @@ struct LpSolution {
 ///
 /// A vertex is where p rows meet, the basis; its inverse p × p matrix is held. A dual simplex walk starts where the
 /// multipliers are >= 0 (after rows were added), a primal one where the vertex satisfies all rows (after c has turned).
-/// The largest violation or the steepest edge is taken; where that stands still, the smallest number (Bland 1977), which
-/// does not cycle. The variables have a box of their own that must contain the rows' set in its interior: its corner is
-/// where a cold start begins, and an optimum on its sides is reported as `failed`.
+/// The largest violation or the steepest edge is taken; where that stands still, the smallest number (Bland 1977),
+/// which does not cycle. The variables have a box of their own that must contain the rows' set in its interior: its
+/// corner is where a cold start begins, and an optimum on its sides is reported as `failed`.
 class LinearProgram {
  public:
   /// Rows of a vertex: numbers of rows, or negative ones for sides of the box. Empty: no start known.

@@ -91,7 +91,8 @@ class Epigraph {
   [[nodiscard]] double scale() const { return scale_; }
   [[nodiscard]] const std::vector<WeightedRow>& active() const { return active_; }
 
-  /// Adds the rows that the fit violates most, until it violates none by more than the tolerance; whether any was added.
+  /// Adds the rows that the fit violates most, until it violates none by more than the tolerance; whether any was
+  /// added.
   bool absorb(const SlabColumns& rows, double relative) {
     const double w = weights_[rows.output];
     bool changed = false;

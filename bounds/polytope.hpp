@@ -133,8 +133,8 @@ class Polytope {
 };
 
 /// Support function of one block of a polytope in the direction of its parameters of `a` (p entries), rounded outward:
-/// the largest over the block's vertices plus its margin, or, where they are not known, the support of the block's sides
-/// of `hull`. Allocates nothing.
+/// the largest over the block's vertices plus its margin, or, where they are not known, the support of the block's
+/// sides of `hull`. Allocates nothing.
 [[nodiscard]] double support_of_vertices(const Polytope::Block& block, const Box& hull,
                                          std::span<const double> a) noexcept;
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Half-spaces of parameters from rows of a regression with bounded errors (theory: errors in variables), and their storage.
+/// Half-spaces of parameters from rows of a regression with bounded errors (theory: errors in variables), and their
+/// storage.
 #pragma once
 
 #include <cstddef>

@@ -100,8 +100,9 @@ double SupportTable::support(std::span<const double> a, std::size_t slot) noexce
     value += product;
     magnitude += std::abs(product);
   }
-  // ε covers the rounding of μ and of a·v. What is left: sums of at most p numbers >= 0 (slack), and of at most p products
-  // of either sign with the last addition (Higham 2002, section 3.1); twice of each covers the bound's own rounding.
+  // ε covers the rounding of μ and of a·v. What is left: sums of at most p numbers >= 0 (slack), and of at most p
+  // products of either sign with the last addition (Higham 2002, section 3.1); twice of each covers the bound's own
+  // rounding.
   const double p = static_cast<double>(a.size());
   const double bound = value + (slack * (1.0 + (p + 6.0) * kEpsilon) + ((p + 2.0) * kEpsilon * magnitude + kTiny));
   return std::min(bound, set_.hull().support(a));

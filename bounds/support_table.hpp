@@ -24,9 +24,9 @@ struct SupportTableOptions {
 /// h(a) = max { a·θ : θ in set } for one direction after the other, as SupportWalk has it, for sets whose vertices are
 /// few enough to be listed with all their edges.
 ///
-/// A block of one parameter is its side [l, u] of the hull. In every other block a query starts from the vertex that was
-/// best for the last direction of its slot and leaves the facet with the steepest negative multiplier, until the negative
-/// ones cost no more than rounding or the budget is used. With the vertices v_b where the blocks' walks end,
+/// A block of one parameter is its side [l, u] of the hull. In every other block a query starts from the vertex that
+/// was best for the last direction of its slot and leaves the facet with the steepest negative multiplier, until the
+/// negative ones cost no more than rounding or the budget is used. With the vertices v_b where the blocks' walks end,
 ///
 ///     h(a) <= Σ_b a·v_b + Σ_b (Σ_r max(0, −μ_r) penalty_r + Σ_j ε_j |a_j|) + rounding,     μ = M a,
 ///
@@ -36,9 +36,9 @@ struct SupportTableOptions {
 /// serves one thread.
 class SupportTable {
  public:
-  /// For `set`, whose data are shared. Nothing where a block has more vertices than options.vertices, or its edges cannot
-  /// be followed in doubles (a set that is too flat). Throws InvalidArgument unless there is a slot and room for two
-  /// vertices.
+  /// For `set`, whose data are shared. Nothing where a block has more vertices than options.vertices, or its edges
+  /// cannot be followed in doubles (a set that is too flat). Throws InvalidArgument unless there is a slot and room for
+  /// two vertices.
   [[nodiscard]] static std::optional<SupportTable> make(const Polytope& set, const SupportTableOptions& options = {});
 
   /// h(a), rounded outward, never above the support of the set's hull; `a` has p finite entries (unchecked), `slot` is

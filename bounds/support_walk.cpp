@@ -193,8 +193,8 @@ void SupportWalk::refine(const Vertex& v, std::size_t q, const double* facets, d
   std::copy(refined, refined + q * q, v.inverse);
 }
 
-/// All that follows from the inverse: M, v, ε, …. How many times larger I − AᵀM is than rounding alone would make it; not
-/// finite where anything is not.
+/// All that follows from the inverse: M, v, ε, …. How many times larger I − AᵀM is than rounding alone would make it;
+/// not finite where anything is not.
 double SupportWalk::enclose(Walk& walk, const Vertex& v, const std::int32_t* basis) noexcept {
   const std::size_t q = walk.q;
   const double gamma = rounding(q);
@@ -254,8 +254,8 @@ double SupportWalk::enclose(Walk& walk, const Vertex& v, const std::int32_t* bas
   return worse;
 }
 
-/// Remembers the vertex of `basis` as the newest; `inverse` is nearly that of its facets, or null. False where the facets
-/// do not meet in a point.
+/// Remembers the vertex of `basis` as the newest; `inverse` is nearly that of its facets, or null. False where the
+/// facets do not meet in a point.
 bool SupportWalk::make(Walk& walk, const std::int32_t* basis, const double* inverse) noexcept {
   const std::size_t q = walk.q;
   const Vertex v = parts(walk.numbers.data() + walk.vertices * walk.size, q);

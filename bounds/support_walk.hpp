@@ -66,15 +66,16 @@ struct Uninitialised : std::allocator<T> {
 
 /// h(a) = max { a·θ : θ in set } for one direction after the other.
 ///
-/// A vertex is where q facets A_B θ = b_B meet; it is the best for all directions a with μ = A_B⁻ᵀa >= 0. The walk starts
-/// from the vertex that was best for the last direction of the same slot and follows edges; vertices and edges are
-/// remembered. Whatever vertex it ends at, with s_i >= b_i − A_i c, |θ_j − c_j| <= H_j on the set, M ≈ A_B⁻ᵀ and v = c + Mᵀs,
+/// A vertex is where q facets A_B θ = b_B meet; it is the best for all directions a with μ = A_B⁻ᵀa >= 0. The walk
+/// starts from the vertex that was best for the last direction of the same slot and follows edges; vertices and edges
+/// are remembered. Whatever vertex it ends at, with s_i >= b_i − A_i c, |θ_j − c_j| <= H_j on the set, M ≈ A_B⁻ᵀ and v
+/// = c + Mᵀs,
 ///
 ///     h(a) <= a·v + Σ_i max(0, −μ_i) (s_i + Σ_j |A_ij| H_j) + Σ_j ε_j |a_j|,     μ = M a,
 ///
-/// ε of a vertex enclosing I − A_Bᵀ M over the hull and all rounding. So the bound holds at every step, is the support to
-/// rounding where μ >= 0, and the hull's support where that is smaller: a budget that runs out costs tightness, never
-/// the guarantee. Nothing is allocated after construction. One object serves one thread.
+/// ε of a vertex enclosing I − A_Bᵀ M over the hull and all rounding. So the bound holds at every step, is the support
+/// to rounding where μ >= 0, and the hull's support where that is smaller: a budget that runs out costs tightness,
+/// never the guarantee. Nothing is allocated after construction. One object serves one thread.
 class SupportWalk {
  public:
   /// For `set`, whose data are shared.

@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 #
-# wheelwright_room(NAME [FOLDER room] [PROGRAM_ONLY] [WORDS] HEADERS h... [SOURCES s...] [HOT s...] [USES room...] [LINK lib...] [LINK_PRIVATE lib...])
+# wheelwright_room(NAME [FOLDER room] [PROGRAM_ONLY] [WORDS] HEADERS h... [SOURCES s...] [HOT s...] [BATCH n] [USES room...] [LINK lib...] [LINK_PRIVATE lib...])
 #
 # One target per room: wheelwright_NAME, alias Wheelwright::NAME. Headers are seen as <wheelwright/NAME/x.hpp>
 # through one symbolic link per room in the build tree, which is also the base of the installed FILE_SET. FOLDER is for a
 # part of a room that has a target of its own, since it links what the rest should not: its headers are the room's.
 # PROGRAM_ONLY serves our own programs and is not installed. In a release WORDS, which says and writes what others found, is
 # optimised for the time of compilation (-O1), other rooms at -O2, and the sources named after HOT at -O3.
+# BATCH: so many sources are compiled as one, where a dozen would take longer than 25 s.
 
 # Of what names none: the rooms are `development`.
 set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME program)
@@ -23,7 +24,7 @@ function(wheelwright_words target)
 endfunction()
 
 function(wheelwright_room name)
-  cmake_parse_arguments(ROOM "PROGRAM_ONLY;WORDS" "FOLDER" "HEADERS;SOURCES;HOT;USES;LINK;LINK_PRIVATE" ${ARGN})
+  cmake_parse_arguments(ROOM "PROGRAM_ONLY;WORDS" "FOLDER;BATCH" "HEADERS;SOURCES;HOT;USES;LINK;LINK_PRIVATE" ${ARGN})
   if(NOT ROOM_FOLDER)
     set(ROOM_FOLDER ${name})
   endif()
@@ -42,6 +43,9 @@ function(wheelwright_room name)
       wheelwright_words(${target})
     else()
       target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O2>)
+    endif()
+    if(ROOM_BATCH)
+      set_target_properties(${target} PROPERTIES UNITY_BUILD_BATCH_SIZE ${ROOM_BATCH})
     endif()
     set_source_files_properties(${ROOM_HOT} PROPERTIES COMPILE_OPTIONS $<$<CONFIG:Release>:-O3>)
   else()

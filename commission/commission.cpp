@@ -140,8 +140,9 @@ Bounded bounded_set(LogSource& log, const Setting& s, Part part, std::vector<Out
   return raised;
 }
 
-// By how much the efforts' bounds of `empty` must be raised for a set, up to kClose. The minimax fit of its rows does not say:
-// with more noise there is a first set, whose dynamics bound the motion between samples more narrowly and may leave none.
+// By how much the efforts' bounds of `empty` must be raised for a set, up to kClose. The minimax fit of its rows does
+// not say: with more noise there is a first set, whose dynamics bound the motion between samples more narrowly and may
+// leave none.
 double needed_noise(LogSource& log, const Setting& s, const Commissioning& empty, std::size_t outliers) {
   constexpr double kClose = 5e-4, kApart = 1.3;
   constexpr int kMost = 40;

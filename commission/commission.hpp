@@ -105,9 +105,9 @@ struct CommissionOptions {
   std::function<void(std::string_view stage, double share)> progress;  ///< told of every stage; may be empty
 };
 
-/// Log → filtered regression → θ̂_L → feasible set and bounds → ρ(t) → validation. Walks the log several times and never
-/// holds it. Throws InputError or InvalidArgument for a log or robot that cannot be used at all; what the data say,
-/// unwelcome or not, is in the result.
+/// Log → filtered regression → θ̂_L → feasible set and bounds → ρ(t) → validation. Walks the log several times and
+/// never holds it. Throws InputError or InvalidArgument for a log or robot that cannot be used at all; what the data
+/// say, unwelcome or not, is in the result.
 [[nodiscard]] Commissioning commission(LogSource& log, const Robot& robot, const CommissionOptions& options = {});
 
 }  // namespace wheelwright

@@ -145,8 +145,8 @@ void find_wrapped_angles(LogSource& log, const Setting& s, std::vector<LogContra
   log.rewind();
 }
 
-// A sample against the line through its neighbours, drawn over the stamps and over row numbers. Of angles: the speed of a
-// motor that follows its controller at once may well be a function of the controller's cycle.
+// A sample against the line through its neighbours, drawn over the stamps and over row numbers. Of angles: the speed of
+// a motor that follows its controller at once may well be a function of the controller's cycle.
 void find_scattered_stamps(LogSource& log, const Setting& s, std::vector<LogContradiction>& out) {
   constexpr double kEven = 0.02;     // relative: steps that differ by less are even
   constexpr double kSmoother = 0.5;  // rms over row numbers over that over stamps
@@ -580,7 +580,8 @@ std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& s, cons
     timing.allowed = s.measurement.delay;
     const bool held = s.measurement.hold == Hold::zero_order;
     const bool ranged = timing.allowed.lower != 0.0 || timing.allowed.upper != 0.0;
-    // As the rows' own hull: a value may come into force up to a step before its stamp; a measured one lies between two.
+    // As the rows' own hull: a value may come into force up to a step before its stamp; a measured one lies between
+    // two.
     if (s.declared.between_samples && (ranged || (held && s.measurement.changes == EffortChanges::between))) {
       timing.allowed.upper += s.survey.median_step;
       timing.allowed.lower -= held ? 0.0 : s.survey.median_step;

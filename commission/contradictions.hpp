@@ -22,9 +22,10 @@ namespace wheelwright {
 struct LogContradiction {
   /// What contradicts what.
   enum class Kind {
-    effort_constant,  ///< an effort has one value in every row although its joint moves
-    angle_wrapped,    ///< an angle jumps by a whole turn between two rows
-    stamps_scatter,  ///< the motion is smoother over row numbers than over the stamps: these scatter, the samples do not
+    effort_constant,   ///< an effort has one value in every row although its joint moves
+    angle_wrapped,     ///< an angle jumps by a whole turn between two rows
+    stamps_scatter,    ///< the motion is smoother over row numbers than over the stamps: these scatter, the samples do
+                       ///< not
     effort_unrelated,  ///< an effort that motion does not explain at all
     effort_timing,     ///< efforts late or early against the motion, beyond what is declared
     wheels_disagree,   ///< the efforts of two joints do not show one and the same mass
@@ -65,15 +66,16 @@ struct EffortTiming {
   [[nodiscard]] double beyond() const { return std::max({0.0, allowed.lower - delay, delay - allowed.upper}); }
 };
 
-/// The shift that explains the first `most_rows` rows of `log` best, at most `longest` either way; nothing where none is
-/// told (flat, at the end of what is searched, segments too short, unsigned efforts).
+/// The shift that explains the first `most_rows` rows of `log` best, at most `longest` either way; nothing where none
+/// is told (flat, at the end of what is searched, segments too short, unsigned efforts).
 [[nodiscard]] std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& setting, const Fit& fit,
                                                         double longest = 0.2, std::size_t most_rows = 60000);
 
-/// Whether `timing` is a latency that a model must not be made with: beyond what is allowed, told from that at a risk of
-/// 1e-8 (Student's t) and further from it than a quarter of `step` (s), of an effect that is not symmetric in the sign of the shift (interpolation averages noise,
-/// which lowers the residual for a shift either way), and one that either lowers the residual by 1 % or more or moves a
-/// parameter by two standard errors. Healthy logs with even steps showed 0.09 steps at most.
+/// Whether `timing` is a latency that a model must not be made with: beyond what is allowed, told from that at a risk
+/// of 1e-8 (Student's t) and further from it than a quarter of `step` (s), of an effect that is not symmetric in the
+/// sign of the shift (interpolation averages noise, which lowers the residual for a shift either way), and one that
+/// either lowers the residual by 1 % or more or moves a parameter by two standard errors. Healthy logs with even steps
+/// showed 0.09 steps at most.
 [[nodiscard]] bool is_latency(const EffortTiming& timing, double step);
 
 /// What the signals of a log say before any set is made.
@@ -82,8 +84,8 @@ struct SignalFindings {
   std::optional<EffortTiming> timing;  ///< nothing where no shift is told, or was not looked for
 };
 
-/// Wrapped angles, constant and unrelated efforts; where there are none, timing, wrong signs, wheels and halves that disagree. Walks `log`
-/// a few times.
+/// Wrapped angles, constant and unrelated efforts; where there are none, timing, wrong signs, wheels and halves that
+/// disagree. Walks `log` a few times.
 [[nodiscard]] SignalFindings contradictions_in_log(LogSource& log, const Setting& setting, const Fit& fit);
 
 /// What a finished commissioning says against itself: best guesses outside their set, held-out rows outside the
@@ -100,9 +102,9 @@ void weigh_contradictions(Commissioning& result, const Setting& setting, const F
 /// Whether weigh_contradictions() would change anything.
 [[nodiscard]] bool wants_weighing(const Commissioning& result, const Setting& setting);
 
-/// Weighs what says that an effort is wrong against the declared errors of the rows (`errors`, with parameters in `box`):
-/// Kind::effort_unrelated is dropped where these are as large as the efforts, Kind::wheels_disagree only demotes where they
-/// are large enough for it.
+/// Weighs what says that an effort is wrong against the declared errors of the rows (`errors`, with parameters in
+/// `box`): Kind::effort_unrelated is dropped where these are as large as the efforts, Kind::wheels_disagree only
+/// demotes where they are large enough for it.
 void weigh_efforts(LogSource& log, const Setting& setting, const SignalErrors& errors, const Box& box,
                    std::vector<LogContradiction>& contradictions);
 

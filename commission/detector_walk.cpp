@@ -23,8 +23,8 @@ void for_each_column(OutputTrace& o, const Change& change) {
   }
 }
 
-// Equal numbers of instants in every bin; when the bins are full, neighbours are joined. A bin shows effort and threshold
-// of its instant that is nearest to the threshold.
+// Equal numbers of instants in every bin; when the bins are full, neighbours are joined. A bin shows effort and
+// threshold of its instant that is nearest to the threshold.
 class Binner {
  public:
   Binner(std::size_t outputs, std::size_t most) : most_(std::max<std::size_t>(most, 16)) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// A log through a commissioned detector: instant by instant, as a thinned trace, and its events with the faults that remain possible.
+/// A log through a commissioned detector: instant by instant, as a thinned trace, and its events with the faults that
+/// remain possible.
 #pragma once
 
 #include <cstddef>
@@ -15,9 +16,9 @@
 namespace wheelwright {
 
 /// Walks `log` from its beginning through `detector` (of either residual), which restarts with every segment, and calls
-/// `at(row, t, first, decision)` for every instant at which it decides: the row of the log, its time in s, whether it is
-/// the first such instant of its segment, and the Decision, valid during the call. Returns the number of rows and rewinds
-/// the log. Throws InvalidArgument when the log lacks a column.
+/// `at(row, t, first, decision)` for every instant at which it decides: the row of the log, its time in s, whether it
+/// is the first such instant of its segment, and the Decision, valid during the call. Returns the number of rows and
+/// rewinds the log. Throws InvalidArgument when the log lacks a column.
 template <RowFilter Filter, typename At>
 std::size_t walk_detector(LogSource& log, Detector<Filter>& detector, const At& at) {
   const std::vector<std::size_t> pick =
@@ -85,8 +86,8 @@ struct DetectionOptions {
   double merge = 0.5;              ///< s: instants outside nearer than this are one event
 };
 
-/// Walks `log` through `detector` from its beginning. Of the kinematic residual OutputTrace::torque and predicted are what
-/// the pose or gyro saw and what the wheels predict. Throws InvalidArgument when the log lacks a column.
+/// Walks `log` through `detector` from its beginning. Of the kinematic residual OutputTrace::torque and predicted are
+/// what the pose or gyro saw and what the wheels predict. Throws InvalidArgument when the log lacks a column.
 template <RowFilter Filter>
 [[nodiscard]] Detection detect(LogSource& log, Detector<Filter> detector, const DetectionOptions& options = {});
 
@@ -99,8 +100,8 @@ struct EventIsolationOptions {
   std::size_t most_events = 8;  ///< the first ones; the others are left alone
 };
 
-/// Isolates the first events of `detection`, which came of walking `log` with the torque residual of `model`, against the
-/// catalogue of its robot. Walks the log once and holds the rows around these events. One result for each of them.
+/// Isolates the first events of `detection`, which came of walking `log` with the torque residual of `model`, against
+/// the catalogue of its robot. Walks the log once and holds the rows around these events. One result for each of them.
 [[nodiscard]] std::vector<Isolation> isolate_events(LogSource& log, const OnlineModel& model,
                                                     const Detection& detection,
                                                     const EventIsolationOptions& options = {});

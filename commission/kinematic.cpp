@@ -143,8 +143,8 @@ Eigen::VectorXd weights_of(const ResidualSummary& residuals) {
   return weights;
 }
 
-// Least squares, weighted once more by its own residuals; parameters that the log does not show are held at their nominal
-// values, which the rows are measured from.
+// Least squares, weighted once more by its own residuals; parameters that the log does not show are held at their
+// nominal values, which the rows are measured from.
 std::optional<OdometryFit> fit_rows(const Frame& s, Part part, double risk) {
   OdometryRows stream = make_rows(s, s.declared);
   FoldedSource rows(stream, part, s.log_rows, s.folds);
@@ -187,8 +187,9 @@ std::optional<OdometryFit> fit_rows(const Frame& s, Part part, double risk) {
   return fit;
 }
 
-// A robot whose wheels slip in every turn (skid steer) is far from its geometry: sides of the prior box that least squares
-// leaves are moved outward until they hold it, with the same share to spare. Returns the names of these parameters.
+// A robot whose wheels slip in every turn (skid steer) is far from its geometry: sides of the prior box that least
+// squares leaves are moved outward until they hold it, with the same share to spare. Returns the names of these
+// parameters.
 std::vector<std::string> widen(Frame& s, const OdometryFit& fit, double share) {
   std::vector<std::string> widened;
   const auto names = s.measurement.parameters();

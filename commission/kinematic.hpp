@@ -74,11 +74,11 @@ struct KinematicCommissionOptions {
 /// `measurement` (nothing: absent) is what find_odometry says, `survey` is that of the log.
 ///
 /// Noise: where position and heading (the latter suffices for the output yaw) and the motion (noise_budget.hpp) are
-/// declared, bounds are the sensors', derived as OdometryFilter states, with the largest acceleration that the log shows
-/// for what happens between samples. Elsewhere, and for the gyro, ē is extrapolated from the residuals. Where nothing
-/// explains the log within the declared noise (wheels slip a little in every turn, the pose's point is off the axle, its
-/// clock is late), all outputs fall back to the extrapolated bound, and the message says so. Throws InvalidArgument for
-/// options out of range.
+/// declared, bounds are the sensors', derived as OdometryFilter states, with the largest acceleration that the log
+/// shows for what happens between samples. Elsewhere, and for the gyro, ē is extrapolated from the residuals. Where
+/// nothing explains the log within the declared noise (wheels slip a little in every turn, the pose's point is off the
+/// axle, its clock is late), all outputs fall back to the extrapolated bound, and the message says so. Throws
+/// InvalidArgument for options out of range.
 [[nodiscard]] KinematicCommissioning commission_kinematics(LogSource& log, const Robot& robot,
                                                            const std::optional<OdometryMeasurement>& measurement,
                                                            const Survey& survey,

@@ -54,9 +54,9 @@ struct MarginSurvey {
   std::string without_kinematic;  ///< why there is no kinematic residual; empty where there is one
 };
 
-/// Walks `log`, a drive whose motion is taken as a reference, and asks of every fault of the catalogue what is certain to
-/// be seen. Throws InvalidArgument when the log lacks a column of the model's measurement, has no settled instant, or a
-/// name is none of the catalogue's.
+/// Walks `log`, a drive whose motion is taken as a reference, and asks of every fault of the catalogue what is certain
+/// to be seen. Throws InvalidArgument when the log lacks a column of the model's measurement, has no settled instant,
+/// or a name is none of the catalogue's.
 [[nodiscard]] MarginSurvey survey_margins(LogSource& log, const OnlineModel& model,
                                           const MarginSurveyOptions& options = {});
 

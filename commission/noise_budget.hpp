@@ -35,19 +35,19 @@ struct OutputNoise {
 /// Whether rows are those of the log that bounds were learnt from, or of driving to come.
 enum class RowUse { learning, driving };
 
-/// The bound of an output that is estimated: `how` from what its residual was, never below `plausible`, the largest error
-/// that the rows of the log can hold.
+/// The bound of an output that is estimated: `how` from what its residual was, never below `plausible`, the largest
+/// error that the rows of the log can hold.
 [[nodiscard]] OutputNoise estimated_noise(const OutputResidual& residual, std::size_t instants, double plausible,
                                           const ExtrapolationOptions& options);
 
-/// Raises estimated bounds that leave no set in `prior`, to just above the minimax fit of `rows` (which have none of them),
-/// and returns the factor. Where that fit did not converge the factor is bisected between what it proved, by `explained`:
-/// whether bounds leave a set.
+/// Raises estimated bounds that leave no set in `prior`, to just above the minimax fit of `rows` (which have none of
+/// them), and returns the factor. Where that fit did not converge the factor is bisected between what it proved, by
+/// `explained`: whether bounds leave a set.
 double raise_until_explained(std::vector<OutputNoise>& noise, RegressionSource& rows, const Box& prior,
                              const std::function<bool(const std::vector<OutputNoise>&)>& explained);
 
-/// The factor by which estimated bounds must grow for a set to be left, and a little more. `fit`, in units of the bounds,
-/// tells it where it converged; else it is bisected between what `fit` proved, by `leaves_a_set`.
+/// The factor by which estimated bounds must grow for a set to be left, and a little more. `fit`, in units of the
+/// bounds, tells it where it converged; else it is bisected between what `fit` proved, by `leaves_a_set`.
 [[nodiscard]] double noise_that_leaves_a_set(const MinimaxFit& fit, const std::function<bool(double)>& leaves_a_set);
 
 /// The declared part of the noise.
@@ -58,8 +58,8 @@ struct NoiseBudget {
 
 /// For complete declarations: half a count for count-differenced speeds and encoder angles, else the declared bound of
 /// the motion column; the declared bound of the effort. What happens between samples is no noise: SignalErrors::motion.
-/// Otherwise the equation error as a whole is estimated from the residuals: it then holds the noise of all sensors, and adding
-/// propagated bounds to it would count them twice.
+/// Otherwise the equation error as a whole is estimated from the residuals: it then holds the noise of all sensors, and
+/// adding propagated bounds to it would count them twice.
 [[nodiscard]] NoiseBudget noise_budget(const Robot& robot, const Measurement& measurement);
 
 /// `limit` of each joint (acceleration_limit) as one of each coordinate of `model`.

@@ -14,7 +14,8 @@
 
 namespace wheelwright {
 
-/// Root mean square errors on held-out blocks, relative to the torque, of the first `basic` parameters alone and of all.
+/// Root mean square errors on held-out blocks, relative to the torque, of the first `basic` parameters alone and of
+/// all.
 struct ParameterChoice {
   double nrmse_basic = 0.0;
   double nrmse_full = 0.0;

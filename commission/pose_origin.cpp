@@ -24,7 +24,8 @@ constexpr double kOfTheCounts = 1.0 / 3.0;
 constexpr double kOfTheRounding = 1.2;
 constexpr double kWholeTurn = 2.0 * std::numbers::pi;
 
-// The coarsest decimal unit of which all values are multiples, as they are or wrapped into a turn; 0 where there is none.
+// The coarsest decimal unit of which all values are multiples, as they are or wrapped into a turn; 0 where there is
+// none.
 class Decimals {
  public:
   void add(double value) {
@@ -170,7 +171,8 @@ PoseOrigin pose_origin(LogSource& log, const OdometryMeasurement& m, double wind
     const double count = m.count > 0.0           ? m.count * m.nominal_step
                          : counts_per_turn > 0.0 ? kWholeTurn / counts_per_turn
                                                  : 0.0;
-    // Half a count at both ends of a window and both wheels, times a gain that is about a third: an independent heading.
+    // Half a count at both ends of a window and both wheels, times a gain that is about a third: an independent
+    // heading.
     const double by_counts = count / (3.0 * std::sqrt(3.0));
     const double rounding = decimals.quantum() / std::sqrt(6.0);
     origin.heading_repeats =

@@ -19,15 +19,15 @@ struct PoseOrigin {
   std::string sentence;           ///< for people; empty where nothing repeats
 };
 
-/// Compares the change of heading over windows of `window` seconds with the best combination of the changes of both wheel
-/// angles (speeds are integrated by the rectangle before, the rectangle after and the trapezium, whichever fits best), and
-/// the length of the way with another one.
+/// Compares the change of heading over windows of `window` seconds with the best combination of the changes of both
+/// wheel angles (speeds are integrated by the rectangle before, the rectangle after and the trapezium, whichever fits
+/// best), and the length of the way with another one.
 ///
-/// A heading repeats the wheels where less is left than 10⁻⁶ rad rms, which no sensor of its own would agree to with wheels
-/// on a floor; or where no more is left than the rounding of the heading's decimals, and that is less than a third of what
-/// the wheels' own counts (where they are known: half a count each) would leave of an independent heading. A way repeats
-/// them below 10⁻⁵ m. Nothing is claimed of fewer than eight windows, or of a robot that hardly turns (drives).
-/// Walks `log` once.
+/// A heading repeats the wheels where less is left than 10⁻⁶ rad rms, which no sensor of its own would agree to with
+/// wheels on a floor; or where no more is left than the rounding of the heading's decimals, and that is less than a
+/// third of what the wheels' own counts (where they are known: half a count each) would leave of an independent
+/// heading. A way repeats them below 10⁻⁵ m. Nothing is claimed of fewer than eight windows, or of a robot that hardly
+/// turns (drives). Walks `log` once.
 [[nodiscard]] PoseOrigin pose_origin(LogSource& log, const OdometryMeasurement& measurement, double window,
                                      double counts_per_turn = 0.0);
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What is settled about a log before anything is fitted: model, filter, how it was measured, the noise that is declared.
+/// What is settled about a log before anything is fitted: model, filter, how it was measured, the noise that is
+/// declared.
 #pragma once
 
 #include <cstddef>

@@ -33,10 +33,10 @@ inline constexpr std::size_t kSurveyWindow = 10;
 /// Walks `log` once.
 [[nodiscard]] Survey survey(LogSource& log, const Measurement& measurement);
 
-/// Limit on the acceleration of each joint at every instant, rad/s² (m/s²): limits.acceleration of the robot file where it
-/// has one, else kBeyondSamples times the largest that the samples show, those of windows and those of single steps less
-/// what errors of `motion_error` (of the motion column, rad or rad/s) may have put there. Without a declaration this is an
-/// assumption: that the motion between samples is no rougher than that.
+/// Limit on the acceleration of each joint at every instant, rad/s² (m/s²): limits.acceleration of the robot file where
+/// it has one, else kBeyondSamples times the largest that the samples show, those of windows and those of single steps
+/// less what errors of `motion_error` (of the motion column, rad or rad/s) may have put there. Without a declaration
+/// this is an assumption: that the motion between samples is no rougher than that.
 [[nodiscard]] std::vector<double> acceleration_limit(const Robot& robot, const Survey& survey, MotionKind motion,
                                                      double motion_error);
 

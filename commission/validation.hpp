@@ -12,8 +12,8 @@
 
 namespace wheelwright {
 
-/// How rows are divided. Samples of a filtered regression are autocorrelated: blocks are contiguous, and a held-out block
-/// begins with a purge as long as the filter remembers, so that it shares nothing with its neighbour.
+/// How rows are divided. Samples of a filtered regression are autocorrelated: blocks are contiguous, and a held-out
+/// block begins with a purge as long as the filter remembers, so that it shares nothing with its neighbour.
 struct FoldOptions {
   std::size_t blocks = 10;         ///< the log's rows in this many contiguous blocks
   std::size_t hold_out_every = 3;  ///< blocks 3, 6, 9, … are held out

@@ -16,8 +16,8 @@ using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::R
 
 /// A block of K instants with n outputs each: K·n rows, instant-major (row k·n + i is output i of instant k).
 ///
-/// Where the assumptions on the sensors hold, there is for every instant an exact regressor Y° with |Y° − Y| <= dY entry
-/// by entry, and |y − Y° θ| <= dy. With all bounds zero this is the ordinary regression.
+/// Where the assumptions on the sensors hold, there is for every instant an exact regressor Y° with |Y° − Y| <= dY
+/// entry by entry, and |y − Y° θ| <= dy. With all bounds zero this is the ordinary regression.
 struct RegressionBlock {
   std::size_t outputs = 0;          ///< n
   std::size_t parameters = 0;       ///< p

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Inspection: a drive after which a robot has either been seen to be broken or is not broken by more than was promised.
+/// Inspection: a drive after which a robot has either been seen to be broken or is not broken by more than was
+/// promised.
 ///
 /// The fault is there from the first instant on (the robot broke before the inspection), the motion is planned, so the
-/// smallest size that is certainly seen at some instant follows exactly for every fault (fault_margin.hpp), whatever θ in
-/// the feasible set and whatever the noise. The plan is chosen to make the largest of these sizes small, each relative to
-/// a size that is asked for.
+/// smallest size that is certainly seen at some instant follows exactly for every fault (fault_margin.hpp), whatever θ
+/// in the feasible set and whatever the noise. The plan is chosen to make the largest of these sizes small, each
+/// relative to a size that is asked for.
 #pragma once
 
 #include <cstddef>
@@ -35,15 +36,15 @@ struct PromisedFault {
 };
 
 /// Promises of `plan`, fault by fault, side by side, for a detector with this persistence. Throws InvalidArgument where
-/// `faults` is empty, or one is not there in full from the beginning on: it drifts, pulses, comes once a turn (its phase
-/// is not known), or holds a reading (its value is not known).
+/// `faults` is empty, or one is not there in full from the beginning on: it drifts, pulses, comes once a turn (its
+/// phase is not known), or holds a reading (its value is not known).
 [[nodiscard]] std::vector<PromisedFault> promised_faults(const Plan& plan, const DesignSubject& subject,
                                                          const ThresholdRule& rule,
                                                          const std::vector<InspectedFault>& faults,
                                                          Persistence persistence = {});
 
-/// The largest of smallest/asked; where a fault is never certain, a number above every such ratio that falls as the fault
-/// comes nearer to being certain at its largest size, so that a search has a slope to follow.
+/// The largest of smallest/asked; where a fault is never certain, a number above every such ratio that falls as the
+/// fault comes nearer to being certain at its largest size, so that a search has a slope to follow.
 [[nodiscard]] PlanObjective certain_detection(const DesignSubject& subject, const ThresholdRule& rule,
                                               const std::vector<InspectedFault>& faults, Persistence persistence = {});
 
@@ -56,8 +57,8 @@ struct DetectionDesign {
   std::vector<PromisedFault> promised_eight;
 };
 
-/// design_manoeuvre() for certain detection of `faults` with the detector of `model` (its errors and its persistence), and
-/// the best figure eight beside it.
+/// design_manoeuvre() for certain detection of `faults` with the detector of `model` (its errors and its persistence),
+/// and the best figure eight beside it.
 [[nodiscard]] DetectionDesign design_for_detection(const OnlineModel& model, const DesignSubject& subject,
                                                    const MotionLimits& limits,
                                                    const std::vector<InspectedFault>& faults,

@@ -15,14 +15,15 @@
 
 namespace wheelwright {
 
-/// A figure eight: constant speed V with v2 = j·w cos(wt), w = 2π/period, j = 2.405 the first zero of the Bessel function
-/// J0, for which it closes; from rest over one second and to rest over the last one.
+/// A figure eight: constant speed V with v2 = j·w cos(wt), w = 2π/period, j = 2.405 the first zero of the Bessel
+/// function J0, for which it closes; from rest over one second and to rest over the last one.
 struct FigureEight {
   double speed = 0.0;   ///< V, m/s
   double period = 0.0;  ///< s
 };
 
-/// The eight, sampled every `step` s over `duration` s. Throws InvalidArgument unless the model is a differential drive.
+/// The eight, sampled every `step` s over `duration` s. Throws InvalidArgument unless the model is a differential
+/// drive.
 [[nodiscard]] Plan plan_of(const FigureEight& eight, const DesignSubject& subject, double duration, double step);
 
 /// The best of the figure eights within `limits` by `objective`: periods from a fourth of a second to twice the

@@ -43,11 +43,12 @@ struct SearchResult {
   std::size_t evaluations = 0;
 };
 
-/// Minimises `f` over [0, 1]^dimension: random points of a seeded generator and `starts`, then from the best ones a local
-/// search by simplices that begin anew and smaller where the last one stood still (Nelder and Mead 1965, in NLopt). On
-/// functions with kinks, like widths of bounds, they came further than BOBYQA and Sbplx for as many evaluations. Deterministic. `f` is called from several threads
-/// where there are, must be pure and finite; a point where it throws InvalidArgument is passed over. Throws
-/// InvalidArgument when the dimension is 0 or f is nowhere defined.
+/// Minimises `f` over [0, 1]^dimension: random points of a seeded generator and `starts`, then from the best ones a
+/// local search by simplices that begin anew and smaller where the last one stood still (Nelder and Mead 1965, in
+/// NLopt). On functions with kinks, like widths of bounds, they came further than BOBYQA and Sbplx for as many
+/// evaluations. Deterministic. `f` is called from several threads where there are, must be pure and finite; a point
+/// where it throws InvalidArgument is passed over. Throws InvalidArgument when the dimension is 0 or f is nowhere
+/// defined.
 [[nodiscard]] SearchResult minimise_over_cube(const std::function<double(std::span<const double>)>& f,
                                               std::size_t dimension, const std::vector<std::vector<double>>& starts,
                                               const SearchOptions& options = {});
@@ -55,17 +56,20 @@ struct SearchResult {
 /// The least duration (s) of a drive with `stages` stages a half: its rests, and its ramps where nothing limits them.
 [[nodiscard]] double shortest_duration(std::size_t stages);
 
-/// The family of manoeuvres with K stages a half. A member is named by a point x of the cube [0, 1]^dimension(): of each
-/// stage the joints' speeds (0: full speed backwards, 1: full speed forwards) and the share of the time that its speed is
-/// held. Every point of the cube is a manoeuvre within the limits, so that a search needs no constraints:
+/// The family of manoeuvres with K stages a half. A member is named by a point x of the cube [0, 1]^dimension(): of
+/// each stage the joints' speeds (0: full speed backwards, 1: full speed forwards) and the share of the time that its
+/// speed is held. Every point of the cube is a manoeuvre within the limits, so that a search needs no constraints:
 ///
 /// - ramps are as short as acceleration and effort allow (the acceleration rises over a quarter of the ramp, holds, and
-///   falls over a quarter); the effort is a sum of friction F and inertia G/T, the ramp's duration T >= G/(limit − |F|);
+///   falls over a quarter); the effort is a sum of friction F and inertia G/T, the ramp's duration T >= G/(limit −
+///   |F|);
 /// - speeds whose friction leaves no effort to accelerate with, or whose ramps do not fit into the duration, are scaled
 ///   down;
 /// - a path that leaves the space is scaled as a whole, by scaling v1 alone (the robot turns as planned; wheel speeds,
-///   accelerations and, where they are linear in v and v̇, efforts can only fall, being largest at the ends of a segment);
-/// - what is still beyond a limit at a sample (friction that depends on the heading) is scaled down with the whole motion.
+///   accelerations and, where they are linear in v and v̇, efforts can only fall, being largest at the ends of a
+///   segment);
+/// - what is still beyond a limit at a sample (friction that depends on the heading) is scaled down with the whole
+///   motion.
 ///
 /// A motion rests for 0.1 s at both ends: a filter that begins at standstill needs no time to settle.
 class StageFamily {

@@ -43,15 +43,15 @@ struct DesignSubject {
 [[nodiscard]] DesignSubject subject_of(const OnlineModel& model);
 
 /// Before any log: nominal values and declared noise; effort limits hold at the nominal values. A log is expected to be
-/// sampled every `step` seconds, with wheel angles where their noise or the encoder is known, else with speeds; a filter
-/// that the robot file leaves open is taken as `filter`.
+/// sampled every `step` seconds, with wheel angles where their noise or the encoder is known, else with speeds; a
+/// filter that the robot file leaves open is taken as `filter`.
 /// Throws InvalidArgument, naming what the robot file lacks, unless every parameter has a nominal value and the noise
 /// of motion and effort is declared.
 [[nodiscard]] DesignSubject subject_of(const Robot& robot, double step, const FilterDesign& filter = {2, 10.0, 10.0});
 
 /// The rows that commissioning would make of a log driven exactly along `plan`, without noise: Y_f of the planned
-/// motion, y = Y_f θ°, and the error bounds dY, dy that the sensors' noise gives, and what θ° needs of efforts may do between
-/// samples. A plan may have other steps than the log to come: it is then read as a log with these steps.
+/// motion, y = Y_f θ°, and the error bounds dY, dy that the sensors' noise gives, and what θ° needs of efforts may do
+/// between samples. A plan may have other steps than the log to come: it is then read as a log with these steps.
 [[nodiscard]] RegressionBlock planned_rows(const Plan& plan, const DesignSubject& subject);
 
 /// The same drive as a reference motion for faults, with the error bounds of its rows.

@@ -64,7 +64,8 @@ struct Decision {
   std::vector<ChannelDecision> channels;  ///< one for each output, meaningful where valid
 };
 
-/// Residual, threshold and decision for rows of n outputs, wherever they were filtered. Not for several threads at once.
+/// Residual, threshold and decision for rows of n outputs, wherever they were filtered. Not for several threads at
+/// once.
 class RowDetector {
  public:
   /// Throws InvalidArgument on persistence or μ_o that make no sense.
@@ -94,8 +95,8 @@ class RowDetector {
 /// of `nominal` (s; 0: any), as logs are split.
 [[nodiscard]] bool follows(double before, double t, double nominal) noexcept;
 
-/// The detector of Dixon, Walker and Dawson (2001), section V, with the tight threshold: filter, threshold and decision in
-/// one object that a robot carries, for one residual. Sample in, decision out. Not for several threads at once.
+/// The detector of Dixon, Walker and Dawson (2001), section V, with the tight threshold: filter, threshold and decision
+/// in one object that a robot carries, for one residual. Sample in, decision out. Not for several threads at once.
 template <RowFilter Filter>
 class Detector {
  public:
@@ -115,9 +116,9 @@ class Detector {
     rows_.restart();
   }
 
-  /// Takes the sample at time `t` (s; as the filter's step) and decides. Allocates nothing. A gap of more than five nominal
-  /// steps, or a time that does not increase, restarts the filter. The result is valid until the next call; it is not valid
-  /// (Decision::valid) where the filter has no row.
+  /// Takes the sample at time `t` (s; as the filter's step) and decides. Allocates nothing. A gap of more than five
+  /// nominal steps, or a time that does not increase, restarts the filter. The result is valid until the next call; it
+  /// is not valid (Decision::valid) where the filter has no row.
   const Decision& step(double t, std::span<const double> sample) {
     if (started_ && !follows(t_, t, filter_.measurement().nominal_step)) {
       restart();

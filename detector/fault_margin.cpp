@@ -17,8 +17,8 @@ double largest_size(const Interval& side) { return std::max(std::abs(side.lower)
 
 }  // namespace
 
-// The regressor that acts, the one that is seen, and its error bound times `errors`. An error of y itself is in both, so
-// that it counts by how far two θ of the set are apart.
+// The regressor that acts, the one that is seen, and its error bound times `errors`. An error of y itself is in both,
+// so that it counts by how far two θ of the set are apart.
 FaultMargin::Sums FaultMargin::at(const FaultRow& row, double kappa, double side, double errors) {
   const std::size_t p = row.y.size();
   acting_.resize(p);

@@ -5,19 +5,20 @@
 /// With P the feasible set, h its support function and θ >= 0 (other signs as ThresholdRule has them), an instant shows
 /// a fault κ > 0 **for certain** when for every θ in P, every |e| <= n̄ and every |δ| <= Δ
 ///
-///     min over P of (y + κ g1 + κ² g2) θ + κ c − n̄  >  h(y + κ s + 2Δ) + n̄      (upwards), or the mirror image downwards:
+///     min over P of (y + κ g1 + κ² g2) θ + κ c − n̄  >  h(y + κ s + 2Δ) + n̄      (upwards), or the mirror image
+///     downwards:
 ///
 /// Δ counts twice, once for what the detector's regressor is wrong by and once for what the threshold allows it.
-/// **The sizes that are certain up to a largest one κ̄ form one interval (κ°, κ̄]**, so bisection finds κ° exactly: for a
-/// single θ and fixed regressor the difference f of both sides is a quadratic in κ with f(0) <= 0 (no false alarm). If
-/// g2 θ >= 0 it is convex and crosses zero once, upwards. If not it is concave, and {f > 0} is an interval, which holds κ̄
-/// or is of no interest. The certain sizes are the intersection over θ; where s is not 0 the threshold's h is convex in κ
-/// and g2 is 0 (validate(FaultType)), so f is concave. What is in doubt of a row (FaultRow::doubt, range, read) takes a
-/// constant and a multiple of κ from f, which changes none of this.
+/// **The sizes that are certain up to a largest one κ̄ form one interval (κ°, κ̄]**, so bisection finds κ° exactly: for
+/// a single θ and fixed regressor the difference f of both sides is a quadratic in κ with f(0) <= 0 (no false alarm).
+/// If g2 θ >= 0 it is convex and crosses zero once, upwards. If not it is concave, and {f > 0} is an interval, which
+/// holds κ̄ or is of no interest. The certain sizes are the intersection over θ; where s is not 0 the threshold's h is
+/// convex in κ and g2 is 0 (validate(FaultType)), so f is concave. What is in doubt of a row (FaultRow::doubt, range,
+/// read) takes a constant and a multiple of κ from f, which changes none of this.
 ///
-/// An instant shows a fault **possibly** when some θ in P and some noise of at most q times the bounds carry it over the
-/// threshold. With q = 1 every fault does: the threshold is tight, fault-free residuals reach it. With q = 0 it is the
-/// smallest fault that sensors without noise could show.
+/// An instant shows a fault **possibly** when some θ in P and some noise of at most q times the bounds carry it over
+/// the threshold. With q = 1 every fault does: the threshold is tight, fault-free residuals reach it. With q = 0 it is
+/// the smallest fault that sensors without noise could show.
 #pragma once
 
 #include <optional>
@@ -33,8 +34,8 @@ class FaultMargin {
   /// For the detector's thresholds `rule`.
   explicit FaultMargin(ThresholdRule rule) : rule_(std::move(rule)) {}
 
-  /// Whether a fault of size κ > 0 (`side` = 1) or −κ (`side` = −1) is certain to be outside [l, u] in this row. Rounding
-  /// is on the safe side: true is a proof.
+  /// Whether a fault of size κ > 0 (`side` = 1) or −κ (`side` = −1) is certain to be outside [l, u] in this row.
+  /// Rounding is on the safe side: true is a proof.
   [[nodiscard]] bool certain(const FaultRow& row, double kappa, double side, std::size_t channel = 0);
 
   /// By how much a fault of that size misses being certain, as a share of the threshold's width: 0 where it is certain.

@@ -20,8 +20,8 @@ namespace wheelwright {
 ///     τ_f = (y + κ g1 + κ² g2) θ + κ c + e,     regressor as seen: y + κ s + δ,
 ///
 /// |e| <= n̄ = dy, |δ| <= Δ = dY entry by entry. All spans have p entries. Where this is not all, τ_f and the threshold
-/// together may be elsewhere by |κ| (`doubt` + Σ `range`_j|θ_j|) for every θ in the set, and y by `read`: both are empty or
-/// have p entries.
+/// together may be elsewhere by |κ| (`doubt` + Σ `range`_j|θ_j|) for every θ in the set, and y by `read`: both are
+/// empty or have p entries.
 struct FaultRow {
   std::span<const double> y;  ///< of the healthy motion
   std::span<const double> g1;
@@ -74,10 +74,10 @@ class FaultRows {
 /// changes an effort's gain too. A reading that stands still at an unknown value is none. Tried at some motions.
 [[nodiscard]] bool polynomial(const FaultType& fault, const Model& model);
 
-/// By how much a measured motion's errors carry a signature that is filtered from its onset on away from that of the motion
-/// itself. The kernel of f₂*(s n̈) for a step s is that of f₂*n̈ cut off at the time x since the onset: its derivatives' total
-/// variations do not grow by that, but for the error n_v of the speed at the onset, with weight f₂(x), as at the start of a
-/// segment (noise.hpp). So with Δ the bounds of the healthy columns
+/// By how much a measured motion's errors carry a signature that is filtered from its onset on away from that of the
+/// motion itself. The kernel of f₂*(s n̈) for a step s is that of f₂*n̈ cut off at the time x since the onset: its
+/// derivatives' total variations do not grow by that, but for the error n_v of the speed at the onset, with weight
+/// f₂(x), as at the start of a segment (noise.hpp). So with Δ the bounds of the healthy columns
 ///
 ///     gains H, G:  e1 = |H + G| (Δ + |scale| f₂(x) n_v)           (n_v for angles only)
 ///     motion K:    e1 = |K| Δ of acceleration and speed: f * d/dt(s K n) has no term at the onset
@@ -123,20 +123,21 @@ class SignatureErrors {
   bool moves_ = false, whole_ = false;
 };
 
-/// Rows of the torque residual: filters a fault's signature along a reference motion, with the filter's own kernel: what
-/// happens between two instants counts as RegressorFilter counts it. Products with the fault's profile need no derivative
-/// of noise. At
+/// Rows of the torque residual: filters a fault's signature along a reference motion, with the filter's own kernel:
+/// what happens between two instants counts as RegressorFilter counts it. Products with the fault's profile need no
+/// derivative of noise. At
 /// the onset of a step the robot's own speed goes on (its mass sees to that) and what the encoders show jumps; the
 /// reading of an effort changes with no more than its gain.
 ///
-/// What the efforts that a fault adds widen in the rows of a faulty log is FaultRow::range and FaultRow::doubt. The hull of
-/// efforts that change between samples: an effort's gain widens it by as much as the efforts do, any other fault by what
-/// its own efforts change from sample to sample. The motion between samples, in dY: faults that multiply efforts,
-/// or the speeds that are seen, by as much as they multiply them, any other by ReferenceMotion::effort_dY times the largest effort that it has added since
-/// the onset, for every θ of the set, and by ReferenceMotion::effort_doubt.
+/// What the efforts that a fault adds widen in the rows of a faulty log is FaultRow::range and FaultRow::doubt. The
+/// hull of efforts that change between samples: an effort's gain widens it by as much as the efforts do, any other
+/// fault by what its own efforts change from sample to sample. The motion between samples, in dY: faults that multiply
+/// efforts, or the speeds that are seen, by as much as they multiply them, any other by ReferenceMotion::effort_dY
+/// times the largest effort that it has added since the onset, for every θ of the set, and by
+/// ReferenceMotion::effort_doubt.
 ///
-/// The signature of a measured motion has its errors (SignatureErrors); that a bump's angles are the measured ones is not
-/// counted.
+/// The signature of a measured motion has its errors (SignatureErrors); that a bump's angles are the measured ones is
+/// not counted.
 class FaultFilter final : public FaultRows {
  public:
   /// Throws InvalidArgument where `fault` does not fit `model`. `model` and `motion` are kept by reference.

@@ -82,9 +82,10 @@ void validate(const FaultType& fault, const Model& model);
 
 /// The faults of a robot that can be told from its model alone: of every joint's effort (`effort_loss`, `effort_bias`,
 /// `effort_stuck`, `effort_dead`) and encoder (`encoder_scale`, `encoder_frozen`, `encoder_dropout`), named after the
-/// joint where there are several ("_right", "_left"); of the mass (`payload_lost`); for a differential drive of its wheel
-/// radii (`wheel_radius`, with `_right`, `_left`, `_drift`, `_bump_right`, `_bump_left`), and slip (`wheel_slip_right`,
-/// `wheel_slip_left`: a share of the wheel's way is lost; `matched`, `unmatched`, `slip_yaw`: (10), (11), δ4 of (1)).
+/// joint where there are several ("_right", "_left"); of the mass (`payload_lost`); for a differential drive of its
+/// wheel radii (`wheel_radius`, with `_right`, `_left`, `_drift`, `_bump_right`, `_bump_left`), and slip
+/// (`wheel_slip_right`, `wheel_slip_left`: a share of the wheel's way is lost; `matched`, `unmatched`, `slip_yaw`:
+/// (10), (11), δ4 of (1)).
 ///
 /// `unmatched` is left out for anisotropic friction, whose part along the heading it would change.
 ///

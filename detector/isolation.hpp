@@ -2,8 +2,8 @@
 /// \file
 /// After an alarm: which faults the data leave possible, how large, and since when. Set-valued, with proofs.
 ///
-/// A fault of size κ that set in in [T_a, T_b] explains the rows of a window when one θ of the feasible set P satisfies all
-/// of them, before and after (onset_rows.hpp), in all outputs:
+/// A fault of size κ that set in in [T_a, T_b] explains the rows of a window when one θ of the feasible set P satisfies
+/// all of them, before and after (onset_rows.hpp), in all outputs:
 ///
 ///     |τ_f − (y + κ g1 + κ² g2) θ − κ c − w₁A − w₂B − w₃C| <= n̄ + (Δ + |κ| e1 + κ² e2)|θ| + |κ| e_c.
 ///
@@ -11,15 +11,17 @@
 ///
 ///     |τ_f − (y + κ_m g1 + κ_m² g2) θ − κ_m c − d (Gθ_c + c) − w₁A − …| <= … + η |G||θ − θ_c| + η² |g2||θ|,
 ///
-/// since dGθ = dGθ_c + dG(θ − θ_c): linear in (θ, d, A, B, C), with all that is left out bounded over the box of P. The linear
-/// program's bounds on d, certified (certificate.hpp), make [κ_m − η, κ_m + η] narrower, again and again; what does not get
-/// narrower is cut in two. A program proved infeasible excludes the piece. The intervals of onsets are cut in two alike.
+/// since dGθ = dGθ_c + dG(θ − θ_c): linear in (θ, d, A, B, C), with all that is left out bounded over the box of P. The
+/// linear program's bounds on d, certified (certificate.hpp), make [κ_m − η, κ_m + η] narrower, again and again; what
+/// does not get narrower is cut in two. A program proved infeasible excludes the piece. The intervals of onsets are cut
+/// in two alike.
 ///
-/// **So the true fault is never excluded, and its size and onset lie in the intervals**, where the model and the sensors'
-/// bounds hold and the fault is of the catalogue. The intervals are outer bounds: where the budget runs out they are
-/// wider, never wrong. Where bounds are estimated (ē) the proof stands on them.
+/// **So the true fault is never excluded, and its size and onset lie in the intervals**, where the model and the
+/// sensors' bounds hold and the fault is of the catalogue. The intervals are outer bounds: where the budget runs out
+/// they are wider, never wrong. Where bounds are estimated (ē) the proof stands on them.
 ///
-/// Faults that make an encoder's reading stand still leave the true motion unknown: they are judged by the reading alone.
+/// Faults that make an encoder's reading stand still leave the true motion unknown: they are judged by the reading
+/// alone.
 #pragma once
 
 #include <cstddef>
@@ -71,8 +73,8 @@ struct Isolation {
 };
 
 /// Tells `faults` apart after an alarm at `alarm` whose first instant outside is `outside` (both times of rows of the
-/// log, s). `motion` is the log's own (read_reference() with `filter`), or a piece of it that begins 16/β and more before
-/// the window; `set` is P. Throws InvalidArgument where `alarm` is not in the motion, or options make no sense.
+/// log, s). `motion` is the log's own (read_reference() with `filter`), or a piece of it that begins 16/β and more
+/// before the window; `set` is P. Throws InvalidArgument where `alarm` is not in the motion, or options make no sense.
 [[nodiscard]] Isolation isolate(const ReferenceMotion& motion, const RegressorFilter& filter, const Polytope& set,
                                 const std::vector<FaultType>& faults, double outside, double alarm,
                                 const IsolationOptions& options = {});

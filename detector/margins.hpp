@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Detectability along a drive: which faults will certainly be seen, how soon, in which manoeuvre, and where to drive for it.
+/// Detectability along a drive: which faults will certainly be seen, how soon, in which manoeuvre, and where to drive
+/// for it.
 #pragma once
 
 #include <cstddef>
@@ -36,8 +37,8 @@ enum class ManoeuvreKind {
 
 /// What kind instants [first, last) of `motion` are of, by root mean squares over them: standstill below 3 % of the
 /// largest joint speed of the whole motion; of two joints, straight where their difference is below a tenth of their
-/// sum, spinning where their sum is below a tenth of their difference; accelerating where the joints' acceleration times
-/// the stretch's length is above half their speed.
+/// sum, spinning where their sum is below a tenth of their difference; accelerating where the joints' acceleration
+/// times the stretch's length is above half their speed.
 [[nodiscard]] ManoeuvreKind kind_of(const ReferenceMotion& motion, std::size_t first, std::size_t last);
 
 /// How a drive is asked about. Sizes of faults are magnitudes, in the unit of their type.
@@ -52,10 +53,11 @@ struct MarginOptions {
   std::function<void(std::string_view stage, double share)> progress = {};  ///< may be empty
 };
 
-/// One fault on one side (growing or shrinking) from one onset on. Of a reading that stands still nothing is certain and
-/// nothing hidden: the value it holds is that of one sample, and not known beforehand. The time until an alarm counts from
-/// the sample of the first instant that the fault has reached, at most a sampling step after the fault. Sizes are absolute; infinite where none is certain in
-/// the fault's range. A window that runs past the end of the segment has no value.
+/// One fault on one side (growing or shrinking) from one onset on. Of a reading that stands still nothing is certain
+/// and nothing hidden: the value it holds is that of one sample, and not known beforehand. The time until an alarm
+/// counts from the sample of the first instant that the fault has reached, at most a sampling step after the fault.
+/// Sizes are absolute; infinite where none is certain in the fault's range. A window that runs past the end of the
+/// segment has no value.
 struct OnsetMargin {
   std::size_t instant = 0;  ///< of the motion
   double t = 0.0;           ///< of the onset, s: rows that the filter has later know of it
@@ -104,8 +106,8 @@ using FaultRowsFactory = std::function<std::unique_ptr<FaultRows>(const FaultTyp
                                                       const std::vector<FaultType>& faults, const ThresholdRule& rule,
                                                       const FaultRowsFactory& rows, const MarginOptions& options = {});
 
-/// A plane of operating points: two coordinates' speeds at no acceleration, or their accelerations while passing through
-/// the speeds `at`.
+/// A plane of operating points: two coordinates' speeds at no acceleration, or their accelerations while passing
+/// through the speeds `at`.
 struct OperatingPlane {
   bool accelerations = false;  ///< the axes are accelerations
   std::vector<double> x;       ///< of the first coordinate, m/s or m/s²
@@ -113,7 +115,8 @@ struct OperatingPlane {
   Eigen::VectorXd at{};        ///< speeds, one for each coordinate, where the axes are accelerations
 };
 
-/// Smallest certain magnitude of a fault on one side at each point, x.size() × y.size(); infinite where none is certain.
+/// Smallest certain magnitude of a fault on one side at each point, x.size() × y.size(); infinite where none is
+/// certain.
 struct OperatingMap {
   OperatingPlane plane;
   Eigen::MatrixXd smallest;

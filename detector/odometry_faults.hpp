@@ -26,15 +26,16 @@ struct OdometryReference {
 /// Throws InvalidArgument when the log lacks a column of the filter's measurement.
 [[nodiscard]] OdometryReference read_odometry(LogSource& log, OdometryFilter filter, const Model& model);
 
-/// Rows of the kinematic residual after a fault's onset. With q_j what a wheel truly rolls beyond what its encoder would
-/// show without a fault in step j (s K in joints, times its way) and σ_j what the encoder shows beyond it (s S), the
-/// displacement is Σ E_j (Δφ + κ q) r/2 + κ Σ (E_j s a_1 + E_j⊥ s d) h, seen as Σ E_j (Δφ + κ σ) r/2, and alike for the
-/// turn. Efforts play no part. A measured way has the encoders' errors, and so have K and S of it. E_j are the directions of the healthy drive: where a fault turns the robot by up to κ η
-/// within a window, rows are in doubt by κ η times the way driven.
+/// Rows of the kinematic residual after a fault's onset. With q_j what a wheel truly rolls beyond what its encoder
+/// would show without a fault in step j (s K in joints, times its way) and σ_j what the encoder shows beyond it (s S),
+/// the displacement is Σ E_j (Δφ + κ q) r/2 + κ Σ (E_j s a_1 + E_j⊥ s d) h, seen as Σ E_j (Δφ + κ σ) r/2, and alike for
+/// the turn. Efforts play no part. A measured way has the encoders' errors, and so have K and S of it. E_j are the
+/// directions of the healthy drive: where a fault turns the robot by up to κ η within a window, rows are in doubt by κ
+/// η times the way driven.
 class OdometryFaultRows final : public FaultRows {
  public:
-  /// `hull` bounds the parameters (OdometryMeasurement::parameters()). Throws InvalidArgument where `fault` does not fit
-  /// `model`. `reference` is kept by reference.
+  /// `hull` bounds the parameters (OdometryMeasurement::parameters()). Throws InvalidArgument where `fault` does not
+  /// fit `model`. `reference` is kept by reference.
   OdometryFaultRows(const FaultType& fault, const Model& model, const OdometryMeasurement& measurement,
                     const OdometryReference& reference, const Box& hull);
 

@@ -8,19 +8,19 @@
 ///     τ_f = (y + κ g1 + κ² g2) θ + κ c + α² (e^{−βx} A + x e^{−βx} B + e^{−γx} C) + e,     x = t − t_s,
 ///
 /// (order 1: α e^{−βx} A): the filter is linear, so what happened in [T, t_s] lives on in its state at t_s alone
-/// (kernel.hpp). A, B and C, for each output, are that state beyond the one of an onset at t_s itself. They are bounded by
-/// what onsets at the instants of [t_a, t_s] leave there, times kTransition: that is what covers a step between two
+/// (kernel.hpp). A, B and C, for each output, are that state beyond the one of an onset at t_s itself. They are bounded
+/// by what onsets at the instants of [t_a, t_s] leave there, times kTransition: that is what covers a step between two
 /// samples, whose interval mixes both sides.
 ///
-/// Errors |ĝ1 − g1| <= e1, |ĝ2 − g2| <= e2, |ĉ − c| <= e_c: SignatureErrors. Where motion between samples counts, Δ is the
-/// row's own dY, from the efforts as they were logged: a faulty robot's motion may be what they say, or what they say less
-/// the offset that the fault adds (effort_dY, effort_doubt).
+/// Errors |ĝ1 − g1| <= e1, |ĝ2 − g2| <= e2, |ĉ − c| <= e_c: SignatureErrors. Where motion between samples counts, Δ is
+/// the row's own dY, from the efforts as they were logged: a faulty robot's motion may be what they say, or what they
+/// say less the offset that the fault adds (effort_dY, effort_doubt).
 ///
-/// A drift s = (t − T)/rise is a mixture of steps; that T is known to t_s − t_a only adds (t_s − t_a)/rise of the step's
-/// signature to e1 and e_c, and twice that to e2.
+/// A drift s = (t − T)/rise is a mixture of steps; that T is known to t_s − t_a only adds (t_s − t_a)/rise of the
+/// step's signature to e1 and e_c, and twice that to e2.
 ///
-/// A fault of the encoders shows (I + κ s S) v: then v = (I − κ' s S) v_seen, κ' = κ/(1 + κ), where S² = S. It is a fault
-/// of motion with K = −S in κ'.
+/// A fault of the encoders shows (I + κ s S) v: then v = (I − κ' s S) v_seen, κ' = κ/(1 + κ), where S² = S. It is a
+/// fault of motion with K = −S in κ'.
 #pragma once
 
 #include <array>

@@ -49,16 +49,17 @@ struct ReferenceMotion {
 
   /// Number of instants K.
   [[nodiscard]] std::size_t instants() const { return t.size(); }
-  /// By how much the steps that end at instants k and k + 1 count for what happens between them, s: all of the second for
-  /// speeds, half of each for angles.
+  /// By how much the steps that end at instants k and k + 1 count for what happens between them, s: all of the second
+  /// for speeds, half of each for angles.
   [[nodiscard]] std::array<double, 2> shares(std::size_t k) const {
     const double half = 0.5 * step[k + 1];
     return {kind == MotionKind::speed ? half : 0.5 * step[k], half};
   }
 };
 
-/// The motion of `log` as `filter` reads it, whose error bounds the rows get. Walks the log (three times where efforts bound
-/// the motion between samples) and holds it. Throws InvalidArgument when the log lacks a column of the filter's measurement.
+/// The motion of `log` as `filter` reads it, whose error bounds the rows get. Walks the log (three times where efforts
+/// bound the motion between samples) and holds it. Throws InvalidArgument when the log lacks a column of the filter's
+/// measurement.
 [[nodiscard]] ReferenceMotion read_reference(LogSource& log, const RegressorFilter& filter);
 
 }  // namespace wheelwright

@@ -39,8 +39,8 @@ struct Threshold {
 /// with h the support function of the feasible set, y a row of Y_f, Δ the bound on its error and n̄ that of τ_f. The
 /// shift by Δ holds for θ_j >= 0; it changes sign where θ_j <= 0 on the whole set, and where θ_j has either sign it is
 /// replaced by Δ_j max|θ_j|. All results are rounded outward. h is followed from vertex to vertex, in a table of all
-/// vertices (SupportTable) where they are few enough, else as they are found (SupportWalk): with bounded work and without
-/// allocation. A budget that runs out makes a threshold wider, never wrong. One object serves one thread.
+/// vertices (SupportTable) where they are few enough, else as they are found (SupportWalk): with bounded work and
+/// without allocation. A budget that runs out makes a threshold wider, never wrong. One object serves one thread.
 class ThresholdRule {
  public:
   /// For the feasible set `set` and the best guess `estimate` (p), which need not lie in it.

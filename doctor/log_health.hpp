@@ -88,8 +88,8 @@ struct LogHealth {
 };
 
 /// Looks at `log`, which must hold what a LogSource promises (finite, increasing inside a segment). `robot` (nothing:
-/// a differential drive or a single axis, by the columns) tells columns, geometry, limits and the model whose excitation
-/// is judged; without it, scales of units cannot be judged against radius, track and mass.
+/// a differential drive or a single axis, by the columns) tells columns, geometry, limits and the model whose
+/// excitation is judged; without it, scales of units cannot be judged against radius, track and mass.
 ///
 /// What each check does, and its thresholds, is in docs/doctor.md. Excitation is that of the filtered regressor (25) as
 /// commission() makes it: settle(), fit_log() and identifiability(); the delay between effort and motion is that of
@@ -144,8 +144,8 @@ void set_stretches(LogFinding& finding, const HealthView& view, const std::vecto
 void check_time(const HealthView& view, const ReaderCounts& reader, std::vector<LogFinding>& findings);
 /// Columns that stand still, repeat, are coarse or noisy, or end at a limit; rest.
 void check_signals(const HealthView& view, const ReaderCounts& reader, std::vector<LogFinding>& findings);
-/// Directions, speeds, accelerations; what the filtered regressor says of each parameter; effort against motion in time.
-/// Returns whether commissioning would get as far as bounds.
+/// Directions, speeds, accelerations; what the filtered regressor says of each parameter; effort against motion in
+/// time. Returns whether commissioning would get as far as bounds.
 bool check_motion(const HealthView& view, std::vector<LogFinding>& findings);
 /// Wheel angles against speeds, wheels against pose and gyro: scales, signs, sides.
 void check_odometry(const HealthView& view, std::vector<LogFinding>& findings);

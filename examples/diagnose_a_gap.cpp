@@ -2,11 +2,11 @@
 /// \file
 /// Question: how is a sim-to-real gap traced to an effect that the toolkit has never heard of?
 ///
-/// One Effect filled in: its columns are the additional efforts that it asks for, per unit of each of its coefficients. Here
-/// cogging: six magnets a turn pull each wheel's motor forwards and back, τ = a sin 6φ + b cos 6φ. A robot is simulated
-/// twice, healthy and with cogging torque in its log, and the gap between the two is searched with the catalogue that ships
-/// and the effect beside it. The claim: the diagnosis names it and finds its size. Without it in the catalogue, the log is
-/// called unexplained.
+/// One Effect filled in: its columns are the additional efforts that it asks for, per unit of each of its coefficients.
+/// Here cogging: six magnets a turn pull each wheel's motor forwards and back, τ = a sin 6φ + b cos 6φ. A robot is
+/// simulated twice, healthy and with cogging torque in its log, and the gap between the two is searched with the
+/// catalogue that ships and the effect beside it. The claim: the diagnosis names it and finds its size. Without it in
+/// the catalogue, the log is called unexplained.
 ///
 ///     diagnose_a_gap examples/scenarios/commissioning.yaml
 #include <cmath>
@@ -42,7 +42,8 @@ Effect cogging() {
   return effect;
 }
 
-/// A minute of driving, slowly enough for the filter to pass six periods a turn; cogging is what the motors must overcome.
+/// A minute of driving, slowly enough for the filter to pass six periods a turn; cogging is what the motors must
+/// overcome.
 LogTable drive(Scenario scenario, double torque, std::uint64_t seed) {
   scenario.duration = 60.0;
   scenario.seed = seed;

@@ -29,25 +29,25 @@ struct EffortCorrection {
   }
   /// Whether it is linear: independent zero-mean noise of the effort then stays so.
   [[nodiscard]] bool linear() const { return limit == std::numeric_limits<double>::infinity() && deadzone == 0.0; }
-  /// Gain of joint `j`: by so much a bound on the error of an effort grows. The other steps do not raise it: clip and dead
-  /// zone have slopes in [0, 1], a delay shifts, and the kernel of the lag, e^{−t/T}/T, has the L1 norm 1.
+  /// Gain of joint `j`: by so much a bound on the error of an effort grows. The other steps do not raise it: clip and
+  /// dead zone have slopes in [0, 1], a delay shifts, and the kernel of the lag, e^{−t/T}/T, has the L1 norm 1.
   [[nodiscard]] double gain_of(std::size_t j) const { return gain.empty() ? 1.0 : gain[j]; }
 };
 
 /// Throws InvalidArgument, naming the field, unless `correction` fits `joints` joints.
 void validate(const EffortCorrection& correction, std::size_t joints);
 
-/// The correction that the robot's effects ask for (`saturation`, `torque_deadzone`, `torque_gain_asymmetric`: 1 + g right,
-/// 1 − g left, `delay` and `sensor_time_offset` together, `actuator_lag`), in the unit of its efforts. Throws
+/// The correction that the robot's effects ask for (`saturation`, `torque_deadzone`, `torque_gain_asymmetric`: 1 + g
+/// right, 1 − g left, `delay` and `sensor_time_offset` together, `actuator_lag`), in the unit of its efforts. Throws
 /// InvalidArgument where its effects make no sense.
 [[nodiscard]] EffortCorrection effort_correction(const Robot& robot);
 
 /// The correction of a running signal. Efforts are constant from a sample to the next (Hold::zero_order) or linear
-/// between samples; the lag is integrated exactly for either. Before a segment's first sample the effort is taken to have
-/// been that of the first sample for ever: what follows is right once memory() has passed.
+/// between samples; the lag is integrated exactly for either. Before a segment's first sample the effort is taken to
+/// have been that of the first sample for ever: what follows is right once memory() has passed.
 ///
-/// step() does not allocate: history is kept in a ring that holds the delay at an eighth of the nominal step; samples that
-/// come closer than that replace each other.
+/// step() does not allocate: history is kept in a ring that holds the delay at an eighth of the nominal step; samples
+/// that come closer than that replace each other.
 class EffortCorrector {
  public:
   EffortCorrector() = default;

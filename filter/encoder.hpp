@@ -18,8 +18,8 @@ struct EncoderFinding {
 /// The largest quantum q such that all `speeds` (rad/s, sampled with the constant step `step`, s) are whole multiples
 /// of it up to the decimals they were printed with, where q = 2π/(N·step) for a whole N between 8 and 2²² that explains
 /// them; nothing where there is none. Speeds that were merely rounded are no encoder and are not taken for one: printed
-/// with few decimals they have a decimal quantum (1, 2 or 5 · 10ᵏ rad/s), and a drive that reports whole rpm, or tenths or
-/// tens of them, one of 1, 2 or 5 · 10ᵏ rpm. An encoder that happens to have such a quantum must be declared.
+/// with few decimals they have a decimal quantum (1, 2 or 5 · 10ᵏ rad/s), and a drive that reports whole rpm, or tenths
+/// or tens of them, one of 1, 2 or 5 · 10ᵏ rpm. An encoder that happens to have such a quantum must be declared.
 ///
 /// `counts_per_turn`, where it is known, is checked instead of searched for.
 [[nodiscard]] std::optional<EncoderFinding> find_encoder(std::span<const double> speeds, double step,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Exact discretisation of the filters f(t) = α e^{−βt} (24) and f₂(t) = α² t e^{−βt} (f twice) for steps of any length.
+/// Exact discretisation of the filters f(t) = α e^{−βt} (24) and f₂(t) = α² t e^{−βt} (f twice) for steps of any
+/// length.
 ///
 /// Both are cascades of z' = −βz + u. Over a step h on which u is a polynomial of degree <= 1 the update is a linear
 /// combination of the state and the ends of u, with weights made of I_n(x) = ∫₀¹ wⁿ e^{−xw} dw, x = βh. There is no
@@ -95,8 +96,8 @@ struct Cascade {
 };
 
 /// Σ q_k P(x_k) e^{−x_k} with P(x) = 1 − x + x²/2, x_k = β(t − t_k), over impulses q_k >= 0 at the times t_k: at least
-/// Σ q_k sup |1 − x| e^{−x} over x >= x_k, since |1 − x| <= P(x) and P(x)e^{−x} falls. α² times it bounds what the slope of f₂
-/// makes of the impulses.
+/// Σ q_k sup |1 − x| e^{−x} over x >= x_k, since |1 − x| <= P(x) and P(x)e^{−x} falls. α² times it bounds what the
+/// slope of f₂ makes of the impulses.
 struct SlopeMajorant {
   double s0 = 0.0;
   double s1 = 0.0;
@@ -111,17 +112,18 @@ struct SlopeMajorant {
   [[nodiscard]] double value() const { return s0 - s1 + 0.5 * s2; }
 };
 
-/// One filtered signal: Σ q_k x_k^i e^{−βx_k} for i = 0 and 1, and Σ q_k e^{−γx_k}, over what went in at the times t − x_k.
+/// One filtered signal: Σ q_k x_k^i e^{−βx_k} for i = 0 and 1, and Σ q_k e^{−γx_k}, over what went in at the times t −
+/// x_k.
 struct KernelState {
   double z1 = 0.0;
   double z2 = 0.0;
   double fast = 0.0;
 };
 
-/// For speeds: f (24), or f₂ = f * f, as means over the steps. For angles and mean speeds: f₂ * γe^{−γt} at the samples,
-/// γ = 2/(nominal step) and at least 4β. This smoothing by half a step spreads the newest angle over its neighbours, as
-/// the mean over a step would, and needs no even steps; it has the area 1 and no sign, so that it raises neither the total
-/// variation of f₂ nor that of its slope.
+/// For speeds: f (24), or f₂ = f * f, as means over the steps. For angles and mean speeds: f₂ * γe^{−γt} at the
+/// samples, γ = 2/(nominal step) and at least 4β. This smoothing by half a step spreads the newest angle over its
+/// neighbours, as the mean over a step would, and needs no even steps; it has the area 1 and no sign, so that it raises
+/// neither the total variation of f₂ nor that of its slope.
 class FilterKernel {
  public:
   FilterKernel() = default;

@@ -59,8 +59,8 @@ struct Measurement {
   EffortChanges changes = EffortChanges::between;  ///< what an effort may do between two samples, beside `hold`
   Interval delay{0.0, 0.0};                        ///< s, holds the constant time by which logged efforts are late
 
-  /// A longer step between two samples is a hole in the log: nothing is known of the effort in it, s; 0 where no step is
-  /// known. 1.75 nominal steps, for steps that vary less: as long as two of the shortest together, but at least 1.35
+  /// A longer step between two samples is a hole in the log: nothing is known of the effort in it, s; 0 where no step
+  /// is known. 1.75 nominal steps, for steps that vary less: as long as two of the shortest together, but at least 1.35
   /// nominal steps; for mean speeds, whose interval is one step, 1.05 of these.
   [[nodiscard]] double longest_step() const;
 
@@ -69,11 +69,12 @@ struct Measurement {
 };
 
 /// Finds how `log` measures `robot`: angles where the log has them, else speeds; for order 2 and speed_source automatic
-/// the log is searched for count-differenced speeds (encoder.hpp). What is merely found never replaces what is declared:
-/// where the robot file bounds the noise of the wheel speeds by half of the quantum found or more, and neither gives
-/// encoder_counts_per_turn nor asks for speed_source encoder_difference, the speeds are samples with that bound. Efforts are corrected for the robot's effects. Walks the log once. Throws InputError when a joint
-/// has no usable motion or effort column (naming the columns that were looked for), InvalidArgument when order 1 is
-/// asked of a log that has angles only.
+/// the log is searched for count-differenced speeds (encoder.hpp). What is merely found never replaces what is
+/// declared: where the robot file bounds the noise of the wheel speeds by half of the quantum found or more, and
+/// neither gives encoder_counts_per_turn nor asks for speed_source encoder_difference, the speeds are samples with that
+/// bound. Efforts are corrected for the robot's effects. Walks the log once. Throws InputError when a joint has no
+/// usable motion or effort column (naming the columns that were looked for), InvalidArgument when order 1 is asked of a
+/// log that has angles only.
 [[nodiscard]] Measurement find_measurement(LogSource& log, const Robot& robot, const Model& model, int order);
 
 }  // namespace wheelwright

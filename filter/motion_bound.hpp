@@ -12,9 +12,9 @@
 
 namespace wheelwright {
 
-/// Bounds on the accelerations of a model's coordinates at every instant, samples or not. With M(θ)q̈ = u − F(θ, q̇) the
-/// dynamics (20), M what multiplies accelerations, |q̈| <= |M⁻¹|(|u| + |F|) for every θ of a set; and whatever else is
-/// known, a limit.
+/// Bounds on the accelerations of a model's coordinates at every instant, samples or not. With M(θ)q̈ = u − F(θ, q̇)
+/// the dynamics (20), M what multiplies accelerations, |q̈| <= |M⁻¹|(|u| + |F|) for every θ of a set; and whatever else
+/// is known, a limit.
 struct MotionBound {
   Eigen::VectorXd limit;     ///< per coordinate: |q̈| <= limit; empty: none
   Eigen::MatrixXd mobility;  ///< coordinates × outputs: sup |M(θ)⁻¹| over the set, entry by entry; empty: not known
@@ -54,9 +54,9 @@ class StepEnclosure {
   StepEnclosure() = default;
   StepEnclosure(const Model& model, MotionBound bound);
 
-  /// Bounds the accelerations of `step` (zero where the bound is empty) and evaluates the model's functions so that they
-  /// hold at every instant of it. Returns false where no bound on an acceleration can be given: the step is too long for
-  /// the model's friction (|M⁻¹F| h/2 >= 1) and there is no limit. Does not allocate.
+  /// Bounds the accelerations of `step` (zero where the bound is empty) and evaluates the model's functions so that
+  /// they hold at every instant of it. Returns false where no bound on an acceleration can be given: the step is too
+  /// long for the model's friction (|M⁻¹F| h/2 >= 1) and there is no limit. Does not allocate.
   bool enclose(const Model& model, StepMotion& step) const;
 
   /// Per coordinate: by how much an acceleration can change within `step`, where the efforts change by at most

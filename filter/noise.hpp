@@ -63,10 +63,10 @@ struct KernelNorms {
 ///   order 1, speeds:  f*n: α/β;  f*ṅ: 2α
 ///   order 2, angles:  f₂*n: α²/β²;  f₂*ṅ: 2α²/(eβ);  f₂*n̈: 2α²(1 + e⁻²)
 ///   order 2, speeds:  f₂*n: α²/β²;  f₂*ṅ: 2α²/(eβ)
-/// For speeds f*n and f₂*n are exact, the others bound those of RegressorFilter's kernels for steps of any length: these
-/// kernels interpolate f₂, or average it over steps, and neither raises the total variation of a function or of its
-/// slope. The effort's norm is that of a long even log; where steps are uneven RegressorFilter follows the kernel's area.
-/// What the beginning of a segment adds to f₂*n̈ is added by RegressorFilter, too.
+/// For speeds f*n and f₂*n are exact, the others bound those of RegressorFilter's kernels for steps of any length:
+/// these kernels interpolate f₂, or average it over steps, and neither raises the total variation of a function or of
+/// its slope. The effort's norm is that of a long even log; where steps are uneven RegressorFilter follows the kernel's
+/// area. What the beginning of a segment adds to f₂*n̈ is added by RegressorFilter, too.
 [[nodiscard]] KernelNorms worst_case_norms(const FilterDesign& design, MotionKind motion);
 
 /// L2 norms (root of the summed squares of the weights of all samples) for a constant step `step` (s), found by sending
@@ -94,10 +94,11 @@ struct NoiseGram {
 [[nodiscard]] SignalErrors propagate(const Model& model, const FilterDesign& design, const Measurement& measurement,
                                      const SensorErrors& sensors, const PropagationOptions& options = {});
 
-/// sup |Σ_k g_kᵀ e_k| over all errors of the sensors within their bounds, where e_k = y_k − Y_k θ are the residuals of rows.
-/// Each error is weighted with what all rows together make of it (the adjoint of the filter), so that what averages out in
-/// the sum does so here; a sum of the rows' own bounds would be many times as large. To first order in the errors, of the
-/// terms that are linear in the motion, and with each block of rows on its own (never smaller for it).
+/// sup |Σ_k g_kᵀ e_k| over all errors of the sensors within their bounds, where e_k = y_k − Y_k θ are the residuals of
+/// rows. Each error is weighted with what all rows together make of it (the adjoint of the filter), so that what
+/// averages out in the sum does so here; a sum of the rows' own bounds would be many times as large. To first order in
+/// the errors, of the terms that are linear in the motion, and with each block of rows on its own (never smaller for
+/// it).
 class ErrorInfluence {
  public:
   /// For `sums` functionals at once. Shapes as in propagate().

@@ -54,8 +54,8 @@ struct OdometryErrors {
 
 /// A window of wheel odometry against what a pose or a gyro saw of it, for every sample k; k0 is the sample of the same
 /// segment with t_k − t_k0 nearest to the window W. With p and θ the measured pose, φ the wheel angles (speeds are
-/// integrated by the trapezoidal rule) and ϑ = [r_R, r_L, c_R, c_L, b]: effective rolling radii, yaw gains c = r/D, gyro
-/// bias,
+/// integrated by the trapezoidal rule) and ϑ = [r_R, r_L, c_R, c_L, b]: effective rolling radii, yaw gains c = r/D,
+/// gyro bias,
 ///
 ///     longitudinal, lateral:  R(−θ_k0)(p_k − p_k0) = Σ_j E_j (Δφ_R,j r_R + Δφ_L,j r_L)/2
 ///     yaw:                    θ_k − θ_k0           = c_R Δφ_R − c_L Δφ_L
@@ -74,8 +74,8 @@ struct OdometryErrors {
 ///     n_θ Σ (|Δφ_j| + 2 n_φ)                        a mean of unit vectors moves by n_θ at most,
 ///     Σ h²[(|Δφ_j| + 2 n_φ + A h²/2) 2cA/12 + (|Δψ_j| + 2 n_θ) A/8]
 ///                                                   speed and turning rate not constant within a step of length h,
-///   with A and c of OdometryErrors: for |ω̇| <= A a speed differs from its mean over the step by A h²/4 in the integral,
-///   and the heading from the straight line between its ends by |θ̈| h³/12.
+///   with A and c of OdometryErrors: for |ω̇| <= A a speed differs from its mean over the step by A h²/4 in the
+///   integral, and the heading from the straight line between its ends by |θ̈| h³/12.
 /// - the rounding of the sums, which are carried with twice the precision.
 /// Bias and length of the window are exact.
 ///
@@ -83,17 +83,17 @@ struct OdometryErrors {
 /// this class in a loop.
 class OdometryFilter {
  public:
-  /// `window` W > 0, s. Throws InvalidArgument for a window shorter than two nominal steps, other than two motion columns,
-  /// no output at all, or bounds that are negative.
+  /// `window` W > 0, s. Throws InvalidArgument for a window shorter than two nominal steps, other than two motion
+  /// columns, no output at all, or bounds that are negative.
   OdometryFilter(OdometryMeasurement measurement, double window, OdometryErrors errors = {});
 
   /// Forgets all samples: the next one starts a segment.
   void restart();
 
   /// Takes the sample at time `t` (s), in the order of OdometryMeasurement::columns(); headings may be wrapped or not.
-  /// `t` must exceed that of the sample before. Returns whether row() now holds an instant: not before the segment is as
-  /// long as the window, and for a held pose only where it is new. Where samples come so fast that one window has more
-  /// than twice as many as the nominal step gives, the window is as long as the last so many samples.
+  /// `t` must exceed that of the sample before. Returns whether row() now holds an instant: not before the segment is
+  /// as long as the window, and for a held pose only where it is new. Where samples come so fast that one window has
+  /// more than twice as many as the nominal step gives, the window is as long as the last so many samples.
   bool step(double t, std::span<const double> sample);
 
   /// The instant at the last sample.
@@ -160,8 +160,8 @@ class OdometryFilter {
 };
 
 /// What `log` has for a kinematic residual of `robot`; nothing where the robot is no differential drive, or the log has
-/// neither the columns theta (with x and y or without) nor gyro_z. Angles are used where the log has them, else speeds in
-/// the way that `torque` (how the torque residual reads the log) found them. A pose is taken as held where it stays
+/// neither the columns theta (with x and y or without) nor gyro_z. Angles are used where the log has them, else speeds
+/// in the way that `torque` (how the torque residual reads the log) found them. A pose is taken as held where it stays
 /// exactly the same over a fifth or more of the steps in which a wheel moves. Walks the log once where it has a pose.
 [[nodiscard]] std::optional<OdometryMeasurement> find_odometry(LogSource& log, const Robot& robot, const Model& model,
                                                                const Measurement& torque);

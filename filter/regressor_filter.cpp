@@ -187,7 +187,8 @@ void RegressorFilter::effort_of_range(double begin, double end) {
   const double from = begin + measurement_.delay.lower, to = end + measurement_.delay.upper;
   low_.setConstant(kInfinity);
   high_.setConstant(-kInfinity);
-  // From the last stamp before the range to the first behind it: a value may change right after its stamp, or before it.
+  // From the last stamp before the range to the first behind it: a value may change right after its stamp, or before
+  // it.
   const std::size_t held = std::min(samples_, ring_.size());
   for (std::size_t k = 0; k < held; ++k) {
     const bool behind = sample(k).t > to && k + 1 < held && sample(k + 1).t >= to;
@@ -324,7 +325,8 @@ void RegressorFilter::begin() {
   }
 }
 
-// q − `corrected`, with `covered` in doubt, both times the curvature of a parabola through three efforts, `a` and `b` apart.
+// q − `corrected`, with `covered` in doubt, both times the curvature of a parabola through three efforts, `a` and `b`
+// apart.
 void RegressorFilter::curve_effort(double a, double b, const Eigen::VectorXd& first, const Eigen::VectorXd& middle,
                                    const Eigen::VectorXd& last, double corrected, double covered) {
   for (Eigen::Index j = 0; j < scratch_.size(); ++j) {

@@ -28,30 +28,33 @@ struct FilteredRow {
   Eigen::VectorXd dy;  ///< n, n̄ >= 0
 };
 
-/// Filters torque and regressor sample by sample: (28) for τ_f, the identities of theory section 2 for Y_f, with kernels
-/// that need no motion between samples for the acceleration, whatever the steps.
+/// Filters torque and regressor sample by sample: (28) for τ_f, the identities of theory section 2 for Y_f, with
+/// kernels that need no motion between samples for the acceleration, whatever the steps.
 ///
-/// A row is the equation (20) multiplied by a weight w and integrated. For **angles** w goes linearly from one sample to the
-/// next, with the values of a smoothed f₂ there (kernel.hpp), from 0 at the first sample of a segment: ẅ is a row of impulses at the samples, and with s_k the mean
-/// speed of the step before t_k, h_k its length, without any error
+/// A row is the equation (20) multiplied by a weight w and integrated. For **angles** w goes linearly from one sample
+/// to the next, with the values of a smoothed f₂ there (kernel.hpp), from 0 at the first sample of a segment: ẅ is a
+/// row of impulses at the samples, and with s_k the mean speed of the step before t_k, h_k its length, without any
+/// error
 ///
 ///     ∫ w φ̈ dt = Σ w_k (s_k+1 − s_k)
-///     ∫ w φ̇ dt = Σ w_k (h_k s_k + h_k+1 s_k+1)/2  + Σ ẇ_k ∫ (s − middle)(φ̇ − s_k) ds,   |last integral| <= h_k³/12 sup|φ̈|
+///     ∫ w φ̇ dt = Σ w_k (h_k s_k + h_k+1 s_k+1)/2  + Σ ẇ_k ∫ (s − middle)(φ̇ − s_k) ds,   |∫| <= h_k³/12 sup|φ̈|
 ///
 /// **Mean speeds** are angles at the ends of their intervals, a known half step after their stamps. For **speeds** w is
-/// constant over each step, with the mean of f or f₂ over it: ∫ w v̇ dt = Σ w_k (v_k − v_k−1), and the trapezoidal rule for
-/// ∫ w v dt. The effort is integrated with the same w:
+/// constant over each step, with the mean of f or f₂ over it: ∫ w v̇ dt = Σ w_k (v_k − v_k−1), and the trapezoidal rule
+/// for ∫ w v dt. The effort is integrated with the same w:
 ///
 ///     held, changes at samples   exactly
 ///     held, changes between      the mean of both samples of the step; half their difference goes into dy
 ///     linear, at samples         exactly
 ///     linear, between            as a parabola through three samples; what makes it differ from the line goes into dy
-///     late by an unknown time    the middle of all values that may have acted in the step; half their range goes into dy
+///     late by an unknown time    the middle of all values that may have acted in the step; half their range goes into
+///     dy
 ///
-/// dY and dy hold the sensors' errors (noise.hpp) and, where SignalErrors::between_samples says so, what motion and efforts
-/// may do between samples, by SignalErrors::motion. Functions of the motion are then enclosed for every instant of a step.
-/// Efforts pass Measurement::correction first; where that has a memory, rows begin when it has forgotten the segment's start
-/// too, unless the segment begins at rest without effort. A correction takes efforts as changing at samples.
+/// dY and dy hold the sensors' errors (noise.hpp) and, where SignalErrors::between_samples says so, what motion and
+/// efforts may do between samples, by SignalErrors::motion. Functions of the motion are then enclosed for every instant
+/// of a step. Efforts pass Measurement::correction first; where that has a memory, rows begin when it has forgotten the
+/// segment's start too, unless the segment begins at rest without effort. A correction takes efforts as changing at
+/// samples.
 ///
 /// step() does not allocate. Batch filtering is this class in a loop, so that both give the same bits.
 class RegressorFilter {
@@ -64,8 +67,8 @@ class RegressorFilter {
 
   /// Takes the sample at time `t` (s): motion of each joint, effort of each joint, heading where
   /// Measurement::heading_column names one (the order of Measurement::columns()). `t` must exceed that of the sample
-  /// before. A step that is longer than Measurement::longest_step restarts the filter: nothing is known of the effort in
-  /// it. Returns whether row() now holds an instant of the regression: not for the first samples of a segment, nor
+  /// before. A step that is longer than Measurement::longest_step restarts the filter: nothing is known of the effort
+  /// in it. Returns whether row() now holds an instant of the regression: not for the first samples of a segment, nor
   /// before the filter has settled (FilterDesign::settle; after lost rows, before the segment's beginning weighs less
   /// than the noise of all later samples).
   bool step(double t, std::span<const double> sample);
@@ -81,8 +84,8 @@ class RegressorFilter {
   /// What dY and dy are made of; zeros where nothing was given.
   [[nodiscard]] const SignalErrors& errors() const { return errors_; }
 
-  /// Number of instants since the segment began: one for each step between two samples (for speeds: for each sample) that
-  /// the filter has taken.
+  /// Number of instants since the segment began: one for each step between two samples (for speeds: for each sample)
+  /// that the filter has taken.
   [[nodiscard]] std::size_t instants() const { return instants_; }
   /// Time of the last instant, s: the end of the last step taken.
   [[nodiscard]] double instant() const { return t_; }
@@ -90,8 +93,8 @@ class RegressorFilter {
   [[nodiscard]] const Eigen::VectorXd& speed() const { return speed_; }
   /// Speeds of the joints, alike.
   [[nodiscard]] const Eigen::VectorXd& joint_speed() const { return joint_speed_; }
-  /// Heading at that instant, rad: measured where there is a column for it, else odometry from the segment's start. In the
-  /// middle of the step for angles and mean speeds.
+  /// Heading at that instant, rad: measured where there is a column for it, else odometry from the segment's start. In
+  /// the middle of the step for angles and mean speeds.
   [[nodiscard]] double heading() const { return heading_; }
   /// Whether row() is there only because the segment began at standstill, exactly: other noise might have hidden that.
   [[nodiscard]] bool rests_on_standstill() const {

@@ -32,8 +32,8 @@ concept RowFilter = requires(F filter, const F& constant, double t, std::span<co
   { constant.measurement().nominal_step } -> std::convertible_to<double>;
 };
 
-/// Walks a log through a filter, which restarts at every segment of the log, so nothing is filtered across a gap. The log
-/// must outlive the stream and is rewound by it.
+/// Walks a log through a filter, which restarts at every segment of the log, so nothing is filtered across a gap. The
+/// log must outlive the stream and is rewound by it.
 template <RowFilter Filter>
 class RowStream final : public RegressionSource {
  public:
@@ -58,7 +58,8 @@ using TorqueRows = RowStream<RegressorFilter>;
 /// Rows of the kinematic residual.
 using OdometryRows = RowStream<OdometryFilter>;
 
-/// Positions of `columns` in `log`. Throws InvalidArgument, naming the first that it lacks, with `why` it is wanted behind.
+/// Positions of `columns` in `log`. Throws InvalidArgument, naming the first that it lacks, with `why` it is wanted
+/// behind.
 [[nodiscard]] std::vector<std::size_t> positions_of(const LogSource& log, const std::vector<std::string>& columns,
                                                     const std::string& why = {});
 

@@ -76,8 +76,8 @@ struct CauseSearchOptions {
 };
 
 /// Sets by size: the empty one, every effect alone at its best shape, and the best pairs and triples, each best first.
-/// Pairs are grown from the best single effects with every other effect, the shapes of both chosen again for each other;
-/// triples from the best pairs.
+/// Pairs are grown from the best single effects with every other effect, the shapes of both chosen again for each
+/// other; triples from the best pairs.
 [[nodiscard]] std::vector<std::vector<CauseSet>> search_causes(const CandidateTable& table,
                                                                const CauseSearchOptions& options = {});
 

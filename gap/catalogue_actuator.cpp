@@ -161,8 +161,8 @@ Effect torque_bias(std::size_t joints) {
   return effect;
 }
 
-// τ less what passes, b clip(τ/b), as b tanh(τ/edge): linear in b. With a wide edge the column would be the commanded effort
-// itself, which explains anything; so would a low limit of saturation() beside it.
+// τ less what passes, b clip(τ/b), as b tanh(τ/edge): linear in b. With a wide edge the column would be the commanded
+// effort itself, which explains anything; so would a low limit of saturation() beside it.
 Effect torque_deadzone() {
   return {.name = "torque_deadzone",
           .sentence = "The actuator answers only to what exceeds a dead zone.",
@@ -212,8 +212,8 @@ double typical_inertia(const Drive& drive) {
   return std::max(std::sqrt(effort / acceleration), 1e-12);
 }
 
-// A rotor with play against its wheel: inertia J, play `gap`, and where they touch a spring and a damper that only push,
-// of the rotor's own frequency ω and damping ratio ζ.
+// A rotor with play against its wheel: inertia J, play `gap`, and where they touch a spring and a damper that only
+// push, of the rotor's own frequency ω and damping ratio ζ.
 struct Play {
   double width = 0.0;  // J·gap
   double inertia = 0.0;

@@ -96,7 +96,8 @@ Effect slope() {
               }};
 }
 
-// Eccentricity e: the radius grows by e cos(φ + φ0), and the weight on the wheel, which is lifted, asks for torque alike.
+// Eccentricity e: the radius grows by e cos(φ + φ0), and the weight on the wheel, which is lifted, asks for torque
+// alike.
 Effect wheel_out_of_round() {
   return {.name = "wheel_out_of_round",
           .sentence = "Wheels that are eccentric or out of round.",
@@ -241,8 +242,8 @@ Applicability needs_sliding_wheels(const Drive& drive) {
                              "the robot turns as its wheels say, but for what the width of its track can explain"};
 }
 
-// Instantaneous centres of rotation outside the wheels' tracks: the robot turns slower by a share, as with a wider track.
-// The moment that scrubbing takes is an effect of its own (lateral_scrub).
+// Instantaneous centres of rotation outside the wheels' tracks: the robot turns slower by a share, as with a wider
+// track. The moment that scrubbing takes is an effect of its own (lateral_scrub).
 Effect turning_slip() {
   return {
       .name = "turning_slip",
@@ -265,8 +266,8 @@ Effect turning_slip() {
           }};
 }
 
-// The centre of rotation lies ahead of the axle and is dragged outwards in a curve; wheels that slide sideways pass on less
-// of their speed.
+// The centre of rotation lies ahead of the axle and is dragged outwards in a curve; wheels that slide sideways pass on
+// less of their speed.
 Effect curve_slip() {
   return {.name = "curve_slip",
           .sentence =

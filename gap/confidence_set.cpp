@@ -152,8 +152,8 @@ std::vector<double> model_confidence_set(const std::vector<Eigen::VectorXd>& los
     }
   }
 
-  // How often the largest studentised mean among the first k + 1 models, beyond that of the best of them, is at least t_k
-  // where all are equally good: which one comes out best is left to chance too.
+  // How often the largest studentised mean among the first k + 1 models, beyond that of the best of them, is at least
+  // t_k where all are equally good: which one comes out best is left to chance too.
   std::vector<std::size_t> beyond(order.size(), 0);
   std::mt19937_64 generator(options.seed);
   std::uniform_int_distribution<Eigen::Index> any(0, blocks - 1);

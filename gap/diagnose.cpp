@@ -145,8 +145,8 @@ Box finite_prior(const Robot& robot, const PreparedGap& prepared) {
   return box;
 }
 
-// Mean square of the efforts in units of the floors, or of the pose's increments where there are no efforts: what shares of
-// the gap are shares of.
+// Mean square of the efforts in units of the floors, or of the pose's increments where there are no efforts: what
+// shares of the gap are shares of.
 double signal_square(const GapProblem& problem, bool efforts) {
   double sum = 0.0, rows = 0.0;
   for (std::size_t s = 0; s < problem.rows.spaces.size(); ++s) {

@@ -36,17 +36,17 @@ struct DiagnoseOptions {
   std::function<void(std::string_view stage, double share)> progress;  ///< may be empty
 };
 
-/// Diagnoses `log` against the model of `robot`. With `baseline`, a log of the healthy robot, its θ is the nominal one and
-/// what it leaves is the noise floor; effects that the healthy robot has already are taken as known. Without, θ is nominal
-/// as far as the robot file says, and the floor is made of the sensors' noise. Throws InputError or InvalidArgument for a
-/// log or robot that cannot be used at all; what the data say is in the result.
+/// Diagnoses `log` against the model of `robot`. With `baseline`, a log of the healthy robot, its θ is the nominal one
+/// and what it leaves is the noise floor; effects that the healthy robot has already are taken as known. Without, θ is
+/// nominal as far as the robot file says, and the floor is made of the sensors' noise. Throws InputError or
+/// InvalidArgument for a log or robot that cannot be used at all; what the data say is in the result.
 [[nodiscard]] Diagnosis diagnose(LogSource& log, LogSource* baseline, const Robot& robot,
                                  const DiagnoseOptions& options = {});
 
-/// What the model leaves of the filtered efforts of `fresh`, a log of the same robot that was not looked at: the nominal
-/// model (`before`), and the one with θ and causes as `found` has them (`after`, with the interval of a block bootstrap);
-/// nothing is fitted to it. With the filter of `found`, `options` and `baseline` as it was made with; nothing for a log
-/// without efforts. Throws as diagnose() does.
+/// What the model leaves of the filtered efforts of `fresh`, a log of the same robot that was not looked at: the
+/// nominal model (`before`), and the one with θ and causes as `found` has them (`after`, with the interval of a block
+/// bootstrap); nothing is fitted to it. With the filter of `found`, `options` and `baseline` as it was made with;
+/// nothing for a log without efforts. Throws as diagnose() does.
 [[nodiscard]] std::vector<ShrinkFigure> torque_on(LogSource& fresh, LogSource* baseline, const Robot& robot,
                                                   const Diagnosis& found, const DiagnoseOptions& options = {});
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The sim-to-real gap of a robot: where it lies, which unmodelled effect causes it, how far it shrinks once the effect is
-/// in the model. Theory section 6; the result is the contract's gap.json.
+/// The sim-to-real gap of a robot: where it lies, which unmodelled effect causes it, how far it shrinks once the effect
+/// is in the model. Theory section 6; the result is the contract's gap.json.
 #pragma once
 
 #include <functional>

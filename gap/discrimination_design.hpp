@@ -24,8 +24,8 @@ struct InseparablePair {
   std::string measurement;  ///< what would split them
 };
 
-/// The objective: minus the least number of deviations (RivalSeparation::deviations) over the ordered pairs that `decidable`
-/// lists (as discrimination() does; empty: all). Keeps a reference to `subject`.
+/// The objective: minus the least number of deviations (RivalSeparation::deviations) over the ordered pairs that
+/// `decidable` lists (as discrimination() does; empty: all). Keeps a reference to `subject`.
 [[nodiscard]] PlanObjective tell_apart(const DesignSubject& subject, const std::vector<Rival>& rivals,
                                        const std::vector<Effect>& catalogue, const PlannedNoise& noise,
                                        std::vector<bool> decidable = {});
@@ -50,16 +50,18 @@ struct DiscriminationDesign {
   std::vector<std::string> sentences;
 };
 
-/// Stages of constant speed of the first half of `plan` in words, e.g. "1.2 s forwards at 0.8 m/s", and that it comes back.
+/// Stages of constant speed of the first half of `plan` in words, e.g. "1.2 s forwards at 0.8 m/s", and that it comes
+/// back.
 [[nodiscard]] std::vector<std::string> stage_words(const Plan& plan, const Model& model);
 
 /// What measurement would split two rivals that no log of efforts, wheel speeds and pose does.
 [[nodiscard]] std::string splitting_measurement(const Rival& a, const Rival& b, const std::vector<Effect>& catalogue);
 
-/// design_manoeuvre() for tell_apart() over the decidable pairs, and the best figure eight beside it. An ordered pair (A, B)
-/// is decidable where on one of some random manoeuvres within the limits B fails to imitate more than 10⁻⁴ of A's
-/// signature, and θ does not take up the signature but for errors of sampling (3·10⁻⁴ of its sum of squares). `analysed`: the drive that was analysed, with predicted efforts, for
-/// comparison; may be null. Throws InvalidArgument as discrimination() and design_manoeuvre() do.
+/// design_manoeuvre() for tell_apart() over the decidable pairs, and the best figure eight beside it. An ordered pair
+/// (A, B) is decidable where on one of some random manoeuvres within the limits B fails to imitate more than 10⁻⁴ of
+/// A's signature, and θ does not take up the signature but for errors of sampling (3·10⁻⁴ of its sum of squares).
+/// `analysed`: the drive that was analysed, with predicted efforts, for comparison; may be null. Throws InvalidArgument
+/// as discrimination() and design_manoeuvre() do.
 [[nodiscard]] DiscriminationDesign design_for_discrimination(const DesignSubject& subject, const MotionLimits& limits,
                                                              const std::vector<Rival>& rivals,
                                                              const std::vector<Effect>& catalogue,

@@ -94,8 +94,8 @@ struct DriveOptions {
 /// - Mean speeds are rounded to whole counts (Measurement::count). Angles become mean speeds between neighbouring
 ///   samples, at the middle of the interval, where all other columns are then means too: one instant less per segment.
 /// - A segment whose steps differ by more than 1 % from the log's median step is resampled linearly at that step.
-/// - Smooth signals are those of a local quadratic over `smoothing_window` (Savitzky and Golay 1964), fitted one-sidedly
-///   at the ends of a segment and never across them.
+/// - Smooth signals are those of a local quadratic over `smoothing_window` (Savitzky and Golay 1964), fitted
+///   one-sidedly at the ends of a segment and never across them.
 /// - Unsigned efforts take the sign of their joint's motion.
 /// - A joint stands still where its smooth speed stays below `count`, four standard deviations of its noise or
 ///   1 % of its root mean square, whichever is largest, for `shortest_rest`.
@@ -129,9 +129,9 @@ void smooth_quadratic(std::span<const double> signal, std::size_t window, std::s
 /// f₂ * τ: Model::input · efforts as the log holds them (held or linear), one signal per output.
 [[nodiscard]] std::vector<Eigen::VectorXd> filtered_outputs(const Drive& drive, double beta);
 
-/// The base regressor f₂ * Y, [parameter][output]; an empty vector stands for a signal of zeros. RegressorFilter (order 2,
-/// α = β) weighs the same motion by means of f₂, so that the rows differ by (βh)² in relation; for angles its instants are
-/// half a step later.
+/// The base regressor f₂ * Y, [parameter][output]; an empty vector stands for a signal of zeros. RegressorFilter (order
+/// 2, α = β) weighs the same motion by means of f₂, so that the rows differ by (βh)² in relation; for angles its
+/// instants are half a step later.
 [[nodiscard]] std::vector<std::vector<Eigen::VectorXd>> filtered_regressor(const Drive& drive, double beta);
 
 /// Rows after `memory`/β from the start of their segment, whose filter has forgotten what was before.

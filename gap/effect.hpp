@@ -95,8 +95,8 @@ void validate(const Effect& effect);
 /// Whether `effect` can be looked for on `drive`.
 [[nodiscard]] Applicability applicability(const Effect& effect, const Drive& drive);
 
-/// All grid points of the effect's shapes on `drive`, the last one running fastest; one empty point for an effect without
-/// shapes.
+/// All grid points of the effect's shapes on `drive`, the last one running fastest; one empty point for an effect
+/// without shapes.
 [[nodiscard]] std::vector<std::vector<double>> shape_grid(const Effect& effect, const Drive& drive);
 
 /// Bounds of a shape on `drive`, in its unit: of its magnitude where it has both signs.
@@ -140,10 +140,10 @@ template <typename Function>
 /// A signal at one joint, empty ones at the others.
 [[nodiscard]] std::vector<Eigen::VectorXd> only(const Drive& drive, std::size_t joint, Eigen::VectorXd signal);
 
-/// The column of a robot whose coordinates move faster than its joints show, by `speed` (one signal per coordinate, empty
-/// for zeros): the base model's effort for that motion; for a robot on wheels also its body velocity. Without `friction` only
-/// its inertia: friction in the joints knows nothing of what they do not show. Terms of the base model that are functions
-/// of the motion are taken as they are.
+/// The column of a robot whose coordinates move faster than its joints show, by `speed` (one signal per coordinate,
+/// empty for zeros): the base model's effort for that motion; for a robot on wheels also its body velocity. Without
+/// `friction` only its inertia: friction in the joints knows nothing of what they do not show. Terms of the base model
+/// that are functions of the motion are taken as they are.
 [[nodiscard]] Column unseen_motion(const Drive& drive, const std::vector<Eigen::VectorXd>& speed, bool friction);
 
 /// The same for wheels whose rims move faster by `right` and `left`, m/s.
@@ -181,8 +181,8 @@ void add(Column& a, const Column& b);
 
 namespace wheelwright {
 
-/// All effects and parametric causes for a robot on two driven wheels. Coefficients are of effect_catalogue's units: N·m
-/// at the wheel, m, rad, s, kg, relative changes; with current or voltage as effort, A or V stand for N·m.
+/// All effects and parametric causes for a robot on two driven wheels. Coefficients are of effect_catalogue's units:
+/// N·m at the wheel, m, rad, s, kg, relative changes; with current or voltage as effort, A or V stand for N·m.
 ///
 /// Add to the vector, or take from it, as you like: nothing else knows what is in it.
 [[nodiscard]] std::vector<Effect> effect_catalogue();

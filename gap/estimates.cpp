@@ -140,9 +140,10 @@ void CausesModel::fill(const Eigen::VectorXd& shape, Eigen::VectorXd& offset, Ei
 
 namespace {
 
-// What the columns themselves leave out (softened signs, second orders), as a share of each number: a share in any case, and
-// a part of what the fit leaves above the floor beside what the effect takes off (root mean squares), since some of that
-// goes along with the effect's own columns. Measured on an independent world as what the intervals of chance alone lack.
+// What the columns themselves leave out (softened signs, second orders), as a share of each number: a share in any
+// case, and a part of what the fit leaves above the floor beside what the effect takes off (root mean squares), since
+// some of that goes along with the effect's own columns. Measured on an independent world as what the intervals of
+// chance alone lack.
 constexpr double kForm = 0.01;
 constexpr double kMisfit = 0.3;
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Coefficients and shapes of a set of causes with their intervals, shapes tuned off the grid, each cause's share of the gap.
+/// Coefficients and shapes of a set of causes with their intervals, shapes tuned off the grid, each cause's share of
+/// the gap.
 #pragma once
 
 #include <cstddef>
@@ -27,9 +28,9 @@ struct FreeShape {
 /// Column `column` of the rows, one part for each space.
 [[nodiscard]] std::vector<Eigen::VectorXd> column_parts(const GapRows& rows, std::size_t column);
 
-/// The rows of `problem` fitted by `set`, θ (where it is not held) and the effects' coefficients linear, their continuous
-/// shapes free. Rows of all spaces one after the other, in units of their floors. Keeps references to `prepared` and
-/// `problem`.
+/// The rows of `problem` fitted by `set`, θ (where it is not held) and the effects' coefficients linear, their
+/// continuous shapes free. Rows of all spaces one after the other, in units of their floors. Keeps references to
+/// `prepared` and `problem`.
 class CausesModel final : public SeparableModel {
  public:
   CausesModel(const PreparedGap& prepared, const GapProblem& problem, const CauseSet& set, BaseModel base);
@@ -77,13 +78,13 @@ struct FittedCauses {
 };
 
 /// Fits `set` to the rows of `problem`. Continuous shapes are fitted by variable projection from where the search found
-/// them; all intervals (95 %) are those of the jackknife over blocks of time (BlockGram::fit) of the model linearised in its
-/// shapes. With `base` nominal θ is held where it is trusted.
+/// them; all intervals (95 %) are those of the jackknife over blocks of time (BlockGram::fit) of the model linearised
+/// in its shapes. With `base` nominal θ is held where it is trusted.
 [[nodiscard]] FittedCauses fit_causes(const PreparedGap& prepared, const GapProblem& problem, const CauseSet& set,
                                       BaseModel base, const BlockOptions& blocks);
 
-/// Shapley value of each member of `set`: its mean gain in held-out mean square over all orders in which the causes could
-/// have been added, as a share of `gap` (mean squares of the floor).
+/// Shapley value of each member of `set`: its mean gain in held-out mean square over all orders in which the causes
+/// could have been added, as a share of `gap` (mean squares of the floor).
 [[nodiscard]] std::vector<double> shapley_shares(const CandidateTable& table, const CauseSet& set, BaseModel base,
                                                  double gap);
 
@@ -99,9 +100,9 @@ struct TuneOptions {
 };
 
 /// Adds to `grids` the best shapes of every effect with many of them: those that leave least in the best set of
-/// `looked_at` (Selection::looked_at on the table of `problem`) that has it, its other causes' shapes tuned along. By simplices
-/// from random points and from where the grid was best, since such effects (play that is crossed, or just not) are not
-/// smooth in their shapes. Errors held out are compared later, as of all other points.
+/// `looked_at` (Selection::looked_at on the table of `problem`) that has it, its other causes' shapes tuned along. By
+/// simplices from random points and from where the grid was best, since such effects (play that is crossed, or just
+/// not) are not smooth in their shapes. Errors held out are compared later, as of all other points.
 void add_tuned_shapes(ShapeGrids& grids, const PreparedGap& prepared, const GapProblem& problem,
                       const std::vector<CauseSet>& looked_at, const TuneOptions& options = {});
 

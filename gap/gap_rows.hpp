@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// A drive as one least-squares problem over all residual spaces: what a nominal model leaves, and what every effect of a
-/// catalogue would add, row by row.
+/// A drive as one least-squares problem over all residual spaces: what a nominal model leaves, and what every effect of
+/// a catalogue would add, row by row.
 #pragma once
 
 #include <cstddef>
@@ -59,8 +59,8 @@ struct GapRows {
 /// Adds a column, one part for each space, and returns its index.
 std::size_t add_column(std::vector<RowSpace>& spaces, std::vector<Eigen::VectorXd> parts);
 
-/// What `subset` with the first of its coefficients leaves of the response of `space`; without any, the response less the
-/// fixed columns.
+/// What `subset` with the first of its coefficients leaves of the response of `space`; without any, the response less
+/// the fixed columns.
 [[nodiscard]] Eigen::VectorXd residual(const RowSpace& space, const Subset& subset,
                                        const Eigen::VectorXd& coefficients);
 
@@ -79,8 +79,8 @@ using ShapeGrids = std::vector<std::vector<std::vector<double>>>;
 [[nodiscard]] ShapeGrids all_shapes(const std::vector<Effect>& catalogue, const Drive& drive);
 
 /// Finer grids about the shapes of the single effects and of the best `sets` of every other size of `looked_at`
-/// (Selection::looked_at on `table`): every continuous shape goes from one point of `grids` below to one above in `points`
-/// steps each way, and discrete ones take all their values.
+/// (Selection::looked_at on `table`): every continuous shape goes from one point of `grids` below to one above in
+/// `points` steps each way, and discrete ones take all their values.
 [[nodiscard]] ShapeGrids finer_shapes(const std::vector<Effect>& catalogue, const ShapeGrids& grids,
                                       const CandidateTable& table, const std::vector<CauseSet>& looked_at,
                                       std::size_t sets = 8, int points = 3);

@@ -192,7 +192,8 @@ class Improvement {
 
   [[nodiscard]] double coefficient(std::size_t k) const { return cause_->coefficients[static_cast<Eigen::Index>(k)]; }
   [[nodiscard]] double shape(std::size_t k) const { return cause_->shape[k]; }
-  // What the first shape makes of a coefficient at the right and at the left wheel (catalogue_parts: side, side_or_opposite).
+  // What the first shape makes of a coefficient at the right and at the left wheel (catalogue_parts: side,
+  // side_or_opposite).
   [[nodiscard]] static Eigen::Vector2d sides(const FittedEffect& cause) {
     const double side = cause.shape.empty() ? 0.0 : cause.shape[0];
     return side > 1.5 ? Eigen::Vector2d(1.0, -1.0) : side < 0.5 ? Eigen::Vector2d(1.0, 0.0) : Eigen::Vector2d(0.0, 1.0);
@@ -308,8 +309,8 @@ class Improvement {
     return true;
   }
 
-  // Equal friction in the joints of unequal wheels turns the robot: Σ b ω_j/r_j has the cross term −2 b (e_R − e_L) D/2 /r²
-  // between forward and yaw, which is what viscous_asymmetric has; b = r θ_f1/2.
+  // Equal friction in the joints of unequal wheels turns the robot: Σ b ω_j/r_j has the cross term −2 b (e_R − e_L) D/2
+  // /r² between forward and yaw, which is what viscous_asymmetric has; b = r θ_f1/2.
   bool keep_joints() {
     const double* const viscous = find("viscous_linear");
     const Eigen::Vector2d e = coefficient(0) * sides(*cause_);
@@ -331,7 +332,8 @@ class Improvement {
     return put();
   }
 
-  // k and R_b of the file's law, u (k t + R_b Σ|u|) at each joint for the command u, that come nearest to what was fitted.
+  // k and R_b of the file's law, u (k t + R_b Σ|u|) at each joint for the command u, that come nearest to what was
+  // fitted.
   void convert_sag() {
     const std::vector<Column> columns = cause_->effect.columns(drive_, cause_->shape);
     Eigen::VectorXd load = Eigen::VectorXd::Zero(drive_.rows());
@@ -362,7 +364,8 @@ class Improvement {
     set("R_b", coefficient(1) != 0.0 ? found[1] * unit_ : 0.0);
   }
 
-  // The file's k is a share of all friction: the one that comes nearest to what was lost over the log, if it comes near.
+  // The file's k is a share of all friction: the one that comes nearest to what was lost over the log, if it comes
+  // near.
   bool convert_drift() {
     constexpr double kNear = 0.3;  // root mean square
     const double* const viscous = find("viscous_linear");

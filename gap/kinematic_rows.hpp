@@ -35,8 +35,8 @@ struct IncrementNoise {
   double yaw = 0.0;      ///< rad
 };
 
-/// Windows of `length` (s; at least two steps), the remainder of each segment left out. A segment without a whole window
-/// has none. Throws InvalidArgument unless `length` is > 0.
+/// Windows of `length` (s; at least two steps), the remainder of each segment left out. A segment without a whole
+/// window has none. Throws InvalidArgument unless `length` is > 0.
 [[nodiscard]] Windows make_windows(const Drive& drive, double length = 0.5);
 
 /// Pose minus odometry over each window: with the measured p and θ and the wheels' smooth v1 and v2,
@@ -56,10 +56,10 @@ struct IncrementNoise {
 /// itself), never below what the pose's resolution makes. Errors of the wheels are not in it.
 [[nodiscard]] IncrementNoise pose_noise(const Drive& drive);
 
-/// What of `gap` the wheels' motion does not determine: half the mean square difference between windows of nearly the same
-/// motion (both coordinates at first, middle and last row, each within a twentieth of its root mean square in the mean), each
-/// with its nearest one of another time. A drive with fewer than `fewest` such windows has none to be had. It is what
-/// repeated runs would show, the ground's and the pose's own whims included (Rice 1984).
+/// What of `gap` the wheels' motion does not determine: half the mean square difference between windows of nearly the
+/// same motion (both coordinates at first, middle and last row, each within a twentieth of its root mean square in the
+/// mean), each with its nearest one of another time. A drive with fewer than `fewest` such windows has none to be had.
+/// It is what repeated runs would show, the ground's and the pose's own whims included (Rice 1984).
 [[nodiscard]] IncrementNoise repeatability(const Drive& drive, const Windows& windows, const Increments& gap,
                                            std::size_t fewest = 30);
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The rule that one would write first, to be compared with: it is wrong most of the time, and selection.hpp is the remedy.
+/// The rule that one would write first, to be compared with: it is wrong most of the time, and selection.hpp is the
+/// remedy.
 #pragma once
 
 #include <cstddef>
@@ -16,9 +17,10 @@ struct NaiveChoice {
   double criterion = 0.0;            ///< the smallest n ln s² + k ln n that was reached
 };
 
-/// Forward selection of single effects by the Bayesian information criterion (Schwarz 1978), θ fitted again beside them,
-/// in sample: at each step the candidate that lowers n ln s² + k ln n most, until none does or there are `largest`.
-/// s² is the mean square over all n rows of the table, k counts the coefficients of θ and of the causes and their shapes.
+/// Forward selection of single effects by the Bayesian information criterion (Schwarz 1978), θ fitted again beside
+/// them, in sample: at each step the candidate that lowers n ln s² + k ln n most, until none does or there are
+/// `largest`. s² is the mean square over all n rows of the table, k counts the coefficients of θ and of the causes and
+/// their shapes.
 ///
 /// The criterion takes rows for independent. Filtered rows are not, so that chance pays for its columns: without any
 /// effect about two logs in three are given one. A forward search never takes back what it took.

@@ -96,8 +96,8 @@ Eigen::VectorXd step_errors(const Drive& drive, double beta) {
   return errors;
 }
 
-// Likewise of odometry over a window: h²/12 of the change of acceleration from its one end to the other by the trapezoidal
-// rule, and half as much again where speeds are means over their step.
+// Likewise of odometry over a window: h²/12 of the change of acceleration from its one end to the other by the
+// trapezoidal rule, and half as much again where speeds are means over their step.
 IncrementNoise step_errors(const Drive& drive) {
   const double share = drive.step * drive.step / 8.0 * std::sqrt(2.0);
   const Mask all = Mask::Constant(drive.rows(), true);

@@ -116,7 +116,8 @@ std::vector<FittedEffect> fitted_effects(const CandidateTable& table, const Caus
 }
 
 // The clocks of effort and speed differ by a little in every log (a command that is held for the sampling step of the
-// robot's own controller): an effort that comes later by δ leaves −δ τ̇. δ is fitted to what is `left`, and taken from it.
+// robot's own controller): an effort that comes later by δ leaves −δ τ̇. δ is fitted to what is `left`, and taken from
+// it.
 FittedEffect timing_of(const Drive& drive, const GapRows& rows, std::vector<Eigen::VectorXd>& left,
                        const GapRowOptions& options) {
   Effect timing;

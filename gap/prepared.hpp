@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What is settled before causes are sought: the drive, the nominal θ, the noise floor, what the healthy robot has already.
+/// What is settled before causes are sought: the drive, the nominal θ, the noise floor, what the healthy robot has
+/// already.
 #pragma once
 
 #include <optional>
@@ -31,8 +32,9 @@ struct PreparedGap {
   std::vector<std::string> notes;
 };
 
-/// θ by least squares on the filtered rows of `drive`, outputs weighted by their own residuals; instants at rest and before
-/// the filter has settled left out; zeros for a drive without efforts. Throws InputError where too few instants are left.
+/// θ by least squares on the filtered rows of `drive`, outputs weighted by their own residuals; instants at rest and
+/// before the filter has settled left out; zeros for a drive without efforts. Throws InputError where too few instants
+/// are left.
 [[nodiscard]] Eigen::VectorXd fit_base(const Drive& drive, double beta);
 
 /// Reads the logs and settles all of this.
@@ -53,9 +55,9 @@ struct GapProblem {
                                       const std::vector<Effect>& catalogue, const ShapeGrids& shapes,
                                       const GapRowOptions& options);
 
-/// Sets JointSignals::expected_effort of `drive` to what a model with `theta` and `causes` expects, the causes' own efforts
-/// included: effects that grow with the effort are then right beyond first order. Causes of unit coefficient, which are
-/// made of the measured effort, are left out.
+/// Sets JointSignals::expected_effort of `drive` to what a model with `theta` and `causes` expects, the causes' own
+/// efforts included: effects that grow with the effort are then right beyond first order. Causes of unit coefficient,
+/// which are made of the measured effort, are left out.
 void expect_efforts(Drive& drive, const Eigen::VectorXd& theta, const std::vector<FittedEffect>& causes);
 
 /// The same with `set` fitted beside θ to the rows of `problem`.

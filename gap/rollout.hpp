@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The simulator against the log, open loop: it starts where the log is, is driven by the measured efforts, and is compared
-/// with the log some seconds later.
+/// The simulator against the log, open loop: it starts where the log is, is driven by the measured efforts, and is
+/// compared with the log some seconds later.
 #pragma once
 
 #include <cstddef>
@@ -41,34 +41,36 @@ struct RolloutRms {
   double upper = 0.0;
 };
 
-/// Rows at which windows begin: each lies within one segment, with `margin` (s) of the same segment before it and behind it.
+/// Rows at which windows begin: each lies within one segment, with `margin` (s) of the same segment before it and
+/// behind it.
 [[nodiscard]] std::vector<Eigen::Index> rollout_starts(const Drive& drive, const RolloutOptions& options,
                                                        double margin = 0.0);
 
-/// By how much time a segment must go beyond a window on either side for `robot`: the memory of its actuators, and the lateness
-/// of its sensors, s.
+/// By how much time a segment must go beyond a window on either side for `robot`: the memory of its actuators, and the
+/// lateness of its sensors, s.
 [[nodiscard]] double rollout_margin(const Robot& robot);
 
-/// Rolls `robot` out from each of `starts` (rollout_starts with rollout_margin), one result per horizon. The parameters are its
-/// nominal values, its effects act as in a Simulation; `drive` is a log of it, which may have been read by a robot file with
-/// other numbers. The first state is the log's: wheel speeds and pose smoothed, over the window of the drive; its actuators
-/// have had the efforts before. Compared are speeds and pose; where the log has no pose (or no heading), odometry of the wheels
-/// on both sides. Throws InvalidArgument for a robot that is not on two driven wheels, or lacks a nominal value.
+/// Rolls `robot` out from each of `starts` (rollout_starts with rollout_margin), one result per horizon. The parameters
+/// are its nominal values, its effects act as in a Simulation; `drive` is a log of it, which may have been read by a
+/// robot file with other numbers. The first state is the log's: wheel speeds and pose smoothed, over the window of the
+/// drive; its actuators have had the efforts before. Compared are speeds and pose; where the log has no pose (or no
+/// heading), odometry of the wheels on both sides. Throws InvalidArgument for a robot that is not on two driven wheels,
+/// or lacks a nominal value.
 [[nodiscard]] std::vector<RolloutErrors> rollouts(const Drive& drive, const Robot& robot,
                                                   const std::vector<Eigen::Index>& starts,
                                                   const RolloutOptions& options = {});
 
-/// The same for a robot whose log has other noise than `drive`: what the noise of wheel speeds (`speed`, per joint and row,
-/// rad/s) and efforts (`effort`, likewise, unit of the log) alone makes of the errors, found by rolling out with it and
-/// without. The end of the log's side has the noise too.
+/// The same for a robot whose log has other noise than `drive`: what the noise of wheel speeds (`speed`, per joint and
+/// row, rad/s) and efforts (`effort`, likewise, unit of the log) alone makes of the errors, found by rolling out with
+/// it and without. The end of the log's side has the noise too.
 [[nodiscard]] std::vector<RolloutErrors> rollout_noise(const Drive& drive, const Robot& robot,
                                                        const std::vector<Eigen::Index>& starts,
                                                        const std::vector<Eigen::VectorXd>& speed,
                                                        const std::vector<Eigen::VectorXd>& effort,
                                                        const RolloutOptions& options = {});
 
-/// Root mean square of `errors`, with the interval of a moving-block bootstrap (Künsch 1989) over windows in order of time, `length`
-/// windows a block, from `seed`.
+/// Root mean square of `errors`, with the interval of a moving-block bootstrap (Künsch 1989) over windows in order of
+/// time, `length` windows a block, from `seed`.
 [[nodiscard]] RolloutRms rollout_rms(const Eigen::VectorXd& errors, std::uint64_t seed, std::size_t length = 2);
 
 }  // namespace wheelwright

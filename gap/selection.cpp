@@ -15,8 +15,8 @@
 namespace wheelwright {
 namespace {
 
-// Wilcoxon's signed-rank statistic of what `better` saves against `worse` over blocks, in standard deviations. An effect
-// may show in a few blocks only, by amounts that differ a thousandfold: the mean's t would be blind to it.
+// Wilcoxon's signed-rank statistic of what `better` saves against `worse` over blocks, in standard deviations. An
+// effect may show in a few blocks only, by amounts that differ a thousandfold: the mean's t would be blind to it.
 double signed_rank(const CauseSet& worse, const CauseSet& better) {
   const Eigen::VectorXd d = worse.loss - better.loss;
   std::vector<Eigen::Index> order(static_cast<std::size_t>(d.size()));
@@ -31,9 +31,9 @@ double signed_rank(const CauseSet& worse, const CauseSet& better) {
   return (positive - n * (n + 1.0) / 4.0) / std::sqrt(n * (n + 1.0) * (2.0 * n + 1.0) / 24.0);
 }
 
-// Probability that the logarithms of the savings add up to so much when their signs are left to chance: for an effect that
-// shows in half of the blocks only, but there by far. By random signs. Below the floor's own mean square savings count by
-// their size.
+// Probability that the logarithms of the savings add up to so much when their signs are left to chance: for an effect
+// that shows in half of the blocks only, but there by far. By random signs. Below the floor's own mean square savings
+// count by their size.
 double sign_flip_p(const CauseSet& worse, const CauseSet& better, std::uint64_t seed) {
   constexpr int kFlips = 20000;
   const Eigen::ArrayXd d = worse.loss - better.loss;
@@ -248,8 +248,8 @@ class Selector {
     return own > options_.cancellation * causes || own + theta > options_.theta_cancellation * all;
   }
 
-  // The set of a level to go on with: the best that is no absurdity, or one that it contains and that is as good with fewer
-  // coefficients.
+  // The set of a level to go on with: the best that is no absurdity, or one that it contains and that is as good with
+  // fewer coefficients.
   [[nodiscard]] const CauseSet* simplest(const std::vector<CauseSet>& level) const {
     const auto first = std::find_if(level.begin(), level.end(), [this](const CauseSet& set) { return !absurd(set); });
     if (first == level.end()) {
@@ -266,7 +266,8 @@ class Selector {
     return chosen;
   }
 
-  // Sets of as many causes that are as good as `best`, itself first. A set that merely contains another one is left out.
+  // Sets of as many causes that are as good as `best`, itself first. A set that merely contains another one is left
+  // out.
   [[nodiscard]] std::vector<CauseSet> rivals_of(const CauseSet& best, const std::vector<CauseSet>& level) const {
     std::vector<CauseSet> rivals{best};
     for (const CauseSet& set : level) {
@@ -286,8 +287,8 @@ class Selector {
     return rivals;
   }
 
-  // The set with θ nominal, its members' shapes chosen again among those that are as good with θ fitted: a friction more on
-  // the right and less on the left are the same thing beside a free θ.
+  // The set with θ nominal, its members' shapes chosen again among those that are as good with θ fitted: a friction
+  // more on the right and less on the left are the same thing beside a free θ.
   [[nodiscard]] CauseSet with_shapes_for_nominal(const CauseSet& set) const {
     CauseSet best = evaluate(table_, set.members, BaseModel::nominal);
     for (std::size_t k = 0; k < set.members.size(); ++k) {

@@ -2,16 +2,16 @@
 /// \file
 /// Which causes a log shows: from the held-out errors of many sets of causes to one verdict.
 ///
-/// Two questions are asked one after the other. First, which effects change the *structure*: sets are compared with θ fitted
-/// again beside them, so that nothing depends on θ being known. Then, where a nominal θ can be trusted (a healthy baseline
-/// log, or the robot file), what θ itself had to do: the structural causes with θ held at its nominal value, and parametric
-/// causes added until that leaves no more than θ fitted freely.
+/// Two questions are asked one after the other. First, which effects change the *structure*: sets are compared with θ
+/// fitted again beside them, so that nothing depends on θ being known. Then, where a nominal θ can be trusted (a
+/// healthy baseline log, or the robot file), what θ itself had to do: the structural causes with θ held at its nominal
+/// value, and parametric causes added until that leaves no more than θ fitted freely.
 ///
-/// A further cause is taken only if it removes a good part of what is left and a part of the whole gap that counts, by more
-/// than what chance does over blocks of time and the number of effects that were tried; none is asked for at the floor.
-/// The rows of a model that
-/// is nearly right leave a misfit of their own (a smoothed sign, a neglected second order); the misfit of the best set is the
-/// yardstick by which others are as good.
+/// A further cause is taken only if it removes a good part of what is left and a part of the whole gap that counts, by
+/// more than what chance does over blocks of time and the number of effects that were tried; none is asked for at the
+/// floor. The rows of a model that
+/// is nearly right leave a misfit of their own (a smoothed sign, a neglected second order); the misfit of the best set
+/// is the yardstick by which others are as good.
 #pragma once
 
 #include <cstddef>
@@ -74,8 +74,8 @@ struct EffectKind {
   double inexact = 0.0;  ///< Effect::inexact
 };
 
-/// Selects. `floor_error` is the mean square that noise alone leaves (1 where the floors are right); `kinds` has one for
-/// each effect. Effects that move θ only, which is found from the columns, are tried only with `nominal_trusted`.
+/// Selects. `floor_error` is the mean square that noise alone leaves (1 where the floors are right); `kinds` has one
+/// for each effect. Effects that move θ only, which is found from the columns, are tried only with `nominal_trusted`.
 [[nodiscard]] Selection select_causes(const CandidateTable& table, const std::vector<EffectKind>& kinds,
                                       bool nominal_trusted, double floor_error, const SelectionOptions& options = {});
 

@@ -305,7 +305,8 @@ Commissioned commissioned(const LogTable& log, const Robot& robot) {
   return result;
 }
 
-// Commissioning chooses parameters of its own where the robot file leaves them open: the model is to stay the one at hand.
+// Commissioning chooses parameters of its own where the robot file leaves them open: the model is to stay the one at
+// hand.
 Robot with_parameters_of(Robot robot, const Model& model) {
   const std::vector<std::string> possible = possible_parameters(robot);
   robot.parameters.emplace();

@@ -60,8 +60,9 @@ struct WhereOptions {
 ///
 /// p-values answer whether so much could lie there by chance; all of one call are corrected together, so that noise
 /// without structure shows any p < 0.05 in at most 5 % of logs:
-/// - regimes: by permutation of contiguous blocks of log(1 + (residual/floor)²), each about ten times as long as they remember,
-///   against the regimes, with the step-down maximum over all regimes of the channel (Westfall and Young 1993);
+/// - regimes: by permutation of contiguous blocks of log(1 + (residual/floor)²), each about ten times as long as they
+///   remember, against the regimes, with the step-down maximum over all regimes of the channel (Westfall and Young
+///   1993);
 /// - bands: against 24 simulated noises of the floor's variance through the same filter, white, differentiated once and
 ///   twice (torque, speed and angle noise; poses: white and differenced), whichever leaves the band the most room; Holm
 ///   (1979) over the bands;
@@ -73,7 +74,8 @@ struct WhereOptions {
 [[nodiscard]] std::vector<GapShare> locate_gap(const Drive& drive, const std::vector<ResidualSeries>& series,
                                                const WhereOptions& options = {});
 
-/// Whether the gap is concentrated there: p < 0.05 and a share above the presence. A channel is a finding by its p alone.
+/// Whether the gap is concentrated there: p < 0.05 and a share above the presence. A channel is a finding by its p
+/// alone.
 [[nodiscard]] bool is_finding(const GapShare& share);
 
 }  // namespace wheelwright

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Estimators of θ_L on the moments of a log, each with the influence of every stretch of the log on it: from these come
-/// covariances that are honest under autocorrelation, and tests of one estimator against another.
+/// Estimators of θ_L on the moments of a log, each with the influence of every stretch of the log on it: from these
+/// come covariances that are honest under autocorrelation, and tests of one estimator against another.
 #pragma once
 
 #include <cstddef>
@@ -69,16 +69,16 @@ struct RowNoise {
 [[nodiscard]] Estimate total_least_squares(const RegressionMoments& moments, const RowNoise& noise,
                                            const EstimatorOptions& options = {});
 
-/// Share of the variation of each column of Y that the instruments explain beyond what they explain of the other columns
-/// (Shea 1997): 1 for instruments as good as Y, 0 for useless ones. NaN where it cannot be computed.
+/// Share of the variation of each column of Y that the instruments explain beyond what they explain of the other
+/// columns (Shea 1997): 1 for instruments as good as Y, 0 for useless ones. NaN where it cannot be computed.
 [[nodiscard]] Eigen::VectorXd instrument_strength(const RegressionMoments& moments,
                                                   const EstimatorOptions& options = {});
 
-/// How surely the instruments move with each parameter's column: F of the first stage, robust to autocorrelation. With z =
-/// Zh the combination of instruments that is orthogonal to all other columns of Y (the one that estimates θ_j) and π =
-/// Σ zY_j / Σ z², F_j = (Σ zY_j)² over the long-run variance of Σ z(Y_j − πz). Below about 10 instruments are weak, and
-/// intervals are not to be trusted (Staiger and Stock 1997); noise in Y alone does not make them weak. NaN where it cannot
-/// be computed, infinite for instruments that are the columns themselves.
+/// How surely the instruments move with each parameter's column: F of the first stage, robust to autocorrelation. With
+/// z = Zh the combination of instruments that is orthogonal to all other columns of Y (the one that estimates θ_j) and
+/// π = Σ zY_j / Σ z², F_j = (Σ zY_j)² over the long-run variance of Σ z(Y_j − πz). Below about 10 instruments are weak,
+/// and intervals are not to be trusted (Staiger and Stock 1997); noise in Y alone does not make them weak. NaN where it
+/// cannot be computed, infinite for instruments that are the columns themselves.
 [[nodiscard]] Eigen::VectorXd instrument_relevance(const RegressionMoments& moments,
                                                    const EstimatorOptions& options = {});
 

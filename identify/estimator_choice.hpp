@@ -18,8 +18,8 @@ namespace wheelwright {
 /// What a log offers for the choice.
 struct EstimatorEvidence {
   RegressionMoments rows;  ///< of the log; with instruments where the commanded motion is logged
-  /// Moments with instruments from a simulation of the model at θ; nothing where it cannot be simulated or runs away. May
-  /// be empty.
+  /// Moments with instruments from a simulation of the model at θ; nothing where it cannot be simulated or runs away.
+  /// May be empty.
   std::function<std::optional<RegressionMoments>(const Eigen::VectorXd& theta)> simulate;
   std::optional<RowNoise> noise;  ///< what the noise of the motion adds to the rows, where that is known
   bool noise_is_limit = false;   ///< `noise` is an upper limit: good for saying that it does not matter, not for taking
@@ -59,11 +59,11 @@ struct EstimatorChoiceOptions {
                            ///< any parameter, gives way to them
 };
 
-/// Least squares where the noise of the motion, or its limit, biases no parameter by more than `negligible_bias`. Otherwise
-/// the first of these that can be had: instruments from the commanded motion; simulated ones where efforts are exact; bias
-/// compensation where the noise itself is known, unless it is `imprecise`; simulated instruments. Where efforts are measured,
-/// the standard errors of simulated instruments hold what noise of the efforts can have done at most: θ_j times the
-/// residual's power over that of the parameter's own part of the effort. Total least squares is
+/// Least squares where the noise of the motion, or its limit, biases no parameter by more than `negligible_bias`.
+/// Otherwise the first of these that can be had: instruments from the commanded motion; simulated ones where efforts
+/// are exact; bias compensation where the noise itself is known, unless it is `imprecise`; simulated instruments. Where
+/// efforts are measured, the standard errors of simulated instruments hold what noise of the efforts can have done at
+/// most: θ_j times the residual's power over that of the parameter's own part of the effort. Total least squares is
 /// shown where both noises are known, and never taken. The rule does not look at the test's outcome, since an estimate
 /// chosen by a test no longer has the intervals it claims (Guggenberger 2010); the test is reported beside it, against
 /// instruments only: bias compensation differs from least squares by what is assumed of the noise. Where nothing can be

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Sums of products over many rows, for the vector units that the processor has. Every element is one running sum in the
-/// order of the rows, without fused multiply-add: all variants give the same digits.
+/// Sums of products over many rows, for the vector units that the processor has. Every element is one running sum in
+/// the order of the rows, without fused multiply-add: all variants give the same digits.
 #pragma once
 
 #include <cstddef>

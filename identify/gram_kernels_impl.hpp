@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The loops of gram_kernels.hpp for vectors of W doubles. Included by one source file per processor variant; nothing of
-/// the standard library is called here, since an inline function compiled for a newer processor could be the one the
+/// The loops of gram_kernels.hpp for vectors of W doubles. Included by one source file per processor variant; nothing
+/// of the standard library is called here, since an inline function compiled for a newer processor could be the one the
 /// linker keeps for all; for the same reason each variant brings a type of its own.
 #pragma once
 

@@ -20,7 +20,8 @@ namespace wheelwright {
 struct InstrumentMotion {
   /// The two kinds.
   enum class Kind {
-    commanded,  ///< logged commands: free of the sensors' noise unless they are feedback of the noisy motion itself, or of
+    commanded,  ///< logged commands: free of the sensors' noise unless they are feedback of the noisy motion itself, or
+                ///< of
                 ///< a pose made from it (noise_level.hpp looks for the first)
     simulated,  ///< the model with parameters `theta`, driven by the logged efforts. It does not see the noise of the
                 ///< motion, except through a controller that answers to it; it holds that of measured efforts, which
@@ -45,8 +46,8 @@ class MotionSimulation {
   MotionSimulation(Model model, Eigen::VectorXd theta, Hold hold);
   /// Begins a segment at time `t` (s) with joint speeds `speed` and `effort` of each joint, heading 0.
   void restart(double t, const Eigen::VectorXd& speed, const Eigen::VectorXd& effort);
-  /// Advances to the sample at `t` with `effort`; returns the speeds of the joints there. The heading that the model's terms
-  /// see is the simulated one.
+  /// Advances to the sample at `t` with `effort`; returns the speeds of the joints there. The heading that the model's
+  /// terms see is the simulated one.
   const Eigen::VectorXd& step(double t, const Eigen::VectorXd& effort);
 
  private:
@@ -62,9 +63,9 @@ class MotionSimulation {
   Eigen::VectorXd speed_, joint_, effort_;
 };
 
-/// Rows of a log and, beside each, its instruments: p columns of Y_f and then p columns Z_f, which are the same filter's of
-/// another motion. Z has no error bounds. Only instants that both filters give are handed out. The log must outlive the
-/// stream and is rewound by it.
+/// Rows of a log and, beside each, its instruments: p columns of Y_f and then p columns Z_f, which are the same
+/// filter's of another motion. Z has no error bounds. Only instants that both filters give are handed out. The log must
+/// outlive the stream and is rewound by it.
 class InstrumentStream final : public RegressionSource {
  public:
   /// Throws InvalidArgument when `log` lacks a column, or the motion cannot be made.
@@ -75,8 +76,8 @@ class InstrumentStream final : public RegressionSource {
   bool next(RegressionBlock& block) override;
   void rewind() override;
   /// Root mean square of the instruments' joint speeds that were made so far over that of the measured ones
-  /// (0 before the first sample, and for logs of angles, whose simulation starts at rest): far from 1 where a simulation
-  /// ran away.
+  /// (0 before the first sample, and for logs of angles, whose simulation starts at rest): far from 1 where a
+  /// simulation ran away.
   [[nodiscard]] double speed_ratio() const;
 
  private:

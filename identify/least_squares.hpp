@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Least squares on filtered torque by sequential QR: θ̂_L of (30) without ever holding the rows; its residuals, its excitation.
+/// Least squares on filtered torque by sequential QR: θ̂_L of (30) without ever holding the rows; its residuals, its
+/// excitation.
 #pragma once
 
 #include <cstddef>

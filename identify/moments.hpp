@@ -2,8 +2,9 @@
 /// \file
 /// Second moments of a regression in one walk, summed over blocks of time, and their long-run covariance.
 ///
-/// A regression in one walk: its second moments, summed over blocks of time. Least squares, instrumental variables, their
-/// corrections for noise, their covariances under autocorrelation, bootstrap and sign-perturbed sums are all made of these.
+/// A regression in one walk: its second moments, summed over blocks of time. Least squares, instrumental variables,
+/// their corrections for noise, their covariances under autocorrelation, bootstrap and sign-perturbed sums are all made
+/// of these.
 #pragma once
 
 #include <cstddef>
@@ -128,8 +129,8 @@ class RegressionMoments {
 /// The same for rows with columns Y and, as many again, Z.
 [[nodiscard]] RegressionMoments moments_with_instruments(RegressionSource& rows);
 
-/// One over each output's own residual standard deviation by ordinary least squares: weights that are efficient for errors
-/// that are independent between outputs. 1 for an output that is zero throughout.
+/// One over each output's own residual standard deviation by ordinary least squares: weights that are efficient for
+/// errors that are independent between outputs. 1 for an output that is zero throughout.
 [[nodiscard]] Eigen::VectorXd efficient_weights(const RegressionMoments& moments);
 
 }  // namespace wheelwright

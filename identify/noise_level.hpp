@@ -57,10 +57,10 @@ struct DifferenceNoise {
 [[nodiscard]] std::vector<DifferenceNoise> difference_noise(LogSource& log, const std::vector<std::string>& columns);
 
 /// Whether column first[i] of `log` carries noise of column second[i], for any i: whether their sixth differences, in
-/// which motion is next to nothing and noise is large, are correlated at the same sample or up to three samples later. Said
-/// so above |ρ| = 0.1 and six standard errors of independent white series, 6·√C(24, 12)/C(12, 6)/√N. One walk; windows as in noise_level.hpp.
-/// A column that is smooth down to rounding carries no noise. Throws InvalidArgument when a column is missing or the lists
-/// differ in length.
+/// which motion is next to nothing and noise is large, are correlated at the same sample or up to three samples later.
+/// Said so above |ρ| = 0.1 and six standard errors of independent white series, 6·√C(24, 12)/C(12, 6)/√N. One walk;
+/// windows as in noise_level.hpp. A column that is smooth down to rounding carries no noise. Throws InvalidArgument
+/// when a column is missing or the lists differ in length.
 [[nodiscard]] bool share_noise(LogSource& log, const std::vector<std::string>& first,
                                const std::vector<std::string>& second);
 
@@ -83,8 +83,8 @@ struct ExtrapolatedBound {
 /// instants (autocorrelated residuals know their own size less well than their number suggests), and z the Gaussian
 /// quantile of risk shared over both sides of all instants of the horizon (union bound: no independence needed).
 ///
-/// Where max |ε| or the kurtosis is larger than Gaussian residuals would show with probability `risk`, the tail is taken to fall by e
-/// over each further `rms`, from the largest residual on: ē = max|ε| + rms·ln(horizon/risk).
+/// Where max |ε| or the kurtosis is larger than Gaussian residuals would show with probability `risk`, the tail is
+/// taken to fall by e over each further `rms`, from the largest residual on: ē = max|ε| + rms·ln(horizon/risk).
 ///
 /// The extrapolation assumes that future driving has the same noise and the same unmodelled rest as the log.
 [[nodiscard]] ExtrapolatedBound extrapolate(const OutputResidual& residual, std::size_t instants,

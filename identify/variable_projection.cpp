@@ -229,7 +229,8 @@ SearchEnd search(const Problem& problem, const VariableProjectionOptions& option
   }
 }
 
-// The cost is flat to rounding within √ε of its minimum: Gauss-Newton steps on the gradient alone find the digits below.
+// The cost is flat to rounding within √ε of its minimum: Gauss-Newton steps on the gradient alone find the digits
+// below.
 void polish(const Problem& problem, const Eigen::VectorXd& lower, const Eigen::VectorXd& upper, SeparableFit& fit) {
   constexpr int kMost = 30;
   constexpr int kPatience = 4;

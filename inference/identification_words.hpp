@@ -45,8 +45,8 @@ inline constexpr double kShapeMatters = 0.95;
 /// from zero or, for the Stribeck speed, not at an end of what was searched.
 [[nodiscard]] bool matters(const ShapeFinding& shape);
 
-/// What the log says of a shape, in one sentence: its value with its 95 % interval and what it explains, or that the log
-/// does not show it.
+/// What the log says of a shape, in one sentence: its value with its 95 % interval and what it explains, or that the
+/// log does not show it.
 [[nodiscard]] std::string in_words(const ShapeFinding& shape);
 
 /// The whole in one sentence.

@@ -279,8 +279,8 @@ class Fit {
     return summary.termination_type == ceres::CONVERGENCE;
   }
 
-  // Solves and finds the spreads in turn until they settle. The heading goes first and alone, and keeps the spread it has
-  // then: searched together, a small spread of the position could buy itself a large one of the heading.
+  // Solves and finds the spreads in turn until they settle. The heading goes first and alone, and keeps the spread it
+  // has then: searched together, a small spread of the position could buy itself a large one of the heading.
   bool settle() {
     const bool position = position_;
     bool good = false;

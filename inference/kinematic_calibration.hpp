@@ -55,8 +55,8 @@ struct KinematicCalibration {
   KinematicQuantity radius_right;             ///< r_R, m
   KinematicQuantity radius_left;              ///< r_L, m
   KinematicQuantity track_width;              ///< D, m, with the radii above
-  KinematicQuantity track_at_nominal_radius;  ///< D·r/r̂, m: what turns the robot as the log shows where the mean radius
-                                              ///< is taken to be the nominal one. The heading alone tells it
+  KinematicQuantity track_at_nominal_radius;  ///< D·r/r̂, m: what turns the robot as the log shows where the mean
+                                              ///< radius is taken to be the nominal one. The heading alone tells it
   KinematicQuantity radius_scale;             ///< r̂/r: longitudinal scale (1 without slip and with the right radius)
   KinematicQuantity asymmetry;                ///< (r_R − r_L)/(r_R + r_L)
   KinematicQuantity axle_offset;              ///< m: the pose's point is ahead of the point that does not move sideways
@@ -66,11 +66,11 @@ struct KinematicCalibration {
   double freedom = 0.0;                       ///< degrees of freedom of Student's t
 };
 
-/// Fits v = (r_R ω_R + r_L ω_L)/2, θ̇ = (r_R ω_R − r_L ω_L)/D to the columns omega_r, omega_l, theta (and x, y where the
-/// log has them), window by window: each has a start pose of its own, so that nothing is drawn across a gap or from an
-/// absolute heading, and errors of the pose do not add up. Wheel speeds are linear between samples. Poses enter with
-/// Huber's loss (Huber 1964), scaled by robust standard deviations that are found from the residuals: single wrong poses
-/// have bounded influence. Headings may be wrapped or not.
+/// Fits v = (r_R ω_R + r_L ω_L)/2, θ̇ = (r_R ω_R − r_L ω_L)/D to the columns omega_r, omega_l, theta (and x, y where
+/// the log has them), window by window: each has a start pose of its own, so that nothing is drawn across a gap or from
+/// an absolute heading, and errors of the pose do not add up. Wheel speeds are linear between samples. Poses enter with
+/// Huber's loss (Huber 1964), scaled by robust standard deviations that are found from the residuals: single wrong
+/// poses have bounded influence. Headings may be wrapped or not.
 ///
 /// Intervals: residuals are alike within a window (slip) and, in driving under one command, from window to window. The
 /// covariance is the sandwich of the windows' scores, each scored as if it had been left out (the jackknife). Of their

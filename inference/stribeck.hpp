@@ -13,12 +13,13 @@
 namespace wheelwright {
 
 /// y_f ≈ Y_f θ + c f*(B g(ω; ω_s)), where g_j = exp(−(|ω_j|/ω_s)²) sgn ω_j at each joint, B is Model::input (joint
-/// efforts to outputs) and f the torque filter: p + 1 linear parameters, the last is c (N·m at each joint), and the shape
-/// ω_s (rad/s, or m/s for a joint that is driven straight).
+/// efforts to outputs) and f the torque filter: p + 1 linear parameters, the last is c (N·m at each joint), and the
+/// shape ω_s (rad/s, or m/s for a joint that is driven straight).
 ///
-/// The recursion is RegressorFilter's own (filter/kernel.hpp). Measured speeds give g at the samples, linear between them as
-/// measured efforts are; angles and mean speeds give g of each step's mean speed, as every other function of the motion. A model with Coulomb friction already
-/// in Y keeps it: c is what is added at low speed. Without slow driving ω_s is flat (ShapeState::flat).
+/// The recursion is RegressorFilter's own (filter/kernel.hpp). Measured speeds give g at the samples, linear between
+/// them as measured efforts are; angles and mean speeds give g of each step's mean speed, as every other function of
+/// the motion. A model with Coulomb friction already in Y keeps it: c is what is added at low speed. Without slow
+/// driving ω_s is flat (ShapeState::flat).
 class StribeckRows final : public SeparableModel {
  public:
   /// Walks `log` once through `filter` and keeps the rows. Throws InvalidArgument when the log lacks a column of the

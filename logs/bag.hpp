@@ -67,8 +67,8 @@ class BagReader {
 };
 
 /// Whether `path` looks like a recording: an MCAP file or an SQLite database by its first bytes, plain or in zstd, or a
-/// directory with a metadata.yaml or with such a file (*.mcap, *.db3, *.mcap.zstd, *.db3.zstd). False where it cannot be
-/// read.
+/// directory with a metadata.yaml or with such a file (*.mcap, *.db3, *.mcap.zstd, *.db3.zstd). False where it cannot
+/// be read.
 [[nodiscard]] bool is_bag(const std::filesystem::path& path);
 
 /// Opens recordings: files, or directories as rosbag2 writes them, whose metadata.yaml says which files in which order
@@ -76,8 +76,8 @@ class BagReader {
 /// order given.
 ///
 /// Files packed with zstd, and a database with a journal beside it (a recording that was not closed), are read from a
-/// copy in the system's directory for temporary files, which is gone afterwards. Messages packed with zstd one by one are
-/// unpacked. A file of a directory that is missing or of no use is a loss while others can be read.
+/// copy in the system's directory for temporary files, which is gone afterwards. Messages packed with zstd one by one
+/// are unpacked. A file of a directory that is missing or of no use is a loss while others can be read.
 ///
 /// Throws InputError, naming the file, when it is missing or no recording, when a directory has none, and for a
 /// BagOptions::msg_path as ros_definitions_from() does; InvalidArgument when `paths` is empty.

@@ -81,8 +81,8 @@ struct BagTopicView {
 ///   topic whose name says that it comes from the wheels is left out, since that is no independent measurement;
 /// - sensor_msgs/Imu gives gyro_z and accel_x;
 /// - types of other packages than ROS's own give the columns that fields of theirs are named after.
-/// Where two topics could give a column it is left out and said. The rows' times are those of the topic with the efforts.
-/// Throws InputError for entries of the map that name no topic, and as RosExtractor for their fields.
+/// Where two topics could give a column it is left out and said. The rows' times are those of the topic with the
+/// efforts. Throws InputError for entries of the map that name no topic, and as RosExtractor for their fields.
 [[nodiscard]] BagChoice choose_bag_columns(const std::vector<BagTopicView>& topics, const CsvOptions& options,
                                            const std::string& path);
 

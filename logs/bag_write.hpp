@@ -34,8 +34,8 @@ class BagWriter {
   /// Adds a topic and returns its number (0, 1, …). `type` is "pkg/msg/Type", `definition` its text
   /// (ros_definition_text), which is kept in the recording. Throws InvalidArgument from the 65 536th on.
   std::size_t add_topic(const std::string& name, const std::string& type, const std::string& definition);
-  /// Appends a message in CDR; `log_time` in ns, >= 0. Throws InvalidArgument unless the topic has been added and the time
-  /// is not negative; InputError when the disk is full.
+  /// Appends a message in CDR; `log_time` in ns, >= 0. Throws InvalidArgument unless the topic has been added and the
+  /// time is not negative; InputError when the disk is full.
   void write(std::size_t topic, std::int64_t log_time, std::string_view cdr);
   /// Puts the recording in its place. To be called once, last. Throws InputError when that fails.
   void commit();

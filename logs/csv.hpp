@@ -27,8 +27,8 @@ namespace wheelwright {
 /// A log in one or several CSV files. Memory does not grow with the files.
 class CsvLog final : public RowLog {
  public:
-  /// Reads all of `paths` once, as RowLog does; columns() are those that all files have, in the order of the first. What
-  /// is repaired and counted, and what is not:
+  /// Reads all of `paths` once, as RowLog does; columns() are those that all files have, in the order of the first.
+  /// What is repaired and counted, and what is not:
   /// - a row with an empty, NaN or infinite used field, or with the time of the row before, is dropped;
   /// - columns that more than a fifth of a file's first rows lack were sampled apart (csv.hpp): they are brought to
   ///   the times of the other rows as topics of a bag are (stream_aligner.hpp), and the report says so;
@@ -83,15 +83,15 @@ struct CsvStream {
   double filled = 1.0;               ///< share of the rows in which they are
 };
 
-/// Finds the streams of a table, row by row. Columns missing in at most a fifth of the rows are one stream (a row in which
-/// one of them is missing has a defect); of the others, those that are filled in exactly the same rows are one.
+/// Finds the streams of a table, row by row. Columns missing in at most a fifth of the rows are one stream (a row in
+/// which one of them is missing has a defect); of the others, those that are filled in exactly the same rows are one.
 class CsvStreamFinder {
  public:
   explicit CsvStreamFinder(std::vector<std::string> names);
   /// A row: its time (s) and the columns' values, NaN where missing.
   void add(double t, const double* values);
-  /// The streams, the one that gives a log its rows first (row_weight). One stream: nothing is sampled apart. Columns that
-  /// were never filled are in none.
+  /// The streams, the one that gives a log its rows first (row_weight). One stream: nothing is sampled apart. Columns
+  /// that were never filled are in none.
   [[nodiscard]] std::vector<CsvStream> streams() const;
 
  private:

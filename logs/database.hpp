@@ -57,15 +57,15 @@ class Database {
   /// or begins it where there is none, and keeps everybody else out until it is closed.
   enum class Mode { unchanging, recovering, writing, keeping };
 
-  /// With `keeping`, an empty path is a database that is gone when it is closed. Throws InputError, beginning with `shown`,
-  /// when it cannot be opened.
+  /// With `keeping`, an empty path is a database that is gone when it is closed. Throws InputError, beginning with
+  /// `shown`, when it cannot be opened.
   Database(const std::filesystem::path& path, const std::string& shown, Mode mode);
 
   [[nodiscard]] Statement prepare(std::string_view sql) const { return {database_.get(), sql}; }
   /// Runs statements without results; false when one fails.
   bool run(const std::string& sql);
-  /// Forgets pages that were read: SQLite examines a page when it reads it, and takes it for good from then on. No statement
-  /// may be at a row.
+  /// Forgets pages that were read: SQLite examines a page when it reads it, and takes it for good from then on. No
+  /// statement may be at a row.
   void forget();
   /// What went wrong last, in words.
   [[nodiscard]] std::string error() const;
@@ -81,13 +81,13 @@ class Database {
   std::unique_ptr<sqlite3, Close> database_;
 };
 
-/// The file of a database, or a copy of it where SQLite would have to write to it, or would read more than is there: with
-/// its journal beside it, which is then played back; up to its last whole page where the file ends inside one. The copy
-/// lives as long as this.
+/// The file of a database, or a copy of it where SQLite would have to write to it, or would read more than is there:
+/// with its journal beside it, which is then played back; up to its last whole page where the file ends inside one. The
+/// copy lives as long as this.
 class DatabaseFile {
  public:
-  /// Looks at `path`; `shown` is its name in sentences. Throws InputError when it cannot be read or copied, or ends inside
-  /// its header.
+  /// Looks at `path`; `shown` is its name in sentences. Throws InputError when it cannot be read or copied, or ends
+  /// inside its header.
   DatabaseFile(const std::filesystem::path& path, const std::string& shown);
 
   /// What to open.

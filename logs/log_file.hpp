@@ -22,8 +22,8 @@ struct LogOptions : CsvOptions {
 };
 
 /// Opens a log in one or several files or bag directories, told apart by their content; each begins a new segment.
-/// Memory does not grow with them. All of it is read once, as RowLog says. `LogOptions::map` and `extra` name columns of
-/// CSV and HDF5 files and fields of bags (TOPIC.FIELD, bag_columns.hpp).
+/// Memory does not grow with them. All of it is read once, as RowLog says. `LogOptions::map` and `extra` name columns
+/// of CSV and HDF5 files and fields of bags (TOPIC.FIELD, bag_columns.hpp).
 /// Throws InputError, naming file and place, for what cannot be read; InvalidArgument when `paths` is empty.
 [[nodiscard]] std::unique_ptr<RecordedLog> open_log(const std::vector<std::filesystem::path>& paths,
                                                     const LogOptions& options = {});
@@ -52,10 +52,10 @@ class LogWriter {
 ///
 /// A bag holds sensor_msgs/JointState on /joint_states (the arrays for which both wheels, or the axis, have a column;
 /// joints right_wheel and left_wheel, or axis), geometry_msgs/PoseStamped on /pose, sensor_msgs/Imu on /imu, and
-/// everything else as float64 fields of a message of its own on `columns_topic`, all with the row's time as stamp; times are
-/// rounded to nanoseconds, and a heading goes through a quaternion. CSV and HDF5 keep every digit.
-/// Throws InputError for another ending and where the file cannot be made; InvalidArgument for a name that is not fit for
-/// a header.
+/// everything else as float64 fields of a message of its own on `columns_topic`, all with the row's time as stamp;
+/// times are rounded to nanoseconds, and a heading goes through a quaternion. CSV and HDF5 keep every digit.
+/// Throws InputError for another ending and where the file cannot be made; InvalidArgument for a name that is not fit
+/// for a header.
 [[nodiscard]] std::unique_ptr<LogWriter> create_log(const std::filesystem::path& path,
                                                     const std::vector<std::string>& names,
                                                     const LogWriteOptions& options = {});

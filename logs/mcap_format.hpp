@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The MCAP container (https://mcap.dev/spec, version 0): schemas, channels and messages, records as bytes, packed chunks, checksums.
+/// The MCAP container (https://mcap.dev/spec, version 0): schemas, channels and messages, records as bytes, packed
+/// chunks, checksums.
 ///
 /// The records of an MCAP file as bytes: opcodes, little-endian fields, both ways (https://mcap.dev/spec, sections
 /// Records and Serialization).

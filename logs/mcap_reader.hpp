@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// MCAP files, message by message in bounded memory; damaged and cut-off files as far as they can be read, and a report of what was lost.
+/// MCAP files, message by message in bounded memory; damaged and cut-off files as far as they can be read, and a report
+/// of what was lost.
 ///
 /// MCAP files, message by message in bounded memory; damaged and cut-off files as far as they can be read.
 ///
 /// What can be trusted: a chunk is unpacked whole and compared with its checksum before a message of it is handed out,
-/// and left out when it does not match. A recording that was cut off is read to its last whole message. Where the length
-/// of a record is damaged, reading goes on at the next chunk (or, in a file without chunks, at the next place where three
-/// records follow each other). All of that is in report(). Attachments, metadata and message indexes are skipped, as are
-/// records of unknown kinds.
+/// and left out when it does not match. A recording that was cut off is read to its last whole message. Where the
+/// length of a record is damaged, reading goes on at the next chunk (or, in a file without chunks, at the next place
+/// where three records follow each other). All of that is in report(). Attachments, metadata and message indexes are
+/// skipped, as are records of unknown kinds.
 #pragma once
 
 #include <cstddef>

@@ -45,8 +45,8 @@ struct DataSection {
 /// in one case of 10⁹ or less, but for the last eight bytes of a file that is cut off.
 [[nodiscard]] bool begins_record(WindowedFile& file, const DataSection& section, std::uint64_t offset);
 
-/// Whether a record whose own length is damaged may begin at `offset`: a message on a channel for which `messages` holds,
-/// or the data end record at the end of the section. Bytes at random look like that in one case of 10⁵ or less.
+/// Whether a record whose own length is damaged may begin at `offset`: a message on a channel for which `messages`
+/// holds, or the data end record at the end of the section. Bytes at random look like that in one case of 10⁵ or less.
 [[nodiscard]] bool begins_damaged_record(WindowedFile& file, const DataSection& section, std::uint64_t offset,
                                          const std::function<bool(std::uint16_t)>& messages);
 

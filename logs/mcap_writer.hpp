@@ -37,8 +37,8 @@ class McapWriter {
 
   /// Adds a schema and returns its id (1, 2, …). Throws InvalidArgument from the 65 536th on.
   std::uint16_t add_schema(std::string name, std::string encoding, std::string text);
-  /// Adds a channel and returns its id (1, 2, …). Throws InvalidArgument unless `schema_id` is 0 or that of a schema, and
-  /// from the 65 536th on.
+  /// Adds a channel and returns its id (1, 2, …). Throws InvalidArgument unless `schema_id` is 0 or that of a schema,
+  /// and from the 65 536th on.
   std::uint16_t add_channel(std::uint16_t schema_id, std::string topic, std::string message_encoding,
                             std::map<std::string, std::string> metadata = {});
   /// Appends a message. Throws InvalidArgument unless its channel has been added; InputError when the disk is full.

@@ -71,8 +71,8 @@ struct RosDefinition {
 [[nodiscard]] std::string full_ros_name(std::string_view type_name);
 
 /// Reads a definition in the language of .msg files, followed by those of the types it uses, each behind a line of "="
-/// and a line "MSG: pkg/Type" (MCAP's encoding "ros2msg"; REP 2016 does not change it). Constants and default values are
-/// skipped. A type that is used and not there is taken from the bundled ones. Throws InputError
+/// and a line "MSG: pkg/Type" (MCAP's encoding "ros2msg"; REP 2016 does not change it). Constants and default values
+/// are skipped. A type that is used and not there is taken from the bundled ones. Throws InputError
 /// "`type_name`: line 7: 'text': expected …" for what is no definition, for types that are not known and for types that
 /// contain themselves.
 [[nodiscard]] RosDefinition parse_ros_definition(std::string type_name, std::string_view text);
@@ -80,9 +80,9 @@ struct RosDefinition {
 /// The definition as parse_ros_definition reads it: without comments, constants and default values.
 [[nodiscard]] std::string ros_definition_text(const RosDefinition& definition);
 
-/// The bundled definition of a type (std_msgs, builtin_interfaces, geometry_msgs, sensor_msgs without images and clouds,
-/// nav_msgs, tf2_msgs, trajectory_msgs, control_msgs, diagnostic_msgs, rosgraph_msgs); nothing where there is none. It is
-/// the form of Humble: see bundled_ros_forms().
+/// The bundled definition of a type (std_msgs, builtin_interfaces, geometry_msgs, sensor_msgs without images and
+/// clouds, nav_msgs, tf2_msgs, trajectory_msgs, control_msgs, diagnostic_msgs, rosgraph_msgs); nothing where there is
+/// none. It is the form of Humble: see bundled_ros_forms().
 [[nodiscard]] std::optional<RosDefinition> bundled_ros_definition(const std::string& type_name);
 
 /// Every form of a bundled type that a distribution from Foxy to Jazzy has, that of Humble first. Only
@@ -92,8 +92,8 @@ struct RosDefinition {
 /// Definitions of a directory: every PKG/msg/TYPE.msg below it.
 class RosDefinitions {
  public:
-  /// The definition of a type; nothing where the directory has none. What it uses is taken from the directory, else from
-  /// the bundled ones. Throws InputError as parse_ros_definition does, naming the file.
+  /// The definition of a type; nothing where the directory has none. What it uses is taken from the directory, else
+  /// from the bundled ones. Throws InputError as parse_ros_definition does, naming the file.
   [[nodiscard]] std::optional<RosDefinition> find(const std::string& type_name) const;
   /// Names of all types, sorted.
   [[nodiscard]] std::vector<std::string> names() const;
@@ -103,9 +103,9 @@ class RosDefinitions {
   std::map<std::string, std::filesystem::path> files_;
 };
 
-/// Looks for definitions below `directory` (a workspace, an installation's share/, a package, or its msg/). Where a type
-/// is there twice, the first path in alphabetical order is taken. Throws InputError, naming it, when it is no directory
-/// that can be read, or has no definition.
+/// Looks for definitions below `directory` (a workspace, an installation's share/, a package, or its msg/). Where a
+/// type is there twice, the first path in alphabetical order is taken. Throws InputError, naming it, when it is no
+/// directory that can be read, or has no definition.
 [[nodiscard]] RosDefinitions ros_definitions_from(const std::filesystem::path& directory);
 
 }  // namespace wheelwright
@@ -129,13 +129,14 @@ struct TextMessage {
 /// Types by "pkg/msg/Type".
 using TextMessages = std::map<std::string, TextMessage>;
 
-/// Reads `text`, which defines `type_name` ("pkg/msg/Type"), and what follows it behind separators. Parts in IDL are left
-/// out. Throws InputError "`source`: line 7: …".
+/// Reads `text`, which defines `type_name` ("pkg/msg/Type"), and what follows it behind separators. Parts in IDL are
+/// left out. Throws InputError "`source`: line 7: …".
 [[nodiscard]] TextMessages read_messages(const std::string& type_name, std::string_view text,
                                          const std::string& source);
 
-/// Puts `type_name` and all that it depends on together. What is not in `known` is asked of `more`, which returns nullptr
-/// for what it does not have. Throws InputError for a type that neither has, cycles and nesting that is too deep.
+/// Puts `type_name` and all that it depends on together. What is not in `known` is asked of `more`, which returns
+/// nullptr for what it does not have. Throws InputError for a type that neither has, cycles and nesting that is too
+/// deep.
 [[nodiscard]] RosDefinition assemble(const std::string& type_name, const TextMessages& known,
                                      const std::function<const TextMessage*(const std::string&)>& more);
 

@@ -78,8 +78,8 @@ struct MessagePlan {
   bool twice = false;              ///< some names come behind the list whose elements they name
 };
 
-/// Makes the plan that puts the number at paths[i] into slot i. `definition` must outlive it. Throws InputError for a path
-/// behind a wstring, and for a definition of more than 100 000 steps.
+/// Makes the plan that puts the number at paths[i] into slot i. `definition` must outlive it. Throws InputError for a
+/// path behind a wstring, and for a definition of more than 100 000 steps.
 [[nodiscard]] MessagePlan make_plan(const RosDefinition& definition, const std::vector<Path>& paths);
 
 }  // namespace wheelwright::ros

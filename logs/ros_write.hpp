@@ -84,12 +84,12 @@ struct RosColumns {
   std::vector<double> values;
 };
 
-/// The definition of a RosColumns with fields of these names, to be kept in the recording. Throws InvalidArgument unless
-/// they are names that ROS accepts (ros_field_name), each once, and none is "header".
+/// The definition of a RosColumns with fields of these names, to be kept in the recording. Throws InvalidArgument
+/// unless they are names that ROS accepts (ros_field_name), each once, and none is "header".
 [[nodiscard]] std::string columns_definition(const std::vector<std::string>& names);
 
-/// `name` as ROS accepts it for a field: lower-case letters, digits and single '_', a letter first and no '_' last. What
-/// is none of these becomes '_'; "column_" is put in front where no letter is first.
+/// `name` as ROS accepts it for a field: lower-case letters, digits and single '_', a letter first and no '_' last.
+/// What is none of these becomes '_'; "column_" is put in front where no letter is first.
 [[nodiscard]] std::string ros_field_name(std::string_view name);
 
 /// Puts messages into bytes, one after the other with the same memory.

@@ -40,10 +40,10 @@ class RowCleaner {
   /// |value| above this cannot be meant, for time and each column.
   [[nodiscard]] const std::vector<double>& limits() const { return limits_; }
 
-  /// Decides by its time what a row is whose values are finite and within limits(), and unwraps its angles in place: the
-  /// heading wherever it jumps by more than π, a wheel angle (phi_r, phi_l) where it jumps by nearly a turn and cannot but
-  /// be wrapped: all its values so far lie within one turn, and every other step (three at least), and this one with the
-  /// turn taken away, is below π/2.
+  /// Decides by its time what a row is whose values are finite and within limits(), and unwraps its angles in place:
+  /// the heading wherever it jumps by more than π, a wheel angle (phi_r, phi_l) where it jumps by nearly a turn and
+  /// cannot but be wrapped: all its values so far lie within one turn, and every other step (three at least), and this
+  /// one with the turn taken away, is below π/2.
   RowOutcome place(std::span<double> row, std::size_t number);
 
   /// The same for any row: one that has a value which is not finite is dropped. Throws InputError, naming the column,
@@ -127,9 +127,9 @@ struct RowLogOptions {
 /// A log over files, each of which begins a new segment. Memory does not grow with them.
 class RowLog : public RecordedLog {
  public:
-  /// Reads all of `files` once: the median step, the hashes, and everything that report() says. columns() are those that
-  /// all files have, in the order of the first. Throws InputError as the files do, for time that never increases, and for
-  /// fewer than `min_rows` usable rows; InvalidArgument when there are no files or `block_rows` is 0.
+  /// Reads all of `files` once: the median step, the hashes, and everything that report() says. columns() are those
+  /// that all files have, in the order of the first. Throws InputError as the files do, for time that never increases,
+  /// and for fewer than `min_rows` usable rows; InvalidArgument when there are no files or `block_rows` is 0.
   RowLog(std::vector<std::unique_ptr<RowFile>> files, RowLogOptions options);
 
   [[nodiscard]] const std::vector<std::string>& columns() const override { return names_; }

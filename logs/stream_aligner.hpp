@@ -24,24 +24,24 @@ struct AlignedStream {
 /// Between samples h apart, linear interpolation at the share a of the way is off by at most a (1 − a) h²/2 max|x''|.
 /// error() is the largest such bound over all rows, with |x''| from the second divided differences at both ends of the
 /// step, times 9/8, plus the slope times `time_error`. For a sine of period P the bend in the middle of a step exceeds
-/// what the differences at its ends show by 2/((1 + cos u) cos u), u = πh/P, which is 1.125 at eight samples a period: the
-/// bound holds for signals as slow as that, or slower. Noise of the samples is in it (it makes the bound wider, by at most
-/// 9/16 of the noise's own bound).
+/// what the differences at its ends show by 2/((1 + cos u) cos u), u = πh/P, which is 1.125 at eight samples a period:
+/// the bound holds for signals as slow as that, or slower. Noise of the samples is in it (it makes the bound wider, by
+/// at most 9/16 of the noise's own bound).
 class StreamAligner {
  public:
   /// `width` is the number of columns of a row. A row is handed out when every other stream has come past its time, has
   /// ended, or lies more than `patience` ns behind. Throws InvalidArgument where there is no stream or columns overlap.
   StreamAligner(std::size_t width, std::vector<AlignedStream> streams, std::int64_t patience = 2'000'000'000);
 
-  /// A sample of `stream` at `time` (ns). Of other streams than the first, samples that are not later than the one before
-  /// are left out (stale()).
+  /// A sample of `stream` at `time` (ns). Of other streams than the first, samples that are not later than the one
+  /// before are left out (stale()).
   void push(std::size_t stream, std::int64_t time, std::span<const double> values);
 
   /// No more samples come.
   void finish();
 
-  /// The next row in the order of stream 0: `time` in ns, `row` its columns; those of a stream that has no samples around
-  /// this time are NaN. False when no row is ready.
+  /// The next row in the order of stream 0: `time` in ns, `row` its columns; those of a stream that has no samples
+  /// around this time are NaN. False when no row is ready.
   bool pop(std::int64_t& time, std::span<double> row);
 
   /// Largest interpolation error so far of each column, in its unit.

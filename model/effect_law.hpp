@@ -38,9 +38,9 @@ struct DriveGeometry {
 /// left as it is where the robot has no such effect.
 void apply_geometry(Model& model, const Robot& robot);
 
-/// Appends the parameters and terms of the robot's effects to `model`, which has the robot's geometry. With ℓ the model's
-/// lever arm, k = ℓ/(D/2), and [δs; δd] the additional effort of (15) per unit of the entry of θ_L; ±ℓ stands for the same at
-/// both wheels with the signs of the input matrix:
+/// Appends the parameters and terms of the robot's effects to `model`, which has the robot's geometry. With ℓ the
+/// model's lever arm, k = ℓ/(D/2), and [δs; δd] the additional effort of (15) per unit of the entry of θ_L; ±ℓ stands
+/// for the same at both wheels with the signs of the input matrix:
 ///   coulomb_asymmetric   sgn ω_R (c_R), sgn ω_L (c_L), at the wheel
 ///   stribeck             e^{−(ω/ω_s)²} sgn ω at both wheels, ω_s fixed
 ///   viscous_asymmetric   v2 D/(2r) ; ℓ v1/r
@@ -59,13 +59,13 @@ void add_effect_terms(Model& model, const Robot& robot);
 /// Adds dry friction of the parameter `parameter` at every joint: sgn ω_j times the column of the input matrix.
 void add_dry_friction(Model& model, std::size_t parameter);
 
-/// Whether the model parameter with the physical name `physical` is one of the robot's effects, and what the file says of
-/// the physical quantity: its interval; [v/3, 3v] for a single value v; for com_* and slope times the mass, which is that
-/// of the robot's prior, else [m/3, 3m] of the nominal m, else anything up to 10⁶ kg.
+/// Whether the model parameter with the physical name `physical` is one of the robot's effects, and what the file says
+/// of the physical quantity: its interval; [v/3, 3v] for a single value v; for com_* and slope times the mass, which is
+/// that of the robot's prior, else [m/3, 3m] of the nominal m, else anything up to 10⁶ kg.
 [[nodiscard]] std::optional<Interval> effect_prior(const Robot& robot, const std::string& physical);
 
-/// The physical quantity that a simulator with the mass `mass` (kg) takes for the same parameter; nothing where it is of
-/// no effect.
+/// The physical quantity that a simulator with the mass `mass` (kg) takes for the same parameter; nothing where it is
+/// of no effect.
 [[nodiscard]] std::optional<double> effect_truth(const Robot& robot, const std::string& physical, double mass);
 
 /// How an effect is accounted for when a log is read. A simulator takes them all.
@@ -110,9 +110,9 @@ struct EffectLaw {
 /// Names of the effects that a robot of the model `model` can have.
 [[nodiscard]] std::vector<std::string> effect_names(const std::string& model);
 
-/// Throws InvalidArgument, naming the effect and its parameter, unless every effect of `robot` is one that its model can
-/// have, stands there once and has the parameters that its law asks for, within their limits; and unless efforts are
-/// torques, or the motor's constants make torques of them, where an effect is an effort.
+/// Throws InvalidArgument, naming the effect and its parameter, unless every effect of `robot` is one that its model
+/// can have, stands there once and has the parameters that its law asks for, within their limits; and unless efforts
+/// are torques, or the motor's constants make torques of them, where an effect is an effort.
 void validate_effects(const Robot& robot);
 
 /// Whether `robot` has the effect `name`.

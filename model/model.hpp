@@ -124,8 +124,8 @@ struct Model {
   [[nodiscard]] std::size_t p() const { return parameters.size(); }
 };
 
-/// Throws InvalidArgument, naming the field, unless the shapes and indices of `model` agree, every parameter has a term,
-/// and every number is finite.
+/// Throws InvalidArgument, naming the field, unless the shapes and indices of `model` agree, every parameter has a
+/// term, and every number is finite.
 void validate(const Model& model);
 
 /// Y(v, v̇) (n × p) of (20) at one instant: what the filtered regressor is the filter of. `acceleration` has one value

@@ -61,7 +61,8 @@ struct FilterWish {
   std::optional<double> beta;   ///< 1/s
 };
 
-/// Constants of the motors, which make physical quantities of current or voltage. Gear ratio: motor turns per wheel turn.
+/// Constants of the motors, which make physical quantities of current or voltage. Gear ratio: motor turns per wheel
+/// turn.
 struct Motor {
   std::optional<double> torque_constant;  ///< N·m/A at the motor shaft
   std::optional<double> resistance;       ///< Ω
@@ -131,8 +132,8 @@ struct PriorBox {
 };
 [[nodiscard]] PriorBox prior_box(const Robot& robot, const Model& model);
 
-/// The robot with `errors` (of interpolated columns) added to the noise bounds that it declares, the largest of each kind;
-/// an estimated bound sees them in the log itself.
+/// The robot with `errors` (of interpolated columns) added to the noise bounds that it declares, the largest of each
+/// kind; an estimated bound sees them in the log itself.
 [[nodiscard]] Robot with_column_errors(Robot robot, const std::vector<ColumnError>& errors);
 
 }  // namespace wheelwright

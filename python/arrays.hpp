@@ -18,8 +18,8 @@ namespace wheelwright::python {
 
 namespace py = pybind11;
 
-/// An argument of doubles, rows one after the other: the caller's own memory where it is float64 and C-contiguous, else a
-/// converted copy.
+/// An argument of doubles, rows one after the other: the caller's own memory where it is float64 and C-contiguous, else
+/// a converted copy.
 using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
 /// A read-only array over `data` (row-major), which lives as long as `owner`.

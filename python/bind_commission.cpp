@@ -89,7 +89,7 @@ void bind_parameter(py::module_& m) {
       });
 }
 
-ModelObject read(const std::filesystem::path& path) {
+ModelObject read_commissioned(const std::filesystem::path& path) {
   return {std::make_shared<const OnlineModel>(read_model(path)), path.string()};
 }
 
@@ -148,7 +148,7 @@ void bind_model(py::module_& m) {
         return "<wheelwright.Model of " + o.model->robot.name + ", " + std::to_string(o.model->model.p()) +
                " parameters>";
       });
-  m.def("read_model", &read, py::arg("path"),
+  m.def("read_model", &read_commissioned, py::arg("path"),
         "Reads a model.json.\n\nRaises InputError, naming file and key, also where the file holds no model.");
 }
 

@@ -91,7 +91,7 @@ py::object step(DetectorObject& d, double t, const Doubles& sample) {
   return py::cast(std::move(out));
 }
 
-RunObject run(const DetectorObject& d, LogObject& log, py::object progress) {
+RunObject run_through(const DetectorObject& d, LogObject& log, py::object progress) {
   LongWork work(std::move(progress));
   Detector detector = d.detector;  // the stream of step() goes on where it was
   return work.run([&] {
@@ -263,7 +263,7 @@ void bind_detector(py::module_& m) {
            "more than five nominal steps, or a time that does not increase, restarts the filter.")
       .def(
           "restart", [](DetectorObject& d) { d.detector.restart(); }, "Forgets all samples: for a gap in the data.")
-      .def("run", &run, py::arg("log"), py::kw_only(), py::arg("progress") = py::none(),
+      .def("run", &run_through, py::arg("log"), py::kw_only(), py::arg("progress") = py::none(),
            "All decisions over a log, from a fresh start. The interpreter's lock is released.");
   py::class_<DetectionObject>(m, "Detection", "What `wheelwright detect` says of a log: both residuals, and isolation.")
       .def_property_readonly("fault", &DetectionObject::fault)

@@ -67,9 +67,9 @@ LogOptions reader_options(const RobotObject* robot, const std::map<std::string, 
   return options;
 }
 
-std::unique_ptr<LogObject> read(const Paths& paths, const RobotObject* robot,
-                                const std::map<std::string, std::string>& map, const std::vector<std::string>& extra,
-                                const std::vector<Path>& msg_path) {
+std::unique_ptr<LogObject> read_recorded(const Paths& paths, const RobotObject* robot,
+                                         const std::map<std::string, std::string>& map,
+                                         const std::vector<std::string>& extra, const std::vector<Path>& msg_path) {
   LogOptions options = reader_options(robot, map, extra);
   options.msg_path = msg_path;
   const auto files = std::holds_alternative<Path>(paths) ? std::vector<Path>{std::get<Path>(paths)}
@@ -145,7 +145,7 @@ void bind_log(py::module_& m) {
       .def("__repr__", [](const LogObject& l) {
         return "<wheelwright.Log " + l.name() + ": " + std::to_string(l.source->report().rows) + " rows>";
       });
-  m.def("read_log", &read, py::arg("paths"), py::arg("robot") = nullptr,
+  m.def("read_log", &read_recorded, py::arg("paths"), py::arg("robot") = nullptr,
         py::arg("map") = std::map<std::string, std::string>{}, py::arg("extra") = std::vector<std::string>{},
         py::arg("msg_path") = std::vector<Path>{},
         "Reads one log (CSV, also .gz and .zst; rosbag2 in MCAP or SQLite; HDF5), or several as one (each begins a "

@@ -11,7 +11,7 @@
 namespace wheelwright::python {
 namespace {
 
-RobotObject read(const std::filesystem::path& path) { return {read_robot(path), path.string()}; }
+RobotObject read_file(const std::filesystem::path& path) { return {read_robot(path), path.string()}; }
 
 RobotObject from_keys(const py::kwargs& keys) { return {robot_from_json(to_json(keys, "Robot"), "Robot"), ""}; }
 
@@ -55,7 +55,7 @@ void bind_robot(py::module_& m) {
           "__eq__", [](const RobotObject& a, const RobotObject& b) { return to_json(a.robot) == to_json(b.robot); },
           py::is_operator())
       .def("__repr__", [](const RobotObject& r) { return "<wheelwright.Robot " + r.robot.name + ">"; });
-  m.def("read_robot", &read, py::arg("path"),
+  m.def("read_robot", &read_file, py::arg("path"),
         "Reads a robot file (YAML).\n\nRaises InputError, naming file, line, key, value and what was expected.");
 }
 

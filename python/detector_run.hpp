@@ -22,7 +22,8 @@ struct DetectorRun {
   std::size_t outputs = 0;
 };
 
-/// Walks `log` through `detector` from its beginning, as detect() does. Throws InvalidArgument when the log lacks a column.
+/// Walks `log` through `detector` from its beginning, as detect() does. Throws InvalidArgument when the log lacks a
+/// column.
 [[nodiscard]] DetectorRun run_detector(LogSource& log, TorqueDetector& detector, double merge);
 
 }  // namespace wheelwright::python

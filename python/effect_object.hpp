@@ -25,8 +25,8 @@ class DriveObject {
   const Drive* drive_;
 };
 
-/// `columns(drive, shape)` as Effect::columns: called with the interpreter's lock, from whatever thread. What it returns is
-/// checked: as many columns as `count`, signals of one value per instant, finite.
+/// `columns(drive, shape)` as Effect::columns: called with the interpreter's lock, from whatever thread. What it
+/// returns is checked: as many columns as `count`, signals of one value per instant, finite.
 [[nodiscard]] std::function<std::vector<Column>(const Drive&, std::span<const double>)> columns_in_python(
     const std::string& name, const py::function& columns, std::size_t count);
 

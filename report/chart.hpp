@@ -15,9 +15,9 @@
 
 namespace wheelwright::report {
 
-/// Times of a page. They count from an origin where the log's clock is an epoch, so that digits are left for the driving.
-/// Where the log's time goes back (several runs in one log), its runs are laid end to end: a moment then no longer has
-/// one place on the axis.
+/// Times of a page. They count from an origin where the log's clock is an epoch, so that digits are left for the
+/// driving. Where the log's time goes back (several runs in one log), its runs are laid end to end: a moment then no
+/// longer has one place on the axis.
 class TimeAxis {
  public:
   /// The axis for the times `t` (s) of a whole log, or of what is known of it: origin 0 unless the first one is beyond
@@ -55,11 +55,11 @@ struct PackedSeries {
 /// Packs `values` to 1/20 000 of their span, or of `span` where that is larger; what is not finite becomes a gap.
 [[nodiscard]] PackedSeries pack(std::span<const double> values, double span = 0.0);
 
-/// Times as integers: t = start + tick · k. A tick is a microsecond; less where the median step is below 100 µs, more where
-/// a step inside a segment exceeds 500 s.
+/// Times as integers: t = start + tick · k. A tick is a microsecond; less where the median step is below 100 µs, more
+/// where a step inside a segment exceeds 500 s.
 ///
-/// Every segment begins with a jump {index, k}. `text` is a zlib stream in base64 of 4n bytes: second differences of k as
-/// 32-bit zigzag, all lowest bytes first; at a jump 0, and the step before it counts on.
+/// Every segment begins with a jump {index, k}. `text` is a zlib stream in base64 of 4n bytes: second differences of k
+/// as 32-bit zigzag, all lowest bytes first; at a jump 0, and the step before it counts on.
 struct PackedTimes {
   double start = 0.0;  ///< s
   double tick = 1e-6;  ///< s

@@ -10,9 +10,9 @@
 
 namespace wheelwright {
 
-/// One self-contained HTML page: the result in words, parameters, residual inside [l, u] and prediction over the whole log
-/// (where `context.own_log` is given), raw signals, validation, noise and filter, data. It loads nothing when opened;
-/// every name is escaped, every number is finite.
+/// One self-contained HTML page: the result in words, parameters, residual inside [l, u] and prediction over the whole
+/// log (where `context.own_log` is given), raw signals, validation, noise and filter, data. It loads nothing when
+/// opened; every name is escaped, every number is finite.
 [[nodiscard]] std::string commission_report(const Commissioning& result, const ReportContext& context);
 
 /// The page of any command that stopped with an error: the error, what is known of the log, and its raw signals.

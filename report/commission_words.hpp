@@ -20,16 +20,16 @@ namespace wheelwright::report {
 /// How a result is to be taken.
 enum class Standing { good, caution, bad };
 
-/// good: a model whose thresholds held and can fire. caution: a model with something to be read first (parameters that the
-/// log does not show, false alarms on held-out driving, thresholds that can hardly fire, or see
+/// good: a model whose thresholds held and can fire. caution: a model with something to be read first (parameters that
+/// the log does not show, false alarms on held-out driving, thresholds that can hardly fire, or see
 /// coarse faults only). bad: no model.
 [[nodiscard]] Standing standing(const Commissioning& result);
 
 /// One short sentence. Text, not HTML.
 [[nodiscard]] std::string verdict(const Commissioning& result);
 
-/// Three to six sentences: what was found, what it stands on, how it fared on held-out driving, what it can see, and what
-/// to do next where the result is not what was hoped for. Text, not HTML.
+/// Three to six sentences: what was found, what it stands on, how it fared on held-out driving, what it can see, and
+/// what to do next where the result is not what was hoped for. Text, not HTML.
 [[nodiscard]] std::vector<std::string> commission_words(const Commissioning& result);
 
 }  // namespace wheelwright::report

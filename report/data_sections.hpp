@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Sections of a commissioning report: tables below the charts, assumptions and their warrant. All functions return HTML.
+/// Sections of a commissioning report: tables below the charts, assumptions and their warrant. All functions return
+/// HTML.
 #pragma once
 
 #include <string>

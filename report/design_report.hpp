@@ -12,8 +12,9 @@
 
 namespace wheelwright {
 
-/// One self-contained HTML page: what was designed in words, the promised bounds beside those of the model and of a figure
-/// eight, the path, the commands over time, how much of each limit is used. `context.signals` and `own_log` are not used.
+/// One self-contained HTML page: what was designed in words, the promised bounds beside those of the model and of a
+/// figure eight, the path, the commands over time, how much of each limit is used. `context.signals` and `own_log` are
+/// not used.
 [[nodiscard]] std::string design_report(const BoundsDesign& design, const DesignSubject& subject,
                                         const MotionLimits& limits, const ReportContext& context);
 

@@ -19,10 +19,10 @@ struct KinematicFindings {
   std::string message{};                 ///< why not
 };
 
-/// One self-contained HTML page: what the detector says in words, its events (a click zooms all charts to one), the residual
-/// inside [l, u] with the events shaded, prediction, raw signals, data, and the same of
-/// the kinematic residual. `isolations` belong to the first events, in their order. It loads nothing when opened; every name is escaped,
-/// every number is finite. `context.own_log` is not used.
+/// One self-contained HTML page: what the detector says in words, its events (a click zooms all charts to one), the
+/// residual inside [l, u] with the events shaded, prediction, raw signals, data, and the same of
+/// the kinematic residual. `isolations` belong to the first events, in their order. It loads nothing when opened; every
+/// name is escaped, every number is finite. `context.own_log` is not used.
 [[nodiscard]] std::string detect_report(const Detection& detection, const OnlineModel& model,
                                         const ReportContext& context, const KinematicFindings& kinematic = {},
                                         const std::vector<Isolation>& isolations = {});

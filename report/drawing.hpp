@@ -18,8 +18,8 @@ namespace wheelwright::report {
 /// `what` (text) at a place; `anchor` is start, middle or end; in the colour of text where `ink`, else of axes.
 [[nodiscard]] std::string svg_text(double x, double y, const char* anchor, const std::string& what, bool ink = false);
 
-/// The interval of the bounds as a box, the 95 % interval as whiskers, Chebyshev centre and nominal value. The scale is that
-/// of what the log says: the prior's sides may lie beyond the drawing, an arrow then tells.
+/// The interval of the bounds as a box, the 95 % interval as whiskers, Chebyshev centre and nominal value. The scale is
+/// that of what the log says: the prior's sides may lie beyond the drawing, an arrow then tells.
 [[nodiscard]] std::string interval_bar(const ParameterView& view);
 
 /// The curve behind the choice of the filter, criterion over β, both logarithmic; empty for fewer than two candidates.

@@ -27,8 +27,9 @@ namespace wheelwright::report {
 /// t − `delay`), in cells on one scale; darker is more. Empty where the log has no place, or never left it.
 [[nodiscard]] std::string position_map(const ResidualSeries& series, const LogTable& signals, double delay);
 
-/// Similarities of pairs of causes as a triangle of shaded cells with the numbers in them (per cent), the most confusable
-/// ones first, at most `most` causes; a frame marks what no log without further sensors separates. Empty for no pairs.
+/// Similarities of pairs of causes as a triangle of shaded cells with the numbers in them (per cent), the most
+/// confusable ones first, at most `most` causes; a frame marks what no log without further sensors separates. Empty for
+/// no pairs.
 [[nodiscard]] std::string confusability_matrix(const std::vector<ConfusablePair>& pairs, std::size_t most = 12);
 
 }  // namespace wheelwright::report

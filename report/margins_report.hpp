@@ -15,8 +15,8 @@ namespace wheelwright::report {
 /// that is certain at every one of them (thin). Empty where nothing is certain.
 [[nodiscard]] std::string delay_curves(const FaultMargins& margins, const MarginSurvey& survey);
 
-/// A map over the operating space: the darker a point, the smaller the certain size, on a logarithmic scale whose ends are
-/// written out; empty points show no certain size. Empty where no point has one.
+/// A map over the operating space: the darker a point, the smaller the certain size, on a logarithmic scale whose ends
+/// are written out; empty points show no certain size. Empty where no point has one.
 [[nodiscard]] std::string margin_map(const OperatingMap& map, const FaultType& fault, const std::string& x_label,
                                      const std::string& y_label);
 
@@ -24,8 +24,8 @@ namespace wheelwright::report {
 
 namespace wheelwright {
 
-/// One self-contained page: what is certainly seen, in words, as a table by manoeuvre, as curves of size over delay, and
-/// as maps over the operating space.
+/// One self-contained page: what is certainly seen, in words, as a table by manoeuvre, as curves of size over delay,
+/// and as maps over the operating space.
 [[nodiscard]] std::string margins_report(const MarginSurvey& survey, const OnlineModel& model,
                                          const ReportContext& context);
 

@@ -49,7 +49,8 @@ struct Cell {
 /// A cell that holds a number.
 [[nodiscard]] inline Cell numeric(std::string text) { return {std::move(text), true}; }
 
-/// A table that scrolls sideways where the window is narrow, and in itself where it is long; the first cell of a row is its heading.
+/// A table that scrolls sideways where the window is narrow, and in itself where it is long; the first cell of a row is
+/// its heading.
 [[nodiscard]] std::string table(const std::vector<Cell>& header, const std::vector<std::vector<Cell>>& rows);
 
 /// <p> of HTML.

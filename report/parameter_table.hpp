@@ -58,8 +58,8 @@ struct ParameterViews {
 /// was estimated.
 [[nodiscard]] std::string estimator_table(const Commissioning& result);
 
-/// The table (HTML), its legend and remarks; empty where there is no parameter. Two rows for each parameter: the physical
-/// quantity, where the robot file tells the scale, and θ_L. Bounds are printed rounded outward.
+/// The table (HTML), its legend and remarks; empty where there is no parameter. Two rows for each parameter: the
+/// physical quantity, where the robot file tells the scale, and θ_L. Bounds are printed rounded outward.
 [[nodiscard]] std::string parameter_table(const Commissioning& result, const TimeAxis& axis);
 
 }  // namespace wheelwright::report

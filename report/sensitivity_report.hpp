@@ -14,7 +14,8 @@
 namespace wheelwright {
 
 /// One self-contained HTML page: what matters most for each quantity in words, tornado charts and curves, shares of the
-/// variance, elementary effects, maps, the bounds' derivatives and where there are none, and what could not be evaluated.
+/// variance, elementary effects, maps, the bounds' derivatives and where there are none, and what could not be
+/// evaluated.
 [[nodiscard]] std::string sensitivity_report(const Study& study, const StudyResult& result,
                                              const std::optional<LocalSensitivity>& local,
                                              const std::vector<std::string>& notes, const ReportContext& context);

@@ -16,8 +16,8 @@
 namespace wheelwright::report {
 namespace {
 
-// Every four neighbours within a segment become two: the smallest and the largest value of each column, at the first time
-// and at the middle one. Rows that are pairs already become pairs of twice the length.
+// Every four neighbours within a segment become two: the smallest and the largest value of each column, at the first
+// time and at the middle one. Rows that are pairs already become pairs of twice the length.
 void halve(LogTable& table) {
   std::vector<std::size_t> starts;
   std::size_t segment = 0, out = 0;

@@ -11,8 +11,8 @@
 
 namespace wheelwright::report {
 
-/// `text` with & < > " ' as character references: fit for HTML text and quoted attributes. Control characters other than
-/// tab and line feed become U+FFFD.
+/// `text` with & < > " ' as character references: fit for HTML text and quoted attributes. Control characters other
+/// than tab and line feed become U+FFFD.
 [[nodiscard]] std::string escape(std::string_view text);
 
 /// The same, and what stands between two backticks becomes <code>.

@@ -35,13 +35,13 @@ struct GapFiles {
 /// Name of a verdict in files: "no_gap", "explained", "ambiguous", "unexplained".
 [[nodiscard]] const char* name_of(GapVerdict verdict);
 
-/// The diagnosis as JSON (results/gap.schema.json). Of `where`, the channels, the frequency bands and the regimes that are
-/// findings (is_finding) are written; its series are not: see write_residuals().
+/// The diagnosis as JSON (results/gap.schema.json). Of `where`, the channels, the frequency bands and the regimes that
+/// are findings (is_finding) are written; its series are not: see write_residuals().
 [[nodiscard]] Json to_json(const Diagnosis& diagnosis, const GapFiles& files);
 
-/// Writes `series` as CSV with the header space,channel,unit,t,signal,nominal,refitted,after,floor: one line per row and
-/// channel, seven significant digits (time: microseconds); a signal that a series lacks is empty. The file appears whole
-/// or not at all. Throws InputError when it cannot be written.
+/// Writes `series` as CSV with the header space,channel,unit,t,signal,nominal,refitted,after,floor: one line per row
+/// and channel, seven significant digits (time: microseconds); a signal that a series lacks is empty. The file appears
+/// whole or not at all. Throws InputError when it cannot be written.
 void write_residuals(const std::filesystem::path& path, const std::vector<ResidualSeries>& series);
 
 }  // namespace wheelwright

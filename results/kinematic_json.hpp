@@ -10,7 +10,8 @@
 
 namespace wheelwright {
 
-/// The section as JSON (results/model.schema.json, definition `kinematic`); nothing where the log had neither pose nor gyro.
+/// The section as JSON (results/model.schema.json, definition `kinematic`); nothing where the log had neither pose nor
+/// gyro.
 [[nodiscard]] std::optional<Json> kinematic_json(const KinematicCommissioning& result, const FoldOptions& folds);
 
 }  // namespace wheelwright

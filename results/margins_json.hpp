@@ -15,16 +15,16 @@ namespace wheelwright {
 /// Name of the format: the value of its key `schema`.
 inline constexpr const char* kMarginsSchema = "wheelwright/margins/1";
 
-/// The whole survey as JSON (results/margins.schema.json). `model` and `log` say what it was made of, `software` is name and
-/// version.
+/// The whole survey as JSON (results/margins.schema.json). `model` and `log` say what it was made of, `software` is
+/// name and version.
 [[nodiscard]] Json to_json(const MarginSurvey& survey, const std::string& model, const std::string& log,
                            const std::string& software);
 
 /// Name of the format: the value of its key `schema`.
 inline constexpr const char* kChoiceSchema = "wheelwright/choice/1";
 
-/// The whole choice as JSON (results/choice.schema.json). `robot` and `logs` say what it was made of, `software` is name and
-/// version.
+/// The whole choice as JSON (results/choice.schema.json). `robot` and `logs` say what it was made of, `software` is
+/// name and version.
 [[nodiscard]] Json to_json(const DetectorChoice& choice, const std::string& robot, const std::vector<std::string>& logs,
                            const std::string& software);
 

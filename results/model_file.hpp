@@ -15,7 +15,8 @@
 
 namespace wheelwright {
 
-/// The whole result as JSON (results/model.schema.json). `data` says which log it came from, `software` is name and version.
+/// The whole result as JSON (results/model.schema.json). `data` says which log it came from, `software` is name and
+/// version.
 [[nodiscard]] Json to_json(const Commissioning& result, const LogReport& data, const std::string& software);
 
 /// A row of a log, or a side of the prior box, and its multiplier in a proof, as model.json names them.

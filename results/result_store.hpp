@@ -17,7 +17,8 @@
 
 namespace wheelwright {
 
-/// What every result of a run depends on, beside the item itself: names and values, e.g. {"--beta", "40"}. Names differ.
+/// What every result of a run depends on, beside the item itself: names and values, e.g. {"--beta", "40"}. Names
+/// differ.
 using StoredPlan = std::vector<std::pair<std::string, std::string>>;
 
 /// "--beta is 40 there and 30 here; …": where two plans differ; empty where they do not. Their order does not count.
@@ -26,17 +27,17 @@ using StoredPlan = std::vector<std::pair<std::string, std::string>>;
 /// The items of a run.
 struct StoredItems {
   std::size_t count = 0;
-  /// A text that stands for all that the item alone depends on, and no other item has, e.g. name and hashes of its logs.
-  /// An item whose key changed is evaluated anew; one that moved in the list is not.
+  /// A text that stands for all that the item alone depends on, and no other item has, e.g. name and hashes of its
+  /// logs. An item whose key changed is evaluated anew; one that moved in the list is not.
   std::function<std::string(std::size_t item)> key;
 };
 
 /// A store in an SQLite file.
 ///
-/// **Killed** at any moment (SIGKILL, out of memory, a job's time limit): every result whose put() had returned is there.
-/// Each is a transaction of its own in the write-ahead log, which the system has when put() returns. **Power loss**: the
-/// file stays sound and may lack what was put since SQLite last flushed its log, about 4 MB of results; they are evaluated
-/// again. Only one process has a store open; a file system without locks cannot promise that.
+/// **Killed** at any moment (SIGKILL, out of memory, a job's time limit): every result whose put() had returned is
+/// there. Each is a transaction of its own in the write-ahead log, which the system has when put() returns. **Power
+/// loss**: the file stays sound and may lack what was put since SQLite last flushed its log, about 4 MB of results;
+/// they are evaluated again. Only one process has a store open; a file system without locks cannot promise that.
 class SqliteResults final : public ResultStore {
  public:
   enum class Opening {
@@ -44,9 +45,9 @@ class SqliteResults final : public ResultStore {
     fresh,   ///< throws away what an earlier run left, whatever its plan
   };
 
-  /// Opens or begins the store in `file`; an empty path is one that is gone with the object. Throws InputError, naming the
-  /// file and what to do, where it cannot be opened, is in use, is no store of results or one of another version of the
-  /// format, or holds results of another plan. InvalidArgument for a plan with a name twice.
+  /// Opens or begins the store in `file`; an empty path is one that is gone with the object. Throws InputError, naming
+  /// the file and what to do, where it cannot be opened, is in use, is no store of results or one of another version of
+  /// the format, or holds results of another plan. InvalidArgument for a plan with a name twice.
   SqliteResults(const std::filesystem::path& file, const StoredPlan& plan, StoredItems items,
                 Opening opening = Opening::resume);
   ~SqliteResults() override;
@@ -64,8 +65,9 @@ class SqliteResults final : public ResultStore {
   /// Hands every item without a result to `take`, in their order.
   void each_missing(const std::function<void(std::size_t item)>& take);
 
-  /// Takes over what the stores `files` hold, such as those of shards; all or, where it throws, nothing. Throws InputError,
-  /// naming the file, as opening one of them does, and where it has another result under a key than is there.
+  /// Takes over what the stores `files` hold, such as those of shards; all or, where it throws, nothing. Throws
+  /// InputError, naming the file, as opening one of them does, and where it has another result under a key than is
+  /// there.
   void merge(const std::vector<std::filesystem::path>& files);
 
   /// The file.

@@ -46,12 +46,12 @@ struct StudyFile {
 ///       grid: {levels: 5} | {levels: {NAME: 5, ...}}     inputs that are not named stay nominal
 ///     seed: 1                           of the designs
 ///
-/// Files are relative to the study file. `relative` counts from the nominal value: [-0.02, 0.02] is from 2 % below it to
-/// 2 % above. The nominal value is the subject's own where it has one inside the range, else the nearest end or, without
-/// one, the middle of the range.
+/// Files are relative to the study file. `relative` counts from the nominal value: [-0.02, 0.02] is from 2 % below it
+/// to 2 % above. The nominal value is the subject's own where it has one inside the range, else the nearest end or,
+/// without one, the middle of the range.
 ///
-/// Throws InputError, naming file, line, key, value and what was expected, for unknown or repeated keys, wrong types and
-/// impossible values.
+/// Throws InputError, naming file, line, key, value and what was expected, for unknown or repeated keys, wrong types
+/// and impossible values.
 [[nodiscard]] StudyFile read_study(const std::filesystem::path& path);
 
 /// The same from text; `file` is for messages, other files are looked for in `folder`.
@@ -61,8 +61,8 @@ struct StudyFile {
 /// Name of the format: the value of its key `schema`.
 inline constexpr const char* kSensitivitySchema = "wheelwright/sensitivity/1";
 
-/// The study and its result as JSON (results/sensitivity.schema.json). `file` is the study file as it was named. Values that
-/// are not there, and sizes of faults where none is certain, are null.
+/// The study and its result as JSON (results/sensitivity.schema.json). `file` is the study file as it was named. Values
+/// that are not there, and sizes of faults where none is certain, are null.
 [[nodiscard]] Json to_json(const StudyFile& study, const StudyResult& result,
                            const std::optional<LocalSensitivity>& local, const std::string& file,
                            const std::string& software);

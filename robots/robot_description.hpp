@@ -81,8 +81,8 @@ struct JointInterfaces {
   FilePlace place;
 };
 
-/// A robot description. The robot's frame is that of the root link (URDF) or of the model (SDF): x ahead, y to the left,
-/// z up, as ROS has it (REP 103).
+/// A robot description. The robot's frame is that of the root link (URDF) or of the model (SDF): x ahead, y to the
+/// left, z up, as ROS has it (REP 103).
 struct RobotTree {
   std::string name;
   std::vector<TreeLink> links;
@@ -99,8 +99,8 @@ struct RobotTree {
 };
 
 /// Throws InputError, naming file, line and element, unless `inertial` is that of a body: finite; mass > 0, or 0 with a
-/// tensor of zeros; principal moments >= 0 and none larger than the sum of the others (a thousandth of the largest apart,
-/// since files are rounded).
+/// tensor of zeros; principal moments >= 0 and none larger than the sum of the others (a thousandth of the largest
+/// apart, since files are rounded).
 void require_possible(const TreeInertial& inertial);
 
 /// Throws InputError unless the names of links and joints stand there once, and the joints make one tree of the links.
@@ -112,19 +112,20 @@ void require_tree(const RobotTree& tree);
 /// The tensor of the moments xx, yy, zz and the products xy, xz, yz.
 [[nodiscard]] Eigen::Matrix3d symmetric(const Eigen::Vector3d& moments, const Eigen::Vector3d& products);
 
-/// The shape `body`, a <cylinder>, <sphere>, <mesh>, ... at `at` in the frame of its link. `radius` reads the radius of a
-/// cylinder or sphere. Throws InputError, naming file, line and element, unless that is > 0.
+/// The shape `body`, a <cylinder>, <sphere>, <mesh>, ... at `at` in the frame of its link. `radius` reads the radius of
+/// a cylinder or sphere. Throws InputError, naming file, line and element, unless that is > 0.
 [[nodiscard]] TreeShape read_shape(const XmlPlace& body, bool collision, const Eigen::Isometry3d& at,
                                    const std::function<double(const XmlPlace&)>& radius);
 
 /// Takes inertial and shapes of `link` from its own frame into the one in which `frame` is that frame.
 void move(TreeLink& link, const Eigen::Isometry3d& frame);
 
-/// Reads a URDF file: links with inertials and shapes, joints with dynamics and limits, <transmission> and <ros2_control>
-/// interfaces, differential-drive plugins inside <gazebo>. Origins are composed from the root link through the joints at
-/// their zero positions: T_child = T_parent · T_origin, with the fixed-axis angles R = Rz(yaw) Ry(pitch) Rx(roll). An origin
-/// that is left out is the identity, and an axis (1, 0, 0), as URDF has it; nothing else has a default. Throws InputError,
-/// naming file, line and element, for what is not there or makes no sense, and for xacro, which has to be expanded first.
+/// Reads a URDF file: links with inertials and shapes, joints with dynamics and limits, <transmission> and
+/// <ros2_control> interfaces, differential-drive plugins inside <gazebo>. Origins are composed from the root link
+/// through the joints at their zero positions: T_child = T_parent · T_origin, with the fixed-axis angles R = Rz(yaw)
+/// Ry(pitch) Rx(roll). An origin that is left out is the identity, and an axis (1, 0, 0), as URDF has it; nothing else
+/// has a default. Throws InputError, naming file, line and element, for what is not there or makes no sense, and for
+/// xacro, which has to be expanded first.
 [[nodiscard]] RobotTree read_urdf(const std::filesystem::path& path);
 
 /// The same from text; `file` is for messages.

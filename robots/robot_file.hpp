@@ -24,8 +24,8 @@ namespace wheelwright {
 ///     encoder_difference | measured, limits: {effort, speed, acceleration}, motor: {torque_constant, resistance,
 ///     back_emf, gear_ratio}, effects: [{effect: name, parameter: value | [lo, hi], ...}] (model/effect_law.hpp)
 ///
-/// Physical names: mass, yaw_inertia, viscous_linear, viscous_yaw, coulomb (differential_drive; viscous_x and viscous_y instead
-/// of viscous_linear where the friction is anisotropic); inertia, viscous, coulomb, offset (single_axis).
+/// Physical names: mass, yaw_inertia, viscous_linear, viscous_yaw, coulomb (differential_drive; viscous_x and viscous_y
+/// instead of viscous_linear where the friction is anisotropic); inertia, viscous, coulomb, offset (single_axis).
 /// Throws InputError, naming file, line, key, value and what was expected, for unknown or repeated keys, wrong types
 /// and impossible values.
 [[nodiscard]] Robot read_robot(const std::filesystem::path& path);

@@ -33,16 +33,17 @@ struct RobotWithOrigins {
 
 /// The robot of a description (nullptr: none) and of a controller's parameters (nullptr: none); at least one is needed.
 ///
-/// - The wheels are those of `hints`, of the controller, of the description's plugin, in this order, else found (driven_wheels).
-/// - Geometry: `hints` first, then the description's shapes and joints, then the controller, then a plugin. Two sources that
-///   differ by more than a tenth are an error, by more than a thousandth a remark.
+/// - The wheels are those of `hints`, of the controller, of the description's plugin, in this order, else found
+///   (driven_wheels).
+/// - Geometry: `hints` first, then the description's shapes and joints, then the controller, then a plugin. Two sources
+///   that differ by more than a tenth are an error, by more than a thousandth a remark.
 /// - nominal: m and I as lumped_body has them; with the damping c of the wheels' joints (N·m·s/rad),
-///   f1 = (c_R + c_L)/r² and f3 = (c_R + c_L) D²/(4r²); `coulomb` is the mean of the joints' dry friction, and where it is
-///   > 0 the model takes it as a parameter.
-/// - A centre of mass more than a hundredth of the track off the middle of the axle is an effect of the robot, com_longitudinal
-///   or com_lateral (a prior of [a/3, 3a]).
-/// - limits: of effort from the wheels' joints and the plugin; of speed from the joints, and such that no pair of wheel speeds
-///   within it exceeds a controller's limits, ω <= min(v/r, v2 D/(2r)); of acceleration likewise.
+///   f1 = (c_R + c_L)/r² and f3 = (c_R + c_L) D²/(4r²); `coulomb` is the mean of the joints' dry friction, and where it
+///   is > 0 the model takes it as a parameter.
+/// - A centre of mass more than a hundredth of the track off the middle of the axle is an effect of the robot,
+///   com_longitudinal or com_lateral (a prior of [a/3, 3a]).
+/// - limits: of effort from the wheels' joints and the plugin; of speed from the joints, and such that no pair of wheel
+///   speeds within it exceeds a controller's limits, ω <= min(v/r, v2 D/(2r)); of acceleration likewise.
 /// - effort: from the interfaces of the wheels' joints; an effort that is only commanded is held (zero_order).
 ///
 /// Throws InputError, naming file, line and element, for what is missing, contradicts itself or makes no sense.

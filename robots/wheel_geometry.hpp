@@ -20,18 +20,19 @@ struct WheelJoints {
   std::string reason;  ///< "named by --left and --right", "the only continuous joints ...", "robot.urdf:80: ..."
 };
 
-/// Names of the wheels' joints from outside the description, and who gave them ("--left and --right", "robot.sdf:9: ...");
-/// empty where nobody did.
+/// Names of the wheels' joints from outside the description, and who gave them ("--left and --right", "robot.sdf:9:
+/// ..."); empty where nobody did.
 struct NamedWheels {
   std::vector<std::string> left, right;
   std::string by;
 };
 
-/// The driven wheels of `tree`: those named; else the continuous joints with a level axis across the robot (within 2° of y)
-/// whose name, or whose link's name, does not say caster; where these are more than two, those that say wheel. Left is the
-/// one with the larger y. Throws InputError where this leaves other than one wheel on each side, listing the candidates and
-/// the options to give; where names and sides contradict each other; for a name that is no such joint (with the nearest that
-/// is); and for robots with two or more wheels a side, of which there is no model yet (skid steer).
+/// The driven wheels of `tree`: those named; else the continuous joints with a level axis across the robot (within 2°
+/// of y) whose name, or whose link's name, does not say caster; where these are more than two, those that say wheel.
+/// Left is the one with the larger y. Throws InputError where this leaves other than one wheel on each side, listing
+/// the candidates and the options to give; where names and sides contradict each other; for a name that is no such
+/// joint (with the nearest that is); and for robots with two or more wheels a side, of which there is no model yet
+/// (skid steer).
 [[nodiscard]] WheelJoints driven_wheels(const RobotTree& tree, const NamedWheels& named);
 
 /// The axle of a differential drive, in the robot's frame.
@@ -54,15 +55,16 @@ struct WheelRadius {
 /// Names of the links that turn with the child of `joint`: the child, and what is fixed to it.
 [[nodiscard]] std::vector<std::string> turning_links(const RobotTree& tree, const TreeJoint& joint);
 
-/// The radius of the larger cylinder (axis along the joint's within 2°) or sphere of a wheel, taken from its collision shapes,
-/// from the visual ones where there is no collision. Throws InputError where a wheel's shape stands off its axis by more than
-/// a hundredth of the radius, or the two wheels differ by more than 10⁻⁵ of the radius. A wheel whose shape is a mesh, a box or
-/// missing has no radius, which is told by `origin`.
+/// The radius of the larger cylinder (axis along the joint's within 2°) or sphere of a wheel, taken from its collision
+/// shapes, from the visual ones where there is no collision. Throws InputError where a wheel's shape stands off its
+/// axis by more than a hundredth of the radius, or the two wheels differ by more than 10⁻⁵ of the radius. A wheel whose
+/// shape is a mesh, a box or missing has no radius, which is told by `origin`.
 [[nodiscard]] WheelRadius wheel_radius(const RobotTree& tree, const WheelJoints& wheels);
 
-/// The axle through the centres of the wheels: D = uᵀ(c_L − c_R) with the wheels' common axis u. The centre of a wheel is that
-/// of its round collision shape (visual without one), projected on the joint's axis; without one the joint's origin. Throws
-/// InputError unless the axes are parallel to each other and to the line between the centres within 2°, and level within 2°.
+/// The axle through the centres of the wheels: D = uᵀ(c_L − c_R) with the wheels' common axis u. The centre of a wheel
+/// is that of its round collision shape (visual without one), projected on the joint's axis; without one the joint's
+/// origin. Throws InputError unless the axes are parallel to each other and to the line between the centres within 2°,
+/// and level within 2°.
 [[nodiscard]] Axle axle(const RobotTree& tree, const WheelJoints& wheels);
 
 /// A robot as the model sees it: one body that carries the turning wheels.
@@ -85,23 +87,25 @@ struct LumpedBody {
   }
 };
 
-/// Sums the inertials of `tree`. With the middle of the axle P, the vertical z, and for link k the mass m_k, the centre of mass
-/// at d_k from P, and the tensor J_k about it, in the robot's axes,
+/// Sums the inertials of `tree`. With the middle of the axle P, the vertical z, and for link k the mass m_k, the centre
+/// of mass at d_k from P, and the tensor J_k about it, in the robot's axes,
 ///
 ///     I_zz = Σ_k zᵀ J_k z + m_k |z × d_k|²
 ///
-/// where the links of a wheel (turning_links) count with their mean over a turn: (tr J_k − uᵀ J_k u)/2 + m_k (s_k² + ρ_k²/2),
-/// with the axle's direction u, s_k along it from P and ρ_k off it. The kinetic energy of body and wheels, rolling with
-/// ω_R,L = (v1 ± v2 D/2)/r,
+/// where the links of a wheel (turning_links) count with their mean over a turn: (tr J_k − uᵀ J_k u)/2 + m_k (s_k² +
+/// ρ_k²/2), with the axle's direction u, s_k along it from P and ρ_k off it. The kinetic energy of body and wheels,
+/// rolling with ω_R,L = (v1 ± v2 D/2)/r,
 ///
 ///     T = ½ m_Σ v1² + ½ I_zz v2² + ½ J_R ω_R² + ½ J_L ω_L²,      J = Σ uᵀ J_k u + m_k ρ_k²
 ///
 /// makes the wheels' spin part of M̄ = diag(m, I) of the torque equation: m = m_Σ + (J_R + J_L)/r² and
-/// I = I_zz + (J_R + J_L) D²/(4r²), in the ratio 1 : (D/2)² that catalogue and identification call `armature`. So the nominal
-/// values are those that a log of this robot identifies, with the lever arm D/2. What a gear and rotor add is in no such file.
+/// I = I_zz + (J_R + J_L) D²/(4r²), in the ratio 1 : (D/2)² that catalogue and identification call `armature`. So the
+/// nominal values are those that a log of this robot identifies, with the lever arm D/2. What a gear and rotor add is
+/// in no such file.
 ///
-/// A link without an inertial has no mass where it has no shape either (a frame), or is one of `massless`. Throws InputError for
-/// any other, naming file, line and link; for a name in `massless` that is no link or has a mass; where nothing has a mass.
+/// A link without an inertial has no mass where it has no shape either (a frame), or is one of `massless`. Throws
+/// InputError for any other, naming file, line and link; for a name in `massless` that is no link or has a mass; where
+/// nothing has a mass.
 [[nodiscard]] LumpedBody lumped_body(const RobotTree& tree, const WheelJoints& wheels, const Axle& axle,
                                      const std::vector<std::string>& massless);
 

@@ -15,10 +15,10 @@
 namespace wheelwright {
 
 /// The actuators of a simulated robot. In this order: `saturation`, `torque_deadzone`, `torque_gain_asymmetric`,
-/// `battery_sag` (τ (1 − k t − R_b Σ|τ|), not below 0), `delay`, `actuator_lag` (exact), `backlash` (after a reversal no torque
-/// reaches the wheel until the motor, of 1 % of the wheel's share of the mass, has crossed the play). Before the start there
-/// was no torque. The plant is moved in pieces of at most ½ ms, on which the torque is linear, or at once where there is
-/// nothing to do.
+/// `battery_sag` (τ (1 − k t − R_b Σ|τ|), not below 0), `delay`, `actuator_lag` (exact), `backlash` (after a reversal
+/// no torque reaches the wheel until the motor, of 1 % of the wheel's share of the mass, has crossed the play). Before
+/// the start there was no torque. The plant is moved in pieces of at most ½ ms, on which the torque is linear, or at
+/// once where there is nothing to do.
 class Drivetrain {
  public:
   /// `parameters` are those of the plant. `fine` asks for pieces of ½ ms even where there is nothing to do.

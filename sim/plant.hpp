@@ -48,7 +48,8 @@ class Noise {
 };
 
 /// The numbers of a robot's effects that act between the wheel torques and the body: those of the terms
-/// (effect_terms.hpp, with the same signs), and load_friction, friction_drift, wheel_out_of_round and longitudinal_slip.
+/// (effect_terms.hpp, with the same signs), and load_friction, friction_drift, wheel_out_of_round and
+/// longitudinal_slip.
 struct DriveEffects {
   /// None.
   DriveEffects() = default;
@@ -77,7 +78,8 @@ struct DriveEffects {
 /// Where dry friction goes over from one sign to the other: sgn x is x/x0 for |x| < x0. Dry friction that would stop a
 /// wheel within a step makes the integration stiff; x0 = 2·step·(slope of the speed per unit of friction) bounds its
 /// eigenvalue by ½ per step and source, inside the region in which Runge-Kutta is stable. A robot that stands creeps at
-/// x0·τ/c at most (about 10⁻³ rad/s at the wheels) instead of sticking, and a reversal is passed in about a millisecond.
+/// x0·τ/c at most (about 10⁻³ rad/s at the wheels) instead of sticking, and a reversal is passed in about a
+/// millisecond.
 struct DryThreshold {
   double wheel = 0.0;   ///< rad/s
   double yaw = 0.0;     ///< rad/s
@@ -127,8 +129,8 @@ struct DriveState {
 /// Where friction is isotropic, radii are constant and nothing slips the speeds and wheel angles follow in closed form,
 /// and the position by three-point Gauss quadrature of the closed form; elsewhere by classical Runge-Kutta steps of at
 /// most 2 ms that end where a fault begins, ends or changes its course; with effects (plant.hpp) of at most
-/// ¼ ms. Forces of effects come beside those above: the wheel torques less what is lost at the wheels, the forces on the
-/// body, and with the centre of mass b beside the axis m (u̇ − b θ̈) and I θ̈ − m b u̇ on the left.
+/// ¼ ms. Forces of effects come beside those above: the wheel torques less what is lost at the wheels, the forces on
+/// the body, and with the centre of mass b beside the axis m (u̇ − b θ̈) and I θ̈ − m b u̇ on the left.
 class Plant {
  public:
   /// Throws InvalidArgument when parameters or faults do not pass their `validate`.

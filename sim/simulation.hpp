@@ -74,20 +74,22 @@ void validate(const Scenario& scenario);
 [[nodiscard]] DriveParameters nominal_parameters(const Scenario& scenario);
 
 /// θ_L of the scenario's truth in the order of `model.parameters`, units of θ_L; in the model's own lever-arm
-/// convention (with ℓ = D inertia and friction of yaw come out doubled); those of effects are the mid-points of the robot's. Throws InvalidArgument when the model has a
-/// parameter that a differential drive does not, or has one viscous_linear while the truth is anisotropic.
+/// convention (with ℓ = D inertia and friction of yaw come out doubled); those of effects are the mid-points of the
+/// robot's. Throws InvalidArgument when the model has a parameter that a differential drive does not, or has one
+/// viscous_linear while the truth is anisotropic.
 [[nodiscard]] Eigen::VectorXd true_parameters(const Scenario& scenario, const Model& model);
 
 /// The log of a scenario, block by block in bounded memory; the same scenario gives the same log each time it is
-/// walked, whatever the size of the blocks. Noise is drawn without the standard library's distributions; what is left to the
-/// machine is the last digit of its sine, cosine and exponential.
+/// walked, whatever the size of the blocks. Noise is drawn without the standard library's distributions; what is left
+/// to the machine is the last digit of its sine, cosine and exponential.
 ///
 /// With Hold::zero_order a row's effort acts from its stamp to the next one, and with Hold::first_order efforts are
-/// linear between stamps, in the simulated world too: a noise-free log of Sampling::instant satisfies the model exactly. The
-/// feedback uses true angles and pose, so sensors do not change the motion.
+/// linear between stamps, in the simulated world too: a noise-free log of Sampling::instant satisfies the model
+/// exactly. The feedback uses true angles and pose, so sensors do not change the motion.
 ///
 /// Effects of the scenario's robot act in the simulated world (plant.hpp, drivetrain.hpp); the log has the commanded
-/// efforts. With `sensor_time_offset` wheel angles and speeds are those of dt before, and `encoder_scale` multiplies them.
+/// efforts. With `sensor_time_offset` wheel angles and speeds are those of dt before, and `encoder_scale` multiplies
+/// them.
 class Simulation final : public LogSource {
  public:
   /// Throws InvalidArgument when `scenario` does not pass its `validate`, or `block_rows` is 0.

@@ -230,8 +230,8 @@ MovedSides moved_sides(const Model& model, const std::vector<Interval>& sides, c
   return moved;
 }
 
-// The parameter whose prior's lower side is 0, holds a bound, and goes down: below 0 errors of the rows' column count with
-// the other sign. p where there is none.
+// The parameter whose prior's lower side is 0, holds a bound, and goes down: below 0 errors of the rows' column count
+// with the other sign. p where there is none.
 std::size_t opened_sign(const HullOptimum& optimum, const Box& at, const Box& moved) {
   for (const WeightedRow& active : optimum.active) {
     const RowOrigin& origin = active.row.origin;

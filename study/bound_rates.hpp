@@ -3,13 +3,14 @@
 /// How the rows of a log that hold a commissioned robot's bounds move with an input of its file.
 /// How fast the bounds of a commissioned robot follow an input, through all passes of its commissioning.
 ///
-/// Rows know how fast the motion can change between samples from the set of the pass before (commission.hpp, EarlierSet).
-/// With B_k the hull of pass k, s the input and V the bounds of the rows of a pass,
+/// Rows know how fast the motion can change between samples from the set of the pass before (commission.hpp,
+/// EarlierSet). With B_k the hull of pass k, s the input and V the bounds of the rows of a pass,
 ///
 ///     B_0 = V(s),   B_k = V(s, B_{k−1}(s)):
 ///
-/// directional derivatives of linear programs follow the chain rule, pass by pass and to each side by itself. So the rows
-/// that hold the bounds of pass k are looked at beside the input's value with B_{k−1} moved along its own derivative.
+/// directional derivatives of linear programs follow the chain rule, pass by pass and to each side by itself. So the
+/// rows that hold the bounds of pass k are looked at beside the input's value with B_{k−1} moved along its own
+/// derivative.
 #pragma once
 
 #include <cstddef>
@@ -53,14 +54,14 @@ struct RowRates {
 /// The prior box of θ.
 [[nodiscard]] Box prior_of(const Robot& robot);
 
-/// How fast the motion of the robot `at` can change between samples, for rows that stand on declared noise: by the limit
-/// of its accelerations and, where there are `sides` (p), by the dynamics with all parameters inside them.
+/// How fast the motion of the robot `at` can change between samples, for rows that stand on declared noise: by the
+/// limit of its accelerations and, where there are `sides` (p), by the dynamics with all parameters inside them.
 [[nodiscard]] MotionBound motion_at(const Commissioning& commissioning, const RobotAt& at,
                                     std::span<const Interval> sides);
 
-/// The rows of `log` for the robot and filter `at`, all else as `commissioning` chose it: the same columns and instants;
-/// errors are propagated anew where noise is declared, with `motion` between samples, else they stay. `confidence` as
-/// CommissionOptions has it.
+/// The rows of `log` for the robot and filter `at`, all else as `commissioning` chose it: the same columns and
+/// instants; errors are propagated anew where noise is declared, with `motion` between samples, else they stay.
+/// `confidence` as CommissionOptions has it.
 [[nodiscard]] TorqueRows rows_of(LogSource& log, const Commissioning& commissioning, const RobotAt& at,
                                  const MotionBound& motion, double confidence);
 
@@ -70,10 +71,10 @@ struct RowRates {
 /// The rows of the log that are active at an optimum, with the sides that are.
 [[nodiscard]] LogRows active_rows(const HullOptima& optima);
 
-/// Rates of the active rows of `optimum` by differences, from their half-spaces at the input's value and by `step` below
-/// and above it: central where a row is smooth, one-sided where it has a kink there. None where a row of the log jumps or
-/// is gone; `reach` is a large change of the input, by which that is judged. Rates to both sides that differ by less than
-/// 1e-3 of them are a curvature where `curved`, else a kink too.
+/// Rates of the active rows of `optimum` by differences, from their half-spaces at the input's value and by `step`
+/// below and above it: central where a row is smooth, one-sided where it has a kink there. None where a row of the log
+/// jumps or is gone; `reach` is a large change of the input, by which that is judged. Rates to both sides that differ
+/// by less than 1e-3 of them are a curvature where `curved`, else a kink too.
 [[nodiscard]] RowRates row_rates(const HullOptima& optima, const HullOptimum& optimum, double reach, double step,
                                  const RowsBeside& below, const RowsBeside& above, bool curved);
 

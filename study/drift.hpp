@@ -52,24 +52,26 @@ struct ParameterDrift {
 };
 
 /// The line through `points` (ascending times) by weighted least squares with weights 1/s², and the certain change.
-/// Points without a usable estimate take part in the latter only. slope_error is that of the weights alone: √(1/Σ w (t −
-/// t̄)²); p and the interval are not filled in. Nothing for fewer than two points.
+/// Points without a usable estimate take part in the latter only. slope_error is that of the weights alone: √(1/Σ w (t
+/// − t̄)²); p and the interval are not filled in. Nothing for fewer than two points.
 [[nodiscard]] std::optional<ParameterDrift> drift_through(std::span<const DriftPoint> points, bool dated);
 
 /// drift_through() of every parameter of `record` that two of its logs bound, with the columns of `table` (new ones are
 /// made where a check alone has one) and the number of the robot in it.
 [[nodiscard]] std::vector<ParameterDrift> drift_of(const RobotRecord& record, std::size_t robot, FleetTable& table);
 
-/// Fills in p, adjusted_p and interval, the fleet taken together, and sorts: certain changes first, then small adjusted p.
+/// Fills in p, adjusted_p and interval, the fleet taken together, and sorts: certain changes first, then small adjusted
+/// p.
 ///
-/// A log's own standard error does not know of floor, payload and temperature, which differ from log to log. How much they
-/// add is learnt from the whole fleet: φ of each parameter, at least 1, multiplies the squared slope errors (`birge1932`). It is
-/// the median over its robots of χ² over the median of its law: where robots have three logs or more, χ² is chi_square; where all
-/// have two and there are at least 10, it is chi_mean, so that a change which most robots share counts as the difference between
-/// logs and not as drift. Fewer robots with two logs teach nothing: φ = 1, and trends rest on the standard errors alone.
+/// A log's own standard error does not know of floor, payload and temperature, which differ from log to log. How much
+/// they add is learnt from the whole fleet: φ of each parameter, at least 1, multiplies the squared slope errors
+/// (`birge1932`). It is the median over its robots of χ² over the median of its law: where robots have three logs or
+/// more, χ² is chi_square; where all have two and there are at least 10, it is chi_mean, so that a change which most
+/// robots share counts as the difference between logs and not as drift. Fewer robots with two logs teach nothing: φ =
+/// 1, and trends rest on the standard errors alone.
 ///
-/// The slope over its error is compared with Student's t of ν degrees of freedom, 1/ν = 1/own_freedom + 1/(0.37 Σ freedom of the
-/// χ²), what a median is worth.
+/// The slope over its error is compared with Student's t of ν degrees of freedom, 1/ν = 1/own_freedom + 1/(0.37 Σ
+/// freedom of the χ²), what a median is worth.
 ///
 /// The certain change assumes nothing but the noise bounds of the two logs.
 void judge_drift(std::vector<ParameterDrift>& drift);

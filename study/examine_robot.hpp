@@ -42,9 +42,9 @@ struct ExamineOptions {
   DetectorOptions detector{};
 };
 
-/// Commissions the robot, walks its detector over every check, and commissions each check by itself. Whatever a log or a
-/// robot throws (any std::exception) becomes the status and message of that log: nothing is thrown. The same logs give
-/// the same record.
+/// Commissions the robot, walks its detector over every check, and commissions each check by itself. Whatever a log or
+/// a robot throws (any std::exception) becomes the status and message of that log: nothing is thrown. The same logs
+/// give the same record.
 [[nodiscard]] RobotRecord examine_robot(const RobotLogs& logs, const ExamineOptions& options = {});
 
 /// The record's parameters of a commissioning; none where it gave no bounds.

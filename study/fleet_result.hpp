@@ -50,8 +50,8 @@ struct FleetOptions {
   double drift_level = 0.05;  ///< probability that any robot of a fleet that does not drift is said to
 };
 
-/// A fleet. Memory grows by the robots' names, six numbers a parameter, and the findings: 10⁶ robots with a later log each take
-/// about 2 GiB.
+/// A fleet. Memory grows by the robots' names, six numbers a parameter, and the findings: 10⁶ robots with a later log
+/// each take about 2 GiB.
 struct FleetResult {
   FleetTable table{};
   std::vector<std::size_t> by_status = std::vector<std::size_t>(5, 0);  ///< robots with each RobotStatus

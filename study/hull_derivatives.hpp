@@ -37,7 +37,8 @@ struct HullOptimum {
   Eigen::VectorXd at;         ///< p, θ*: an optimal vertex, from its equations; the set's centre in other blocks
   /// The rows and prior sides that θ* meets with equality (to 1e-9 of the block's size), p coefficients each. The first
   /// `basis` of them define θ*; their multipliers >= 0 are a solution of Σ λ_i a_i = ±e_j, those of the others are 0.
-  /// An upper bound moves by +λ_i per unit of b_i (for a row of the log: per unit of its bound dy), a lower bound by −λ_i.
+  /// An upper bound moves by +λ_i per unit of b_i (for a row of the log: per unit of its bound dy), a lower bound by
+  /// −λ_i.
   std::vector<WeightedRow> active;
   std::size_t basis = 0;
   bool unique_maximiser = true;  ///< all multipliers of the basis are > 0 (1e-9 of their scale): θ* is the only optimum
@@ -55,8 +56,8 @@ struct HullOptima {
 };
 
 /// The optima of all bounds of `set`, made of rows in the box `prior`. Active rows are sought among the facets and the
-/// sides of the prior: rows that the set never needed are found by add_active_rows() only. Throws InvalidArgument unless
-/// set and prior have the same dimension.
+/// sides of the prior: rows that the set never needed are found by add_active_rows() only. Throws InvalidArgument
+/// unless set and prior have the same dimension.
 [[nodiscard]] HullOptima hull_optima(const Polytope& set, const Box& prior);
 
 /// Walks `rows` once, and adds those that an optimum meets with equality and that its set could do without. `rows` are
@@ -71,9 +72,9 @@ struct RowRate {
 
 /// The derivative of a bound when its active rows move: with rates `right` where s grows, and `left` where it falls
 /// (both per unit of growing s; the same where rows are smooth in s). One rate for each of optimum.active. Both sides
-/// agree where the bound is regular, the rates are the same, and they couple no parameters that the rows keep apart (the
-/// right one then is the largest over all values of these). NaN where no vertex was found, and where rows of a bound that
-/// is not regular come to couple.
+/// agree where the bound is regular, the rates are the same, and they couple no parameters that the rows keep apart
+/// (the right one then is the largest over all values of these). NaN where no vertex was found, and where rows of a
+/// bound that is not regular come to couple.
 /// Throws InvalidArgument unless the numbers agree.
 [[nodiscard]] OneSided bound_derivative(const HullOptima& optima, const HullOptimum& optimum,
                                         std::span<const RowRate> left, std::span<const RowRate> right);

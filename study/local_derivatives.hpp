@@ -4,9 +4,10 @@
 /// What a bound gains or loses per unit of an input of the robot file: exact, at the point where one stands.
 ///
 /// The rows that hold a bound are smooth functions of an input; their multipliers turn the rows' rates into the bound's
-/// (hull_derivatives.hpp), pass by pass of commissioning (bound_rates.hpp). No linear program over the log is solved again:
-/// per input and pass, the log is walked twice, for all bounds at once. Everything that commissioning chose from the log
-/// stays as it chose it: columns, filter (but for the input itself), parameters, instants, outliers left out, passes.
+/// (hull_derivatives.hpp), pass by pass of commissioning (bound_rates.hpp). No linear program over the log is solved
+/// again: per input and pass, the log is walked twice, for all bounds at once. Everything that commissioning chose from
+/// the log stays as it chose it: columns, filter (but for the input itself), parameters, instants, outliers left out,
+/// passes.
 #pragma once
 
 #include <optional>
@@ -92,8 +93,8 @@ struct LocalSensitivity {
   Warrant warrant = Warrant::extrapolated;  ///< of the bounds
 };
 
-/// Derivatives of all bounds of `commissioning`, which was made from `log`. None (see notes) where its set is empty or a
-/// union over open signs. Where noise is estimated, the rows' bounds are held fixed: the estimate's own dependence on
+/// Derivatives of all bounds of `commissioning`, which was made from `log`. None (see notes) where its set is empty or
+/// a union over open signs. Where noise is estimated, the rows' bounds are held fixed: the estimate's own dependence on
 /// the input is not seen. Throws InvalidArgument, naming what was expected, for an input that is none or has no value.
 [[nodiscard]] LocalSensitivity local_derivatives(LogSource& log, const Commissioning& commissioning,
                                                  const LocalOptions& options = {});

@@ -48,8 +48,8 @@ struct PooledPrior {
   std::vector<PooledParameter> parameters{};  ///< of the columns that are keys of a prior
 };
 
-/// Split-conformal prediction (`vovk2005`, `lei2018`) of a box. The robots whose logs could be read are split in halves by
-/// a seeded hash of their names. One half gives each parameter a centre and a scale to each side, and says which
+/// Split-conformal prediction (`vovk2005`, `lei2018`) of a box. The robots whose logs could be read are split in halves
+/// by a seeded hash of their names. One half gives each parameter a centre and a scale to each side, and says which
 /// parameters are left out. Each of the m robots of the other half gets the score
 ///
 ///     S_i = max over parameters of max((c − l_i)/s_below, (u_i − c)/s_above)
@@ -58,20 +58,22 @@ struct PooledPrior {
 /// points with a score of at most the k-th smallest, k = ⌈(m + 1)(1 − a)⌉, cut to the hull of the robots' own priors.
 ///
 /// Where the robots and the next one are exchangeable and their noise keeps to its bounds, P(θ of the next robot in the
-/// box) >= k/(m + 1) >= 1 − a, over fleets and next robots together, for any distribution of θ: the true θ's of the scored
-/// robots and the next one's are exchangeable given the learning half, and larger scores only enlarge the box. No robot is
-/// left out for being strange. A robot that was read but gave no bounds (contradicted, nothing shown) has an infinite score, so
-/// the statement is about such robots too; where they are more than the coverage allows, there is no box. A
-/// parameter that a scored robot's log does not show has the bounds of its prior, which are wide and true. Which
-/// parameters are included depends on the learning half only, and so costs no coverage. Robots whose logs could not be
-/// read take no part: that has to have nothing to do with their θ.
+/// box) >= k/(m + 1) >= 1 − a, over fleets and next robots together, for any distribution of θ: the true θ's of the
+/// scored robots and the next one's are exchangeable given the learning half, and larger scores only enlarge the box.
+/// No robot is left out for being strange. A robot that was read but gave no bounds (contradicted, nothing shown) has
+/// an infinite score, so the statement is about such robots too; where they are more than the coverage allows, there is
+/// no box. A parameter that a scored robot's log does not show has the bounds of its prior, which are wide and true.
+/// Which parameters are included depends on the learning half only, and so costs no coverage. Robots whose logs could
+/// not be read take no part: that has to have nothing to do with their θ.
 ///
-/// The other way, a box of order statistics of each parameter, uses all n robots but pays for each of 2p sides: 1 − 2pk/(n
-/// + 1) (order_statistics_box()). Throws InvalidArgument for a coverage outside (0, 1) or a share outside [0, 1].
+/// The other way, a box of order statistics of each parameter, uses all n robots but pays for each of 2p sides: 1 −
+/// 2pk/(n + 1) (order_statistics_box()). Throws InvalidArgument for a coverage outside (0, 1) or a share outside [0,
+/// 1].
 [[nodiscard]] PooledPrior pooled_prior(const FleetTable& table, const PooledPriorOptions& options = {});
 
-/// For each of `columns`, [k-th smallest lower bound, k-th largest upper bound] over all readable robots, with the largest
-/// k >= 1 for which 1 − 2pk/(n + 1) >= `coverage`; empty where there is none, or robots without bounds use k up.
+/// For each of `columns`, [k-th smallest lower bound, k-th largest upper bound] over all readable robots, with the
+/// largest k >= 1 for which 1 − 2pk/(n + 1) >= `coverage`; empty where there is none, or robots without bounds use k
+/// up.
 [[nodiscard]] std::vector<Interval> order_statistics_box(const FleetTable& table,
                                                          const std::vector<std::size_t>& columns, double coverage);
 

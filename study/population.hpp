@@ -40,8 +40,8 @@ inline constexpr std::size_t kNoMember = static_cast<std::size_t>(-1);
 [[nodiscard]] RandomEffects fit_random_effects(std::span<const double> values, std::span<const double> errors,
                                                std::size_t without = kNoMember);
 
-/// Holm's step-down adjustment (`holm1979`): rejecting where the adjusted p is at most α errs anywhere with a probability
-/// of at most α, however the tests depend on one another. The order of `p` is kept; values are in [0, 1].
+/// Holm's step-down adjustment (`holm1979`): rejecting where the adjusted p is at most α errs anywhere with a
+/// probability of at most α, however the tests depend on one another. The order of `p` is kept; values are in [0, 1].
 [[nodiscard]] std::vector<double> holm(const std::vector<double>& p);
 
 /// Options of describe_population().
@@ -83,15 +83,16 @@ struct Population {
 };
 
 /// Of each parameter, centre and spread of the robots that show it (population.hpp), and the robots outside. A robot
-/// is compared with the others: with their μ and τ (fitted without it where there are at most 200 robots; beyond, its own
-/// pull on them is bounded and below a hundredth of a deviation),
+/// is compared with the others: with their μ and τ (fitted without it where there are at most 200 robots; beyond, its
+/// own pull on them is bounded and below a hundredth of a deviation),
 ///
 ///     t = (x − μ)/√(s² + τ² + s_μ²),
 ///
-/// which for a robot like the others follows about Student's t (normal θ and errors) of ν degrees of freedom, those of the
-/// estimated variances in it: 1/ν = 1/RandomEffects::freedom of the others + q²/(those of s), q = s²/(s² + τ² + s_μ²). It is outside where its p, adjusted by Holm's method over all robots and parameters, is at most
-/// `level`. The certain statement needs no distribution, only the noise bounds.
-/// Throws InvalidArgument for a level or share outside (0, 1) or fewest < 4.
+/// which for a robot like the others follows about Student's t (normal θ and errors) of ν degrees of freedom, those of
+/// the estimated variances in it: 1/ν = 1/RandomEffects::freedom of the others + q²/(those of s), q = s²/(s² + τ² +
+/// s_μ²). It is outside where its p, adjusted by Holm's method over all robots and parameters, is at most `level`. The
+/// certain statement needs no distribution, only the noise bounds. Throws InvalidArgument for a level or share outside
+/// (0, 1) or fewest < 4.
 [[nodiscard]] Population describe_population(const FleetTable& table, const PopulationOptions& options = {});
 
 }  // namespace wheelwright

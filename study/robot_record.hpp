@@ -24,8 +24,8 @@ enum class RobotStatus {
 };
 
 /// One parameter of one log. Where the effort's constants are known it is the physical quantity as a robot file's
-/// `prior` counts it, θ_L,j / per_physical (under voltage, viscous terms with the braking of the back-EMF in them); else
-/// θ_L,j itself. Bounds are rounded outward.
+/// `prior` counts it, θ_L,j / per_physical (under voltage, viscous terms with the braking of the back-EMF in them);
+/// else θ_L,j itself. Bounds are rounded outward.
 struct RecordedParameter {
   std::string name;  ///< physical name, name of θ_L,j, or "kinematic." and the name of a kinematic parameter
   std::string unit;

@@ -25,8 +25,8 @@ struct GridMap {
   Eigen::MatrixXd values = {};  ///< values(a, b) at x[a], y[b]; NaN where there was none
 };
 
-/// Points of the grid. Throws InvalidArgument for no input, a level below 1, a nominal vector of another length or outside
-/// [0, 1], and more points than `most`, telling their number (or that it overflows).
+/// Points of the grid. Throws InvalidArgument for no input, a level below 1, a nominal vector of another length or
+/// outside [0, 1], and more points than `most`, telling their number (or that it overflows).
 [[nodiscard]] Eigen::Index grid_points(const Grid& grid);
 
 /// Level of each input at a point. Throws as grid_points(), and for a point that the grid has not.
@@ -42,9 +42,9 @@ struct GridMap {
 /// All points, one a row. Throws as grid_points().
 [[nodiscard]] Eigen::MatrixXd grid_design(const Grid& grid);
 
-/// The map of one quantity (`values`, one for each point) over inputs `x` and `y`, the others at the levels of `at` (whose
-/// entries for x and y are not looked at). Throws as grid_points(), where x and y are the same or no inputs, where `at` has
-/// not a level of each other input, and where `values` has not one value for each point.
+/// The map of one quantity (`values`, one for each point) over inputs `x` and `y`, the others at the levels of `at`
+/// (whose entries for x and y are not looked at). Throws as grid_points(), where x and y are the same or no inputs,
+/// where `at` has not a level of each other input, and where `values` has not one value for each point.
 [[nodiscard]] GridMap grid_map(const Grid& grid, const Eigen::VectorXd& values, Eigen::Index x, Eigen::Index y,
                                std::vector<Eigen::Index> at);
 
@@ -65,9 +65,9 @@ struct OneAtATime {
   std::vector<std::size_t> order = {};  ///< of the inputs, the largest swing first, those without a value last
 };
 
-/// The nominal point, then for each input `levels` rows with that input at 0, 1/(levels − 1), …, 1 and the others nominal.
-/// `nominal` holds a coordinate in [0, 1] for each input. Shape (1 + inputs · levels) × inputs. Throws InvalidArgument for
-/// no input, a coordinate outside [0, 1], or fewer than two levels.
+/// The nominal point, then for each input `levels` rows with that input at 0, 1/(levels − 1), …, 1 and the others
+/// nominal. `nominal` holds a coordinate in [0, 1] for each input. Shape (1 + inputs · levels) × inputs. Throws
+/// InvalidArgument for no input, a coordinate outside [0, 1], or fewer than two levels.
 [[nodiscard]] Eigen::MatrixXd one_at_a_time_design(const Eigen::VectorXd& nominal, Eigen::Index levels = 5);
 
 /// Curves for each column of `values` (rows of the design × quantities; NaN or an infinity where a row gave no value).
@@ -104,11 +104,11 @@ struct ElementaryEffects {
 /// row gave no value); result[quantity][input].
 ///
 /// Trajectories are independent, each has one effect of an input: the interval is μ* ± Student's t with effects − 1
-/// degrees of freedom times standard error, for the mean over the grid's points. It holds its confidence as far as a mean
-/// of that many effects is normally distributed; rare large effects, as of a threshold, need more trajectories.
+/// degrees of freedom times standard error, for the mean over the grid's points. It holds its confidence as far as a
+/// mean of that many effects is normally distributed; rare large effects, as of a threshold, need more trajectories.
 ///
-/// An effect that lacks one of its two values is left out and not imputed. Throws InvalidArgument where `values` has not
-/// the rows of the design.
+/// An effect that lacks one of its two values is left out and not imputed. Throws InvalidArgument where `values` has
+/// not the rows of the design.
 [[nodiscard]] std::vector<std::vector<ElementaryEffects>> morris_effects(const Eigen::MatrixXd& values,
                                                                          Eigen::Index inputs,
                                                                          const MorrisOptions& options = {});

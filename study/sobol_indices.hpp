@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Sobol's quasi-random points, randomised.
-/// Sobol' indices: the shares of a quantity's variance that inputs bring about, each uniform over its range (in the unit
-/// cube) and independent of the others.
+/// Sobol' indices: the shares of a quantity's variance that inputs bring about, each uniform over its range (in the
+/// unit cube) and independent of the others.
 #pragma once
 
 #include <cstdint>
@@ -13,14 +13,14 @@
 
 namespace wheelwright {
 
-/// `replicates` independent randomisations of the first `points` points of Sobol's sequence (Boost's, with the direction
-/// numbers of joe2008; the point at 0, which Boost leaves out, is the first): one point a row, the replicates one below the
-/// other, coordinates inside (0, 1).
+/// `replicates` independent randomisations of the first `points` points of Sobol's sequence (Boost's, with the
+/// direction numbers of joe2008; the point at 0, which Boost leaves out, is the first): one point a row, the replicates
+/// one below the other, coordinates inside (0, 1).
 ///
-/// Each replicate scrambles the digits of every coordinate by a random lower triangular matrix over {0, 1} and adds a random
-/// digital shift (matousek1998). So each point is uniform in the cube, the points of one replicate fill it as evenly as
-/// the sequence does, and the replicates are independent of each other: what they say apart gives honest standard
-/// errors (lecuyer2023), while points within one are dependent.
+/// Each replicate scrambles the digits of every coordinate by a random lower triangular matrix over {0, 1} and adds a
+/// random digital shift (matousek1998). So each point is uniform in the cube, the points of one replicate fill it as
+/// evenly as the sequence does, and the replicates are independent of each other: what they say apart gives honest
+/// standard errors (lecuyer2023), while points within one are dependent.
 /// More replicates, with the same seed, only add rows.
 ///
 /// Throws InvalidArgument unless `points` is a power of two up to 2³², `replicates` >= 1 and 1 <= `dimensions` <= 3667.
@@ -35,8 +35,8 @@ struct SobolOptions {
   double confidence = 0.95;  ///< of each interval by itself, inside (0, 1)
 };
 
-/// An estimate with its confidence interval. Neither is clipped to [0, 1]: an interval that reaches below 0 says that the
-/// index may be none.
+/// An estimate with its confidence interval. Neither is clipped to [0, 1]: an interval that reaches below 0 says that
+/// the index may be none.
 struct SobolIndex {
   double estimate = 0.0;
   double standard_error = 0.0;
@@ -68,27 +68,28 @@ struct SobolIndices {
   double left_out = 0.0;               ///< share of the base points that were not, in [0, 1]
 };
 
-/// The design of saltelli2010: for each base point the rows A, B and A_B^(1) … A_B^(k), one after the other, where A_B^(i)
-/// is A with the i-th coordinate of B, and (A, B) is one of sobol_points() in 2k dimensions. Shape replicates · points ·
-/// (k + 2) × k, coordinates inside (0, 1). Throws InvalidArgument for no input or options outside their domains.
+/// The design of saltelli2010: for each base point the rows A, B and A_B^(1) … A_B^(k), one after the other, where
+/// A_B^(i) is A with the i-th coordinate of B, and (A, B) is one of sobol_points() in 2k dimensions. Shape replicates ·
+/// points · (k + 2) × k, coordinates inside (0, 1). Throws InvalidArgument for no input or options outside their
+/// domains.
 [[nodiscard]] Eigen::MatrixXd sobol_design(Eigen::Index inputs, const SobolOptions& options = {});
 
-/// Indices for each column of `values` (rows of sobol_design(inputs, options) × quantities, in the quantity's unit; NaN or
-/// an infinity where a row gave no value). First order: (b) of saltelli2010, table 2; total: (f), of jansen1999; values
-/// are centred. An input that does nothing gets 0 exactly.
+/// Indices for each column of `values` (rows of sobol_design(inputs, options) × quantities, in the quantity's unit; NaN
+/// or an infinity where a row gave no value). First order: (b) of saltelli2010, table 2; total: (f), of jansen1999;
+/// values are centred. An input that does nothing gets 0 exactly.
 ///
 /// Points of one randomised sequence are dependent, replicates are not. Estimates are ratios of sums over all
 /// replicates, standard errors their jackknife that leaves out one replicate at a time (efron1982), intervals
 /// estimate ± Student's t with one degree of freedom less than replicates. In repetitions with other seeds, the stated
 /// share of such intervals holds the exact index, as far as the estimates are normally distributed. Measured over 1000
-/// seeds at 95 %: on average 95 to 97 %, at least 92 % for each index of three functions, from 8 replicates of 16 points
-/// on (tests/study/sobol_coverage_test.cpp repeats a part). They hold too little for a quantity that differs from a
-/// constant on a small part of the cube: 94 % with 8 replicates of 64 points for an event of probability 9 %, but for one
-/// of 1 % only 38 %, and 62 % with 16 replicates, since 5 or 10 base points then tell everything.
+/// seeds at 95 %: on average 95 to 97 %, at least 92 % for each index of three functions, from 8 replicates of 16
+/// points on (tests/study/sobol_coverage_test.cpp repeats a part). They hold too little for a quantity that differs
+/// from a constant on a small part of the cube: 94 % with 8 replicates of 64 points for an event of probability 9 %,
+/// but for one of 1 % only 38 %, and 62 % with 16 replicates, since 5 or 10 base points then tell everything.
 ///
-/// A base point that lacks one of its k + 2 values is left out for that quantity, with all of them, and counted: nothing
-/// is imputed. Indices are then those of the inputs for which the quantity has a value, which are no longer independent;
-/// where `left_out` is not small they mean little.
+/// A base point that lacks one of its k + 2 values is left out for that quantity, with all of them, and counted:
+/// nothing is imputed. Indices are then those of the inputs for which the quantity has a value, which are no longer
+/// independent; where `left_out` is not small they mean little.
 ///
 /// Throws InvalidArgument where `values` has not the rows of the design.
 [[nodiscard]] std::vector<SobolIndices> sobol_indices(const Eigen::MatrixXd& values, Eigen::Index inputs,

@@ -37,15 +37,16 @@ struct Study {
   EvaluateOptions evaluate;
 };
 
-/// Gives a filter that is chosen from the data the constants chosen for the subject as it is, where an input of the study
-/// is a filter constant: what is varied must have a value. Returns a sentence that says so; empty where nothing was done.
+/// Gives a filter that is chosen from the data the constants chosen for the subject as it is, where an input of the
+/// study is a filter constant: what is varied must have a value. Returns a sentence that says so; empty where nothing
+/// was done.
 std::string settle_filter(StudyCase& subject, const std::vector<std::string>& inputs);
 
 /// Coordinates of the nominal values.
 [[nodiscard]] Eigen::VectorXd nominal_point(const std::vector<StudyInput>& inputs);
 
-/// The points of all methods, one below the other in the order of StudyMethods. Methods share points: each differing one
-/// is an item of work.
+/// The points of all methods, one below the other in the order of StudyMethods. Methods share points: each differing
+/// one is an item of work.
 struct StudyDesign {
   /// Rows of one method.
   struct Part {

@@ -73,8 +73,8 @@ struct StudyInputKind {
 /// lacks what it is about (a prior for NAME, a scenario).
 [[nodiscard]] std::optional<double> nominal_of_input(const StudyCase& subject, const std::string& name);
 
-/// Sets the input `name` of `subject` to `x`; numbers of instants, rows and seeds are rounded. Throws InvalidArgument as
-/// nominal_of_input, and for a value that the input cannot have.
+/// Sets the input `name` of `subject` to `x`; numbers of instants, rows and seeds are rounded. Throws InvalidArgument
+/// as nominal_of_input, and for a value that the input cannot have.
 void set_input(StudyCase& subject, const std::string& name, double x);
 
 /// The drive of a case: simulated, or cut from the recorded log; outliers put in. Throws InvalidArgument where the

@@ -61,8 +61,8 @@ struct CaseResult {
   std::string finding;         ///< why there is no model; empty where there is one
 };
 
-/// Commissions the case and reads the quantities off. What the data say (an empty feasible set, a parameter that does not
-/// show) and what the inputs do to each other (a filter too fast for the rate) is a result, not an exception.
+/// Commissions the case and reads the quantities off. What the data say (an empty feasible set, a parameter that does
+/// not show) and what the inputs do to each other (a filter too fast for the rate) is a result, not an exception.
 [[nodiscard]] CaseResult evaluate_case(const StudyCase& subject, const std::vector<StudyQuantity>& quantities,
                                        const EvaluateOptions& options = {});
 

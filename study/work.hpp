@@ -55,8 +55,8 @@ struct RunCount {
 
 /// Evaluates the items of the shard that `store` does not have, and puts each into it as soon as it is done, in any
 /// order; memory does not grow with the number of items. The first that an item, the store or the progress throws is
-/// thrown when the items under way have ended; their results are in the store. Throws InvalidArgument for no thread or a
-/// shard that is none.
+/// thrown when the items under way have ended; their results are in the store. Throws InvalidArgument for no thread or
+/// a shard that is none.
 RunCount run_work(const Work& work, ResultStore& store, const RunOptions& options = {});
 
 }  // namespace wheelwright

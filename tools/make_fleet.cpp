@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// make_fleet DIR [--robots N] [--seconds S] [--checks K] [--seed N]: a fleet of simulated robots to measure `wheelwright fleet` with.
+// make_fleet DIR [--robots N] [--seconds S] [--checks K] [--seed N]: a fleet of simulated robots to measure
+// `wheelwright fleet` with.
 //
-// Parameters are drawn around a nominal robot (lognormal, 5 %); each robot drives the commissioning trajectory for S seconds at
-// 100 Hz, and K times again a week apart each. The same arguments give the same files: DIR/fleet.csv, DIR/robot.yaml, DIR/logs/.
+// Parameters are drawn around a nominal robot (lognormal, 5 %); each robot drives the commissioning trajectory for S
+// seconds at 100 Hz, and K times again a week apart each. The same arguments give the same files: DIR/fleet.csv,
+// DIR/robot.yaml, DIR/logs/.
 #include <charconv>
 #include <cmath>
 #include <cstdint>

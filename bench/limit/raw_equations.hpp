@@ -3,8 +3,8 @@
 /// What the model says of raw samples: one sparse equation per sampling interval and output, without a filter.
 ///
 /// Multiply u = Yθ (20) by a weight g_k(t) of area one and integrate. With φ the joint angles, t_k the samples,
-/// h_k = t_k − t_k−1, w_k = (φ_k − φ_k−1)/h_k and H_k = (h_k + h_k+1)/2, take for **angles** the hat on [t_k−1, t_k+1] with
-/// its peak 1/H_k at t_k. Then, for steps of any length and without error,
+/// h_k = t_k − t_k−1, w_k = (φ_k − φ_k−1)/h_k and H_k = (h_k + h_k+1)/2, take for **angles** the hat on [t_k−1, t_k+1]
+/// with its peak 1/H_k at t_k. Then, for steps of any length and without error,
 ///
 ///     ∫ g_k v̇ dt = (v(w_k+1) − v(w_k))/H_k
 ///     ∫ g_k τ dt = (h_k τ_k−1 + h_k+1 τ_k)/(2H_k)                                       zero-order hold
@@ -12,9 +12,9 @@
 ///                = the same less a parabola's curvature                                 curved: 1/12, 10/12, 1/12
 ///
 /// and ∫ g_k v dt = (v(w_k) + v(w_k+1))/2 up to terms of second order in the step, as for functions of the motion. For
-/// **mean speeds** w_k and w_k+1 stand in the log, and efforts are taken as RegressorFilter takes them, as for **speeds**,
-/// where g_k is the box on [t_k, t_k+1]: τ_k (zero order) or (τ_k + τ_k+1)/2. The filter's rows are weighted sums of these
-/// equations.
+/// **mean speeds** w_k and w_k+1 stand in the log, and efforts are taken as RegressorFilter takes them, as for
+/// **speeds**, where g_k is the box on [t_k, t_k+1]: τ_k (zero order) or (τ_k + τ_k+1)/2. The filter's rows are
+/// weighted sums of these equations.
 ///
 /// The sensors' errors enter by the sample: φ_k by |n| <= n̄_φ (for mean speeds the angle at the ends of an interval,
 /// for speeds the speed), τ_k by |n| <= n̄_τ, functions of the motion by their own error bound.

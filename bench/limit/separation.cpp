@@ -70,8 +70,8 @@ Separation SeparationSolver::solve(const SeparationProblem& problem) {
   for (double& s : facet_scale) {
     s = s > 0.0 ? s : 1.0;
   }
-  // A disturbance that θ_j bounds is x = t − θ_j with t >= 0 and a row t − 2(θ_j − θ̂_j) <= 2θ̂_j; where θ is fixed, it is
-  // bounded by a number.
+  // A disturbance that θ_j bounds is x = t − θ_j with t >= 0 and a row t − 2(θ_j − θ̂_j) <= 2θ̂_j; where θ is fixed, it
+  // is bounded by a number.
   std::vector<std::size_t> bounded;
   RowMatrix healthy = *problem.healthy;
   Eigen::VectorXd right = problem.deviation;

@@ -9,8 +9,8 @@
 
 namespace wheelwright::peers {
 
-/// With z = (ε − mean)/sd of the fault-free residual: S⁺ = max(0, S⁺ + z − k), S⁻ = max(0, S⁻ − z − k); the value is the
-/// larger of both. Best for a step of 2k standard deviations in white Gaussian noise (Lorden 1971).
+/// With z = (ε − mean)/sd of the fault-free residual: S⁺ = max(0, S⁺ + z − k), S⁻ = max(0, S⁻ − z − k); the value is
+/// the larger of both. Best for a step of 2k standard deviations in white Gaussian noise (Lorden 1971).
 class Cusum final : public Statistic {
  public:
   /// `mean` and `sd` (> 0) of the fault-free residual; `reference` is k.

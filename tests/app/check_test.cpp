@@ -213,7 +213,8 @@ TEST_F(Check, AnotherLogIsNamed) {
   const Outcome plain = run("check model/model.json plain.csv");
   EXPECT_EQ(plain.code, 0) << "the same numbers, not packed";
   EXPECT_THAT(plain.out, HasSubstr("warning: plain.csv ("));
-  // One value just before a row that a bound stands on: raised or lowered, one of the two makes the stated row too strong.
+  // One value just before a row that a bound stands on: raised or lowered, one of the two makes the stated row too
+  // strong.
   const Json model = read_json(path("model/model.json"));
   const auto row = model["parameters"][0]["binding_samples"]["lower"][0]["row"].get<std::size_t>();
   std::string& line = lines.at(row - 9);

@@ -192,8 +192,8 @@ std::pair<std::vector<BoundClaim>, std::vector<BoundClaim>> claims_of(const Feas
   return {lower, upper};
 }
 
-// What the engine publishes is proved, also where the prior is so wide that the rounding of λ would ruin one step alone;
-// what it does not publish is not.
+// What the engine publishes is proved, also where the prior is so wide that the rounding of λ would ruin one step
+// alone; what it does not publish is not.
 TEST(CheckHullAgainstRationals, ProvesWhatIsPublishedAndNothingMore) {
   Random random(11);
   for (const double width : {10.0, 1e12}) {

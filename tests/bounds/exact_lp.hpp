@@ -109,8 +109,8 @@ inline Problem problem(Family family, std::size_t p, std::uint64_t seed) {
   return result;
 }
 
-/// The problem with every bound widened by what rounding may make of its row: 8ε(|y| + ē + Σ_j |Y_j| max|θ_j|). A published
-/// value that this set reaches is the exact one of data that a double cannot tell from those given.
+/// The problem with every bound widened by what rounding may make of its row: 8ε(|y| + ē + Σ_j |Y_j| max|θ_j|). A
+/// published value that this set reaches is the exact one of data that a double cannot tell from those given.
 inline Problem rounded(Problem problem) {
   for (Eigen::Index r = 0; r < problem.rows.rows(); ++r) {
     double size = std::abs(problem.rows.y[r]) + problem.rows.dy[r];
@@ -122,9 +122,9 @@ inline Problem rounded(Problem problem) {
   return problem;
 }
 
-/// Published against exact, of one problem. Every value has to be no further out than 1e-9 of the exact width and a unit in
-/// its last place. Where a set is a sliver, which nearly_empty problems alone are, rounding of the data is more than that:
-/// there every value has to be reached by rounded() data.
+/// Published against exact, of one problem. Every value has to be no further out than 1e-9 of the exact width and a
+/// unit in its last place. Where a set is a sliver, which nearly_empty problems alone are, rounding of the data is more
+/// than that: there every value has to be reached by rounded() data.
 struct Verdict {
   bool empty = false;        ///< proved empty by the library, and not so exactly: a failure
   std::size_t compared = 0;  ///< bounds and values of the support function
@@ -135,8 +135,8 @@ struct Verdict {
   std::string worst_at;      ///< where
 };
 
-/// Holds every bound of the hull, and the support function in `trials` random directions and along as many rows, against
-/// the exact ones.
+/// Holds every bound of the hull, and the support function in `trials` random directions and along as many rows,
+/// against the exact ones.
 inline Verdict judge(const Problem& problem, std::uint64_t seed, std::size_t trials) {
   const std::size_t p = problem.prior.dimension();
   Verdict verdict;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Published bounds against exact optima (QSopt_ex), p from 1 to 12: never inside, with zero tolerance, and no further out
-// than 1e-9 of the exact width, or than rounding of the data where the set is a sliver. No problem is exempted; thousands
-// of them: exact_lp_study.cpp.
+// Published bounds against exact optima (QSopt_ex), p from 1 to 12: never inside, with zero tolerance, and no further
+// out than 1e-9 of the exact width, or than rounding of the data where the set is a sliver. No problem is exempted;
+// thousands of them: exact_lp_study.cpp.
 #include <gtest/gtest.h>
 
 #include <wheelwright/bounds/minimax.hpp>

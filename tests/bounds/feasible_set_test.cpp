@@ -18,8 +18,8 @@ using testing_rows::BlockSource;
 using testing_rows::Random;
 using testing_rows::Rows;
 
-/// Rows y = Y°θ + e, Y within dY of Y°, with e = ±noise and Y − Y° = ±dY in every second row, and less in the others. Bounds
-/// are the declared ones, or what rounding makes of them: never more than what is there in every second row.
+/// Rows y = Y°θ + e, Y within dY of Y°, with e = ±noise and Y − Y° = ±dY in every second row, and less in the others.
+/// Bounds are the declared ones, or what rounding makes of them: never more than what is there in every second row.
 Rows simulate(std::uint64_t seed, const std::vector<double>& theta, std::size_t count, double noise, double dY) {
   Random random(seed);
   const std::size_t p = theta.size();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Each step that rounds a bound outward, against rationals with zero tolerance and where nothing else hides it: sets far
-// from the origin and directions across it, so that products cancel; optima that are no doubles; multipliers that cancel.
-// tools/mutate_rounding.sh takes the steps away one by one, and these tests have to notice.
+// Each step that rounds a bound outward, against rationals with zero tolerance and where nothing else hides it: sets
+// far from the origin and directions across it, so that products cancel; optima that are no doubles; multipliers that
+// cancel. tools/mutate_rounding.sh takes the steps away one by one, and these tests have to notice.
 #include <cmath>
 #include <functional>
 #include <memory>
@@ -271,7 +271,8 @@ TEST(Rounding, RowsWithErrorsInVariables) {
       const double sign = side * (theta[j] >= 0.0 ? 1.0 : -1.0);
       product += (rational(Y[j]) - rational(sign) * rational(dY[j])) * rational(theta[j]);
     }
-    // side = 1: the largest of Y°θ − dy that y may not be below; the other way round for −1. Rounded into what is allowed.
+    // side = 1: the largest of Y°θ − dy that y may not be below; the other way round for −1. Rounded into what is
+    // allowed.
     const Rational limit = product - rational(side) * rational(dy);
     auto y = static_cast<double>(limit);
     while (rational(side) * rational(y) < rational(side) * limit) {

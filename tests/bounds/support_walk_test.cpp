@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The walk from vertex to vertex: never below the exact support, equal to it where the budget lasts, without allocation.
+// The walk from vertex to vertex: never below the exact support, equal to it where the budget lasts, without
+// allocation.
 #include <cmath>
 
 #include <gtest/gtest.h>

@@ -10,8 +10,8 @@
 namespace wheelwright::effects_test {
 namespace {
 
-// Noise inside its declared bounds: the truth is inside the guaranteed ones, and without the effects nothing explains the
-// log.
+// Noise inside its declared bounds: the truth is inside the guaranteed ones, and without the effects nothing explains
+// the log.
 TEST(CommissionEffects, TheTruthIsInsideAndTheBasicModelIsRefuted) {
   Scenario s = testing_support::noisy_drive(3, 20.0);
   s.robot.hold = Hold::first_order;

@@ -35,9 +35,9 @@ struct Case {
 
 class Recovery : public ::testing::TestWithParam<Case> {};
 
-// The acceleration's column is exact, and so is the torque's where efforts are known between samples; the integral of the
-// speed over a step is known to the second order. The order is the slope of log(error) over log(step), by least squares over
-// three steps, for each parameter; with exact efforts only friction is left to err so.
+// The acceleration's column is exact, and so is the torque's where efforts are known between samples; the integral of
+// the speed over a step is known to the second order. The order is the slope of log(error) over log(step), by least
+// squares over three steps, for each parameter; with exact efforts only friction is left to err so.
 TEST_P(Recovery, ErrorFallsByFourWhenTheStepHalves) {
   const auto [shown, hold, order, inertia, friction] = GetParam();
   Scenario s = exact_drive(shown, hold);

@@ -104,8 +104,8 @@ TEST_F(SlowRecordings, TheElectroMechanicalAxisIsIdentifiedFromPositionsAlone) {
   }
 }
 
-// From efforts and positions only: 95 % intervals of every method, and what is left on held-out driving. The same authors
-// report that the model explains 99.8 % of the force's variation, a relative error of 0.045.
+// From efforts and positions only: 95 % intervals of every method, and what is left on held-out driving. The same
+// authors report that the model explains 99.8 % of the force's variation, a relative error of 0.045.
 TEST_F(SlowRecordings, IntervalsOfTheAxisHoldAllPublishedValues) {
   const Robot robot = read_robot(root / "data/emps.yaml");
   CsvOptions reader;
@@ -163,7 +163,8 @@ TEST_F(SlowRecordings, EveryRobotOfTheFleetGivesAModelOrSaysWhatContradictsIt) {
   EXPECT_LE(5 * contradicted, runs);
 }
 
-// Healthy robots of another physics engine: nothing is said against any of them, and every one late by a sample is told.
+// Healthy robots of another physics engine: nothing is said against any of them, and every one late by a sample is
+// told.
 TEST_F(SlowRecordings, NoHealthyBaselineIsContradictedAndEveryLateOneIs) {
   int cases = 0, drawn = 0, beyond = 0;
   for (const char* world : {"withheld-dev", "withheld-train"}) {

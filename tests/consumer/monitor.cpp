@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// monitor MODEL LOG.csv: the on-line part of a commissioned model alone, fed row by row. Exit code 1: an alarm, 0: none.
+/// monitor MODEL LOG.csv: the on-line part of a commissioned model alone, fed row by row. Exit code 1: an alarm, 0:
+/// none.
 
 #include <fstream>
 #include <iostream>

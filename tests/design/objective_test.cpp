@@ -79,7 +79,8 @@ TEST(Promise, PlannedRowsAreWithoutResidualAndCarryTheDeclaredNoise) {
   const RegressionBlock rows = planned_rows(plan_of({0.4, 6.0}, s, 12.0, 0.02), s);
   EXPECT_GT(rows.instants(), 500U);
   EXPECT_EQ((rows.y - rows.Y * s.theta).cwiseAbs().maxCoeff(), 0.0);
-  // ē of the effort alone in the worst case: both wheels' bounds through a filter of gain 1 (sum), times D/2 (difference).
+  // ē of the effort alone in the worst case: both wheels' bounds through a filter of gain 1 (sum), times D/2
+  // (difference).
   for (Eigen::Index k = 0; k < rows.rows(); k += 2) {
     EXPECT_NEAR(rows.dy[k], 0.04, 1e-12);
     EXPECT_NEAR(rows.dy[k + 1], 0.5 * 0.381 * 0.04, 1e-12);

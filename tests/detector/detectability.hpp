@@ -24,8 +24,8 @@ struct Commissioned {
   OnlineModel model;
 };
 
-/// Another robot for every seed: masses, rates, encoders, noise, holds, filters. The noise reaches its declared bounds; for
-/// a third of the seeds it is never anywhere else.
+/// Another robot for every seed: masses, rates, encoders, noise, holds, filters. The noise reaches its declared bounds;
+/// for a third of the seeds it is never anywhere else.
 inline Scenario random_robot(std::uint64_t seed) {
   Random random(seed);
   Scenario s = noisy_drive(seed, 12.0);
@@ -123,14 +123,14 @@ inline LogTable log_of(const FaultyRun& run, double magnitude, bool noisy) {
   return log;
 }
 
-/// What is promised for a motion: the smallest certain magnitude within `window` s of the onset, and the largest one that
-/// stays hidden for noise of `share` times its bounds.
+/// What is promised for a motion: the smallest certain magnitude within `window` s of the onset, and the largest one
+/// that stays hidden for noise of `share` times its bounds.
 struct Promise {
   double certain = 0.0, hidden = 0.0;
 };
 
-/// The promise for the motion of a run in which the fault has this magnitude already (it changes the motion), or for the
-/// healthy motion where it is the reading of a sensor that breaks.
+/// The promise for the motion of a run in which the fault has this magnitude already (it changes the motion), or for
+/// the healthy motion where it is the reading of a sensor that breaks.
 inline Promise promise(const FaultyRun& run, double magnitude, double window, double share) {
   const OnlineModel& m = run.robot->model;
   FaultyRun reference = run;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Smallest certain and largest hidden sizes in single rows: closed forms, and the theorem itself, tried with the worst θ
-// and the worst noise.
+// Smallest certain and largest hidden sizes in single rows: closed forms, and the theorem itself, tried with the worst
+// θ and the worst noise.
 #include <array>
 #include <cmath>
 #include <vector>
@@ -54,8 +54,9 @@ TEST(FaultMargin, OfOneParameterIsTheClosedForm) {
   }
 }
 
-// With exact parameters what is left is the noise: a fault is seen for certain where its part of the residual exceeds the
-// largest distance of two noises, Varga's smallest detectable fault 2τ/‖G_f‖ with τ the sup of the noise's response.
+// With exact parameters what is left is the noise: a fault is seen for certain where its part of the residual exceeds
+// the largest distance of two noises, Varga's smallest detectable fault 2τ/‖G_f‖ with τ the sup of the noise's
+// response.
 TEST(FaultMargin, WithExactParametersIsTwiceTheNoise) {
   const Eigen::Vector2d theta(2.0, 0.7);
   Box box;
@@ -171,8 +172,8 @@ std::vector<Eigen::VectorXd> members(const Polytope& set, Random& random, const 
   return list;
 }
 
-// The theorem: no θ of the set, no noise and no size above the smallest certain one keeps the detector silent. And it is
-// tight: a little below there are θ and noise that do.
+// The theorem: no θ of the set, no noise and no size above the smallest certain one keeps the detector silent. And it
+// is tight: a little below there are θ and noise that do.
 TEST(FaultMargin, IsATheoremAndTight) {
   Random random(20261121);
   std::size_t found = 0, tight = 0;
@@ -225,8 +226,8 @@ TEST(FaultMargin, IsATheoremAndTight) {
   EXPECT_EQ(tight, found);
 }
 
-// The mirror image: below the hidden size no θ and no noise of that share shows the fault; a little above some do, where
-// it is not hidden altogether.
+// The mirror image: below the hidden size no θ and no noise of that share shows the fault; a little above some do,
+// where it is not hidden altogether.
 TEST(FaultMargin, HiddenSizesAreHiddenAndTight) {
   Random random(77);
   std::size_t found = 0, shown = 0;

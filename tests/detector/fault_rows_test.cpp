@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Filtered signatures against the simulator, which integrates the faulty robot itself, and against logs whose columns were
-// falsified as a broken sensor would.
+// Filtered signatures against the simulator, which integrates the faulty robot itself, and against logs whose columns
+// were falsified as a broken sensor would.
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -35,8 +35,9 @@ std::size_t onset_of(const ReferenceMotion& motion, double t) {
                                   motion.instant.begin());
 }
 
-// τ_f − (y + κ g1 + κ² g2) θ − κ c over two seconds from the onset, and its regressor as seen against y + κ s; both over the
-// largest size of what the fault adds. `motion` is what encoders of a healthy robot would show, `log` what was logged.
+// τ_f − (y + κ g1 + κ² g2) θ − κ c over two seconds from the onset, and its regressor as seen against y + κ s; both
+// over the largest size of what the fault adds. `motion` is what encoders of a healthy robot would show, `log` what was
+// logged.
 struct Mismatch {
   double torque = 0.0, seen = 0.0;
 };

@@ -29,7 +29,8 @@ using Verdict = FaultFinding::Verdict;
 
 RegressorFilter filter_of(const OnlineModel& m) { return {m.model, m.filter, m.measurement, m.errors}; }
 
-// What the detector's first alarm on `table` is isolated to; nothing where there is none. An alarm before `onset` fails.
+// What the detector's first alarm on `table` is isolated to; nothing where there is none. An alarm before `onset`
+// fails.
 std::optional<Isolation> isolated(const OnlineModel& m, const LogTable& table, double onset,
                                   const IsolationOptions& options = {}) {
   TableSource log(table);
@@ -102,8 +103,9 @@ TEST(Isolation, KeepsTheTrueFault) {
 
 class SlowIsolationPart : public ::testing::TestWithParam<std::uint64_t> {};
 
-// The truth is excluded in none of 60 isolations and more: if it happened in a share q of them, that would be seen with a
-// probability of 1 − (1 − q)⁶⁰, so that q < 5 % at a confidence of 95 % (0.95⁶⁰ = 0.046), of both halves together 2.5 %.
+// The truth is excluded in none of 60 isolations and more: if it happened in a share q of them, that would be seen with
+// a probability of 1 − (1 − q)⁶⁰, so that q < 5 % at a confidence of 95 % (0.95⁶⁰ = 0.046), of both halves together 2.5
+// %.
 TEST_P(SlowIsolationPart, KeepsTheTrueFaultInEveryOneOfSixtyRuns) {
   Tally tally;
   for (std::uint64_t robot = 1; tally.runs < 60; ++robot) {

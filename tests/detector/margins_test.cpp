@@ -24,8 +24,8 @@ using testing_support::promise;
 using testing_support::random_run;
 using testing_support::watch;
 
-// What is certain is so for noise at its declared bounds, which it reaches here. What is hidden is so for noise of a share
-// of them: half of it is there then, and what interpolation adds.
+// What is certain is so for noise at its declared bounds, which it reaches here. What is hidden is so for noise of a
+// share of them: half of it is there then, and what interpolation adds.
 constexpr double kShare = 0.75;
 
 FaultyRun with_half_the_noise(FaultyRun run) {
@@ -38,8 +38,8 @@ struct Tally {
   int certain = 0, hidden = 0;
 };
 
-// A fault of the smallest certain size for the motion that it leaves the robot: found by turns, since the size changes the
-// motion and the motion the size.
+// A fault of the smallest certain size for the motion that it leaves the robot: found by turns, since the size changes
+// the motion and the motion the size.
 std::optional<double> certain_on_its_own_motion(const FaultyRun& run, double window) {
   double size = promise(run, 0.0, window, 1.0).certain;
   for (int turn = 0; turn < 12 && size < kInfinity; ++turn) {

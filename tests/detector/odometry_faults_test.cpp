@@ -113,8 +113,8 @@ TEST(OdometryFaults, AreTheSimulators) {
   }
 }
 
-// Driving straight a lateral slip cannot be promised by the torque residual, whatever its size, and is by the pose; both
-// are known beforehand.
+// Driving straight a lateral slip cannot be promised by the torque residual, whatever its size, and is by the pose;
+// both are known beforehand.
 TEST(OdometryFaults, LateralSlipOnAStraightLineIsForThePose) {
   Scenario learning = noisy_drive(3, 30.0);
   learning.sensors.pose = true;

@@ -149,8 +149,8 @@ TEST(Threshold, OfThePolytopeIsNeverLooserThanOfItsBox) {
   }
 }
 
-// Fault-free: θ in the set, |Y° − Y| <= Δ and |n| <= n̄. All of it is exact; τ is rounded to a double that is admissible.
-// Both the exact residual and the one that floating point makes of τ − yθ̂ have to lie in [l, u].
+// Fault-free: θ in the set, |Y° − Y| <= Δ and |n| <= n̄. All of it is exact; τ is rounded to a double that is
+// admissible. Both the exact residual and the one that floating point makes of τ − yθ̂ have to lie in [l, u].
 void expect_residuals_held(const Inequalities& set, const Eigen::VectorXd& estimate, std::uint64_t seed, double error,
                            int rows) {
   const Polytope polytope = set.polytope();

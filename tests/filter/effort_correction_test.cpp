@@ -41,8 +41,8 @@ TEST(EffortCorrection, TheLagOfARampIsExact) {
   }
 }
 
-// A delay of 2.3 steps: of an effort that is linear between samples the value then, of one that is held the mean over the
-// shifted interval.
+// A delay of 2.3 steps: of an effort that is linear between samples the value then, of one that is held the mean over
+// the shifted interval.
 TEST(EffortCorrection, ADelayShifts) {
   constexpr double delay = 2.3 * kStep;
   EffortCorrector linear = corrector({.gain = {}, .delay = delay}, Hold::first_order);

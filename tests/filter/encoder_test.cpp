@@ -93,7 +93,8 @@ TEST(FindEncoder, AnglesMayHaveAnyNumberOfCounts) {
   }
 }
 
-// What is merely found replaces nothing that is declared, unless that cannot be: a rounded speed is wrong by half a unit.
+// What is merely found replaces nothing that is declared, unless that cannot be: a rounded speed is wrong by half a
+// unit.
 TEST(FindEncoder, AQuantumThatIsFoundReplacesNoDeclaredBound) {
   LogTable log;
   log.names = {"omega_r", "omega_l", "tau_r", "tau_l"};

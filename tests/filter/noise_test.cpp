@@ -98,7 +98,8 @@ TEST(StatisticalNorms, ApproachTheClosedFormsForSmallSteps) {
   const KernelNorms n2 = statistical_norms(second, MotionKind::angle, h);
   EXPECT_NEAR(n2.effort / (64.0 * std::sqrt(h / (4.0 * 125.0))), 1.0, 1e-3);
   EXPECT_NEAR(n2.speed / (64.0 * std::sqrt(h / 20.0)), 1.0, 1e-3);
-  // Slopes of the smoothed kernel over its first steps: 1 − r^k (1 − r)/2 with r = e^{−2}; their differences weigh the angles.
+  // Slopes of the smoothed kernel over its first steps: 1 − r^k (1 − r)/2 with r = e^{−2}; their differences weigh the
+  // angles.
   const double r = std::exp(-2.0), first_weight = 1.0 - 0.5 * (1.0 - r);
   const double energy = first_weight * first_weight + 0.25 * std::pow(1.0 - r, 4) / (1.0 - r * r);
   EXPECT_NEAR(n2.acceleration / (64.0 * std::sqrt(energy)), 1.0, 1e-2);
@@ -156,9 +157,10 @@ TEST(NoiseGram, IsWhatUnitErrorsLeaveInTheRows) {
   }
 }
 
-// The two bounds are compared as wholes: a statistical bound at a confidence of nearly one is the worst case, for a robot
-// of two joints, too, whose worst cases add up in absolute values. (Comparing the norms of one joint first and adding
-// squares after that was too small by √2, and 1,600 of 400,000 rows went beyond a bound that one row in 4·10⁸ may pass.)
+// The two bounds are compared as wholes: a statistical bound at a confidence of nearly one is the worst case, for a
+// robot of two joints, too, whose worst cases add up in absolute values. (Comparing the norms of one joint first and
+// adding squares after that was too small by √2, and 1,600 of 400,000 rows went beyond a bound that one row in 4·10⁸
+// may pass.)
 TEST(StatisticalNoise, OfTwoJointsIsNeverBelowWhatTheyCanDoTogether) {
   DifferentialDrive drive;
   drive.wheel_radius = 0.1;

@@ -171,8 +171,8 @@ Fine fine_drive(std::size_t rows, double step) {
   return f;
 }
 
-// For every window, the regressor that the true headings and angles give in the *measured* frame lies within dY, and the
-// pose within dy.
+// For every window, the regressor that the true headings and angles give in the *measured* frame lies within dY, and
+// the pose within dy.
 void expect_bounds_hold(MotionKind motion, double step, OdometryErrors errors, std::uint64_t seed, double least_use) {
   const Fine f = fine_drive(400, step);
   errors.acceleration = f.acceleration;

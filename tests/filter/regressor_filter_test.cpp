@@ -160,8 +160,8 @@ TEST(TorqueRows, NothingIsFilteredAcrossASplit) {
 }
 
 TEST(RegressorFilter, FunctionTermsAreFilteredLikeTheMotion) {
-  // Constant speed: Coulomb friction, viscous friction and the effort are all the same filtered constant, which is 1 up to
-  // (βh)²/12 of how the kernel is interpolated.
+  // Constant speed: Coulomb friction, viscous friction and the effort are all the same filtered constant, which is 1 up
+  // to (βh)²/12 of how the kernel is interpolated.
   SingleAxis axis{.coulomb = true, .offset = true};
   Measurement m;
   m.motion = MotionKind::angle;

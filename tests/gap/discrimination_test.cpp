@@ -91,8 +91,8 @@ TEST(PlannedDrive, EffortsObeyTheModel) {
   EXPECT_TRUE(drive.has_pose());
 }
 
-// Dry friction at one speed is viscous friction, which θ takes up; at two speeds u and w, n rows each, what is left of a
-// constant g beside a column (u, w) is S = g² n (u − w)²/(u² + w²), and Δ = S/τ with τ the sum of the correlations.
+// Dry friction at one speed is viscous friction, which θ takes up; at two speeds u and w, n rows each, what is left of
+// a constant g beside a column (u, w) is S = g² n (u − w)²/(u² + w²), and Δ = S/τ with τ the sum of the correlations.
 TEST(Discrimination, DryFrictionAtOneSpeedAndAtTwo) {
   const DesignSubject s = subject(0.05);
   const PlannedNoise noise = torque_only(s);

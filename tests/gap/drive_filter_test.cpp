@@ -53,8 +53,8 @@ Measurement measurement_of(MotionKind kind, Hold hold) {
   return m;
 }
 
-// The rows of both filters at the same instants: RegressorFilter gives a step's row at its end, and for angles the drive's
-// instant is the middle of the step.
+// The rows of both filters at the same instants: RegressorFilter gives a step's row at its end, and for angles the
+// drive's instant is the middle of the step.
 struct Both {
   RowMatrix drive, regressor;  // instants × (y and Y of both outputs)
 };

@@ -49,8 +49,8 @@ struct Case {
 
 class EffectOfASimulator : public testing::TestWithParam<Case> {};
 
-// A log of a robot with an effect; the effect fitted to it; the robot file that comes of it has the effect's numbers and the
-// truth's nominal values.
+// A log of a robot with an effect; the effect fitted to it; the robot file that comes of it has the effect's numbers
+// and the truth's nominal values.
 TEST_P(EffectOfASimulator, ComesBackInTheRobotFile) {
   const Case& c = GetParam();
   Robot world = plain_robot();

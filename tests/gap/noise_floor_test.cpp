@@ -69,7 +69,8 @@ TEST(NoiseFloor, IsTheDeviationOfFilteredEffortNoise) {
   Scenario s = long_drive();
   s.sensors.effort = 0.2;
   expect_floor(s, "Gaussian");
-  // (1, −3, 3, −1) of uniform numbers has the excess kurtosis −1.2 · 164/400, which moves the median of its size by 5 %.
+  // (1, −3, 3, −1) of uniform numbers has the excess kurtosis −1.2 · 164/400, which moves the median of its size by 5
+  // %.
   s.sensors.noise = NoiseShape::uniform;
   expect_floor(s, "uniform", 1.05);
 }

@@ -58,8 +58,8 @@ bool credible_with(const Diagnosis& diagnosis, const std::string& effect) {
                              [&](const CredibleCauses& c) { return std::ranges::count(c.effects, effect) > 0; });
 }
 
-// Janot, Gautier and Brunot (2019) publish a dry friction of 20.3935 N, an offset of −3.1648 N and 203.5034 N·s/m of viscous
-// friction for this axis.
+// Janot, Gautier and Brunot (2019) publish a dry friction of 20.3935 N, an offset of −3.1648 N and 203.5034 N·s/m of
+// viscous friction for this axis.
 TEST_F(GapRecordings, AnAxisWithoutFrictionAndOffsetInItsModelLacksBoth) {
   Robot robot = read_robot(root / "emps.yaml");
   robot.parameters = {"inertia", "viscous"};
@@ -94,7 +94,8 @@ struct SkidSteer {
 
 class GapOfSkidSteer : public GapRecordings, public ::testing::WithParamInterface<SkidSteer> {};
 
-// Wheel speeds and pose alone: slip and a wider track are the same, and the tool says so. It never takes the track's word.
+// Wheel speeds and pose alone: slip and a wider track are the same, and the tool says so. It never takes the track's
+// word.
 TEST_P(GapOfSkidSteer, IsSlipOrAnotherTrackAndNoOneCanTellFromThisLog) {
   const auto [name, track] = GetParam();
   const Robot robot = read_robot(root / (std::string(name) + ".yaml"));

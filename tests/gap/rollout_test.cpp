@@ -68,8 +68,8 @@ TEST(Rollout, EffectsActAsInTheSimulation) {
   }
 }
 
-// A wrong mass under constant torque: v̇ = τ/(r m) without friction, so v errs by (1/m' − 1/m) τ t/r and the way by half of
-// that times t.
+// A wrong mass under constant torque: v̇ = τ/(r m) without friction, so v errs by (1/m' − 1/m) τ t/r and the way by
+// half of that times t.
 TEST(Rollout, OfAWrongMassHasTheClosedForm) {
   Robot robot = plain_robot();
   robot.nominal = {{"mass", 20.0}, {"yaw_inertia", 1.0}, {"viscous_linear", 0.0}, {"viscous_yaw", 0.0}};

@@ -144,7 +144,8 @@ TEST(Shrink, WithoutAnEffectBeforeAndAfterAreTheFloor) {
   }
 }
 
-// The lag that the nominal model lacks widens its thresholds; with it smaller faults are certain, as on a healthy robot.
+// The lag that the nominal model lacks widens its thresholds; with it smaller faults are certain, as on a healthy
+// robot.
 TEST(Shrink, ThresholdsAndSmallestFaultsFall) {
   const World world = with("actuator_lag", "T", 0.06, {0.06});
   PreparedGap log = prepared_log(world.robot, 3, 8.0);

@@ -169,8 +169,8 @@ Case random_case(std::uint64_t seed, std::uint64_t number) {
   if (turns(c.noise) || turns(c.noise_watch) || dice.chance(0.3)) {
     c.beta = std::min(omega * dice.uniform(0.3, 2.0), 0.5 * c.rate);
   }
-  // Late logs keep to what is said of efforts only where every command is in force at the (shifted) time of some row, and
-  // no kink lies between two of them.
+  // Late logs keep to what is said of efforts only where every command is in force at the (shifted) time of some row,
+  // and no kink lies between two of them.
   const bool shown = c.changes == Changes::at_samples ? c.stamps == Stamps::even : c.changes != Changes::linear;
   if (c.broken == Broken::none && dice.chance(0.1) && shown) {
     c.delay = std::min(dice.decade(0.001, 0.02), 2.9 / c.rate);

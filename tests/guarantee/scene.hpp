@@ -113,7 +113,8 @@ struct Scene {
 /// What breaks in the second drive, of the right wheel (or the axis), from a time on.
 struct Breakdown {
   enum class Kind {
-    effort_loss,  ///< a share `size` in [0, 1) is lost, while the logged effort is as large as it takes to drive all the same
+    effort_loss,    ///< a share `size` in [0, 1) is lost, while the logged effort is as large as it takes to drive all
+                    ///< the same
     effort_bias,    ///< the effort reads `size` too much
     encoder_scale,  ///< the motion reads 1 + `size` times what it is, angles from where they are
   };
@@ -128,7 +129,8 @@ struct Breakdown {
 /// Case `number` of the campaign `seed`: everything follows from these two.
 [[nodiscard]] Case random_case(std::uint64_t seed, std::uint64_t number);
 
-/// Sets the efforts' reach of `order` so that wheels swing by about `angle` rad at its bandwidth, dry friction overcome.
+/// Sets the efforts' reach of `order` so that wheels swing by about `angle` rad at its bandwidth, dry friction
+/// overcome.
 void reach_for(const Truth& truth, double angle, Order& order);
 
 [[nodiscard]] const char* name(Breakdown::Kind x);

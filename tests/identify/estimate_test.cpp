@@ -103,8 +103,9 @@ TEST(Estimates, SayWhenTheyCannotBeHad) {
   EXPECT_FALSE(bias_compensated(noisy.moments(noisy.Z), noise_of(5.0, 0.1)).usable);
 }
 
-// Where the bias of least squares is many standard errors, the others keep their 95 % intervals: 400 runs × 3 parameters
-// are binomial with a standard deviation of 0.63 % of the share, 1.1 % if the three depend wholly on one another.
+// Where the bias of least squares is many standard errors, the others keep their 95 % intervals: 400 runs × 3
+// parameters are binomial with a standard deviation of 0.63 % of the share, 1.1 % if the three depend wholly on one
+// another.
 TEST(Estimates, CoverTheTruthWhereLeastSquaresDoesNot) {
   constexpr int runs = 400;
   double covered[4] = {};

@@ -136,17 +136,19 @@ struct NistLimits {
   double residual_sd = 0.0;
 };
 
-/// What backward stable least squares with the columns (or, of a nonlinear model, the Jacobian) `Y` can be asked for. The
-/// factorisation, and data that are decimals and their powers rounded to doubles, amount to other data: each column a_j and
-/// the response, of size `response`, off by γ of their norm (Higham 2002, theorems 19.4 and 20.3), γ = (p + 4√(mp))·ε for m
-/// rows of p columns, where roundings partly cancel (Higham and Mary 2019, "A new approach to probabilistic rounding error
-/// analysis", SIAM J. Sci. Comput. 41; the worst case is of order mp). With s_j = √(AᵀA)⁻¹_jj, the length of row j of A⁺,
-/// and r the residuals, to first order (Björck 1996, "Numerical methods for least squares problems", section 1.4)
+/// What backward stable least squares with the columns (or, of a nonlinear model, the Jacobian) `Y` can be asked for.
+/// The factorisation, and data that are decimals and their powers rounded to doubles, amount to other data: each column
+/// a_j and the response, of size `response`, off by γ of their norm (Higham 2002, theorems 19.4 and 20.3), γ = (p +
+/// 4√(mp))·ε for m rows of p columns, where roundings partly cancel (Higham and Mary 2019, "A new approach to
+/// probabilistic rounding error analysis", SIAM J. Sci. Comput. 41; the worst case is of order mp). With s_j =
+/// √(AᵀA)⁻¹_jj, the length of row j of A⁺, and r the residuals, to first order (Björck 1996, "Numerical methods for
+/// least squares problems", section 1.4)
 ///
 ///     |δx_j| <= γ(s_j t + Σ_k |(AᵀA)⁻¹_jk| ‖a_k‖ ‖r‖),    t = ‖y‖ + Σ_k ‖a_k‖ |x_k|,
 ///     |δσ| <= γ(t + Σ_k s_k ‖a_k‖ ‖r‖) / √(m − p),           |δs_j| <= 2γ s_j Σ_k s_k ‖a_k‖,
 ///
-/// Σ_k s_k ‖a_k‖ being a condition number (p where columns are orthogonal). Certified values are rounded by `published`.
+/// Σ_k s_k ‖a_k‖ being a condition number (p where columns are orthogonal). Certified values are rounded by
+/// `published`.
 inline NistLimits nist_limits(const Eigen::MatrixXd& Y, const NistProblem& problem, double response, double published) {
   using Long = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic>;
   const Eigen::Index p = Y.cols();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The models of NIST's nonlinear reference problems, each written once and usable in two ways: with the parameters that
-/// enter linearly split off, or with all of them as shape parameters.
+/// The models of NIST's nonlinear reference problems, each written once and usable in two ways: with the parameters
+/// that enter linearly split off, or with all of them as shape parameters.
 #pragma once
 
 #include <functional>

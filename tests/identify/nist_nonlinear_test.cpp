@@ -57,11 +57,11 @@ Eigen::MatrixXd jacobian(const NistProblem& problem, const NistModel& model) {
   return J;
 }
 
-// The last Gauss-Newton step is a linear least-squares problem. Certified values have 11 digits. Where the search is over
-// all parameters it ends as soon as the cost is flat to rounding: residuals r of data y are known to ε‖y‖, the cost ‖r‖²/2
-// relatively to η = 2ε(1 + ‖y‖/‖r‖), and ‖Jδ‖² <= η‖r‖² leaves |δ_j| <= √(η(m − p)) standard deviations; ten times that
-// allows for steps that become shorter by a constant factor only. Lanczos1 has exact data: its residuals are rounding
-// (certified rss 1.4e-25), so that its standard deviations are too.
+// The last Gauss-Newton step is a linear least-squares problem. Certified values have 11 digits. Where the search is
+// over all parameters it ends as soon as the cost is flat to rounding: residuals r of data y are known to ε‖y‖, the
+// cost ‖r‖²/2 relatively to η = 2ε(1 + ‖y‖/‖r‖), and ‖Jδ‖² <= η‖r‖² leaves |δ_j| <= √(η(m − p)) standard deviations;
+// ten times that allows for steps that become shorter by a constant factor only. Lanczos1 has exact data: its residuals
+// are rounding (certified rss 1.4e-25), so that its standard deviations are too.
 void expect_certified(const NistProblem& problem, const NistModel& model, const Found& found, bool by_cost = false) {
   EXPECT_EQ(found.fit.end, SearchEnd::converged);
   const Eigen::VectorXd y = model.log_response ? Eigen::VectorXd(problem.y.array().log()) : problem.y;

@@ -102,8 +102,8 @@ TEST(TimeShift, DerivativesAreThoseOfDifferences) {
   }
 }
 
-// 80 logs of 8 s with residuals of correlation 0.9 from sample to sample: honest intervals hold the truth at about their
-// level, those of independent residuals do not.
+// 80 logs of 8 s with residuals of correlation 0.9 from sample to sample: honest intervals hold the truth at about
+// their level, those of independent residuals do not.
 TEST(TimeShift, IntervalsAreHonestUnderAutocorrelation) {
   int honest = 0;
   int naive = 0;

@@ -54,8 +54,8 @@ TEST(BlockBootstrap, CoversUnderAutocorrelatedErrors) {
   const double share = covered / (2.0 * runs);
   EXPECT_GE(share, 0.90);
   EXPECT_LE(share, 0.98);
-  // A mean of N values has the variance (1 + φ)/(1 − φ)/N. Without allowing for their edges stretches miss 16 % of it, of
-  // which the mean's own removal takes some 4 %.
+  // A mean of N values has the variance (1 + φ)/(1 − φ)/N. Without allowing for their edges stretches miss 16 % of it,
+  // of which the mean's own removal takes some 4 %.
   EXPECT_NEAR(variance, 19.0 / 4000.0, 0.08 * 19.0 / 4000.0);
 }
 

@@ -114,8 +114,8 @@ TEST_F(BagFuzz, ThePlaceOfTheDamageIsTheMessageBefore) {
   EXPECT_THAT(found.losses, HasSubstr("nothing behind it can be read"));
 }
 
-/// A byte inside a message can change unseen, since SQLite has no checksums; a message that is missing, and one whose time
-/// was changed, is reported.
+/// A byte inside a message can change unseen, since SQLite has no checksums; a message that is missing, and one whose
+/// time was changed, is reported.
 TEST_F(BagFuzz, ChangedAtRandom) {
   const auto items = sample_items(60);
   const std::string good = sample(items);

@@ -11,8 +11,8 @@
 
 namespace wheelwright::testing {
 
-/// Bytes of a message, in either byte order (DDSI-RTPS 2.3, 10.2: a primitive is aligned to its size, counted from behind
-/// the 4 bytes of encapsulation).
+/// Bytes of a message, in either byte order (DDSI-RTPS 2.3, 10.2: a primitive is aligned to its size, counted from
+/// behind the 4 bytes of encapsulation).
 class HandCdr {
  public:
   explicit HandCdr(bool little) : little_(little) { bytes_ = {'\0', little ? '\1' : '\0', '\0', '\0'}; }

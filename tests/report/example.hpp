@@ -137,7 +137,8 @@ inline Commissioning empty() {
   return c;
 }
 
-/// A detector's walk over `bins` bins of 0.01 s: |ε| <= 0.3 in [−1, 1]; with a fault, ε = 1.6 in the last third of output 0.
+/// A detector's walk over `bins` bins of 0.01 s: |ε| <= 0.3 in [−1, 1]; with a fault, ε = 1.6 in the last third of
+/// output 0.
 inline Detection detection(std::size_t bins, bool fault) {
   Detection d;
   d.rows = d.instants = bins;

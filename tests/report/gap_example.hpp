@@ -14,7 +14,8 @@
 
 namespace wheelwright::gap_example {
 
-/// Residuals of `seconds` at 50 Hz: a sine of 8 left by the nominal model, a square wave of 5 after fitting, noise of 1.
+/// Residuals of `seconds` at 50 Hz: a sine of 8 left by the nominal model, a square wave of 5 after fitting, noise of
+/// 1.
 inline ResidualSeries series(std::string channel, std::string unit, double seconds, GapSpace space, unsigned seed) {
   ResidualSeries s;
   s.space = space;

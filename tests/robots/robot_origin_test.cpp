@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Robot files from URDF, SDF and controllers: closed forms, frames that stand anyhow, and the way back through the reader.
+// Robot files from URDF, SDF and controllers: closed forms, frames that stand anyhow, and the way back through the
+// reader.
 #include <wheelwright/robots/robot_origin.hpp>
 
 #include <nlohmann/json.hpp>

@@ -12,8 +12,8 @@
 
 namespace wheelwright::testing_support {
 
-/// A record of one log with the parameters "mass" and "yaw_inertia": the truth, an estimate that is off by a normal error
-/// of `error`, and guaranteed bounds that hold the truth, about 4 errors wide on each side.
+/// A record of one log with the parameters "mass" and "yaw_inertia": the truth, an estimate that is off by a normal
+/// error of `error`, and guaranteed bounds that hold the truth, about 4 errors wide on each side.
 inline RobotRecord drawn_record(const std::string& name, const std::vector<double>& truth, double error,
                                 Random& random) {
   static const std::vector<std::string> names = {"mass", "yaw_inertia", "viscous_linear", "viscous_yaw"};

@@ -30,8 +30,8 @@ TEST(RandomEffects, AgreesWithTheWeightedMeanWhereErrorsExplainAll) {
 }
 
 TEST(RandomEffects, SolvesPauleAndMandelWhereNoMemberIsFarOff) {
-  // With all |z| < 1.5, psi(z) = z: sum z = 0 weighted and sum z^2 = (n - 1) E psi^2, here with no errors at all, so that
-  // the spread is the standard deviation over sqrt(E psi^2) = 0.8823...
+  // With all |z| < 1.5, psi(z) = z: sum z = 0 weighted and sum z^2 = (n - 1) E psi^2, here with no errors at all, so
+  // that the spread is the standard deviation over sqrt(E psi^2) = 0.8823...
   const std::vector<double> x = {-1.0, -1.0, 1.0, 1.0, -1.0, 1.0}, s(6, 0.0);
   const RandomEffects fit = fit_random_effects(x, s);
   const double inside = std::erf(1.5 / std::sqrt(2.0));

@@ -19,7 +19,8 @@ namespace {
 
 namespace example = sensitivity_example;
 
-// How often, over seeds 1 … seeds, each index's interval holds the exact value: the first-order ones, then the total ones.
+// How often, over seeds 1 … seeds, each index's interval holds the exact value: the first-order ones, then the total
+// ones.
 std::vector<int> hits(const example::TestFunction& f, SobolOptions options, int seeds) {
   std::vector<int> out(2 * f.first.size(), 0);
   for (int seed = 1; seed <= seeds; ++seed) {

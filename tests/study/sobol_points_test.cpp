@@ -39,8 +39,8 @@ TEST(SobolPoints, FillTheSquareEvenly) {
   }
 }
 
-// Each point is uniform whatever its place in the sequence: over replicates, the mean of the first and of the last point
-// is 1/2, with a standard error of 1/√(12 · 3000) = 0.0053.
+// Each point is uniform whatever its place in the sequence: over replicates, the mean of the first and of the last
+// point is 1/2, with a standard error of 1/√(12 · 3000) = 0.0053.
 TEST(SobolPoints, AreUniformOneByOne) {
   constexpr Eigen::Index replicates = 3000;
   const Eigen::MatrixXd points = sobol_points(4, 3, replicates, 2);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// killed_rank FILE RANK: a run into a store in which RANK kills itself after 20 items; nobody with RANK = -1. Rank 0 then
-// checks every result, and prints how many items were there before. killed.cmake runs it.
+// killed_rank FILE RANK: a run into a store in which RANK kills itself after 20 items; nobody with RANK = -1. Rank 0
+// then checks every result, and prints how many items were there before. killed.cmake runs it.
 #include <chrono>
 #include <csignal>
 #include <cstdio>

@@ -92,8 +92,8 @@ void detector_run(long rows, const double *t, const double *sample, double *out)
   [[nodiscard]] bool loaded() const { return library_ != nullptr; }
   /// Forgets all but the model and the vertices it was at.
   void restart() { restart_(); }
-  /// Steps through rows; 2 + 7 n numbers for each: valid, fault, then for each channel residual, predicted, lower, upper,
-  /// dead zone, outside, alarm.
+  /// Steps through rows; 2 + 7 n numbers for each: valid, fault, then for each channel residual, predicted, lower,
+  /// upper, dead zone, outside, alarm.
   [[nodiscard]] std::vector<double> run(const std::vector<double>& t, const std::vector<double>& samples) const {
     std::vector<double> out(t.size() * (2 + 7 * outputs_));
     run_(static_cast<long>(t.size()), t.data(), samples.data(), out.data());

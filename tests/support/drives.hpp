@@ -28,7 +28,8 @@ enum class Shown {
   mean_speeds,  ///< angle differences over sampling intervals, stamped at their middle
 };
 
-/// A commissioning drive without noise of the robot of the examples, 20 s at 100 Hz, of which exactly `shown` is logged.
+/// A commissioning drive without noise of the robot of the examples, 20 s at 100 Hz, of which exactly `shown` is
+/// logged.
 inline Scenario exact_drive(Shown shown, Hold hold) {
   Scenario s;
   s.robot.wheel_radius = 0.0975;

@@ -13,7 +13,8 @@
 namespace wheelwright::testing_support {
 
 /// Whether the test has to end here, since `there` is false: skipped, and failed where the environment variable
-/// WHEELWRIGHT_NO_SKIPS is 1 (`.ci/run` sets it, and installs all that tests need). For programs that a machine may lack.
+/// WHEELWRIGHT_NO_SKIPS is 1 (`.ci/run` sets it, and installs all that tests need). For programs that a machine may
+/// lack.
 ///
 ///     if (skip_unless(has_c_compiler(), "there is no cc")) return;
 [[nodiscard]] inline bool skip_unless(bool there, const std::string& why) {

@@ -1,0 +1,103 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""What a build cost, from ninja's log: seconds of its compilations by room, and the dearest objects.
+
+    tools/check_cost.py [BUILD]                  the table (BUILD: build)
+    tools/check_cost.py [BUILD] --most SECONDS   ends with 1, naming it, where an object took longer
+    tools/check_cost.py --self-test
+
+Seconds are those on the clock: compilations that waited for a processor look dearer than they are, and what a compiler cache
+handed out looks free. `--most` therefore allows for that much of waiting: what the machine's load was beyond its processors.
+"""
+
+import argparse
+import os
+import sys
+import tempfile
+from collections import defaultdict
+from pathlib import Path
+
+
+def read_log(path):
+    """Object -> seconds, of the last time that each was made."""
+    objects = {}
+    with open(path, encoding="utf-8") as lines:
+        if not next(lines, "").startswith("# ninja log"):
+            raise SystemExit(f"{path}: no log of ninja")
+        for line in lines:
+            fields = line.rstrip("\n").split("\t")
+            if len(fields) >= 4 and fields[3].endswith(".o"):
+                objects[fields[3]] = (int(fields[1]) - int(fields[0])) / 1000.0
+    return objects
+
+
+def room_of(name):
+    parts = name.split("/")
+    return "/".join([parts[0], parts[2].removesuffix(".dir")]) if parts[0] == "tests" and len(parts) > 2 else parts[0]
+
+
+def table(objects, dearest):
+    rooms = defaultdict(float)
+    for name, seconds in objects.items():
+        rooms[room_of(name)] += seconds
+    lines = [f"{seconds:8.1f} s  {room}" for room, seconds in sorted(rooms.items(), key=lambda item: -item[1])]
+    lines.append(f"{sum(rooms.values()):8.1f} s  {len(objects)} objects")
+    lines.append("dearest:")
+    for name, seconds in sorted(objects.items(), key=lambda item: -item[1])[:dearest]:
+        lines.append(f"{seconds:8.1f} s  {name}")
+    return "\n".join(lines)
+
+
+def waiting():
+    """How much longer a compilation takes since others want the processors, by the load of the last five minutes."""
+    return max(1.0, os.getloadavg()[1] / (os.cpu_count() or 1))
+
+
+def complaints(objects, most, factor):
+    return [f"{name}: {seconds:.1f} s, more than {most:g} s" + (f" × {factor:.2f} for the load" if factor > 1.0 else "")
+            for name, seconds in sorted(objects.items(), key=lambda item: -item[1]) if seconds > most * factor]
+
+
+def self_test():
+    with tempfile.TemporaryDirectory() as folder:
+        log = Path(folder) / ".ninja_log"
+        log.write_text("# ninja log v5\n0\t9000\t1\told.o\tx\n0\t1000\t1\tcore/CMakeFiles/c.dir/a.o\tx\n"
+                       "5\t26005\t1\tgap/CMakeFiles/g.dir/b.o\tx\n0\t99000\t1\tbin/program\tx\n0\t500\t1\told.o\tx\n"
+                       "0\t2000\t1\ttests/CMakeFiles/test_core.dir/t.o\tx\n", encoding="utf-8")
+        objects = read_log(log)
+        assert objects == {"old.o": 0.5, "core/CMakeFiles/c.dir/a.o": 1.0, "gap/CMakeFiles/g.dir/b.o": 26.0,
+                           "tests/CMakeFiles/test_core.dir/t.o": 2.0}, objects
+        assert room_of("tests/CMakeFiles/test_core.dir/t.o") == "tests/test_core"
+        assert "29.5 s  4 objects" in table(objects, 1) and table(objects, 1).endswith("b.o")
+        assert len(complaints(objects, 25.0, 1.0)) == 1 and not complaints(objects, 25.0, 1.1)
+        log.write_text("something else\n", encoding="utf-8")
+        try:
+            read_log(log)
+        except SystemExit as error:
+            assert "no log of ninja" in str(error)
+        else:
+            raise AssertionError("a file that is no log was read")
+    print("cost: self-test passed")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("build", nargs="?", type=Path, default=Path("build"))
+    parser.add_argument("--most", type=float, metavar="SECONDS")
+    parser.add_argument("--dearest", type=int, default=10)
+    parser.add_argument("--self-test", action="store_true")
+    arguments = parser.parse_args()
+    if arguments.self_test:
+        self_test()
+        return 0
+    objects = {name: seconds for name, seconds in read_log(arguments.build / ".ninja_log").items()
+               if (arguments.build / name).exists()}
+    print(table(objects, arguments.dearest))
+    found = complaints(objects, arguments.most, waiting()) if arguments.most else []
+    for complaint in found:
+        print(complaint, file=sys.stderr)
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
