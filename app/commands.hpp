@@ -43,7 +43,7 @@ using Run = std::function<int(const std::string& command_line)>;
 [[nodiscard]] Run add_man(CLI::App& program);
 /// wheelwright margins LOG --model model.json
 [[nodiscard]] Run add_margins(CLI::App& program);
-/// wheelwright robot --urdf FILE | --sdf FILE | --ros2-control FILE
+/// wheelwright robot --urdf FILE | --ros2-control FILE
 [[nodiscard]] Run add_robot(CLI::App& program);
 /// wheelwright sensitivity STUDY.yaml
 [[nodiscard]] Run add_sensitivity(CLI::App& program);

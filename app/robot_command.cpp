@@ -11,7 +11,6 @@
 #include <wheelwright/robots/robot_description.hpp>
 #include <wheelwright/robots/robot_file.hpp>
 #include <wheelwright/robots/robot_origin.hpp>
-#include <wheelwright/robots/sdf.hpp>
 
 #include "commands.hpp"
 #include "common.hpp"
@@ -22,7 +21,7 @@ namespace robot_command {
 namespace {
 
 struct Arguments {
-  std::filesystem::path urdf, sdf, ros2_control, file;
+  std::filesystem::path urdf, ros2_control, file;
   std::string controller;
   RobotHints hints;
   bool force = false;
@@ -30,7 +29,7 @@ struct Arguments {
 };
 
 constexpr const char* kHelp =
-    "Writes a robot file from what a robot already has: its URDF or SDF and the parameters of its ros2_control "
+    "Writes a robot file from what a robot already has: its URDF and the parameters of its ros2_control "
     "diff_drive_controller. Above each value stands where it came from; what cannot be used is an error that says "
     "where it "
     "stands.";
@@ -38,16 +37,13 @@ constexpr const char* kHelp =
 constexpr const char* kExamples =
     "Examples:\n"
     "  wheelwright robot --urdf my_robot.urdf --ros2-control controllers.yaml --out-file robot.yaml\n"
-    "  wheelwright robot --sdf model.sdf --left left_wheel_joint --right right_wheel_joint > robot.yaml\n"
+    "  wheelwright robot --urdf my_robot.urdf --left left_wheel_joint --right right_wheel_joint > robot.yaml\n"
     "  wheelwright robot --urdf my_robot.urdf --wheel-radius 9.75cm --massless camera_link\n\n"
     "xacro has to be expanded first: xacro my_robot.urdf.xacro > my_robot.urdf.";
 
 RobotWithOrigins made(const Arguments& a) {
-  if (a.urdf.empty() && a.sdf.empty() && a.ros2_control.empty()) {
-    throw InputError("robot: expected at least one of --urdf, --sdf, --ros2-control");
-  }
-  if (!a.urdf.empty() && !a.sdf.empty()) {
-    throw InputError("--urdf and --sdf: two descriptions of one robot: expected one of them");
+  if (a.urdf.empty() && a.ros2_control.empty()) {
+    throw InputError("robot: expected at least one of --urdf, --ros2-control");
   }
   if (!a.controller.empty() && a.ros2_control.empty()) {
     throw InputError("--controller: expected --ros2-control FILE with it");
@@ -55,8 +51,6 @@ RobotWithOrigins made(const Arguments& a) {
   std::optional<RobotTree> tree;
   if (!a.urdf.empty()) {
     tree = read_urdf(a.urdf);
-  } else if (!a.sdf.empty()) {
-    tree = read_sdf(a.sdf);
   }
   std::optional<DriveFacts> controller;
   if (!a.ros2_control.empty()) {
@@ -105,7 +99,6 @@ Run add_robot(CLI::App& program) {
   auto a = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("robot", kHelp);
   command.add_option("--urdf", a->urdf, "Robot description in URDF: geometry, masses, joints")->type_name("FILE");
-  command.add_option("--sdf", a->sdf, "Robot description in SDF, in place of URDF")->type_name("FILE");
   command.add_option("--ros2-control", a->ros2_control, "Parameters of a diff_drive_controller (YAML)")
       ->type_name("FILE");
   command.add_option("--controller", a->controller, "Name of the controller, where the file has several")

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// An element of an XML file that knows its line and whose it is: what the readers of URDF and SDF are written with.
+/// An element of an XML file that knows its line and whose it is: what the readers of URDF is written with.
 #pragma once
 
 #include <memory>

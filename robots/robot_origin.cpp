@@ -49,7 +49,7 @@ struct Maker {
       friction();
     } else {
       out.remarks.push_back(
-          "nominal values: none, because a controller's parameters hold no masses; --urdf or --sdf gives "
+          "nominal values: none, because a controller's parameters hold no masses; --urdf gives "
           "them");
     }
     const WheelJoints* const joints = wheels ? &*wheels : nullptr;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Robot files from what a robot already has: URDF, SDF, parameters of its controller; each value with its origin.
+/// Robot files from what a robot already has: URDF, parameters of its controller; each value with its origin.
 #pragma once
 
 #include <filesystem>

@@ -20,7 +20,7 @@ struct WheelJoints {
   std::string reason;  ///< "named by --left and --right", "the only continuous joints ...", "robot.urdf:80: ..."
 };
 
-/// Names of the wheels' joints from outside the description, and who gave them ("--left and --right", "robot.sdf:9:
+/// Names of the wheels' joints from outside the description, and who gave them ("--left and --right", "robot.urdf:9:
 /// ..."); empty where nobody did.
 struct NamedWheels {
   std::vector<std::string> left, right;

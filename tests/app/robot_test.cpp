@@ -19,7 +19,6 @@ class RobotCommand : public testing::ProgramTest {
   RobotCommand() {
     const testing::SampleRobot sample;
     put("robot.urdf", sample_urdf(sample, usual_frames(sample)));
-    put("model.sdf", sample_sdf(sample, usual_frames(sample)));
     put("control.yaml", testing::sample_controller);
   }
 };
@@ -30,10 +29,8 @@ TEST_F(RobotCommand, FileFromDescriptionAndController) {
   const Robot robot = read_robot(path("made.yaml"));
   EXPECT_EQ(robot.wheel_radius, 0.05);
   EXPECT_EQ(robot.limits.at("effort"), 6.0);
-  // The same on standard output, and from SDF the same robot.
+  // The same on standard output.
   EXPECT_EQ(run("robot --urdf robot.urdf --ros2-control control.yaml").out, bytes(path("made.yaml")));
-  const Robot other = parse_robot(run("robot --sdf model.sdf").out, "standard output");
-  EXPECT_NEAR(other.nominal.at("mass"), robot.nominal.at("mass"), 1e-12 * robot.nominal.at("mass"));
   // With --out it has the name that the other commands' examples have.
   EXPECT_EQ(run("robot --urdf robot.urdf --out folder --quiet").code, 0);
   EXPECT_EQ(read_robot(path("folder/robot.yaml")).name, "sample");
@@ -68,8 +65,7 @@ TEST_F(RobotCommand, LengthsHaveUnits) {
 
 TEST_F(RobotCommand, RefusalsLeaveNothing) {
   put("broken.urdf", "<robot name=\"a\">\n<link name=\"b\"><inertial></inertial></link></robot>");
-  for (const auto& [words, message] : {std::pair{"", "expected at least one of --urdf, --sdf, --ros2-control"},
-                                       {"--urdf robot.urdf --sdf model.sdf", "two descriptions"},
+  for (const auto& [words, message] : {std::pair{"", "expected at least one of --urdf, --ros2-control"},
                                        {"--urdf broken.urdf", "broken.urdf:2: <inertial> of link 'b'"},
                                        {"--urdf no.urdf", "no.urdf: no such file"},
                                        {"--urdf robot.urdf --controller x", "--controller"}}) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What URDF, SDF and controllers' files cannot be used for: each message names file, line and element.
+// What URDF and controllers' files cannot be used for: each message names file, line and element.
 #include <functional>
 #include <regex>
 
@@ -9,7 +9,6 @@
 #include <wheelwright/robots/robot_description.hpp>
 #include <wheelwright/robots/robot_file.hpp>
 #include <wheelwright/robots/robot_origin.hpp>
-#include <wheelwright/robots/sdf.hpp>
 
 #include "robots/robot_samples.hpp"
 #include "support/scratch.hpp"
@@ -32,11 +31,6 @@ RobotWithOrigins from_urdf(const std::string& text, const RobotHints& hints = {}
   return robot_from(&tree, nullptr, hints);
 }
 
-RobotWithOrigins from_sdf(const std::string& text) {
-  const RobotTree tree = parse_sdf(text, "robot.sdf");
-  return robot_from(&tree, nullptr);
-}
-
 /// `text` with the first `from` behind `anchor` written as `to`.
 std::string changed(std::string text, const std::string& anchor, const std::string& from, const std::string& to) {
   const std::size_t at = text.find(from, text.find(anchor));
@@ -50,10 +44,6 @@ std::string refused(const std::string& anchor, const std::string& from, const st
 
 std::string urdf_error(const std::string& text, const std::string& file) {
   return input_error([&] { static_cast<void>(parse_urdf(text, file)); });
-}
-
-std::string sdf_error(const std::string& text, const std::string& file) {
-  return input_error([&] { static_cast<void>(parse_sdf(text, file)); });
 }
 
 std::string yaml_error(const std::string& text, const std::string& file, const std::string& controller = {}) {
@@ -154,7 +144,6 @@ TEST(RobotOriginErrors, FilesOfAnotherKind) {
       AllOf(HasSubstr("robot.urdf.xacro:2: <xacro:include> is xacro"), HasSubstr("expanded first")));
   EXPECT_THAT(urdf_error("<robot name=\"${n}\"/>", "a.urdf"), HasSubstr("a.urdf:1: '${n}' is xacro"));
   EXPECT_THAT(urdf_error("<sdf version=\"1.7\"/>", "a.urdf"), HasSubstr("is no URDF"));
-  EXPECT_THAT(sdf_error("<robot name=\"a\"/>", "a.sdf"), HasSubstr("is no SDF"));
   EXPECT_THAT(urdf_error("<robot>\n<link>", "a.urdf"), HasSubstr("a.urdf:2"));
   EXPECT_THAT(urdf_error("", "a.urdf"), HasSubstr("a.urdf:1"));
   EXPECT_THAT(urdf_error("<robot/><robot/>", "a.urdf"), HasSubstr("a second root element"));
@@ -169,21 +158,6 @@ TEST(RobotOriginErrors, LinksThatMakeNoTree) {
               HasSubstr("did you mean 'base_link'?"));
   EXPECT_THAT(refused("<link", "<link name=\"base_footprint\"/>", "<link name=\"mast\"/>"),
               HasSubstr("has the name of robot.urdf:3"));
-}
-
-TEST(RobotOriginErrors, SdfThatLeavesSomethingOut) {
-  const SampleRobot sample;
-  const auto refused_sdf = [&](const std::string& from, const std::string& to) {
-    return input_error([&] { from_sdf(changed(sample_sdf(sample, usual_frames(sample)), "<sdf", from, to)); });
-  };
-  EXPECT_THAT(refused_sdf("<mass>10</mass>", ""), HasSubstr("<inertial> of link 'base_link': holds no <mass>"));
-  EXPECT_THAT(refused_sdf("relative_to=\"holder\"", "relative_to=\"holdr\""), HasSubstr("did you mean 'holder'?"));
-  EXPECT_THAT(refused_sdf("<frame name=\"holder\">", "<frame name=\"holder\" attached_to=\"mast\">"),
-              HasSubstr("relative to itself"));
-  EXPECT_THAT(refused_sdf("<frame", "<include><uri>model://x</uri></include><frame"),
-              HasSubstr("robot.sdf:4: <include>"));
-  EXPECT_THAT(refused_sdf("<parent>base_link", "<parent>world"), HasSubstr("holds the robot to the world"));
-  EXPECT_THAT(refused_sdf("version=\"1.7\"", "version=\"1.2\""), HasSubstr("expected 1.4 or later"));
 }
 
 TEST(RobotOriginErrors, ControllersThatCannotBeUsed) {
@@ -255,12 +229,6 @@ void fuzz(const std::string& good, const std::string& spice, const std::string& 
 TEST(RobotOriginFuzz, Urdf) {
   fuzz(sample_text("<transmission name=\"t\"><joint name=\"left_wheel_joint\"/></transmission>\n"),
        "<>/\"'= -+.e0123456789na&;${}", "robot.urdf", 1, [](const std::string& text) { return from_urdf(text); });
-}
-
-TEST(RobotOriginFuzz, Sdf) {
-  const SampleRobot sample;
-  fuzz(sample_sdf(sample, usual_frames(sample), "<plugin name=\"p\" filename=\"diff_drive\"/>"),
-       "<>/\"'= -+.e0123456789na&;", "robot.sdf", 2, [](const std::string& text) { return from_sdf(text); });
 }
 
 TEST(RobotOriginFuzz, Controller) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Robot files from URDF, SDF and controllers: closed forms, frames that stand anyhow, and the way back through the
+// Robot files from URDF and controllers: closed forms, frames that stand anyhow, and the way back through the
 // reader.
 #include <wheelwright/robots/robot_origin.hpp>
 
@@ -8,7 +8,6 @@
 #include <wheelwright/robots/controller_file.hpp>
 #include <wheelwright/robots/robot_description.hpp>
 #include <wheelwright/robots/robot_file.hpp>
-#include <wheelwright/robots/sdf.hpp>
 
 #include "robots/robot_samples.hpp"
 #include "support/scratch.hpp"
@@ -28,11 +27,6 @@ void expect_relative(double value, double truth, double tolerance = 1e-12) {
 
 RobotWithOrigins from_urdf(const std::string& text, const RobotHints& hints = {}) {
   const RobotTree tree = parse_urdf(text, "robot.urdf");
-  return robot_from(&tree, nullptr, hints);
-}
-
-RobotWithOrigins from_sdf(const std::string& text, const RobotHints& hints = {}) {
-  const RobotTree tree = parse_sdf(text, "robot.sdf");
   return robot_from(&tree, nullptr, hints);
 }
 
@@ -56,7 +50,6 @@ void expect_sample(const Robot& robot, const SampleRobot& sample, double toleran
 TEST(RobotOrigin, ClosedFormsOfBoxesAndCylinders) {
   const SampleRobot sample;
   expect_sample(from_urdf(sample_urdf(sample, usual_frames(sample))).robot, sample, 1e-12);
-  expect_sample(from_sdf(sample_sdf(sample, usual_frames(sample))).robot, sample, 1e-12);
 }
 
 // Values by hand: 12.5 kg + 2 · ½ m_w; the wheels add m_w (D/2)² each as bodies and ½ m_w (D/2)² each by their spin.
@@ -80,7 +73,6 @@ TEST(RobotOrigin, FramesMayStandAnyhow) {
   for (int k = 0; k < 20; ++k) {
     const testing::SampleFrames frames = random_frames(sample, random);
     expect_sample(from_urdf(sample_urdf(sample, frames)).robot, sample, 1e-9);
-    expect_sample(from_sdf(sample_sdf(sample, frames)).robot, sample, 1e-9);
   }
 }
 
@@ -160,16 +152,17 @@ TEST(RobotOrigin, ControllerAlone) {
 TEST(RobotOrigin, PluginAndDescriptionAreCompared) {
   const SampleRobot sample;
   const auto with = [&](const std::string& keys) {
-    return from_sdf(sample_sdf(sample, usual_frames(sample),
-                               "<plugin filename=\"gz-sim-diff-drive-system\" name=\"gz::sim::systems::DiffDrive\">"
-                               "<left_joint>left_wheel_joint</left_joint><right_joint>right_wheel_joint</right_joint>" +
-                                   keys + "</plugin>\n"));
+    return from_urdf(
+        sample_urdf(sample, usual_frames(sample),
+                    "<gazebo><plugin filename=\"gz-sim-diff-drive-system\" name=\"gz::sim::systems::DiffDrive\">"
+                    "<left_joint>left_wheel_joint</left_joint><right_joint>right_wheel_joint</right_joint>" +
+                        keys + "</plugin></gazebo>\n"));
   };
   EXPECT_EQ(with("<wheel_separation>0.39</wheel_separation>").robot.track_width, 0.38);
   EXPECT_THAT(with("<wheel_separation>0.39</wheel_separation>").remarks,
-              Contains(AllOf(HasSubstr("0.39 m: robot.sdf:"), HasSubstr("the first is taken"))));
+              Contains(AllOf(HasSubstr("0.39 m: robot.urdf:"), HasSubstr("the first is taken"))));
   EXPECT_THAT(input_error([&] { with("<wheel_diameter>0.2</wheel_diameter>"); }),
-              AllOf(HasSubstr("wheel_radius 0.05 m: robot.sdf:"), HasSubstr("but 0.1 m: robot.sdf:"),
+              AllOf(HasSubstr("wheel_radius 0.05 m: robot.urdf:"), HasSubstr("but 0.1 m: robot.urdf:"),
                     HasSubstr("--wheel-radius")));
   EXPECT_EQ(with("<max_linear_acceleration>1</max_linear_acceleration>").robot.limits.at("acceleration"), 20.0);
 }

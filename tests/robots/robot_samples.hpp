@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// A small robot of boxes and cylinders, as URDF and as SDF, whose frames may stand anyhow.
+/// A small robot of boxes and cylinders, as URDF, whose frames may stand anyhow.
 #pragma once
 
 #include <cmath>
@@ -90,11 +90,6 @@ struct SamplePose {
     return fmt::format(R"(<origin xyz="{:.17g} {:.17g} {:.17g}" rpy="{:.17g} {:.17g} {:.17g}"/>)", xyz.x(), xyz.y(),
                        xyz.z(), rpy.x(), rpy.y(), rpy.z());
   }
-  [[nodiscard]] std::string sdf(const std::string& relative = "") const {
-    return fmt::format("<pose{}>{:.17g} {:.17g} {:.17g} {:.17g} {:.17g} {:.17g}</pose>",
-                       relative.empty() ? "" : fmt::format(R"( relative_to="{}")", relative), xyz.x(), xyz.y(), xyz.z(),
-                       rpy.x(), rpy.y(), rpy.z());
-  }
 };
 
 /// Where the frames of the links stand, in the robot's frame; that of the root is the robot's own.
@@ -155,42 +150,6 @@ inline std::string sample_urdf(const SampleRobot& robot, const SampleFrames& fra
         body.name, wheel ? "continuous" : "fixed", body.name, SamplePose(frame).urdf(), wheel ? turning : "");
   }
   return out + more + "</robot>\n";
-}
-
-/// The sample robot as SDF 1.7; the mast's pose is relative to a frame of its own.
-inline std::string sample_sdf(const SampleRobot& robot, const SampleFrames& frames, const std::string& more = "") {
-  const Eigen::Isometry3d held = placed({0.2, -0.1, 0.3}, Eigen::Quaterniond(0.9, 0.1, 0.3, -0.2));
-  std::string out = "<?xml version=\"1.0\"?>\n<sdf version=\"1.7\">\n<model name=\"sample\">\n<frame name=\"holder\">" +
-                    SamplePose(held).sdf() + "</frame>\n";
-  for (const SampleBody& body : robot.bodies()) {
-    const Eigen::Isometry3d& frame = frames.at(body.name);
-    const std::string pose = SamplePose(frame.inverse() * body.pose).sdf();
-    const std::string own =
-        body.name == "mast" ? SamplePose(held.inverse() * frame).sdf("holder") : SamplePose(frame).sdf();
-    const Eigen::Vector3d j = body.moments();
-    const std::string shape =
-        body.round()
-            ? fmt::format("<cylinder><radius>{}</radius><length>{}</length></cylinder>", body.size.x(), body.size.y())
-            : fmt::format("<box><size>{} {} {}</size></box>", body.size.x(), body.size.y(), body.size.z());
-    out += fmt::format(
-        "<link name=\"{}\">\n{}\n<inertial>\n{}\n<mass>{:.17g}</mass>\n<inertia><ixx>{:.17g}</ixx><iyy>{:.17g}</iyy>"
-        "<izz>{:.17g}</izz></inertia>\n</inertial>\n<collision "
-        "name=\"c\">{}<geometry>{}</geometry></collision>\n</link>\n",
-        body.name, own, pose, body.mass, j.x(), j.y(), j.z(), pose, shape);
-    if (body.name == "base_link") {
-      continue;
-    }
-    const bool wheel = body.name != "mast";
-    const std::string turning = fmt::format(
-        "<axis><xyz expressed_in=\"__model__\">0 1 "
-        "0</xyz><dynamics><damping>{}</damping><friction>{}</friction></dynamics>"
-        "<limit><effort>6</effort><velocity>12</velocity><lower>-1e16</lower><upper>1e16</upper></limit></axis>\n",
-        robot.damping, robot.friction);
-    out += fmt::format(
-        "<joint name=\"{}_joint\" type=\"{}\">\n<parent>base_link</parent>\n<child>{}</child>\n{}</joint>\n", body.name,
-        wheel ? "revolute" : "fixed", body.name, wheel ? turning : "");
-  }
-  return out + more + "</model>\n</sdf>\n";
 }
 
 /// The parameters of its controller.
