@@ -53,7 +53,7 @@ constexpr const char* kExamples =
 bool for_kinematics_only(const LogSource& log, const Robot& robot) {
   const std::vector<std::string> needed = needed_columns(robot);
   const bool effort = std::ranges::any_of(needed, [&](const std::string& name) { return log.find(name).has_value(); });
-  return !effort && robot.model != "single_axis" && log.find("theta") && log.find("omega_r") && log.find("omega_l");
+  return !effort && on_two_wheels(robot) && log.find("theta") && log.find("omega_r") && log.find("omega_l");
 }
 
 int run(const Arguments& a) {

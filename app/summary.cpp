@@ -64,10 +64,9 @@ std::string smallest_fault(const Robot& robot, double kappa) {
   if (!std::isfinite(kappa) || kappa > useless) {
     return "no fault that scales the effort is certainly seen: the threshold is as wide as the effort itself";
   }
-  return robot.model == "differential_drive"
-             ? fmt::format("a change of the wheel radius by {:.2g} % is certainly seen",
-                           100.0 * (std::sqrt(1.0 + kappa) - 1.0))
-             : fmt::format("a change of the effort by {:.2g} % is certainly seen", 100.0 * kappa);
+  return on_two_wheels(robot) ? fmt::format("a change of the wheel radius by {:.2g} % is certainly seen",
+                                            100.0 * (std::sqrt(1.0 + kappa) - 1.0))
+                              : fmt::format("a change of the effort by {:.2g} % is certainly seen", 100.0 * kappa);
 }
 
 std::string kinematic_table(const KinematicCommissioning& k) {

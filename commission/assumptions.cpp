@@ -337,7 +337,7 @@ std::vector<Assumption> assumptions_of(const Commissioning& result) {
   }
   list.push_back(assumed_prior(result));
   add_limits(list, robot);
-  if (robot.model == "differential_drive") {
+  if (on_two_wheels(robot)) {
     list.push_back(assumed_geometry(result));
   }
   if (result.kinematic.model) {

@@ -311,7 +311,7 @@ void find_unrelated_efforts(const Setting& s, const std::vector<JointFit>& joint
 
 // Both wheels of a differential drive carry half of the mass: their efforts must show one and the same.
 void find_uneven_efforts(const Setting& s, const std::vector<JointFit>& joints, std::vector<LogContradiction>& out) {
-  if (joints.size() != 2 || s.robot.model != "differential_drive" || !s.robot.effects.empty()) {
+  if (joints.size() != 2 || !on_two_wheels(s.robot) || !s.robot.effects.empty()) {
     return;
   }
   const auto columns = side_by_side(s.model);

@@ -35,7 +35,7 @@ std::vector<StatedFault> faults_for(const Robot& robot, const std::vector<Stated
   if (!stated.empty()) {
     return stated;
   }
-  if (robot.model == "single_axis") {
+  if (!on_two_wheels(robot)) {
     return {{"effort_loss"}};
   }
   return {{"wheel_radius"}, {"wheel_radius_right"}};

@@ -343,7 +343,7 @@ KinematicCommissioning commission_kinematics(LogSource& log, const Robot& robot,
                                              const Survey& survey, const KinematicCommissionOptions& options) {
   KinematicCommissioning result;
   if (!measurement) {
-    result.message = robot.model == "differential_drive"
+    result.message = on_two_wheels(robot)
                          ? "no kinematic residual: the log has neither a pose (x, y, theta) nor gyro_z, so that slip "
                            "across the heading cannot be seen"
                          : "no kinematic residual: the robot is no differential drive";

@@ -48,7 +48,7 @@ double noise_that_leaves_a_set(const MinimaxFit& fit, const std::function<bool(d
 }
 
 std::optional<double> motion_error(const Robot& robot, const Measurement& measurement) {
-  const bool axis = robot.model == "single_axis";
+  const bool axis = !on_two_wheels(robot);
   switch (measurement.motion) {
     case MotionKind::mean_speed:
       if (measurement.count > 0.0) {

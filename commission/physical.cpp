@@ -85,7 +85,7 @@ std::optional<std::vector<PhysicalScale>> physical_scales(const Robot& robot, co
           *motor.torque_constant * *motor.back_emf * motor.gear_ratio * motor.gear_ratio / *motor.resistance;
       const double r = robot.wheel_radius;
       const double arm = robot.lever_arm_is_track ? robot.track_width : 0.5 * robot.track_width;
-      if (robot.model == "single_axis") {
+      if (!on_two_wheels(robot)) {
         scale.offset = braking;
       } else if (parameter.physical == "viscous_yaw") {
         scale.offset = braking * arm * robot.track_width / (r * r);

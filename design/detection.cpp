@@ -125,7 +125,7 @@ DetectionDesign design_for_detection(const OnlineModel& model, const DesignSubje
   DetectionDesign design;
   design.manoeuvre = design_manoeuvre(watched, limits, objective, options);
   design.promised = promises(design.manoeuvre.plan);
-  if (watched.model.name == "differential_drive") {
+  if (watched.model.on_two_wheels) {
     design.figure_eight = find_figure_eight(watched, limits, objective);
   }
   if (design.figure_eight) {

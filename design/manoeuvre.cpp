@@ -36,7 +36,7 @@ Window smooth_step(double t) {
 }  // namespace
 
 Plan plan_of(const FigureEight& eight, const DesignSubject& subject, double duration, double step) {
-  check::that(subject.model.name == "differential_drive", "figure eight: the model", "a differential drive");
+  check::that(subject.model.on_two_wheels, "figure eight: the model", "a differential drive");
   check::positive(eight.period, "period");
   const double w = 2.0 * std::numbers::pi / eight.period;
   Plan plan;
@@ -164,7 +164,7 @@ BoundsDesign design_for_bounds(const DesignSubject& subject, const MotionLimits&
   const RowObjective objective = narrow_bounds(subject, criterion);
   design.manoeuvre = design_manoeuvre(subject, limits, objective, options);
   design.promised = promised_bounds(planned_rows(design.manoeuvre.plan, subject), subject);
-  if (subject.model.name == "differential_drive") {
+  if (subject.model.on_two_wheels) {
     design.figure_eight = find_figure_eight(subject, limits, of_rows(objective, subject));
   }
   if (design.figure_eight) {

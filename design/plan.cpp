@@ -144,7 +144,7 @@ LimitUse limit_use(const Plan& plan, const DesignSubject& subject, const MotionL
 Eigen::MatrixXd joint_speeds(const Plan& plan, const Model& model) { return pseudo_inverse(model.motion) * plan.speed; }
 
 LogTable command_table(const Plan& plan, const Model& model) {
-  const bool wheels = model.name == "differential_drive" && model.joints.size() == 2;
+  const bool wheels = model.on_two_wheels && model.joints.size() == 2;
   check::that(wheels || model.joints.size() == 1, "command_table: the model '" + model.name + "'",
               "a differential drive or a single axis");
   const Eigen::MatrixXd joints = joint_speeds(plan, model);

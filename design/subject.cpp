@@ -188,7 +188,7 @@ DesignSubject subject_of(const Robot& robot, double step, const FilterDesign& fi
   m.changes = robot.effort_changes;
   m.delay = robot.effort_delay;
   m.nominal_step = step;
-  const NoiseBound& angle_noise = robot.model == "single_axis" ? robot.noise.position : robot.noise.wheel_angle;
+  const NoiseBound& angle_noise = !on_two_wheels(robot) ? robot.noise.position : robot.noise.wheel_angle;
   const bool angles = subject.filter.order == 2 && robot.speed_source != SpeedSource::measured &&
                       (angle_noise.value || robot.encoder_counts_per_turn);
   m.motion = angles ? MotionKind::angle : MotionKind::speed;

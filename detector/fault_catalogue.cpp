@@ -126,7 +126,7 @@ std::vector<FaultType> fault_catalogue(const Model& model, const Eigen::VectorXd
   check::that(static_cast<std::size_t>(theta.size()) == model.p(), "theta", "one value for each parameter");
   std::vector<FaultType> all;
   const auto c = static_cast<Eigen::Index>(model.coordinates.size());
-  const bool drive = model.name == "differential_drive";
+  const bool drive = model.on_two_wheels;
   if (drive) {
     FaultType both{.name = "wheel_radius",
                    .sentence = "both wheels' radii change",

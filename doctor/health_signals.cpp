@@ -272,9 +272,9 @@ void check_resolution(const HealthView& view, const Column& c, const std::vector
       sample.push_back(is_angle ? (*c.values)[k] - (*c.values)[k - 1] : (*c.values)[k]);
     }
   }
-  const auto encoder = view.robot.model == "single_axis" || !(view.step > 0.0) ? std::nullopt
-                       : is_angle                                              ? find_encoder_of_angles(sample)
-                                                                               : find_encoder(sample, view.step);
+  const auto encoder = !on_two_wheels(view.robot) || !(view.step > 0.0) ? std::nullopt
+                       : is_angle                                       ? find_encoder_of_angles(sample)
+                                                                        : find_encoder(sample, view.step);
   if (!encoder) {
     return;
   }

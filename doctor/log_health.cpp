@@ -16,7 +16,7 @@ std::string listed(const std::vector<std::string>& names) { return fmt::format("
 
 // Whether wheel radii and track can be found without efforts.
 bool has_kinematics(const HealthView& view) {
-  return view.has_motion() && view.column("theta") != nullptr && view.robot.model != "single_axis";
+  return view.has_motion() && view.column("theta") != nullptr && on_two_wheels(view.robot);
 }
 
 // Columns that are missing, and what the log has instead.
@@ -102,7 +102,7 @@ std::string assumption(const HealthView& view) {
   const char* effort = view.robot.effort == EffortKind::torque    ? "torques"
                        : view.robot.effort == EffortKind::current ? "currents"
                                                                   : "voltages";
-  return view.robot.model == "single_axis"
+  return !on_two_wheels(view.robot)
              ? "no robot file: taken for a single axis"
              : fmt::format(
                    "no robot file: taken for a differential drive with {} as efforts; whether units fit radius, "

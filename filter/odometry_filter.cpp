@@ -335,7 +335,7 @@ bool is_held(LogSource& log, const OdometryMeasurement& m) {
 
 std::optional<OdometryMeasurement> find_odometry(LogSource& log, const Robot& robot, const Model& model,
                                                  const Measurement& torque) {
-  if (robot.model != "differential_drive" || model.joints.size() != 2) {
+  if (!on_two_wheels(robot) || model.joints.size() != 2) {
     return std::nullopt;
   }
   OdometryMeasurement m;

@@ -247,7 +247,7 @@ DiscriminationDesign design_for_discrimination(const DesignSubject& subject, con
     return discrimination(planned_drive(plan, subject), rivals, catalogue, noise);
   };
   design.promised = pairs(design.manoeuvre.plan);
-  if (any && subject.model.name == "differential_drive") {
+  if (any && subject.model.on_two_wheels) {
     design.figure_eight = find_figure_eight(subject, limits, objective);
   }
   if (design.figure_eight) {

@@ -18,34 +18,6 @@ namespace {
 constexpr double kWider = 3.0;        // times a 95 % interval's half width: a prior
 constexpr double kMotorShare = 0.01;  // of a wheel's share of the mass, as the simulator's backlash has it
 
-// The name in θ of a linear parameter of an effect, as effect_terms.hpp has it.
-std::string physical_name(const Robot& robot, const std::string& effect, const std::string& parameter) {
-  if (effect == "coulomb") {
-    return "coulomb";
-  }
-  if (effect == "torque_bias" && robot.model == "single_axis") {
-    return "offset";
-  }
-  if (effect == "com_longitudinal" || effect == "com_lateral") {
-    return effect + "_moment";
-  }
-  return effect + (effect != "slope" ? "_" + parameter : parameter == "g_x" ? "_force_x" : "_force_y");
-}
-
-bool times_mass(std::string_view effect) {
-  return effect == "com_longitudinal" || effect == "com_lateral" || effect == "slope";
-}
-
-// Parameters of one effect that add up when the effect is there twice, to first order where they are not linear.
-bool adds_up(const std::string& effect, const EffectParameterLaw& law) {
-  static const std::vector<std::string> additive = {
-      "actuator_lag",           "delay",         "sensor_time_offset",
-      "torque_deadzone",        "load_friction", "battery_sag",
-      "torque_gain_asymmetric", "encoder_scale", "wheel_radius_asymmetric",
-      "wheel_out_of_round"};
-  return law.linear || std::ranges::find(additive, effect) != additive.end();
-}
-
 class Improvement {
  public:
   Improvement(const Robot& robot, const Drive& drive, const Eigen::VectorXd& theta)
@@ -53,38 +25,9 @@ class Improvement {
 
   // What changes θ and the geometry.
   void change_parameters(const FittedEffect& cause) {
-    const auto c = [&](Eigen::Index k) { return k < cause.coefficients.size() ? cause.coefficients[k] : 0.0; };
-    const std::string& name = cause.effect.name;
-    const Eigen::Vector2d side = sides(cause);
-    if (name == "payload") {
-      add(axis() ? "inertia" : "mass", c(0));
-      add("yaw_inertia", c(1));
-    } else if (name == "viscous") {
-      add(axis() ? "viscous" : "viscous_linear", c(0));
-      add("viscous_yaw", c(1));
-    } else if (name == "armature") {
-      add_armature(2.0 * c(0));
-    } else if (name == "torque_gain") {
-      theta_ += c(0) * drive_.theta;
-    } else if (name == "torque_gain_asymmetric") {
-      excess_ = c(0) * inertia_ratio() * side;
-      theta_ *= 2.0 * (1.0 + excess_[0]) * (1.0 + excess_[1]) / (2.0 + excess_.sum());
-    } else if (name == "viscous_asymmetric") {
-      add_damping(c(0) * side.sum());
-    } else if (name == "com_longitudinal") {
-      add("yaw_inertia", c(1) * drive_.physical("yaw_inertia"));
-    } else if (name == "encoder_scale") {
-      add_armature(c(1) * side.sum());
-    } else if (name == "wheel_radius") {
-      grow_wheels(1.0 + c(0));
-      add_armature(2.0 * c(1));
-    } else if (name == "wheel_radius_asymmetric") {
-      grow_wheels(1.0 + 0.5 * c(0) * side.sum());
-      add_armature(c(1) * side.sum());
-    } else if (name == "track_width") {
-      improved_.track_width *= 1.0 + c(0);
-      scale("viscous_yaw", std::pow(1.0 + c(0), 2));
-      add("yaw_inertia", c(1) * drive_.physical("yaw_inertia"));
+    if (const Way* const way = way_of(cause.effect.name); way != nullptr && way->change != nullptr) {
+      cause_ = &cause;
+      way->change(*this);
     }
   }
 
@@ -103,34 +46,49 @@ class Improvement {
   // What becomes an effect of the robot file; false where the file cannot have it.
   bool add_effect(const FittedEffect& cause, const std::vector<Interval>& intervals) {
     const std::string& name = cause.effect.name;
-    static const std::vector<std::string> nominal_only = {"payload",     "viscous",      "armature",
-                                                          "torque_gain", "wheel_radius", "track_width"};
-    if (std::ranges::find(nominal_only, name) != nominal_only.end()) {
+    const Way* const way = way_of(name);
+    if (way != nullptr && way->convert == nullptr) {
       return true;
     }
     const auto& laws = effect_laws();
     const auto law = std::ranges::find(laws, name, &EffectLaw::name);
-    if (law == laws.end() || law->parameters_of(improved_.model).empty()) {
+    if (law == laws.end() || law->parameters_of(improved_).empty()) {
       return refuse("a robot file has no effect called " + name);
     }
     cause_ = &cause;
     intervals_ = &intervals;
     law_ = &*law;
     effect_ = {name, {}};
-    if (!convert()) {
+    if (way == nullptr) {
+      return refuse("there is no rule yet by which " + name + " becomes an effect of a robot file");
+    }
+    if (!way->convert(*this)) {
       return false;
     }
     if (!effect_.parameters.empty() && !no_linear_left() && !put()) {
       return false;
     }
-    return name != "wheel_radius_asymmetric" || keep_joints();
+    return way->beside == nullptr || way->beside(*this);
   }
 
   [[nodiscard]] const Robot& robot() const { return improved_; }
   [[nodiscard]] const std::string& why_not() const { return why_not_; }
 
  private:
-  [[nodiscard]] bool axis() const { return improved_.model == "single_axis"; }
+  // How a cause of one name changes the robot.
+  struct Way {
+    void (*change)(Improvement& robot) = nullptr;   // θ and the geometry
+    bool (*convert)(Improvement& robot) = nullptr;  // into an effect of the robot file; nothing: it is no effect there
+    bool adds_up = false;  // its parameters add up when it is there twice, to first order where they are not linear
+    bool (*beside)(Improvement& robot) = nullptr;  // what comes along with the effect
+  };
+  static const std::map<std::string, Way>& ways();
+  static const Way* way_of(const std::string& name) {
+    const auto found = ways().find(name);
+    return found != ways().end() ? &found->second : nullptr;
+  }
+
+  [[nodiscard]] bool axis() const { return !on_two_wheels(improved_); }
   bool refuse(std::string why) {
     why_not_ = std::move(why);
     return false;
@@ -202,7 +160,7 @@ class Improvement {
 
   // The linear parameter is `factor` times the k-th coefficient.
   void linear(const std::string& parameter, std::size_t k, double factor) {
-    const auto law = std::ranges::find(law_->parameters_of(improved_.model), parameter, &EffectParameterLaw::name);
+    const auto law = std::ranges::find(law_->parameters_of(improved_), parameter, &EffectParameterLaw::name);
     const double value = factor * coefficient(k);
     if (value == 0.0 || value < law->lower || value > law->upper) {
       return;
@@ -218,93 +176,50 @@ class Improvement {
 
   // Without any of its linear parameters an effect does nothing.
   [[nodiscard]] bool no_linear_left() const {
-    const auto& parameters = law_->parameters_of(improved_.model);
+    const auto& parameters = law_->parameters_of(improved_);
     const auto is_linear = [](const EffectParameterLaw& p) { return p.linear; };
     return std::ranges::any_of(parameters, is_linear) && std::ranges::none_of(parameters, [&](const auto& p) {
              return p.linear && effect_.parameters.contains(p.name);
            });
   }
 
-  bool convert() {
-    const std::string& name = effect_.name;
-    const double per_torque = 1.0 / unit_;  // efforts are `unit_` times torques
-    const double k = axis() ? 1.0 : 2.0 * drive_.lever_arm / drive_.track_width;
-    const auto& parameters = law_->parameters_of(improved_.model);
-    const Eigen::Vector2d side = sides(*cause_);
-    if (name == "coulomb" || name == "coulomb_asymmetric" || name == "torque_bias") {
-      for (std::size_t j = 0; j < parameters.size(); ++j) {
-        linear(parameters[j].name, j, per_torque);
-      }
-    } else if (name == "stribeck") {
-      linear("c_s", 0, per_torque);
-      set("omega_s", shape(0));
-    } else if (name == "viscous_asymmetric") {
-      linear("b", 0, per_torque * (side[0] - side[1]));
-    } else if (name == "quadratic_drag") {
-      linear("c", 0, per_torque);
-      if (!axis()) {
-        linear("c2", 1, per_torque / k);
-      }
-    } else if (times_mass(name)) {
-      if (find("mass") == nullptr) {
-        return refuse(name + " needs a model with the mass in it");
-      }
-      const double ratio = drive_.physical("mass") / improved_.nominal.at("mass");
-      for (std::size_t j = 0; j < parameters.size(); ++j) {
-        linear(parameters[j].name, j, ratio);
-      }
-    } else if (name == "caster_drag") {
-      linear("c", 0, per_torque);
-      set("p", shape(0));
-    } else if (name == "lateral_scrub") {
-      linear("mu", 0, per_torque / k);
-    } else {
-      return convert_fixed();
+  [[nodiscard]] const std::vector<EffectParameterLaw>& known() const { return law_->parameters_of(improved_); }
+  // k of effect_law.hpp.
+  [[nodiscard]] double arm_ratio() const { return axis() ? 1.0 : 2.0 * drive_.lever_arm / drive_.track_width; }
+  // Efforts are `unit_` times torques.
+  [[nodiscard]] double per_torque() const { return 1.0 / unit_; }
+  // The coefficient k; 0 where the fit has none.
+  [[nodiscard]] double fitted(Eigen::Index k) const {
+    return k < cause_->coefficients.size() ? cause_->coefficients[k] : 0.0;
+  }
+  void set_first(double value) { set(known().front().name, value); }
+  bool linear_all(double factor) {
+    for (std::size_t j = 0; j < known().size(); ++j) {
+      linear(known()[j].name, j, factor);
     }
     return true;
   }
-
-  bool convert_fixed() {
-    const std::string& name = effect_.name;
-    const std::string first = law_->parameters_of(improved_.model).front().name;
-    if (name == "actuator_lag" || name == "delay") {
-      set(first, shape(0));
-    } else if (name == "sensor_time_offset") {
-      if (!(shape(0) > 0.0)) {
-        return refuse("the speeds are early: a robot file can only have them late");
+  bool first_shape(double factor) {
+    set_first(factor * shape(0));
+    return true;
+  }
+  bool first_if_positive(double factor) {
+    if (coefficient(0) > 0.0) {
+      set_first(factor * coefficient(0));
+    }
+    return true;
+  }
+  bool linear_per_mass() {
+    if (find("mass") == nullptr) {
+      return refuse(effect_.name + " needs a model with the mass in it");
+    }
+    return linear_all(drive_.physical("mass") / improved_.nominal.at("mass"));
+  }
+  bool out_of_round() {
+    for (std::size_t j = 0; j < cause_->effect.parameters.size(); ++j) {
+      if (!cause_->effect.parameters[j].beside) {
+        set(cause_->effect.parameters[j].name, coefficient(j) / unit_);
       }
-      set(first, shape(0));
-    } else if (name == "saturation") {
-      set(first, shape(0) / unit_);
-    } else if (name == "torque_deadzone" || name == "load_friction") {
-      if (coefficient(0) > 0.0) {
-        set(first, name == "load_friction" ? coefficient(0) : coefficient(0) / unit_);
-      }
-    } else if (name == "torque_gain_asymmetric") {
-      set(first, (excess_[1] - excess_[0]) / (2.0 + excess_.sum()));
-    } else if (name == "wheel_radius_asymmetric") {
-      const Eigen::Vector2d e = coefficient(0) * sides(*cause_);
-      set(first, (e[0] - e[1]) / (2.0 + e.sum()));
-    } else if (name == "encoder_scale") {
-      const Eigen::Vector2d e = coefficient(0) * sides(*cause_);
-      set("s_R", -e[0] / (1.0 + e[0]));
-      set("s_L", -e[1] / (1.0 + e[1]));
-    } else if (name == "battery_sag") {
-      convert_sag();
-    } else if (name == "longitudinal_slip") {
-      set(first, shape(0) / unit_);
-    } else if (name == "wheel_out_of_round") {
-      for (std::size_t j = 0; j < cause_->effect.parameters.size(); ++j) {
-        if (!cause_->effect.parameters[j].beside) {
-          set(cause_->effect.parameters[j].name, coefficient(j) / unit_);
-        }
-      }
-    } else if (name == "friction_drift") {
-      return convert_drift();
-    } else if (name == "backlash") {
-      return convert_backlash();
-    } else {
-      return refuse("there is no rule yet by which " + name + " becomes an effect of a robot file");
     }
     return true;
   }
@@ -334,7 +249,7 @@ class Improvement {
 
   // k and R_b of the file's law, u (k t + R_b Σ|u|) at each joint for the command u, that come nearest to what was
   // fitted.
-  void convert_sag() {
+  bool convert_sag() {
     const std::vector<Column> columns = cause_->effect.columns(drive_, cause_->shape);
     Eigen::VectorXd load = Eigen::VectorXd::Zero(drive_.rows());
     for (const JointSignals& joint : drive_.joints) {
@@ -362,6 +277,7 @@ class Improvement {
                                        : Eigen::Vector2d(b.cwiseQuotient(A.diagonal()));
     set("k", coefficient(0) != 0.0 ? found[0] : 0.0);
     set("R_b", coefficient(1) != 0.0 ? found[1] * unit_ : 0.0);
+    return true;
   }
 
   // The file's k is a share of all friction: the one that comes nearest to what was lost over the log, if it comes
@@ -418,16 +334,18 @@ class Improvement {
       improved_.effects.push_back(effect_);
       return true;
     }
+    const Way* const way = way_of(effect_.name);
     for (const auto& [name, value] : effect_.parameters) {
-      const auto law = std::ranges::find(law_->parameters_of(improved_.model), name, &EffectParameterLaw::name);
+      const auto law = std::ranges::find(law_->parameters_of(improved_), name, &EffectParameterLaw::name);
+      const bool adds_up = law->linear || (way != nullptr && way->adds_up);
       const auto [old, is_new] = there->parameters.emplace(name, value);
       if (is_new || old->second == value) {
-        if (!is_new && adds_up(effect_.name, *law)) {
+        if (!is_new && adds_up) {
           old->second = {2.0 * value.lower, 2.0 * value.upper};
         }
         continue;
       }
-      if (!adds_up(effect_.name, *law)) {
+      if (!adds_up) {
         return refuse("the robot has " + effect_.name + " already, with another " + name);
       }
       old->second = {old->second.lower + value.lower, old->second.upper + value.upper};
@@ -447,6 +365,157 @@ class Improvement {
   RobotEffect effect_;
 };
 
+const std::map<std::string, Improvement::Way>& Improvement::ways() {
+  using I = Improvement;
+  static const std::map<std::string, Way> all = {
+      {"payload",
+       {.change =
+            [](I& r) {
+              r.add(r.axis() ? "inertia" : "mass", r.fitted(0));
+              r.add("yaw_inertia", r.fitted(1));
+            }}},
+      {"viscous",
+       {.change =
+            [](I& r) {
+              r.add(r.axis() ? "viscous" : "viscous_linear", r.fitted(0));
+              r.add("viscous_yaw", r.fitted(1));
+            }}},
+      {"armature", {.change = [](I& r) { r.add_armature(2.0 * r.fitted(0)); }}},
+      {"torque_gain", {.change = [](I& r) { r.theta_ += r.fitted(0) * r.drive_.theta; }}},
+      {"wheel_radius",
+       {.change =
+            [](I& r) {
+              r.grow_wheels(1.0 + r.fitted(0));
+              r.add_armature(2.0 * r.fitted(1));
+            }}},
+      {"track_width",
+       {.change =
+            [](I& r) {
+              r.improved_.track_width *= 1.0 + r.fitted(0);
+              r.scale("viscous_yaw", std::pow(1.0 + r.fitted(0), 2));
+              r.add("yaw_inertia", r.fitted(1) * r.drive_.physical("yaw_inertia"));
+            }}},
+      {"coulomb", {.convert = [](I& r) { return r.linear_all(r.per_torque()); }}},
+      {"coulomb_asymmetric", {.convert = [](I& r) { return r.linear_all(r.per_torque()); }}},
+      {"torque_bias", {.convert = [](I& r) { return r.linear_all(r.per_torque()); }}},
+      {"stribeck",
+       {.convert =
+            [](I& r) {
+              r.linear("c_s", 0, r.per_torque());
+              r.set("omega_s", r.shape(0));
+              return true;
+            }}},
+      {"viscous_asymmetric",
+       {.change = [](I& r) { r.add_damping(r.fitted(0) * sides(*r.cause_).sum()); },
+        .convert =
+            [](I& r) {
+              const Eigen::Vector2d side = sides(*r.cause_);
+              r.linear("b", 0, r.per_torque() * (side[0] - side[1]));
+              return true;
+            }}},
+      {"quadratic_drag",
+       {.convert =
+            [](I& r) {
+              r.linear("c", 0, r.per_torque());
+              if (!r.axis()) {
+                r.linear("c2", 1, r.per_torque() / r.arm_ratio());
+              }
+              return true;
+            }}},
+      {"com_longitudinal",
+       {.change = [](I& r) { r.add("yaw_inertia", r.fitted(1) * r.drive_.physical("yaw_inertia")); },
+        .convert = [](I& r) { return r.linear_per_mass(); }}},
+      {"com_lateral", {.convert = [](I& r) { return r.linear_per_mass(); }}},
+      {"slope", {.convert = [](I& r) { return r.linear_per_mass(); }}},
+      {"caster_drag",
+       {.convert =
+            [](I& r) {
+              r.linear("c", 0, r.per_torque());
+              r.set("p", r.shape(0));
+              return true;
+            }}},
+      {"lateral_scrub",
+       {.convert =
+            [](I& r) {
+              r.linear("mu", 0, r.per_torque() / r.arm_ratio());
+              return true;
+            }}},
+      {"torque_gain_asymmetric",
+       {.change =
+            [](I& r) {
+              r.excess_ = r.fitted(0) * r.inertia_ratio() * sides(*r.cause_);
+              r.theta_ *= 2.0 * (1.0 + r.excess_[0]) * (1.0 + r.excess_[1]) / (2.0 + r.excess_.sum());
+            },
+        .convert =
+            [](I& r) {
+              r.set_first((r.excess_[1] - r.excess_[0]) / (2.0 + r.excess_.sum()));
+              return true;
+            },
+        .adds_up = true}},
+      {"actuator_lag", {.convert = [](I& r) { return r.first_shape(1.0); }, .adds_up = true}},
+      {"delay", {.convert = [](I& r) { return r.first_shape(1.0); }, .adds_up = true}},
+      {"sensor_time_offset",
+       {.convert =
+            [](I& r) {
+              return r.shape(0) > 0.0 ? r.first_shape(1.0)
+                                      : r.refuse("the speeds are early: a robot file can only have them late");
+            },
+        .adds_up = true}},
+      {"saturation",
+       {.convert =
+            [](I& r) {
+              r.set_first(r.shape(0) / r.unit_);
+              return true;
+            }}},
+      {"torque_deadzone",
+       {.convert =
+            [](I& r) {
+              if (r.coefficient(0) > 0.0) {
+                r.set_first(r.coefficient(0) / r.unit_);
+              }
+              return true;
+            },
+        .adds_up = true}},
+      {"load_friction", {.convert = [](I& r) { return r.first_if_positive(1.0); }, .adds_up = true}},
+      {"wheel_radius_asymmetric",
+       {.change =
+            [](I& r) {
+              const double both = sides(*r.cause_).sum();
+              r.grow_wheels(1.0 + 0.5 * r.fitted(0) * both);
+              r.add_armature(r.fitted(1) * both);
+            },
+        .convert =
+            [](I& r) {
+              const Eigen::Vector2d e = r.coefficient(0) * sides(*r.cause_);
+              r.set_first((e[0] - e[1]) / (2.0 + e.sum()));
+              return true;
+            },
+        .adds_up = true,
+        .beside = [](I& r) { return r.keep_joints(); }}},
+      {"encoder_scale",
+       {.change = [](I& r) { r.add_armature(r.fitted(1) * sides(*r.cause_).sum()); },
+        .convert =
+            [](I& r) {
+              const Eigen::Vector2d e = r.coefficient(0) * sides(*r.cause_);
+              r.set("s_R", -e[0] / (1.0 + e[0]));
+              r.set("s_L", -e[1] / (1.0 + e[1]));
+              return true;
+            },
+        .adds_up = true}},
+      {"battery_sag", {.convert = [](I& r) { return r.convert_sag(); }, .adds_up = true}},
+      {"longitudinal_slip",
+       {.convert =
+            [](I& r) {
+              r.set_first(r.shape(0) / r.unit_);
+              return true;
+            }}},
+      {"wheel_out_of_round", {.convert = [](I& r) { return r.out_of_round(); }, .adds_up = true}},
+      {"friction_drift", {.convert = [](I& r) { return r.convert_drift(); }}},
+      {"backlash", {.convert = [](I& r) { return r.convert_backlash(); }}},
+  };
+  return all;
+}
+
 }  // namespace
 
 Robot with_nominal(const Robot& robot, const Model& model, const Eigen::VectorXd& theta) {
@@ -460,8 +529,8 @@ Robot with_nominal(const Robot& robot, const Model& model, const Eigen::VectorXd
     const double value = theta[static_cast<Eigen::Index>(j)] / parameter.per_physical;
     physical[parameter.physical] = value;
     const bool of_effect = std::ranges::any_of(robot.effects, [&](const RobotEffect& effect) {
-      return std::ranges::any_of(effect.parameters, [&](const auto& entry) {
-        return physical_name(robot, effect.name, entry.first) == parameter.physical;
+      return std::ranges::any_of(effect_law(effect.name).parameters_of(robot), [&](const EffectParameterLaw& law) {
+        return law.linear && law.physical == parameter.physical && effect.parameters.contains(law.name);
       });
     });
     if (of_effect || std::ranges::find(possible, parameter.physical) == possible.end()) {
@@ -475,13 +544,13 @@ Robot with_nominal(const Robot& robot, const Model& model, const Eigen::VectorXd
     }
   }
   for (RobotEffect& effect : changed.effects) {
-    for (const EffectParameterLaw& law : effect_law(effect.name).parameters_of(robot.model)) {
-      const auto value = physical.find(physical_name(robot, effect.name, law.name));
+    for (const EffectParameterLaw& law : effect_law(effect.name).parameters_of(robot)) {
+      const auto value = physical.find(law.physical);
       const auto entry = effect.parameters.find(law.name);
       if (!law.linear || value == physical.end() || entry == effect.parameters.end()) {
         continue;
       }
-      const double number = value->second / (times_mass(effect.name) ? physical["mass"] : 1.0);
+      const double number = value->second / (law.times_mass ? physical["mass"] : 1.0);
       if (std::isfinite(number) && number != 0.0 && number >= law.lower && number <= law.upper) {
         entry->second = {number, number};
       }

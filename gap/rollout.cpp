@@ -250,7 +250,7 @@ void write(RolloutErrors& errors, std::size_t window, const Shown& simulated, co
 }
 
 void check_robot(const Drive& drive, const Robot& robot) {
-  check::that(drive.two_wheels() && robot.model == "differential_drive", "rollouts", "a robot on two driven wheels");
+  check::that(drive.two_wheels() && on_two_wheels(robot), "rollouts", "a robot on two driven wheels");
 }
 
 }  // namespace

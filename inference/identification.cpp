@@ -25,7 +25,7 @@ constexpr double kRisk = 1e-3;     // of Fit::plausible, which is not looked at 
 constexpr double kSlowestStribeck = 0.01, kFastestStribeck = 0.5;  // of the largest joint speed
 
 std::string motion_unit(const Setting& s) {
-  const bool linear = s.robot.model == "single_axis";  // its own unit: m or rad
+  const bool linear = !on_two_wheels(s.robot);  // its own unit: m or rad
   return s.measurement.motion == MotionKind::angle ? (linear ? "m or rad" : "rad") : (linear ? "per s" : "rad/s");
 }
 
@@ -37,7 +37,7 @@ std::optional<KnownNoise> known_motion_noise(const Setting& s) {
   }
   const bool counts = s.measurement.count > 0.0 || s.robot.encoder_counts_per_turn;
   const bool of_angles = s.measurement.motion != MotionKind::speed;
-  const bool linear = s.robot.model == "single_axis";
+  const bool linear = !on_two_wheels(s.robot);
   return KnownNoise{*bound, of_angles ? (linear ? "m or rad" : "rad") : motion_unit(s),
                     of_angles && counts ? "half an encoder count" : "as declared"};
 }
@@ -52,7 +52,7 @@ std::vector<ColumnNoise> find_noise(LogSource& log, const Setting& s) {
     ColumnNoise of_column;
     of_column.column = columns[c];
     const bool motion = c < s.measurement.motion_columns.size();
-    const bool axis = s.robot.model == "single_axis";
+    const bool axis = !on_two_wheels(s.robot);
     of_column.unit = motion ? motion_unit(s) : output_unit(s.robot, axis ? s.model.output_units.front() : "N·m");
     if (motion) {
       of_column.known = known_motion_noise(s);
@@ -217,14 +217,14 @@ void find_shapes(LogSource& log, const Setting& s, const Fit& fit, const Identif
     VariableProjectionOptions search;
     search.lower = Eigen::VectorXd::Constant(1, kSlowestStribeck * fastest);
     search.upper = Eigen::VectorXd::Constant(1, kFastestStribeck * fastest);
-    const char* unit = s.robot.model == "single_axis" ? "m/s or rad/s" : "rad/s";
+    const char* unit = !on_two_wheels(s.robot) ? "m/s or rad/s" : "rad/s";
     result.shapes.push_back(
         finding("stribeck_speed", unit, model, search, fit, fit.squares.weighted_rss, options.curve_points));
   }
 }
 
 bool shows_kinematics(const LogSource& log, const Robot& robot) {
-  return robot.model != "single_axis" && log.find("theta") && log.find("omega_r") && log.find("omega_l");
+  return on_two_wheels(robot) && log.find("theta") && log.find("omega_r") && log.find("omega_l");
 }
 
 bool has_effort(const LogSource& log, const Robot& robot, const Model& model) {

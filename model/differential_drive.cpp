@@ -77,6 +77,7 @@ Model DifferentialDrive::model() const {
 
   Model m;
   m.name = "differential_drive";
+  m.on_two_wheels = true;
   m.outputs = {"sum", "difference"};
   m.output_units = {"N·m", "N·m²"};
   m.coordinates = {"v1", "v2"};

@@ -108,28 +108,6 @@ TermValue caster_direction(const MotionState& s, const Constants& constants) {
   return {value, v > 0.0 ? std::min(2.0, 0.5 * std::numbers::pi * error / v) : 0.0};
 }
 
-// What stands behind the θ of an effect's parameter: its name, and whether the mass is in it.
-struct Quantity {
-  std::string physical;
-  bool times_mass = false;
-};
-
-Quantity quantity(const Robot& robot, const std::string& effect, const std::string& parameter) {
-  if (effect == "coulomb") {
-    return {"coulomb"};
-  }
-  if (effect == "torque_bias" && robot.model == "single_axis") {
-    return {"offset"};
-  }
-  if (effect == "com_longitudinal" || effect == "com_lateral") {
-    return {effect + "_moment", true};
-  }
-  if (effect == "slope") {
-    return {effect + (parameter == "g_x" ? "_force_x" : "_force_y"), true};
-  }
-  return {effect + "_" + parameter};
-}
-
 struct Found {
   const RobotEffect* effect = nullptr;
   std::string parameter;
@@ -141,10 +119,9 @@ Found find(const Robot& robot, const std::string& physical) {
     if (effect_law(effect.name).mechanism != EffectMechanism::term) {
       continue;
     }
-    for (const EffectParameterLaw& law : effect_law(effect.name).parameters_of(robot.model)) {
-      const Quantity q = quantity(robot, effect.name, law.name);
-      if (law.linear && q.physical == physical && effect.parameters.contains(law.name)) {
-        return {&effect, law.name, q.times_mass};
+    for (const EffectParameterLaw& law : effect_law(effect.name).parameters_of(robot)) {
+      if (law.linear && law.physical == physical && effect.parameters.contains(law.name)) {
+        return {&effect, law.name, law.times_mass};
       }
     }
   }
@@ -178,8 +155,18 @@ Parameter torque_like(const char* unit, const char* excite, double per_physical 
   return p;
 }
 
-// Fills a model with the terms of one robot's effects.
-struct Builder {
+}  // namespace
+
+// The model that gets the terms of one robot's effects.
+class EffectTerms {
+ public:
+  EffectTerms(Model& to, const Robot& of) : model(to), robot(of) {
+    if (on_two_wheels(robot)) {
+      half_track = 0.5 * drive_geometry(robot).track_width;
+      arm_ratio = robot.lever_arm_is_track ? 2.0 : 1.0;
+    }
+  }
+
   Model& model;
   const Robot& robot;
   double half_track = 0.0;  // of the geometry
@@ -190,7 +177,8 @@ struct Builder {
     if (!effect.parameters.contains(name)) {
       return false;
     }
-    p.physical = quantity(robot, effect.name, name).physical;
+    const auto& known = effect_law(effect.name).parameters_of(robot);
+    p.physical = std::ranges::find(known, name, &EffectParameterLaw::name)->physical;
     p.name = (p.per_physical == 1.0 ? "" : "r_") + p.physical;
     p.prior = *effect_prior(robot, p.physical);
     model.parameters.push_back(std::move(p));
@@ -214,106 +202,111 @@ struct Builder {
       term(i, model.input(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)), function);
     }
   }
-
-  void friction_at_wheels(const RobotEffect& effect) {
-    constexpr const char* both_ways = "drive both wheels in both directions";
-    const Parameter torque = torque_like("N·m", both_ways);
-    if (effect.name == "coulomb_asymmetric") {
-      for (std::size_t j = 0; j < 2; ++j) {
-        if (parameter(effect, j == 0 ? "c_R" : "c_L", torque)) {
-          at_joint(j, {dry, {static_cast<double>(j), 0.0}});
-        }
-      }
-    } else if (effect.name == "torque_bias") {
-      for (std::size_t j = 0; j < 2; ++j) {
-        if (parameter(effect, j == 0 ? "b_R" : "b_L", torque)) {
-          at_joint(j, {one, {}});
-        }
-      }
-    } else if (effect.name == "stribeck") {
-      Parameter slow = torque;
-      slow.excite = "drive slowly and fast, in both directions";
-      const bool axis = robot.model == "single_axis";
-      if (axis) {
-        slow.unit = slow.physical_unit = "N (rotary: N·m)";
-      }
-      parameter(effect, "c_s", slow);
-      for (std::size_t j = 0; j < model.joints.size(); ++j) {
-        const double scale = axis ? 1.0 : drive_geometry(robot).encoder_scale[static_cast<Eigen::Index>(j)];
-        at_joint(j, {stribeck, {static_cast<double>(j), scale * effect.value("omega_s")}});
-      }
-    }
-  }
-
-  void friction_of_motion(const RobotEffect& effect) {
-    constexpr auto speed = Term::Kind::speed;
-    if (effect.name == "viscous_asymmetric") {
-      parameter(effect, "b", torque_like("N·m·s/rad", "drive straight and turn"));
-      const double r = robot.wheel_radius;
-      term(0, half_track / r, speed, 1);
-      term(1, arm_ratio * half_track / r, speed, 0);
-    } else if (effect.name == "quadratic_drag" && robot.model == "single_axis") {
-      parameter(effect, "c", torque_like("N·s²/m² (rotary: N·m·s²/rad²)", "move at different speeds"));
-      term(0, 1.0, {signed_square, {}});
-    } else if (effect.name == "quadratic_drag") {
-      if (parameter(effect, "c", torque_like("N·s²/m", "drive straight at different speeds"))) {
-        term(0, 1.0, {signed_square, {0.0, 0.0}});
-      }
-      if (parameter(effect, "c2", torque_like("N·m²·s²/rad²", "turn at different rates"))) {
-        term(1, arm_ratio, {signed_square, {1.0, 0.0}});
-      }
-    } else if (effect.name == "caster_drag") {
-      parameter(effect, "c", torque_like("N·m", "drive straight, turn, and both"));
-      const double p = effect.value("p");
-      term(0, 1.0, {caster_direction, {p, 0.0}});
-      term(1, arm_ratio * p, {caster_direction, {p, 1.0}});
-    } else if (effect.name == "lateral_scrub") {
-      parameter(effect, "mu", torque_like("N·m²", "turn to both sides"));
-      term(1, arm_ratio, {yaw_sign, {}});
-    }
-  }
-
-  void mass(const RobotEffect& effect) {
-    constexpr auto acceleration = Term::Kind::acceleration;
-    const double r = robot.wheel_radius;
-    const Parameter moment = torque_like(
-        "kg·m²", effect.name == "com_lateral" ? "accelerate and brake on straight lines" : "drive in fast curves", r,
-        "kg·m");
-    if (effect.name == "com_longitudinal") {
-      parameter(effect, "a", moment);
-      term(0, 1.0, {minus_yaw_square, {}});
-      term(1, arm_ratio, {product_of_speeds, {}});
-    } else if (effect.name == "com_lateral") {
-      parameter(effect, "b", moment);
-      term(0, -1.0, acceleration, 1);
-      term(1, -arm_ratio, acceleration, 0);
-    } else if (effect.name == "slope") {
-      const Parameter force = torque_like("N·m", "drive straight in different directions", r, "N");
-      if (parameter(effect, "g_x", force)) {
-        term(0, 1.0, {along_x, {}});
-      }
-      if (parameter(effect, "g_y", force)) {
-        term(0, 1.0, {along_y, {}});
-      }
-      model.heading_used = true;
-    }
-  }
 };
+
+namespace {
+
+Parameter wheel_torque() { return torque_like("N·m", "drive both wheels in both directions"); }
+
+void coulomb_asymmetric(EffectTerms& add, const RobotEffect& effect) {
+  for (std::size_t j = 0; j < 2; ++j) {
+    if (add.parameter(effect, j == 0 ? "c_R" : "c_L", wheel_torque())) {
+      add.at_joint(j, {dry, {static_cast<double>(j), 0.0}});
+    }
+  }
+}
+
+void torque_bias(EffectTerms& add, const RobotEffect& effect) {
+  for (std::size_t j = 0; j < 2; ++j) {
+    if (add.parameter(effect, j == 0 ? "b_R" : "b_L", wheel_torque())) {
+      add.at_joint(j, {one, {}});
+    }
+  }
+}
+
+void stribeck_of_wheels(EffectTerms& add, const RobotEffect& effect) {
+  add.parameter(effect, "c_s", torque_like("N·m", "drive slowly and fast, in both directions"));
+  for (std::size_t j = 0; j < add.model.joints.size(); ++j) {
+    const double scale = drive_geometry(add.robot).encoder_scale[static_cast<Eigen::Index>(j)];
+    add.at_joint(j, {stribeck, {static_cast<double>(j), scale * effect.value("omega_s")}});
+  }
+}
+
+void stribeck_of_axis(EffectTerms& add, const RobotEffect& effect) {
+  add.parameter(effect, "c_s", torque_like("N (rotary: N·m)", "drive slowly and fast, in both directions"));
+  for (std::size_t j = 0; j < add.model.joints.size(); ++j) {
+    add.at_joint(j, {stribeck, {static_cast<double>(j), effect.value("omega_s")}});
+  }
+}
+
+void viscous_asymmetric(EffectTerms& add, const RobotEffect& effect) {
+  add.parameter(effect, "b", torque_like("N·m·s/rad", "drive straight and turn"));
+  const double r = add.robot.wheel_radius;
+  add.term(0, add.half_track / r, Term::Kind::speed, 1);
+  add.term(1, add.arm_ratio * add.half_track / r, Term::Kind::speed, 0);
+}
+
+void quadratic_drag(EffectTerms& add, const RobotEffect& effect) {
+  if (add.parameter(effect, "c", torque_like("N·s²/m", "drive straight at different speeds"))) {
+    add.term(0, 1.0, {signed_square, {0.0, 0.0}});
+  }
+  if (add.parameter(effect, "c2", torque_like("N·m²·s²/rad²", "turn at different rates"))) {
+    add.term(1, add.arm_ratio, {signed_square, {1.0, 0.0}});
+  }
+}
+
+void quadratic_drag_of_axis(EffectTerms& add, const RobotEffect& effect) {
+  add.parameter(effect, "c", torque_like("N·s²/m² (rotary: N·m·s²/rad²)", "move at different speeds"));
+  add.term(0, 1.0, {signed_square, {}});
+}
+
+void caster_drag(EffectTerms& add, const RobotEffect& effect) {
+  add.parameter(effect, "c", torque_like("N·m", "drive straight, turn, and both"));
+  const double p = effect.value("p");
+  add.term(0, 1.0, {caster_direction, {p, 0.0}});
+  add.term(1, add.arm_ratio * p, {caster_direction, {p, 1.0}});
+}
+
+void lateral_scrub(EffectTerms& add, const RobotEffect& effect) {
+  add.parameter(effect, "mu", torque_like("N·m²", "turn to both sides"));
+  add.term(1, add.arm_ratio, {yaw_sign, {}});
+}
+
+Parameter moment_of_mass(const EffectTerms& add, const char* excite) {
+  return torque_like("kg·m²", excite, add.robot.wheel_radius, "kg·m");
+}
+
+void com_longitudinal(EffectTerms& add, const RobotEffect& effect) {
+  add.parameter(effect, "a", moment_of_mass(add, "drive in fast curves"));
+  add.term(0, 1.0, {minus_yaw_square, {}});
+  add.term(1, add.arm_ratio, {product_of_speeds, {}});
+}
+
+void com_lateral(EffectTerms& add, const RobotEffect& effect) {
+  add.parameter(effect, "b", moment_of_mass(add, "accelerate and brake on straight lines"));
+  add.term(0, -1.0, Term::Kind::acceleration, 1);
+  add.term(1, -add.arm_ratio, Term::Kind::acceleration, 0);
+}
+
+void slope(EffectTerms& add, const RobotEffect& effect) {
+  const Parameter force = torque_like("N·m", "drive straight in different directions", add.robot.wheel_radius, "N");
+  if (add.parameter(effect, "g_x", force)) {
+    add.term(0, 1.0, {along_x, {}});
+  }
+  if (add.parameter(effect, "g_y", force)) {
+    add.term(0, 1.0, {along_y, {}});
+  }
+  add.model.heading_used = true;
+}
 
 }  // namespace
 
 void add_effect_terms(Model& model, const Robot& robot) {
-  Builder builder{model, robot};
-  if (robot.model == "differential_drive") {
-    builder.half_track = 0.5 * drive_geometry(robot).track_width;
-    builder.arm_ratio = robot.lever_arm_is_track ? 2.0 : 1.0;
-  }
+  EffectTerms terms{model, robot};
   for (const RobotEffect& effect : robot.effects) {
-    const bool own = effect.name == "coulomb" || (effect.name == "torque_bias" && robot.model == "single_axis");
-    if (effect_law(effect.name).mechanism == EffectMechanism::term && !own) {
-      builder.friction_at_wheels(effect);
-      builder.friction_of_motion(effect);
-      builder.mass(effect);
+    const EffectLaw& law = effect_law(effect.name);
+    if (const auto add = on_two_wheels(robot) ? law.add_terms : law.add_terms_of_axis) {
+      add(terms, effect);
     }
   }
 }
@@ -363,16 +356,42 @@ EffectParameterLaw shape(const char* name, const char* unit, double upper = kInf
 EffectParameterLaw share(const char* name) { return {name, "1", false, -largest_share, largest_share}; }
 EffectParameterLaw fixed(const char* name, const char* unit) { return {name, unit, false}; }
 
-EffectLaw terms(const char* name, Parameters parameters, Parameters of_axis = {}) {
-  return {name, EffectMechanism::term, std::move(parameters), std::move(of_axis), {}};
+// The quantity behind θ where it is not called after effect and parameter.
+EffectParameterLaw known_as(const char* physical, EffectParameterLaw law, bool times_mass = false) {
+  law.physical = physical;
+  law.times_mass = times_mass;
+  return law;
+}
+
+EffectParameterLaw optional(EffectParameterLaw law) {
+  law.optional = true;
+  return law;
+}
+
+using AddTerms = void (*)(EffectTerms&, const RobotEffect&);
+
+Parameters named(const std::string& effect, Parameters parameters) {
+  for (EffectParameterLaw& law : parameters) {
+    if (law.linear && law.physical.empty()) {
+      law.physical = effect + "_" + law.name;
+    }
+  }
+  return parameters;
+}
+
+EffectLaw terms(const char* name, AddTerms add, Parameters parameters, AddTerms add_of_axis = nullptr,
+                Parameters of_axis = {}) {
+  return {
+      name,       EffectMechanism::term, named(name, std::move(parameters)), named(name, std::move(of_axis)), {}, add,
+      add_of_axis};
 }
 
 EffectLaw effort(const char* name, const Parameters& parameters, bool axis) {
-  return {name, EffectMechanism::effort, parameters, axis ? parameters : Parameters{}, {}};
+  return {name, EffectMechanism::effort, parameters, axis ? parameters : Parameters{}};
 }
 
 EffectLaw geometry(const char* name, Parameters parameters) {
-  return {name, EffectMechanism::geometry, std::move(parameters), {}, {}};
+  return {name, EffectMechanism::geometry, std::move(parameters), {}};
 }
 
 EffectLaw simulation(const char* name, Parameters parameters, const char* remedy) {
@@ -381,17 +400,22 @@ EffectLaw simulation(const char* name, Parameters parameters, const char* remedy
 
 std::vector<EffectLaw> make_laws() {
   return {
-      terms("coulomb", {not_negative("c", "N·m")}, {not_negative("c", "N·m")}),
-      terms("coulomb_asymmetric", {not_negative("c_R", "N·m"), not_negative("c_L", "N·m")}),
-      terms("stribeck", {linear("c_s", "N·m"), shape("omega_s", "rad/s")},
+      terms("coulomb", nullptr, {known_as("coulomb", not_negative("c", "N·m"))}, nullptr,
+            {known_as("coulomb", not_negative("c", "N·m"))}),
+      terms("coulomb_asymmetric", coulomb_asymmetric, {not_negative("c_R", "N·m"), not_negative("c_L", "N·m")}),
+      terms("stribeck", stribeck_of_wheels, {linear("c_s", "N·m"), shape("omega_s", "rad/s")}, stribeck_of_axis,
             {linear("c_s", "N·m"), shape("omega_s", "rad/s")}),
-      terms("viscous_asymmetric", {linear("b", "N·m·s/rad")}),
-      terms("quadratic_drag", {linear("c", "N·s²/m"), linear("c2", "N·m²·s²/rad²")}, {linear("c", "N·m·s²/rad²")}),
-      terms("com_longitudinal", {linear("a", "m")}),
-      terms("com_lateral", {linear("b", "m")}),
+      terms("viscous_asymmetric", viscous_asymmetric, {linear("b", "N·m·s/rad")}),
+      terms("quadratic_drag", quadratic_drag, {linear("c", "N·s²/m"), linear("c2", "N·m²·s²/rad²")},
+            quadratic_drag_of_axis, {linear("c", "N·m·s²/rad²")}),
+      terms("com_longitudinal", com_longitudinal, {known_as("com_longitudinal_moment", linear("a", "m"), true)}),
+      terms("com_lateral", com_lateral, {known_as("com_lateral_moment", linear("b", "m"), true)}),
       effort("torque_gain_asymmetric", {share("g")}, false),
-      terms("torque_bias", {linear("b_R", "N·m"), linear("b_L", "N·m")}, {linear("b", "N·m")}),
-      terms("slope", {linear("g_x", "m/s²"), linear("g_y", "m/s²")}),
+      terms("torque_bias", torque_bias, {linear("b_R", "N·m"), linear("b_L", "N·m")}, nullptr,
+            {known_as("offset", linear("b", "N·m"))}),
+      terms("slope", slope,
+            {known_as("slope_force_x", linear("g_x", "m/s²"), true),
+             known_as("slope_force_y", linear("g_y", "m/s²"), true)}),
       effort("actuator_lag", {shape("T", "s", longest_time)}, true),
       effort("delay", {shape("T_d", "s", longest_time)}, true),
       effort("sensor_time_offset", {shape("dt", "s", longest_time)}, true),
@@ -412,8 +436,8 @@ std::vector<EffectLaw> make_laws() {
       simulation("friction_drift", {{"k", "1", false, -1.0, 1.0}, shape("T", "s", longest_drift)},
                  "how warm the robot was at the start of a log is not known; leave it out of the robot file, and "
                  "commission with a log of the warm robot, or give wide priors of friction"),
-      terms("caster_drag", {not_negative("c", "N·m"), shape("p", "m")}),
-      terms("lateral_scrub", {linear("mu", "N·m²")}),
+      terms("caster_drag", caster_drag, {not_negative("c", "N·m"), shape("p", "m")}),
+      terms("lateral_scrub", lateral_scrub, {linear("mu", "N·m²")}),
       simulation("wheel_out_of_round",
                  {fixed("A_R", "N·m"), fixed("B_R", "N·m"), fixed("A_L", "N·m"), fixed("B_L", "N·m")},
                  "the angle at which a log's encoders begin is not known; leave it out of the robot file, and let the "
@@ -425,7 +449,7 @@ std::vector<EffectLaw> make_laws() {
       geometry("wheel_radius_asymmetric", {share("eps")}),
       geometry("wheel_radius", {share("eps")}),
       geometry("track_width", {share("eps")}),
-      geometry("encoder_scale", {share("s_R"), share("s_L")}),
+      geometry("encoder_scale", {optional(share("s_R")), optional(share("s_L"))}),
   };
 }
 
@@ -450,9 +474,9 @@ std::string limits_of(const EffectParameterLaw& law) {
 
 void validate_effect(const RobotEffect& effect, const Robot& robot) {
   const EffectLaw& law = effect_law(effect.name);
-  const Parameters& known = law.parameters_of(robot.model);
+  const Parameters& known = law.parameters_of(robot);
   check::that(!known.empty(), "effects." + effect.name,
-              "an effect of the model " + robot.model + ", one of " + joined(effect_names(robot.model)));
+              "an effect of the model " + robot.model + ", one of " + joined(effect_names(robot)));
   for (const auto& [name, interval] : effect.parameters) {
     const std::string where = "effects." + effect.name + "." + name;
     const auto found = std::ranges::find(known, name, &EffectParameterLaw::name);
@@ -476,8 +500,8 @@ void validate_effect(const RobotEffect& effect, const Robot& robot) {
     const bool given = effect.parameters.contains(parameter.name);
     any_linear = any_linear || parameter.linear;
     some_linear = some_linear || (parameter.linear && given);
-    const bool side = effect.name == "encoder_scale";  // a side that is not named is right
-    check::that(parameter.linear || given || side, "effects." + effect.name, "the parameter " + parameter.name);
+    check::that(parameter.linear || given || parameter.optional, "effects." + effect.name,
+                "the parameter " + parameter.name);
   }
   check::that((!any_linear || some_linear) && !effect.parameters.empty(), "effects." + effect.name,
               "at least one parameter");
@@ -501,10 +525,10 @@ const EffectLaw& effect_law(const std::string& name) {
   return *found;
 }
 
-std::vector<std::string> effect_names(const std::string& model) {
+std::vector<std::string> effect_names(const Robot& robot) {
   std::vector<std::string> names;
   for (const EffectLaw& law : effect_laws()) {
-    if (!law.parameters_of(model).empty()) {
+    if (!law.parameters_of(robot).empty()) {
       names.push_back(law.name);
     }
   }

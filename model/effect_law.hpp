@@ -85,7 +85,12 @@ struct EffectParameterLaw {
   double lower = -std::numeric_limits<double>::infinity();  ///< least value that makes sense
   double upper = std::numeric_limits<double>::infinity();   ///< largest one
   bool positive = false;                                    ///< and not 0
+  bool optional = false;                                    ///< not linear, and not needed: without it the effect has 0
+  std::string physical{};   ///< linear: the quantity of the model's parameter, e.g. "coulomb_asymmetric_c_R"
+  bool times_mass = false;  ///< linear: that quantity is this times the mass
 };
+
+class EffectTerms;
 
 /// One effect. An effect's δ is the effort that the motors have to supply in addition to the basic model's.
 struct EffectLaw {
@@ -93,11 +98,14 @@ struct EffectLaw {
   EffectMechanism mechanism = EffectMechanism::term;
   std::vector<EffectParameterLaw> parameters;  ///< of a differential drive; empty: it has no such effect
   std::vector<EffectParameterLaw> of_axis;     ///< of a single axis; empty: it has no such effect
-  std::string remedy;  ///< for Mechanism::simulation: why a log cannot be corrected for it, and what to do instead
+  std::string remedy{};  ///< for Mechanism::simulation: why a log cannot be corrected for it, and what to do instead
+  /// Appends the terms of one robot's effect to its model (add_effect_terms); nothing where they are the model's own.
+  void (*add_terms)(EffectTerms& terms, const RobotEffect& effect) = nullptr;
+  void (*add_terms_of_axis)(EffectTerms& terms, const RobotEffect& effect) = nullptr;
 
-  /// The parameters for a robot of the model `model`.
-  [[nodiscard]] const std::vector<EffectParameterLaw>& parameters_of(const std::string& model) const {
-    return model == "single_axis" ? of_axis : parameters;
+  /// The parameters for a robot of the model that `robot` names.
+  [[nodiscard]] const std::vector<EffectParameterLaw>& parameters_of(const Robot& robot) const {
+    return on_two_wheels(robot) ? parameters : of_axis;
   }
 };
 
@@ -107,8 +115,8 @@ struct EffectLaw {
 /// The law called `name`. Throws InvalidArgument, listing the names, where there is none.
 [[nodiscard]] const EffectLaw& effect_law(const std::string& name);
 
-/// Names of the effects that a robot of the model `model` can have.
-[[nodiscard]] std::vector<std::string> effect_names(const std::string& model);
+/// Names of the effects that a robot of the model that `robot` names can have.
+[[nodiscard]] std::vector<std::string> effect_names(const Robot& robot);
 
 /// Throws InvalidArgument, naming the effect and its parameter, unless every effect of `robot` is one that its model
 /// can have, stands there once and has the parameters that its law asks for, within their limits; and unless efforts

@@ -117,6 +117,7 @@ struct Model {
   std::vector<Term> terms;      ///< the non-zero entries of Y
   int heading_coordinate = -1;  ///< coordinate whose integral is the heading, −1 where there is none
   bool heading_used = false;    ///< whether a term looks at the heading
+  bool on_two_wheels = false;   ///< drives on a right and a left wheel: has a heading, a pose, faults of its wheels
 
   /// n.
   [[nodiscard]] std::size_t n() const { return outputs.size(); }

@@ -16,16 +16,18 @@ namespace {
 // An unknown effort constant (A or V per N·m) is taken to lie below this in a default prior.
 constexpr double widest_effort_constant = 1e3;
 
+constexpr std::string_view kDrive = "differential_drive", kAxis = "single_axis";
+
 // Everything the robot's kind of model can have, before the robot's own choice of parameters and its effects' terms.
 Model full_model(const Robot& robot) {
-  if (robot.model == "differential_drive") {
+  if (robot.model == kDrive) {
     Model model = DifferentialDrive{robot.wheel_radius, drive_geometry(robot).track_width, robot.lever_arm_is_track,
                                     robot.anisotropic_friction, !has_effect(robot, "coulomb_asymmetric")}
                       .model();
     apply_geometry(model, robot);
     return model;
   }
-  if (robot.model == "single_axis") {
+  if (robot.model == kAxis) {
     return SingleAxis{.coulomb = true, .offset = true}.model();
   }
   throw InvalidArgument("model is '" + robot.model + "': expected differential_drive or single_axis");
@@ -186,6 +188,8 @@ PriorBox prior_box(const Robot& robot, const Model& model) {
   }
   return box;
 }
+
+bool on_two_wheels(const Robot& robot) { return robot.model == kDrive; }
 
 Robot with_column_errors(Robot robot, const std::vector<ColumnError>& errors) {
   const SensorNoise declared = robot.noise;

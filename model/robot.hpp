@@ -132,6 +132,10 @@ struct PriorBox {
 };
 [[nodiscard]] PriorBox prior_box(const Robot& robot, const Model& model);
 
+/// Whether the robot drives on a right and a left wheel beside each other, so that it has wheel radius and track width, a
+/// heading and a pose (Model::on_two_wheels); else it is an axis.
+[[nodiscard]] bool on_two_wheels(const Robot& robot);
+
 /// The robot with `errors` (of interpolated columns) added to the noise bounds that it declares, the largest of each
 /// kind; an estimated bound sees them in the log itself.
 [[nodiscard]] Robot with_column_errors(Robot robot, const std::vector<ColumnError>& errors);

@@ -114,7 +114,7 @@ std::unique_ptr<IdentificationObject> identify_log(LogObject& log, const RobotOb
     const std::vector<std::string> needed = app::needed_columns(robot.robot);
     const bool efforts = std::any_of(needed.begin(), needed.end(),
                                      [&](const std::string& name) { return given.find(name).has_value(); });
-    if (efforts || robot.robot.model == "single_axis" || !given.find("theta")) {
+    if (efforts || !on_two_wheels(robot.robot) || !given.find("theta")) {
       require_columns(given, needed);
     }
     WatchedLog source(*log.source, work);

@@ -138,7 +138,7 @@ std::string sees(const Commissioning& result) {
            "all "
            "that the robot did.";
   }
-  if (result.model.robot.model == "differential_drive") {
+  if (on_two_wheels(result.model.robot)) {
     return fmt::format(
         "The smallest change of both wheel radii that is certain to be seen is {}, at the best moment of the held-out "
         "driving (|δ1|/r = √(1+κ) − 1 with κ = {}); `wheelwright margins` says it for other faults, and while doing "

@@ -27,7 +27,7 @@ std::string smallest_change(const Commissioning& result, double kappa) {
   if (!(kappa > 0.0) || !std::isfinite(kappa)) {
     return "none";
   }
-  return result.model.robot.model == "differential_drive" ? percent(radius_change(kappa)) : "–";
+  return on_two_wheels(result.model.robot) ? percent(radius_change(kappa)) : "–";
 }
 
 std::string joint_list(const std::vector<double>& values) {

@@ -189,10 +189,10 @@ std::vector<std::string> keys_of(const std::vector<EffectParameterLaw>& paramete
 }
 
 // Keys of all effects together: with them the name of the effect is found before its own keys are checked.
-std::vector<std::string> all_keys(const std::string& model) {
+std::vector<std::string> all_keys(const Robot& robot) {
   std::vector<std::string> keys = {"effect"};
   for (const EffectLaw& law : effect_laws()) {
-    for (const EffectParameterLaw& parameter : law.parameters_of(model)) {
+    for (const EffectParameterLaw& parameter : law.parameters_of(robot)) {
       if (std::ranges::find(keys, parameter.name) == keys.end()) {
         keys.push_back(parameter.name);
       }
@@ -203,11 +203,11 @@ std::vector<std::string> all_keys(const std::string& model) {
 
 RobotEffect read_effect(const YamlPlace& place, const Robot& robot) {
   RobotEffect effect;
-  const std::vector<std::string> names = effect_names(robot.model);
+  const std::vector<std::string> names = effect_names(robot);
   if (place.is_scalar()) {
     place.fail("{effect: NAME, parameter: value, ...}");
   }
-  for (const auto& [key, value] : place.members(all_keys(robot.model))) {
+  for (const auto& [key, value] : place.members(all_keys(robot))) {
     if (key == "effect") {
       effect.name = names[value.choice(names)];
     }
@@ -215,7 +215,7 @@ RobotEffect read_effect(const YamlPlace& place, const Robot& robot) {
   if (effect.name.empty()) {
     place.fail("the key effect, one of " + listed(names));
   }
-  const std::vector<EffectParameterLaw>& known = effect_law(effect.name).parameters_of(robot.model);
+  const std::vector<EffectParameterLaw>& known = effect_law(effect.name).parameters_of(robot);
   for (const auto& [key, value] : place.members(keys_of(known))) {
     if (key != "effect") {
       const auto law = std::ranges::find(known, key, &EffectParameterLaw::name);

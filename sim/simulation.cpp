@@ -39,7 +39,7 @@ DifferentialDrive drive_of(const Robot& robot) {
 }
 
 void validate(const Scenario& scenario) {
-  check::that(scenario.robot.model == "differential_drive", "robot.model is '" + scenario.robot.model + "'",
+  check::that(on_two_wheels(scenario.robot), "robot.model is '" + scenario.robot.model + "'",
               "differential_drive, which is what can be simulated");
   static_cast<void>(make_model(scenario.robot));
   check::that(scenario.robot.effort != EffortKind::voltage, "robot.effort",

@@ -127,7 +127,7 @@ std::vector<std::string> robot_inputs(const RobotAt& at) {
     names.emplace_back("encoder_counts_per_turn");
   }
   names.insert(names.end(), {"filter.alpha", "filter.beta"});
-  if (at.robot.model != "single_axis") {
+  if (on_two_wheels(at.robot)) {
     names.insert(names.end(), {"wheel_radius", "track_width"});
   }
   return names;

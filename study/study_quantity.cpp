@@ -313,7 +313,7 @@ std::vector<StudyQuantity> study_quantities(const std::vector<std::string>& name
                                                  "false_alarms", "commissioned"};
   Reader reader{robot, make_model(robot)};
   for (const std::string& name : names.empty() ? usual : names) {
-    if (names.empty() && name.starts_with("smallest_fault") && robot.model != "differential_drive") {
+    if (names.empty() && name.starts_with("smallest_fault") && !on_two_wheels(robot)) {
       continue;
     }
     reader.read(name);

@@ -136,7 +136,9 @@ def results_of(run, program, folder, words):
     here = folder / run.name
     here.mkdir()
     environment = dict(os.environ, GLIBC_TUNABLES="glibc.cpu.hwcaps=-AVX2,-FMA,-AVX512F", LC_ALL="C")
-    done = subprocess.run([program, *run.words], cwd=here, env=environment, capture_output=True, check=False)
+    # Results name the files they come from: as seen from the run's folder, wherever this repository lies.
+    call = [word.replace(str(ROOT / "examples"), "../shipped").replace(str(SHARED), "../recorded") for word in run.words]
+    done = subprocess.run([program, *call], cwd=here, env=environment, capture_output=True, check=False)
     found = {"exit": done.returncode}
     if "--json" in run.words:
         (here / "stdout.json").write_bytes(done.stdout)
@@ -156,6 +158,8 @@ def all_results(runs, program, jobs, words, keep):
         keep.mkdir(parents=True)
     with tempfile.TemporaryDirectory() as temporary, concurrent.futures.ThreadPoolExecutor(jobs) as pool:
         going, folder = {}, (keep or pathlib.Path(temporary)).resolve()
+        (folder / "shipped").symlink_to(ROOT / "examples")
+        (folder / "recorded").symlink_to(SHARED)
         while waiting or going:
             for run in [r for r in waiting if all(n in results for n in r.needs)]:
                 waiting.remove(run)

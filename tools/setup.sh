@@ -14,7 +14,7 @@ set -eu
 cd "$(dirname "$0")/.."
 
 packages="g++ cmake ninja-build pkg-config
-  libeigen3-dev libfmt-dev libyaml-cpp-dev nlohmann-json3-dev zlib1g-dev libzstd-dev liblz4-dev libboost-dev
+  libeigen3-dev libfmt-dev libyaml-cpp-dev nlohmann-json3-dev zlib1g-dev libzstd-dev liblz4-dev libxxhash-dev libboost-dev
   libsqlite3-dev libfastcdr-dev libhdf5-dev libtinyxml2-dev
   libceres-dev libnlopt-cxx-dev libnlopt-dev libtbb-dev
   libcli11-dev"

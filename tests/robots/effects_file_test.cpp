@@ -50,16 +50,17 @@ TEST(EffectsFile, ValuesAndIntervalsAreRead) {
 // Every effect of the catalogue, written and read again, is the same to the last bit.
 TEST(EffectsFile, ARobotFileReadsBackEqual) {
   for (const std::string model : {"differential_drive", "single_axis"}) {
-    for (const std::string& name : effect_names(model)) {
-      Robot robot;
-      robot.model = model;
+    Robot kind;
+    kind.model = model;
+    for (const std::string& name : effect_names(kind)) {
+      Robot robot = kind;
       if (model == "differential_drive") {
         robot.wheel_radius = 0.0975;
         robot.track_width = 0.381;
       }
       RobotEffect effect{name, {}};
       double value = 0.1 / 3.0;
-      for (const EffectParameterLaw& law : effect_law(name).parameters_of(model)) {
+      for (const EffectParameterLaw& law : effect_law(name).parameters_of(robot)) {
         effect.parameters[law.name] = law.linear ? Interval{value, 7.0 * value} : Interval{value, value};
         value *= 1.1;
       }
