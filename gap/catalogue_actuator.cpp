@@ -59,6 +59,7 @@ Effect actuator_lag() {
           .shapes = {duration("T")},
           .unit_coefficient = true,
           .excite = "change the torque fast: steps and high frequencies",
+          .measured_by = DirectMeasurement::timing,
           .columns = [](const Drive& drive, Shape shape) {
             return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
                                            const Signal& u = drive.joints[j].effort;
@@ -74,6 +75,7 @@ Effect delay() {
           .shapes = {duration("T_d")},
           .unit_coefficient = true,
           .excite = "change the torque fast: steps and high frequencies",
+          .measured_by = DirectMeasurement::timing,
           .columns = [](const Drive& drive, Shape shape) {
             return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
                                            const Signal& u = drive.joints[j].effort;
@@ -91,6 +93,7 @@ Effect sensor_time_offset() {
           .shapes = {late},
           .unit_coefficient = true,
           .excite = "change speed and torque fast, with the pose logged",
+          .measured_by = DirectMeasurement::timing,
           .columns = [](const Drive& drive, Shape shape) {
             Column column = at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
                                         const Signal& u = drive.joints[j].effort;
@@ -108,10 +111,12 @@ Effect sensor_time_offset() {
 
 Effect torque_gain() {
   return {.name = "torque_gain",
+          .noun = "a torque constant other than designed",
           .sentence = "The actuators' torque constant is not as designed: all of the commands are too large or small.",
           .parametric = true,
           .parameters = {{"command_excess", "1", 0}},
           .excite = "drive a known load",
+          .measured_by = DirectMeasurement::pull,
           .columns =
               [](const Drive& drive, Shape) {
                 return std::vector{at_joints(
@@ -127,6 +132,7 @@ Effect torque_gain_asymmetric() {
           .parameters = {{"command_excess", "1", 0}},
           .shapes = {side_or_opposite()},
           .excite = "accelerate and brake on a straight line, with the pose logged",
+          .measured_by = DirectMeasurement::pull,
           .applies = needs_two_wheels,
           .columns =
               [](const Drive& drive, Shape shape) {
@@ -147,6 +153,7 @@ Effect torque_bias(std::size_t joints) {
                 .family = "constant_force",
                 .parameters = {{"b", "N·m", 0}},
                 .excite = "drive in all directions, forwards and backwards",
+                .measured_by = DirectMeasurement::turned_round,
                 .applies = [](const Drive& drive) { return needs_no(drive, "offset"); }};
   if (joints == 2) {
     effect.parameters = {{"b_R", "N·m", 0}, {"b_L", "N·m", 0}};

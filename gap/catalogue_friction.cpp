@@ -21,6 +21,7 @@ Effect coulomb() {
           .family = "dry_friction",
           .parameters = {{"c", "N·m", 1}},
           .excite = "reverse often, turn on the spot, drive at several speeds",
+          .measured_by = DirectMeasurement::lifted_wheels,
           .applies = [](const Drive& drive) { return needs_no(drive, "coulomb"); },
           .columns = [](const Drive& drive, Shape) { return std::vector{at_joints(drive, speed_signs(drive))}; }};
 }
@@ -30,6 +31,7 @@ Effect coulomb_asymmetric() {
           .sentence = "Dry friction that differs between the wheels.",
           .parameters = {{"c_R", "N·m", 1}, {"c_L", "N·m", 1}},
           .excite = "reverse each wheel often",
+          .measured_by = DirectMeasurement::lifted_wheels,
           .applies = needs_two_wheels,
           .columns = [](const Drive& drive, Shape) {
             return std::vector{at_joints(drive, only(drive, 0, speed_sign(drive, 0))),
@@ -49,6 +51,7 @@ Effect stribeck() {
                       .logarithmic = true,
                       .scale = typical_speed}},
           .excite = "creep, and reverse slowly",
+          .measured_by = DirectMeasurement::lifted_wheels,
           .columns = [](const Drive& drive, Shape shape) {
             return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
                                            const auto w = drive.joints[j].smooth_speed.array() / shape[0];
@@ -59,10 +62,12 @@ Effect stribeck() {
 
 Effect viscous(std::size_t joints) {
   Effect effect{.name = "viscous",
+                .noun = "viscous friction other than designed",
                 .sentence = "Viscous friction other than in the base model.",
                 .parametric = true,
                 .parameters = {{"viscous_linear", "N·s/m", 0}, {"viscous_yaw", "N·m·s/rad", 0}},
-                .excite = "drive at different steady speeds, straight and turning"};
+                .excite = "drive at different steady speeds, straight and turning",
+                .measured_by = DirectMeasurement::lifted_wheels};
   if (joints == 1) {
     effect.parameters = {{"viscous", "N·s/m or N·m·s/rad", 0}};
     effect.columns = [](const Drive& drive, Shape) { return std::vector{base_column(drive, "viscous")}; };
@@ -82,6 +87,7 @@ Effect viscous_asymmetric() {
           .parameters = {{"damping", "N·m·s/rad", 0}},
           .shapes = {side_or_opposite()},
           .excite = "drive straight at different steady speeds, with the pose logged",
+          .measured_by = DirectMeasurement::lifted_wheels,
           .applies = needs_two_wheels,
           .columns =
               [](const Drive& drive, Shape shape) {
@@ -101,7 +107,8 @@ Effect quadratic_drag(std::size_t joints) {
   Effect effect{.name = "quadratic_drag",
                 .sentence = "Drag that grows with the square of the speed.",
                 .parameters = {{"c", "N·s²/m", 1}},
-                .excite = "drive from slow to as fast as it goes, straight and turning"};
+                .excite = "drive from slow to as fast as it goes, straight and turning",
+                .measured_by = DirectMeasurement::lifted_wheels};
   if (joints == 1) {
     effect.columns = [](const Drive& drive, Shape) {
       const auto v = drive.joints[0].smooth_speed.array();
@@ -127,6 +134,7 @@ Effect load_friction() {
           .sentence = "Friction in proportion to the torque that is passed on, as in a worm or harmonic drive.",
           .parameters = {{"k", "1", 1}},
           .excite = "accelerate and brake hard, and drive at constant speed",
+          .measured_by = DirectMeasurement::lifted_wheels,
           .applies =
               [](const Drive& drive) {
                 return drive.efforts_unsigned
@@ -181,6 +189,7 @@ Effect caster_drag() {
                       .logarithmic = true,
                       .scale = [](const Drive& drive) { return drive.wheel_radius * typical_speed(drive); }}},
           .excite = "mix straight driving and turning in all ratios",
+          .measured_by = DirectMeasurement::lifted_wheels,
           .applies = needs_two_wheels,
           .columns = [](const Drive& drive, Shape shape) {
             const double p = shape[0];
@@ -208,6 +217,7 @@ Effect lateral_scrub() {
                             return std::max(deviation(drive.coordinates[1].smooth_speed), 1e-12);
                           }}},
           .excite = "turn on the spot and in curves, both ways",
+          .measured_by = DirectMeasurement::lifted_wheels,
           .applies = needs_two_wheels,
           .columns = [](const Drive& drive, Shape shape) {
             Column column;

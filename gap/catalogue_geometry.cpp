@@ -41,6 +41,7 @@ Effect com_longitudinal() {
           .sentence = "The centre of mass lies before or behind the axle.",
           .parameters = {{"a", "m", 0}, {"inertia_change", "1", 0, true}},
           .excite = "drive fast curves of changing radius",
+          .measured_by = DirectMeasurement::weight,
           .applies = needs_two_wheels,
           .columns = [](const Drive& drive, Shape) {
             const double rm = drive.wheel_radius * drive.physical("mass");
@@ -58,6 +59,7 @@ Effect com_lateral() {
           .sentence = "The centre of mass lies to the left or right of the middle.",
           .parameters = {{"b", "m", 0}, {"inertia_change", "1", 0, true}},
           .excite = "accelerate and brake hard on a straight line",
+          .measured_by = DirectMeasurement::weight,
           .applies = needs_two_wheels,
           .columns = [](const Drive& drive, Shape) {
             const double rm = drive.wheel_radius * drive.physical("mass");
@@ -75,6 +77,7 @@ Effect slope() {
           .family = "constant_force",
           .parameters = {{"g_x", "m/s²", 0}, {"g_y", "m/s²", 0}},
           .excite = "drive slowly in all directions",
+          .measured_by = DirectMeasurement::turned_round,
           .applies = needs_heading,
           .columns =
               [](const Drive& drive, Shape) {
@@ -145,6 +148,7 @@ Effect wheel_radius() {
           .parametric = true,
           .parameters = {{"epsilon", "1", 0}, armature_change()},
           .excite = "drive straight with the pose logged",
+          .measured_by = DirectMeasurement::lengths,
           .applies = needs_two_wheels,
           .columns = [](const Drive& drive, Shape) {
             const Signal one = Signal::Ones(drive.rows());
@@ -160,6 +164,7 @@ Effect wheel_radius_asymmetric() {
           .parameters = {{"epsilon", "1", 0}, armature_change()},
           .shapes = {side_or_opposite()},
           .excite = "drive straight with the pose logged",
+          .measured_by = DirectMeasurement::lengths,
           .applies = needs_two_wheels,
           .columns = [](const Drive& drive, Shape shape) {
             const Signal one = Signal::Ones(drive.rows());
@@ -182,6 +187,7 @@ Effect encoder_scale() {
           .parameters = {{"epsilon", "1", 0}, armature_change()},
           .shapes = {side()},
           .excite = "drive straight with the pose logged",
+          .measured_by = DirectMeasurement::lengths,
           .applies = needs_two_wheels,
           .columns = [](const Drive& drive, Shape shape) {
             const std::size_t j = chosen(shape);
@@ -198,6 +204,7 @@ Effect track_width() {
       .parametric = true,
       .parameters = {{"narrowing", "1", 0}, {"inertia_change", "1", 0, true}},
       .excite = "turn on the spot, both ways, with the heading logged",
+      .measured_by = DirectMeasurement::lengths,
       .applies = needs_two_wheels,
       .columns =
           [](const Drive& drive, Shape) {
@@ -247,6 +254,7 @@ Applicability needs_sliding_wheels(const Drive& drive) {
 Effect turning_slip() {
   return {
       .name = "turning_slip",
+      .noun = "slip in turns",
       .sentence =
           "The wheels slide when the robot turns, as those of a skid-steer robot do: it turns slower than they "
           "say. Wheels and pose alone do not tell this from a wider track: measure the track on a turntable or "
@@ -270,6 +278,7 @@ Effect turning_slip() {
 // less of their speed.
 Effect curve_slip() {
   return {.name = "curve_slip",
+          .noun = "slip in fast curves",
           .sentence =
               "The robot slides in curves: its centre of rotation is ahead of or behind the wheels' axle, curves "
               "carry it outwards, and it runs slower in them than its wheels say.",
@@ -323,10 +332,12 @@ Effect longitudinal_slip() {
 
 Effect payload(std::size_t joints) {
   Effect effect{.name = "payload",
+                .noun = "a payload",
                 .sentence = "Mass was added or taken away; friction stayed.",
                 .parametric = true,
                 .parameters = {{"mass_kg", "kg", 0}},
-                .excite = "accelerate and brake, straight and turning"};
+                .excite = "accelerate and brake, straight and turning",
+                .measured_by = DirectMeasurement::weight};
   if (joints == 1) {
     effect.columns = [](const Drive& drive, Shape) { return std::vector{base_column(drive, "inertia")}; };
     return effect;
@@ -341,10 +352,12 @@ Effect payload(std::size_t joints) {
 
 Effect armature() {
   return {.name = "armature",
+          .noun = "inertia of rotors and gears",
           .sentence = "The joints' own turning parts (rotors, gears) have more inertia.",
           .parametric = true,
           .parameters = {{"armature", "kg·m²", 1}},
           .excite = "accelerate and brake, straight and turning",
+          .measured_by = DirectMeasurement::weight,
           .applies = needs_two_wheels,
           .columns = [](const Drive& drive, Shape) {
             return std::vector{rate_at_joints(drive, {drive.joints[0].speed, drive.joints[1].speed})};

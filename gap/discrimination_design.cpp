@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
-#include <set>
 
 #include <fmt/format.h>
 
@@ -189,40 +188,34 @@ std::vector<std::string> stage_words(const Plan& plan, const Model& model) {
 }
 
 std::string splitting_measurement(const Rival& a, const Rival& b, const std::vector<Effect>& catalogue) {
-  std::set<std::string> names;
+  DirectMeasurement by = DirectMeasurement::none;
   bool parametric = false;
   for (const Rival* rival : {&a, &b}) {
     for (const RivalCause& cause : rival->causes) {
       const auto effect = std::ranges::find(catalogue, cause.effect, &Effect::name);
       const bool in_both = std::ranges::count(a.causes, cause.effect, &RivalCause::effect) > 0 &&
                            std::ranges::count(b.causes, cause.effect, &RivalCause::effect) > 0;
-      if (!in_both) {
-        names.insert(cause.effect);
-        parametric = parametric || (effect != catalogue.end() && effect->parametric);
+      if (!in_both && effect != catalogue.end()) {
+        by = std::min(by, effect->measured_by);
+        parametric = parametric || effect->parametric;
       }
     }
   }
-  const auto any = [&names](std::initializer_list<const char*> of) {
-    return std::ranges::any_of(of, [&names](const char* name) { return names.contains(name); });
-  };
-  if (any({"wheel_radius", "wheel_radius_asymmetric", "encoder_scale", "track_width"})) {
-    return "the wheels' circumference and the track measured with a tape, or the pose in the log";
-  }
-  if (any({"payload", "armature", "com_longitudinal", "com_lateral"})) {
-    return "scales under the wheels, or a baseline log of the healthy robot driven with the same torque constants";
-  }
-  if (any({"torque_gain", "torque_gain_asymmetric"})) {
-    return "a spring balance that holds the robot while it pulls, which compares torque as logged with a known force";
-  }
-  if (any({"actuator_lag", "delay", "sensor_time_offset"})) {
-    return "motor current at a higher rate on the clock of the encoders, which shows when torque really begins";
-  }
-  if (any({"slope", "torque_bias"})) {
-    return "the same drive with the robot turned by half a turn, or a spirit level";
-  }
-  if (any({"coulomb", "coulomb_asymmetric", "stribeck", "caster_drag", "lateral_scrub", "load_friction", "viscous",
-           "viscous_asymmetric", "quadratic_drag"})) {
-    return "the wheels driven lifted off the ground: what remains is in bearings and gears, what goes is on the floor";
+  switch (by) {
+    case DirectMeasurement::lengths:
+      return "the wheels' circumference and the track measured with a tape, or the pose in the log";
+    case DirectMeasurement::weight:
+      return "scales under the wheels, or a baseline log of the healthy robot driven with the same torque constants";
+    case DirectMeasurement::pull:
+      return "a spring balance that holds the robot while it pulls, which compares torque as logged with a known force";
+    case DirectMeasurement::timing:
+      return "motor current at a higher rate on the clock of the encoders, which shows when torque really begins";
+    case DirectMeasurement::turned_round:
+      return "the same drive with the robot turned by half a turn, or a spirit level";
+    case DirectMeasurement::lifted_wheels:
+      return "the wheels driven lifted off the ground: what remains is in bearings and gears, what goes is on the "
+             "floor";
+    case DirectMeasurement::none: break;
   }
   return parametric ? "a baseline log of the healthy robot, or nominal values that can be trusted"
                     : "a sensor that sees one of them directly";

@@ -10,6 +10,7 @@
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/linear_algebra.hpp>
+#include <wheelwright/model/effect_law.hpp>
 
 namespace wheelwright {
 namespace {
@@ -246,19 +247,35 @@ Applicability needs_no(const Drive& drive, std::string_view name) {
 namespace wheelwright {
 namespace {
 
-std::vector<Effect> catalogue_of(std::size_t joints) {
-  std::vector<Effect> all = friction_effects(joints);
-  for (auto* group : {&geometry_effects, &actuator_effects}) {
-    std::vector<Effect> more = group(joints);
+std::vector<Effect> catalogue_of(const Model& model) {
+  std::vector<Effect> all = friction_effects(model.joints.size());
+  const auto append = [&all](std::vector<Effect> more) {
     all.insert(all.end(), std::make_move_iterator(more.begin()), std::make_move_iterator(more.end()));
-  }
+  };
+  append(geometry_effects(model.joints.size()));
+  append(actuator_effects(model.joints.size()));
+  append(effects_by_law(model, all));
   return all;
 }
 
 }  // namespace
 
-std::vector<Effect> effect_catalogue() { return catalogue_of(2); }
+std::vector<Effect> effect_catalogue() {
+  Robot robot;
+  robot.wheel_radius = robot.track_width = 1.0;
+  return catalogue_of(make_model(robot));
+}
 
-std::vector<Effect> effect_catalogue(const Model& model) { return catalogue_of(model.joints.size()); }
+std::vector<Effect> effect_catalogue(const Model& model) { return catalogue_of(model); }
+
+std::string catalogue_noun(std::string_view name) {
+  const auto law = std::ranges::find(effect_laws(), name, &EffectLaw::name);
+  if (law != effect_laws().end()) {
+    return law->noun;
+  }
+  static const std::vector<Effect> catalogue = effect_catalogue();
+  const auto effect = std::ranges::find(catalogue, name, &Effect::name);
+  return effect != catalogue.end() ? effect->noun : std::string();
+}
 
 }  // namespace wheelwright

@@ -63,9 +63,21 @@ struct Applicability {
   std::string reason;  ///< what is missing, in words; empty where it applies
 };
 
+/// A measurement without driving that tells an effect from others, the most telling first.
+enum class DirectMeasurement {
+  lengths,        ///< circumference of the wheels and track
+  weight,         ///< scales under the wheels
+  pull,           ///< force of the robot against a spring balance
+  timing,         ///< motor current on the clock of the encoders
+  turned_round,   ///< the same drive turned by half a turn
+  lifted_wheels,  ///< driving with the wheels off the ground
+  none,
+};
+
 /// One unmodelled effect, or one parametric cause.
 struct Effect {
   std::string name{};                         ///< as in results
+  std::string noun{};                         ///< as sentences call it; empty: as catalogue_noun(name)
   std::string sentence{};                     ///< what it is, for people
   std::string family{};                       ///< of effects that are the same cause; empty where it is alone
   std::string common{};                       ///< parametric cause that is a part of this effect: unequal gains have a
@@ -78,6 +90,7 @@ struct Effect {
   double inexact = 0.0;  ///< share of what it takes off that its columns leave at best (impacts shorter than a sampling
                          ///< interval); an explanation with it may leave so much more
   std::string excite{};  ///< the manoeuvre that would show it
+  DirectMeasurement measured_by = DirectMeasurement::none;
   std::function<Applicability(const Drive&)> applies{};  ///< empty: on every drive
   /// The columns at `shape` (one value for each of `shapes`), for a drive on which the effect applies and whose efforts
   /// are predicted (predict_efforts).
@@ -189,6 +202,14 @@ namespace wheelwright {
 
 /// The same for the robot `model`: those with one joint have fewer effects, and one coefficient where wheels have two.
 [[nodiscard]] std::vector<Effect> effect_catalogue(const Model& model);
+
+/// What sentences call the effect `name`: the noun of its law or of its entry in the catalogue; empty where there is
+/// neither.
+[[nodiscard]] std::string catalogue_noun(std::string_view name);
+
+/// Those that `own` lacks and whose law (effect_law.hpp) has terms for a robot of the model `model`: the terms on the
+/// smooth motion are their columns, the law's parameters their coefficients and shapes.
+[[nodiscard]] std::vector<Effect> effects_by_law(const Model& model, const std::vector<Effect>& own);
 
 /// Dry, viscous, load-dependent and drifting friction, drag, scrub and casters.
 [[nodiscard]] std::vector<Effect> friction_effects(std::size_t joints = 2);

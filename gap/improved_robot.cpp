@@ -55,20 +55,20 @@ class Improvement {
     if (law == laws.end() || law->parameters_of(improved_).empty()) {
       return refuse("a robot file has no effect called " + name);
     }
+    if (way == nullptr && !same_parameters(cause.effect, *law)) {
+      return refuse("there is no rule by which " + name + " becomes an effect of a robot file");
+    }
     cause_ = &cause;
     intervals_ = &intervals;
     law_ = &*law;
     effect_ = {name, {}};
-    if (way == nullptr) {
-      return refuse("there is no rule yet by which " + name + " becomes an effect of a robot file");
-    }
-    if (!way->convert(*this)) {
+    if (way != nullptr ? !way->convert(*this) : !as_law()) {
       return false;
     }
     if (!effect_.parameters.empty() && !no_linear_left() && !put()) {
       return false;
     }
-    return way->beside == nullptr || way->beside(*this);
+    return way == nullptr || way->beside == nullptr || way->beside(*this);
   }
 
   [[nodiscard]] const Robot& robot() const { return improved_; }
@@ -88,6 +88,22 @@ class Improvement {
     return found != ways().end() ? &found->second : nullptr;
   }
 
+  // Whether they are as effects_by_law() makes them.
+  [[nodiscard]] bool same_parameters(const Effect& effect, const EffectLaw& law) const {
+    std::vector<std::string> of_effect, of_law;
+    for (const bool is_linear : {true, false}) {
+      for (const EffectParameterLaw& parameter : law.parameters_of(improved_)) {
+        if (parameter.linear == is_linear) {
+          of_law.push_back(parameter.name);
+        }
+      }
+    }
+    std::ranges::transform(effect.parameters, std::back_inserter(of_effect), &EffectParameter::name);
+    std::ranges::transform(effect.shapes, std::back_inserter(of_effect), &ShapeParameter::name);
+    return of_effect == of_law &&
+           (!std::ranges::any_of(law.parameters_of(improved_), &EffectParameterLaw::times_mass) ||
+            improved_.nominal.contains("mass"));
+  }
   [[nodiscard]] bool axis() const { return !on_two_wheels(improved_); }
   bool refuse(std::string why) {
     why_not_ = std::move(why);
@@ -196,6 +212,19 @@ class Improvement {
   bool linear_all(double factor) {
     for (std::size_t j = 0; j < known().size(); ++j) {
       linear(known()[j].name, j, factor);
+    }
+    return true;
+  }
+  // Coefficients and shapes are the law's own parameters (effects_by_law).
+  bool as_law() {
+    std::size_t linear_one = 0, fixed_one = 0;
+    for (const EffectParameterLaw& law : known()) {
+      if (law.linear) {
+        const double mass = law.times_mass ? drive_.physical("mass") / improved_.nominal.at("mass") : 1.0;
+        linear(law.name, linear_one++, per_torque() * mass);
+      } else {
+        set(law.name, shape(fixed_one++));
+      }
     }
     return true;
   }

@@ -311,6 +311,14 @@ void add_effect_terms(Model& model, const Robot& robot) {
   }
 }
 
+Model effect_terms(Model model, const Robot& robot) {
+  model.parameters.clear();
+  model.terms.clear();
+  model.heading_used = false;
+  add_effect_terms(model, robot);
+  return model;
+}
+
 void add_dry_friction(Model& model, std::size_t parameter) {
   for (std::size_t j = 0; j < model.joints.size(); ++j) {
     for (std::size_t i = 0; i < model.n(); ++i) {
@@ -379,77 +387,85 @@ Parameters named(const std::string& effect, Parameters parameters) {
   return parameters;
 }
 
-EffectLaw terms(const char* name, AddTerms add, Parameters parameters, AddTerms add_of_axis = nullptr,
+EffectLaw terms(const char* name, const char* noun, AddTerms add, Parameters parameters, AddTerms add_of_axis = nullptr,
                 Parameters of_axis = {}) {
   return {
-      name,       EffectMechanism::term, named(name, std::move(parameters)), named(name, std::move(of_axis)), {}, add,
-      add_of_axis};
+      name, noun,       EffectMechanism::term, named(name, std::move(parameters)), named(name, std::move(of_axis)), {},
+      add,  add_of_axis};
 }
 
-EffectLaw effort(const char* name, const Parameters& parameters, bool axis) {
-  return {name, EffectMechanism::effort, parameters, axis ? parameters : Parameters{}};
+EffectLaw effort(const char* name, const char* noun, const Parameters& parameters, bool axis) {
+  return {name, noun, EffectMechanism::effort, parameters, axis ? parameters : Parameters{}};
 }
 
-EffectLaw geometry(const char* name, Parameters parameters) {
-  return {name, EffectMechanism::geometry, std::move(parameters), {}};
+EffectLaw geometry(const char* name, const char* noun, Parameters parameters) {
+  return {name, noun, EffectMechanism::geometry, std::move(parameters), {}};
 }
 
-EffectLaw simulation(const char* name, Parameters parameters, const char* remedy) {
-  return {name, EffectMechanism::simulation, std::move(parameters), {}, remedy};
+EffectLaw simulation(const char* name, const char* noun, Parameters parameters, const char* remedy) {
+  return {name, noun, EffectMechanism::simulation, std::move(parameters), {}, remedy};
 }
 
 std::vector<EffectLaw> make_laws() {
   return {
-      terms("coulomb", nullptr, {known_as("coulomb", not_negative("c", "N·m"))}, nullptr,
+      terms("coulomb", "dry friction", nullptr, {known_as("coulomb", not_negative("c", "N·m"))}, nullptr,
             {known_as("coulomb", not_negative("c", "N·m"))}),
-      terms("coulomb_asymmetric", coulomb_asymmetric, {not_negative("c_R", "N·m"), not_negative("c_L", "N·m")}),
-      terms("stribeck", stribeck_of_wheels, {linear("c_s", "N·m"), shape("omega_s", "rad/s")}, stribeck_of_axis,
+      terms("coulomb_asymmetric", "dry friction that differs between the wheels", coulomb_asymmetric,
+            {not_negative("c_R", "N·m"), not_negative("c_L", "N·m")}),
+      terms("stribeck", "dry friction that fades with speed", stribeck_of_wheels,
+            {linear("c_s", "N·m"), shape("omega_s", "rad/s")}, stribeck_of_axis,
             {linear("c_s", "N·m"), shape("omega_s", "rad/s")}),
-      terms("viscous_asymmetric", viscous_asymmetric, {linear("b", "N·m·s/rad")}),
-      terms("quadratic_drag", quadratic_drag, {linear("c", "N·s²/m"), linear("c2", "N·m²·s²/rad²")},
-            quadratic_drag_of_axis, {linear("c", "N·m·s²/rad²")}),
-      terms("com_longitudinal", com_longitudinal, {known_as("com_longitudinal_moment", linear("a", "m"), true)}),
-      terms("com_lateral", com_lateral, {known_as("com_lateral_moment", linear("b", "m"), true)}),
-      effort("torque_gain_asymmetric", {share("g")}, false),
-      terms("torque_bias", torque_bias, {linear("b_R", "N·m"), linear("b_L", "N·m")}, nullptr,
-            {known_as("offset", linear("b", "N·m"))}),
-      terms("slope", slope,
+      terms("viscous_asymmetric", "viscous friction that differs between the wheels", viscous_asymmetric,
+            {linear("b", "N·m·s/rad")}),
+      terms("quadratic_drag", "drag that grows with the square of the speed", quadratic_drag,
+            {linear("c", "N·s²/m"), linear("c2", "N·m²·s²/rad²")}, quadratic_drag_of_axis,
+            {linear("c", "N·m·s²/rad²")}),
+      terms("com_longitudinal", "a centre of mass before or behind the axle", com_longitudinal,
+            {known_as("com_longitudinal_moment", linear("a", "m"), true)}),
+      terms("com_lateral", "a centre of mass beside the middle", com_lateral,
+            {known_as("com_lateral_moment", linear("b", "m"), true)}),
+      effort("torque_gain_asymmetric", "an actuator gain that differs between the wheels", {share("g")}, false),
+      terms("torque_bias", "a constant offset of the torque", torque_bias, {linear("b_R", "N·m"), linear("b_L", "N·m")},
+            nullptr, {known_as("offset", linear("b", "N·m"))}),
+      terms("slope", "a slope of the ground", slope,
             {known_as("slope_force_x", linear("g_x", "m/s²"), true),
              known_as("slope_force_y", linear("g_y", "m/s²"), true)}),
-      effort("actuator_lag", {shape("T", "s", longest_time)}, true),
-      effort("delay", {shape("T_d", "s", longest_time)}, true),
-      effort("sensor_time_offset", {shape("dt", "s", longest_time)}, true),
-      effort("torque_deadzone", {shape("b", "N·m")}, true),
-      effort("saturation", {shape("tau_max", "N·m")}, true),
+      effort("actuator_lag", "a lag of the actuators", {shape("T", "s", longest_time)}, true),
+      effort("delay", "a delay of the torque", {shape("T_d", "s", longest_time)}, true),
+      effort("sensor_time_offset", "a time offset between the sensors", {shape("dt", "s", longest_time)}, true),
+      effort("torque_deadzone", "a dead zone of the actuators", {shape("b", "N·m")}, true),
+      effort("saturation", "a limit of the torque", {shape("tau_max", "N·m")}, true),
       simulation(
-          "backlash", {shape("gap", "rad", 1.0)},
+          "backlash", "play in the gears", {shape("gap", "rad", 1.0)},
           "where a wheel stands inside its play cannot be seen from the log; leave it out of the robot file, and "
           "avoid reversals of torque in the log, or widen noise.effort"),
       simulation(
-          "load_friction", {{"k", "1", false, 0.0, largest_share}},
+          "load_friction", "friction in proportion to the load", {{"k", "1", false, 0.0, largest_share}},
           "its regressor is the measured torque itself, whose noise it shares; leave it out of the robot file and "
           "give coulomb instead, which takes its mean part"),
       simulation(
-          "battery_sag", {fixed("k", "1/s"), fixed("R_b", "1/(N·m)")},
+          "battery_sag", "a sagging battery", {fixed("k", "1/s"), fixed("R_b", "1/(N·m)")},
           "the battery's charge at the start of a log is not known; leave it out of the robot file, and commission "
           "with a log of the same length and charge, or measure the current instead of the command"),
-      simulation("friction_drift", {{"k", "1", false, -1.0, 1.0}, shape("T", "s", longest_drift)},
+      simulation("friction_drift", "friction that falls as the drive warms up",
+                 {{"k", "1", false, -1.0, 1.0}, shape("T", "s", longest_drift)},
                  "how warm the robot was at the start of a log is not known; leave it out of the robot file, and "
                  "commission with a log of the warm robot, or give wide priors of friction"),
-      terms("caster_drag", caster_drag, {not_negative("c", "N·m"), shape("p", "m")}),
-      terms("lateral_scrub", lateral_scrub, {linear("mu", "N·m²")}),
-      simulation("wheel_out_of_round",
+      terms("caster_drag", "a dragging castor", caster_drag, {not_negative("c", "N·m"), shape("p", "m")}),
+      terms("lateral_scrub", "scrubbing of the tyres in turns", lateral_scrub, {linear("mu", "N·m²")}),
+      simulation("wheel_out_of_round", "a wheel that is out of round",
                  {fixed("A_R", "N·m"), fixed("B_R", "N·m"), fixed("A_L", "N·m"), fixed("B_L", "N·m")},
                  "the angle at which a log's encoders begin is not known; leave it out of the robot file, and let the "
                  "noise of the effort be estimated, which takes it in"),
       simulation(
-          "longitudinal_slip", {shape("stiffness", "N")},
+          "longitudinal_slip", "slip of the wheels", {shape("stiffness", "N")},
           "the body's speed is not that of the wheels, and depends on the force; leave it out of the robot file, "
           "and commission with a log of gentle driving"),
-      geometry("wheel_radius_asymmetric", {share("eps")}),
-      geometry("wheel_radius", {share("eps")}),
-      geometry("track_width", {share("eps")}),
-      geometry("encoder_scale", {optional(share("s_R")), optional(share("s_L"))}),
+      geometry("wheel_radius_asymmetric", "a difference between the wheel radii", {share("eps")}),
+      geometry("wheel_radius", "a wheel radius other than designed", {share("eps")}),
+      geometry("track_width", "a track width other than designed", {share("eps")}),
+      geometry("encoder_scale", "an encoder scale other than in the robot file",
+               {optional(share("s_R")), optional(share("s_L"))}),
   };
 }
 

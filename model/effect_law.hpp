@@ -56,6 +56,9 @@ void apply_geometry(Model& model, const Robot& robot);
 /// Where a sign is in doubt, by the error of the speed, the term is any number in [−1, 1].
 void add_effect_terms(Model& model, const Robot& robot);
 
+/// The parameters and terms of the robot's effects alone: `model` without its own, and then as add_effect_terms.
+[[nodiscard]] Model effect_terms(Model model, const Robot& robot);
+
 /// Adds dry friction of the parameter `parameter` at every joint: sgn ω_j times the column of the input matrix.
 void add_dry_friction(Model& model, std::size_t parameter);
 
@@ -88,6 +91,8 @@ struct EffectParameterLaw {
   bool optional = false;                                    ///< not linear, and not needed: without it the effect has 0
   std::string physical{};   ///< linear: the quantity of the model's parameter, e.g. "coulomb_asymmetric_c_R"
   bool times_mass = false;  ///< linear: that quantity is this times the mass
+  Interval search{};        ///< not linear: where a gap analysis looks for it, > 0 in its unit, where the effect has no
+                            ///< columns of its own in the catalogue of gap
 };
 
 class EffectTerms;
@@ -95,6 +100,7 @@ class EffectTerms;
 /// One effect. An effect's δ is the effort that the motors have to supply in addition to the basic model's.
 struct EffectLaw {
   std::string name;
+  std::string noun;  ///< as sentences call it: "dry friction that fades with speed"
   EffectMechanism mechanism = EffectMechanism::term;
   std::vector<EffectParameterLaw> parameters;  ///< of a differential drive; empty: it has no such effect
   std::vector<EffectParameterLaw> of_axis;     ///< of a single axis; empty: it has no such effect

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/model/model.hpp>
 
+#include <algorithm>
 #include <cmath>
+#include <span>
 #include <string>
+#include <vector>
 
 #include <wheelwright/core/check.hpp>
 
@@ -45,6 +48,32 @@ void validate_parameter(const Model& model, std::size_t j) {
 }
 
 }  // namespace
+
+double softened(const TermFunction& function, const MotionState& state) {
+  constexpr int points = 8;
+  std::vector<double> speed(state.speed.size()), joint_speed(state.joint_speed.size());
+  const auto move = [](std::span<const double> from, std::span<const double> error, double by,
+                       std::vector<double>& to) {
+    for (std::size_t i = 0; i < from.size(); ++i) {
+      to[i] = from[i] + by * error[i];
+    }
+  };
+  const std::vector<double> exact(std::max(speed.size(), joint_speed.size()), 0.0);
+  MotionState moved = state;
+  moved.speed = speed;
+  moved.joint_speed = joint_speed;
+  moved.speed_error = std::span(exact).first(speed.size());
+  moved.joint_error = std::span(exact).first(joint_speed.size());
+  moved.heading_error = 0.0;
+  double sum = 0.0;
+  for (int k = 0; k < points; ++k) {
+    const double by = (2.0 * k + 1.0) / points - 1.0;
+    move(state.speed, state.speed_error, by, speed);
+    move(state.joint_speed, state.joint_error, by, joint_speed);
+    sum += function(moved).value;
+  }
+  return sum / points;
+}
 
 void validate(const Model& model) {
   const auto joints = static_cast<Eigen::Index>(model.joints.size());

@@ -88,6 +88,11 @@ class TermFunction {
   std::array<double, 2> constants_{};
 };
 
+/// Mean of `function` over the errors of `state`: eight points on the way of all its speeds from −error to +error. Where
+/// it jumps with the sign of a speed, as dry friction does, it goes over from one value to the other, which simulators
+/// and fits of measured speeds need.
+[[nodiscard]] double softened(const TermFunction& function, const MotionState& state);
+
 /// One non-zero entry of Y: what stands at (output, parameter).
 struct Term {
   /// What the entry is made of.

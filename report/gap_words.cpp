@@ -8,47 +8,12 @@
 
 #include <fmt/format.h>
 
+#include <wheelwright/gap/effect.hpp>
 #include <wheelwright/gap/where.hpp>
 #include <wheelwright/report/text.hpp>
 
 namespace wheelwright::report {
 namespace {
-
-constexpr std::array<std::pair<std::string_view, std::string_view>, 33> kNouns = {{
-    {"coulomb", "dry friction"},
-    {"coulomb_asymmetric", "dry friction that differs between the wheels"},
-    {"stribeck", "dry friction that fades with speed"},
-    {"viscous_asymmetric", "viscous friction that differs between the wheels"},
-    {"quadratic_drag", "drag that grows with the square of the speed"},
-    {"com_longitudinal", "a centre of mass before or behind the axle"},
-    {"com_lateral", "a centre of mass beside the middle"},
-    {"torque_gain_asymmetric", "an actuator gain that differs between the wheels"},
-    {"torque_bias", "a constant offset of the torque"},
-    {"slope", "a slope of the ground"},
-    {"actuator_lag", "a lag of the actuators"},
-    {"delay", "a delay of the torque"},
-    {"sensor_time_offset", "a time offset between the sensors"},
-    {"torque_deadzone", "a dead zone of the actuators"},
-    {"saturation", "a limit of the torque"},
-    {"backlash", "play in the gears"},
-    {"load_friction", "friction in proportion to the load"},
-    {"battery_sag", "a sagging battery"},
-    {"friction_drift", "friction that falls as the drive warms up"},
-    {"caster_drag", "a dragging castor"},
-    {"lateral_scrub", "scrubbing of the tyres in turns"},
-    {"wheel_out_of_round", "a wheel that is out of round"},
-    {"longitudinal_slip", "slip of the wheels"},
-    {"wheel_radius_asymmetric", "a difference between the wheel radii"},
-    {"payload", "a payload"},
-    {"armature", "inertia of rotors and gears"},
-    {"viscous", "viscous friction other than designed"},
-    {"torque_gain", "a torque constant other than designed"},
-    {"wheel_radius", "a wheel radius other than designed"},
-    {"track_width", "a track width other than designed"},
-    {"encoder_scale", "an encoder scale other than in the robot file"},
-    {"turning_slip", "slip in turns"},
-    {"curve_slip", "slip in fast curves"},
-}};
 
 constexpr std::array<std::pair<std::string_view, std::string_view>, 8> kParameterNames{{
     {"mass_kg", "mass"},
@@ -162,9 +127,8 @@ std::string parameter_words(std::string_view parameter) {
 }
 
 std::string effect_noun(std::string_view effect) {
-  const auto found =
-      std::find_if(kNouns.begin(), kNouns.end(), [&](const auto& entry) { return entry.first == effect; });
-  return found != kNouns.end() ? std::string(found->second) : words(effect);
+  const std::string noun = catalogue_noun(effect);
+  return noun.empty() ? words(effect) : noun;
 }
 
 std::string effect_nouns(const std::vector<std::string>& effects) {

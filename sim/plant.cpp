@@ -4,9 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
+#include <string_view>
 #include <utility>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/model/effect_law.hpp>
 
 namespace wheelwright {
@@ -67,37 +70,121 @@ bool is_force(const RobotEffect& effect) {
   return law.mechanism == EffectMechanism::term || law.mechanism == EffectMechanism::simulation;
 }
 
+using TakeOver = void (*)(DriveEffects& effects, const RobotEffect& effect);
+
+// 0 where the robot file does not name it.
+double given(const RobotEffect& effect, const char* parameter) {
+  return effect.parameters.contains(parameter) ? effect.value(parameter) : 0.0;
+}
+
+// The effects that have a formula here.
+const std::map<std::string_view, TakeOver>& own_formulas() {
+  using D = DriveEffects;
+  using E = RobotEffect;
+  static const std::map<std::string_view, TakeOver> all = {
+      {"coulomb", [](D& d, const E& e) { d.coulomb.array() += given(e, "c"); }},
+      {"coulomb_asymmetric", [](D& d, const E& e) { d.coulomb += Eigen::Vector2d(given(e, "c_R"), given(e, "c_L")); }},
+      {"torque_bias",
+       [](D& d, const E& e) {
+         d.bias = {given(e, "b_R"), given(e, "b_L")};
+       }},
+      {"wheel_out_of_round",
+       [](D& d, const E& e) {
+         d.round_cos = {given(e, "A_R"), given(e, "A_L")};
+         d.round_sin = {given(e, "B_R"), given(e, "B_L")};
+       }},
+      {"stribeck",
+       [](D& d, const E& e) {
+         d.stribeck = given(e, "c_s");
+         d.stribeck_speed = given(e, "omega_s");
+       }},
+      {"viscous_asymmetric", [](D& d, const E& e) { d.viscous = given(e, "b"); }},
+      {"quadratic_drag",
+       [](D& d, const E& e) {
+         d.drag = given(e, "c");
+         d.drag_yaw = given(e, "c2");
+       }},
+      {"com_longitudinal", [](D& d, const E& e) { d.com_longitudinal = given(e, "a"); }},
+      {"com_lateral", [](D& d, const E& e) { d.com_lateral = given(e, "b"); }},
+      {"slope",
+       [](D& d, const E& e) {
+         d.gravity = {given(e, "g_x"), given(e, "g_y")};
+       }},
+      {"caster_drag",
+       [](D& d, const E& e) {
+         d.caster = given(e, "c");
+         d.caster_arm = given(e, "p");
+       }},
+      {"lateral_scrub", [](D& d, const E& e) { d.scrub = given(e, "mu"); }},
+      {"load_friction", [](D& d, const E& e) { d.load = given(e, "k"); }},
+      {"friction_drift",
+       [](D& d, const E& e) {
+         d.drift = given(e, "k");
+         d.drift_time = given(e, "T");
+       }},
+      {"longitudinal_slip", [](D& d, const E& e) { d.stiffness = given(e, "stiffness"); }},
+  };
+  return all;
+}
+
+DriveEffects::ByTerms act_by_terms(const Robot& robot, const RobotEffect& effect) {
+  Robot with = robot;
+  with.effects = {effect};
+  Robot without = robot;
+  without.effects.clear();
+  const Model base = make_model(without);
+  DriveEffects::ByTerms out{effect_terms(base, with), {}, {}, inverse(base.input)};
+  for (const Term& term : out.terms.terms) {
+    check::that(term.kind != Term::Kind::acceleration, "effects." + effect.name,
+                "no terms of acceleration, for which the simulator has no formula of this effect");
+  }
+  const auto& known = effect_law(effect.name).parameters_of(robot);
+  for (const Parameter& parameter : out.terms.parameters) {
+    const auto law = std::ranges::find(known, parameter.physical, &EffectParameterLaw::physical);
+    out.sizes.push_back(parameter.per_physical * effect.value(law->name));
+    out.times_mass.push_back(law->times_mass);
+  }
+  return out;
+}
+
+// Torques at the wheels; where they jump, at a sign of a speed, they go over as dry friction does.
+Eigen::Vector2d torques_of(const DriveEffects::ByTerms& effect, const DifferentialDrive& drive, double mass,
+                           double per_torque, const EffectState& x) {
+  const std::array<double, 2> speed{x.speed, x.yaw_rate}, wheels{x.wheel_speed[0], x.wheel_speed[1]};
+  const auto within = [&](const Eigen::Vector2d& width) {
+    const double forward = 0.5 * drive.wheel_radius * (width[0] + width[1]);
+    const std::array<double, 2> speed_error{forward, 2.0 * forward / drive.track_width};
+    const std::array<double, 2> wheel_error{width[0], width[1]};
+    const MotionState state{.speed = speed,
+                            .speed_error = speed_error,
+                            .joint_speed = wheels,
+                            .joint_error = wheel_error,
+                            .heading = x.heading};
+    Eigen::Vector2d outputs = Eigen::Vector2d::Zero();
+    for (const Term& term : effect.terms.terms) {
+      const double size = effect.sizes[term.parameter] * (effect.times_mass[term.parameter] ? mass : 1.0);
+      const double value = term.kind == Term::Kind::speed ? speed[term.coordinate] : softened(term.function, state);
+      outputs[static_cast<Eigen::Index>(term.output)] += size * term.scale * value;
+    }
+    return Eigen::Vector2d(effect.wheel_torques * outputs);
+  };
+  return within(per_torque * within(Eigen::Vector2d::Zero()).cwiseAbs());
+}
+
 }  // namespace
 
 DriveEffects::DriveEffects(const Robot& robot) {
-  const auto value = [&](const char* effect, const char* parameter) { return effect_value(robot, effect, parameter); };
-  const auto shape = [&](const char* effect, const char* parameter, double otherwise) {
-    return has_effect(robot, effect) ? value(effect, parameter) : otherwise;
-  };
   forces = std::ranges::any_of(robot.effects, is_force);
   const DriveGeometry geometry = drive_geometry(robot);
   radius = geometry.radius.array() - robot.wheel_radius;
   track = geometry.track_width - robot.track_width;
-  const double c = value("coulomb", "c");
-  coulomb = {c + value("coulomb_asymmetric", "c_R"), c + value("coulomb_asymmetric", "c_L")};
-  bias = {value("torque_bias", "b_R"), value("torque_bias", "b_L")};
-  round_cos = {value("wheel_out_of_round", "A_R"), value("wheel_out_of_round", "A_L")};
-  round_sin = {value("wheel_out_of_round", "B_R"), value("wheel_out_of_round", "B_L")};
-  stribeck = value("stribeck", "c_s");
-  stribeck_speed = shape("stribeck", "omega_s", 1.0);
-  viscous = value("viscous_asymmetric", "b");
-  drag = value("quadratic_drag", "c");
-  drag_yaw = value("quadratic_drag", "c2");
-  com_longitudinal = value("com_longitudinal", "a");
-  com_lateral = value("com_lateral", "b");
-  gravity = {value("slope", "g_x"), value("slope", "g_y")};
-  caster = value("caster_drag", "c");
-  caster_arm = shape("caster_drag", "p", 1.0);
-  scrub = value("lateral_scrub", "mu");
-  load = value("load_friction", "k");
-  drift = value("friction_drift", "k");
-  drift_time = shape("friction_drift", "T", 1.0);
-  stiffness = value("longitudinal_slip", "stiffness");
+  for (const RobotEffect& effect : robot.effects) {
+    if (const auto own = own_formulas().find(effect.name); own != own_formulas().end()) {
+      own->second(*this, effect);
+    } else if (effect_law(effect.name).mechanism == EffectMechanism::term) {
+      by_terms.push_back(act_by_terms(robot, effect));
+    }
+  }
 }
 
 DryThreshold dry_threshold(const DriveEffects& e, const DifferentialDrive& drive, const DriveParameters& p,
@@ -106,7 +193,8 @@ DryThreshold dry_threshold(const DriveEffects& e, const DifferentialDrive& drive
   const double mobility = 2.0 * std::max(1.0 / p.mass, arm * arm / p.yaw_inertia) / (r * r);
   const double friction = e.coulomb.maxCoeff() + std::abs(e.stribeck) + (e.load > 0.0 ? 10.0 * e.load : 0.0);
   return {2.0 * step * friction * mobility, 2.0 * step * std::abs(e.scrub) / (r * p.yaw_inertia),
-          2.0 * step * e.caster / r * std::max(1.0 / p.mass, e.caster_arm * e.caster_arm / p.yaw_inertia)};
+          2.0 * step * e.caster / r * std::max(1.0 / p.mass, e.caster_arm * e.caster_arm / p.yaw_inertia),
+          2.0 * step * mobility};
 }
 
 EffectLoad effect_load(const DriveEffects& e, const DifferentialDrive& drive, const DriveParameters& p,
@@ -119,6 +207,9 @@ EffectLoad effect_load(const DriveEffects& e, const DifferentialDrive& drive, co
         e.coulomb[j] * (1.0 - warm) + e.stribeck * std::exp(-slow * slow) + e.load * std::abs(x.torque[j]);
     load.torque[j] = dry * soft_sign(w, threshold.wheel) + e.bias[j] + e.round_cos[j] * std::cos(x.wheel_angle[j]) +
                      e.round_sin[j] * std::sin(x.wheel_angle[j]);
+  }
+  for (const DriveEffects::ByTerms& effect : e.by_terms) {
+    load.torque += torques_of(effect, drive, p.mass, threshold.per_torque, x);
   }
   const double r = drive.wheel_radius, arm = 0.5 * (drive.track_width + e.track), u = x.speed, w = x.yaw_rate;
   const double across = e.caster_arm * w, caster = std::max(std::hypot(u, across), threshold.caster);

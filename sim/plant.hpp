@@ -48,12 +48,13 @@ class Noise {
 };
 
 /// The numbers of a robot's effects that act between the wheel torques and the body: those of the terms
-/// (effect_terms.hpp, with the same signs), and load_friction, friction_drift, wheel_out_of_round and
-/// longitudinal_slip.
+/// (effect_law.hpp, with the same signs), and load_friction, friction_drift, wheel_out_of_round and
+/// longitudinal_slip. An effect without a formula here acts by the terms of its law.
 struct DriveEffects {
   /// None.
   DriveEffects() = default;
-  /// Those of `robot` (mid-points of intervals).
+  /// Those of `robot` (mid-points of intervals). Throws InvalidArgument where an effect without a formula here has
+  /// terms of acceleration.
   explicit DriveEffects(const Robot& robot);
 
   bool forces = false;                                  ///< whether there is anything besides geometry
@@ -73,6 +74,15 @@ struct DriveEffects {
   double load = 0.0;                                    ///< –
   double drift = 0.0, drift_time = 1.0;                 ///< –, s
   double stiffness = 0.0;                               ///< N; 0: no slip
+
+  /// An effect that has terms in its law and no formula here.
+  struct ByTerms {
+    Model terms;                    ///< the law's, alone
+    std::vector<double> sizes;      ///< of their parameters
+    std::vector<bool> times_mass;   ///< whether a size is per kg of the simulated robot
+    Eigen::Matrix2d wheel_torques;  ///< what they ask for at the outputs, as torques of the wheels
+  };
+  std::vector<ByTerms> by_terms;
 };
 
 /// Where dry friction goes over from one sign to the other: sgn x is x/x0 for |x| < x0. Dry friction that would stop a
@@ -81,9 +91,10 @@ struct DriveEffects {
 /// x0·τ/c at most (about 10⁻³ rad/s at the wheels) instead of sticking, and a reversal is passed in about a
 /// millisecond.
 struct DryThreshold {
-  double wheel = 0.0;   ///< rad/s
-  double yaw = 0.0;     ///< rad/s
-  double caster = 0.0;  ///< m/s
+  double wheel = 0.0;       ///< rad/s
+  double yaw = 0.0;         ///< rad/s
+  double caster = 0.0;      ///< m/s
+  double per_torque = 0.0;  ///< of effects by their terms, rad/s per N·m that they ask for
 };
 [[nodiscard]] DryThreshold dry_threshold(const DriveEffects& effects, const DifferentialDrive& drive,
                                          const DriveParameters& parameters, double step);

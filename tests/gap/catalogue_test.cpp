@@ -320,6 +320,37 @@ TEST(Catalogue, EveryEffectGivesAsManyColumnsAsParametersOnItsWholeGrid) {
   }
 }
 
+// Two makers of the same column: the catalogue's own, and the terms of the law on the smooth motion.
+TEST(Catalogue, ColumnsOfALawAreThoseOfTheCatalogue) {
+  const Drive drive = drive_of({});
+  std::size_t compared = 0;
+  for (const Effect& by_law : effects_by_law(drive.model, {})) {
+    const Effect own = effect(by_law.name);
+    EXPECT_EQ(by_law.noun, catalogue_noun(by_law.name));
+    // Other shapes (a side, a softness), and what comes beside.
+    if (own.parameters.size() != by_law.parameters.size() || own.shapes.size() != by_law.shapes.size() ||
+        !applicability(own, drive).applies) {
+      continue;
+    }
+    const std::vector<double> shape = shape_grid(own, drive).back();
+    const auto columns = own.columns(drive, shape), others = by_law.columns(drive, shape);
+    ASSERT_EQ(columns.size(), others.size()) << by_law.name;
+    for (std::size_t k = 0; k < columns.size(); ++k) {
+      const Eigen::VectorXd a = effort_of(drive, columns[k]), b = effort_of(drive, others[k]);
+      EXPECT_LT((a - b).norm(), 0.02 * a.norm()) << by_law.name << " " << by_law.parameters[k].name;
+      ++compared;
+    }
+  }
+  EXPECT_GE(compared, 8U);
+}
+
+TEST(Catalogue, EveryEffectHasANoun) {
+  for (const Effect& e : effect_catalogue()) {
+    EXPECT_FALSE(catalogue_noun(e.name).empty()) << e.name;
+  }
+  EXPECT_EQ(catalogue_noun("no_such_effect"), "");
+}
+
 TEST(Catalogue, SingleAxisHasItsOwnEffects) {
   Robot axis;
   axis.model = "single_axis";

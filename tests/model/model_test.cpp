@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <random>
 #include <vector>
@@ -225,6 +227,19 @@ TEST(Validate, NamesTheFieldThatIsWrong) {
   bad = good;
   bad.terms[0].kind = Term::Kind::function;
   EXPECT_THAT([&] { validate(bad); }, ThrowsMessage<InvalidArgument>(HasSubstr("function")));
+}
+
+// Closed forms: the mean of an odd or linear function over a symmetric interval; the share of it above zero.
+TEST(Softened, IsTheMeanOverTheErrors) {
+  const TermFunction sign([](const MotionState& s) { return TermValue{s.speed[0] > 0.0 ? 1.0 : -1.0, 0.0}; });
+  const TermFunction line([](const MotionState& s) { return TermValue{3.0 * s.speed[0] - s.joint_speed[0], 0.0}; });
+  const std::array<double, 1> error{0.5}, joint{2.0}, none{0.0};
+  for (const double v : {-0.9, -0.5, -0.25, 0.0, 0.25, 0.5, 0.9}) {
+    const std::array<double, 1> speed{v};
+    const MotionState state{.speed = speed, .speed_error = error, .joint_speed = joint, .joint_error = none};
+    EXPECT_NEAR(softened(sign, state), std::clamp(v / 0.5, -1.0, 1.0), 1e-15) << v;
+    EXPECT_NEAR(softened(line, state), 3.0 * v - 2.0, 1e-14) << v;
+  }
 }
 
 TEST(Regressor, RefusesTheWrongNumberOfCoordinates) {
