@@ -200,8 +200,7 @@ void add_noise_bounds(std::vector<Assumption>& list, const Commissioning& r, con
 }
 
 Assumption model_shape(const Commissioning& r, const RowsVerdict& rows) {
-  const bool dry =
-      std::ranges::any_of(r.parameters, [](const ParameterResult& p) { return p.parameter.physical == "coulomb"; });
+  const bool dry = std::ranges::any_of(r.parameters, [](const ParameterResult& p) { return p.parameter.dry_friction; });
   const std::string friction = dry ? "viscous and dry" : "viscous only";
   const std::string effects = r.model.robot.effects.empty() ? "" : ", with the effects that the robot file names";
   return {.id = "friction_shape",

@@ -372,7 +372,7 @@ std::string shift_words(const Setting& s, const EffortTiming& timing) {
     return "that is half a step, as with efforts that are measured and not held (`hold: first_order`); " + declare;
   }
   std::string what = "stamp efforts and motion by one clock where they are measured";
-  const bool dry = std::ranges::any_of(s.model.parameters, [](const Parameter& p) { return p.physical == "coulomb"; });
+  const bool dry = std::ranges::any_of(s.model.parameters, [](const Parameter& p) { return p.dry_friction; });
   if (timing.delay < 0.0 && !dry) {
     what += "; dry friction that the model lacks looks like it too, and `gap` tells it";
   }
@@ -443,7 +443,7 @@ void find_dry_friction(LogSource& log, const Setting& s, std::vector<LogContradi
   Setting wide = s;
   wide.robot.parameters = possible_parameters(s.robot);
   wide.model = make_model(wide.robot);
-  const auto is_dry = [](const Parameter& p) { return p.physical == "coulomb"; };
+  const auto is_dry = [](const Parameter& p) { return p.dry_friction; };
   if (std::ranges::any_of(s.model.parameters, is_dry) || std::ranges::none_of(wide.model.parameters, is_dry)) {
     return;
   }

@@ -138,12 +138,8 @@ DetectionDesign design_for_detection(const OnlineModel& model, const DesignSubje
 std::vector<InspectedFault> usual_inspection(const OnlineModel& model) {
   std::vector<InspectedFault> faults;
   for (const FaultType& fault : fault_catalogue(model.model, model.estimate, model.robot.effort)) {
-    const bool radius =
-        fault.name == "wheel_radius" || fault.name == "wheel_radius_right" || fault.name == "wheel_radius_left";
-    if (radius || fault.name.starts_with("encoder_scale")) {
-      faults.push_back({fault, 0.05});
-    } else if (fault.name.starts_with("effort_loss")) {
-      faults.push_back({fault, 0.2});
+    if (fault.inspected > 0.0) {
+      faults.push_back({fault, fault.inspected});
     }
   }
   return faults;

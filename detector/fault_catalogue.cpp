@@ -15,9 +15,10 @@ using std::numbers::pi;
 constexpr double kDrift = 20.0;              // s, of a slow change of radius
 constexpr double kDropout = 0.1;             // s
 constexpr double kBump = 30.0 * pi / 180.0;  // rad of the wheel's turn
-constexpr double kMostRadius = 0.5;          // share of the radius
-constexpr double kMostLost = 0.95;           // share of an effort or of counts
-constexpr double kMostLostOfSign = 0.5;      // of counts where functions need a speed's sign: slower, it is in doubt
+constexpr double kInspectedLength = 0.05, kInspectedLoss = 0.2;
+constexpr double kMostRadius = 0.5;      // share of the radius
+constexpr double kMostLost = 0.95;       // share of an effort or of counts
+constexpr double kMostLostOfSign = 0.5;  // of counts where functions need a speed's sign: slower, it is in doubt
 
 // What acts on one joint alone, seen in coordinates or outputs: A E_j A⁻¹.
 Eigen::MatrixXd of_joint(const Eigen::MatrixXd& map, std::size_t joint) {
@@ -50,7 +51,8 @@ void add_efforts(std::vector<FaultType>& all, const Model& model, const WheelSid
                  .unit = "1",
                  .range = {0.0, kMostLost},
                  .share_lost = true,
-                 .effort = own};
+                 .effort = own,
+                 .inspected = kInspectedLoss};
   all.push_back(loss);
   all.push_back({.name = "effort_bias" + side.suffix,
                  .sentence = side.words + " effort reads too much (negative: too little)",
@@ -81,7 +83,8 @@ void add_encoders(std::vector<FaultType>& all, const Model& model, const WheelSi
                  .sentence = side.words + " encoder counts too much (negative: too little)",
                  .unit = "1",
                  .range = {-most_lost, 1.0},
-                 .seen = own});
+                 .seen = own,
+                 .inspected = kInspectedLength});
   all.push_back({.name = "encoder_frozen" + side.suffix,
                  .sentence = side.words + " encoder stands still",
                  .unit = "1",
@@ -105,7 +108,8 @@ void add_radii(std::vector<FaultType>& all, const Model& model, const WheelSide&
                  .unit = "1",
                  .range = range,
                  .motion = own,
-                 .ground = ground});
+                 .ground = ground,
+                 .inspected = kInspectedLength});
   all.push_back({.name = "wheel_radius_bump" + side.suffix,
                  .sentence = side.words + " radius is larger once a turn, over 30°",
                  .unit = "1",
@@ -133,8 +137,10 @@ std::vector<FaultType> fault_catalogue(const Model& model, const Eigen::VectorXd
                    .unit = "1",
                    .range = {-kMostRadius, kMostRadius},
                    .motion = Eigen::MatrixXd::Identity(c, c),
-                   .ground = Eigen::MatrixXd::Identity(c, c)};
+                   .ground = Eigen::MatrixXd::Identity(c, c),
+                   .inspected = kInspectedLength};
     all.push_back(both);
+    both.inspected = 0.0;
     both.name = "wheel_radius_drift";
     both.sentence = "both wheels' radii change slowly, over 20 s";
     both.profile = {.kind = FaultProfile::Kind::drift, .rise = kDrift};

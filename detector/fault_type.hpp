@@ -68,6 +68,7 @@ struct FaultType {
                              ///< (margins.hpp)
   bool of_reading = false;  ///< K is of what encoders show: the joints' own speeds share in it, and dry friction's sign
   FaultProfile profile{};
+  double inspected = 0.0;  ///< size for which people ask how well a drive would show it; 0: none is usual
 
   /// κ of a magnitude.
   [[nodiscard]] double kappa(double magnitude) const;

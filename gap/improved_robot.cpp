@@ -71,6 +71,12 @@ class Improvement {
     return way == nullptr || way->beside == nullptr || way->beside(*this);
   }
 
+  // Whether the effect `name` is a share of others.
+  [[nodiscard]] static bool is_of_others(const std::string& name) {
+    const Way* const way = way_of(name);
+    return way != nullptr && way->of_others;
+  }
+
   [[nodiscard]] const Robot& robot() const { return improved_; }
   [[nodiscard]] const std::string& why_not() const { return why_not_; }
 
@@ -81,6 +87,7 @@ class Improvement {
     bool (*convert)(Improvement& robot) = nullptr;  // into an effect of the robot file; nothing: it is no effect there
     bool adds_up = false;  // its parameters add up when it is there twice, to first order where they are not linear
     bool (*beside)(Improvement& robot) = nullptr;  // what comes along with the effect
+    bool of_others = false;                        // it is a share of other effects, which have to be there
   };
   static const std::map<std::string, Way>& ways();
   static const Way* way_of(const std::string& name) {
@@ -349,14 +356,24 @@ class Improvement {
     return true;
   }
 
+  // The same value at the right and at the left wheel.
+  [[nodiscard]] RobotEffect of_each_wheel(const RobotEffect& effect) const {
+    RobotEffect each{effect_law(effect.name).of_each_wheel, {}};
+    for (const EffectParameterLaw& parameter : effect_law(each.name).parameters_of(improved_)) {
+      each.parameters[parameter.name] = effect.parameters.begin()->second;
+    }
+    return each;
+  }
+
   bool put() {
-    if (effect_.name == "coulomb" && has_effect(improved_, "coulomb_asymmetric")) {
-      effect_ = {"coulomb_asymmetric", {{"c_R", effect_.parameters["c"]}, {"c_L", effect_.parameters["c"]}}};
+    if (has_effect(improved_, law_->of_each_wheel)) {
+      effect_ = of_each_wheel(effect_);
       law_ = &effect_law(effect_.name);
-    } else if (effect_.name == "coulomb_asymmetric" && has_effect(improved_, "coulomb")) {
-      const auto same = std::ranges::find(improved_.effects, "coulomb", &RobotEffect::name);
-      const Interval c = same->parameters["c"];
-      *same = {"coulomb_asymmetric", {{"c_R", c}, {"c_L", c}}};
+    }
+    for (RobotEffect& same : improved_.effects) {
+      if (effect_law(same.name).of_each_wheel == effect_.name) {
+        same = of_each_wheel(same);
+      }
     }
     const auto there = std::ranges::find(improved_.effects, effect_.name, &RobotEffect::name);
     if (there == improved_.effects.end()) {
@@ -539,7 +556,7 @@ const std::map<std::string, Improvement::Way>& Improvement::ways() {
               return true;
             }}},
       {"wheel_out_of_round", {.convert = [](I& r) { return r.out_of_round(); }, .adds_up = true}},
-      {"friction_drift", {.convert = [](I& r) { return r.convert_drift(); }}},
+      {"friction_drift", {.convert = [](I& r) { return r.convert_drift(); }, .of_others = true}},
       {"backlash", {.convert = [](I& r) { return r.convert_backlash(); }}},
   };
   return all;
@@ -565,7 +582,7 @@ Robot with_nominal(const Robot& robot, const Model& model, const Eigen::VectorXd
     if (of_effect || std::ranges::find(possible, parameter.physical) == possible.end()) {
       continue;
     }
-    const bool friction = parameter.physical.starts_with("viscous") || parameter.physical == "coulomb";
+    const bool friction = parameter.physical.starts_with("viscous") || parameter.dry_friction;
     changed.nominal[parameter.physical] = friction ? std::max(value, 0.0) : value;
     if (const auto prior = changed.prior.find(parameter.physical);
         prior != changed.prior.end() && value > 0.0 && !prior->second.contains(value)) {
@@ -605,10 +622,9 @@ std::optional<Robot> improved_robot(const Robot& robot, const Drive& drive, cons
     improvement.change_parameters(cause);
   }
   bool possible = improvement.settle_nominal();
-  // What others refer to comes first: a drift is a share of dry friction.
-  for (const bool drift : {false, true}) {
+  for (const bool of_others : {false, true}) {
     for (std::size_t k = 0; possible && k < causes.size(); ++k) {
-      if ((causes[k].effect.name == "friction_drift") == drift) {
+      if (Improvement::is_of_others(causes[k].effect.name) == of_others) {
         possible = improvement.add_effect(causes[k], intervals.empty() ? std::vector<Interval>{} : intervals[k]);
       }
     }

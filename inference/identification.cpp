@@ -133,12 +133,13 @@ Identifiability judge(const Setting& s, const Fit& fit, const RegressionMoments&
 }
 
 // The shape at its best and along all that was searched; `reference` is the weighted rss without it.
-ShapeFinding finding(std::string name, std::string unit, const SeparableModel& model, VariableProjectionOptions options,
-                     const Fit& fit, double reference, std::size_t points) {
+ShapeFinding finding(ShapeKind kind, std::string name, std::string unit, const SeparableModel& model,
+                     VariableProjectionOptions options, const Fit& fit, double reference, std::size_t points) {
   options.weights = fit.weights;
   const SeparableFit found = variable_projection(model, options);
   const auto ratio = [&](double rss) { return reference > 0.0 ? std::sqrt(rss / reference) : 1.0; };
   ShapeFinding f;
+  f.kind = kind;
   f.name = std::move(name);
   f.unit = std::move(unit);
   f.searched = {options.lower[0], options.upper[0]};
@@ -199,18 +200,18 @@ void find_shapes(LogSource& log, const Setting& s, const Fit& fit, const Identif
                  Identification& result) {
   TorqueRows stream = make_rows(log, s);
   const RegressionBlock rows = read_all(stream);
-  const auto look = [&](const char* name, TimeEffect effect, double lower) {
+  const auto look = [&](ShapeKind kind, const char* name, TimeEffect effect, double lower) {
     try {
       const TimeShiftedRows model(rows, effect, lower, options.longest_delay);
       result.shapes.push_back(
-          finding(name, "s", model, model.options(), fit, rss_at(model, 0.0, fit), options.curve_points));
+          finding(kind, name, "s", model, model.options(), fit, rss_at(model, 0.0, fit), options.curve_points));
     } catch (const InvalidArgument& error) {
       result.notes.push_back(fmt::format("{} was not looked for: {}", name, error.what()));
     }
   };
-  look("delay", TimeEffect::delay, -options.longest_delay);
-  look("effort_lag", TimeEffect::effort_lag, 0.0);
-  look("actuator_lag", TimeEffect::actuator_lag, 0.0);
+  look(ShapeKind::delay, "delay", TimeEffect::delay, -options.longest_delay);
+  look(ShapeKind::effort_lag, "effort_lag", TimeEffect::effort_lag, 0.0);
+  look(ShapeKind::actuator_lag, "actuator_lag", TimeEffect::actuator_lag, 0.0);
   const double fastest = *std::ranges::max_element(s.survey.largest_speed);
   if (fastest > 0.0) {
     const StribeckRows model(log, RegressorFilter(s.model, s.filter, s.measurement));
@@ -218,8 +219,8 @@ void find_shapes(LogSource& log, const Setting& s, const Fit& fit, const Identif
     search.lower = Eigen::VectorXd::Constant(1, kSlowestStribeck * fastest);
     search.upper = Eigen::VectorXd::Constant(1, kFastestStribeck * fastest);
     const char* unit = !on_two_wheels(s.robot) ? "m/s or rad/s" : "rad/s";
-    result.shapes.push_back(
-        finding("stribeck_speed", unit, model, search, fit, fit.squares.weighted_rss, options.curve_points));
+    result.shapes.push_back(finding(ShapeKind::stribeck_speed, "stribeck_speed", unit, model, search, fit,
+                                    fit.squares.weighted_rss, options.curve_points));
   }
 }
 

@@ -46,8 +46,12 @@ struct ShapePoint {
   double residual_ratio = 1.0;  ///< as ShapeFinding's; NaN where the model is not defined
 };
 
+/// What a ShapeFinding is of.
+enum class ShapeKind { delay, effort_lag, actuator_lag, stribeck_speed };
+
 /// One more quantity that enters nonlinearly, added alone to the model.
 struct ShapeFinding {
+  ShapeKind kind = ShapeKind::delay;
   std::string name;  ///< delay, effort_lag, actuator_lag or stribeck_speed
   std::string unit;
   ShapeState state = ShapeState::flat;

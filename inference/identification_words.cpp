@@ -75,13 +75,15 @@ const ShapeFinding* strongest(const Identification& r) {
 }
 
 const char* kind_words(const ShapeFinding& shape) {
-  if (shape.name == "delay") {
-    return shape.estimate < 0.0 ? "a delay of the motion against the effort"
-                                : "a delay of the effort against the motion";
+  switch (shape.kind) {
+    case ShapeKind::delay:
+      return shape.estimate < 0.0 ? "a delay of the motion against the effort"
+                                  : "a delay of the effort against the motion";
+    case ShapeKind::effort_lag: return "a lag of the measured effort";
+    case ShapeKind::actuator_lag: return "a lag between commanded and acting effort";
+    case ShapeKind::stribeck_speed: break;
   }
-  return shape.name == "effort_lag"     ? "a lag of the measured effort"
-         : shape.name == "actuator_lag" ? "a lag between commanded and acting effort"
-                                        : "a Stribeck bend of the friction";
+  return "a Stribeck bend of the friction";
 }
 
 // A number of seconds as people say it.
@@ -259,14 +261,14 @@ void add_shape(const Identification& r, std::vector<std::string>& steps) {
   }
   const std::string residual =
       fmt::format("it takes the residual to {:.2g} % of what it is without", 100.0 * shape->residual_ratio);
-  if (shape->name == "delay") {
+  if (shape->kind == ShapeKind::delay) {
     const bool motion = shape->estimate < 0.0;
     steps.push_back(fmt::format(
         "Check the clocks: the {} comes {} late ({}){}. Estimates that ignore it are biased: shift the time stamps and "
         "identify again.",
         motion ? "motion" : "effort", value_text(*shape, std::abs(shape->estimate)), residual,
         motion ? ", or the logged effort is a command that acts that much later" : ""));
-  } else if (shape->name == "stribeck_speed") {
+  } else if (shape->kind == ShapeKind::stribeck_speed) {
     steps.push_back(fmt::format(
         "Friction bends at {} ({}): slow driving is not what viscous and dry friction say. Drive faster, or expect "
         "larger residuals there.",
@@ -364,7 +366,7 @@ bool matters(const ShapeFinding& shape) {
   if (shape.state != ShapeState::identified || !(shape.residual_ratio < kShapeMatters)) {
     return false;
   }
-  return shape.name == "stribeck_speed" || std::abs(shape.estimate) > half_interval(shape);
+  return shape.kind == ShapeKind::stribeck_speed || std::abs(shape.estimate) > half_interval(shape);
 }
 
 IdentificationStanding standing(const Identification& r) {
@@ -383,7 +385,7 @@ IdentificationStanding standing(const Identification& r) {
 
 std::string in_words(const ShapeFinding& shape) {
   const std::string name = capital(spoken(shape.name)) + ": ";
-  const bool stribeck = shape.name == "stribeck_speed";
+  const bool stribeck = shape.kind == ShapeKind::stribeck_speed;
   const std::string explains =
       fmt::format("the residual with it is {:.3g} % of that without", 100.0 * shape.residual_ratio);
   if (!shape.converged) {

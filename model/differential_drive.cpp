@@ -130,7 +130,9 @@ Model DifferentialDrive::model() const {
          .physical_unit = "N·m",
          .per_physical = 1.0,
          .prior = {0.0, 1e6},
-         .excite = "drive in both directions"},
+         .excite = "drive in both directions",
+         .on_request = true,
+         .dry_friction = true},
         {.output = 0, .kind = Term::Kind::function, .function = signs_sum});
     m.terms.push_back({.output = 1,
                        .parameter = m.terms.back().parameter,

@@ -32,7 +32,7 @@ void apply_geometry(Model& model, const Robot& robot) {
   model.motion.array().rowwise() /= g.encoder_scale.transpose().array();
   model.input.array().rowwise() *= robot.wheel_radius / g.radius.transpose().array();
   for (std::size_t j = 0; j < model.p(); ++j) {
-    if (model.parameters[j].physical == "coulomb") {
+    if (model.parameters[j].dry_friction) {
       std::erase_if(model.terms, [&](const Term& term) { return term.parameter == j; });
       add_dry_friction(model, j);
     }
@@ -389,9 +389,13 @@ Parameters named(const std::string& effect, Parameters parameters) {
 
 EffectLaw terms(const char* name, const char* noun, AddTerms add, Parameters parameters, AddTerms add_of_axis = nullptr,
                 Parameters of_axis = {}) {
-  return {
-      name, noun,       EffectMechanism::term, named(name, std::move(parameters)), named(name, std::move(of_axis)), {},
-      add,  add_of_axis};
+  return {.name = name,
+          .noun = noun,
+          .mechanism = EffectMechanism::term,
+          .parameters = named(name, std::move(parameters)),
+          .of_axis = named(name, std::move(of_axis)),
+          .add_terms = add,
+          .add_terms_of_axis = add_of_axis};
 }
 
 EffectLaw effort(const char* name, const char* noun, const Parameters& parameters, bool axis) {
@@ -406,10 +410,16 @@ EffectLaw simulation(const char* name, const char* noun, Parameters parameters, 
   return {name, noun, EffectMechanism::simulation, std::move(parameters), {}, remedy};
 }
 
+EffectLaw coulomb_law() {
+  const Parameters parameters{known_as("coulomb", not_negative("c", "N·m"))};
+  EffectLaw law = terms("coulomb", "dry friction", nullptr, parameters, nullptr, parameters);
+  law.of_each_wheel = "coulomb_asymmetric";
+  return law;
+}
+
 std::vector<EffectLaw> make_laws() {
   return {
-      terms("coulomb", "dry friction", nullptr, {known_as("coulomb", not_negative("c", "N·m"))}, nullptr,
-            {known_as("coulomb", not_negative("c", "N·m"))}),
+      coulomb_law(),
       terms("coulomb_asymmetric", "dry friction that differs between the wheels", coulomb_asymmetric,
             {not_negative("c_R", "N·m"), not_negative("c_L", "N·m")}),
       terms("stribeck", "dry friction that fades with speed", stribeck_of_wheels,
@@ -562,8 +572,11 @@ void validate_effects(const Robot& robot) {
     check::that(mechanism == EffectMechanism::geometry || effort_per_torque(robot).has_value(),
                 "effects." + effect.name, "effort as torque, or the motor's constants, to make effort of it");
   }
-  check::that(!has_effect(robot, "coulomb") || !has_effect(robot, "coulomb_asymmetric"), "effects",
-              "coulomb or coulomb_asymmetric, not both: they say the same of equal wheels");
+  for (const RobotEffect& effect : robot.effects) {
+    const std::string& each = effect_law(effect.name).of_each_wheel;
+    check::that(!has_effect(robot, each), "effects",
+                effect.name + " or " + each + ", not both: they say the same of equal wheels");
+  }
 }
 
 bool has_effect(const Robot& robot, const std::string& name) {

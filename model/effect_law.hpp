@@ -108,6 +108,7 @@ struct EffectLaw {
   /// Appends the terms of one robot's effect to its model (add_effect_terms); nothing where they are the model's own.
   void (*add_terms)(EffectTerms& terms, const RobotEffect& effect) = nullptr;
   void (*add_terms_of_axis)(EffectTerms& terms, const RobotEffect& effect) = nullptr;
+  std::string of_each_wheel{};  ///< the effect that says the same with a parameter for each wheel; empty: there is none
 
   /// The parameters for a robot of the model that `robot` names.
   [[nodiscard]] const std::vector<EffectParameterLaw>& parameters_of(const Robot& robot) const {

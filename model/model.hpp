@@ -32,6 +32,8 @@ struct Parameter {
       1.0;             ///< θ_L,j = per_physical · physical quantity (the wheel radius r for the robot of the paper)
   Interval prior;      ///< wide physical default of the physical quantity, in physical_unit
   std::string excite;  ///< what to do when a log does not show it, e.g. "drive in curves"
+  bool on_request = false;    ///< in a robot's model only where it is asked for
+  bool dry_friction = false;  ///< equal at all joints, of the signs of their speeds: at rest it is any number up to it
 };
 
 /// A measured joint: which columns of the log hold its angle, speed and effort.

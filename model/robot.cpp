@@ -65,11 +65,6 @@ Model select(const Model& model, const std::vector<std::string>& keep) {
   return selected;
 }
 
-// Dry friction and an offset are there on request only, or where an effect is that.
-bool is_optional(const Robot& robot, const std::string& physical) {
-  return (physical == "coulomb" || physical == "offset") && !effect_prior(robot, physical);
-}
-
 // The model with the parameters of `more` after its own.
 void append(Model& model, const Model& more) {
   for (Term term : more.terms) {
@@ -143,7 +138,7 @@ Model make_model(const Robot& robot) {
   for (const Parameter& parameter : full.parameters) {
     const std::string& name = parameter.physical;
     const bool wanted = robot.parameters && std::ranges::find(*robot.parameters, name) != robot.parameters->end();
-    if (is_optional(robot, name)) {
+    if (parameter.on_request && !effect_prior(robot, name)) {
       if (wanted) {
         last.push_back(name);
       }

@@ -31,7 +31,7 @@ Model SingleAxis::model() const {
 
   const auto add = [&m](const char* name, const char* unit, Interval prior, const char* excite, Term term) {
     term.parameter = m.parameters.size();
-    m.parameters.push_back({name, unit, name, unit, 1.0, prior, excite});
+    m.parameters.push_back({name, unit, name, unit, 1.0, prior, excite, false, false});
     m.terms.push_back(term);
   };
   add("inertia", "kg (rotary: kg·m²)", {0.0, 1e6}, "accelerate and brake", {.kind = Term::Kind::acceleration});
@@ -39,10 +39,12 @@ Model SingleAxis::model() const {
   if (coulomb) {
     add("coulomb", "N (rotary: N·m)", {0.0, 1e7}, "move in both directions",
         {.kind = Term::Kind::function, .function = sign_of_speed});
+    m.parameters.back().on_request = m.parameters.back().dry_friction = true;
   }
   if (offset) {
     add("offset", "N (rotary: N·m)", {-1e7, 1e7}, "move in both directions",
         {.kind = Term::Kind::function, .function = constant_term});
+    m.parameters.back().on_request = true;
   }
   return m;
 }

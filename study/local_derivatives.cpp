@@ -10,6 +10,7 @@
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/study/bound_rates.hpp>
+#include <wheelwright/study/study_case.hpp>
 
 namespace wheelwright {
 namespace {
@@ -84,8 +85,8 @@ LocalInput local_input(const RobotAt& at, const Model& model, const std::string&
   if (name == "filter.alpha" || name == "filter.beta") {
     return {name, "1/s", name == "filter.alpha" ? at.filter.alpha : at.filter.beta};
   }
-  if (name == "wheel_radius" || name == "track_width") {
-    const double length = name == "wheel_radius" ? robot.wheel_radius : robot.track_width;
+  if (double Robot::*const geometry = length_of(name)) {
+    const double length = robot.*geometry;
     check::that(length > 0.0, "input " + name, "a robot with wheels");
     return {name, "m", length};
   }
@@ -106,10 +107,8 @@ RobotAt with_input(RobotAt at, const LocalInput& input, double x) {
       at.filter.alpha *= x / at.filter.beta;
     }
     at.filter.beta = x;
-  } else if (input.name == "wheel_radius") {
-    at.robot.wheel_radius = x;
-  } else if (input.name == "track_width") {
-    at.robot.track_width = x;
+  } else if (double Robot::*const geometry = length_of(input.name)) {
+    at.robot.*geometry = x;
   } else {
     at.robot.encoder_counts_per_turn = x;
   }

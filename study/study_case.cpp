@@ -2,6 +2,7 @@
 #include <wheelwright/study/study_case.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -269,8 +270,8 @@ std::optional<double> nominal_of_input(const StudyCase& subject, const std::stri
   if (name == "filter.beta") {
     return robot.filter.beta;
   }
-  if (name == "wheel_radius" || name == "track_width") {
-    const double length = name == "wheel_radius" ? robot.wheel_radius : robot.track_width;
+  if (double Robot::*const geometry = length_of(name)) {
+    const double length = robot.*geometry;
     return length > 0.0 ? std::optional(length) : std::nullopt;
   }
   if (name == "encoder_counts_per_turn") {
@@ -315,8 +316,8 @@ void set_input(StudyCase& subject, const std::string& name, double x) {
     }
   } else if (name == "filter.alpha" || name == "filter.beta") {
     (name == "filter.alpha" ? robot.filter.alpha : robot.filter.beta) = check::positive(x, "input " + name);
-  } else if (name == "wheel_radius" || name == "track_width") {
-    (name == "wheel_radius" ? robot.wheel_radius : robot.track_width) = check::positive(x, "input " + name);
+  } else if (double Robot::*const geometry = length_of(name)) {
+    robot.*geometry = check::positive(x, "input " + name);
   } else if (name == "encoder_counts_per_turn") {
     robot.encoder_counts_per_turn = static_cast<double>(std::max<std::size_t>(whole(x, name), 1));
     if (subject.scenario) {
@@ -357,6 +358,13 @@ LogTable drive_of_case(const StudyCase& subject) {
   put_outliers(log, subject.robot.effort, subject.outliers,
                subject.seed.value_or(subject.scenario ? subject.scenario->seed : 1));
   return log;
+}
+
+double Robot::*length_of(std::string_view name) {
+  static constexpr std::array<std::pair<std::string_view, double Robot::*>, 2> lengths{
+      {{"wheel_radius", &Robot::wheel_radius}, {"track_width", &Robot::track_width}}};
+  const auto found = std::ranges::find(lengths, name, &std::pair<std::string_view, double Robot::*>::first);
+  return found != lengths.end() ? found->second : nullptr;
 }
 
 }  // namespace wheelwright

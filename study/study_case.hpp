@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <wheelwright/core/log.hpp>
@@ -80,5 +81,8 @@ void set_input(StudyCase& subject, const std::string& name, double x);
 /// The drive of a case: simulated, or cut from the recorded log; outliers put in. Throws InvalidArgument where the
 /// scenario makes no sense with its inputs, or a recorded log of mean speeds without angles is to be thinned.
 [[nodiscard]] LogTable drive_of_case(const StudyCase& subject);
+
+/// The length of a robot that the input `name` moves (wheel_radius, track_width); null where it is none.
+[[nodiscard]] double Robot::*length_of(std::string_view name);
 
 }  // namespace wheelwright
