@@ -8,14 +8,22 @@
 
 Seconds are those on the clock: compilations that waited for a processor look dearer than they are, and what a compiler cache
 handed out looks free. `--most` therefore allows for that much of waiting: what the machine's load was beyond its processors.
+It is meant for a machine that compiles PROBE in PROBE_SECONDS of processor; on a slower one it is so much more.
 """
 
 import argparse
 import os
+import resource
+import subprocess
 import sys
 import tempfile
 from collections import defaultdict
 from pathlib import Path
+
+PROBE = """#include <Eigen/LU>
+double probe(const Eigen::MatrixXd& a, const Eigen::VectorXd& b) { return a.partialPivLu().solve(b).norm(); }
+"""
+PROBE_SECONDS = 2.0
 
 
 def read_log(path):
@@ -53,8 +61,23 @@ def waiting():
     return max(1.0, os.getloadavg()[1] / (os.cpu_count() or 1))
 
 
+def slowness(compiler="g++"):
+    """How much more of a processor a compilation takes here than where the budget was measured, at least 1."""
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "probe.cpp").write_text(PROBE, encoding="utf-8")
+        taken = []
+        for _ in range(3):
+            before = resource.getrusage(resource.RUSAGE_CHILDREN)
+            subprocess.run([compiler, "-std=c++20", "-O1", "-isystem", "/usr/include/eigen3", "-c", "probe.cpp", "-o", "probe.o"],
+                           cwd=folder, check=True, env={**os.environ, "CCACHE_DISABLE": "1"})
+            after = resource.getrusage(resource.RUSAGE_CHILDREN)
+            taken.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+    return max(1.0, min(taken) / PROBE_SECONDS)
+
+
 def complaints(objects, most, factor):
-    return [f"{name}: {seconds:.1f} s, more than {most:g} s" + (f" × {factor:.2f} for the load" if factor > 1.0 else "")
+    return [f"{name}: {seconds:.1f} s, more than {most:g} s"
+            + (f" × {factor:.2f} for load and machine" if factor > 1.0 else "")
             for name, seconds in sorted(objects.items(), key=lambda item: -item[1]) if seconds > most * factor]
 
 
@@ -93,7 +116,7 @@ def main():
     objects = {name: seconds for name, seconds in read_log(arguments.build / ".ninja_log").items()
                if (arguments.build / name).exists()}
     print(table(objects, arguments.dearest))
-    found = complaints(objects, arguments.most, waiting()) if arguments.most else []
+    found = complaints(objects, arguments.most, waiting() * slowness()) if arguments.most else []
     for complaint in found:
         print(complaint, file=sys.stderr)
     return 1 if found else 0
