@@ -83,27 +83,6 @@ class TableSource final : public LogSource {
   double median_step_ = 0.0;
 };
 
-/// Several logs one after the other, each starting a new segment. The sources must outlive it; their columns may be in
-/// any order, and only those that all of them have are handed on.
-class JoinedSource final : public LogSource {
- public:
-  /// Throws InvalidArgument when `sources` is empty.
-  explicit JoinedSource(std::vector<LogSource*> sources);
-  [[nodiscard]] const std::vector<std::string>& columns() const override;
-  bool next(LogBlock& block) override;
-  void rewind() override;
-  /// Median of the sources' median steps, s.
-  [[nodiscard]] double median_step() const override;
-
- private:
-  std::vector<LogSource*> sources_;
-  std::vector<std::string> names_;
-  std::vector<std::vector<std::size_t>> pick_;
-  std::size_t current_ = 0;
-  std::size_t first_row_ = 0;
-  LogBlock scratch_;
-};
-
 /// Reads all of `source` (from its beginning) into a table.
 [[nodiscard]] LogTable read_all(LogSource& source);
 

@@ -42,18 +42,6 @@ Eigen::Index grid_points(const Grid& grid) {
   return points;
 }
 
-std::vector<Eigen::Index> grid_levels(const Grid& grid, Eigen::Index point) {
-  const Eigen::Index points = grid_points(grid);
-  check::that(point >= 0 && point < points, fmt::format("point {} of a grid", point),
-              fmt::format("0 to {}", points - 1));
-  std::vector<Eigen::Index> at(grid.levels.size());
-  for (std::size_t i = at.size(); i-- > 0;) {
-    at[i] = point % grid.levels[i];
-    point /= grid.levels[i];
-  }
-  return at;
-}
-
 Eigen::Index grid_point(const Grid& grid, const std::vector<Eigen::Index>& at) {
   (void)grid_points(grid);
   check::that(at.size() == grid.levels.size(), fmt::format("{} levels of a grid's point", at.size()),
