@@ -30,6 +30,17 @@ std::vector<double>& LogTable::column(std::string_view name) {
   return const_cast<std::vector<double>&>(std::as_const(*this).column(name));
 }
 
+std::vector<std::size_t> positions_of(const LogSource& log, const std::vector<std::string>& columns,
+                                      const std::string& why) {
+  std::vector<std::size_t> positions;
+  for (const std::string& name : columns) {
+    const auto column = log.find(name);
+    check::that(column.has_value(), "log", "a column '" + name + "'" + why);
+    positions.push_back(*column);
+  }
+  return positions;
+}
+
 double median_step(const std::vector<double>& t) {
   if (t.size() < 2) {
     return 0.0;

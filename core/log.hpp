@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace wheelwright {
@@ -57,6 +58,27 @@ struct LogTable {
   /// The same, to be written.
   [[nodiscard]] std::vector<double>& column(std::string_view name);
 };
+
+/// Where columns stand among those of `log`. Throws InvalidArgument where one is not there, `why` behind its name.
+[[nodiscard]] std::vector<std::size_t> positions_of(const LogSource& log, const std::vector<std::string>& columns,
+                                                    const std::string& why = "");
+
+/// visit(block, k, starts) for every row k of every block of `log`; `starts` where a segment does. The log is rewound
+/// before and after.
+template <typename Visit>
+void for_each_row(LogSource& log, Visit&& visit) {
+  LogBlock block;
+  log.rewind();
+  while (log.next(block)) {
+    std::size_t segment = 0;
+    for (std::size_t k = 0; k < block.rows(); ++k) {
+      const bool starts = segment < block.segment_starts.size() && block.segment_starts[segment] == k;
+      segment += starts ? 1 : 0;
+      visit(std::as_const(block), k, starts);
+    }
+  }
+  log.rewind();
+}
 
 /// Median of the steps of `t` (the steps across segment starts included), s; 0 for fewer than two rows.
 [[nodiscard]] double median_step(const std::vector<double>& t);

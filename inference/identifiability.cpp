@@ -10,6 +10,7 @@
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/linear_algebra.hpp>
+#include <wheelwright/core/words.hpp>
 
 namespace wheelwright {
 namespace {
@@ -114,8 +115,8 @@ void find_base(const IdentifiabilityInput& input, const ScaledDirections& scaled
       unseen.words = input.parameters[static_cast<std::size_t>(d)].name + ": its motion never occurs in the log";
     } else {
       unseen.words = fmt::format("{} cannot be told apart here: only {} {} seen",
-                                 names_in_words(names_of(unseen.members, input.parameters)),
-                                 names_in_words(combinations), combinations.size() == 1 ? "is" : "are");
+                                 enumerated(names_of(unseen.members, input.parameters)), enumerated(combinations),
+                                 combinations.size() == 1 ? "is" : "are");
     }
     unseen.manoeuvres = missing_manoeuvres(unseen.members, input.parameters);
     result.unseen.push_back(std::move(unseen));

@@ -160,8 +160,6 @@ TEST(DirectionWords, ReadAsSentences) {
   EXPECT_EQ(combination_in_words(Eigen::Vector4d::Zero(), kAxis, one), "nothing");
   EXPECT_EQ(largest_part_one(Eigen::Vector4d(0.0, 2.0, -4.0, 0.0), one), Eigen::Vector4d(0.0, 0.5, -1.0, 0.0));
   EXPECT_EQ(largest_part_one(Eigen::Vector4d(0.0, -2.0, 4.0, 0.0), one), Eigen::Vector4d(0.0, 0.5, -1.0, 0.0));
-  EXPECT_EQ(names_in_words({"a"}), "a");
-  EXPECT_EQ(names_in_words({"a", "b", "c"}), "a, b and c");
   EXPECT_EQ(kind_of("viscous_linear"), TermKind::viscous);
   EXPECT_EQ(kind_of("r_yaw_inertia"), TermKind::inertia);
   EXPECT_EQ(kind_of("slope"), TermKind::other);
