@@ -9,14 +9,6 @@
 namespace wheelwright::app {
 namespace {
 
-std::string joined(const std::vector<std::string>& words, const std::string& between) {
-  std::string out;
-  for (const std::string& word : words) {
-    out += (out.empty() ? "" : between) + word;
-  }
-  return out;
-}
-
 std::vector<std::string> names_of(const ProgramWords& program) {
   std::vector<std::string> out;
   for (const CommandWords& command : program.commands) {
@@ -49,7 +41,7 @@ std::string quoted(const std::string& text) {
 // What bash offers for a value.
 std::string bash_values(const OptionWords& option) {
   if (!option.choices.empty()) {
-    return fmt::format("-W {}", quoted(joined(option.choices, " ")));
+    return fmt::format("-W {}", quoted(listed(option.choices, " ")));
   }
   return option.takes_directory() ? "-d" : option.takes_file() ? "-f" : "";
 }
@@ -57,7 +49,7 @@ std::string bash_values(const OptionWords& option) {
 std::string bash(const ProgramWords& program) {
   std::string values, options, positionals;
   const auto add = [&](const CommandWords& command, const std::string& name) {
-    options += fmt::format("    {}) words={} ;;\n", quoted(name), quoted(joined(names_of(command), " ")));
+    options += fmt::format("    {}) words={} ;;\n", quoted(name), quoted(listed(names_of(command), " ")));
     for (const OptionWords& option : command.options) {
       const std::string offer = bash_values(option);
       if (option.positional()) {
@@ -109,13 +101,13 @@ _wheelwright() {{
 }}
 complete -F _wheelwright wheelwright
 )",
-                     joined(names_of(program), " | "), values, options, quoted(joined(names_of(program), " ")),
+                     listed(names_of(program), " | "), values, options, quoted(listed(names_of(program), " ")),
                      positionals);
 }
 
 // An argument of _arguments: '--out[words]:DIR:_files -/'.
 std::string zsh_argument(const OptionWords& option, const std::string& name) {
-  const std::string action = !option.choices.empty()    ? fmt::format("({})", joined(option.choices, " "))
+  const std::string action = !option.choices.empty()    ? fmt::format("({})", listed(option.choices, " "))
                              : option.takes_directory() ? "_files -/"
                              : option.takes_file()      ? "_files"
                                                         : " ";
@@ -180,7 +172,7 @@ std::string fish_option(const OptionWords& option, const std::string& condition)
     out += fmt::format("complete -c wheelwright -n {} -{} {}", condition, name.starts_with("--") ? "l" : "s",
                        name.substr(name.find_first_not_of('-')));
     if (!option.choices.empty()) {
-      out += fmt::format(" -x -a '{}'", joined(option.choices, " "));
+      out += fmt::format(" -x -a '{}'", listed(option.choices, " "));
     } else if (option.takes_directory()) {
       out += " -x -a '(__fish_complete_directories)'";
     } else if (!option.value.empty()) {
@@ -203,7 +195,7 @@ std::string fish(const ProgramWords& program) {
     for (const OptionWords& option : command.options) {
       if (option.positional()) {
         out += fmt::format("complete -c wheelwright -n {} {}\n", condition,
-                           option.choices.empty() ? "-F" : fmt::format("-a '{}'", joined(option.choices, " ")));
+                           option.choices.empty() ? "-F" : fmt::format("-a '{}'", listed(option.choices, " ")));
       } else {
         out += fish_option(option, condition);
       }

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include <wheelwright/core/words.hpp>
 #include <wheelwright/gap/where.hpp>
 #include <wheelwright/report/gap_words.hpp>
 #include <wheelwright/report/text.hpp>
@@ -15,7 +16,7 @@ namespace {
 std::string causes_words(const Diagnosis& d) {
   std::string out;
   for (const GapCause& cause : d.causes) {
-    out += fmt::format("  {}: {}\n", report::capital(report::effect_noun(cause.effect)), cause.sentence);
+    out += fmt::format("  {}: {}\n", capital(report::effect_noun(cause.effect)), cause.sentence);
     for (const GapEstimate& p : cause.parameters) {
       out += fmt::format("      {} {}\n", report::parameter_words(p.name), report::estimate_words(p));
     }
@@ -60,7 +61,7 @@ std::string places(const Diagnosis& d) {
       names.push_back(s.regime);
     }
   }
-  return report::list(names);
+  return enumerated(names);
 }
 
 std::string next_step(const Diagnosis& d, const GapResults& r) {

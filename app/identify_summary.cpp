@@ -76,12 +76,6 @@ int decimals(double spread) {
 
 std::string number(double x, int digits) { return std::isfinite(x) ? fmt::format("{:.{}f}", x, digits) : "-"; }
 
-std::string name_of(std::string_view identifier) {
-  std::string name(identifier);
-  std::ranges::replace(name, '_', ' ');
-  return name;
-}
-
 // Estimators and intervals by method are the lines; one block for each parameter keeps lines short.
 std::string comparison(const Identification& r) {
   const auto shown = shown_parameters(r);
@@ -90,7 +84,7 @@ std::string comparison(const Identification& r) {
   std::vector<std::string> header = {""}, units = {""};
   std::vector<int> digits;
   for (std::size_t j = 0; j < shown.size(); ++j) {
-    header.push_back(name_of(shown[j].name));
+    header.push_back(report::words(shown[j].name));
     units.push_back(shown[j].unit);
     const auto at = static_cast<Eigen::Index>(j);
     const Eigen::VectorXd& error = r.fit.residuals.standard_error;
@@ -110,7 +104,7 @@ std::string comparison(const Identification& r) {
   for (std::size_t c = 0; c < choice.candidates.size(); ++c) {
     const Estimate& e = choice.candidates[c].estimate;
     if (e.usable) {
-      line(name_of(to_string(e.estimator)) + (c == choice.chosen ? " (taken)" : ""), e.theta);
+      line(report::words(to_string(e.estimator)) + (c == choice.chosen ? " (taken)" : ""), e.theta);
     }
   }
   line("robust", r.robust.estimate);
@@ -123,7 +117,7 @@ std::string comparison(const Identification& r) {
     }
     for (const bool upper : {false, true}) {
       line(upper ? "  to"
-                 : fmt::format("{} {:g} %{}", name_of(to_string(region.method)), 100.0 * region.confidence,
+                 : fmt::format("{} {:g} %{}", report::words(to_string(region.method)), 100.0 * region.confidence,
                                region.all_at_once ? ", all at once" : ""),
            upper ? region.upper : region.lower);
     }
@@ -134,7 +128,7 @@ std::string comparison(const Identification& r) {
 std::string promises(const Identification& r) {
   std::string out;
   for (const RegionRow& row : r.regions.rows) {
-    const std::string name = "  " + name_of(to_string(row.method)) + ": ";
+    const std::string name = "  " + report::words(to_string(row.method)) + ": ";
     out += wrapped(
         row.available ? row.promise + (row.remark.empty() ? "" : "; " + row.remark) : "not available: " + row.remark,
         name);

@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include <wheelwright/core/words.hpp>
+
 namespace wheelwright::app {
 namespace {
 
@@ -43,7 +45,7 @@ std::string literal(const std::string& text) {
   return out;
 }
 
-std::string capital(std::string text) {
+std::string upper(std::string text) {
   for (char& c : text) {
     c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
   }
@@ -58,7 +60,7 @@ std::string lower_first(std::string text) {
 }
 
 std::string header(const std::string& name, const std::string& description, const std::string& version) {
-  return fmt::format(".TH {} 1 \"\" \"{}\" \"User Commands\"\n.SH NAME\n{} \\- {}\n", capital(literal(name)),
+  return fmt::format(".TH {} 1 \"\" \"{}\" \"User Commands\"\n.SH NAME\n{} \\- {}\n", upper(literal(name)),
                      literal(version), literal(name), literal(lower_first(first_sentence(description))));
 }
 
@@ -97,11 +99,7 @@ std::string options(const CommandWords& command) {
     out += names + (names.empty() || value.empty() ? "" : " ") + value + "\n";
     std::string words = option.description;
     if (!option.choices.empty()) {
-      std::string all;
-      for (const std::string& choice : option.choices) {
-        all += (all.empty() ? "" : ", ") + choice;
-      }
-      words += "; one of " + all;
+      words += "; one of " + listed(option.choices);
     }
     if (option.required && !option.positional()) {
       words += " (required)";

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include <wheelwright/core/error.hpp>
+#include <wheelwright/core/words.hpp>
 #include <wheelwright/gap/estimates.hpp>
 #include <wheelwright/gap/further_drive.hpp>
 #include <wheelwright/gap/prepared.hpp>
@@ -80,8 +81,6 @@ std::vector<Rival> fitted_rivals(const PreparedGap& prepared, const Diagnosis& d
   return rivals;
 }
 
-std::string joined(const std::vector<std::string>& sentences) { return fmt::format("{}", fmt::join(sentences, " ")); }
-
 }  // namespace
 
 NextDrive next_drive(LogSource& log, LogSource* baseline, const Robot& robot, const Diagnosis& diagnosis,
@@ -113,7 +112,7 @@ NextDrive next_drive(LogSource& log, LogSource* baseline, const Robot& robot, co
   const MotionLimits limits = limits_within(prepared, robot);
   const DiscriminationDesign design =
       design_for_discrimination(subject, limits, next.rivals, prepared.catalogue, noise, search, &prepared.drive);
-  next.sentence = in_words(joined(design.sentences), prepared.catalogue);
+  next.sentence = in_words(listed(design.sentences, " "), prepared.catalogue);
   if (design.worst()) {
     next.commands = command_table(design.manoeuvre.plan, subject.model);
     next.sentence = fmt::format("A drive of {:.0f} s within {:.2g} m of its start. {}", limits.duration,

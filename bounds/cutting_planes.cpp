@@ -401,27 +401,6 @@ void CuttingPlanes::reduce() {
   update_box();
 }
 
-std::optional<LpSolution> CuttingPlanes::maximise(const Eigen::VectorXd& a) {
-  const Eigen::VectorXd g = coordinates_.transform.transpose() * a;
-  const double norm = g.norm();
-  if (!(norm > 0.0)) {
-    LpSolution zero;
-    zero.status = LpSolution::Status::optimal;
-    zero.x = coordinates_.centre;
-    return zero;
-  }
-  LpSolution solution = program_->maximise(g / norm);
-  if (solution.status != LpSolution::Status::optimal) {
-    return std::nullopt;
-  }
-  solution.x = coordinates_.centre + coordinates_.transform * solution.x;
-  solution.value = a.dot(solution.x);
-  for (std::size_t k = 0; k < solution.rows.size(); ++k) {
-    solution.multipliers[static_cast<Eigen::Index>(k)] *= norm / norms_[solution.rows[k]];
-  }
-  return solution;
-}
-
 CertifiedBound CuttingPlanes::certified_maximum(const Eigen::VectorXd& a, const Box& within) {
   const std::span<const double> direction(a.data(), static_cast<std::size_t>(a.size()));
   CertifiedBound bound{within.support(direction), {}};

@@ -58,8 +58,6 @@ class CuttingPlanes {
   [[nodiscard]] const std::vector<HalfSpace>& rows() const { return rows_; }
   /// Half-spaces left out because floating point found them contradictory but no rigorous proof could be given.
   [[nodiscard]] std::size_t undecided() const { return undecided_; }
-  /// The box it started from.
-  [[nodiscard]] const Box& box() const { return box_; }
   /// Coordinates in which the set lies in about [−1, 1]ᵖ.
   [[nodiscard]] const Coordinates& coordinates() const { return coordinates_; }
 

@@ -47,8 +47,6 @@ class LinearProgram {
 
   /// Adds rows; column k of `a_columns` (variables × k) is row k of A.
   void add_rows(const Eigen::MatrixXd& a_columns, const Eigen::VectorXd& b);
-  /// Number of rows.
-  [[nodiscard]] Eigen::Index rows() const { return static_cast<Eigen::Index>(count_); }
   /// The rows, padded, for the loops of kernels.hpp.
   [[nodiscard]] kernels::Rows view() const;
 

@@ -16,6 +16,7 @@
 #include <wheelwright/core/interval.hpp>
 #include <wheelwright/core/limits.hpp>
 #include <wheelwright/core/linear_algebra.hpp>
+#include <wheelwright/core/random.hpp>
 
 namespace wheelwright {
 namespace {
@@ -232,8 +233,7 @@ std::optional<VertexSet> enumerate_vertices(std::span<const HalfSpace> rows, con
     Eigen::VectorXd shifted(m);
     for (Eigen::Index i = 0; i < m; ++i) {
       const HalfSpace& row = rows[static_cast<std::size_t>(i)];
-      const double uniform = static_cast<double>(generator() >> 11) * 0x1.0p-53;
-      shifted[i] = round_up(row.b + norms[i] * shift * (1.0 + uniform));
+      shifted[i] = round_up(row.b + norms[i] * shift * (1.0 + uniform(generator)));
       b[i] = (shifted[i] - row.a.dot(coordinates.centre)) / norms[i];
     }
     const std::optional<std::vector<Vertex>> vertices = insert_all(normals, b, limit, too_many);

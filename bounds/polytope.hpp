@@ -93,8 +93,6 @@ class Polytope {
   [[nodiscard]] bool has_vertices() const noexcept { return data_->has_vertices; }
   /// Number of vertices, summed over blocks; 0 unless has_vertices().
   [[nodiscard]] std::size_t vertex_count() const noexcept { return data_->vertex_count; }
-  /// Always false: support() is a linear program. SupportWalk is the form for a robot.
-  [[nodiscard]] bool is_online() const noexcept { return false; }
 
   /// How far, relative to its size in Block::coordinates, the facets were shifted outward to know the vertices (1e-10
   /// or so, more where many facets meet in one vertex; 0 where they are not known).

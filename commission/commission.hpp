@@ -62,6 +62,8 @@ struct Commissioning {
     contradicted,  ///< a set came out, but the log contradicts what it stands on: see contradictions; no model
   };
   Status status = Status::done;
+  /// Whether a model came out.
+  [[nodiscard]] bool has_model() const { return status == Status::done || status == Status::partial; }
   std::string message;  ///< one sentence for people, with what to do next where that is needed
   OnlineModel model;    ///< without estimate, facets and box where the status gives no model
   std::vector<ParameterResult> parameters;

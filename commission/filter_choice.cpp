@@ -102,31 +102,21 @@ FilterChoice by_residual(LogSource& log, const Model& model, const Measurement& 
     choice.reason = "the log is too short, or sampled too slowly, for a choice";
     return choice;
   }
-  std::vector<std::size_t> pick;
-  for (const auto& name : measurement.columns()) {
-    pick.push_back(*log.find(name));
-  }
+  const std::vector<std::size_t> pick = positions_of(log, measurement.columns());
   std::vector<double> sample(pick.size());
-  log.rewind();
-  LogBlock block;
-  while (log.next(block)) {
-    std::size_t segment = 0;
-    for (std::size_t k = 0; k < block.rows(); ++k) {
-      if (segment < block.segment_starts.size() && block.segment_starts[segment] == k) {
-        ++segment;
-        for (Trial& trial : trials) {
-          trial.restart();
-        }
-      }
-      for (std::size_t c = 0; c < pick.size(); ++c) {
-        sample[c] = block.columns[pick[c]][k];
-      }
+  for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
+    if (starts) {
       for (Trial& trial : trials) {
-        trial.step(block.t[k], sample);
+        trial.restart();
       }
     }
-  }
-  log.rewind();
+    for (std::size_t c = 0; c < pick.size(); ++c) {
+      sample[c] = block.columns[pick[c]][k];
+    }
+    for (Trial& trial : trials) {
+      trial.step(block.t[k], sample);
+    }
+  });
   std::vector<std::vector<double>> noise;
   std::vector<double> least(model.n(), 1.0);
   for (const Trial& trial : trials) {

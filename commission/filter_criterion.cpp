@@ -85,31 +85,19 @@ void walk(LogSource& log, const Model& model, const Measurement& measurement, co
   for (const FilterDesign& design : designs) {
     filters.emplace_back(model, design, measurement);
   }
-  std::vector<std::size_t> pick;
-  for (const auto& name : measurement.columns()) {
-    const auto found = log.find(name);
-    check::that(found.has_value(), "log", "a column '" + name + "'");
-    pick.push_back(*found);
-  }
+  const std::vector<std::size_t> pick = positions_of(log, measurement.columns());
   std::vector<double> sample(pick.size());
-  LogBlock block;
-  log.rewind();
-  while (log.next(block)) {
-    std::size_t segment = 0;
-    for (std::size_t k = 0; k < block.rows(); ++k) {
-      const bool starts = segment < block.segment_starts.size() && block.segment_starts[segment] == k;
-      segment += starts ? 1 : 0;
-      for (std::size_t c = 0; c < pick.size(); ++c) {
-        sample[c] = block.columns[pick[c]][k];
-      }
-      for (std::size_t f = 0; f < filters.size(); ++f) {
-        if (starts) {
-          filters[f].restart();
-        }
-        filters[f].step(block.t[k], sample, [&](const RegressionBlock& rows) { take(f, rows); });
-      }
+  for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
+    for (std::size_t c = 0; c < pick.size(); ++c) {
+      sample[c] = block.columns[pick[c]][k];
     }
-  }
+    for (std::size_t f = 0; f < filters.size(); ++f) {
+      if (starts) {
+        filters[f].restart();
+      }
+      filters[f].step(block.t[k], sample, [&](const RegressionBlock& rows) { take(f, rows); });
+    }
+  });
   for (std::size_t f = 0; f < filters.size(); ++f) {
     filters[f].flush([&](const RegressionBlock& rows) { take(f, rows); });
   }

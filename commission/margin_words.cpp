@@ -6,16 +6,10 @@
 
 #include <fmt/format.h>
 
+#include <wheelwright/core/words.hpp>
+
 namespace wheelwright {
 namespace {
-
-std::string joined(const std::vector<std::string>& words) {
-  std::string out;
-  for (std::size_t k = 0; k < words.size(); ++k) {
-    out += (k == 0 ? "" : k + 1 == words.size() ? " and " : ", ") + words[k];
-  }
-  return out;
-}
 
 // What is best known of one fault on one side in one manoeuvre, over the residuals.
 struct Best {
@@ -78,12 +72,13 @@ std::string sentence(const MarginSurvey& survey, const FaultMargins& of) {
     name += of.side > 0.0 ? " (+)" : " (−)";
   }
   std::string out = name + ": ";
-  out += seen.empty() ? "not certain to be seen at every moment of any manoeuvre" : "certainly seen " + joined(seen);
+  out +=
+      seen.empty() ? "not certain to be seen at every moment of any manoeuvre" : "certainly seen " + enumerated(seen);
   if (!at_best.empty()) {
-    out += fmt::format("; at some moments only while {}", joined(at_best));
+    out += fmt::format("; at some moments only while {}", enumerated(at_best));
   }
   if (!unseen.empty()) {
-    out += fmt::format("; not certain while {}", joined(unseen));
+    out += fmt::format("; not certain while {}", enumerated(unseen));
   }
   return out + ".";
 }

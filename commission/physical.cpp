@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include <wheelwright/core/words.hpp>
 #include <wheelwright/identify/least_squares.hpp>
 
 namespace wheelwright {
@@ -45,12 +46,6 @@ ParameterChoice choose_parameters(RegressionSource& rows, std::size_t basic, std
 }
 
 namespace {
-
-void replace_all(std::string& text, const std::string& from, const std::string& to) {
-  for (std::size_t at = text.find(from); at != std::string::npos; at = text.find(from, at + to.size())) {
-    text.replace(at, from.size(), to);
-  }
-}
 
 std::string in_effort_unit(const Robot& robot, const std::string& unit) {
   if (robot.effort == EffortKind::torque) {

@@ -114,49 +114,42 @@ PoseOrigin pose_origin(LogSource& log, const OdometryMeasurement& m, double wind
     heading = way = 0.0;
     turned = {};
   };
-  log.rewind();
-  LogBlock block;
-  while (log.next(block)) {
-    std::size_t segment = 0;
-    for (std::size_t k = 0; k < block.rows(); ++k) {
-      const double t = block.t[k];
-      const std::array<double, 2> now = {block.columns[wheel[0]][k], block.columns[wheel[1]][k]};
-      const double theta_now = block.columns[theta][k], x_now = block.columns[x][k], y_now = block.columns[y][k];
-      decimals.add(theta_now);
-      if (segment < block.segment_starts.size() && block.segment_starts[segment] == k) {
-        ++segment;
-        restart(t);
-      } else {
-        const double h = t - before;
-        double along = 0.0;
-        for (std::size_t j = 0; j < 2; ++j) {
-          const bool angle = m.motion == MotionKind::angle;
-          const std::array<double, 3> steps = {angle ? now[j] - motion[j] : h * 0.5 * (now[j] + motion[j]),
-                                               angle ? now[j] - motion[j] : h * motion[j],
-                                               angle ? now[j] - motion[j] : h * now[j]};
-          for (std::size_t rule = 0; rule < 3; ++rule) {
-            turned[rule][j] += steps[rule];
-          }
-          along += steps[0];
+  for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
+    const double t = block.t[k];
+    const std::array<double, 2> now = {block.columns[wheel[0]][k], block.columns[wheel[1]][k]};
+    const double theta_now = block.columns[theta][k], x_now = block.columns[x][k], y_now = block.columns[y][k];
+    decimals.add(theta_now);
+    if (starts) {
+      restart(t);
+    } else {
+      const double h = t - before;
+      double along = 0.0;
+      for (std::size_t j = 0; j < 2; ++j) {
+        const bool angle = m.motion == MotionKind::angle;
+        const std::array<double, 3> steps = {angle ? now[j] - motion[j] : h * 0.5 * (now[j] + motion[j]),
+                                             angle ? now[j] - motion[j] : h * motion[j],
+                                             angle ? now[j] - motion[j] : h * now[j]};
+        for (std::size_t rule = 0; rule < 3; ++rule) {
+          turned[rule][j] += steps[rule];
         }
-        heading += std::remainder(theta_now - theta_before, kWholeTurn);
-        way += std::copysign(std::hypot(x_now - x_before, y_now - y_before), along);
-        if (t - begin >= window) {
-          for (std::size_t rule = 0; rule < 3; ++rule) {
-            headings[rule].add(turned[rule][0], turned[rule][1], heading);
-            ways[rule].add(turned[rule][0], turned[rule][1], way);
-          }
-          restart(t);
-        }
+        along += steps[0];
       }
-      before = t;
-      motion = now;
-      theta_before = theta_now;
-      x_before = x_now;
-      y_before = y_now;
+      heading += std::remainder(theta_now - theta_before, kWholeTurn);
+      way += std::copysign(std::hypot(x_now - x_before, y_now - y_before), along);
+      if (t - begin >= window) {
+        for (std::size_t rule = 0; rule < 3; ++rule) {
+          headings[rule].add(turned[rule][0], turned[rule][1], heading);
+          ways[rule].add(turned[rule][0], turned[rule][1], way);
+        }
+        restart(t);
+      }
     }
-  }
-  log.rewind();
+    before = t;
+    motion = now;
+    theta_before = theta_now;
+    x_before = x_now;
+    y_before = y_now;
+  });
   const auto least = [](const std::array<Combination, 3>& fits) {
     std::optional<double> best;
     for (const Combination& fit : fits) {

@@ -81,10 +81,7 @@ Survey survey(LogSource& log, const Measurement& measurement) {
   s.largest_acceleration.assign(joints, 0.0);
   s.sharpest_change.assign(joints, 0.0);
   s.reversals.assign(joints, 0.0);
-  std::vector<std::size_t> pick;
-  for (const auto& name : measurement.motion_columns) {
-    pick.push_back(*log.find(name));
-  }
+  const std::vector<std::size_t> pick = positions_of(log, measurement.motion_columns);
   std::vector<JointWatch> watch(joints);
   const bool is_angle = measurement.motion == MotionKind::angle;
   double segment_start = 0.0;
@@ -94,33 +91,27 @@ Survey survey(LogSource& log, const Measurement& measurement) {
     s.seconds += length;
     s.longest_segment = std::max(s.longest_segment, length);
   };
-  log.rewind();
-  LogBlock block;
-  while (log.next(block)) {
-    std::size_t segment = 0;
-    for (std::size_t k = 0; k < block.rows(); ++k) {
-      const double t = block.t[k];
-      if (segment < block.segment_starts.size() && block.segment_starts[segment] == k) {
-        if (s.segments > 0) {
-          close_segment();
-        }
-        ++segment;
-        ++s.segments;
-        segment_start = t;
-        for (JointWatch& w : watch) {
-          w.restart();
-        }
-      } else {
-        s.largest_step = std::max(s.largest_step, t - before);
+  for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
+    ++s.rows;
+    const double t = block.t[k];
+    if (starts) {
+      if (s.segments > 0) {
+        close_segment();
       }
-      before = t;
-      for (std::size_t j = 0; j < joints; ++j) {
-        watch[j].add(t, block.columns[pick[j]][k], is_angle, s.largest_speed[j], s.largest_acceleration[j],
-                     s.sharpest_change[j], s.reversals[j]);
+      ++s.segments;
+      segment_start = t;
+      for (JointWatch& w : watch) {
+        w.restart();
       }
+    } else {
+      s.largest_step = std::max(s.largest_step, t - before);
     }
-    s.rows += block.rows();
-  }
+    before = t;
+    for (std::size_t j = 0; j < joints; ++j) {
+      watch[j].add(t, block.columns[pick[j]][k], is_angle, s.largest_speed[j], s.largest_acceleration[j],
+                   s.sharpest_change[j], s.reversals[j]);
+    }
+  });
   if (s.segments > 0) {
     close_segment();
   }

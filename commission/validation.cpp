@@ -56,13 +56,7 @@ bool FoldedSource::next(RegressionBlock& block) {
     }
     ++kept;
   }
-  block.sample.resize(kept);
-  block.t.resize(kept);
-  const auto rows = block.rows();
-  block.Y.conservativeResize(rows, Eigen::NoChange);
-  block.dY.conservativeResize(rows, Eigen::NoChange);
-  block.y.conservativeResize(rows);
-  block.dy.conservativeResize(rows);
+  block.shorten(kept);
   return true;
 }
 

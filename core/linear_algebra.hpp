@@ -24,10 +24,8 @@ struct EigenPairs {
 /// Of a symmetric matrix, whose lower triangle is read; the vectors are orthonormal.
 [[nodiscard]] EigenPairs symmetric_eigen(const Eigen::MatrixXd& symmetric);
 
-/// Of the pencil A v = λ B v with A symmetric and B positive definite; nothing where B is not, or rounding hides it.
-[[nodiscard]] std::optional<EigenPairs> generalized_eigen(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B);
-
-/// The eigenvalues alone.
+/// Eigenvalues of the pencil A v = λ B v with A symmetric and B positive definite; nothing where B is not, or rounding
+/// hides it.
 [[nodiscard]] std::optional<Eigen::VectorXd> generalized_eigenvalues(const Eigen::MatrixXd& A,
                                                                      const Eigen::MatrixXd& B);
 

@@ -30,6 +30,17 @@ std::vector<double>& LogTable::column(std::string_view name) {
   return const_cast<std::vector<double>&>(std::as_const(*this).column(name));
 }
 
+std::vector<std::size_t> positions_of(const LogSource& log, const std::vector<std::string>& columns,
+                                      const std::string& why) {
+  std::vector<std::size_t> positions;
+  for (const std::string& name : columns) {
+    const auto column = log.find(name);
+    check::that(column.has_value(), "log", "a column '" + name + "'" + why);
+    positions.push_back(*column);
+  }
+  return positions;
+}
+
 double median_step(const std::vector<double>& t) {
   if (t.size() < 2) {
     return 0.0;
@@ -109,58 +120,6 @@ bool TableSource::next(LogBlock& block) {
   }
   position_ += rows;
   return rows > 0;
-}
-
-JoinedSource::JoinedSource(std::vector<LogSource*> sources) : sources_(std::move(sources)) {
-  check::that(!sources_.empty(), "sources", "at least one log");
-  for (const auto& name : sources_.front()->columns()) {
-    if (std::all_of(sources_.begin(), sources_.end(), [&](const LogSource* s) { return s->find(name).has_value(); })) {
-      names_.push_back(name);
-    }
-  }
-  for (const LogSource* source : sources_) {
-    auto& pick = pick_.emplace_back();
-    for (const auto& name : names_) {
-      pick.push_back(*source->find(name));
-    }
-  }
-}
-
-const std::vector<std::string>& JoinedSource::columns() const { return names_; }
-
-void JoinedSource::rewind() {
-  for (LogSource* source : sources_) {
-    source->rewind();
-  }
-  current_ = 0;
-  first_row_ = 0;
-}
-
-bool JoinedSource::next(LogBlock& block) {
-  while (current_ < sources_.size()) {
-    if (sources_[current_]->next(scratch_)) {
-      block.first_row = first_row_;
-      block.t.swap(scratch_.t);
-      block.segment_starts.swap(scratch_.segment_starts);
-      block.columns.resize(names_.size());
-      for (std::size_t c = 0; c < names_.size(); ++c) {
-        block.columns[c] = scratch_.columns[pick_[current_][c]];
-      }
-      first_row_ += block.rows();
-      return true;
-    }
-    ++current_;
-  }
-  block.t.clear();
-  return false;
-}
-
-double JoinedSource::median_step() const {
-  std::vector<double> steps;
-  for (const LogSource* source : sources_) {
-    steps.push_back(source->median_step());
-  }
-  return median(std::move(steps));
 }
 
 LogTable read_all(LogSource& source) {

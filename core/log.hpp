@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace wheelwright {
@@ -58,6 +59,27 @@ struct LogTable {
   [[nodiscard]] std::vector<double>& column(std::string_view name);
 };
 
+/// Where columns stand among those of `log`. Throws InvalidArgument where one is not there, `why` behind its name.
+[[nodiscard]] std::vector<std::size_t> positions_of(const LogSource& log, const std::vector<std::string>& columns,
+                                                    const std::string& why = "");
+
+/// visit(block, k, starts) for every row k of every block of `log`; `starts` where a segment does. The log is rewound
+/// before and after.
+template <typename Visit>
+void for_each_row(LogSource& log, Visit&& visit) {
+  LogBlock block;
+  log.rewind();
+  while (log.next(block)) {
+    std::size_t segment = 0;
+    for (std::size_t k = 0; k < block.rows(); ++k) {
+      const bool starts = segment < block.segment_starts.size() && block.segment_starts[segment] == k;
+      segment += starts ? 1 : 0;
+      visit(std::as_const(block), k, starts);
+    }
+  }
+  log.rewind();
+}
+
 /// Median of the steps of `t` (the steps across segment starts included), s; 0 for fewer than two rows.
 [[nodiscard]] double median_step(const std::vector<double>& t);
 
@@ -81,27 +103,6 @@ class TableSource final : public LogSource {
   std::size_t block_rows_;
   std::size_t position_ = 0;
   double median_step_ = 0.0;
-};
-
-/// Several logs one after the other, each starting a new segment. The sources must outlive it; their columns may be in
-/// any order, and only those that all of them have are handed on.
-class JoinedSource final : public LogSource {
- public:
-  /// Throws InvalidArgument when `sources` is empty.
-  explicit JoinedSource(std::vector<LogSource*> sources);
-  [[nodiscard]] const std::vector<std::string>& columns() const override;
-  bool next(LogBlock& block) override;
-  void rewind() override;
-  /// Median of the sources' median steps, s.
-  [[nodiscard]] double median_step() const override;
-
- private:
-  std::vector<LogSource*> sources_;
-  std::vector<std::string> names_;
-  std::vector<std::vector<std::size_t>> pick_;
-  std::size_t current_ = 0;
-  std::size_t first_row_ = 0;
-  LogBlock scratch_;
 };
 
 /// Reads all of `source` (from its beginning) into a table.

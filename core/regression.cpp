@@ -19,6 +19,15 @@ void RegressionBlock::resize(std::size_t instants, std::size_t n, std::size_t p)
   dy.resize(rows_now);
 }
 
+void RegressionBlock::shorten(std::size_t instants) {
+  sample.resize(instants);
+  t.resize(instants);
+  Y.conservativeResize(rows(), Eigen::NoChange);
+  dY.conservativeResize(rows(), Eigen::NoChange);
+  y.conservativeResize(rows());
+  dy.conservativeResize(rows());
+}
+
 RegressionTable::RegressionTable(RegressionBlock block) : block_(std::move(block)) {
   const auto columns = static_cast<Eigen::Index>(block_.parameters);
   check::that(block_.outputs > 0 && block_.parameters > 0, "regression", "at least one output and one parameter");

@@ -34,6 +34,8 @@ struct RegressionBlock {
   [[nodiscard]] Eigen::Index rows() const { return static_cast<Eigen::Index>(t.size() * outputs); }
   /// Makes room for `instants` instants; contents are unspecified, storage is reused where it suffices.
   void resize(std::size_t instants, std::size_t n, std::size_t p);
+  /// Leaves the first `instants` instants.
+  void shorten(std::size_t instants);
 };
 
 /// A regression that can be walked from beginning to end any number of times, block by block.
@@ -59,8 +61,6 @@ class RegressionTable final : public RegressionSource {
   [[nodiscard]] std::size_t parameters() const override { return block_.parameters; }
   bool next(RegressionBlock& block) override;
   void rewind() override { done_ = false; }
-  /// The rows.
-  [[nodiscard]] const RegressionBlock& block() const { return block_; }
 
  private:
   RegressionBlock block_;

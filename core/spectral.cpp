@@ -11,17 +11,6 @@ EigenPairs symmetric_eigen(const Eigen::MatrixXd& symmetric) {
   return {solver.eigenvalues(), solver.eigenvectors()};
 }
 
-std::optional<EigenPairs> generalized_eigen(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B) {
-  if (!CholeskyFactors(B).positive()) {  // the solver would not tell
-    return std::nullopt;
-  }
-  const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> solver(A, B);
-  if (solver.info() != Eigen::Success) {
-    return std::nullopt;
-  }
-  return EigenPairs{solver.eigenvalues(), solver.eigenvectors()};
-}
-
 std::optional<Eigen::VectorXd> generalized_eigenvalues(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B) {
   if (!CholeskyFactors(B).positive()) {
     return std::nullopt;

@@ -39,4 +39,8 @@ namespace wheelwright {
 /// What Fisher's variable exceeds with probability `risk`.
 [[nodiscard]] double fisher_upper_quantile(double above, double below, double risk);
 
+/// Holm's step-down adjustment (`holm1979`): rejecting where the adjusted p is at most α errs anywhere with a
+/// probability of at most α, however the tests depend on one another. The order of `p` is kept; values are in [0, 1].
+[[nodiscard]] std::vector<double> holm(const std::vector<double>& p);
+
 }  // namespace wheelwright

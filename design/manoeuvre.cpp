@@ -56,10 +56,6 @@ Plan plan_of(const FigureEight& eight, const DesignSubject& subject, double dura
   return plan;
 }
 
-FigureEight best_figure_eight(const DesignSubject& subject, const MotionLimits& limits, const RowObjective& objective) {
-  return best_figure_eight(subject, limits, of_rows(objective, subject));
-}
-
 std::optional<FigureEight> find_figure_eight(const DesignSubject& subject, const MotionLimits& limits,
                                              const PlanObjective& objective) {
   validate(limits);

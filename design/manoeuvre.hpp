@@ -31,9 +31,6 @@ struct FigureEight {
 /// Throws InvalidArgument where none is within the limits.
 [[nodiscard]] FigureEight best_figure_eight(const DesignSubject& subject, const MotionLimits& limits,
                                             const PlanObjective& objective);
-/// The same for an objective of the planned rows.
-[[nodiscard]] FigureEight best_figure_eight(const DesignSubject& subject, const MotionLimits& limits,
-                                            const RowObjective& objective);
 
 /// The same where there is one within the limits; else nothing.
 [[nodiscard]] std::optional<FigureEight> find_figure_eight(const DesignSubject& subject, const MotionLimits& limits,

@@ -13,6 +13,7 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/core/for_all.hpp>
+#include <wheelwright/core/random.hpp>
 #include <wheelwright/design/plan.hpp>
 
 namespace wheelwright {
@@ -30,9 +31,6 @@ double value_at(const Function& f, std::span<const double> x) {
     return kNowhere;
   }
 }
-
-// A number in [0, 1) that is the same with every standard library.
-double uniform(std::mt19937_64& generator) { return static_cast<double>(generator() >> 11) * 0x1p-53; }
 
 struct Descent {
   const Function* f;

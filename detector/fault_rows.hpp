@@ -153,8 +153,6 @@ class FaultFilter final : public FaultRows {
   [[nodiscard]] FaultRow row(std::size_t i) const override;
   /// What one signal of the filter remembers, entry by entry: `part` of its state.
   [[nodiscard]] FaultSignals state(double KernelState::*part) const;
-  /// The fault.
-  [[nodiscard]] const FaultType& fault() const { return fault_; }
 
  private:
   // The fault and the motion at one instant: s(t), what moves (s u) and what is seen (s S v) beyond v.

@@ -25,12 +25,7 @@ Eigen::Vector2d mean_direction(double from, double to) {
 
 OdometryReference read_odometry(LogSource& log, OdometryFilter filter, const Model& model) {
   const OdometryMeasurement& measurement = filter.measurement();
-  std::vector<std::size_t> pick;
-  for (const auto& name : measurement.columns()) {
-    const auto column = log.find(name);
-    check::that(column.has_value(), "log", "a column '" + name + "'");
-    pick.push_back(*column);
-  }
+  const std::vector<std::size_t> pick = positions_of(log, measurement.columns());
   const std::size_t n = measurement.outputs().size(), p = measurement.parameters().size();
   const std::size_t heading_at = measurement.position ? 4 : 2;
   OdometryReference reference;

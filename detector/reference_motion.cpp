@@ -24,12 +24,7 @@ std::size_t effort_reach(const Measurement& m, const SignalErrors& errors) {
 }
 
 ReferenceMotion walk(LogSource& log, RegressorFilter filter) {
-  std::vector<std::size_t> pick;
-  for (const auto& name : filter.measurement().columns()) {
-    const auto column = log.find(name);
-    check::that(column.has_value(), "log", "a column '" + name + "'");
-    pick.push_back(*column);
-  }
+  const std::vector<std::size_t> pick = positions_of(log, filter.measurement().columns());
   const std::size_t n = filter.model().n(), p = filter.model().p();
   const auto coordinates = static_cast<Eigen::Index>(filter.model().coordinates.size());
   const auto joints = static_cast<Eigen::Index>(filter.model().joints.size());

@@ -8,11 +8,10 @@
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/statistics.hpp>
+#include <wheelwright/core/words.hpp>
 
 namespace wheelwright {
 namespace {
-
-std::string listed(const std::vector<std::string>& names) { return fmt::format("{}", fmt::join(names, ", ")); }
 
 // Whether wheel radii and track can be found without efforts.
 bool has_kinematics(const HealthView& view) {

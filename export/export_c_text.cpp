@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/words.hpp>
 
 namespace wheelwright::c_text {
 
@@ -17,12 +18,6 @@ std::string hex(double x) {
   }
   check::finite(x, "a number of the exported detector");
   return fmt::format("{:a}", x);
-}
-
-void replace_all(std::string& text, std::string_view from, std::string_view to) {
-  for (std::size_t at = text.find(from); at != std::string::npos; at = text.find(from, at + to.size())) {
-    text.replace(at, from.size(), to);
-  }
 }
 
 std::string plain(std::string text) {
@@ -85,7 +80,8 @@ typedef struct pfx_decision {
 )";
 
 const std::string_view kSmoothKernel =
-    R"(/* One filtered signal: sums of impulses with the weights exp(-beta x), x exp(-beta x) and exp(-gamma x), x their age. */
+    "/* One filtered signal: sums of impulses with the weights exp(-beta x), x exp(-beta x) and "
+    R"(exp(-gamma x), x their age. */
 typedef struct pfx_cascade {
   double z1, z2, fast;
 } pfx_cascade;
@@ -252,7 +248,8 @@ static inline double pfx_value(const pfx_cascade *c)
 )";
 
 const std::string_view kMajorant =
-    R"(/* Sum of impulses with the weight (1 - x + x^2 / 2) exp(-x), x beta times their age: bounds what the slope of the kernel
+    "/* Sum of impulses with the weight (1 - x + x^2 / 2) exp(-x), x beta times their age: bounds what "
+    R"(the slope of the kernel
  * makes of them. */
 typedef struct pfx_majorant {
   double s0, s1, s2;
@@ -289,7 +286,8 @@ static inline double pfx_support_of_hull(const double *a)
 )";
 
 const std::string_view kFollow =
-    R"(/* Largest a.theta over one group of q parameters: from the vertex that was best last time along edges to the best one, at
+    "/* Largest a.theta over one group of q parameters: from the vertex that was best last time along "
+    R"(edges to the best one, at
  * most PFX_EDGES of them. A vertex has q * q multipliers per unit of a, then its place, its doubt, what a
  * negative multiplier costs, and how steep its edges are (q numbers each). Wherever the walk ends the bound holds. */
 static inline void pfx_follow(const double *numbers, const unsigned short *next, const unsigned char *index,
@@ -349,7 +347,8 @@ static inline void pfx_follow(const double *numbers, const unsigned short *next,
 )";
 
 const std::string_view kThreshold =
-    R"(/* [lower, upper] of the residual without a fault, for the regressor row y that is wrong by at most dy, and torque that is
+    "/* [lower, upper] of the residual without a fault, for the regressor row y that is wrong by at most "
+    R"(dy, and torque that is
  * wrong by at most output; rounded outward. */
 static inline void pfx_threshold(pfx_state *s, const double *y, const double *dy, double output, int channel,
                                  double *lower, double *upper)

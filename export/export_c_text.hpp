@@ -19,7 +19,6 @@ namespace wheelwright::c_text {
 /// `text` as ASCII that is safe inside a C comment.
 [[nodiscard]] std::string plain(std::string text);
 /// Puts `to` wherever `text` has `from`.
-void replace_all(std::string& text, std::string_view from, std::string_view to);
 /// matrix(row, 0) x[0] + matrix(row, 1) x[1] + …
 [[nodiscard]] std::string combination(const Eigen::MatrixXd& matrix, std::size_t row, const char* x);
 

@@ -123,10 +123,6 @@ double JsonPlace::number() const {
   return value_->get<double>();
 }
 
-double JsonPlace::number_or_nan() const {
-  return value_->is_null() ? std::numeric_limits<double>::quiet_NaN() : number();
-}
-
 std::size_t JsonPlace::count() const {
   if (!value_->is_number_unsigned() && !(value_->is_number_integer() && value_->get<std::int64_t>() >= 0)) {
     fail("an integer >= 0");

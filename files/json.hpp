@@ -53,8 +53,6 @@ class JsonPlace {
 
   /// A finite number.
   [[nodiscard]] double number() const;
-  /// A number, or NaN for null (which is how NaN and infinity are written).
-  [[nodiscard]] double number_or_nan() const;
   /// An integer >= 0.
   [[nodiscard]] std::size_t count() const;
   [[nodiscard]] bool boolean() const;

@@ -63,12 +63,4 @@ std::string shown(std::string_view text) {
   return out + (text.size() > longest ? "...'" : "'");
 }
 
-std::string listed(const std::vector<std::string>& names) {
-  std::string out;
-  for (const std::string& name : names) {
-    out += (out.empty() ? "" : ", ") + name;
-  }
-  return out;
-}
-
 }  // namespace wheelwright

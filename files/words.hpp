@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include <wheelwright/core/words.hpp>
 #include <wheelwright/files/json.hpp>
 
 namespace wheelwright {
@@ -52,8 +53,5 @@ template <typename Value, std::size_t n>
 /// `text` between quotes, fit for a message: control characters and bytes that are not ASCII shown as '?', cut after 40
 /// characters.
 [[nodiscard]] std::string shown(std::string_view text);
-
-/// "a, b, c".
-[[nodiscard]] std::string listed(const std::vector<std::string>& names);
 
 }  // namespace wheelwright

@@ -6,6 +6,7 @@
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/statistics.hpp>
+#include <wheelwright/core/words.hpp>
 #include <wheelwright/filter/encoder.hpp>
 
 namespace wheelwright {
@@ -26,14 +27,6 @@ namespace {
 constexpr std::size_t kMostSpeeds = 200000;   // enough to find an encoder; longer logs are not searched further
 constexpr double kHalf = 0.5 * (1.0 - 1e-6);  // of a quantum: what rounding to it makes wrong, as printed
 constexpr double kEvenSteps = 0.02;           // steps further apart than this share are not one sampling interval
-
-std::string join(const std::vector<std::string>& words) {
-  std::string out;
-  for (const auto& word : words) {
-    out += (out.empty() ? "" : ", ") + word;
-  }
-  return out;
-}
 
 std::string effort_column(const Joint& joint, EffortKind kind) {
   switch (kind) {
@@ -140,16 +133,16 @@ Measurement find_measurement(LogSource& log, const Robot& robot, const Model& mo
   const bool have_angles = has_all(log, model, [](const Joint& j) { return j.angle; });
   const bool have_speeds = has_all(log, model, [](const Joint& j) { return j.speed; });
   if (!have_angles && !have_speeds) {
-    throw InputError("the log has columns t, " + join(log.columns()) + ": expected the motion of every joint, " +
-                     join(speeds) + " or " + join(angles) + " (use --map to rename columns)");
+    throw InputError("the log has columns t, " + listed(log.columns()) + ": expected the motion of every joint, " +
+                     listed(speeds) + " or " + listed(angles) + " (use --map to rename columns)");
   }
   if (order == 1 && !have_speeds) {
-    throw InvalidArgument("filter order is 1, which works on speeds, but the log has angles only (" + join(angles) +
-                          "): expected order 2, or a log with " + join(speeds));
+    throw InvalidArgument("filter order is 1, which works on speeds, but the log has angles only (" + listed(angles) +
+                          "): expected order 2, or a log with " + listed(speeds));
   }
   if (!has_all(log, model, [&](const Joint& j) { return effort_column(j, robot.effort); })) {
-    throw InputError("the log has columns t, " + join(log.columns()) + ": expected the effort of every joint, " +
-                     join(m.effort_columns) + " (effort.kind in the robot file says which effort is used; --map " +
+    throw InputError("the log has columns t, " + listed(log.columns()) + ": expected the effort of every joint, " +
+                     listed(m.effort_columns) + " (effort.kind in the robot file says which effort is used; --map " +
                      "renames columns)");
   }
   m.motion = order == 2 && have_angles ? MotionKind::angle : MotionKind::speed;

@@ -64,8 +64,6 @@ class StepEnclosure {
   [[nodiscard]] double change(std::size_t coordinate, const Model& model, const StepMotion& step,
                               const Eigen::VectorXd& effort_change) const;
 
-  [[nodiscard]] const MotionBound& bound() const { return bound_; }
-
  private:
   void evaluate(const Model& model, StepMotion& step) const;
   void force(const Model& model, const StepMotion& step) const;

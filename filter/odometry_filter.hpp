@@ -102,13 +102,10 @@ class OdometryFilter {
   [[nodiscard]] double window_start() const { return at(tail_).t; }
   /// t_k of row(), s.
   [[nodiscard]] double window_end() const { return at(size_ - 1).t; }
-  /// W, s.
-  [[nodiscard]] double window() const { return window_; }
   [[nodiscard]] const OdometryMeasurement& measurement() const { return measurement_; }
   /// Outputs and parameters of a row.
   [[nodiscard]] std::size_t outputs() const { return static_cast<std::size_t>(row_.Y.rows()); }
   [[nodiscard]] std::size_t parameters() const { return static_cast<std::size_t>(row_.Y.cols()); }
-  [[nodiscard]] const OdometryErrors& errors() const { return errors_; }
 
  private:
   // A sum with its rounding error beside it (Dekker 1971): differences of two are as good as if they were summed alone.

@@ -133,7 +133,6 @@ class RegressorFilter {
   bool measure_effort(std::size_t age);
   void effort_of_range(double begin, double end);
   [[nodiscard]] bool effort_is_covered(double end) const;
-  void to_outputs(const Eigen::VectorXd& joint, Eigen::VectorXd& output) const;
   void begin();
   void follow_angles();
   void follow_speeds();

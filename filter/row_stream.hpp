@@ -58,11 +58,6 @@ using TorqueRows = RowStream<RegressorFilter>;
 /// Rows of the kinematic residual.
 using OdometryRows = RowStream<OdometryFilter>;
 
-/// Positions of `columns` in `log`. Throws InvalidArgument, naming the first that it lacks, with `why` it is wanted
-/// behind.
-[[nodiscard]] std::vector<std::size_t> positions_of(const LogSource& log, const std::vector<std::string>& columns,
-                                                    const std::string& why = {});
-
 template <RowFilter Filter>
 RowStream<Filter>::RowStream(LogSource& log, Filter filter)
     : log_(&log), filter_(std::move(filter)), pick_(positions_of(log, filter_.measurement().columns())) {

@@ -92,10 +92,6 @@ double made_up(const CandidateTable& table, const Signature& a, const Signature&
   return std::clamp(1.0 - left / square, 0.0, 1.0);
 }
 
-std::vector<ConfusablePair> confusable_pairs(const CandidateTable& table, BaseModel base, double least) {
-  return confusable_pairs(table, signatures(table, base), base, least);
-}
-
 std::vector<ConfusablePair> confusable_pairs(const CandidateTable& table,
                                              const std::vector<std::optional<Signature>>& of_effect, BaseModel base,
                                              double least) {

@@ -39,9 +39,6 @@ struct Signature {
 [[nodiscard]] std::vector<ConfusablePair> confusable_pairs(const CandidateTable& table,
                                                            const std::vector<std::optional<Signature>>& of_effect,
                                                            BaseModel base, double least = 0.9);
-/// The same of signatures(table, base).
-[[nodiscard]] std::vector<ConfusablePair> confusable_pairs(const CandidateTable& table, BaseModel base,
-                                                           double least = 0.9);
 
 /// Sentences on effects that leave no trace on this log: they do not apply, their columns are zero, or θ makes up all
 /// but `least` of them; with what would show them.

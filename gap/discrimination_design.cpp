@@ -9,6 +9,7 @@
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/error.hpp>
+#include <wheelwright/core/random.hpp>
 #include <wheelwright/design/stages.hpp>
 #include <wheelwright/gap/further_drive.hpp>
 
@@ -30,7 +31,7 @@ std::vector<bool> find_decidable(const DesignSubject& subject, const MotionLimit
   std::vector<bool> decidable(rivals.size() * (rivals.size() - 1), false);
   for (int k = 0; k < kProbes; ++k) {
     std::vector<double> x(family.dimension());
-    std::ranges::generate(x, [&] { return static_cast<double>(generator() >> 11) * 0x1p-53; });
+    std::ranges::generate(x, [&] { return uniform(generator); });
     const std::vector<RivalSeparation> pairs =
         discrimination(planned_drive(family.plan(x, subject.step), subject), rivals, catalogue, noise);
     for (std::size_t i = 0; i < pairs.size(); ++i) {

@@ -9,6 +9,7 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/core/linear_algebra.hpp>
+#include <wheelwright/core/random.hpp>
 #include <wheelwright/design/stages.hpp>
 #include <wheelwright/filter/measurement.hpp>
 #include <wheelwright/gap/discrimination_design.hpp>
@@ -142,7 +143,7 @@ std::string reason_for(const Judged& pair, const Effect& first, const Effect& se
 Drive random_drive(const StageFamily& family, const DesignSubject& subject, const Drive& like,
                    std::mt19937_64& generator) {
   std::vector<double> x(family.dimension());
-  std::ranges::generate(x, [&] { return static_cast<double>(generator() >> 11) * 0x1p-53; });
+  std::ranges::generate(x, [&] { return uniform(generator); });
   Drive drive = planned_drive(family.plan(x, subject.step), subject);
   drive.has_efforts = like.has_efforts;
   if (!like.has_pose()) {

@@ -192,8 +192,4 @@ IncrementNoise repeatability(const Drive& drive, const Windows& windows, const I
   return {root(sum.forward), root(sum.lateral), root(sum.yaw)};
 }
 
-IncrementNoise root_mean_square(const Increments& gap) {
-  return {rms_of(gap.forward), rms_of(gap.lateral), rms_of(gap.yaw)};
-}
-
 }  // namespace wheelwright

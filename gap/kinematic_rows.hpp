@@ -63,7 +63,4 @@ struct IncrementNoise {
 [[nodiscard]] IncrementNoise repeatability(const Drive& drive, const Windows& windows, const Increments& gap,
                                            std::size_t fewest = 30);
 
-/// Root mean square of a healthy drive's pose_gap: noise of pose and wheels together.
-[[nodiscard]] IncrementNoise root_mean_square(const Increments& gap);
-
 }  // namespace wheelwright

@@ -16,6 +16,7 @@
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/limits.hpp>
+#include <wheelwright/core/log.hpp>
 #include <wheelwright/core/statistics.hpp>
 #include <wheelwright/gap/confidence_set.hpp>
 #include <wheelwright/gap/drive.hpp>
@@ -64,14 +65,6 @@ Eigen::Index smooth_length(Eigen::Index length) {
   return length;
 }
 
-double median_step(const Eigen::VectorXd& t) {
-  std::vector<double> steps(static_cast<std::size_t>(t.size() - 1));
-  for (std::size_t k = 0; k < steps.size(); ++k) {
-    steps[k] = t[static_cast<Eigen::Index>(k) + 1] - t[static_cast<Eigen::Index>(k)];
-  }
-  return median(std::move(steps));
-}
-
 }  // namespace
 
 double Spectrum::power(double lower, double upper) const {
@@ -92,7 +85,7 @@ Spectrum spectrum(const Eigen::VectorXd& t, const Eigen::VectorXd& values, const
   if (t.size() < 16 || !(t[t.size() - 1] > t[0])) {
     return out;
   }
-  const double step = median_step(t);
+  const double step = median_step({t.begin(), t.end()});
   if (!(step > 0.0)) {
     return out;
   }
@@ -239,19 +232,6 @@ double band_p_value(double power, double mean, double variance) {
   }
   const double freedom = 2.0 * mean * mean / variance;
   return chi_squared_tail(freedom, std::max(0.0, freedom * power / mean));
-}
-
-std::vector<double> holm(const std::vector<double>& p) {
-  std::vector<std::size_t> order(p.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return p[a] < p[b]; });
-  std::vector<double> out(p.size());
-  double running = 0.0;
-  for (std::size_t i = 0; i < order.size(); ++i) {
-    running = std::max(running, std::min(1.0, p[order[i]] * static_cast<double>(p.size() - i)));
-    out[order[i]] = running;
-  }
-  return out;
 }
 
 double share_of(double part, double whole) {

@@ -235,13 +235,7 @@ bool InstrumentStream::next(RegressionBlock& block) {
     block.dy.segment(at, n) = rows_.row().dy;
     ++kept;
   }
-  block.sample.resize(kept);
-  block.t.resize(kept);
-  const auto rows = block.rows();
-  block.Y.conservativeResize(rows, Eigen::NoChange);
-  block.dY.conservativeResize(rows, Eigen::NoChange);
-  block.y.conservativeResize(rows);
-  block.dy.conservativeResize(rows);
+  block.shorten(kept);
   return true;
 }
 

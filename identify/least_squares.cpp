@@ -57,15 +57,6 @@ void LeastSquares::add(const RegressionBlock& block, std::size_t first, std::siz
   instants_ += last > first ? last - first : 0;
 }
 
-void LeastSquares::merge(const LeastSquares& other) {
-  check::that(other.p_ == p_ && other.weights_ == weights_, "merge", "the same parameters and weights");
-  other.fold();
-  fold();
-  stack_.middleRows(filled_, other.stack_.cols()) = other.stack_.topRows(other.stack_.cols());
-  filled_ += other.stack_.cols();
-  instants_ += other.instants_;
-}
-
 Eigen::MatrixXd LeastSquares::factor() const {
   fold();
   return stack_.topRows(stack_.cols()).triangularView<Eigen::Upper>();

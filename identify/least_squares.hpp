@@ -39,8 +39,6 @@ class LeastSquares {
   explicit LeastSquares(std::size_t parameters, Eigen::VectorXd weights = {});
   /// Adds instants [first, last) of `block` (all by default).
   void add(const RegressionBlock& block, std::size_t first = 0, std::size_t last = static_cast<std::size_t>(-1));
-  /// Adds all that `other` has seen; it must have the same parameters and weights.
-  void merge(const LeastSquares& other);
   /// Number of instants added.
   [[nodiscard]] std::size_t instants() const { return instants_; }
   /// The triangular factor of [Y y] with weighted rows: (p+1) × (p+1), upper triangular; ‖[Y y]v‖ = ‖factor()·v‖ for

@@ -36,8 +36,6 @@ void BlockSums::add(const Eigen::Ref<const Eigen::VectorXd>& value) {
   }
 }
 
-Eigen::VectorXd BlockSums::total() const { return blocks().rowwise().sum() + current_; }
-
 LongRunCovariance long_run_covariance(const Eigen::MatrixXd& block_sums, std::size_t most_frequencies) {
   const auto blocks = block_sums.cols();
   LongRunCovariance result;

@@ -26,8 +26,6 @@ class BlockSums {
   void add(const Eigen::Ref<const Eigen::VectorXd>& value);
   /// Number of values seen.
   [[nodiscard]] std::size_t count() const { return count_; }
-  /// Sum of all values.
-  [[nodiscard]] Eigen::VectorXd total() const;
   /// Sums of the full blocks, one a column.
   [[nodiscard]] Eigen::MatrixXd blocks() const { return sums_.leftCols(static_cast<Eigen::Index>(full_)); }
   /// Values in each full block.

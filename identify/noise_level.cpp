@@ -91,45 +91,32 @@ DifferenceNoise judge_windows(const Sums& sums, std::size_t windows) {
 }  // namespace
 
 std::vector<DifferenceNoise> difference_noise(LogSource& log, const std::vector<std::string>& columns) {
-  std::vector<std::size_t> pick;
-  for (const auto& name : columns) {
-    const auto column = log.find(name);
-    check::that(column.has_value(), "log", "a column '" + name + "'");
-    pick.push_back(*column);
-  }
+  const std::vector<std::size_t> pick = positions_of(log, columns);
   const double step = log.median_step();
   std::vector<Sums> sums(columns.size());
   // Last differences of order 0, 1, …, of each column.
   std::vector<std::array<double, kOrders + 1>> last(columns.size());
   std::size_t run = 0, windows = 0;
   double before = 0.0;
-  LogBlock block;
-  log.rewind();
-  while (log.next(block)) {
-    std::size_t segment = 0;
-    for (std::size_t k = 0; k < block.rows(); ++k) {
-      const bool starts = segment < block.segment_starts.size() && block.segment_starts[segment] == k;
-      segment += starts ? 1 : 0;
-      const bool even = std::abs(block.t[k] - before - step) <= kEvenStep * step;
-      run = starts || !even ? 1 : run + 1;
-      before = block.t[k];
-      const bool whole = run > kOrders;
-      windows += whole ? 1 : 0;
-      for (std::size_t c = 0; c < pick.size(); ++c) {
-        double difference = block.columns[pick[c]][k];
-        sums[c].largest = std::max(sums[c].largest, std::abs(difference));
-        for (std::size_t d = 0; d <= kOrders; ++d) {
-          const double older = last[c][d];
-          last[c][d] = difference;
-          if (whole && d > 0) {
-            sums[c].squares[d - 1] += difference * difference;
-          }
-          difference -= older;
+  for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
+    const bool even = std::abs(block.t[k] - before - step) <= kEvenStep * step;
+    run = starts || !even ? 1 : run + 1;
+    before = block.t[k];
+    const bool whole = run > kOrders;
+    windows += whole ? 1 : 0;
+    for (std::size_t c = 0; c < pick.size(); ++c) {
+      double difference = block.columns[pick[c]][k];
+      sums[c].largest = std::max(sums[c].largest, std::abs(difference));
+      for (std::size_t d = 0; d <= kOrders; ++d) {
+        const double older = last[c][d];
+        last[c][d] = difference;
+        if (whole && d > 0) {
+          sums[c].squares[d - 1] += difference * difference;
         }
+        difference -= older;
       }
     }
-  }
-  log.rewind();
+  });
   std::vector<DifferenceNoise> result;
   result.reserve(sums.size());
   for (const Sums& s : sums) {
@@ -175,47 +162,32 @@ struct Pair {
 
 bool share_noise(LogSource& log, const std::vector<std::string>& first, const std::vector<std::string>& second) {
   check::that(first.size() == second.size(), "share_noise", "as many columns of one kind as of the other");
-  std::vector<std::size_t> pick;
-  for (const auto* names : {&first, &second}) {
-    for (const auto& name : *names) {
-      const auto column = log.find(name);
-      check::that(column.has_value(), "log", "a column '" + name + "'");
-      pick.push_back(*column);
-    }
-  }
+  const std::vector<std::size_t> pick = positions_of(log, first), pick_second = positions_of(log, second);
   const std::size_t count = first.size();
   const double step = log.median_step();
   std::vector<Pair> pairs(count);
   std::size_t run = 0, windows = 0;
   double before = 0.0;
-  LogBlock block;
-  log.rewind();
-  while (log.next(block)) {
-    std::size_t segment = 0;
-    for (std::size_t k = 0; k < block.rows(); ++k) {
-      const bool starts = segment < block.segment_starts.size() && block.segment_starts[segment] == k;
-      segment += starts ? 1 : 0;
-      const bool even = std::abs(block.t[k] - before - step) <= kEvenGrid * step;
-      run = starts || !even ? 1 : run + 1;
-      before = block.t[k];
-      const bool whole = run > kOrder + kLags;
-      windows += whole ? 1 : 0;
-      for (std::size_t c = 0; c < count; ++c) {
-        Pair& pair = pairs[c];
-        const double a = pair.first(block.columns[pick[c]][k]);
-        std::rotate(pair.before.rbegin(), pair.before.rbegin() + 1, pair.before.rend());
-        pair.before[0] = pair.second(block.columns[pick[count + c]][k]);
-        if (whole) {
-          pair.squares_first += a * a;
-          pair.squares_second += pair.before[0] * pair.before[0];
-          for (std::size_t lag = 0; lag < kLags; ++lag) {
-            pair.products[lag] += a * pair.before[lag];
-          }
+  for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
+    const bool even = std::abs(block.t[k] - before - step) <= kEvenGrid * step;
+    run = starts || !even ? 1 : run + 1;
+    before = block.t[k];
+    const bool whole = run > kOrder + kLags;
+    windows += whole ? 1 : 0;
+    for (std::size_t c = 0; c < count; ++c) {
+      Pair& pair = pairs[c];
+      const double a = pair.first(block.columns[pick[c]][k]);
+      std::rotate(pair.before.rbegin(), pair.before.rbegin() + 1, pair.before.rend());
+      pair.before[0] = pair.second(block.columns[pick_second[c]][k]);
+      if (whole) {
+        pair.squares_first += a * a;
+        pair.squares_second += pair.before[0] * pair.before[0];
+        for (std::size_t lag = 0; lag < kLags; ++lag) {
+          pair.products[lag] += a * pair.before[lag];
         }
       }
     }
-  }
-  log.rewind();
+  });
   if (windows < kFewestSharedWindows) {
     return false;
   }

@@ -10,6 +10,7 @@
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/linear_algebra.hpp>
+#include <wheelwright/core/random.hpp>
 
 namespace wheelwright {
 namespace {
@@ -213,16 +214,6 @@ constexpr double kSingularResample = 1e-12;  // reciprocal condition, columns sc
 constexpr std::size_t kFewStretches = 4;     // fewer cannot show their own spread
 constexpr double kMostMissed = 0.5;          // of the variance, that is allowed for
 
-// An index below `count`, each as likely, the same with every standard library.
-std::size_t below(std::mt19937_64& generator, std::size_t count) {
-  const std::uint64_t range = std::mt19937_64::max() - std::mt19937_64::max() % count;
-  std::uint64_t drawn = generator();
-  while (drawn >= range) {
-    drawn = generator();
-  }
-  return static_cast<std::size_t>(drawn % count);
-}
-
 // Column s: the sum of columns s, s + 1, …, s + length − 1, counted round a circle.
 Eigen::MatrixXd circular_sums(const Eigen::MatrixXd& columns, Eigen::Index length) {
   Eigen::MatrixXd sums = columns;
@@ -290,7 +281,7 @@ BlockBootstrap block_bootstrap(const RegressionMoments& moments, const BlockBoot
     A_sum.setZero();
     c_sum.setZero();
     for (Eigen::Index& start : starts) {
-      start = static_cast<Eigen::Index>(below(generator, blocks.blocks()));
+      start = static_cast<Eigen::Index>(uniform_below(generator, blocks.blocks()));
       A_sum += A.col(start);
       c_sum += c.col(start);
     }

@@ -331,27 +331,4 @@ std::vector<LinearConstraint> physical_consistency(const std::vector<PhysicalQua
   return constraints;
 }
 
-std::vector<LinearConstraint> bounds_on(const std::vector<PhysicalQuantity>& parameters,
-                                        const std::vector<std::optional<Interval>>& bounds) {
-  check_scales(parameters);
-  check::that(bounds.size() == parameters.size(), "bounds", "one for each parameter");
-  std::vector<LinearConstraint> constraints;
-  for (std::size_t j = 0; j < bounds.size(); ++j) {
-    if (!bounds[j]) {
-      continue;
-    }
-    check::that(bounds[j]->lower <= bounds[j]->upper, "bounds of " + parameters[j].name, "lower <= upper");
-    for (const double sign : {-1.0, 1.0}) {
-      const double end = sign < 0.0 ? bounds[j]->lower : bounds[j]->upper;
-      if (std::isfinite(end)) {
-        constraints.push_back(one_sided(parameters, j, sign, sign * end));
-        constraints.back().name = fmt::format("{} = {} {}", parameters[j].name, end, parameters[j].unit);
-        constraints.back().asks =
-            fmt::format("a {} {} than stated", sign < 0.0 ? "smaller" : "larger", with_blanks(parameters[j].name));
-      }
-    }
-  }
-  return constraints;
-}
-
 }  // namespace wheelwright

@@ -87,9 +87,4 @@ struct PhysicalQuantity {
 [[nodiscard]] std::vector<LinearConstraint> physical_consistency(const std::vector<PhysicalQuantity>& parameters,
                                                                  std::optional<double> footprint_radius = {});
 
-/// lower <= quantity <= upper for each interval that is given (in the quantity's unit; an infinite end is no
-/// constraint); `bounds` has one for each parameter. Throws InvalidArgument for an empty interval or a NaN.
-[[nodiscard]] std::vector<LinearConstraint> bounds_on(const std::vector<PhysicalQuantity>& parameters,
-                                                      const std::vector<std::optional<Interval>>& bounds);
-
 }  // namespace wheelwright

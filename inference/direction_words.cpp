@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/words.hpp>
 
 namespace wheelwright {
 
@@ -71,15 +72,6 @@ std::string combination_in_words(const Eigen::VectorXd& c, const std::vector<Par
   return fmt::format("{} ({})", words, fmt::join(units, ", "));
 }
 
-std::string names_in_words(const std::vector<std::string>& names) {
-  std::string words;
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    words += i == 0 ? "" : i + 1 == names.size() ? " and " : ", ";
-    words += names[i];
-  }
-  return words;
-}
-
 std::vector<std::string> missing_manoeuvres(const std::vector<Eigen::Index>& members,
                                             const std::vector<ParameterWords>& parameters) {
   std::vector<std::string> names, own;
@@ -101,7 +93,7 @@ std::vector<std::string> missing_manoeuvres(const std::vector<Eigen::Index>& mem
     return own;
   }
   if (only(TermKind::inertia)) {
-    advice.push_back("no motion may tell " + names_in_words(names) +
+    advice.push_back("no motion may tell " + enumerated(names) +
                      " apart: state one of them, or drive once more with a load of known mass");
   }
   if (has(TermKind::viscous) && has(TermKind::coulomb)) {

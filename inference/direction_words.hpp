@@ -41,9 +41,6 @@ struct ParameterWords {
 [[nodiscard]] Eigen::VectorXd largest_part_one(const Eigen::VectorXd& c, const Eigen::VectorXd& size,
                                                double least = 0.1);
 
-/// Names joined for a sentence: "a", "a and b", "a, b and c".
-[[nodiscard]] std::string names_in_words(const std::vector<std::string>& names);
-
 /// The driving that would tell the parameters `members` (indices) apart, or show it where it is only one. Follows from
 /// their kinds (two friction laws: both directions and many speeds; inertia and friction: changes of speed and constant
 /// speeds; two inertias on one motion: none, a known load), else from what each says itself.

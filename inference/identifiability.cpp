@@ -10,6 +10,7 @@
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/linear_algebra.hpp>
+#include <wheelwright/core/words.hpp>
 
 namespace wheelwright {
 namespace {
@@ -114,8 +115,8 @@ void find_base(const IdentifiabilityInput& input, const ScaledDirections& scaled
       unseen.words = input.parameters[static_cast<std::size_t>(d)].name + ": its motion never occurs in the log";
     } else {
       unseen.words = fmt::format("{} cannot be told apart here: only {} {} seen",
-                                 names_in_words(names_of(unseen.members, input.parameters)),
-                                 names_in_words(combinations), combinations.size() == 1 ? "is" : "are");
+                                 enumerated(names_of(unseen.members, input.parameters)), enumerated(combinations),
+                                 combinations.size() == 1 ? "is" : "are");
     }
     unseen.manoeuvres = missing_manoeuvres(unseen.members, input.parameters);
     result.unseen.push_back(std::move(unseen));
@@ -200,20 +201,6 @@ IdentifiabilityInput identifiability_input(const LeastSquares& rows, std::vector
   return input;
 }
 
-IdentifiabilityInput identifiability_input(const RegressionMoments& moments, const Eigen::VectorXd& weights,
-                                           std::vector<ParameterWords> parameters) {
-  const Eigen::MatrixXd G = moments.total(weights).YY;
-  const Eigen::VectorXd length = G.diagonal().unaryExpr([](double d) { return d > 0.0 ? std::sqrt(d) : 1.0; });
-  const Eigen::VectorXd one_over = length.cwiseInverse();
-  const EigenPairs eigen = symmetric_eigen(one_over.asDiagonal() * G * one_over.asDiagonal());
-  IdentifiabilityInput input;
-  input.parameters = std::move(parameters);
-  input.factor = eigen.values.cwiseMax(0.0).cwiseSqrt().asDiagonal() * eigen.vectors.transpose() * length.asDiagonal();
-  input.from_gram = true;
-  input.instants = moments.instants();
-  return input;
-}
-
 Identifiability identifiability(const IdentifiabilityInput& input) {
   const auto p = static_cast<Eigen::Index>(input.parameters.size());
   const auto square_or_empty = [&](const Eigen::MatrixXd& m) {
@@ -245,7 +232,7 @@ Identifiability identifiability(const IdentifiabilityInput& input) {
   result.condition = smallest > 0.0 ? largest / smallest : std::numeric_limits<double>::infinity();
   const double rounding = kRoundings * static_cast<double>(p) * 0x1.0p-53 *
                           std::sqrt(static_cast<double>(std::max<std::size_t>(input.instants, 1)));
-  result.tolerance = input.from_gram ? std::sqrt(rounding) : rounding;
+  result.tolerance = rounding;
   result.rank = static_cast<int>((result.singular_values.array() > result.tolerance * largest).count());
   find_base(input, scaled, result);
   find_noise(input, scaled, result);

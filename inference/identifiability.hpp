@@ -23,19 +23,14 @@ namespace wheelwright {
 struct IdentifiabilityInput {
   std::vector<ParameterWords> parameters;  ///< p
   Eigen::MatrixXd factor;                  ///< any R (rows × p) with RᵀR = Σ w²YᵀY
-  bool from_gram = false;      ///< R was made of Σ w²YᵀY: only half the digits of small directions are left
-  std::size_t instants = 0;    ///< of the log
-  Eigen::MatrixXd noise;       ///< p × p, Σ w² E δYᵀδY over all instants; empty: unknown
-  Eigen::MatrixXd covariance;  ///< p × p, of θ̂, zero for parameters that were left out; empty: unknown
+  std::size_t instants = 0;                ///< of the log
+  Eigen::MatrixXd noise;                   ///< p × p, Σ w² E δYᵀδY over all instants; empty: unknown
+  Eigen::MatrixXd covariance;              ///< p × p, of θ̂, zero for parameters that were left out; empty: unknown
   Eigen::VectorXd size;  ///< p, > 0: what counts as large, the half-width of the prior or |θ̂_j|; empty: unknown
 };
 
 /// R, with the parameters of `rows` seen through the triangular factor of least squares: condition enters once.
 [[nodiscard]] IdentifiabilityInput identifiability_input(const LeastSquares& rows,
-                                                         std::vector<ParameterWords> parameters);
-/// R from second moments, weighted: the condition enters squared.
-[[nodiscard]] IdentifiabilityInput identifiability_input(const RegressionMoments& moments,
-                                                         const Eigen::VectorXd& weights,
                                                          std::vector<ParameterWords> parameters);
 
 /// Why a direction is not seen.

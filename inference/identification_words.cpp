@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include <wheelwright/core/statistics.hpp>
+#include <wheelwright/core/words.hpp>
 #include <wheelwright/identify/noise_level.hpp>
 
 namespace wheelwright {
@@ -23,13 +24,6 @@ constexpr double kOtherTrack = 0.01;   // relative difference of track widths th
 std::string spoken(std::string name) {
   std::ranges::replace(name, '_', ' ');
   return name;
-}
-
-std::string capital(std::string text) {
-  if (!text.empty() && text[0] >= 'a' && text[0] <= 'z') {
-    text[0] = static_cast<char>(text[0] - 'a' + 'A');
-  }
-  return text;
 }
 
 std::string sentence(const std::string& text) {
@@ -60,7 +54,7 @@ std::string names_of(const Identification& r, const std::vector<std::size_t>& li
   for (const std::size_t j : list) {
     names.push_back(spoken(shown[j].name));
   }
-  return names_in_words(names);
+  return enumerated(names);
 }
 
 // The shape that explains most, of those that matter.
@@ -146,7 +140,7 @@ std::string regions_sentence(const Identification& r) {
                        : fmt::format(
                              "Against the intervals of Student's t, those of {}: what they assume stands "
                              "beside them.",
-                             names_in_words(parts));
+                             enumerated(parts));
 }
 
 // Where least squares and the fit that ignores outliers differ.

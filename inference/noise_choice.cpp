@@ -12,15 +12,6 @@
 
 namespace wheelwright {
 
-std::string_view to_string(NoiseLaw law) {
-  switch (law) {
-    case NoiseLaw::uniform: return "uniform";
-    case NoiseLaw::gaussian: return "gaussian";
-    case NoiseLaw::any_variance: return "any_variance";
-  }
-  return "";
-}
-
 ErrorBound bound_of_sd(double sd, double relative_sd, const ErrorBoundOptions& options) {
   check::non_negative(sd, "standard deviation");
   check::non_negative(relative_sd, "relative standard error");
@@ -44,7 +35,6 @@ ErrorBound bound_of_sd(double sd, double relative_sd, const ErrorBoundOptions& o
 
 namespace {
 
-constexpr double kUncorrelated = 0.2;
 constexpr double kClearlyLarger = 3.0;
 
 struct Level {
@@ -61,7 +51,6 @@ std::string_view assumption_of(NoiseMethod method) {
   switch (method) {
     case NoiseMethod::none: break;
     case NoiseMethod::standstill: return "the noise in motion is that at rest";
-    case NoiseMethod::repeats: return "everything but the sensors' noise repeats";
     case NoiseMethod::differences: return "noise independent from sample to sample";
   }
   return "";
@@ -85,7 +74,6 @@ std::string_view to_string(NoiseMethod method) {
   switch (method) {
     case NoiseMethod::none: return "none";
     case NoiseMethod::standstill: return "standstill";
-    case NoiseMethod::repeats: return "repeats";
     case NoiseMethod::differences: return "differences";
   }
   return "";
@@ -93,29 +81,20 @@ std::string_view to_string(NoiseMethod method) {
 
 NoiseChoice choose_noise(const NoiseEvidence& evidence, const ErrorBoundOptions& options) {
   using Kind = DifferenceNoise::Kind;
-  std::optional<Level> rest, repeats, differences;
+  std::optional<Level> rest, differences;
   if (evidence.standstill && evidence.standstill->kind == StandstillNoise::Kind::noisy) {
     rest = Level{NoiseMethod::standstill, evidence.standstill->sd, evidence.standstill->relative_sd};
-  }
-  if (evidence.repeats && evidence.repeats->sd > 0.0) {
-    repeats = Level{NoiseMethod::repeats, evidence.repeats->sd, evidence.repeats->relative_sd};
   }
   const Kind kind = evidence.differences ? evidence.differences->kind : Kind::too_short;
   if (kind == Kind::white || kind == Kind::rough) {
     differences = Level{NoiseMethod::differences, evidence.differences->sd, evidence.differences->relative_sd};
   }
-  const bool repeats_are_noise = repeats && !evidence.repeats->autocorrelation.empty() &&
-                                 std::abs(evidence.repeats->autocorrelation.front()) < kUncorrelated;
   const auto at_rest = [&](std::string reason, NoiseMeaning meaning) {
     NoiseChoice choice = chosen(*rest, meaning, std::move(reason), options);
     choice.bound.bound = std::max(choice.bound.bound, evidence.standstill->bound.bound);
     return choice;
   };
   if (kind == Kind::white) {
-    if (repeats_are_noise && exceeds(*repeats, *differences)) {
-      return chosen(*repeats, NoiseMeaning::estimate,
-                    "two runs differ by more than differences show, without correlation in time", options);
-    }
     if (rest && exceeds(*rest, *differences)) {
       return at_rest("standstill shows more than differences do: slow noise, which differences do not see",
                      NoiseMeaning::estimate);
@@ -129,18 +108,8 @@ NoiseChoice choose_noise(const NoiseEvidence& evidence, const ErrorBoundOptions&
                                      : kind == Kind::rough ? "differences grow (differenced angles)"
                                      : kind == Kind::none  ? "differences show nothing"
                                                            : "too few even steps for differences";
-  if (repeats_are_noise) {
-    return chosen(*repeats, NoiseMeaning::estimate,
-                  fmt::format("{}; two runs differ without correlation in time", not_white), options);
-  }
   if (rest) {
-    return at_rest(
-        fmt::format("{}; {}", not_white, repeats ? "two runs differ by more than noise" : "there is no second run"),
-        NoiseMeaning::lower_limit);
-  }
-  if (repeats) {
-    return chosen(*repeats, NoiseMeaning::upper_limit, fmt::format("{}; two runs differ by more than noise", not_white),
-                  options);
+    return at_rest(fmt::format("{}; there is no second run", not_white), NoiseMeaning::lower_limit);
   }
   if (differences) {
     return chosen(*differences, NoiseMeaning::upper_limit,

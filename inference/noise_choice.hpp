@@ -8,7 +8,6 @@
 #include <string_view>
 
 #include <wheelwright/identify/noise_level.hpp>
-#include <wheelwright/inference/repeat_noise.hpp>
 #include <wheelwright/inference/standstill_noise.hpp>
 
 namespace wheelwright {
@@ -19,9 +18,6 @@ enum class NoiseLaw {
   gaussian,      ///< tails as light as a Gaussian's
   any_variance,  ///< a finite variance and nothing else
 };
-
-/// Name for people and files: "uniform", …
-[[nodiscard]] std::string_view to_string(NoiseLaw law);
 
 /// What the bound is to hold for.
 struct ErrorBoundOptions {
@@ -51,7 +47,7 @@ struct ErrorBound {
 [[nodiscard]] ErrorBound bound_of_sd(double sd, double relative_sd, const ErrorBoundOptions& options = {});
 
 /// How a noise level was found.
-enum class NoiseMethod { none, standstill, repeats, differences };
+enum class NoiseMethod { none, standstill, differences };
 
 /// Name for people and files: "none", "standstill", …
 [[nodiscard]] std::string_view to_string(NoiseMethod method);
@@ -59,7 +55,6 @@ enum class NoiseMethod { none, standstill, repeats, differences };
 /// What is known about the noise of one column.
 struct NoiseEvidence {
   std::optional<StandstillNoise> standstill;
-  std::optional<RepeatNoise> repeats;  ///< of runs that are repeats (RepeatStatus::repeats)
   std::optional<DifferenceNoise> differences;
 };
 
@@ -82,11 +77,9 @@ struct NoiseChoice {
   std::string reason;        ///< one sentence: why this one
 };
 
-/// Differences where they look white, because they are of the sensor in motion and need no second run; unless another
-/// level is larger by three standard errors and not driving that failed to repeat, since differences do not see
-/// correlated noise. Then repeats whose differences are uncorrelated (|ρ| < 0.2 at lag one); then standstill, as a
-/// lower limit; then correlated repeats or rough differences, as an upper limit. Smooth differences are never used:
-/// they may be wrong either way. The bound is made for `options`; where standstill is used, it is no less than the one
+/// Differences where they look white, because they are of the sensor in motion; unless standstill is larger by three
+/// standard errors, since differences do not see correlated noise. Then standstill, as a lower limit; then rough
+/// differences, as an upper limit. Smooth differences are never used: they may be wrong either way. The bound is made for `options`; where standstill is used, it is no less than the one
 /// extrapolated there.
 [[nodiscard]] NoiseChoice choose_noise(const NoiseEvidence& evidence, const ErrorBoundOptions& options = {});
 

@@ -7,38 +7,13 @@
 #include <fmt/format.h>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/log.hpp>
 #include <wheelwright/identify/least_squares.hpp>
 
 namespace wheelwright {
 namespace {
 
 constexpr double kZero = 1e-9;  // of a command's largest value
-
-std::vector<std::size_t> find_all(const LogSource& log, const std::vector<std::string>& names) {
-  std::vector<std::size_t> found;
-  for (const auto& name : names) {
-    const auto column = log.find(name);
-    check::that(column.has_value(), "log", "a column '" + name + "'");
-    found.push_back(*column);
-  }
-  return found;
-}
-
-// Every row of the log: visit(block, row, whether a segment starts).
-template <typename Visit>
-void walk(LogSource& log, Visit visit) {
-  LogBlock block;
-  log.rewind();
-  while (log.next(block)) {
-    std::size_t segment = 0;
-    for (std::size_t k = 0; k < block.rows(); ++k) {
-      const bool starts = segment < block.segment_starts.size() && block.segment_starts[segment] == k;
-      segment += starts ? 1 : 0;
-      visit(block, k, starts);
-    }
-  }
-  log.rewind();
-}
 
 // Rows of a stretch that may be a standstill: time, the motion's columns, the measured columns.
 struct Stretch {
@@ -68,10 +43,10 @@ class StandstillGathering {
   StandstillGathering(LogSource& log, const StandstillSigns& signs, const std::vector<std::string>& columns,
                       const StandstillOptions& options)
       : options_(options),
-        commands_(find_all(log, signs.commands)),
+        commands_(positions_of(log, signs.commands)),
         by_angle_(signs.speeds.empty() && !signs.angles.empty()),
-        motion_(find_all(log, by_angle_ ? signs.angles : signs.speeds)),
-        picked_(find_all(log, columns)),
+        motion_(positions_of(log, by_angle_ ? signs.angles : signs.speeds)),
+        picked_(positions_of(log, columns)),
         zero_(commands_.size(), 0.0),
         largest_(motion_.size(), 0.0),
         statistics_(Eigen::VectorXd::Zero(1), Eigen::VectorXd::Ones(static_cast<Eigen::Index>(columns.size()))),
@@ -287,8 +262,8 @@ Standstill standstill_noise(LogSource& log, const StandstillSigns& signs, const 
   check::that(options.piece >= options.least_time + 2.0 * options.trim, "piece", "a whole stretch with its ends");
   check::that(!columns.empty(), "columns", "at least one");
   StandstillGathering gathering(log, signs, columns, options);
-  walk(log, [&](const LogBlock& block, std::size_t k, bool starts) { gathering.size_up(block, k, starts); });
-  walk(log, [&](const LogBlock& block, std::size_t k, bool starts) { gathering.take(block, k, starts); });
+  for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) { gathering.size_up(block, k, starts); });
+  for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) { gathering.take(block, k, starts); });
   gathering.finish();
   return gathering.result();
 }

@@ -28,42 +28,31 @@ StribeckRows::StribeckRows(LogSource& log, RegressorFilter filter)
     : kernel_(filter.design(), filter.measurement().motion, filter.measurement().nominal_step),
       input_(filter.model().input) {
   const Measurement& measurement = filter.measurement();
-  std::vector<std::size_t> pick;
-  for (const std::string& name : measurement.columns()) {
-    const auto at = log.find(name);
-    check::that(at.has_value(), "log", "a column '" + name + "'");
-    pick.push_back(*at);
-  }
+  const std::vector<std::size_t> pick = positions_of(log, measurement.columns());
   const auto joints = filter.model().joints.size();
   std::vector<double> sample(pick.size()), speeds, Y, y;
   std::size_t seen = 0;
-  log.rewind();
-  LogBlock block;
-  while (log.next(block)) {
-    std::size_t segment = 0;
-    for (std::size_t k = 0; k < block.rows(); ++k) {
-      if (segment < block.segment_starts.size() && block.segment_starts[segment] == k) {
-        filter.restart();
-        seen = 0;
-        ++segment;
-      }
-      for (std::size_t c = 0; c < pick.size(); ++c) {
-        sample[c] = block.columns[pick[c]][k];
-      }
-      const bool gives_row = filter.step(block.t[k], sample);
-      if (filter.instants() != 0 && filter.instants() != seen) {
-        instants_.push_back({filter.step_length(), filter.instants() == 1, gives_row});
-        const Eigen::VectorXd& speed = filter.joint_speed();
-        speeds.insert(speeds.end(), speed.data(), speed.data() + speed.size());
-      }
-      seen = filter.instants();
-      if (gives_row) {
-        const FilteredRow& row = filter.row();
-        Y.insert(Y.end(), row.Y.data(), row.Y.data() + row.Y.size());
-        y.insert(y.end(), row.y.data(), row.y.data() + row.y.size());
-      }
+  for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
+    if (starts) {
+      filter.restart();
+      seen = 0;
     }
-  }
+    for (std::size_t c = 0; c < pick.size(); ++c) {
+      sample[c] = block.columns[pick[c]][k];
+    }
+    const bool gives_row = filter.step(block.t[k], sample);
+    if (filter.instants() != 0 && filter.instants() != seen) {
+      instants_.push_back({filter.step_length(), filter.instants() == 1, gives_row});
+      const Eigen::VectorXd& speed = filter.joint_speed();
+      speeds.insert(speeds.end(), speed.data(), speed.data() + speed.size());
+    }
+    seen = filter.instants();
+    if (gives_row) {
+      const FilteredRow& row = filter.row();
+      Y.insert(Y.end(), row.Y.data(), row.Y.data() + row.Y.size());
+      y.insert(y.end(), row.y.data(), row.y.data() + row.y.size());
+    }
+  });
   check::that(!y.empty(), "log", "at least one filtered row");
   response_ = Eigen::Map<const Eigen::VectorXd>(y.data(), static_cast<Eigen::Index>(y.size()));
   Y_ = Eigen::Map<const RowMatrix>(Y.data(), response_.size(), static_cast<Eigen::Index>(filter.model().p()));

@@ -17,6 +17,7 @@
 #include <zstd.h>
 
 #include <wheelwright/core/error.hpp>
+#include <wheelwright/core/words.hpp>
 #include <wheelwright/files/byte_source.hpp>
 #include <wheelwright/files/words.hpp>
 
@@ -24,33 +25,6 @@ namespace wheelwright::bag {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// Whether "x_2" comes before "x_10".
-bool natural_less(const std::string& a, const std::string& b) {
-  std::size_t i = 0, j = 0;
-  const auto digit = [](char c) { return c >= '0' && c <= '9'; };
-  const auto number = [&](const std::string& text, std::size_t& at) {
-    const std::size_t start = std::min(text.find_first_not_of('0', at), text.size());
-    for (at = start; at < text.size() && digit(text[at]);) {
-      ++at;
-    }
-    return std::string_view(text).substr(start, at - start);
-  };
-  while (i < a.size() && j < b.size()) {
-    if (digit(a[i]) && digit(b[j])) {
-      const auto x = number(a, i), y = number(b, j);
-      if (x != y) {
-        return x.size() != y.size() ? x.size() < y.size() : x < y;
-      }
-    } else if (a[i] != b[j]) {
-      return a[i] < b[j];
-    } else {
-      ++i;
-      ++j;
-    }
-  }
-  return a.size() - i < b.size() - j || (a.size() - i == b.size() - j && a < b);
-}
 
 }  // namespace
 

@@ -105,14 +105,6 @@ std::optional<RosDefinition> RosDefinitions::find(const std::string& type_name) 
   return definition;
 }
 
-std::vector<std::string> RosDefinitions::names() const {
-  std::vector<std::string> all;
-  for (const auto& [name, file] : files_) {
-    all.push_back(name);
-  }
-  return all;
-}
-
 RosDefinitions ros_definitions_from(const std::filesystem::path& directory) {
   namespace fs = std::filesystem;
   std::error_code error;

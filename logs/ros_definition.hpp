@@ -95,8 +95,6 @@ class RosDefinitions {
   /// The definition of a type; nothing where the directory has none. What it uses is taken from the directory, else
   /// from the bundled ones. Throws InputError as parse_ros_definition does, naming the file.
   [[nodiscard]] std::optional<RosDefinition> find(const std::string& type_name) const;
-  /// Names of all types, sorted.
-  [[nodiscard]] std::vector<std::string> names() const;
 
  private:
   friend RosDefinitions ros_definitions_from(const std::filesystem::path& directory);

@@ -143,8 +143,4 @@ Model DifferentialDrive::model() const {
   return m;
 }
 
-Eigen::Matrix<double, 3, 2> kinematic_matrix(double heading) {
-  return (Eigen::Matrix<double, 3, 2>() << std::cos(heading), 0.0, std::sin(heading), 0.0, 0.0, 1.0).finished();
-}
-
 }  // namespace wheelwright

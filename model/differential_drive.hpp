@@ -35,7 +35,4 @@ struct DifferentialDrive {
   [[nodiscard]] Model model() const;
 };
 
-/// S(q) of (3), 3 × 2, for the heading θ (rad).
-[[nodiscard]] Eigen::Matrix<double, 3, 2> kinematic_matrix(double heading);
-
 }  // namespace wheelwright

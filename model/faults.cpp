@@ -35,21 +35,6 @@ double rise_rate(TimeProfile::Shape shape, double since, double rise_time) {
 constexpr std::array<std::string_view, 8> kind_names = {
     "wheel_radius", "wheel_radius_right", "wheel_radius_left", "slip_x", "slip_y", "slip_yaw", "matched", "unmatched"};
 
-// v⁺ = K v is what unequal or changed radii add to the body speed: K = G diag(δ1R, δ1L) (r G)⁻¹, G = [½ ½; 1/D −1/D].
-Eigen::Matrix2d radius_gain(const DifferentialDrive& drive, const Eigen::Vector2d& radius) {
-  const double r = drive.wheel_radius, d = drive.track_width;
-  const double mean = 0.5 * (radius[0] + radius[1]) / r, half_difference = 0.5 * (radius[0] - radius[1]) / r;
-  return (Eigen::Matrix2d() << mean, half_difference * d / 2.0, half_difference * 2.0 / d, mean).finished();
-}
-
-// [1 1; ℓ −ℓ] diag(r+δ1R, r+δ1L) [1 1; ℓ −ℓ]⁻¹
-Eigen::Matrix2d torque_gain(const DifferentialDrive& drive, const Eigen::Vector2d& radius) {
-  const double l = drive.lever_arm();
-  const double mean = drive.wheel_radius + 0.5 * (radius[0] + radius[1]);
-  const double half_difference = 0.5 * (radius[0] - radius[1]);
-  return (Eigen::Matrix2d() << mean, half_difference / l, half_difference * l, mean).finished();
-}
-
 }  // namespace
 
 void validate(const DriveParameters& p) {
@@ -119,59 +104,6 @@ FaultState fault_state(std::span<const Fault> faults, double t) {
     }
   }
   return state;
-}
-
-Eigen::Vector3d delta(const DifferentialDrive& drive, const FaultState& fault, const DriveMotion& motion) {
-  const double c = std::cos(motion.heading), s = std::sin(motion.heading);
-  return fault.slip + kinematic_matrix(motion.heading) * (radius_gain(drive, fault.radius) * motion.speed) +
-         fault.matched * Eigen::Vector3d(c, s, 0.0) + fault.unmatched * Eigen::Vector3d(s, -c, 0.0);
-}
-
-Eigen::Vector3d delta_rate(const DifferentialDrive& drive, const FaultState& fault, const DriveMotion& motion) {
-  const double c = std::cos(motion.heading), s = std::sin(motion.heading);
-  const Eigen::Vector2d gained = radius_gain(drive, fault.radius) * motion.speed;
-  const Eigen::Vector2d gained_rate =
-      radius_gain(drive, fault.radius) * motion.acceleration + radius_gain(drive, fault.radius_rate) * motion.speed;
-  const double yaw_rate = motion.speed[1] + gained[1] + fault.slip[2];
-  const Eigen::Vector3d along(c, s, 0.0), right(s, -c, 0.0);
-  return fault.slip_rate + kinematic_matrix(motion.heading) * gained_rate + fault.matched_rate * along +
-         fault.unmatched_rate * right + yaw_rate * (fault.unmatched * along - (fault.matched + gained[0]) * right);
-}
-
-Eigen::Vector2d zeta(const DifferentialDrive& drive, const DriveParameters& p, const FaultState& fault,
-                     const DriveMotion& motion) {
-  const Eigen::Matrix<double, 3, 2> s = kinematic_matrix(motion.heading);
-  const Eigen::Vector3d mass(p.mass, p.mass, p.yaw_inertia), friction(p.viscous_x, p.viscous_y, p.viscous_yaw);
-  const Eigen::Matrix2d mbar = s.transpose() * mass.asDiagonal() * s, fbar = s.transpose() * friction.asDiagonal() * s;
-  const Eigen::Vector2d healthy = mbar * motion.acceleration + fbar * motion.speed;
-  const Eigen::Vector2d added = s.transpose() * (mass.cwiseProduct(delta_rate(drive, fault, motion)) +
-                                                 friction.cwiseProduct(delta(drive, fault, motion)));
-  return torque_gain(drive, fault.radius) * (healthy + added) - drive.wheel_radius * healthy;
-}
-
-Eigen::Vector3d delta_bound(const DifferentialDrive& drive, std::span<const Fault> faults,
-                            const Eigen::Vector2d& speed_bound) {
-  check::non_negative(speed_bound[0], "speed_bound[0]");
-  check::non_negative(speed_bound[1], "speed_bound[1]");
-  const double v1 = speed_bound[0] / drive.wheel_radius, v2 = speed_bound[1] / drive.wheel_radius;
-  const double wheel = v1 + 0.5 * drive.track_width * v2;  // |ω_R|, |ω_L| at most
-  Eigen::Vector3d bound = Eigen::Vector3d::Zero();
-  for (const Fault& fault : faults) {
-    const double size = std::abs(fault.magnitude);
-    switch (fault.kind) {
-      case Fault::Kind::wheel_radius: bound += size * Eigen::Vector3d(v1, v1, v2); break;
-      case Fault::Kind::wheel_radius_right:
-      case Fault::Kind::wheel_radius_left:
-        bound += size * wheel * Eigen::Vector3d(0.5, 0.5, 1.0 / drive.track_width);
-        break;
-      case Fault::Kind::slip_x: bound[0] += size; break;
-      case Fault::Kind::slip_y: bound[1] += size; break;
-      case Fault::Kind::slip_yaw: bound[2] += size; break;
-      case Fault::Kind::matched:
-      case Fault::Kind::unmatched: bound.head<2>().array() += size; break;
-    }
-  }
-  return bound;
 }
 
 }  // namespace wheelwright

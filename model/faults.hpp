@@ -88,31 +88,4 @@ struct FaultState {
 /// All of `faults` at time `t` (s).
 [[nodiscard]] FaultState fault_state(std::span<const Fault> faults, double t);
 
-/// The robot at one instant, as its encoders see it with the nominal radius.
-struct DriveMotion {
-  double heading = 0.0;                                    ///< θ, rad
-  Eigen::Vector2d speed = Eigen::Vector2d::Zero();         ///< v of (5), m/s, rad/s
-  Eigen::Vector2d acceleration = Eigen::Vector2d::Zero();  ///< v̇, m/s², rad/s²
-};
-
-/// δ(t) of (6) in the world frame, m/s, m/s, rad/s: what q̇ = S v + δ has beyond pure rolling; ρ_M (10), ρ_U (11) and
-/// unequal radii (Remark 1) included.
-[[nodiscard]] Eigen::Vector3d delta(const DifferentialDrive& drive, const FaultState& fault, const DriveMotion& motion);
-
-/// δ̇(t), m/s², m/s², rad/s², along the motion (θ̇ = v2 + δ_θ).
-[[nodiscard]] Eigen::Vector3d delta_rate(const DifferentialDrive& drive, const FaultState& fault,
-                                         const DriveMotion& motion);
-
-/// ζ(t) of (16), N·m, N·m²: [1 1; ℓ −ℓ]τ − r(M̄ v̇ + F̄ v). For unequal radii (Remark 1) the wheel forces are
-/// τ_R/(r+δ1R) and τ_L/(r+δ1L), and
-///   ζ = A (M̄ v̇ + F̄ v + SᵀM δ̇ + SᵀF_d δ) − r (M̄ v̇ + F̄ v),  A = [1 1; ℓ −ℓ] diag(r+δ1R, r+δ1L) [1 1; ℓ −ℓ]⁻¹,
-/// which is (16) when they are equal.
-[[nodiscard]] Eigen::Vector2d zeta(const DifferentialDrive& drive, const DriveParameters& parameters,
-                                   const FaultState& fault, const DriveMotion& motion);
-
-/// Δ of (8): |δ_i(t)| <= Δ_i at all times, for motions with |v1| <= `speed_bound`[0] (m/s) and |v2| <= `speed_bound`[1]
-/// (rad/s); not rounded outward. Throws InvalidArgument on a negative bound.
-[[nodiscard]] Eigen::Vector3d delta_bound(const DifferentialDrive& drive, std::span<const Fault> faults,
-                                          const Eigen::Vector2d& speed_bound);
-
 }  // namespace wheelwright

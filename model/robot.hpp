@@ -132,8 +132,8 @@ struct PriorBox {
 };
 [[nodiscard]] PriorBox prior_box(const Robot& robot, const Model& model);
 
-/// Whether the robot drives on a right and a left wheel beside each other, so that it has wheel radius and track width, a
-/// heading and a pose (Model::on_two_wheels); else it is an axis.
+/// Whether the robot drives on a right and a left wheel beside each other, so that it has wheel radius and track width,
+/// a heading and a pose (Model::on_two_wheels); else it is an axis.
 [[nodiscard]] bool on_two_wheels(const Robot& robot);
 
 /// The robot with `errors` (of interpolated columns) added to the noise bounds that it declares, the largest of each

@@ -28,13 +28,7 @@ std::vector<std::string> LogObject::paths() const {
   return names;
 }
 
-std::string LogObject::name() const {
-  std::string line;
-  for (const std::string& path : paths()) {
-    line += (line.empty() ? "" : ", ") + path;
-  }
-  return line;
-}
+std::string LogObject::name() const { return listed(paths()); }
 
 LogWalk::LogWalk(LogObject& log) : log_(&log) {
   check::that(!log.walked.exchange(true), "log " + log.name(),

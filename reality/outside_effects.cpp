@@ -79,21 +79,20 @@ Effect sloshing(const RobotDesign& robot, Random random, double severity) {
   const double mass = std::min(0.12 * severity, 0.4) * robot.mass;
   const double frequency = 2.0 * std::numbers::pi * random.uniform(0.5, 1.5);
   const double ratio = random.uniform(0.03, 0.12);
-  return {
-      "sloshing",
-      {{"mass_kg", mass}, {"frequency_Hz", frequency / (2.0 * std::numbers::pi)}, {"damping_ratio", ratio}},
-      [=](Body& body) {
-        const double k = mass * frequency * frequency;
-        const double d = 2.0 * ratio * frequency * mass;
-        const auto joints = fmt::format(
-            R"(<joint type="slide" axis="1 0 0" stiffness="{0}" damping="{1}"/><joint type="slide" axis="0 1 0" stiffness="{0}" damping="{1}"/>)",
-            k, d);
-        body.attached += hung("liquid", 0.0, joints, 0.0, mass, 0.02);
-      },
-      {},
-      {},
-      {},
-      0.0};
+  return {"sloshing",
+          {{"mass_kg", mass}, {"frequency_Hz", frequency / (2.0 * std::numbers::pi)}, {"damping_ratio", ratio}},
+          [=](Body& body) {
+            const double k = mass * frequency * frequency;
+            const double d = 2.0 * ratio * frequency * mass;
+            const auto joints = fmt::format(R"(<joint type="slide" axis="1 0 0" stiffness="{0}" damping="{1}"/>)"
+                                            R"(<joint type="slide" axis="0 1 0" stiffness="{0}" damping="{1}"/>)",
+                                            k, d);
+            body.attached += hung("liquid", 0.0, joints, 0.0, mass, 0.02);
+          },
+          {},
+          {},
+          {},
+          0.0};
 }
 
 Effect trailer(const RobotDesign& robot, Random random, double severity) {
@@ -108,11 +107,11 @@ Effect trailer(const RobotDesign& robot, Random random, double severity) {
       [=](Body& body) {
         std::string wheels;
         for (const double y : {-track, track}) {
-          wheels += fmt::format(
-              R"(<body pos="{0} {1} 0"><joint type="hinge" axis="0 1 0"/><inertial pos="0 0 0" mass="{2}" diaginertia="{3} {3} {3}"/>
+          wheels += fmt::format(R"(<body pos="{0} {1} 0"><joint type="hinge" axis="0 1 0"/>)"
+                                R"(<inertial pos="0 0 0" mass="{2}" diaginertia="{3} {3} {3}"/>
 <geom type="ellipsoid" size="{4} {5} {4}" condim="3" friction="1.5 0 0"/></body>
 )",
-              -bar, y, 0.03 * mass, 0.015 * mass * r * r, r, 0.15 * r);
+                                -bar, y, 0.03 * mass, 0.015 * mass * r * r, r, 0.15 * r);
         }
         const double part = mass * 0.2 * bar * bar;
         body.attached += fmt::format(

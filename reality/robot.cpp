@@ -84,13 +84,14 @@ std::string engine_xml(const Body& b, double step) {
   const double spin = wheel_spin(b);
   std::string wheels;
   for (const auto& [name, side, y] : {std::tuple{"right", right, -b.half_track}, {"left", left, b.half_track}}) {
-    wheels += fmt::format(
-        R"(<body name="{0}" pos="0 {1} {2}"><joint name="{0}" type="hinge" axis="0 1 0" armature="{3}" damping="{4}" frictionloss="{5}"/>
+    wheels +=
+        fmt::format(R"(<body name="{0}" pos="0 {1} {2}"><joint name="{0}" type="hinge" axis="0 1 0" armature="{3}" )"
+                    R"(damping="{4}" frictionloss="{5}"/>
 <inertial pos="0 0 0" mass="{6}" diaginertia="{7} {8} {7}"/>
 <geom type="ellipsoid" size="{9} {10} {9}" condim="3" friction="1.5 0 0"/></body>
 )",
-        name, y, b.radius[side] - height, b.armature[side], b.damping[side], b.friction[side], b.wheel_mass, 0.5 * spin,
-        spin, b.radius[side], b.wheel_width);
+                    name, y, b.radius[side] - height, b.armature[side], b.damping[side], b.friction[side], b.wheel_mass,
+                    0.5 * spin, spin, b.radius[side], b.wheel_width);
   }
   const double ball = 0.3 * height;
   std::string casters;
@@ -100,7 +101,8 @@ std::string engine_xml(const Body& b, double step) {
   }
   return fmt::format(
       R"(<mujoco><compiler boundmass="1e-9" boundinertia="1e-12"/>
-<option timestep="{0}" cone="elliptic" impratio="100" solver="Newton" iterations="30" tolerance="1e-12" gravity="{1} {2} {3}"/>
+<option timestep="{0}" cone="elliptic" impratio="100" solver="Newton" iterations="30" )"
+      R"(tolerance="1e-12" gravity="{1} {2} {3}"/>
 <default><geom solref="{4} 1" solimp="0.99 0.99 0.001"/></default>
 <worldbody><geom type="plane" size="0 0 1" condim="1" friction="1.5 0 0"/>
 <body name="chassis" pos="0 0 {5}"><freejoint/>

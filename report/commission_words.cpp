@@ -22,10 +22,6 @@ constexpr double coarse_kappa = 0.5;
 // Below this utilisation a threshold is called one that can hardly fire.
 constexpr double idle_utilisation = 0.1;
 
-bool has_model(const Commissioning& result) {
-  return result.status == Status::done || result.status == Status::partial;
-}
-
 std::size_t false_alarms(const Commissioning& result) {
   std::size_t sum = 0;
   for (const OutputValidation& v : result.validation) {
@@ -74,9 +70,10 @@ std::string estimates(const Commissioning& result) {
     }
   }
   if (physical_values_unknown(result)) {
-    return "In units of the effort that was logged, since the motor’s constants are not given: " + list(items) + ".";
+    return "In units of the effort that was logged, since the motor’s constants are not given: " + enumerated(items) +
+           ".";
   }
-  return capital(list(items)) + ".";
+  return capital(enumerated(items)) + ".";
 }
 
 std::string footing(const Commissioning& result) {
@@ -106,8 +103,8 @@ std::string footing(const Commissioning& result) {
     return "The bounds stand on noise bounds that were extrapolated from the residuals of this log: they hold while "
            "noise and driving stay like it.";
   }
-  return "The bounds stand on the sensors’ declared noise for " + list(declared) +
-         ", and on bounds extrapolated from the residuals of this log for " + list(estimated) + ".";
+  return "The bounds stand on the sensors’ declared noise for " + enumerated(declared) +
+         ", and on bounds extrapolated from the residuals of this log for " + enumerated(estimated) + ".";
 }
 
 std::string held_out(const Commissioning& result) {
@@ -165,11 +162,11 @@ std::string unseen(const Commissioning& result) {
   if (names.empty()) {
     return {};
   }
-  std::string text = "The log says nothing about " + list(names) + ".";
+  std::string text = "The log says nothing about " + enumerated(names) + ".";
   if (!todo.empty()) {
-    text += " What to do: " + list(todo) + ", and commission again.";
+    text += " What to do: " + enumerated(todo) + ", and commission again.";
   }
-  if (has_model(result)) {
+  if (result.has_model()) {
     text += " Until then their bounds are the prior’s, and thresholds are wide wherever they matter.";
   }
   return text;
@@ -218,7 +215,7 @@ std::vector<std::string> words_with_model(const Commissioning& result) {
     out.push_back(
         fmt::format("The threshold of {} is much wider than its residual and can hardly fire: declared noise "
                     "bounds that are smaller, where the sensors allow it, would tighten it.",
-                    list(idle)));
+                    enumerated(idle)));
   } else if (smallest_certain_kappa(result).value_or(coarse_kappa) >= coarse_kappa) {
     out.emplace_back(
         "Only coarse faults are certain to be seen: a longer log with stronger acceleration and tighter curves, or a "
@@ -242,7 +239,7 @@ std::optional<double> smallest_certain_kappa(const Commissioning& result) {
 double radius_change(double kappa) { return std::sqrt(1.0 + kappa) - 1.0; }
 
 Standing standing(const Commissioning& result) {
-  if (!has_model(result)) {
+  if (!result.has_model()) {
     return Standing::bad;
   }
   const bool clean = result.status == Status::done && held_out_instants(result) > 0 && false_alarms(result) == 0 &&

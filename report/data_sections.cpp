@@ -35,7 +35,7 @@ std::string joint_list(const std::vector<double>& values) {
   for (const double x : values) {
     items.push_back(number(x));
   }
-  return items.empty() ? "–" : list(items);
+  return items.empty() ? "–" : enumerated(items);
 }
 
 }  // namespace

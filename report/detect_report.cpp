@@ -104,10 +104,10 @@ std::string isolation_section(const std::vector<Isolation>& isolations, const De
       }
     }
     const Event& e = detection.events[k];
-    std::string others =
-        fmt::format("<details><summary>{} excluded</summary>{}</details>", excluded.size(), escape(list(excluded)));
+    std::string others = fmt::format("<details><summary>{} excluded</summary>{}</details>", excluded.size(),
+                                     escape(enumerated(excluded)));
     if (!open.empty()) {
-      others += "<small>not examined: " + escape(list(open)) + "</small>";
+      others += "<small>not examined: " + escape(enumerated(open)) + "</small>";
     }
     rows.push_back({time_button(e.start, e.end, "event " + std::to_string(k + 1), axis),
                     possible.empty() ? "Nothing in the catalogue explains it." : bullets(possible), others});
@@ -157,9 +157,9 @@ std::string detect_report(const Detection& detection, const OnlineModel& model, 
   if (!detection.trace.t.empty()) {
     content.sections.push_back(
         {"residual", "Residual and threshold",
-         paragraph("Without a fault ε = τ_f − Y_f θ̂ stays inside the grey band [l, u]. Events are shaded and numbered. "
-                   "Drag to "
-                   "zoom (all charts follow), Shift and drag to pan, double click for the whole log.") +
+         paragraph(
+             "Without a fault ε = τ_f − Y_f θ̂ stays inside the grey band [l, u]. Events are shaded and "
+             "numbered. Drag to zoom (all charts follow), Shift and drag to pan, double click for the whole log.") +
              residual_charts(detection.trace, model.robot, model.model, marks, axis, "trace") +
              torque_charts(detection.trace, model.robot, model.model, axis, "trace") +
              thinning_note(detection.instants, detection.trace.t.size(), "instants")});

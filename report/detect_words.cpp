@@ -27,7 +27,7 @@ std::string contradicting(const Detection& detection, const OnlineModel& model) 
     }
   }
   return fmt::format("Of {} of driving, {} contradict the fault-free model.",
-                     with_unit(number(detection.seconds, 4), "s"), parts.empty() ? "0 s" : list(parts));
+                     with_unit(number(detection.seconds, 4), "s"), parts.empty() ? "0 s" : enumerated(parts));
 }
 
 // What the first event can be, in a sentence; empty where it was not asked.

@@ -48,7 +48,7 @@ std::string parameters_of(const GapCause& cause) {
   for (const GapEstimate& p : cause.parameters) {
     parts.push_back(parameter_words(p.name) + " " + estimate_words(p));
   }
-  return list(parts);
+  return enumerated(parts);
 }
 
 std::string cause_sentence(const GapCause& cause, bool alone) {
@@ -104,7 +104,7 @@ std::string where_sentence(const Diagnosis& d) {
     }
   }
   return places.empty() ? std::string()
-                        : "What fitting θ again cannot remove is concentrated at: " + list(places) + ".";
+                        : "What fitting θ again cannot remove is concentrated at: " + enumerated(places) + ".";
 }
 
 std::vector<std::string> credible_names(const Diagnosis& d) {
@@ -170,15 +170,16 @@ std::string gap_verdict(const Diagnosis& d) {
       return names.empty() ? "The gap is explained."
              : names.size() == 1
                  ? cause_sentence(d.causes.front(), true)
-                 : fmt::format("{} together explain {} of the gap.", capital(list(names)), whole_percent(share));
+                 : fmt::format("{} together explain {} of the gap.", capital(enumerated(names)), whole_percent(share));
     case GapVerdict::ambiguous:
       return d.credible.size() > 1
                  ? fmt::format("The gap has one of {} causes, which this log cannot tell apart.", d.credible.size())
                  : "The gap has causes that this log cannot tell apart.";
     case GapVerdict::unexplained:
-      return names.empty() ? "There is a gap, and no effect of the catalogue explains it."
-                           : fmt::format("The gap is not explained: {} of it stays when {} {} added.",
-                                         whole_percent(d.remaining), list(names), names.size() == 1 ? "is" : "are");
+      return names.empty()
+                 ? "There is a gap, and no effect of the catalogue explains it."
+                 : fmt::format("The gap is not explained: {} of it stays when {} {} added.", whole_percent(d.remaining),
+                               enumerated(names), names.size() == 1 ? "is" : "are");
   }
   return {};
 }
@@ -212,7 +213,7 @@ std::vector<std::string> gap_sentences(const Diagnosis& d, const std::string& ne
   if (d.verdict == GapVerdict::explained && d.credible.size() > 1) {
     const std::vector<std::string> names = credible_names(d);
     add(fmt::format("Within the confidence of 90 % {} would do as well on this log.",
-                    list({names.begin() + 1, names.end()})));
+                    enumerated({names.begin() + 1, names.end()})));
   }
   add(next_manoeuvre);
   return out;

@@ -221,7 +221,7 @@ std::string margins_table(const MarginSurvey& survey, const ResidualMargins& res
     for (const std::string& name : residual.blind) {
       names.push_back(words(name));
     }
-    out += paragraph("Leaves no trace in this residual, whatever its size: " + escape(list(names)) + ".");
+    out += paragraph("Leaves no trace in this residual, whatever its size: " + escape(enumerated(names)) + ".");
   }
   return out +
          paragraph(fmt::format(

@@ -130,17 +130,7 @@ class Recorder {
 
 LogTable raw_signals(LogSource& log, std::size_t most) {
   Recorder recorder(log.columns(), most);
-  log.rewind();
-  LogBlock block;
-  while (log.next(block)) {
-    std::size_t segment = 0;
-    for (std::size_t k = 0; k < block.rows(); ++k) {
-      const bool starts = segment < block.segment_starts.size() && block.segment_starts[segment] == k;
-      segment += starts ? 1 : 0;
-      recorder.add(block, k, starts);
-    }
-  }
-  log.rewind();
+  for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) { recorder.add(block, k, starts); });
   return recorder.finish();
 }
 

@@ -122,13 +122,6 @@ std::string words(std::string_view identifier) {
   return text;
 }
 
-std::string capital(std::string text) {
-  if (!text.empty() && text[0] >= 'a' && text[0] <= 'z') {
-    text[0] = static_cast<char>(text[0] - 'a' + 'A');
-  }
-  return text;
-}
-
 std::string number(double x, int digits) {
   if (!std::isfinite(x)) {
     return std::string(missing);
@@ -200,13 +193,5 @@ std::string beside(double x, double lower, double upper) {
 }
 
 std::string decimal(double x, int decimals) { return std::isfinite(x) ? with_sign(x, decimals) : std::string(missing); }
-
-std::string list(const std::vector<std::string>& items) {
-  std::string text;
-  for (std::size_t i = 0; i < items.size(); ++i) {
-    text += (i == 0 ? "" : i + 1 == items.size() ? " and " : ", ") + items[i];
-  }
-  return text;
-}
 
 }  // namespace wheelwright::report

@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include <wheelwright/core/words.hpp>
+
 namespace wheelwright::report {
 
 /// `text` with & < > " ' as character references: fit for HTML text and quoted attributes. Control characters other
@@ -20,9 +22,6 @@ namespace wheelwright::report {
 
 /// An identifier as words: "yaw_inertia" → "yaw inertia".
 [[nodiscard]] std::string words(std::string_view identifier);
-
-/// `text` with its first letter (ASCII) in upper case.
-[[nodiscard]] std::string capital(std::string text);
 
 /// `x` with `digits` significant digits, trailing zeros kept: "21.3", "−0.0210", "1.20·10⁻⁷"; "–" where not finite.
 [[nodiscard]] std::string number(double x, int digits = 3);
@@ -52,8 +51,5 @@ namespace wheelwright::report {
 /// `x` with as many decimals as outward(lower, upper) shows, three significant digits at least; as number() where that
 /// interval has no width.
 [[nodiscard]] std::string beside(double x, double lower, double upper);
-
-/// "a", "a and b", "a, b and c".
-[[nodiscard]] std::string list(const std::vector<std::string>& items);
 
 }  // namespace wheelwright::report

@@ -13,6 +13,7 @@
 #include <fmt/format.h>
 
 #include <wheelwright/core/error.hpp>
+#include <wheelwright/core/words.hpp>
 #include <wheelwright/files/byte_source.hpp>
 #include <wheelwright/files/number.hpp>
 #include <wheelwright/files/words.hpp>
@@ -317,35 +318,6 @@ std::optional<double> days_of_date(std::string_view text) {
     return std::nullopt;
   }
   return static_cast<double>(std::chrono::sys_days(date).time_since_epoch().count());
-}
-
-bool natural_less(std::string_view a, std::string_view b) {
-  std::size_t i = 0, k = 0;
-  const auto run = [](std::string_view text, std::size_t& at) {
-    while (at < text.size() && text[at] == '0') {
-      ++at;
-    }
-    const std::size_t first = at;
-    while (at < text.size() && is_digit(text[at])) {
-      ++at;
-    }
-    return text.substr(first, at - first);
-  };
-  while (i < a.size() && k < b.size()) {
-    if (is_digit(a[i]) && is_digit(b[k])) {
-      const std::string_view x = run(a, i), y = run(b, k);
-      if (x != y) {
-        return x.size() != y.size() ? x.size() < y.size() : x < y;
-      }
-    } else if (a[i] != b[k]) {
-      return a[i] < b[k];
-    } else {
-      ++i;
-      ++k;
-    }
-  }
-  const bool a_ends = i == a.size(), b_ends = k == b.size();
-  return a_ends != b_ends ? a_ends : a < b;
 }
 
 std::vector<FleetListRobot> read_fleet(const std::filesystem::path& path) {

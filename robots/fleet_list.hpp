@@ -51,7 +51,4 @@ struct FleetListRobot {
 /// Days from 1970-01-01 to a date of the Gregorian calendar, "2026-03-01" or "20260301"; nothing for what is none.
 [[nodiscard]] std::optional<double> days_of_date(std::string_view text);
 
-/// Whether `a` comes before `b` where digits count as the number they make: log_2 before log_10.
-[[nodiscard]] bool natural_less(std::string_view a, std::string_view b);
-
 }  // namespace wheelwright

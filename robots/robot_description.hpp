@@ -81,7 +81,7 @@ struct JointInterfaces {
   FilePlace place;
 };
 
-/// A robot description. The robot's frame is that of the root link: x ahead, y to the left, z up, as ROS has it (REP 103).
+/// A robot description. The robot's frame is that of the root link: x ahead, y to the left, z up (REP 103).
 struct RobotTree {
   std::string name;
   std::vector<TreeLink> links;

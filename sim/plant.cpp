@@ -10,6 +10,7 @@
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/linear_algebra.hpp>
+#include <wheelwright/core/random.hpp>
 #include <wheelwright/model/effect_law.hpp>
 
 namespace wheelwright {
@@ -28,7 +29,7 @@ std::uint64_t mix(std::uint64_t x) {
 Noise::Noise(std::uint64_t seed, std::uint64_t stream, double bound, NoiseShape shape)
     : generator_(mix(mix(seed) ^ stream)), bound_(check::non_negative(bound, "noise bound")), shape_(shape) {}
 
-double Noise::uniform() { return 2.0 * (static_cast<double>(generator_() >> 11U) * 0x1p-53) - 1.0; }
+double Noise::uniform() { return 2.0 * wheelwright::uniform(generator_) - 1.0; }
 
 double Noise::unit() {
   double x = uniform();

@@ -12,8 +12,6 @@ namespace wheelwright {
 namespace {
 
 using std::numbers::pi;
-constexpr std::array<std::string_view, 8> kind_names = {"straight", "circle", "figure_eight",  "multi_sine",
-                                                        "spin",     "stops",  "commissioning", "table"};
 constexpr double first_zero_of_j0 = 2.404825557695773;
 constexpr double soft_start = 1.0;  // s
 
@@ -94,8 +92,6 @@ ReferenceSpeed looked_up(const SpeedTable& table, double t) {
 }
 
 }  // namespace
-
-std::string_view to_string(Trajectory::Kind kind) { return kind_names.at(static_cast<std::size_t>(kind)); }
 
 void validate(const Trajectory& trajectory) {
   check::non_negative(trajectory.speed, "trajectory.speed");

@@ -4,7 +4,6 @@
 #pragma once
 
 #include <optional>
-#include <string_view>
 #include <vector>
 
 #include <Eigen/Core>
@@ -39,9 +38,6 @@ struct Trajectory {
   double period = 10.0;   ///< s
   SpeedTable table = {};  ///< of Kind::table
 };
-
-/// Name of a kind as scenario files write it, e.g. "figure_eight".
-[[nodiscard]] std::string_view to_string(Trajectory::Kind kind);
 
 /// Throws InvalidArgument, naming the field, unless speed and yaw rate are >= 0, the period is > 0 and, for
 /// Kind::table, the table has two rows or more of finite numbers with increasing times.

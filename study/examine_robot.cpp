@@ -31,10 +31,6 @@ Interval over(double lower, double upper, double unit) {
   return {low == 0.0 ? 0.0 : round_down(low), high == 0.0 ? 0.0 : round_up(high)};
 }
 
-bool has_model(const Commissioning& result) {
-  return result.status == Commissioning::Status::done || result.status == Commissioning::Status::partial;
-}
-
 LogRecord record_of(const FleetLog& log, const Commissioning& result) {
   return {.log = log.name,
           .when = log.when,
@@ -127,7 +123,7 @@ CheckRecord check_log(const FleetLog& log, const std::optional<OnlineModel>& mod
 
 std::vector<RecordedParameter> recorded_parameters(const Commissioning& result) {
   std::vector<RecordedParameter> out;
-  if (!has_model(result)) {
+  if (!result.has_model()) {
     return out;
   }
   const Robot& robot = result.model.robot;
@@ -180,7 +176,7 @@ RobotRecord examine_robot(const RobotLogs& logs, const ExamineOptions& options) 
     const Commissioning result = commission(*opened.log, opened.robot, options.commission);
     record.commissioning = record_of(logs.commissioning, result);
     record.notes = result.notes;
-    if (has_model(result)) {
+    if (result.has_model()) {
       take_outputs(record, result);
       model = result.model;
     }

@@ -182,29 +182,4 @@ PooledPrior pooled_prior(const FleetTable& table, const PooledPriorOptions& opti
   return out;
 }
 
-std::vector<Interval> order_statistics_box(const FleetTable& table, const std::vector<std::size_t>& columns,
-                                           double coverage) {
-  const auto readable = static_cast<std::size_t>(std::count_if(
-      table.status.begin(), table.status.end(), [](RobotStatus s) { return s != RobotStatus::unreadable; }));
-  const double sides = 2.0 * static_cast<double>(columns.size());
-  const auto k = static_cast<std::size_t>((1.0 - coverage) * static_cast<double>(readable + 1) / sides * (1.0 + 1e-12));
-  std::vector<Interval> box;
-  for (const std::size_t j : columns) {
-    std::vector<double> lower, upper;
-    for (const FleetEntry& e : table.columns[j].entries) {
-      lower.push_back(e.lower);
-      upper.push_back(-e.upper);
-    }
-    // Robots without bounds stand first on both sides.
-    const std::size_t boundless = readable - lower.size();
-    if (k < boundless + 1) {
-      return {};
-    }
-    std::sort(lower.begin(), lower.end());
-    std::sort(upper.begin(), upper.end());
-    box.push_back({lower[k - 1 - boundless], -upper[k - 1 - boundless]});
-  }
-  return box;
-}
-
 }  // namespace wheelwright

@@ -66,15 +66,7 @@ struct PooledPrior {
 /// Which parameters are included depends on the learning half only, and so costs no coverage. Robots whose logs could
 /// not be read take no part: that has to have nothing to do with their θ.
 ///
-/// The other way, a box of order statistics of each parameter, uses all n robots but pays for each of 2p sides: 1 −
-/// 2pk/(n + 1) (order_statistics_box()). Throws InvalidArgument for a coverage outside (0, 1) or a share outside [0,
-/// 1].
+/// Throws InvalidArgument for a coverage outside (0, 1) or a share outside [0, 1].
 [[nodiscard]] PooledPrior pooled_prior(const FleetTable& table, const PooledPriorOptions& options = {});
-
-/// For each of `columns`, [k-th smallest lower bound, k-th largest upper bound] over all readable robots, with the
-/// largest k >= 1 for which 1 − 2pk/(n + 1) >= `coverage`; empty where there is none, or robots without bounds use k
-/// up.
-[[nodiscard]] std::vector<Interval> order_statistics_box(const FleetTable& table,
-                                                         const std::vector<std::size_t>& columns, double coverage);
 
 }  // namespace wheelwright

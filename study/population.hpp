@@ -40,10 +40,6 @@ inline constexpr std::size_t kNoMember = static_cast<std::size_t>(-1);
 [[nodiscard]] RandomEffects fit_random_effects(std::span<const double> values, std::span<const double> errors,
                                                std::size_t without = kNoMember);
 
-/// Holm's step-down adjustment (`holm1979`): rejecting where the adjusted p is at most α errs anywhere with a
-/// probability of at most α, however the tests depend on one another. The order of `p` is kept; values are in [0, 1].
-[[nodiscard]] std::vector<double> holm(const std::vector<double>& p);
-
 /// Options of describe_population().
 struct PopulationOptions {
   double level = 0.05;     ///< probability that any robot of a homogeneous fleet is called outside

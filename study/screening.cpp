@@ -12,6 +12,7 @@
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/limits.hpp>
+#include <wheelwright/core/random.hpp>
 #include <wheelwright/core/statistics.hpp>
 
 namespace wheelwright {
@@ -40,18 +41,6 @@ Eigen::Index grid_points(const Grid& grid) {
                        : fmt::format("a grid of {} = {} points", fmt::join(grid.levels, " × "), points),
               fmt::format("at most {}; take fewer levels, or Sobol' indices, which need no grid", grid.most));
   return points;
-}
-
-std::vector<Eigen::Index> grid_levels(const Grid& grid, Eigen::Index point) {
-  const Eigen::Index points = grid_points(grid);
-  check::that(point >= 0 && point < points, fmt::format("point {} of a grid", point),
-              fmt::format("0 to {}", points - 1));
-  std::vector<Eigen::Index> at(grid.levels.size());
-  for (std::size_t i = at.size(); i-- > 0;) {
-    at[i] = point % grid.levels[i];
-    point /= grid.levels[i];
-  }
-  return at;
 }
 
 Eigen::Index grid_point(const Grid& grid, const std::vector<Eigen::Index>& at) {
@@ -181,16 +170,6 @@ struct Trajectories {
   double step = 0.0;
 };
 
-Eigen::Index below(std::mt19937_64& generator, Eigen::Index count) {
-  const auto n = static_cast<std::uint64_t>(count);
-  const std::uint64_t range = std::mt19937_64::max() - std::mt19937_64::max() % n;
-  std::uint64_t draw = generator();
-  while (draw >= range) {
-    draw = generator();
-  }
-  return static_cast<Eigen::Index>(draw % n);
-}
-
 Trajectories trajectories(Eigen::Index inputs, const MorrisOptions& options) {
   check::that(inputs >= 1, "inputs of a screening", "at least 1");
   check::that(options.trajectories >= 2, "trajectories", "at least 2");
@@ -206,13 +185,13 @@ Trajectories trajectories(Eigen::Index inputs, const MorrisOptions& options) {
     std::vector<Eigen::Index> order(static_cast<std::size_t>(inputs));
     std::iota(order.begin(), order.end(), Eigen::Index{0});
     for (Eigen::Index i = inputs - 1; i > 0; --i) {
-      std::swap(order[static_cast<std::size_t>(i)], order[static_cast<std::size_t>(below(generator, i + 1))]);
+      std::swap(order[static_cast<std::size_t>(i)], order[uniform_below(generator, static_cast<std::uint64_t>(i + 1))]);
     }
     Eigen::RowVectorXd from(inputs), to(inputs);
     std::vector<bool> up(order.size());
     for (Eigen::Index i = 0; i < inputs; ++i) {
-      const Eigen::Index level = below(generator, half);
-      up[static_cast<std::size_t>(i)] = below(generator, 2) == 1;
+      const auto level = static_cast<Eigen::Index>(uniform_below(generator, static_cast<std::uint64_t>(half)));
+      up[static_cast<std::size_t>(i)] = uniform_below(generator, 2) == 1;
       from[i] = static_cast<double>(level) / last;
       to[i] = static_cast<double>(level + half) / last;
       if (!up[static_cast<std::size_t>(i)]) {

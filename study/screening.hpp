@@ -29,11 +29,8 @@ struct GridMap {
 /// outside [0, 1], and more points than `most`, telling their number (or that it overflows).
 [[nodiscard]] Eigen::Index grid_points(const Grid& grid);
 
-/// Level of each input at a point. Throws as grid_points(), and for a point that the grid has not.
-[[nodiscard]] std::vector<Eigen::Index> grid_levels(const Grid& grid, Eigen::Index point);
-
-/// The point at a level for each input: the inverse of grid_levels(). Throws as grid_points(), and for levels that the
-/// grid has not.
+/// The point at a level for each input, the last input's levels following one another. Throws as grid_points(), and for
+/// levels that the grid has not.
 [[nodiscard]] Eigen::Index grid_point(const Grid& grid, const std::vector<Eigen::Index>& at);
 
 /// Coordinates of an input's levels. Throws as grid_points(), and for an input that the grid has not.

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/random.hpp>
 #include <wheelwright/sim/simulation.hpp>
 
 namespace wheelwright {
@@ -130,9 +131,6 @@ std::size_t whole(double x, const std::string& name) {
   check::that(x >= 0.0 && x < 9e15, "input " + name, "a number >= 0");
   return static_cast<std::size_t>(std::llround(x));
 }
-
-// A number in [0, 1).
-double uniform(std::mt19937_64& generator) { return static_cast<double>(generator() >> 11U) * 0x1.0p-53; }
 
 std::vector<std::size_t> effort_columns(const LogTable& log, EffortKind kind) {
   const std::string prefix = kind == EffortKind::torque ? "tau" : kind == EffortKind::current ? "current" : "voltage";

@@ -14,6 +14,7 @@
 #include <wheelwright/commission/physical.hpp>
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/core/limits.hpp>
+#include <wheelwright/core/words.hpp>
 #include <wheelwright/detector/fault_type.hpp>
 #include <wheelwright/gap/diagnose.hpp>
 
@@ -41,14 +42,6 @@ const std::vector<std::pair<std::string, Kind>>& families() {
   return all;
 }
 
-std::string joined(const std::vector<std::string>& names) {
-  std::string out;
-  for (const std::string& name : names) {
-    out += (out.empty() ? "" : ", ") + name;
-  }
-  return out;
-}
-
 [[noreturn]] void fail(const std::string& name, const std::string& expected) {
   throw InvalidArgument("quantity " + name + ": expected " + expected);
 }
@@ -69,7 +62,7 @@ struct Reader {
     for (const auto& [family, kind] : families()) {
       known.push_back(family);
     }
-    fail(name, "one of " + joined(known));
+    fail(name, "one of " + listed(known));
   }
 
   void read_member(const std::string& name, const std::string& family, Kind kind, const std::string& member) {
@@ -117,7 +110,7 @@ struct Reader {
       }
     }
     if (found.size() == before) {
-      fail(q.name, family + " of one of the parameters " + joined(names));
+      fail(q.name, family + " of one of the parameters " + listed(names));
     }
   }
 
@@ -132,7 +125,7 @@ struct Reader {
       }
     }
     if (found.size() == before) {
-      fail(q.name, family + " of one of the outputs " + joined(model.outputs));
+      fail(q.name, family + " of one of the outputs " + listed(model.outputs));
     }
   }
 

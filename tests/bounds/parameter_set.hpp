@@ -32,8 +32,6 @@ concept ParameterSet = requires(const Set& set, std::span<const double> a, std::
   { set.contains(a) }
   noexcept->std::same_as<bool>;
   { set.centre() } -> std::convertible_to<std::vector<double>>;
-  { set.is_online() }
-  noexcept->std::same_as<bool>;
 };
 
 /// Width of the set across direction `a`, h(a) + h(−a), rounded outward. `a` has p finite entries.

@@ -49,11 +49,11 @@ TEST(LinearAlgebra, EigenvaluesOfTheSecondDifference) {
 
 TEST(LinearAlgebra, PencilsWithoutAPositiveDefiniteSideHaveNoAnswer) {
   const MatrixXd A = hilbert(4), B = MatrixXd{{2, 0, 0, 0}, {0, 3, 0, 0}, {0, 0, 5, 0}, {0, 0, 0, 7}};
-  const auto pairs = generalized_eigen(A, B);
-  ASSERT_TRUE(pairs);
-  EXPECT_LT((A * pairs->vectors - B * pairs->vectors * pairs->values.asDiagonal()).norm(), kTight);
-  EXPECT_LT((*generalized_eigenvalues(A, B) - pairs->values).norm(), kTight);
-  EXPECT_FALSE(generalized_eigen(A, -B));
+  const auto values = generalized_eigenvalues(A, B);
+  ASSERT_TRUE(values);
+  for (const double value : *values) {
+    EXPECT_LT(singular_values(A - value * B).values.minCoeff(), kTight);
+  }
   EXPECT_FALSE(generalized_eigenvalues(A, -B));
 }
 

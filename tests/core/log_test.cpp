@@ -106,27 +106,5 @@ TEST(LogTable, KnowsItsColumns) {
   EXPECT_THROW(static_cast<void>(log.column("c")), InvalidArgument);
 }
 
-TEST(JoinedSource, IsOneLogAfterTheOther) {
-  const LogTable first = table(5, {0, 3});
-  LogTable second = table(4);
-  second.names = {"b", "c"};
-  TableSource one(first, 2), two(second, 3);
-  JoinedSource joined({&one, &two});
-  EXPECT_THAT(joined.columns(), ElementsAre("b"));
-  const LogTable all = read_all(joined);
-  EXPECT_THAT(all.columns[0], ElementsAre(0, -1, -2, -3, -4, 0, 1, 2, 3));
-  EXPECT_THAT(all.segment_starts, ElementsAre(0, 3, 5));
-  expect_same(read_all(joined), all);
-  LogBlock block;
-  joined.rewind();
-  std::size_t next = 0;
-  while (joined.next(block)) {
-    EXPECT_EQ(block.first_row, next);
-    next += block.rows();
-  }
-  EXPECT_EQ(next, 9u);
-  EXPECT_THROW(JoinedSource({}), InvalidArgument);
-}
-
 }  // namespace
 }  // namespace wheelwright::log_test

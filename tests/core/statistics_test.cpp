@@ -84,5 +84,15 @@ TEST(Statistics, InfiniteOutcomesHaveNoTail) {
   EXPECT_EQ(fisher_tail(3.0, 4.0, kInfinity), 0.0);
 }
 
+TEST(Holm, IsTheTextbookExample) {
+  // Holm 1979: 4·0.01, then 3·0.02 and so on, never falling.
+  const std::vector<double> adjusted = holm({0.02, 0.01, 0.9, 0.03});
+  EXPECT_DOUBLE_EQ(adjusted[1], 0.04);
+  EXPECT_DOUBLE_EQ(adjusted[0], 0.06);
+  EXPECT_DOUBLE_EQ(adjusted[3], 0.06);
+  EXPECT_DOUBLE_EQ(adjusted[2], 0.9);
+  EXPECT_TRUE(holm({}).empty());
+}
+
 }  // namespace
 }  // namespace wheelwright

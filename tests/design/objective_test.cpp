@@ -154,7 +154,7 @@ TEST(FigureEightPlan, TheBestOneKeepsToTheLimitsAndBeatsASlowerOne) {
   limits.duration = 10.0;
   limits.radius = 0.8;
   const RowObjective objective = narrow_bounds(s, WidthCriterion::geometric_mean);
-  const FigureEight best = best_figure_eight(s, limits, objective);
+  const FigureEight best = best_figure_eight(s, limits, of_rows(objective, s));
   const Plan plan = plan_of(best, s, 10.0, 0.02);
   EXPECT_LE(limit_use(plan, s, limits).largest(), 1.0);
   const FigureEight slower{0.5 * best.speed, best.period};

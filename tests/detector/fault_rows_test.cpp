@@ -10,6 +10,7 @@
 #include <wheelwright/detector/fault_rows.hpp>
 
 #include "support/drives.hpp"
+#include "support/fault_oracle.hpp"
 
 namespace wheelwright::fault_rows_test {
 namespace {
@@ -238,7 +239,7 @@ TEST(FaultRows, SettleToClosedForms) {
   EXPECT_LT((radius.signature.g2 - radius.Y).norm(), 1e-12 * radius.Y.norm());
 }
 
-// ζ of (16) for every combination of speed, acceleration and radii, from model/faults.
+// ζ of (16) for every combination of speed, acceleration and radii, by the paper's own formula.
 TEST(FaultRows, SettleToZetaOfThePaper) {
   const Prepared s = prepared(Shown::angles, 100.0);
   const DifferentialDrive drive = drive_of(s.scenario.robot);

@@ -44,8 +44,6 @@ TEST_F(JsonFile, NanAndInfinityAreNull) {
   EXPECT_THAT(text, HasSubstr("\"b\": null"));
   const Json read = read_json(path("n.json"));
   const JsonPlace root(read, "n.json");
-  EXPECT_TRUE(std::isnan(root.at("a").number_or_nan()));
-  EXPECT_EQ(root.at("c").number_or_nan(), 1.5);
   EXPECT_FALSE(root.has("a"));
   EXPECT_TRUE(root.has("c"));
   EXPECT_THAT(root.keys(), ElementsAre("a", "b", "c"));

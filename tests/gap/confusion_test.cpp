@@ -57,12 +57,16 @@ struct Angles {
   }
 };
 
+std::vector<ConfusablePair> pairs_of(const CandidateTable& table, BaseModel base, double least = 0.9) {
+  return confusable_pairs(table, signatures(table, base), base, least);
+}
+
 TEST(ConfusablePairs, HaveTheSquaredCosineOfWhatThetaLeaves) {
   for (const double cosine : {0.96, 0.99, 0.9999}) {
     Angles made(cosine);
     const BlockGram gram(made.spaces);
     made.table.gram = &gram;
-    const std::vector<ConfusablePair> pairs = confusable_pairs(made.table, BaseModel::refitted);
+    const std::vector<ConfusablePair> pairs = pairs_of(made.table, BaseModel::refitted);
     ASSERT_EQ(pairs.size(), 1u);
     EXPECT_EQ(pairs[0].first, "first");
     EXPECT_EQ(pairs[0].second, "mixed");
@@ -71,8 +75,8 @@ TEST(ConfusablePairs, HaveTheSquaredCosineOfWhatThetaLeaves) {
   Angles made(0.9);
   const BlockGram gram(made.spaces);
   made.table.gram = &gram;
-  EXPECT_TRUE(confusable_pairs(made.table, BaseModel::refitted).empty());
-  EXPECT_EQ(confusable_pairs(made.table, BaseModel::refitted, 0.8).size(), 1u);
+  EXPECT_TRUE(pairs_of(made.table, BaseModel::refitted).empty());
+  EXPECT_EQ(pairs_of(made.table, BaseModel::refitted, 0.8).size(), 1u);
 }
 
 // Held, θ hides nothing: "mixed" is nine parts θ's column of ten.
@@ -80,7 +84,7 @@ TEST(ConfusablePairs, AreOthersWhereThetaIsHeld) {
   Angles made(0.99);
   const BlockGram gram(made.spaces);
   made.table.gram = &gram;
-  const std::vector<ConfusablePair> pairs = confusable_pairs(made.table, BaseModel::nominal, 0.85);
+  const std::vector<ConfusablePair> pairs = pairs_of(made.table, BaseModel::nominal, 0.85);
   ASSERT_EQ(pairs.size(), 1u);
   EXPECT_EQ(pairs[0].first, "mixed");
   EXPECT_EQ(pairs[0].second, "like theta");
@@ -99,7 +103,7 @@ TEST(JudgePairs, TellsWhatThisLogLacksFromWhatNoLogHas) {
   const PreparedGap prepared = gap_example::prepared_log(s, false, options);
   const gap_example::Problem problem(prepared);
   const CandidateTable& table = problem.problem.table;
-  std::vector<ConfusablePair> pairs = confusable_pairs(table, BaseModel::refitted, 0.0);
+  std::vector<ConfusablePair> pairs = pairs_of(table, BaseModel::refitted, 0.0);
   judge_pairs(pairs, table, signatures(table, BaseModel::refitted), BaseModel::refitted, prepared,
               gap_example::counted_robot(), {});
   const auto pair = [&pairs](const std::string& first, const std::string& second) {

@@ -107,7 +107,11 @@ TEST(NoiseFloor, IsTheErrorOfTheStepWhereThereIsNoNoise) {
       EXPECT_NEAR(floor[i], rms, 0.1 * rms) << rate << " Hz, output " << i;
     }
     const Increments gap = pose_gap(drive, make_windows(drive));
-    const IncrementNoise seen = root_mean_square(gap), said = noise_floor(drive, signal_noise(drive), kBeta).increments;
+    const auto rms_of = [](const Eigen::VectorXd& x) {
+      return std::sqrt(x.squaredNorm() / static_cast<double>(x.size()));
+    };
+    const IncrementNoise seen{rms_of(gap.forward), rms_of(gap.lateral), rms_of(gap.yaw)};
+    const IncrementNoise said = noise_floor(drive, signal_noise(drive), kBeta).increments;
     EXPECT_LE(seen.forward, said.forward);
     EXPECT_LE(seen.lateral, said.lateral);
     EXPECT_LE(seen.yaw, said.yaw);

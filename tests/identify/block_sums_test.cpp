@@ -38,11 +38,6 @@ TEST(BlockSums, AreBoundedAndExact) {
     if (k % 97 != 0) {
       continue;
     }
-    Eigen::Vector2d total = Eigen::Vector2d::Zero();
-    for (std::size_t b = 0; b < values.size(); ++b) {
-      total += values[b];
-    }
-    ASSERT_EQ(sums.total(), total);
     for (std::size_t b = 0; b < blocks; ++b) {
       Eigen::Vector2d sum = Eigen::Vector2d::Zero();
       for (std::size_t i = b * length; i < (b + 1) * length; ++i) {

@@ -88,39 +88,6 @@ TEST(LeastSquares, WeightsScaleTheRowsOfTheirOutput) {
   EXPECT_NEAR(twice.weighted_rss, 4.0 * fit.weighted_rss, 1e-11 * twice.weighted_tss);
 }
 
-TEST(LeastSquares, PartsMergedAreTheWhole) {
-  const Problem a = problem(7, 3000, 4, 2);
-  const RegressionBlock block = a.block();
-  const Eigen::Vector2d weights(1.0, 3.0);
-  LeastSquares whole(4, weights);
-  whole.add(block);
-  const LeastSquaresFit expected = whole.solve();
-  for (const std::size_t cut : {std::size_t{0}, std::size_t{1}, std::size_t{128}, std::size_t{1499}}) {
-    LeastSquares first(4, weights), second(4, weights);
-    first.add(block, 0, cut);
-    second.add(block, cut);
-    first.merge(second);
-    const LeastSquaresFit merged = first.solve();
-    expect_same(merged.estimate, expected.estimate);
-    EXPECT_NEAR(merged.weighted_rss, expected.weighted_rss, 1e-11 * expected.weighted_tss);
-    EXPECT_EQ(merged.instants, expected.instants);
-  }
-}
-
-TEST(LeastSquares, MergingManyIsTheWhole) {
-  const Problem a = problem(8, 4000, 3, 1);
-  const RegressionBlock block = a.block();
-  LeastSquares whole(3), sum(3);
-  whole.add(block);
-  for (std::size_t k = 0; k < 4000; k += 10) {
-    LeastSquares part(3);
-    part.add(block, k, k + 10);
-    sum.merge(part);
-  }
-  expect_same(sum.solve().estimate, whole.solve().estimate);
-  EXPECT_THROW(sum.merge(LeastSquares(4)), InvalidArgument);
-}
-
 TEST(LeastSquares, ColumnsAreMeasuredAloneAndBesideTheOthers) {
   const Problem a = problem(11, 500, 3, 1);
   RegressionTable table(a.block());

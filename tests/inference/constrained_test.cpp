@@ -221,18 +221,6 @@ TEST(PhysicalConsistency, KnowsWhatIsNeverNegative) {
   EXPECT_THROW((void)physical_consistency({}), InvalidArgument);
 }
 
-TEST(PhysicalConsistency, StatedBoundsAreConstraints) {
-  const double infinity = std::numeric_limits<double>::infinity();
-  const std::vector<PhysicalQuantity> parameters = {{"mass", 0.1, "kg"}, {"viscous_yaw", 0.1, "N·m·s/rad"}};
-  const auto constraints = bounds_on(parameters, {Interval{5.0, infinity}, std::nullopt});
-  ASSERT_EQ(constraints.size(), 1u);
-  EXPECT_EQ(constraints[0].b, -5.0);
-  EXPECT_EQ(constraints[0].name, "mass = 5 kg");
-  EXPECT_EQ(constraints[0].asks, "a smaller mass than stated");
-  EXPECT_THROW((void)bounds_on(parameters, {Interval{5.0, 4.0}, std::nullopt}), InvalidArgument);
-  EXPECT_THROW((void)bounds_on(parameters, {}), InvalidArgument);
-}
-
 TEST(NonnegativeLeastSquares, FulfilsItsOptimalityConditions) {
   for (std::uint64_t seed = 1; seed <= 200; ++seed) {
     Random random(seed);

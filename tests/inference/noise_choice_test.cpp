@@ -15,14 +15,6 @@ DifferenceNoise differences(DifferenceNoise::Kind kind, double sd) {
   return n;
 }
 
-RepeatNoise repeats(double sd, double correlation) {
-  RepeatNoise n;
-  n.sd = sd;
-  n.relative_sd = 0.05;
-  n.autocorrelation = {correlation};
-  return n;
-}
-
 StandstillNoise standstill(StandstillNoise::Kind kind, double sd) {
   StandstillNoise n;
   n.kind = kind;
@@ -44,24 +36,16 @@ struct Case {
 TEST(NoiseChoice, FollowsItsRules) {
   const auto white = differences(Kind::white, 1.0);
   const Case cases[] = {
-      {{{}, {}, white}, NoiseMethod::differences, NoiseMeaning::estimate},
-      {{standstill(Rest::noisy, 0.7), repeats(1.02, 0.0), white}, NoiseMethod::differences, NoiseMeaning::estimate},
-      {{{}, repeats(1.5, 0.1), white}, NoiseMethod::repeats, NoiseMeaning::estimate},
-      {{{}, repeats(9.0, 0.9), white}, NoiseMethod::differences, NoiseMeaning::estimate},
-      {{standstill(Rest::noisy, 1.5), {}, white}, NoiseMethod::standstill, NoiseMeaning::estimate},
-      {{standstill(Rest::constant, 0.0), {}, white}, NoiseMethod::differences, NoiseMeaning::estimate},
-      {{standstill(Rest::noisy, 0.5), repeats(2.0, 0.0), differences(Kind::smooth, 3.0)},
-       NoiseMethod::repeats,
-       NoiseMeaning::estimate},
-      {{standstill(Rest::noisy, 0.5), repeats(2.0, 0.9), differences(Kind::smooth, 3.0)},
+      {{{}, white}, NoiseMethod::differences, NoiseMeaning::estimate},
+      {{standstill(Rest::noisy, 0.7), white}, NoiseMethod::differences, NoiseMeaning::estimate},
+      {{standstill(Rest::noisy, 1.5), white}, NoiseMethod::standstill, NoiseMeaning::estimate},
+      {{standstill(Rest::constant, 0.0), white}, NoiseMethod::differences, NoiseMeaning::estimate},
+      {{standstill(Rest::noisy, 0.5), differences(Kind::smooth, 3.0)},
        NoiseMethod::standstill,
        NoiseMeaning::lower_limit},
-      {{standstill(Rest::constant, 0.0), repeats(2.0, 0.9), differences(Kind::rough, 3.0)},
-       NoiseMethod::repeats,
-       NoiseMeaning::upper_limit},
-      {{{}, {}, differences(Kind::rough, 3.0)}, NoiseMethod::differences, NoiseMeaning::upper_limit},
-      {{{}, {}, differences(Kind::smooth, 3.0)}, NoiseMethod::none, NoiseMeaning::unknown},
-      {{standstill(Rest::constant, 0.0), {}, differences(Kind::none, 0.0)}, NoiseMethod::none, NoiseMeaning::unknown},
+      {{{}, differences(Kind::rough, 3.0)}, NoiseMethod::differences, NoiseMeaning::upper_limit},
+      {{{}, differences(Kind::smooth, 3.0)}, NoiseMethod::none, NoiseMeaning::unknown},
+      {{standstill(Rest::constant, 0.0), differences(Kind::none, 0.0)}, NoiseMethod::none, NoiseMeaning::unknown},
       {{}, NoiseMethod::none, NoiseMeaning::unknown},
   };
   int index = 0;
@@ -78,9 +62,9 @@ TEST(NoiseChoice, FollowsItsRules) {
 
 TEST(NoiseChoice, MakesItsBoundAsItSays) {
   const ErrorBoundOptions options{NoiseLaw::uniform, 1e3, 0.01};
-  const NoiseChoice a = choose_noise({{}, {}, differences(Kind::white, 0.3)}, options);
+  const NoiseChoice a = choose_noise({{}, differences(Kind::white, 0.3)}, options);
   EXPECT_EQ(a.bound.bound, bound_of_sd(0.3, 0.05, options).bound);
-  const NoiseChoice b = choose_noise({standstill(Rest::noisy, 0.3), {}, {}}, options);
+  const NoiseChoice b = choose_noise({standstill(Rest::noisy, 0.3), {}}, options);
   EXPECT_EQ(b.bound.bound, 30.0);
 }
 

@@ -10,6 +10,8 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/model/faults.hpp>
 
+#include "support/fault_oracle.hpp"
+
 namespace wheelwright::faults_test {
 namespace {
 
@@ -156,26 +158,6 @@ TEST(Zeta, IsNothingWithoutAFault) {
     const std::vector<Fault> later = {{kind, 0.02, {Shape::step, 10.0}}};
     EXPECT_EQ(zeta(drive, body, fault_state(later, 9.99), motion), Eigen::Vector2d::Zero());
     EXPECT_EQ(delta(drive, fault_state(later, 9.99), motion), Eigen::Vector3d::Zero());
-  }
-}
-
-TEST(DeltaBound, HoldsForEveryMotionInsideItsBoundsAndIsAttained) {
-  const Eigen::Vector2d bound(0.8, 1.2);
-  std::mt19937_64 generator(3);
-  const auto unit = [&] { return 2.0 * static_cast<double>(generator() >> 11U) * 0x1p-53 - 1.0; };
-  for (const Kind kind : all_kinds) {
-    const std::vector<Fault> faults = {{kind, -0.03, {Shape::smooth, 0.0, 1.0}}};
-    const Eigen::Vector3d most = delta_bound(drive, faults, bound);
-    Eigen::Vector3d seen = Eigen::Vector3d::Zero();
-    for (int i = 0; i < 5000; ++i) {
-      // Corners of the speed box, where a linear function is largest.
-      const DriveMotion m{4.0 * unit(), {std::copysign(bound[0], unit()), std::copysign(bound[1], unit())}, {0.0, 0.0}};
-      seen = seen.cwiseMax(delta(drive, fault_state(faults, 1.0 + unit()), m).cwiseAbs());
-    }
-    for (int i = 0; i < 3; ++i) {
-      EXPECT_LE(seen[i], most[i] * (1.0 + 1e-12)) << to_string(kind);
-      EXPECT_GE(seen[i], most[i] * 0.99) << to_string(kind);
-    }
   }
 }
 

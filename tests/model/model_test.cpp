@@ -13,6 +13,8 @@
 #include <wheelwright/model/robot.hpp>
 #include <wheelwright/model/single_axis.hpp>
 
+#include "support/fault_oracle.hpp"
+
 namespace wheelwright::model_test {
 namespace {
 

@@ -88,7 +88,7 @@ TEST(Plural, CountsInWords) {
   EXPECT_EQ(plural(0, "event"), "no events");
   EXPECT_EQ(plural(1, "event"), "1 event");
   EXPECT_EQ(plural(12000, "event"), "12\u202f000 events");
-  EXPECT_EQ(list({"a", "b", "c"}), "a, b and c");
+  EXPECT_EQ(enumerated({"a", "b", "c"}), "a, b and c");
 }
 
 TEST(TimeAxis, CountsFromTheStartOfAnEpochClock) {

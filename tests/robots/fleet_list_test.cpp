@@ -44,15 +44,6 @@ TEST(FleetDates, AreDaysOfTheCalendar) {
   EXPECT_FALSE(days_of_date("2001/02/03"));
 }
 
-TEST(FleetNames, CountAsPeopleDo) {
-  EXPECT_TRUE(natural_less("log_2", "log_10"));
-  EXPECT_FALSE(natural_less("log_10", "log_2"));
-  EXPECT_TRUE(natural_less("a", "b"));
-  EXPECT_TRUE(natural_less("a", "a1"));
-  EXPECT_FALSE(natural_less("a", "a"));
-  EXPECT_NE(natural_less("a01", "a1"), natural_less("a1", "a01")) << "a strict order";
-}
-
 TEST_F(FleetList, TheEarliestLogCommissions) {
   logs({"a.csv", "b.csv", "c.csv"});
   const auto fleet = list("robot,log,when\namy,b.csv,2026-03-08\namy,a.csv,2026-03-01\nbob,c.csv,3.5\n");

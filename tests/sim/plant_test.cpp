@@ -8,6 +8,8 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/sim/plant.hpp>
 
+#include "support/fault_oracle.hpp"
+
 namespace wheelwright::plant_test {
 namespace {
 

@@ -81,7 +81,7 @@ TEST(Simulation, NoiseFreeLogSatisfiesTheModelExactlyInBothHoldsAndConventions) 
         s.robot.lever_arm_is_track = track;
         s.time_jitter = 0.3;
         // Rounding: angles of some hundred rad carry 1e-13, times r θ.
-        EXPECT_LT(integrated_violation(s, simulate(s)), 1e-12) << to_string(kind);
+        EXPECT_LT(integrated_violation(s, simulate(s)), 1e-12) << static_cast<int>(kind);
       }
     }
   }
@@ -166,7 +166,7 @@ TEST(Simulation, TrackingErrorFallsOnEveryTrajectory) {
     };
     const double start = s.initial_pose_error.norm();
     // Turning on the spot cannot take away an error along the wheel axis at once: half is enough there.
-    EXPECT_LT(error_after(60.0), (kind == Kind::spin ? 0.5 : 0.02) * start) << to_string(kind);
+    EXPECT_LT(error_after(60.0), (kind == Kind::spin ? 0.5 : 0.02) * start) << static_cast<int>(kind);
   }
 }
 

@@ -25,7 +25,7 @@ TEST(Trajectory, AccelerationIsTheDerivativeOfSpeed) {
           (reference_speed(trajectory, t + h).speed - reference_speed(trajectory, t - h).speed) / (2.0 * h);
       // Speeds are once continuously differentiable: h times a jump of the second derivative at worst.
       EXPECT_LT((difference - reference_speed(trajectory, t).acceleration).norm(), 1e-4)
-          << to_string(kind) << " at " << t;
+          << static_cast<int>(kind) << " at " << t;
     }
   }
 }
@@ -40,8 +40,8 @@ TEST(Trajectory, StartsFromRestAndKeepsToItsLimits) {
       v1 = std::max(v1, std::abs(v[0]));
       v2 = std::max(v2, std::abs(v[1]));
     }
-    EXPECT_LE(v1, 0.6 * (1.0 + 1e-12)) << to_string(kind);
-    EXPECT_LE(v2, 1.7 * (1.0 + 1e-12)) << to_string(kind);
+    EXPECT_LE(v1, 0.6 * (1.0 + 1e-12)) << static_cast<int>(kind);
+    EXPECT_LE(v2, 1.7 * (1.0 + 1e-12)) << static_cast<int>(kind);
   }
 }
 

@@ -178,19 +178,6 @@ TEST(PooledPrior, ManyRobotsWithoutBoundsLeaveNoBox) {
   EXPECT_EQ(pooled_prior(readable).radius, before.radius);
 }
 
-TEST(PooledPrior, OrderStatisticsPayForEverySide) {
-  Random random(2);
-  // 1 − 2·3·k/(n + 1) >= 0.9 needs n = 59 for k = 1.
-  EXPECT_TRUE(order_statistics_box(strange_fleet(58, random), {0, 1, 2}, 0.9).empty());
-  const FleetTable table = strange_fleet(59, random);
-  const std::vector<Interval> box = order_statistics_box(table, {0, 1, 2}, 0.9);
-  ASSERT_EQ(box.size(), 3U);
-  for (const FleetEntry& e : table.columns[1].entries) {
-    EXPECT_GE(e.lower, box[1].lower);
-    EXPECT_LE(e.upper, box[1].upper);
-  }
-}
-
 TEST(PooledPrior, RefusesOptionsThatMakeNoSense) {
   EXPECT_THROW((void)pooled_prior({}, {.coverage = 1.0}), InvalidArgument);
   EXPECT_THROW((void)pooled_prior({}, {.most_hidden = 1.5}), InvalidArgument);

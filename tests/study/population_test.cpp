@@ -32,16 +32,6 @@ FleetTable alike(std::size_t n, std::size_t p, double spread, double error, Rand
   return table;
 }
 
-TEST(Holm, IsTheTextbookExample) {
-  // Holm 1979: 4·0.01, then 3·0.02 and so on, never falling.
-  const std::vector<double> adjusted = holm({0.02, 0.01, 0.9, 0.03});
-  EXPECT_DOUBLE_EQ(adjusted[1], 0.04);
-  EXPECT_DOUBLE_EQ(adjusted[0], 0.06);
-  EXPECT_DOUBLE_EQ(adjusted[3], 0.06);
-  EXPECT_DOUBLE_EQ(adjusted[2], 0.9);
-  EXPECT_TRUE(holm({}).empty());
-}
-
 // The share of homogeneous fleets in which any robot is called outside is at most the stated level, small fleets and
 // large, spread dominating or error dominating. 4 standard errors of the simulation are allowed for.
 TEST(Population, CallsNobodyOutsideInFleetsThatAreAlike) {
