@@ -23,19 +23,24 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 ROOMS = {
-    "core": "errors, checks, outward-rounded interval, the table of a log, the regression",
+    "core": "errors, argument checks, outward-rounded intervals, log table, regression rows, linear algebra, statistics",
     "model": "robots as data, their faults and effects",
-    "filter": "the exact filter, batch and streaming, and noise through it",
-    "bounds": "feasible set, interval hull, support functions, certificates",
-    "identify": "estimators and what they promise",
+    "filter": "row filters (torque, odometry), batch and streaming, and propagation of noise bounds through them",
+    "bounds": "feasible parameter set, interval hull, support function, certificates",
     "detector": "thresholds and decisions: the part that runs on the robot; margins, isolation",
+    "files": "bytes, numbers, JSON, YAML, XML",
+    "logs": "logs in CSV, rosbag2 and HDF5",
+    "robots": "robot files, URDF, the on-line part of model.json",
+    "sim": "simulator of the robot in closed loop, with faults and effects",
+    "identify": "estimators and what they promise",
     "commission": "the pipeline from a log to a model",
+    "inference": "robust and constrained fits, confidence regions, identifiability",
+    "doctor": "log checks",
     "design": "manoeuvres",
-    "sim": "the robot in closed loop, with faults and effects",
     "gap": "the sim-to-real gap",
-    "sensitivity": "studies over inputs; work on threads, shards and ranks",
-    "fleet": "many robots: population, drift, pooled prior",
-    "io": "logs, robot files, JSON",
+    "study": "sensitivity studies and fleets; work on threads, shards and ranks",
+    "results": "results as JSON, with their schemas",
+    "export": "the detector as a C header",
     "report": "the page of a result",
 }
 
@@ -107,9 +112,9 @@ def cell(text):
 
 
 def files():
-    out = ("# JSON files\n\nEvery result is JSON with a schema, which stands in `io/` and is installed to "
+    out = ("# JSON files\n\nEvery result is JSON with a schema, which stands in `results/` and is installed to "
            "`share/wheelwright/schemas`. Units are SI; a number that is not finite is `null`.\n")
-    for path in sorted((ROOT / "io").glob("*.schema.json")):
+    for path in sorted((ROOT / "results").glob("*.schema.json")):
         schema = json.loads(path.read_text(encoding="utf-8"))
         out += f"\n## {path.name.replace('.schema.json', '')}\n\n{cell(schema.get('title', ''))}"
         out += f" ({path.name}). {cell(schema.get('description', ''))}\n\n"
