@@ -33,7 +33,7 @@ namespace wheelwright {
 [[nodiscard]] double certified_upper_bound(std::span<const double> a, std::span<const WeightedRow> rows,
                                            const Box& box);
 
-/// Whether the multipliers prove that { θ in box : row·θ <= row.b for every row } is empty: that 0·θ has a certified
+/// True if the multipliers prove that { θ in box : row·θ <= row.b for every row } is empty: that 0·θ has a certified
 /// upper bound below zero (Farkas).
 [[nodiscard]] bool proves_empty(std::span<const WeightedRow> rows, const Box& box);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// From a log of fault-free driving to a model that a detector can carry: the paper, front to back.
+/// Commissioning pipeline: from a log of fault-free driving to a model with thresholds for the detector.
 #pragma once
 
 #include <functional>
@@ -26,7 +26,7 @@
 
 namespace wheelwright {
 
-/// What commissioning found about one parameter.
+/// Result of commissioning for one parameter.
 struct ParameterResult {
   Parameter parameter;
   Excitation excitation = Excitation::identified;

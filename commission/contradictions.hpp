@@ -71,14 +71,14 @@ struct EffortTiming {
 [[nodiscard]] std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& setting, const Fit& fit,
                                                         double longest = 0.2, std::size_t most_rows = 60000);
 
-/// Whether `timing` is a latency that a model must not be made with: beyond what is allowed, told from that at a risk
+/// True if `timing` is a latency that a model must not be made with: beyond what is allowed, told from that at a risk
 /// of 1e-8 (Student's t) and further from it than a quarter of `step` (s), of an effect that is not symmetric in the
 /// sign of the shift (interpolation averages noise, which lowers the residual for a shift either way), and one that
 /// either lowers the residual by 1 % or more or moves a parameter by two standard errors. Healthy logs with even steps
 /// showed 0.09 steps at most.
 [[nodiscard]] bool is_latency(const EffortTiming& timing, double step);
 
-/// What the signals of a log say before any set is made.
+/// Findings about the signals of a log, before any feasible set is computed.
 struct SignalFindings {
   std::vector<LogContradiction> contradictions;
   std::optional<EffortTiming> timing;  ///< nothing where no shift is told, or was not looked for
@@ -88,8 +88,8 @@ struct SignalFindings {
 /// disagree. Walks `log` a few times.
 [[nodiscard]] SignalFindings contradictions_in_log(LogSource& log, const Setting& setting, const Fit& fit);
 
-/// What a finished commissioning says against itself: best guesses outside their set, held-out rows outside the
-/// thresholds, a noise bound that had to be raised by `raised` for the prior box to explain the log.
+/// Contradictions within a finished commissioning: estimates outside their set, held-out rows outside the thresholds, a
+/// noise bound that had to be raised by `raised` for the prior box to explain the log.
 [[nodiscard]] std::vector<LogContradiction> contradictions_in_result(const Commissioning& result,
                                                                      const Setting& setting, double raised);
 
@@ -99,7 +99,7 @@ struct SignalFindings {
 void weigh_contradictions(Commissioning& result, const Setting& setting, const Fit& fit,
                           const std::optional<EffortTiming>& timing, const Explained& explained);
 
-/// Whether weigh_contradictions() would change anything.
+/// True if weigh_contradictions() would change anything.
 [[nodiscard]] bool wants_weighing(const Commissioning& result, const Setting& setting);
 
 /// Weighs what says that an effort is wrong against the declared errors of the rows (`errors`, with parameters in

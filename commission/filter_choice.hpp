@@ -18,7 +18,7 @@
 
 namespace wheelwright {
 
-/// How the choice is made.
+/// Options of the choice.
 struct FilterChoiceOptions {
   double longest_delay = 0.4;  ///< s: order/β is at most this
   double tolerance = 1.15;     ///< residual_over_torque: the chosen filter's value is at most this times the best one's

@@ -31,13 +31,13 @@ inline double dead_zone(double residual, double lower, double upper) noexcept {
   return residual < lower || residual > upper ? std::abs(residual) : 0.0;
 }
 
-/// Which comparison decides.
+/// Comparison that decides.
 enum class Test {
   two_sided,  ///< l <= ε <= u: does not depend on θ̂ and is never less sensitive
   symmetric,  ///< |ε| <= ρ: the paper's (35)
 };
 
-/// How a detector decides.
+/// Options of a detector.
 struct DetectorOptions {
   ParameterSetKind set = ParameterSetKind::polytope;
   Test test = Test::two_sided;
@@ -91,7 +91,7 @@ class RowDetector {
   Decision decision_;
 };
 
-/// Whether a sample at time `t` (s) follows the one at `before` in the same segment: later, by no more than five steps
+/// True if a sample at time `t` (s) follows the one at `before` in the same segment: later, by no more than five steps
 /// of `nominal` (s; 0: any), as logs are split.
 [[nodiscard]] bool follows(double before, double t, double nominal) noexcept;
 

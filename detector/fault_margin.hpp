@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// How large a fault must be to be seen at one instant: for certain, or at all. Exact, over the whole feasible set.
+/// Minimum detectable fault at one instant: the smallest size that is certain to be detected, and the largest that is
+/// certain not to be; exact, over the whole feasible set.
 ///
 /// With P the feasible set, h its support function and θ >= 0 (other signs as ThresholdRule has them), an instant shows
 /// a fault κ > 0 **for certain** when for every θ in P, every |e| <= n̄ and every |δ| <= Δ
@@ -34,7 +35,7 @@ class FaultMargin {
   /// For the detector's thresholds `rule`.
   explicit FaultMargin(ThresholdRule rule) : rule_(std::move(rule)) {}
 
-  /// Whether a fault of size κ > 0 (`side` = 1) or −κ (`side` = −1) is certain to be outside [l, u] in this row.
+  /// True if a fault of size κ > 0 (`side` = 1) or −κ (`side` = −1) is certain to be outside [l, u] in this row.
   /// Rounding is on the safe side: true is a proof.
   [[nodiscard]] bool certain(const FaultRow& row, double kappa, double side, std::size_t channel = 0);
 
@@ -51,7 +52,7 @@ class FaultMargin {
   [[nodiscard]] double largest_hidden(const FaultRow& row, double largest, double side, double share,
                                       std::size_t channel = 0);
 
-  /// Whether a fault of size κ on that side can be outside [l, u] in this row, for some θ in P and noise of at most
+  /// True if a fault of size κ on that side can be outside [l, u] in this row, for some θ in P and noise of at most
   /// `share` times the bounds. Rounding is on the safe side: false is a proof.
   [[nodiscard]] bool possible(const FaultRow& row, double kappa, double side, double share, std::size_t channel = 0);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The on-line model: what a detector carries of a commissioned robot, and nothing else.
+/// On-line model: the part of a commissioned model that a detector needs.
 #pragma once
 
 #include <optional>
@@ -20,7 +20,7 @@
 
 namespace wheelwright {
 
-/// What a fault-free log taught about the parameters of one residual, and when that residual raises an alarm.
+/// Parameter set of one residual, learnt from a fault-free log, and its alarm rule.
 struct LearntSet {
   Eigen::VectorXd estimate{};  ///< best guess; for a parameter that the log does not show, the Chebyshev centre's value
   std::vector<HalfSpace> facets{};  ///< of the feasible set, p coefficients each

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The sim-to-real gap of a robot: where it lies, which unmodelled effect causes it, how far it shrinks once the effect
-/// is in the model. Theory section 6; the result is the contract's gap.json.
+/// is in the model. The result is written as gap.json.
 #pragma once
 
 #include <functional>
@@ -19,7 +19,7 @@
 
 namespace wheelwright {
 
-/// What the log says about the model.
+/// Verdict of the log on the model.
 enum class GapVerdict {
   no_gap,       ///< the model, re-fitted at most within its prior, explains the log to the noise floor
   explained,    ///< one cause (which may be a combination) beats every other, and reaches the floor
@@ -83,7 +83,7 @@ struct ShrinkFigure {
   double upper = 0.0;
 };
 
-/// How far the gap shrinks.
+/// Shrinkage of the gap.
 struct GapShrink {
   std::vector<ShrinkFigure> torque_rms;       ///< per channel
   std::vector<ShrinkFigure> rollout;          ///< open loop

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Unmodelled effects as data, the parts that they are made of, and the catalogue.
+/// Unmodelled effects as data, helpers to build them, and the catalogue.
 #pragma once
 
 #include <cstddef>
@@ -47,8 +47,8 @@ struct PhysicalValue {
   double larger = 0.0;  ///< share by which it may be larger for what the model does not know
 };
 
-/// What an effect adds per unit of one of its parameters. Signals have one value per instant of the drive and are not
-/// filtered yet; an empty signal stands for zeros.
+/// Column of an effect: its contribution per unit of one of its parameters. Signals have one value per instant of the
+/// drive and are not filtered yet; an empty signal stands for zeros.
 struct Column {
   std::vector<Eigen::VectorXd> effort;       ///< per output: effort that the effect asks for in addition, (15)
   std::vector<Eigen::VectorXd> effort_rate;  ///< per output: signal whose time derivative is such an effort
@@ -57,7 +57,7 @@ struct Column {
   Eigen::VectorXd yaw;                       ///< likewise, rad/s
 };
 
-/// Whether an effect can be looked for on a drive at all.
+/// Applicability of an effect to a drive, with the reason where it does not apply.
 struct Applicability {
   bool applies = true;
   std::string reason;  ///< what is missing, in words; empty where it applies
@@ -105,7 +105,7 @@ struct Effect {
 /// (> 0 where logarithmic) and at least one grid point, and a unit coefficient goes with no parameters.
 void validate(const Effect& effect);
 
-/// Whether `effect` can be looked for on `drive`.
+/// Applicability of `effect` to `drive`.
 [[nodiscard]] Applicability applicability(const Effect& effect, const Drive& drive);
 
 /// All grid points of the effect's shapes on `drive`, the last one running fastest; one empty point for an effect

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Second moments of a regression in one walk, summed over blocks of time, and their long-run covariance.
+/// Second moments of a regression from one pass, summed over blocks of time, and their long-run covariance.
 ///
 /// A regression in one walk: its second moments, summed over blocks of time. Least squares, instrumental variables,
 /// their corrections for noise, their covariances under autocorrelation, bootstrap and sign-perturbed sums are all made

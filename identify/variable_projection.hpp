@@ -38,7 +38,7 @@ class SeparableModel {
   virtual bool evaluate(const Eigen::VectorXd& shape, bool derivatives, SeparableValues& at) const = 0;
 };
 
-/// What is searched, and for how long.
+/// Search range and stopping rules.
 struct VariableProjectionOptions {
   Eigen::VectorXd start;          ///< q; empty: the best of a grid of `scan` values of each shape (needs finite bounds)
   Eigen::VectorXd lower;          ///< q, empty: none
@@ -51,14 +51,14 @@ struct VariableProjectionOptions {
   bool full_jacobian = true;      ///< Golub and Pereyra 1973; false: without its second term (Kaufman 1975)
 };
 
-/// How the search ended.
+/// Status of the search.
 enum class SearchEnd {
   converged,   ///< no step lowers the cost any more
   iterations,  ///< most_iterations were used up: the numbers are the best seen
   failed,      ///< the model is not defined at the start, or no step could be made
 };
 
-/// What is known of one shape parameter.
+/// Knowledge of one shape parameter.
 enum class ShapeState {
   identified,
   at_lower,  ///< at its lower bound with the cost falling beyond: its covariance is that of a fixed number, 0

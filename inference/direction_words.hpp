@@ -11,7 +11,7 @@
 
 namespace wheelwright {
 
-/// What motion a parameter answers to.
+/// Kind of motion that excites a parameter.
 enum class TermKind {
   inertia,  ///< acceleration
   viscous,  ///< speed

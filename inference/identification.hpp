@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Everything that a log of fault-free driving says about the parameters, without bounds and thresholds: how they are
-/// best estimated, how sure that is, what the log cannot tell, and what the model leaves out.
+/// Everything that a log of fault-free driving says about the parameters, without bounds and thresholds: estimates,
+/// uncertainty, unidentified directions, and unmodelled effects.
 #pragma once
 
 #include <cstddef>
@@ -64,7 +64,7 @@ struct ShapeFinding {
   std::vector<ShapePoint> curve;  ///< over all that was searched, ascending
 };
 
-/// What is done, and how far.
+/// Options of an identification.
 struct IdentificationOptions {
   SettingOptions setting;
   double confidence = 0.95;        ///< of the regions

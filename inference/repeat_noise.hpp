@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// How noisy the columns of two logs are that were driven by the same commands.
+/// Noise levels of the columns of two logs that were driven by the same commands.
 #pragma once
 
 #include <cstddef>
@@ -11,7 +11,7 @@
 
 namespace wheelwright {
 
-/// How two runs are laid on one another.
+/// Alignment of two runs.
 struct RepeatOptions {
   std::vector<std::string> commands;  ///< columns that both runs share; empty: runs are aligned by the time since their
                                       ///< start
@@ -33,7 +33,7 @@ struct RepeatNoise {
                                   ///< not)
 };
 
-/// Whether the runs are repeats.
+/// Verdict: the runs are repeats or not.
 enum class RepeatStatus {
   repeats,             ///< numbers can be used
   different_commands,  ///< the commands differ at every shift: the numbers are no noise

@@ -38,7 +38,7 @@ class Handle {
     }
   }
 
-  /// Whether the library gave one.
+  /// True if the library gave one.
   explicit operator bool() const { return id_ >= 0; }
   /// For the library's functions.
   [[nodiscard]] hid_t get() const { return id_; }
@@ -52,7 +52,7 @@ class Handle {
 
 namespace wheelwright {
 
-/// Whether the file begins as HDF5 files do (without a user block).
+/// True if the file begins as HDF5 files do (without a user block).
 [[nodiscard]] bool is_hdf5(const std::filesystem::path& path);
 
 /// An HDF5 file as a file of a log. The group is the one whose columns include a time; where there are several, the

@@ -18,7 +18,7 @@
 
 namespace wheelwright {
 
-/// What became of a row.
+/// Outcome of a row.
 enum class RowOutcome {
   dropped,      ///< a defect; counted
   row,          ///< continues the segment
@@ -118,7 +118,7 @@ class RowFile {
                                                       LogReport* report) = 0;
 };
 
-/// How RowLog hands out rows.
+/// Options of RowLog.
 struct RowLogOptions {
   std::size_t block_rows = 4096;  ///< rows of a block, at least 1
   std::size_t min_rows = 20;      ///< usable rows that a log must have

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Which robots a fleet has and where their logs are: from a list, or from a directory.
+/// The robots of a fleet and the places of their logs, from a list or a directory.
 #pragma once
 
 #include <filesystem>
@@ -51,7 +51,7 @@ struct FleetListRobot {
 /// Days from 1970-01-01 to a date of the Gregorian calendar, "2026-03-01" or "20260301"; nothing for what is none.
 [[nodiscard]] std::optional<double> days_of_date(std::string_view text);
 
-/// Whether `a` comes before `b` where digits count as the number they make: log_2 before log_10.
+/// True if `a` comes before `b` where digits count as the number they make: log_2 before log_10.
 [[nodiscard]] bool natural_less(std::string_view a, std::string_view b);
 
 }  // namespace wheelwright

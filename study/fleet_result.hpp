@@ -74,7 +74,7 @@ struct FleetResult {
   [[nodiscard]] std::size_t robots_drifting() const;
   [[nodiscard]] std::size_t robots_drifting_for_certain() const;
   [[nodiscard]] std::size_t robots_alarmed() const;
-  /// Whether no robot is outside, drifts, raised an alarm, was contradicted or could not be examined.
+  /// True if no robot is outside, drifts, raised an alarm, was contradicted or could not be examined.
   [[nodiscard]] bool well() const;
 };
 

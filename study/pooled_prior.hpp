@@ -28,7 +28,7 @@ struct PooledParameter {
   double hidden = 0.0;       ///< share of the learning robots whose log does not show it
   double centre = 0.0;       ///< median of the learning robots' mid-points
   double scale_below = 0.0;  ///< median of how far their intervals reach below the centre
-  double scale_above = 0.0;  ///< … above
+  double scale_above = 0.0;  ///< median of how far their intervals reach above the centre
   Interval before{};         ///< hull of the priors with which the fleet was commissioned
   Interval box{};            ///< rounded outward; `before` where it is not included or there is no box
 };

@@ -89,7 +89,7 @@ struct Population {
 ///     t = (x − μ)/√(s² + τ² + s_μ²),
 ///
 /// which for a robot like the others follows about Student's t (normal θ and errors) of ν degrees of freedom, those of
-/// the estimated variances in it: 1/ν = 1/RandomEffects::freedom of the others + q²/(those of s), q = s²/(s² + τ² +
+/// the estimated variances in it: 1/ν = 1/(freedom of the others' random effects) + q²/(those of s), q = s²/(s² + τ² +
 /// s_μ²). It is outside where its p, adjusted by Holm's method over all robots and parameters, is at most `level`. The
 /// certain statement needs no distribution, only the noise bounds. Throws InvalidArgument for a level or share outside
 /// (0, 1) or fewest < 4.

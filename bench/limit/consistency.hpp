@@ -58,7 +58,7 @@
 
 namespace wheelwright {
 
-/// Whether a window of samples has an explanation.
+/// Verdict on a window of samples: explained by a healthy robot or not.
 struct Consistency {
   bool refuted = false;      ///< proved: no θ in P and no admissible noise explains the samples
   double unexplained = 0.0;  ///< share of the deviation from the centre of P that no explanation of the relaxed program
@@ -77,7 +77,7 @@ struct DetectableSize {
   std::size_t programs = 0;  ///< linear programs that it took
 };
 
-/// How hard it is to try.
+/// Effort limits of the search.
 struct ConsistencyOptions {
   double before = 0.5;          ///< s of healthy samples before the onset, as far as the segment has them
   double tolerance = 1e-3;      ///< the descent ends where it gains less than this share
