@@ -32,7 +32,7 @@ struct ParameterResult {
   Excitation excitation = Excitation::identified;
   std::string reason;                    ///< why it is not identified, for people
   std::optional<double> estimate;        ///< nothing where the log does not show the parameter
-  std::optional<double> standard_error;  ///< honest under autocorrelated residuals
+  std::optional<double> standard_error;  ///< valid under autocorrelated residuals
   double lower = 0.0;                    ///< bounds (certified hull)
   double upper = 0.0;
   double chebyshev = 0.0;       ///< centre of the feasible set

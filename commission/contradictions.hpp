@@ -31,14 +31,14 @@ struct LogContradiction {
     wheels_disagree,   ///< the efforts of two joints do not show one and the same mass
     wrong_sign,        ///< a quantity that cannot be negative is, significantly
     dry_friction,      ///< the efforts follow the sign of the motion, and the model has no dry friction
-    prior_edge,        ///< only a far larger noise lets the prior explain the log
-    estimate_outside,  ///< the best guess lies outside the set, with its whole interval
+    prior_edge,        ///< the prior explains the log only with far larger noise
+    estimate_outside,  ///< the estimate lies outside the set, with its whole interval
     halves_disagree,   ///< the two halves of the log give different robots
     held_out_outside,  ///< driving that was held out leaves the thresholds
   };
   Kind kind = Kind::effort_constant;
   bool withdraws = true;   ///< no model is published; false: a note beside a model
-  bool demotes = false;    ///< chance does not explain it, noise of the worst shape would: nothing is called guaranteed
+  bool demotes = false;    ///< chance does not explain it, worst-case noise would: nothing is called guaranteed
   std::string subject{};   ///< the parameter, column or output that it is about
   double value = 0.0;      ///< what was found: s, share, factor, or the parameter's unit
   double limit = 0.0;      ///< what it was compared with, same unit
@@ -54,7 +54,7 @@ struct Commissioning;
 /// A constant shift in time between effort and motion, by least squares over filtered rows (TimeShiftedRows).
 struct EffortTiming {
   double delay = 0.0;           ///< s; > 0: the logged effort comes late
-  double standard_error = 0.0;  ///< s, honest under autocorrelated residuals
+  double standard_error = 0.0;  ///< s, valid under autocorrelated residuals
   double freedom = 1.0;         ///< degrees of freedom of its Student's t
   Interval allowed{};  ///< s, what is taken as given: effort.delay; where bounds are declared and held efforts may
                        ///< change between samples, up to a step more

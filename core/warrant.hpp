@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Warrants (guaranteed, extrapolated, statistical) and the assumptions behind them: what a published number stands on.
+/// Warrants (guaranteed, extrapolated, statistical) and the assumptions behind them: the basis of a published number.
 #pragma once
 
 #include <string>
@@ -40,8 +40,8 @@ enum class Warrant {
          "within its bound or an encoder's scale, are not in it.";
 }
 
-/// The weaker of two, for what stands on both: extrapolated, which has no stated confidence, before statistical before
-/// guaranteed.
+/// The weaker of two, for a number that rests on both: extrapolated, which has no stated confidence, before statistical
+/// before guaranteed.
 [[nodiscard]] constexpr Warrant weaker(Warrant a, Warrant b) {
   const auto either = [&](Warrant w) { return a == w || b == w; };
   return either(Warrant::extrapolated)  ? Warrant::extrapolated

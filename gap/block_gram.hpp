@@ -107,8 +107,9 @@ class BlockGram {
   double all_rows_ = 0.0;
 };
 
-/// Σ rᵢ rⱼ over all rows, r the columns `of` less their least-squares fit by the columns `on` (indices of `gram`, the
-/// response has the index columns()). Columns of `on` that the others make up to ten digits count once.
+/// Schur complement of the Gram matrix: Σ rᵢ rⱼ over all rows, r the columns `of` less their least-squares fit by the
+/// columns `on` (indices of `gram`, the response has the index columns()). Columns of `on` that depend linearly on the
+/// others, to ten digits, count once.
 [[nodiscard]] Eigen::MatrixXd remainder(const BlockGram& gram, const std::vector<std::size_t>& of,
                                         const std::vector<std::size_t>& on);
 

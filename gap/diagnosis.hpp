@@ -56,7 +56,7 @@ struct CredibleCauses {
 /// Two sets of causes that look alike on this log, whatever came out.
 struct ConfusablePair {
   std::string first, second;
-  double similarity = 0.0;  ///< share of the one's signature (after θ is fitted again) that the other makes up, 0 … 1
+  double similarity = 0.0;   ///< share of one's signature (after θ is fitted again) that the other explains, in [0, 1]
   bool inseparable = false;  ///< by any log without further sensors, not by this one alone
   std::string reason;        ///< "not excited", or what measurement would split them
 };

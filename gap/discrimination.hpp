@@ -83,8 +83,8 @@ struct RivalSeparation {
   double excess = 0.0;    ///< S: what B leaves above the noise, sum of squares in units of the noise
   double delta = 0.0;     ///< Δ
   double rows = 0.0;      ///< number of rows that it is spread over
-  double share = 0.0;  ///< of A's signature (after θ is fitted again) that B cannot imitate, sum of squares, 0 … 1
-  double kept = 0.0;   ///< of A's signature that is left after θ is fitted again, sum of squares, 0 … 1
+  double share = 0.0;  ///< of A's signature (after θ is fitted again) that B cannot explain, sum of squares, in [0, 1]
+  double kept = 0.0;   ///< of A's signature that is left after θ is fitted again, sum of squares, in [0, 1]
   std::vector<double> shape{};  ///< of B where it imitates best, cause after cause
 
   /// √(Δ/(2(1 + ρ))), ρ² = 1 − share: by how many standard deviations the comparison goes the right way.

@@ -68,7 +68,7 @@ std::size_t add_column(std::vector<RowSpace>& spaces, std::vector<Eigen::VectorX
 [[nodiscard]] std::vector<Eigen::VectorXd> rows_of(const Drive& drive, const GapRows& rows, const Column& column,
                                                    const GapRowOptions& options);
 
-/// The rows that `fitted` makes up.
+/// The contribution of `fitted` to the rows.
 [[nodiscard]] std::vector<Eigen::VectorXd> rows_of(const Drive& drive, const GapRows& rows, const FittedEffect& fitted,
                                                    const GapRowOptions& options);
 

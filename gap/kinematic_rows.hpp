@@ -28,7 +28,7 @@ struct Increments {
   Eigen::VectorXd yaw;      ///< rad
 };
 
-/// Standard deviation of the increments' noise; 0 where there is none to be had.
+/// Standard deviation of the increments' noise; 0 where it is unknown.
 struct IncrementNoise {
   double forward = 0.0;  ///< m
   double lateral = 0.0;  ///< m

@@ -51,7 +51,7 @@ struct LongRunCovariance {
 
 /// Covariance of the sum of a mean-zero series by the equal-weighted cosine estimator: the average over B cosine
 /// frequencies of the squared projections, with t_B critical values (Lazarus, Lewis, Stock and Watson 2018).
-/// B = 0.4·(blocks)^{2/3}, at least 4 and at most `most_frequencies`; fewer cosines stay honest under slower noise, at
+/// B = 0.4·(blocks)^{2/3}, at least 4 and at most `most_frequencies`; fewer cosines stay valid under slower noise, at
 /// the price of heavier t tails.
 [[nodiscard]] LongRunCovariance long_run_covariance(const BlockSums& series, std::size_t most_frequencies = 24);
 

@@ -47,7 +47,7 @@ struct VariableProjectionOptions {
   int scan = 13;                  ///< >= 2, values of each shape on the grid
   int most_iterations = 500;      ///< > 0
   double rank_tolerance = 1e-13;  ///< diagonal of the pivoted triangular factor of unit columns below which a column
-                                  ///< counts as one that the others make up
+                                  ///< counts as linearly dependent on the others
   bool full_jacobian = true;      ///< Golub and Pereyra 1973; false: without its second term (Kaufman 1975)
 };
 
@@ -63,7 +63,7 @@ enum class ShapeState {
   identified,
   at_lower,  ///< at its lower bound with the cost falling beyond: its covariance is that of a fixed number, 0
   at_upper,  ///< at its upper bound, likewise
-  flat,      ///< the data do not tell it: its column is made up by the others, or its 95 % interval is wider than
+  flat,      ///< the data do not tell it: its column depends linearly on the others, or its 95 % interval is wider than
   ///< the bounds (without bounds: than a million times the estimate). The estimate is one of many; no interval
   ///< is given (standard error infinite)
 };
@@ -77,7 +77,7 @@ struct SeparableFit {
   int rank = 0;                   ///< numerical rank of Φ(ω̂); below p the columns left over have θ_j = 0
   double weighted_rss = 0.0;      ///< the minimum
   int iterations = 0;
-  Eigen::VectorXd standard_error;             ///< q + p, ω first: honest under autocorrelated residuals
+  Eigen::VectorXd standard_error;             ///< q + p, ω first: valid under autocorrelated residuals
   double freedom = 0.0;                       ///< degrees of freedom of its Student's t
   Eigen::MatrixXd covariance;                 ///< (q+p) × (q+p), the sandwich; rows of fixed or flat parameters 0
   Eigen::MatrixXd covariance_if_independent;  ///< the same if residuals were independent and alike: s²(JᵀJ)⁻¹ with

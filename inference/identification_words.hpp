@@ -41,7 +41,7 @@ enum class IdentificationStanding {
 /// A shape matters where it is identified and the residual with it is below this share of that without.
 inline constexpr double kShapeMatters = 0.95;
 
-/// True if `shape` is told by the log and worth a word: it lowers the residual below kShapeMatters and is either told
+/// True if `shape` is identified by the log and relevant: it lowers the residual below kShapeMatters and is either told
 /// from zero or, for the Stribeck speed, not at an end of what was searched.
 [[nodiscard]] bool matters(const ShapeFinding& shape);
 

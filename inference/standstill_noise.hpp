@@ -54,7 +54,7 @@ struct StandstillNoise {
   ExtrapolatedBound bound;     ///< on the deviation, extrapolated over the horizon as noise_level.hpp says
 };
 
-/// The columns and the stretches they stand on.
+/// The noise levels of the columns, and the stretches of standstill that they come from.
 struct Standstill {
   std::vector<StandstillNoise> columns;  ///< in the order that was asked
   std::size_t stretches = 0;

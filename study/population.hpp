@@ -26,8 +26,8 @@ struct RandomEffects {
 inline constexpr std::size_t kNoMember = static_cast<std::size_t>(-1);
 
 /// The random-effects model x_i = μ + b_i + e_i, b_i of standard deviation τ, e_i of standard deviation s_i known
-/// (`paule1982`), fitted so that a few strange members do not move it: with z_i = (x_i − μ)/√(s_i² + τ²) and Huber's
-/// ψ(z) = max(−c, min(c, z)), c = 1.5, μ and τ solve (`huber2009`, section 6.4, "Proposal 2")
+/// (`paule1982`), fitted robustly against a few outliers: with z_i = (x_i − μ)/√(s_i² + τ²) and Huber's ψ(z) = max(−c,
+/// min(c, z)), c = 1.5, μ and τ solve (`huber2009`, section 6.4, "Proposal 2")
 ///
 ///     Σ ψ(z_i)/√(s_i² + τ²) = 0,     Σ ψ(z_i)² = (n − 1) E ψ(Z)²,     Z standard normal,
 ///

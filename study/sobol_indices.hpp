@@ -18,9 +18,9 @@ namespace wheelwright {
 ///
 /// Each replicate scrambles the digits of every coordinate by a random lower triangular matrix over {0, 1} and adds a
 /// random digital shift (matousek1998). So each point is uniform in the cube, the points of one replicate fill it as
-/// evenly as the sequence does, and the replicates are independent of each other: what they say apart gives honest
-/// standard errors (lecuyer2023), while points within one are dependent.
-/// More replicates, with the same seed, only add rows.
+/// evenly as the sequence does, and the replicates are independent of each other: their separate estimates give valid
+/// standard errors (lecuyer2023), while points within one are dependent. More replicates, with the same seed, only add
+/// rows.
 ///
 /// Throws InvalidArgument unless `points` is a power of two up to 2³², `replicates` >= 1 and 1 <= `dimensions` <= 3667.
 [[nodiscard]] Eigen::MatrixXd sobol_points(Eigen::Index points, Eigen::Index dimensions, Eigen::Index replicates,

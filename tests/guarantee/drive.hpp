@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What a robot is told to do, and the motion that follows: efforts held by a controller with a clock of its own, or
-/// continuous ones.
+/// Input of a robot, and the motion that follows: efforts held by a controller with a clock of its own, or continuous
+/// ones.
 #pragma once
 
 #include <cstdint>

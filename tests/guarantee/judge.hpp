@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Whether what the library says of a case is true.
+/// Comparison of the claims of the library on a case with the truth.
 #pragma once
 
 #include <array>

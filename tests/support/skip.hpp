@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What a test does where something it needs is missing. GTEST_SKIP stands in no other file.
+/// Skipping of tests whose requirements are missing. GTEST_SKIP stands in no other file.
 #pragma once
 
 #include <cstdlib>
