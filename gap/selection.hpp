@@ -7,10 +7,10 @@
 /// healthy baseline log, or the robot file), what θ itself had to do: the structural causes with θ held at its nominal
 /// value, and parametric causes added until that leaves no more than θ fitted freely.
 ///
-/// A further cause is taken only if it removes a large part of the remaining gap (SelectionOptions::part) and a
-/// relevant part of the whole gap (share), and more than chance explains, over blocks of time and the number of effects
-/// that were tried. At the noise floor no further cause is sought. Columns are not exact (a smoothed sign, a neglected
-/// second order), so the misfit of the best set is the reference by which other sets count as equally good.
+/// A further cause is taken only if it removes a large part of the remaining gap or of the whole gap (SelectionOptions
+/// has the limits), and more than chance explains, over blocks of time and the number of effects that were tried. At
+/// the noise floor no further cause is sought. Columns are not exact (a smoothed sign, a neglected second order), so
+/// the misfit of the best set is the reference by which other sets count as equally good.
 #pragma once
 
 #include <cstddef>
