@@ -44,8 +44,7 @@ struct ParameterResult {
   Warrant warrant = Warrant::extrapolated;  ///< of lower and upper
 };
 
-/// A set on the way to the one that is published: its parameters bound the motion between the samples of the rows that
-/// the next set is made of.
+/// Feasible set of an earlier pass: it bounds the motion between samples in the rows of the next pass.
 struct EarlierSet {
   FeasibleSet set;
   std::vector<std::size_t> dropped;  ///< rows of the log whose instants it leaves out as outliers
@@ -53,13 +52,13 @@ struct EarlierSet {
 
 /// The result of commissioning.
 struct Commissioning {
-  /// What became of the log.
+  /// Status of the commissioning.
   enum class Status {
     done,          ///< a model came out
     partial,       ///< a model came out, but some parameters are not excited: their bounds are the prior's
     empty,         ///< no θ explains the log within the declared noise: see contradiction; no model
     nothing,       ///< no parameter is excited: no model
-    contradicted,  ///< a set came out, but the log contradicts what it stands on: see contradictions; no model
+    contradicted,  ///< a set came out, but the log contradicts its assumptions: see contradictions; no model
   };
   Status status = Status::done;
   std::string message;  ///< one sentence for people, with what to do next where that is needed
@@ -83,12 +82,13 @@ struct Commissioning {
   SignalErrors row_errors;  ///< dY and dy of the rows that the set is made of: OutputNoise::learning in `output`
   std::vector<std::size_t> dropped;  ///< rows of the log whose instants the set leaves out as outliers
   FeasibleSet feasible;              ///< the set, its hull, certificates
-  std::vector<EarlierSet> earlier;   ///< what it was sharpened from, pass by pass: the first one stands on the limit of
-                                     ///< the accelerations alone; none where nothing bounds the motion by the model
-  KinematicCommissioning kinematic;  ///< of the kinematic residual; its model is also OnlineModel::kinematic
-  double polytope_over_box = 1.0;    ///< median width of [l, u]: polytope over box, held out, worst output
-  std::vector<std::string> notes;    ///< what was repaired or chosen, for people
-  std::vector<Assumption> assumptions;  ///< everything that is taken as given, with what the log says of it
+  std::vector<EarlierSet>
+      earlier;  ///< sets of the earlier passes, from which it was refined: the first one rests on the
+                ///< limit of the accelerations alone; none where nothing bounds the motion by the model
+  KinematicCommissioning kinematic;     ///< of the kinematic residual; its model is also OnlineModel::kinematic
+  double polytope_over_box = 1.0;       ///< median width of [l, u]: polytope over box, held out, worst output
+  std::vector<std::string> notes;       ///< what was repaired or chosen, for people
+  std::vector<Assumption> assumptions;  ///< all assumptions, with the verdict of the log on each
 };
 
 /// Options of commission().
@@ -106,8 +106,8 @@ struct CommissionOptions {
 };
 
 /// Log → filtered regression → θ̂_L → feasible set and bounds → ρ(t) → validation. Walks the log several times and
-/// never holds it. Throws InputError or InvalidArgument for a log or robot that cannot be used at all; what the data
-/// say, unwelcome or not, is in the result.
+/// never holds it. Throws InputError or InvalidArgument for a log or robot that cannot be used at all; outcomes that
+/// depend on the data are in the result.
 [[nodiscard]] Commissioning commission(LogSource& log, const Robot& robot, const CommissionOptions& options = {});
 
 }  // namespace wheelwright

@@ -42,7 +42,7 @@ struct DetectorOptions {
   ParameterSetKind set = ParameterSetKind::polytope;
   Test test = Test::two_sided;
   /// k of n; 1 of 1 (or what a commissioned model says) where it is not given, which keeps the certain detections of
-  /// theory section 5.
+  /// fault_margin.hpp.
   std::optional<Persistence> persistence{};
   std::optional<Eigen::VectorXd> mu{};  ///< μ_o of (39), one for each output: constant thresholds instead of ρ(t)
 };

@@ -9,7 +9,7 @@
 ///     min over P of (y + κ g1 + κ² g2) θ + κ c − n̄  >  h(y + κ s + 2Δ) + n̄      (upwards), or the mirror image
 ///     downwards:
 ///
-/// Δ counts twice, once for what the detector's regressor is wrong by and once for what the threshold allows it.
+/// Δ counts twice: once for the error of the detector's regressor, and once for the allowance of the threshold.
 /// **The sizes that are certain up to a largest one κ̄ form one interval (κ°, κ̄]**, so bisection finds κ° exactly: for
 /// a single θ and fixed regressor the difference f of both sides is a quadratic in κ with f(0) <= 0 (no false alarm).
 /// If g2 θ >= 0 it is convex and crosses zero once, upwards. If not it is concave, and {f > 0} is an interval, which
@@ -29,7 +29,7 @@
 
 namespace wheelwright {
 
-/// Sizes of faults that one instant shows. One object serves one thread.
+/// Minimum detectable fault sizes of one instant. One object serves one thread.
 class FaultMargin {
  public:
   /// For the detector's thresholds `rule`.
@@ -39,7 +39,7 @@ class FaultMargin {
   /// Rounding is on the safe side: true is a proof.
   [[nodiscard]] bool certain(const FaultRow& row, double kappa, double side, std::size_t channel = 0);
 
-  /// By how much a fault of that size misses being certain, as a share of the threshold's width: 0 where it is certain.
+  /// Shortfall of a fault of that size from being certain, as a share of the threshold's width: 0 where it is certain.
   [[nodiscard]] double missing(const FaultRow& row, double kappa, double side, std::size_t channel = 0);
 
   /// κ° of the header's text: the fault is certain for all sizes in [κ°, largest]; nothing where `largest` is not

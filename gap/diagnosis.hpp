@@ -93,7 +93,7 @@ struct GapShrink {
       fresh_torque_rms;  ///< per channel, on another log that nothing was fitted to; where there is one
 };
 
-/// A parameter of θ: as designed, as the log has it without the causes (poisoned by them), and with them.
+/// A parameter of θ: nominal, estimated without the causes (biased by them), and estimated with them.
 struct ParameterShift {
   std::string parameter;
   std::string unit;

@@ -3,7 +3,7 @@
 """The pages of the documentation that are made from the program, the schemas and the headers.
 
     docs_pages.py PROGRAM TAGS OUT      OUT/commands.md: the --help of every command; OUT/files.md: the JSON files by
-                                        their schemas; OUT/api.md: the headers by room, with links into Doxygen's pages,
+                                        their schemas; OUT/api.md: the installed headers by room, with links into Doxygen's pages,
                                         which its tag file TAGS lists; OUT/references.md: the bibliography
     docs_pages.py --check SITE          exit code 1 where a page of SITE links to what SITE does not have, or fetches
                                         anything from the network
@@ -20,6 +20,8 @@ import urllib.parse
 import xml.etree.ElementTree as ElementTree
 from html.parser import HTMLParser
 from pathlib import Path
+
+import check_layers
 
 ROOT = Path(__file__).resolve().parent.parent
 ROOMS = {
@@ -147,8 +149,9 @@ def api(tags):
     out = ("# C++ library\n\nOne target for each room: `find_package(Wheelwright 0.1 REQUIRED COMPONENTS detector)`, then "
            "`target_link_libraries(… Wheelwright::detector)`. Headers are `<wheelwright/ROOM/HEADER>`. "
            '<a href="../api/index.html">All pages</a>, <a href="../api/annotated.html">all types</a>.\n')
+    public = check_layers.public_headers(ROOT)
     for room, what in ROOMS.items():
-        headers = sorted((ROOT / room).glob("*.hpp"))
+        headers = sorted(ROOT / room / name for name in public.get(room, ()))
         if not headers:
             continue
         out += f"\n## {room}\n\n{what[0].upper() + what[1:]}.\n\n| header | |\n|---|---|\n"

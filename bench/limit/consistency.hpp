@@ -17,9 +17,9 @@
 ///     λᵀu > h(y + Δ) + n̄   or   λᵀu < −h(−y + Δ) − n̄,      y = λᵀY,  Δ_j = n̄_φ Σ_k |(D_jᵀλ)_k|,  n̄ = n̄_τ Σ_k
 ///     |(Tᵀλ)_k|,
 ///
-/// T the weights of the efforts: the two-sided threshold of theory section 4 for the best residual that is linear in
-/// the samples. The program finds λ; that λ proves what is claimed is then evaluated with outward rounding, so that the
-/// solver's tolerance can make the test miss something, never accuse a healthy robot.
+/// T the weights of the efforts: the two-sided threshold of detector/threshold.hpp for the best residual that is linear
+/// in the samples. The program finds λ; that λ proves what is claimed is then evaluated with outward rounding, so that
+/// the solver's tolerance can make the test miss something, never accuse a healthy robot.
 ///
 /// **Limit.** For a motion φ° as the encoders of a healthy robot would show it, a fault of size κ is seen for certain,
 /// by any test whatever, if and only if no healthy robot could have given the same samples: there are no θ°, θ in P
