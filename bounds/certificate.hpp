@@ -2,8 +2,6 @@
 /// \file
 /// Certificates: rigorous bounds from the approximate multipliers of a linear program.
 ///
-/// Rigorous bounds from the approximate multipliers of a linear program.
-///
 /// Neumaier and Shcherbina 2004, "Safe bounds in linear and mixed-integer linear programming", Math. Program. 99: for
 /// any λ >= 0 and any θ in the box with Aθ <= b,
 ///

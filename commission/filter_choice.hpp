@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The filter constants, chosen from the data by a stated criterion; without one, the fastest filter that is nearly as
-/// quiet as the quietest.
+/// Choice of the filter constants from the data by a stated criterion; without one, the fastest filter whose noise is
+/// nearly the least.
 #pragma once
 
 #include <cstddef>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Held-out blocks of a log, and a commissioned detector tried on them.
+/// Validation of a commissioned detector on held-out blocks of a log.
 #pragma once
 
 #include <cstddef>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The rows that a detector sees once a fault has set in, as polynomials of its size.
+/// Rows of a faulty robot from the onset of a fault on, as polynomials of its size.
 #pragma once
 
 #include <array>

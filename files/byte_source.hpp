@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Byte streams of files, unpacked where they are packed, and their lines, in bounded memory.
+/// Byte streams of files, decompressed where needed, and their lines, in bounded memory.
 #pragma once
 
 #include <cstddef>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// From the effort that was logged to the effort that acted: saturation, dead zone, gain, delay and lag of an actuator,
+/// Correction of logged efforts to the efforts that acted: saturation, dead zone, gain, delay and lag of an actuator,
 /// sample by sample.
 #pragma once
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Samples in, rows {τ_f, Y_f} out: the one recursion behind the batch and the online use of the filter.
+/// Recursive torque filter: from samples to rows {τ_f, Y_f}, for batch and on-line use.
 #pragma once
 
 #include <array>

@@ -2,9 +2,8 @@
 /// \file
 /// Second moments of a regression from one pass, summed over blocks of time, and their long-run covariance.
 ///
-/// A regression in one walk: its second moments, summed over blocks of time. Least squares, instrumental variables,
-/// their corrections for noise, their covariances under autocorrelation, bootstrap and sign-perturbed sums are all made
-/// of these.
+/// Least squares, instrumental variables, their corrections for noise, their covariances under autocorrelation,
+/// bootstrap and sign-perturbed sums are all functions of these moments.
 #pragma once
 
 #include <cstddef>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Noise levels: of a signal by its differences, shared by two signals, of the equation error by fault-free residuals.
+/// Noise levels: of a signal from its differences, of noise shared by two signals, of the equation error from
+/// fault-free residuals.
 #pragma once
 
 #include <array>

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Least squares under linear inequalities, solved exactly; non-negative least squares; the inequalities that every
-/// real robot fulfils.
-///
-/// Physical constraints on θ_L: no negative mass, inertia or friction, and mass inside its footprint.
+/// Least squares under linear inequalities, solved exactly; non-negative least squares; and physical constraints on
+/// θ_L: no negative mass, inertia or friction, and mass inside its footprint.
 #pragma once
 
 #include <cstddef>

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Identifiability of the parameters from a log: base parameters, unidentified directions, information over time.
-///
-/// Joint identifiability of the parameters by a log: base parameters, unidentified directions, and the best-determined
-/// combinations, in numbers and in words.
+/// Identifiability of the parameters from a log: base parameters, unidentified directions, best-determined combinations
+/// (in numbers and in words), and information over time.
 #pragma once
 
 #include <cstddef>

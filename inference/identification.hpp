@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Everything that a log of fault-free driving says about the parameters, without bounds and thresholds: estimates,
+/// Identification of the parameters from a log of fault-free driving, without bounds and thresholds: estimates,
 /// uncertainty, unidentified directions, and unmodelled effects.
 #pragma once
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Wheel radii and track width from wheel speeds and pose.
+/// Kinematic calibration: wheel radii and track width from wheel speeds and pose.
 #pragma once
 
 #include <array>

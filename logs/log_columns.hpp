@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The columns of the log contract, their units and the other names under which they are met.
+/// The columns of the log contract, their units and aliases.
 #pragma once
 
 #include <optional>

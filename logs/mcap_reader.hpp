@@ -3,8 +3,6 @@
 /// MCAP files, message by message in bounded memory; damaged and cut-off files as far as they can be read, and a report
 /// of what was lost.
 ///
-/// MCAP files, message by message in bounded memory; damaged and cut-off files as far as they can be read.
-///
 /// Integrity: a chunk is unpacked whole and compared with its checksum before a message of it is handed out, and left
 /// out when it does not match. A recording that was cut off is read to its last whole message. Where the length of a
 /// record is damaged, reading goes on at the next chunk (or, in a file without chunks, at the next place where three

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Rows of numbers made clean rows of a log, whatever the format: defects dropped and counted, segments split.
-///
-/// Rows of numbers → clean rows of a log, whatever the format: defects dropped and counted, segments split, heading and
-/// wheel angles unwrapped.
+/// Cleaning of the rows of a log, for all formats: defects dropped and counted, segments split, heading and wheel angles
+/// unwrapped.
 #pragma once
 
 #include <cstddef>

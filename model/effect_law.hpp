@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Unmodelled effects that a robot file can carry: parameters, regressor terms, geometry.
-///
-/// The effects that a robot file can carry, as data: what they are called, their parameters, and which part of the
-/// toolkit accounts for them.
+/// Effects that a robot file can carry, as data: names, parameters, regressor terms, geometry, and the part of the
+/// toolkit that accounts for each.
 #pragma once
 
 #include <cstddef>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The on-line part of model.json, which `wheelwright commission` writes, read back.
+/// Reader of the on-line part of model.json, which `wheelwright commission` writes.
 #pragma once
 
 #include <cstddef>

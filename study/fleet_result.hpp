@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The whole fleet: gathered record by record, judged once all are there.
+/// Result of a fleet: gathered record by record, evaluated once all are there.
 #pragma once
 
 #include <cstddef>

@@ -137,7 +137,7 @@ def about(header):
     """The first sentence of a header: what stands behind its \\file, or over its first declaration."""
     lines = re.findall(r"^\s*/// ?(?!<)(.*)$", header.read_text(encoding="utf-8"), re.M)
     text = " ".join(line for line in lines[:6] if line.strip() != "\\file").replace("\\file", "")
-    text = re.split(r"(?<=[.:;])\s", text.strip())[0]
+    text = re.split(r"(?<=\.)\s", text.strip())[0]
     return text.rstrip(".:;") + "." if text else ""
 
 
