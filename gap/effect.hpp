@@ -203,7 +203,7 @@ namespace wheelwright {
 /// The same for the robot `model`: those with one joint have fewer effects, and one coefficient where wheels have two.
 [[nodiscard]] std::vector<Effect> effect_catalogue(const Model& model);
 
-/// What sentences call the effect `name`: the noun of its law or of its entry in the catalogue; empty where there is
+/// Noun of the effect `name` in sentences: that of its law or of its entry in the catalogue; empty where there is
 /// neither.
 [[nodiscard]] std::string catalogue_noun(std::string_view name);
 

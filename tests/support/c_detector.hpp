@@ -108,7 +108,7 @@ void detector_run(long rows, const double *t, const double *sample, double *out)
   void (*run_)(long, const double*, const double*, double*) = nullptr;
 };
 
-/// What a comparison saw.
+/// Result of a comparison.
 struct Seen {
   std::size_t rows = 0, valid = 0, outside = 0, alarms = 0, different = 0;
 };
