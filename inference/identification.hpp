@@ -46,7 +46,7 @@ struct ShapePoint {
   double residual_ratio = 1.0;  ///< as ShapeFinding's; NaN where the model is not defined
 };
 
-/// What a ShapeFinding is of.
+/// Shape parameter of a ShapeFinding.
 enum class ShapeKind { delay, effort_lag, actuator_lag, stribeck_speed };
 
 /// One more quantity that enters nonlinearly, added alone to the model.
