@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What a check of a model found, for a terminal, as JSON and as a page.
+/// Result of a model check for a terminal, as JSON and as a page.
 #pragma once
 
 #include <string>
@@ -16,7 +16,7 @@ struct CheckedFiles {
   std::vector<std::string> logs;
 };
 
-/// What the proof is about and what it is not, one sentence or two.
+/// Scope of the proof and its limits, one sentence or two.
 [[nodiscard]] std::string proof_scope(const ModelClaims& claims);
 
 /// The answer in one sentence.

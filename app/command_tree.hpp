@@ -22,7 +22,7 @@ struct OptionWords {
   bool required = false;
   bool repeated = false;  ///< may be given several times, or takes several values
 
-  /// Whether it stands on the command line without a name.
+  /// True if it stands on the command line without a name.
   [[nodiscard]] bool positional() const { return names.empty(); }
   /// What its values are, for a shell.
   [[nodiscard]] bool takes_directory() const { return value == "DIR"; }
@@ -55,8 +55,8 @@ struct ProgramWords {
 /// The first sentence of a description without its end: "Looks for faults in a log with a commissioned model".
 [[nodiscard]] std::string first_sentence(const std::string& description);
 
-/// What a user meant who gave `words` (without the program's name): "did you mean '--model' instead of '--modle'?";
-/// empty where every word that begins with -- is an option and the first other one a command.
+/// Suggestion for misspelt `words` (without the program's name): "did you mean '--model' instead of '--modle'?"; empty
+/// where every word that begins with -- is an option and the first other one a command.
 [[nodiscard]] std::string suggestion(const ProgramWords& program, const std::vector<std::string>& words);
 
 }  // namespace wheelwright::app

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What all commands share: exit codes, where results go.
+/// Parts that all commands share: exit codes, output directory.
 #pragma once
 
 #include <cstdint>

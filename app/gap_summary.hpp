@@ -11,7 +11,7 @@
 
 namespace wheelwright::app {
 
-/// What the summary points to.
+/// Files that the summary refers to.
 struct GapResults {
   std::filesystem::path out;               ///< directory of the results; empty: none was written
   std::filesystem::path robot;             ///< robot file

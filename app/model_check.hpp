@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Whether what a model.json says of θ follows from the log: rows are filtered again, proofs are checked exactly.
+/// Verification of a model.json against its log: rows are filtered again, and the proofs of all bounds are checked in
+/// exact arithmetic.
 #pragma once
 
 #include <optional>
@@ -24,7 +25,7 @@ struct BoundVerdict {
   std::string reason;      ///< why it is not proved; empty where it is
 };
 
-/// How the rows of `feasible_set` relate to the log.
+/// Verdicts on the rows of `feasible_set`.
 struct FacetVerdicts {
   std::size_t rows = 0;            ///< the log's row that they name, coefficient by coefficient, b not smaller
   std::size_t sides = 0;           ///< the side of the prior box that they name, b not smaller
@@ -32,7 +33,7 @@ struct FacetVerdicts {
   std::vector<std::string> wrong;  ///< the others, a sentence each
 };
 
-/// What check_model() found.
+/// Result of check_model().
 struct ModelCheck {
   std::vector<BoundVerdict> bounds;           ///< lower and upper bound of each parameter
   std::optional<CertificateCheck> emptiness;  ///< where the model says that no θ explains the log
@@ -42,7 +43,7 @@ struct ModelCheck {
   std::vector<std::string> warnings;  ///< what is worth knowing and contradicts no proof
   std::vector<std::string> premises;  ///< what the proofs stand on and do not prove
 
-  /// Whether everything is proved.
+  /// True if everything is proved.
   [[nodiscard]] bool proved() const { return failures.empty(); }
 };
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The drive that would tell apart causes which a log leaves standing.
+/// The drive that discriminates between the causes that a log leaves possible.
 #pragma once
 
 #include <optional>
@@ -13,7 +13,7 @@
 
 namespace wheelwright::app {
 
-/// What is to be driven next.
+/// The next drive to record.
 struct NextDrive {
   std::vector<Rival> rivals;         ///< members of the credible set as fitted to the log, in its order
   std::optional<LogTable> commands;  ///< of the wheels; nothing where no drive tells any two of the rivals apart

@@ -21,7 +21,7 @@ namespace wheelwright::app {
 
 /// Adds the common options to `command`.
 void add_common(CLI::App& command, CommonOptions& options);
-/// What stands below the options in the help of `command`.
+/// Text below the options in the help of `command`.
 void add_footer(CLI::App& command, const char* text);
 
 /// The end of every registration: the common options, the examples, and what runs the command. `Arguments` has a member

@@ -11,7 +11,7 @@
 
 namespace wheelwright::app {
 
-/// Whether this process is one of several that mpirun or srun started together, by the environment they set; MPI itself
+/// True if this process is one of several that mpirun or srun started together, by the environment they set; MPI itself
 /// is not asked, so that a plain run never starts it. False where that says that there is one alone.
 [[nodiscard]] bool launched_by_mpi();
 

@@ -19,7 +19,7 @@ class RebuiltRows {
   /// lacks a column.
   RebuiltRows(const ModelClaims& claims, LogSource& log);
 
-  /// Whether a column is noisy and `box` leaves the sign of its parameter open: the rows then depend on the box.
+  /// True if a column is noisy and `box` leaves the sign of its parameter open: the rows then depend on the box.
   [[nodiscard]] bool depends_on(const Box& box) const;
 
   /// The half-space that holds for every admissible θ of `box` (SlabRows; sides are those of the prior). Nothing where

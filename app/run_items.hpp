@@ -18,7 +18,7 @@
 
 namespace wheelwright::app {
 
-/// How a command shares its items out.
+/// Distribution of the items of a command.
 struct ScaleOptions {
   std::optional<Shard> shard = {};  ///< --shard I/N is index I - 1 of N
   bool merge = false;
@@ -28,7 +28,7 @@ struct ScaleOptions {
 /// "I/N" with 1 <= I <= N as a shard; nothing for anything else.
 [[nodiscard]] std::optional<Shard> shard_of(std::string_view text);
 
-/// What is to be evaluated.
+/// The items to evaluate.
 struct ItemsToRun {
   Work work;
   /// StoredItems::key of each item. Messages name items by the beginning of their keys: begin with a name.
@@ -38,7 +38,7 @@ struct ItemsToRun {
   StoredPlan plan;
 };
 
-/// What came of it.
+/// Outcome of a run.
 struct ItemsRun {
   /// All results, to be read in the order of items; null where this process has nothing more to do: it then ends with
   /// kDone, and prints nothing.

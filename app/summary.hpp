@@ -12,13 +12,13 @@
 
 namespace wheelwright::app {
 
-/// What commissioning found, for a terminal.
+/// Summary of a commissioning for a terminal.
 [[nodiscard]] std::string summary(const Commissioning& result);
 
-/// What a detector said of a log, for a terminal.
+/// Summary of a detection for a terminal.
 [[nodiscard]] std::string summary(const Detection& detection, const OnlineModel& model);
 
-/// What was said of the kinematic residual, beside what was said of the torque residual.
+/// Detection by the kinematic residual, beside that by the torque residual.
 struct KinematicWatch {
   std::optional<Detection> detection;  ///< nothing where it was not watched
   std::string message;                 ///< why not, for people
@@ -32,13 +32,13 @@ struct KinematicWatch {
 /// reports.
 [[nodiscard]] OnlineModel with_kinematic_outputs(const OnlineModel& model);
 
-/// What the kinematic residual showed, for a terminal.
+/// Summary of the kinematic residual for a terminal.
 [[nodiscard]] std::string summary(const KinematicWatch& watch, const OnlineModel& model);
 
 /// Adds outputs and events of the kinematic residual to a detection as JSON; events stay in the order of their alarms.
 void add_kinematic(Json& detection, const KinematicWatch& watch, const OnlineModel& model);
 
-/// What the first events are isolated to, for a terminal.
+/// Summary of the isolation of the first events for a terminal.
 [[nodiscard]] std::string summary(const std::vector<Isolation>& isolations, const Detection& detection);
 
 /// Adds what its first events are isolated to to a detection as JSON, before add_kinematic().

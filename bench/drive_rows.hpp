@@ -12,7 +12,7 @@
 
 namespace wheelwright::bench {
 
-/// What disturbs the filtered torque, and what bound ē is stated for it.
+/// Noise of the filtered torque, and the bound ē that is stated for it.
 enum class RowNoise {
   uniform,   ///< u: independent uniform on [−ē, ē], and exactly ē is stated: a tight set
   gaussian,  ///< g: independent Gaussian of deviation ē/3, cut at ±ē; 1.1 ē is stated

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What an able user of a linear programming library would write in place of bounds/: the peers of its benchmarks.
+/// Peers of the benchmarks of bounds/: straightforward uses of linear programming libraries.
 ///
 /// Every function here *builds* a peer from the rows: it scales them and loads them into the library. What it returns
 /// *solves*: it can be called any number of times, begins without a basis each time, and returns the answer and nothing
@@ -51,7 +51,7 @@ struct LoopOptions {
   std::size_t pass_limit = 200;  ///< then it throws
 };
 
-/// What the cutting-plane loop returns.
+/// Result of the cutting-plane loop.
 struct LoopAnswer {
   Box hull;                     ///< all 2p bounds
   std::size_t passes = 0;       ///< passes over all rows
@@ -89,7 +89,7 @@ struct Facets {
 /// primal form took 1.1 times as long.)
 [[nodiscard]] SupportPeer glpk_support(const Facets& facets);
 
-/// Whether GLPK was there when this was built; where not, its peers throw Error.
+/// True if GLPK was there when this was built; where not, its peers throw Error.
 [[nodiscard]] bool has_glpk() noexcept;
 
 }  // namespace wheelwright::bench

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Between all parameters and those of one independent block of a set.
+/// Mapping between all parameters and those of one independent block of a set.
 #pragma once
 
 #include <cstddef>

@@ -50,7 +50,7 @@ struct Box {
     return support(a);
   }
 
-  /// Whether θ lies in the box, sides included. `theta` has p entries.
+  /// True if θ lies in the box, sides included. `theta` has p entries.
   [[nodiscard]] bool contains(std::span<const double> theta) const noexcept {
     for (std::size_t j = 0; j < sides.size(); ++j) {
       if (!sides[j].contains(theta[j])) {

@@ -2,8 +2,6 @@
 /// \file
 /// Certificates: rigorous bounds from the approximate multipliers of a linear program.
 ///
-/// Rigorous bounds from the approximate multipliers of a linear program.
-///
 /// Neumaier and Shcherbina 2004, "Safe bounds in linear and mixed-integer linear programming", Math. Program. 99: for
 /// any λ >= 0 and any θ in the box with Aθ <= b,
 ///
@@ -33,7 +31,7 @@ namespace wheelwright {
 [[nodiscard]] double certified_upper_bound(std::span<const double> a, std::span<const WeightedRow> rows,
                                            const Box& box);
 
-/// Whether the multipliers prove that { θ in box : row·θ <= row.b for every row } is empty: that 0·θ has a certified
+/// True if the multipliers prove that { θ in box : row·θ <= row.b for every row } is empty: that 0·θ has a certified
 /// upper bound below zero (Farkas).
 [[nodiscard]] bool proves_empty(std::span<const WeightedRow> rows, const Box& box);
 

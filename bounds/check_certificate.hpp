@@ -22,7 +22,7 @@
 
 namespace wheelwright {
 
-/// What a check found. Every doubtful input is an answer here, never an exception: certificates come from files.
+/// Result of a check. A malformed certificate is a result, never an exception, since certificates come from files.
 struct CertificateCheck {
   bool proved = false;
   double bound = 0.0;      ///< what is proved, as the smallest double not below it; +∞ where nothing is
@@ -35,14 +35,14 @@ struct CertificateCheck {
   std::string reason;  ///< in words why nothing, or not enough, is proved; empty where it is
 };
 
-/// Whether `rows` prove that a·θ <= claimed for every θ of `box` that satisfies them.
+/// Checks that `rows` prove a·θ <= claimed for every θ of `box` that satisfies them.
 ///
 /// At most p + 1 rows, p the sides of the box, with finite multipliers >= 0 and p finite coefficients each. Rows that
 /// say of themselves that they are sides of the box (RowOrigin::is_prior) must hold in all of it.
 [[nodiscard]] CertificateCheck check_bound(std::span<const double> a, std::span<const WeightedRow> rows, const Box& box,
                                            double claimed);
 
-/// Whether `rows` prove that no θ of `box` satisfies them all: that 0·θ has an upper bound below zero (`bound`;
+/// Checks that `rows` prove that no θ of `box` satisfies them all: that 0·θ has an upper bound below zero (`bound`;
 /// strictly, so that a `shortfall` of zero is not proved).
 [[nodiscard]] CertificateCheck check_emptiness(std::span<const WeightedRow> rows, const Box& box);
 
@@ -52,7 +52,7 @@ struct BoundClaim {
   std::vector<WeightedRow> rows;  ///< at most p + 1
 };
 
-/// What check_hull() found.
+/// Result of check_hull().
 struct HullCheck {
   std::vector<CertificateCheck> lower;  ///< per parameter; `bound` and `shortfall` are of −θ_j <= −value
   std::vector<CertificateCheck> upper;  ///< per parameter
@@ -60,11 +60,11 @@ struct HullCheck {
   bool contradiction = false;           ///< the rows leave no θ at all: then every claim is true, and says nothing
   std::size_t rounds = 0;               ///< how often the box was narrowed by what was proved
 
-  /// Whether every claim is proved.
+  /// True if every claim is proved.
   [[nodiscard]] bool all_proved() const;
 };
 
-/// Whether the claims, one lower and one upper bound for each side of `prior`, hold for every θ of `prior` that
+/// Checks that the claims, one lower and one upper bound for each side of `prior`, hold for every θ of `prior` that
 /// satisfies the rows of all of them.
 ///
 /// A bound may stand on the others: what is proved narrows the box over which the next is evaluated, round by round

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Cutting a feasible set out of its prior box with rows that come by, portion after portion.
+/// Incremental cutting of a feasible set from its prior box by the rows of a log, batch after batch.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@
 
 namespace wheelwright {
 
-/// How a Cutter works.
+/// Options of a Cutter.
 struct CutterOptions {
   bool facets = true;          ///< find all facets; false: only what sets the interval hull
   std::size_t most = 1 << 17;  ///< half-spaces kept or rows put aside, per block of parameters

@@ -50,7 +50,7 @@ class CuttingPlanes {
   /// Drops every row that the others imply.
   void reduce();
 
-  /// Whether the set is proved empty; then nothing more is added.
+  /// True if the set is proved empty; then nothing more is added.
   [[nodiscard]] bool is_empty() const { return contradiction_.has_value(); }
   /// The proof (data rows only; the box is understood). Call only where is_empty().
   [[nodiscard]] const std::vector<WeightedRow>& contradiction() const { return *contradiction_; }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Small linear programs max c·x subject to A x <= b with many rows and few variables, solved again and again.
+/// Small linear programs max c·x subject to A x <= b with many rows and few variables, solved repeatedly.
 #pragma once
 
 #include <cstddef>

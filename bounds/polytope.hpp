@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// All vertices of a polytope, proved complete.
-/// Polytopes of parameters: facets, vertices, support function, interval hull.
+/// Polytopes of parameters: facets, vertices (proved complete), support function, interval hull.
 #pragma once
 
 #include <memory>
@@ -89,7 +88,7 @@ class Polytope {
   /// Upper bound of each parameter with the rows that prove it.
   [[nodiscard]] const std::vector<CertifiedBound>& upper() const noexcept { return data_->upper; }
 
-  /// Whether all vertices are known.
+  /// True if all vertices are known.
   [[nodiscard]] bool has_vertices() const noexcept { return data_->has_vertices; }
   /// Number of vertices, summed over blocks; 0 unless has_vertices().
   [[nodiscard]] std::size_t vertex_count() const noexcept { return data_->vertex_count; }
@@ -105,7 +104,7 @@ class Polytope {
   /// The same, and writes a maximiser (to rounding) to `maximiser` (p entries).
   double support(std::span<const double> a, std::span<double> maximiser) const noexcept;
 
-  /// Whether θ satisfies every facet, within the rounding of its evaluation: never false for an exact member.
+  /// True if θ satisfies every facet, within the rounding of its evaluation: never false for an exact member.
   [[nodiscard]] bool contains(std::span<const double> theta) const noexcept;
 
   /// Centre of the largest ball of each block, after division of every parameter by half its hull's width (the ball

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Half-spaces of parameters from rows of a regression with bounded errors (theory: errors in variables), and their
-/// storage.
+/// Half-spaces of parameters from rows of a regression with bounded errors (errors in variables), and their storage.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +14,7 @@
 
 namespace wheelwright {
 
-/// Which of the two inequalities of a slab, or of a side of the prior box, a half-space is.
+/// Side of a half-space: which of the two inequalities of a slab, or of an interval of the prior box, it is.
 enum class Side {
   upper,  ///< Yθ <= y + dy, or θ_j <= upper
   lower,  ///< Yθ >= y − dy, or θ_j >= lower
@@ -94,7 +93,7 @@ class SlabRows {
   void half_spaces(std::span<const double> Y, std::span<const double> dY, double y, double dy, const RowOrigin& origin,
                    HalfSpace& upper, HalfSpace& lower) const;
 
-  /// Whether the sign of θ_j is open.
+  /// True if the sign of θ_j is open.
   [[nodiscard]] bool sign_is_open(std::size_t j) const { return open_[j]; }
 
  private:

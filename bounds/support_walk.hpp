@@ -24,7 +24,7 @@ struct SupportWalkOptions {
   std::size_t few = 24;            ///< blocks with at most that many known vertices are looked through instead
 };
 
-/// What a walk has cost so far.
+/// Cost of a walk so far.
 struct SupportWalkCount {
   std::size_t directions = 0;   ///< support() calls, times blocks that are walked
   std::size_t edges = 0;        ///< edges walked

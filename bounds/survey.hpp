@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// First pass over a regression: a spread sample of its rows, consistency, what must be known before cutting starts.
+/// First pass over a regression: a spread sample of its rows, consistency checks, scales and coupling of the
+/// parameters.
 #pragma once
 
 #include <functional>
@@ -33,7 +34,7 @@ class SpreadSample {
   std::vector<SlabColumns> levels_;
 };
 
-/// What one pass over all rows tells.
+/// Result of one pass over all rows.
 struct RowSurvey {
   std::size_t instants = 0;                      ///< instants seen (excluded ones not counted)
   std::size_t rows = 0;                          ///< rows seen: outputs × instants

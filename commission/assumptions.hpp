@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The assumptions that a commissioned model stands on, and what its log says of each (docs/assumptions.md).
+/// The assumptions of a commissioned model, and the verdict of its log on each (docs/assumptions.md).
 #pragma once
 
 #include <vector>
@@ -11,8 +11,8 @@ namespace wheelwright {
 
 struct Commissioning;
 
-/// The assumptions that `result` stands on with the verdicts of its log, those of the rows first. The one place where a
-/// test sets a verdict.
+/// The assumptions of `result` with the verdicts of its log, those of the rows first. The one place where a test sets a
+/// verdict.
 [[nodiscard]] std::vector<Assumption> assumptions_of(const Commissioning& result);
 
 /// Fills in Commissioning::assumptions (and those of its model), and the warrant of every number: that of the noise it

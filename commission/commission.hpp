@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// From a log of fault-free driving to a model that a detector can carry: the paper, front to back.
+/// Commissioning pipeline: from a log of fault-free driving to a model with thresholds for the detector.
 #pragma once
 
 #include <functional>
@@ -26,13 +26,13 @@
 
 namespace wheelwright {
 
-/// What commissioning found about one parameter.
+/// Result of commissioning for one parameter.
 struct ParameterResult {
   Parameter parameter;
   Excitation excitation = Excitation::identified;
   std::string reason;                    ///< why it is not identified, for people
   std::optional<double> estimate;        ///< nothing where the log does not show the parameter
-  std::optional<double> standard_error;  ///< honest under autocorrelated residuals
+  std::optional<double> standard_error;  ///< valid under autocorrelated residuals
   double lower = 0.0;                    ///< bounds (certified hull)
   double upper = 0.0;
   double chebyshev = 0.0;       ///< centre of the feasible set
@@ -44,8 +44,7 @@ struct ParameterResult {
   Warrant warrant = Warrant::extrapolated;  ///< of lower and upper
 };
 
-/// A set on the way to the one that is published: its parameters bound the motion between the samples of the rows that
-/// the next set is made of.
+/// Feasible set of an earlier pass: it bounds the motion between samples in the rows of the next pass.
 struct EarlierSet {
   FeasibleSet set;
   std::vector<std::size_t> dropped;  ///< rows of the log whose instants it leaves out as outliers
@@ -53,13 +52,13 @@ struct EarlierSet {
 
 /// The result of commissioning.
 struct Commissioning {
-  /// What became of the log.
+  /// Status of the commissioning.
   enum class Status {
     done,          ///< a model came out
     partial,       ///< a model came out, but some parameters are not excited: their bounds are the prior's
     empty,         ///< no θ explains the log within the declared noise: see contradiction; no model
     nothing,       ///< no parameter is excited: no model
-    contradicted,  ///< a set came out, but the log contradicts what it stands on: see contradictions; no model
+    contradicted,  ///< a set came out, but the log contradicts its assumptions: see contradictions; no model
   };
   Status status = Status::done;
   /// Whether a model came out.
@@ -85,12 +84,13 @@ struct Commissioning {
   SignalErrors row_errors;  ///< dY and dy of the rows that the set is made of: OutputNoise::learning in `output`
   std::vector<std::size_t> dropped;  ///< rows of the log whose instants the set leaves out as outliers
   FeasibleSet feasible;              ///< the set, its hull, certificates
-  std::vector<EarlierSet> earlier;   ///< what it was sharpened from, pass by pass: the first one stands on the limit of
-                                     ///< the accelerations alone; none where nothing bounds the motion by the model
-  KinematicCommissioning kinematic;  ///< of the kinematic residual; its model is also OnlineModel::kinematic
-  double polytope_over_box = 1.0;    ///< median width of [l, u]: polytope over box, held out, worst output
-  std::vector<std::string> notes;    ///< what was repaired or chosen, for people
-  std::vector<Assumption> assumptions;  ///< everything that is taken as given, with what the log says of it
+  std::vector<EarlierSet>
+      earlier;  ///< sets of the earlier passes, from which it was refined: the first one rests on the
+                ///< limit of the accelerations alone; none where nothing bounds the motion by the model
+  KinematicCommissioning kinematic;     ///< of the kinematic residual; its model is also OnlineModel::kinematic
+  double polytope_over_box = 1.0;       ///< median width of [l, u]: polytope over box, held out, worst output
+  std::vector<std::string> notes;       ///< what was repaired or chosen, for people
+  std::vector<Assumption> assumptions;  ///< all assumptions, with the verdict of the log on each
 };
 
 /// Options of commission().
@@ -108,8 +108,8 @@ struct CommissionOptions {
 };
 
 /// Log → filtered regression → θ̂_L → feasible set and bounds → ρ(t) → validation. Walks the log several times and
-/// never holds it. Throws InputError or InvalidArgument for a log or robot that cannot be used at all; what the data
-/// say, unwelcome or not, is in the result.
+/// never holds it. Throws InputError or InvalidArgument for a log or robot that cannot be used at all; outcomes that
+/// depend on the data are in the result.
 [[nodiscard]] Commissioning commission(LogSource& log, const Robot& robot, const CommissionOptions& options = {});
 
 }  // namespace wheelwright

@@ -31,14 +31,14 @@ struct LogContradiction {
     wheels_disagree,   ///< the efforts of two joints do not show one and the same mass
     wrong_sign,        ///< a quantity that cannot be negative is, significantly
     dry_friction,      ///< the efforts follow the sign of the motion, and the model has no dry friction
-    prior_edge,        ///< only a far larger noise lets the prior explain the log
-    estimate_outside,  ///< the best guess lies outside the set, with its whole interval
+    prior_edge,        ///< the prior explains the log only with far larger noise
+    estimate_outside,  ///< the estimate lies outside the set, with its whole interval
     halves_disagree,   ///< the two halves of the log give different robots
     held_out_outside,  ///< driving that was held out leaves the thresholds
   };
   Kind kind = Kind::effort_constant;
   bool withdraws = true;   ///< no model is published; false: a note beside a model
-  bool demotes = false;    ///< chance does not explain it, noise of the worst shape would: nothing is called guaranteed
+  bool demotes = false;    ///< chance does not explain it, worst-case noise would: nothing is called guaranteed
   std::string subject{};   ///< the parameter, column or output that it is about
   double value = 0.0;      ///< what was found: s, share, factor, or the parameter's unit
   double limit = 0.0;      ///< what it was compared with, same unit
@@ -54,7 +54,7 @@ struct Commissioning;
 /// A constant shift in time between effort and motion, by least squares over filtered rows (TimeShiftedRows).
 struct EffortTiming {
   double delay = 0.0;           ///< s; > 0: the logged effort comes late
-  double standard_error = 0.0;  ///< s, honest under autocorrelated residuals
+  double standard_error = 0.0;  ///< s, valid under autocorrelated residuals
   double freedom = 1.0;         ///< degrees of freedom of its Student's t
   Interval allowed{};  ///< s, what is taken as given: effort.delay; where bounds are declared and held efforts may
                        ///< change between samples, up to a step more
@@ -71,14 +71,14 @@ struct EffortTiming {
 [[nodiscard]] std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& setting, const Fit& fit,
                                                         double longest = 0.2, std::size_t most_rows = 60000);
 
-/// Whether `timing` is a latency that a model must not be made with: beyond what is allowed, told from that at a risk
+/// True if `timing` is a latency that a model must not be made with: beyond what is allowed, told from that at a risk
 /// of 1e-8 (Student's t) and further from it than a quarter of `step` (s), of an effect that is not symmetric in the
 /// sign of the shift (interpolation averages noise, which lowers the residual for a shift either way), and one that
 /// either lowers the residual by 1 % or more or moves a parameter by two standard errors. Healthy logs with even steps
 /// showed 0.09 steps at most.
 [[nodiscard]] bool is_latency(const EffortTiming& timing, double step);
 
-/// What the signals of a log say before any set is made.
+/// Findings about the signals of a log, before any feasible set is computed.
 struct SignalFindings {
   std::vector<LogContradiction> contradictions;
   std::optional<EffortTiming> timing;  ///< nothing where no shift is told, or was not looked for
@@ -88,8 +88,8 @@ struct SignalFindings {
 /// disagree. Walks `log` a few times.
 [[nodiscard]] SignalFindings contradictions_in_log(LogSource& log, const Setting& setting, const Fit& fit);
 
-/// What a finished commissioning says against itself: best guesses outside their set, held-out rows outside the
-/// thresholds, a noise bound that had to be raised by `raised` for the prior box to explain the log.
+/// Contradictions within a finished commissioning: estimates outside their set, held-out rows outside the thresholds, a
+/// noise bound that had to be raised by `raised` for the prior box to explain the log.
 [[nodiscard]] std::vector<LogContradiction> contradictions_in_result(const Commissioning& result,
                                                                      const Setting& setting, double raised);
 
@@ -99,7 +99,7 @@ struct SignalFindings {
 void weigh_contradictions(Commissioning& result, const Setting& setting, const Fit& fit,
                           const std::optional<EffortTiming>& timing, const Explained& explained);
 
-/// Whether weigh_contradictions() would change anything.
+/// True if weigh_contradictions() would change anything.
 [[nodiscard]] bool wants_weighing(const Commissioning& result, const Setting& setting);
 
 /// Weighs what says that an effort is wrong against the declared errors of the rows (`errors`, with parameters in

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Which detector to take for a stated guarantee: order of the filter, β, decision rule; and what the others cost.
+/// Choice of a detector for a stated guarantee: order of the filter, β, decision rule; with the cost of the
+/// alternatives.
 ///
-/// What need not be searched:
+/// Not part of the search:
 /// - **α**: (25) and all its error bounds are linear in the filter's gain, so that α scales residual and threshold
 ///   alike, and decisions do not change. α = β, for a gain of 1.
 /// - **[l, u] or ρ**: [l, u] lies inside [−ρ, ρ], so it is never less sensitive, at the same guarantee.
@@ -64,7 +65,7 @@ struct DetectorChoice {
 [[nodiscard]] DetectorChoice choose_detector(LogSource& log, const Robot& robot,
                                              const DetectorChoiceOptions& options = {});
 
-/// Whether `a` is to be taken rather than `b`, given the least size among all candidates.
+/// True if `a` is to be taken rather than `b`, given the least size among all candidates.
 [[nodiscard]] bool better(const DetectorCandidate& a, const DetectorCandidate& b, double least, double tie);
 
 }  // namespace wheelwright

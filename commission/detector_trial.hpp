@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What one detector is worth on a log: commissioned with a filter and a guarantee, then asked for its margins.
+/// Trial of one detector on a log: commissioning with a filter and a guarantee, then minimum detectable faults.
 #pragma once
 
 #include <cstddef>
@@ -27,7 +27,7 @@ struct StatedFault {
                                  ///< 0.2 of a share, 1 of a fault that is there or not
 };
 
-/// What a detector promises about false alarms.
+/// Promise of a detector about false alarms.
 enum class Guarantee {
   never,         ///< none while noise stays inside its declared bounds, whatever it does there
   hourly,        ///< one in an hour with at most the stated probability, for independent zero-mean noise inside its
@@ -35,7 +35,7 @@ enum class Guarantee {
   extrapolated,  ///< noise is not declared: its bounds are extrapolated from the log's residuals (noise_level.hpp)
 };
 
-/// What a detector is asked for.
+/// Options of a trial.
 struct TrialOptions {
   std::vector<StatedFault> faults;
   double window = 1.0;           ///< s, in which a fault is to be seen

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// A log through a commissioned detector: instant by instant, as a thinned trace, and its events with the faults that
-/// remain possible.
+/// Detection over a whole log with a commissioned detector: decisions, a thinned trace, and events with their fault
+/// isolation.
 #pragma once
 
 #include <cstddef>
@@ -68,7 +68,7 @@ struct Trace {
   std::vector<std::size_t> breaks;  ///< indices of `t` at which a new segment starts
 };
 
-/// What a detector said of a whole log.
+/// Result of a detector over a whole log.
 struct Detection {
   std::vector<Event> events;
   std::size_t rows = 0;              ///< rows of the log

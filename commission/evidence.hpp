@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What declared errors and unknown motion between samples can explain of a finding, before it counts against a robot.
+/// Part of a finding that declared errors and unknown motion between samples can explain, and that therefore does not
+/// count against a model.
 #pragma once
 
 #include <cstddef>

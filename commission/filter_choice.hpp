@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The filter constants, chosen from the data by a stated criterion; without one, the fastest filter that is nearly as
-/// quiet as the quietest.
+/// Choice of the filter constants from the data by a stated criterion; without one, the fastest filter whose noise is
+/// nearly the least.
 #pragma once
 
 #include <cstddef>
@@ -18,7 +18,7 @@
 
 namespace wheelwright {
 
-/// How the choice is made.
+/// Options of the choice.
 struct FilterChoiceOptions {
   double longest_delay = 0.4;  ///< s: order/β is at most this
   double tolerance = 1.15;     ///< residual_over_torque: the chosen filter's value is at most this times the best one's

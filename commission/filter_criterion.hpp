@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What a filter is worth on a log: how far θ̂ will be off, or how wide the thresholds will be.
+/// Criteria for a filter on a log: expected error of θ̂, or width of the thresholds.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +15,7 @@
 
 namespace wheelwright {
 
-/// What the filter is chosen for. α cancels in each of them, since it scales both sides of (25) alike: α = β
+/// Criterion by which the filter is chosen. α cancels in each of them, since it scales both sides of (25) alike: α = β
 /// throughout, for a static gain of 1.
 enum class FilterCriterion {
   residual_over_torque,  ///< residual rms/torque rms: the largest β whose value is near the best one
@@ -23,7 +23,7 @@ enum class FilterCriterion {
   threshold_width,       ///< width of the threshold over torque rms of each output, geometric mean: the least
 };
 
-/// What goes into the criteria beside the log.
+/// Inputs of the criteria beside the log.
 struct FilterCriterionOptions {
   std::optional<double> motion_noise;  ///< standard deviation of the motion column (rad for angles and the angles
                                        ///< behind mean speeds, else rad/s or m/s); nothing: no bias is predicted

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// θ̂ on a part of a log: the estimator that the log calls for, what it leaves, and what the log shows.
+/// Estimate θ̂ on a part of a log: the chosen estimator, its residuals, and the excitation of the parameters.
 #pragma once
 
 #include <vector>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The kinematic residual commissioned: effective wheel radii and yaw gains with bounds, from the pose or gyro of a
+/// Commissioning of the kinematic residual: effective wheel radii and yaw gains with bounds, from the pose or gyro of a
 /// fault-free log.
 #pragma once
 
@@ -22,7 +22,7 @@
 
 namespace wheelwright {
 
-/// What commissioning found about one kinematic parameter.
+/// Result of commissioning for one kinematic parameter.
 struct KinematicParameter {
   std::string name;
   std::string unit;

@@ -14,9 +14,9 @@ namespace wheelwright {
 /// A magnitude of a fault: a share as a percentage ("4.1 %"), else with its unit; "–" where it is infinite.
 [[nodiscard]] std::string magnitude_words(const FaultType& fault, double magnitude);
 
-/// What is certain in one manoeuvre within window number `window`: "4.1 %" at every onset of it in the drive, "4.1 % at
-/// 5 of 7" onsets, "–" at none; of a fault that is there or not "yes", "at 3 of 7" or "–". Empty where the drive has no
-/// such onset.
+/// Smallest certain size in one manoeuvre within window number `window`, in words: "4.1 %" at every onset of it in the
+/// drive, "4.1 % at 5 of 7" onsets, "–" at none; of a fault without a size "yes", "at 3 of 7" or "–". Empty where the
+/// drive has no such onset.
 [[nodiscard]] std::string certain_words(const FaultMargins& margins, std::size_t window, ManoeuvreKind kind);
 
 /// The window that tables show: the longest one up to a second.

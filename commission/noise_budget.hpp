@@ -32,7 +32,7 @@ struct OutputNoise {
   Warrant warrant = Warrant::extrapolated;  ///< of both bounds
 };
 
-/// Whether rows are those of the log that bounds were learnt from, or of driving to come.
+/// Use of rows: those of the log that bounds are learnt from, or those of later driving.
 enum class RowUse { learning, driving };
 
 /// The bound of an output that is estimated: `how` from what its residual was, never below `plausible`, the largest

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// θ_L in the words of a data sheet, and the choice of the dry-friction parameters.
+/// Physical quantities (mass, inertia, friction) of θ_L, and the choice of the dry-friction parameters.
 #pragma once
 
 #include <optional>
@@ -32,9 +32,9 @@ struct PhysicalScale {
   double offset = 0.0;  ///< back-EMF, for viscous terms under voltage
 };
 
-/// How each θ_L,j becomes the physical quantity of its name; nothing where the effort is not torque and the robot file
-/// lacks the motor's constants. Current: torque = k_t·gear·i at the wheel. Voltage: i = (V − k_e·gear·ω)/R, so that the
-/// back-EMF k_t k_e gear²/R stands in the viscous terms.
+/// Scales from each θ_L,j to the physical quantity of its name; nothing where the effort is not torque and the robot
+/// file lacks the motor's constants. Current: torque = k_t·gear·i at the wheel. Voltage: i = (V − k_e·gear·ω)/R, so
+/// that the back-EMF k_t k_e gear²/R stands in the viscous terms.
 [[nodiscard]] std::optional<std::vector<PhysicalScale>> physical_scales(const Robot& robot, const Model& model);
 
 /// Unit of θ_L,j with the effort that was used in place of N·m (or N).

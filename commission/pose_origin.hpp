@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Whether a pose is a measurement of its own, or wheel odometry over again.
+/// Origin of a pose: an independent measurement, or wheel odometry.
 #pragma once
 
 #include <string>
@@ -10,7 +10,7 @@
 
 namespace wheelwright {
 
-/// What the pose of a log repeats of the wheels.
+/// Agreement of the pose of a log with the wheel angles.
 struct PoseOrigin {
   bool heading_repeats = false;   ///< theta is a combination of the wheel angles
   bool position_repeats = false;  ///< x, y advance by a combination of the wheel angles

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What is settled about a log before anything is fitted: model, filter, how it was measured, the noise that is
-/// declared.
+/// Setting of a commissioning, fixed before any fit: model, filter, measurement, declared noise.
 #pragma once
 
 #include <cstddef>
@@ -67,8 +66,9 @@ struct SettingOptions {
 /// The rows of `log` in this setting, with the error bounds `errors`.
 [[nodiscard]] TorqueRows make_rows(LogSource& log, const Setting& setting, const SignalErrors& errors = {});
 
-/// What the noise of the motion (at its limit, where only that is known) adds to the rows' moments (estimate.hpp), and
-/// the efforts' variance for total least squares where their noise is declared; nothing where it is not known at all.
+/// Contribution of the noise of the motion (at its limit, where only that is known) to the rows' moments
+/// (estimate.hpp), and the efforts' variance for total least squares where their noise is declared; nothing where it is
+/// not known at all.
 [[nodiscard]] std::optional<RowNoise> row_noise(const Setting& setting);
 
 }  // namespace wheelwright

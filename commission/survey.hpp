@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// One walk over a log before anything is fitted: how long, how even, how the joints moved.
+/// Survey of a log in one pass before any fit: duration, regularity of the steps, motion of the joints.
 #pragma once
 
 #include <cstddef>
@@ -12,7 +12,7 @@
 
 namespace wheelwright {
 
-/// What a log is like.
+/// Properties of a log.
 struct Survey {
   std::size_t rows = 0;
   std::size_t segments = 0;

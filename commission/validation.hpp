@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Held-out blocks of a log, and a commissioned detector tried on them.
+/// Validation of a commissioned detector on held-out blocks of a log.
 #pragma once
 
 #include <cstddef>
@@ -12,15 +12,16 @@
 
 namespace wheelwright {
 
-/// How rows are divided. Samples of a filtered regression are autocorrelated: blocks are contiguous, and a held-out
-/// block begins with a purge as long as the filter remembers, so that it shares nothing with its neighbour.
+/// Division of rows into training and held-out blocks. Samples of a filtered regression are autocorrelated: blocks are
+/// contiguous, and a held-out block begins with a purge as long as the memory of the filter, so that it shares nothing
+/// with its neighbour.
 struct FoldOptions {
   std::size_t blocks = 10;         ///< the log's rows in this many contiguous blocks
   std::size_t hold_out_every = 3;  ///< blocks 3, 6, 9, … are held out
   double purge = 0.6;              ///< s dropped at the beginning of every block
 };
 
-/// Which part of a log.
+/// Part of a log.
 enum class Part { everything, training, held_out };
 
 /// The rows of one part of a source, which must outlive it.
@@ -42,7 +43,7 @@ class FoldedSource final : public RegressionSource {
   double block_start_ = 0.0;
 };
 
-/// What happened in one output.
+/// Validation of one output.
 struct OutputValidation {
   std::size_t instants = 0;
   std::size_t outside = 0;           ///< instants with ε outside [l, u]: false alarms, since the log is fault-free
@@ -59,8 +60,8 @@ struct OutputValidation {
 };
 
 /// Walks `rows` and compares every instant with its threshold. κ: an instant shows ζ = κ·Yθ for certain when
-/// |κ|·min|Yθ| exceeds u − l, the minimum taken over the feasible set (theory section 5); a constant change δ1 of the
-/// wheel radius r has κ = (1 + δ1/r)² − 1.
+/// |κ|·min|Yθ| exceeds u − l, the minimum taken over the feasible set; a constant change δ1 of the wheel radius r has κ
+/// = (1 + δ1/r)² − 1.
 [[nodiscard]] std::vector<OutputValidation> validate_on(RegressionSource& rows, const ThresholdRule& rule);
 
 }  // namespace wheelwright

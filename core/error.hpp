@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What is thrown when a caller hands in something wrong. What the data say is never thrown: it is returned.
+/// Exceptions for misuse by the caller. Outcomes that depend on the data are returned, never thrown.
 #pragma once
 
 #include <stdexcept>

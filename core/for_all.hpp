@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// A loop whose turns are independent, on several threads.
+/// Parallel loop over independent iterations, on several threads.
 #pragma once
 
 #include <algorithm>

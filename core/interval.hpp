@@ -27,7 +27,7 @@ struct Interval {
   [[nodiscard]] double width() const { return round_up(upper - lower); }
   /// Mid-point, rounded to nearest.
   [[nodiscard]] double centre() const { return lower + 0.5 * (upper - lower); }
-  /// Whether `x` lies in the interval, ends included.
+  /// True if `x` lies in the interval, ends included.
   [[nodiscard]] bool contains(double x) const { return lower <= x && x <= upper; }
   friend bool operator==(const Interval&, const Interval&) = default;
 };

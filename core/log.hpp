@@ -25,8 +25,8 @@ struct LogBlock {
 };
 
 /// A log that can be walked from beginning to end any number of times, block by block, in bounded memory.
-/// Rows are clean: finite where a value is required by nobody is NaN-free, times strictly increase inside a segment,
-/// and segments are split at gaps and resets.
+/// Rows are clean: all values are finite, times strictly increase inside a segment, and segments are split at gaps and
+/// resets.
 class LogSource {
  public:
   virtual ~LogSource() = default;

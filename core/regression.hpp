@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The linear regression that a filtered log is: y = Y θ + e, row by row, with bounds on what is wrong in Y and y.
+/// Linear regression rows of a filtered log, y = Y θ + e, with bounds on the errors of Y and y.
 #pragma once
 
 #include <cstddef>

@@ -18,25 +18,25 @@ namespace wheelwright {
 /// The median of `values`, of two middle ones the larger. At least one value.
 [[nodiscard]] double median(std::vector<double> values);
 
-/// What a normal variable of mean 0 and deviation 1 exceeds with probability `risk`.
+/// Upper quantile of the standard normal distribution: exceeded with probability `risk`.
 [[nodiscard]] double normal_upper_quantile(double risk);
 
 /// The probability that a chi-squared variable exceeds `x`.
 [[nodiscard]] double chi_squared_tail(double freedom, double x);
-/// What a chi-squared variable stays below with probability `p`.
+/// Quantile `p` of the chi-squared distribution.
 [[nodiscard]] double chi_squared_quantile(double freedom, double p);
 [[nodiscard]] double chi_squared_median(double freedom);
 
 /// The probability that Student's variable exceeds `t`.
 [[nodiscard]] double student_tail(double freedom, double t);
-/// What Student's variable stays below with probability `p`.
+/// Quantile `p` of Student's t distribution.
 [[nodiscard]] double student_quantile_below(double freedom, double p);
 /// The factor of a two-sided interval: |Student's variable| stays below it with probability `confidence`.
 [[nodiscard]] double student_quantile(double confidence, double freedom);
 
 /// The probability that Fisher's variable with freedoms `above` and `below` exceeds `x`.
 [[nodiscard]] double fisher_tail(double above, double below, double x);
-/// What Fisher's variable exceeds with probability `risk`.
+/// Upper quantile of Fisher's F distribution: exceeded with probability `risk`.
 [[nodiscard]] double fisher_upper_quantile(double above, double below, double risk);
 
 /// Holm's step-down adjustment (`holm1979`): rejecting where the adjusted p is at most α errs anywhere with a

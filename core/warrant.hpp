@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Warrants (guaranteed, extrapolated, statistical) and the assumptions behind them: what a published number stands on.
+/// Warrants (guaranteed, extrapolated, statistical) and the assumptions behind them: the basis of a published number.
 #pragma once
 
 #include <string>
@@ -8,8 +8,8 @@
 
 namespace wheelwright {
 
-/// What a bound, a threshold or a margin stands on. Results say per number which one it is, and these words are used in
-/// no other sense.
+/// Kind of promise of a bound, a threshold or a margin. Results name it per number, and these words are used in no
+/// other sense.
 enum class Warrant {
   guaranteed,    ///< declared bounds of the sensors, and assumptions of which no test failed (docs/assumptions.md)
   extrapolated,  ///< noise bounds learnt from a log, or an assumption that the log contradicts
@@ -23,7 +23,7 @@ enum class Warrant {
                                            : "extrapolated";
 }
 
-/// What the word means, one sentence for people.
+/// Meaning of the word, one sentence for people.
 [[nodiscard]] constexpr std::string_view warrant_meaning(Warrant warrant) {
   return warrant == Warrant::guaranteed ? "Guaranteed: holds for every noise within the sensors’ declared bounds, "
                                           "while the assumptions listed hold."
@@ -34,14 +34,14 @@ enum class Warrant {
                "it holds as far as noise and driving to come are like that log.";
 }
 
-/// What a statistical interval of an estimate leaves out, one sentence for people.
+/// Errors that a statistical interval of an estimate does not cover, one sentence for people.
 [[nodiscard]] constexpr std::string_view statistical_remark() {
   return "± 95 % statistical: scatter only; errors that do not average out, such as a constant offset of the effort "
          "within its bound or an encoder's scale, are not in it.";
 }
 
-/// The weaker of two, for what stands on both: extrapolated, which has no stated confidence, before statistical before
-/// guaranteed.
+/// The weaker of two, for a number that rests on both: extrapolated, which has no stated confidence, before statistical
+/// before guaranteed.
 [[nodiscard]] constexpr Warrant weaker(Warrant a, Warrant b) {
   const auto either = [&](Warrant w) { return a == w || b == w; };
   return either(Warrant::extrapolated)  ? Warrant::extrapolated
@@ -55,7 +55,7 @@ enum class NoiseOrigin {
   estimated,  ///< extrapolated from the residuals of this log (noise_level.hpp), on top of what is declared
 };
 
-/// What a log says of an assumption.
+/// Verdict of a log on an assumption.
 enum class AssumptionVerdict {
   holds,       ///< the test found nothing against it
   not_tested,  ///< no test, or the log does not decide: it is taken as given

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Inspection: a drive after which a robot has either been seen to be broken or is not broken by more than was
-/// promised.
+/// Inspection drives: after one of them a robot has either raised an alarm or has no fault larger than promised.
 ///
 /// The fault is there from the first instant on (the robot broke before the inspection), the motion is planned, so the
 /// smallest size that is certainly seen at some instant follows exactly for every fault (fault_margin.hpp), whatever θ
@@ -25,7 +24,7 @@ struct InspectedFault {
   double asked = 0.05;  ///< magnitude, > 0; both sides where the fault's range has two
 };
 
-/// What a plan is certain to find.
+/// A fault that a plan is certain to detect.
 struct PromisedFault {
   FaultType fault;
   double side = 1.0;
@@ -64,7 +63,7 @@ struct DetectionDesign {
                                                    const std::vector<InspectedFault>& faults,
                                                    const DesignOptions& options = {});
 
-/// What is inspected where nothing is asked for: wheel radii by 5 %, efforts lost by 20 %, encoders' scale by 5 %; for
+/// Faults that are inspected where none is named: wheel radii by 5 %, efforts lost by 20 %, encoders' scale by 5 %; for
 /// other models what there is of these.
 [[nodiscard]] std::vector<InspectedFault> usual_inspection(const OnlineModel& model);
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The figure eight that a designed manoeuvre is compared with.
-/// The design of a manoeuvre: the best member of a family for a stated objective.
+/// Design of a manoeuvre: the best member of a family for a stated objective, and the figure eight that it is compared
+/// with.
 #pragma once
 
 #include <cstddef>

@@ -2,7 +2,7 @@
 /// \file
 /// A manoeuvre's plan: limits of the robot, objective, effort, result.
 ///
-/// What a manoeuvre is good for, as a function of the rows that its log would give.
+/// The value of a manoeuvre is a function of the rows that its log would give.
 ///
 /// **Guaranteed bounds, before the drive.** A log driven along a plan gives rows Y_k with y_k = Y_k θ° + e_k, |e_k| <=
 /// ē_k, and commissioning publishes the interval hull of P(e) = { θ : |y_k − Y_k θ| <= ē_k }. With d = θ − θ°,
@@ -107,10 +107,10 @@ struct LimitUse {
 /// a step).
 void integrate_pose(Plan& plan, const Model& model);
 
-/// How much of `limits` `plan` uses at its samples.
+/// Share of `limits` that `plan` uses at its samples.
 [[nodiscard]] LimitUse limit_use(const Plan& plan, const DesignSubject& subject, const MotionLimits& limits);
 
-/// How much of the space `plan` uses, as LimitUse::space.
+/// Share of the space that `plan` uses, as LimitUse::space.
 [[nodiscard]] double space_use(const Plan& plan, const MotionLimits& limits);
 
 /// Speeds of the joints, joints × samples, rad/s (or m/s): what is commanded.
@@ -131,7 +131,7 @@ using PlanObjective = std::function<double(const Plan&)>;
 /// An objective of the planned rows as one of the plan. Keeps a reference to `subject`.
 [[nodiscard]] PlanObjective of_rows(RowObjective objective, const DesignSubject& subject);
 
-/// How widths of several parameters become one number. Relative width: (upper − lower)/|θ°|.
+/// Criterion that makes one number of the widths of several parameters. Relative width: (upper − lower)/|θ°|.
 enum class WidthCriterion {
   geometric_mean,  ///< of the relative widths; which plan is best does not depend on what the widths are relative to
   mean,            ///< of the relative widths

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Minimising a function that is neither smooth nor convex over a cube, without derivatives.
-/// Manoeuvres made of stages: from one constant speed to the next as fast as the limits allow, out and back.
+/// Manoeuvres made of stages: from one constant speed to the next as fast as the limits allow, out and back; and a
+/// derivative-free search over a cube, for objectives that are neither smooth nor convex.
 ///
 /// Bounds that hold for every noise are set by the extreme rows of a log, not by their number: what they need is speed
-/// held for as long as the filter remembers, and acceleration as hard as is allowed. Hence stages of constant joint
+/// held for as long as the memory of the filter, and acceleration as hard as is allowed. Hence stages of constant joint
 /// speeds u_1 … u_K with ramps between them, in place of sines or splines, whose peaks are short. The second half runs
 /// the first one backwards,
 ///
@@ -25,7 +25,7 @@
 
 namespace wheelwright {
 
-/// How a cube is searched.
+/// Options of the search.
 struct SearchOptions {
   std::size_t samples = 400;  ///< random points that are looked at first
   std::size_t descents = 6;   ///< best of these from which a local search starts

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The robot that a manoeuvre is designed for: what is believed of it, and what its log will be wrong by.
+/// The robot that a manoeuvre is designed for: its assumed parameters, and the error bounds of its log.
 #pragma once
 
 #include <optional>
@@ -18,7 +18,7 @@ namespace wheelwright {
 
 struct Plan;
 
-/// What planning needs to know. θ is used where it must be known beforehand: for the effort of a motion, and in the
+/// Robot data that planning needs. θ is used where it must be known beforehand: for the effort of a motion, and in the
 /// terms dY|θ| of the rows' errors.
 struct DesignSubject {
   Robot robot;

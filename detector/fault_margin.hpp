@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// How large a fault must be to be seen at one instant: for certain, or at all. Exact, over the whole feasible set.
+/// Minimum detectable fault at one instant: the smallest size that is certain to be detected, and the largest that is
+/// certain not to be; exact, over the whole feasible set.
 ///
 /// With P the feasible set, h its support function and θ >= 0 (other signs as ThresholdRule has them), an instant shows
 /// a fault κ > 0 **for certain** when for every θ in P, every |e| <= n̄ and every |δ| <= Δ
@@ -8,7 +9,7 @@
 ///     min over P of (y + κ g1 + κ² g2) θ + κ c − n̄  >  h(y + κ s + 2Δ) + n̄      (upwards), or the mirror image
 ///     downwards:
 ///
-/// Δ counts twice, once for what the detector's regressor is wrong by and once for what the threshold allows it.
+/// Δ counts twice: once for the error of the detector's regressor, and once for the allowance of the threshold.
 /// **The sizes that are certain up to a largest one κ̄ form one interval (κ°, κ̄]**, so bisection finds κ° exactly: for
 /// a single θ and fixed regressor the difference f of both sides is a quadratic in κ with f(0) <= 0 (no false alarm).
 /// If g2 θ >= 0 it is convex and crosses zero once, upwards. If not it is concave, and {f > 0} is an interval, which
@@ -28,17 +29,17 @@
 
 namespace wheelwright {
 
-/// Sizes of faults that one instant shows. One object serves one thread.
+/// Minimum detectable fault sizes of one instant. One object serves one thread.
 class FaultMargin {
  public:
   /// For the detector's thresholds `rule`.
   explicit FaultMargin(ThresholdRule rule) : rule_(std::move(rule)) {}
 
-  /// Whether a fault of size κ > 0 (`side` = 1) or −κ (`side` = −1) is certain to be outside [l, u] in this row.
+  /// True if a fault of size κ > 0 (`side` = 1) or −κ (`side` = −1) is certain to be outside [l, u] in this row.
   /// Rounding is on the safe side: true is a proof.
   [[nodiscard]] bool certain(const FaultRow& row, double kappa, double side, std::size_t channel = 0);
 
-  /// By how much a fault of that size misses being certain, as a share of the threshold's width: 0 where it is certain.
+  /// Shortfall of a fault of that size from being certain, as a share of the threshold's width: 0 where it is certain.
   [[nodiscard]] double missing(const FaultRow& row, double kappa, double side, std::size_t channel = 0);
 
   /// κ° of the header's text: the fault is certain for all sizes in [κ°, largest]; nothing where `largest` is not
@@ -51,7 +52,7 @@ class FaultMargin {
   [[nodiscard]] double largest_hidden(const FaultRow& row, double largest, double side, double share,
                                       std::size_t channel = 0);
 
-  /// Whether a fault of size κ on that side can be outside [l, u] in this row, for some θ in P and noise of at most
+  /// True if a fault of size κ on that side can be outside [l, u] in this row, for some θ in P and noise of at most
   /// `share` times the bounds. Rounding is on the safe side: false is a proof.
   [[nodiscard]] bool possible(const FaultRow& row, double kappa, double side, double share, std::size_t channel = 0);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The rows that a detector sees once a fault has set in, as polynomials of its size.
+/// Rows of a faulty robot from the onset of a fault on, as polynomials of its size.
 #pragma once
 
 #include <array>
@@ -35,13 +35,13 @@ struct FaultRow {
   std::span<const double> read{};
 };
 
-/// What a fault adds to the motion at one instant: of the coordinates, and of the joints.
+/// Motion that a fault adds at one instant: of the coordinates, and of the joints.
 struct ExtraMotion {
   Eigen::VectorXd moved, joint_moved;  ///< of the robot
   Eigen::VectorXd seen, joint_seen;    ///< of what encoders show
 };
 
-/// What a fault adds to the unfiltered equation at one instant, matrices n × p.
+/// Terms that a fault adds to the unfiltered equation at one instant, matrices n × p.
 struct FaultSignals {
   RowMatrix g1, g2, s;
   Eigen::VectorXd c;
@@ -56,7 +56,7 @@ class FaultRows {
   virtual ~FaultRows() = default;
   /// Number of outputs.
   [[nodiscard]] virtual std::size_t outputs() const = 0;
-  /// Whether rows are those polynomials for every size in the fault's range. Where they are not, nothing is certain.
+  /// True if rows are those polynomials for every size in the fault's range. Where they are not, nothing is certain.
   [[nodiscard]] virtual bool exact() const { return true; }
   /// Sets the fault in at instant `onset` of the motion.
   virtual void begin(std::size_t onset) = 0;
@@ -68,7 +68,7 @@ class FaultRows {
   [[nodiscard]] virtual FaultRow row(std::size_t i) const = 0;
 };
 
-/// Whether the signature of `fault` for `model` is a polynomial of κ as FaultRow has it, over the fault's whole range.
+/// True if the signature of `fault` for `model` is a polynomial of κ as FaultRow has it, over the fault's whole range.
 /// Functions of the motion have to be at most quadratic in what the fault adds to it (dry friction, which only looks at
 /// signs, and drag are; Stribeck friction is not), linear where it is only seen, and constant in it where the fault
 /// changes an effort's gain too. A reading that stands still at an unknown value is none. Tried at some motions.
@@ -129,12 +129,11 @@ class SignatureErrors {
 /// the onset of a step the robot's own speed goes on (its mass sees to that) and what the encoders show jumps; the
 /// reading of an effort changes with no more than its gain.
 ///
-/// What the efforts that a fault adds widen in the rows of a faulty log is FaultRow::range and FaultRow::doubt. The
-/// hull of efforts that change between samples: an effort's gain widens it by as much as the efforts do, any other
-/// fault by what its own efforts change from sample to sample. The motion between samples, in dY: faults that multiply
-/// efforts, or the speeds that are seen, by as much as they multiply them, any other by ReferenceMotion::effort_dY
-/// times the largest effort that it has added since the onset, for every θ of the set, and by
-/// ReferenceMotion::effort_doubt.
+/// FaultRow::range and FaultRow::doubt bound the widening of the rows by the efforts that a fault adds. The hull of
+/// efforts that change between samples: an effort's gain widens it by as much as the efforts do, any other fault by
+/// what its own efforts change from sample to sample. The motion between samples, in dY: faults that multiply efforts,
+/// or the speeds that are seen, by as much as they multiply them, any other by ReferenceMotion::effort_dY times the
+/// largest effort that it has added since the onset, for every θ of the set, and by ReferenceMotion::effort_doubt.
 ///
 /// The signature of a measured motion has its errors (SignatureErrors); that a bump's angles are the measured ones is
 /// not counted.

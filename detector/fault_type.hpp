@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What a fault does to a robot and to its sensors, as data: a signature with one unknown size.
+/// Fault models as data: the signature of a fault in robot and sensors, with one unknown size.
 ///
 /// A fault has a size κ, 0 without it. With the profile s(t) in [0, 1] of its coming, v the coordinate speeds that the
 /// encoders of a healthy robot would show, and Y the model's regressor, a faulty robot
@@ -11,7 +11,7 @@
 ///
 /// G acts on what passes through the ground only, not on dry friction in the wheels: it is the torque that another
 /// wheel radius takes. This is (16) of the paper and its relatives: for both radii K = G = I and κ = δ1/r, so that
-/// ζ = ((1 + κ)² − 1) Yθ. Motion across the heading adds −w2 κ d to the forward acceleration (theory section 1).
+/// ζ = ((1 + κ)² − 1) Yθ. Motion across the heading adds −w2 κ d to the forward acceleration.
 #pragma once
 
 #include <string>
@@ -25,7 +25,7 @@
 
 namespace wheelwright {
 
-/// How a fault comes: s(t) of its signature.
+/// Time profile of a fault: s(t) of its signature.
 struct FaultProfile {
   /// Shape.
   enum class Kind {
@@ -42,7 +42,7 @@ struct FaultProfile {
 
   /// s at `since` >= 0 s after the onset, when the joint has turned by `angle` (rad) since then at `speed` (rad/s).
   [[nodiscard]] double at(double since, double angle, double speed) const;
-  /// Whether s jumps to 1 at the onset.
+  /// True if s jumps to 1 at the onset.
   [[nodiscard]] bool jumps() const { return kind == Kind::step || kind == Kind::pulse; }
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// After an alarm: which faults the data leave possible, how large, and since when. Set-valued, with proofs.
+/// Fault isolation after an alarm: the faults that the data still allow, with bounds on size and onset. Set-valued,
+/// with proofs.
 ///
 /// A fault of size κ that set in in [T_a, T_b] explains the rows of a window when one θ of the feasible set P satisfies
 /// all of them, before and after (onset_rows.hpp), in all outputs:
@@ -35,7 +36,7 @@
 
 namespace wheelwright {
 
-/// How faults are told apart.
+/// Options of the isolation.
 struct IsolationOptions {
   double before = 3.0;             ///< s before the first instant outside in which the fault may have set in
   double after = 1.0;              ///< s after the alarm that are looked at
@@ -46,7 +47,7 @@ struct IsolationOptions {
   std::size_t threads = 1;         ///< the result does not depend on it
 };
 
-/// What the data say of one fault.
+/// Finding on one fault.
 struct FaultFinding {
   /// Kinds of answers.
   enum class Verdict {
@@ -63,7 +64,7 @@ struct FaultFinding {
   std::size_t programs = 0;           ///< linear programs that were solved
 };
 
-/// What the data say of all faults.
+/// Findings on all faults.
 struct Isolation {
   Interval window{};  ///< s, of the rows that were used
   std::vector<FaultFinding> findings;

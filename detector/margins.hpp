@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Detectability along a drive: which faults will certainly be seen, how soon, in which manoeuvre, and where to drive
-/// for it.
+/// Detectability along a drive: minimum detectable faults by delay and manoeuvre, and maps over the operating space.
 #pragma once
 
 #include <cstddef>
@@ -23,7 +22,7 @@
 
 namespace wheelwright {
 
-/// What a robot does for a while.
+/// Manoeuvre: the kind of motion over a stretch of time.
 enum class ManoeuvreKind {
   standstill,
   cruising,      ///< straight, or a single axis, at nearly constant speed
@@ -35,13 +34,13 @@ enum class ManoeuvreKind {
 /// In words, e.g. "cruising straight".
 [[nodiscard]] std::string_view words(ManoeuvreKind kind);
 
-/// What kind instants [first, last) of `motion` are of, by root mean squares over them: standstill below 3 % of the
-/// largest joint speed of the whole motion; of two joints, straight where their difference is below a tenth of their
-/// sum, spinning where their sum is below a tenth of their difference; accelerating where the joints' acceleration
-/// times the stretch's length is above half their speed.
+/// Kind of manoeuvre of the instants [first, last) of `motion`, by root mean squares over them: standstill below 3 % of
+/// the largest joint speed of the whole motion; of two joints, straight where their difference is below a tenth of
+/// their sum, spinning where their sum is below a tenth of their difference; accelerating where the joints'
+/// acceleration times the stretch's length is above half their speed.
 [[nodiscard]] ManoeuvreKind kind_of(const ReferenceMotion& motion, std::size_t first, std::size_t last);
 
-/// How a drive is asked about. Sizes of faults are magnitudes, in the unit of their type.
+/// Options of the margins along a drive. Sizes of faults are magnitudes, in the unit of their type.
 struct MarginOptions {
   std::vector<double> windows = {0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 5.0};  ///< s, ascending
   double onset_step = 0.5;        ///< s between the onsets that are tried
@@ -69,7 +68,7 @@ struct OnsetMargin {
                                                 ///< fits, whatever θ in P and noise of MarginOptions::noise_share
 };
 
-/// What a drive is worth for one fault on one side.
+/// Margins of a drive for one fault of one sign.
 struct FaultMargins {
   FaultType fault;
   double side = 1.0;  ///< 1: positive magnitudes, −1: negative ones

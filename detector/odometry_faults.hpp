@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Faults in the kinematic residual: what a pose or a gyro sees of them beyond wheel odometry.
+/// Fault signatures in the kinematic residual: the motion by pose or gyro that wheel odometry does not show.
 #pragma once
 
 #include <array>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The on-line model: what a detector carries of a commissioned robot, and nothing else.
+/// On-line model: the part of a commissioned model that a detector needs.
 #pragma once
 
 #include <optional>
@@ -20,9 +20,9 @@
 
 namespace wheelwright {
 
-/// What a fault-free log taught about the parameters of one residual, and when that residual raises an alarm.
+/// Parameter set of one residual, learnt from a fault-free log, and its alarm rule.
 struct LearntSet {
-  Eigen::VectorXd estimate{};  ///< best guess; for a parameter that the log does not show, the Chebyshev centre's value
+  Eigen::VectorXd estimate{};  ///< θ̂; for a parameter that the log does not excite, the Chebyshev centre's value
   std::vector<HalfSpace> facets{};  ///< of the feasible set, p coefficients each
   Box box{};                        ///< finite box that bounds the set (the certified hull)
   Persistence persistence{};
@@ -45,7 +45,7 @@ struct OnlineModel : LearntSet {
   FilterDesign filter{};
   SignalErrors errors{};  ///< dY and dy of the rows, ē included
   std::optional<KinematicModel> kinematic{};
-  std::vector<Assumption> assumptions{};  ///< that the numbers stand on, with what the log said of each
+  std::vector<Assumption> assumptions{};  ///< behind the numbers, with the verdict of the log on each
 };
 
 /// The filter of a channel.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What a log's own motion says of a fault that set in somewhere in an interval of time.
+/// Rows for a fault whose onset lies somewhere in an interval of time, from the motion of the faulty log itself.
 ///
 /// A log's motion is the healthy encoders', measured: v + n. With the signature filtered from it, from the instant t_s
 /// on (fault_rows.hpp), a row at t > t_s reads, for a fault that set in at any T in [t_a, t_b], t_b < t_s,
@@ -46,7 +46,7 @@ class OnsetRows {
   /// Times the states that onsets between two samples may leave.
   static constexpr double kTransition = 2.0;
 
-  /// Whether the fault's rows are known: a step or a drift whose S, if any, has S² = S and comes alone, that does not
+  /// True if the fault's rows are known: a step or a drift whose S, if any, has S² = S and comes alone, that does not
   /// stand for a reading that stands still, and whose signature is a polynomial of κ (polynomial()).
   [[nodiscard]] static bool knows(const FaultType& fault, const Model& model);
 
@@ -66,7 +66,7 @@ class OnsetRows {
   /// The same of an effort that was never larger than `effort` before t_s.
   [[nodiscard]] std::array<double, 3> left_bounds(double effort) const;
 
-  /// Whether κ of the rows is κ' of a fault of the encoders.
+  /// True if κ of the rows is κ' of a fault of the encoders.
   [[nodiscard]] bool encoder() const { return encoder_; }
 
  private:

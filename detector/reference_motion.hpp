@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// A drive that margins are asked for: its motion, instant by instant, and the rows that a healthy robot would show.
+/// Reference motion of a drive for which margins are computed, and the rows of a healthy robot along it.
 #pragma once
 
 #include <array>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The tight threshold ρ(t) of (34): what the residual can be without a fault, for every θ in the feasible set.
+/// Tight threshold ρ(t) of (34): the range of the fault-free residual over every θ in the feasible set.
 #pragma once
 
 #include <optional>
@@ -16,7 +16,7 @@
 
 namespace wheelwright {
 
-/// Which outer description of the feasible set a threshold is made of.
+/// Outer description of the feasible set from which a threshold is computed.
 enum class ParameterSetKind {
   box,       ///< the interval hull: closed form, never tighter than the polytope
   polytope,  ///< the set itself
@@ -32,7 +32,7 @@ struct Threshold {
   [[nodiscard]] double width() const noexcept { return upper - lower; }
 };
 
-/// Thresholds along a log (theory section 4):
+/// Thresholds along a log:
 ///
 ///     u = h(y + Δ) − yθ̂ + n̄        l = −h(−y + Δ) − yθ̂ − n̄
 ///

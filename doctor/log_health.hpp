@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Health of a log before anything is fitted: time stamps, signals, motion, units.
+/// Checks of a log before any fit: time stamps, signals, motion, units.
 #pragma once
 
 #include <cstddef>
@@ -17,7 +17,7 @@
 
 namespace wheelwright {
 
-/// How much a finding matters, the least first.
+/// Severity of a finding, the least first.
 enum class FindingSeverity {
   fine,     ///< as it should be
   notice,   ///< worth knowing; results stay what they claim to be
@@ -28,7 +28,7 @@ enum class FindingSeverity {
 /// Name for people and files: "fine", "notice", "warning", "fatal".
 [[nodiscard]] std::string_view to_string(FindingSeverity severity);
 
-/// What a finding is about.
+/// Topic of a finding.
 enum class FindingTopic { time, signals, motion, units };
 
 /// Name for people and files: "time", "signals", "motion", "units".
@@ -51,7 +51,7 @@ struct LogFinding {
 /// Stretches that a finding lists at most.
 inline constexpr std::size_t kMostStretches = 20;
 
-/// What is to be said of the log as a whole.
+/// Verdict on the log as a whole.
 enum class LogVerdict {
   commission,     ///< it can be commissioned
   identify_only,  ///< wheels and pose without efforts: `identify` finds the kinematics, nothing can be commissioned
@@ -61,7 +61,7 @@ enum class LogVerdict {
 /// Name for people and files: "commission", "identify_only", "unusable".
 [[nodiscard]] std::string_view to_string(LogVerdict verdict);
 
-/// What the reader of a log met and repaired. All zero where a log needed no reading.
+/// Defects that the reader of a log found and repaired. All zero where a log needed no reading.
 struct ReaderCounts {
   std::size_t rows_read = 0;   ///< rows met, those dropped included; 0: not known
   std::size_t incomplete = 0;  ///< rows dropped: a field that is needed is empty or not finite
@@ -91,7 +91,7 @@ struct LogHealth {
 /// a differential drive or a single axis, by the columns) tells columns, geometry, limits and the model whose
 /// excitation is judged; without it, scales of units cannot be judged against radius, track and mass.
 ///
-/// What each check does, and its thresholds, is in docs/doctor.md. Excitation is that of the filtered regressor (25) as
+/// The checks and their thresholds are in docs/doctor.md. Excitation is that of the filtered regressor (25) as
 /// commission() makes it: settle(), fit_log() and identifiability(); the delay between effort and motion is that of
 /// TimeShiftedRows with its standard error. Throws nothing for what a log may hold; InvalidArgument for a robot that
 /// makes no sense or a log whose columns differ in length.
@@ -107,7 +107,7 @@ struct JointView {
   std::vector<double> smooth;  ///< speed over ten steps, rad/s or m/s: of angles where there are any, else of speeds
   double top = 0.0;            ///< 99 % quantile of |smooth|
 
-  /// Whether the log has the joint's motion.
+  /// True if the log has the joint's motion.
   [[nodiscard]] bool has_motion() const { return angle != nullptr || speed != nullptr; }
   /// Name of the motion column that is used: the angle's where there is one.
   [[nodiscard]] const std::string& motion_name() const { return angle != nullptr ? angle_name : speed_name; }
@@ -126,11 +126,11 @@ struct HealthView {
 
   /// Whether a column `name` is there.
   [[nodiscard]] const std::vector<double>* column(const std::string& name) const;
-  /// Whether all joints have their motion in one kind of column.
+  /// True if all joints have their motion in one kind of column.
   [[nodiscard]] bool has_motion() const;
-  /// Whether all joints have an effort.
+  /// True if all joints have an effort.
   [[nodiscard]] bool has_effort() const;
-  /// Whether the effort of `joint` is hardly ever negative although the joint moves backwards too.
+  /// True if the effort of `joint` is hardly ever negative although the joint moves backwards too.
   [[nodiscard]] bool one_sided(const JointView& joint) const;
 };
 

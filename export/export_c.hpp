@@ -9,7 +9,7 @@
 
 namespace wheelwright {
 
-/// How an exported detector is called, and what its header says of its origin.
+/// Name of an exported detector, and the origin that its header states.
 struct CExportOptions {
   std::string name = "wheelwright";  ///< prefix of all its names: a C identifier, at most 40 characters
   std::string robot{};               ///< name of the robot, for the header's comment

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Byte streams of files, unpacked where they are packed, and their lines, in bounded memory.
+/// Byte streams of files, decompressed where needed, and their lines, in bounded memory.
 #pragma once
 
 #include <cstddef>
@@ -47,7 +47,7 @@ class LineReader {
 
   /// Number of the line that was returned last; the first is 1.
   [[nodiscard]] std::size_t number() const { return number_; }
-  /// Whether the line that was returned last had a line end (only the last of a file may lack it).
+  /// True if the line that was returned last had a line end (only the last of a file may lack it).
   [[nodiscard]] bool terminated() const { return terminated_; }
   /// The stream.
   [[nodiscard]] const ByteSource& source() const { return *source_; }

@@ -44,7 +44,7 @@ class JsonPlace {
   [[nodiscard]] JsonPlace at(std::string_view key) const;
   /// The element `index` of an array.
   [[nodiscard]] JsonPlace at(std::size_t index) const;
-  /// Whether this is an object with a member `key` that is not null.
+  /// True if this is an object with a member `key` that is not null.
   [[nodiscard]] bool has(std::string_view key) const;
   /// Number of elements of an array.
   [[nodiscard]] std::size_t size() const;

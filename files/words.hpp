@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Enumerations as the words that stand for them in files, both ways, and suggestions for misspelt names.
+/// Conversion between enumerations and their words in files, and suggestions for misspelt names.
 #pragma once
 
 #include <array>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// An element of an XML file that knows its line and whose it is: what the readers of URDF is written with.
+/// Elements of an XML file that know their line and their parents; the reader of URDF uses them.
 #pragma once
 
 #include <memory>

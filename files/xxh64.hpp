@@ -12,8 +12,8 @@ struct XXH64_state_s;
 
 namespace wheelwright {
 
-/// XXH64 with seed 0 (Collet, xxHash), fed in pieces of any size, by libxxhash. It tells one recording from another; it
-/// is no protection against a forger.
+/// XXH64 with seed 0 (Collet, xxHash), fed in pieces of any size, by libxxhash. It identifies recordings; it does not
+/// protect against forgery.
 class Xxh64 {
  public:
   Xxh64();

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Where in a file something stands.
-/// A place in a YAML file that knows its line and key: what the readers of YAML files are written with.
+/// Places in a YAML file that know their line and key; all readers of YAML files use them.
 #pragma once
 
 #include <functional>
@@ -47,9 +46,9 @@ class YamlPlace {
   /// All members, whatever their keys; throws as members() does.
   [[nodiscard]] std::vector<std::pair<std::string, YamlPlace>> members() const;
 
-  /// Whether this is a mapping.
+  /// True if this is a mapping.
   [[nodiscard]] bool is_mapping() const;
-  /// Whether this is a single value (neither a list nor a mapping, nor nothing).
+  /// True if this is a single value (neither a list nor a mapping, nor nothing).
   [[nodiscard]] bool is_scalar() const;
   /// Elements of a list.
   [[nodiscard]] std::vector<YamlPlace> elements(std::string_view expected) const;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// From the effort that was logged to the effort that acted: saturation, dead zone, gain, delay and lag of an actuator,
+/// Correction of logged efforts to the efforts that acted: saturation, dead zone, gain, delay and lag of an actuator,
 /// sample by sample.
 #pragma once
 
@@ -13,7 +13,7 @@
 
 namespace wheelwright {
 
-/// What stands between a logged effort u and the effort y that acts. Applied in this order, per joint:
+/// Actuator model between a logged effort u and the effort y that acts. Applied in this order, per joint:
 ///   clip to ±limit,  u − deadzone·sgn u (0 inside),  times gain,  u(t − delay),  lag·ẏ + y = u.
 struct EffortCorrection {
   double limit = std::numeric_limits<double>::infinity();  ///< unit of the effort, > 0
@@ -22,12 +22,12 @@ struct EffortCorrection {
   double delay = 0.0;                                      ///< s, >= 0
   double lag = 0.0;                                        ///< time constant, s, >= 0
 
-  /// Whether it leaves every effort as it is.
+  /// True if it leaves every effort as it is.
   [[nodiscard]] bool empty() const {
     return limit == std::numeric_limits<double>::infinity() && deadzone == 0.0 && gain.empty() && delay == 0.0 &&
            lag == 0.0;
   }
-  /// Whether it is linear: independent zero-mean noise of the effort then stays so.
+  /// True if it is linear: independent zero-mean noise of the effort then stays so.
   [[nodiscard]] bool linear() const { return limit == std::numeric_limits<double>::infinity() && deadzone == 0.0; }
   /// Gain of joint `j`: by so much a bound on the error of an effort grows. The other steps do not raise it: clip and
   /// dead zone have slopes in [0, 1], a delay shifts, and the kernel of the lag, e^{−t/T}/T, has the L1 norm 1.
@@ -54,7 +54,7 @@ class EffortCorrector {
   /// `nominal_step` (s) sizes the history: > 0 where there is a delay. Throws InvalidArgument as validate.
   EffortCorrector(EffortCorrection correction, std::size_t joints, Hold hold, double nominal_step);
 
-  /// Whether there is nothing to do.
+  /// True if there is nothing to do.
   [[nodiscard]] bool empty() const { return correction_.empty(); }
   /// Forgets all samples.
   void restart() { count_ = 0; }

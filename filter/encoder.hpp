@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Wheel speeds that are differenced encoder counts are recognised, and the encoder's resolution found.
+/// Detection of wheel speeds that are differenced encoder counts, and of the encoder's resolution.
 #pragma once
 
 #include <optional>
@@ -8,7 +8,7 @@
 
 namespace wheelwright {
 
-/// What was found.
+/// Result of the search.
 struct EncoderFinding {
   double counts_per_turn = 0.0;  ///< N
   double speed_step = 0.0;       ///< 2π/(N h), rad/s: every speed is a whole multiple of it

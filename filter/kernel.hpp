@@ -143,7 +143,7 @@ class FilterKernel {
     prepare(0.0);
   }
 
-  /// Whether signals enter at samples (angles) or over steps (speeds).
+  /// True if signals enter at samples (angles) or over steps (speeds).
   [[nodiscard]] bool nodes() const { return nodes_; }
   /// α^order.
   [[nodiscard]] double gain() const { return gain_; }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The constants of the torque filter.
-/// How a log measures a robot: which columns, what kind of motion signal, how it behaves between samples.
+/// Measurement of a robot by a log (columns, kind of motion signal, behaviour between samples), and the constants of
+/// the torque filter.
 #pragma once
 
 #include <optional>
@@ -33,7 +33,7 @@ struct FilterDesign {
 /// Throws InvalidArgument, naming the field, unless order is 1 or 2, α and β are finite and > 0, and settle >= 0.
 void validate(const FilterDesign& design);
 
-/// What the motion columns hold.
+/// Kind of the motion columns.
 enum class MotionKind {
   angle,       ///< joint angle at the time stamp
   mean_speed,  ///< encoder counts over a sampling interval, divided by it, stamped in its middle: the angles at the

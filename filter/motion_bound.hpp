@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// How fast the motion can change between two samples: from the model, the efforts and a set of parameters.
+/// Bound on the acceleration between two samples, from the model, the efforts and a set of parameters.
 #pragma once
 
 #include <span>
@@ -21,7 +21,7 @@ struct MotionBound {
   Eigen::VectorXd largest;   ///< p: sup |θ_j| over the set
   Eigen::VectorXd effort;    ///< per output: bound on the error of the unfiltered effort
 
-  /// Whether nothing at all is known: then rows take the motion between samples as interpolated without error.
+  /// True if nothing at all is known: then rows take the motion between samples as interpolated without error.
   [[nodiscard]] bool empty() const { return limit.size() == 0 && mobility.size() == 0; }
 };
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Sensor noise propagated through the filters: what the rows of the regression can be wrong by.
-/// How far bounded errors of the sensors can move a sum over filtered rows.
+/// Propagation of sensor noise through the filters: error bounds of the rows of the regression, and of sums over
+/// filtered rows.
 #pragma once
 
 #include <cstddef>
@@ -16,7 +16,7 @@
 
 namespace wheelwright {
 
-/// Which of the two propagations a bound stands on.
+/// Propagation that a bound rests on: worst case or statistical.
 enum class NoiseMode {
   worst_case,   ///< for every noise |n(t)| <= n̄: L1 norm of the filter's kernel
   statistical,  ///< for independent zero-mean noise |n_k| <= n̄: Hoeffding's bound on the filtered sum, at a stated
@@ -32,7 +32,7 @@ struct SensorErrors {
   double heading = 0.0;  ///< rad
 };
 
-/// How the worst case is to be judged.
+/// Options of the worst case.
 struct PropagationOptions {
   NoiseMode mode = NoiseMode::worst_case;
   double confidence = 0.999;  ///< statistical: probability that every row of the log obeys its bound
@@ -71,8 +71,7 @@ struct KernelNorms {
 
 /// L2 norms (root of the summed squares of the weights of all samples) for a constant step `step` (s), found by sending
 /// a unit sample through the filter's recursion. For small βh: f*n: α√(h/(2β)), f*ṅ: about α, f₂*n: α²√(h/(4β³)),
-/// f₂*ṅ: α²√(h/(4β)), f₂*n̈: about 0.68 α² (the newest angles enter with 0.57, 0.37,
-/// 0.05, … of α²).
+/// f₂*ṅ: α²√(h/(4β)), f₂*n̈: about 0.68 α² (the three newest angles enter with 0.57, 0.37 and 0.05 of α²).
 [[nodiscard]] KernelNorms statistical_norms(const FilterDesign& design, MotionKind motion, double step);
 
 /// Second moments that independent sensor noise adds to the rows, for noise of variance 1.
@@ -83,9 +82,9 @@ struct NoiseGram {
   Eigen::VectorXd effort;  ///< per output: variance of τ_f, noise of each joint's effort
 };
 
-/// What noise that is independent from sample to sample and from joint to joint does to the rows of a settled filter at
-/// a constant step `step` (s): what bias-compensated and total least squares take away. Terms that are functions of the
-/// motion (dry friction) are taken as exact. Throws InvalidArgument unless `step` > 0.
+/// Second moments that independent noise (from sample to sample and from joint to joint) adds to the rows of a settled
+/// filter at a constant step `step` (s): what bias-compensated and total least squares take away. Terms that are
+/// functions of the motion (dry friction) are taken as exact. Throws InvalidArgument unless `step` > 0.
 [[nodiscard]] NoiseGram noise_gram(const Model& model, const FilterDesign& design, const Measurement& measurement,
                                    double step);
 

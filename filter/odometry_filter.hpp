@@ -17,7 +17,7 @@
 
 namespace wheelwright {
 
-/// What a log has of motion and pose, and what the kinematic residual is made of. Part of a commissioned model.
+/// Columns of motion and pose of a log, and the settings of the kinematic residual. Part of a commissioned model.
 struct OdometryMeasurement {
   MotionKind motion = MotionKind::speed;    ///< mean speeds are integrated back to the angles behind them
   std::vector<std::string> motion_columns;  ///< right wheel, left wheel
@@ -156,10 +156,11 @@ class OdometryFilter {
   FilteredRow row_;
 };
 
-/// What `log` has for a kinematic residual of `robot`; nothing where the robot is no differential drive, or the log has
-/// neither the columns theta (with x and y or without) nor gyro_z. Angles are used where the log has them, else speeds
-/// in the way that `torque` (how the torque residual reads the log) found them. A pose is taken as held where it stays
-/// exactly the same over a fifth or more of the steps in which a wheel moves. Walks the log once where it has a pose.
+/// Measurement of `log` for a kinematic residual of `robot`; nothing where the robot is no differential drive, or the
+/// log has neither the columns theta (with x and y or without) nor gyro_z. Angles are used where the log has them, else
+/// speeds in the way that `torque` (how the torque residual reads the log) found them. A pose is taken as held where it
+/// stays exactly the same over a fifth or more of the steps in which a wheel moves. Walks the log once where it has a
+/// pose.
 [[nodiscard]] std::optional<OdometryMeasurement> find_odometry(LogSource& log, const Robot& robot, const Model& model,
                                                                const Measurement& torque);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Samples in, rows {τ_f, Y_f} out: the one recursion behind the batch and the online use of the filter.
+/// Recursive torque filter: from samples to rows {τ_f, Y_f}, for batch and on-line use.
 #pragma once
 
 #include <array>
@@ -28,7 +28,7 @@ struct FilteredRow {
   Eigen::VectorXd dy;  ///< n, n̄ >= 0
 };
 
-/// Filters torque and regressor sample by sample: (28) for τ_f, the identities of theory section 2 for Y_f, with
+/// Filters torque and regressor sample by sample: (28) for τ_f, the identities of docs/notation.md for Y_f, with
 /// kernels that need no motion between samples for the acceleration, whatever the steps.
 ///
 /// A row is the equation (20) multiplied by a weight w and integrated. For **angles** w goes linearly from one sample
@@ -96,7 +96,7 @@ class RegressorFilter {
   /// Heading at that instant, rad: measured where there is a column for it, else odometry from the segment's start. In
   /// the middle of the step for angles and mean speeds.
   [[nodiscard]] double heading() const { return heading_; }
-  /// Whether row() is there only because the segment began at standstill, exactly: other noise might have hidden that.
+  /// True if row() is there only because the segment began at standstill, exactly: other noise might have hidden that.
   [[nodiscard]] bool rests_on_standstill() const {
     return angles_ && at_rest_ && (t_ - t0_) * design_.beta < design_.settle && errors_.joint_sample > 0.0;
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Row filters, and a log as a linear regression, block by block, without ever holding the whole of either.
+/// Row filters, and the stream of regression rows of a log, block by block in bounded memory.
 #pragma once
 
 #include <concepts>
@@ -18,7 +18,7 @@
 
 namespace wheelwright {
 
-/// What a residual's filter offers: samples of measurement().columns() in, rows of outputs() × parameters() out. step()
+/// Concept of a residual's filter: samples of measurement().columns() in, rows of outputs() × parameters() out. step()
 /// returns whether row() holds an instant, restart() begins a segment. RegressorFilter and OdometryFilter are two; what
 /// consumes rows (RowStream, Detector) takes any.
 template <typename F>

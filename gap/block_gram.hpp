@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Least squares on any subset of many columns, held out block of time by block of time, from Gram matrices alone.
+/// Cross-validated least squares on any subset of many columns, over blocks of time, from Gram matrices alone.
 #pragma once
 
 #include <cstddef>
@@ -20,15 +20,15 @@ struct RowSpace {
   double floor = 1.0;                    ///< standard deviation of the noise: all is divided by it
 };
 
-/// How rows are cut into blocks.
+/// Division of rows into blocks.
 struct BlockOptions {
   std::size_t blocks = 24;  ///< at most, of equal duration, from the first time of all spaces to the last
   double purge = 0.5;       ///< s: rows nearer than this to a border between two blocks are in no held-out block and
                             ///< train none
-  double shortest = 2.0;    ///< s: a log that is shorter than `blocks` of these has fewer blocks, so that there is
-                            ///< something to hold out between two purges …
-  std::size_t fewest = 12;  ///< … but, of those wished for, at least so many: a signed-rank test over fewer of them
-                            ///< cannot be significant for one of thirty effects
+  double shortest = 2.0;    ///< s, length of a block below which a log has fewer blocks than `blocks`, so that rows
+                            ///< remain to be held out between two purges
+  std::size_t fewest = 12;  ///< blocks, or `blocks` where these are fewer, that a short log has at least: a signed-rank
+                            ///< test over fewer of them cannot be significant for one of thirty effects
   std::size_t threads = 1;  ///< results do not depend on it
 };
 
@@ -106,8 +106,9 @@ class BlockGram {
   double all_rows_ = 0.0;
 };
 
-/// Σ rᵢ rⱼ over all rows, r the columns `of` less their least-squares fit by the columns `on` (indices of `gram`, the
-/// response has the index columns()). Columns of `on` that the others make up to ten digits count once.
+/// Schur complement of the Gram matrix: Σ rᵢ rⱼ over all rows, r the columns `of` less their least-squares fit by the
+/// columns `on` (indices of `gram`, the response has the index columns()). Columns of `on` that depend linearly on the
+/// others, to ten digits, count once.
 [[nodiscard]] Eigen::MatrixXd remainder(const BlockGram& gram, const std::vector<std::size_t>& of,
                                         const std::vector<std::size_t>& on);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Effects as columns of one least-squares problem, and sets of them compared by what they leave on held-out blocks.
+/// Effects as columns of one least-squares problem, and sets of them compared by cross-validation.
 #pragma once
 
 #include <cstddef>
@@ -34,7 +34,7 @@ struct CandidateTable {
   std::vector<std::string> names;     ///< of the effects, by index
 };
 
-/// Whether θ may move freely beside the causes or is held at its nominal value.
+/// Treatment of θ beside the causes: fitted freely, or held at its nominal value.
 enum class BaseModel {
   refitted,
   nominal,  ///< as far as it has a nominal value

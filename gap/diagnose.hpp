@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Diagnosis of a log's sim-to-real gap, front to back, and its trial on a fresh log.
+/// Diagnosis of a log's sim-to-real gap, all steps, and its validation on a fresh log.
 #pragma once
 
 #include <cstddef>
@@ -43,10 +43,10 @@ struct DiagnoseOptions {
 [[nodiscard]] Diagnosis diagnose(LogSource& log, LogSource* baseline, const Robot& robot,
                                  const DiagnoseOptions& options = {});
 
-/// What the model leaves of the filtered efforts of `fresh`, a log of the same robot that was not looked at: the
-/// nominal model (`before`), and the one with θ and causes as `found` has them (`after`, with the interval of a block
-/// bootstrap); nothing is fitted to it. With the filter of `found`, `options` and `baseline` as it was made with;
-/// nothing for a log without efforts. Throws as diagnose() does.
+/// Residual of the filtered efforts of `fresh`, a log of the same robot that was not used: the nominal model
+/// (`before`), and the one with θ and causes as `found` has them (`after`, with the interval of a block bootstrap);
+/// nothing is fitted to it. With the filter of `found`, `options` and `baseline` as it was made with; nothing for a log
+/// without efforts. Throws as diagnose() does.
 [[nodiscard]] std::vector<ShrinkFigure> torque_on(LogSource& fresh, LogSource* baseline, const Robot& robot,
                                                   const Diagnosis& found, const DiagnoseOptions& options = {});
 

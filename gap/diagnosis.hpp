@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// The sim-to-real gap of a robot: where it lies, which unmodelled effect causes it, how far it shrinks once the effect
-/// is in the model. Theory section 6; the result is the contract's gap.json.
+/// is in the model. The result is written as gap.json.
 #pragma once
 
 #include <functional>
@@ -19,7 +19,7 @@
 
 namespace wheelwright {
 
-/// What the log says about the model.
+/// Verdict of the log on the model.
 enum class GapVerdict {
   no_gap,       ///< the model, re-fitted at most within its prior, explains the log to the noise floor
   explained,    ///< one cause (which may be a combination) beats every other, and reaches the floor
@@ -56,7 +56,7 @@ struct CredibleCauses {
 /// Two sets of causes that look alike on this log, whatever came out.
 struct ConfusablePair {
   std::string first, second;
-  double similarity = 0.0;  ///< share of the one's signature (after θ is fitted again) that the other makes up, 0 … 1
+  double similarity = 0.0;   ///< share of one's signature (after θ is fitted again) that the other explains, in [0, 1]
   bool inseparable = false;  ///< by any log without further sensors, not by this one alone
   std::string reason;        ///< "not excited", or what measurement would split them
 };
@@ -83,7 +83,7 @@ struct ShrinkFigure {
   double upper = 0.0;
 };
 
-/// How far the gap shrinks.
+/// Shrinkage of the gap.
 struct GapShrink {
   std::vector<ShrinkFigure> torque_rms;       ///< per channel
   std::vector<ShrinkFigure> rollout;          ///< open loop
@@ -93,7 +93,7 @@ struct GapShrink {
       fresh_torque_rms;  ///< per channel, on another log that nothing was fitted to; where there is one
 };
 
-/// A parameter of θ: as designed, as the log has it without the causes (poisoned by them), and with them.
+/// A parameter of θ: nominal, estimated without the causes (biased by them), and estimated with them.
 struct ParameterShift {
   std::string parameter;
   std::string unit;

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// How well a drive tells rival causes apart, before it is driven.
+/// Expected discrimination between rival causes by a planned drive.
 ///
 /// Let rival A be true with its estimated coefficients. Without noise the rows of a log are y_A = Yθ + Σ X_A c_A:
-/// filtered efforts (theory, section 6) and, where there is a pose, its increments against odometry, each divided by
-/// the standard deviation of its noise. What rival B cannot imitate of them is
+/// filtered efforts and, where there is a pose, its increments against odometry, each divided by the standard deviation
+/// of its noise. What rival B cannot imitate of them is
 ///
 ///     d_AB = y_A − Yθ' − X_B(φ) c,    S_AB = |d_AB|² the least over θ', c (within its signs) and the shapes φ.
 ///
@@ -62,7 +62,7 @@ void validate(const Rival& rival, const std::vector<Effect>& catalogue, const Dr
 [[nodiscard]] Rival typical_rival(const std::vector<std::string>& effects, const std::vector<Effect>& catalogue,
                                   const Drive& drive, double share = 0.05);
 
-/// What the rows will be wrong by: standard deviations.
+/// Expected noise of the rows: standard deviations.
 struct PlannedNoise {
   double beta = 10.0;          ///< of the filter f₂, α = β, 1/s
   std::vector<double> output;  ///< of each filtered output, > 0, unit of the output
@@ -76,15 +76,15 @@ struct PlannedNoise {
 /// own noise, where the robot file declares it.
 [[nodiscard]] PlannedNoise expected_noise(const DesignSubject& subject);
 
-/// How well rival `truth` can be told from rival `other` when it is true.
+/// Separation of rival `truth`, when it is true, from rival `other`.
 struct RivalSeparation {
   std::size_t truth = 0;  ///< index of A
   std::size_t other = 0;  ///< index of B
   double excess = 0.0;    ///< S: what B leaves above the noise, sum of squares in units of the noise
   double delta = 0.0;     ///< Δ
   double rows = 0.0;      ///< number of rows that it is spread over
-  double share = 0.0;  ///< of A's signature (after θ is fitted again) that B cannot imitate, sum of squares, 0 … 1
-  double kept = 0.0;   ///< of A's signature that is left after θ is fitted again, sum of squares, 0 … 1
+  double share = 0.0;  ///< of A's signature (after θ is fitted again) that B cannot explain, sum of squares, in [0, 1]
+  double kept = 0.0;   ///< of A's signature that is left after θ is fitted again, sum of squares, in [0, 1]
   std::vector<double> shape{};  ///< of B where it imitates best, cause after cause
 
   /// √(Δ/(2(1 + ρ))), ρ² = 1 − share: by how many standard deviations the comparison goes the right way.
@@ -95,7 +95,7 @@ struct RivalSeparation {
   [[nodiscard]] double ratio() const;
 };
 
-/// What kind of drive is looked at.
+/// Kind of drive.
 enum class DriveKind {
   planned,  ///< of planned_drive(): efforts are the base model's; those of the true rival are added (a fixed point, two
             ///< passes), and the motion begins from rest, so that the filter needs no time to settle

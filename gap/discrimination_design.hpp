@@ -54,7 +54,7 @@ struct DiscriminationDesign {
 /// back.
 [[nodiscard]] std::vector<std::string> stage_words(const Plan& plan, const Model& model);
 
-/// What measurement would split two rivals that no log of efforts, wheel speeds and pose does.
+/// Measurement that separates two rivals which no log of efforts, wheel speeds and pose separates.
 [[nodiscard]] std::string splitting_measurement(const Rival& a, const Rival& b, const std::vector<Effect>& catalogue);
 
 /// design_manoeuvre() for tell_apart() over the decidable pairs, and the best figure eight beside it. An ordered pair

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// A whole log in memory as the effects of the catalogue look at it: evenly sampled, raw and smoothed.
-/// The one filter that everything in a gap analysis passes: f₂ = f * f of (24) with α = β, on whole signals.
+/// A whole log in memory for a gap analysis: evenly sampled, raw and smoothed; and its filter f₂ = f * f of (24) with α
+/// = β, on whole signals.
 #pragma once
 
 #include <cstddef>
@@ -19,7 +19,7 @@
 
 namespace wheelwright {
 
-/// Which rows of a Drive have a property.
+/// Rows of a Drive that have a property.
 using Mask = Eigen::Array<bool, Eigen::Dynamic, 1>;
 
 /// One joint (a wheel, or the axis of a single_axis robot); for a linear axis read m for rad. All have one value per
@@ -70,11 +70,11 @@ struct Drive {
 
   /// Number of instants.
   [[nodiscard]] Eigen::Index rows() const { return t.size(); }
-  /// Whether the log has a position and a heading.
+  /// True if the log has a position and a heading.
   [[nodiscard]] bool has_pose() const { return heading.size() > 0 && x.size() > 0; }
-  /// Whether the log has a heading.
+  /// True if the log has a heading.
   [[nodiscard]] bool has_heading() const { return heading.size() > 0; }
-  /// Whether it is a robot on two driven wheels, with torques (in whatever unit) of both.
+  /// True if it is a robot on two driven wheels, with torques (in whatever unit) of both.
   [[nodiscard]] bool two_wheels() const { return wheel_radius > 0.0 && track_width > 0.0 && joints.size() == 2; }
   /// Half-open rows [first, last) of segment `k`.
   [[nodiscard]] std::pair<Eigen::Index, Eigen::Index> segment(std::size_t k) const;

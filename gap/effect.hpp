@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Unmodelled effects as data, the parts that they are made of, and the catalogue.
+/// Unmodelled effects as data, helpers to build them, and the catalogue.
 #pragma once
 
 #include <cstddef>
@@ -17,12 +17,12 @@
 
 namespace wheelwright {
 
-/// A coefficient of an effect: what multiplies one of its columns.
+/// A coefficient of an effect, the factor of one of its columns.
 struct EffectParameter {
   std::string name{};
   std::string unit{};
-  int sign = 0;         ///< +1: physics wants >= 0; −1: <= 0; 0: either
-  bool beside = false;  ///< comes along with the effect and is no measure of it (a changed inertia): not reported
+  int sign = 0;         ///< +1: physically >= 0; −1: <= 0; 0: either
+  bool beside = false;  ///< accompanies the effect and does not measure it (a changed inertia): not reported
 };
 
 /// A parameter on which an effect's columns depend nonlinearly.
@@ -36,7 +36,7 @@ struct ShapeParameter {
   bool both_signs = false;   ///< |value| is between the bounds, its sign either
   double resolution = 0.0;   ///< of a time: steps of the log below which stamps and holds of its makers are not known
   bool discrete = false;     ///< the grid's points are all values there are (a side, a kind): nothing lies between
-  std::function<double(const Drive&)> scale{};  ///< of this drive, > 0 (a typical speed …); empty: 1
+  std::function<double(const Drive&)> scale{};  ///< of this drive, > 0, e.g. a typical speed; empty: 1
 };
 
 /// A physical quantity that an effect's coefficients and shapes stand for.
@@ -44,20 +44,20 @@ struct PhysicalValue {
   std::string name{};
   std::string unit{};
   double value = 0.0;
-  double larger = 0.0;  ///< share by which it may be larger for what the model does not know
+  double larger = 0.0;  ///< share by which it may be larger, for unknown properties of the robot
 };
 
-/// What an effect adds per unit of one of its parameters. Signals have one value per instant of the drive and are not
-/// filtered yet; an empty signal stands for zeros.
+/// Column of an effect: its contribution per unit of one of its parameters. Signals have one value per instant of the
+/// drive and are not filtered yet; an empty signal stands for zeros.
 struct Column {
-  std::vector<Eigen::VectorXd> effort;       ///< per output: effort that the effect asks for in addition, (15)
+  std::vector<Eigen::VectorXd> effort;       ///< per output: additional effort that the effect needs, (15)
   std::vector<Eigen::VectorXd> effort_rate;  ///< per output: signal whose time derivative is such an effort
   Eigen::VectorXd forward;                   ///< body velocity that the wheels do not show, m/s
   Eigen::VectorXd lateral;                   ///< likewise, to the left, m/s
   Eigen::VectorXd yaw;                       ///< likewise, rad/s
 };
 
-/// Whether an effect can be looked for on a drive at all.
+/// Applicability of an effect to a drive, with the reason where it does not apply.
 struct Applicability {
   bool applies = true;
   std::string reason;  ///< what is missing, in words; empty where it applies
@@ -78,25 +78,25 @@ enum class DirectMeasurement {
 struct Effect {
   std::string name{};                         ///< as in results
   std::string noun{};                         ///< as sentences call it; empty: as catalogue_noun(name)
-  std::string sentence{};                     ///< what it is, for people
-  std::string family{};                       ///< of effects that are the same cause; empty where it is alone
+  std::string sentence{};                     ///< description for people
+  std::string family{};                       ///< name shared by effects that are the same cause; empty: none
   std::string common{};                       ///< parametric cause that is a part of this effect: unequal gains have a
                                               ///< mean. Where both are found it is one cause; empty: none
   bool parametric = false;                    ///< moves θ or the kinematic scale of the base model
   std::vector<EffectParameter> parameters{};  ///< one for each column
-  std::vector<ShapeParameter> shapes{};       ///< what the columns depend on besides
+  std::vector<ShapeParameter> shapes{};       ///< on which the columns depend nonlinearly
   bool unit_coefficient = false;  ///< the one column's coefficient is 1; `parameters` is empty, the shapes are
                                   ///< what is estimated
-  double inexact = 0.0;  ///< share of what it takes off that its columns leave at best (impacts shorter than a sampling
-                         ///< interval); an explanation with it may leave so much more
+  double inexact = 0.0;  ///< share of its own contribution that its columns cannot explain (impacts shorter than a
+                         ///< sampling interval); added to what an explanation with it may leave
   std::string excite{};  ///< the manoeuvre that would show it
   DirectMeasurement measured_by = DirectMeasurement::none;
   std::function<Applicability(const Drive&)> applies{};  ///< empty: on every drive
   /// The columns at `shape` (one value for each of `shapes`), for a drive on which the effect applies and whose efforts
   /// are predicted (predict_efforts).
   std::function<std::vector<Column>(const Drive&, std::span<const double> shape)> columns{};
-  /// What the coefficients (one for each of `parameters`) and shapes mean physically where they are not such quantities
-  /// themselves, e.g. angle and direction of a slope; empty: they are.
+  /// Physical quantities of the coefficients (one for each of `parameters`) and shapes, where these are not physical
+  /// quantities themselves, e.g. angle and direction of a slope; empty: they are.
   std::function<std::vector<PhysicalValue>(std::span<const double> coefficients, std::span<const double> shape)>
       physical{};
 };
@@ -105,7 +105,7 @@ struct Effect {
 /// (> 0 where logarithmic) and at least one grid point, and a unit coefficient goes with no parameters.
 void validate(const Effect& effect);
 
-/// Whether `effect` can be looked for on `drive`.
+/// Applicability of `effect` to `drive`.
 [[nodiscard]] Applicability applicability(const Effect& effect, const Drive& drive);
 
 /// All grid points of the effect's shapes on `drive`, the last one running fastest; one empty point for an effect
@@ -203,7 +203,7 @@ namespace wheelwright {
 /// The same for the robot `model`: those with one joint have fewer effects, and one coefficient where wheels have two.
 [[nodiscard]] std::vector<Effect> effect_catalogue(const Model& model);
 
-/// What sentences call the effect `name`: the noun of its law or of its entry in the catalogue; empty where there is
+/// Noun of the effect `name` in sentences: that of its law or of its entry in the catalogue; empty where there is
 /// neither.
 [[nodiscard]] std::string catalogue_noun(std::string_view name);
 

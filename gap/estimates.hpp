@@ -88,7 +88,7 @@ struct FittedCauses {
 [[nodiscard]] std::vector<double> shapley_shares(const CandidateTable& table, const CauseSet& set, BaseModel base,
                                                  double gap);
 
-/// How add_tuned_shapes() searches.
+/// Options of add_tuned_shapes().
 struct TuneOptions {
   std::size_t shapes = 3;     ///< effects with at least so many continuous shapes are tuned: a grid of them is coarse
   double gain = 0.05;         ///< share of what the other causes leave that the effect must take off already

@@ -37,7 +37,7 @@ namespace wheelwright {
 /// Fills ConfusablePair::inseparable and reason. The signatures `on_log` (signatures() of `table`) are looked at on a
 /// few random manoeuvres within limits_within(), without noise and with the log's channels. Where on all of them the
 /// columns of the one are sums of columns of the other, it is a special case of it. A pair is inseparable where on all
-/// of them either one makes up the other but for 10⁻³ of its sum of squares. Else the log did not excite what tells the
+/// of them either one explains the other but for 10⁻³ of its sum of squares. Else the log did not excite what tells the
 /// two apart. Nothing is filled where no motion is within the limits.
 void judge_pairs(std::vector<ConfusablePair>& pairs, const CandidateTable& table,
                  const std::vector<std::optional<Signature>>& on_log, BaseModel base, const PreparedGap& prepared,

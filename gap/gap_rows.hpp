@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// A drive as one least-squares problem over all residual spaces: what a nominal model leaves, and what every effect of
-/// a catalogue would add, row by row.
+/// A drive as one least-squares problem over all residual spaces: the residual of a nominal model, and the columns of
+/// every effect of a catalogue, row by row.
 #pragma once
 
 #include <cstddef>
@@ -30,7 +30,7 @@ struct NoiseFloor {
   IncrementNoise increments;  ///< of the pose; a zero leaves that row out
 };
 
-/// How a drive becomes rows.
+/// Options for the rows of a drive.
 struct GapRowOptions {
   double beta = 10.0;       ///< of f₂, 1/s
   double row_step = 0.4;    ///< in 1/β: rows of efforts are taken this far apart; those between say nothing new
@@ -59,8 +59,8 @@ struct GapRows {
 /// Adds a column, one part for each space, and returns its index.
 std::size_t add_column(std::vector<RowSpace>& spaces, std::vector<Eigen::VectorXd> parts);
 
-/// What `subset` with the first of its coefficients leaves of the response of `space`; without any, the response less
-/// the fixed columns.
+/// Residual of the response of `space` under `subset` with the first of its coefficients; without any, the response
+/// less the fixed columns.
 [[nodiscard]] Eigen::VectorXd residual(const RowSpace& space, const Subset& subset,
                                        const Eigen::VectorXd& coefficients);
 
@@ -68,7 +68,7 @@ std::size_t add_column(std::vector<RowSpace>& spaces, std::vector<Eigen::VectorX
 [[nodiscard]] std::vector<Eigen::VectorXd> rows_of(const Drive& drive, const GapRows& rows, const Column& column,
                                                    const GapRowOptions& options);
 
-/// The rows that `fitted` makes up.
+/// The contribution of `fitted` to the rows.
 [[nodiscard]] std::vector<Eigen::VectorXd> rows_of(const Drive& drive, const GapRows& rows, const FittedEffect& fitted,
                                                    const GapRowOptions& options);
 

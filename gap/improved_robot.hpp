@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The improved simulator: a robot file in which the causes that were found stand beside nominal values that fit.
+/// Improved robot file: the causes that were found, and nominal values fitted with them.
 #pragma once
 
 #include <optional>

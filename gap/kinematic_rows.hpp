@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What the pose saw of a robot's motion against what its wheels say, window by window.
+/// Increments of a robot's pose against wheel odometry, window by window.
 #pragma once
 
 #include <vector>
@@ -28,7 +28,7 @@ struct Increments {
   Eigen::VectorXd yaw;      ///< rad
 };
 
-/// Standard deviation of the increments' noise; 0 where there is none to be had.
+/// Standard deviation of the increments' noise; 0 where it is unknown.
 struct IncrementNoise {
   double forward = 0.0;  ///< m
   double lateral = 0.0;  ///< m
@@ -48,18 +48,18 @@ struct IncrementNoise {
 /// nothing for a log with neither, or a robot without two wheels.
 [[nodiscard]] Increments pose_gap(const Drive& drive, const Windows& windows);
 
-/// What a column's body velocity (Column::forward, lateral, yaw) adds to the same: ∫ R(θ) [forward, lateral] dt, turned
-/// alike, and ∫ yaw dt. The vectors are empty where those of pose_gap are, and where the column has no such part.
+/// Increments of a column's body velocity (Column::forward, lateral, yaw): ∫ R(θ) [forward, lateral] dt, turned alike,
+/// and ∫ yaw dt. The vectors are empty where those of pose_gap are, and where the column has no such part.
 [[nodiscard]] Increments increments_of(const Drive& drive, const Windows& windows, const Column& column);
 
-/// What the noise of the pose makes of the increments, by third differences of the pose (a smooth motion leaves none of
+/// Noise of the increments from that of the pose, by third differences of the pose (a smooth motion leaves none of
 /// itself), never below what the pose's resolution makes. Errors of the wheels are not in it.
 [[nodiscard]] IncrementNoise pose_noise(const Drive& drive);
 
-/// What of `gap` the wheels' motion does not determine: half the mean square difference between windows of nearly the
-/// same motion (both coordinates at first, middle and last row, each within a twentieth of its root mean square in the
-/// mean), each with its nearest one of another time. A drive with fewer than `fewest` such windows has none to be had.
-/// It is what repeated runs would show, the ground's and the pose's own whims included (Rice 1984).
+/// Part of `gap` that the wheels' motion does not determine: half the mean square difference between windows of nearly
+/// the same motion (both coordinates at first, middle and last row, each within a twentieth of its root mean square in
+/// the mean), each with its nearest one of another time. A drive with fewer than `fewest` such windows has none to be
+/// had. It is what repeated runs would show, the ground's and the pose's own whims included (Rice 1984).
 [[nodiscard]] IncrementNoise repeatability(const Drive& drive, const Windows& windows, const Increments& gap,
                                            std::size_t fewest = 30);
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The rule that one would write first, to be compared with: it is wrong most of the time, and selection.hpp is the
-/// remedy.
+/// Naive selection rule for comparison with selection.hpp (docs/gap.md has its results).
 #pragma once
 
 #include <cstddef>

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What noise alone leaves in the rows of a gap analysis, found from the sensors' own behaviour, without any model's
-/// fit.
+/// Noise floor of the rows of a gap analysis, from the behaviour of the sensors alone, without a fit of the model.
 #pragma once
 
 #include <Eigen/Core>

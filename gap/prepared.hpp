@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What is settled before causes are sought: the drive, the nominal θ, the noise floor, what the healthy robot has
-/// already.
+/// Preparation of a gap analysis: the drive, the nominal θ, the noise floor, the effects of the healthy robot.
 #pragma once
 
 #include <optional>
@@ -63,7 +62,7 @@ void expect_efforts(Drive& drive, const Eigen::VectorXd& theta, const std::vecto
 /// The same with `set` fitted beside θ to the rows of `problem`.
 void expect_efforts(PreparedGap& prepared, const GapProblem& problem, const CauseSet& set);
 
-/// What `fit` of `subset` leaves in each space, in its own unit.
+/// Residuals of `fit` of `subset` in each space, in its own unit.
 [[nodiscard]] std::vector<Eigen::VectorXd> residuals(const GapRows& rows, const Subset& subset,
                                                      const Eigen::VectorXd& coefficients);
 

@@ -19,7 +19,7 @@ struct Regime {
   Mask instants;     ///< one value per instant of the drive
 };
 
-/// How finely a drive is divided.
+/// Resolution of the regimes.
 struct RegimeOptions {
   double reversal = 0.3;          ///< s about a change of a joint's direction
   double straight = 0.1;          ///< |yaw rate| below this share of its 95 % quantile counts as straight
@@ -36,12 +36,12 @@ struct RegimeOptions {
 /// wheel angles, which are each joint's own.
 [[nodiscard]] std::vector<Regime> regimes(const Drive& drive, const RegimeOptions& options = {});
 
-/// How find_contradictions() sets the noise bound.
+/// Noise bound of find_contradictions().
 struct ContradictionOptions {
   double confidence = 0.999;  ///< that noise stays within its bound on all rows
 };
 
-/// What find_contradictions() found.
+/// Result of find_contradictions().
 struct Contradictions {
   std::vector<Contradiction>
       rows;                    ///< largest weight first; empty where some θ explains all rows, or no proof was found
@@ -50,11 +50,11 @@ struct Contradictions {
   std::string statement;       ///< the question, its bound and the answer in one sentence
 };
 
-/// Whether any θ in `prior` keeps |f₂*τ − (f₂*Y)θ| within k times the floor on all `rows` of the drive at once (theory,
-/// section 3, "Empty P"), and if not, a Farkas certificate: a few rows that, with the prior, contradict each other,
-/// checked in outward arithmetic (bounds/infeasibility.hpp). k is such that independent Gaussian noise of the floor's
-/// standard deviation `floors` (one per output, > 0) stays within it on all N rows of all outputs with the confidence:
-/// Φ(k) = 1 − (1 − confidence)/(2N), a union bound that holds for dependent rows too.
+/// Tests if any θ in `prior` keeps |f₂*τ − (f₂*Y)θ| within k times the floor on all `rows` of the drive at once; if
+/// none does, the result has a Farkas certificate: a few rows that, with the prior, contradict each other, checked in
+/// outward arithmetic (bounds/infeasibility.hpp). k is such that independent Gaussian noise of the floor's standard
+/// deviation `floors` (one per output, > 0) stays within it on all N rows of all outputs with the confidence: Φ(k) = 1
+/// − (1 − confidence)/(2N), a union bound that holds for dependent rows too.
 ///
 /// Weights are multipliers times the row's bound, as shares of their sum; sides of the prior take part in it but are no
 /// rows. Throws InvalidArgument when sizes disagree or the prior is not finite.

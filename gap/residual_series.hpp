@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What each stage of a gap analysis leaves, as signals in time: what `where` looks at and a report draws.
+/// Residuals of each stage of a gap analysis as signals in time, for locate_gap() and for reports.
 #pragma once
 
 #include <string>
@@ -10,7 +10,7 @@
 
 namespace wheelwright {
 
-/// Which equation a residual belongs to.
+/// Equation that a residual belongs to.
 enum class GapSpace {
   dynamic,    ///< filtered efforts against the model
   kinematic,  ///< increments of the pose against wheel odometry

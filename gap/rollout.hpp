@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The simulator against the log, open loop: it starts where the log is, is driven by the measured efforts, and is
-/// compared with the log some seconds later.
+/// Open-loop simulation against a log: the simulator starts at the state of the log, is driven by the measured efforts,
+/// and is compared with the log some seconds later.
 #pragma once
 
 #include <cstddef>
@@ -15,17 +15,17 @@
 
 namespace wheelwright {
 
-/// How windows are laid over a log.
+/// Windows over a log.
 struct RolloutOptions {
   std::vector<double> horizons = {1.0, 5.0};  ///< s, ascending; the last one is the windows' length
-  double every = 3.0;       ///< s from one start to the next, less where there would be fewer than …
-  std::size_t fewest = 40;  ///< … windows, …
-  double closest = 0.25;    ///< s … but no less than this
+  double every = 3.0;       ///< s from one start to the next, less where there would be fewer than `fewest` windows
+  std::size_t fewest = 40;  ///< windows that are wished for
+  double closest = 0.25;    ///< s, least distance from one start to the next
   std::size_t threads = 1;  ///< the result does not depend on it
 };
 
-/// What the simulator shows minus what the log shows at one horizon, one value per window. Speeds and angles are as the
-/// wheels show them through the drive's own geometry.
+/// Errors of the open-loop simulation (simulator minus log) at one horizon, one value per window. Speeds and angles are
+/// as the wheels show them through the drive's own geometry.
 struct RolloutErrors {
   double horizon = 0.0;      ///< s
   Eigen::VectorXd velocity;  ///< v1, m/s

@@ -1,17 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Which causes a log shows: from the held-out errors of many sets of causes to one verdict.
+/// Selection of causes: from the held-out errors of many sets of causes to one verdict.
 ///
 /// Two questions are asked one after the other. First, which effects change the *structure*: sets are compared with θ
 /// fitted again beside them, so that nothing depends on θ being known. Then, where a nominal θ can be trusted (a
 /// healthy baseline log, or the robot file), what θ itself had to do: the structural causes with θ held at its nominal
 /// value, and parametric causes added until that leaves no more than θ fitted freely.
 ///
-/// A further cause is taken only if it removes a good part of what is left and a part of the whole gap that counts, by
-/// more than what chance does over blocks of time and the number of effects that were tried; none is asked for at the
-/// floor. The rows of a model that
-/// is nearly right leave a misfit of their own (a smoothed sign, a neglected second order); the misfit of the best set
-/// is the yardstick by which others are as good.
+/// A further cause is taken only if it removes a large part of the remaining gap or of the whole gap (SelectionOptions
+/// has the limits), and more than chance explains, over blocks of time and the number of effects that were tried. At
+/// the noise floor no further cause is sought. Columns are not exact (a smoothed sign, a neglected second order), so
+/// the misfit of the best set is the reference by which other sets count as equally good.
 #pragma once
 
 #include <cstddef>
@@ -23,26 +22,34 @@
 
 namespace wheelwright {
 
-/// Options of select_causes().
+/// Options of select_causes(). Gains, remainders and the gap are mean squares in units of the noise floor, held out and
+/// beyond the floor. A further cause is taken where its gain is significant, above `smallest`, and satisfies one of
+///
+///     gain > share·gap and gain > part·remainder,     a relevant part of both,
+///     gain > large_share·gap,                         a large part of the gap,
+///     gain > large_part·remainder, tolerated_floor and small_share·gap,   nearly all of the remainder.
+///
+/// The causes explain the log where the remainder is at most the largest of tolerated·(structural part) +
+/// EffectKind::inexact, min(tolerated_nominal·gap, 4·tolerated_floor) and tolerated_floor.
 struct SelectionOptions {
-  double share = 0.03;         ///< of the gap that a cause must remove to be one …
-  double part = 0.5;           ///< … and of what is left without it
-  double large_share = 0.25;   ///< of the gap that is enough alone
-  double large_part = 0.8;     ///< of what is left that is enough …
-  double small_share = 0.002;  ///< … with this share of the gap
-  double smallest = 0.3;       ///< gain that a cause must have in any case, mean squares of the floor
+  double share = 0.03;         ///< fraction of the gap, with `part`
+  double part = 0.5;           ///< fraction of the remainder, with `share`
+  double large_share = 0.25;   ///< fraction of the gap that suffices alone
+  double large_part = 0.8;     ///< fraction of the remainder, with `small_share`
+  double small_share = 0.002;  ///< fraction of the gap, with `large_part`
+  double smallest = 0.3;       ///< least gain of a cause in any case
   double significance = 0.05;  ///< of a gain, over all effects that were tried
-  double misfit = 1.0;         ///< times the best set's own excess by which another set may be worse and be as good
-  double level = 0.10;         ///< 1 − level: of the confidence set
-  double cancellation = 4.0;   ///< sum of squares of the causes' own signatures over that of their sum, above
-                               ///< which a set is no explanation: causes that undo each other
-  double theta_cancellation = 300.0;  ///< the same with what θ moves by among them; larger, since a cause that θ had
-                                      ///< taken up moves it back
-  double tolerated = 0.04;  ///< share of the structural part that an explanation may leave (EffectKind::inexact more) …
-  double tolerated_nominal = 0.003;  ///< … or of the whole gap, θ's part included, up to four times …
-  double tolerated_floor = 0.5;      ///< … or excess in mean squares of the floor, whichever is larger
-  double theta_share = 0.06;         ///< of the gap that θ may make by having moved without a cause being asked for
-  double contained = 1e-3;           ///< share of a signature that another set leaves of it, below which it contains it
+  double misfit = 1.0;  ///< another set is as good if it is worse by at most this many times the best set's excess
+  double level = 0.10;  ///< 1 − level is that of the confidence set
+  double cancellation = 4.0;  ///< largest sum of squares of the causes' own signatures over that of their sum; above
+                              ///< it the causes cancel each other and the set is no explanation
+  double theta_cancellation = 300.0;  ///< the same limit with the change of θ among the signatures; larger, since a
+                                      ///< cause that θ had absorbed moves θ back
+  double tolerated = 0.04;            ///< fraction of the structural part that an explanation may leave
+  double tolerated_nominal = 0.003;   ///< fraction of the whole gap, θ's part included, that an explanation may leave
+  double tolerated_floor = 0.5;       ///< remainder that an explanation may leave in any case
+  double theta_share = 0.06;  ///< fraction of the gap that a change of θ may explain without a parametric cause
+  double contained = 1e-3;    ///< one set contains another's signature if it leaves less than this fraction of it
   std::uint64_t seed = 1;
   std::size_t threads = 1;
 };
@@ -53,7 +60,7 @@ struct CredibleSet {
   double p_value = 1.0;
 };
 
-/// What select_causes() found.
+/// Result of select_causes().
 struct Selection {
   CauseSet structural;  ///< best set with θ fitted again; empty: θ explains the log
   CauseSet all;         ///< with the parametric causes, θ nominal (as `structural` where no θ is trusted)
@@ -69,7 +76,7 @@ struct Selection {
   std::vector<CauseSet> looked_at;  ///< every single effect and the best pairs and triples, θ fitted again
 };
 
-/// What selection must know of an effect besides its columns.
+/// Properties of an effect that selection needs besides its columns.
 struct EffectKind {
   double inexact = 0.0;  ///< Effect::inexact
 };
@@ -79,7 +86,8 @@ struct EffectKind {
 [[nodiscard]] Selection select_causes(const CandidateTable& table, const std::vector<EffectKind>& kinds,
                                       bool nominal_trusted, double floor_error, const SelectionOptions& options = {});
 
-/// Largest share of a column of `a`, freed of θ, that the columns of `b` cannot make up: 0 where b contains a.
+/// Unexplained fraction: the largest share of a column of `a`, after θ is fitted, that the columns of `b` do not span;
+/// 0 where b contains a.
 [[nodiscard]] double unexplained_by(const CandidateTable& table, const std::vector<std::size_t>& a,
                                     const std::vector<std::size_t>& b, BaseModel base);
 

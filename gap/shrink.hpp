@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// How far the gap shrinks once the causes are in the model, on held-out data, in four units; and by how much the
-/// missing causes had moved the parameters.
+/// Shrinkage of the gap on held-out data once the causes are in the model, in four units; and the bias of the
+/// parameters that the missing causes had caused.
 #pragma once
 
 #include <cstddef>

@@ -25,7 +25,7 @@ struct Spectrum {
   [[nodiscard]] double power(double lower, double upper) const;
 };
 
-/// How it is estimated.
+/// Options of the spectrum.
 struct SpectrumOptions {
   double window = 20.0;   ///< s; half of it for logs shorter than two windows
   double highest = 10.0;  ///< Hz; values are averaged over cells of at most a quarter of its period
@@ -41,7 +41,7 @@ struct SpectrumOptions {
 /// `sd` behind it: sd² (8/β) β⁴/(β² + (2πf)²)².
 [[nodiscard]] double filtered_noise_density(double beta, double sd, double frequency);
 
-/// How locate_gap() looks.
+/// Options of locate_gap().
 struct WhereOptions {
   double beta = 5.0;                ///< of the filter that the dynamic residuals passed, 1/s
   double floor_error = 0.0;         ///< relative error of the floors
@@ -74,7 +74,7 @@ struct WhereOptions {
 [[nodiscard]] std::vector<GapShare> locate_gap(const Drive& drive, const std::vector<ResidualSeries>& series,
                                                const WhereOptions& options = {});
 
-/// Whether the gap is concentrated there: p < 0.05 and a share above the presence. A channel is a finding by its p
+/// True if the gap is concentrated there: p < 0.05 and a share above the presence. A channel is a finding by its p
 /// alone.
 [[nodiscard]] bool is_finding(const GapShare& share);
 

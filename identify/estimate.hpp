@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Estimators of θ_L on the moments of a log, each with the influence of every stretch of the log on it: from these
-/// come covariances that are honest under autocorrelation, and tests of one estimator against another.
+/// Estimators of θ_L on the moments of a log, each with the influence function of every block of time. From the
+/// influences follow covariances that are valid under autocorrelation, and tests of one estimator against another.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +15,7 @@
 
 namespace wheelwright {
 
-/// How θ̂_L was found.
+/// Estimator of θ̂_L.
 enum class Estimator {
   least_squares,           ///< min Σ w²(y − Yθ)²: biased towards zero where Y is noisy
   instrumental_variables,  ///< Σ w² Zᵀ(y − Yθ) = 0 with instruments Z that share nothing with the noise of Y and y
@@ -38,14 +38,14 @@ struct Estimate {
   Eigen::MatrixXd influence;  ///< p × blocks: θ̂ − θ is nearly the sum of its columns, each from one block of time
 };
 
-/// What the estimators share.
+/// Options that the estimators share.
 struct EstimatorOptions {
   Eigen::VectorXd weights;            ///< one for each output (moments.hpp, efficient_weights); empty: all one
   std::vector<bool> excluded;         ///< parameters held at zero; empty: none
   std::size_t most_frequencies = 24;  ///< of the long-run covariance
 };
 
-/// What noise adds to Σ YᵀY and Σ y² at one instant.
+/// Second moments that noise adds to Σ YᵀY and Σ y² at one instant.
 struct RowNoise {
   std::vector<Eigen::MatrixXd> YY;  ///< per output p × p: E δYᵀδY
   Eigen::VectorXd yy;               ///< per output: E δy² (total least squares)
@@ -74,10 +74,10 @@ struct RowNoise {
 [[nodiscard]] Eigen::VectorXd instrument_strength(const RegressionMoments& moments,
                                                   const EstimatorOptions& options = {});
 
-/// How surely the instruments move with each parameter's column: F of the first stage, robust to autocorrelation. With
-/// z = Zh the combination of instruments that is orthogonal to all other columns of Y (the one that estimates θ_j) and
-/// π = Σ zY_j / Σ z², F_j = (Σ zY_j)² over the long-run variance of Σ z(Y_j − πz). Below about 10 instruments are weak,
-/// and intervals are not to be trusted (Staiger and Stock 1997); noise in Y alone does not make them weak. NaN where it
+/// Relevance of the instruments for each parameter's column: F of the first stage, robust to autocorrelation. With z =
+/// Zh the combination of instruments that is orthogonal to all other columns of Y (the one that estimates θ_j) and π =
+/// Σ zY_j / Σ z², F_j = (Σ zY_j)² over the long-run variance of Σ z(Y_j − πz). Below about 10 instruments are weak, and
+/// intervals are not to be trusted (Staiger and Stock 1997); noise in Y alone does not make them weak. NaN where it
 /// cannot be computed, infinite for instruments that are the columns themselves.
 [[nodiscard]] Eigen::VectorXd instrument_relevance(const RegressionMoments& moments,
                                                    const EstimatorOptions& options = {});

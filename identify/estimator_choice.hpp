@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Which estimator to believe on a log, and why.
+/// Choice of an estimator for a log, with its reason.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +15,7 @@
 
 namespace wheelwright {
 
-/// What a log offers for the choice.
+/// Evidence of a log for the choice.
 struct EstimatorEvidence {
   RegressionMoments rows;  ///< of the log; with instruments where the commanded motion is logged
   /// Moments with instruments from a simulation of the model at θ; nothing where it cannot be simulated or runs away.
@@ -50,7 +50,7 @@ struct EstimatorChoice {
   [[nodiscard]] const Estimate& best() const { return candidates[chosen].estimate; }
 };
 
-/// What the choice goes by.
+/// Options of the choice.
 struct EstimatorChoiceOptions {
   EstimatorOptions estimator;
   double negligible_bias = 0.1;  ///< of a standard error

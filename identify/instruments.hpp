@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Instruments: regressor columns made of a motion that shares nothing with the noise of the measured one.
+/// Instruments: regressor columns of a motion that is independent of the noise of the measured motion.
 #pragma once
 
 #include <cstddef>
@@ -39,7 +39,7 @@ struct InstrumentMotion {
 /// fourth order, two a sample.
 class MotionSimulation {
  public:
-  /// Whether `model` can be simulated with `theta`: as many outputs as coordinates and joints, M(θ) and the map from
+  /// True if `model` can be simulated with `theta`: as many outputs as coordinates and joints, M(θ) and the map from
   /// joints to coordinates invertible.
   [[nodiscard]] static bool possible(const Model& model, const Eigen::VectorXd& theta);
   /// Throws InvalidArgument where it is not possible. `hold` of the efforts between samples.

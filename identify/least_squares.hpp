@@ -101,7 +101,7 @@ class ResidualStatistics {
   BlockSums squared_;  // one for each output: ε²
 };
 
-/// What a log says about one parameter.
+/// Excitation of one parameter by a log.
 enum class Excitation {
   identified,   ///< the estimate can be used
   indistinct,   ///< excited, but not told from zero at 95 %: the estimate is small, its interval holds zero

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The least value of a function of one variable that is dear to evaluate.
+/// Minimisation of an expensive function of one variable.
 #pragma once
 
 #include <cstddef>
@@ -8,13 +8,13 @@
 
 namespace wheelwright {
 
-/// When the search ends.
+/// Stopping rules of the search.
 struct ScalarSearchOptions {
   std::size_t most_evaluations = 16;  ///< of the function; >= 1
   double tolerance = 1e-3;            ///< of the argument, its unit
 };
 
-/// How the search ended.
+/// Status of the search.
 enum class ScalarSearchStatus {
   converged,      ///< steps became smaller than the tolerance
   out_of_budget,  ///< all evaluations were used
@@ -32,7 +32,7 @@ struct ScalarMinimum {
 /// Searches [lower, upper] for a least value of `f` from `start` on, with steps of a quarter of the interval at first:
 /// NLopt's subplex method (Rowan 1990), which uses no derivatives. A value that is not finite counts as worse than any
 /// other. The result is never worse than f(start), and is a minimum of the whole interval where f falls and rises once.
-/// What `f` throws passes through. Throws InvalidArgument unless lower < upper, both finite, lower <= start <= upper,
+/// Exceptions of `f` pass through. Throws InvalidArgument unless lower < upper, both finite, lower <= start <= upper,
 /// and the options are positive.
 [[nodiscard]] ScalarMinimum minimise_scalar(const std::function<double(double)>& f, double lower, double upper,
                                             double start, const ScalarSearchOptions& options = {});

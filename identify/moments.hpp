@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Second moments of a regression in one walk, summed over blocks of time, and their long-run covariance.
+/// Second moments of a regression from one pass, summed over blocks of time, and their long-run covariance.
 ///
-/// A regression in one walk: its second moments, summed over blocks of time. Least squares, instrumental variables,
-/// their corrections for noise, their covariances under autocorrelation, bootstrap and sign-perturbed sums are all made
-/// of these.
+/// Least squares, instrumental variables, their corrections for noise, their covariances under autocorrelation,
+/// bootstrap and sign-perturbed sums are all functions of these moments.
 #pragma once
 
 #include <cstddef>
@@ -49,7 +48,7 @@ struct LongRunCovariance {
 
 /// Covariance of the sum of a mean-zero series by the equal-weighted cosine estimator: the average over B cosine
 /// frequencies of the squared projections, with t_B critical values (Lazarus, Lewis, Stock and Watson 2018).
-/// B = 0.4·(blocks)^{2/3}, at least 4 and at most `most_frequencies`; fewer cosines stay honest under slower noise, at
+/// B = 0.4·(blocks)^{2/3}, at least 4 and at most `most_frequencies`; fewer cosines stay valid under slower noise, at
 /// the price of heavier t tails.
 [[nodiscard]] LongRunCovariance long_run_covariance(const BlockSums& series, std::size_t most_frequencies = 24);
 

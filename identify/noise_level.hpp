@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Noise levels: of a signal by its differences, shared by two signals, of the equation error by fault-free residuals.
+/// Noise levels: of a signal from its differences, of noise shared by two signals, of the equation error from
+/// fault-free residuals.
 #pragma once
 
 #include <array>
@@ -56,15 +57,15 @@ struct DifferenceNoise {
 /// Throws InvalidArgument when a column is missing.
 [[nodiscard]] std::vector<DifferenceNoise> difference_noise(LogSource& log, const std::vector<std::string>& columns);
 
-/// Whether column first[i] of `log` carries noise of column second[i], for any i: whether their sixth differences, in
-/// which motion is next to nothing and noise is large, are correlated at the same sample or up to three samples later.
-/// Said so above |ρ| = 0.1 and six standard errors of independent white series, 6·√C(24, 12)/C(12, 6)/√N. One walk;
-/// windows as in noise_level.hpp. A column that is smooth down to rounding carries no noise. Throws InvalidArgument
-/// when a column is missing or the lists differ in length.
+/// True if column first[i] of `log` carries noise of column second[i], for any i: if their sixth differences, in which
+/// motion is next to nothing and noise is large, are correlated at the same sample or up to three samples later. Said
+/// so above |ρ| = 0.1 and six standard errors of independent white series, 6·√C(24, 12)/C(12, 6)/√N. One walk; windows
+/// as in noise_level.hpp. A column that is smooth down to rounding carries no noise. Throws InvalidArgument when a
+/// column is missing or the lists differ in length.
 [[nodiscard]] bool share_noise(LogSource& log, const std::vector<std::string>& first,
                                const std::vector<std::string>& second);
 
-/// What the extrapolated bound promises.
+/// Promise of the extrapolated bound.
 struct ExtrapolationOptions {
   double risk = 1e-3;    ///< probability, per output, that a fault-free log of the horizon exceeds the bound
   double horizon = 1.0;  ///< number of instants of the horizon, as a multiple of those that were seen

@@ -11,7 +11,7 @@
 
 namespace wheelwright {
 
-/// What lies between effort and motion. With y the effort as logged and Yθ what the motion asks for:
+/// Time effect between effort and motion. With y the effort as logged and Yθ the effort that the motion needs:
 enum class TimeEffect {
   delay,         ///< y(t) = (Yθ)(t − T): for T > 0 the logged effort comes late, for T < 0 the motion does
   effort_lag,    ///< T ẏ + y = Yθ: the effort's sensor is slow

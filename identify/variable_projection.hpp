@@ -38,7 +38,7 @@ class SeparableModel {
   virtual bool evaluate(const Eigen::VectorXd& shape, bool derivatives, SeparableValues& at) const = 0;
 };
 
-/// What is searched, and for how long.
+/// Search range and stopping rules.
 struct VariableProjectionOptions {
   Eigen::VectorXd start;          ///< q; empty: the best of a grid of `scan` values of each shape (needs finite bounds)
   Eigen::VectorXd lower;          ///< q, empty: none
@@ -47,23 +47,23 @@ struct VariableProjectionOptions {
   int scan = 13;                  ///< >= 2, values of each shape on the grid
   int most_iterations = 500;      ///< > 0
   double rank_tolerance = 1e-13;  ///< diagonal of the pivoted triangular factor of unit columns below which a column
-                                  ///< counts as one that the others make up
+                                  ///< counts as linearly dependent on the others
   bool full_jacobian = true;      ///< Golub and Pereyra 1973; false: without its second term (Kaufman 1975)
 };
 
-/// How the search ended.
+/// Status of the search.
 enum class SearchEnd {
   converged,   ///< no step lowers the cost any more
   iterations,  ///< most_iterations were used up: the numbers are the best seen
   failed,      ///< the model is not defined at the start, or no step could be made
 };
 
-/// What is known of one shape parameter.
+/// Knowledge of one shape parameter.
 enum class ShapeState {
   identified,
   at_lower,  ///< at its lower bound with the cost falling beyond: its covariance is that of a fixed number, 0
   at_upper,  ///< at its upper bound, likewise
-  flat,      ///< the data do not tell it: its column is made up by the others, or its 95 % interval is wider than
+  flat,      ///< the data do not tell it: its column depends linearly on the others, or its 95 % interval is wider than
   ///< the bounds (without bounds: than a million times the estimate). The estimate is one of many; no interval
   ///< is given (standard error infinite)
 };
@@ -77,7 +77,7 @@ struct SeparableFit {
   int rank = 0;                   ///< numerical rank of Φ(ω̂); below p the columns left over have θ_j = 0
   double weighted_rss = 0.0;      ///< the minimum
   int iterations = 0;
-  Eigen::VectorXd standard_error;             ///< q + p, ω first: honest under autocorrelated residuals
+  Eigen::VectorXd standard_error;             ///< q + p, ω first: valid under autocorrelated residuals
   double freedom = 0.0;                       ///< degrees of freedom of its Student's t
   Eigen::MatrixXd covariance;                 ///< (q+p) × (q+p), the sandwich; rows of fixed or flat parameters 0
   Eigen::MatrixXd covariance_if_independent;  ///< the same if residuals were independent and alike: s²(JᵀJ)⁻¹ with

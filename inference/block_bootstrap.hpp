@@ -75,7 +75,7 @@ struct ScoreBlocks {
 /// The same equations over groups of `length` >= 1 neighbouring blocks; the last group may be shorter.
 [[nodiscard]] ScoreBlocks grouped(const ScoreBlocks& blocks, std::size_t length);
 
-/// How it is resampled.
+/// Options of the resampling.
 struct BlockBootstrapOptions {
   EstimatorOptions estimator;
   bool instruments = true;       ///< use the instruments where the moments have them
@@ -85,7 +85,7 @@ struct BlockBootstrapOptions {
   std::uint64_t seed = 1;
 };
 
-/// What the resamples say. Parameters that were left out are zero everywhere.
+/// Result of the resamples. Parameters that were left out are zero everywhere.
 struct BlockBootstrap {
   bool usable = false;             ///< whether the equations could be solved; if not, `reason` says why
   std::string reason;              ///< empty where usable

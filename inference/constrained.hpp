@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Least squares under linear inequalities, solved exactly; non-negative least squares; the inequalities that every
-/// real robot fulfils.
-///
-/// What every real robot fulfils, as constraints on θ_L: no negative mass, inertia or friction, and mass inside its
-/// footprint.
+/// Least squares under linear inequalities, solved exactly; non-negative least squares; and physical constraints on
+/// θ_L: no negative mass, inertia or friction, and mass inside its footprint.
 #pragma once
 
 #include <cstddef>
@@ -43,7 +40,7 @@ struct ActiveConstraint {
   std::string words;              ///< a sentence for people
 };
 
-/// How a constrained fit ended.
+/// Status of a constrained fit.
 enum class ConstrainedStatus {
   solved,        ///< `estimate` is the one minimiser
   undetermined,  ///< the rows leave directions free: `estimate` is a minimiser, near the one of least norm in scaled
@@ -72,7 +69,7 @@ struct ConstrainedFit {
                                                        const std::vector<LinearConstraint>& constraints,
                                                        const Eigen::MatrixXd& covariance = {});
 
-/// What stands behind one entry of θ_L: θ_j = per_physical · quantity (model/model.hpp's Parameter).
+/// Physical quantity of one entry of θ_L: θ_j = per_physical · quantity (model/model.hpp's Parameter).
 struct PhysicalQuantity {
   std::string name;           ///< e.g. "mass", "yaw_inertia", "viscous_linear"
   double per_physical = 1.0;  ///< other than 0

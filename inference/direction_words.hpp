@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Directions in the space of parameters, said in physical words, and the driving that would show them.
+/// Physical descriptions of directions in the parameter space, and the driving that excites them.
 #pragma once
 
 #include <string>
@@ -11,7 +11,7 @@
 
 namespace wheelwright {
 
-/// What motion a parameter answers to.
+/// Kind of motion that excites a parameter.
 enum class TermKind {
   inertia,  ///< acceleration
   viscous,  ///< speed

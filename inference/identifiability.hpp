@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Identifiability of the parameters of a log: base parameters, unseen directions, information over time.
-///
-/// What a log can tell about the parameters together: base parameters, directions it does not see, combinations it
-/// knows best, in numbers and in words.
+/// Identifiability of the parameters from a log: base parameters, unidentified directions, best-determined combinations
+/// (in numbers and in words), and information over time.
 #pragma once
 
 #include <cstddef>
@@ -19,7 +17,7 @@
 
 namespace wheelwright {
 
-/// What is judged. p parameters.
+/// Input. p parameters.
 struct IdentifiabilityInput {
   std::vector<ParameterWords> parameters;  ///< p
   Eigen::MatrixXd factor;                  ///< any R (rows × p) with RᵀR = Σ w²YᵀY
@@ -88,7 +86,7 @@ struct Identifiability {
 /// log says less than was known before.
 [[nodiscard]] Identifiability identifiability(const IdentifiabilityInput& input);
 
-/// How the log is cut.
+/// Division of the log.
 struct InformationOptions {
   Eigen::VectorXd weights;  ///< one for each output; empty: all one
   double seconds = 0.0;     ///< length of a window, s; 0: a sixtieth of the log

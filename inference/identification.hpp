@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Everything that a log of fault-free driving says about the parameters, without bounds and thresholds: how they are
-/// best estimated, how sure that is, what the log cannot tell, and what the model leaves out.
+/// Identification of the parameters from a log of fault-free driving, without bounds and thresholds: estimates,
+/// uncertainty, unidentified directions, and unmodelled effects.
 #pragma once
 
 #include <cstddef>
@@ -46,7 +46,7 @@ struct ShapePoint {
   double residual_ratio = 1.0;  ///< as ShapeFinding's; NaN where the model is not defined
 };
 
-/// What a ShapeFinding is of.
+/// Shape parameter of a ShapeFinding.
 enum class ShapeKind { delay, effort_lag, actuator_lag, stribeck_speed };
 
 /// One more quantity that enters nonlinearly, added alone to the model.
@@ -64,7 +64,7 @@ struct ShapeFinding {
   std::vector<ShapePoint> curve;  ///< over all that was searched, ascending
 };
 
-/// What is done, and how far.
+/// Options of an identification.
 struct IdentificationOptions {
   SettingOptions setting;
   double confidence = 0.95;        ///< of the regions

@@ -25,7 +25,7 @@ struct ShownParameter {
 /// All parameters, in their order.
 [[nodiscard]] std::vector<ShownParameter> shown_parameters(const Identification& result);
 
-/// How good the news is.
+/// Overall standing of the result.
 enum class IdentificationStanding {
   good,     ///< every parameter is identified, and nothing that was looked for is missing in the model
   caution,  ///< something is missing: a parameter, or something in the model
@@ -41,21 +41,21 @@ enum class IdentificationStanding {
 /// A shape matters where it is identified and the residual with it is below this share of that without.
 inline constexpr double kShapeMatters = 0.95;
 
-/// Whether `shape` is told by the log and worth a word: it lowers the residual below kShapeMatters and is either told
+/// True if `shape` is identified by the log and relevant: it lowers the residual below kShapeMatters and is either told
 /// from zero or, for the Stribeck speed, not at an end of what was searched.
 [[nodiscard]] bool matters(const ShapeFinding& shape);
 
-/// What the log says of a shape, in one sentence: its value with its 95 % interval and what it explains, or that the
-/// log does not show it.
+/// Estimate of a shape in one sentence: its value with its 95 % interval and what it explains, or that the log does not
+/// show it.
 [[nodiscard]] std::string in_words(const ShapeFinding& shape);
 
 /// The whole in one sentence.
 [[nodiscard]] std::string verdict(const Identification& result);
 
-/// What was found, most important first, one sentence each.
+/// Findings, most important first, one sentence each.
 [[nodiscard]] std::vector<std::string> findings(const Identification& result);
 
-/// What is missing and what to do about it, most important first, one or two sentences each; never empty.
+/// Missing information and the next steps, most important first, one or two sentences each; never empty.
 [[nodiscard]] std::vector<std::string> next_steps(const Identification& result);
 
 }  // namespace wheelwright

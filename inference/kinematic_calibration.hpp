@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Wheel radii and track width from wheel speeds and pose.
+/// Kinematic calibration: wheel radii and track width from wheel speeds and pose.
 #pragma once
 
 #include <array>
@@ -12,7 +12,7 @@
 
 namespace wheelwright {
 
-/// What is searched, and what it starts from.
+/// Search options and starting values.
 struct KinematicOptions {
   double wheel_radius = 0.0;   ///< nominal r, m (> 0)
   double track_width = 0.0;    ///< nominal D, m (> 0)
@@ -28,7 +28,7 @@ struct KinematicOptions {
   std::size_t fewest_poses = 5;  ///< windows with fewer poses are not used (>= 4)
 };
 
-/// What the log says about one quantity.
+/// Knowledge of one quantity.
 enum class KinematicState {
   identified,
   not_identified,  ///< the log does not show it: the estimate is no measurement; `reason` says what to drive

@@ -69,7 +69,7 @@ struct BoxCoordinates {
   Eigen::VectorXd lower, upper;
 };
 
-/// Whether `constraints` on p unknowns are a box in other coordinates: `box` is filled where they are (rows parallel to
+/// True if `constraints` on p unknowns are a box in other coordinates: `box` is filled where they are (rows parallel to
 /// each other apart, they are independent, and every interval has an inside).
 [[nodiscard]] bool find_box(const std::vector<LinearConstraint>& constraints, Eigen::Index p, BoxCoordinates& box);
 

@@ -12,14 +12,14 @@
 
 namespace wheelwright {
 
-/// What is assumed of the noise's distribution.
+/// Assumed distribution of the noise.
 enum class NoiseLaw {
   uniform,       ///< on an interval, as rounding to decimals or counts is
   gaussian,      ///< tails as light as a Gaussian's
   any_variance,  ///< a finite variance and nothing else
 };
 
-/// What the bound is to hold for.
+/// Scope of the bound.
 struct ErrorBoundOptions {
   NoiseLaw law = NoiseLaw::gaussian;
   double horizon = 1e6;  ///< samples of one column that are all to obey it
@@ -46,19 +46,19 @@ struct ErrorBound {
 /// inside (0, 1).
 [[nodiscard]] ErrorBound bound_of_sd(double sd, double relative_sd, const ErrorBoundOptions& options = {});
 
-/// How a noise level was found.
+/// Method by which a noise level was found.
 enum class NoiseMethod { none, standstill, differences };
 
 /// Name for people and files: "none", "standstill", …
 [[nodiscard]] std::string_view to_string(NoiseMethod method);
 
-/// What is known about the noise of one column.
+/// Evidence on the noise of one column.
 struct NoiseEvidence {
   std::optional<StandstillNoise> standstill;
   std::optional<DifferenceNoise> differences;
 };
 
-/// How the chosen level stands to the true one.
+/// Relation of the chosen level to the true one.
 enum class NoiseMeaning {
   estimate,     ///< the assumption behind it is borne out as far as the log can tell
   upper_limit,  ///< holds more than the sensor's noise

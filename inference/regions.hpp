@@ -21,7 +21,7 @@
 
 namespace wheelwright {
 
-/// What region is asked for.
+/// Options of the region.
 struct SignPerturbedOptions {
   EstimatorOptions
       estimator;             ///< weights and parameters that are zero; weights made of the log's own residuals keep the
@@ -59,7 +59,7 @@ class SignPerturbedSums {
   /// Draws the signs. Throws InvalidArgument for options out of range or too few `sums` for the confidence.
   explicit SignPerturbedSums(const RegressionMoments& moments, const SignPerturbedOptions& options = {});
 
-  /// Whether the sums could be formed; if not, nothing is excluded: the region is everything.
+  /// True if the sums could be formed; if not, nothing is excluded: the region is everything.
   [[nodiscard]] bool usable() const { return usable_; }
   /// Why not; empty where usable.
   [[nodiscard]] const std::string& reason() const { return reason_; }
@@ -75,7 +75,7 @@ class SignPerturbedSums {
   [[nodiscard]] double edge_share() const { return edge_share_; }
   /// θ̂ (p), where S_0 = 0: always in the region, up to ties.
   [[nodiscard]] const Eigen::VectorXd& centre() const { return centre_; }
-  /// Whether θ (p) is in the region. Entries of parameters that were left out are not looked at.
+  /// True if θ (p) is in the region. Entries of parameters that were left out are not looked at.
   [[nodiscard]] bool contains(const Eigen::VectorXd& theta) const;
   /// Bounds that hold the region. A member satisfies ‖S_0‖ <= ‖S_i‖ for at least q of the i, each an ellipsoid: its
   /// largest ‖S_0‖² by the S-lemma, min over ξ of one scalar (any ξ bounds it), and its extent in θ_j in closed form;
@@ -96,7 +96,7 @@ class SignPerturbedSums {
   std::vector<std::uint64_t> order_;  // m, decides ties
 };
 
-/// How a row of the comparison was found.
+/// Method of a row of the comparison.
 enum class RegionMethod { student_t, block_bootstrap, sign_perturbed_sums, interval_hull };
 
 /// Name for people and files: "student_t", …
@@ -122,7 +122,7 @@ struct IntervalBounds {
   std::string unit;       ///< of ē, may be empty
 };
 
-/// What is compared.
+/// Options of the comparison.
 struct RegionOptions {
   double confidence = 0.95;
   BlockBootstrapOptions bootstrap;      ///< `confidence` and `instruments` are set by the comparison

@@ -26,7 +26,7 @@ struct RobustOptions {
   std::size_t most_episodes = 10;      ///< length of RobustFit::episodes
 };
 
-/// How a robust fit ended.
+/// Status of a robust fit.
 enum class RobustStatus {
   converged,      ///< the last reweighted fit moved the estimate by less than 10⁻⁶ of a standard error (of white
                   ///< residuals)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// How noisy the columns of a log are while the robot stands still.
+/// Noise levels of the columns of a log while the robot stands still.
 #pragma once
 
 #include <cstddef>
@@ -24,7 +24,7 @@ struct StandstillSigns {
 /// The signs that `log` has for `model`: each list only where the columns of all joints are there.
 [[nodiscard]] StandstillSigns standstill_signs(const LogSource& log, const Model& model);
 
-/// When the robot is said to stand still.
+/// Criteria for standstill.
 struct StandstillOptions {
   double least_time = 1.0;  ///< s, of a stretch after trimming
   double trim = 0.5;        ///< s, left out at both ends of a stretch: coasting, and torque that rises before motion
@@ -54,7 +54,7 @@ struct StandstillNoise {
   ExtrapolatedBound bound;     ///< on the deviation, extrapolated over the horizon as noise_level.hpp says
 };
 
-/// The columns and the stretches they stand on.
+/// The noise levels of the columns, and the stretches of standstill that they come from.
 struct Standstill {
   std::vector<StandstillNoise> columns;  ///< in the order that was asked
   std::size_t stretches = 0;

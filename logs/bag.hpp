@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Recordings of rosbag2, message by message, whichever way they are stored.
-/// One file of a recording, as open_bag() puts several together.
+/// Recordings of rosbag2, message by message, in any storage format, as one file or several.
 #pragma once
 
 #include <cstddef>
@@ -34,7 +33,7 @@ struct BagMessage {
   std::string_view data;      ///< borrowed until the next call of next() or rewind()
 };
 
-/// What reading one file gave; final when the file has been read to its end.
+/// Report on reading one file; final when the file has been read to its end.
 struct BagReport {
   std::string path;                 ///< as it was given, or found in the directory that was given
   std::string storage;              ///< "mcap" or "sqlite3"
@@ -44,7 +43,7 @@ struct BagReport {
   std::vector<std::string> losses;  ///< what could not be read, one sentence each, with file and place
 };
 
-/// How to read recordings.
+/// Options for reading recordings.
 struct BagOptions {
   std::vector<std::filesystem::path> msg_path = {};  ///< directories with definitions: see ros_definitions_from()
   bool hashed = false;                               ///< whether BagReport::hash is wanted
@@ -66,7 +65,7 @@ class BagReader {
   [[nodiscard]] virtual const std::vector<BagReport>& reports() const = 0;
 };
 
-/// Whether `path` looks like a recording: an MCAP file or an SQLite database by its first bytes, plain or in zstd, or a
+/// True if `path` looks like a recording: an MCAP file or an SQLite database by its first bytes, plain or in zstd, or a
 /// directory with a metadata.yaml or with such a file (*.mcap, *.db3, *.mcap.zstd, *.db3.zstd). False where it cannot
 /// be read.
 [[nodiscard]] bool is_bag(const std::filesystem::path& path);
@@ -113,7 +112,7 @@ class Source {
   [[nodiscard]] virtual std::optional<std::string> first_message(std::size_t topic);
 };
 
-/// What the first bytes of a file say it is.
+/// Content of a file by its first bytes.
 enum class Content { empty, mcap, sqlite, zstd, other };
 
 /// Looks at the first bytes. Throws InputError, naming the file, when it is missing, no regular file or unreadable.

@@ -15,7 +15,7 @@
 
 namespace wheelwright {
 
-/// What the first messages of a topic tell of its clock.
+/// Clock of a topic, from its first messages.
 struct TopicTimes {
   std::string topic;
   std::vector<std::int64_t> log_times;              ///< ns, when each was recorded
@@ -51,7 +51,7 @@ struct BagColumn {
   bool operator==(const BagColumn&) const = default;
 };
 
-/// What is read from one topic.
+/// Columns that are read from one topic.
 struct BagSource {
   std::size_t topic = 0;  ///< index in BagReader::topics()
   std::vector<BagColumn> columns;
@@ -81,7 +81,7 @@ struct BagTopicView {
 ///   topic whose name says that it comes from the wheels is left out, since that is no independent measurement;
 /// - sensor_msgs/Imu gives gyro_z and accel_x;
 /// - types of other packages than ROS's own give the columns that fields of theirs are named after.
-/// Where two topics could give a column it is left out and said. The rows' times are those of the topic with the
+/// Where two topics could give a column it is left out and reported. The rows' times are those of the topic with the
 /// efforts. Throws InputError for entries of the map that name no topic, and as RosExtractor for their fields.
 [[nodiscard]] BagChoice choose_bag_columns(const std::vector<BagTopicView>& topics, const CsvOptions& options,
                                            const std::string& path);

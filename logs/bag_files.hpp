@@ -34,7 +34,7 @@ struct Parts {
 /// InputError, naming it, for a directory without any, and for one with files of both storages and no metadata.
 [[nodiscard]] Parts parts_of(const std::filesystem::path& path);
 
-/// What reading needs of it.
+/// Metadata that reading needs.
 struct Metadata {
   std::vector<std::string> files;         ///< relative to its directory, in their order
   std::optional<std::uint64_t> messages;  ///< in all files
@@ -78,7 +78,7 @@ class TemporaryDirectory {
   std::filesystem::path path_;
 };
 
-/// Whether a message is packed: it begins as a zstd frame does, and no CDR does.
+/// True if a message is packed: it begins as a zstd frame does, and no CDR does.
 [[nodiscard]] bool is_packed(std::string_view data);
 
 /// Unpacks message after message with the same memory.

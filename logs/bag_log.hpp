@@ -13,7 +13,7 @@
 
 namespace wheelwright {
 
-/// What the times of all bags of a log are counted from, ns: set by the first that is opened.
+/// Origin of the times of all bags of a log, ns: set by the first that is opened.
 using TimeOrigin = std::shared_ptr<std::optional<std::int64_t>>;
 
 /// A bag (file or directory) as a file of a log. Columns are those of choose_bag_columns(), clocks those of

@@ -14,7 +14,7 @@
 
 namespace wheelwright {
 
-/// How to write a recording.
+/// Options for writing a recording.
 struct BagWriterOptions {
   McapCompression compression = McapCompression::zstd;  ///< of an MCAP file; a database is not packed
   bool sqlite = false;  ///< whether a directory gets a database rather than an MCAP file

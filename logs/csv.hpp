@@ -2,8 +2,6 @@
 /// \file
 /// CSV logs: read in bounded memory and cleaned on the way, or row by row from a live stream; written.
 ///
-/// CSV logs: read in bounded memory and cleaned on the way, or row by row from a live stream; written.
-///
 /// A file has a header line with the names of its columns in any order (see log_columns.hpp for the spellings that are
 /// known), then one row a line. Separators , ; or tab; LF or CRLF; blank lines and lines that begin with # are skipped;
 /// plain text, gzip or zstd, told apart by the first bytes. Fields that are not used may hold anything.

@@ -15,7 +15,7 @@
 
 namespace wheelwright {
 
-/// What to read from a CSV log.
+/// Options for reading a CSV log.
 struct CsvOptions {
   /// Contract name (or a name in `extra`) -> column of the file, for headers that no spelling covers
   /// (`--map name=column`). It goes before everything else.
@@ -43,7 +43,7 @@ struct CsvHeader {
 /// name of `map` or `extra` is not there, two fields mean the same column, or there is no time.
 [[nodiscard]] CsvHeader read_csv_header(std::string_view line, const CsvOptions& options, const std::string& place);
 
-/// Whether `line` is neither blank nor a comment (#).
+/// True if `line` is neither blank nor a comment (#).
 [[nodiscard]] bool is_csv_content(std::string_view line);
 
 /// The cleaning of a log, row by row; the same for whole files and for a live stream.

@@ -26,7 +26,7 @@ class Statement {
   Statement() = default;
   Statement(sqlite3* database, std::string_view sql);
 
-  /// Whether it could be prepared.
+  /// True if it could be prepared.
   [[nodiscard]] bool ok() const { return statement_ != nullptr; }
   /// Sets parameter `place` (from 1).
   void set(int place, std::int64_t value);
@@ -69,7 +69,7 @@ class Database {
   void forget();
   /// What went wrong last, in words.
   [[nodiscard]] std::string error() const;
-  /// Whether that was another process that has it open.
+  /// True if that was another process that has it open.
   [[nodiscard]] bool in_use() const;
   /// Closes it; false when that fails.
   bool close();
@@ -92,7 +92,7 @@ class DatabaseFile {
 
   /// What to open.
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-  /// Whether a journal is beside it.
+  /// True if a journal is beside it.
   [[nodiscard]] bool has_journal() const { return journal_; }
   /// "at byte 5000: the file ends here, …" where it is shorter than its header says; empty otherwise.
   [[nodiscard]] const std::string& defect() const { return defect_; }

@@ -2,8 +2,6 @@
 /// \file
 /// HDF5 files as files of a log.
 ///
-/// HDF5 files as files of a log.
-///
 /// A log is a group with one-dimensional numeric datasets of the same length, one for each column (any names that
 /// log_columns.hpp knows; other datasets are ignored), or one dataset of a compound type whose members are the columns,
 /// as h5py writes structured arrays. A text attribute `units` (or `unit`) that is not the contract's keeps a dataset
@@ -38,7 +36,7 @@ class Handle {
     }
   }
 
-  /// Whether the library gave one.
+  /// True if the library gave one.
   explicit operator bool() const { return id_ >= 0; }
   /// For the library's functions.
   [[nodiscard]] hid_t get() const { return id_; }
@@ -52,7 +50,7 @@ class Handle {
 
 namespace wheelwright {
 
-/// Whether the file begins as HDF5 files do (without a user block).
+/// True if the file begins as HDF5 files do (without a user block).
 [[nodiscard]] bool is_hdf5(const std::filesystem::path& path);
 
 /// An HDF5 file as a file of a log. The group is the one whose columns include a time; where there are several, the

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The columns of the log contract, their units and the other names under which they are met.
+/// The columns of the log contract, their units and aliases.
 #pragma once
 
 #include <optional>
@@ -30,8 +30,8 @@ struct LogColumn {
 /// ("Time [s]" is `t`; "Time [ms]" is nothing). nullptr where it means none.
 [[nodiscard]] const LogColumn* recognise_log_column(std::string_view text);
 
-/// Which of several streams of samples gives a log its rows: that whose columns' weights sum to most. Efforts go before
-/// motion, motion before the rest.
+/// Weight of a column in the choice of the stream whose samples become the rows of a log: the stream with the largest
+/// sum. Efforts go before motion, motion before the rest.
 [[nodiscard]] int row_weight(std::string_view name);
 
 /// `text` in lower case, blanks, '-', '.' and '/' as single '_', none at the ends.

@@ -15,7 +15,7 @@
 
 namespace wheelwright {
 
-/// What to read from a log.
+/// Options for reading a log.
 struct LogOptions : CsvOptions {
   /// Directories with definitions of messages (PKG/msg/TYPE.msg below them), for bags that do not bring their own.
   std::vector<std::filesystem::path> msg_path;
@@ -28,7 +28,7 @@ struct LogOptions : CsvOptions {
 [[nodiscard]] std::unique_ptr<RecordedLog> open_log(const std::vector<std::filesystem::path>& paths,
                                                     const LogOptions& options = {});
 
-/// How to write a log.
+/// Options for writing a log.
 struct LogWriteOptions {
   McapCompression compression = McapCompression::zstd;  ///< of MCAP files
   std::string columns_topic = "/columns";               ///< of a bag: what has no message of its own

@@ -22,7 +22,7 @@
 
 namespace wheelwright {
 
-/// How the records of a chunk are packed. `lz4` is the LZ4 frame format.
+/// Compression of the records of a chunk. `lz4` is the LZ4 frame format.
 enum class McapCompression { none, zstd, lz4 };
 
 /// The description of a type of messages.
@@ -107,7 +107,7 @@ class Fields {
   /// Map<string, string>.
   std::map<std::string, std::string> text_map();
 
-  /// Whether all that was asked for was there.
+  /// True if all that was asked for was there.
   [[nodiscard]] bool ok() const { return ok_; }
   /// Bytes taken so far.
   [[nodiscard]] std::size_t used() const { return used_; }
@@ -129,7 +129,7 @@ class Fields {
 /// Content of a message record; everything that is left is its data, which is borrowed.
 [[nodiscard]] McapMessage read_message(Fields& fields);
 
-/// What stands before the records of a chunk.
+/// Head of a chunk, before its records.
 struct ChunkHead {
   std::uint64_t start_time = 0;     ///< earliest log time, ns
   std::uint64_t end_time = 0;       ///< latest log time, ns

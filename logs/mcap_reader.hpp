@@ -3,13 +3,11 @@
 /// MCAP files, message by message in bounded memory; damaged and cut-off files as far as they can be read, and a report
 /// of what was lost.
 ///
-/// MCAP files, message by message in bounded memory; damaged and cut-off files as far as they can be read.
-///
-/// What can be trusted: a chunk is unpacked whole and compared with its checksum before a message of it is handed out,
-/// and left out when it does not match. A recording that was cut off is read to its last whole message. Where the
-/// length of a record is damaged, reading goes on at the next chunk (or, in a file without chunks, at the next place
-/// where three records follow each other). All of that is in report(). Attachments, metadata and message indexes are
-/// skipped, as are records of unknown kinds.
+/// Integrity: a chunk is unpacked whole and compared with its checksum before a message of it is handed out, and left
+/// out when it does not match. A recording that was cut off is read to its last whole message. Where the length of a
+/// record is damaged, reading goes on at the next chunk (or, in a file without chunks, at the next place where three
+/// records follow each other). All of that is in report(). Attachments, metadata and message indexes are skipped, as
+/// are records of unknown kinds.
 #pragma once
 
 #include <cstddef>
@@ -64,14 +62,14 @@ struct McapReport {
   std::uint64_t damaged_bytes = 0;  ///< sum over all of them
   static constexpr std::size_t kept = 1000;
 
-  /// Whether nothing was found wrong: no damage, and as many messages as were promised.
+  /// True if nothing was found wrong: no damage, and as many messages as were promised.
   [[nodiscard]] bool clean() const { return damage_count == 0 && (!promised || !finished || *promised == messages); }
 };
 
-/// What is not as it should be in `report`, one sentence each, naming file and offset; empty where there is nothing.
+/// Defects in `report`, one sentence each, naming file and offset; empty where there is nothing.
 [[nodiscard]] std::vector<std::string> sentences(const McapReport& report);
 
-/// How to read an MCAP file.
+/// Options for reading an MCAP file.
 struct McapReaderOptions {
   /// Longest record, and longest unpacked chunk, that is read; longer ones are left out and reported. Memory is at most
   /// about twice this, and in practice twice the longest chunk.

@@ -15,7 +15,7 @@
 
 namespace wheelwright::mcap {
 
-/// What the end of a file says.
+/// Summary at the end of a file.
 struct Summary {
   bool has_footer = false;  ///< footer and trailing magic are there
   bool usable = false;      ///< and a summary which is whole: its checksum is right, or it has none and can be parsed
@@ -40,12 +40,12 @@ struct DataSection {
   std::size_t max_bytes = 0;  ///< longest record that is looked for
 };
 
-/// Whether a record of a data section may begin at `offset`: the end of the section, or an opcode with a length that
+/// True if a record of a data section may begin at `offset`: the end of the section, or an opcode with a length that
 /// fits (in a file that is cut off also a known opcode with a length within max_bytes). Bytes at random look like that
 /// in one case of 10⁹ or less, but for the last eight bytes of a file that is cut off.
 [[nodiscard]] bool begins_record(WindowedFile& file, const DataSection& section, std::uint64_t offset);
 
-/// Whether a record whose own length is damaged may begin at `offset`: a message on a channel for which `messages`
+/// True if a record whose own length is damaged may begin at `offset`: a message on a channel for which `messages`
 /// holds, or the data end record at the end of the section. Bytes at random look like that in one case of 10⁵ or less.
 [[nodiscard]] bool begins_damaged_record(WindowedFile& file, const DataSection& section, std::uint64_t offset,
                                          const std::function<bool(std::uint16_t)>& messages);

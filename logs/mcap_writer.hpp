@@ -15,7 +15,7 @@
 
 namespace wheelwright {
 
-/// How to write an MCAP file.
+/// Options for writing an MCAP file.
 struct McapWriterOptions {
   McapCompression compression = McapCompression::zstd;
   /// A chunk is closed when its unpacked records reach this; 0 writes messages outside of chunks, unpacked and without

@@ -13,7 +13,7 @@
 
 namespace wheelwright {
 
-/// How often something was met, and where first.
+/// Count of a defect, and the place of the first one.
 struct Occurrences {
   std::size_t count = 0;
   std::string first;  ///< "file:line" of the first, with column and value where they say more; empty when count is 0
@@ -62,7 +62,7 @@ struct LogReport {
   Occurrences wraps;         ///< jumps of `theta` by more than π that were unwrapped (no row is lost)
   Occurrences angle_wraps;   ///< jumps of a wheel angle by a turn that were unwrapped (no row is lost)
 
-  /// Whether no row was dropped.
+  /// True if no row was dropped.
   [[nodiscard]] bool clean() const { return rows == rows_read; }
 };
 

@@ -15,7 +15,7 @@
 
 namespace wheelwright {
 
-/// What an element of a field is. `byte` and `char` of the language are `uint8`, as they are in a message's bytes.
+/// Type of an element of a field. `byte` and `char` of the language are `uint8`, as they are in a message's bytes.
 enum class RosKind : std::uint8_t {
   boolean,
   int8,
@@ -33,7 +33,8 @@ enum class RosKind : std::uint8_t {
   message
 };
 
-/// How many elements a field has: one, a number that the definition fixes, or one that each message says.
+/// Shape of a field, the number of its elements: one, a number that the definition fixes, or one that each message
+/// says.
 enum class RosShape : std::uint8_t { single, array, sequence };
 
 /// A field of a message.

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Walks along the bytes of a message as its plan says.
-/// Numbers out of messages in CDR, by their paths.
+/// Extraction of numbers from messages in CDR by their paths: a walk along the bytes of a message by its plan.
 #pragma once
 
 #include <cstddef>
@@ -21,7 +20,7 @@ namespace wheelwright::ros {
 /// The place of a name that was not found.
 inline constexpr std::size_t nowhere = ~std::size_t{0};
 
-/// Where a walk puts what it reads.
+/// Targets of a walk.
 struct WalkTargets {
   std::span<double> values{};                   ///< slots 0, 1, …
   std::span<double> more{};                     ///< slots behind those

@@ -37,7 +37,7 @@ using Path = std::vector<PathStep>;
 /// Bytes of a number; 0 for strings and messages.
 [[nodiscard]] std::size_t size_of(RosKind kind);
 
-/// Which element of a list is wanted, and what for.
+/// Wanted element of a list, and its use.
 struct WantedElement {
   bool named = false;
   std::size_t element = 0;  ///< its index; named: place of its name in MessagePlan::names
@@ -70,7 +70,7 @@ struct Step {
 /// Steps that are walked in turn. Single messages are part of what they are in.
 using Block = std::vector<Step>;
 
-/// What is to be done with the bytes of a message.
+/// Plan for the bytes of a message.
 struct MessagePlan {
   std::vector<Block> blocks;  ///< [0] is the message's
   std::vector<WantedElement> selections;

@@ -89,7 +89,7 @@ struct RosColumns {
 [[nodiscard]] std::string columns_definition(const std::vector<std::string>& names);
 
 /// `name` as ROS accepts it for a field: lower-case letters, digits and single '_', a letter first and no '_' last.
-/// What is none of these becomes '_'; "column_" is put in front where no letter is first.
+/// Any other character becomes '_'; "column_" is put in front where no letter is first.
 [[nodiscard]] std::string ros_field_name(std::string_view name);
 
 /// Puts messages into bytes, one after the other with the same memory.

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Rows of numbers made clean rows of a log, whatever the format: defects dropped and counted, segments split.
-///
-/// Rows of numbers → clean rows of a log, whatever the format: defects dropped and counted, segments split, heading and
-/// wheel angles unwrapped.
+/// Cleaning of the rows of a log, for all formats: defects dropped and counted, segments split, heading and wheel angles
+/// unwrapped.
 #pragma once
 
 #include <cstddef>
@@ -18,7 +16,7 @@
 
 namespace wheelwright {
 
-/// What became of a row.
+/// Outcome of a row.
 enum class RowOutcome {
   dropped,      ///< a defect; counted
   row,          ///< continues the segment
@@ -118,7 +116,7 @@ class RowFile {
                                                       LogReport* report) = 0;
 };
 
-/// How RowLog hands out rows.
+/// Options of RowLog.
 struct RowLogOptions {
   std::size_t block_rows = 4096;  ///< rows of a block, at least 1
   std::size_t min_rows = 20;      ///< usable rows that a log must have

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Unmodelled effects that a robot file can carry: parameters, regressor terms, geometry.
-///
-/// The effects that a robot file can carry, as data: what they are called, their parameters, and which part of the
-/// toolkit accounts for them.
+/// Effects that a robot file can carry, as data: names, parameters, regressor terms, geometry, and the part of the
+/// toolkit that accounts for each.
 #pragma once
 
 #include <cstddef>
@@ -62,16 +60,16 @@ void add_effect_terms(Model& model, const Robot& robot);
 /// Adds dry friction of the parameter `parameter` at every joint: sgn ω_j times the column of the input matrix.
 void add_dry_friction(Model& model, std::size_t parameter);
 
-/// Whether the model parameter with the physical name `physical` is one of the robot's effects, and what the file says
-/// of the physical quantity: its interval; [v/3, 3v] for a single value v; for com_* and slope times the mass, which is
-/// that of the robot's prior, else [m/3, 3m] of the nominal m, else anything up to 10⁶ kg.
+/// Prior of the model parameter with the physical name `physical`, where it is one of the robot's effects: the interval
+/// of the robot file; [v/3, 3v] for a single value v; for com_* and slope times the mass, which is that of the robot's
+/// prior, else [m/3, 3m] of the nominal m, else anything up to 10⁶ kg.
 [[nodiscard]] std::optional<Interval> effect_prior(const Robot& robot, const std::string& physical);
 
 /// The physical quantity that a simulator with the mass `mass` (kg) takes for the same parameter; nothing where it is
 /// of no effect.
 [[nodiscard]] std::optional<double> effect_truth(const Robot& robot, const std::string& physical, double mass);
 
-/// How an effect is accounted for when a log is read. A simulator takes them all.
+/// Mechanism by which an effect is accounted for when a log is read. A simulator takes them all.
 enum class EffectMechanism {
   term,        ///< terms of Y, linear in the parameters, which are then bounded from the log (effect_law.hpp)
   effort,      ///< a correction of the measured effort with fixed numbers, before the filter (effort_correction.hpp)
@@ -130,7 +128,7 @@ struct EffectLaw {
 /// are torques, or the motor's constants make torques of them, where an effect is an effort.
 void validate_effects(const Robot& robot);
 
-/// Whether `robot` has the effect `name`.
+/// True if `robot` has the effect `name`.
 [[nodiscard]] bool has_effect(const Robot& robot, const std::string& name);
 
 /// Value (mid-point) of a parameter of the robot's effect `effect`; 0 where the robot does not have it.

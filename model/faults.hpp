@@ -27,8 +27,8 @@ struct DriveParameters {
 /// Throws InvalidArgument, naming the field, unless mass and yaw inertia are > 0 and the friction is >= 0.
 void validate(const DriveParameters& parameters);
 
-/// How a fault comes and goes: 0 before `onset`, 1 from `onset` + `rise_time` on, and the same way back from `end`.
-/// (8) asks for a differentiable fault: `smooth` is, `ramp` is but for its two corners, `step` is not (its rate is 0
+/// Time profile of a fault: 0 before `onset`, 1 from `onset` + `rise_time` on, and the same way back from `end`. (8)
+/// asks for a differentiable fault: `smooth` is, `ramp` is but for its two corners, `step` is not (its rate is 0
 /// wherever it exists).
 struct TimeProfile {
   /// The way from 0 to 1 over the rise time.

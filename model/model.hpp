@@ -46,7 +46,7 @@ struct Joint {
   std::string command;  ///< commanded speed, e.g. "command_r"; empty where no column is known for it
 };
 
-/// What an instantaneous term may look at, at one instant.
+/// Motion at one instant, the argument of an instantaneous term.
 struct MotionState {
   std::span<const double> speed{};        ///< speed of each motion coordinate (v1, v2), m/s, rad/s
   std::span<const double> speed_error{};  ///< bound on the error of each speed (0 where nothing is declared)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What an engineer knows of a robot before its first drive: the robot file as a plain struct.
+/// Robot description before the first drive: the robot file as a plain struct.
 #pragma once
 
 #include <map>
@@ -14,20 +14,20 @@
 
 namespace wheelwright {
 
-/// What the effort columns hold.
+/// Kind of the effort columns.
 enum class EffortKind {
   torque,   ///< N·m at the wheel (N at a linear axis)
   current,  ///< A
   voltage,  ///< V
 };
 
-/// How the effort behaves between two samples.
+/// Behaviour of the effort between two samples.
 enum class Hold {
   zero_order,   ///< a command, constant from its time stamp to the next one
   first_order,  ///< measured, linear between samples
 };
 
-/// When a held effort (Hold::zero_order) is replaced by the next one.
+/// Time at which a held effort (Hold::zero_order) is replaced by the next one.
 enum class EffortChanges {
   between,     ///< at an unknown moment between the stamps of the two
   at_samples,  ///< exactly at the stamp of the next one
@@ -132,8 +132,8 @@ struct PriorBox {
 };
 [[nodiscard]] PriorBox prior_box(const Robot& robot, const Model& model);
 
-/// Whether the robot drives on a right and a left wheel beside each other, so that it has wheel radius and track width,
-/// a heading and a pose (Model::on_two_wheels); else it is an axis.
+/// True if the robot drives on a right and a left wheel beside each other, and so has wheel radius and track width, a
+/// heading and a pose (Model::on_two_wheels); else it is an axis.
 [[nodiscard]] bool on_two_wheels(const Robot& robot);
 
 /// The robot with `errors` (of interpolated columns) added to the noise bounds that it declares, the largest of each

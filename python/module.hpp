@@ -88,7 +88,7 @@ struct SetObject {
 /// are None.
 [[nodiscard]] py::object to_python(const Json& value);
 
-/// What `json.dumps(value)` writes, read again. Throws InvalidArgument, naming `what`, where it cannot be written.
+/// JSON of `json.dumps(value)`, parsed. Throws InvalidArgument, naming `what`, where it cannot be written.
 [[nodiscard]] Json to_json(const py::handle& value, const std::string& what);
 
 }  // namespace wheelwright::python

@@ -13,10 +13,10 @@
 
 namespace wheelwright::reality {
 
-/// What a set is made of.
+/// Composition of a set.
 enum class Kind { mixed, single, pair, none, outside };
 
-/// What cases are drawn from. Equal requests give equal cases.
+/// Request for random cases. Equal requests give equal cases.
 struct Request {
   std::uint64_t seed = 1;
   Kind kind = Kind::mixed;

@@ -11,7 +11,7 @@
 
 namespace wheelwright::reality {
 
-/// How an effect is classed.
+/// Class of an effect.
 enum class Class {
   structural,  ///< leaves something when the nominal model is fitted again
   parametric,  ///< moves parameters of the nominal model

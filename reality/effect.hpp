@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What an effect may do to the world.
+/// Interface of an effect on the simulated world.
 #pragma once
 
 #include <functional>

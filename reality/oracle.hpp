@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What can be known from a drive: the gap, the noise floor, and which other effects would explain it as well.
+/// Oracle of a drive: the gap, the noise floor, and the other effects that would explain it equally well.
 #pragma once
 
 #include <string>
@@ -26,7 +26,7 @@ struct Gap {
 /// made of `clean`.
 [[nodiscard]] double noise_floor(const RobotDesign& robot, const Signals& clean, const Signals& log, double beta);
 
-/// How the nearest other effect does.
+/// Fit of the nearest other effect.
 struct Oracle {
   bool separable = true;
   std::string closest_rival;

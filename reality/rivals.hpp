@@ -30,7 +30,7 @@ struct Rival {
 /// All formulas.
 [[nodiscard]] std::vector<Rival> rivals(const RobotDesign& robot);
 
-/// Whether `truth` is a special case of `rival`, or the same.
+/// True if `truth` is a special case of `rival`, or the same.
 [[nodiscard]] bool nests(std::string_view rival, std::string_view truth);
 
 }  // namespace wheelwright::reality

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What sensors make of a drive, and the signals of the nominal model, filtered.
+/// Sensor readings of a drive, and the filtered signals of the nominal model.
 #pragma once
 
 #include <Eigen/Core>

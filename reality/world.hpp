@@ -10,7 +10,7 @@
 
 namespace wheelwright::reality {
 
-/// What happened in one drive, sampling interval by sampling interval. All columns have the same length.
+/// Record of one drive, sampling interval by sampling interval. All columns have the same length.
 struct Record {
   double period = 0.01;                             ///< s
   std::vector<double> t;                            ///< middle of the interval, s

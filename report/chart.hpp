@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The one time axis that all charts and tables of a page share.
-/// Series and times as text that a page unpacks (series.js): differences of integers, deflated, in base64.
-/// A chart over time, as data: the page's script draws it with uPlot.
+/// Charts over time as data, which the page's script draws with uPlot; the time axis that all charts and tables of a
+/// page share; and series as text that a page unpacks (series.js): differences of integers, deflated, in base64.
 #pragma once
 
 #include <cstddef>
@@ -26,7 +25,7 @@ class TimeAxis {
 
   /// s, subtracted from every time that is shown.
   [[nodiscard]] double origin() const { return origin_; }
-  /// Whether the log's time goes back somewhere.
+  /// True if the log's time goes back somewhere.
   [[nodiscard]] bool repeats() const { return offsets_.size() > 1; }
   /// Seconds since the origin.
   [[nodiscard]] double shown(double t) const { return t - origin_; }
@@ -70,7 +69,7 @@ struct PackedTimes {
 /// Packs `t` (s, finite). `breaks`: ascending indices at which a segment starts; 0 may be among them.
 [[nodiscard]] PackedTimes pack_times(std::span<const double> t, const std::vector<std::size_t>& breaks);
 
-/// How a line is drawn. Styles differ in dash and width as well as in colour, so that they tell without colour.
+/// Style of a line. Styles differ in dash and width as well as in colour, so that they tell without colour.
 enum class Line {
   first,   ///< solid
   second,  ///< dashed

@@ -14,10 +14,10 @@ namespace wheelwright::report {
 /// Smallest |κ| over the outputs that held-out driving shows for certain; nothing where it shows none.
 [[nodiscard]] std::optional<double> smallest_certain_kappa(const Commissioning& result);
 
-/// |δ1|/r = √(1 + κ) − 1: the growth of both wheel radii that ζ = κ·Yθ means (theory section 5).
+/// |δ1|/r = √(1 + κ) − 1: the growth of both wheel radii that ζ = κ·Yθ means.
 [[nodiscard]] double radius_change(double kappa);
 
-/// How a result is to be taken.
+/// Overall standing of a result.
 enum class Standing { good, caution, bad };
 
 /// good: a model whose thresholds held and can fire. caution: a model with something to be read first (parameters that

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What a report says beside the result itself: where the result came from, and the signals behind it.
+/// Context of a report: the origin of its result, and the signals behind it.
 #pragma once
 
 #include <cstddef>

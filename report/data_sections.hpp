@@ -14,7 +14,7 @@
 
 namespace wheelwright::report {
 
-/// What happened on held-out blocks, one row for each output, with what the numbers mean.
+/// Validation on held-out blocks, one row for each output, with the meaning of the numbers.
 [[nodiscard]] std::string validation_section(const Commissioning& result);
 
 /// Where each noise bound comes from.

@@ -13,7 +13,7 @@
 
 namespace wheelwright {
 
-/// What the kinematic residual showed.
+/// Findings of the kinematic residual.
 struct KinematicFindings {
   std::optional<Detection> detection{};  ///< nothing where it was not watched
   std::string message{};                 ///< why not

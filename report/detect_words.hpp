@@ -15,9 +15,9 @@ namespace wheelwright::report {
 /// One short sentence; `kinematic_events` are those of the kinematic residual. Text, not HTML.
 [[nodiscard]] std::string detect_verdict(const Detection& detection, std::size_t kinematic_events);
 
-/// What was watched; where there are events: the first and the clearest one, how much of the driving contradicts the
-/// fault-free model, what this means, and which faults of the catalogue the first event leaves possible. Text, not
-/// HTML.
+/// The residuals that were checked; where there are events: the first and the clearest one, how much of the driving
+/// contradicts the fault-free model, what this means, and the faults of the catalogue that remain possible for the
+/// first event. Text, not HTML.
 [[nodiscard]] std::vector<std::string> detect_words(const Detection& detection, const OnlineModel& model,
                                                     const std::vector<Isolation>& isolations, const TimeAxis& axis);
 

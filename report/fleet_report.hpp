@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Drawings of a fleet as SVG, small however many robots there are.
-/// The page of a fleet.
+/// The page of a fleet, and its drawings as SVG, which stay small for any number of robots.
 #pragma once
 
 #include <cstddef>

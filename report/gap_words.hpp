@@ -26,7 +26,7 @@ namespace wheelwright::report {
 /// The headline: what the log says, in one sentence for each verdict.
 [[nodiscard]] std::string gap_verdict(const Diagnosis& diagnosis);
 
-/// What follows it: the causes with their parameters, what the residual falls to, where it lies, what cannot be told
+/// Sentences after it: the causes with their parameters, the remaining residual, its place, causes that cannot be told
 /// apart. `next_manoeuvre` is the sentence of the drive that would, or empty.
 [[nodiscard]] std::vector<std::string> gap_sentences(const Diagnosis& diagnosis, const std::string& next_manoeuvre);
 

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Drawings of an identification, as SVG.
-/// The parts of an identification's page. All functions return HTML; empty where the result has nothing of the kind.
-/// The page of an identification.
+/// The page of an identification, its sections (HTML; empty where the result has nothing of the kind) and its drawings
+/// as SVG.
 #pragma once
 
 #include <string>
@@ -30,7 +29,7 @@ namespace wheelwright::report {
 /// Rank and condition, directions that are not seen with their manoeuvres, combinations that are known best.
 [[nodiscard]] std::string identifiability_section(const Identification& result);
 
-/// Which seconds carry which parameter.
+/// Information about each parameter over time.
 [[nodiscard]] std::string information_section(const Identification& result, const TimeAxis& axis);
 
 /// Weights and worst episodes of the robust fit, active physical constraints.

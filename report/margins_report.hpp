@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Drawings of detectability margins as SVG.
-/// The report of `wheelwright margins`.
+/// The report of `wheelwright margins`, and its drawings as SVG.
 #pragma once
 
 #include <string>

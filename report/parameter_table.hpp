@@ -13,7 +13,7 @@
 
 namespace wheelwright::report {
 
-/// What commissioning says of one quantity. All numbers are in `unit`.
+/// Result of commissioning for one quantity. All numbers are in `unit`.
 struct ParameterView {
   std::string name;  ///< identifier, e.g. "mass" or "r_mass"
   std::string unit;
@@ -46,7 +46,7 @@ struct ParameterViews {
 /// Views of all parameters, in their order.
 [[nodiscard]] std::vector<ParameterViews> parameter_views(const Commissioning& result);
 
-/// Whether the effort is not torque and the robot file lacks the motor's constants.
+/// True if the effort is not torque and the robot file lacks the motor's constants.
 [[nodiscard]] bool physical_values_unknown(const Commissioning& result);
 
 /// Name of output `i`; "output 2" where the model has none.

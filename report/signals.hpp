@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Charts of what was measured and of what the detector made of it.
+/// Charts of the measured signals, and of the residuals, thresholds and decisions of the detector.
 #pragma once
 
 #include <cstddef>

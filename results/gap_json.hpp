@@ -22,7 +22,7 @@ struct NextManoeuvre {
   std::string sentence;  ///< what it is and what it promises
 };
 
-/// What a diagnosis was made of, and where its parts are.
+/// Input files of a diagnosis, and the files of its parts.
 struct GapFiles {
   std::string robot;              ///< the robot file as it was named
   std::vector<std::string> logs;  ///< the logs as they were named

@@ -15,14 +15,14 @@ namespace wheelwright {
 /// Name of the format: the value of its key `schema`.
 inline constexpr const char* kHealthSchema = "wheelwright/doctor/1";
 
-/// What was examined.
+/// Files that were examined.
 struct HealthFiles {
   std::string robot;              ///< the robot file as it was named; empty: none
   std::vector<std::string> logs;  ///< the logs as they were named
   std::string software;           ///< name and version
 };
 
-/// What the reader of CSV logs dropped.
+/// Defects that the reader of CSV logs dropped.
 [[nodiscard]] ReaderCounts reader_counts(const LogReport& report);
 
 /// The examination as JSON (results/doctor.schema.json), findings in their order.

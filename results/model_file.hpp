@@ -31,8 +31,8 @@ struct PublishedBound {
   std::vector<NamedRow> proof;
 };
 
-/// What a model.json says of θ, and all that is needed to prove it again from the log: what `wheelwright check`
-/// verifies.
+/// Claims of a model.json about θ, and all that is needed to prove them again from the log; `wheelwright check`
+/// verifies them.
 struct ModelClaims {
   Robot robot;
   Model model;

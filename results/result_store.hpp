@@ -17,7 +17,7 @@
 
 namespace wheelwright {
 
-/// What every result of a run depends on, beside the item itself: names and values, e.g. {"--beta", "40"}. Names
+/// Inputs that every result of a run depends on, beside the item itself: names and values, e.g. {"--beta", "40"}. Names
 /// differ.
 using StoredPlan = std::vector<std::pair<std::string, std::string>>;
 

@@ -26,7 +26,7 @@ namespace wheelwright {
 [[nodiscard]] DriveFacts parse_ros2_control(std::string_view text, const std::string& file,
                                             const std::string& controller = {});
 
-/// What a <plugin> says of a differential drive; nothing where it is another plugin. Keys are read as Gazebo's own
+/// Data of a differential drive from a <plugin>; nothing where it is another plugin. Keys are read as Gazebo's own
 /// plugins (left_joint, right_joint, wheel_separation, wheel_radius, max_linear_velocity, ...), gazebo_ros_diff_drive
 /// (wheel_diameter, max_wheel_torque) and its predecessor (leftJoint, wheelSeparation, ...) write them. Throws
 /// InputError, naming file, line and element, for values that are not numbers > 0, and for plugins that drive more than

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Which robots a fleet has and where their logs are: from a list, or from a directory.
+/// The robots of a fleet and the places of their logs, from a list or a directory.
 #pragma once
 
 #include <filesystem>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The on-line part of model.json, which `wheelwright commission` writes, read back.
+/// Reader of the on-line part of model.json, which `wheelwright commission` writes.
 #pragma once
 
 #include <cstddef>
@@ -28,7 +28,7 @@ inline constexpr const char* kModelSchema = "wheelwright/model/1";
 ///
 /// The document's root, after a look at its schema.
 [[nodiscard]] JsonPlace model_root(const Json& json, const std::string& file);
-/// What the numbers of a model stand on; of a model from before it said so, what its noise tells.
+/// Warrant of the numbers of a model; for a model file without one, as its noise implies.
 [[nodiscard]] Warrant model_warrant(const JsonPlace& root);
 /// The word of the member `warrant` of `place`; `absent` where there is none, as in files from before there was one.
 [[nodiscard]] Warrant warrant_at(const JsonPlace& place, Warrant absent);
@@ -43,7 +43,7 @@ inline constexpr const char* kModelSchema = "wheelwright/model/1";
 [[nodiscard]] Box box_at(const JsonPlace& place, std::size_t p);
 /// The channel in the section `kinematic`; nothing where it holds no model.
 [[nodiscard]] std::optional<KinematicModel> kinematic_from_json(const JsonPlace& place);
-/// Whether each of the `outputs` of an object `noise` has the origin "declared", and there is one.
+/// True if each of the `outputs` of an object `noise` has the origin "declared", and there is one.
 [[nodiscard]] bool all_declared(const JsonPlace& noise);
 
 }  // namespace wheelwright

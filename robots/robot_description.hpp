@@ -58,7 +58,7 @@ struct TreeJoint {
   FilePlace place;
 };
 
-/// What a simulator's plugin or a controller's parameters say of a differential drive.
+/// Data of a differential drive from a simulator's plugin or a controller's parameters.
 struct DriveFacts {
   std::vector<std::string> left, right;          ///< names of joints
   std::optional<OriginNumber> wheel_radius;      ///< m
@@ -72,7 +72,7 @@ struct DriveFacts {
   FilePlace place;
 };
 
-/// What a <ros2_control> or <transmission> element says of a joint.
+/// Data of a joint from a <ros2_control> or <transmission> element.
 struct JointInterfaces {
   std::string joint;
   std::vector<std::string> commands;      ///< "velocity", "effort", ...
@@ -81,7 +81,7 @@ struct JointInterfaces {
   FilePlace place;
 };
 
-/// A robot description. The robot's frame is that of the root link: x ahead, y to the left, z up (REP 103).
+/// A robot description in the frame of the root link: x ahead, y to the left, z up, as ROS has it (REP 103).
 struct RobotTree {
   std::string name;
   std::vector<TreeLink> links;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Robot files from what a robot already has: URDF, parameters of its controller; each value with its origin.
+/// Robot files from URDF and the parameters of a controller; each value with its origin.
 #pragma once
 
 #include <filesystem>
@@ -14,7 +14,7 @@
 
 namespace wheelwright {
 
-/// What the caller knows beside the files.
+/// Facts that the caller knows beside the files.
 struct RobotHints {
   std::vector<std::string> left, right;  ///< joints of the driven wheels; empty: those that the files tell
   std::optional<double> wheel_radius;    ///< m, goes before the files

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What happens between the commanded torque, which is logged, and the torque that drives the simulated wheels.
+/// Drivetrain between the commanded torque, which is logged, and the torque that drives the simulated wheels.
 #pragma once
 
 #include <deque>

@@ -18,7 +18,7 @@
 
 namespace wheelwright {
 
-/// How noise is distributed inside its bound.
+/// Distribution of the noise inside its bound.
 enum class NoiseShape {
   uniform,             ///< on [−bound, bound]
   truncated_gaussian,  ///< standard deviation bound/3 before it is cut at ±bound
@@ -99,7 +99,7 @@ struct DryThreshold {
 [[nodiscard]] DryThreshold dry_threshold(const DriveEffects& effects, const DifferentialDrive& drive,
                                          const DriveParameters& parameters, double step);
 
-/// What is lost on the way from the wheel torques to the body.
+/// Losses between the wheel torques and the body.
 struct EffectLoad {
   Eigen::Vector2d torque = Eigen::Vector2d::Zero();  ///< at the wheels, N·m
   double force = 0.0;                                ///< along the heading, N

@@ -22,14 +22,14 @@
 
 namespace wheelwright {
 
-/// What a row of the log stands for.
+/// Meaning of a row of the log.
 enum class Sampling {
   instant,   ///< everything at the time stamp: speeds are samples of the speed
   interval,  ///< a sampling interval, stamped at its middle: speeds are angle differences over it (encoder differences
              ///< where the encoder is quantised), efforts its mean; angles and pose are those of the stamp
 };
 
-/// What is logged, and how wrong it is. Bounds are |error| <= bound; 0 means exact.
+/// Logged signals and their errors. Bounds are |error| <= bound; 0 means exact.
 struct Sensors {
   Sampling sampling = Sampling::instant;
   NoiseShape noise = NoiseShape::uniform;
@@ -70,7 +70,7 @@ void validate(const Scenario& scenario);
 /// Geometry of the scenario's robot.
 [[nodiscard]] DifferentialDrive drive_of(const Robot& robot);
 
-/// What the controller believes: the robot's nominal values where they are given, else the truth.
+/// Parameters that the controller assumes: the robot's nominal values where they are given, else the truth.
 [[nodiscard]] DriveParameters nominal_parameters(const Scenario& scenario);
 
 /// θ_L of the scenario's truth in the order of `model.parameters`, units of θ_L; in the model's own lever-arm

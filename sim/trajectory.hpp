@@ -19,7 +19,7 @@ struct SpeedTable {
   std::vector<Eigen::Vector2d> speed;  ///< [v1, v2] at these times, m/s, rad/s
 };
 
-/// What the reference robot does. Speeds start from 0 over one second, and are continuously differentiable; those of a
+/// Motion of the reference robot. Speeds start from 0 over one second, and are continuously differentiable; those of a
 /// table are as the table says.
 struct Trajectory {
   enum class Kind {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// How the rows of a log that hold a commissioned robot's bounds move with an input of its file.
-/// How fast the bounds of a commissioned robot follow an input, through all passes of its commissioning.
+/// Directional derivatives of a commissioned robot's bounds by an input of its robot file, and of the rows that hold
+/// them, through all passes of commissioning.
 ///
 /// Rows know how fast the motion can change between samples from the set of the pass before (commission.hpp,
 /// EarlierSet). With B_k the hull of pass k, s the input and V the bounds of the rows of a pass,
@@ -42,20 +42,20 @@ struct RowsBeside {
   Box prior;
 };
 
-/// How the active rows of an optimum move, to both sides of an input's value; one rate for each.
+/// Rates of the active rows of an optimum, to both sides of an input's value; one rate for each.
 struct RowRates {
   std::vector<RowRate> left, right;
   std::string trouble{};  ///< why there are none, in words; empty where there are
 };
 
-/// Whether the rows' error bounds stand on declared noise alone.
+/// True if the rows' error bounds stand on declared noise alone.
 [[nodiscard]] bool noise_is_declared(const Commissioning& commissioning);
 
 /// The prior box of θ.
 [[nodiscard]] Box prior_of(const Robot& robot);
 
-/// How fast the motion of the robot `at` can change between samples, for rows that stand on declared noise: by the
-/// limit of its accelerations and, where there are `sides` (p), by the dynamics with all parameters inside them.
+/// Bound on the acceleration of the robot `at` between samples, for rows that stand on declared noise: by the limit of
+/// its accelerations and, where there are `sides` (p), by the dynamics with all parameters inside them.
 [[nodiscard]] MotionBound motion_at(const Commissioning& commissioning, const RobotAt& at,
                                     std::span<const Interval> sides);
 

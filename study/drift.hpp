@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Parameters that move from log to log.
+/// Drift of parameters from log to log.
 #pragma once
 
 #include <cstddef>
@@ -23,7 +23,7 @@ struct DriftPoint {
   double freedom = std::numeric_limits<double>::infinity();  ///< of the standard error
 };
 
-/// What the logs of one robot say of one parameter over time.
+/// One parameter of one robot over its logs.
 struct ParameterDrift {
   std::size_t robot = 0;
   std::size_t column = 0;
@@ -47,7 +47,7 @@ struct ParameterDrift {
   double p = 1.0;                                                ///< of a slope of 0, two-sided
   double adjusted_p = 1.0;                                       ///< Holm over robots and parameters
 
-  /// Whether the robot drifts: for certain, or by a trend that is unlikely to be chance.
+  /// True if the robot drifts: for certain, or by a trend that is unlikely to be chance.
   [[nodiscard]] bool drifts(double level) const { return certain != 0.0 || (has_trend && adjusted_p <= level); }
 };
 
@@ -76,7 +76,7 @@ struct ParameterDrift {
 /// The certain change assumes nothing but the noise bounds of the two logs.
 void judge_drift(std::vector<ParameterDrift>& drift);
 
-/// Whether some robot of `drift` has three logs, so that repeats are known apart from drift.
+/// True if some robot of `drift` has three logs, so that repeats are known apart from drift.
 [[nodiscard]] bool repeats_known(std::span<const ParameterDrift> drift);
 
 }  // namespace wheelwright

@@ -27,7 +27,7 @@ struct FleetLog {
   std::function<OpenedLog()> open;
 };
 
-/// What there is of one robot.
+/// Logs of one robot.
 struct RobotLogs {
   std::string robot;
   bool dated = false;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The whole fleet: gathered record by record, judged once all are there.
+/// Result of a fleet: gathered record by record, evaluated once all are there.
 #pragma once
 
 #include <cstddef>
@@ -74,7 +74,7 @@ struct FleetResult {
   [[nodiscard]] std::size_t robots_drifting() const;
   [[nodiscard]] std::size_t robots_drifting_for_certain() const;
   [[nodiscard]] std::size_t robots_alarmed() const;
-  /// Whether no robot is outside, drifts, raised an alarm, was contradicted or could not be examined.
+  /// True if no robot is outside, drifts, raised an alarm, was contradicted or could not be examined.
   [[nodiscard]] bool well() const;
 };
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// How the bounds of the parameters move when their rows move: derivatives from the linear programs' duals.
+/// Derivatives of the parameters' bounds by changes of their rows, from the duals of the linear programs.
 ///
 /// An upper bound is V = max { θ_j : a_i·θ <= b_i }. When rows depend on a number s, with rates a_i' and b_i', then
 /// (envelope theorem; Gol'shtein 1972 and Freund 1985 where the optimum is degenerate)
@@ -27,7 +27,7 @@ struct OneSided {
   double right = 0.0;
 };
 
-/// Where one bound of one parameter is attained, and what holds it there.
+/// Optimal vertex of one bound of one parameter, and its active rows.
 struct HullOptimum {
   std::size_t parameter = 0;  ///< j
   Side side = Side::upper;    ///< which bound of θ_j
@@ -42,7 +42,7 @@ struct HullOptimum {
   std::vector<WeightedRow> active;
   std::size_t basis = 0;
   bool unique_maximiser = true;  ///< all multipliers of the basis are > 0 (1e-9 of their scale): θ* is the only optimum
-  /// Whether just the basis is active and the maximiser is unique: then the bound has a derivative with respect to
+  /// True if just the basis is active and the maximiser is unique: then the bound has a derivative with respect to
   /// everything on which its rows depend smoothly.
   [[nodiscard]] bool is_regular() const { return found && unique_maximiser && active.size() == basis; }
 };
@@ -64,7 +64,7 @@ struct HullOptima {
 /// those that the set was made of; the row numbers `excluded` (any order) are left out.
 void add_active_rows(HullOptima& optima, RegressionSource& rows, std::vector<std::size_t> excluded = {});
 
-/// How an active row moves: a' and b'.
+/// Rates of an active row: a' and b'.
 struct RowRate {
   Eigen::VectorXd a;  ///< p, or empty for zero
   double b = 0.0;

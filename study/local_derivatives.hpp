@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Inputs of a robot file near the value that they have: the robot and the filter beside it.
-/// What a bound gains or loses per unit of an input of the robot file: exact, at the point where one stands.
+/// Local sensitivity: derivatives of every bound by an input of the robot file at its present value, and the robot and
+/// filter at neighbouring values.
 ///
 /// The rows that hold a bound are smooth functions of an input; their multipliers turn the rows' rates into the bound's
 /// (hull_derivatives.hpp), pass by pass of commissioning (bound_rates.hpp). No linear program over the log is solved

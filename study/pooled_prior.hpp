@@ -28,7 +28,7 @@ struct PooledParameter {
   double hidden = 0.0;       ///< share of the learning robots whose log does not show it
   double centre = 0.0;       ///< median of the learning robots' mid-points
   double scale_below = 0.0;  ///< median of how far their intervals reach below the centre
-  double scale_above = 0.0;  ///< … above
+  double scale_above = 0.0;  ///< median of how far their intervals reach above the centre
   Interval before{};         ///< hull of the priors with which the fleet was commissioned
   Interval box{};            ///< rounded outward; `before` where it is not included or there is no box
 };
@@ -54,17 +54,17 @@ struct PooledPrior {
 ///
 ///     S_i = max over parameters of max((c − l_i)/s_below, (u_i − c)/s_above)
 ///
-/// of the farthest corner of its bounds: at least the score of its true θ, which nobody sees. The box is all
-/// points with a score of at most the k-th smallest, k = ⌈(m + 1)(1 − a)⌉, cut to the hull of the robots' own priors.
+/// of the farthest corner of its bounds: at least the score of its true θ, which is unknown. The box is all points with
+/// a score of at most the k-th smallest, k = ⌈(m + 1)(1 − a)⌉, cut to the hull of the robots' own priors.
 ///
 /// Where the robots and the next one are exchangeable and their noise keeps to its bounds, P(θ of the next robot in the
 /// box) >= k/(m + 1) >= 1 − a, over fleets and next robots together, for any distribution of θ: the true θ's of the
 /// scored robots and the next one's are exchangeable given the learning half, and larger scores only enlarge the box.
-/// No robot is left out for being strange. A robot that was read but gave no bounds (contradicted, nothing shown) has
-/// an infinite score, so the statement is about such robots too; where they are more than the coverage allows, there is
-/// no box. A parameter that a scored robot's log does not show has the bounds of its prior, which are wide and true.
-/// Which parameters are included depends on the learning half only, and so costs no coverage. Robots whose logs could
-/// not be read take no part: that has to have nothing to do with their θ.
+/// No robot is left out as an outlier. A robot that was read but gave no bounds (contradicted, nothing shown) has an
+/// infinite score, so the statement is about such robots too; where they are more than the coverage allows, there is no
+/// box. A parameter that a scored robot's log does not show has the bounds of its prior, which are wide and true. Which
+/// parameters are included depends on the learning half only, and so costs no coverage. Robots whose logs could not be
+/// read take no part: that has to have nothing to do with their θ.
 ///
 /// Throws InvalidArgument for a coverage outside (0, 1) or a share outside [0, 1].
 [[nodiscard]] PooledPrior pooled_prior(const FleetTable& table, const PooledPriorOptions& options = {});

@@ -26,8 +26,8 @@ struct RandomEffects {
 inline constexpr std::size_t kNoMember = static_cast<std::size_t>(-1);
 
 /// The random-effects model x_i = μ + b_i + e_i, b_i of standard deviation τ, e_i of standard deviation s_i known
-/// (`paule1982`), fitted so that a few strange members do not move it: with z_i = (x_i − μ)/√(s_i² + τ²) and Huber's
-/// ψ(z) = max(−c, min(c, z)), c = 1.5, μ and τ solve (`huber2009`, section 6.4, "Proposal 2")
+/// (`paule1982`), fitted robustly against a few outliers: with z_i = (x_i − μ)/√(s_i² + τ²) and Huber's ψ(z) = max(−c,
+/// min(c, z)), c = 1.5, μ and τ solve (`huber2009`, section 6.4, "Proposal 2")
 ///
 ///     Σ ψ(z_i)/√(s_i² + τ²) = 0,     Σ ψ(z_i)² = (n − 1) E ψ(Z)²,     Z standard normal,
 ///
@@ -85,7 +85,7 @@ struct Population {
 ///     t = (x − μ)/√(s² + τ² + s_μ²),
 ///
 /// which for a robot like the others follows about Student's t (normal θ and errors) of ν degrees of freedom, those of
-/// the estimated variances in it: 1/ν = 1/RandomEffects::freedom of the others + q²/(those of s), q = s²/(s² + τ² +
+/// the estimated variances in it: 1/ν = 1/(freedom of the others' random effects) + q²/(those of s), q = s²/(s² + τ² +
 /// s_μ²). It is outside where its p, adjusted by Holm's method over all robots and parameters, is at most `level`. The
 /// certain statement needs no distribution, only the noise bounds. Throws InvalidArgument for a level or share outside
 /// (0, 1) or fewest < 4.

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Exceptions that travel between ranks.
-/// Messages between ranks that neither wait nor keep a processor busy.
-/// Rank 0's part of run_work_on_ranks().
+/// Rank 0's part of run_work_on_ranks(), non-blocking messages between ranks that keep no processor busy, and
+/// exceptions that are passed between ranks.
 #pragma once
 
 #include <cstddef>
@@ -29,7 +28,7 @@ namespace wheelwright {
 /// InvalidArgument where `bytes` is none.
 [[nodiscard]] std::exception_ptr unpacked(int rank, std::string_view bytes);
 
-/// What a message says.
+/// Meaning of a message.
 enum class RankWord : int {
   hello = 1,    ///< to rank 0: threads, and the fingerprint of what is to be done
   items = 2,    ///< from rank 0: items to be evaluated
@@ -60,7 +59,7 @@ class RankMessages {
   void send(int rank, RankWord word, std::string bytes = {});
   /// The next message, where one has arrived.
   [[nodiscard]] std::optional<RankMessage> receive();
-  /// Whether something that was sent has not left yet.
+  /// True if something that was sent has not left yet.
   [[nodiscard]] bool sending();
 
  private:

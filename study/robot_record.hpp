@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What a fleet keeps of one robot: numbers and sentences, no logs and no sets.
-/// The numbers of a fleet by parameter: all that is kept of its records while they stream by.
+/// Record of one robot of a fleet (numbers and sentences, no logs and no sets), and the table of a fleet by parameter.
 #pragma once
 
 #include <cstddef>
@@ -14,7 +13,7 @@
 
 namespace wheelwright {
 
-/// What became of a robot's commissioning.
+/// Status of a robot's commissioning.
 enum class RobotStatus {
   commissioned,  ///< every parameter shows
   partial,       ///< a model came out; the bounds of some parameters are the prior's

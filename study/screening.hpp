@@ -80,8 +80,8 @@ struct MorrisOptions {
   double confidence = 0.95;  ///< of each interval by itself, inside (0, 1)
 };
 
-/// What one input does to one quantity. In the quantity's unit per whole range of the input; NaN where too few effects
-/// have values: none for means, fewer than two for the rest.
+/// Elementary effects of one input on one quantity. In the quantity's unit per whole range of the input; NaN where too
+/// few effects have values: none for means, fewer than two for the rest.
 struct ElementaryEffects {
   double mean = 0.0;            ///< μ: the effect's mean over the cube; effects of both signs cancel
   double mean_absolute = 0.0;   ///< μ* (campolongo2007): of its absolute value, by which inputs are ranked

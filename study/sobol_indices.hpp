@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Sobol's quasi-random points, randomised.
-/// Sobol' indices: the shares of a quantity's variance that inputs bring about, each uniform over its range (in the
-/// unit cube) and independent of the others.
+/// Sobol' indices and randomised quasi-random points. An index is the share of a quantity's variance that an input
+/// causes, with all inputs uniform over their ranges (in the unit cube) and independent of each other.
 #pragma once
 
 #include <cstdint>
@@ -19,9 +18,9 @@ namespace wheelwright {
 ///
 /// Each replicate scrambles the digits of every coordinate by a random lower triangular matrix over {0, 1} and adds a
 /// random digital shift (matousek1998). So each point is uniform in the cube, the points of one replicate fill it as
-/// evenly as the sequence does, and the replicates are independent of each other: what they say apart gives honest
-/// standard errors (lecuyer2023), while points within one are dependent.
-/// More replicates, with the same seed, only add rows.
+/// evenly as the sequence does, and the replicates are independent of each other: their separate estimates give valid
+/// standard errors (lecuyer2023), while points within one are dependent. More replicates, with the same seed, only add
+/// rows.
 ///
 /// Throws InvalidArgument unless `points` is a power of two up to 2³², `replicates` >= 1 and 1 <= `dimensions` <= 3667.
 [[nodiscard]] Eigen::MatrixXd sobol_points(Eigen::Index points, Eigen::Index dimensions, Eigen::Index replicates,
@@ -44,7 +43,7 @@ struct SobolIndex {
   double upper = 0.0;
 };
 
-/// Whether there is something to share out.
+/// Status: the quantity has a variance or not.
 enum class SobolStatus {
   estimated,
   constant,  ///< the values differ by rounding only: there is no variance to share out, all indices are given as 0
@@ -56,7 +55,7 @@ enum class SobolStatus {
 /// "estimated", "constant", "too_few".
 [[nodiscard]] std::string_view to_string(SobolStatus status);
 
-/// What one quantity owes to each input.
+/// Indices of one quantity for each input.
 struct SobolIndices {
   SobolStatus status = SobolStatus::too_few;
   double mean = 0.0;                   ///< over the base points that were used; 0 where none were

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// A sensitivity study: inputs, quantities, and the methods that ask how the ones depend on the others.
+/// A sensitivity study: inputs, quantities, and the methods that relate them.
 #pragma once
 
 #include <cstddef>
@@ -18,7 +18,7 @@
 
 namespace wheelwright {
 
-/// What is done with the inputs.
+/// Methods of a study.
 struct StudyMethods {
   bool local = false;                           ///< derivatives of the bounds (local_derivatives.hpp)
   std::optional<Eigen::Index> one_at_a_time{};  ///< levels
@@ -82,7 +82,7 @@ struct StudyFinding {
   std::size_t points = 0;
 };
 
-/// What the methods found; [quantity] or [quantity][input].
+/// Results of the methods; [quantity] or [quantity][input].
 struct StudyResult {
   std::vector<OneAtATime> one_at_a_time;
   std::vector<std::vector<ElementaryEffects>> morris;

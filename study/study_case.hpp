@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What a study varies: a quantity with a range.
-/// One point of a study: a robot and the drive that it is commissioned from, with the study's inputs set.
+/// Inputs of a study with their ranges, and one point of a study: a robot and the drive from which it is commissioned.
 #pragma once
 
 #include <cstddef>
@@ -50,7 +49,7 @@ struct StudyCase {
   std::optional<std::uint64_t> seed{};    ///< of the scenario's noise and of where outliers lie
 };
 
-/// What can be an input, with its unit and a sentence.
+/// Kind of input, with its unit and a sentence.
 struct StudyInputKind {
   std::string name;  ///< with NAME for a physical parameter
   std::string unit;

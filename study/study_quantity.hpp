@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What a study asks of each of its points.
+/// Quantities that a study evaluates at each of its points.
 #pragma once
 
 #include <cstddef>
@@ -49,13 +49,13 @@ struct StudyQuantity {
 /// Throws InvalidArgument, naming what was expected, for a name that stands for nothing.
 [[nodiscard]] std::vector<StudyQuantity> study_quantities(const std::vector<std::string>& names, const Robot& robot);
 
-/// What evaluate_case() takes beside the case.
+/// Options of evaluate_case().
 struct EvaluateOptions {
   double window = 1.0;           ///< s, of smallest_fault
   std::size_t most_onsets = 60;  ///< of smallest_fault and delay
 };
 
-/// What a point gave.
+/// Result of one point.
 struct CaseResult {
   std::vector<double> values;  ///< one for each quantity; NaN where there is none; infinite where no size is certain
   std::string finding;         ///< why there is no model; empty where there is one

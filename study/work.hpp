@@ -23,7 +23,7 @@ struct Work {
 class ResultStore {
  public:
   virtual ~ResultStore() = default;
-  /// Whether the item's result is there.
+  /// True if the item's result is there.
   [[nodiscard]] virtual bool has(std::size_t item) = 0;
   /// Keeps the result of an item.
   virtual void put(std::size_t item, std::string_view result) = 0;
@@ -35,7 +35,7 @@ struct Shard {
   std::size_t count = 1;
 };
 
-/// How many of `items` items a shard has. Throws InvalidArgument unless index < count.
+/// Number of items, of `items`, that a shard has. Throws InvalidArgument unless index < count.
 [[nodiscard]] std::size_t items_of(const Shard& shard, std::size_t items);
 
 /// Options of run_work().
@@ -47,7 +47,7 @@ struct RunOptions {
   std::function<void(std::size_t done, std::size_t items)> progress = {};
 };
 
-/// What a run did.
+/// Counts of a run.
 struct RunCount {
   std::size_t found = 0;      ///< items of the shard whose result was there already
   std::size_t evaluated = 0;  ///< items that were evaluated now

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// MPI from its start to its end.
-/// How often to look for messages.
-/// Items that threads evaluate while the thread that gave them does something else.
-/// Independent items of work on the processes that mpirun started, with the results of one thread.
+/// Independent items of work on the processes that mpirun started, with the results of one thread: the MPI session, the
+/// polling interval for messages, and items that threads evaluate in the background.
 #pragma once
 
 #include <algorithm>
@@ -99,10 +97,11 @@ class ItemTeam {
 
 /// run_work() on all ranks; each has to call it. Rank 0 hands items out to whoever has little left, evaluates items
 /// itself, and puts each result into the store as soon as it has arrived. The others send each result as soon as it is
-/// done, and have an item or more waiting for each thread, so that nobody idles for want of a message. Looks for
-/// messages are up to 2 ms apart and keep no processor busy. A killed rank ends all (mpirun sees to that): what rank 0
-/// had put is in the store, and what was under way or on its way is evaluated again by the next run.
+/// done, and have an item or more waiting for each thread, so that no rank waits idle for a message. Looks for messages
+/// are up to 2 ms apart and keep no processor busy. A killed rank ends all (mpirun sees to that): what rank 0 had put
+/// is in the store, and what was under way or on its way is evaluated again by the next run.
 ///
+/// \param mpi          the session of MPI
 /// \param work         the same on every rank
 /// \param fingerprint  what all ranks have to agree on, in lines; nothing is evaluated before they do
 /// \param open         called on rank 0 alone, once: the store, which has to live until the end

@@ -3,7 +3,7 @@
 """The pages of the documentation that are made from the program, the schemas and the headers.
 
     docs_pages.py PROGRAM TAGS OUT      OUT/commands.md: the --help of every command; OUT/files.md: the JSON files by
-                                        their schemas; OUT/api.md: the headers by room, with links into Doxygen's pages,
+                                        their schemas; OUT/api.md: the installed headers by room, with links into Doxygen's pages,
                                         which its tag file TAGS lists; OUT/references.md: the bibliography
     docs_pages.py --check SITE          exit code 1 where a page of SITE links to what SITE does not have, or fetches
                                         anything from the network
@@ -21,21 +21,28 @@ import xml.etree.ElementTree as ElementTree
 from html.parser import HTMLParser
 from pathlib import Path
 
+import check_layers
+
 ROOT = Path(__file__).resolve().parent.parent
 ROOMS = {
-    "core": "errors, checks, outward-rounded interval, the table of a log, the regression",
+    "core": "errors, argument checks, outward-rounded intervals, log table, regression rows, linear algebra, statistics",
     "model": "robots as data, their faults and effects",
-    "filter": "the exact filter, batch and streaming, and noise through it",
-    "bounds": "feasible set, interval hull, support functions, certificates",
-    "identify": "estimators and what they promise",
+    "filter": "row filters (torque, odometry), batch and streaming, and propagation of noise bounds through them",
+    "bounds": "feasible parameter set, interval hull, support function, certificates",
     "detector": "thresholds and decisions: the part that runs on the robot; margins, isolation",
+    "files": "bytes, numbers, JSON, YAML, XML",
+    "logs": "logs in CSV, rosbag2 and HDF5",
+    "robots": "robot files, URDF, the on-line part of model.json",
+    "sim": "simulator of the robot in closed loop, with faults and effects",
+    "identify": "estimators and what they promise",
     "commission": "the pipeline from a log to a model",
+    "inference": "robust and constrained fits, confidence regions, identifiability",
+    "doctor": "log checks",
     "design": "manoeuvres",
-    "sim": "the robot in closed loop, with faults and effects",
     "gap": "the sim-to-real gap",
-    "sensitivity": "studies over inputs; work on threads, shards and ranks",
-    "fleet": "many robots: population, drift, pooled prior",
-    "io": "logs, robot files, JSON",
+    "study": "sensitivity studies and fleets; work on threads, shards and ranks",
+    "results": "results as JSON, with their schemas",
+    "export": "the detector as a C header",
     "report": "the page of a result",
 }
 
@@ -107,9 +114,9 @@ def cell(text):
 
 
 def files():
-    out = ("# JSON files\n\nEvery result is JSON with a schema, which stands in `io/` and is installed to "
+    out = ("# JSON files\n\nEvery result is JSON with a schema, which stands in `results/` and is installed to "
            "`share/wheelwright/schemas`. Units are SI; a number that is not finite is `null`.\n")
-    for path in sorted((ROOT / "io").glob("*.schema.json")):
+    for path in sorted((ROOT / "results").glob("*.schema.json")):
         schema = json.loads(path.read_text(encoding="utf-8"))
         out += f"\n## {path.name.replace('.schema.json', '')}\n\n{cell(schema.get('title', ''))}"
         out += f" ({path.name}). {cell(schema.get('description', ''))}\n\n"
@@ -130,7 +137,7 @@ def about(header):
     """The first sentence of a header: what stands behind its \\file, or over its first declaration."""
     lines = re.findall(r"^\s*/// ?(?!<)(.*)$", header.read_text(encoding="utf-8"), re.M)
     text = " ".join(line for line in lines[:6] if line.strip() != "\\file").replace("\\file", "")
-    text = re.split(r"(?<=[.:;])\s", text.strip())[0]
+    text = re.split(r"(?<=\.)\s", text.strip())[0]
     return text.rstrip(".:;") + "." if text else ""
 
 
@@ -142,8 +149,9 @@ def api(tags):
     out = ("# C++ library\n\nOne target for each room: `find_package(Wheelwright 0.1 REQUIRED COMPONENTS detector)`, then "
            "`target_link_libraries(… Wheelwright::detector)`. Headers are `<wheelwright/ROOM/HEADER>`. "
            '<a href="../api/index.html">All pages</a>, <a href="../api/annotated.html">all types</a>.\n')
+    public = check_layers.public_headers(ROOT)
     for room, what in ROOMS.items():
-        headers = sorted((ROOT / room).glob("*.hpp"))
+        headers = sorted(ROOT / room / name for name in public.get(room, ()))
         if not headers:
             continue
         out += f"\n## {room}\n\n{what[0].upper() + what[1:]}.\n\n| header | |\n|---|---|\n"

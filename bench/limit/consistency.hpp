@@ -17,9 +17,9 @@
 ///     λᵀu > h(y + Δ) + n̄   or   λᵀu < −h(−y + Δ) − n̄,      y = λᵀY,  Δ_j = n̄_φ Σ_k |(D_jᵀλ)_k|,  n̄ = n̄_τ Σ_k
 ///     |(Tᵀλ)_k|,
 ///
-/// T the weights of the efforts: the two-sided threshold of theory section 4 for the best residual that is linear in
-/// the samples. The program finds λ; that λ proves what is claimed is then evaluated with outward rounding, so that the
-/// solver's tolerance can make the test miss something, never accuse a healthy robot.
+/// T the weights of the efforts: the two-sided threshold of detector/threshold.hpp for the best residual that is linear
+/// in the samples. The program finds λ; that λ proves what is claimed is then evaluated with outward rounding, so that
+/// the solver's tolerance can make the test miss something, never accuse a healthy robot.
 ///
 /// **Limit.** For a motion φ° as the encoders of a healthy robot would show it, a fault of size κ is seen for certain,
 /// by any test whatever, if and only if no healthy robot could have given the same samples: there are no θ°, θ in P
@@ -58,7 +58,7 @@
 
 namespace wheelwright {
 
-/// Whether a window of samples has an explanation.
+/// Verdict on a window of samples: explained by a healthy robot or not.
 struct Consistency {
   bool refuted = false;      ///< proved: no θ in P and no admissible noise explains the samples
   double unexplained = 0.0;  ///< share of the deviation from the centre of P that no explanation of the relaxed program
@@ -77,7 +77,7 @@ struct DetectableSize {
   std::size_t programs = 0;  ///< linear programs that it took
 };
 
-/// How hard it is to try.
+/// Effort limits of the search.
 struct ConsistencyOptions {
   double before = 0.5;          ///< s of healthy samples before the onset, as far as the segment has them
   double tolerance = 1e-3;      ///< the descent ends where it gains less than this share

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What the model says of raw samples: one sparse equation per sampling interval and output, without a filter.
+/// Model equations on raw samples: one sparse equation per sampling interval and output, without a filter.
 ///
 /// Multiply u = Yθ (20) by a weight g_k(t) of area one and integrate. With φ the joint angles, t_k the samples,
 /// h_k = t_k − t_k−1, w_k = (φ_k − φ_k−1)/h_k and H_k = (h_k + h_k+1)/2, take for **angles** the hat on [t_k−1, t_k+1]
@@ -82,10 +82,10 @@ struct RawEquations {
 /// The effort columns of a log, joints × rows. Throws InvalidArgument for a missing column, or efforts without sign.
 [[nodiscard]] Eigen::MatrixXd read_efforts(LogSource& log, const Measurement& measurement);
 
-/// What a fault that sets in at instant `onset` of the motion adds to these equations: matrices N·n × p, zero before.
-/// Means of FaultFilter's signature over the intervals; what jumps at the onset is in the equation that ends there.
-/// Throws InvalidArgument for a fault that needs a filtered value (FaultType::held_effort), or an onset that is not
-/// inside the stretch.
+/// Terms that a fault with onset at instant `onset` of the motion adds to these equations: matrices N·n × p, zero
+/// before. Means of FaultFilter's signature over the intervals; what jumps at the onset is in the equation that ends
+/// there. Throws InvalidArgument for a fault that needs a filtered value (FaultType::held_effort), or an onset that is
+/// not inside the stretch.
 [[nodiscard]] FaultSignals raw_signature(const RawEquations& equations, const FaultType& fault, const Model& model,
                                          const ReferenceMotion& motion, std::size_t onset);
 

@@ -18,7 +18,7 @@
 
 namespace wheelwright::peers {
 
-/// What is known of the parameters.
+/// Knowledge of the parameters.
 enum class Regime {
   uncertain,   ///< θ in θ° ± 20 %, another one in every drive; θ̂ one of them
   identified,  ///< commissioned on a rich log of 60 s

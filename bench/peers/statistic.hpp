@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What every detector of the study of peers has in common: it turns an instant into numbers that a limit is put to.
+/// Interface of the detectors that are compared: each turns an instant into test statistics with a limit.
 #pragma once
 
 #include <array>

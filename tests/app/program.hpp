@@ -24,7 +24,7 @@
 
 namespace wheelwright::testing {
 
-/// What became of a run.
+/// Outcome of a run.
 struct Outcome {
   int code = -1;    ///< exit code; −1 where a signal ended the program
   std::string out;  ///< standard output

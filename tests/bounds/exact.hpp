@@ -112,7 +112,7 @@ inline double noise_of(const std::vector<double>& Y, const std::vector<double>& 
   return rounded_up(abs(rest));
 }
 
-/// Whether θ satisfies every row exactly.
+/// True if θ satisfies every row exactly.
 inline bool satisfies(std::span<const HalfSpace> rows, std::span<const double> theta) {
   for (const HalfSpace& row : rows) {
     Rational left = 0;
@@ -178,7 +178,7 @@ inline std::vector<std::vector<Rational>> vertices(const std::vector<Row>& rows,
   }
 }
 
-/// Whether Σ λ(b − a·θ) < 0 for every θ of the box, in exact arithmetic: the rows contradict each other.
+/// True if Σ λ(b − a·θ) < 0 for every θ of the box, in exact arithmetic: the rows contradict each other.
 inline bool contradict(std::span<const WeightedRow> members, const Box& box) {
   std::vector<Rational> combined(box.dimension(), 0);
   Rational bound = 0;

@@ -24,7 +24,7 @@ namespace wheelwright::exact_lp {
 
 using testing_rows::Random;
 
-/// What makes a problem hard.
+/// Kind of difficulty of a problem.
 enum class Family {
   random,        ///< entries of Y uniform on [−1, 1]
   collinear,     ///< columns that differ by 1e-7 of the first

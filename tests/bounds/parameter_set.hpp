@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What a set of parameters is, and what can be measured of any of them.
+/// Concept of a set of parameters, and measurements on any of them.
 #pragma once
 
 #include <concepts>

@@ -57,7 +57,7 @@ inline Commissioned commissioned_robot(std::uint64_t seed) {
   return c;
 }
 
-/// How a catalogue fault is made in a run.
+/// Realisation of a catalogue fault in a run.
 struct Breakage {
   std::string fault;                     ///< of the catalogue
   std::optional<Fault::Kind> simulated;  ///< the simulator's, where the robot itself breaks
@@ -123,8 +123,8 @@ inline LogTable log_of(const FaultyRun& run, double magnitude, bool noisy) {
   return log;
 }
 
-/// What is promised for a motion: the smallest certain magnitude within `window` s of the onset, and the largest one
-/// that stays hidden for noise of `share` times its bounds.
+/// Promise for a motion: the smallest certain magnitude within `window` s of the onset, and the largest one that stays
+/// hidden for noise of `share` times its bounds.
 struct Promise {
   double certain = 0.0, hidden = 0.0;
 };
@@ -156,7 +156,7 @@ inline Promise promise(const FaultyRun& run, double magnitude, double window, do
   throw InvalidArgument("the window runs past the end of the drive");
 }
 
-/// What the detector said of a run.
+/// Decisions of the detector in a run.
 struct Outcome {
   bool early = false;                                      ///< an alarm before the onset
   double first = std::numeric_limits<double>::infinity();  ///< first alarm from the onset on, s after it

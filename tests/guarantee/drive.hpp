@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What a robot is told to do, and the motion that follows: efforts held by a controller with a clock of its own, or
-/// continuous ones.
+/// Input of a robot, and the motion that follows: efforts held by a controller with a clock of its own, or continuous
+/// ones.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ namespace wheelwright::guarantee {
 /// Shape of the efforts over time.
 enum class Motion { multisine, chirp, staircase, random_steps, speed_loop, saturated };
 
-/// How efforts behave between the instants at which they are set.
+/// Behaviour of efforts between the instants at which they are set.
 enum class Between { held, linear };
 
 /// One drive. Efforts are set at `ticks` and held, or linear from each to the next.
@@ -28,7 +28,7 @@ struct Order {
   std::uint64_t seed = 1;
 };
 
-/// What really happened at given instants.
+/// True motion at given instants.
 struct History {
   std::vector<double> t;
   std::vector<Pair> angle, speed;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Whether what the library says of a case is true.
+/// Comparison of the claims of the library on a case with the truth.
 #pragma once
 
 #include <array>
@@ -11,7 +11,7 @@
 
 namespace wheelwright::guarantee {
 
-/// What came of the faults of one kind.
+/// Outcome for the faults of one kind.
 struct FaultTally {
   std::size_t certain = 0;   ///< tried, of a size and in a time that margins call certain
   std::size_t missed = 0;    ///< of them, without an alarm in that time
@@ -19,7 +19,7 @@ struct FaultTally {
   std::size_t excluded = 0;  ///< of them, where the true fault, its size or its time was excluded
 };
 
-/// What came of a case.
+/// Outcome of a case.
 struct Verdict {
   /// How commissioning ended.
   enum class End {

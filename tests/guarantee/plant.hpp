@@ -14,7 +14,7 @@
 
 namespace wheelwright::guarantee {
 
-/// What is true of a robot, SI units. A single axis uses `mass`, `viscous_linear` and `coulomb` only.
+/// True parameters of a robot, SI units. A single axis uses `mass`, `viscous_linear` and `coulomb` only.
 struct Truth {
   bool axis = false;            ///< single axis instead of two wheels
   double radius = 1.0;          ///< of the wheels, m

@@ -24,7 +24,7 @@ enum class Stamps {
   tenth_twice,  ///< every tenth step is twice as long
 };
 
-/// What the motion columns hold.
+/// Kind of the motion columns.
 enum class Sense {
   angle,       ///< with a bounded error
   encoder,     ///< the angle in whole counts
@@ -110,7 +110,7 @@ struct Scene {
 /// Plays `c`; `exact`: with the exact speeds.
 [[nodiscard]] Scene play(const Case& c, bool exact = false);
 
-/// What breaks in the second drive, of the right wheel (or the axis), from a time on.
+/// Fault of the right wheel (or the axis) in the second drive, from a time on.
 struct Breakdown {
   enum class Kind {
     effort_loss,    ///< a share `size` in [0, 1) is lost, while the logged effort is as large as it takes to drive all

@@ -130,13 +130,13 @@ inline NistProblem read_nist(const std::string& name) {
   return p;
 }
 
-/// How far from the certified values a fit may be, absolutely.
+/// Tolerance of a fit against the certified values, absolute.
 struct NistLimits {
   Eigen::VectorXd estimate, sd;
   double residual_sd = 0.0;
 };
 
-/// What backward stable least squares with the columns (or, of a nonlinear model, the Jacobian) `Y` can be asked for.
+/// Attainable accuracy of backward stable least squares with the columns (or, of a nonlinear model, the Jacobian) `Y`.
 /// The factorisation, and data that are decimals and their powers rounded to doubles, amount to other data: each column
 /// a_j and the response, of size `response`, off by γ of their norm (Higham 2002, theorems 19.4 and 20.3), γ = (p +
 /// 4√(mp))·ε for m rows of p columns, where roundings partly cancel (Higham and Mary 2019, "A new approach to

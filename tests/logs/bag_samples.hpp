@@ -37,7 +37,7 @@ inline std::vector<BagItem> all_items(BagReader& reader) {
   return items;
 }
 
-/// What its reports say was lost.
+/// Losses according to its reports.
 inline std::string all_losses(const BagReader& reader) {
   std::string text;
   for (const BagReport& report : reader.reports()) {

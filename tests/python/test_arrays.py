@@ -135,7 +135,7 @@ class Detecting(unittest.TestCase):
                          [(e.start, e.alarm, e.output) for e in found.events])
 
     def test_no_theta_of_the_set_leaves_the_threshold(self):
-        # The threshold bounds the residual for every theta of the set (theory section 4), and some theta attains it.
+        # The threshold bounds the residual for every theta of the set (34), and some theta attains it.
         model = commissioned().model
         rows = ww.filter_log(healthy_log(), robot(), model)
         found = model.feasible_set

@@ -212,7 +212,7 @@ inline ReportContext context(std::size_t rows = 6000) {
   return context;
 }
 
-/// Whether `page` holds every one of `texts`. A failure names the text, not a page of a megabyte.
+/// Assertion that `page` holds every one of `texts`. A failure names the text, not a page of a megabyte.
 inline testing::AssertionResult holds(const std::string& page, const std::vector<std::string>& texts) {
   for (const std::string& text : texts) {
     if (page.find(text) == std::string::npos) {
@@ -222,7 +222,7 @@ inline testing::AssertionResult holds(const std::string& page, const std::vector
   return testing::AssertionSuccess();
 }
 
-/// Whether `page` holds none of `texts`.
+/// Assertion that `page` holds none of `texts`.
 inline testing::AssertionResult lacks(const std::string& page, const std::vector<std::string>& texts) {
   for (const std::string& text : texts) {
     if (page.find(text) != std::string::npos) {

@@ -23,7 +23,7 @@ namespace wheelwright::testing_support {
 /// Flags that the header promises to stand.
 inline constexpr const char* kStrictC = "-std=c99 -Wall -Wextra -Wpedantic -Werror -ffp-contract=off";
 
-/// Whether there is a C compiler to be called.
+/// True if there is a C compiler to be called.
 inline bool has_c_compiler() { return std::system("cc --version > /dev/null 2>&1") == 0; }
 
 /// An exported detector behind three plain functions.
@@ -88,7 +88,7 @@ void detector_run(long rows, const double *t, const double *sample, double *out)
   CDetector(const CDetector&) = delete;
   CDetector& operator=(const CDetector&) = delete;
 
-  /// Whether it was compiled and loaded.
+  /// True if it was compiled and loaded.
   [[nodiscard]] bool loaded() const { return library_ != nullptr; }
   /// Forgets all but the model and the vertices it was at.
   void restart() { restart_(); }
@@ -108,7 +108,7 @@ void detector_run(long rows, const double *t, const double *sample, double *out)
   void (*run_)(long, const double*, const double*, double*) = nullptr;
 };
 
-/// What a comparison saw.
+/// Result of a comparison.
 struct Seen {
   std::size_t rows = 0, valid = 0, outside = 0, alarms = 0, different = 0;
 };

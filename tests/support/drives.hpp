@@ -21,7 +21,7 @@ inline const std::vector<std::string> kFour = {"mass", "yaw_inertia", "viscous_l
 /// All shapes of noise; two_point is at its bound in every sample.
 inline constexpr std::array kNoiseShapes{NoiseShape::uniform, NoiseShape::truncated_gaussian, NoiseShape::two_point};
 
-/// What a drive's log shows of its motion.
+/// Motion columns of a drive's log.
 enum class Shown {
   angles,       ///< wheel angles at the stamp
   speeds,       ///< wheel speeds at the stamp

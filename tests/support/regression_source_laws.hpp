@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What every RegressionSource promises, as a suite over types.
+/// Laws that every RegressionSource fulfils, as a suite over types.
 ///
 /// A type joins with a struct that has `std::unique_ptr<RegressionSource> make(std::size_t block_rows)`: the same rows
 /// whatever the size of the blocks in which what lies beneath is read; the struct owns what the source refers to.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// What a test does where something it needs is missing. GTEST_SKIP stands in no other file.
+/// Skipping of tests whose requirements are missing. GTEST_SKIP stands in no other file.
 #pragma once
 
 #include <cstdlib>
@@ -12,7 +12,7 @@
 
 namespace wheelwright::testing_support {
 
-/// Whether the test has to end here, since `there` is false: skipped, and failed where the environment variable
+/// True if the test has to end here, since `there` is false: skipped, and failed where the environment variable
 /// WHEELWRIGHT_NO_SKIPS is 1 (`.ci/run` sets it, and installs all that tests need). For programs that a machine may
 /// lack.
 ///
