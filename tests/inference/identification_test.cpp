@@ -197,7 +197,8 @@ TEST(Identification, WithoutEffortsThePoseStillTellsTheTrackWidth) {
 }
 
 TEST(ShapeWords, SayWhereTheLogDoesNotShowIt) {
-  ShapeFinding shape{.name = "stribeck_speed",
+  ShapeFinding shape{.kind = ShapeKind::stribeck_speed,
+                     .name = "stribeck_speed",
                      .unit = "rad/s",
                      .state = ShapeState::flat,
                      .converged = true,
@@ -212,6 +213,7 @@ TEST(ShapeWords, SayWhereTheLogDoesNotShowIt) {
     EXPECT_THAT(in_words(shape), HasSubstr("the log does not show it"));
     EXPECT_FALSE(matters(shape));
   }
+  shape.kind = ShapeKind::effort_lag;
   shape.name = "effort_lag";
   shape.unit = "s";
   shape.state = ShapeState::at_lower;

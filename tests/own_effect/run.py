@@ -114,8 +114,8 @@ def main():
     assert model["warrant"] == "guaranteed", model["message"]
     bounds = {p["name"]: p for p in model["parameters"]}["curve_resistance_c"]
     assert 0.1 < bounds["lower"] <= C <= bounds["upper"] < 1.0, bounds
-    mass = {p["name"]: p for p in model["physical"]}["mass"] if "physical" in model else None
-    assert mass is None or mass["lower"] <= MASS <= mass["upper"], mass
+    mass = model["physical"]["mass"]
+    assert mass["lower"] <= MASS <= mass["upper"], mass
     run([program, "check", "model/model.json", "resists.csv"], scratch)
     print("own effect: as the page says")
 
