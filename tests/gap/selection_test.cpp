@@ -50,7 +50,7 @@ Found found_on(const Scenario& scenario, bool with_baseline, const DiagnoseOptio
 
 bool alarmed(const Selection& selection) { return selection.any_cause || !selection.reaches_floor; }
 
-TEST(SelectCausesSlow, FindsNothingInNoise) {
+TEST(SlowSelectCauses, FindsNothingInNoise) {
   int alarms = 0;
   for (unsigned seed = 1; seed <= 60; ++seed) {
     Scenario s = noisy_scenario(counted_robot(), seed);

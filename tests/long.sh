@@ -1,0 +1,33 @@
+#!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
+#
+# What takes longer than a change should wait for; each part can be asked for alone:
+#   tests/long.sh slow        properties over hundreds of runs
+#   tests/long.sh campaign    the campaign on random robots, five minutes of it
+#   tests/long.sh sanitizers  all test programs once more under AddressSanitizer and UndefinedBehaviorSanitizer, but for these
+set -eu
+cd "$(dirname "$0")/.."
+jobs=$(nproc 2>/dev/null || echo 2)
+slow='(^|/)Slow[A-Z]'
+campaign='^guarantee[.]campaign$'
+tools/setup.sh
+for part in ${*:-slow campaign sanitizers}; do
+  case $part in
+    slow)
+      tools/build.sh release
+      ctest --test-dir build --output-on-failure --no-tests=error -j "$jobs" -R "$slow"
+      ;;
+    campaign)
+      tools/build.sh release wheelwright-campaign
+      ctest --test-dir build --output-on-failure --no-tests=error -R "$campaign"
+      ;;
+    sanitizers)
+      tools/build.sh asan
+      ctest --preset asan --output-on-failure --no-tests=error -j "$jobs"
+      ;;
+    *)
+      echo "usage: tests/long.sh [slow] [campaign] [sanitizers]" >&2
+      exit 2
+      ;;
+  esac
+done
