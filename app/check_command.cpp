@@ -7,10 +7,10 @@
 
 #include <wheelwright/results/model_file.hpp>
 
-#include "check_words.hpp"
+#include <wheelwright/results/model_check.hpp>
+#include "check_report.hpp"
 #include "commands.hpp"
 #include "common.hpp"
-#include "model_check.hpp"
 #include "options.hpp"
 
 namespace wheelwright::app {

@@ -14,13 +14,15 @@
 #include <wheelwright/results/model_file.hpp>
 #include <wheelwright/robots/robot_file.hpp>
 
+#include <wheelwright/results/detection_json.hpp>
+#include <wheelwright/words/summary.hpp>
 #include "commands.hpp"
 #include "common.hpp"
 #include "options.hpp"
 #include "progress.hpp"
-#include "summary.hpp"
 
 namespace wheelwright::app {
+using namespace words;
 namespace commission_command {
 namespace {
 

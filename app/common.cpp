@@ -15,8 +15,6 @@
 
 namespace wheelwright::app {
 
-std::string software() { return std::string("wheelwright ") + WHEELWRIGHT_VERSION; }
-
 LogOptions reader_options(const CommonOptions& options) {
   LogOptions reader;
   reader.msg_path = options.msg_path;
@@ -39,37 +37,11 @@ LogOptions reader_options(const CommonOptions& options) {
   return reader;
 }
 
-namespace {
-
-const std::string& effort_column(const Robot& robot, const Joint& joint) {
-  return robot.effort == EffortKind::torque    ? joint.torque
-         : robot.effort == EffortKind::current ? joint.current
-                                               : joint.voltage;
-}
-
-}  // namespace
-
-std::vector<std::string> useful_columns(const Robot& robot) {
-  std::vector<std::string> names = {"t", "x", "y", "theta", "gyro_z", "command_r", "command_l"};
-  for (const Joint& joint : make_model(robot).joints) {
-    names.insert(names.end(), {joint.angle, joint.speed, effort_column(robot, joint)});
-  }
-  return names;
-}
-
 std::unique_ptr<RecordedLog> open_robot_log(const std::vector<std::filesystem::path>& paths, const Robot& robot,
                                             const CommonOptions& options) {
   LogOptions reader = reader_options(options);
   reader.only = useful_columns(robot);
   return open_log(paths, reader);
-}
-
-std::vector<std::string> needed_columns(const Robot& robot) {
-  std::vector<std::string> names;
-  for (const Joint& joint : make_model(robot).joints) {
-    names.insert(names.end(), {joint.speed + "|" + joint.angle, effort_column(robot, joint)});
-  }
-  return names;
 }
 
 void make_directory(const CommonOptions& options) {

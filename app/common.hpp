@@ -14,6 +14,8 @@
 #include <wheelwright/files/json.hpp>
 #include <wheelwright/logs/log_file.hpp>
 #include <wheelwright/report/context.hpp>
+#include <wheelwright/results/software.hpp>
+#include <wheelwright/robots/robot_columns.hpp>
 
 #include "commands.hpp"
 
@@ -39,21 +41,12 @@ struct CommonOptions {
   std::string command_line;                     ///< as the user gave it
 };
 
-/// Name and version of the program.
-[[nodiscard]] std::string software();
-
 /// --map as reader options. Throws InputError where an entry is not name=column, or its name none of the log contract.
 [[nodiscard]] LogOptions reader_options(const CommonOptions& options);
 
 /// The log in `paths`, with the columns that `robot` can use. Throws InputError as open_log does.
 [[nodiscard]] std::unique_ptr<RecordedLog> open_robot_log(const std::vector<std::filesystem::path>& paths,
                                                           const Robot& robot, const CommonOptions& options);
-
-/// Columns that a robot of this model can use, so that a defect elsewhere in a file does no harm.
-[[nodiscard]] std::vector<std::string> useful_columns(const Robot& robot);
-
-/// Columns that commissioning needs, as require_columns() takes them: each joint's effort, and its speed or angle.
-[[nodiscard]] std::vector<std::string> needed_columns(const Robot& robot);
 
 /// Makes the result directory `out` where it is wanted. Throws InputError when that is impossible.
 void make_directory(const CommonOptions& options);

@@ -7,6 +7,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include <wheelwright/results/rival_json.hpp>
 #include <wheelwright/design/detection.hpp>
 #include <wheelwright/design/manoeuvre.hpp>
 #include <wheelwright/design/stages.hpp>
@@ -19,15 +20,17 @@
 #include <wheelwright/results/model_file.hpp>
 #include <wheelwright/robots/robot_file.hpp>
 
+#include <wheelwright/results/design_json.hpp>
+#include <wheelwright/words/design_summary.hpp>
 #include "commands.hpp"
 #include "common.hpp"
-#include "design_result.hpp"
 #include "options.hpp"
 #include "progress.hpp"
 #include "rivals.hpp"
 #include "units.hpp"
 
 namespace wheelwright::app {
+using namespace words;
 namespace design_command {
 namespace {
 

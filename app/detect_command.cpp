@@ -12,15 +12,17 @@
 #include <wheelwright/report/detect_report.hpp>
 #include <wheelwright/results/model_file.hpp>
 
+#include <wheelwright/results/detection_json.hpp>
+#include <wheelwright/words/summary.hpp>
 #include "commands.hpp"
 #include "common.hpp"
 #include "failure_page.hpp"
 #include "follow.hpp"
 #include "options.hpp"
 #include "series.hpp"
-#include "summary.hpp"
 
 namespace wheelwright::app {
+using namespace words;
 namespace detect_command {
 namespace {
 
@@ -81,7 +83,7 @@ int run(const Arguments& a) {
   const std::string undecided =
       detection.instants == 0 ? why_undecided(model, log.report().rows, log.median_step()) : std::string();
   if (!a.common.out.empty() || a.common.json) {
-    Json json = to_json(detection, model, a.model.string(), a.log.string());
+    Json json = to_json(detection, model, a.model.string(), a.log.string(), software());
     add_isolation(json, isolations);
     add_kinematic(json, kinematic, model);
     if (!undecided.empty()) {

@@ -13,9 +13,11 @@
 
 #include <wheelwright/logs/csv.hpp>
 
-#include "summary.hpp"
+#include <wheelwright/results/detection_json.hpp>
+#include <wheelwright/words/summary.hpp>
 
 namespace wheelwright::app {
+using namespace words;
 namespace {
 
 constexpr double kMerge = 0.5;            // s, as detect() on a whole log

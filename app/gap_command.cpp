@@ -16,19 +16,20 @@
 #include <wheelwright/logs/csv.hpp>
 #include <wheelwright/report/commission_report.hpp>
 #include <wheelwright/report/gap_report.hpp>
-#include <wheelwright/report/gap_words.hpp>
 #include <wheelwright/results/gap_json.hpp>
 #include <wheelwright/robots/robot_file.hpp>
+#include <wheelwright/words/gap_words.hpp>
 
+#include <wheelwright/gap/next_drive.hpp>
+#include <wheelwright/results/rival_json.hpp>
+#include <wheelwright/words/gap_summary.hpp>
 #include "commands.hpp"
 #include "common.hpp"
-#include "gap_summary.hpp"
-#include "next_manoeuvre.hpp"
 #include "options.hpp"
 #include "progress.hpp"
-#include "rivals.hpp"
 
 namespace wheelwright::app {
+using namespace words;
 namespace gap_command {
 namespace {
 
@@ -106,7 +107,7 @@ std::vector<std::string> naive_effects(LogSource& log, LogSource* baseline, cons
 std::string origin(const Arguments& a, const Diagnosis& d) {
   std::vector<std::string> effects;
   for (const GapCause& cause : d.causes) {
-    effects.push_back(report::effect_noun(cause.effect));
+    effects.push_back(words::effect_noun(cause.effect));
   }
   std::string line =
       fmt::format("# {} with what `wheelwright gap` found in {}: {} ({}). {}.", a.robot.string(),
@@ -180,10 +181,11 @@ int run(const Arguments& a) {
       text = in_words(text, catalogue);
     }
   }
+  next.sentence = in_words(next.sentence, catalogue);
   const std::string promise = next.commands ? next.sentence : "";
   if (diagnosis.summary.empty()) {
-    diagnosis.summary = report::gap_verdict(diagnosis);
-    for (const std::string& sentence : report::gap_sentences(diagnosis, promise)) {
+    diagnosis.summary = words::gap_verdict(diagnosis);
+    for (const std::string& sentence : words::gap_sentences(diagnosis, promise)) {
       diagnosis.summary += " " + sentence;
     }
   }
@@ -209,8 +211,9 @@ int run(const Arguments& a) {
   publish(a.common, result, "gap.json", files ? gap_report(diagnosis, robot.name, context, promise) : std::string());
   if (!a.common.quiet && !a.common.json) {
     print_log(context.warnings);
-    fmt::print("{}", summary(diagnosis, {a.common.out, a.robot, files && diagnosis.improved, promise,
-                                         files && next.commands, a.naive, naive}));
+    fmt::print("{}",
+               summary(diagnosis, {files ? (a.common.out / "").string() : "", a.robot.string(),
+                                   files && diagnosis.improved, promise, files && next.commands, a.naive, naive}));
     if (files) {
       fmt::print("wrote {} and {}\n", (a.common.out / "gap.json").string(), (a.common.out / "report.html").string());
     }

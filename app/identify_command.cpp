@@ -8,19 +8,20 @@
 
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/inference/identification.hpp>
-#include <wheelwright/inference/identification_words.hpp>
 #include <wheelwright/report/identify_report.hpp>
 #include <wheelwright/results/identification_json.hpp>
 #include <wheelwright/robots/robot_file.hpp>
+#include <wheelwright/words/identification_words.hpp>
 
+#include <wheelwright/words/identify_summary.hpp>
 #include "commands.hpp"
 #include "common.hpp"
 #include "failure_page.hpp"
-#include "identify_summary.hpp"
 #include "options.hpp"
 #include "progress.hpp"
 
 namespace wheelwright::app {
+using namespace words;
 namespace identify_command {
 namespace {
 

@@ -9,12 +9,12 @@
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/commission/margin_survey.hpp>
-#include <wheelwright/commission/margin_words.hpp>
 #include <wheelwright/report/margins_report.hpp>
 #include <wheelwright/results/margins_json.hpp>
 #include <wheelwright/results/model_file.hpp>
+#include <wheelwright/words/margin_words.hpp>
 
-#include "columns.hpp"
+#include <wheelwright/words/columns.hpp>
 #include "commands.hpp"
 #include "common.hpp"
 #include "failure_page.hpp"
@@ -22,6 +22,7 @@
 #include "progress.hpp"
 
 namespace wheelwright::app {
+using namespace words;
 namespace margins_command {
 namespace {
 
@@ -58,7 +59,7 @@ std::string table(const MarginSurvey& survey, const ResidualMargins& residual) {
                                 survey.windows[window]);
   out += padded("", name_width);
   for (const auto& [kind, count] : survey.manoeuvres) {
-    const std::string_view name = words(kind);
+    const std::string_view name = manoeuvre_words(kind);
     out += padded(std::string(name.substr(0, name.find(' '))), width);
   }
   out += "\n";

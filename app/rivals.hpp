@@ -1,31 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Rival causes as a user names them: in a gap.json, or on the command line.
+/// Rival causes as a user names them on the command line.
 #pragma once
 
-#include <filesystem>
 #include <string>
 #include <vector>
 
-#include <wheelwright/files/json.hpp>
 #include <wheelwright/gap/discrimination.hpp>
 
 namespace wheelwright::app {
-
-/// Members of the credible set of a gap.json. Parameters are those of credible_set[].parameters, keyed
-/// "effect.parameter", else of `causes` where the effects are the same; a member without any is as large as
-/// typical_rival() makes it. Noise and filter of the analysed log, where the file has them, take the place of those in
-/// `noise`. Throws InputError where fewer than two members are left that the catalogue knows.
-[[nodiscard]] std::vector<Rival> rivals_of_gap(const std::filesystem::path& file, const std::vector<Effect>& catalogue,
-                                               const Drive& drive, PlannedNoise& noise);
 
 /// Rivals "A" or "A+B", at a typical size; `sizes` are EFFECT=VALUE (its first coefficient, or its first shape where it
 /// has no coefficient; others in proportion) or EFFECT.PARAMETER=VALUE. Throws InputError for unknown names.
 [[nodiscard]] std::vector<Rival> rivals_named(const std::vector<std::string>& names,
                                               const std::vector<std::string>& sizes,
                                               const std::vector<Effect>& catalogue, const Drive& drive);
-
-/// Adds the parameters of `rivals` to the members of the credible set of a gap.json: `design --gap` begins from them.
-void add_rivals(Json& result, const std::vector<Rival>& rivals, const std::vector<Effect>& catalogue);
 
 }  // namespace wheelwright::app

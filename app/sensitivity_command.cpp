@@ -14,14 +14,15 @@
 #include <wheelwright/study/local_derivatives.hpp>
 #include <wheelwright/study/study.hpp>
 
+#include <wheelwright/words/study_summary.hpp>
 #include "commands.hpp"
 #include "common.hpp"
 #include "options.hpp"
 #include "progress.hpp"
 #include "run_items.hpp"
-#include "study_summary.hpp"
 
 namespace wheelwright::app {
+using namespace words;
 namespace sensitivity_command {
 namespace {
 

@@ -280,4 +280,30 @@ std::string sentence(const Isolation& isolation) {
          ".";
 }
 
+OnlineModel with_kinematic_outputs(const OnlineModel& model) {
+  OnlineModel view = model;
+  view.robot.effort = EffortKind::torque;  // units are those of the pose
+  view.model = model.kinematic ? kinematic_outputs(*model.kinematic) : Model{};
+  view.persistence = model.kinematic ? model.kinematic->persistence : model.persistence;
+  view.warrant = model.kinematic ? model.kinematic->warrant : model.warrant;
+  return view;
+}
+
+KinematicWatch watch_kinematics(LogSource& log, const OnlineModel& model, const DetectorOptions& options,
+                                const DetectionOptions& detection) {
+  if (!model.kinematic) {
+    return {std::nullopt, "the log that the model was commissioned on had neither a usable pose nor a gyro"};
+  }
+  std::string missing;
+  for (const std::string& name : model.kinematic->measurement.columns()) {
+    if (!log.find(name)) {
+      missing += (missing.empty() ? "" : ", ") + name;
+    }
+  }
+  if (!missing.empty()) {
+    return {std::nullopt, "the log has no " + missing};
+  }
+  return {detect(log, make_detector(*model.kinematic, options), detection), {}};
+}
+
 }  // namespace wheelwright

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -93,6 +94,19 @@ template <RowFilter Filter>
 
 extern template Detection detect(LogSource& log, TorqueDetector detector, const DetectionOptions& options);
 extern template Detection detect(LogSource& log, KinematicDetector detector, const DetectionOptions& options);
+
+/// Detection by the kinematic residual, beside that by the torque residual.
+struct KinematicWatch {
+  std::optional<Detection> detection;  ///< nothing where it was not watched
+  std::string message;                 ///< why not, for people
+};
+
+/// The kinematic residual of `log`, where it and the model have one.
+[[nodiscard]] KinematicWatch watch_kinematics(LogSource& log, const OnlineModel& model, const DetectorOptions& options,
+                                              const DetectionOptions& detection = {});
+
+/// `model` with the outputs of its kinematic model in the place of its own, for whatever reads outputs of a Detection.
+[[nodiscard]] OnlineModel with_kinematic_outputs(const OnlineModel& model);
 
 /// Options of isolate_events().
 struct EventIsolationOptions {

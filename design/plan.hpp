@@ -90,6 +90,8 @@ struct Plan {
   [[nodiscard]] Eigen::Index samples() const { return speed.cols(); }
   /// Time of sample `k`, s.
   [[nodiscard]] double t(Eigen::Index k) const { return step * static_cast<double>(k); }
+  /// Largest distance from the start, m.
+  [[nodiscard]] double reach() const { return pose.topRows<2>().colwise().norm().maxCoeff(); }
 };
 
 /// Largest use of each limit as a share of it: <= 1 within the limits; 0 where there is no limit.

@@ -21,7 +21,7 @@ double rms(const Eigen::MatrixXd& x) { return std::sqrt(x.squaredNorm() / static
 
 }  // namespace
 
-std::string_view words(ManoeuvreKind kind) {
+std::string_view manoeuvre_words(ManoeuvreKind kind) {
   switch (kind) {
     case ManoeuvreKind::standstill: return "standing still";
     case ManoeuvreKind::cruising: return "cruising straight";

@@ -32,7 +32,7 @@ enum class ManoeuvreKind {
 };
 
 /// In words, e.g. "cruising straight".
-[[nodiscard]] std::string_view words(ManoeuvreKind kind);
+[[nodiscard]] std::string_view manoeuvre_words(ManoeuvreKind kind);
 
 /// Kind of manoeuvre of the instants [first, last) of `motion`, by root mean squares over them: standstill below 3 % of
 /// the largest joint speed of the whole motion; of two joints, straight where their difference is below a tenth of

@@ -13,8 +13,10 @@
 #include <wheelwright/results/model_words.hpp>
 #include <wheelwright/robots/robot_file.hpp>
 
-#include "../app/common.hpp"
-#include "../app/summary.hpp"
+#include <wheelwright/results/detection_json.hpp>
+#include <wheelwright/results/software.hpp>
+#include <wheelwright/robots/robot_columns.hpp>
+#include <wheelwright/words/summary.hpp>
 #include "arrays.hpp"
 #include "long_work.hpp"
 #include "module.hpp"
@@ -28,7 +30,7 @@ struct CommissionObject {
   Eigen::VectorXd estimate, standard_error, lower, upper;
 
   [[nodiscard]] bool has_model() const { return !result->model.facets.empty(); }
-  [[nodiscard]] Json json() const { return wheelwright::to_json(*result, data, app::software()); }
+  [[nodiscard]] Json json() const { return wheelwright::to_json(*result, data, software()); }
 };
 
 std::unique_ptr<CommissionObject> run(LogObject& log, const RobotObject& robot, bool statistical, std::size_t outliers,
@@ -41,7 +43,7 @@ std::unique_ptr<CommissionObject> run(LogObject& log, const RobotObject& robot, 
   options.progress = work.teller();
   return work.run([&] {
     const LogWalk walk(log);
-    require_columns(*log.source, app::needed_columns(robot.robot));
+    require_columns(*log.source, needed_columns(robot.robot));
     WatchedLog source(*log.source, work);
     auto out = std::make_unique<CommissionObject>();
     out->result = std::make_shared<const Commissioning>(
@@ -203,7 +205,8 @@ void bind_commission(py::module_& m) {
       .def_property_readonly("rank", [](const CommissionObject& c) { return c.result->rank; })
       .def_property_readonly("condition", [](const CommissionObject& c) { return c.result->condition; })
       .def_property_readonly(
-          "summary", [](const CommissionObject& c) { return app::summary(*c.result); }, "what the command line prints")
+          "summary", [](const CommissionObject& c) { return words::summary(*c.result); },
+          "what the command line prints")
       .def(
           "to_dict", [](const CommissionObject& c) { return to_python(c.json()); },
           "The content of model.json (results/model.schema.json).")

@@ -9,8 +9,10 @@
 #include <wheelwright/commission/detector_walk.hpp>
 #include <wheelwright/core/check.hpp>
 
-#include "../app/common.hpp"
-#include "../app/summary.hpp"
+#include <wheelwright/results/detection_json.hpp>
+#include <wheelwright/results/software.hpp>
+#include <wheelwright/robots/robot_columns.hpp>
+#include <wheelwright/words/summary.hpp>
 #include "arrays.hpp"
 #include "detector_run.hpp"
 #include "long_work.hpp"
@@ -105,21 +107,21 @@ struct DetectionObject {
   ModelObject model;
   std::string log;
   Detection detection;
-  app::KinematicWatch kinematic;
+  KinematicWatch kinematic;
   std::vector<Isolation> isolations;
 
   [[nodiscard]] bool fault() const {
     return !detection.events.empty() || (kinematic.detection && !kinematic.detection->events.empty());
   }
   [[nodiscard]] Json json() const {
-    Json json = app::to_json(detection, *model.model, model.path, log);
-    app::add_isolation(json, isolations);
-    app::add_kinematic(json, kinematic, *model.model);
+    Json json = to_json(detection, *model.model, model.path, log, software());
+    add_isolation(json, isolations);
+    add_kinematic(json, kinematic, *model.model);
     return json;
   }
   [[nodiscard]] std::string summary() const {
-    return app::summary(detection, *model.model) + app::summary(isolations, detection) +
-           app::summary(kinematic, *model.model);
+    return words::summary(detection, *model.model) + words::summary(isolations, detection) +
+           words::summary(kinematic, *model.model);
   }
 };
 
@@ -143,7 +145,7 @@ DetectionObject detect_in(LogObject& log, const ModelObject& given, const std::s
     tell("the torque residual", 0.0);
     out.detection = detect(source, make_detector(*model, own));
     tell("the kinematic residual", 0.4);
-    out.kinematic = app::watch_kinematics(source, *model, own);
+    out.kinematic = watch_kinematics(source, *model, own);
     tell("what the events can be", 0.8);
     EventIsolationOptions isolation;
     isolation.isolation.threads = threads;
@@ -274,7 +276,7 @@ void bind_detector(py::module_& m) {
           "kinematic_events",
           [](const DetectionObject& d) {
             return d.kinematic.detection
-                       ? named(d.kinematic.detection->events, app::with_kinematic_outputs(*d.model.model).model.outputs)
+                       ? named(d.kinematic.detection->events, with_kinematic_outputs(*d.model.model).model.outputs)
                        : std::vector<EventObject>{};
           },
           "of wheel odometry against pose or gyro")

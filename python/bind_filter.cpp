@@ -14,8 +14,9 @@
 #include <wheelwright/results/identification_json.hpp>
 #include <wheelwright/robots/robot_file.hpp>
 
-#include "../app/common.hpp"
-#include "../app/identify_summary.hpp"
+#include <wheelwright/results/software.hpp>
+#include <wheelwright/robots/robot_columns.hpp>
+#include <wheelwright/words/identify_summary.hpp>
 #include "arrays.hpp"
 #include "long_work.hpp"
 #include "module.hpp"
@@ -44,7 +45,7 @@ std::unique_ptr<RegressionObject> filtered(LogObject& log, const RobotObject& ro
       out->model = m.model;
       out->filter = m.filter;
     } else {
-      require_columns(*log.source, app::needed_columns(robot.robot));
+      require_columns(*log.source, needed_columns(robot.robot));
       SettingOptions options;
       options.progress = work.teller();
       const Setting setting =
@@ -98,7 +99,7 @@ struct IdentificationObject {
   Identification result;
   LogReport data;
   std::uint64_t seed = 1;
-  [[nodiscard]] Json json() const { return wheelwright::to_json(result, data, app::software(), seed); }
+  [[nodiscard]] Json json() const { return wheelwright::to_json(result, data, software(), seed); }
 };
 
 std::unique_ptr<IdentificationObject> identify_log(LogObject& log, const RobotObject& robot, bool shapes,
@@ -111,7 +112,7 @@ std::unique_ptr<IdentificationObject> identify_log(LogObject& log, const RobotOb
   return work.run([&] {
     const LogWalk walk(log);
     const RecordedLog& given = *log.source;
-    const std::vector<std::string> needed = app::needed_columns(robot.robot);
+    const std::vector<std::string> needed = needed_columns(robot.robot);
     const bool efforts = std::any_of(needed.begin(), needed.end(),
                                      [&](const std::string& name) { return given.find(name).has_value(); });
     if (efforts || !on_two_wheels(robot.robot) || !given.find("theta")) {
@@ -205,7 +206,7 @@ void bind_filter(py::module_& m) {
   m.def("least_squares", &fit, py::arg("Y"), py::arg("y"),
         "min |y - Y theta|^2 by sequential QR. Y of shape (rows, p), y (rows,). The interpreter's lock is released.");
   py::class_<IdentificationObject>(m, "Identification", "What `wheelwright identify` says of a log.")
-      .def_property_readonly("summary", [](const IdentificationObject& i) { return app::summary(i.result); })
+      .def_property_readonly("summary", [](const IdentificationObject& i) { return words::summary(i.result); })
       .def_property_readonly("notes", [](const IdentificationObject& i) { return i.result.notes; })
       .def(
           "to_dict", [](const IdentificationObject& i) { return to_python(i.json()); },

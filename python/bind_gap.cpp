@@ -11,13 +11,14 @@
 #include <wheelwright/gap/diagnose.hpp>
 #include <wheelwright/gap/effect.hpp>
 #include <wheelwright/logs/log_file.hpp>
-#include <wheelwright/report/gap_words.hpp>
 #include <wheelwright/results/gap_json.hpp>
 #include <wheelwright/robots/robot_file.hpp>
+#include <wheelwright/words/gap_words.hpp>
 
-#include "../app/common.hpp"
-#include "../app/next_manoeuvre.hpp"
-#include "../app/rivals.hpp"
+#include <wheelwright/gap/next_drive.hpp>
+#include <wheelwright/results/rival_json.hpp>
+#include <wheelwright/results/software.hpp>
+#include <wheelwright/robots/robot_columns.hpp>
 #include "arrays.hpp"
 #include "effect_object.hpp"
 #include "long_work.hpp"
@@ -28,7 +29,7 @@ namespace {
 
 struct DiagnosisObject {
   Diagnosis diagnosis;
-  app::NextDrive next;
+  NextDrive next;
   Json json;
 };
 
@@ -70,7 +71,7 @@ std::shared_ptr<DiagnosisObject> gap(LogObject& log, const RobotObject& robot, L
   LongWork work(std::move(progress));
   options.progress = work.teller();
   return work.run([&] {
-    const std::vector<std::string> needed = app::needed_columns(robot.robot);
+    const std::vector<std::string> needed = needed_columns(robot.robot);
     const LogWalk walk(log);
     const Robot measured = with_column_errors(robot.robot, interpolation_errors(log.source->report()));
     require_columns(*log.source, needed);
@@ -93,17 +94,18 @@ std::shared_ptr<DiagnosisObject> gap(LogObject& log, const RobotObject& robot, L
       d.shrink.fresh_torque_rms = torque_on(fresh_source, healthy, measured, d, options);
     }
     if (manoeuvre) {
-      out->next = app::what_next(source, healthy, measured, d, options);
+      out->next = what_next(source, healthy, measured, d, options);
     }
     for (std::vector<std::string>* texts : {&d.notes, &d.not_excited}) {
       for (std::string& text : *texts) {
-        text = app::in_words(text, catalogue);
+        text = words::in_words(text, catalogue);
       }
     }
+    out->next.sentence = words::in_words(out->next.sentence, catalogue);
     const std::string promise = out->next.commands ? out->next.sentence : "";
     if (d.summary.empty()) {
-      d.summary = report::gap_verdict(d);
-      for (const std::string& sentence : report::gap_sentences(d, promise)) {
+      d.summary = words::gap_verdict(d);
+      for (const std::string& sentence : words::gap_sentences(d, promise)) {
         d.summary += " " + sentence;
       }
     }
@@ -111,13 +113,13 @@ std::shared_ptr<DiagnosisObject> gap(LogObject& log, const RobotObject& robot, L
     files.robot = robot.path;
     files.logs = log.paths();
     files.baseline = baseline != nullptr ? baseline->name() : "";
-    files.software = app::software();
+    files.software = software();
     if (out->next.commands) {
       files.next_manoeuvre = NextManoeuvre{"", promise};
     }
     out->json = wheelwright::to_json(d, files);
     out->json["improved"] = nullptr;
-    app::add_rivals(out->json, out->next.rivals, catalogue);
+    add_rivals(out->json, out->next.rivals, catalogue);
     return out;
   });
 }
@@ -130,7 +132,7 @@ void bind_cause(py::module_& m) {
       .def_readonly("lower", &GapEstimate::lower)
       .def_readonly("upper", &GapEstimate::upper)
       .def("__repr__", [](const GapEstimate& e) {
-        return "<wheelwright.GapEstimate " + e.name + ": " + report::estimate_words(e) + ">";
+        return "<wheelwright.GapEstimate " + e.name + ": " + words::estimate_words(e) + ">";
       });
   py::class_<GapCause>(m, "GapCause", "One cause of the best combination.")
       .def_readonly("effect", &GapCause::effect)

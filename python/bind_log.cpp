@@ -12,7 +12,8 @@
 #include <wheelwright/logs/log_columns.hpp>
 #include <wheelwright/logs/log_file.hpp>
 
-#include "../app/common.hpp"
+#include <wheelwright/results/software.hpp>
+#include <wheelwright/robots/robot_columns.hpp>
 #include "array_log.hpp"
 #include "arrays.hpp"
 #include "long_work.hpp"
@@ -56,7 +57,7 @@ LogOptions reader_options(const RobotObject* robot, const std::map<std::string, 
     }
   }
   if (robot != nullptr) {
-    options.only = app::useful_columns(robot->robot);
+    options.only = useful_columns(robot->robot);
   }
   return options;
 }

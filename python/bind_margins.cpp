@@ -8,11 +8,12 @@
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/commission/margin_survey.hpp>
-#include <wheelwright/commission/margin_words.hpp>
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/results/margins_json.hpp>
+#include <wheelwright/words/margin_words.hpp>
 
-#include "../app/common.hpp"
+#include <wheelwright/results/software.hpp>
+#include <wheelwright/robots/robot_columns.hpp>
 #include "arrays.hpp"
 #include "long_work.hpp"
 #include "module.hpp"
@@ -23,7 +24,7 @@ namespace {
 struct MarginsObject {
   MarginSurvey survey;
   std::string model, log;
-  [[nodiscard]] Json json() const { return wheelwright::to_json(survey, model, log, app::software()); }
+  [[nodiscard]] Json json() const { return wheelwright::to_json(survey, model, log, software()); }
 };
 
 using Rule = std::optional<std::pair<std::size_t, std::size_t>>;
@@ -61,10 +62,10 @@ std::optional<ManoeuvreKind> kind_called(const std::optional<std::string>& name)
   std::string known;
   for (const ManoeuvreKind kind : {ManoeuvreKind::standstill, ManoeuvreKind::cruising, ManoeuvreKind::accelerating,
                                    ManoeuvreKind::turning, ManoeuvreKind::spinning}) {
-    if (words(kind) == *name) {
+    if (manoeuvre_words(kind) == *name) {
       return kind;
     }
-    known += (known.empty() ? "" : ", ") + std::string(words(kind));
+    known += (known.empty() ? "" : ", ") + std::string(manoeuvre_words(kind));
   }
   throw InvalidArgument("manoeuvre '" + *name + "': expected one of " + known);
 }
@@ -93,7 +94,7 @@ void bind_fault(py::module_& m) {
           [](const FaultMargins& f) {
             std::vector<std::string> kinds;
             for (const OnsetMargin& onset : f.onsets) {
-              kinds.emplace_back(words(onset.kind));
+              kinds.emplace_back(manoeuvre_words(onset.kind));
             }
             return kinds;
           },

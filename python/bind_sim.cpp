@@ -15,8 +15,10 @@
 #include <wheelwright/results/scenario_file.hpp>
 #include <wheelwright/sim/simulation.hpp>
 
-#include "../app/common.hpp"
-#include "../app/design_result.hpp"
+#include <wheelwright/results/design_json.hpp>
+#include <wheelwright/results/software.hpp>
+#include <wheelwright/robots/robot_columns.hpp>
+#include <wheelwright/words/design_summary.hpp>
 #include "array_log.hpp"
 #include "arrays.hpp"
 #include "long_work.hpp"
@@ -113,7 +115,7 @@ std::unique_ptr<DesignObject> design(const std::variant<const ModelObject*, cons
     const DesignSubject subject = from_model ? subject_of(*std::get<0>(of)->model) : subject_of(robot, 1.0 / rate);
     auto out = std::make_unique<DesignObject>();
     const auto finish = [&](const auto& made) {
-      out->json["software"] = app::software();
+      out->json["software"] = software();
       out->json["seed"] = seed;
       out->json["warrant"] = warrant_word(subject.warrant);
       out->commands = command_table(made.manoeuvre.plan, subject.model);
@@ -128,13 +130,13 @@ std::unique_ptr<DesignObject> design(const std::variant<const ModelObject*, cons
       options.steps = 250;
       const OnlineModel& model = *std::get<0>(of)->model;
       const DetectionDesign made = design_for_detection(model, subject, limits, inspected(faults, model), options);
-      out->json = app::to_json(made, limits);
-      out->summary = app::summary(made);
+      out->json = to_json(made, limits);
+      out->summary = words::summary(made);
       finish(made);
     } else {
       const BoundsDesign made = design_for_bounds(subject, limits, wanted, options);
-      out->json = app::to_json(made, subject, limits);
-      out->summary = app::summary(made, subject);
+      out->json = to_json(made, subject, limits);
+      out->summary = words::summary(made, subject);
       finish(made);
     }
     return out;

@@ -8,7 +8,8 @@
 
 #include <wheelwright/core/check.hpp>
 
-#include "../app/common.hpp"
+#include <wheelwright/results/software.hpp>
+#include <wheelwright/robots/robot_columns.hpp>
 
 namespace wheelwright::python {
 
@@ -72,7 +73,7 @@ PYBIND11_MODULE(_core, m) {
   namespace py = pybind11;
   using namespace wheelwright::python;
   m.doc() = "The compiled part of the package wheelwright.";
-  m.attr("software") = wheelwright::app::software();
+  m.attr("software") = wheelwright::software();
   const py::object value_error = py::reinterpret_borrow<py::object>(PyExc_ValueError);
   const py::object exception = py::reinterpret_borrow<py::object>(PyExc_Exception);
   static const py::object error =

@@ -7,15 +7,16 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/report/commission_words.hpp>
 #include <wheelwright/report/data_sections.hpp>
 #include <wheelwright/report/drawing.hpp>
 #include <wheelwright/report/page.hpp>
 #include <wheelwright/report/parameter_table.hpp>
 #include <wheelwright/report/signals.hpp>
-#include <wheelwright/report/text.hpp>
+#include <wheelwright/words/commission_words.hpp>
+#include <wheelwright/words/text.hpp>
 
 namespace wheelwright {
+using namespace words;
 
 using namespace report;
 
@@ -52,10 +53,10 @@ std::vector<ChartMark> deciding_marks(const Commissioning& result, std::optional
     const std::vector<ParameterViews> views = parameter_views(result);
     for (std::size_t j = 0; j < views.size(); ++j) {
       for (const RowOrigin& o : result.parameters[j].lower_binding) {
-        add(o, words(views[j].best().name) + " ≥", true);
+        add(o, spaced(views[j].best().name) + " ≥", true);
       }
       for (const RowOrigin& o : result.parameters[j].upper_binding) {
-        add(o, words(views[j].best().name) + " ≤", true);
+        add(o, spaced(views[j].best().name) + " ≤", true);
       }
     }
   }

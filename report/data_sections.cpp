@@ -7,13 +7,14 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/report/commission_words.hpp>
 #include <wheelwright/report/drawing.hpp>
 #include <wheelwright/report/page.hpp>
 #include <wheelwright/report/parameter_table.hpp>
-#include <wheelwright/report/text.hpp>
+#include <wheelwright/words/commission_words.hpp>
+#include <wheelwright/words/text.hpp>
 
 namespace wheelwright::report {
+using namespace words;
 namespace {
 
 std::string unit_cell(const Commissioning& result, std::size_t i) {

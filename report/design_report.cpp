@@ -8,14 +8,15 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/commission/margin_words.hpp>
 #include <wheelwright/commission/physical.hpp>
 #include <wheelwright/report/chart.hpp>
 #include <wheelwright/report/drawing.hpp>
 #include <wheelwright/report/page.hpp>
-#include <wheelwright/report/text.hpp>
+#include <wheelwright/words/margin_words.hpp>
+#include <wheelwright/words/text.hpp>
 
 namespace wheelwright {
+using namespace words;
 
 using namespace report;
 
@@ -52,7 +53,7 @@ std::string bounds_table(const BoundsDesign& design, const DesignSubject& subjec
     const Parameter& parameter = subject.model.parameters[j];
     const double scale = scales ? (*scales)[j].scale : 1.0;
     const double centre = subject.theta[static_cast<Eigen::Index>(j)] * scale - (scales ? (*scales)[j].offset : 0.0);
-    std::vector<Cell> row = {escape(words(scales ? parameter.physical : parameter.name)),
+    std::vector<Cell> row = {escape(spaced(scales ? parameter.physical : parameter.name)),
                              escape(scales ? parameter.physical_unit : parameter_unit(subject.robot, parameter)),
                              numeric(number(centre)), numeric(half_width(design.promised.sides[j], scale, centre))};
     if (subject.known) {
@@ -159,10 +160,10 @@ std::string faults_table(const DetectionDesign& design, const DesignSubject& sub
     const bool found = std::isfinite(p.smallest);
     const bool sides = p.fault.range.lower < 0.0 && !p.fault.whole;
     std::vector<Cell> row = {
-        escape(capital(words(p.fault.name)) + (sides ? p.side > 0.0 ? ", growing" : ", shrinking" : "")),
+        escape(capital(spaced(p.fault.name)) + (sides ? p.side > 0.0 ? ", growing" : ", shrinking" : "")),
         numeric(escape(magnitude_words(p.fault, p.asked))), numeric(escape(magnitude_words(p.fault, p.smallest))),
         numeric(found ? with_unit(number(p.t), "s") : "–"),
-        found ? escape(words(subject.model.outputs[p.output])) : "–"};
+        found ? escape(spaced(subject.model.outputs[p.output])) : "–"};
     if (design.figure_eight) {
       row.push_back(numeric(escape(magnitude_words(p.fault, design.promised_eight[k].smallest))));
     }
@@ -189,8 +190,8 @@ std::string separations_table(const DiscriminationDesign& design) {
   for (std::size_t k = 0; k < design.promised.size(); ++k) {
     const RivalSeparation& pair = design.promised[k];
     const double chance = pair.probability();
-    std::vector<Cell> row = {escape(words(design.rivals[pair.truth].name())),
-                             escape(words(design.rivals[pair.other].name())), numeric(number(pair.deviations())),
+    std::vector<Cell> row = {escape(spaced(design.rivals[pair.truth].name())),
+                             escape(spaced(design.rivals[pair.other].name())), numeric(number(pair.deviations())),
                              numeric(chance > 0.999 ? "> 99.9 %" : percent(chance)), numeric(number(pair.ratio()))};
     if (!design.analysed.empty()) {
       row.push_back(numeric(number(design.analysed[k].deviations())));

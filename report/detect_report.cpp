@@ -7,13 +7,14 @@
 #include <fmt/format.h>
 
 #include <wheelwright/report/data_sections.hpp>
-#include <wheelwright/report/detect_words.hpp>
 #include <wheelwright/report/page.hpp>
 #include <wheelwright/report/parameter_table.hpp>
 #include <wheelwright/report/signals.hpp>
-#include <wheelwright/report/text.hpp>
+#include <wheelwright/words/detect_words.hpp>
+#include <wheelwright/words/text.hpp>
 
 namespace wheelwright {
+using namespace words;
 
 using namespace report;
 
@@ -99,8 +100,8 @@ std::string isolation_section(const std::vector<Isolation>& isolations, const De
     for (const FaultFinding& f : isolations[k].findings) {
       switch (f.verdict) {
         case Verdict::consistent: possible.push_back(capital(sentence(f))); break;
-        case Verdict::excluded: excluded.push_back(words(f.fault.name)); break;
-        case Verdict::not_examined: open.push_back(words(f.fault.name)); break;
+        case Verdict::excluded: excluded.push_back(spaced(f.fault.name)); break;
+        case Verdict::not_examined: open.push_back(spaced(f.fault.name)); break;
       }
     }
     const Event& e = detection.events[k];

@@ -15,9 +15,10 @@
 
 #include <wheelwright/report/page.hpp>
 #include <wheelwright/report/parameter_table.hpp>
-#include <wheelwright/report/text.hpp>
+#include <wheelwright/words/text.hpp>
 
 namespace wheelwright::report {
+using namespace words;
 
 std::string open_svg(double width, double height, const std::string& label) {
   return fmt::format(
@@ -273,7 +274,7 @@ std::string outline(const Polytope& set, std::size_t i, std::size_t j, const Sid
 }
 
 std::string projection(const Polytope& set, std::size_t i, std::size_t j, const Side& across, const Side& up) {
-  const std::string x_name = words(across.view->name), y_name = words(up.view->name);
+  const std::string x_name = spaced(across.view->name), y_name = spaced(up.view->name);
   std::string out = fmt::format(
       "<div><h3>{3} and {4}</h3><svg viewBox=\"0 0 {0:.0f} {1:.0f}\" width=\"{0:.0f}\" height=\"{1:.0f}\" role=\"img\" "
       "aria-label=\"feasible set: {3} and {4}\"><rect x=\"{5}\" y=\"{6}\" width=\"{2}\" height=\"{2}\" "

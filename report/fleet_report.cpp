@@ -12,9 +12,10 @@
 #include <wheelwright/report/chart.hpp>
 #include <wheelwright/report/data_sections.hpp>
 #include <wheelwright/report/page.hpp>
-#include <wheelwright/report/text.hpp>
+#include <wheelwright/words/text.hpp>
 
 namespace wheelwright::report {
+using namespace words;
 namespace {
 
 constexpr double kFleetWidth = 860.0, kHeight = 240.0, kFleetLeft = 74.0, kFleetRight = 10.0, kFleetTop = 10.0,
@@ -102,7 +103,7 @@ std::string fleet_strip(const FleetResult& fleet, std::size_t parameter) {
   axis.take(lower[tenth]);
   axis.take(upper[shown.size() - 1 - tenth]);
   axis.pad(0.08);
-  std::string out = frame(axis, "bounds of " + words(column.name) + " of all robots", column.unit,
+  std::string out = frame(axis, "bounds of " + spaced(column.name) + " of all robots", column.unit,
                           fmt::format("{}, sorted by estimate", plural(shown.size(), "robot")));
   if (population.described) {
     const double two = 2.0 * population.fit.spread;
@@ -164,7 +165,7 @@ std::string slope_strip(const FleetResult& fleet, std::size_t column, std::size_
   axis.pad(0.05);
   const FleetColumn& of = fleet.table.columns[column];
   std::string out =
-      frame(axis, "slopes of " + words(of.name), of.unit + (shown.front()->dated ? " per week" : " per log"),
+      frame(axis, "slopes of " + spaced(of.name), of.unit + (shown.front()->dated ? " per week" : " per log"),
             fmt::format("{}, worst first", plural(shown.size(), "robot")));
   const double step = (kFleetWidth - kFleetLeft - kFleetRight) / static_cast<double>(shown.size());
   out += fmt::format("<line x1=\"{}\" x2=\"{}\" y1=\"{:.1f}\" y2=\"{:.1f}\" style=\"stroke:var(--ink)\"/>", kFleetLeft,
@@ -218,12 +219,12 @@ std::string population_section(const FleetResult& fleet) {
     const FleetColumn& column = fleet.table.columns[p.column];
     const auto cell = [&](double x) { return numeric(p.described ? number(x) : std::string("–")); };
     const auto range = outward(p.central.lower, p.central.upper);
-    rows.push_back({escape(capital(words(column.name))) + "<small>" + escape(column.unit) + "</small>",
+    rows.push_back({escape(capital(spaced(column.name))) + "<small>" + escape(column.unit) + "</small>",
                     numeric(count(p.shown)), cell(p.fit.centre), cell(p.fit.spread), cell(p.typical_error),
                     numeric(p.described ? "[" + range.first + ", " + range.second + "]" : "–")});
     const std::string strip = fleet_strip(fleet, j);
     if (!strip.empty()) {
-      strips += "<h3>" + escape(capital(words(column.name))) + "</h3>" + strip;
+      strips += "<h3>" + escape(capital(spaced(column.name))) + "</h3>" + strip;
     }
   }
   if (rows.empty()) {
@@ -254,7 +255,7 @@ std::string outside_section(const FleetResult& fleet) {
              [&](const RobotOutside& o) -> std::vector<Cell> {
                const FleetColumn& column = fleet.table.columns[o.column];
                return {robot_name(fleet, o.robot),
-                       escape(words(column.name)),
+                       escape(spaced(column.name)),
                        numeric(escape(with_unit(number(o.value, 4), column.unit))),
                        numeric(number(o.deviations)),
                        numeric(number(o.adjusted_p, 2)),
@@ -278,7 +279,7 @@ std::string drift_section(const FleetResult& fleet) {
                               const FleetColumn& column = fleet.table.columns[d.column];
                               const std::string per = column.unit + (d.dated ? "/week" : " a log");
                               return {robot_name(fleet, d.robot),
-                                      escape(words(column.name)),
+                                      escape(spaced(column.name)),
                                       numeric(d.certain == 0.0 ? std::string("–")
                                                                : escape((d.certain > 0.0 ? "at least +" : "at most ") +
                                                                         with_unit(number(d.certain, 3), column.unit)) +
@@ -299,7 +300,7 @@ std::string drift_section(const FleetResult& fleet) {
     const bool any = std::any_of(drifting.begin(), drifting.end(), [&](const auto& d) { return d.column == j; });
     const std::string strip = any ? slope_strip(fleet, j) : std::string();
     if (!strip.empty()) {
-      out += "<h3>" + escape(capital(words(fleet.table.columns[j].name))) + "</h3>" + strip;
+      out += "<h3>" + escape(capital(spaced(fleet.table.columns[j].name))) + "</h3>" + strip;
     }
   }
   return out;
@@ -323,7 +324,7 @@ std::string threshold_section(const FleetResult& fleet) {
   std::vector<std::vector<Cell>> rows;
   const auto take = [&](const FleetSpread& s, const auto& text) {
     if (!s.values.empty()) {
-      rows.push_back({escape(capital(words(s.name))), numeric(count(s.values.size())), numeric(text(s.quantile(0.0))),
+      rows.push_back({escape(capital(spaced(s.name))), numeric(count(s.values.size())), numeric(text(s.quantile(0.0))),
                       numeric(text(s.quantile(0.5))), numeric(text(s.quantile(0.95))), numeric(text(s.largest)),
                       robot_name(fleet, s.largest_robot)});
     }
@@ -347,7 +348,7 @@ std::string prior_section(const FleetResult& fleet) {
   for (const PooledParameter& p : prior.parameters) {
     const FleetColumn& column = fleet.table.columns[p.column];
     const auto before = outward(p.before.lower, p.before.upper), box = outward(p.box.lower, p.box.upper);
-    rows.push_back({escape(capital(words(column.name))) + "<small>" + escape(column.unit) + "</small>",
+    rows.push_back({escape(capital(spaced(column.name))) + "<small>" + escape(column.unit) + "</small>",
                     numeric("[" + before.first + ", " + before.second + "]"),
                     numeric(p.included ? "[" + box.first + ", " + box.second + "]" : "–"), escape(p.reason)});
   }

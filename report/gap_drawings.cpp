@@ -12,9 +12,10 @@
 
 #include <wheelwright/gap/where.hpp>
 #include <wheelwright/report/drawing.hpp>
-#include <wheelwright/report/text.hpp>
+#include <wheelwright/words/text.hpp>
 
 namespace wheelwright::report {
+using namespace words;
 namespace {
 
 std::string line(double x1, double y1, double x2, double y2, const std::string& style) {
@@ -85,7 +86,7 @@ std::string shrink_bars(const std::vector<ShrinkFigure>& figures) {
     const double largest = std::max({std::isfinite(f.before) ? f.before : 0.0, std::isfinite(f.after) ? f.after : 0.0,
                                      std::isfinite(f.upper) ? f.upper : 0.0, f.floor, 1e-300});
     const char* known = figure_words(f.name);
-    out += svg_text(left - 10.0, y + 18.0, "end", known != nullptr ? known : words(f.name), true);
+    out += svg_text(left - 10.0, y + 18.0, "end", known != nullptr ? known : spaced(f.name), true);
     const auto size = [&](double value) { return f.unit == "1" ? percent(value) : with_unit(number(value), f.unit); };
     const auto bar = [&](double value, const char* name, const char* style, const std::string& note) {
       if (!std::isfinite(value)) {
@@ -327,7 +328,7 @@ std::string confusability_matrix(const std::vector<ConfusablePair>& pairs, std::
   }
   for (std::size_t row = 1; row < names.size(); ++row) {
     const double y = slant + cell * static_cast<double>(row - 1);
-    out += svg_text(left - 8.0, y + 21.0, "end", words(names[row]), true);
+    out += svg_text(left - 8.0, y + 21.0, "end", spaced(names[row]), true);
     for (std::size_t column = 0; column < row; ++column) {
       const double x = left + cell * static_cast<double>(column);
       const auto found = cells.find({row, column});
@@ -345,7 +346,7 @@ std::string confusability_matrix(const std::vector<ConfusablePair>& pairs, std::
     const double x = left + cell * (static_cast<double>(column) + 0.55),
                  y = slant + cell * static_cast<double>(column) - 6.0;
     out += fmt::format("<text class=\"ink\" transform=\"translate({:.1f} {:.1f}) rotate(-45)\">{}</text>", x, y,
-                       escape(words(names[column])));
+                       escape(spaced(names[column])));
   }
   return out + "</svg>";
 }

@@ -13,12 +13,13 @@
 #include <wheelwright/gap/where.hpp>
 #include <wheelwright/report/chart.hpp>
 #include <wheelwright/report/gap_drawings.hpp>
-#include <wheelwright/report/gap_words.hpp>
 #include <wheelwright/report/page.hpp>
 #include <wheelwright/report/signals.hpp>
-#include <wheelwright/report/text.hpp>
+#include <wheelwright/words/gap_words.hpp>
+#include <wheelwright/words/text.hpp>
 
 namespace wheelwright {
+using namespace words;
 
 using namespace report;
 
@@ -35,8 +36,8 @@ const char* status_of(GapVerdict verdict) {
 }
 
 std::string channel_title(const ResidualSeries& s) {
-  return s.space == GapSpace::dynamic ? "Torque residual of the " + words(s.channel) + " channel"
-                                      : "Pose against wheel odometry, " + words(s.channel);
+  return s.space == GapSpace::dynamic ? "Torque residual of the " + spaced(s.channel) + " channel"
+                                      : "Pose against wheel odometry, " + spaced(s.channel);
 }
 
 std::string p_words(double p) { return p < 0.001 ? "< 0.001" : decimal(p, 3); }
@@ -220,7 +221,7 @@ std::string where_section(const Diagnosis& d, const TimeAxis& axis) {
   for (const GapShare& s : d.where) {
     if (s.kind == "channel") {
       channels.push_back(s);
-      channels.back().regime = (s.space == GapSpace::dynamic ? "torque, " : "pose, ") + words(s.channel);
+      channels.back().regime = (s.space == GapSpace::dynamic ? "torque, " : "pose, ") + spaced(s.channel);
     }
   }
   if (channels.size() > 1) {
@@ -279,7 +280,7 @@ std::string parameters_section(const Diagnosis& d) {
   for (const ParameterShift& p : d.parametric) {
     const auto [low, high] = outward(p.lower, p.upper);
     const double base = p.nominal.value_or(p.estimate);
-    rows.push_back({escape(capital(words(p.parameter))), escape(unit_of(p.unit)),
+    rows.push_back({escape(capital(spaced(p.parameter))), escape(unit_of(p.unit)),
                     numeric(p.nominal ? number(*p.nominal, 4) : "–"), numeric(number(p.without_causes, 4)),
                     numeric(base != 0.0 ? fmt::format("{}{}\u00a0%", p.without_causes >= base ? "+" : "−",
                                                       number(100.0 * std::abs(p.without_causes / base - 1.0), 2))
@@ -300,7 +301,7 @@ std::string contradiction_section(const Diagnosis& d, const TimeAxis& axis) {
   }
   std::vector<std::vector<Cell>> rows;
   for (const Contradiction& c : d.contradictions) {
-    rows.push_back({time_button(c.t - 1.0, c.t + 1.0, axis.text(c.t), axis), escape(words(c.channel)),
+    rows.push_back({time_button(c.t - 1.0, c.t + 1.0, axis.text(c.t), axis), escape(spaced(c.channel)),
                     numeric(percent(c.weight, 2))});
   }
   const bool one = d.contradictions.size() == 1;

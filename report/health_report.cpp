@@ -9,9 +9,10 @@
 
 #include <wheelwright/report/page.hpp>
 #include <wheelwright/report/signals.hpp>
-#include <wheelwright/report/text.hpp>
+#include <wheelwright/words/text.hpp>
 
 namespace wheelwright {
+using namespace words;
 
 using namespace report;
 

@@ -11,12 +11,13 @@
 
 #include <wheelwright/core/statistics.hpp>
 #include <wheelwright/identify/noise_level.hpp>
-#include <wheelwright/inference/identification_words.hpp>
 #include <wheelwright/report/page.hpp>
 #include <wheelwright/report/signals.hpp>
-#include <wheelwright/report/text.hpp>
+#include <wheelwright/words/identification_words.hpp>
+#include <wheelwright/words/text.hpp>
 
 namespace wheelwright::report {
+using namespace words;
 namespace {
 
 // 1, 2 or 5 times a power of ten, so that about `parts` of them make up `span`.
@@ -84,7 +85,7 @@ std::string information_bars(const InformationOverTime& information, const std::
     const ParameterInformation& p = information.parameters[j];
     const double base = top + row * static_cast<double>(j + 1) - 6.0, full = row - 12.0;
     out += fmt::format("<text class=\"ink\" x=\"{}\" y=\"{:.1f}\" text-anchor=\"end\">{}</text>", left - 8.0,
-                       base - 0.5 * full + 4.0, escape(words(j < names.size() ? names[j] : "")));
+                       base - 0.5 * full + 4.0, escape(spaced(j < names.size() ? names[j] : "")));
     out += fmt::format("<line class=\"axis\" x1=\"{0}\" x2=\"{1}\" y1=\"{2:.1f}\" y2=\"{2:.1f}\"/>", left, width - 14.0,
                        base);
     const double largest = p.share.size() > 0 ? p.share.maxCoeff() : 0.0;
@@ -122,7 +123,7 @@ std::string shape_curve(const ShapeFinding& shape) {
   const double unit = shape.unit == "s" ? 1e3 : 1.0;
   std::string out = fmt::format(
       "<svg viewBox=\"0 0 {0} 186\" width=\"{0}\" height=\"186\" role=\"img\" aria-label=\"residual over {1}\">", width,
-      escape(words(shape.name)));
+      escape(spaced(shape.name)));
   out += ticks_below(x, 12.0, bottom, unit, 6.0);
   const double step = round_step(100.0 * (y.high - y.low), 4.0);
   for (double at = std::ceil(100.0 * y.low / step) * step; at <= 100.0 * y.high; at += step) {
@@ -141,13 +142,13 @@ std::string shape_curve(const ShapeFinding& shape) {
                        y(shape.residual_ratio));
   }
   return out + fmt::format("<text x=\"{:.1f}\" y=\"180\" text-anchor=\"middle\">{}, {}</text></svg>",
-                           0.5 * (left + width), escape(words(shape.name)),
+                           0.5 * (left + width), escape(spaced(shape.name)),
                            escape(shape.unit == "s" ? "ms" : shape.unit));
 }
 
 namespace {
 
-std::string name_of(std::string_view identifier) { return capital(words(identifier)); }
+std::string name_of(std::string_view identifier) { return capital(spaced(identifier)); }
 
 bool excluded(const Identification& r, std::size_t j) {
   return j < r.fit.excitation.size() && r.fit.excitation[j].state == Excitation::not_excited;
@@ -194,7 +195,7 @@ std::string test_words(const EstimatorChoice& choice) {
   if (!choice.tested_against || !choice.test.made) {
     return {};
   }
-  const std::string other = words(to_string(choice.candidates[*choice.tested_against].estimate.estimator));
+  const std::string other = spaced(to_string(choice.candidates[*choice.tested_against].estimate.estimator));
   const double p = choice.test.p_value;
   return paragraph(
       fmt::format("Least squares against {} (Durbin, Wu and Hausman’s test): p = {}, {}.", escape(other), number(p, 2),
@@ -219,7 +220,7 @@ std::string comparison_section(const Identification& r) {
   }
   std::vector<Cell> header = {"By"};
   for (const ShownParameter& p : shown_parameters(r)) {
-    header.push_back(numeric(escape(words(p.name)) + "<small>" + escape(p.unit) + "</small>"));
+    header.push_back(numeric(escape(spaced(p.name)) + "<small>" + escape(p.unit) + "</small>"));
   }
   std::vector<std::vector<Cell>> rows;
   std::vector<std::string> remarks;
@@ -300,7 +301,7 @@ std::string information_section(const Identification& r, const TimeAxis& axis) {
       spans += (spans.empty() ? "" : ", ") +
                time_button(first, last, decimal(axis.shown(first), 1) + " to " + decimal(axis.shown(last), 1), axis);
     }
-    rows.push_back({escape(words(names[j])), numeric(p.information > 0.0 ? number(p.seconds) : "–"),
+    rows.push_back({escape(spaced(names[j])), numeric(p.information > 0.0 ? number(p.seconds) : "–"),
                     p.information > 0.0 ? spans : "no information"});
   }
   return paragraph(

@@ -8,15 +8,16 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/commission/margin_words.hpp>
 #include <wheelwright/core/limits.hpp>
 #include <wheelwright/report/chart.hpp>
 #include <wheelwright/report/data_sections.hpp>
 #include <wheelwright/report/page.hpp>
 #include <wheelwright/report/signals.hpp>
-#include <wheelwright/report/text.hpp>
+#include <wheelwright/words/margin_words.hpp>
+#include <wheelwright/words/text.hpp>
 
 namespace wheelwright::report {
+using namespace words;
 namespace {
 
 // A logarithmic axis.
@@ -64,7 +65,7 @@ std::string delay_curves(const FaultMargins& margins, const MarginSurvey& survey
   std::vector<Curve> curves;
   double low = kInfinity, high = 0.0;
   for (const auto& [kind, count] : survey.manoeuvres) {
-    Curve curve{std::string(words(kind)), {}, {}};
+    Curve curve{std::string(manoeuvre_words(kind)), {}, {}};
     for (std::size_t w = 0; w < survey.windows.size(); ++w) {
       const MarginSummary summary = summarise(margins, w, kind);
       const auto add = [&](std::vector<std::pair<double, double>>& to, double size) {
@@ -196,7 +197,7 @@ namespace {
 
 std::string name_of(const FaultMargins& margins) {
   const bool sides = !margins.fault.whole && margins.fault.range.lower < 0.0;
-  return words(margins.fault.name) + (sides ? margins.side > 0.0 ? ", growing" : ", shrinking" : "");
+  return spaced(margins.fault.name) + (sides ? margins.side > 0.0 ? ", growing" : ", shrinking" : "");
 }
 
 std::string margins_table(const MarginSurvey& survey, const ResidualMargins& residual) {
@@ -204,7 +205,7 @@ std::string margins_table(const MarginSurvey& survey, const ResidualMargins& res
   std::vector<Cell> header = {"Fault"};
   for (const auto& [kind, count] : survey.manoeuvres) {
     header.push_back(
-        numeric(capital(std::string(words(kind))) + fmt::format("<small>{}</small>", plural(count, "onset"))));
+        numeric(capital(std::string(manoeuvre_words(kind))) + fmt::format("<small>{}</small>", plural(count, "onset"))));
   }
   std::vector<std::vector<Cell>> rows;
   for (const FaultMargins& margins : residual.margins) {
@@ -219,7 +220,7 @@ std::string margins_table(const MarginSurvey& survey, const ResidualMargins& res
   if (!residual.blind.empty()) {
     std::vector<std::string> names;
     for (const std::string& name : residual.blind) {
-      names.push_back(words(name));
+      names.push_back(spaced(name));
     }
     out += paragraph("Leaves no trace in this residual, whatever its size: " + escape(enumerated(names)) + ".");
   }

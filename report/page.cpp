@@ -4,11 +4,12 @@
 #include <fmt/format.h>
 
 #include <wheelwright/report/data_sections.hpp>
-#include <wheelwright/report/text.hpp>
+#include <wheelwright/words/text.hpp>
 
 #include "report_assets.hpp"
 
 namespace wheelwright::report {
+using namespace words;
 namespace {
 
 void append_definition(std::string& out, std::string_view term, const std::vector<std::string>& values) {

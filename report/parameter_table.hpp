@@ -9,50 +9,10 @@
 #include <vector>
 
 #include <wheelwright/commission/commission.hpp>
-#include <wheelwright/report/chart.hpp>
+#include <wheelwright/words/parameter_view.hpp>
+#include <wheelwright/words/time_axis.hpp>
 
 namespace wheelwright::report {
-
-/// Result of commissioning for one quantity. All numbers are in `unit`.
-struct ParameterView {
-  std::string name;  ///< identifier, e.g. "mass" or "r_mass"
-  std::string unit;
-  std::optional<double> estimate;
-  std::optional<double> spread;  ///< half of the 95 % interval, t·standard error
-  double lower = 0.0;            ///< bounds, in the sense of `warrant`
-  double upper = 0.0;
-  double centre = 0.0;            ///< Chebyshev centre
-  std::optional<double> nominal;  ///< of the robot file
-  bool lower_is_prior = false;
-  bool upper_is_prior = false;
-  bool has_set = true;                      ///< false: the feasible set is empty, and nothing is bounded
-  Warrant warrant = Warrant::extrapolated;  ///< of lower and upper
-};
-
-/// A parameter as θ_L,j, and as a physical quantity where the robot file tells the scale and the two differ.
-struct ParameterViews {
-  ParameterView theta;
-  std::optional<ParameterView> physical;
-
-  /// The physical quantity where there is one.
-  [[nodiscard]] const ParameterView& best() const { return physical ? *physical : theta; }
-};
-
-/// The estimate with the digits that its uncertainty leaves it; "–" where there is none.
-[[nodiscard]] std::string estimate_text(const ParameterView& view);
-/// The Chebyshev centre, in the same way; "–" where the log says nothing of the parameter.
-[[nodiscard]] std::string centre_text(const ParameterView& view);
-
-/// Views of all parameters, in their order.
-[[nodiscard]] std::vector<ParameterViews> parameter_views(const Commissioning& result);
-
-/// True if the effort is not torque and the robot file lacks the motor's constants.
-[[nodiscard]] bool physical_values_unknown(const Commissioning& result);
-
-/// Name of output `i`; "output 2" where the model has none.
-[[nodiscard]] std::string output_name(const Model& model, std::size_t i);
-/// Unit of output `i` with the effort that was used; empty where the model has none.
-[[nodiscard]] std::string output_unit_of(const Robot& robot, const Model& model, std::size_t i);
 
 /// Reason, Durbin-Wu-Hausman test and a table of all candidates with their 95 % intervals, as HTML; empty where nothing
 /// was estimated.

@@ -10,9 +10,10 @@
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/report/drawing.hpp>
-#include <wheelwright/report/text.hpp>
+#include <wheelwright/words/text.hpp>
 
 namespace wheelwright::report {
+using namespace words;
 namespace {
 
 std::string upright(double y, const std::string& what) {

@@ -11,9 +11,10 @@
 #include <wheelwright/report/data_sections.hpp>
 #include <wheelwright/report/page.hpp>
 #include <wheelwright/report/sensitivity_drawings.hpp>
-#include <wheelwright/report/text.hpp>
+#include <wheelwright/words/text.hpp>
 
 namespace wheelwright {
+using namespace words;
 
 using namespace report;
 
@@ -28,7 +29,7 @@ AxisLabel axis(const StudyQuantity& quantity) { return {quantity.name, unit_of(q
 AxisLabel axis(const StudyInput& input) { return {input.name, unit_of(input.unit)}; }
 
 std::string range_of(const StudyInput& input) {
-  return report::with_unit(fmt::format("{} … {}", number(input.lower), number(input.upper)), unit_of(input.unit));
+  return words::with_unit(fmt::format("{} … {}", number(input.lower), number(input.upper)), unit_of(input.unit));
 }
 
 std::vector<std::string> names_of(const Study& study) {
@@ -57,7 +58,7 @@ std::string sentence(const Study& study, const StudyResult& result, std::size_t 
     }
     const StudyInput& input = study.inputs[found.order.front()];
     return fmt::format("{}: {} as it is; {} swings it most, {} to {} for {}", quantity.name,
-                       report::with_unit(number(found.nominal), unit_of(quantity.unit)), input.name, number(curve.low),
+                       words::with_unit(number(found.nominal), unit_of(quantity.unit)), input.name, number(curve.low),
                        number(curve.high), range_of(input));
   }
   return {};
@@ -151,7 +152,7 @@ Section quantity_section(const Study& study, const StudyResult& result, std::siz
   const std::string map = maps(study, result, q);
   body += map.empty() ? "" : "<h3>Map</h3>" + map;
   return {"quantity-" + std::to_string(q),
-          report::with_unit(quantity.name, quantity.unit == "1" ? "" : "in " + quantity.unit), body};
+          words::with_unit(quantity.name, quantity.unit == "1" ? "" : "in " + quantity.unit), body};
 }
 
 std::string one_sided(const OneSided& derivative) {
@@ -164,12 +165,12 @@ Section local_section(const LocalSensitivity& local) {
   std::vector<Cell> header = {"Input"};
   for (std::size_t j = 0; j < local.parameters.size(); ++j) {
     header.push_back(
-        numeric(escape(words(local.parameters[j])) + "<small>width, " + escape(local.units[j]) + "</small>"));
+        numeric(escape(spaced(local.parameters[j])) + "<small>width, " + escape(local.units[j]) + "</small>"));
   }
   std::vector<std::vector<Cell>> rows;
   for (const LocalDerivative& input : local.inputs) {
     std::vector<Cell> row = {escape(input.input) + "<small>" +
-                             escape(report::with_unit(number(input.value), unit_of(input.unit))) + "</small>"};
+                             escape(words::with_unit(number(input.value), unit_of(input.unit))) + "</small>"};
     for (const ParameterDerivative& d : input.parameters) {
       row.push_back(numeric(escape(one_sided(d.width)) +
                             (d.elasticity ? "<small>elasticity " + escape(number(*d.elasticity)) + "</small>"

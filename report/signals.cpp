@@ -11,9 +11,10 @@
 #include <wheelwright/report/drawing.hpp>
 #include <wheelwright/report/page.hpp>
 #include <wheelwright/report/parameter_table.hpp>
-#include <wheelwright/report/text.hpp>
+#include <wheelwright/words/text.hpp>
 
 namespace wheelwright::report {
+using namespace words;
 namespace {
 
 // Every four neighbours within a segment become two: the smallest and the largest value of each column, at the first

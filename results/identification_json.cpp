@@ -8,11 +8,12 @@
 
 #include <wheelwright/commission/physical.hpp>
 #include <wheelwright/files/words.hpp>
-#include <wheelwright/inference/identification_words.hpp>
 #include <wheelwright/results/model_words.hpp>
 #include <wheelwright/robots/robot_file.hpp>
+#include <wheelwright/words/identification_words.hpp>
 
 namespace wheelwright {
+using namespace words;
 
 Json numbers(const Eigen::VectorXd& v) { return std::vector<double>(v.begin(), v.end()); }
 

@@ -6,11 +6,12 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/commission/margin_words.hpp>
 #include <wheelwright/files/json.hpp>
 #include <wheelwright/results/model_json.hpp>
+#include <wheelwright/words/margin_words.hpp>
 
 namespace wheelwright {
+using namespace words;
 namespace {
 
 Json sizes_json(const std::vector<double>& sizes) {

@@ -18,7 +18,7 @@ GROUND = ["core", "model", "filter", "bounds", "detector"]
 DOORS = ["files", "logs", "sim", "robots"]
 FIRST = ["identify", "commission", "inference", "doctor"]
 SECOND = ["design", "gap", "study"]
-ROOF = ["results", "export", "report"]
+ROOF = ["words", "results", "export", "report"]
 HOUSE = GROUND + DOORS + FIRST + SECOND + ROOF
 PURE = set(HOUSE) - {"files", "logs", "robots", "results", "export"}
 

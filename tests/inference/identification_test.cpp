@@ -10,11 +10,12 @@
 #include <gtest/gtest.h>
 
 #include <wheelwright/inference/identification.hpp>
-#include <wheelwright/inference/identification_words.hpp>
+#include <wheelwright/words/identification_words.hpp>
 
 #include "support/drives.hpp"
 
 namespace wheelwright::identification_test {
+using namespace words;
 namespace {
 
 using ::testing::Contains;

@@ -6,12 +6,13 @@
 
 #include <wheelwright/report/gap_drawings.hpp>
 #include <wheelwright/report/gap_report.hpp>
-#include <wheelwright/report/gap_words.hpp>
+#include <wheelwright/words/gap_words.hpp>
 
 #include "report/example.hpp"
 #include "report/gap_example.hpp"
 
 namespace wheelwright::gap_report_test {
+using namespace words;
 namespace {
 
 using namespace report;

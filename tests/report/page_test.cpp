@@ -11,7 +11,6 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/inference/identification_words.hpp>
 #include <wheelwright/report/chart.hpp>
 #include <wheelwright/report/commission_report.hpp>
 #include <wheelwright/report/design_report.hpp>
@@ -19,12 +18,14 @@
 #include <wheelwright/report/gap_report.hpp>
 #include <wheelwright/report/identify_report.hpp>
 #include <wheelwright/report/signals.hpp>
+#include <wheelwright/words/identification_words.hpp>
 
 #include "report/example.hpp"
 #include "report/gap_example.hpp"
 #include "support/drives.hpp"
 
 namespace wheelwright::page_test {
+using namespace words;
 namespace {
 
 namespace example = report_example;

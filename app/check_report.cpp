@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "check_report.hpp"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include <wheelwright/commission/physical.hpp>
+#include <wheelwright/report/data_sections.hpp>
+#include <wheelwright/report/page.hpp>
+#include <wheelwright/results/model_json.hpp>
+#include <wheelwright/results/model_words.hpp>
+#include <wheelwright/words/text.hpp>
+
+namespace wheelwright {
+using namespace words;
+namespace {
+
+const PublishedBound& claim_of(const BoundVerdict& verdict, const ModelClaims& claims) {
+  return (verdict.side == Side::upper ? claims.upper : claims.lower)[verdict.parameter];
+}
+
+/// "rows 5017, 8211 and the prior"; "the prior" where there is no row.
+std::string stands_on(const BoundVerdict& verdict, const ModelClaims& claims) {
+  std::vector<std::size_t> rows;
+  bool prior = false;
+  for (const NamedRow& row : claim_of(verdict, claims).proof) {
+    prior = prior || row.origin.is_prior;
+    if (!row.origin.is_prior) {
+      rows.push_back(row.origin.sample);
+    }
+  }
+  if (rows.empty()) {
+    return "the prior";
+  }
+  return fmt::format("row{} {}{}", rows.size() == 1 ? "" : "s", fmt::join(rows, ", "), prior ? " and the prior" : "");
+}
+
+std::string statement(const BoundVerdict& verdict, const ModelClaims& claims) {
+  const Parameter& parameter = claims.model.parameters[verdict.parameter];
+  return fmt::format("{} {} {:.7g} {}", parameter.name, verdict.side == Side::upper ? "<=" : ">=", verdict.stated,
+                     parameter_unit(claims.robot, parameter));
+}
+
+std::string facet_sentence(const FacetVerdicts& facets) {
+  const std::size_t all = facets.rows + facets.sides + facets.implied + facets.wrong.size();
+  std::string text = fmt::format("{} of {} facets are what they name: {} rows of the log, {} sides of the prior",
+                                 all - facets.wrong.size(), all, facets.rows, facets.sides);
+  if (facets.implied > 0) {
+    text += fmt::format(", {} that follow from the row named", facets.implied);
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string check_summary(const ModelCheck& check, const ModelClaims& claims) {
+  constexpr std::size_t most = 12;
+  std::string text = fmt::format("{}: {}\n", claims.robot.name, verdict(check, claims));
+  if (check.emptiness) {
+    text += fmt::format("  contradiction of {} rows: {}\n", claims.contradiction.size(),
+                        check.emptiness->proved ? "proved" : "NOT PROVED");
+  } else {
+    constexpr int width = 44;
+    text += fmt::format("  {:<{}} {:<10}   stands on\n", "bound", width, "");
+    for (const BoundVerdict& each : check.bounds) {
+      text += fmt::format("  {:<{}} {:<10}   {}\n", statement(each, claims), width,
+                          each.proved ? "proved" : "NOT PROVED", stands_on(each, claims));
+    }
+    text += "  " + facet_sentence(check.facets) + "\n";
+  }
+  for (std::size_t k = 0; k < std::min(check.failures.size(), most); ++k) {
+    text += "  failure: " + check.failures[k] + "\n";
+  }
+  if (check.failures.size() > most) {
+    text += fmt::format("  … and {} more (--json lists them all)\n", check.failures.size() - most);
+  }
+  for (const std::string& warning : check.warnings) {
+    text += "  warning: " + warning + "\n";
+  }
+  for (const std::string& premise : check.premises) {
+    text += "  given: " + premise + "\n";
+  }
+  text += "  " + proof_scope(claims) + "\n";
+  for (const Assumption& a : claims.assumptions) {
+    text += fmt::format("  assumed ({}): {}\n", verdict_word(a.verdict), a.statement);
+  }
+  return text;
+}
+
+std::string check_report(const ModelCheck& check, const ModelClaims& claims, const CheckedFiles& files,
+                         const std::string& software) {
+  using namespace report;
+  std::vector<std::vector<Cell>> rows;
+  for (const BoundVerdict& each : check.bounds) {
+    rows.push_back({escape(spaced(claims.model.parameters[each.parameter].name)),
+                    each.side == Side::upper ? "at most" : "at least",
+                    numeric(escape(with_unit(fmt::format("{:.7g}", each.stated),
+                                             parameter_unit(claims.robot, claims.model.parameters[each.parameter])))),
+                    each.proved ? "proved" : "not proved", escape(stands_on(each, claims))});
+  }
+  PageContent content;
+  content.title = "Check of the model of " + claims.robot.name;
+  content.status = check.proved() ? (check.warnings.empty() ? "good" : "caution") : "bad";
+  content.verdict = capital(verdict(check, claims)) + ".";
+  content.sentences = {
+      "Every proof was evaluated in exact rational arithmetic on rows that were filtered again from the log, without "
+      "the "
+      "solver that found them.",
+      proof_scope(claims)};
+  content.warrant = claims.warrant;
+  content.sections = {{"bounds", "Bounds", table({"parameter", "", "bound", "", "stands on"}, rows)}};
+  if (!check.emptiness) {
+    content.sections.push_back(
+        {"facets", "Feasible set", paragraph(escape(capital(facet_sentence(check.facets)) + "."))});
+  }
+  if (!check.failures.empty()) {
+    content.sections.push_back({"failures", "Not proved", bullets(check.failures)});
+  }
+  if (!check.warnings.empty()) {
+    content.sections.push_back({"warnings", "Warnings", bullets(check.warnings)});
+  }
+  content.sections.push_back({"premises", "Given, not proved", bullets(check.premises)});
+  if (std::string given = assumptions_section(claims.assumptions); !given.empty()) {
+    content.sections.push_back({"assumptions", "Assumptions", std::move(given)});
+  }
+  content.sections.push_back(
+      {"files", "Files",
+       definitions({{"model", files.model}, {"log", fmt::format("{}", fmt::join(files.logs, ", "))}})});
+  content.software = software;
+  return page(content);
+}
+
+}  // namespace wheelwright

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Result of a model check for a terminal and as a page.
+#pragma once
+
+#include <string>
+
+#include <wheelwright/results/check_json.hpp>
+
+namespace wheelwright {
+
+/// The answer, a short table and what is not proved, for a terminal.
+[[nodiscard]] std::string check_summary(const ModelCheck& check, const ModelClaims& claims);
+
+/// The same as one self-contained HTML page.
+[[nodiscard]] std::string check_report(const ModelCheck& check, const ModelClaims& claims, const CheckedFiles& files,
+                                       const std::string& software);
+
+}  // namespace wheelwright

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// design.json: a designed manoeuvre and what it promises.
+#pragma once
+
+#include <string>
+
+#include <wheelwright/design/detection.hpp>
+#include <wheelwright/design/manoeuvre.hpp>
+#include <wheelwright/files/json.hpp>
+#include <wheelwright/gap/discrimination_design.hpp>
+
+namespace wheelwright {
+
+/// The result as JSON, schema "wheelwright/design/1": limits and their use, θ as believed, and bounds in the units of
+/// θ_L (promised; of the model, where there is one; of the figure eight, where there is one), with the physical half
+/// widths.
+[[nodiscard]] Json to_json(const BoundsDesign& design, const DesignSubject& subject, const MotionLimits& limits);
+
+/// The same for an inspection: smallest sizes that are certainly found, by the plan and by the figure eight.
+[[nodiscard]] Json to_json(const DetectionDesign& design, const MotionLimits& limits);
+
+/// The same for telling causes apart: how well each rival, being true, is told from each other one.
+[[nodiscard]] Json to_json(const DiscriminationDesign& design, const MotionLimits& limits);
+
+}  // namespace wheelwright

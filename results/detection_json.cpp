@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/results/detection_json.hpp>
+
+#include <algorithm>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include <wheelwright/results/model_json.hpp>
+
+namespace wheelwright {
+
+Json to_json(const Event& e, const OnlineModel& model) {
+  return {{"output", model.model.outputs[e.output]},
+          {"start", e.start},
+          {"alarm", e.alarm},
+          {"end", e.end},
+          {"peak_time", e.peak_time},
+          {"peak_residual", e.peak_residual},
+          {"peak_ratio", e.peak_ratio},
+          {"instants", e.instants},
+          {"start_row", e.start_sample}};
+}
+
+Json to_json(const Detection& d, const OnlineModel& model, const std::string& model_file, const std::string& log,
+             const std::string& software) {
+  Json json = {{"schema", "wheelwright/detection/1"},
+               {"software", software},
+               {"model", model_file},
+               {"log", log},
+               {"warrant", warrant_word(model.warrant)},
+               {"assumptions", assumptions_json(model.assumptions)},
+               {"fault", !d.events.empty()},
+               {"rows", d.rows},
+               {"instants", d.instants},
+               {"seconds", d.seconds},
+               {"outputs", Json::array()},
+               {"events", Json::array()}};
+  for (std::size_t i = 0; i < d.outside.size(); ++i) {
+    json["outputs"].push_back({{"output", model.model.outputs[i]},
+                               {"instants_outside", d.outside[i]},
+                               {"utilisation", d.utilisation[i]},
+                               {"nrmse", d.nrmse[i]}});
+  }
+  for (const Event& event : d.events) {
+    json["events"].push_back(to_json(event, model));
+  }
+  return json;
+}
+
+void add_isolation(Json& json, const std::vector<Isolation>& isolations) {
+  using Verdict = FaultFinding::Verdict;
+  for (std::size_t k = 0; k < isolations.size(); ++k) {
+    Json &event = json["events"][k], consistent = Json::array(), excluded = Json::array(), open = Json::array();
+    for (const FaultFinding& f : isolations[k].findings) {
+      if (f.verdict == Verdict::excluded) {
+        excluded.push_back(f.fault.name);
+      } else if (f.verdict == Verdict::not_examined) {
+        open.push_back(f.fault.name);
+      } else {
+        Json entry = {{"fault", f.fault.name}, {"magnitude", nullptr}, {"onset", {f.onset.lower, f.onset.upper}},
+                      {"unit", f.fault.unit},  {"earlier", f.earlier}, {"complete", f.complete}};
+        if (f.magnitude) {
+          entry["magnitude"] = {f.magnitude->lower, f.magnitude->upper};
+        }
+        consistent.push_back(std::move(entry));
+      }
+    }
+    event["isolation"] = std::move(consistent);
+    event["excluded"] = std::move(excluded);
+    event["not_examined"] = std::move(open);
+    event["explanation"] = sentence(isolations[k]);
+  }
+}
+
+void add_kinematic(Json& json, const KinematicWatch& watch, const OnlineModel& model) {
+  const Detection none;
+  const Detection& d = watch.detection ? *watch.detection : none;
+  const OnlineModel view = with_kinematic_outputs(model);
+  const Json own = to_json(d, view, {}, {}, {});
+  for (const Json& output : own.at("outputs")) {
+    json["outputs"].push_back(output);
+  }
+  std::vector<Json> events = json.at("events").get<std::vector<Json>>();
+  events.insert(events.end(), own.at("events").begin(), own.at("events").end());
+  std::ranges::stable_sort(events, {}, [](const Json& event) { return event.at("alarm").get<double>(); });
+  json["events"] = events;
+  json["fault"] = !events.empty();
+  json["kinematic"] = {{"warrant", warrant_word(view.warrant)},
+                       {"watched", watch.detection.has_value()},
+                       {"message", watch.message},
+                       {"instants", d.instants},
+                       {"seconds", d.seconds}};
+}
+
+}  // namespace wheelwright

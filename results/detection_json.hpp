@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// detection.json: decisions, events and their isolation.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <wheelwright/commission/detector_walk.hpp>
+#include <wheelwright/files/json.hpp>
+
+namespace wheelwright {
+
+/// A detection as JSON (results/detection.schema.json). `model_file` and `log` say what was used, `software` is name and
+/// version.
+[[nodiscard]] Json to_json(const Detection& detection, const OnlineModel& model, const std::string& model_file,
+                           const std::string& log, const std::string& software);
+
+/// One event as JSON.
+[[nodiscard]] Json to_json(const Event& event, const OnlineModel& model);
+
+/// Adds what its first events are isolated to to a detection as JSON, before add_kinematic().
+void add_isolation(Json& detection, const std::vector<Isolation>& isolations);
+
+/// Adds outputs and events of the kinematic residual to a detection as JSON; events stay in the order of their alarms.
+void add_kinematic(Json& detection, const KinematicWatch& watch, const OnlineModel& model);
+
+}  // namespace wheelwright

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Verification of a model.json against its log: rows are filtered again, and the proofs of all bounds are checked in
+/// exact arithmetic.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <wheelwright/bounds/check_certificate.hpp>
+#include <wheelwright/core/log.hpp>
+#include <wheelwright/results/model_file.hpp>
+
+namespace wheelwright {
+
+/// A published bound and what became of it.
+struct BoundVerdict {
+  std::size_t parameter = 0;
+  Side side = Side::upper;
+  double stated = 0.0;
+  double shown = 0.0;  ///< the bound that is proved, rounded outward; ±∞ where none is
+  bool proved = false;
+  double shortfall = 0.0;  ///< CertificateCheck::shortfall
+  std::string reason;      ///< why it is not proved; empty where it is
+};
+
+/// Verdicts on the rows of `feasible_set`.
+struct FacetVerdicts {
+  std::size_t rows = 0;            ///< the log's row that they name, coefficient by coefficient, b not smaller
+  std::size_t sides = 0;           ///< the side of the prior box that they name, b not smaller
+  std::size_t implied = 0;         ///< other numbers, which follow from the row that they name and the proved bounds
+  std::vector<std::string> wrong;  ///< the others, a sentence each
+};
+
+/// Result of check_model().
+struct ModelCheck {
+  std::vector<BoundVerdict> bounds;           ///< lower and upper bound of each parameter
+  std::optional<CertificateCheck> emptiness;  ///< where the model says that no θ explains the log
+  FacetVerdicts facets;
+  bool same_log = false;              ///< same bytes, file by file
+  std::vector<std::string> failures;  ///< everything that is not proved, a sentence each
+  std::vector<std::string> warnings;  ///< what is worth knowing and contradicts no proof
+  std::vector<std::string> premises;  ///< what the proofs stand on and do not prove
+
+  /// True if everything is proved.
+  [[nodiscard]] bool proved() const { return failures.empty(); }
+};
+
+/// Filters `log` again as the claims say and verifies, exactly (check_certificate.hpp): that each facet is the log's
+/// row that it names, or follows from it; that each published bound is proved by the rows that it names; that the hull
+/// and the physical intervals contain the proved bounds; or, where the set is said to be empty, that it is. `data` says
+/// which files the log is. Rows of columns with noise whose sign the prior leaves open are rebuilt over the box that
+/// they prove. Throws InvalidArgument when the log lacks a column.
+[[nodiscard]] ModelCheck check_model(const ModelClaims& claims, LogSource& log, const LogReport& data);
+
+/// "row 5017 (t = 50.17 s, sum, upper)", or "the prior's lower bound of r_mass".
+[[nodiscard]] std::string name_of(const RowOrigin& origin, const Model& model);
+
+}  // namespace wheelwright

@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Each outcome has its sentences.
+#include <wheelwright/words/commission_words.hpp>
+
+#include <cmath>
+#include <limits>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <wheelwright/report/commission_report.hpp>
+#include <wheelwright/report/detect_report.hpp>
+
+#include "report/example.hpp"
+
+namespace wheelwright::report {
+using namespace words;
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
+namespace example = report_example;
+
+std::string spoken(const Commissioning& result) {
+  std::string text;
+  for (const std::string& sentence : commission_words(result)) {
+    text += sentence + "\n";
+  }
+  return text;
+}
+
+TEST(CommissionWords, HaveThreeToSixSentencesForEveryOutcome) {
+  for (const Commissioning& c : {example::done(), example::partial(), example::nothing(), example::empty()}) {
+    EXPECT_GE(commission_words(c).size(), 3U);
+    EXPECT_LE(commission_words(c).size(), 6U);
+    for (const std::string& sentence : commission_words(c)) {
+      EXPECT_TRUE(sentence.ends_with('.')) << sentence;
+    }
+  }
+}
+
+TEST(CommissionWords, OfAModelSayWhatWasFoundAndWhatItSees) {
+  const Commissioning c = example::done();
+  EXPECT_EQ(standing(c), Standing::good);
+  const std::string text = spoken(c);
+  EXPECT_THAT(text, HasSubstr("Mass 21.30\u00a0kg (extrapolated 20.90 to 21.70)"));
+  EXPECT_THAT(text, HasSubstr("3500 instants"));
+  EXPECT_THAT(text, HasSubstr("no false alarm"));
+  EXPECT_THAT(text, HasSubstr("62.0 %"));
+  EXPECT_THAT(text, HasSubstr("is 4.10 %"));  // (1 + 0.0837)^(1/2) − 1 = 0.04101, of the output that sees more
+  EXPECT_THAT(text, HasSubstr("extrapolated"));
+}
+
+TEST(CommissionWords, RadiusChangeInvertsKappa) {
+  for (const double share : {1e-3, 0.04, 0.5, 2.0}) {
+    EXPECT_NEAR(radius_change((1.0 + share) * (1.0 + share) - 1.0), share, 1e-14);
+  }
+}
+
+TEST(CommissionWords, SayWhatTheGuaranteeStandsOn) {
+  Commissioning c = example::done();
+  for (OutputNoise& noise : c.noise) {
+    noise.origin = NoiseOrigin::declared;
+  }
+  settle_warrants(c);
+  EXPECT_THAT(spoken(c), AllOf(HasSubstr("declared noise bounds"), HasSubstr("every noise"),
+                               HasSubstr("(guaranteed 20.90 to 21.70)"), Not(HasSubstr("extrapolated"))));
+  c.noise_mode = NoiseMode::statistical;
+  settle_warrants(c);
+  EXPECT_THAT(spoken(c), AllOf(HasSubstr("confidence"), HasSubstr("(statistical 20.90 to 21.70)"),
+                               Not(HasSubstr("uarantee")), Not(HasSubstr("extrapolated"))));
+  c.validation.front().outside = 2;
+  settle_warrants(c);
+  EXPECT_THAT(spoken(c), AllOf(HasSubstr("the log contradicts these"), HasSubstr("(extrapolated 20.90 to 21.70)"),
+                               Not(HasSubstr("uarantee"))));
+}
+
+TEST(CommissionWords, OfAPartialResultSayWhatToDrive) {
+  const std::string text = spoken(example::partial());
+  EXPECT_EQ(standing(example::partial()), Standing::caution);
+  EXPECT_THAT(text, HasSubstr("says nothing about yaw inertia and viscous yaw"));
+  EXPECT_THAT(text, HasSubstr("drive in curves"));
+  EXPECT_THAT(text, HasSubstr("Mass 21.30"));
+  EXPECT_THAT(text, Not(HasSubstr("Yaw inertia 0.9")));
+}
+
+TEST(CommissionWords, OfAnEmptySetSayTheContradictionAndWhatToDo) {
+  const Commissioning c = example::empty();
+  EXPECT_EQ(standing(c), Standing::bad);
+  EXPECT_THAT(spoken(c),
+              AllOf(HasSubstr("1.80 times as large"), HasSubstr("2 samples of the log"), HasSubstr("What to do")));
+  const std::string page = commission_report(c, example::context(300));
+  EXPECT_TRUE(example::holds(page, {"12.500\u00a0s", "31.250\u00a0s", "side of the prior"}));
+  EXPECT_TRUE(example::holds(page, {"[12.500000,12.500000,\"sum\",0]"}));  // marked on the raw signals
+}
+
+TEST(CommissionWords, OfNothingSayWhatToDrive) {
+  EXPECT_EQ(standing(example::nothing()), Standing::bad);
+  EXPECT_THAT(spoken(example::nothing()), AllOf(HasSubstr("accelerate and brake"), HasSubstr("drive in curves")));
+  EXPECT_THAT(verdict(example::nothing()), HasSubstr("No model"));
+}
+
+TEST(CommissionWords, FalseAlarmsAndIdleThresholdsAreNotPraised) {
+  Commissioning alarms = example::done();
+  alarms.validation[1].outside = 3;
+  EXPECT_EQ(standing(alarms), Standing::caution);
+  EXPECT_THAT(spoken(alarms), AllOf(HasSubstr("3 times"), HasSubstr("What to do"), Not(HasSubstr("no false alarm"))));
+
+  Commissioning idle = example::done();
+  idle.validation[0].utilisation = 0.02;
+  EXPECT_EQ(standing(idle), Standing::caution);
+  EXPECT_THAT(spoken(idle), HasSubstr("threshold of sum is much wider"));
+
+  Commissioning blind = example::done();
+  for (OutputValidation& v : blind.validation) {
+    v.smallest_kappa = std::numeric_limits<double>::infinity();
+  }
+  EXPECT_EQ(standing(blind), Standing::caution);
+  EXPECT_THAT(spoken(blind), HasSubstr("no change of scale"));
+
+  Commissioning coarse = example::done();
+  for (OutputValidation& v : coarse.validation) {
+    v.smallest_kappa = 0.97;
+  }
+  EXPECT_EQ(standing(coarse), Standing::caution);
+  EXPECT_THAT(spoken(coarse), HasSubstr("Only coarse faults"));
+
+  Commissioning untried = example::done();
+  untried.validation.clear();
+  EXPECT_EQ(standing(untried), Standing::caution);
+  EXPECT_THAT(spoken(untried), HasSubstr("no held-out driving"));
+}
+
+TEST(CommissionWords, DoNotCallABoundOfThePriorOneOfTheLog) {
+  Commissioning c = example::done();
+  c.parameters[0].lower = 0.0;
+  c.parameters[0].lower_is_prior = true;
+  EXPECT_THAT(spoken(c), HasSubstr("(extrapolated at most 21.7)"));
+  c.parameters[0].upper_is_prior = true;
+  EXPECT_THAT(spoken(c), HasSubstr("(bounded by the prior alone)"));
+}
+
+TEST(CommissionReport, ShowsNoPhysicalValuesWithoutTheMotorsConstants) {
+  Commissioning c = example::done();
+  c.model.robot.effort = EffortKind::current;
+  const std::string page = commission_report(c, example::context(300));
+  EXPECT_TRUE(example::holds(page, {"not identifiable", "A·s²/m"}));
+  EXPECT_TRUE(example::lacks(page, {"\u00a0kg"}));
+  EXPECT_TRUE(example::lacks(commission_report(example::done(), example::context(300)), {"not identifiable"}));
+}
+
+TEST(CommissionReport, BoundsNothingOfAnEmptySet) {
+  const ReportContext context = example::context(300);
+  EXPECT_TRUE(example::holds(commission_report(example::done(), context), {"20.90 to 21.70", "class=\"bar\""}));
+  EXPECT_TRUE(example::lacks(commission_report(example::empty(), context), {"20.90 to 21.70", "class=\"bar"}));
+}
+
+TEST(CommissionReport, PhysicalValuesFollowFromTheta) {
+  // θ_1 = r m: 2.13 kg·m at r = 0.1 m is 21.3 kg.
+  const std::string page = commission_report(example::done(), example::context(300));
+  EXPECT_TRUE(example::holds(page, {">21.30<", ">2.130<", "20.90 to 21.70", "2.090 to 2.170"}));
+}
+
+TEST(FailureReport, ShowsTheErrorAndTheRawSignals) {
+  const std::string page = failure_report("the log lacks the column tau_r", example::context(300));
+  EXPECT_TRUE(example::holds(page, {"the log lacks the column tau_r", "\"omega_r\"", "Wheel speeds"}));
+}
+
+TEST(DetectReport, SaysWhenAndWhereTheFirstEventCame) {
+  const OnlineModel model = example::done().model;
+  const std::string page = detect_report(example::detection(900, true), model, example::context(900));
+  EXPECT_TRUE(example::holds(
+      page, {"1 event", "first alarm came at 6.020\u00a0s in the output sum",
+             "Of 9.000\u00a0s of driving, 3.00\u00a0s in the output sum contradict the fault-free model.",
+             "[6.000000,9.000000,\"1\",0]"}));
+  const std::string healthy = detect_report(example::detection(900, false), model, example::context(900));
+  EXPECT_TRUE(example::holds(healthy, {"No fault was seen", "30.0 %"}));
+  EXPECT_TRUE(example::lacks(healthy, {"first alarm"}));
+}
+
+}  // namespace
+}  // namespace wheelwright::report

@@ -1,0 +1,312 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/words/commission_words.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include <wheelwright/words/margin_words.hpp>
+#include <wheelwright/words/parameter_view.hpp>
+#include <wheelwright/words/text.hpp>
+
+namespace wheelwright::words {
+namespace {
+
+using Status = Commissioning::Status;
+
+// Above this κ (a change of the wheel radii by 22 %) thresholds are called coarse.
+constexpr double coarse_kappa = 0.5;
+
+// Below this utilisation a threshold is called one that can hardly fire.
+constexpr double idle_utilisation = 0.1;
+
+std::size_t false_alarms(const Commissioning& result) {
+  std::size_t sum = 0;
+  for (const OutputValidation& v : result.validation) {
+    sum += v.outside;
+  }
+  return sum;
+}
+
+std::size_t held_out_instants(const Commissioning& result) {
+  std::size_t most = 0;
+  for (const OutputValidation& v : result.validation) {
+    most = std::max(most, v.instants);
+  }
+  return most;
+}
+
+std::vector<std::string> idle_outputs(const Commissioning& result) {
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < result.validation.size(); ++i) {
+    if (result.validation[i].instants > 0 && result.validation[i].utilisation < idle_utilisation) {
+      names.push_back(output_name(result.model.model, i));
+    }
+  }
+  return names;
+}
+
+std::string bounds_text(const ParameterView& v) {
+  const std::string word(warrant_word(v.warrant));
+  const auto [lower, upper] = outward(v.lower, v.upper);
+  if (v.lower_is_prior && v.upper_is_prior) {
+    return "bounded by the prior alone";
+  }
+  if (v.lower_is_prior || v.upper_is_prior) {
+    return v.lower_is_prior ? word + " at most " + upper : word + " at least " + lower;
+  }
+  return word + " " + lower + " to " + upper;
+}
+
+std::string estimates(const Commissioning& result) {
+  std::vector<std::string> items;
+  const std::vector<ParameterViews> views = parameter_views(result);
+  for (std::size_t j = 0; j < views.size(); ++j) {
+    const ParameterView& v = views[j].best();
+    if (v.estimate && result.parameters[j].excitation != Excitation::not_excited) {
+      items.push_back(with_unit(v.name + " " + estimate_text(v), v.unit) + " (" + bounds_text(v) + ")");
+    }
+  }
+  if (physical_values_unknown(result)) {
+    return "In units of the effort that was logged, since the motor’s constants are not given: " + enumerated(items) +
+           ".";
+  }
+  return capital(enumerated(items)) + ".";
+}
+
+std::string footing(const Commissioning& result) {
+  std::vector<std::string> declared, estimated, broken;
+  for (std::size_t i = 0; i < result.noise.size(); ++i) {
+    (result.noise[i].origin == NoiseOrigin::declared ? declared : estimated)
+        .push_back(output_name(result.model.model, i));
+  }
+  for (const Assumption& a : result.assumptions) {
+    if (a.verdict == AssumptionVerdict::fails) {
+      broken.push_back(a.statement);
+    }
+  }
+  if (!broken.empty()) {
+    return "The bounds stand on assumptions of which the log contradicts these: " +
+           fmt::format("{}", fmt::join(broken, " "));
+  }
+  if (estimated.empty()) {
+    return result.noise_mode == NoiseMode::worst_case
+               ? "The guarantee stands on the sensors’ declared noise bounds: it holds for every noise within them, "
+                 "while "
+                 "the assumptions listed below hold."
+               : "The bounds stand on the sensors’ declared noise bounds and on their noise being independent from "
+                 "sample to sample, at the stated confidence.";
+  }
+  if (declared.empty()) {
+    return "The bounds stand on noise bounds that were extrapolated from the residuals of this log: they hold while "
+           "noise and driving stay like it.";
+  }
+  return "The bounds stand on the sensors’ declared noise for " + enumerated(declared) +
+         ", and on bounds extrapolated from the residuals of this log for " + enumerated(estimated) + ".";
+}
+
+std::string held_out(const Commissioning& result) {
+  const std::size_t instants = held_out_instants(result);
+  if (instants == 0) {
+    return "There was no held-out driving to try the thresholds on: their false-alarm rate is not known.";
+  }
+  const std::size_t alarms = false_alarms(result);
+  double most = 0.0;
+  for (const OutputValidation& v : result.validation) {
+    most = std::max(most, v.utilisation);
+  }
+  if (alarms == 0) {
+    return fmt::format(
+        "On {} instants of driving that the model had not seen there was no false alarm; the residual used "
+        "at most {} of its threshold.",
+        count(instants), percent(most));
+  }
+  return fmt::format(
+      "On {} instants of driving that the model had not seen, the residual left its threshold {} in error.",
+      count(instants), alarms == 1 ? "once" : count(alarms) + " times");
+}
+
+std::string sees(const Commissioning& result) {
+  const std::optional<double> kappa = smallest_certain_kappa(result);
+  if (!kappa) {
+    return "On this driving no change of scale, however large, is certain to be seen: the thresholds are wider than "
+           "all "
+           "that the robot did.";
+  }
+  if (on_two_wheels(result.model.robot)) {
+    return fmt::format(
+        "The smallest change of both wheel radii that is certain to be seen is {}, at the best moment of the held-out "
+        "driving (|δ1|/r = √(1+κ) − 1 with κ = {}); `wheelwright margins` says it for other faults, and while doing "
+        "what.",
+        percent(radius_change(*kappa)), number(*kappa));
+  }
+  return fmt::format(
+      "The smallest change of all forces by one factor that is certain to be seen is {}: ζ = κ·Yθ with κ = {}.",
+      percent(*kappa), number(*kappa));
+}
+
+std::string unseen(const Commissioning& result) {
+  std::vector<std::string> names, todo;
+  const std::vector<ParameterViews> views = parameter_views(result);
+  for (std::size_t j = 0; j < views.size(); ++j) {
+    const ParameterResult& r = result.parameters[j];
+    if (r.excitation == Excitation::not_excited) {
+      names.push_back(views[j].best().name);
+      if (!r.parameter.excite.empty() && std::find(todo.begin(), todo.end(), r.parameter.excite) == todo.end()) {
+        todo.push_back(r.parameter.excite);
+      }
+    }
+  }
+  if (names.empty()) {
+    return {};
+  }
+  std::string text = "The log says nothing about " + enumerated(names) + ".";
+  if (!todo.empty()) {
+    text += " What to do: " + enumerated(todo) + ", and commission again.";
+  }
+  if (result.has_model()) {
+    text += " Until then their bounds are the prior’s, and thresholds are wide wherever they matter.";
+  }
+  return text;
+}
+
+std::string contradiction(const Commissioning& result) {
+  std::vector<double> t;
+  for (const WeightedRow& w : result.feasible.contradiction) {
+    if (!w.row.origin.is_prior) {
+      t.push_back(w.row.origin.t);
+    }
+  }
+  if (t.empty()) {
+    return {};
+  }
+  return fmt::format("{} of the log already contradict{} the model by {} (the table “Contradiction” gives {}).",
+                     capital(t.size() == 1 ? "one sample" : plural(t.size(), "sample")), t.size() == 1 ? "s" : "",
+                     t.size() == 1 ? "itself" : "themselves", t.size() == 1 ? "it" : "them");
+}
+
+// Each contradiction that withdraws a model (or does not) with what to do about it.
+void tell_contradictions(const Commissioning& result, bool withdraws, std::vector<std::string>& out) {
+  for (const LogContradiction& c : result.contradictions) {
+    if (c.withdraws == withdraws) {
+      out.push_back(fmt::format("{}. What to do: {}.", capital(c.sentence), c.next));
+    }
+  }
+}
+
+std::vector<std::string> words_with_model(const Commissioning& result) {
+  std::vector<std::string> out = {estimates(result)};
+  tell_contradictions(result, false, out);
+  if (std::string missing = unseen(result); !missing.empty()) {
+    out.push_back(std::move(missing));
+  }
+  out.push_back(footing(result));
+  out.push_back(held_out(result));
+  out.push_back(sees(result) + (smallest_certain_kappa(result) && result.model.warrant != Warrant::guaranteed
+                                    ? " " + certain_meaning(result.model.warrant)
+                                    : ""));
+  if (false_alarms(result) > 0) {
+    out.emplace_back(
+        "What to do: look at those moments in the log; where they are no fault, commission on longer and more "
+        "varied driving, or declare the sensors’ noise in the robot file.");
+  } else if (const auto idle = idle_outputs(result); !idle.empty()) {
+    out.push_back(
+        fmt::format("The threshold of {} is much wider than its residual and can hardly fire: declared noise "
+                    "bounds that are smaller, where the sensors allow it, would tighten it.",
+                    enumerated(idle)));
+  } else if (smallest_certain_kappa(result).value_or(coarse_kappa) >= coarse_kappa) {
+    out.emplace_back(
+        "Only coarse faults are certain to be seen: a longer log with stronger acceleration and tighter curves, or a "
+        "quieter effort signal, would narrow the thresholds.");
+  }
+  return out;
+}
+
+}  // namespace
+
+std::optional<double> smallest_certain_kappa(const Commissioning& result) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const OutputValidation& v : result.validation) {
+    if (v.instants > 0 && v.smallest_kappa > 0.0) {
+      least = std::min(least, v.smallest_kappa);
+    }
+  }
+  return std::isfinite(least) ? std::optional(least) : std::nullopt;
+}
+
+double radius_change(double kappa) { return std::sqrt(1.0 + kappa) - 1.0; }
+
+Standing standing(const Commissioning& result) {
+  if (!result.has_model()) {
+    return Standing::bad;
+  }
+  const bool clean = result.status == Status::done && held_out_instants(result) > 0 && false_alarms(result) == 0 &&
+                     smallest_certain_kappa(result).value_or(coarse_kappa) < coarse_kappa &&
+                     idle_outputs(result).empty();
+  return clean ? Standing::good : Standing::caution;
+}
+
+std::string verdict(const Commissioning& result) {
+  switch (result.status) {
+    case Status::done:
+      return standing(result) == Standing::good ? "Commissioned: the model can watch this robot."
+                                                : "Commissioned, with something to be read first.";
+    case Status::partial: return "Commissioned in part: the log does not show every parameter.";
+    case Status::empty: return "No model: the log contradicts the model within the declared noise.";
+    case Status::nothing: return "No model: the log shows none of the parameters.";
+    case Status::contradicted: return "No model: the log contradicts what a model takes for granted.";
+  }
+  return {};
+}
+
+std::vector<std::string> commission_words(const Commissioning& result) {
+  switch (result.status) {
+    case Status::done:
+    case Status::partial: return words_with_model(result);
+    case Status::nothing: {
+      std::vector<std::string> out;
+      if (std::string missing = unseen(result); !missing.empty()) {
+        out.push_back(std::move(missing));
+      } else {
+        out.emplace_back(
+            "The log says nothing about any parameter. What to do: drive with changing speed and in curves, "
+            "and commission again.");
+      }
+      out.push_back(fmt::format("The log holds {} rows over {}; the raw signals below show how the robot moved.",
+                                count(result.survey.rows), with_unit(number(result.survey.seconds), "s")));
+      out.emplace_back("No useful threshold can be made of this log.");
+      return out;
+    }
+    case Status::contradicted: {
+      std::vector<std::string> out;
+      tell_contradictions(result, true, out);
+      tell_contradictions(result, false, out);
+      out.emplace_back("Numbers below are what the log says by itself; no threshold is made of them.");
+      return out;
+    }
+    case Status::empty: {
+      std::vector<std::string> out = {fmt::format(
+          "No parameters within their prior explain this log while the sensors keep to their noise bounds: these "
+          "would have to be {} times as large.",
+          number(result.minimax))};
+      if (std::string text = contradiction(result); !text.empty()) {
+        out.push_back(std::move(text));
+      }
+      tell_contradictions(result, true, out);
+      tell_contradictions(result, false, out);
+      out.emplace_back(
+          "This means one of three things: a fault during the drive, an effect that the model lacks (payload "
+          "that moves, slip, dry friction), or noise bounds in the robot file that are too small.");
+      out.emplace_back(
+          "What to do: look at the moments named below in the raw signals; check units, geometry and the noise "
+          "in the robot file; if they are right, leave that part of the drive out, or let the noise be "
+          "estimated.");
+      return out;
+    }
+  }
+  return {};
+}
+
+}  // namespace wheelwright::words

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// A designed manoeuvre in a few lines for a terminal.
+#pragma once
+
+#include <string>
+
+#include <wheelwright/design/detection.hpp>
+#include <wheelwright/design/manoeuvre.hpp>
+#include <wheelwright/gap/discrimination_design.hpp>
+
+namespace wheelwright::words {
+
+/// The result for a terminal.
+[[nodiscard]] std::string summary(const BoundsDesign& design, const DesignSubject& subject);
+
+/// The result for a terminal.
+[[nodiscard]] std::string summary(const DetectionDesign& design);
+
+/// The result for a terminal.
+[[nodiscard]] std::string summary(const DiscriminationDesign& design);
+
+}  // namespace wheelwright::words

@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// An identification for a terminal.
+#pragma once
+
+#include <string>
+
+#include <wheelwright/inference/identification.hpp>
+
+namespace wheelwright::words {
+
+/// Words first, then one table of estimates and intervals by every method, then what to do next.
+[[nodiscard]] std::string summary(const Identification& result);
+
+}  // namespace wheelwright::words

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// A sensitivity study in tables for a terminal.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include <wheelwright/study/local_derivatives.hpp>
+#include <wheelwright/study/study.hpp>
+
+namespace wheelwright::words {
+
+/// One table for each quantity: what each input does to it, by every method that the study asks for; the widths'
+/// elasticities; and what could not be evaluated.
+[[nodiscard]] std::string summary(const Study& study, const StudyResult& result,
+                                  const std::optional<LocalSensitivity>& local);
+
+}  // namespace wheelwright::words
