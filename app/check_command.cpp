@@ -51,10 +51,11 @@ int run(const Arguments& a) {
     files.logs.push_back(path.string());
   }
   if (!a.common.out.empty() || a.common.json) {
-    publish(a.common, to_json(check, claims, log.report(), files), "check.json", check_report(check, claims, files));
+    publish(a.common, to_json(check, claims, log.report(), files, software()), "check.json",
+            check_report(check, claims, files, software()));
   }
   if (!a.common.quiet && !a.common.json) {
-    fmt::print("{}", summary(check, claims));
+    fmt::print("{}", check_summary(check, claims));
     if (!a.common.out.empty()) {
       fmt::print("wrote {} and {}\n", (a.common.out / "check.json").string(), (a.common.out / "report.html").string());
     }

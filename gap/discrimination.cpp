@@ -4,9 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <ranges>
 #include <utility>
 
+#include <fmt/format.h>
 #include <wheelwright/commission/noise_budget.hpp>
+
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/filter/noise.hpp>
@@ -327,11 +330,7 @@ double size_for(const Column& column, const Drive& drive, double share) {
 }  // namespace
 
 std::string Rival::name() const {
-  std::string name;
-  for (const RivalCause& cause : causes) {
-    name += (name.empty() ? "" : " + ") + cause.effect;
-  }
-  return name;
+  return fmt::format("{}", fmt::join(causes | std::views::transform(&RivalCause::effect), " + "));
 }
 
 void validate(const Rival& rival, const std::vector<Effect>& catalogue, const Drive& drive) {

@@ -3,7 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ranges>
 #include <utility>
+
+#include <fmt/format.h>
 
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/core/linear_algebra.hpp>
@@ -68,11 +71,8 @@ std::vector<Effect> chosen_catalogue(const Model& model, const DiagnoseOptions& 
   for (const std::string& name : options.without) {
     const auto gone = std::remove_if(all.begin(), all.end(), [&](const Effect& e) { return e.name == name; });
     if (gone == all.end()) {
-      std::string known;
-      for (const Effect& effect : all) {
-        known.append(known.empty() ? "" : ", ").append(effect.name);
-      }
-      throw InvalidArgument("DiagnoseOptions::without: there is no effect called " + name + "; there are " + known);
+      throw InvalidArgument(fmt::format("DiagnoseOptions::without: there is no effect called {}; there are {}", name,
+                                        fmt::join(all | std::views::transform(&Effect::name), ", ")));
     }
     all.erase(gone, all.end());
   }
