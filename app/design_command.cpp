@@ -7,7 +7,6 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/results/rival_json.hpp>
 #include <wheelwright/design/detection.hpp>
 #include <wheelwright/design/manoeuvre.hpp>
 #include <wheelwright/design/stages.hpp>
@@ -18,6 +17,7 @@
 #include <wheelwright/logs/csv.hpp>
 #include <wheelwright/report/design_report.hpp>
 #include <wheelwright/results/model_file.hpp>
+#include <wheelwright/results/rival_json.hpp>
 #include <wheelwright/robots/robot_file.hpp>
 
 #include <wheelwright/results/design_json.hpp>

@@ -204,8 +204,8 @@ std::string margins_table(const MarginSurvey& survey, const ResidualMargins& res
   const std::size_t window = shown_window(survey);
   std::vector<Cell> header = {"Fault"};
   for (const auto& [kind, count] : survey.manoeuvres) {
-    header.push_back(
-        numeric(capital(std::string(manoeuvre_words(kind))) + fmt::format("<small>{}</small>", plural(count, "onset"))));
+    header.push_back(numeric(capital(std::string(manoeuvre_words(kind))) +
+                             fmt::format("<small>{}</small>", plural(count, "onset"))));
   }
   std::vector<std::vector<Cell>> rows;
   for (const FaultMargins& margins : residual.margins) {
