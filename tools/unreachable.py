@@ -2,17 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which functions of the product no command, binding or example reaches, by room, with their lines.
 
-    tools/unreachable.py              builds the product in build-unreachable (minutes the first time), then the table and the list
+    tools/unreachable.py              builds the product in build-unreachable (minutes, at first), then a table and a list
     tools/unreachable.py --built      as it is built already
     tools/unreachable.py --names      without a build: names that a header declares and nothing of the product uses
     tools/unreachable.py --self-test
 
 Every function is compiled into a section of its own, not optimised, and the linker keeps what the programs, the examples and
 the Python module lead to. What none of them keeps is unreachable, unless an embedder's example calls it (KEPT) or it is an
-accessor of one line through which a test looks. Inline
-functions and templates that nothing instantiates are not compiled at all: they are found by their names, as types, constants
-and fields are. What only other unreachable functions use is listed with them; names come to light one after the other: run
-it again after deleting. Tests and benchmarks reach nothing.
+accessor of one line through which a test looks. Functions of a header that nothing instantiates are missing from all that was
+compiled, and types, constants and fields of a header that nothing uses are found by their names. What only unreachable
+functions use is listed with them, but for names: run it again after deleting. Tests and benchmarks reach nothing.
 """
 
 import argparse
@@ -40,6 +39,7 @@ DECLARED = re.compile(
     r"^\s*(?:(?:template\s*<[^;{}]*>|\[\[\w+\]\]|inline|static|constexpr|explicit|virtual|friend|extern|const)\s+)*"
     r"(?:(?:struct|class|enum(?:\s+class)?|using|concept)\s+(\w+)|[\w:][\w:<>,*&\s]*?[\s*&>](\w+)\s*(?:\(|=|;|\{))")
 FUNCTION = re.compile(r"^\s*(?:\[\[\w+\]\]\s*)?(?:[\w:][\w:<>,*&\s]*?[\s*&>])?(\w+)\(")
+ACCESSOR = re.compile(r"\(\) const (?:noexcept )?(?:override )?\{ return [^;]+; \}")
 NO_NAMES = {"return", "if", "for", "while", "operator", "namespace", "default", "delete", "noexcept", "final", "override",
             "rebind", "const", "requires", "switch", "throw", "sizeof", "main", "int", "double", "bool", "auto", "void"}
 
@@ -202,8 +202,7 @@ def is_accessor(texts, place):
     """Whether it is one line in a header that hands out a member or what it says of itself: tests look through it."""
     lines = texts[place[0]].split("\n")[place[1] - 1:place[2]]
     code = [line for line in lines if line.strip() and not line.strip().startswith("//")]
-    return place[0].endswith(".hpp") and len(code) == 1 and re.search(r"\(\) const (?:noexcept )?(?:override )?\{ return [^;]+; \}",
-                                                                      code[0]) is not None
+    return place[0].endswith(".hpp") and len(code) == 1 and ACCESSOR.search(code[0]) is not None
 
 
 def table(found):
@@ -264,8 +263,8 @@ def main():
         objects = [path for room in PRODUCT for path in sorted((arguments.build / room).rglob("*.o"))]
         unreached, everywhere = find_unreached(everything(arguments.build, objects), linked(arguments.build))
         found = sorted({*unreached_functions(unreached, texts, kept), *never_compiled(texts, everywhere), *found})
-        looked_at = set(re.findall(r"[.>](\w+)\(\)", "\n".join(path.read_text(encoding="utf-8") for folder in ("tests", "bench")
-                                                            for path in sorted((ROOT / folder).rglob("*.[ch]pp")))))
+        watchers = [path for folder in ("tests", "bench") for path in sorted((ROOT / folder).rglob("*.[ch]pp"))]
+        looked_at = set(re.findall(r"[.>](\w+)\(\)", "\n".join(path.read_text(encoding="utf-8") for path in watchers)))
         found = [each for each in found if not (each[3] in looked_at and is_accessor(texts, each))]
     print(table(found))
 
