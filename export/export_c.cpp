@@ -13,6 +13,7 @@
 
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/core/limits.hpp>
+#include <wheelwright/core/words.hpp>
 #include <wheelwright/export/export_c_filter.hpp>
 #include <wheelwright/export/export_c_text.hpp>
 
@@ -22,7 +23,6 @@ namespace {
 using c_text::hex;
 using c_text::list;
 using c_text::plain;
-using c_text::replace_all;
 
 void check_name(const std::string& name) {
   constexpr std::array<std::string_view, 12> kTaken = {"double", "int",   "void",  "static", "inline", "struct",
