@@ -18,7 +18,9 @@
 namespace wheelwright {
 namespace {
 
+constexpr std::size_t kScanned = 1 << 14;
 constexpr std::size_t kSmall = 64;  // rows that are not worth a store of their own
+constexpr double kAside = 1e-6;     // of γ: room for rounding below which a row is not put aside
 
 /// γ that row `row` asks for at θ, a bound on the rounding of it, and what it asks for without dy and dY.
 struct Demand {
@@ -85,6 +87,7 @@ class Epigraph {
   }
 
   [[nodiscard]] const Eigen::VectorXd& theta() const { return theta_; }
+  [[nodiscard]] double gamma() const { return gamma_; }
   [[nodiscard]] double scale() const { return scale_; }
   [[nodiscard]] const std::vector<WeightedRow>& active() const { return active_; }
 
@@ -306,6 +309,58 @@ MinimaxFit fit(RegressionSource& source, const RowSurvey& survey, const Box& pri
   return finished(epigraph, std::move(result), options.tolerance);
 }
 
+MinimaxFit fit(const SlabColumns& rows, const Box& prior, const std::vector<double>& weights,
+               const MinimaxOptions& options) {
+  const double w = weights[rows.output];
+  const SpreadSample sample(rows);
+  const Eigen::MatrixXd information = sample.information(prior);
+  Epigraph epigraph(prior, weights, information, sample.estimate(prior), {sample.all()});
+  std::vector<Eigen::VectorXd> fits;
+  sample.each_level([&](const SlabColumns& level) {
+    epigraph.absorb(level, options.tolerance);
+    fits.push_back(epigraph.theta());
+    return true;
+  });
+  Eigen::VectorXd half = 2.0 * (fits[2] - fits[1]).cwiseAbs() + 0.5 * (fits[1] - fits[0]).cwiseAbs();
+  MinimaxFit result;
+  result.upper = std::numeric_limits<double>::infinity();
+  std::vector<double> peaks(rows.parameters() + 1);
+  while (result.passes < options.pass_limit && !epigraph.failed()) {
+    const Eigen::VectorXd centre = epigraph.theta();
+    const double floor = (1.0 - kAside) * epigraph.gamma();
+    SlabStore aside;
+    std::fill(peaks.begin(), peaks.end(), 0.0);
+    for (std::size_t first = 0; first < rows.n; first += kScanned) {
+      const SlabColumns portion = rows.part(first, std::min(kScanned, rows.n - first));
+      aside.append(portion, epigraph.beyond(portion, centre, half, floor * w, peaks.data()));
+    }
+    const SlabColumns near = aside.view();
+    ++result.passes;
+    epigraph.absorb(near, options.tolerance);
+    const Eigen::VectorXd theta = epigraph.theta();
+    if (!((theta - centre).cwiseAbs().array() <= half.array()).all()) {
+      half = half.cwiseMax(4.0 * (theta - centre).cwiseAbs());
+      continue;
+    }
+    // Rows that are not near ask for less than `floor` anywhere in the box, but for rounding.
+    double magnitude = peaks.back() + floor * w;
+    for (Eigen::Index j = 0; j < theta.size(); ++j) {
+      magnitude += 2.0 * peaks[static_cast<std::size_t>(j)] * (std::abs(centre[j]) + 2.0 * half[j]);
+    }
+    const double doubt = 8.0 * static_cast<double>(theta.size() + 4) * kEpsilon * magnitude / w;
+    result.upper = std::max(largest_demand(near, theta, w), round_up(floor + doubt));
+    result.theta.assign(theta.data(), theta.data() + theta.size());
+    break;
+  }
+  if (!std::isfinite(result.upper)) {
+    const Eigen::VectorXd theta = epigraph.theta();
+    result.upper = largest_demand(rows, theta, w);
+    result.theta.assign(theta.data(), theta.data() + theta.size());
+    ++result.passes;
+  }
+  return finished(epigraph, std::move(result), options.tolerance);
+}
+
 /// The weights of all outputs, checked.
 std::vector<double> checked_weights(const MinimaxOptions& options, std::size_t outputs) {
   std::vector<double> weights = options.weights;
@@ -355,6 +410,15 @@ MinimaxFit minimax_fit(RegressionSource& source, const Box& prior, const Minimax
   best.lower = lower;
   best.passes = passes;
   return best;
+}
+
+MinimaxFit minimax_fit(const SlabColumns& rows, const Box& prior, const MinimaxOptions& options) {
+  check::that(prior.dimension() > 0 && rows.parameters() == prior.dimension(), "prior box",
+              "one side per parameter of the regression");
+  check_finite(prior, "prior box");
+  check::that(rows.output == 0 && rows.outputs == nullptr, "rows", "of one output");
+  check::that(options.excluded_samples.empty(), "excluded_samples", "none for rows in memory");
+  return fit(rows, prior, checked_weights(options, 1), options);
 }
 
 }  // namespace wheelwright

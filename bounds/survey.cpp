@@ -101,6 +101,16 @@ Eigen::MatrixXd SpreadSample::information(const Box& prior) const {
   return weighted.transpose() * weighted;
 }
 
+Eigen::VectorXd SpreadSample::estimate(const Box& prior) const {
+  const auto p = static_cast<Eigen::Index>(all().parameters());
+  const auto n = static_cast<Eigen::Index>(all().n);
+  const Eigen::Map<const Eigen::MatrixXd> Y(memory_.data(), n, p);
+  const Eigen::VectorXd weight = weights(prior).cwiseAbs2();
+  const Coordinates at = whitened(prior, information(prior));
+  const Eigen::VectorXd rest = Eigen::Map<const Eigen::VectorXd>(all().y, n) - Y * at.centre;
+  return at.centre + at.transform * (at.transform.transpose() * (Y.transpose() * weight.cwiseProduct(rest)));
+}
+
 bool SpreadSample::each_level(const std::function<bool(const SlabColumns&)>& take) const {
   return std::all_of(levels_.begin(), levels_.end(), take);
 }

@@ -61,6 +61,8 @@ class RegressionTable final : public RegressionSource {
   [[nodiscard]] std::size_t parameters() const override { return block_.parameters; }
   bool next(RegressionBlock& block) override;
   void rewind() override { done_ = false; }
+  /// The rows.
+  [[nodiscard]] const RegressionBlock& block() const { return block_; }
 
  private:
   RegressionBlock block_;

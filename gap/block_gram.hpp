@@ -60,6 +60,7 @@ class BlockGram {
   /// not finite, there are fewer than two blocks, or no row lies inside a block.
   explicit BlockGram(const std::vector<RowSpace>& spaces, const BlockOptions& options = {});
 
+  [[nodiscard]] std::size_t columns() const { return columns_; }
   [[nodiscard]] std::size_t blocks() const { return blocks_; }
   /// Number of held-out rows of each block.
   [[nodiscard]] const Eigen::VectorXd& rows() const { return rows_; }

@@ -146,5 +146,35 @@ TEST(IntervalHull, AContradictionIsProvedAndNumbersThatAreNoneAreRefused) {
   EXPECT_THROW(static_cast<void>(interval_hull(columns.view, positive(2))), InvalidArgument);
 }
 
+// Chebyshev's fits of x² by lines on {−1, 0, 1} and of x³ by quadratics on {±1, ±1/2}, and a long log.
+TEST(MinimaxInMemory, ClosedFormsAndTheSource) {
+  Rows square(2), cubic(3);
+  for (const double x : {-1.0, 0.0, 1.0}) {
+    square.add({1.0, x}, x * x, 0.0);
+  }
+  for (const double x : {-1.0, -0.5, 0.5, 1.0}) {
+    cubic.add({1.0, x, x * x}, x * x * x, 0.0);
+  }
+  const MinimaxFit half = minimax_fit(Columns(square.block(0, 3)).view, cube(2, 100.0));
+  EXPECT_LE(half.lower, 0.5);
+  EXPECT_GE(half.upper, 0.5);
+  EXPECT_LE(half.upper - half.lower, 1e-12);
+  const MinimaxFit quarter = minimax_fit(Columns(cubic.block(0, 4)).view, cube(3, 100.0));
+  EXPECT_LE(quarter.lower, 0.25);
+  EXPECT_GE(quarter.upper, 0.25);
+  EXPECT_LE(quarter.upper - quarter.lower, 1e-12);
+
+  for (const bool noisy : {false, true}) {
+    Rows rows = slow_rows(8, 4, 40000, noisy);
+    RegressionBlock block = rows.block(0, 40000);
+    block.dy.setZero();
+    RegressionTable table(block);
+    const MinimaxFit source = minimax_fit(table, positive(4)), memory = minimax_fit(Columns(block).view, positive(4));
+    EXPECT_TRUE(source.converged && memory.converged);
+    EXPECT_LE(std::max(source.lower, memory.lower), std::min(source.upper, memory.upper));
+    EXPECT_NEAR(source.upper, memory.upper, 1e-8 * source.upper);
+  }
+}
+
 }  // namespace
 }  // namespace wheelwright::interval_hull_test

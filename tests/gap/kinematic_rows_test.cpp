@@ -78,7 +78,7 @@ TEST(KinematicRows, NoiseOfThePoseIsFound) {
   const IncrementNoise noise = pose_noise(drive);
   EXPECT_NEAR(noise.forward, std::sqrt(2.0) * 0.004, 0.0006);
   EXPECT_NEAR(noise.yaw, std::sqrt(2.0) * 0.004, 0.0006);
-  const Signal yaw = pose_gap(drive, make_windows(drive, 0.1)).yaw;
+  const Eigen::VectorXd yaw = pose_gap(drive, make_windows(drive, 0.1)).yaw;
   EXPECT_NEAR(std::sqrt(yaw.squaredNorm() / static_cast<double>(yaw.size())), noise.yaw, 0.25 * noise.yaw);
 }
 
