@@ -164,7 +164,7 @@ void bind_margins(py::module_& m) {
           "seconds", [](const MarginsObject& o) { return o.survey.seconds; }, "of driving")
       .def_property_readonly("residuals", [](const MarginsObject& o) { return o.survey.residuals; })
       .def_property_readonly(
-          "sentences", [](const MarginsObject& o) { return margin_sentences(o.survey); }, "for people")
+          "sentences", [](const MarginsObject& o) { return words::margin_sentences(o.survey); }, "for people")
       .def(
           "to_dict", [](const MarginsObject& o) { return to_python(o.json()); },
           "The content of margins.json (results/margins.schema.json).")

@@ -20,7 +20,7 @@ namespace wheelwright::report {
 
 /// The interval of the bounds as a box, the 95 % interval as whiskers, Chebyshev centre and nominal value. The scale is
 /// that of what the log says: the prior's sides may lie beyond the drawing, an arrow then tells.
-[[nodiscard]] std::string interval_bar(const ParameterView& view);
+[[nodiscard]] std::string interval_bar(const words::ParameterView& view);
 
 /// The curve behind the choice of the filter, criterion over β, both logarithmic; empty for fewer than two candidates.
 [[nodiscard]] std::string filter_curve(const FilterChoice& choice);

@@ -20,6 +20,6 @@ namespace wheelwright::report {
 
 /// The table (HTML), its legend and remarks; empty where there is no parameter. Two rows for each parameter: the
 /// physical quantity, where the robot file tells the scale, and θ_L. Bounds are printed rounded outward.
-[[nodiscard]] std::string parameter_table(const Commissioning& result, const TimeAxis& axis);
+[[nodiscard]] std::string parameter_table(const Commissioning& result, const words::TimeAxis& axis);
 
 }  // namespace wheelwright::report
