@@ -95,10 +95,10 @@ TEST(ScenarioFile, FaultKindsAreCalledAsInTheLibrary) {
         parse_scenario(head + "faults: [{kind: " + std::string(to_string(expected)) + ", magnitude: 0.01}]", "s.yaml");
     EXPECT_EQ(s.faults.at(0).kind, expected);
   }
-  for (int kind = 0; kind < 7; ++kind) {
-    const auto expected = static_cast<Trajectory::Kind>(kind);
-    const Scenario s = parse_scenario(head + "trajectory: {kind: " + std::string(to_string(expected)) + "}", "s.yaml");
-    EXPECT_EQ(s.trajectory.kind, expected);
+  int kind = 0;
+  for (const char* name : {"straight", "circle", "figure_eight", "multi_sine", "spin", "stops", "commissioning"}) {
+    const Scenario s = parse_scenario(head + "trajectory: {kind: " + name + "}", "s.yaml");
+    EXPECT_EQ(s.trajectory.kind, static_cast<Trajectory::Kind>(kind++)) << name;
   }
 }
 
