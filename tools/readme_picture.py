@@ -93,7 +93,7 @@ def svg(series, events, onset):
             f'<text x="{x(alarm) + 5:.1f}" y="{bottom - 8}">first alarm, {alarm:.2f} s</text>']
     at = LEFT
     for look, text, room in (('stroke="#b3261e" stroke-width="2"', "residual", 90),
-                             ('stroke="#cfe3f5" stroke-width="12"', "thresholds [l(t), u(t)]: no healthy robot leaves them", 330),
+                             ('stroke="#cfe3f5" stroke-width="12"', "thresholds [l(t), u(t)]: no healthy robot leaves them", 390),
                              ('stroke="#fde4df" stroke-width="12"', "fault event", 0)):
         out.append(f'<path d="M{at},24h26" {look}/><text x="{at + 32}" y="28">{text}</text>')
         at += room + 32
@@ -101,7 +101,7 @@ def svg(series, events, onset):
 
 
 def main():
-    if len(sys.argv) not in (2, 3):
+    if len(sys.argv) not in (2, 3) or sys.argv[1].startswith("-"):
         sys.exit(__doc__)
     target = Path(sys.argv[2]) if len(sys.argv) == 3 else ROOT / "docs/residual.svg"
     target.write_text(svg(*measured(str(Path(sys.argv[1]).resolve()))), encoding="utf-8")
