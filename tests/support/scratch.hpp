@@ -9,6 +9,8 @@
 #include <string>
 #include <string_view>
 
+#include <unistd.h>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -21,8 +23,8 @@ class ScratchTest : public ::testing::Test {
  protected:
   ScratchTest() {
     const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
-    directory_ = std::filesystem::path(::testing::TempDir()) /
-                 ("wheelwright_" + std::string(info->test_suite_name()) + "_" + info->name());
+    directory_ = std::filesystem::path(::testing::TempDir()) / ("wheelwright_" + std::string(info->test_suite_name()) +
+                                                                "_" + info->name() + "_" + std::to_string(::getpid()));
     std::filesystem::remove_all(directory_);
     std::filesystem::create_directories(directory_);
   }
