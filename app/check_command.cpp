@@ -41,18 +41,18 @@ constexpr const char* kExamples =
 
 int run(const Arguments& a) {
   make_directory(a.common);
-  const ModelClaims claims = read_claims(a.model);
+  const results::ModelClaims claims = results::read_claims(a.model);
   const auto opened = open_robot_log(a.logs, claims.robot, a.common);
-  RecordedLog& log = *opened;
-  require_columns(log, claims.measurement.columns());
-  const ModelCheck check = check_model(claims, log, log.report());
-  CheckedFiles files{a.model.string(), {}};
+  logs::RecordedLog& log = *opened;
+  logs::require_columns(log, claims.measurement.columns());
+  const results::ModelCheck check = results::check_model(claims, log, log.report());
+  results::CheckedFiles files{a.model.string(), {}};
   for (const std::filesystem::path& path : a.logs) {
     files.logs.push_back(path.string());
   }
   if (!a.common.out.empty() || a.common.json) {
-    publish(a.common, to_json(check, claims, log.report(), files, software()), "check.json",
-            check_report(check, claims, files, software()));
+    publish(a.common, results::to_json(check, claims, log.report(), files, results::software()), "check.json",
+            check_report(check, claims, files, results::software()));
   }
   if (!a.common.quiet && !a.common.json) {
     fmt::print("{}", check_summary(check, claims));

@@ -12,19 +12,19 @@
 #include <wheelwright/results/model_words.hpp>
 #include <wheelwright/words/text.hpp>
 
-namespace wheelwright {
+namespace wheelwright::app {
 using namespace words;
 namespace {
 
-const PublishedBound& claim_of(const BoundVerdict& verdict, const ModelClaims& claims) {
-  return (verdict.side == Side::upper ? claims.upper : claims.lower)[verdict.parameter];
+const results::PublishedBound& claim_of(const results::BoundVerdict& verdict, const results::ModelClaims& claims) {
+  return (verdict.side == bounds::Side::upper ? claims.upper : claims.lower)[verdict.parameter];
 }
 
 /// "rows 5017, 8211 and the prior"; "the prior" where there is no row.
-std::string stands_on(const BoundVerdict& verdict, const ModelClaims& claims) {
+std::string stands_on(const results::BoundVerdict& verdict, const results::ModelClaims& claims) {
   std::vector<std::size_t> rows;
   bool prior = false;
-  for (const NamedRow& row : claim_of(verdict, claims).proof) {
+  for (const results::NamedRow& row : claim_of(verdict, claims).proof) {
     prior = prior || row.origin.is_prior;
     if (!row.origin.is_prior) {
       rows.push_back(row.origin.sample);
@@ -36,13 +36,14 @@ std::string stands_on(const BoundVerdict& verdict, const ModelClaims& claims) {
   return fmt::format("row{} {}{}", rows.size() == 1 ? "" : "s", fmt::join(rows, ", "), prior ? " and the prior" : "");
 }
 
-std::string statement(const BoundVerdict& verdict, const ModelClaims& claims) {
-  const Parameter& parameter = claims.model.parameters[verdict.parameter];
-  return fmt::format("{} {} {:.7g} {}", parameter.name, verdict.side == Side::upper ? "<=" : ">=", verdict.stated,
-                     parameter_unit(claims.robot, parameter));
+std::string statement(const results::BoundVerdict& verdict, const results::ModelClaims& claims) {
+  const model::Parameter& parameter = claims.model.parameters[verdict.parameter];
+  return fmt::format("{} {} {:.7g} {}", parameter.name,
+                     verdict.side == bounds::Side::upper ? "<=" : ">=", verdict.stated,
+                     commission::parameter_unit(claims.robot, parameter));
 }
 
-std::string facet_sentence(const FacetVerdicts& facets) {
+std::string facet_sentence(const results::FacetVerdicts& facets) {
   const std::size_t all = facets.rows + facets.sides + facets.implied + facets.wrong.size();
   std::string text = fmt::format("{} of {} facets are what they name: {} rows of the log, {} sides of the prior",
                                  all - facets.wrong.size(), all, facets.rows, facets.sides);
@@ -54,16 +55,16 @@ std::string facet_sentence(const FacetVerdicts& facets) {
 
 }  // namespace
 
-std::string check_summary(const ModelCheck& check, const ModelClaims& claims) {
+std::string check_summary(const results::ModelCheck& check, const results::ModelClaims& claims) {
   constexpr std::size_t most = 12;
-  std::string text = fmt::format("{}: {}\n", claims.robot.name, verdict(check, claims));
+  std::string text = fmt::format("{}: {}\n", claims.robot.name, results::verdict(check, claims));
   if (check.emptiness) {
     text += fmt::format("  contradiction of {} rows: {}\n", claims.contradiction.size(),
                         check.emptiness->proved ? "proved" : "NOT PROVED");
   } else {
     constexpr int width = 44;
     text += fmt::format("  {:<{}} {:<10}   stands on\n", "bound", width, "");
-    for (const BoundVerdict& each : check.bounds) {
+    for (const results::BoundVerdict& each : check.bounds) {
       text += fmt::format("  {:<{}} {:<10}   {}\n", statement(each, claims), width,
                           each.proved ? "proved" : "NOT PROVED", stands_on(each, claims));
     }
@@ -81,38 +82,39 @@ std::string check_summary(const ModelCheck& check, const ModelClaims& claims) {
   for (const std::string& premise : check.premises) {
     text += "  given: " + premise + "\n";
   }
-  text += "  " + proof_scope(claims) + "\n";
-  for (const Assumption& a : claims.assumptions) {
-    text += fmt::format("  assumed ({}): {}\n", verdict_word(a.verdict), a.statement);
+  text += "  " + results::proof_scope(claims) + "\n";
+  for (const core::Assumption& a : claims.assumptions) {
+    text += fmt::format("  assumed ({}): {}\n", core::verdict_word(a.verdict), a.statement);
   }
   return text;
 }
 
-std::string check_report(const ModelCheck& check, const ModelClaims& claims, const CheckedFiles& files,
-                         const std::string& software) {
+std::string check_report(const results::ModelCheck& check, const results::ModelClaims& claims,
+                         const results::CheckedFiles& files, const std::string& software) {
   using namespace report;
   std::vector<std::vector<Cell>> rows;
-  for (const BoundVerdict& each : check.bounds) {
-    rows.push_back({escape(spaced(claims.model.parameters[each.parameter].name)),
-                    each.side == Side::upper ? "at most" : "at least",
-                    numeric(escape(with_unit(fmt::format("{:.7g}", each.stated),
-                                             parameter_unit(claims.robot, claims.model.parameters[each.parameter])))),
-                    each.proved ? "proved" : "not proved", escape(stands_on(each, claims))});
+  for (const results::BoundVerdict& each : check.bounds) {
+    rows.push_back(
+        {escape(spaced(claims.model.parameters[each.parameter].name)),
+         each.side == bounds::Side::upper ? "at most" : "at least",
+         numeric(escape(with_unit(fmt::format("{:.7g}", each.stated),
+                                  commission::parameter_unit(claims.robot, claims.model.parameters[each.parameter])))),
+         each.proved ? "proved" : "not proved", escape(stands_on(each, claims))});
   }
   PageContent content;
   content.title = "Check of the model of " + claims.robot.name;
   content.status = check.proved() ? (check.warnings.empty() ? "good" : "caution") : "bad";
-  content.verdict = capital(verdict(check, claims)) + ".";
+  content.verdict = core::capital(results::verdict(check, claims)) + ".";
   content.sentences = {
       "Every proof was evaluated in exact rational arithmetic on rows that were filtered again from the log, without "
       "the "
       "solver that found them.",
-      proof_scope(claims)};
+      results::proof_scope(claims)};
   content.warrant = claims.warrant;
   content.sections = {{"bounds", "Bounds", table({"parameter", "", "bound", "", "stands on"}, rows)}};
   if (!check.emptiness) {
     content.sections.push_back(
-        {"facets", "Feasible set", paragraph(escape(capital(facet_sentence(check.facets)) + "."))});
+        {"facets", "Feasible set", paragraph(escape(core::capital(facet_sentence(check.facets)) + "."))});
   }
   if (!check.failures.empty()) {
     content.sections.push_back({"failures", "Not proved", bullets(check.failures)});
@@ -131,4 +133,4 @@ std::string check_report(const ModelCheck& check, const ModelClaims& claims, con
   return page(content);
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::app

@@ -7,13 +7,13 @@
 
 #include <wheelwright/results/check_json.hpp>
 
-namespace wheelwright {
+namespace wheelwright::app {
 
 /// The answer, a short table and what is not proved, for a terminal.
-[[nodiscard]] std::string check_summary(const ModelCheck& check, const ModelClaims& claims);
+[[nodiscard]] std::string check_summary(const results::ModelCheck& check, const results::ModelClaims& claims);
 
 /// The same as one self-contained HTML page.
-[[nodiscard]] std::string check_report(const ModelCheck& check, const ModelClaims& claims, const CheckedFiles& files,
-                                       const std::string& software);
+[[nodiscard]] std::string check_report(const results::ModelCheck& check, const results::ModelClaims& claims,
+                                       const results::CheckedFiles& files, const std::string& software);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::app

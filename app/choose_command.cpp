@@ -27,7 +27,7 @@ struct Arguments {
   std::vector<std::filesystem::path> logs;
   std::filesystem::path robot;
   std::vector<std::string> faults;
-  DetectorChoiceOptions choice;
+  commission::DetectorChoiceOptions choice;
   CommonOptions common;
 };
 
@@ -46,9 +46,9 @@ constexpr const char* kExamples =
     "  wheelwright choose drive.csv --robot robot.yaml --false-alarms 1e-3\n\n"
     "Exit code: 0 a detector was chosen, 1 no candidate is certain to see a stated fault, 2 bad input.";
 
-StatedFault stated(const std::string& text) {
+commission::StatedFault stated(const std::string& text) {
   const std::size_t at = text.find('=');
-  StatedFault fault{text.substr(0, at)};
+  commission::StatedFault fault{text.substr(0, at)};
   if (at != std::string::npos) {
     double size = 0.0;
     const char* const end = text.data() + text.size();
@@ -65,16 +65,16 @@ std::string shown(double value, const char* form) {
   return std::isfinite(value) ? fmt::format(fmt::runtime(form), value) : "-";
 }
 
-const char* words(Guarantee guarantee) {
+const char* words(commission::Guarantee guarantee) {
   switch (guarantee) {
-    case Guarantee::never: return "never";
-    case Guarantee::hourly: return "hourly";
-    case Guarantee::extrapolated: return "extrapol.";
+    case commission::Guarantee::never: return "never";
+    case commission::Guarantee::hourly: return "hourly";
+    case commission::Guarantee::extrapolated: return "extrapol.";
   }
   return "";
 }
 
-std::string cost(const DetectorCandidate& candidate, const DetectorCandidate& chosen) {
+std::string cost(const commission::DetectorCandidate& candidate, const commission::DetectorCandidate& chosen) {
   if (!std::isfinite(candidate.size)) {
     return "not certain";
   }
@@ -85,13 +85,13 @@ std::string cost(const DetectorCandidate& candidate, const DetectorCandidate& ch
   return text;
 }
 
-std::string table(const DetectorChoice& choice) {
+std::string table(const commission::DetectorChoice& choice) {
   std::string out = fmt::format(
       "smallest certain size over the stated one, within {:g} s, and delay of the stated size: medians, worst fault\n"
       "{:>5} {:>8} {:>10} {:>7} {:>8} {:>8}  {}\n",
       choice.window, "order", "beta", "alarms", "k of n", "size", "delay", "against the chosen one");
-  const DetectorCandidate& chosen = choice.candidates.front();
-  for (const DetectorCandidate& candidate : choice.candidates) {
+  const commission::DetectorCandidate& chosen = choice.candidates.front();
+  for (const commission::DetectorCandidate& candidate : choice.candidates) {
     out +=
         fmt::format("{:>5} {:>8.4g} {:>10} {:>7} ", candidate.filter.order, candidate.filter.beta,
                     words(candidate.guarantee), fmt::format("{}/{}", candidate.persistence.k, candidate.persistence.n));
@@ -107,9 +107,9 @@ std::string table(const DetectorChoice& choice) {
   return out;
 }
 
-std::string faults(const DetectorChoice& choice) {
+std::string faults(const commission::DetectorChoice& choice) {
   std::string out;
-  for (const StatedMargin& m : choice.candidates.front().faults) {
+  for (const commission::StatedMargin& m : choice.candidates.front().faults) {
     out +=
         fmt::format("{} {}: certain from {} on at half of {} onsets, from {} at all; one of {:g} after {}\n", m.fault,
                     m.side > 0.0 ? "growing" : "shrinking", shown(m.median, "{:.3g}"), m.onsets,
@@ -119,37 +119,37 @@ std::string faults(const DetectorChoice& choice) {
 }
 
 int run(const Arguments& a) {
-  DetectorChoiceOptions options = a.choice;
+  commission::DetectorChoiceOptions options = a.choice;
   for (const std::string& text : a.faults) {
     options.trial.faults.push_back(stated(text));
   }
   make_directory(a.common);
   Robot robot = read_robot(a.robot);
   const auto opened = open_robot_log(a.logs, robot, a.common);
-  RecordedLog& log = *opened;
-  robot = with_column_errors(robot, interpolation_errors(log.report()));
-  require_columns(log, needed_columns(robot));
+  logs::RecordedLog& log = *opened;
+  robot = model::with_column_errors(robot, logs::interpolation_errors(log.report()));
+  logs::require_columns(log, robots::needed_columns(robot));
   Progress progress(a.common.quiet);
   options.trial.threads = static_cast<std::size_t>(a.common.threads);
   options.progress = [&](std::string_view stage, double share) { progress.tell(stage, share); };
-  const DetectorChoice choice = choose_detector(log, robot, options);
+  const commission::DetectorChoice choice = commission::choose_detector(log, robot, options);
 
   std::vector<std::string> logs;
   for (const auto& path : a.logs) {
     logs.push_back(path.string());
   }
-  const Json json = to_json(choice, a.robot.string(), logs, software());
+  const Json json = results::to_json(choice, a.robot.string(), logs, results::software());
   if (!a.common.out.empty()) {
     if (choice.chosen) {
       CommonOptions files = a.common;
       files.json = false;
-      publish(files, to_json(*choice.chosen, log.report(), software()), "model.json",
-              commission_report(*choice.chosen, report_context(a.common, log.report(), log)));
+      publish(files, results::to_json(*choice.chosen, log.report(), results::software()), "model.json",
+              report::commission_report(*choice.chosen, report_context(a.common, log.report(), log)));
     }
-    write_json(a.common.out / "choice.json", json);
+    files::write_json(a.common.out / "choice.json", json);
   }
   if (a.common.json) {
-    fmt::print("{}\n", json_text(json));
+    fmt::print("{}\n", files::json_text(json));
   } else if (!a.common.quiet) {
     fmt::print("{}", table(choice));
     fmt::print("{}", faults(choice));
@@ -160,7 +160,7 @@ int run(const Arguments& a) {
       fmt::print("{}\n", note);
     }
     if (choice.chosen) {
-      fmt::print("for the robot file:\n{}\n", robot_file_line(choice.candidates.front().filter));
+      fmt::print("for the robot file:\n{}\n", results::robot_file_line(choice.candidates.front().filter));
     }
   }
   return choice.chosen ? kDone : kNo;

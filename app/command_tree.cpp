@@ -130,11 +130,11 @@ std::string suggestion(const ProgramWords& program, const std::vector<std::strin
     if (std::find(known.begin(), known.end(), name) != known.end()) {
       continue;
     }
-    if (const std::string nearest = nearest_name(name, known); !nearest.empty()) {
-      return fmt::format("did you mean {} instead of {}?", shown(nearest), shown(name));
+    if (const std::string nearest = files::nearest_name(name, known); !nearest.empty()) {
+      return fmt::format("did you mean {} instead of {}?", files::shown(nearest), files::shown(name));
     }
     if (!option) {
-      return fmt::format("there is no command {}: expected one of {}", shown(name), listed(known));
+      return fmt::format("there is no command {}: expected one of {}", files::shown(name), core::listed(known));
     }
   }
   return {};

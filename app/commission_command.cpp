@@ -31,7 +31,7 @@ struct Arguments {
   std::filesystem::path robot;
   bool statistical = false;
   std::size_t outliers = 0;
-  std::optional<Persistence> persistence;
+  std::optional<detector::Persistence> persistence;
   CommonOptions common;
 };
 
@@ -53,29 +53,30 @@ int run(const Arguments& a) {
   make_directory(a.common);
   Robot robot = read_robot(a.robot);
   const auto opened = open_robot_log(a.logs, robot, a.common);
-  RecordedLog& log = *opened;
-  robot = with_column_errors(robot, interpolation_errors(log.report()));
-  ReportContext context = report_context(a.common, log.report(), log);
+  logs::RecordedLog& log = *opened;
+  robot = model::with_column_errors(robot, logs::interpolation_errors(log.report()));
+  report::ReportContext context = report_context(a.common, log.report(), log);
   Progress progress(a.common.quiet);
-  CommissionOptions options;
-  options.noise_mode = a.statistical ? NoiseMode::statistical : NoiseMode::worst_case;
+  commission::CommissionOptions options;
+  options.noise_mode = a.statistical ? filter::NoiseMode::statistical : filter::NoiseMode::worst_case;
   options.outliers = a.outliers;
-  options.persistence = a.persistence.value_or(Persistence{});
+  options.persistence = a.persistence.value_or(detector::Persistence{});
   options.progress = [&](std::string_view stage, double share) { progress.tell(stage, share); };
   Commissioning result;
   try {
-    require_columns(log, needed_columns(robot));
-    result = commission(log, robot, options);
+    logs::require_columns(log, robots::needed_columns(robot));
+    result = commission_robot(log, robot, options);
     if (!result.model.facets.empty() && !a.common.out.empty()) {
       context.own_log = detect(log, make_detector(result.model), {.most_points = report::most_chart_points});
     }
   } catch (const Error& error) {
     if (!a.common.out.empty()) {
-      atomic_write(a.common.out / "report.html", failure_report(error.what(), context));
+      files::atomic_write(a.common.out / "report.html", report::failure_report(error.what(), context));
     }
     throw;
   }
-  publish(a.common, to_json(result, log.report(), software()), "model.json", commission_report(result, context));
+  publish(a.common, results::to_json(result, log.report(), results::software()), "model.json",
+          report::commission_report(result, context));
   if (!a.common.quiet && !a.common.json) {
     print_log(context.warnings);
     fmt::print("{}", summary(result));

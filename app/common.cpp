@@ -15,8 +15,8 @@
 
 namespace wheelwright::app {
 
-LogOptions reader_options(const CommonOptions& options) {
-  LogOptions reader;
+logs::LogOptions reader_options(const CommonOptions& options) {
+  logs::LogOptions reader;
   reader.msg_path = options.msg_path;
   for (const std::string& entry : options.map) {
     const std::size_t at = entry.find('=');
@@ -24,24 +24,24 @@ LogOptions reader_options(const CommonOptions& options) {
       throw InputError("--map '" + entry + "': expected NAME=COLUMN, e.g. --map omega_r=wheel_2");
     }
     const std::string name = entry.substr(0, at);
-    if (find_log_column(name) == nullptr) {
+    if (logs::find_log_column(name) == nullptr) {
       std::vector<std::string> names;
-      for (const LogColumn& column : log_columns()) {
+      for (const logs::LogColumn& column : logs::log_columns()) {
         names.push_back(column.name);
       }
-      throw InputError("--map '" + entry + "': " + shown(name) + " is no column of a log: expected one of " +
-                       listed(names) + did_you_mean(name, names));
+      throw InputError("--map '" + entry + "': " + files::shown(name) + " is no column of a log: expected one of " +
+                       core::listed(names) + files::did_you_mean(name, names));
     }
     reader.map[name] = entry.substr(at + 1);
   }
   return reader;
 }
 
-std::unique_ptr<RecordedLog> open_robot_log(const std::vector<std::filesystem::path>& paths, const Robot& robot,
-                                            const CommonOptions& options) {
-  LogOptions reader = reader_options(options);
-  reader.only = useful_columns(robot);
-  return open_log(paths, reader);
+std::unique_ptr<logs::RecordedLog> open_robot_log(const std::vector<std::filesystem::path>& paths, const Robot& robot,
+                                                  const CommonOptions& options) {
+  logs::LogOptions reader = reader_options(options);
+  reader.only = robots::useful_columns(robot);
+  return logs::open_log(paths, reader);
 }
 
 void make_directory(const CommonOptions& options) {
@@ -58,11 +58,11 @@ void make_directory(const CommonOptions& options) {
 
 void publish(const CommonOptions& options, const Json& result, const std::string& name, const std::string& report) {
   if (!options.out.empty()) {
-    atomic_write(options.out / "report.html", report);
-    write_json(options.out / name, result);
+    files::atomic_write(options.out / "report.html", report);
+    files::write_json(options.out / name, result);
   }
   if (options.json) {
-    const std::string text = json_text(result);
+    const std::string text = files::json_text(result);
     std::fwrite(text.data(), 1, text.size(), stdout);
     std::fputc('\n', stdout);
   }
@@ -74,14 +74,14 @@ void print_log(const std::vector<std::string>& sentences) {
   }
 }
 
-ReportContext report_context(const CommonOptions& options, const LogReport& data, LogSource& log) {
-  ReportContext context;
-  for (const LogFileReport& file : data.files) {
+report::ReportContext report_context(const CommonOptions& options, const logs::LogReport& data, LogSource& log) {
+  report::ReportContext context;
+  for (const logs::LogFileReport& file : data.files) {
     context.log_files.push_back(file.path);
   }
-  context.software = software();
+  context.software = results::software();
   context.command_line = options.command_line;
-  context.warnings = sentences(data);
+  context.warnings = logs::sentences(data);
   if (!options.out.empty()) {
     context.signals = report::raw_signals(log);
     context.rows = data.rows;

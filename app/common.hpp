@@ -42,11 +42,11 @@ struct CommonOptions {
 };
 
 /// --map as reader options. Throws InputError where an entry is not name=column, or its name none of the log contract.
-[[nodiscard]] LogOptions reader_options(const CommonOptions& options);
+[[nodiscard]] logs::LogOptions reader_options(const CommonOptions& options);
 
 /// The log in `paths`, with the columns that `robot` can use. Throws InputError as open_log does.
-[[nodiscard]] std::unique_ptr<RecordedLog> open_robot_log(const std::vector<std::filesystem::path>& paths,
-                                                          const Robot& robot, const CommonOptions& options);
+[[nodiscard]] std::unique_ptr<logs::RecordedLog> open_robot_log(const std::vector<std::filesystem::path>& paths,
+                                                                const Robot& robot, const CommonOptions& options);
 
 /// Makes the result directory `out` where it is wanted. Throws InputError when that is impossible.
 void make_directory(const CommonOptions& options);
@@ -59,6 +59,7 @@ void publish(const CommonOptions& options, const Json& result, const std::string
 void print_log(const std::vector<std::string>& sentences);
 
 /// The context of a report: files, repairs, software, command line, raw signals of `log` (which is walked once).
-[[nodiscard]] ReportContext report_context(const CommonOptions& options, const LogReport& data, LogSource& log);
+[[nodiscard]] report::ReportContext report_context(const CommonOptions& options, const logs::LogReport& data,
+                                                   LogSource& log);
 
 }  // namespace wheelwright::app

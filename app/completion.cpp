@@ -41,7 +41,7 @@ std::string quoted(const std::string& text) {
 // What bash offers for a value.
 std::string bash_values(const OptionWords& option) {
   if (!option.choices.empty()) {
-    return fmt::format("-W {}", quoted(listed(option.choices, " ")));
+    return fmt::format("-W {}", quoted(core::listed(option.choices, " ")));
   }
   return option.takes_directory() ? "-d" : option.takes_file() ? "-f" : "";
 }
@@ -49,7 +49,7 @@ std::string bash_values(const OptionWords& option) {
 std::string bash(const ProgramWords& program) {
   std::string values, options, positionals;
   const auto add = [&](const CommandWords& command, const std::string& name) {
-    options += fmt::format("    {}) words={} ;;\n", quoted(name), quoted(listed(names_of(command), " ")));
+    options += fmt::format("    {}) words={} ;;\n", quoted(name), quoted(core::listed(names_of(command), " ")));
     for (const OptionWords& option : command.options) {
       const std::string offer = bash_values(option);
       if (option.positional()) {
@@ -101,13 +101,13 @@ _wheelwright() {{
 }}
 complete -F _wheelwright wheelwright
 )",
-                     listed(names_of(program), " | "), values, options, quoted(listed(names_of(program), " ")),
-                     positionals);
+                     core::listed(names_of(program), " | "), values, options,
+                     quoted(core::listed(names_of(program), " ")), positionals);
 }
 
 // An argument of _arguments: '--out[words]:DIR:_files -/'.
 std::string zsh_argument(const OptionWords& option, const std::string& name) {
-  const std::string action = !option.choices.empty()    ? fmt::format("({})", listed(option.choices, " "))
+  const std::string action = !option.choices.empty()    ? fmt::format("({})", core::listed(option.choices, " "))
                              : option.takes_directory() ? "_files -/"
                              : option.takes_file()      ? "_files"
                                                         : " ";
@@ -172,7 +172,7 @@ std::string fish_option(const OptionWords& option, const std::string& condition)
     out += fmt::format("complete -c wheelwright -n {} -{} {}", condition, name.starts_with("--") ? "l" : "s",
                        name.substr(name.find_first_not_of('-')));
     if (!option.choices.empty()) {
-      out += fmt::format(" -x -a '{}'", listed(option.choices, " "));
+      out += fmt::format(" -x -a '{}'", core::listed(option.choices, " "));
     } else if (option.takes_directory()) {
       out += " -x -a '(__fish_complete_directories)'";
     } else if (!option.value.empty()) {
@@ -195,7 +195,7 @@ std::string fish(const ProgramWords& program) {
     for (const OptionWords& option : command.options) {
       if (option.positional()) {
         out += fmt::format("complete -c wheelwright -n {} {}\n", condition,
-                           option.choices.empty() ? "-F" : fmt::format("-a '{}'", listed(option.choices, " ")));
+                           option.choices.empty() ? "-F" : fmt::format("-a '{}'", core::listed(option.choices, " ")));
       } else {
         out += fish_option(option, condition);
       }
@@ -216,7 +216,7 @@ std::string completion(const ProgramWords& program, const std::string& shell) {
   if (shell == "fish") {
     return fish(program);
   }
-  throw InputError("completion: " + shown(shell) + ": expected one of bash, zsh, fish");
+  throw InputError("completion: " + files::shown(shell) + ": expected one of bash, zsh, fish");
 }
 
 }  // namespace wheelwright::app

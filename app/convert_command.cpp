@@ -20,7 +20,7 @@ namespace {
 
 struct Arguments {
   std::vector<std::filesystem::path> paths;
-  McapCompression compression = McapCompression::zstd;
+  logs::McapCompression compression = logs::McapCompression::zstd;
   bool force = false;
   CommonOptions common;
 };
@@ -44,13 +44,13 @@ int run(const Arguments& a) {
   if (std::filesystem::exists(to) && !a.force) {
     throw InputError(to.string() + ": it is there already: --force replaces it");
   }
-  const std::unique_ptr<RecordedLog> log = open_log(from, reader_options(a.common));
-  const LogReport& report = log->report();
-  LogWriteOptions options;
+  const std::unique_ptr<logs::RecordedLog> log = logs::open_log(from, reader_options(a.common));
+  const logs::LogReport& report = log->report();
+  logs::LogWriteOptions options;
   options.compression = a.compression;
   options.time_origin = report.files.front().time_origin;
   Progress progress(a.common.quiet);
-  const auto writer = create_log(to, log->columns(), options);
+  const auto writer = logs::create_log(to, log->columns(), options);
   LogBlock block;
   std::size_t rows = 0;
   while (log->next(block)) {
@@ -59,7 +59,7 @@ int run(const Arguments& a) {
     progress.tell("writing", static_cast<double>(rows) / static_cast<double>(report.rows));
   }
   writer->commit();
-  const std::vector<std::string> said = sentences(report);
+  const std::vector<std::string> said = logs::sentences(report);
   if (a.common.json) {
     const Json json = {{"schema", "wheelwright/convert/1"},
                        {"file", to.string()},
@@ -69,7 +69,7 @@ int run(const Arguments& a) {
                        {"seconds", report.seconds},
                        {"columns", log->columns()},
                        {"notes", said}};
-    fmt::print("{}\n", json_text(json));
+    fmt::print("{}\n", files::json_text(json));
   } else if (!a.common.quiet) {
     print_log(said);
     fmt::print("wrote {}: {} rows, {:.6g} s in {} segment{}, columns t", to.string(), report.rows, report.seconds,
@@ -93,10 +93,11 @@ Run add_convert(CLI::App& program) {
       ->required()
       ->expected(-2);
   command.add_option("--compression", a->compression, "Of an MCAP file's chunks: none, zstd or lz4")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, McapCompression>{{"none", McapCompression::none},
-                                                                                 {"zstd", McapCompression::zstd},
-                                                                                 {"lz4", McapCompression::lz4}})
-                      .description("{none,zstd,lz4}"))
+      ->transform(
+          CLI::CheckedTransformer(std::map<std::string, logs::McapCompression>{{"none", logs::McapCompression::none},
+                                                                               {"zstd", logs::McapCompression::zstd},
+                                                                               {"lz4", logs::McapCompression::lz4}})
+              .description("{none,zstd,lz4}"))
       ->type_name("KIND");
   command.add_flag("--force", a->force, "Replace what is there");
   add_map(command, a->common);

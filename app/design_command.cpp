@@ -41,11 +41,11 @@ struct Arguments {
   std::optional<double> speed, acceleration, effort, radius;
   std::vector<double> box;
   double rate = 100.0;
-  WidthCriterion criterion = WidthCriterion::geometric_mean;
+  design::WidthCriterion criterion = design::WidthCriterion::geometric_mean;
   std::vector<std::string> faults;
   std::filesystem::path gap;
   std::vector<std::string> between, sizes;
-  std::size_t stages = DesignOptions{}.stages;
+  std::size_t stages = design::DesignOptions{}.stages;
   CommonOptions common;
 };
 
@@ -70,9 +70,9 @@ constexpr const char* kExamples =
     "coulomb=0.2\n"
     "  then drive plan/manoeuvre.csv, or simulate it with trajectory: {kind: table, file: plan/manoeuvre.csv}";
 
-MotionLimits limits_from(const Arguments& a, const Robot& robot) {
-  MotionLimits limits = limits_of(robot);
-  if (const double shortest = shortest_duration(a.stages); a.duration < shortest) {
+design::MotionLimits limits_from(const Arguments& a, const Robot& robot) {
+  design::MotionLimits limits = design::limits_of(robot);
+  if (const double shortest = design::shortest_duration(a.stages); a.duration < shortest) {
     throw InputError(fmt::format(
         "--duration {} s: expected at least {} s, since each half of the drive has {} stages (--stages) of speed",
         a.duration, shortest, a.stages));
@@ -97,15 +97,16 @@ MotionLimits limits_from(const Arguments& a, const Robot& robot) {
 }
 
 // NAME or NAME=SIZE of the catalogue; without any, the usual ones.
-std::vector<InspectedFault> inspected(const Arguments& a, const OnlineModel& model) {
-  std::vector<InspectedFault> faults;
-  const std::vector<InspectedFault> usual = usual_inspection(model);
-  const std::vector<FaultType> catalogue = fault_catalogue(model.model, model.estimate, model.robot.effort);
+std::vector<design::InspectedFault> inspected(const Arguments& a, const OnlineModel& model) {
+  std::vector<design::InspectedFault> faults;
+  const std::vector<design::InspectedFault> usual = design::usual_inspection(model);
+  const std::vector<detector::FaultType> catalogue =
+      detector::fault_catalogue(model.model, model.estimate, model.robot.effort);
   for (const std::string& text : a.faults) {
     const std::size_t equals = text.find('=');
     const std::string name = text.substr(0, equals);
-    InspectedFault fault{find_fault(catalogue, name), 0.05};
-    for (const InspectedFault& each : usual) {
+    design::InspectedFault fault{detector::find_fault(catalogue, name), 0.05};
+    for (const design::InspectedFault& each : usual) {
       fault.asked = each.fault.name == name ? each.asked : fault.asked;
     }
     if (equals != std::string::npos) {
@@ -119,11 +120,12 @@ std::vector<InspectedFault> inspected(const Arguments& a, const OnlineModel& mod
   return faults.empty() ? usual : faults;
 }
 
-void write_plans(const Arguments& a, const Model& model, const Plan& plan, const std::optional<Plan>& eight) {
+void write_plans(const Arguments& a, const Model& model, const design::Plan& plan,
+                 const std::optional<design::Plan>& eight) {
   if (!a.common.out.empty()) {
-    write_csv(a.common.out / "manoeuvre.csv", command_table(plan, model));
+    logs::write_csv(a.common.out / "manoeuvre.csv", design::command_table(plan, model));
     if (eight) {
-      write_csv(a.common.out / "figure_eight.csv", command_table(*eight, model));
+      logs::write_csv(a.common.out / "figure_eight.csv", design::command_table(*eight, model));
     }
   }
 }
@@ -151,24 +153,24 @@ void check_rivals(const Arguments& a) {
 }
 
 // A drive with a bit of everything, on which sizes that nobody gave are found.
-Drive ordinary_drive(const DesignSubject& subject, const MotionLimits& limits) {
-  const StageFamily family(subject, limits, 2);
+gap::Drive ordinary_drive(const design::DesignSubject& subject, const design::MotionLimits& limits) {
+  const design::StageFamily family(subject, limits, 2);
   std::vector<double> x(family.dimension(), 0.5);
   x[0] = 1.0;
   x[1] = x.size() > 4 ? 1.0 : 0.5;
   x[family.dimension() / 2] = x.size() > 4 ? 1.0 : 0.0;
   x[family.dimension() / 2 + 1] = x.size() > 4 ? 0.0 : 0.5;
-  return planned_drive(family.plan(x, subject.step), subject);
+  return gap::planned_drive(family.plan(x, subject.step), subject);
 }
 
-DiscriminationDesign discriminate(const Arguments& a, const DesignSubject& subject, const MotionLimits& limits,
-                                  const DesignOptions& options) {
-  const std::vector<Effect> catalogue = effect_catalogue(subject.model);
-  const Drive drive = ordinary_drive(subject, limits);
-  PlannedNoise noise = expected_noise(subject);
-  const std::vector<Rival> rivals = a.gap.empty() ? rivals_named(a.between, a.sizes, catalogue, drive)
-                                                  : rivals_of_gap(a.gap, catalogue, drive, noise);
-  return design_for_discrimination(subject, limits, rivals, catalogue, noise, options);
+gap::DiscriminationDesign discriminate(const Arguments& a, const design::DesignSubject& subject,
+                                       const design::MotionLimits& limits, const design::DesignOptions& options) {
+  const std::vector<Effect> catalogue = gap::effect_catalogue(subject.model);
+  const gap::Drive drive = ordinary_drive(subject, limits);
+  gap::PlannedNoise noise = gap::expected_noise(subject);
+  const std::vector<gap::Rival> rivals = a.gap.empty() ? rivals_named(a.between, a.sizes, catalogue, drive)
+                                                       : results::rivals_of_gap(a.gap, catalogue, drive, noise);
+  return gap::design_for_discrimination(subject, limits, rivals, catalogue, noise, options);
 }
 
 int run(const Arguments& a) {
@@ -185,42 +187,44 @@ int run(const Arguments& a) {
   check_rivals(a);
   make_directory(a.common);
   const std::optional<OnlineModel> model = a.model.empty() ? std::nullopt : std::optional(read_model(a.model));
-  const DesignSubject subject = model ? subject_of(*model) : subject_of(read_robot(a.robot), 1.0 / a.rate);
-  const MotionLimits limits = limits_from(a, subject.robot);
+  const design::DesignSubject subject =
+      model ? design::subject_of(*model) : design::subject_of(read_robot(a.robot), 1.0 / a.rate);
+  const design::MotionLimits limits = limits_from(a, subject.robot);
   Progress progress(a.common.quiet);
-  DesignOptions options;
+  design::DesignOptions options;
   options.stages = a.stages;
   options.seed = a.common.seed;
   options.threads = static_cast<std::size_t>(a.common.threads);
   options.progress = [&](std::string_view stage, double share) { progress.tell(stage, share); };
-  ReportContext context;
-  context.software = software();
+  report::ReportContext context;
+  context.software = results::software();
   context.command_line = a.common.command_line;
   context.seeds = {{"search", a.common.seed}};
   const auto finish = [&](Json result, const auto& design, const std::string& words) {
-    result["software"] = software();
+    result["software"] = results::software();
     result["seed"] = a.common.seed;
-    result["warrant"] = warrant_word(subject.warrant);
+    result["warrant"] = core::warrant_word(subject.warrant);
     write_plans(a, subject.model, design.manoeuvre.plan, design.figure_eight_plan);
-    publish(a.common, result, "design.json", design_report(design, subject, limits, context));
-    tell(a, words + fmt::format("  these promises are {}\n", warrant_word(subject.warrant)));
+    publish(a.common, result, "design.json", report::design_report(design, subject, limits, context));
+    tell(a, words + fmt::format("  these promises are {}\n", core::warrant_word(subject.warrant)));
   };
   if (detection) {
     // An evaluation walks the plan once for each fault: fewer of them than for bounds.
     options.samples = 150;
     options.descents = 3;
     options.steps = 250;
-    const DetectionDesign design = design_for_detection(*model, subject, limits, inspected(a, *model), options);
-    finish(to_json(design, limits), design, summary(design));
+    const design::DetectionDesign design =
+        design::design_for_detection(*model, subject, limits, inspected(a, *model), options);
+    finish(results::to_json(design, limits), design, summary(design));
   } else if (a.aim == "discrimination") {
     options.samples = 150;
     options.descents = 3;
     options.steps = 250;
-    const DiscriminationDesign design = discriminate(a, subject, limits, options);
-    finish(to_json(design, limits), design, summary(design));
+    const gap::DiscriminationDesign design = discriminate(a, subject, limits, options);
+    finish(results::to_json(design, limits), design, summary(design));
   } else {
-    const BoundsDesign design = design_for_bounds(subject, limits, a.criterion, options);
-    finish(to_json(design, subject, limits), design, summary(design, subject));
+    const design::BoundsDesign design = design::design_for_bounds(subject, limits, a.criterion, options);
+    finish(results::to_json(design, subject, limits), design, summary(design, subject));
   }
   return kDone;
 }
@@ -274,10 +278,10 @@ Run add_design(CLI::App& program) {
   command
       .add_option("--criterion", a->criterion,
                   "Relative widths are judged by their geometric_mean, their mean, or the largest")
-      ->transform(CLI::CheckedTransformer(
-                      std::map<std::string, WidthCriterion>{{"geometric_mean", WidthCriterion::geometric_mean},
-                                                            {"mean", WidthCriterion::mean},
-                                                            {"largest", WidthCriterion::largest}})
+      ->transform(CLI::CheckedTransformer(std::map<std::string, design::WidthCriterion>{
+                                              {"geometric_mean", design::WidthCriterion::geometric_mean},
+                                              {"mean", design::WidthCriterion::mean},
+                                              {"largest", design::WidthCriterion::largest}})
                       .description("{geometric_mean,mean,largest}"))
       ->default_str("geometric_mean");
   command

@@ -31,8 +31,8 @@ struct Arguments {
   std::filesystem::path model;
   std::filesystem::path series;
   bool follow = false;
-  DetectorOptions detector;
-  std::optional<Persistence> persistence;
+  detector::DetectorOptions detector;
+  std::optional<detector::Persistence> persistence;
   CommonOptions common;
 };
 
@@ -55,8 +55,8 @@ int run(const Arguments& a) {
     model.kinematic->persistence = a.persistence.value_or(model.kinematic->persistence);
   }
   Detector detector = make_detector(model, a.detector);
-  LogOptions reader = reader_options(a.common);
-  reader.only = useful_columns(model.robot);
+  logs::LogOptions reader = reader_options(a.common);
+  reader.only = robots::useful_columns(model.robot);
   if (a.follow) {
     return follow(std::cin, std::cout, std::move(detector), model, a.detector, reader, a.common.json);
   }
@@ -64,35 +64,35 @@ int run(const Arguments& a) {
     throw InputError("detect: expected a LOG, or --follow to read rows from standard input");
   }
   make_directory(a.common);
-  const auto opened = open_log({a.log}, reader);
-  RecordedLog& log = *opened;
-  const ReportContext context = report_context(a.common, log.report(), log);
-  DetectionOptions watch;
+  const auto opened = logs::open_log({a.log}, reader);
+  logs::RecordedLog& log = *opened;
+  const report::ReportContext context = report_context(a.common, log.report(), log);
+  commission::DetectionOptions watch;
   if (!a.common.out.empty()) {
     watch.most_points = report::most_chart_points;
   }
   const Detection detection = or_failure_page(a.common, context, [&] {
-    require_columns(log, model.measurement.columns());
+    logs::require_columns(log, model.measurement.columns());
     return detect(log, std::move(detector), watch);
   });
-  const KinematicWatch kinematic = watch_kinematics(log, model, a.detector, watch);
-  EventIsolationOptions isolation;
+  const commission::KinematicWatch kinematic = commission::watch_kinematics(log, model, a.detector, watch);
+  commission::EventIsolationOptions isolation;
   isolation.isolation.threads = static_cast<std::size_t>(std::max(a.common.threads, 1));
-  const std::vector<Isolation> isolations = isolate_events(log, model, detection, isolation);
+  const std::vector<detector::Isolation> isolations = commission::isolate_events(log, model, detection, isolation);
   const bool fault = !detection.events.empty() || (kinematic.detection && !kinematic.detection->events.empty());
   const std::string undecided =
       detection.instants == 0 ? why_undecided(model, log.report().rows, log.median_step()) : std::string();
   if (!a.common.out.empty() || a.common.json) {
-    Json json = to_json(detection, model, a.model.string(), a.log.string(), software());
-    add_isolation(json, isolations);
-    add_kinematic(json, kinematic, model);
+    Json json = results::to_json(detection, model, a.model.string(), a.log.string(), results::software());
+    results::add_isolation(json, isolations);
+    results::add_kinematic(json, kinematic, model);
     if (!undecided.empty()) {
       json["undecided"] = undecided;
     }
     std::string page;
     if (!a.common.out.empty()) {
-      page = detect_report(detection, model, context, {.detection = kinematic.detection, .message = kinematic.message},
-                           isolations);
+      page = report::detect_report(detection, model, context,
+                                   {.detection = kinematic.detection, .message = kinematic.message}, isolations);
     }
     publish(a.common, json, "detection.json", page);
   }
@@ -100,7 +100,7 @@ int run(const Arguments& a) {
     write_series(a.series, log, model, a.detector, log.report().files.front().time_origin);
   }
   if (!a.common.quiet && !a.common.json) {
-    print_log(sentences(log.report()));
+    print_log(logs::sentences(log.report()));
     fmt::print("{}{}{}", summary(detection, model), summary(isolations, detection), summary(kinematic, model));
     if (!a.common.out.empty()) {
       fmt::print("wrote {} and {}\n", (a.common.out / "detection.json").string(),

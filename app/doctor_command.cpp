@@ -66,7 +66,7 @@ LogTable first_rows(LogSource& log, std::size_t most) {
   return table;
 }
 
-std::string stretches(const LogFinding& finding) {
+std::string stretches(const doctor::LogFinding& finding) {
   if (finding.when.empty()) {
     return {};
   }
@@ -95,12 +95,12 @@ std::string wrapped(const std::string& text, const std::string& indent, std::siz
   return out;
 }
 
-void tell(const LogHealth& health, bool all) {
-  for (const LogFinding& finding : health.findings) {
-    if (finding.severity == FindingSeverity::fine && !all) {
+void tell(const doctor::LogHealth& health, bool all) {
+  for (const doctor::LogFinding& finding : health.findings) {
+    if (finding.severity == doctor::FindingSeverity::fine && !all) {
       continue;
     }
-    fmt::print("{}: {}\n{}", to_string(finding.severity), finding.id, wrapped(finding.sentence, "  "));
+    fmt::print("{}: {}\n{}", doctor::to_string(finding.severity), finding.id, wrapped(finding.sentence, "  "));
     if (const std::string when = stretches(finding); !when.empty()) {
       fmt::print("{}", wrapped(when, "  "));
     }
@@ -108,7 +108,7 @@ void tell(const LogHealth& health, bool all) {
       fmt::print("{}", wrapped(finding.next, "  → "));
     }
   }
-  const std::size_t fine = health.count(FindingSeverity::fine);
+  const std::size_t fine = health.count(doctor::FindingSeverity::fine);
   if (!all && fine > 0) {
     fmt::print("{} check{} found nothing to mention (--all shows them)\n", fine, fine == 1 ? "" : "s");
   }
@@ -121,38 +121,38 @@ void tell(const LogHealth& health, bool all) {
 int run(const Arguments& a) {
   make_directory(a.common);
   const std::optional<Robot> robot = a.robot.empty() ? std::nullopt : std::optional(read_robot(a.robot));
-  LogOptions reader = reader_options(a.common);
+  logs::LogOptions reader = reader_options(a.common);
   if (robot) {
-    reader.only = useful_columns(*robot);
+    reader.only = robots::useful_columns(*robot);
   }
-  const auto opened = open_log(a.logs, reader);
-  RecordedLog& log = *opened;
+  const auto opened = logs::open_log(a.logs, reader);
+  logs::RecordedLog& log = *opened;
   const LogTable table = first_rows(log, a.most_rows);
-  LogHealth health = examine(table, robot, reader_counts(log.report()));
+  doctor::LogHealth health = doctor::examine(table, robot, results::reader_counts(log.report()));
   if (table.rows() < log.report().rows) {
     health.findings.push_back(
         {.id = "time.first_rows_only",
          .sentence = fmt::format("Only the first {} of {} rows were looked at.", table.rows(), log.report().rows),
          .next = "--rows N looks at more.",
          .value = static_cast<double>(table.rows())});
-    health.findings.back().severity = FindingSeverity::notice;
+    health.findings.back().severity = doctor::FindingSeverity::notice;
   }
   if (!a.common.out.empty() || a.common.json) {
-    HealthFiles files{a.robot.string(), {}, software()};
+    results::HealthFiles files{a.robot.string(), {}, results::software()};
     for (const std::filesystem::path& path : a.logs) {
       files.logs.push_back(path.string());
     }
-    publish(a.common, to_json(health, files), "doctor.json",
-            health_report(health, report_context(a.common, log.report(), log)));
+    publish(a.common, results::to_json(health, files), "doctor.json",
+            report::health_report(health, report_context(a.common, log.report(), log)));
   }
   if (!a.common.quiet && !a.common.json) {
-    print_log(sentences(log.report()));
+    print_log(logs::sentences(log.report()));
     tell(health, a.all);
     if (!a.common.out.empty()) {
       fmt::print("wrote {} and {}\n", (a.common.out / "doctor.json").string(), (a.common.out / "report.html").string());
     }
   }
-  return health.verdict == LogVerdict::commission ? kDone : kNo;
+  return health.verdict == doctor::LogVerdict::commission ? kDone : kNo;
 }
 
 }  // namespace

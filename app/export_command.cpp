@@ -21,9 +21,9 @@ namespace {
 struct Arguments {
   std::filesystem::path model;
   std::string language;
-  std::string name = CExportOptions{}.name;
-  DetectorOptions detector;
-  std::optional<Persistence> persistence;
+  std::string name = exporter::CExportOptions{}.name;
+  detector::DetectorOptions detector;
+  std::optional<detector::Persistence> persistence;
   CommonOptions common;
 };
 
@@ -42,26 +42,26 @@ Json to_json(const Arguments& a, const OnlineModel& model, const TorqueDetector&
              const std::string& text) {
   Json result;
   result["schema"] = "wheelwright/export/1";
-  result["software"] = software();
+  result["software"] = results::software();
   result["command"] = a.common.command_line;
   result["model"] = a.model.string();
   result["language"] = a.language;
   result["name"] = a.name;
-  result["set"] = a.detector.set == ParameterSetKind::box ? "box" : "polytope";
-  result["test"] = a.detector.test == Test::two_sided ? "two_sided" : "symmetric";
-  const Persistence persistence = detector.options().persistence.value_or(Persistence{});
+  result["set"] = a.detector.set == detector::ParameterSetKind::box ? "box" : "polytope";
+  result["test"] = a.detector.test == detector::Test::two_sided ? "two_sided" : "symmetric";
+  const detector::Persistence persistence = detector.options().persistence.value_or(detector::Persistence{});
   result["persistence"] = {{"k", persistence.k}, {"n", persistence.n}};
   result["sample"] = model.measurement.columns();
   result["outputs"] = model.model.outputs;
   std::size_t vertices = 0;
   if (const auto& table = detector.threshold().table()) {
-    for (const VertexGraph& graph : table->graphs()) {
+    for (const bounds::VertexGraph& graph : table->graphs()) {
       vertices += graph.vertices();
     }
   }
   result["vertices"] = vertices;
-  result["warrant"] = warrant_word(model.warrant);
-  result["assumptions"] = assumptions_json(model.assumptions);
+  result["warrant"] = core::warrant_word(model.warrant);
+  result["assumptions"] = results::assumptions_json(model.assumptions);
   if (file.empty()) {
     result["text"] = text;
   } else {
@@ -75,19 +75,20 @@ int run(const Arguments& a) {
   OnlineModel model = read_model(a.model);
   model.persistence = a.persistence.value_or(model.persistence);
   const Detector detector = make_detector(model, a.detector);
-  const std::string text = c_header(
-      detector, {.name = a.name,
-                 .robot = model.robot.name,
-                 .source = fmt::format("{}, thresholds {}", a.model.filename().string(), warrant_word(model.warrant)),
-                 .software = software()});
+  const std::string text = exporter::c_header(
+      detector,
+      {.name = a.name,
+       .robot = model.robot.name,
+       .source = fmt::format("{}, thresholds {}", a.model.filename().string(), core::warrant_word(model.warrant)),
+       .software = results::software()});
   std::string file;
   if (!a.common.out.empty()) {
     make_directory(a.common);
     file = (a.common.out / (a.name + ".h")).string();
-    atomic_write(file, text);
+    files::atomic_write(file, text);
   }
   if (a.common.json) {
-    fmt::print("{}\n", json_text(to_json(a, model, detector, file, text)));
+    fmt::print("{}\n", files::json_text(to_json(a, model, detector, file, text)));
   } else if (file.empty()) {
     fmt::print("{}", text);
   } else if (!a.common.quiet) {

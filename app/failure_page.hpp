@@ -14,12 +14,12 @@ namespace wheelwright::app {
 /// Runs `work` and returns what it returns. Where it throws an Error and results are wanted, out/report.html shows the
 /// message and the raw signals of `context`; the error is thrown on.
 template <typename Work>
-auto or_failure_page(const CommonOptions& options, const ReportContext& context, const Work& work) {
+auto or_failure_page(const CommonOptions& options, const report::ReportContext& context, const Work& work) {
   try {
     return work();
   } catch (const Error& error) {
     if (!options.out.empty()) {
-      atomic_write(options.out / "report.html", failure_report(error.what(), context));
+      files::atomic_write(options.out / "report.html", report::failure_report(error.what(), context));
     }
     throw;
   }

@@ -30,7 +30,7 @@ namespace {
 struct Arguments {
   std::filesystem::path list, robot;
   bool statistical = false;
-  FleetOptions judge;
+  study::FleetOptions judge;
   ScaleOptions scale;
   CommonOptions common;
 };
@@ -62,11 +62,11 @@ constexpr const char* kExamples =
     "Exit code: 0 all is well, 1 a robot stands outside, drifts, raised an alarm, contradicts its model or could not "
     "be\nexamined (the report lists which), 2 bad usage or no such list.";
 
-FleetLog log_of(const FleetListRobot& robot, const std::vector<FleetListLog>& logs, const std::optional<Robot>& fleet,
-                const CommonOptions& common) {
-  FleetLog out;
+study::FleetLog log_of(const robots::FleetListRobot& robot, const std::vector<robots::FleetListLog>& logs,
+                       const std::optional<Robot>& fleet, const CommonOptions& common) {
+  study::FleetLog out;
   std::vector<std::filesystem::path> paths;
-  for (const FleetListLog& log : logs) {
+  for (const robots::FleetListLog& log : logs) {
     out.name += (out.name.empty() ? "" : ", ") + log.path.string();
     paths.push_back(log.path);
   }
@@ -79,29 +79,30 @@ FleetLog log_of(const FleetListRobot& robot, const std::vector<FleetListLog>& lo
       throw InputError("no robot file: expected --robot, or a robot.yaml or robot_file of its own");
     }
     const Robot declared = file.empty() ? *fleet : read_robot(file);
-    std::unique_ptr<RecordedLog> log = open_robot_log(paths, declared, common);
-    require_columns(*log, needed_columns(declared));
-    Robot robot_with_errors = with_column_errors(declared, interpolation_errors(log->report()));
-    return OpenedLog{std::move(log), std::move(robot_with_errors)};
+    std::unique_ptr<logs::RecordedLog> log = open_robot_log(paths, declared, common);
+    logs::require_columns(*log, robots::needed_columns(declared));
+    Robot robot_with_errors = model::with_column_errors(declared, logs::interpolation_errors(log->report()));
+    return study::OpenedLog{std::move(log), std::move(robot_with_errors)};
   };
   return out;
 }
 
-RobotLogs logs_of(const FleetListRobot& robot, const std::optional<Robot>& fleet, const CommonOptions& common) {
-  RobotLogs logs{.robot = robot.name,
-                 .dated = robot.dated,
-                 .commissioning = log_of(robot, robot.commission, fleet, common),
-                 .findings = robot.findings};
-  for (const FleetListLog& check : robot.checks) {
+study::RobotLogs logs_of(const robots::FleetListRobot& robot, const std::optional<Robot>& fleet,
+                         const CommonOptions& common) {
+  study::RobotLogs logs{.robot = robot.name,
+                        .dated = robot.dated,
+                        .commissioning = log_of(robot, robot.commission, fleet, common),
+                        .findings = robot.findings};
+  for (const robots::FleetListLog& check : robot.checks) {
     logs.checks.push_back(log_of(robot, {check}, fleet, common));
   }
   return logs;
 }
 
-StoredPlan plan_of(const Arguments& a, const std::optional<Robot>& fleet) {
-  StoredPlan plan = {{"fleet format", kFleetSchema},
-                     {"--robot", fleet ? json_text(to_json(*fleet), -1) : std::string("none")},
-                     {"--statistical", a.statistical ? "yes" : "no"}};
+results::StoredPlan plan_of(const Arguments& a, const std::optional<Robot>& fleet) {
+  results::StoredPlan plan = {{"fleet format", results::kFleetSchema},
+                              {"--robot", fleet ? files::json_text(robots::to_json(*fleet), -1) : std::string("none")},
+                              {"--statistical", a.statistical ? "yes" : "no"}};
   std::string maps;
   for (const std::string& map : a.common.map) {
     maps += map + " ";
@@ -111,27 +112,28 @@ StoredPlan plan_of(const Arguments& a, const std::optional<Robot>& fleet) {
 }
 
 // Reads the records in the order of items: the fleet, and fleet.csv on the way.
-FleetResult gather(SqliteResults& results, const Arguments& a) {
-  FleetResult fleet;
-  std::optional<AtomicFile> csv;
+study::FleetResult gather(results::SqliteResults& results, const Arguments& a) {
+  study::FleetResult fleet;
+  std::optional<files::AtomicFile> csv;
   if (!a.common.out.empty()) {
     csv.emplace(a.common.out / "fleet.csv");
-    csv->write(fleet_csv_header());
+    csv->write(results::fleet_csv_header());
   }
   results.each([&](std::size_t item, std::string_view text) {
-    const RobotRecord record = record_from_text(text, fmt::format("{}: item {}", results.file().string(), item));
-    take(fleet, record);
+    const study::RobotRecord record =
+        results::record_from_text(text, fmt::format("{}: item {}", results.file().string(), item));
+    study::take(fleet, record);
     if (csv) {
-      csv->write(fleet_csv_rows(record));
+      csv->write(results::fleet_csv_rows(record));
     }
   });
   if (csv) {
     csv->commit();
   }
-  FleetOptions options = a.judge;
+  study::FleetOptions options = a.judge;
   options.prior.seed = a.common.seed;
   options.drift_level = a.judge.population.level;
-  judge_fleet(fleet, options);
+  study::judge_fleet(fleet, options);
   return fleet;
 }
 
@@ -149,14 +151,14 @@ std::string command_of(const Arguments& a) {
 }
 
 // Why logs failed, the most frequent reasons first, each with one log that it befell.
-void tell_failures(const FleetResult& fleet) {
+void tell_failures(const study::FleetResult& fleet) {
   constexpr std::size_t kMostReasons = 5;
   struct Reason {
-    const FleetFinding* first;
+    const study::FleetFinding* first;
     std::size_t count;
   };
   std::vector<Reason> reasons;
-  for (const FleetFinding& finding : fleet.failed) {
+  for (const study::FleetFinding& finding : fleet.failed) {
     const auto known = std::find_if(reasons.begin(), reasons.end(),
                                     [&](const Reason& reason) { return reason.first->text == finding.text; });
     if (known == reasons.end()) {
@@ -180,16 +182,16 @@ void tell_failures(const FleetResult& fleet) {
 int run(const Arguments& a) {
   make_directory(a.common);
   (void)reader_options(a.common);  // what is wrong with --map is wrong for every log
-  const std::vector<FleetListRobot> robots = read_fleet(a.list);
+  const std::vector<robots::FleetListRobot> robots = robots::read_fleet(a.list);
   const std::optional<Robot> own = a.robot.empty() ? std::nullopt : std::optional(read_robot(a.robot));
-  ExamineOptions examine;
-  examine.commission.noise_mode = a.statistical ? NoiseMode::statistical : NoiseMode::worst_case;
+  study::ExamineOptions examine;
+  examine.commission.noise_mode = a.statistical ? filter::NoiseMode::statistical : filter::NoiseMode::worst_case;
   ItemsToRun items;
   items.work.items = robots.size();
   items.work.evaluate = [&](std::size_t item) {
-    return record_text(examine_robot(logs_of(robots[item], own, a.common), examine));
+    return results::record_text(study::examine_robot(logs_of(robots[item], own, a.common), examine));
   };
-  items.key = [&](std::size_t item) { return key_of(robots[item]); };
+  items.key = [&](std::size_t item) { return robots::key_of(robots[item]); };
   items.plan = plan_of(a, own);
   std::optional<Progress> progress(a.common.quiet);
   const ItemsRun run = run_items(items, a.common, a.scale, [&](std::size_t done, std::size_t all) {
@@ -199,19 +201,19 @@ int run(const Arguments& a) {
   if (!run.results) {
     return kDone;
   }
-  const FleetResult fleet = gather(*run.results, a);
-  ReportContext context;
-  context.software = software();
+  const study::FleetResult fleet = gather(*run.results, a);
+  report::ReportContext context;
+  context.software = results::software();
   context.command_line = command_of(a);
   context.log_files = {a.list.string()};
   context.seeds = {{"which robots the pooled prior learns from", a.common.seed}};
   if (!a.common.out.empty()) {
-    atomic_write(a.common.out / "pooled_prior.yaml", pooled_prior_yaml(fleet, software()));
+    files::atomic_write(a.common.out / "pooled_prior.yaml", results::pooled_prior_yaml(fleet, results::software()));
   }
-  publish(a.common, to_json(fleet, a.list.string(), software()), "fleet.json",
-          a.common.out.empty() ? std::string() : fleet_report(fleet, context));
+  publish(a.common, results::to_json(fleet, a.list.string(), results::software()), "fleet.json",
+          a.common.out.empty() ? std::string() : report::fleet_report(fleet, context));
   if (!a.common.quiet && !a.common.json) {
-    for (const std::string& sentence : sentences(fleet)) {
+    for (const std::string& sentence : study::sentences(fleet)) {
       fmt::print("{}\n", sentence);
     }
     tell_failures(fleet);

@@ -24,8 +24,8 @@ constexpr double kMerge = 0.5;            // s, as detect() on a whole log
 constexpr std::size_t kMostTimes = 1000;  // rows from which the step is taken
 
 // Positions of the columns `names`; nothing, and `missing` says which, where there are not all of them.
-std::optional<std::vector<std::size_t>> pick_columns(const CsvRowParser& parser, const std::vector<std::string>& names,
-                                                     std::string& missing) {
+std::optional<std::vector<std::size_t>> pick_columns(const logs::CsvRowParser& parser,
+                                                     const std::vector<std::string>& names, std::string& missing) {
   std::vector<std::size_t> pick;
   for (const std::string& name : names) {
     const auto& columns = parser.columns();
@@ -60,10 +60,10 @@ class Watch {
     const Decision& decision = detector_.step(row.t[0], sample_);
     decisions_ += decision.valid ? 1 : 0;
     for (std::size_t i = 0; decision.valid && i < decision.channels.size(); ++i) {
-      const ChannelDecision& c = decision.channels[i];
+      const detector::ChannelDecision& c = decision.channels[i];
       if (recorder_.add(i, number, row.t[0], c.residual, c.threshold.lower, c.threshold.upper, c.outside, c.alarm)) {
-        const Event& event = recorder_.events().back();
-        out << (json ? json_text(to_json(event, model_), -1) : event_line(event, model_)) << std::endl;
+        const detector::Event& event = recorder_.events().back();
+        out << (json ? files::json_text(results::to_json(event, model_), -1) : event_line(event, model_)) << std::endl;
       }
     }
   }
@@ -76,31 +76,31 @@ class Watch {
   std::vector<std::size_t> pick_;
   OnlineModel model_;
   std::vector<double> sample_;
-  EventRecorder recorder_;
+  detector::EventRecorder recorder_;
   std::size_t decisions_ = 0;
 };
 
 }  // namespace
 
 ExitCode follow(std::istream& in, std::ostream& out, TorqueDetector detector, const OnlineModel& model,
-                const DetectorOptions& options, const CsvOptions& reader, bool json) {
+                const detector::DetectorOptions& options, const logs::CsvOptions& reader, bool json) {
   std::string line;
   do {
     if (!std::getline(in, line)) {
       throw InputError("standard input: expected a header line with the names of the columns, found its end");
     }
-  } while (!is_csv_content(line));
-  CsvRowParser parser(line, reader, model.measurement.nominal_step);
+  } while (!logs::is_csv_content(line));
+  logs::CsvRowParser parser(line, reader, model.measurement.nominal_step);
   std::string missing;
   const auto pick = pick_columns(parser, model.measurement.columns(), missing);
   if (!pick) {
     throw InputError("standard input: no column '" + missing + "', which the model was commissioned on");
   }
   Watch torque(std::move(detector), *pick, model);
-  std::optional<Watch<KinematicDetector>> kinematic;
+  std::optional<Watch<detector::KinematicDetector>> kinematic;
   if (model.kinematic) {
     if (const auto pose = pick_columns(parser, model.kinematic->measurement.columns(), missing)) {
-      kinematic.emplace(make_detector(*model.kinematic, options), *pose, with_kinematic_outputs(model));
+      kinematic.emplace(make_detector(*model.kinematic, options), *pose, commission::with_kinematic_outputs(model));
     } else {
       fmt::print(stderr, "wheelwright detect: no column '{}': the kinematic residual is not watched\n", missing);
     }
@@ -132,7 +132,7 @@ ExitCode follow(std::istream& in, std::ostream& out, TorqueDetector detector, co
   if (torque.decisions() > 0) {
     return kDone;
   }
-  fmt::print(stderr, "wheelwright detect: {}\n", why_undecided(model, number, median_step(times)));
+  fmt::print(stderr, "wheelwright detect: {}\n", why_undecided(model, number, core::median_step(times)));
   return kBadInput;
 }
 

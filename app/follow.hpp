@@ -19,6 +19,6 @@ namespace wheelwright::app {
 /// the reason on standard error. The kinematic residual is watched with `options` where the model and the rows have it;
 /// on standard error it is said when the rows lack its columns.
 ExitCode follow(std::istream& in, std::ostream& out, TorqueDetector detector, const OnlineModel& model,
-                const DetectorOptions& options, const CsvOptions& reader, bool json);
+                const detector::DetectorOptions& options, const logs::CsvOptions& reader, bool json);
 
 }  // namespace wheelwright::app

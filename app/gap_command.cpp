@@ -78,26 +78,26 @@ void check_without(const std::vector<std::string>& without, const std::vector<Ef
   }
   for (const std::string& name : without) {
     if (std::ranges::find(names, name) == names.end()) {
-      throw InputError("--without " + shown(name) + ": no effect of the catalogue: expected one of " + listed(names) +
-                       did_you_mean(name, names));
+      throw InputError("--without " + files::shown(name) + ": no effect of the catalogue: expected one of " +
+                       core::listed(names) + files::did_you_mean(name, names));
     }
   }
 }
 
 // What the naive rule makes of every row of the log.
 std::vector<std::string> naive_effects(LogSource& log, LogSource* baseline, const Robot& robot,
-                                       const DiagnoseOptions& options) {
-  PreparedGap prepared = prepare_gap(log, baseline, robot, options);
+                                       const gap::DiagnoseOptions& options) {
+  gap::PreparedGap prepared = gap::prepare_gap(log, baseline, robot, options);
   prepared.row_options.row_step = 1e-9;
-  GapProblem problem =
-      make_problem(prepared.drive, prepared.floor, prepared.healthy, prepared.trusted, prepared.catalogue,
-                   all_shapes(prepared.catalogue, prepared.drive), prepared.row_options);
-  BlockOptions blocks = options.blocks;
+  gap::GapProblem problem =
+      gap::make_problem(prepared.drive, prepared.floor, prepared.healthy, prepared.trusted, prepared.catalogue,
+                        gap::all_shapes(prepared.catalogue, prepared.drive), prepared.row_options);
+  gap::BlockOptions blocks = options.blocks;
   blocks.threads = options.threads;
-  const BlockGram gram(problem.rows.spaces, blocks);
+  const gap::BlockGram gram(problem.rows.spaces, blocks);
   problem.table.gram = &gram;
   std::vector<std::string> names;
-  for (const std::size_t c : naive_selection(problem.table).members) {
+  for (const std::size_t c : gap::naive_selection(problem.table).members) {
     names.push_back(problem.table.names[problem.table.candidates[c].effect]);
   }
   return names;
@@ -106,29 +106,29 @@ std::vector<std::string> naive_effects(LogSource& log, LogSource* baseline, cons
 // What the improved robot file is, in a line that YAML ignores.
 std::string origin(const Arguments& a, const Diagnosis& d) {
   std::vector<std::string> effects;
-  for (const GapCause& cause : d.causes) {
+  for (const gap::GapCause& cause : d.causes) {
     effects.push_back(words::effect_noun(cause.effect));
   }
-  std::string line =
-      fmt::format("# {} with what `wheelwright gap` found in {}: {} ({}). {}.", a.robot.string(),
-                  fmt::join(names_of_files(a.logs), ", "), fmt::join(effects, ", "), name_of(d.verdict), software());
+  std::string line = fmt::format("# {} with what `wheelwright gap` found in {}: {} ({}). {}.", a.robot.string(),
+                                 fmt::join(names_of_files(a.logs), ", "), fmt::join(effects, ", "),
+                                 results::name_of(d.verdict), results::software());
   for (char& c : line) {
     c = static_cast<unsigned char>(c) < 0x20U ? ' ' : c;
   }
   return line + "\n";
 }
 
-void write_beside(const Arguments& a, const Diagnosis& d, const NextDrive& next) {
+void write_beside(const Arguments& a, const Diagnosis& d, const gap::NextDrive& next) {
   const std::filesystem::path& out = a.common.out;
-  write_residuals(out / kResiduals, d.series);
+  results::write_residuals(out / kResiduals, d.series);
   // What an earlier run left would contradict this one.
   if (d.improved) {
-    atomic_write(out / kImproved, origin(a, d) + robot_yaml(*d.improved));
+    files::atomic_write(out / kImproved, origin(a, d) + robots::robot_yaml(*d.improved));
   } else {
     std::filesystem::remove(out / kImproved);
   }
   if (next.commands) {
-    write_csv(out / kNext, *next.commands);
+    logs::write_csv(out / kNext, *next.commands);
   } else {
     std::filesystem::remove(out / kNext);
   }
@@ -137,17 +137,17 @@ void write_beside(const Arguments& a, const Diagnosis& d, const NextDrive& next)
 int run(const Arguments& a) {
   make_directory(a.common);
   Robot robot = read_robot(a.robot);
-  const std::vector<Effect> catalogue = effect_catalogue(make_model(robot));
+  const std::vector<Effect> catalogue = gap::effect_catalogue(model::make_model(robot));
   check_without(a.without, catalogue);
   const auto opened = open_robot_log(a.logs, robot, a.common);
-  RecordedLog& log = *opened;
+  logs::RecordedLog& log = *opened;
   const auto baseline = a.baseline.empty() ? nullptr : open_robot_log(a.baseline, robot, a.common);
-  RecordedLog* const healthy = baseline.get();
-  robot = with_column_errors(robot, interpolation_errors(log.report()));
-  ReportContext context = report_context(a.common, log.report(), log);
+  logs::RecordedLog* const healthy = baseline.get();
+  robot = model::with_column_errors(robot, logs::interpolation_errors(log.report()));
+  report::ReportContext context = report_context(a.common, log.report(), log);
   context.seeds = {{"permutations, bootstrap and search", a.common.seed}};
   Progress progress(a.common.quiet);
-  DiagnoseOptions options;
+  gap::DiagnoseOptions options;
   options.without = a.without;
   options.beta = a.beta;
   options.shrink = !a.no_shrink;
@@ -155,24 +155,24 @@ int run(const Arguments& a) {
   options.threads = static_cast<std::size_t>(a.common.threads);
   options.progress = [&](std::string_view stage, double share) { progress.tell(stage, share); };
   Diagnosis diagnosis;
-  NextDrive next;
+  gap::NextDrive next;
   std::vector<std::string> naive;
   try {
-    require_columns(log, needed_columns(robot));
+    logs::require_columns(log, robots::needed_columns(robot));
     if (healthy != nullptr) {
-      require_columns(*healthy, needed_columns(robot));
+      logs::require_columns(*healthy, robots::needed_columns(robot));
     }
     diagnosis = diagnose(log, healthy, robot, options);
     if (!a.fresh.empty()) {
       const auto fresh = open_robot_log(a.fresh, robot, a.common);
-      require_columns(*fresh, needed_columns(robot));
-      diagnosis.shrink.fresh_torque_rms = torque_on(*fresh, healthy, robot, diagnosis, options);
+      logs::require_columns(*fresh, robots::needed_columns(robot));
+      diagnosis.shrink.fresh_torque_rms = gap::torque_on(*fresh, healthy, robot, diagnosis, options);
     }
-    next = a.no_manoeuvre ? NextDrive{} : what_next(log, healthy, robot, diagnosis, options);
+    next = a.no_manoeuvre ? gap::NextDrive{} : gap::what_next(log, healthy, robot, diagnosis, options);
     naive = a.naive ? naive_effects(log, healthy, robot, options) : naive;
   } catch (const Error& error) {
     if (!a.common.out.empty()) {
-      atomic_write(a.common.out / "report.html", failure_report(error.what(), context));
+      files::atomic_write(a.common.out / "report.html", report::failure_report(error.what(), context));
     }
     throw;
   }
@@ -190,25 +190,26 @@ int run(const Arguments& a) {
     }
   }
   const bool files = !a.common.out.empty();
-  GapFiles names;
+  results::GapFiles names;
   names.robot = a.robot.string();
   names.logs = names_of_files(a.logs);
   names.baseline = fmt::format("{}", fmt::join(names_of_files(a.baseline), ", "));
   names.residuals = files ? kResiduals : "";
-  names.software = software();
+  names.software = results::software();
   if (next.commands) {
-    names.next_manoeuvre = NextManoeuvre{files ? kNext : "", promise};
+    names.next_manoeuvre = results::NextManoeuvre{files ? kNext : "", promise};
   }
-  Json result = to_json(diagnosis, names);
+  Json result = results::to_json(diagnosis, names);
   result["improved"] = files && diagnosis.improved ? Json(kImproved) : Json(nullptr);
-  add_rivals(result, next.rivals, catalogue);
+  results::add_rivals(result, next.rivals, catalogue);
   if (a.naive) {
     result["naive"] = {{"effects", naive}};
   }
   if (files) {
     write_beside(a, diagnosis, next);
   }
-  publish(a.common, result, "gap.json", files ? gap_report(diagnosis, robot.name, context, promise) : std::string());
+  publish(a.common, result, "gap.json",
+          files ? report::gap_report(diagnosis, robot.name, context, promise) : std::string());
   if (!a.common.quiet && !a.common.json) {
     print_log(context.warnings);
     fmt::print("{}",

@@ -52,35 +52,35 @@ constexpr const char* kExamples =
 
 // Wheel speeds and a pose, and no effort at all.
 bool for_kinematics_only(const LogSource& log, const Robot& robot) {
-  const std::vector<std::string> needed = needed_columns(robot);
+  const std::vector<std::string> needed = robots::needed_columns(robot);
   const bool effort = std::ranges::any_of(needed, [&](const std::string& name) { return log.find(name).has_value(); });
-  return !effort && on_two_wheels(robot) && log.find("theta") && log.find("omega_r") && log.find("omega_l");
+  return !effort && model::on_two_wheels(robot) && log.find("theta") && log.find("omega_r") && log.find("omega_l");
 }
 
 int run(const Arguments& a) {
   make_directory(a.common);
   Robot robot = read_robot(a.robot);
   const auto opened = open_robot_log(a.logs, robot, a.common);
-  RecordedLog& log = *opened;
-  robot = with_column_errors(robot, interpolation_errors(log.report()));
+  logs::RecordedLog& log = *opened;
+  robot = model::with_column_errors(robot, logs::interpolation_errors(log.report()));
   if (!for_kinematics_only(log, robot)) {
-    require_columns(log, needed_columns(robot));
+    logs::require_columns(log, robots::needed_columns(robot));
   }
-  ReportContext context = report_context(a.common, log.report(), log);
+  report::ReportContext context = report_context(a.common, log.report(), log);
   context.seeds = {{"bootstrap and signs", a.common.seed}};
   Progress progress(a.common.quiet);
-  IdentificationOptions options;
+  inference::IdentificationOptions options;
   options.seed = a.common.seed;
   options.shapes = !a.no_shapes;
   options.progress = [&](std::string_view stage, double share) { progress.tell(stage, share); };
-  const Identification result = or_failure_page(a.common, context, [&] {
+  const inference::Identification result = or_failure_page(a.common, context, [&] {
     if (!for_kinematics_only(log, robot)) {
-      require_columns(log, needed_columns(robot));
+      logs::require_columns(log, robots::needed_columns(robot));
     }
-    return identify(log, robot, options);
+    return inference::identify(log, robot, options);
   });
-  publish(a.common, to_json(result, log.report(), software(), a.common.seed), "identification.json",
-          identify_report(result, context));
+  publish(a.common, results::to_json(result, log.report(), results::software(), a.common.seed), "identification.json",
+          report::identify_report(result, context));
   if (!a.common.quiet && !a.common.json) {
     print_log(context.warnings);
     fmt::print("{}", summary(result));

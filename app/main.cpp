@@ -43,7 +43,7 @@ int main(int argc, char** argv) {
       "A robot and a log of fault-free driving go in; a model with thresholds that no healthy robot exceeds, while the "
       "assumptions that it lists hold, comes out.",
       "wheelwright");
-  program.set_version_flag("--version", wheelwright::software());
+  program.set_version_flag("--version", wheelwright::results::software());
   program.require_subcommand(1);
   program.formatter(std::make_shared<ShortList>());
   program.footer(

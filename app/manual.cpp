@@ -99,7 +99,7 @@ std::string options(const CommandWords& command) {
     out += names + (names.empty() || value.empty() ? "" : " ") + value + "\n";
     std::string words = option.description;
     if (!option.choices.empty()) {
-      words += "; one of " + listed(option.choices);
+      words += "; one of " + core::listed(option.choices);
     }
     if (option.required && !option.positional()) {
       words += " (required)";

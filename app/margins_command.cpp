@@ -30,8 +30,8 @@ struct Arguments {
   std::filesystem::path log, model;
   std::vector<std::string> faults;
   std::vector<double> windows;
-  std::optional<Persistence> persistence;
-  MarginSurveyOptions survey;
+  std::optional<detector::Persistence> persistence;
+  commission::MarginSurveyOptions survey;
   CommonOptions common;
 };
 
@@ -52,18 +52,18 @@ constexpr const char* kExamples =
     "  wheelwright margins drive.csv --model result/model.json --out margins\n"
     "  wheelwright margins drive.csv --model result/model.json --fault wheel_radius --fault payload_lost --window 0.5";
 
-std::string table(const MarginSurvey& survey, const ResidualMargins& residual) {
+std::string table(const commission::MarginSurvey& survey, const commission::ResidualMargins& residual) {
   const std::size_t window = shown_window(survey);
   constexpr std::size_t name_width = 28, width = 19;
   std::string out = fmt::format("{} residual, seen for certain within {:g} s, when it sets in while\n", residual.name,
                                 survey.windows[window]);
   out += padded("", name_width);
   for (const auto& [kind, count] : survey.manoeuvres) {
-    const std::string_view name = manoeuvre_words(kind);
+    const std::string_view name = detector::manoeuvre_words(kind);
     out += padded(std::string(name.substr(0, name.find(' '))), width);
   }
   out += "\n";
-  for (const FaultMargins& margins : residual.margins) {
+  for (const detector::FaultMargins& margins : residual.margins) {
     const bool sides = !margins.fault.whole && margins.fault.range.lower < 0.0;
     out += padded("  " + margins.fault.name + (sides ? margins.side > 0.0 ? " +" : " −" : ""), name_width);
     for (const auto& [kind, count] : survey.manoeuvres) {
@@ -78,10 +78,10 @@ int run(const Arguments& a) {
   const OnlineModel model = read_model(a.model);
   make_directory(a.common);
   const auto opened = open_robot_log({a.log}, model.robot, a.common);
-  RecordedLog& log = *opened;
-  const ReportContext context = report_context(a.common, log.report(), log);
+  logs::RecordedLog& log = *opened;
+  const report::ReportContext context = report_context(a.common, log.report(), log);
   Progress progress(a.common.quiet);
-  MarginSurveyOptions options = a.survey;
+  commission::MarginSurveyOptions options = a.survey;
   options.faults = a.faults;
   options.persistence = a.persistence;
   if (!a.windows.empty()) {
@@ -90,17 +90,17 @@ int run(const Arguments& a) {
   }
   options.margins.threads = static_cast<std::size_t>(a.common.threads);
   options.margins.progress = [&](std::string_view stage, double share) { progress.tell(stage, share); };
-  const MarginSurvey survey = or_failure_page(a.common, context, [&] {
-    require_columns(log, model.measurement.columns());
-    return survey_margins(log, model, options);
+  const commission::MarginSurvey survey = or_failure_page(a.common, context, [&] {
+    logs::require_columns(log, model.measurement.columns());
+    return commission::survey_margins(log, model, options);
   });
   if (!a.common.out.empty() || a.common.json) {
-    publish(a.common, to_json(survey, a.model.string(), a.log.string(), software()), "margins.json",
-            a.common.out.empty() ? std::string() : margins_report(survey, model, context));
+    publish(a.common, results::to_json(survey, a.model.string(), a.log.string(), results::software()), "margins.json",
+            a.common.out.empty() ? std::string() : report::margins_report(survey, model, context));
   }
   if (!a.common.quiet && !a.common.json) {
-    print_log(sentences(log.report()));
-    for (const ResidualMargins& residual : survey.residuals) {
+    print_log(logs::sentences(log.report()));
+    for (const commission::ResidualMargins& residual : survey.residuals) {
       fmt::print("{}{}\n", table(survey, residual), certain_meaning(residual.warrant));
     }
     if (!survey.without_kinematic.empty()) {

@@ -46,12 +46,13 @@ void add_map(CLI::App& command, CommonOptions& options) {
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
 }
 
-void add_persistence(CLI::App& command, std::optional<Persistence>& persistence, const std::string& otherwise) {
+void add_persistence(CLI::App& command, std::optional<detector::Persistence>& persistence,
+                     const std::string& otherwise) {
   command
       .add_option_function<std::string>(
           "--persistence",
           [&persistence](const std::string& text) {
-            Persistence rule;
+            detector::Persistence rule;
             const char* const end = text.data() + text.size();
             const auto k = std::from_chars(text.data(), end, rule.k);
             const bool slash = k.ec == std::errc() && k.ptr != end && *k.ptr == '/';
@@ -66,19 +67,21 @@ void add_persistence(CLI::App& command, std::optional<Persistence>& persistence,
       ->type_name("K/N");
 }
 
-void add_set(CLI::App& command, ParameterSetKind& set) {
+void add_set(CLI::App& command, detector::ParameterSetKind& set) {
   command.add_option("--set", set, "Threshold from the feasible set itself (polytope) or from its box")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, ParameterSetKind>{
-                                              {"polytope", ParameterSetKind::polytope}, {"box", ParameterSetKind::box}})
+      ->transform(CLI::CheckedTransformer(
+                      std::map<std::string, detector::ParameterSetKind>{
+                          {"polytope", detector::ParameterSetKind::polytope}, {"box", detector::ParameterSetKind::box}})
                       .description("{polytope,box}"))
       ->type_name("SET");
 }
 
-void add_test(CLI::App& command, Test& test) {
+void add_test(CLI::App& command, detector::Test& test) {
   command.add_option("--test", test, "Compare with [l, u] (two_sided) or with rho as the paper does (symmetric)")
-      ->transform(CLI::CheckedTransformer(
-                      std::map<std::string, Test>{{"two_sided", Test::two_sided}, {"symmetric", Test::symmetric}})
-                      .description("{two_sided,symmetric}"))
+      ->transform(
+          CLI::CheckedTransformer(std::map<std::string, detector::Test>{{"two_sided", detector::Test::two_sided},
+                                                                        {"symmetric", detector::Test::symmetric}})
+              .description("{two_sided,symmetric}"))
       ->type_name("TEST");
 }
 
@@ -104,7 +107,7 @@ CLI::Validator in_unit(const std::string& unit) {
   CLI::Validator out(
       [unit](std::string& text) {
         try {
-          text = number_text(quantity(text, unit));
+          text = files::number_text(quantity(text, unit));
           return std::string();
         } catch (const InputError& error) {
           return std::string(error.what());

@@ -40,12 +40,13 @@ template <typename Arguments>
 void add_map(CLI::App& command, CommonOptions& options);
 
 /// Adds --persistence K/N; `persistence` stays empty where it is not given. `otherwise` says what holds then.
-void add_persistence(CLI::App& command, std::optional<Persistence>& persistence, const std::string& otherwise);
+void add_persistence(CLI::App& command, std::optional<detector::Persistence>& persistence,
+                     const std::string& otherwise);
 
 /// Adds --set polytope|box.
-void add_set(CLI::App& command, ParameterSetKind& set);
+void add_set(CLI::App& command, detector::ParameterSetKind& set);
 /// Adds --test two_sided|symmetric.
-void add_test(CLI::App& command, Test& test);
+void add_test(CLI::App& command, detector::Test& test);
 
 /// Makes an option take quantities with units: what the option itself converts is the number in `unit` (quantity()).
 [[nodiscard]] CLI::Validator in_unit(const std::string& unit);

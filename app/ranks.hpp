@@ -18,8 +18,8 @@ namespace wheelwright::app {
 /// Evaluates `work` on all these processes (run_work_on_ranks()); each has to call it, once. `fingerprint` is what all
 /// have to agree on; `open` is called on rank 0, and what it opens has the results there. Returns what was done on rank
 /// 0, nothing on the others, whose part is over. Throws InputError where the program was built without MPI.
-[[nodiscard]] std::optional<RunCount> run_on_ranks(const Work& work, const std::string& fingerprint,
-                                                   const std::function<ResultStore&()>& open,
-                                                   const RunOptions& options);
+[[nodiscard]] std::optional<study::RunCount> run_on_ranks(const study::Work& work, const std::string& fingerprint,
+                                                          const std::function<study::ResultStore&()>& open,
+                                                          const study::RunOptions& options);
 
 }  // namespace wheelwright::app

@@ -5,8 +5,9 @@
 
 namespace wheelwright::app {
 
-std::optional<RunCount> run_on_ranks(const Work& /*work*/, const std::string& /*fingerprint*/,
-                                     const std::function<ResultStore&()>& /*open*/, const RunOptions& /*options*/) {
+std::optional<study::RunCount> run_on_ranks(const study::Work& /*work*/, const std::string& /*fingerprint*/,
+                                            const std::function<study::ResultStore&()>& /*open*/,
+                                            const study::RunOptions& /*options*/) {
   throw InputError(
       "mpirun: this wheelwright was built without MPI: expected one that was built with it (tools/setup.sh), or one "
       "process, or --shard I/N");

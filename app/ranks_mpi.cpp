@@ -5,10 +5,11 @@
 
 namespace wheelwright::app {
 
-std::optional<RunCount> run_on_ranks(const Work& work, const std::string& fingerprint,
-                                     const std::function<ResultStore&()>& open, const RunOptions& options) {
-  const MpiSession mpi;
-  const RunCount count = run_work_on_ranks(mpi, work, fingerprint, open, options);
+std::optional<study::RunCount> run_on_ranks(const study::Work& work, const std::string& fingerprint,
+                                            const std::function<study::ResultStore&()>& open,
+                                            const study::RunOptions& options) {
+  const study::MpiSession mpi;
+  const study::RunCount count = study::run_work_on_ranks(mpi, work, fingerprint, open, options);
   return mpi.rank() == 0 ? std::optional(count) : std::nullopt;
 }
 

@@ -16,7 +16,7 @@ const Effect* find(const std::vector<Effect>& catalogue, const std::string& name
   return found == catalogue.end() ? nullptr : &*found;
 }
 
-void resize(Rival& rival, const std::vector<Effect>& catalogue, const std::string& text) {
+void resize(gap::Rival& rival, const std::vector<Effect>& catalogue, const std::string& text) {
   const std::size_t equals = text.find('=');
   const std::string what = text.substr(0, equals), effect = what.substr(0, what.find('.'));
   if (equals == std::string::npos) {
@@ -25,7 +25,7 @@ void resize(Rival& rival, const std::vector<Effect>& catalogue, const std::strin
   const auto value = [&](const std::string& unit) {
     return quantity(text.substr(equals + 1), unit.empty() ? "1" : unit, "--size " + text);
   };
-  for (RivalCause& cause : rival.causes) {
+  for (gap::RivalCause& cause : rival.causes) {
     if (cause.effect != effect) {
       continue;
     }
@@ -37,16 +37,16 @@ void resize(Rival& rival, const std::vector<Effect>& catalogue, const std::strin
       cause.shape[0] = value(known.shapes[0].unit);
     } else {
       const std::string name = what.substr(effect.size() + 1);
-      const auto coefficient = std::ranges::find(known.parameters, name, &EffectParameter::name);
-      const auto shape = std::ranges::find(known.shapes, name, &ShapeParameter::name);
+      const auto coefficient = std::ranges::find(known.parameters, name, &gap::EffectParameter::name);
+      const auto shape = std::ranges::find(known.shapes, name, &gap::ShapeParameter::name);
       if (coefficient != known.parameters.end()) {
         cause.coefficients[static_cast<std::size_t>(coefficient - known.parameters.begin())] = value(coefficient->unit);
       } else if (shape != known.shapes.end()) {
         cause.shape[static_cast<std::size_t>(shape - known.shapes.begin())] = value(shape->unit);
       } else {
         std::string names;
-        for (const EffectParameter& p : known.parameters) names += " " + p.name;
-        for (const ShapeParameter& p : known.shapes) names += " " + p.name;
+        for (const gap::EffectParameter& p : known.parameters) names += " " + p.name;
+        for (const gap::ShapeParameter& p : known.shapes) names += " " + p.name;
         throw InputError("--size " + text + ": " + effect + " has no parameter '" + name + "': expected one of" +
                          names);
       }
@@ -56,9 +56,9 @@ void resize(Rival& rival, const std::vector<Effect>& catalogue, const std::strin
 
 }  // namespace
 
-std::vector<Rival> rivals_named(const std::vector<std::string>& names, const std::vector<std::string>& sizes,
-                                const std::vector<Effect>& catalogue, const Drive& drive) {
-  std::vector<Rival> rivals;
+std::vector<gap::Rival> rivals_named(const std::vector<std::string>& names, const std::vector<std::string>& sizes,
+                                     const std::vector<Effect>& catalogue, const gap::Drive& drive) {
+  std::vector<gap::Rival> rivals;
   std::set<std::string> all;
   for (const std::string& name : names) {
     std::vector<std::string> effects;
@@ -71,13 +71,13 @@ std::vector<Rival> rivals_named(const std::vector<std::string>& names, const std
       all.insert(effects.back());
       from = plus + 1;
     }
-    rivals.push_back(typical_rival(effects, catalogue, drive));
+    rivals.push_back(gap::typical_rival(effects, catalogue, drive));
   }
   for (const std::string& size : sizes) {
     if (!all.contains(size.substr(0, size.find_first_of(".=")))) {
       throw InputError("--size " + size + ": expected an effect that is named with --between");
     }
-    for (Rival& rival : rivals) {
+    for (gap::Rival& rival : rivals) {
       resize(rival, catalogue, size);
     }
   }

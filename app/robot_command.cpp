@@ -23,7 +23,7 @@ namespace {
 struct Arguments {
   std::filesystem::path urdf, ros2_control, file;
   std::string controller;
-  RobotHints hints;
+  robots::RobotHints hints;
   bool force = false;
   CommonOptions common;
 };
@@ -41,22 +41,22 @@ constexpr const char* kExamples =
     "  wheelwright robot --urdf my_robot.urdf --wheel-radius 9.75cm --massless camera_link\n\n"
     "xacro has to be expanded first: xacro my_robot.urdf.xacro > my_robot.urdf.";
 
-RobotWithOrigins made(const Arguments& a) {
+robots::RobotWithOrigins made(const Arguments& a) {
   if (a.urdf.empty() && a.ros2_control.empty()) {
     throw InputError("robot: expected at least one of --urdf, --ros2-control");
   }
   if (!a.controller.empty() && a.ros2_control.empty()) {
     throw InputError("--controller: expected --ros2-control FILE with it");
   }
-  std::optional<RobotTree> tree;
+  std::optional<robots::RobotTree> tree;
   if (!a.urdf.empty()) {
-    tree = read_urdf(a.urdf);
+    tree = robots::read_urdf(a.urdf);
   }
-  std::optional<DriveFacts> controller;
+  std::optional<robots::DriveFacts> controller;
   if (!a.ros2_control.empty()) {
-    controller = read_ros2_control(a.ros2_control, a.controller);
+    controller = robots::read_ros2_control(a.ros2_control, a.controller);
   }
-  return robot_from(tree ? &*tree : nullptr, controller ? &*controller : nullptr, a.hints);
+  return robots::robot_from(tree ? &*tree : nullptr, controller ? &*controller : nullptr, a.hints);
 }
 
 int run(const Arguments& a) {
@@ -67,19 +67,19 @@ int run(const Arguments& a) {
   if (!target.empty() && !a.force && std::filesystem::exists(target)) {
     throw InputError(target.string() + ": is there already: expected a new name, or --force");
   }
-  const RobotWithOrigins robot = made(a);
-  const std::string text = robot_yaml(robot);
-  static_cast<void>(parse_robot(text, target.empty() ? "the robot file" : target.string()));
+  const robots::RobotWithOrigins robot = made(a);
+  const std::string text = robots::robot_yaml(robot);
+  static_cast<void>(robots::parse_robot(text, target.empty() ? "the robot file" : target.string()));
   if (!target.empty()) {
     make_directory(a.common);
-    atomic_write(target, text);
+    files::atomic_write(target, text);
   }
   if (a.common.json) {
-    Json result{{"schema", "wheelwright/robot-file/1"}, {"software", software()}, {"files", robot.files}};
-    result["robot"] = to_json(robot.robot);
+    Json result{{"schema", "wheelwright/robot-file/1"}, {"software", results::software()}, {"files", robot.files}};
+    result["robot"] = robots::to_json(robot.robot);
     result["origins"] = robot.origins;
     result["remarks"] = robot.remarks;
-    fmt::print("{}\n", json_text(result));
+    fmt::print("{}\n", files::json_text(result));
   } else if (target.empty()) {
     fmt::print("{}", text);
   } else if (!a.common.quiet) {

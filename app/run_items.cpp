@@ -22,7 +22,7 @@ namespace wheelwright::app {
 namespace {
 
 namespace fs = std::filesystem;
-using Opening = SqliteResults::Opening;
+using Opening = results::SqliteResults::Opening;
 
 constexpr const char* kResults = "results.sqlite";
 constexpr std::size_t kNamed = 5;  // items that a message names
@@ -41,12 +41,12 @@ void check_together(const CommonOptions& common, const ScaleOptions& scale) {
 }
 
 // What every process that takes part has to agree on.
-std::string fingerprint(const StoredPlan& plan, const StoredItems& items) {
+std::string fingerprint(const results::StoredPlan& plan, const results::StoredItems& items) {
   std::string text;
   for (const auto& [name, value] : plan) {
     text += fmt::format("{}: {}\n", name, value);
   }
-  Xxh64 keys;
+  files::Xxh64 keys;
   for (std::size_t item = 0; item < items.count; ++item) {
     const std::string key = items.key(item) + '\n';
     keys.update(key.data(), key.size());
@@ -55,14 +55,14 @@ std::string fingerprint(const StoredPlan& plan, const StoredItems& items) {
 }
 
 // Shards in `directory`, by file name.
-std::vector<std::pair<fs::path, Shard>> shards_in(const fs::path& directory) {
+std::vector<std::pair<fs::path, study::Shard>> shards_in(const fs::path& directory) {
   static const std::regex pattern("shard-([0-9]+)-of-([0-9]+)\\.sqlite");
-  std::vector<std::pair<fs::path, Shard>> shards;
+  std::vector<std::pair<fs::path, study::Shard>> shards;
   for (const fs::directory_entry& entry : fs::directory_iterator(directory)) {
     const std::string name = entry.path().filename().string();
     std::smatch match;
     if (std::regex_match(name, match, pattern)) {
-      if (const std::optional<Shard> shard = shard_of(match[1].str() + "/" + match[2].str())) {
+      if (const std::optional<study::Shard> shard = shard_of(match[1].str() + "/" + match[2].str())) {
         shards.emplace_back(entry.path(), *shard);
       }
     }
@@ -72,7 +72,7 @@ std::vector<std::pair<fs::path, Shard>> shards_in(const fs::path& directory) {
 }
 
 // Throws unless nothing is missing.
-void check_complete(SqliteResults& results, const std::vector<std::pair<fs::path, Shard>>& shards) {
+void check_complete(results::SqliteResults& results, const std::vector<std::pair<fs::path, study::Shard>>& shards) {
   std::size_t missing = 0;
   std::vector<std::string> names;
   const std::size_t count = shards.back().second.count;
@@ -81,7 +81,7 @@ void check_complete(SqliteResults& results, const std::vector<std::pair<fs::path
     ++missing;
     of.insert(item % count + 1);
     if (names.size() < kNamed) {
-      names.push_back(shown(results.items().key(item)));
+      names.push_back(files::shown(results.items().key(item)));
     }
   });
   if (missing == 0) {
@@ -98,15 +98,15 @@ void check_complete(SqliteResults& results, const std::vector<std::pair<fs::path
       fmt::format("{}: {} of {} items are missing ({}{}): expected all; evaluate them with {} instead of --merge and "
                   "merge again, or "
                   "without --merge, which evaluates what is missing",
-                  results.file().string(), missing, results.items().count, listed(names), missing > kNamed ? ", …" : "",
-                  listed(again)));
+                  results.file().string(), missing, results.items().count, core::listed(names),
+                  missing > kNamed ? ", …" : "", core::listed(again)));
 }
 
 }  // namespace
 
-std::optional<Shard> shard_of(std::string_view text) {
+std::optional<study::Shard> shard_of(std::string_view text) {
   const char* const end = text.data() + text.size();
-  Shard shard;
+  study::Shard shard;
   const auto i = std::from_chars(text.data(), end, shard.index);
   const bool slash = i.ec == std::errc() && i.ptr != end && *i.ptr == '/';
   const auto n = std::from_chars(slash ? i.ptr + 1 : end, end, shard.count);
@@ -121,20 +121,21 @@ ItemsRun run_items(const ItemsToRun& items, const CommonOptions& common, const S
                    const std::function<void(std::size_t, std::size_t)>& progress) {
   check_together(common, scale);
   make_directory(common);
-  StoredPlan plan = items.plan;
-  plan.emplace_back("the program", software());
-  const StoredItems stored{items.work.items, items.key};
+  results::StoredPlan plan = items.plan;
+  plan.emplace_back("the program", results::software());
+  const results::StoredItems stored{items.work.items, items.key};
   const Opening opening = scale.fresh ? Opening::fresh : Opening::resume;
   const auto open = [&](const std::string& name) {
-    return std::make_unique<SqliteResults>(common.out.empty() ? fs::path() : common.out / name, plan, stored, opening);
+    return std::make_unique<results::SqliteResults>(common.out.empty() ? fs::path() : common.out / name, plan, stored,
+                                                    opening);
   };
-  RunOptions options{static_cast<std::size_t>(common.threads), {}, progress};
+  study::RunOptions options{static_cast<std::size_t>(common.threads), {}, progress};
   ItemsRun run;
   if (scale.shard) {
-    const Shard shard = *scale.shard;
+    const study::Shard shard = *scale.shard;
     const auto results = open(fmt::format("shard-{}-of-{}.sqlite", shard.index + 1, shard.count));
     options.shard = shard;
-    run.count = run_work(items.work, *results, options);
+    run.count = study::run_work(items.work, *results, options);
     if (!common.quiet && !common.json) {
       fmt::print("shard {} of {}: {} items evaluated, {} were there; {}\nwhen all are done: the same with --merge\n",
                  shard.index + 1, shard.count, run.count.evaluated, run.count.found, results->file().string());
@@ -157,10 +158,10 @@ ItemsRun run_items(const ItemsToRun& items, const CommonOptions& common, const S
     return run;
   }
   if (launched_by_mpi()) {
-    std::unique_ptr<SqliteResults> results;
-    const std::optional<RunCount> count = run_on_ranks(
+    std::unique_ptr<results::SqliteResults> results;
+    const std::optional<study::RunCount> count = run_on_ranks(
         items.work, fingerprint(plan, stored),
-        [&]() -> ResultStore& {
+        [&]() -> study::ResultStore& {
           results = open(kResults);
           return *results;
         },
@@ -172,7 +173,7 @@ ItemsRun run_items(const ItemsToRun& items, const CommonOptions& common, const S
     return run;
   }
   run.results = open(kResults);
-  run.count = run_work(items.work, *run.results, options);
+  run.count = study::run_work(items.work, *run.results, options);
   return run;
 }
 

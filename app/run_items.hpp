@@ -20,30 +20,30 @@ namespace wheelwright::app {
 
 /// Distribution of the items of a command.
 struct ScaleOptions {
-  std::optional<Shard> shard = {};  ///< --shard I/N is index I - 1 of N
+  std::optional<study::Shard> shard = {};  ///< --shard I/N is index I - 1 of N
   bool merge = false;
   bool fresh = false;
 };
 
 /// "I/N" with 1 <= I <= N as a shard; nothing for anything else.
-[[nodiscard]] std::optional<Shard> shard_of(std::string_view text);
+[[nodiscard]] std::optional<study::Shard> shard_of(std::string_view text);
 
 /// The items to evaluate.
 struct ItemsToRun {
-  Work work;
+  study::Work work;
   /// StoredItems::key of each item. Messages name items by the beginning of their keys: begin with a name.
   std::function<std::string(std::size_t item)> key;
   /// What every result depends on; run_items() adds the program's version. No option that changes no result (threads,
   /// shard).
-  StoredPlan plan;
+  results::StoredPlan plan;
 };
 
 /// Outcome of a run.
 struct ItemsRun {
   /// All results, to be read in the order of items; null where this process has nothing more to do: it then ends with
   /// kDone, and prints nothing.
-  std::unique_ptr<SqliteResults> results = nullptr;
-  RunCount count = {};
+  std::unique_ptr<results::SqliteResults> results = nullptr;
+  study::RunCount count = {};
 };
 
 /// Evaluates the items that are not in OUT/results.sqlite yet, on `common.threads` threads, and where mpirun started

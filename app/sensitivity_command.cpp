@@ -55,14 +55,14 @@ constexpr const char* kExamples =
     "quantities.";
 
 // What the drive and the robot are, apart from the inputs.
-std::string fingerprint_of(const Study& study) {
-  Xxh64 hash;
+std::string fingerprint_of(const study::Study& study) {
+  files::Xxh64 hash;
   const auto add = [&](const std::string& text) { hash.update(text.data(), text.size()); };
-  add(robot_yaml(study.subject.robot));
+  add(robots::robot_yaml(study.subject.robot));
   if (study.subject.scenario) {
-    add(robot_yaml(study.subject.scenario->robot));
+    add(robots::robot_yaml(study.subject.scenario->robot));
   }
-  const LogTable drive = drive_of_case(study.subject);
+  const LogTable drive = study::drive_of_case(study.subject);
   const auto numbers = [&](const std::vector<double>& column) {
     hash.update(reinterpret_cast<const char*>(column.data()), column.size() * sizeof(double));
   };
@@ -74,16 +74,18 @@ std::string fingerprint_of(const Study& study) {
   return hash.text();
 }
 
-ItemsToRun items_of(const Study& study, const StudyDesign& design) {
+ItemsToRun items_of(const study::Study& study, const study::StudyDesign& design) {
   const auto point = [&](std::size_t item) -> Eigen::VectorXd {
     return design.points.row(static_cast<Eigen::Index>(design.rows[item]));
   };
   ItemsToRun items;
   items.work.items = design.rows.size();
-  items.work.evaluate = [&study, point](std::size_t item) { return text_of(evaluate_point(study, point(item))); };
-  items.key = [&study, point](std::size_t item) { return name_of_point(study, point(item)); };
+  items.work.evaluate = [&study, point](std::size_t item) {
+    return study::text_of(study::evaluate_point(study, point(item)));
+  };
+  items.key = [&study, point](std::size_t item) { return study::name_of_point(study, point(item)); };
   std::string quantities;
-  for (const StudyQuantity& quantity : study.quantities) {
+  for (const study::StudyQuantity& quantity : study.quantities) {
     quantities += (quantities.empty() ? "" : ", ") + quantity.name;
   }
   items.plan = {{"robot and drive", fingerprint_of(study)},
@@ -93,9 +95,9 @@ ItemsToRun items_of(const Study& study, const StudyDesign& design) {
 }
 
 // The inputs that have local derivatives: those of the robot file.
-std::vector<std::string> local_inputs(const Study& study) {
+std::vector<std::string> local_inputs(const study::Study& study) {
   std::vector<std::string> names;
-  for (const StudyInput& input : study.inputs) {
+  for (const study::StudyInput& input : study.inputs) {
     for (const char* family :
          {"noise.", "declared.", "filter.", "wheel_radius", "track_width", "encoder_counts_per_turn", "prior."}) {
       if (input.name.starts_with(family)) {
@@ -107,7 +109,7 @@ std::vector<std::string> local_inputs(const Study& study) {
 }
 
 // Derivatives at the nominal point; without a model or an input that has any, a note says so.
-std::optional<LocalSensitivity> derivatives(const Study& study, std::vector<std::string>& notes) {
+std::optional<study::LocalSensitivity> derivatives(const study::Study& study, std::vector<std::string>& notes) {
   const std::vector<std::string> inputs = local_inputs(study);
   if (!study.methods.local || inputs.empty()) {
     if (study.methods.local) {
@@ -116,13 +118,13 @@ std::optional<LocalSensitivity> derivatives(const Study& study, std::vector<std:
     return std::nullopt;
   }
   try {
-    const StudyCase nominal = case_at(study, nominal_point(study.inputs));
-    const LogTable table = drive_of_case(nominal);
+    const study::StudyCase nominal = study::case_at(study, study::nominal_point(study.inputs));
+    const LogTable table = study::drive_of_case(nominal);
     TableSource log(table);
-    CommissionOptions options;
+    commission::CommissionOptions options;
     options.outliers = nominal.outliers_allowed;
-    const Commissioning commissioning = commission(log, nominal.robot, options);
-    return local_derivatives(log, commissioning, {.inputs = inputs});
+    const Commissioning commissioning = commission_robot(log, nominal.robot, options);
+    return study::local_derivatives(log, commissioning, {.inputs = inputs});
   } catch (const Error& error) {
     notes.push_back(std::string("no local derivatives: ") + error.what());
     return std::nullopt;
@@ -131,9 +133,9 @@ std::optional<LocalSensitivity> derivatives(const Study& study, std::vector<std:
 
 int run(const Arguments& a) {
   make_directory(a.common);
-  StudyFile file = read_study(a.study);
-  const Study& study = file.study;
-  const StudyDesign design = design_of(study);
+  results::StudyFile file = results::read_study(a.study);
+  const study::Study& study = file.study;
+  const study::StudyDesign design = study::design_of(study);
   Progress progress(a.common.quiet);
   const ItemsRun done = run_items(items_of(study, design), a.common, a.scale, [&](std::size_t k, std::size_t n) {
     progress.tell(fmt::format("point {} of {}", k, n), n > 0 ? static_cast<double>(k) / static_cast<double>(n) : 1.0);
@@ -141,15 +143,15 @@ int run(const Arguments& a) {
   if (!done.results) {
     return kDone;
   }
-  StudyValues values(study, design);
-  done.results->each([&](std::size_t item, std::string_view text) { values.put(item, case_result(text)); });
-  const StudyResult result = values.result();
-  const std::optional<LocalSensitivity> local = derivatives(study, file.notes);
-  ReportContext context;
-  context.software = software();
+  study::StudyValues values(study, design);
+  done.results->each([&](std::size_t item, std::string_view text) { values.put(item, study::case_result(text)); });
+  const study::StudyResult result = values.result();
+  const std::optional<study::LocalSensitivity> local = derivatives(study, file.notes);
+  report::ReportContext context;
+  context.software = results::software();
   context.command_line = a.common.command_line;
-  publish(a.common, to_json(file, result, local, a.study.string(), software()), "sensitivity.json",
-          a.common.out.empty() ? std::string() : sensitivity_report(study, result, local, file.notes, context));
+  publish(a.common, results::to_json(file, result, local, a.study.string(), results::software()), "sensitivity.json",
+          a.common.out.empty() ? std::string() : report::sensitivity_report(study, result, local, file.notes, context));
   if (!a.common.quiet && !a.common.json) {
     print_log(file.notes);
     fmt::print("{}", summary(study, result, local));

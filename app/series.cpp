@@ -16,17 +16,17 @@ constexpr const char* kQuantities[] = {"residual", "lower", "upper", "rho", "out
 }  // namespace
 
 void write_series(const std::filesystem::path& path, LogSource& log, const OnlineModel& model,
-                  const DetectorOptions& options, double origin) {
+                  const detector::DetectorOptions& options, double origin) {
   std::vector<std::string> names;
   for (const std::string& output : model.model.outputs) {
     for (const char* quantity : kQuantities) {
       names.push_back(std::string(quantity) + "_" + output);
     }
   }
-  LogWriteOptions how;
+  logs::LogWriteOptions how;
   how.time_origin = origin;
   how.columns_topic = "/residual";
-  const auto writer = create_log(path, names, how);
+  const auto writer = logs::create_log(path, names, how);
   Detector detector = make_detector(model, options);
   LogBlock out;
   out.columns.resize(names.size());
@@ -37,10 +37,10 @@ void write_series(const std::filesystem::path& path, LogSource& log, const Onlin
       column.clear();
     }
   };
-  walk_detector(log, detector, [&](std::size_t, double t, bool, const Decision& decision) {
+  commission::walk_detector(log, detector, [&](std::size_t, double t, bool, const Decision& decision) {
     out.t.push_back(t);
     std::size_t column = 0;
-    for (const ChannelDecision& of : decision.channels) {
+    for (const detector::ChannelDecision& of : decision.channels) {
       for (const double value : {of.residual, of.threshold.lower, of.threshold.upper, of.threshold.rho(),
                                  static_cast<double>(of.outside), static_cast<double>(of.alarm)}) {
         out.columns[column++].push_back(value);

@@ -16,6 +16,6 @@ namespace wheelwright::app {
 /// format that the ending of `path` says (create_log); in a bag they are on the topic /residual. `origin` is
 /// LogFileReport::time_origin. Throws InputError as create_log does.
 void write_series(const std::filesystem::path& path, LogSource& log, const OnlineModel& model,
-                  const DetectorOptions& options, double origin);
+                  const detector::DetectorOptions& options, double origin);
 
 }  // namespace wheelwright::app

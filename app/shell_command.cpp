@@ -47,9 +47,9 @@ int write_pages(const ProgramWords& words, const std::filesystem::path& out) {
   CommonOptions where;
   where.out = out;
   make_directory(where);
-  atomic_write(out / "wheelwright.1", manual_page(words, software()));
+  files::atomic_write(out / "wheelwright.1", manual_page(words, results::software()));
   for (const CommandWords& command : words.commands) {
-    atomic_write(out / ("wheelwright-" + command.name + ".1"), manual_page(command, software()));
+    files::atomic_write(out / ("wheelwright-" + command.name + ".1"), manual_page(command, results::software()));
   }
   return kDone;
 }
@@ -84,10 +84,10 @@ Run add_man(CLI::App& program) {
       for (const CommandWords& each : words.commands) {
         names.push_back(each.name);
       }
-      throw InputError(fmt::format("man: there is no command {}: expected one of {}{}", shown(a->command),
-                                   listed(names), did_you_mean(a->command, names)));
+      throw InputError(fmt::format("man: there is no command {}: expected one of {}{}", files::shown(a->command),
+                                   core::listed(names), files::did_you_mean(a->command, names)));
     }
-    fmt::print("{}", one == nullptr ? manual_page(words, software()) : manual_page(*one, software()));
+    fmt::print("{}", one == nullptr ? manual_page(words, results::software()) : manual_page(*one, results::software()));
     return static_cast<int>(kDone);
   };
 }

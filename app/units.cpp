@@ -78,7 +78,7 @@ double quantity(std::string_view text, std::string_view unit, std::string_view o
     rest.remove_prefix(1);
   }
   double number = 0.0;
-  const char* const behind = parse_number(rest.data(), rest.data() + rest.size(), number);
+  const char* const behind = files::parse_number(rest.data(), rest.data() + rest.size(), number);
   if (behind != nullptr && std::isfinite(number)) {
     const std::string name = plain({behind, static_cast<std::size_t>(rest.data() + rest.size() - behind)});
     for (const Unit& each : units) {
@@ -96,10 +96,10 @@ double quantity(std::string_view text, std::string_view unit, std::string_view o
   }
   const std::string expected = si == "1" ? "a number, or one with %"
                                : names.size() > 1
-                                   ? fmt::format("a number in {}, or one with a unit: {}", si, listed(names))
+                                   ? fmt::format("a number in {}, or one with a unit: {}", si, core::listed(names))
                                    : "a number in " + si;
   throw InputError(
-      fmt::format("{}{}{}: expected {}", option, option.empty() ? "" : ": ", wheelwright::shown(text), expected));
+      fmt::format("{}{}{}: expected {}", option, option.empty() ? "" : ": ", files::shown(text), expected));
 }
 
 }  // namespace wheelwright::app

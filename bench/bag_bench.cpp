@@ -25,14 +25,15 @@ constexpr std::size_t messages = 1'000'000;
 constexpr int repetitions = 3;
 
 /// Joint states of two wheels, whose last digits are noise.
-void write_log(const std::filesystem::path& path, McapCompression compression) {
-  BagWriter writer(path, {.compression = compression});
-  const auto topic = writer.add_topic("/joint_states", RosJointState::type,
-                                      ros_definition_text(bundled_ros_definition(RosJointState::type).value()));
+void write_log(const std::filesystem::path& path, logs::McapCompression compression) {
+  logs::BagWriter writer(path, {.compression = compression});
+  const auto topic =
+      writer.add_topic("/joint_states", logs::RosJointState::type,
+                       logs::ros_definition_text(logs::bundled_ros_definition(logs::RosJointState::type).value()));
   std::mt19937_64 random(5);
   std::normal_distribution<double> noise(0.0, 1e-3);
-  RosEncoder encoder;
-  RosJointState state;
+  logs::RosEncoder encoder;
+  logs::RosJointState state;
   state.header.frame_id = "base_link";
   state.name = {"left_wheel_joint", "right_wheel_joint"};
   state.position = state.velocity = state.effort = {0.0, 0.0};
@@ -51,12 +52,12 @@ void write_log(const std::filesystem::path& path, McapCompression compression) {
 }
 
 void read_messages(const std::filesystem::path& path, bool decoded) {
-  const auto bag = open_bag({path});
-  RosExtractor extractor(bag->topics().at(0).definition.value(),
-                         {"velocity[left_wheel_joint]", "velocity[right_wheel_joint]", "effort[left_wheel_joint]",
-                          "effort[right_wheel_joint]"});
+  const auto bag = logs::open_bag({path});
+  logs::RosExtractor extractor(bag->topics().at(0).definition.value(),
+                               {"velocity[left_wheel_joint]", "velocity[right_wheel_joint]", "effort[left_wheel_joint]",
+                                "effort[right_wheel_joint]"});
   std::array<double, 4> values{};
-  BagMessage message;
+  logs::BagMessage message;
   double sum = 0.0;
   std::size_t count = 0;
   while (bag->next(message)) {
@@ -72,7 +73,7 @@ void read_messages(const std::filesystem::path& path, bool decoded) {
   }
 }
 
-Measurement measure(const char* word, const char* ending, McapCompression compression) {
+Measurement measure(const char* word, const char* ending, logs::McapCompression compression) {
   const TemporaryFile file(ending);
   write_log(file.path, compression);
   const auto [seconds, peer_seconds] = interleaved_medians([&] { read_messages(file.path, true); },
@@ -90,8 +91,9 @@ Measurement measure(const char* word, const char* ending, McapCompression compre
 }
 
 std::vector<Measurement> bag_against_undecoded() {
-  return {measure("mcap none", "mcap", McapCompression::none), measure("mcap zstd", "mcap", McapCompression::zstd),
-          measure("mcap lz4", "mcap", McapCompression::lz4), measure("db3", "db3", McapCompression::none)};
+  return {measure("mcap none", "mcap", logs::McapCompression::none),
+          measure("mcap zstd", "mcap", logs::McapCompression::zstd),
+          measure("mcap lz4", "mcap", logs::McapCompression::lz4), measure("db3", "db3", logs::McapCompression::none)};
 }
 
 const bool registered = register_bench("logs/bag", bag_against_undecoded);

@@ -19,7 +19,7 @@ constexpr double noise = 0.1;
 double uniform(std::mt19937_64& generator) { return 2.0 * static_cast<double>(generator() >> 11) * 0x1.0p-53 - 1.0; }
 
 /// Rows y = Yθ + e with |e| <= noise, θ = (1, 2, …). With `separate` outputs take turns with the columns.
-RegressionTable rows_of(std::size_t instants, std::size_t outputs, std::size_t p, bool separate) {
+core::RegressionTable rows_of(std::size_t instants, std::size_t outputs, std::size_t p, bool separate) {
   std::mt19937_64 generator(1);
   RegressionBlock block;
   block.resize(instants, outputs, p);
@@ -40,7 +40,7 @@ RegressionTable rows_of(std::size_t instants, std::size_t outputs, std::size_t p
       block.y[row] = y;
     }
   }
-  return RegressionTable(std::move(block));
+  return core::RegressionTable(std::move(block));
 }
 
 Box positive(std::size_t p) {
@@ -49,14 +49,14 @@ Box positive(std::size_t p) {
   return box;
 }
 
-void read_bare(RegressionTable& table) {
+void read_bare(core::RegressionTable& table) {
   const RegressionBlock& block = table.block();
   keep(block.Y.sum() + block.dY.sum() + block.y.sum() + block.dy.sum());
 }
 
 std::vector<Measurement> sets() {
   std::vector<Measurement> result;
-  const auto measure = [&](const char* name, RegressionTable& table, const char* peer, const auto& ours,
+  const auto measure = [&](const char* name, core::RegressionTable& table, const char* peer, const auto& ours,
                            const auto& theirs, int repetitions) {
     const auto [seconds, peer_seconds] = interleaved_medians(ours, theirs, repetitions);
     const auto rows = static_cast<std::size_t>(table.block().rows());
@@ -64,13 +64,14 @@ std::vector<Measurement> sets() {
                       fmt::format("{:.0f} ns a row", 1e9 * seconds / static_cast<double>(rows))});
   };
   {
-    RegressionTable table = rows_of(1000000, 2, 4, true);
+    core::RegressionTable table = rows_of(1000000, 2, 4, true);
     const auto bare = [&] { read_bare(table); };
     measure(
         "bounds/source/feasible set", table, "bare read", [&] { keep(feasible_set(table, positive(4)).hull); }, bare,
         3);
     measure(
-        "bounds/source/minimax", table, "bare read", [&] { keep(minimax_fit(table, positive(4)).upper); }, bare, 3);
+        "bounds/source/minimax", table, "bare read", [&] { keep(bounds::minimax_fit(table, positive(4)).upper); }, bare,
+        3);
   }
   return result;
 }

@@ -24,7 +24,7 @@ constexpr int repetitions = 5;
 
 /// A log of a differential-drive robot at 100 Hz with pose, as loggers print it.
 void write_log(const std::filesystem::path& path) {
-  AtomicFile file(path);
+  files::AtomicFile file(path);
   std::string text = "t,omega_r,omega_l,tau_r,tau_l,x,y,theta\n";
   for (std::size_t k = 0; k < rows; ++k) {
     const double t = 0.01 * static_cast<double>(k);

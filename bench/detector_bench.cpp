@@ -28,6 +28,9 @@
 #include "drive_rows.hpp"
 
 namespace wheelwright::bench::detector_bench {
+
+using detector::ParameterSetKind;
+
 namespace {
 
 constexpr int kRepetitions = 5;
@@ -55,22 +58,22 @@ struct World {
       scenario.robot.parameters = {{"mass", "yaw_inertia", "viscous_linear", "viscous_yaw", "coulomb"}};
     }
     scenario.parameters = {.mass = 21.0, .yaw_inertia = 0.9, .viscous_x = 4.0, .viscous_y = 4.0, .viscous_yaw = 0.5};
-    scenario.trajectory = {.kind = Trajectory::Kind::commissioning, .speed = 0.6, .yaw_rate = 1.2, .period = 12.0};
+    scenario.trajectory = {.kind = sim::Trajectory::Kind::commissioning, .speed = 0.6, .yaw_rate = 1.2, .period = 12.0};
     scenario.rate = 100.0;
     scenario.duration = static_cast<double>(rows - 1) / scenario.rate;
     scenario.sensors.encoder_counts_per_turn = 4096.0;
     scenario.sensors.effort = 0.02;
     scenario.sensors.speeds = scenario.sensors.pose = scenario.sensors.commands = false;
-    const LogTable table = simulate(scenario);
+    const LogTable table = sim::simulate(scenario);
     TableSource log(table);
-    const Model model = make_model(scenario.robot);
+    const Model model = model::make_model(scenario.robot);
     const FilterDesign design{.order = 2, .alpha = 10.0, .beta = 10.0};
-    const wheelwright::Measurement measurement = find_measurement(log, scenario.robot, model, design.order);
-    const SensorErrors sensors{.motion = 3.1415927 / 4096.0, .effort = 0.02};
-    filter.emplace(model, design, measurement, propagate(model, design, measurement, sensors));
+    const wheelwright::Measurement measurement = filter::find_measurement(log, scenario.robot, model, design.order);
+    const filter::SensorErrors sensors{.motion = 3.1415927 / 4096.0, .effort = 0.02};
+    filter.emplace(model, design, measurement, filter::propagate(model, design, measurement, sensors));
     TorqueRows stream(log, *filter);
     Box prior;
-    prior.sides = prior_box(scenario.robot, model).bounds;
+    prior.sides = model::prior_box(scenario.robot, model).bounds;
     set = feasible_set(stream, prior).polytope.value();
     estimate = Eigen::Map<const Eigen::VectorXd>(set->chebyshev_centre().data(), static_cast<Eigen::Index>(model.p()));
     const auto names = measurement.columns();
@@ -83,8 +86,8 @@ struct World {
     }
   }
 
-  [[nodiscard]] TorqueDetector detector(DetectorOptions options) const {
-    return {*filter, ThresholdRule(*set, estimate, options.set), options};
+  [[nodiscard]] TorqueDetector detector(detector::DetectorOptions options) const {
+    return {*filter, detector::ThresholdRule(*set, estimate, options.set), options};
   }
   void run(TorqueDetector& detector) const {
     detector.restart();
@@ -101,7 +104,7 @@ class Exported {
     const auto folder =
         std::filesystem::temp_directory_path() / fmt::format("wheelwright-bench-{}", std::random_device{}());
     std::filesystem::create_directories(folder);
-    std::ofstream(folder / "robot.h") << c_header(detector, {.name = "robot"});
+    std::ofstream(folder / "robot.h") << exporter::c_header(detector, {.name = "robot"});
     std::ofstream(folder / "robot.c") << fmt::format(
         "#include \"robot.h\"\n"
         "int robot_run(long rows, const double *t, const double *samples) {{\n"
@@ -174,12 +177,12 @@ std::vector<Measurement> thresholds() {
   const std::size_t n = 100000;
   for (const std::size_t p : {4, 6, 8}) {
     const DriveRows rows = drive_rows(n, p, RowNoise::uniform);
-    RegressionTable table(as_block(rows));
+    core::RegressionTable table(as_block(rows));
     const Polytope set = feasible_set(table, rows.prior).polytope.value();
     const Eigen::VectorXd estimate = Eigen::Map<const Eigen::VectorXd>(rows.truth.data(), static_cast<Eigen::Index>(p));
     const std::vector<double> along = directions(rows, n), none(p, 0.0);
     for (const ParameterSetKind kind : {ParameterSetKind::box, ParameterSetKind::polytope}) {
-      const ThresholdRule rule(set, estimate, kind);
+      const detector::ThresholdRule rule(set, estimate, kind);
       const auto ours = [&] {
         for (std::size_t k = 0; k < n; ++k) {
           keep(rule.at({along.data() + k * p, p}, none, 0.01, k < n / 2 ? 0 : 1));
@@ -212,17 +215,17 @@ std::vector<Measurement> supports() {
   const std::size_t n = 100000;
   for (const std::size_t p : {4, 6, 8}) {
     const DriveRows rows = drive_rows(n, p, RowNoise::uniform);
-    RegressionTable source(as_block(rows));
+    core::RegressionTable source(as_block(rows));
     const Polytope set = feasible_set(source, rows.prior).polytope.value();
-    std::optional<SupportTable> table = SupportTable::make(set, {.vertices = 1 << 14});
+    std::optional<bounds::SupportTable> table = bounds::SupportTable::make(set, {.vertices = 1 << 14});
     if (!table) {
       continue;
     }
     std::size_t vertices = 0;
-    for (const VertexGraph& graph : table->graphs()) {
+    for (const bounds::VertexGraph& graph : table->graphs()) {
       vertices += graph.vertices();
     }
-    SupportWalk walk(set);
+    bounds::SupportWalk walk(set);
     const std::vector<double> along = directions(rows, n);
     const auto [seconds, peer_seconds] = interleaved_medians(
         [&] {

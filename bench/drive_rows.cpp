@@ -118,11 +118,12 @@ DriveRows drive_rows(std::size_t n, std::size_t p, RowNoise noise, std::uint64_t
 
   std::mt19937_64 generator(seed);
   const MultiSine speed(generator, 0.25, 0.5), turn(generator, 0.1, 1.0);
-  const StepWeights weights(beta, step);
-  std::array<std::array<Cascade, largest_p>, 2> filters{};
+  const filter::StepWeights weights(beta, step);
+  std::array<std::array<filter::Cascade, largest_p>, 2> filters{};
   const std::array<double, 2> bound{torque_error, lever * torque_error};
-  const NoiseShape shape = noise == RowNoise::gaussian ? NoiseShape::truncated_gaussian : NoiseShape::uniform;
-  std::array<Noise, 2> independent{Noise(seed, 1, bound[0], shape), Noise(seed, 2, bound[1], shape)};
+  const sim::NoiseShape shape =
+      noise == RowNoise::gaussian ? sim::NoiseShape::truncated_gaussian : sim::NoiseShape::uniform;
+  std::array<sim::Noise, 2> independent{sim::Noise(seed, 1, bound[0], shape), sim::Noise(seed, 2, bound[1], shape)};
   std::array<Coloured, 2> coloured{Coloured(2 * seed + 1), Coloured(2 * seed + 2)};
 
   double heading = 0.0, v2 = turn(0.0);

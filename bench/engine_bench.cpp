@@ -29,14 +29,14 @@ struct Kind {
 };
 constexpr Kind kinds[] = {{RowNoise::uniform, "u"}, {RowNoise::gaussian, "g"}, {RowNoise::coloured, "s"}};
 
-FeasibleSetOptions without_vertices() {
-  FeasibleSetOptions options;
+bounds::FeasibleSetOptions without_vertices() {
+  bounds::FeasibleSetOptions options;
   options.polytope.vertex_limit = 0;
   return options;
 }
 
-SlabColumns columns_of(const DriveRows& rows) {
-  SlabColumns columns;
+bounds::SlabColumns columns_of(const DriveRows& rows) {
+  bounds::SlabColumns columns;
   columns.n = rows.n;
   for (std::size_t j = 0; j < rows.p; ++j) {
     columns.Y.push_back(rows.column(j));
@@ -49,7 +49,7 @@ SlabColumns columns_of(const DriveRows& rows) {
 /// Rows divided by their bound, so that γ dy is γ: what the minimax peers load.
 struct ScaledColumns {
   std::vector<double> columns, y, zero;
-  SlabColumns view;
+  bounds::SlabColumns view;
 
   explicit ScaledColumns(const DriveRows& rows) : columns(rows.columns), y(rows.y), zero(rows.n, 0.0) {
     for (std::size_t i = 0; i < rows.n; ++i) {
@@ -85,12 +85,12 @@ std::vector<Measurement> hulls() {
   for (const std::size_t n : {100000, 1000000}) {
     for (const Kind& kind : kinds) {
       const DriveRows rows = drive_rows(n, 8, kind.noise);
-      const SlabColumns columns = columns_of(rows);
-      IntervalHull hull;
+      const bounds::SlabColumns columns = columns_of(rows);
+      bounds::IntervalHull hull;
       Box peer;
       const auto take = [&](const char* name, const std::function<void()>& solve) {
         const auto [seconds, peer_seconds] =
-            interleaved_medians([&] { hull = interval_hull(columns, rows.prior); }, solve, n < 1000000 ? 3 : 1);
+            interleaved_medians([&] { hull = bounds::interval_hull(columns, rows.prior); }, solve, n < 1000000 ? 3 : 1);
         require_contains(hull.hull, peer);
         result.push_back(
             {"bounds/hull", n, 8, 1, seconds, name, peer_seconds,
@@ -113,11 +113,11 @@ std::vector<Measurement> minimax() {
     for (const Kind& kind : {kinds[0], kinds[1]}) {
       const DriveRows rows = drive_rows(n, 8, kind.noise);
       const ScaledColumns scaled(rows);
-      MinimaxFit fit;
+      bounds::MinimaxFit fit;
       double peer = 0.0;
       const auto take = [&](const char* name, const MinimaxPeer& solve) {
-        const auto [seconds, peer_seconds] = interleaved_medians([&] { fit = minimax_fit(scaled.view, rows.prior); },
-                                                                 [&] { peer = solve(); }, n < 1000000 ? 3 : 1);
+        const auto [seconds, peer_seconds] = interleaved_medians(
+            [&] { fit = bounds::minimax_fit(scaled.view, rows.prior); }, [&] { peer = solve(); }, n < 1000000 ? 3 : 1);
         if (!(fit.lower <= peer * (1.0 + 1e-6) && fit.upper >= peer * (1.0 - 1e-6))) {
           throw Error(fmt::format("minimax: [{:.17g}, {:.17g}], peer {:.17g}", fit.lower, fit.upper, peer));
         }
@@ -140,10 +140,10 @@ std::vector<Measurement> walks() {
     const std::size_t n = 100000;
     for (const Kind& kind : {kinds[0], kinds[1]}) {
       const DriveRows rows = drive_rows(n, p, kind.noise);
-      RegressionTable table(as_block(rows));
+      core::RegressionTable table(as_block(rows));
       const Polytope set = feasible_set(table, rows.prior, without_vertices()).polytope.value();
       Facets facets{set.facets().size(), p, {}, {}};
-      for (const HalfSpace& facet : set.facets()) {
+      for (const bounds::HalfSpace& facet : set.facets()) {
         facets.a.insert(facets.a.end(), facet.a.begin(), facet.a.end());
         facets.b.push_back(facet.b);
       }
@@ -153,10 +153,10 @@ std::vector<Measurement> walks() {
         along.push_back(-along[k]);
       }
       std::vector<double> ours(2 * n), theirs;
-      SupportWalkCount cost;
+      bounds::SupportWalkCount cost;
       // The walk begins without a vertex each time, as the peers begin without a basis.
       const auto walk = [&] {
-        SupportWalk h(set, {.vertices = 1 << 16, .few = 0});
+        bounds::SupportWalk h(set, {.vertices = 1 << 16, .few = 0});
         for (std::size_t k = 0; k < 2 * n; ++k) {
           ours[k] = h.support({along.data() + k * p, p}, k / n);
         }
@@ -196,7 +196,7 @@ std::vector<Measurement> facets() {
   std::vector<Measurement> result;
   for (const Kind& kind : kinds) {
     const DriveRows rows = drive_rows(1000000, 8, kind.noise);
-    RegressionTable table(as_block(rows));
+    core::RegressionTable table(as_block(rows));
     FeasibleSet set;
     const auto [seconds, read] = interleaved_medians([&] { set = feasible_set(table, rows.prior, without_vertices()); },
                                                      [&] { keep(table.block().Y.sum() + table.block().y.sum()); }, 3);
@@ -211,11 +211,11 @@ std::vector<Measurement> threads() {
   std::vector<Measurement> result;
   for (const Kind& kind : {kinds[0], kinds[1]}) {
     const DriveRows rows = drive_rows(4000000, 8, kind.noise);
-    const SlabColumns columns = columns_of(rows);
+    const bounds::SlabColumns columns = columns_of(rows);
     const auto run = [&](std::size_t count) {
-      IntervalHullOptions options;
+      bounds::IntervalHullOptions options;
       options.threads = count;
-      keep(interval_hull(columns, rows.prior, options).hull);
+      keep(bounds::interval_hull(columns, rows.prior, options).hull);
     };
     const auto [two, one] = interleaved_medians([&] { run(2); }, [&] { run(1); }, 5);
     result.push_back({"bounds/threads", rows.n, 8, 2, two, "one thread", one, kind.letter});

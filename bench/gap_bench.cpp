@@ -45,7 +45,7 @@ LogTable drive(double duration, double ahead, std::uint64_t seed) {
     s.robot.effects = {{"com_longitudinal", {{"a", {ahead, ahead}}}}};
   }
   s.parameters = {.mass = 21.0, .yaw_inertia = 0.9, .viscous_x = 4.0, .viscous_y = 4.0, .viscous_yaw = 0.145};
-  s.trajectory = {.kind = Trajectory::Kind::multi_sine, .speed = 0.8, .yaw_rate = 1.6, .period = 8.0};
+  s.trajectory = {.kind = sim::Trajectory::Kind::multi_sine, .speed = 0.8, .yaw_rate = 1.6, .period = 8.0};
   s.duration = duration;
   s.rate = kRate;
   s.sensors.wheel_speed = 0.01;
@@ -64,14 +64,14 @@ double seconds_of(const std::function<void()>& work) {
 }
 
 /// All rows of all spaces, whitened, with the columns of `members` beside θ; the last column is the response.
-Eigen::MatrixXd stacked(const GapProblem& problem, const std::vector<std::size_t>& members) {
-  const Subset subset = subset_of(problem.table, members, BaseModel::refitted);
+Eigen::MatrixXd stacked(const gap::GapProblem& problem, const std::vector<std::size_t>& members) {
+  const gap::Subset subset = gap::subset_of(problem.table, members, gap::BaseModel::refitted);
   const auto n = static_cast<Eigen::Index>(subset.columns.size());
   Eigen::Index total = 0;
-  for (const RowSpace& space : problem.rows.spaces) total += space.t.size();
+  for (const gap::RowSpace& space : problem.rows.spaces) total += space.t.size();
   Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(total, n + 1);
   Eigen::Index at = 0;
-  for (const RowSpace& space : problem.rows.spaces) {
+  for (const gap::RowSpace& space : problem.rows.spaces) {
     const Eigen::Index m = space.t.size();
     for (Eigen::Index j = 0; j < n; ++j) {
       const Eigen::VectorXd& column = space.columns[subset.columns[static_cast<std::size_t>(j)]];
@@ -87,7 +87,7 @@ Eigen::MatrixXd stacked(const GapProblem& problem, const std::vector<std::size_t
   return rows;
 }
 
-double cross_validated(const GapProblem& problem, const std::vector<std::size_t>& members,
+double cross_validated(const gap::GapProblem& problem, const std::vector<std::size_t>& members,
                        const std::vector<Eigen::Index>& order) {
   const Eigen::MatrixXd rows = stacked(problem, members);
   const Eigen::Index n = rows.cols() - 1;
@@ -106,9 +106,9 @@ double cross_validated(const GapProblem& problem, const std::vector<std::size_t>
 }
 
 /// The best single effect or pair of a plain search; rows and columns are given to it.
-std::vector<std::size_t> plain_search(const GapProblem& problem) {
+std::vector<std::size_t> plain_search(const gap::GapProblem& problem) {
   Eigen::Index total = 0;
-  for (const RowSpace& space : problem.rows.spaces) total += space.t.size();
+  for (const gap::RowSpace& space : problem.rows.spaces) total += space.t.size();
   std::vector<Eigen::Index> order(static_cast<std::size_t>(total));
   std::iota(order.begin(), order.end(), Eigen::Index{0});
   std::shuffle(order.begin(), order.end(), std::mt19937_64(1));
@@ -138,11 +138,11 @@ std::vector<std::size_t> plain_search(const GapProblem& problem) {
 }
 
 double plain_seconds(TableSource& log, TableSource& baseline) {
-  PreparedGap prepared = prepare_gap(log, &baseline, plain_robot(), {});
+  gap::PreparedGap prepared = gap::prepare_gap(log, &baseline, plain_robot(), {});
   prepared.row_options.row_step = 1e-9;
-  const GapProblem problem =
-      make_problem(prepared.drive, prepared.floor, prepared.healthy, prepared.trusted, prepared.catalogue,
-                   all_shapes(prepared.catalogue, prepared.drive), prepared.row_options);
+  const gap::GapProblem problem =
+      gap::make_problem(prepared.drive, prepared.floor, prepared.healthy, prepared.trusted, prepared.catalogue,
+                        gap::all_shapes(prepared.catalogue, prepared.drive), prepared.row_options);
   return seconds_of([&] { keep(plain_search(problem)); });
 }
 
@@ -158,7 +158,7 @@ std::vector<Measurement> catalogue() {
         if (of_plain == 0.0) {
           of_plain = plain_seconds(log, baseline);
         }
-        DiagnoseOptions options;
+        gap::DiagnoseOptions options;
         options.shrink = shrink;
         options.threads = threads;
         std::vector<double> times;

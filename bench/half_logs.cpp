@@ -43,17 +43,17 @@ struct Recipe {
 Recipe recipe(LogSource& learning, LogSource& watching, const OnlineModel& model) {
   const RegressorFilter bare(model.model, model.filter, model.measurement);
   TorqueRows rows(learning, bare);
-  const PriorBox prior = prior_box(model.robot, model.model);
+  const model::PriorBox prior = model::prior_box(model.robot, model.model);
   const Box box{prior.bounds};
   const auto n = static_cast<Eigen::Index>(model.model.n());
   Eigen::VectorXd error(n);
   for (Eigen::Index i = 0; i < n; ++i) {
-    MinimaxOptions only;
+    bounds::MinimaxOptions only;
     only.weights.assign(static_cast<std::size_t>(n), std::numeric_limits<double>::infinity());
     only.weights[static_cast<std::size_t>(i)] = 1.0;
-    error[i] = 1.1 * minimax_fit(rows, box, only).upper;
+    error[i] = 1.1 * bounds::minimax_fit(rows, box, only).upper;
   }
-  SignalErrors errors;
+  filter::SignalErrors errors;
   errors.output = error;
   TorqueRows bounded(learning, RegressorFilter(model.model, model.filter, model.measurement, errors));
   const FeasibleSet set = feasible_set(bounded, box);
@@ -62,20 +62,20 @@ Recipe recipe(LogSource& learning, LogSource& watching, const OnlineModel& model
     return result;
   }
   TorqueRows test(watching, RegressorFilter(model.model, model.filter, model.measurement, errors));
-  const auto validation = validate_on(test, ThresholdRule(*set.polytope, model.estimate));
+  const auto validation = commission::validate_on(test, detector::ThresholdRule(*set.polytope, model.estimate));
   return {validation[0].median_width / validation[0].torque_rms, validation[0].outside, validation[0].instants};
 }
 
-void study(const std::string& robot_file, const std::string& log_file) {
+void study_halves(const std::string& robot_file, const std::string& log_file) {
   const Robot robot = read_robot(robot_file);
   CsvLog log({log_file});
   const LogTable all = read_all(log);
-  const LogTable first = slice(all, 0, all.rows() / 2), second = slice(all, all.rows() / 2, all.rows());
+  const LogTable first = core::slice(all, 0, all.rows() / 2), second = core::slice(all, all.rows() / 2, all.rows());
   for (const Line line : {Line{1, 20.0}, Line{2, 20.0}, Line{2, 5.0}, Line{1, std::nullopt}, Line{2, std::nullopt}}) {
     Robot asked = robot;
     asked.filter = {.order = line.order, .alpha = line.beta, .beta = line.beta};
     TableSource learning(first), watching(second);
-    const Commissioning result = commission(learning, asked);
+    const Commissioning result = commission_robot(learning, asked);
     const std::string label =
         fmt::format("{} | {} | {}{:.3g}", log_file.substr(log_file.rfind('/', log_file.rfind('/') - 1) + 1), line.order,
                     line.beta ? "" : "chosen: ", result.model.filter.beta);
@@ -86,7 +86,8 @@ void study(const std::string& robot_file, const std::string& log_file) {
     const Detection detection = detect(watching, make_detector(result.model));
     TorqueRows rows(watching, RegressorFilter(result.model.model, result.model.filter, result.model.measurement,
                                               result.model.errors));
-    const OutputValidation v = validate_on(rows, ThresholdRule(*result.feasible.polytope, result.model.estimate))[0];
+    const commission::OutputValidation v =
+        commission::validate_on(rows, detector::ThresholdRule(*result.feasible.polytope, result.model.estimate))[0];
     const Recipe usual = recipe(learning, watching, result.model);
     fmt::print("| {} | {:.3f} | {:.3f} | {:.3f} | {} | {:.3f} | {} of {} |\n", label, v.nrmse,
                v.median_width / v.torque_rms, v.smallest_kappa, detection.events.size(), usual.width, usual.outside,
@@ -107,7 +108,7 @@ int main(int count, char** words) {
       "| recipe: width / torque rms | recipe: outside |\n|---|---|---|---|---|---|---|---|---|\n");
   try {
     for (int i = 1; i < count; i += 2) {
-      study(words[i], words[i + 1]);
+      study_halves(words[i], words[i + 1]);
     }
   } catch (const Error& error) {
     fmt::print(stderr, "{}\n", error.what());

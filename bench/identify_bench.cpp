@@ -64,9 +64,9 @@ Eigen::VectorXd dgels(const Eigen::MatrixXd& Y, const Eigen::VectorXd& y) {
 #endif
 
 Eigen::VectorXd by_moments(const RegressionBlock& block) {
-  RegressionMoments sums(1, kParameters);
+  identify::RegressionMoments sums(1, kParameters);
   sums.add(block);
-  return ordinary_least_squares(sums).theta;
+  return identify::ordinary_least_squares(sums).theta;
 }
 
 std::vector<Measurement> moments() {
@@ -94,9 +94,9 @@ std::vector<Measurement> instruments() {
   const RegressionBlock both = rows(2 * kParameters);
   const RegressionBlock block = rows(kParameters);
   const auto ours = [&] {
-    RegressionMoments sums(1, kParameters, true);
+    identify::RegressionMoments sums(1, kParameters, true);
     sums.add(both);
-    keep(instrumental_variables(sums).theta);
+    keep(identify::instrumental_variables(sums).theta);
   };
   const auto [seconds, peer_seconds] = interleaved_medians(
       ours, [&] { keep(by_moments(block)); }, kRepetitions);

@@ -66,15 +66,15 @@ Drive simulated(std::uint64_t seed) {
   s.robot.track_width = between(0.3, 0.6);
   s.robot.hold = Hold::first_order;
   s.robot.parameters = {"mass", "yaw_inertia", "viscous_linear", "viscous_yaw"};
-  s.robot.speed_source = SpeedSource::encoder_difference;
+  s.robot.speed_source = model::SpeedSource::encoder_difference;
   s.parameters.mass = between(8.0, 48.0);
   s.parameters.yaw_inertia = s.parameters.mass * between(0.02, 0.07);
   s.parameters.viscous_x = s.parameters.viscous_y = between(1.0, 10.0);
   s.parameters.viscous_yaw = between(0.1, 1.3);
-  s.trajectory = {.kind = Trajectory::Kind::commissioning, .speed = 0.6, .yaw_rate = 1.2, .period = 6.0};
+  s.trajectory = {.kind = sim::Trajectory::Kind::commissioning, .speed = 0.6, .yaw_rate = 1.2, .period = 6.0};
   s.duration = 60.0;
   s.rate = one_of({50.0, 100.0});
-  s.sensors.sampling = Sampling::interval;
+  s.sensors.sampling = sim::Sampling::interval;
   s.sensors.angles = s.sensors.pose = s.sensors.commands = false;
   const double counts = one_of({2048.0, 8192.0, 32768.0});
   s.robot.encoder_counts_per_turn = s.sensors.encoder_counts_per_turn = counts;
@@ -84,7 +84,7 @@ Drive simulated(std::uint64_t seed) {
   s.sensors.effort = 0.5 * effort;
   s.seed = seed;
   return {fmt::format("seed {}: {:.0f} Hz, {:.0f} counts, {:.3f} N·m", seed, s.rate, counts, effort), s.robot,
-          simulate(s)};
+          sim::simulate(s)};
 }
 
 std::vector<std::string> robots_in(const std::string& directory) {
@@ -107,8 +107,8 @@ double median(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
-SensorErrors raw_errors(const OnlineModel& m, const Robot& robot, const Measurement& measurement) {
-  SensorErrors errors;
+filter::SensorErrors raw_errors(const OnlineModel& m, const Robot& robot, const Measurement& measurement) {
+  filter::SensorErrors errors;
   if (measurement.count > 0.0) {
     errors.motion = 0.5 * measurement.count * measurement.nominal_step;
   } else if (robot.encoder_counts_per_turn) {
@@ -136,27 +136,30 @@ struct Window {
 void compare(const OnlineModel& m, const Drive& drive, const LogTable& second, const Options& options,
              std::vector<Window>& windows, std::size_t& programs) {
   TableSource log(second);
-  const ReferenceMotion filtered = read_reference(log, RegressorFilter(m.model, m.filter, m.measurement, m.errors));
-  const ThresholdRule rule(Polytope(m.facets, m.box), m.estimate);
-  FaultType radius;
-  for (const FaultType& fault : fault_catalogue(m.model, m.estimate)) {
+  const detector::ReferenceMotion filtered =
+      detector::read_reference(log, RegressorFilter(m.model, m.filter, m.measurement, m.errors));
+  const detector::ThresholdRule rule(Polytope(m.facets, m.box), m.estimate);
+  detector::FaultType radius;
+  for (const detector::FaultType& fault : detector::fault_catalogue(m.model, m.estimate)) {
     if (fault.name == "wheel_radius") {
       radius = fault;
     }
   }
   radius.range.upper = 0.0;
-  const auto margins = margins_along(
-      filtered, {radius}, rule,
-      [&](const FaultType& fault) { return std::make_unique<FaultFilter>(fault, m.model, m.filter, filtered); },
-      {.windows = kWindows, .most_onsets = options.onsets});
-  const Measurement raw = find_measurement(log, drive.robot, m.model, 2);
-  const ReferenceMotion motion = read_reference(log, RegressorFilter(m.model, {}, raw));
-  ConsistencyTest limit(m.model, raw, raw_errors(m, drive.robot, raw), rule.set(), {.before = options.before});
-  for (const OnsetMargin& onset : margins.at(0).onsets) {
+  const auto margins =
+      detector::margins_along(filtered, {radius}, rule,
+                              [&](const detector::FaultType& fault) {
+                                return std::make_unique<detector::FaultFilter>(fault, m.model, m.filter, filtered);
+                              },
+                              {.windows = kWindows, .most_onsets = options.onsets});
+  const Measurement raw = filter::find_measurement(log, drive.robot, m.model, 2);
+  const detector::ReferenceMotion motion = detector::read_reference(log, RegressorFilter(m.model, {}, raw));
+  bench::ConsistencyTest limit(m.model, raw, raw_errors(m, drive.robot, raw), rule.set(), {.before = options.before});
+  for (const detector::OnsetMargin& onset : margins.at(0).onsets) {
     const auto at =
         static_cast<std::size_t>(std::lower_bound(motion.t.begin(), motion.t.end(), onset.t) - motion.t.begin());
     for (std::size_t w = 0; w < onset.certain.size(); ++w) {
-      const DetectableSize size = limit.smallest_detectable(motion, radius, -1.0, at, kWindows[w]);
+      const bench::DetectableSize size = limit.smallest_detectable(motion, radius, -1.0, at, kWindows[w]);
       Window& window = windows[w];
       programs += size.programs;
       ++window.onsets;
@@ -175,14 +178,14 @@ void compare(const OnlineModel& m, const Drive& drive, const LogTable& second, c
 
 std::string percent(double share) { return std::isfinite(share) ? fmt::format("{:.2f} %", 100.0 * share) : "none"; }
 
-void study(const Drive& drive, const Options& options) {
-  const LogTable first = slice(drive.log, 0, drive.log.rows() / 2),
-                 second = slice(drive.log, drive.log.rows() / 2, drive.log.rows());
+void study_drive(const Drive& drive, const Options& options) {
+  const LogTable first = core::slice(drive.log, 0, drive.log.rows() / 2),
+                 second = core::slice(drive.log, drive.log.rows() / 2, drive.log.rows());
   for (const int order : {1, 2}) {
     Robot asked = drive.robot;
     asked.filter.order = order;
     TableSource learning(first);
-    const Commissioning result = commission(learning, asked);
+    const Commissioning result = commission_robot(learning, asked);
     if (result.model.facets.empty()) {
       fmt::print("| {} | {} | {} |\n", drive.name, order, result.message);
       continue;
@@ -240,13 +243,14 @@ int main(int count, char** words) {
   fmt::print("---|\n");
   try {
     for (std::size_t seed = 1; seed <= options.simulated; ++seed) {
-      study(simulated(seed), options);
+      study_drive(simulated(seed), options);
     }
     for (const std::string& directory : options.directories) {
       for (const std::string& robot : robots_in(directory)) {
         CsvLog log({robot + "/baseline.csv.gz"});
-        study({std::filesystem::path(robot).filename().string(), read_robot(robot + "/robot.yaml"), read_all(log)},
-              options);
+        study_drive(
+            {std::filesystem::path(robot).filename().string(), read_robot(robot + "/robot.yaml"), read_all(log)},
+            options);
       }
     }
   } catch (const Error& error) {

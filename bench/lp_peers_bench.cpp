@@ -65,7 +65,7 @@ Facets half_spaces(const DriveRows& rows) {
 
 Facets facets_of(const Polytope& polytope) {
   Facets facets{polytope.facets().size(), polytope.dimension(), {}, {}};
-  for (const HalfSpace& facet : polytope.facets()) {
+  for (const bounds::HalfSpace& facet : polytope.facets()) {
     facets.a.insert(facets.a.end(), facet.a.begin(), facet.a.end());
     facets.b.push_back(facet.b);
   }
@@ -171,7 +171,7 @@ std::vector<Measurement> peers() {
               "glpk", "minimax", [&] { keep(minimax()); }, nothing);
         }
         if (n == 10000) {
-          RegressionTable table(as_block(rows));
+          core::RegressionTable table(as_block(rows));
           const FeasibleSet set = feasible_set(table, rows.prior);
           const Facets facets = facets_of(set.polytope.value());
           const std::vector<double> along = directions(rows, n);

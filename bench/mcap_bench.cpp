@@ -26,8 +26,8 @@ constexpr int repetitions = 3;
 
 /// Messages as a driver of two wheels sends them: a stamp, the names of the joints, and position, velocity and effort
 /// of each, whose last digits are noise. Returns the bytes of all data.
-std::size_t write_log(const std::filesystem::path& path, McapCompression compression) {
-  McapWriter writer(path, {compression, std::size_t{1} << 20, "ros2", "wheelwright-bench"});
+std::size_t write_log(const std::filesystem::path& path, logs::McapCompression compression) {
+  logs::McapWriter writer(path, {compression, std::size_t{1} << 20, "ros2", "wheelwright-bench"});
   const auto schema = writer.add_schema("sensor_msgs/msg/JointState", "ros2msg", "float64[] position\n");
   const auto channel = writer.add_channel(schema, "/joint_states", "cdr");
   const std::string names = "base_link: left_wheel_joint, right_wheel_joint                                  ";
@@ -64,8 +64,8 @@ void read_bare(const std::filesystem::path& path) {
 }
 
 void read_messages(const std::filesystem::path& path) {
-  McapReader reader(path);
-  McapMessage message;
+  logs::McapReader reader(path);
+  logs::McapMessage message;
   double sum = 0.0;
   while (reader.next(message)) {
     double first = 0.0;
@@ -78,7 +78,7 @@ void read_messages(const std::filesystem::path& path) {
   }
 }
 
-Measurement measure(const char* word, McapCompression compression) {
+Measurement measure(const char* word, logs::McapCompression compression) {
   const TemporaryFile file("mcap");
   const std::size_t unpacked = write_log(file.path, compression);
   const auto [seconds, peer_seconds] =
@@ -96,8 +96,8 @@ Measurement measure(const char* word, McapCompression compression) {
 }
 
 std::vector<Measurement> mcap_against_bare_read() {
-  return {measure("none", McapCompression::none), measure("zstd", McapCompression::zstd),
-          measure("lz4", McapCompression::lz4)};
+  return {measure("none", logs::McapCompression::none), measure("zstd", logs::McapCompression::zstd),
+          measure("lz4", logs::McapCompression::lz4)};
 }
 
 const bool registered = register_bench("logs/mcap", mcap_against_bare_read);

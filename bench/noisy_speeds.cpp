@@ -24,7 +24,7 @@
 #include <wheelwright/identify/noise_level.hpp>
 #include <wheelwright/sim/simulation.hpp>
 
-namespace wheelwright {
+namespace wheelwright::bench {
 namespace {
 
 constexpr double kTorqueNoise = 0.02;  // N·m
@@ -46,11 +46,11 @@ Scenario drive(bool rich) {
   Scenario s;
   s.robot.wheel_radius = 0.1;
   s.robot.track_width = 0.4;
-  s.robot.speed_source = SpeedSource::measured;
+  s.robot.speed_source = model::SpeedSource::measured;
   s.robot.parameters = std::vector<std::string>{"mass", "yaw_inertia", "viscous_linear", "viscous_yaw"};
   s.robot.filter = {.order = 1, .alpha = 10.0, .beta = 10.0};
   s.parameters = {.mass = 20.0, .yaw_inertia = 0.8, .viscous_x = 4.0, .viscous_y = 4.0, .viscous_yaw = 0.5};
-  s.trajectory = {.kind = Trajectory::Kind::multi_sine,
+  s.trajectory = {.kind = sim::Trajectory::Kind::multi_sine,
                   .speed = rich ? 0.8 : 0.2,
                   .yaw_rate = rich ? 1.6 : 0.6,
                   .period = rich ? 4.0 : 23.0};
@@ -105,9 +105,9 @@ struct Tally {
 
 void study(bool rich, double noise, double correlation, bool commands, int seeds) {
   const Scenario scenario = drive(rich);
-  const LogTable exact = commands ? simulate(scenario) : without_commands(simulate(scenario));
-  const Model model = make_model(scenario.robot);
-  const Eigen::VectorXd truth = true_parameters(scenario, model);
+  const LogTable exact = commands ? sim::simulate(scenario) : without_commands(sim::simulate(scenario));
+  const Model model = model::make_model(scenario.robot);
+  const Eigen::VectorXd truth = sim::true_parameters(scenario, model);
   // v1 = r (ω_R + ω_L)/2.
   const double of_wheel = noise / scenario.robot.wheel_radius * std::numbers::sqrt2;
   Tally squares, chosen;
@@ -123,14 +123,14 @@ void study(bool rich, double noise, double correlation, bool commands, int seeds
       add_noise(table, column, kTorqueNoise, correlation, normal);
     }
     TableSource log(table);
-    const Setting setting = settle(log, scenario.robot);
-    const Fit fit = fit_log(log, setting, Part::everything, 1e-3);
-    const Estimate& ls = fit.choice.candidates.front().estimate;
-    const Estimate& best = fit.choice.best();
-    squares.add(ls.theta, ls.standard_error, student_quantile(0.95, ls.freedom), truth);
-    chosen.add(best.theta, best.standard_error, student_quantile(0.95, best.freedom), truth);
+    const commission::Setting setting = commission::settle(log, scenario.robot);
+    const commission::Fit fit = commission::fit_log(log, setting, commission::Part::everything, 1e-3);
+    const identify::Estimate& ls = fit.choice.candidates.front().estimate;
+    const identify::Estimate& best = fit.choice.best();
+    squares.add(ls.theta, ls.standard_error, core::student_quantile(0.95, ls.freedom), truth);
+    chosen.add(best.theta, best.standard_error, core::student_quantile(0.95, best.freedom), truth);
     ++choices[fmt::format(
-        "{}{}", to_string(best.estimator),
+        "{}{}", identify::to_string(best.estimator),
         fit.choice.chosen > 0 ? ", " + fit.choice.candidates[fit.choice.chosen].origin.substr(0, 12) : "")];
     tests += fit.choice.tested_against ? 1 : 0;
     rejected += fit.choice.tested_against && fit.choice.test.p_value < 0.05 ? 1 : 0;
@@ -147,7 +147,7 @@ void study(bool rich, double noise, double correlation, bool commands, int seeds
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::bench
 
 int main(int argc, char** argv) {
   const int seeds = argc > 1 ? std::atoi(argv[1]) : 200;
@@ -162,7 +162,7 @@ int main(int argc, char** argv) {
     for (const bool commands : {true, false}) {
       for (const bool rich : {false, true}) {
         for (const double noise : {0.002, 0.01}) {
-          wheelwright::study(rich, noise, correlation, commands, seeds);
+          wheelwright::bench::study(rich, noise, correlation, commands, seeds);
         }
       }
     }

@@ -123,7 +123,7 @@ class Trial {
         run.drive = make_drive(subject_, driving, drive_seed(robot, driving, 5'000 + k), onset + kPatience + 0.2);
         run.onset = (std::floor(onset * run.drive.rate) + 0.01) / run.drive.rate;
         run.side = random.unit() < 0.5 ? -1.0 : 1.0;
-        twins.push_back(simulate(run.drive));
+        twins.push_back(sim::simulate(run.drive));
         runs.push_back(run);
       }
       banks_.emplace_back(subject_, twins);

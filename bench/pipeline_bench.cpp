@@ -44,7 +44,7 @@ Scenario drive(std::size_t rows) {
   s.robot.encoder_counts_per_turn = 4096.0;
   s.robot.noise.effort.value = 0.02;
   s.parameters = {.mass = 21.0, .yaw_inertia = 0.9, .viscous_x = 4.0, .viscous_y = 4.0, .viscous_yaw = 0.5};
-  s.trajectory = {.kind = Trajectory::Kind::commissioning, .speed = 0.6, .yaw_rate = 1.2, .period = 12.0};
+  s.trajectory = {.kind = sim::Trajectory::Kind::commissioning, .speed = 0.6, .yaw_rate = 1.2, .period = 12.0};
   s.rate = 100.0;
   s.duration = static_cast<double>(rows - 1) / s.rate;
   s.sensors.encoder_counts_per_turn = 4096.0;
@@ -103,13 +103,13 @@ Measurement against(std::string name, std::size_t rows, int p, const std::functi
 struct World {
   static constexpr std::size_t rows = 1000000;
   Scenario scenario = drive(rows);
-  LogTable table = simulate(scenario);
+  LogTable table = sim::simulate(scenario);
   Commissioning result;
 
   World() {
-    const LogTable learning = slice(table, 0, 20000);
+    const LogTable learning = core::slice(table, 0, 20000);
     TableSource log(learning);
-    result = commission(log, scenario.robot);
+    result = commission_robot(log, scenario.robot);
   }
   [[nodiscard]] RegressorFilter filter() const {
     return {result.model.model, result.model.filter, result.model.measurement, result.model.errors};
@@ -167,7 +167,7 @@ std::vector<Measurement> least_squares_peers() {
   const World w;
   TableSource log(w.table);
   TorqueRows stream(log, w.filter());
-  RegressionTable rows(read_all(stream));
+  core::RegressionTable rows(read_all(stream));
   const auto instants = rows.block().instants();
   const auto ours = [&] { keep(least_squares(rows).estimate); };
   std::vector<Measurement> result;
@@ -190,9 +190,9 @@ std::vector<Measurement> bounds_set() {
   const World w;
   TableSource log(w.table);
   TorqueRows stream(log, w.filter());
-  RegressionTable rows(read_all(stream));
+  core::RegressionTable rows(read_all(stream));
   Box prior;
-  prior.sides = prior_box(w.scenario.robot, w.result.model.model).bounds;
+  prior.sides = model::prior_box(w.scenario.robot, w.result.model.model).bounds;
   return {against(
       "bounds/feasible_set", rows.block().instants(), 4, [&] { keep(feasible_set(rows, prior).hull); }, "bare read",
       [&] { read_bare(rows.block()); })};
@@ -201,7 +201,7 @@ std::vector<Measurement> bounds_set() {
 std::vector<Measurement> detector_step() {
   const World w;
   std::vector<Measurement> result;
-  const auto measure = [&](const char* name, DetectorOptions options) {
+  const auto measure = [&](const char* name, detector::DetectorOptions options) {
     Detector detector = make_detector(w.result.model, std::move(options));
     std::vector<const double*> columns;
     for (const auto& column : w.result.model.measurement.columns()) {
@@ -218,7 +218,7 @@ std::vector<Measurement> detector_step() {
     result.push_back(against(name, World::rows, 4, ours, "bare read", [&] { read_bare(w.table); }));
   };
   measure("detector/step", {});
-  measure("detector/step box", {.set = ParameterSetKind::box});
+  measure("detector/step box", {.set = detector::ParameterSetKind::box});
   return result;
 }
 
@@ -226,7 +226,7 @@ std::vector<Measurement> commission_all() {
   const World w;
   TableSource log(w.table);
   return {against(
-      "commission/all", World::rows, 4, [&] { keep(commission(log, w.scenario.robot).parameters); }, "bare read",
+      "commission/all", World::rows, 4, [&] { keep(commission_robot(log, w.scenario.robot).parameters); }, "bare read",
       [&] { read_bare(w.table); })};
 }
 
@@ -315,7 +315,7 @@ std::vector<Measurement> commission_file() {
     write_log(file.path, scenario);
     const Usage ours = usage_of([&] {
       CsvLog source({file.path});
-      keep(commission(source, scenario.robot).parameters);
+      keep(commission_robot(source, scenario.robot).parameters);
     });
     const Usage bare = usage_of([&] { read_file(file.path); });
     result.push_back({"commission/file", rows, 4, 1, ours.seconds, "bare read of the file", bare.seconds,

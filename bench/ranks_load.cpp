@@ -27,7 +27,7 @@ double processor_seconds() {
   return seconds(usage.ru_utime) + seconds(usage.ru_stime);
 }
 
-class Nowhere : public wheelwright::ResultStore {
+class Nowhere : public wheelwright::study::ResultStore {
  public:
   bool has(std::size_t /*item*/) override { return false; }
   void put(std::size_t /*item*/, std::string_view /*result*/) override {}
@@ -41,34 +41,34 @@ int main(int argc, char** argv) {
     std::fputs("usage: mpirun -n RANKS wheelwright-ranks-load ITEMS BYTES MICROSECONDS THREADS [FILE]\n", stderr);
     return 2;
   }
-  const MpiSession mpi;
+  const study::MpiSession mpi;
   const auto items = static_cast<std::size_t>(std::atoll(argv[1]));
   const auto bytes = static_cast<std::size_t>(std::atoll(argv[2]));
   const std::chrono::microseconds sleep(std::atoll(argv[3]));
   const auto threads = static_cast<std::size_t>(std::atoll(argv[4]));
-  const Work work{items, [&](std::size_t) {
-                    if (sleep.count() > 0) {
-                      std::this_thread::sleep_for(sleep);
-                    }
-                    return std::string(bytes, 'x');
-                  }};
-  std::unique_ptr<ResultStore> store;
+  const study::Work work{items, [&](std::size_t) {
+                           if (sleep.count() > 0) {
+                             std::this_thread::sleep_for(sleep);
+                           }
+                           return std::string(bytes, 'x');
+                         }};
+  std::unique_ptr<study::ResultStore> store;
   const double before = processor_seconds();
   const auto begin = std::chrono::steady_clock::now();
-  const RunCount count =
-      run_work_on_ranks(mpi, work, "",
-                        [&]() -> ResultStore& {
-                          if (argc == 6) {
-                            store = std::make_unique<SqliteResults>(
-                                argv[5], StoredPlan{},
-                                StoredItems{items, [](std::size_t item) { return "robot " + std::to_string(item); }},
-                                SqliteResults::Opening::fresh);
-                          } else {
-                            store = std::make_unique<Nowhere>();
-                          }
-                          return *store;
-                        },
-                        {threads, {}, {}});
+  const study::RunCount count = study::run_work_on_ranks(
+      mpi, work, "",
+      [&]() -> study::ResultStore& {
+        if (argc == 6) {
+          store = std::make_unique<results::SqliteResults>(
+              argv[5], results::StoredPlan{},
+              results::StoredItems{items, [](std::size_t item) { return "robot " + std::to_string(item); }},
+              results::SqliteResults::Opening::fresh);
+        } else {
+          store = std::make_unique<Nowhere>();
+        }
+        return *store;
+      },
+      {threads, {}, {}});
   const double wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   const double processor = processor_seconds() - before;
   std::printf("rank %d of %d, %zu threads: %zu items, %.3f s, %.0f items/s, processor %.3f s, %.2f us/item, %.2f %%\n",

@@ -24,7 +24,7 @@ constexpr std::size_t shared_items = 200'000;
 constexpr std::size_t kept_items = 20'000;
 constexpr int repetitions = 5;
 
-class Counter : public ResultStore {
+class Counter : public study::ResultStore {
  public:
   bool has(std::size_t /*item*/) override { return false; }
   void put(std::size_t /*item*/, std::string_view result) override { bytes += result.size(); }
@@ -33,11 +33,11 @@ class Counter : public ResultStore {
 
 std::vector<Measurement> sharing() {
   std::vector<Measurement> measurements;
-  const Work work{shared_items, [](std::size_t item) { return std::string(item % 8, 'x'); }};
+  const study::Work work{shared_items, [](std::size_t item) { return std::string(item % 8, 'x'); }};
   for (const std::size_t threads : {1U, 2U}) {
     const auto shared = [&] {
       Counter counter;
-      run_work(work, counter, {threads, {}, {}});
+      study::run_work(work, counter, {threads, {}, {}});
       keep(counter.bytes);
     };
     const auto bare = [&] {
@@ -60,8 +60,8 @@ std::vector<Measurement> keeping() {
     const std::string result(size, 'x');
     const auto store = [&] {
       const TemporaryFile file("sqlite");
-      SqliteResults results(file.path, {},
-                            {kept_items, [](std::size_t item) { return fmt::format("robot {}", item); }});
+      results::SqliteResults results(file.path, {},
+                                     {kept_items, [](std::size_t item) { return fmt::format("robot {}", item); }});
       for (std::size_t item = 0; item < kept_items; ++item) {
         results.put(item, result);
       }

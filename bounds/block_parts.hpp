@@ -10,7 +10,7 @@
 
 #include <wheelwright/bounds/slab_rows.hpp>
 
-namespace wheelwright {
+namespace wheelwright::bounds {
 
 /// The entries `parameters` of `all`, in that order; every index is below its size (unchecked).
 [[nodiscard]] inline Eigen::VectorXd pick(const Eigen::VectorXd& all, const std::vector<std::size_t>& parameters) {
@@ -30,4 +30,4 @@ namespace wheelwright {
   return full;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::bounds

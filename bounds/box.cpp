@@ -3,7 +3,7 @@
 
 #include <wheelwright/core/linear_algebra.hpp>
 
-namespace wheelwright {
+namespace wheelwright::bounds {
 
 Coordinates whitened(const Box& box, const Eigen::MatrixXd& information) {
   check_finite(box, "box of coordinates");
@@ -15,7 +15,7 @@ Coordinates whitened(const Box& box, const Eigen::MatrixXd& information) {
   }
   const Eigen::VectorXd scale = full.diagonal().cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd correlation = scale.asDiagonal() * full * scale.asDiagonal();
-  const EigenPairs eigen = symmetric_eigen(correlation);
+  const core::EigenPairs eigen = core::symmetric_eigen(correlation);
   const Eigen::VectorXd roots = eigen.values.cwiseMax(1e-14).cwiseSqrt().cwiseInverse();
   const std::vector<double> centre = box.centre();
   return {Eigen::Map<const Eigen::VectorXd>(centre.data(), p), scale.asDiagonal() * eigen.vectors * roots.asDiagonal()};
@@ -29,7 +29,7 @@ Eigen::VectorXd extent(const Box& box, const Coordinates& coordinates) {
     const double centre = coordinates.centre[j];
     farthest[j] = std::max(std::abs(side.upper - centre), std::abs(side.lower - centre));
   }
-  return inverse(coordinates.transform).cwiseAbs() * farthest;
+  return core::inverse(coordinates.transform).cwiseAbs() * farthest;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::bounds

@@ -15,7 +15,7 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/interval.hpp>
 
-namespace wheelwright {
+namespace wheelwright::bounds {
 
 /// { θ : lower_j <= θ_j <= upper_j }. Sides have the units of the parameters.
 struct Box {
@@ -110,4 +110,8 @@ struct Coordinates {
 /// Half-widths of a box about the origin of z that contains `box` (to rounding).
 [[nodiscard]] Eigen::VectorXd extent(const Box& box, const Coordinates& coordinates);
 
+}  // namespace wheelwright::bounds
+
+namespace wheelwright {
+using bounds::Box;
 }  // namespace wheelwright

@@ -8,7 +8,7 @@
 
 #include <wheelwright/core/interval.hpp>
 
-namespace wheelwright {
+namespace wheelwright::bounds {
 
 std::vector<WeightedRow> refined_multipliers(std::span<const HalfSpace* const> basis, std::span<const double> a,
                                              bool split) {
@@ -65,7 +65,7 @@ std::vector<WeightedRow> refined_multipliers(std::span<const HalfSpace* const> b
       continue;
     }
     if (split && Quad(nearest) > lambda[i]) {
-      nearest = round_down(nearest);
+      nearest = core::round_down(nearest);
     }
     result.push_back({*basis[i], nearest});
     if (split) {
@@ -104,7 +104,7 @@ class Sum {
 /// The smallest double not below x.
 double outward(const Quad& x) {
   const auto nearest = static_cast<double>(x);
-  return Quad(nearest) < x ? round_up(nearest) : nearest;
+  return Quad(nearest) < x ? core::round_up(nearest) : nearest;
 }
 
 }  // namespace
@@ -140,4 +140,4 @@ bool proves_empty(std::span<const WeightedRow> rows, const Box& box) {
   return certified_upper_bound(zero, rows, box) < 0.0;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::bounds

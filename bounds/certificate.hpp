@@ -17,7 +17,7 @@
 #include <wheelwright/bounds/box.hpp>
 #include <wheelwright/bounds/slab_rows.hpp>
 
-namespace wheelwright {
+namespace wheelwright::bounds {
 
 /// λ >= 0 with Aᵀλ = a as nearly as 113 bits allow, for p half-spaces that meet in a vertex: nearly collinear columns
 /// make λ large, and its last place as a double is then worth more than the width of the set. `split`: every multiplier
@@ -35,4 +35,4 @@ namespace wheelwright {
 /// upper bound below zero (Farkas).
 [[nodiscard]] bool proves_empty(std::span<const WeightedRow> rows, const Box& box);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::bounds

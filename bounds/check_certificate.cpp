@@ -10,7 +10,7 @@
 
 #include <boost/multiprecision/cpp_int.hpp>
 
-namespace wheelwright {
+namespace wheelwright::bounds {
 namespace {
 
 using Rational = boost::multiprecision::cpp_rational;
@@ -31,13 +31,14 @@ Rational rational(double x) {
 double double_above(const Rational& x) {
   const Rational largest = rational(std::numeric_limits<double>::max());
   if (x > largest || x < -largest) {
-    return x > 0 ? kInfinity : -std::numeric_limits<double>::max();
+    return x > 0 ? core::kInfinity : -std::numeric_limits<double>::max();
   }
   auto guess = x.convert_to<double>();
   while (rational(guess) < x) {
-    guess = std::nextafter(guess, kInfinity);
+    guess = std::nextafter(guess, core::kInfinity);
   }
-  for (double below = guess; (below = std::nextafter(guess, -kInfinity)) > -kInfinity && rational(below) >= x;) {
+  for (double below = guess;
+       (below = std::nextafter(guess, -core::kInfinity)) > -core::kInfinity && rational(below) >= x;) {
     guess = below;
   }
   return guess;
@@ -93,7 +94,7 @@ Evaluation evaluate(std::span<const double> a, std::span<const WeightedRow> rows
 
 CertificateCheck refused(std::string reason, std::optional<std::size_t> row = {}) {
   CertificateCheck check;
-  check.bound = check.shortfall = kInfinity;
+  check.bound = check.shortfall = core::kInfinity;
   check.row = row;
   check.reason = std::move(reason);
   return check;
@@ -259,11 +260,11 @@ HullCheck check_hull(std::span<const BoundClaim> lower, std::span<const BoundCla
   if (result.contradiction) {
     CertificateCheck anything;
     anything.proved = true;
-    anything.bound = anything.shortfall = -kInfinity;
+    anything.bound = anything.shortfall = -core::kInfinity;
     result.lower.assign(p, anything);
     result.upper.assign(p, anything);
   }
   return result;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::bounds

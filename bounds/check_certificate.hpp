@@ -20,7 +20,7 @@
 #include <wheelwright/bounds/box.hpp>
 #include <wheelwright/bounds/slab_rows.hpp>
 
-namespace wheelwright {
+namespace wheelwright::bounds {
 
 /// Result of a check. A malformed certificate is a result, never an exception, since certificates come from files.
 struct CertificateCheck {
@@ -75,4 +75,4 @@ struct HullCheck {
 [[nodiscard]] HullCheck check_hull(std::span<const BoundClaim> lower, std::span<const BoundClaim> upper,
                                    const Box& prior);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::bounds

@@ -6,7 +6,7 @@
 #include <thread>
 #include <tuple>
 
-namespace wheelwright {
+namespace wheelwright::bounds {
 namespace {
 
 constexpr std::size_t kBatch = 512;        // fresh candidates that are worth a linear program
@@ -336,4 +336,4 @@ std::size_t Cutter::undecided() const {
   return sum;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::bounds

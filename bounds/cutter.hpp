@@ -11,7 +11,7 @@
 #include <wheelwright/bounds/interval_hull.hpp>
 #include <wheelwright/bounds/slab_rows.hpp>
 
-namespace wheelwright {
+namespace wheelwright::bounds {
 
 /// Options of a Cutter.
 struct CutterOptions {
@@ -90,4 +90,4 @@ class Cutter {
   bool passed_over_ = false, again_ = false;
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::bounds

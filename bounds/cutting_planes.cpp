@@ -8,7 +8,7 @@
 
 #include <wheelwright/bounds/certificate.hpp>
 
-namespace wheelwright {
+namespace wheelwright::bounds {
 namespace {
 
 constexpr double kCut = 1e-12;  // of the size of the set: a row that cuts less than that is left out
@@ -449,4 +449,4 @@ std::pair<std::vector<CertifiedBound>, std::vector<CertifiedBound>> CuttingPlane
   return {std::move(lower), std::move(upper)};
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::bounds

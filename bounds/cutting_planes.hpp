@@ -11,7 +11,7 @@
 #include <wheelwright/bounds/linear_program.hpp>
 #include <wheelwright/bounds/slab_rows.hpp>
 
-namespace wheelwright {
+namespace wheelwright::bounds {
 
 /// One certified bound of a parameter over a set, and the rows that set it.
 struct CertifiedBound {
@@ -101,4 +101,4 @@ class CuttingPlanes {
   std::optional<std::vector<WeightedRow>> contradiction_;
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::bounds

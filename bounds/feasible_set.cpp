@@ -8,13 +8,13 @@
 #include <wheelwright/bounds/cutter.hpp>
 #include <wheelwright/bounds/survey.hpp>
 
-namespace wheelwright {
+namespace wheelwright::bounds {
 namespace {
 
 constexpr std::size_t kMostOpenSigns = 4;
 
 /// One cutting pass over a part of the prior box with the convex description of the rows.
-FeasibleSet cut(RegressionSource& source, const RowSurvey& survey, const Box& prior,
+FeasibleSet cut(core::RegressionSource& source, const RowSurvey& survey, const Box& prior,
                 const std::vector<std::size_t>& excluded, const PolytopeOptions& options) {
   Cutter cutter(prior, survey.blocks, survey.information);
   ColumnPacker packer(source.outputs(), prior.dimension());
@@ -70,7 +70,7 @@ void merge(FeasibleSet& all, const FeasibleSet& part) {
 
 }  // namespace
 
-FeasibleSet feasible_set(RegressionSource& source, const Box& prior, const FeasibleSetOptions& options) {
+FeasibleSet feasible_set(core::RegressionSource& source, const Box& prior, const FeasibleSetOptions& options) {
   std::vector<std::size_t> excluded = options.excluded_samples;
   std::sort(excluded.begin(), excluded.end());
   const RowSurvey known = survey(source, prior, excluded);
@@ -137,4 +137,4 @@ FeasibleSet feasible_set(RegressionSource& source, const Box& prior, const Feasi
   return result;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::bounds

@@ -9,7 +9,7 @@
 #include <wheelwright/bounds/polytope.hpp>
 #include <wheelwright/core/regression.hpp>
 
-namespace wheelwright {
+namespace wheelwright::bounds {
 
 /// Options of feasible_set().
 struct FeasibleSetOptions {
@@ -52,7 +52,12 @@ struct FeasibleSet {
 /// serves.
 ///
 /// `prior` must be finite. Throws InvalidArgument when shapes disagree or a number is not finite.
-[[nodiscard]] FeasibleSet feasible_set(RegressionSource& source, const Box& prior,
+[[nodiscard]] FeasibleSet feasible_set(core::RegressionSource& source, const Box& prior,
                                        const FeasibleSetOptions& options = {});
 
+}  // namespace wheelwright::bounds
+
+namespace wheelwright {
+using bounds::feasible_set;
+using bounds::FeasibleSet;
 }  // namespace wheelwright

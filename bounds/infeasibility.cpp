@@ -4,7 +4,7 @@
 #include <wheelwright/bounds/certificate.hpp>
 #include <wheelwright/bounds/linear_program.hpp>
 
-namespace wheelwright {
+namespace wheelwright::bounds {
 namespace {
 
 /// The smallest s >= −1 for which every row may be exceeded by s (in the scaled coordinates); its multipliers are the
@@ -99,4 +99,4 @@ std::optional<std::vector<WeightedRow>> find_contradiction(std::span<const HalfS
   return members;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::bounds

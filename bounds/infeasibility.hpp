@@ -10,7 +10,7 @@
 #include <wheelwright/bounds/box.hpp>
 #include <wheelwright/bounds/slab_rows.hpp>
 
-namespace wheelwright {
+namespace wheelwright::bounds {
 
 /// The 2p half-spaces of a box, lower before upper side, with their origin marked as prior. Where `parameters` is
 /// given, side j belongs to parameter parameters[j].
@@ -24,4 +24,4 @@ namespace wheelwright {
                                                                          const Box& box,
                                                                          const Coordinates& coordinates);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::bounds

@@ -8,7 +8,7 @@
 #include <wheelwright/bounds/cutter.hpp>
 #include <wheelwright/bounds/survey.hpp>
 
-namespace wheelwright {
+namespace wheelwright::bounds {
 namespace {
 
 constexpr std::size_t kInstants = 8192;
@@ -160,7 +160,7 @@ bool ColumnPacker::hand_over(const Sink& sink) {
   return alive;
 }
 
-bool ColumnPacker::walk(RegressionSource& source, const std::vector<std::size_t>& excluded, const Sink& sink) {
+bool ColumnPacker::walk(core::RegressionSource& source, const std::vector<std::size_t>& excluded, const Sink& sink) {
   RegressionBlock block;
   source.rewind();
   bool alive = true;
@@ -228,7 +228,7 @@ IntervalHull interval_hull(const SlabColumns& rows, const Box& prior, const Inte
   return hull_of(cutter, prior, [&] { return cutter.offer(rows); });
 }
 
-IntervalHull interval_hull(RegressionSource& source, const Box& prior, const IntervalHullOptions& options) {
+IntervalHull interval_hull(core::RegressionSource& source, const Box& prior, const IntervalHullOptions& options) {
   std::vector<std::size_t> excluded = options.excluded_samples;
   std::sort(excluded.begin(), excluded.end());
   const RowSurvey known = survey(source, prior, excluded);
@@ -243,4 +243,4 @@ IntervalHull interval_hull(RegressionSource& source, const Box& prior, const Int
   return result;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::bounds

@@ -13,7 +13,7 @@
 #include <wheelwright/bounds/slab_rows.hpp>
 #include <wheelwright/core/regression.hpp>
 
-namespace wheelwright {
+namespace wheelwright::bounds {
 
 /// Rows |y − Y°θ| <= dy, |Y° − Y| <= dY of one output, by columns in somebody else's memory.
 struct SlabColumns {
@@ -73,7 +73,7 @@ class ColumnPacker {
   ColumnPacker(std::size_t outputs, std::size_t parameters);
   /// Walks `source` from its beginning and hands every 8192 instants, output by output, to `sink`. Instants whose
   /// number is in `excluded` (ascending) are left out. False where the sink ended the walk.
-  bool walk(RegressionSource& source, const std::vector<std::size_t>& excluded, const Sink& sink);
+  bool walk(core::RegressionSource& source, const std::vector<std::size_t>& excluded, const Sink& sink);
   /// The same for one block in memory.
   bool walk(const RegressionBlock& block, const Sink& sink);
 
@@ -119,7 +119,7 @@ struct IntervalHull {
 [[nodiscard]] IntervalHull interval_hull(const SlabColumns& rows, const Box& prior,
                                          const IntervalHullOptions& options = {});
 /// The same for a regression that is walked block by block.
-[[nodiscard]] IntervalHull interval_hull(RegressionSource& source, const Box& prior,
+[[nodiscard]] IntervalHull interval_hull(core::RegressionSource& source, const Box& prior,
                                          const IntervalHullOptions& options = {});
 
-}  // namespace wheelwright
+}  // namespace wheelwright::bounds

@@ -3,7 +3,7 @@
 
 #include <wheelwright/core/vector_units.hpp>
 
-namespace wheelwright::kernels {
+namespace wheelwright::bounds::kernels {
 
 extern const Table k_baseline;
 #if defined(__x86_64__)
@@ -19,9 +19,9 @@ std::span<const Table* const> available() {
     &k_avx512,
 #endif
   };
-  return {kAll, vector_units()};
+  return {kAll, core::vector_units()};
 }
 
 const Table& best() { return *available().back(); }
 
-}  // namespace wheelwright::kernels
+}  // namespace wheelwright::bounds::kernels

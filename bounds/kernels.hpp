@@ -11,7 +11,7 @@
 #include <cstdint>
 #include <span>
 
-namespace wheelwright::kernels {
+namespace wheelwright::bounds::kernels {
 
 /// Rows are padded to a multiple of this.
 inline constexpr std::size_t kLanes = 8;
@@ -76,4 +76,4 @@ struct Table {
 /// The last of them.
 [[nodiscard]] const Table& best();
 
-}  // namespace wheelwright::kernels
+}  // namespace wheelwright::bounds::kernels

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/bounds/kernels_impl.hpp>
 
-namespace wheelwright::kernels {
+namespace wheelwright::bounds::kernels {
 
 extern const Table k_avx2;
 const Table k_avx2 = Loops<4>::table("avx2");
 
-}  // namespace wheelwright::kernels
+}  // namespace wheelwright::bounds::kernels

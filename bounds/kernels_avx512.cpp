@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/bounds/kernels_impl.hpp>
 
-namespace wheelwright::kernels {
+namespace wheelwright::bounds::kernels {
 
 extern const Table k_avx512;
 const Table k_avx512 = Loops<8>::table("avx512");
 
-}  // namespace wheelwright::kernels
+}  // namespace wheelwright::bounds::kernels

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/bounds/kernels_impl.hpp>
 
-namespace wheelwright::kernels {
+namespace wheelwright::bounds::kernels {
 
 extern const Table k_baseline;
 const Table k_baseline = Loops<2>::table("baseline");
 
-}  // namespace wheelwright::kernels
+}  // namespace wheelwright::bounds::kernels

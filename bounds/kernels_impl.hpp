@@ -7,7 +7,7 @@
 
 #include <wheelwright/bounds/kernels.hpp>
 
-namespace wheelwright::kernels {
+namespace wheelwright::bounds::kernels {
 
 template <int W>
 struct VectorOf;
@@ -323,4 +323,4 @@ struct Loops {
   }
 };
 
-}  // namespace wheelwright::kernels
+}  // namespace wheelwright::bounds::kernels

@@ -10,7 +10,10 @@
 
 #include <Eigen/Core>
 
-namespace wheelwright {
+namespace wheelwright::bounds {
+
+using core::kInfinity;
+
 namespace {
 
 constexpr double kFeasible = 1e-12;    // violation of a row that is none
@@ -100,7 +103,7 @@ bool LinearProgram::refactor() {
     }
   }
   Eigen::Map<Eigen::MatrixXd> inverse(inverse_.data(), p, p);
-  inverse = LuFactors(rows).inverse();
+  inverse = core::LuFactors(rows).inverse();
   // One step of Newton's iteration halves the digits that are missing.
   inverse += inverse * (Eigen::MatrixXd::Identity(p, p) - rows * inverse);
   factored_ = inverse.allFinite() && inverse.cwiseAbs().maxCoeff() < 1e13;
@@ -531,4 +534,4 @@ LpSolution LinearProgram::maximise(const Eigen::VectorXd& c, Basis& start) {
   return report(c, norm);
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::bounds

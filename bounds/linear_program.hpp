@@ -12,7 +12,7 @@
 
 #include <wheelwright/bounds/kernels.hpp>
 
-namespace wheelwright {
+namespace wheelwright::bounds {
 
 /// Result of LinearProgram::maximise. Floating point: no bound until it has gone through certificate.hpp.
 struct LpSolution {
@@ -97,4 +97,4 @@ class LinearProgram {
   std::size_t since_factored_ = 0;
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::bounds

@@ -15,7 +15,7 @@
 #include <wheelwright/bounds/survey.hpp>
 #include <wheelwright/core/limits.hpp>
 
-namespace wheelwright {
+namespace wheelwright::bounds {
 namespace {
 
 constexpr std::size_t kScanned = 1 << 14;
@@ -38,8 +38,8 @@ Demand demand(const SlabColumns& rows, std::size_t row, const Eigen::VectorXd& t
     allowance += noise;
     magnitude += std::abs(term) + noise;
   }
-  return {(std::abs(residual) - allowance) / weight, 4.0 * static_cast<double>(p + 4) * kEpsilon * magnitude / weight,
-          std::abs(residual) / weight};
+  return {(std::abs(residual) - allowance) / weight,
+          4.0 * static_cast<double>(p + 4) * core::kEpsilon * magnitude / weight, std::abs(residual) / weight};
 }
 
 /// The working set of the epigraph problem in (θ, γ): min γ.
@@ -258,7 +258,7 @@ double largest_demand(const SlabColumns& rows, const Eigen::VectorXd& theta, dou
   double upper = 0.0;
   for (std::size_t r = 0; r < rows.n; ++r) {
     const Demand asked = demand(rows, r, theta, weight);
-    upper = std::max(upper, round_up(asked.value + asked.doubt));
+    upper = std::max(upper, core::round_up(asked.value + asked.doubt));
   }
   return upper;
 }
@@ -270,8 +270,9 @@ MinimaxFit finished(const Epigraph& epigraph, MinimaxFit result, double toleranc
   return result;
 }
 
-MinimaxFit fit(RegressionSource& source, const RowSurvey& survey, const Box& prior, const std::vector<double>& weights,
-               const std::vector<std::size_t>& excluded, const MinimaxOptions& options) {
+MinimaxFit fit(core::RegressionSource& source, const RowSurvey& survey, const Box& prior,
+               const std::vector<double>& weights, const std::vector<std::size_t>& excluded,
+               const MinimaxOptions& options) {
   ColumnPacker packer(source.outputs(), prior.dimension()), sampled(source.outputs(), prior.dimension());
   std::vector<SlabColumns> sample;
   sampled.walk(survey.sample, [&](const SlabColumns& columns, const std::vector<char>&) {
@@ -347,8 +348,8 @@ MinimaxFit fit(const SlabColumns& rows, const Box& prior, const std::vector<doub
     for (Eigen::Index j = 0; j < theta.size(); ++j) {
       magnitude += 2.0 * peaks[static_cast<std::size_t>(j)] * (std::abs(centre[j]) + 2.0 * half[j]);
     }
-    const double doubt = 8.0 * static_cast<double>(theta.size() + 4) * kEpsilon * magnitude / w;
-    result.upper = std::max(largest_demand(near, theta, w), round_up(floor + doubt));
+    const double doubt = 8.0 * static_cast<double>(theta.size() + 4) * core::kEpsilon * magnitude / w;
+    result.upper = std::max(largest_demand(near, theta, w), core::round_up(floor + doubt));
     result.theta.assign(theta.data(), theta.data() + theta.size());
     break;
   }
@@ -377,7 +378,7 @@ std::vector<double> checked_weights(const MinimaxOptions& options, std::size_t o
 
 }  // namespace
 
-MinimaxFit minimax_fit(RegressionSource& source, const Box& prior, const MinimaxOptions& options) {
+MinimaxFit minimax_fit(core::RegressionSource& source, const Box& prior, const MinimaxOptions& options) {
   const std::vector<double> weights = checked_weights(options, source.outputs());
   std::vector<std::size_t> excluded = options.excluded_samples;
   std::sort(excluded.begin(), excluded.end());
@@ -421,4 +422,4 @@ MinimaxFit minimax_fit(const SlabColumns& rows, const Box& prior, const MinimaxO
   return fit(rows, prior, checked_weights(options, 1), options);
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::bounds

@@ -10,7 +10,7 @@
 #include <wheelwright/bounds/slab_rows.hpp>
 #include <wheelwright/core/regression.hpp>
 
-namespace wheelwright {
+namespace wheelwright::bounds {
 
 /// Options of minimax_fit().
 struct MinimaxOptions {
@@ -37,11 +37,12 @@ struct MinimaxFit {
 /// none, evaluates the fit on all rows. Signs that the prior leaves open in noisy columns are examined one pattern at a
 /// time (up to four such parameters; beyond, `lower` stands on the convex description of SlabRows and the bracket may
 /// stay open). Throws InvalidArgument when shapes disagree, a number is not finite, or no output is left.
-[[nodiscard]] MinimaxFit minimax_fit(RegressionSource& source, const Box& prior, const MinimaxOptions& options = {});
+[[nodiscard]] MinimaxFit minimax_fit(core::RegressionSource& source, const Box& prior,
+                                     const MinimaxOptions& options = {});
 
 /// The same for rows of one output in memory (γ* in units of `weights`, one number, or of 1), usually in one pass: the
 /// fit of an evenly spread sample comes first; of all rows, those are put aside that can matter for any θ in a box
 /// around it, and the fit of these is the fit of all when it lies in the box (else the box is made wider).
 [[nodiscard]] MinimaxFit minimax_fit(const SlabColumns& rows, const Box& prior, const MinimaxOptions& options = {});
 
-}  // namespace wheelwright
+}  // namespace wheelwright::bounds

@@ -7,7 +7,7 @@
 
 #include <wheelwright/bounds/survey.hpp>
 
-namespace wheelwright {
+namespace wheelwright::bounds {
 namespace {
 
 using SampleSet = std::set<std::size_t>;
@@ -15,7 +15,7 @@ using SampleSet = std::set<std::size_t>;
 /// Feasible sets with samples left out, and what their contradictions say.
 class Trials {
  public:
-  Trials(RegressionSource& source, const Box& prior, const OutlierOptions& options)
+  Trials(core::RegressionSource& source, const Box& prior, const OutlierOptions& options)
       : source_(source), prior_(prior), options_(options) {}
 
   FeasibleSet without(const SampleSet& dropped) {
@@ -51,7 +51,7 @@ class Trials {
   bool one_part = true;
 
  private:
-  RegressionSource& source_;
+  core::RegressionSource& source_;
   const Box& prior_;
   const OutlierOptions& options_;
 };
@@ -62,7 +62,8 @@ OutlierResult answer(FeasibleSet set, const SampleSet& dropped, bool minimal, st
 
 }  // namespace
 
-OutlierResult feasible_set_with_outliers(RegressionSource& source, const Box& prior, const OutlierOptions& options) {
+OutlierResult feasible_set_with_outliers(core::RegressionSource& source, const Box& prior,
+                                         const OutlierOptions& options) {
   Trials trials(source, prior, options);
   FeasibleSet plain = trials.without({});
   if (plain.status == FeasibleSet::Status::nonempty) {
@@ -113,4 +114,4 @@ OutlierResult feasible_set_with_outliers(RegressionSource& source, const Box& pr
   return answer(std::move(plain), {}, false, trials.count);
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::bounds

@@ -7,7 +7,7 @@
 
 #include <wheelwright/bounds/feasible_set.hpp>
 
-namespace wheelwright {
+namespace wheelwright::bounds {
 
 /// Options of feasible_set_with_outliers().
 struct OutlierOptions {
@@ -33,7 +33,7 @@ struct OutlierResult {
 /// again and again, the member of the present contradiction with the largest share λ(a·θ − b) in it at the
 /// least-squares estimate θ of the rows still there, and `minimal` is false; it also is where open signs of noisy
 /// columns needed several parts, whose contradictions differ.
-[[nodiscard]] OutlierResult feasible_set_with_outliers(RegressionSource& source, const Box& prior,
+[[nodiscard]] OutlierResult feasible_set_with_outliers(core::RegressionSource& source, const Box& prior,
                                                        const OutlierOptions& options);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::bounds

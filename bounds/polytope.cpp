@@ -18,7 +18,7 @@
 #include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/core/random.hpp>
 
-namespace wheelwright {
+namespace wheelwright::bounds {
 namespace {
 
 constexpr std::size_t kMaxDimension = 16;
@@ -68,7 +68,7 @@ Eigen::VectorXd meet(const Facets& facets, const Eigen::MatrixXd& normals, const
     columns.col(k) = normals.col(facets[static_cast<std::size_t>(k)]);
     rhs[k] = b[facets[static_cast<std::size_t>(k)]];
   }
-  return LuFactors(columns.transpose()).solve(rhs);
+  return core::LuFactors(columns.transpose()).solve(rhs);
 }
 
 /// Vertices of { z : normalsᵀ z <= b }, whose last p + 1 columns are a simplex around it that must not remain.
@@ -148,7 +148,7 @@ bool enclose(const std::vector<Vertex>& vertices, std::span<const HalfSpace> row
   const Eigen::Index p = coordinates.centre.size();
   const auto m = static_cast<Eigen::Index>(rows.size());
   const double gamma =
-      2.0 * static_cast<double>(p + 4) * kEpsilon;  // roundings of a p-term sum (Higham 2002), four times over
+      2.0 * static_cast<double>(p + 4) * core::kEpsilon;  // roundings of a p-term sum (Higham 2002), four times over
   const Eigen::VectorXd size = coordinates.transform.cwiseAbs().rowwise().sum();
   Eigen::MatrixXd a(p, m);
   for (Eigen::Index i = 0; i < m; ++i) {
@@ -165,7 +165,7 @@ bool enclose(const std::vector<Vertex>& vertices, std::span<const HalfSpace> row
       basis.row(k) = a.col(f).transpose();
       rhs[k] = shifted[f];
     }
-    const Eigen::MatrixXd inverse = coordinates.transform * wheelwright::inverse(basis * coordinates.transform);
+    const Eigen::MatrixXd inverse = coordinates.transform * core::inverse(basis * coordinates.transform);
     Eigen::VectorXd theta = coordinates.centre + coordinates.transform * vertices[v].z;
     theta += inverse * (rhs - basis * theta);
     const Eigen::VectorXd residual = rhs - basis * theta;
@@ -233,7 +233,7 @@ std::optional<VertexSet> enumerate_vertices(std::span<const HalfSpace> rows, con
     Eigen::VectorXd shifted(m);
     for (Eigen::Index i = 0; i < m; ++i) {
       const HalfSpace& row = rows[static_cast<std::size_t>(i)];
-      shifted[i] = round_up(row.b + norms[i] * shift * (1.0 + uniform(generator)));
+      shifted[i] = core::round_up(row.b + norms[i] * shift * (1.0 + core::uniform(generator)));
       b[i] = (shifted[i] - row.a.dot(coordinates.centre)) / norms[i];
     }
     const std::optional<std::vector<Vertex>> vertices = insert_all(normals, b, limit, too_many);
@@ -352,12 +352,12 @@ double support_of_vertices(const Polytope::Block& block, const Box& hull, std::s
     for (Eigen::Index k = 0; k < q; ++k) {
       margin += std::abs(a[block.parameters[static_cast<std::size_t>(k)]]) * block.margin[k];
     }
-    return margin == 0.0 ? 0.0 : round_up(best + round_up(margin * (1.0 + 64.0 * kEpsilon)));
+    return margin == 0.0 ? 0.0 : core::round_up(best + core::round_up(margin * (1.0 + 64.0 * core::kEpsilon)));
   }
   double sum = 0.0;
   for (const std::size_t j : block.parameters) {
     if (a[j] != 0.0) {
-      sum = round_up(sum + round_up(a[j] * (a[j] > 0.0 ? hull.sides[j].upper : hull.sides[j].lower)));
+      sum = core::round_up(sum + core::round_up(a[j] * (a[j] > 0.0 ? hull.sides[j].upper : hull.sides[j].lower)));
     }
   }
   return sum;
@@ -471,7 +471,7 @@ std::variant<Polytope, std::vector<WeightedRow>> Polytope::intersect(const std::
     }
     if (block.vertices) {
       // The radius of the points, and the rounding of a p-term product with any of them.
-      const double gamma = 8.0 * static_cast<double>(p + 4) * kEpsilon;
+      const double gamma = 8.0 * static_cast<double>(p + 4) * core::kEpsilon;
       block.margin = block.vertices->radius * (1.0 + gamma) +
                      gamma * block.vertices->points.cwiseAbs().rowwise().maxCoeff() +
                      Eigen::VectorXd::Constant(q, std::numeric_limits<double>::min());
@@ -509,14 +509,14 @@ double Polytope::support(std::span<const double> a, std::span<double> maximiser)
     for (Eigen::Index k = 0; k < q && !maximiser.empty(); ++k) {
       maximiser[block.parameters[static_cast<std::size_t>(k)]] = at[k];
     }
-    total = bound == 0.0 ? total : round_up(total + bound);
+    total = bound == 0.0 ? total : core::round_up(total + bound);
   }
   return std::min(total, data_->hull.support(a));
 }
 
 bool Polytope::contains(std::span<const double> theta) const noexcept {
   const Eigen::Map<const Eigen::VectorXd> point(theta.data(), static_cast<Eigen::Index>(theta.size()));
-  const double gamma = 4.0 * (static_cast<double>(theta.size()) + 2.0) * kEpsilon;
+  const double gamma = 4.0 * (static_cast<double>(theta.size()) + 2.0) * core::kEpsilon;
   return std::all_of(data_->facets.begin(), data_->facets.end(), [&](const HalfSpace& row) {
     double sum = 0.0, magnitude = std::abs(row.b);
     for (Eigen::Index j = 0; j < point.size(); ++j) {
@@ -527,4 +527,4 @@ bool Polytope::contains(std::span<const double> theta) const noexcept {
   });
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::bounds

@@ -13,7 +13,7 @@
 #include <wheelwright/bounds/cutting_planes.hpp>
 #include <wheelwright/bounds/infeasibility.hpp>
 
-namespace wheelwright {
+namespace wheelwright::bounds {
 
 /// Vertices of a polytope P' that contains P and exceeds it by about `looseness` of P's size.
 struct VertexSet {
@@ -135,4 +135,8 @@ class Polytope {
 [[nodiscard]] double support_of_vertices(const Polytope::Block& block, const Box& hull,
                                          std::span<const double> a) noexcept;
 
+}  // namespace wheelwright::bounds
+
+namespace wheelwright {
+using bounds::Polytope;
 }  // namespace wheelwright

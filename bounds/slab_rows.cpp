@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/bounds/slab_rows.hpp>
 
-namespace wheelwright {
+namespace wheelwright::bounds {
 namespace {
 
 /// Rounding error of fl(x + y), exactly (Knuth's TwoSum).
@@ -12,7 +12,7 @@ double sum_error(double x, double y, double sum) {
 
 double add_up(double x, double y) {
   const double sum = x + y;
-  return sum_error(x, y, sum) > 0.0 ? round_up(sum) : sum;
+  return sum_error(x, y, sum) > 0.0 ? core::round_up(sum) : sum;
 }
 
 double add_down(double x, double y) { return -add_up(-x, -y); }
@@ -20,7 +20,7 @@ double add_down(double x, double y) { return -add_up(-x, -y); }
 Interval quotient(Interval x, Interval positive) {
   const double a = x.lower / positive.lower, b = x.lower / positive.upper;
   const double c = x.upper / positive.lower, d = x.upper / positive.upper;
-  return {round_down(std::min({a, b, c, d})), round_up(std::max({a, b, c, d}))};
+  return {core::round_down(std::min({a, b, c, d})), core::round_up(std::max({a, b, c, d}))};
 }
 
 }  // namespace
@@ -82,7 +82,7 @@ void SlabRows::half_spaces(std::span<const double> Y, std::span<const double> dY
         const Interval coefficient = Interval{at, at} - shift;
         half_space.a[j] = coefficient.centre();
         half_space.b = add_up(half_space.b, room);
-        half_space.b = add_up(half_space.b, round_up(coefficient.width() * magnitude_[k]));
+        half_space.b = add_up(half_space.b, core::round_up(coefficient.width() * magnitude_[k]));
       };
       place(Y[k], upper);
       place(-Y[k], lower);
@@ -90,4 +90,4 @@ void SlabRows::half_spaces(std::span<const double> Y, std::span<const double> dY
   }
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::bounds

@@ -12,7 +12,7 @@
 #include <wheelwright/bounds/box.hpp>
 #include <wheelwright/core/regression.hpp>
 
-namespace wheelwright {
+namespace wheelwright::bounds {
 
 /// Side of a half-space: which of the two inequalities of a slab, or of an interval of the prior box, it is.
 enum class Side {
@@ -103,4 +103,4 @@ class SlabRows {
   std::vector<double> magnitude_;
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::bounds

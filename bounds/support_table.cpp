@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-namespace wheelwright {
+namespace wheelwright::bounds {
 
 std::optional<SupportTable> SupportTable::make(const Polytope& set, const SupportTableOptions& options) {
   check::that(options.slots > 0 && options.vertices >= 2, "support table", "at least one slot and two vertices");
@@ -104,8 +104,9 @@ double SupportTable::support(std::span<const double> a, std::size_t slot) noexce
   // products of either sign with the last addition (Higham 2002, section 3.1); twice of each covers the bound's own
   // rounding.
   const double p = static_cast<double>(a.size());
-  const double bound = value + (slack * (1.0 + (p + 6.0) * kEpsilon) + ((p + 2.0) * kEpsilon * magnitude + kTiny));
+  const double bound =
+      value + (slack * (1.0 + (p + 6.0) * core::kEpsilon) + ((p + 2.0) * core::kEpsilon * magnitude + core::kTiny));
   return std::min(bound, set_.hull().support(a));
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::bounds

@@ -12,7 +12,7 @@
 #include <wheelwright/bounds/polytope.hpp>
 #include <wheelwright/bounds/support_walk.hpp>
 
-namespace wheelwright {
+namespace wheelwright::bounds {
 
 /// Options of SupportTable.
 struct SupportTableOptions {
@@ -69,4 +69,4 @@ class SupportTable {
   std::size_t edges_ = 0;
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::bounds

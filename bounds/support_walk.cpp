@@ -9,7 +9,7 @@
 #include <wheelwright/bounds/linear_program.hpp>
 #include <wheelwright/core/limits.hpp>
 
-namespace wheelwright {
+namespace wheelwright::bounds {
 namespace {
 
 constexpr double kTight = 1e-13;         // share of the size of h that negative multipliers may cost
@@ -21,7 +21,7 @@ constexpr std::uint32_t kNone = 0xffffffff;
 constexpr std::uint32_t kFull = kNone - 1;
 
 /// Twice the bound on the relative rounding of a sum of q products and a few terms more (Higham 2002, section 3.1).
-double rounding(std::size_t q) { return static_cast<double>(q + 6) * kEpsilon; }
+double rounding(std::size_t q) { return static_cast<double>(q + 6) * core::kEpsilon; }
 
 std::size_t numbers(std::size_t q) { return 2 * q * q + 5 * q; }
 
@@ -94,7 +94,7 @@ bool SupportWalk::begin(Walk& walk, const Polytope::Block& block, const SupportW
     const Interval& side = set_.hull().sides[walk.parameters[k]];
     const double c = at.centre[static_cast<Eigen::Index>(k)];
     walk.centre.push_back(c);
-    walk.half.push_back(std::max({round_up(side.upper - c), round_up(c - side.lower), 0.0}));
+    walk.half.push_back(std::max({core::round_up(side.upper - c), core::round_up(c - side.lower), 0.0}));
   }
   Eigen::MatrixXd normals(n, static_cast<Eigen::Index>(m));
   Eigen::VectorXd offsets(static_cast<Eigen::Index>(m));
@@ -116,8 +116,8 @@ bool SupportWalk::begin(Walk& walk, const Polytope::Block& block, const SupportW
       magnitude += std::abs(a * walk.centre[j]);
       reach += std::abs(a) * walk.half[j];
     }
-    walk.bounds[i] = slack + gamma * magnitude + kTiny;
-    walk.penalties[i] = (walk.bounds[i] + reach) * (1.0 + gamma) + gamma * magnitude + kTiny;
+    walk.bounds[i] = slack + gamma * magnitude + core::kTiny;
+    walk.penalties[i] = (walk.bounds[i] + reach) * (1.0 + gamma) + gamma * magnitude + core::kTiny;
   }
   walk.size = numbers(q);
   walk.room = options.vertices;
@@ -246,8 +246,8 @@ double SupportWalk::enclose(Walk& walk, const Vertex& v, const std::int32_t* bas
       floor += gamma * size[j] * walk.half[j];
     }
     v.point[k] = point;
-    v.doubt[k] = (left + floor + gamma * (2.0 * sizes + std::abs(point) + negative)) * (1.0 + gamma) + kTiny;
-    const double ratio = left / std::max(floor, kTiny);
+    v.doubt[k] = (left + floor + gamma * (2.0 * sizes + std::abs(point) + negative)) * (1.0 + gamma) + core::kTiny;
+    const double ratio = left / std::max(floor, core::kTiny);
     worse = ratio <= worse ? worse : ratio;
     worse = std::isfinite(v.doubt[k]) && std::isfinite(point) ? worse : std::numeric_limits<double>::quiet_NaN();
   }
@@ -480,7 +480,7 @@ double SupportWalk::follow(Walk& walk, Place& place, double size) noexcept {
     doubt += std::abs(a[k]) * v.doubt[k];
   }
   // The last addition rounds by half an epsilon of the result at most.
-  return value + ((cost + doubt) * (1.0 + rounding(q)) + (2.0 * kEpsilon * std::abs(value) + kTiny));
+  return value + ((cost + doubt) * (1.0 + rounding(q)) + (2.0 * core::kEpsilon * std::abs(value) + core::kTiny));
 }
 
 std::optional<VertexGraph> SupportWalk::graph(std::size_t block) {
@@ -533,9 +533,9 @@ double SupportWalk::support(std::span<const double> a, std::size_t slot) noexcep
     } else {
       bound = support_of_vertices(set_.blocks()[i], set_.hull(), a);
     }
-    total = i == 0 || total == 0.0 ? bound : round_up(total + bound);
+    total = i == 0 || total == 0.0 ? bound : core::round_up(total + bound);
   }
   return std::min(total, set_.hull().support(a));
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::bounds

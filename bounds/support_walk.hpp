@@ -14,7 +14,7 @@
 
 #include <wheelwright/bounds/polytope.hpp>
 
-namespace wheelwright {
+namespace wheelwright::bounds {
 
 /// Options of SupportWalk.
 struct SupportWalkOptions {
@@ -135,4 +135,4 @@ class SupportWalk {
   SupportWalkCount count_;
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::bounds

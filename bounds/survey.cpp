@@ -6,7 +6,7 @@
 
 #include <wheelwright/bounds/box.hpp>
 
-namespace wheelwright {
+namespace wheelwright::bounds {
 namespace {
 
 constexpr std::size_t kRun = 8;
@@ -198,7 +198,7 @@ class Groups {
 
 }  // namespace
 
-RowSurvey survey(RegressionSource& source, const Box& prior, const std::vector<std::size_t>& excluded) {
+RowSurvey survey(core::RegressionSource& source, const Box& prior, const std::vector<std::size_t>& excluded) {
   const std::size_t p = prior.dimension();
   check::that(p > 0 && source.parameters() == p, "prior box", "one side per parameter of the regression");
   check_finite(prior, "prior box");
@@ -284,4 +284,4 @@ std::vector<std::size_t> open_signs(const RowSurvey& survey, const Box& box) {
   return open;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::bounds

@@ -11,7 +11,7 @@
 #include <wheelwright/bounds/interval_hull.hpp>
 #include <wheelwright/core/regression.hpp>
 
-namespace wheelwright {
+namespace wheelwright::bounds {
 
 /// Up to 16 384 rows, or all where there are fewer, in runs of eight (a line of the cache) at even distances.
 class SpreadSample {
@@ -50,7 +50,7 @@ struct RowSurvey {
 /// Walks `source` once. Instants whose number is in `excluded` (ascending) are skipped. A row of half-width 0 (no error
 /// bounds) gets the weight of a half-width 1e-9 of its reach over the prior box. Throws InvalidArgument when shapes
 /// disagree, a number is not finite, or a bound is negative.
-[[nodiscard]] RowSurvey survey(RegressionSource& source, const Box& prior,
+[[nodiscard]] RowSurvey survey(core::RegressionSource& source, const Box& prior,
                                const std::vector<std::size_t>& excluded = {});
 
 /// Parameters whose column is noisy and whose sign the box leaves open.
@@ -60,4 +60,4 @@ struct RowSurvey {
 /// that it exists for any rank). Uncertified; it need not lie in the box.
 [[nodiscard]] Eigen::VectorXd weighted_estimate(const RowSurvey& survey, const Box& prior);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::bounds

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 #
-# wheelwright_room(NAME [FOLDER room] [PROGRAM_ONLY] [WORDS] HEADERS h... [SOURCES s...] [HOT s...] [BATCH n] [USES room...] [LINK lib...] [LINK_PRIVATE lib...])
+# wheelwright_room(NAME [FOLDER room] [PROGRAM_ONLY] [WORDS] [HEADERS h...] [SHARED h...] [SOURCES s...] [HOT s...]
+#                  [BATCH n] [USES room...] [LINK lib...] [LINK_PRIVATE lib...])
 #
 # One target per room: wheelwright_NAME, alias Wheelwright::NAME. Headers are seen as <wheelwright/NAME/x.hpp>
 # through one symbolic link per room in the build tree, which is also the base of the installed FILE_SET. FOLDER is for a
 # part of a room that has a target of its own, since it links what the rest should not: its headers are the room's.
+# HEADERS are installed, SHARED are for the rooms above only; what stands in neither is the room's own.
 # PROGRAM_ONLY serves our own programs and is not installed. In a release WORDS, which says and writes what others found, is
 # optimised for the time of compilation (-O1), other rooms at -O2, and the sources named after HOT at -O3.
 # BATCH: so many sources are compiled as one, where a dozen would take longer than 25 s.
@@ -49,13 +51,14 @@ function(wheelwright_use_precompiled target name)
 endfunction()
 
 function(wheelwright_room name)
-  cmake_parse_arguments(ROOM "PROGRAM_ONLY;WORDS" "FOLDER;BATCH" "HEADERS;SOURCES;HOT;USES;LINK;LINK_PRIVATE" ${ARGN})
+  cmake_parse_arguments(ROOM "PROGRAM_ONLY;WORDS" "FOLDER;BATCH" "HEADERS;SHARED;SOURCES;HOT;USES;LINK;LINK_PRIVATE" ${ARGN})
   if(NOT ROOM_FOLDER)
     set(ROOM_FOLDER ${name})
   endif()
   file(MAKE_DIRECTORY ${WHEELWRIGHT_INCLUDE_TREE}/wheelwright)
   file(CREATE_LINK ${CMAKE_CURRENT_SOURCE_DIR} ${WHEELWRIGHT_INCLUDE_TREE}/wheelwright/${ROOM_FOLDER} SYMBOLIC)
   list(TRANSFORM ROOM_HEADERS PREPEND ${WHEELWRIGHT_INCLUDE_TREE}/wheelwright/${ROOM_FOLDER}/)
+  list(TRANSFORM ROOM_SHARED PREPEND ${WHEELWRIGHT_INCLUDE_TREE}/wheelwright/${ROOM_FOLDER}/)
   list(TRANSFORM ROOM_USES PREPEND Wheelwright::)
 
   set(target wheelwright_${name})
@@ -80,6 +83,10 @@ function(wheelwright_room name)
   endif()
   add_library(Wheelwright::${name} ALIAS ${target})
   target_sources(${target} ${scope} FILE_SET HEADERS BASE_DIRS ${WHEELWRIGHT_INCLUDE_TREE} FILES ${ROOM_HEADERS})
+  if(ROOM_SHARED)
+    target_sources(${target} PRIVATE FILE_SET shared TYPE HEADERS BASE_DIRS ${WHEELWRIGHT_INCLUDE_TREE}
+      FILES ${ROOM_SHARED})
+  endif()
   target_compile_features(${target} ${scope} cxx_std_20)
   target_link_libraries(${target} ${scope} ${ROOM_USES} ${ROOM_LINK})
   if(ROOM_LINK_PRIVATE)

@@ -9,7 +9,12 @@
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/commission/noise_budget.hpp>
 
-namespace wheelwright {
+namespace wheelwright::commission {
+
+using core::Assumption;
+using core::AssumptionVerdict;
+using core::Warrant;
+
 namespace {
 
 constexpr const char* kMotionInDriving = "motion_in_driving";
@@ -24,7 +29,7 @@ struct RowsVerdict {
   std::string detail;
 };
 
-bool learnt(const OutputNoise& noise) { return noise.origin == NoiseOrigin::estimated; }
+bool learnt(const OutputNoise& noise) { return noise.origin == core::NoiseOrigin::estimated; }
 
 RowsVerdict rows_verdict(const Commissioning& r) {
   if (r.status == Commissioning::Status::empty) {
@@ -62,11 +67,11 @@ RowsVerdict rows_verdict(const Commissioning& r) {
 Assumption assumed_hold(const Robot& robot) {
   Assumption a{.id = "effort_hold", .declared_by = "effort.hold, effort.changes"};
   a.statement = robot.hold == Hold::first_order
-                    ? (robot.effort_changes == EffortChanges::at_samples
+                    ? (robot.effort_changes == model::EffortChanges::at_samples
                            ? "Efforts are measured: straight between two stamps."
                            : "Efforts are measured: between two stamps somewhere from straight to a parabola through "
                              "the stamps about them.")
-                : robot.effort_changes == EffortChanges::at_samples
+                : robot.effort_changes == model::EffortChanges::at_samples
                     ? "Efforts are commands: each acts from its stamp to the stamp of the next."
                     : "Efforts are commands: each acts until the next replaces it, at an unknown moment between their "
                       "stamps.";
@@ -166,8 +171,8 @@ void add_noise_bounds(std::vector<Assumption>& list, const Commissioning& r, con
              rows.verdict == AssumptionVerdict::fails ? rows.detail : "says nothing of driving that is unlike it"});
     return;
   }
-  const SensorNoise& noise = r.model.robot.noise;
-  const auto add = [&](const char* name, const NoiseBound& bound, const char* unit) {
+  const model::SensorNoise& noise = r.model.robot.noise;
+  const auto add = [&](const char* name, const model::NoiseBound& bound, const char* unit) {
     if (bound.value) {
       list.push_back({.id = fmt::format("noise_{}", name),
                       .statement = fmt::format("The error of {} never exceeds {:g} {}.", name, *bound.value, unit),
@@ -190,9 +195,12 @@ void add_noise_bounds(std::vector<Assumption>& list, const Commissioning& r, con
     add("wheel_speed", noise.wheel_speed, "rad/s");
     add("wheel_angle", noise.wheel_angle, "rad");
   }
-  const EffortKind kind = r.model.robot.effort;
-  add("effort", noise.effort, kind == EffortKind::torque ? "N·m" : kind == EffortKind::current ? "A" : "V");
-  if (r.noise_mode == NoiseMode::statistical) {
+  const model::EffortKind kind = r.model.robot.effort;
+  add("effort", noise.effort,
+      kind == model::EffortKind::torque    ? "N·m"
+      : kind == model::EffortKind::current ? "A"
+                                           : "V");
+  if (r.noise_mode == filter::NoiseMode::statistical) {
     list.push_back({.id = "noise_independent",
                     .statement = "Errors of the sensors are of zero mean and independent from sample to sample.",
                     .declared_by = "--statistical"});
@@ -299,19 +307,19 @@ void add_limits(std::vector<Assumption>& list, const Robot& robot) {
   }
 }
 
-Warrant warrant_of(const OutputNoise& noise, NoiseMode mode, bool contradicted) {
-  return contradicted || learnt(noise)    ? Warrant::extrapolated
-         : mode == NoiseMode::statistical ? Warrant::statistical
-                                          : Warrant::guaranteed;
+Warrant warrant_of(const OutputNoise& noise, filter::NoiseMode mode, bool contradicted) {
+  return contradicted || learnt(noise)            ? Warrant::extrapolated
+         : mode == filter::NoiseMode::statistical ? Warrant::statistical
+                                                  : Warrant::guaranteed;
 }
 
 // Sets the warrant of each output's noise and thresholds; the weakest of them.
-Warrant settle_outputs(std::vector<OutputNoise>& noise, std::vector<OutputValidation>& validation, NoiseMode mode,
-                       bool contradicted) {
+Warrant settle_outputs(std::vector<OutputNoise>& noise, std::vector<OutputValidation>& validation,
+                       filter::NoiseMode mode, bool contradicted) {
   Warrant all = noise.empty() ? Warrant::extrapolated : Warrant::guaranteed;
   for (OutputNoise& each : noise) {
     each.warrant = warrant_of(each, mode, contradicted);
-    all = weaker(all, each.warrant);
+    all = core::weaker(all, each.warrant);
   }
   for (OutputValidation& each : validation) {
     each.warrant = all;  // a threshold stands on the set, and the set on all outputs
@@ -336,7 +344,7 @@ std::vector<Assumption> assumptions_of(const Commissioning& result) {
   }
   list.push_back(assumed_prior(result));
   add_limits(list, robot);
-  if (on_two_wheels(robot)) {
+  if (model::on_two_wheels(robot)) {
     list.push_back(assumed_geometry(result));
   }
   if (result.kinematic.model) {
@@ -362,16 +370,17 @@ void settle_warrants(Commissioning& result) {
   for (ParameterResult& parameter : result.parameters) {
     parameter.warrant = set;
   }
-  result.model.warrant = driving_contradicted ? weaker(set, Warrant::extrapolated) : set;
+  result.model.warrant = driving_contradicted ? core::weaker(set, Warrant::extrapolated) : set;
   for (OutputValidation& each : result.validation) {
     each.warrant = result.model.warrant;
   }
   KinematicCommissioning& kinematic = result.kinematic;
-  const Warrant warrant = settle_outputs(kinematic.noise, kinematic.validation, NoiseMode::worst_case, contradicted);
+  const Warrant warrant =
+      settle_outputs(kinematic.noise, kinematic.validation, filter::NoiseMode::worst_case, contradicted);
   for (KinematicParameter& parameter : kinematic.parameters) {
     parameter.warrant = warrant;
   }
-  for (std::optional<KinematicModel>* model : {&kinematic.model, &result.model.kinematic}) {
+  for (std::optional<detector::KinematicModel>* model : {&kinematic.model, &result.model.kinematic}) {
     if (*model) {
       (*model)->warrant = warrant;
     }
@@ -382,4 +391,4 @@ Warrant interval_warrant(const Commissioning& result) {
   return result.parameters.empty() ? result.model.warrant : result.parameters.front().warrant;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::commission

@@ -7,13 +7,13 @@
 
 #include <wheelwright/core/warrant.hpp>
 
-namespace wheelwright {
+namespace wheelwright::commission {
 
 struct Commissioning;
 
 /// The assumptions of `result` with the verdicts of its log, those of the rows first. The one place where a test sets a
 /// verdict.
-[[nodiscard]] std::vector<Assumption> assumptions_of(const Commissioning& result);
+[[nodiscard]] std::vector<core::Assumption> assumptions_of(const Commissioning& result);
 
 /// Fills in Commissioning::assumptions (and those of its model), and the warrant of every number: that of the noise it
 /// stands on; extrapolated where an assumption fails. Where only that of driving to come fails, intervals of parameters
@@ -21,6 +21,6 @@ struct Commissioning;
 void settle_warrants(Commissioning& result);
 
 /// Of the parameters' intervals; that of the model, which thresholds share, where there are none.
-[[nodiscard]] Warrant interval_warrant(const Commissioning& result);
+[[nodiscard]] core::Warrant interval_warrant(const Commissioning& result);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::commission

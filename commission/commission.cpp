@@ -15,17 +15,20 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/filter/row_stream.hpp>
 
-namespace wheelwright {
+namespace wheelwright::commission {
+
+using filter::SignalErrors;
+
 namespace {
 
 constexpr double kMuchUnexplained = 0.2;  // residual over effort, root mean square
 
-std::vector<OutputNoise> output_noise(const Setting& s, const Fit& fit, const ExtrapolationOptions& options) {
+std::vector<OutputNoise> output_noise(const Setting& s, const Fit& fit, const identify::ExtrapolationOptions& options) {
   std::vector<OutputNoise> noise(s.model.n());
   for (std::size_t i = 0; i < noise.size(); ++i) {
     const auto at = static_cast<Eigen::Index>(i);
     if (s.noise_complete) {
-      noise[i].origin = NoiseOrigin::declared;
+      noise[i].origin = core::NoiseOrigin::declared;
       noise[i].learning = noise[i].bound = s.declared.output[at];
     } else {
       noise[i] = estimated_noise(fit.residuals.outputs[i], fit.residuals.instants, fit.plausible[at], options);
@@ -46,20 +49,21 @@ SignalErrors with_noise(const Setting& s, const std::vector<OutputNoise>& noise,
 // What bounds the motion between samples: a first set stands on the limit of the accelerations, the next ones on the
 // dynamics with the parameters of the set before, as long as that brings something.
 struct Bounded {
-  OutlierResult result;
+  bounds::OutlierResult result;
   std::vector<EarlierSet> earlier;
-  MotionBound learning;  // of the rows that the set is made of
-  MotionBound driving;   // for driving to come: what was seen in this log is no limit of that
-  double raised = 1.0;   // factor on an estimated noise bound without which the prior box explains nothing
+  filter::MotionBound learning;  // of the rows that the set is made of
+  filter::MotionBound driving;   // for driving to come: what was seen in this log is no limit of that
+  double raised = 1.0;           // factor on an estimated noise bound without which the prior box explains nothing
 };
 
-OutlierResult set_of(LogSource& log, const Setting& s, Part part, const SignalErrors& errors, std::size_t outliers) {
+bounds::OutlierResult set_of(LogSource& log, const Setting& s, Part part, const SignalErrors& errors,
+                             std::size_t outliers) {
   TorqueRows rows = make_rows(log, s, errors);
   FoldedSource folded(rows, part, s.survey.rows, s.folds);
   if (outliers > 0) {
-    return feasible_set_with_outliers(folded, s.prior, {.most = outliers, .set = {}});
+    return bounds::feasible_set_with_outliers(folded, s.prior, {.most = outliers, .set = {}});
   }
-  OutlierResult result;
+  bounds::OutlierResult result;
   result.set = feasible_set(folded, s.prior);
   return result;
 }
@@ -84,7 +88,7 @@ Bounded refined_set(LogSource& log, const Setting& s, Part part, SignalErrors er
     if (best.result.set.status != FeasibleSet::Status::nonempty) {
       return best;
     }
-    MotionBound bound = motion_bound(s.model, best.result.set.hull.sides);
+    filter::MotionBound bound = filter::motion_bound(s.model, best.result.set.hull.sides);
     if (bound.mobility.size() == 0) {
       return best;
     }
@@ -96,7 +100,7 @@ Bounded refined_set(LogSource& log, const Setting& s, Part part, SignalErrors er
     bound.limit = errors.motion.limit;
     SignalErrors sharper = errors;
     sharper.motion = bound;
-    OutlierResult next = set_of(log, s, part, sharper, outliers);
+    bounds::OutlierResult next = set_of(log, s, part, sharper, outliers);
     const bool better =
         next.set.status != FeasibleSet::Status::nonempty || widths(next.set.hull, best.result.set.hull) < kWorthAnother;
     best.earlier.push_back({std::move(best.result.set), std::move(best.result.dropped)});
@@ -153,7 +157,7 @@ double needed_noise(LogSource& log, const Setting& s, const Commissioning& empty
     return refined_set(log, s, Part::everything, std::move(errors), outliers).result.set.status ==
            FeasibleSet::Status::nonempty;
   };
-  MinimaxOptions options;
+  bounds::MinimaxOptions options;
   options.excluded_samples = empty.dropped;
   for (Eigen::Index i = 0; i < empty.row_errors.output.size(); ++i) {
     options.weights.push_back(std::max(empty.row_errors.output[i], std::numeric_limits<double>::min()));
@@ -161,7 +165,7 @@ double needed_noise(LogSource& log, const Setting& s, const Commissioning& empty
   SignalErrors without_output = empty.row_errors;
   without_output.output.setZero();
   TorqueRows bare = make_rows(log, s, without_output);
-  const double fit = minimax_fit(bare, s.prior, options).upper;
+  const double fit = bounds::minimax_fit(bare, s.prior, options).upper;
   // The first rows are met again with any noise.
   const bool no_less = outliers == 0 && empty.row_errors.motion.mobility.size() == 0;
   double lower = no_less ? std::max(1.0, fit) : 1.0, upper = std::max(lower, fit) * (1.0 + kClose);
@@ -176,9 +180,9 @@ double needed_noise(LogSource& log, const Setting& s, const Commissioning& empty
   return upper;
 }
 
-std::vector<RowOrigin> binding(const CertifiedBound& bound) {
-  std::vector<RowOrigin> rows;
-  for (const WeightedRow& weighted : bound.binding) {
+std::vector<bounds::RowOrigin> binding(const bounds::CertifiedBound& bound) {
+  std::vector<bounds::RowOrigin> rows;
+  for (const bounds::WeightedRow& weighted : bound.binding) {
     if (weighted.multiplier > 0.0) {
       rows.push_back(weighted.row.origin);
     }
@@ -186,9 +190,9 @@ std::vector<RowOrigin> binding(const CertifiedBound& bound) {
   return rows;
 }
 
-bool is_prior(const std::vector<RowOrigin>& rows, const Interval& prior, double bound, double other) {
+bool is_prior(const std::vector<bounds::RowOrigin>& rows, const Interval& prior, double bound, double other) {
   const bool on_side = bound == prior.lower || bound == prior.upper;
-  const bool only_prior = std::ranges::all_of(rows, [](const RowOrigin& row) { return row.is_prior; });
+  const bool only_prior = std::ranges::all_of(rows, [](const bounds::RowOrigin& row) { return row.is_prior; });
   return on_side || (only_prior && bound != other);
 }
 
@@ -200,7 +204,7 @@ std::vector<ParameterResult> parameter_results(const Setting& s, const Fit& fit,
     r.parameter = s.model.parameters[j];
     r.excitation = fit.excitation[j].state;
     r.reason = fit.excitation[j].reason;
-    if (r.excitation == Excitation::not_excited) {
+    if (r.excitation == identify::Excitation::not_excited) {
       r.reason += ": " + r.parameter.excite;
     } else {
       r.estimate = fit.estimate[at];
@@ -221,7 +225,7 @@ std::vector<ParameterResult> parameter_results(const Setting& s, const Fit& fit,
   return results;
 }
 
-OnlineModel described_model(const Setting& s, Persistence persistence) {
+OnlineModel described_model(const Setting& s, detector::Persistence persistence) {
   OnlineModel model;
   model.robot = s.robot;
   model.model = s.model;
@@ -232,7 +236,7 @@ OnlineModel described_model(const Setting& s, Persistence persistence) {
 }
 
 void finish_model(OnlineModel& model, const Setting& s, const std::vector<OutputNoise>& noise, const Fit& fit,
-                  const FeasibleSet& set, const MotionBound& motion) {
+                  const FeasibleSet& set, const filter::MotionBound& motion) {
   model.errors = with_noise(s, noise, RowUse::driving);
   model.errors.motion = motion;
   model.estimate = best_guess(fit.estimate, fit.excitation, *set.polytope);
@@ -252,7 +256,8 @@ KinematicCommissioning kinematics(LogSource& log, const Setting& s, const Commis
   kinematic.extrapolation = options.extrapolation;
   kinematic.persistence = options.persistence;
   kinematic.window = s.robot.kinematic_window.value_or(kinematic.window);
-  return commission_kinematics(log, s.robot, find_odometry(log, s.robot, s.model, s.measurement), s.survey, kinematic);
+  return commission_kinematics(log, s.robot, filter::find_odometry(log, s.robot, s.model, s.measurement), s.survey,
+                               kinematic);
 }
 
 void describe_assumptions(const Setting& s, Commissioning& result) {
@@ -280,7 +285,8 @@ void describe_assumptions(const Setting& s, Commissioning& result) {
         "the noise bounds are extrapolated from the residuals of this log: they hold while the noise and "
         "the driving stay like it; declare `noise:` in the robot file for bounds that stand on the sensors");
   }
-  if (s.noise_complete && s.measurement.hold == Hold::zero_order && s.measurement.changes == EffortChanges::between) {
+  if (s.noise_complete && s.measurement.hold == Hold::zero_order &&
+      s.measurement.changes == model::EffortChanges::between) {
     notes.push_back(
         "commands were taken to change at an unknown moment between two samples: where they change at the samples, "
         "`effort: {changes: at_samples}` in the robot file says so and narrows the bounds; else a higher rate does");
@@ -292,7 +298,7 @@ void describe_assumptions(const Setting& s, Commissioning& result) {
   }
   for (std::size_t j = 0; j < s.model.p(); ++j) {
     if (!s.prior_declared[j] && (result.parameters[j].lower_is_prior || result.parameters[j].upper_is_prior)) {
-      const Parameter& p = result.parameters[j].parameter;
+      const model::Parameter& p = result.parameters[j].parameter;
       notes.push_back(
           fmt::format("a bound of {} is the tool's own wide default ({} from {:.3g} to {:.3g} {}), not the robot's: "
                       "`prior:` in the robot file replaces it",
@@ -305,7 +311,7 @@ void describe_assumptions(const Setting& s, Commissioning& result) {
 std::string reservations(const Setting& s, const Commissioning& result) {
   std::string text;
   for (std::size_t i = 0; i < s.model.n(); ++i) {
-    const OutputResidual& o = result.residuals.outputs[i];
+    const identify::OutputResidual& o = result.residuals.outputs[i];
     const double share = o.torque_rms > 0.0 ? o.rms / o.torque_rms : 0.0;
     if (share > kMuchUnexplained) {
       text += fmt::format("; the model leaves {:.0f} % of the effort in the {} channel unexplained", 100.0 * share,
@@ -314,7 +320,7 @@ std::string reservations(const Setting& s, const Commissioning& result) {
   }
   std::string indistinct;
   for (const ParameterResult& p : result.parameters) {
-    if (p.excitation == Excitation::indistinct) {
+    if (p.excitation == identify::Excitation::indistinct) {
       indistinct += (indistinct.empty() ? "" : ", ") + p.parameter.name;
     }
   }
@@ -345,7 +351,7 @@ std::string default_prior_in_the_way(const Setting& s, const Commissioning& resu
   for (std::size_t j = 0; j < result.parameters.size(); ++j) {
     const std::optional<double>& estimate = result.parameters[j].estimate;
     if (estimate && !s.prior_declared[j] && *estimate > s.prior.sides[j].upper) {
-      const Parameter& p = s.model.parameters[j];
+      const model::Parameter& p = s.model.parameters[j];
       return fmt::format(
           "no {0} within the tool's own default prior, at most {1:.3g} {2}, explains the log: check the units of "
           "efforts "
@@ -373,7 +379,7 @@ bool withdrawn(const Commissioning& result) {
 std::string status_message(const Setting& s, const Commissioning& result) {
   std::string missing, todo;
   for (const ParameterResult& p : result.parameters) {
-    if (p.excitation == Excitation::not_excited) {
+    if (p.excitation == identify::Excitation::not_excited) {
       missing += (missing.empty() ? "" : ", ") + p.parameter.name;
       if (todo.find(p.parameter.excite) == std::string::npos) {
         todo += (todo.empty() ? "" : "; ") + p.parameter.excite;
@@ -459,7 +465,7 @@ Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionO
   }
 
   const auto unexcited = std::ranges::count_if(
-      result.parameters, [](const ParameterResult& p) { return p.excitation == Excitation::not_excited; });
+      result.parameters, [](const ParameterResult& p) { return p.excitation == identify::Excitation::not_excited; });
   result.status = unexcited == 0                                          ? Commissioning::Status::done
                   : unexcited == static_cast<std::ptrdiff_t>(s.model.p()) ? Commissioning::Status::nothing
                                                                           : Commissioning::Status::partial;
@@ -481,7 +487,8 @@ Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionO
     TorqueRows unseen = make_rows(log, s, errors);
     FoldedSource held_out(unseen, Part::held_out, s.survey.rows, s.folds);
     result.validation = validate_on(
-        held_out, ThresholdRule(*set.polytope, best_guess(trained.estimate, trained.excitation, *set.polytope)));
+        held_out,
+        detector::ThresholdRule(*set.polytope, best_guess(trained.estimate, trained.excitation, *set.polytope)));
     result.polytope_over_box = 0.0;
     for (const OutputValidation& v : result.validation) {
       const double ratio = v.median_width_box > 0.0 ? v.median_width / v.median_width_box : 1.0;
@@ -507,10 +514,10 @@ Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionO
 
 }  // namespace
 
-Commissioning commission(LogSource& log, const Robot& robot, const CommissionOptions& options) {
+Commissioning commission_robot(LogSource& log, const Robot& robot, const CommissionOptions& options) {
   Commissioning result = commissioned(log, robot, options);
   settle_warrants(result);
   return result;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::commission

@@ -24,12 +24,12 @@
 #include <wheelwright/identify/least_squares.hpp>
 #include <wheelwright/model/robot.hpp>
 
-namespace wheelwright {
+namespace wheelwright::commission {
 
 /// Result of commissioning for one parameter.
 struct ParameterResult {
-  Parameter parameter;
-  Excitation excitation = Excitation::identified;
+  model::Parameter parameter;
+  identify::Excitation excitation = identify::Excitation::identified;
   std::string reason;                    ///< why it is not identified, for people
   std::optional<double> estimate;        ///< nothing where the log does not show the parameter
   std::optional<double> standard_error;  ///< valid under autocorrelated residuals
@@ -38,10 +38,10 @@ struct ParameterResult {
   double chebyshev = 0.0;       ///< centre of the feasible set
   bool lower_is_prior = false;  ///< the bound is the prior box's: the log does not tighten it
   bool upper_is_prior = false;
-  bool estimate_inside = true;           ///< least squares may leave the hull
-  std::vector<RowOrigin> lower_binding;  ///< samples that set the lower bound
-  std::vector<RowOrigin> upper_binding;
-  Warrant warrant = Warrant::extrapolated;  ///< of lower and upper
+  bool estimate_inside = true;                   ///< least squares may leave the hull
+  std::vector<bounds::RowOrigin> lower_binding;  ///< samples that set the lower bound
+  std::vector<bounds::RowOrigin> upper_binding;
+  core::Warrant warrant = core::Warrant::extrapolated;  ///< of lower and upper
 };
 
 /// Feasible set of an earlier pass: it bounds the motion between samples in the rows of the next pass.
@@ -68,10 +68,11 @@ struct Commissioning {
   std::vector<ParameterResult> parameters;
   Survey survey;
   std::vector<OutputNoise> noise;  ///< one for each output
-  NoiseMode noise_mode = NoiseMode::worst_case;
+  filter::NoiseMode noise_mode = filter::NoiseMode::worst_case;
   FilterChoice filter_choice;  ///< the curve is empty where the filter was given
-  EstimatorChoice estimators;  ///< candidates for θ̂, the one chosen and why; none where no parameter is excited
-  ResidualSummary residuals;   ///< of θ̂ on the whole log
+  identify::EstimatorChoice
+      estimators;  ///< candidates for θ̂, the one chosen and why; none where no parameter is excited
+  identify::ResidualSummary residuals;  ///< of θ̂ on the whole log
   int rank = 0;
   double condition = 0.0;
   std::vector<OutputValidation> validation;  ///< on held-out blocks, of a model made from the other blocks
@@ -81,35 +82,41 @@ struct Commissioning {
   std::optional<double> effort_shift;            ///< s, by which the efforts seem late against the motion
   std::vector<LogContradiction> contradictions;  ///< found whatever the status; one that withdraws leaves no model
   Box prior;                                     ///< in which the set was sought
-  SignalErrors row_errors;  ///< dY and dy of the rows that the set is made of: OutputNoise::learning in `output`
+  filter::SignalErrors
+      row_errors;  ///< dY and dy of the rows that the set is made of: OutputNoise::learning in `output`
   std::vector<std::size_t> dropped;  ///< rows of the log whose instants the set leaves out as outliers
   FeasibleSet feasible;              ///< the set, its hull, certificates
   std::vector<EarlierSet>
       earlier;  ///< sets of the earlier passes, from which it was refined: the first one rests on the
                 ///< limit of the accelerations alone; none where nothing bounds the motion by the model
-  KinematicCommissioning kinematic;     ///< of the kinematic residual; its model is also OnlineModel::kinematic
-  double polytope_over_box = 1.0;       ///< median width of [l, u]: polytope over box, held out, worst output
-  std::vector<std::string> notes;       ///< what was repaired or chosen, for people
-  std::vector<Assumption> assumptions;  ///< all assumptions, with the verdict of the log on each
+  KinematicCommissioning kinematic;           ///< of the kinematic residual; its model is also OnlineModel::kinematic
+  double polytope_over_box = 1.0;             ///< median width of [l, u]: polytope over box, held out, worst output
+  std::vector<std::string> notes;             ///< what was repaired or chosen, for people
+  std::vector<core::Assumption> assumptions;  ///< all assumptions, with the verdict of the log on each
 };
 
-/// Options of commission().
+/// Options of commission_robot().
 struct CommissionOptions {
   FilterChoiceOptions filter_choice;
   FoldOptions folds;  ///< purge is set to the filter's memory
-  ExtrapolationOptions extrapolation;
-  NoiseMode noise_mode = NoiseMode::worst_case;  ///< for declared noise
-  double confidence = 0.999;                     ///< statistical noise mode
+  identify::ExtrapolationOptions extrapolation;
+  filter::NoiseMode noise_mode = filter::NoiseMode::worst_case;  ///< for declared noise
+  double confidence = 0.999;                                     ///< statistical noise mode
   KinematicCommissionOptions kinematic;  ///< of the kinematic residual; folds, extrapolation and persistence are
                                          ///< those of these options
   std::size_t outliers = 0;              ///< instants that the feasible set may leave out (θ̂ stands on all of them)
-  Persistence persistence;
+  detector::Persistence persistence;
   std::function<void(std::string_view stage, double share)> progress;  ///< told of every stage; may be empty
 };
 
 /// Log → filtered regression → θ̂_L → feasible set and bounds → ρ(t) → validation. Walks the log several times and
 /// never holds it. Throws InputError or InvalidArgument for a log or robot that cannot be used at all; outcomes that
 /// depend on the data are in the result.
-[[nodiscard]] Commissioning commission(LogSource& log, const Robot& robot, const CommissionOptions& options = {});
+[[nodiscard]] Commissioning commission_robot(LogSource& log, const Robot& robot, const CommissionOptions& options = {});
 
+}  // namespace wheelwright::commission
+
+namespace wheelwright {
+using commission::commission_robot;
+using commission::Commissioning;
 }  // namespace wheelwright

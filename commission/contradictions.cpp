@@ -19,7 +19,7 @@
 #include <wheelwright/identify/time_shift.hpp>
 #include <wheelwright/identify/variable_projection.hpp>
 
-namespace wheelwright {
+namespace wheelwright::commission {
 
 std::string_view to_string(LogContradiction::Kind kind) {
   switch (kind) {
@@ -59,7 +59,7 @@ constexpr double kManyOutside = 0.01;      // of the held-out instants
 constexpr std::size_t kFewestHalf = 200;   // instants of a half from which on it is looked at
 
 // Standard errors beyond which a difference is taken for real.
-double certain(double freedom) { return student_quantile(1.0 - kRiskOfWithdrawal, std::max(freedom, 1.0)); }
+double certain(double freedom) { return core::student_quantile(1.0 - kRiskOfWithdrawal, std::max(freedom, 1.0)); }
 
 // A column of the log over all rows.
 struct ColumnRange {
@@ -115,7 +115,7 @@ void find_wrapped_angles(LogSource& log, const Setting& s, std::vector<LogContra
       continue;
     }
     const std::size_t column = *log.find(name);
-    double last = std::numeric_limits<double>::quiet_NaN(), least_jump = kInfinity, most_move = 0.0;
+    double last = std::numeric_limits<double>::quiet_NaN(), least_jump = core::kInfinity, most_move = 0.0;
     std::size_t jumps = 0;
     LogBlock block;
     log.rewind();
@@ -252,12 +252,12 @@ std::vector<JointFit> fit_joints(LogSource& log, const Setting& s) {
   if (s.model.input.rows() != s.model.input.cols() || joints < 2 || s.measurement.effort_unsigned) {
     return {};
   }
-  const Eigen::MatrixXd shares = inverse(s.model.input);
+  const Eigen::MatrixXd shares = core::inverse(s.model.input);
   if (!shares.allFinite()) {
     return {};
   }
   const auto columns = side_by_side(s.model);
-  std::vector<LeastSquares> sums(joints, LeastSquares(columns.size()));
+  std::vector<identify::LeastSquares> sums(joints, identify::LeastSquares(columns.size()));
   TorqueRows rows = make_rows(log, s, errors_of_fit(s));
   RegressionBlock block;
   const auto each = [&](auto&& visit) {
@@ -272,17 +272,17 @@ std::vector<JointFit> fit_joints(LogSource& log, const Setting& s) {
   if (sums.front().instants() < kFewestHalf) {
     return {};
   }
-  std::vector<LeastSquaresFit> fits;
-  std::vector<ResidualStatistics> statistics;
-  for (const LeastSquares& sum : sums) {
+  std::vector<identify::LeastSquaresFit> fits;
+  std::vector<identify::ResidualStatistics> statistics;
+  for (const identify::LeastSquares& sum : sums) {
     fits.push_back(sum.solve());
     statistics.emplace_back(fits.back().estimate, Eigen::VectorXd::Ones(1));
   }
   each([&](std::size_t j, const RegressionBlock& of_joint) { statistics[j].add(of_joint); });
   std::vector<JointFit> result;
   for (std::size_t j = 0; j < joints; ++j) {
-    const LeastSquaresFit& fit = fits[j];
-    const ResidualSummary summary = statistics[j].summary(fit.inverse_gram);
+    const identify::LeastSquaresFit& fit = fits[j];
+    const identify::ResidualSummary summary = statistics[j].summary(fit.inverse_gram);
     result.push_back({.explained = fit.weighted_tss > 0.0 ? 1.0 - fit.weighted_rss / fit.weighted_tss : 0.0,
                       .estimate = fit.estimate,
                       .error = summary.standard_error,
@@ -311,7 +311,7 @@ void find_unrelated_efforts(const Setting& s, const std::vector<JointFit>& joint
 
 // Both wheels of a differential drive carry half of the mass: their efforts must show one and the same.
 void find_uneven_efforts(const Setting& s, const std::vector<JointFit>& joints, std::vector<LogContradiction>& out) {
-  if (joints.size() != 2 || !on_two_wheels(s.robot) || !s.robot.effects.empty()) {
+  if (joints.size() != 2 || !model::on_two_wheels(s.robot) || !s.robot.effects.empty()) {
     return;
   }
   const auto columns = side_by_side(s.model);
@@ -343,8 +343,8 @@ void find_uneven_efforts(const Setting& s, const std::vector<JointFit>& joints, 
 }
 
 // θ with the rows of `model` shifted by `shift`.
-Eigen::VectorXd at_shift(const TimeShiftedRows& model, double shift, const Eigen::VectorXd& weights) {
-  SeparableValues at;
+Eigen::VectorXd at_shift(const identify::TimeShiftedRows& model, double shift, const Eigen::VectorXd& weights) {
+  identify::SeparableValues at;
   model.evaluate(Eigen::VectorXd::Constant(1, shift), false, at);
   Eigen::VectorXd y = model.response();
   for (Eigen::Index r = 0; r < y.size(); ++r) {
@@ -372,7 +372,7 @@ std::string shift_words(const Setting& s, const EffortTiming& timing) {
     return "that is half a step, as with efforts that are measured and not held (`hold: first_order`); " + declare;
   }
   std::string what = "stamp efforts and motion by one clock where they are measured";
-  const bool dry = std::ranges::any_of(s.model.parameters, [](const Parameter& p) { return p.dry_friction; });
+  const bool dry = std::ranges::any_of(s.model.parameters, [](const model::Parameter& p) { return p.dry_friction; });
   if (timing.delay < 0.0 && !dry) {
     what += "; dry friction that the model lacks looks like it too, and `gap` tells it";
   }
@@ -407,7 +407,7 @@ struct InWords {
 
 InWords in_words(const Setting& s, std::size_t j) {
   const auto scales = physical_scales(s.robot, s.model);
-  const Parameter& p = s.model.parameters[j];
+  const model::Parameter& p = s.model.parameters[j];
   return scales ? InWords{p.physical, p.physical_unit, (*scales)[j].scale, (*scales)[j].offset}
                 : InWords{p.name, parameter_unit(s.robot, p)};
 }
@@ -418,7 +418,7 @@ void find_wrong_signs(const Setting& s, const Fit& fit, std::vector<LogContradic
   for (std::size_t j = 0; j < s.model.p(); ++j) {
     const auto at = static_cast<Eigen::Index>(j);
     const double estimate = fit.estimate[at], error = fit.residuals.standard_error[at];
-    if (fit.excitation[j].state != Excitation::identified || s.prior.sides[j].lower < 0.0 ||
+    if (fit.excitation[j].state != identify::Excitation::identified || s.prior.sides[j].lower < 0.0 ||
         s.measurement.effort_unsigned || !(estimate < -certain(fit.residuals.freedom) * error)) {
       continue;
     }
@@ -441,26 +441,26 @@ void find_dry_friction(LogSource& log, const Setting& s, std::vector<LogContradi
     return;
   }
   Setting wide = s;
-  wide.robot.parameters = possible_parameters(s.robot);
-  wide.model = make_model(wide.robot);
-  const auto is_dry = [](const Parameter& p) { return p.dry_friction; };
+  wide.robot.parameters = model::possible_parameters(s.robot);
+  wide.model = model::make_model(wide.robot);
+  const auto is_dry = [](const model::Parameter& p) { return p.dry_friction; };
   if (std::ranges::any_of(s.model.parameters, is_dry) || std::ranges::none_of(wide.model.parameters, is_dry)) {
     return;
   }
   const auto at =
       static_cast<Eigen::Index>(std::ranges::find_if(wide.model.parameters, is_dry) - wide.model.parameters.begin());
   TorqueRows rows = make_rows(log, wide, errors_of_fit(wide));
-  const Eigen::VectorXd weights = efficient_weights(moments(rows));
+  const Eigen::VectorXd weights = identify::efficient_weights(identify::moments(rows));
   rows.rewind();
-  const LeastSquaresFit fit = least_squares(rows, weights);
-  ResidualStatistics statistics(fit.estimate, weights);
+  const identify::LeastSquaresFit fit = least_squares(rows, weights);
+  identify::ResidualStatistics statistics(fit.estimate, weights);
   RegressionBlock block;
   rows.rewind();
   while (rows.next(block)) {
     statistics.add(block);
   }
   log.rewind();
-  const ResidualSummary summary = statistics.summary(fit.inverse_gram);
+  const identify::ResidualSummary summary = statistics.summary(fit.inverse_gram);
   const double estimate = fit.estimate[at], error = summary.standard_error[at];
   if (!(estimate > certain(summary.freedom) * error)) {
     return;
@@ -497,35 +497,36 @@ void find_uneven_halves(LogSource& log, const Setting& s, const Fit& fit, std::v
       visit(std::size_t{1}, static_cast<std::size_t>(from), block.instants());
     }
   };
-  std::vector<LeastSquares> sums(2, LeastSquares(s.model.p(), fit.weights));
+  std::vector<identify::LeastSquares> sums(2, identify::LeastSquares(s.model.p(), fit.weights));
   each([&](std::size_t half, std::size_t first, std::size_t last) { sums[half].add(block, first, last); });
   if (std::min(sums[0].instants(), sums[1].instants()) < kFewestHalf) {
     return;
   }
   std::vector<bool> excluded;
-  for (const ExcitationFinding& finding : fit.excitation) {
-    excluded.push_back(finding.state == Excitation::not_excited);
+  for (const identify::ExcitationFinding& finding : fit.excitation) {
+    excluded.push_back(finding.state == identify::Excitation::not_excited);
   }
-  std::vector<LeastSquaresFit> fits;
-  std::vector<ResidualStatistics> statistics;
-  for (const LeastSquares& sum : sums) {
+  std::vector<identify::LeastSquaresFit> fits;
+  std::vector<identify::ResidualStatistics> statistics;
+  for (const identify::LeastSquares& sum : sums) {
     fits.push_back(sum.solve(excluded));
     statistics.emplace_back(fits.back().estimate, fit.weights);
   }
   each([&](std::size_t half, std::size_t first, std::size_t last) { statistics[half].add(block, first, last); });
-  std::vector<ResidualSummary> residuals;
-  std::vector<std::vector<ExcitationFinding>> excitation;
+  std::vector<identify::ResidualSummary> residuals;
+  std::vector<std::vector<identify::ExcitationFinding>> excitation;
   for (std::size_t half = 0; half < 2; ++half) {
     residuals.push_back(statistics[half].summary(fits[half].inverse_gram));
-    excitation.push_back(judge_excitation(fits[half], residuals[half].standard_error,
-                                          student_quantile(0.95, std::max(residuals[half].freedom, 1.0))));
+    excitation.push_back(
+        identify::judge_excitation(fits[half], residuals[half].standard_error,
+                                   core::student_quantile(0.95, std::max(residuals[half].freedom, 1.0))));
   }
   for (std::size_t j = 0; j < s.model.p(); ++j) {
     const auto at = static_cast<Eigen::Index>(j);
     const double a = fits[0].estimate[at], b = fits[1].estimate[at];
     const double error = std::hypot(residuals[0].standard_error[at], residuals[1].standard_error[at]);
-    const bool shown = !excluded[j] && excitation[0][j].state != Excitation::not_excited &&
-                       excitation[1][j].state != Excitation::not_excited;
+    const bool shown = !excluded[j] && excitation[0][j].state != identify::Excitation::not_excited &&
+                       excitation[1][j].state != identify::Excitation::not_excited;
     const double sure = (certain(std::min(residuals[0].freedom, residuals[1].freedom)) + biased) * error;
     if (!shown || !(std::abs(a - b) > sure)) {
       continue;
@@ -564,17 +565,19 @@ std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& s, cons
     return std::nullopt;
   }
   try {
-    const TimeShiftedRows model(rows, TimeEffect::delay, -longest, longest);
-    VariableProjectionOptions options = model.options();
+    const identify::TimeShiftedRows model(rows, identify::TimeEffect::delay, -longest, longest);
+    identify::VariableProjectionOptions options = model.options();
     options.weights = fit.weights;
-    const SeparableFit found = variable_projection(model, options);
+    const identify::SeparableFit found = identify::variable_projection(model, options);
     constexpr double kInside = 0.97;  // of the range that is searched: its end is no answer
-    if (found.end != SearchEnd::converged || found.state[0] != ShapeState::identified ||
+    if (found.end != identify::SearchEnd::converged || found.state[0] != identify::ShapeState::identified ||
         std::abs(found.shape[0]) > kInside * longest) {
       return std::nullopt;
     }
     const auto rss = [&](double shift) {
-      return cost_curve(model, Eigen::VectorXd::Zero(1), 0, shift, shift + 1e-9, 2, fit.weights).front().weighted_rss;
+      return identify::cost_curve(model, Eigen::VectorXd::Zero(1), 0, shift, shift + 1e-9, 2, fit.weights)
+          .front()
+          .weighted_rss;
     };
     EffortTiming timing{.delay = found.shape[0], .standard_error = found.standard_error[0], .freedom = found.freedom};
     timing.allowed = s.measurement.delay;
@@ -582,7 +585,7 @@ std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& s, cons
     const bool ranged = timing.allowed.lower != 0.0 || timing.allowed.upper != 0.0;
     // As the rows' own hull: a value may come into force up to a step before its stamp; a measured one lies between
     // two.
-    if (s.declared.between_samples && (ranged || (held && s.measurement.changes == EffortChanges::between))) {
+    if (s.declared.between_samples && (ranged || (held && s.measurement.changes == model::EffortChanges::between))) {
       timing.allowed.upper += s.survey.median_step;
       timing.allowed.lower -= held ? 0.0 : s.survey.median_step;
     }
@@ -594,7 +597,7 @@ std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& s, cons
     for (std::size_t j = 0; j < s.model.p(); ++j) {
       const auto at = static_cast<Eigen::Index>(j);
       const double error = fit.residuals.standard_error[at];
-      if (fit.excitation[j].state == Excitation::identified && error > 0.0) {
+      if (fit.excitation[j].state == identify::Excitation::identified && error > 0.0) {
         timing.moved = std::max(timing.moved, moved[at] / error);
       }
     }
@@ -632,7 +635,7 @@ SignalFindings contradictions_in_log(LogSource& log, const Setting& s, const Fit
 
 std::vector<LogContradiction> contradictions_in_result(const Commissioning& result, const Setting& s, double raised) {
   std::vector<LogContradiction> found;
-  const double t = student_quantile(0.95, std::max(result.residuals.freedom, 1.0));
+  const double t = core::student_quantile(0.95, std::max(result.residuals.freedom, 1.0));
   for (std::size_t j = 0; j < result.parameters.size(); ++j) {
     const ParameterResult& p = result.parameters[j];
     const Interval& prior = s.prior.sides[j];
@@ -749,7 +752,7 @@ void weigh_contradictions(Commissioning& result, const Setting& s, const Fit& fi
                 [](const LogContradiction& c) { return c.kind == Kind::effort_timing && !c.withdraws && !c.demotes; });
 }
 
-void weigh_efforts(LogSource& log, const Setting& s, const SignalErrors& errors, const Box& box,
+void weigh_efforts(LogSource& log, const Setting& s, const filter::SignalErrors& errors, const Box& box,
                    std::vector<LogContradiction>& contradictions) {
   const auto of_efforts = [](const LogContradiction& c) {
     return c.kind == Kind::effort_unrelated || (c.kind == Kind::wheels_disagree && c.withdraws);
@@ -759,7 +762,7 @@ void weigh_efforts(LogSource& log, const Setting& s, const SignalErrors& errors,
   }
   Eigen::VectorXd largest(static_cast<Eigen::Index>(box.sides.size()));
   for (std::size_t j = 0; j < box.sides.size(); ++j) {
-    largest[static_cast<Eigen::Index>(j)] = magnitude(box.sides[j]);
+    largest[static_cast<Eigen::Index>(j)] = core::magnitude(box.sides[j]);
   }
   double effort = 0.0, error = 0.0;
   TorqueRows rows = make_rows(log, s, errors);
@@ -770,7 +773,7 @@ void weigh_efforts(LogSource& log, const Setting& s, const SignalErrors& errors,
     error += (block.dY * largest + block.dy).squaredNorm();
   }
   log.rewind();
-  const double share = effort > 0.0 ? std::sqrt(error / effort) : kInfinity;
+  const double share = effort > 0.0 ? std::sqrt(error / effort) : core::kInfinity;
   for (LogContradiction& c : contradictions) {
     // Errors of this share can make (1 − share)/(1 + share) of equal masses.
     if (c.kind == Kind::wheels_disagree && share >= (c.value - 1.0) / (c.value + 1.0)) {
@@ -783,4 +786,4 @@ void weigh_efforts(LogSource& log, const Setting& s, const SignalErrors& errors,
   }
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::commission

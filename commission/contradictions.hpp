@@ -16,7 +16,7 @@
 #include <wheelwright/core/interval.hpp>
 #include <wheelwright/core/log.hpp>
 
-namespace wheelwright {
+namespace wheelwright::commission {
 
 /// One contradiction.
 struct LogContradiction {
@@ -105,7 +105,7 @@ void weigh_contradictions(Commissioning& result, const Setting& setting, const F
 /// Weighs what says that an effort is wrong against the declared errors of the rows (`errors`, with parameters in
 /// `box`): Kind::effort_unrelated is dropped where these are as large as the efforts, Kind::wheels_disagree only
 /// demotes where they are large enough for it.
-void weigh_efforts(LogSource& log, const Setting& setting, const SignalErrors& errors, const Box& box,
+void weigh_efforts(LogSource& log, const Setting& setting, const filter::SignalErrors& errors, const Box& box,
                    std::vector<LogContradiction>& contradictions);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::commission

@@ -15,7 +15,10 @@
 #include <wheelwright/filter/measurement.hpp>
 #include <wheelwright/identify/minimise_scalar.hpp>
 
-namespace wheelwright {
+namespace wheelwright::commission {
+
+using core::kInfinity;
+
 namespace {
 
 constexpr double kFastestStep = 0.5;       // βh
@@ -35,7 +38,7 @@ std::vector<StatedFault> faults_for(const Robot& robot, const std::vector<Stated
   if (!stated.empty()) {
     return stated;
   }
-  if (!on_two_wheels(robot)) {
+  if (!model::on_two_wheels(robot)) {
     return {{"effort_loss"}};
   }
   return {{"wheel_radius"}, {"wheel_radius_right"}};
@@ -62,12 +65,12 @@ std::vector<double> grid(int order, const Measurement& measurement, const Survey
 std::vector<Wish> wishes(const LogTable& log, const Robot& robot, const DetectorChoiceOptions& options,
                          std::vector<std::string>& notes) {
   std::vector<Wish> all;
-  const Model model = make_model(robot);
+  const Model model = model::make_model(robot);
   for (const int order : {1, 2}) {
     TableSource source(log);
     Measurement measurement;
     try {
-      measurement = find_measurement(source, robot, model, order);
+      measurement = filter::find_measurement(source, robot, model, order);
     } catch (const InvalidArgument& error) {
       notes.push_back(fmt::format("order {} is left out: {}", order, error.what()));
       continue;
@@ -87,9 +90,9 @@ std::vector<Wish> wishes(const LogTable& log, const Robot& robot, const Detector
     } else {
       // As settle() asks: for the widest model that the robot may have.
       Robot wide = robot;
-      wide.parameters = robot.parameters.value_or(possible_parameters(robot));
-      const FilterChoice taken =
-          choose_filter(source, make_model(wide), measurement, order, seen, options.trial.commission.filter_choice);
+      wide.parameters = robot.parameters.value_or(model::possible_parameters(robot));
+      const FilterChoice taken = choose_filter(source, model::make_model(wide), measurement, order, seen,
+                                               options.trial.commission.filter_choice);
       all.push_back({taken.design, "what commissioning takes"});
     }
   }
@@ -214,7 +217,7 @@ class Search {
     options_.trial.tried = all.size() + options_.most_refinements;
     TrialOptions trial = options_.trial;
     trial.threads = 1;
-    for_all(
+    core::for_all(
         all.size(), options_.trial.threads,
         [&](std::size_t i) {
           choice_.candidates[i] =
@@ -252,7 +255,7 @@ class Search {
     }
     std::size_t done = 0;
     const double centre = std::clamp(std::log(start.beta), std::log(lower), std::log(upper));
-    static_cast<void>(minimise_scalar(
+    static_cast<void>(identify::minimise_scalar(
         [&](double log_beta) {
           if (log_beta == centre) {
             return least;
@@ -283,8 +286,8 @@ class Search {
     }
   }
 
-  double add(const FilterDesign& filter, const std::vector<Persistence>& persistences, const std::string& origin,
-             const TrialOptions& trial) {
+  double add(const FilterDesign& filter, const std::vector<detector::Persistence>& persistences,
+             const std::string& origin, const TrialOptions& trial) {
     if (persistences.empty()) {
       return kInfinity;
     }
@@ -319,4 +322,4 @@ DetectorChoice choose_detector(LogSource& log, const Robot& robot, const Detecto
   return Search(read_all(log), robot, options)();
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::commission

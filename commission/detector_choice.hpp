@@ -24,7 +24,7 @@
 
 #include <wheelwright/commission/detector_trial.hpp>
 
-namespace wheelwright {
+namespace wheelwright::commission {
 
 /// Options of choose_detector().
 struct DetectorChoiceOptions {
@@ -32,7 +32,7 @@ struct DetectorChoiceOptions {
   double beta_factor = 1.5;          ///< between neighbours of the grid over β
   std::size_t most_refinements = 6;  ///< candidates between the best one's neighbours
   double tie = 0.01;                 ///< relative difference of sizes below which the delay decides
-  std::vector<Persistence> persistences = {{2, 3}, {3, 5}};                 ///< shown beside 1/1 for the chosen filter
+  std::vector<detector::Persistence> persistences = {{2, 3}, {3, 5}};       ///< shown beside 1/1 for the chosen filter
   std::function<void(std::string_view stage, double share)> progress = {};  ///< may be empty
 };
 
@@ -51,8 +51,8 @@ struct DetectorChoice {
 };
 
 /// Tries filters of order 1 (where speeds are measured) and 2 on a logarithmic grid over β, beside those that the robot
-/// file or commission() would take and the paper's (order 1, β = 20), and takes the one with the least `size`: the
-/// largest, over the stated faults and sides, of the smallest size that is certain within the window (median over
+/// file or commission_robot() would take and the paper's (order 1, β = 20), and takes the one with the least `size`:
+/// the largest, over the stated faults and sides, of the smallest size that is certain within the window (median over
 /// onsets while moving) over the stated size. Sizes within `tie` of the least are ties: the shortest delay wins. log β
 /// is refined between the best one's neighbours. β spans from order/β = window, as far as the log's length allows, to
 /// βh = 0.5.
@@ -68,4 +68,4 @@ struct DetectorChoice {
 /// True if `a` is to be taken rather than `b`, given the least size among all candidates.
 [[nodiscard]] bool better(const DetectorCandidate& a, const DetectorCandidate& b, double least, double tie);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::commission

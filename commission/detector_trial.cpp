@@ -14,7 +14,7 @@
 #include <wheelwright/core/statistics.hpp>
 #include <wheelwright/detector/margins.hpp>
 
-namespace wheelwright {
+namespace wheelwright::commission {
 namespace {
 
 constexpr double kHour = 3600.0;          // s
@@ -24,7 +24,7 @@ constexpr double kLeastOnsetStep = 1e-9;  // s: onsets are where `settled` says
 
 double rows_of_an_hour(double step) { return kHour / check::positive(step, "sampling step"); }
 
-double stated_size(const StatedFault& stated, const FaultType& fault) {
+double stated_size(const StatedFault& stated, const detector::FaultType& fault) {
   const double most = std::max(fault.range.upper, -fault.range.lower);
   if (fault.whole) {
     return most;
@@ -35,15 +35,15 @@ double stated_size(const StatedFault& stated, const FaultType& fault) {
   return size;
 }
 
-// The bounds' promise, as commission() takes it.
+// The bounds' promise, as commission_robot() takes it.
 CommissionOptions promise(const TrialOptions& options, const LogTable& log, std::size_t outputs) {
   CommissionOptions commissioning = options.commission;
   commissioning.persistence = {};
-  commissioning.noise_mode = NoiseMode::worst_case;
+  commissioning.noise_mode = filter::NoiseMode::worst_case;
   if (options.false_alarms > 0.0) {
     const auto rows = static_cast<double>(log.rows());
-    const double step = median_step(log.t);
-    commissioning.noise_mode = NoiseMode::statistical;
+    const double step = core::median_step(log.t);
+    commissioning.noise_mode = filter::NoiseMode::statistical;
     commissioning.confidence = hourly_confidence(options.false_alarms, rows, step, options.tried);
     commissioning.extrapolation.risk = options.false_alarms / static_cast<double>(outputs);
     commissioning.extrapolation.horizon = std::max(1.0, rows_of_an_hour(step) / rows);
@@ -52,8 +52,8 @@ CommissionOptions promise(const TrialOptions& options, const LogTable& log, std:
 }
 
 // Leaves as onsets the first settled instants from evenly spaced rows of the log on, whatever the filter.
-void set_onsets(ReferenceMotion& motion, const LogTable& log, const TrialOptions& options) {
-  const double seconds = static_cast<double>(log.rows()) * median_step(log.t);
+void set_onsets(detector::ReferenceMotion& motion, const LogTable& log, const TrialOptions& options) {
+  const double seconds = static_cast<double>(log.rows()) * core::median_step(log.t);
   const double wanted = std::clamp(std::floor(seconds / options.onset_step), 1.0,
                                    static_cast<double>(std::max<std::size_t>(options.most_onsets, 1)));
   std::vector<bool> onsets(motion.instants(), false);
@@ -68,23 +68,23 @@ void set_onsets(ReferenceMotion& motion, const LogTable& log, const TrialOptions
   motion.settled = std::move(onsets);
 }
 
-StatedMargin margin_of(const FaultMargins& margins, double asked, const std::vector<double>& windows) {
+StatedMargin margin_of(const detector::FaultMargins& margins, double asked, const std::vector<double>& windows) {
   StatedMargin result{.fault = margins.fault.name, .unit = margins.fault.unit, .side = margins.side, .asked = asked};
   std::vector<double> sizes, delays;
-  for (const OnsetMargin& onset : margins.onsets) {
-    if (onset.kind == ManoeuvreKind::standstill || onset.certain.size() < windows.size()) {
+  for (const detector::OnsetMargin& onset : margins.onsets) {
+    if (onset.kind == detector::ManoeuvreKind::standstill || onset.certain.size() < windows.size()) {
       continue;
     }
     sizes.push_back(onset.certain.back());
     const auto seen = std::find_if(onset.certain.begin(), onset.certain.end(), [&](double x) { return x <= asked; });
-    delays.push_back(seen == onset.certain.end() ? kInfinity
+    delays.push_back(seen == onset.certain.end() ? core::kInfinity
                                                  : windows[static_cast<std::size_t>(seen - onset.certain.begin())]);
   }
   check::that(!sizes.empty(), "log", "driving that is longer than the window, after the filter has settled");
   result.onsets = sizes.size();
   result.worst = *std::max_element(sizes.begin(), sizes.end());
-  result.median = median(std::move(sizes));
-  result.delay = median(std::move(delays));
+  result.median = core::median(std::move(sizes));
+  result.delay = core::median(std::move(delays));
   return result;
 }
 
@@ -93,36 +93,37 @@ class Margins {
   Margins(const LogTable& log, const OnlineModel& model, const TrialOptions& options)
       : model_(&model),
         options_(&options),
-        catalogue_(fault_catalogue(model.model, model.estimate, model.robot.effort)),
+        catalogue_(detector::fault_catalogue(model.model, model.estimate, model.robot.effort)),
         rule_(Polytope(model.facets, model.box), model.estimate) {
     TableSource source(log);
-    motion_ = read_reference(source, RegressorFilter(model.model, model.filter, model.measurement, model.errors));
+    motion_ =
+        detector::read_reference(source, RegressorFilter(model.model, model.filter, model.measurement, model.errors));
     set_onsets(motion_, log, options);
     for (std::size_t k = 1; k <= kDelaySteps; ++k) {
       windows_.push_back(options.window * static_cast<double>(k) / static_cast<double>(kDelaySteps));
     }
   }
 
-  [[nodiscard]] std::vector<StatedMargin> operator()(Persistence persistence) const {
-    std::vector<FaultType> faults;
+  [[nodiscard]] std::vector<StatedMargin> operator()(detector::Persistence persistence) const {
+    std::vector<detector::FaultType> faults;
     std::vector<double> asked;
     for (const StatedFault& stated : options_->faults) {
-      faults.push_back(find_fault(catalogue_, stated.name));
+      faults.push_back(detector::find_fault(catalogue_, stated.name));
       asked.push_back(stated_size(stated, faults.back()));
     }
-    const auto all =
-        margins_along(motion_, faults, rule_,
-                      [this](const FaultType& fault) {
-                        return std::make_unique<FaultFilter>(fault, model_->model, model_->filter, motion_);
-                      },
-                      {.windows = windows_,
-                       .onset_step = kLeastOnsetStep,
-                       .most_onsets = motion_.instants(),
-                       .persistence = persistence,
-                       .threads = options_->threads});
+    const auto all = detector::margins_along(motion_, faults, rule_,
+                                             [this](const detector::FaultType& fault) {
+                                               return std::make_unique<detector::FaultFilter>(fault, model_->model,
+                                                                                              model_->filter, motion_);
+                                             },
+                                             {.windows = windows_,
+                                              .onset_step = kLeastOnsetStep,
+                                              .most_onsets = motion_.instants(),
+                                              .persistence = persistence,
+                                              .threads = options_->threads});
     std::vector<StatedMargin> result;
     std::size_t of = 0;
-    for (const FaultMargins& margins : all) {
+    for (const detector::FaultMargins& margins : all) {
       while (faults[of].name != margins.fault.name) {
         ++of;
       }
@@ -136,17 +137,17 @@ class Margins {
  private:
   const OnlineModel* model_;
   const TrialOptions* options_;
-  std::vector<FaultType> catalogue_;
-  ThresholdRule rule_;
-  ReferenceMotion motion_;
+  std::vector<detector::FaultType> catalogue_;
+  detector::ThresholdRule rule_;
+  detector::ReferenceMotion motion_;
   std::vector<double> windows_;
 };
 
 Guarantee guarantee_of(const Commissioning& result) {
   switch (result.model.warrant) {
-    case Warrant::guaranteed: return Guarantee::never;
-    case Warrant::statistical: return Guarantee::hourly;
-    case Warrant::extrapolated: return Guarantee::extrapolated;
+    case core::Warrant::guaranteed: return Guarantee::never;
+    case core::Warrant::statistical: return Guarantee::hourly;
+    case core::Warrant::extrapolated: return Guarantee::extrapolated;
   }
   return Guarantee::extrapolated;
 }
@@ -166,15 +167,15 @@ void validate(const TrialOptions& options, const Robot& robot) {
   check::that(options.false_alarms >= 0.0 && options.false_alarms < 1.0, "false alarms an hour",
               "a probability in [0, 1); 0 stands for never");
   check::that(!options.faults.empty(), "faults", "at least one");
-  const Model model = make_model(robot);
+  const Model model = model::make_model(robot);
   Eigen::VectorXd middle(static_cast<Eigen::Index>(model.p()));
-  const PriorBox prior = prior_box(robot, model);
+  const model::PriorBox prior = model::prior_box(robot, model);
   for (std::size_t j = 0; j < model.p(); ++j) {
     middle[static_cast<Eigen::Index>(j)] = 0.5 * (prior.bounds[j].lower + prior.bounds[j].upper);
   }
-  const auto catalogue = fault_catalogue(model, middle, robot.effort);
+  const auto catalogue = detector::fault_catalogue(model, middle, robot.effort);
   for (const StatedFault& stated : options.faults) {
-    const FaultType& fault = find_fault(catalogue, stated.name);
+    const detector::FaultType& fault = detector::find_fault(catalogue, stated.name);
     if (fault.theta.size() == 0) {  // the range of a lost mass depends on the robot that is found
       static_cast<void>(stated_size(stated, fault));
     }
@@ -184,7 +185,7 @@ void validate(const TrialOptions& options, const Robot& robot) {
 }
 
 Trial try_detector(const LogTable& log, const Robot& robot, const FilterDesign& filter,
-                   const std::vector<Persistence>& persistences, const std::string& origin,
+                   const std::vector<detector::Persistence>& persistences, const std::string& origin,
                    const TrialOptions& options) {
   validate(options, robot);
   Robot wished = robot;
@@ -194,12 +195,12 @@ Trial try_detector(const LogTable& log, const Robot& robot, const FilterDesign& 
   candidate.guarantee = options.false_alarms > 0.0 ? Guarantee::hourly : Guarantee::never;
   try {
     TableSource source(log);
-    trial.commissioning = commission(source, wished, promise(options, log, make_model(robot).n()));
+    trial.commissioning = commission_robot(source, wished, promise(options, log, model::make_model(robot).n()));
     candidate.guarantee = guarantee_of(*trial.commissioning);
     candidate.failure = trial.commissioning->model.facets.empty() ? trial.commissioning->message : std::string();
     if (candidate.failure.empty()) {
       const Margins margins(log, trial.commissioning->model, options);
-      for (const Persistence& persistence : persistences) {
+      for (const detector::Persistence& persistence : persistences) {
         trial.candidates.push_back(candidate);
         trial.candidates.back().persistence = persistence;
         trial.candidates.back().faults = margins(persistence);
@@ -213,4 +214,4 @@ Trial try_detector(const LogTable& log, const Robot& robot, const FilterDesign& 
   return trial;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::commission

@@ -18,7 +18,7 @@
 #include <wheelwright/filter/noise.hpp>
 #include <wheelwright/model/robot.hpp>
 
-namespace wheelwright {
+namespace wheelwright::commission {
 
 /// A fault that a detector is chosen for.
 struct StatedFault {
@@ -64,7 +64,7 @@ struct StatedMargin {
 struct DetectorCandidate {
   FilterDesign filter;
   Guarantee guarantee = Guarantee::never;
-  Persistence persistence;
+  detector::Persistence persistence;
   std::string origin;                  ///< how it became a candidate
   std::string failure{};               ///< why there is no such detector; empty where there is one
   std::vector<StatedMargin> faults{};  ///< in the order of TrialOptions::faults, the positive side first
@@ -91,11 +91,11 @@ struct Trial {
 /// the stated faults along the same log under each of `persistences`. Commissioning that fails, for what the data say
 /// or because the filter does not fit the log, is in DetectorCandidate::failure. Throws as validate().
 [[nodiscard]] Trial try_detector(const LogTable& log, const Robot& robot, const FilterDesign& filter,
-                                 const std::vector<Persistence>& persistences, const std::string& origin,
+                                 const std::vector<detector::Persistence>& persistences, const std::string& origin,
                                  const TrialOptions& options);
 
 /// Throws InvalidArgument unless lengths are positive, the probability is in [0, 1), and every fault is one of the
 /// catalogue's, stated once, with a size inside its range (of a mass: when it is found).
 void validate(const TrialOptions& options, const Robot& robot);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::commission

@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-namespace wheelwright {
+namespace wheelwright::commission {
 namespace {
 
 double use_of(double residual, double lower, double upper) {
@@ -39,7 +39,7 @@ class Binner {
     last_.push_back(t);
     starts_.push_back(starts);
     for (std::size_t i = 0; i < trace_.outputs.size(); ++i) {
-      const ChannelDecision& c = decision.channels[i];
+      const detector::ChannelDecision& c = decision.channels[i];
       OutputTrace& o = trace_.outputs[i];
       o.torque.push_back(c.predicted + c.residual);
       o.predicted.push_back(c.predicted);
@@ -120,7 +120,7 @@ class Binner {
 
 }  // namespace
 
-template <RowFilter Filter>
+template <filter::RowFilter Filter>
 Detection detect(LogSource& log, Detector<Filter> detector, const DetectionOptions& options) {
   const std::size_t n = detector.filter().outputs();
   Detection d;
@@ -128,7 +128,7 @@ Detection detect(LogSource& log, Detector<Filter> detector, const DetectionOptio
   d.utilisation.assign(n, 0.0);
   d.nrmse.assign(n, 0.0);
   std::vector<double> torque_square(n), residual_square(n);
-  EventRecorder recorder(n, options.merge);
+  detector::EventRecorder recorder(n, options.merge);
   Binner binner(n, options.most_points);
   double before = 0.0;
   d.rows = walk_detector(log, detector, [&](std::size_t row, double t, bool first, const Decision& decision) {
@@ -137,7 +137,7 @@ Detection detect(LogSource& log, Detector<Filter> detector, const DetectionOptio
     before = t;
     binner.add(t, first, decision);
     for (std::size_t i = 0; i < n; ++i) {
-      const ChannelDecision& c = decision.channels[i];
+      const detector::ChannelDecision& c = decision.channels[i];
       d.outside[i] += c.outside ? 1 : 0;
       d.utilisation[i] = std::max(d.utilisation[i], use_of(c.residual, c.threshold.lower, c.threshold.upper));
       const double torque = c.predicted + c.residual;
@@ -155,11 +155,11 @@ Detection detect(LogSource& log, Detector<Filter> detector, const DetectionOptio
 }
 
 template Detection detect(LogSource& log, TorqueDetector detector, const DetectionOptions& options);
-template Detection detect(LogSource& log, KinematicDetector detector, const DetectionOptions& options);
+template Detection detect(LogSource& log, detector::KinematicDetector detector, const DetectionOptions& options);
 
 namespace {
 
-using Verdict = FaultFinding::Verdict;
+using Verdict = detector::FaultFinding::Verdict;
 
 constexpr double kMemory = 16.0;  // of the filter before the window, in units of 1/β
 
@@ -203,9 +203,9 @@ void gather(LogSource& log, std::vector<Piece>& pieces) {
   log.rewind();
 }
 
-std::string names(const Isolation& isolation, Verdict verdict) {
+std::string names(const detector::Isolation& isolation, Verdict verdict) {
   std::string out;
-  for (const FaultFinding& f : isolation.findings) {
+  for (const detector::FaultFinding& f : isolation.findings) {
     if (f.verdict == verdict) {
       out += (out.empty() ? "" : ", ") + f.fault.name;
     }
@@ -215,12 +215,12 @@ std::string names(const Isolation& isolation, Verdict verdict) {
 
 }  // namespace
 
-std::vector<Isolation> isolate_events(LogSource& log, const OnlineModel& model, const Detection& detection,
-                                      const EventIsolationOptions& options) {
+std::vector<detector::Isolation> isolate_events(LogSource& log, const OnlineModel& model, const Detection& detection,
+                                                const EventIsolationOptions& options) {
   const RegressorFilter filter(model.model, model.filter, model.measurement, model.errors);
   std::vector<Piece> pieces;
   for (std::size_t k = 0; k < std::min(detection.events.size(), options.most_events); ++k) {
-    const Event& event = detection.events[k];
+    const detector::Event& event = detection.events[k];
     const double memory = (kMemory + model.filter.settle) / model.filter.beta;
     pieces.push_back({.row = event.start_sample,
                       .from = event.start - options.isolation.before - memory,
@@ -231,19 +231,20 @@ std::vector<Isolation> isolate_events(LogSource& log, const OnlineModel& model, 
   }
   gather(log, pieces);
   const Polytope set(model.facets, model.box);
-  const std::vector<FaultType> faults = fault_catalogue(model.model, model.estimate, model.robot.effort);
-  std::vector<Isolation> out;
+  const std::vector<detector::FaultType> faults =
+      detector::fault_catalogue(model.model, model.estimate, model.robot.effort);
+  std::vector<detector::Isolation> out;
   for (std::size_t k = 0; k < pieces.size(); ++k) {
     TableSource source(pieces[k].table);
-    const ReferenceMotion motion = read_reference(source, filter);
-    out.push_back(
-        isolate(motion, filter, set, faults, detection.events[k].start, detection.events[k].alarm, options.isolation));
+    const detector::ReferenceMotion motion = detector::read_reference(source, filter);
+    out.push_back(detector::isolate(motion, filter, set, faults, detection.events[k].start, detection.events[k].alarm,
+                                    options.isolation));
   }
   return out;
 }
 
-std::string sentence(const FaultFinding& finding) {
-  const FaultType& fault = finding.fault;
+std::string sentence(const detector::FaultFinding& finding) {
+  const detector::FaultType& fault = finding.fault;
   std::string text = fault.sentence.empty() ? fault.name : fault.sentence;
   if (finding.magnitude && finding.magnitude->lower <= fault.range.lower &&
       finding.magnitude->upper >= fault.range.upper) {
@@ -264,9 +265,9 @@ std::string sentence(const FaultFinding& finding) {
   return text + (finding.complete ? "" : " (not narrowed down further)");
 }
 
-std::string sentence(const Isolation& isolation) {
+std::string sentence(const detector::Isolation& isolation) {
   std::string text;
-  for (const FaultFinding& finding : isolation.findings) {
+  for (const detector::FaultFinding& finding : isolation.findings) {
     if (finding.verdict == Verdict::consistent) {
       text += (text.empty() ? "consistent with: " : "; ") + sentence(finding);
     }
@@ -282,14 +283,14 @@ std::string sentence(const Isolation& isolation) {
 
 OnlineModel with_kinematic_outputs(const OnlineModel& model) {
   OnlineModel view = model;
-  view.robot.effort = EffortKind::torque;  // units are those of the pose
-  view.model = model.kinematic ? kinematic_outputs(*model.kinematic) : Model{};
+  view.robot.effort = model::EffortKind::torque;  // units are those of the pose
+  view.model = model.kinematic ? detector::kinematic_outputs(*model.kinematic) : Model{};
   view.persistence = model.kinematic ? model.kinematic->persistence : model.persistence;
   view.warrant = model.kinematic ? model.kinematic->warrant : model.warrant;
   return view;
 }
 
-KinematicWatch watch_kinematics(LogSource& log, const OnlineModel& model, const DetectorOptions& options,
+KinematicWatch watch_kinematics(LogSource& log, const OnlineModel& model, const detector::DetectorOptions& options,
                                 const DetectionOptions& detection) {
   if (!model.kinematic) {
     return {std::nullopt, "the log that the model was commissioned on had neither a usable pose nor a gyro"};
@@ -306,4 +307,4 @@ KinematicWatch watch_kinematics(LogSource& log, const OnlineModel& model, const 
   return {detect(log, make_detector(*model.kinematic, options), detection), {}};
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::commission

@@ -14,16 +14,16 @@
 #include <wheelwright/detector/detector.hpp>
 #include <wheelwright/detector/isolation.hpp>
 
-namespace wheelwright {
+namespace wheelwright::commission {
 
 /// Walks `log` from its beginning through `detector` (of either residual), which restarts with every segment, and calls
 /// `at(row, t, first, decision)` for every instant at which it decides: the row of the log, its time in s, whether it
 /// is the first such instant of its segment, and the Decision, valid during the call. Returns the number of rows and
 /// rewinds the log. Throws InvalidArgument when the log lacks a column.
-template <RowFilter Filter, typename At>
+template <filter::RowFilter Filter, typename At>
 std::size_t walk_detector(LogSource& log, Detector<Filter>& detector, const At& at) {
   const std::vector<std::size_t> pick =
-      positions_of(log, detector.filter().measurement().columns(), ", which the model was commissioned on");
+      core::positions_of(log, detector.filter().measurement().columns(), ", which the model was commissioned on");
   std::vector<double> sample(pick.size());
   std::size_t rows = 0;
   bool first = true;
@@ -71,7 +71,7 @@ struct Trace {
 
 /// Result of a detector over a whole log.
 struct Detection {
-  std::vector<Event> events;
+  std::vector<detector::Event> events;
   std::size_t rows = 0;              ///< rows of the log
   std::size_t instants = 0;          ///< instants with a decision
   double seconds = 0.0;              ///< time under watch, s
@@ -89,11 +89,11 @@ struct DetectionOptions {
 
 /// Walks `log` through `detector` from its beginning. Of the kinematic residual OutputTrace::torque and predicted are
 /// what the pose or gyro saw and what the wheels predict. Throws InvalidArgument when the log lacks a column.
-template <RowFilter Filter>
+template <filter::RowFilter Filter>
 [[nodiscard]] Detection detect(LogSource& log, Detector<Filter> detector, const DetectionOptions& options = {});
 
 extern template Detection detect(LogSource& log, TorqueDetector detector, const DetectionOptions& options);
-extern template Detection detect(LogSource& log, KinematicDetector detector, const DetectionOptions& options);
+extern template Detection detect(LogSource& log, detector::KinematicDetector detector, const DetectionOptions& options);
 
 /// Detection by the kinematic residual, beside that by the torque residual.
 struct KinematicWatch {
@@ -102,7 +102,8 @@ struct KinematicWatch {
 };
 
 /// The kinematic residual of `log`, where it and the model have one.
-[[nodiscard]] KinematicWatch watch_kinematics(LogSource& log, const OnlineModel& model, const DetectorOptions& options,
+[[nodiscard]] KinematicWatch watch_kinematics(LogSource& log, const OnlineModel& model,
+                                              const detector::DetectorOptions& options,
                                               const DetectionOptions& detection = {});
 
 /// `model` with the outputs of its kinematic model in the place of its own, for whatever reads outputs of a Detection.
@@ -110,22 +111,27 @@ struct KinematicWatch {
 
 /// Options of isolate_events().
 struct EventIsolationOptions {
-  IsolationOptions isolation{};
+  detector::IsolationOptions isolation{};
   std::size_t most_events = 8;  ///< the first ones; the others are left alone
 };
 
 /// Isolates the first events of `detection`, which came of walking `log` with the torque residual of `model`, against
 /// the catalogue of its robot. Walks the log once and holds the rows around these events. One result for each of them.
-[[nodiscard]] std::vector<Isolation> isolate_events(LogSource& log, const OnlineModel& model,
-                                                    const Detection& detection,
-                                                    const EventIsolationOptions& options = {});
+[[nodiscard]] std::vector<detector::Isolation> isolate_events(LogSource& log, const OnlineModel& model,
+                                                              const Detection& detection,
+                                                              const EventIsolationOptions& options = {});
 
 /// A finding that is consistent, for people: "the right wheel's radius changes by the share 3.1 to 5.2 % since 12.4 to
 /// 12.6 s".
-[[nodiscard]] std::string sentence(const FaultFinding& finding);
+[[nodiscard]] std::string sentence(const detector::FaultFinding& finding);
 
 /// All findings in a sentence: "consistent with: …; …. Excluded: …. Not examined: …", or that nothing in the catalogue
 /// explains the data.
-[[nodiscard]] std::string sentence(const Isolation& isolation);
+[[nodiscard]] std::string sentence(const detector::Isolation& isolation);
 
+}  // namespace wheelwright::commission
+
+namespace wheelwright {
+using commission::detect;
+using commission::Detection;
 }  // namespace wheelwright

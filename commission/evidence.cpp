@@ -8,7 +8,7 @@
 #include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/filter/noise.hpp>
 
-namespace wheelwright {
+namespace wheelwright::commission {
 namespace {
 
 // −d(Yθ)/dt, row by row, by central differences; zero at the ends of segments.
@@ -28,7 +28,7 @@ Eigen::VectorXd shift_column(const RegressionBlock& rows, const Eigen::VectorXd&
 
 }  // namespace
 
-RegressionBlock first_rows(RegressionSource& rows, std::size_t most) {
+RegressionBlock first_rows(core::RegressionSource& rows, std::size_t most) {
   std::vector<RegressionBlock> parts;
   RegressionBlock block, all;
   std::size_t instants = 0;
@@ -53,14 +53,14 @@ RegressionBlock first_rows(RegressionSource& rows, std::size_t most) {
   return all;
 }
 
-Explained explained_by_errors(LogSource& log, const Setting& s, const Fit& fit, const SignalErrors& errors,
+Explained explained_by_errors(LogSource& log, const Setting& s, const Fit& fit, const filter::SignalErrors& errors,
                               const Box& box, std::size_t most_rows) {
   const auto p = static_cast<Eigen::Index>(s.model.p());
   Explained result{Eigen::VectorXd::Zero(p + 1), Eigen::VectorXd::Zero(p + 1)};
   if (!s.noise_complete) {
     return result;
   }
-  SignalErrors between = errors;
+  filter::SignalErrors between = errors;
   between.acceleration.setZero();
   between.speed.setZero();
   between.output.setZero();
@@ -76,10 +76,10 @@ Explained explained_by_errors(LogSource& log, const Setting& s, const Fit& fit, 
   for (Eigen::Index j = 0; j < p; ++j) {
     const Interval& side = box.sides[static_cast<std::size_t>(j)];
     theta[j] = side.centre();
-    largest[j] = magnitude(side);
+    largest[j] = core::magnitude(side);
   }
   // Weighted columns of all that is estimated; what is not excited stays out.
-  RowMatrix A(rows.rows(), p + 1);
+  core::RowMatrix A(rows.rows(), p + 1);
   A.leftCols(p) = rows.Y;
   A.col(p) = shift_column(rows, theta);
   Eigen::VectorXd weight(rows.rows());
@@ -89,7 +89,8 @@ Explained explained_by_errors(LogSource& log, const Setting& s, const Fit& fit, 
   A.array().colwise() *= weight.array();
   std::vector<Eigen::Index> kept;
   for (Eigen::Index j = 0; j < p; ++j) {
-    if (fit.excitation[static_cast<std::size_t>(j)].state != Excitation::not_excited && A.col(j).squaredNorm() > 0.0) {
+    if (fit.excitation[static_cast<std::size_t>(j)].state != identify::Excitation::not_excited &&
+        A.col(j).squaredNorm() > 0.0) {
       kept.push_back(j);
     }
   }
@@ -104,8 +105,8 @@ Explained explained_by_errors(LogSource& log, const Setting& s, const Fit& fit, 
   const Eigen::VectorXd scale = columns.colwise().norm().cwiseInverse();
   columns *= scale.asDiagonal();
   const Eigen::MatrixXd gram = columns.transpose() * columns;
-  const Eigen::MatrixXd inverse = pseudo_inverse(gram);
-  RowMatrix g(rows.rows(), fitted + 1);
+  const Eigen::MatrixXd inverse = core::pseudo_inverse(gram);
+  core::RowMatrix g(rows.rows(), fitted + 1);
   g.leftCols(fitted) = columns * inverse * scale.asDiagonal();
   const Eigen::VectorXd shift = A.col(p);
   const Eigen::VectorXd left = shift - columns * (inverse * (columns.transpose() * shift));
@@ -116,8 +117,8 @@ Explained explained_by_errors(LogSource& log, const Setting& s, const Fit& fit, 
   const Eigen::VectorXd doubt =
       (bounded.dY + (bounded.Y - rows.Y).cwiseAbs()) * largest + bounded.dy + (bounded.y - rows.y).cwiseAbs();
   const Eigen::VectorXd in_doubt = g.cwiseAbs().transpose() * doubt;
-  ErrorInfluence influence(s.model, s.filter, s.measurement, noise_budget(s.robot, s.measurement).sensors, theta,
-                           fitted + 1);
+  filter::ErrorInfluence influence(s.model, s.filter, s.measurement, noise_budget(s.robot, s.measurement).sensors,
+                                   theta, fitted + 1);
   influence.add(rows, g);
   for (Eigen::Index j = 0; j < fitted; ++j) {
     result.in_doubt[kept[static_cast<std::size_t>(j)]] = in_doubt[j];
@@ -128,4 +129,4 @@ Explained explained_by_errors(LogSource& log, const Setting& s, const Fit& fit, 
   return result;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::commission

@@ -14,7 +14,7 @@
 #include <wheelwright/core/log.hpp>
 #include <wheelwright/filter/noise.hpp>
 
-namespace wheelwright {
+namespace wheelwright::commission {
 
 /// By how much an estimate may be off without any assumption being broken, to first order.
 struct Explained {
@@ -27,9 +27,10 @@ struct Explained {
 /// entry, s), over the first `most_rows` rows of `log`. `errors` are those of the rows that made the set, `box` its
 /// hull. Zeros where noise is not declared. Walks the log twice.
 [[nodiscard]] Explained explained_by_errors(LogSource& log, const Setting& setting, const Fit& fit,
-                                            const SignalErrors& errors, const Box& box, std::size_t most_rows = 60000);
+                                            const filter::SignalErrors& errors, const Box& box,
+                                            std::size_t most_rows = 60000);
 
 /// The first instants of `rows`, at least `most` of them where there are so many.
-[[nodiscard]] RegressionBlock first_rows(RegressionSource& rows, std::size_t most);
+[[nodiscard]] RegressionBlock first_rows(core::RegressionSource& rows, std::size_t most);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::commission

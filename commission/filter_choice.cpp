@@ -14,7 +14,7 @@
 #include <wheelwright/identify/least_squares.hpp>
 #include <wheelwright/identify/minimise_scalar.hpp>
 
-namespace wheelwright {
+namespace wheelwright::commission {
 namespace {
 
 constexpr std::array kBetas{2.0, 3.0, 4.0, 5.0, 7.0, 10.0, 14.0, 20.0, 30.0, 40.0, 60.0, 80.0, 120.0, 200.0};
@@ -29,7 +29,7 @@ constexpr double kShareOfLog = 0.2;  // of the longest segment that a filter may
 class Trial {
  public:
   Trial(const Model& model, const Measurement& measurement, const FilterDesign& design)
-      : filter_(model, design, measurement), fits_(model.n(), LeastSquares(model.p())) {
+      : filter_(model, design, measurement), fits_(model.n(), identify::LeastSquares(model.p())) {
     row_.resize(1, 1, model.p());
   }
   void restart() { filter_.restart(); }
@@ -48,10 +48,10 @@ class Trial {
   // Residual rms over torque rms of each output.
   [[nodiscard]] std::vector<double> noise() const {
     std::vector<double> shares;
-    for (const LeastSquares& fit : fits_) {
+    for (const identify::LeastSquares& fit : fits_) {
       double share = 1.0;
       if (instants_ >= kFewestInstants) {
-        const LeastSquaresFit f = fit.solve();
+        const identify::LeastSquaresFit f = fit.solve();
         share = f.weighted_tss > 0.0 ? std::sqrt(f.weighted_rss / f.weighted_tss) : 1.0;
       }
       shares.push_back(std::max(share, 1e-12));
@@ -62,7 +62,7 @@ class Trial {
 
  private:
   RegressorFilter filter_;
-  std::vector<LeastSquares> fits_;
+  std::vector<identify::LeastSquares> fits_;
   RegressionBlock row_;
   std::size_t instants_ = 0;
 };
@@ -102,9 +102,9 @@ FilterChoice by_residual(LogSource& log, const Model& model, const Measurement& 
     choice.reason = "the log is too short, or sampled too slowly, for a choice";
     return choice;
   }
-  const std::vector<std::size_t> pick = positions_of(log, measurement.columns());
+  const std::vector<std::size_t> pick = core::positions_of(log, measurement.columns());
   std::vector<double> sample(pick.size());
-  for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
+  core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
     if (starts) {
       for (Trial& trial : trials) {
         trial.restart();
@@ -168,7 +168,7 @@ void refine(FilterEvaluation& evaluate, const Range& range, FilterChoice& choice
     return;
   }
   const double centre = std::clamp(std::log(beta), std::log(lower), std::log(upper));
-  static_cast<void>(minimise_scalar(
+  static_cast<void>(identify::minimise_scalar(
       [&](double log_beta) {
         if (log_beta == centre) {
           return start.criterion;
@@ -238,4 +238,4 @@ FilterChoice choose_filter(LogSource& log, const Model& model, const Measurement
              : by_evaluation(log, model, measurement, order, survey, options);
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::commission

@@ -16,7 +16,7 @@
 #include <wheelwright/filter/measurement.hpp>
 #include <wheelwright/model/model.hpp>
 
-namespace wheelwright {
+namespace wheelwright::commission {
 
 /// Options of the choice.
 struct FilterChoiceOptions {
@@ -60,4 +60,4 @@ struct FilterChoice {
 [[nodiscard]] FilterChoice choose_filter(LogSource& log, const Model& model, const Measurement& measurement, int order,
                                          const Survey& survey, const FilterChoiceOptions& options = {});
 
-}  // namespace wheelwright
+}  // namespace wheelwright::commission

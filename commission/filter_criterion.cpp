@@ -16,7 +16,7 @@
 #include <wheelwright/identify/least_squares.hpp>
 #include <wheelwright/identify/noise_level.hpp>
 
-namespace wheelwright {
+namespace wheelwright::commission {
 namespace {
 
 constexpr double kCollinear = 1e-12;      // of a column's Σ Y²: what the columns before it leave
@@ -85,9 +85,9 @@ void walk(LogSource& log, const Model& model, const Measurement& measurement, co
   for (const FilterDesign& design : designs) {
     filters.emplace_back(model, design, measurement);
   }
-  const std::vector<std::size_t> pick = positions_of(log, measurement.columns());
+  const std::vector<std::size_t> pick = core::positions_of(log, measurement.columns());
   std::vector<double> sample(pick.size());
-  for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
+  core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
     for (std::size_t c = 0; c < pick.size(); ++c) {
       sample[c] = block.columns[pick[c]][k];
     }
@@ -112,16 +112,16 @@ double geometric_mean(const Eigen::VectorXd& values, const std::vector<bool>& co
       number += 1.0;
     }
   }
-  return number > 0.0 ? std::exp(sum / number) : kInfinity;
+  return number > 0.0 ? std::exp(sum / number) : core::kInfinity;
 }
 
 }  // namespace
 
 struct FilterEvaluation::Fit {
   FilterDesign design;
-  RegressionMoments moments;
+  identify::RegressionMoments moments;
   Eigen::VectorXd weights;
-  Estimate estimate;
+  identify::Estimate estimate;
 };
 
 FilterEvaluation::FilterEvaluation(LogSource& log, const Model& model, const Measurement& measurement,
@@ -139,8 +139,8 @@ std::vector<FilterValue> FilterEvaluation::operator()(const std::vector<FilterDe
   leave_out(fits);
   for (Fit& f : fits) {
     if (f.moments.instants() >= kFewestCompared) {
-      f.weights = efficient_weights(f.moments);
-      f.estimate = ordinary_least_squares(f.moments, {.weights = f.weights, .excluded = excluded_});
+      f.weights = identify::efficient_weights(f.moments);
+      f.estimate = identify::ordinary_least_squares(f.moments, {.weights = f.weights, .excluded = excluded_});
     }
   }
   if (criterion_ == FilterCriterion::threshold_width) {
@@ -156,7 +156,7 @@ std::vector<FilterValue> FilterEvaluation::operator()(const std::vector<FilterDe
 std::vector<FilterEvaluation::Fit> FilterEvaluation::fit(const std::vector<FilterDesign>& designs) {
   std::vector<Fit> fits;
   for (const FilterDesign& design : designs) {
-    fits.push_back({design, RegressionMoments(model_.n(), model_.p()), {}, {}});
+    fits.push_back({design, identify::RegressionMoments(model_.n(), model_.p()), {}, {}});
   }
   walk(*log_, model_, measurement_, designs,
        [&](std::size_t k, const RegressionBlock& rows) { fits[k].moments.add(rows); });
@@ -190,7 +190,7 @@ void FilterEvaluation::leave_out(const std::vector<Fit>& fits) {
 }
 
 FilterValue FilterEvaluation::predicted_error(const Fit& f) const {
-  FilterValue value{kInfinity, Eigen::VectorXd::Zero(static_cast<Eigen::Index>(model_.p()))};
+  FilterValue value{core::kInfinity, Eigen::VectorXd::Zero(static_cast<Eigen::Index>(model_.p()))};
   if (!f.estimate.usable) {
     return value;
   }
@@ -202,7 +202,7 @@ FilterValue FilterEvaluation::predicted_error(const Fit& f) const {
         kept.push_back(static_cast<Eigen::Index>(j));
       }
     }
-    const NoiseGram gram = noise_gram(model_, f.design, measurement_, options_.step);
+    const filter::NoiseGram gram = filter::noise_gram(model_, f.design, measurement_, options_.step);
     Eigen::MatrixXd added = Eigen::MatrixXd::Zero(value.parts.size(), value.parts.size());
     for (std::size_t i = 0; i < gram.motion.size(); ++i) {
       added += std::pow(f.weights[static_cast<Eigen::Index>(i)], 2.0) * gram.motion[i];
@@ -212,13 +212,13 @@ FilterValue FilterEvaluation::predicted_error(const Fit& f) const {
     const Eigen::VectorXd scale = G.diagonal()(kept).cwiseSqrt().cwiseInverse();
     const Eigen::MatrixXd all = scale.asDiagonal() * G(kept, kept) * scale.asDiagonal();
     const Eigen::MatrixXd noise = scale.asDiagonal() * added(kept, kept) * scale.asDiagonal();
-    const std::optional<Eigen::VectorXd> share = generalized_eigenvalues(noise, all);
+    const std::optional<Eigen::VectorXd> share = core::generalized_eigenvalues(noise, all);
     if (!(share && share->maxCoeff() < kMostNoise)) {
       return value;
     }
     const Eigen::VectorXd theta = scale.cwiseInverse().asDiagonal() * f.estimate.theta(kept);
-    bias(kept) =
-        -options_.bias_left * (scale.asDiagonal() * LdltFactors(all - noise).solve(Eigen::VectorXd(noise * theta)));
+    bias(kept) = -options_.bias_left *
+                 (scale.asDiagonal() * core::LdltFactors(all - noise).solve(Eigen::VectorXd(noise * theta)));
   }
   value.parts = (f.estimate.standard_error.array().square() + bias.array().square()).sqrt();
   std::vector<bool> counts = excluded_;
@@ -230,7 +230,7 @@ FilterValue FilterEvaluation::predicted_error(const Fit& f) const {
 std::vector<FilterValue> FilterEvaluation::threshold_widths(const std::vector<Fit>& fits) {
   const auto n = static_cast<Eigen::Index>(model_.n());
   std::vector<FilterDesign> designs;
-  std::vector<ResidualStatistics> statistics;
+  std::vector<identify::ResidualStatistics> statistics;
   for (const Fit& f : fits) {
     designs.push_back(f.design);
     const bool usable = f.estimate.usable;
@@ -244,21 +244,21 @@ std::vector<FilterValue> FilterEvaluation::threshold_widths(const std::vector<Fi
   std::vector<FilterValue> values;
   std::vector<bool> explained(model_.n(), false);
   for (std::size_t k = 0; k < fits.size(); ++k) {
-    values.push_back({kInfinity, Eigen::VectorXd::Constant(n, kInfinity)});
+    values.push_back({core::kInfinity, Eigen::VectorXd::Constant(n, core::kInfinity)});
     const Fit& f = fits[k];
     if (!f.estimate.usable) {
       continue;
     }
-    const ResidualSummary summary =
+    const identify::ResidualSummary summary =
         statistics[k].summary(Eigen::MatrixXd::Zero(f.estimate.theta.size(), f.estimate.theta.size()));
-    const double t = student_quantile(1.0 - options_.risk, f.estimate.freedom);
+    const double t = core::student_quantile(1.0 - options_.risk, f.estimate.freedom);
     for (Eigen::Index i = 0; i < n; ++i) {
       const auto at = static_cast<std::size_t>(i);
-      const OutputResidual& rest = summary.outputs[at];
+      const identify::OutputResidual& rest = summary.outputs[at];
       if (!(rest.torque_rms > 0.0)) {
         continue;
       }
-      const double bound = extrapolate(rest, summary.instants, {.risk = options_.risk}).bound;
+      const double bound = identify::extrapolate(rest, summary.instants, {.risk = options_.risk}).bound;
       const double spread = (f.estimate.covariance * f.moments.of_output(at).YY).trace();
       const double of_theta = std::sqrt(std::max(spread, 0.0) / static_cast<double>(summary.instants));
       values[k].parts[i] = 2.0 * (bound + t * of_theta) / rest.torque_rms;
@@ -275,4 +275,4 @@ std::vector<FilterValue> FilterEvaluation::threshold_widths(const std::vector<Fi
   return values;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::commission

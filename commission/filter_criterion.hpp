@@ -13,7 +13,7 @@
 #include <wheelwright/filter/measurement.hpp>
 #include <wheelwright/model/model.hpp>
 
-namespace wheelwright {
+namespace wheelwright::commission {
 
 /// Criterion by which the filter is chosen. α cancels in each of them, since it scales both sides of (25) alike: α = β
 /// throughout, for a static gain of 1.
@@ -81,4 +81,4 @@ class FilterEvaluation {
   std::size_t walks_ = 0;
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::commission

@@ -9,7 +9,7 @@
 #include <wheelwright/identify/instruments.hpp>
 #include <wheelwright/identify/noise_level.hpp>
 
-namespace wheelwright {
+namespace wheelwright::commission {
 namespace {
 
 constexpr double kConfidence = 0.95;  // of the statistical intervals
@@ -27,17 +27,17 @@ Eigen::VectorXd column_noise(const Setting& s, const Eigen::VectorXd& weights) {
   return squares.cwiseSqrt();
 }
 
-std::optional<RegressionMoments> simulated_moments(LogSource& log, const Setting& s, Part part,
-                                                   const Eigen::VectorXd& theta) {
-  if (s.measurement.effort_unsigned || !MotionSimulation::possible(s.model, theta)) {
+std::optional<identify::RegressionMoments> simulated_moments(LogSource& log, const Setting& s, Part part,
+                                                             const Eigen::VectorXd& theta) {
+  if (s.measurement.effort_unsigned || !identify::MotionSimulation::possible(s.model, theta)) {
     return std::nullopt;
   }
-  InstrumentMotion motion;
-  motion.kind = InstrumentMotion::Kind::simulated;
+  identify::InstrumentMotion motion;
+  motion.kind = identify::InstrumentMotion::Kind::simulated;
   motion.theta = theta;
-  InstrumentStream stream(log, RegressorFilter(s.model, s.filter, s.measurement), motion);
+  identify::InstrumentStream stream(log, RegressorFilter(s.model, s.filter, s.measurement), motion);
   FoldedSource rows(stream, part, s.survey.rows, s.folds);
-  std::optional<RegressionMoments> sums = moments_with_instruments(rows);
+  std::optional<identify::RegressionMoments> sums = identify::moments_with_instruments(rows);
   const double ratio = stream.speed_ratio();
   const bool known = s.measurement.motion != MotionKind::angle;
   if (known && !(ratio < kRunAway && ratio > 1.0 / kRunAway)) {
@@ -46,10 +46,10 @@ std::optional<RegressionMoments> simulated_moments(LogSource& log, const Setting
   return sums;
 }
 
-std::vector<bool> flags(const std::vector<ExcitationFinding>& findings) {
+std::vector<bool> flags(const std::vector<identify::ExcitationFinding>& findings) {
   std::vector<bool> excluded;
-  for (const ExcitationFinding& finding : findings) {
-    excluded.push_back(finding.state == Excitation::not_excited);
+  for (const identify::ExcitationFinding& finding : findings) {
+    excluded.push_back(finding.state == identify::Excitation::not_excited);
   }
   return excluded;
 }
@@ -58,16 +58,16 @@ bool all(const std::vector<bool>& flags) {
   return std::ranges::all_of(flags, [](bool flag) { return flag; });
 }
 
-ResidualSummary summarise(RegressionSource& rows, const Fit& fit) {
-  ResidualStatistics statistics(fit.estimate, fit.weights);
+identify::ResidualSummary summarise(core::RegressionSource& rows, const Fit& fit) {
+  identify::ResidualStatistics statistics(fit.estimate, fit.weights);
   RegressionBlock block;
   rows.rewind();
   while (rows.next(block)) {
     statistics.add(block);
   }
-  ResidualSummary summary = statistics.summary(fit.squares.inverse_gram);
+  identify::ResidualSummary summary = statistics.summary(fit.squares.inverse_gram);
   if (!fit.choice.candidates.empty() && fit.choice.chosen > 0) {
-    const Estimate& best = fit.choice.best();
+    const identify::Estimate& best = fit.choice.best();
     summary.covariance = best.covariance;
     summary.standard_error = best.standard_error;
     summary.freedom = best.freedom;
@@ -75,41 +75,41 @@ ResidualSummary summarise(RegressionSource& rows, const Fit& fit) {
   return summary;
 }
 
-double t_quantile(const ResidualSummary& summary) {
-  return student_quantile(kConfidence, std::max(summary.freedom, 1.0));
+double t_quantile(const identify::ResidualSummary& summary) {
+  return core::student_quantile(kConfidence, std::max(summary.freedom, 1.0));
 }
 
 }  // namespace
 
-RegressionMoments log_moments(LogSource& log, const Setting& s, Part part) {
+identify::RegressionMoments log_moments(LogSource& log, const Setting& s, Part part) {
   const RegressorFilter filter(s.model, s.filter, s.measurement, errors_of_fit(s));
-  const auto commands = commanded_motion(log, s.model);
+  const auto commands = identify::commanded_motion(log, s.model);
   if (commands && !s.commands_are_noisy) {
-    InstrumentStream stream(log, filter, *commands);
+    identify::InstrumentStream stream(log, filter, *commands);
     FoldedSource rows(stream, part, s.survey.rows, s.folds);
-    return moments_with_instruments(rows);
+    return identify::moments_with_instruments(rows);
   }
   TorqueRows stream(log, filter);
   FoldedSource rows(stream, part, s.survey.rows, s.folds);
-  return moments(rows);
+  return identify::moments(rows);
 }
 
-SignalErrors errors_of_fit(const Setting& s) {
-  SignalErrors errors = s.declared;
+filter::SignalErrors errors_of_fit(const Setting& s) {
+  filter::SignalErrors errors = s.declared;
   errors.between_samples = false;
   return errors;
 }
 
 Fit fit_log(LogSource& log, const Setting& s, Part part, double risk) {
-  EstimatorEvidence evidence{
+  identify::EstimatorEvidence evidence{
       .rows = log_moments(log, s, part),
       .simulate = [&](const Eigen::VectorXd& theta) { return simulated_moments(log, s, part, theta); },
       .noise = row_noise(s),
       .noise_origin = s.motion_noise ? s.motion_noise->origin : "",
       .effort_is_exact = s.measurement.hold == Hold::zero_order && !(s.robot.noise.effort.value.value_or(0.0) > 0.0)};
   Fit fit;
-  fit.weights = efficient_weights(evidence.rows);
-  fit.factor = LeastSquares(s.model.p(), fit.weights);
+  fit.weights = identify::efficient_weights(evidence.rows);
+  fit.factor = identify::LeastSquares(s.model.p(), fit.weights);
   TorqueRows stream = make_rows(log, s, errors_of_fit(s));
   FoldedSource rows(stream, part, s.survey.rows, s.folds);
   RegressionBlock block;
@@ -120,7 +120,7 @@ Fit fit_log(LogSource& log, const Setting& s, Part part, double risk) {
 
   // Columns that never move or always move together are out at once; those that may be made of noise only where no
   // estimator is to be had that noise does not bias.
-  EstimatorChoiceOptions options;
+  identify::EstimatorChoiceOptions options;
   options.estimator.weights = fit.weights;
   const auto fit_with = [&](const std::vector<bool>& excluded) {
     fit.squares = fit.factor.solve(excluded);
@@ -128,21 +128,21 @@ Fit fit_log(LogSource& log, const Setting& s, Part part, double risk) {
     fit.choice = {};
     if (!all(excluded)) {
       options.estimator.excluded = excluded;
-      fit.choice = choose_estimator(evidence, options);
+      fit.choice = identify::choose_estimator(evidence, options);
       fit.estimate = fit.choice.chosen > 0 ? fit.choice.best().theta : fit.estimate;
     }
     fit.residuals = summarise(rows, fit);
   };
   const auto judge = [&](const Eigen::VectorXd& noise) {
-    LeastSquaresFit judged = fit.squares;
+    identify::LeastSquaresFit judged = fit.squares;
     judged.estimate = fit.estimate;
-    return judge_excitation(judged, fit.residuals.standard_error, t_quantile(fit.residuals), noise);
+    return identify::judge_excitation(judged, fit.residuals.standard_error, t_quantile(fit.residuals), noise);
   };
   const auto judge_further = [&](const Eigen::VectorXd& noise) {
-    const std::vector<ExcitationFinding> before = fit.excitation;
+    const std::vector<identify::ExcitationFinding> before = fit.excitation;
     fit.excitation = judge(noise);
     for (std::size_t j = 0; j < before.size(); ++j) {
-      if (before[j].state == Excitation::not_excited) {
+      if (before[j].state == identify::Excitation::not_excited) {
         fit.excitation[j] = before[j];
       }
     }
@@ -161,19 +161,19 @@ Fit fit_log(LogSource& log, const Setting& s, Part part, double risk) {
     judge_further({});
   }
   if (!s.noise_complete) {
-    fit.plausible = largest_plausible_error(rows, fit.estimate, fit.residuals, risk);
+    fit.plausible = identify::largest_plausible_error(rows, fit.estimate, fit.residuals, risk);
   }
   return fit;
 }
 
-Eigen::VectorXd best_guess(Eigen::VectorXd estimate, const std::vector<ExcitationFinding>& excitation,
+Eigen::VectorXd best_guess(Eigen::VectorXd estimate, const std::vector<identify::ExcitationFinding>& excitation,
                            const Polytope& set) {
   for (std::size_t j = 0; j < excitation.size(); ++j) {
-    if (excitation[j].state == Excitation::not_excited) {
+    if (excitation[j].state == identify::Excitation::not_excited) {
       estimate[static_cast<Eigen::Index>(j)] = set.chebyshev_centre()[j];
     }
   }
   return estimate;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::commission

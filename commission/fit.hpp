@@ -13,32 +13,33 @@
 #include <wheelwright/identify/estimator_choice.hpp>
 #include <wheelwright/identify/least_squares.hpp>
 
-namespace wheelwright {
+namespace wheelwright::commission {
 
 /// A fit with everything that later stages ask of it.
 struct Fit {
-  Eigen::VectorXd weights;                    ///< one for each output, 1/residual
-  LeastSquares factor{1};                     ///< the rows, folded
-  LeastSquaresFit squares;                    ///< weighted least squares, parameters that are not excited held at zero
-  EstimatorChoice choice;                     ///< no candidates where no parameter is excited
-  Eigen::VectorXd estimate;                   ///< p, θ̂ of the chosen estimator
-  ResidualSummary residuals;                  ///< at θ̂, with θ̂'s covariance
-  std::vector<ExcitationFinding> excitation;  ///< one for each parameter
-  Eigen::VectorXd plausible;                  ///< per output, largest_plausible_error; empty where noise is declared
+  Eigen::VectorXd weights;              ///< one for each output, 1/residual
+  identify::LeastSquares factor{1};     ///< the rows, folded
+  identify::LeastSquaresFit squares;    ///< weighted least squares, parameters that are not excited held at zero
+  identify::EstimatorChoice choice;     ///< no candidates where no parameter is excited
+  Eigen::VectorXd estimate;             ///< p, θ̂ of the chosen estimator
+  identify::ResidualSummary residuals;  ///< at θ̂, with θ̂'s covariance
+  std::vector<identify::ExcitationFinding> excitation;  ///< one for each parameter
+  Eigen::VectorXd plausible;  ///< per output, largest_plausible_error; empty where noise is declared
 };
 
 /// Errors of the rows that are fitted: efforts and motion between samples as most likely, not in the middle of what is
 /// possible; signs are left open where noise of the samples leaves them so.
-[[nodiscard]] SignalErrors errors_of_fit(const Setting& setting);
+[[nodiscard]] filter::SignalErrors errors_of_fit(const Setting& setting);
 
 /// Fits `part` of `log`. `risk` is for Fit::plausible.
 [[nodiscard]] Fit fit_log(LogSource& log, const Setting& setting, Part part, double risk);
 
 /// Moments of `part` of `log`: with the commanded motion as instruments where it is logged.
-[[nodiscard]] RegressionMoments log_moments(LogSource& log, const Setting& setting, Part part);
+[[nodiscard]] identify::RegressionMoments log_moments(LogSource& log, const Setting& setting, Part part);
 
 /// `estimate`, with the Chebyshev centre's value for each parameter that the log does not show.
-[[nodiscard]] Eigen::VectorXd best_guess(Eigen::VectorXd estimate, const std::vector<ExcitationFinding>& excitation,
+[[nodiscard]] Eigen::VectorXd best_guess(Eigen::VectorXd estimate,
+                                         const std::vector<identify::ExcitationFinding>& excitation,
                                          const Polytope& set);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::commission

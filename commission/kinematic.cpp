@@ -15,7 +15,7 @@
 #include <wheelwright/core/statistics.hpp>
 #include <wheelwright/identify/least_squares.hpp>
 
-namespace wheelwright {
+namespace wheelwright::commission {
 namespace {
 
 using Status = KinematicCommissioning::Status;
@@ -26,21 +26,21 @@ constexpr std::size_t kFewestWindows = 8;
 // What is settled before a fit.
 struct Frame {
   LogSource* log = nullptr;
-  OdometryMeasurement measurement;
+  filter::OdometryMeasurement measurement;
   double window = 1.0;
-  OdometryErrors declared;  // without ē
+  filter::OdometryErrors declared;  // without ē
   std::vector<bool> is_declared;
   Box prior;
   Eigen::VectorXd nominal;
   FoldOptions folds;
-  ExtrapolationOptions extrapolation;
+  identify::ExtrapolationOptions extrapolation;
   std::size_t log_rows = 0;
 };
 
 struct OdometryFit {
-  LeastSquaresFit squares;
-  ResidualSummary residuals;
-  std::vector<ExcitationFinding> excitation;
+  identify::LeastSquaresFit squares;
+  identify::ResidualSummary residuals;
+  std::vector<identify::ExcitationFinding> excitation;
   Eigen::VectorXd plausible;
 };
 
@@ -62,7 +62,7 @@ double between_samples(double acceleration, const Survey& survey, MotionKind mot
   return 0.0;
 }
 
-Frame settle(LogSource& log, const Robot& robot, const OdometryMeasurement& m, const Survey& survey,
+Frame settle(LogSource& log, const Robot& robot, const filter::OdometryMeasurement& m, const Survey& survey,
              const KinematicCommissionOptions& options) {
   check::that(options.radius_share > 0.0 && options.radius_share < 1.0, "radius share", "a number inside (0, 1)");
   Frame s;
@@ -113,27 +113,27 @@ Frame settle(LogSource& log, const Robot& robot, const OdometryMeasurement& m, c
   return s;
 }
 
-OdometryRows make_rows(const Frame& s, const OdometryErrors& errors) {
-  return {*s.log, OdometryFilter(s.measurement, s.window, errors)};
+filter::OdometryRows make_rows(const Frame& s, const filter::OdometryErrors& errors) {
+  return {*s.log, filter::OdometryFilter(s.measurement, s.window, errors)};
 }
 
-OdometryErrors with_noise(const Frame& s, const std::vector<OutputNoise>& noise, RowUse use) {
+filter::OdometryErrors with_noise(const Frame& s, const std::vector<OutputNoise>& noise, RowUse use) {
   Eigen::VectorXd estimated = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(noise.size()));
   for (std::size_t i = 0; i < noise.size(); ++i) {
-    if (noise[i].origin == NoiseOrigin::estimated) {
+    if (noise[i].origin == core::NoiseOrigin::estimated) {
       estimated[static_cast<Eigen::Index>(i)] =
           std::max(use == RowUse::learning ? noise[i].learning : noise[i].bound, std::numeric_limits<double>::min());
     }
   }
-  OdometryErrors errors = s.declared;
+  filter::OdometryErrors errors = s.declared;
   errors.estimated = std::move(estimated);
   return errors;
 }
 
-Eigen::VectorXd weights_of(const ResidualSummary& residuals) {
+Eigen::VectorXd weights_of(const identify::ResidualSummary& residuals) {
   Eigen::VectorXd weights(static_cast<Eigen::Index>(residuals.outputs.size()));
   double size = 0.0;  // of the largest output, in m or rad: one that shows nothing at all has no scale of its own
-  for (const OutputResidual& output : residuals.outputs) {
+  for (const identify::OutputResidual& output : residuals.outputs) {
     size = std::max(size, output.torque_rms);
   }
   const double floor = size > 0.0 ? 1e-9 * size : 1.0;
@@ -146,12 +146,12 @@ Eigen::VectorXd weights_of(const ResidualSummary& residuals) {
 // Least squares, weighted once more by its own residuals; parameters that the log does not show are held at their
 // nominal values, which the rows are measured from.
 std::optional<OdometryFit> fit_rows(const Frame& s, Part part, double risk) {
-  OdometryRows stream = make_rows(s, s.declared);
+  filter::OdometryRows stream = make_rows(s, s.declared);
   FoldedSource rows(stream, part, s.log_rows, s.folds);
   OdometryFit fit;
   Eigen::VectorXd weights = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(rows.outputs()));
   for (int pass = 0; pass < 2; ++pass) {
-    LeastSquares squares(rows.parameters(), weights);
+    identify::LeastSquares squares(rows.parameters(), weights);
     RegressionBlock block;
     rows.rewind();
     while (rows.next(block)) {
@@ -165,7 +165,7 @@ std::optional<OdometryFit> fit_rows(const Frame& s, Part part, double risk) {
     const auto solve = [&] {
       fit.squares = squares.solve(excluded);
       fit.squares.estimate += s.nominal;
-      ResidualStatistics statistics(fit.squares.estimate, weights);
+      identify::ResidualStatistics statistics(fit.squares.estimate, weights);
       rows.rewind();
       while (rows.next(block)) {
         statistics.add(block);
@@ -173,17 +173,18 @@ std::optional<OdometryFit> fit_rows(const Frame& s, Part part, double risk) {
       fit.residuals = statistics.summary(fit.squares.inverse_gram);
     };
     solve();
-    fit.excitation = judge_excitation(fit.squares, fit.residuals.standard_error,
-                                      student_quantile(kOdometryConfidence, std::max(fit.residuals.freedom, 1.0)));
-    for (const ExcitationFinding& finding : fit.excitation) {
-      excluded.push_back(finding.state == Excitation::not_excited);
+    fit.excitation =
+        identify::judge_excitation(fit.squares, fit.residuals.standard_error,
+                                   core::student_quantile(kOdometryConfidence, std::max(fit.residuals.freedom, 1.0)));
+    for (const identify::ExcitationFinding& finding : fit.excitation) {
+      excluded.push_back(finding.state == identify::Excitation::not_excited);
     }
     if (std::ranges::find(excluded, true) != excluded.end()) {
       solve();
     }
     weights = weights_of(fit.residuals);
   }
-  fit.plausible = largest_plausible_error(rows, fit.squares.estimate, fit.residuals, risk);
+  fit.plausible = identify::largest_plausible_error(rows, fit.squares.estimate, fit.residuals, risk);
   return fit;
 }
 
@@ -195,7 +196,7 @@ std::vector<std::string> widen(Frame& s, const OdometryFit& fit, double share) {
   const auto names = s.measurement.parameters();
   for (std::size_t j = 0; j < names.size(); ++j) {
     const double value = fit.squares.estimate[static_cast<Eigen::Index>(j)];
-    const bool certain = fit.excitation[j].state == Excitation::identified && value > 0.0;
+    const bool certain = fit.excitation[j].state == identify::Excitation::identified && value > 0.0;
     if (certain && names[j] != "gyro_bias" && !s.prior.sides[j].contains(value)) {
       Interval& side = s.prior.sides[j];
       side = {std::min(side.lower, (1.0 - share) * value), std::max(side.upper, (1.0 + share) * value)};
@@ -212,7 +213,7 @@ std::vector<OutputNoise> output_noise(const Frame& s, const OdometryFit& fit) {
   std::vector<OutputNoise> noise(s.is_declared.size());
   for (std::size_t i = 0; i < noise.size(); ++i) {
     if (s.is_declared[i]) {
-      noise[i].origin = NoiseOrigin::declared;
+      noise[i].origin = core::NoiseOrigin::declared;
     } else {
       noise[i] = estimated_noise(fit.residuals.outputs[i], fit.residuals.instants,
                                  fit.plausible[static_cast<Eigen::Index>(i)], s.extrapolation);
@@ -222,7 +223,7 @@ std::vector<OutputNoise> output_noise(const Frame& s, const OdometryFit& fit) {
 }
 
 FeasibleSet set_of(const Frame& s, Part part, const std::vector<OutputNoise>& noise) {
-  OdometryRows stream = make_rows(s, with_noise(s, noise, RowUse::learning));
+  filter::OdometryRows stream = make_rows(s, with_noise(s, noise, RowUse::learning));
   FoldedSource rows(stream, part, s.log_rows, s.folds);
   return feasible_set(rows, s.prior);
 }
@@ -230,12 +231,12 @@ FeasibleSet set_of(const Frame& s, Part part, const std::vector<OutputNoise>& no
 // The feasible set; bounds that are too small for the prior box are raised, where all are estimated.
 BoundedSet bounded_set(const Frame& s, Part part, std::vector<OutputNoise>& noise) {
   BoundedSet result{set_of(s, part, noise)};
-  const bool all_estimated = std::ranges::count(noise, NoiseOrigin::estimated, &OutputNoise::origin) ==
+  const bool all_estimated = std::ranges::count(noise, core::NoiseOrigin::estimated, &OutputNoise::origin) ==
                              static_cast<std::ptrdiff_t>(noise.size());
   if (result.set.status == FeasibleSet::Status::nonempty || !all_estimated) {
     return result;
   }
-  OdometryRows bare = make_rows(s, {});
+  filter::OdometryRows bare = make_rows(s, {});
   FoldedSource bare_rows(bare, part, s.log_rows, s.folds);
   result.raise = raise_until_explained(noise, bare_rows, s.prior, [&](const std::vector<OutputNoise>& more) {
     return set_of(s, part, more).status == FeasibleSet::Status::nonempty;
@@ -246,14 +247,14 @@ BoundedSet bounded_set(const Frame& s, Part part, std::vector<OutputNoise>& nois
 
 // A declared bound differs from row to row: the largest is told.
 void tell_declared(const Frame& s, const Eigen::VectorXd& theta, std::vector<OutputNoise>& noise) {
-  OdometryRows rows = make_rows(s, s.declared);
+  filter::OdometryRows rows = make_rows(s, s.declared);
   RegressionBlock block;
   rows.rewind();
   const auto n = static_cast<Eigen::Index>(noise.size());
   while (rows.next(block)) {
     for (Eigen::Index r = 0; r < block.rows(); ++r) {
       OutputNoise& o = noise[static_cast<std::size_t>(r % n)];
-      if (o.origin == NoiseOrigin::declared) {
+      if (o.origin == core::NoiseOrigin::declared) {
         o.bound = std::max(o.bound, block.dy[r] + block.dY.row(r).dot(theta.cwiseAbs()));
         o.learning = o.bound;
       }
@@ -271,7 +272,7 @@ std::vector<KinematicParameter> parameters_of(const Frame& s, const OdometryFit&
     p.unit = units[j];
     p.excitation = fit.excitation[j].state;
     p.reason = fit.excitation[j].reason;
-    if (p.excitation != Excitation::not_excited) {
+    if (p.excitation != identify::Excitation::not_excited) {
       p.estimate = fit.squares.estimate[at];
       p.standard_error = fit.residuals.standard_error[at];
     }
@@ -292,7 +293,7 @@ std::string message_of(const Frame& s, const KinematicCommissioning& r) {
                                  : s.measurement.heading ? "the heading"
                                                          : "the gyro",
                                  s.window);
-  const auto estimated = std::ranges::count(r.noise, NoiseOrigin::estimated, &OutputNoise::origin);
+  const auto estimated = std::ranges::count(r.noise, core::NoiseOrigin::estimated, &OutputNoise::origin);
   if (r.declared_too_small) {
     text +=
         "; no wheel radii explain the pose within the declared noise (wheels that slip in turns, a pose beside the "
@@ -313,7 +314,7 @@ std::string message_of(const Frame& s, const KinematicCommissioning& r) {
   }
   std::string missing;
   for (const KinematicParameter& p : r.parameters) {
-    if (p.excitation == Excitation::not_excited) {
+    if (p.excitation == identify::Excitation::not_excited) {
       missing += (missing.empty() ? "" : ", ") + p.name;
     }
   }
@@ -330,20 +331,21 @@ void validate_held_out(const Frame& s, KinematicCommissioning& result) {
   if (set.status != FeasibleSet::Status::nonempty) {
     return;
   }
-  OdometryRows unseen = make_rows(s, with_noise(s, noise, RowUse::driving));
+  filter::OdometryRows unseen = make_rows(s, with_noise(s, noise, RowUse::driving));
   FoldedSource held_out(unseen, Part::held_out, s.log_rows, s.folds);
   result.validation = validate_on(
-      held_out, ThresholdRule(*set.polytope, best_guess(fit->squares.estimate, fit->excitation, *set.polytope)));
+      held_out,
+      detector::ThresholdRule(*set.polytope, best_guess(fit->squares.estimate, fit->excitation, *set.polytope)));
 }
 
 }  // namespace
 
 KinematicCommissioning commission_kinematics(LogSource& log, const Robot& robot,
-                                             const std::optional<OdometryMeasurement>& measurement,
+                                             const std::optional<filter::OdometryMeasurement>& measurement,
                                              const Survey& survey, const KinematicCommissionOptions& options) {
   KinematicCommissioning result;
   if (!measurement) {
-    result.message = on_two_wheels(robot)
+    result.message = model::on_two_wheels(robot)
                          ? "no kinematic residual: the log has neither a pose (x, y, theta) nor gyro_z, so that slip "
                            "across the heading cannot be seen"
                          : "no kinematic residual: the robot is no differential drive";
@@ -355,7 +357,7 @@ KinematicCommissioning commission_kinematics(LogSource& log, const Robot& robot,
                                  options.window);
     return result;
   }
-  OdometryMeasurement independent = *measurement;
+  filter::OdometryMeasurement independent = *measurement;
   const PoseOrigin origin = pose_origin(log, independent, options.window, robot.encoder_counts_per_turn.value_or(0.0));
   independent.heading = independent.heading && !origin.heading_repeats;
   independent.position = independent.position && !origin.position_repeats;
@@ -392,16 +394,16 @@ KinematicCommissioning commission_kinematics(LogSource& log, const Robot& robot,
     return result;
   }
   const bool partial = std::ranges::any_of(
-      result.parameters, [](const KinematicParameter& p) { return p.excitation == Excitation::not_excited; });
+      result.parameters, [](const KinematicParameter& p) { return p.excitation == identify::Excitation::not_excited; });
   result.status = partial ? Status::partial : Status::done;
   const Polytope& set = *bounded.set.polytope;
-  result.model = KinematicModel{{.estimate = best_guess(fit->squares.estimate, fit->excitation, set),
-                                 .facets = set.facets(),
-                                 .box = bounded.set.hull,
-                                 .persistence = options.persistence},
-                                s.measurement,
-                                s.window,
-                                with_noise(s, result.noise, RowUse::driving)};
+  result.model = detector::KinematicModel{{.estimate = best_guess(fit->squares.estimate, fit->excitation, set),
+                                           .facets = set.facets(),
+                                           .box = bounded.set.hull,
+                                           .persistence = options.persistence},
+                                          s.measurement,
+                                          s.window,
+                                          with_noise(s, result.noise, RowUse::driving)};
   tell_declared(s, result.model->estimate, result.noise);
   validate_held_out(s, result);
   result.message = message_of(s, result) + (origin.sentence.empty() ? "" : "; " + origin.sentence);
@@ -409,4 +411,4 @@ KinematicCommissioning commission_kinematics(LogSource& log, const Robot& robot,
   return result;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::commission

@@ -20,20 +20,20 @@
 #include <wheelwright/identify/least_squares.hpp>
 #include <wheelwright/model/robot.hpp>
 
-namespace wheelwright {
+namespace wheelwright::commission {
 
 /// Result of commissioning for one kinematic parameter.
 struct KinematicParameter {
   std::string name;
   std::string unit;
-  Excitation excitation = Excitation::identified;
+  identify::Excitation excitation = identify::Excitation::identified;
   std::string reason;              ///< why it is not identified, for people
   std::optional<double> estimate;  ///< least squares; nothing where the log does not show the parameter
   std::optional<double> standard_error;
   double lower = 0.0;  ///< bounds (certified hull)
   double upper = 0.0;
-  double nominal = 0.0;                     ///< of the robot file's geometry; 0 for a bias
-  Warrant warrant = Warrant::extrapolated;  ///< of lower and upper
+  double nominal = 0.0;                                 ///< of the robot file's geometry; 0 for a bias
+  core::Warrant warrant = core::Warrant::extrapolated;  ///< of lower and upper
 };
 
 /// Result of commission_kinematics().
@@ -47,8 +47,8 @@ struct KinematicCommissioning {
     nothing,  ///< too little driving, or no parameters in the prior box explain it: no model
   };
   Status status = Status::absent;
-  std::string message;                  ///< one sentence for people
-  std::optional<KinematicModel> model;  ///< where the status gives one
+  std::string message;                            ///< one sentence for people
+  std::optional<detector::KinematicModel> model;  ///< where the status gives one
   std::vector<KinematicParameter> parameters;
   std::vector<OutputNoise> noise;            ///< one for each output; a declared bound is the largest of the log's rows
   std::vector<OutputValidation> validation;  ///< on held-out blocks, of a model made from the other blocks
@@ -63,15 +63,15 @@ struct KinematicCommissioning {
 struct KinematicCommissionOptions {
   double window = 1.0;  ///< W, s, > 0; a robot's own stands above it
   FoldOptions folds;    ///< purge is set to the window
-  ExtrapolationOptions extrapolation;
-  Persistence persistence;
+  identify::ExtrapolationOptions extrapolation;
+  detector::Persistence persistence;
   double radius_share = 0.3;  ///< prior box of radii and yaw gains: nominal ± this share, inside (0, 1); moved outward
                               ///< where least squares leaves it, which the message says
   double bias = 0.2;          ///< prior box of the gyro's bias: ± this, rad/s
 };
 
-/// Log → rows of OdometryFilter → least squares, feasible set, validation, as commission() does it for the torque.
-/// `measurement` (nothing: absent) is what find_odometry says, `survey` is that of the log.
+/// Log → rows of OdometryFilter → least squares, feasible set, validation, as commission_robot() does it for the
+/// torque. `measurement` (nothing: absent) is what find_odometry says, `survey` is that of the log.
 ///
 /// Noise: where position and heading (the latter suffices for the output yaw) and the motion (noise_budget.hpp) are
 /// declared, bounds are the sensors', derived as OdometryFilter states, with the largest acceleration that the log
@@ -79,9 +79,8 @@ struct KinematicCommissionOptions {
 /// nothing explains the log within the declared noise (wheels slip a little in every turn, the pose's point is off the
 /// axle, its clock is late), all outputs fall back to the extrapolated bound, and the message says so. Throws
 /// InvalidArgument for options out of range.
-[[nodiscard]] KinematicCommissioning commission_kinematics(LogSource& log, const Robot& robot,
-                                                           const std::optional<OdometryMeasurement>& measurement,
-                                                           const Survey& survey,
-                                                           const KinematicCommissionOptions& options = {});
+[[nodiscard]] KinematicCommissioning commission_kinematics(
+    LogSource& log, const Robot& robot, const std::optional<filter::OdometryMeasurement>& measurement,
+    const Survey& survey, const KinematicCommissionOptions& options = {});
 
-}  // namespace wheelwright
+}  // namespace wheelwright::commission

@@ -10,11 +10,15 @@
 #include <wheelwright/core/for_all.hpp>
 #include <wheelwright/detector/odometry_faults.hpp>
 
-namespace wheelwright {
+namespace wheelwright::commission {
+
+using detector::FaultType;
+
 namespace {
 
-constexpr std::array kKinds = {ManoeuvreKind::standstill, ManoeuvreKind::cruising, ManoeuvreKind::accelerating,
-                               ManoeuvreKind::turning, ManoeuvreKind::spinning};
+constexpr std::array kKinds = {detector::ManoeuvreKind::standstill, detector::ManoeuvreKind::cruising,
+                               detector::ManoeuvreKind::accelerating, detector::ManoeuvreKind::turning,
+                               detector::ManoeuvreKind::spinning};
 
 std::vector<FaultType> chosen(const std::vector<FaultType>& catalogue, const std::vector<std::string>& names) {
   if (names.empty()) {
@@ -22,7 +26,7 @@ std::vector<FaultType> chosen(const std::vector<FaultType>& catalogue, const std
   }
   std::vector<FaultType> faults;
   for (const std::string& name : names) {
-    faults.push_back(find_fault(catalogue, name));
+    faults.push_back(detector::find_fault(catalogue, name));
   }
   return faults;
 }
@@ -39,8 +43,8 @@ std::vector<double> axis(double largest, std::size_t points) {
 }
 
 // Largest acceleration of each coordinate over tenths of a second: single differences would show the encoder.
-Eigen::VectorXd largest_accelerations(const ReferenceMotion& motion) {
-  const double step = median_step(motion.instant);
+Eigen::VectorXd largest_accelerations(const detector::ReferenceMotion& motion) {
+  const double step = core::median_step(motion.instant);
   const auto gap = std::max<Eigen::Index>(1, static_cast<Eigen::Index>(std::lround(0.1 / step)));
   Eigen::VectorXd largest = Eigen::VectorXd::Zero(motion.speed.rows());
   for (Eigen::Index k = gap; k < motion.speed.cols(); ++k) {
@@ -56,9 +60,9 @@ Eigen::VectorXd largest_accelerations(const ReferenceMotion& motion) {
   return largest;
 }
 
-std::vector<FaultMaps> maps_of(const std::vector<FaultMargins>& margins, const ReferenceMotion& motion,
-                               const OnlineModel& model, const ThresholdRule& rule,
-                               const MarginSurveyOptions& options) {
+std::vector<FaultMaps> maps_of(const std::vector<detector::FaultMargins>& margins,
+                               const detector::ReferenceMotion& motion, const OnlineModel& model,
+                               const detector::ThresholdRule& rule, const MarginSurveyOptions& options) {
   std::vector<FaultMaps> maps(options.map_points > 1 ? margins.size() : 0);
   const Eigen::VectorXd speed = motion.speed.cwiseAbs().rowwise().maxCoeff();
   const Eigen::VectorXd acceleration = largest_accelerations(motion);
@@ -67,10 +71,10 @@ std::vector<FaultMaps> maps_of(const std::vector<FaultMargins>& margins, const R
   const auto values = [&](const Eigen::VectorXd& most, Eigen::Index c) {
     return c > 0 && !plane ? std::vector<double>{0.0} : axis(std::max(most[c], 1e-6), options.map_points);
   };
-  for_all(maps.size(), options.margins.threads, [&](std::size_t i) {
-    const FaultMargins& each = margins[i];
-    const auto map = [&](const OperatingPlane& on) {
-      return operating_map(each.fault, each.side, model.model, model.filter, model.errors, rule, on);
+  core::for_all(maps.size(), options.margins.threads, [&](std::size_t i) {
+    const detector::FaultMargins& each = margins[i];
+    const auto map = [&](const detector::OperatingPlane& on) {
+      return detector::operating_map(each.fault, each.side, model.model, model.filter, model.errors, rule, on);
     };
     maps[i] = {each.fault.name, each.side, map({false, values(speed, 0), values(speed, 1)}),
                map({true, values(acceleration, 0), values(acceleration, 1), typical})};
@@ -82,17 +86,17 @@ std::vector<FaultMaps> maps_of(const std::vector<FaultMargins>& margins, const R
 
 MarginSurvey survey_margins(LogSource& log, const OnlineModel& model, const MarginSurveyOptions& options) {
   MarginSurvey survey;
-  MarginOptions margins = options.margins;
+  detector::MarginOptions margins = options.margins;
   margins.persistence = options.persistence.value_or(model.persistence);
   survey.windows = margins.windows;
   survey.persistence = margins.persistence;
   survey.noise_share = margins.noise_share;
   survey.assumptions = model.assumptions;
   const std::vector<FaultType> faults =
-      chosen(fault_catalogue(model.model, model.estimate, model.robot.effort), options.faults);
+      chosen(detector::fault_catalogue(model.model, model.estimate, model.robot.effort), options.faults);
 
-  const ReferenceMotion motion =
-      read_reference(log, RegressorFilter(model.model, model.filter, model.measurement, model.errors));
+  const detector::ReferenceMotion motion =
+      detector::read_reference(log, RegressorFilter(model.model, model.filter, model.measurement, model.errors));
   check::that(std::find(motion.settled.begin(), motion.settled.end(), true) != motion.settled.end(), "log",
               "a stretch that is long enough for the filter to settle");
   for (std::size_t k = 1; k < motion.instants(); ++k) {
@@ -106,16 +110,18 @@ MarginSurvey survey_margins(LogSource& log, const OnlineModel& model, const Marg
                          .blind = {},
                          .maps = {},
                          .warrant = model.warrant};
-  const ThresholdRule rule(Polytope(model.facets, model.box), model.estimate, options.set);
-  torque.margins = margins_along(
+  const detector::ThresholdRule rule(Polytope(model.facets, model.box), model.estimate, options.set);
+  torque.margins = detector::margins_along(
       motion, faults, rule,
-      [&](const FaultType& fault) { return std::make_unique<FaultFilter>(fault, model.model, model.filter, motion); },
+      [&](const FaultType& fault) {
+        return std::make_unique<detector::FaultFilter>(fault, model.model, model.filter, motion);
+      },
       margins);
   torque.maps = maps_of(torque.margins, motion, model, rule, options);
-  for (const ManoeuvreKind kind : kKinds) {
+  for (const detector::ManoeuvreKind kind : kKinds) {
     const auto& onsets = torque.margins.front().onsets;
-    const auto count =
-        std::count_if(onsets.begin(), onsets.end(), [&](const OnsetMargin& onset) { return onset.kind == kind; });
+    const auto count = std::count_if(onsets.begin(), onsets.end(),
+                                     [&](const detector::OnsetMargin& onset) { return onset.kind == kind; });
     if (count > 0) {
       survey.manoeuvres.emplace_back(kind, static_cast<std::size_t>(count));
     }
@@ -128,7 +134,7 @@ MarginSurvey survey_margins(LogSource& log, const OnlineModel& model, const Marg
                                    : "the log that was commissioned with had neither a pose nor a gyro";
     return survey;
   }
-  const KinematicModel& k = *model.kinematic;
+  const detector::KinematicModel& k = *model.kinematic;
   for (const std::string& column : k.measurement.columns()) {
     if (!log.find(column)) {
       survey.without_kinematic = "the log has no column '" + column + "'";
@@ -149,7 +155,8 @@ MarginSurvey survey_margins(LogSource& log, const OnlineModel& model, const Marg
       kinematic.blind.push_back(fault.name);
     }
   }
-  const OdometryReference seen = read_odometry(log, OdometryFilter(k.measurement, k.window, k.errors), model.model);
+  const detector::OdometryReference seen =
+      detector::read_odometry(log, filter::OdometryFilter(k.measurement, k.window, k.errors), model.model);
   const bool settled =
       std::find(seen.motion.settled.begin(), seen.motion.settled.end(), true) != seen.motion.settled.end();
   if (!settled) {
@@ -157,14 +164,14 @@ MarginSurvey survey_margins(LogSource& log, const OnlineModel& model, const Marg
     return survey;
   }
   margins.persistence = options.persistence.value_or(k.persistence);
-  kinematic.margins = margins_along(
-      seen.motion, visible, ThresholdRule(Polytope(k.facets, k.box), k.estimate, options.set),
+  kinematic.margins = detector::margins_along(
+      seen.motion, visible, detector::ThresholdRule(Polytope(k.facets, k.box), k.estimate, options.set),
       [&](const FaultType& fault) {
-        return std::make_unique<OdometryFaultRows>(fault, model.model, k.measurement, seen, k.box);
+        return std::make_unique<detector::OdometryFaultRows>(fault, model.model, k.measurement, seen, k.box);
       },
       margins);
   survey.residuals.push_back(std::move(kinematic));
   return survey;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::commission

@@ -13,13 +13,13 @@
 #include <wheelwright/core/log.hpp>
 #include <wheelwright/detector/margins.hpp>
 
-namespace wheelwright {
+namespace wheelwright::commission {
 
 /// Options of survey_margins().
 struct MarginSurveyOptions {
-  MarginOptions margins;  ///< persistence is the model's where `persistence` below is not given
-  std::optional<Persistence> persistence{};
-  ParameterSetKind set = ParameterSetKind::polytope;
+  detector::MarginOptions margins;  ///< persistence is the model's where `persistence` below is not given
+  std::optional<detector::Persistence> persistence{};
+  detector::ParameterSetKind set = detector::ParameterSetKind::polytope;
   std::vector<std::string> faults{};  ///< names; empty: the whole catalogue
   std::size_t map_points = 15;        ///< on each axis of the maps; 0: none
 };
@@ -28,30 +28,30 @@ struct MarginSurveyOptions {
 struct FaultMaps {
   std::string fault;
   double side = 1.0;
-  OperatingMap speeds;         ///< at no acceleration
-  OperatingMap accelerations;  ///< at the drive's typical speeds (root mean square)
+  detector::OperatingMap speeds;         ///< at no acceleration
+  detector::OperatingMap accelerations;  ///< at the drive's typical speeds (root mean square)
 };
 
 /// Margins in one residual.
 struct ResidualMargins {
-  std::string name;                         ///< "torque" or "kinematic"
-  std::vector<std::string> outputs;         ///< channels
-  std::vector<FaultMargins> margins;        ///< of the faults that this residual can see at all
-  std::vector<std::string> blind;           ///< faults that leave no trace in it, whatever their size
-  std::vector<FaultMaps> maps;              ///< torque only
-  Warrant warrant = Warrant::extrapolated;  ///< of the thresholds: in which sense a size is certain
+  std::string name;                                     ///< "torque" or "kinematic"
+  std::vector<std::string> outputs;                     ///< channels
+  std::vector<detector::FaultMargins> margins;          ///< of the faults that this residual can see at all
+  std::vector<std::string> blind;                       ///< faults that leave no trace in it, whatever their size
+  std::vector<FaultMaps> maps;                          ///< torque only
+  core::Warrant warrant = core::Warrant::extrapolated;  ///< of the thresholds: in which sense a size is certain
 };
 
 /// Everything that `wheelwright margins` says.
 struct MarginSurvey {
   std::vector<double> windows;  ///< s
-  Persistence persistence;
+  detector::Persistence persistence;
   double noise_share = 0.0;
-  double seconds = 0.0;                                           ///< of driving
-  std::vector<std::pair<ManoeuvreKind, std::size_t>> manoeuvres;  ///< onsets of each kind in the drive
-  std::vector<ResidualMargins> residuals;                         ///< torque; kinematic where model and log have it
-  std::vector<Assumption> assumptions;                            ///< of the model
-  std::string without_kinematic;  ///< why there is no kinematic residual; empty where there is one
+  double seconds = 0.0;                                                     ///< of driving
+  std::vector<std::pair<detector::ManoeuvreKind, std::size_t>> manoeuvres;  ///< onsets of each kind in the drive
+  std::vector<ResidualMargins> residuals;     ///< torque; kinematic where model and log have it
+  std::vector<core::Assumption> assumptions;  ///< of the model
+  std::string without_kinematic;              ///< why there is no kinematic residual; empty where there is one
 };
 
 /// Walks `log`, a drive whose motion is taken as a reference, and asks of every fault of the catalogue what is certain
@@ -60,4 +60,4 @@ struct MarginSurvey {
 [[nodiscard]] MarginSurvey survey_margins(LogSource& log, const OnlineModel& model,
                                           const MarginSurveyOptions& options = {});
 
-}  // namespace wheelwright
+}  // namespace wheelwright::commission

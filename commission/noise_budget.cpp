@@ -6,24 +6,24 @@
 #include <limits>
 #include <numbers>
 
-namespace wheelwright {
+namespace wheelwright::commission {
 
-OutputNoise estimated_noise(const OutputResidual& residual, std::size_t instants, double plausible,
-                            const ExtrapolationOptions& options) {
+OutputNoise estimated_noise(const identify::OutputResidual& residual, std::size_t instants, double plausible,
+                            const identify::ExtrapolationOptions& options) {
   OutputNoise noise;
-  noise.how = extrapolate(residual, instants, options);
+  noise.how = identify::extrapolate(residual, instants, options);
   noise.learning = plausible;
   noise.bound = std::max(noise.how.bound, plausible);
   return noise;
 }
 
-double raise_until_explained(std::vector<OutputNoise>& noise, RegressionSource& rows, const Box& prior,
+double raise_until_explained(std::vector<OutputNoise>& noise, core::RegressionSource& rows, const Box& prior,
                              const std::function<bool(const std::vector<OutputNoise>&)>& explained) {
-  MinimaxOptions options;
+  bounds::MinimaxOptions options;
   for (const OutputNoise& o : noise) {
     options.weights.push_back(std::max(o.learning, std::numeric_limits<double>::min()));
   }
-  const double factor = noise_that_leaves_a_set(minimax_fit(rows, prior, options), [&](double by) {
+  const double factor = noise_that_leaves_a_set(bounds::minimax_fit(rows, prior, options), [&](double by) {
     std::vector<OutputNoise> more = noise;
     for (OutputNoise& o : more) {
       o.learning *= by;
@@ -37,7 +37,7 @@ double raise_until_explained(std::vector<OutputNoise>& noise, RegressionSource& 
   return factor;
 }
 
-double noise_that_leaves_a_set(const MinimaxFit& fit, const std::function<bool(double)>& leaves_a_set) {
+double noise_that_leaves_a_set(const bounds::MinimaxFit& fit, const std::function<bool(double)>& leaves_a_set) {
   constexpr double kAbove = 1.05;
   double lower = std::max(1.0, fit.lower), upper = fit.upper;
   while (!fit.converged && upper > kAbove * lower) {
@@ -48,7 +48,7 @@ double noise_that_leaves_a_set(const MinimaxFit& fit, const std::function<bool(d
 }
 
 std::optional<double> motion_error(const Robot& robot, const Measurement& measurement) {
-  const bool axis = !on_two_wheels(robot);
+  const bool axis = !model::on_two_wheels(robot);
   switch (measurement.motion) {
     case MotionKind::mean_speed:
       if (measurement.count > 0.0) {
@@ -56,7 +56,7 @@ std::optional<double> motion_error(const Robot& robot, const Measurement& measur
       }
       break;
     case MotionKind::angle: {
-      const NoiseBound& declared = axis ? robot.noise.position : robot.noise.wheel_angle;
+      const model::NoiseBound& declared = axis ? robot.noise.position : robot.noise.wheel_angle;
       if (declared.value) {
         return declared.value;
       }
@@ -90,4 +90,4 @@ Eigen::VectorXd coordinate_limit(const Model& model, const std::vector<double>& 
          Eigen::Map<const Eigen::VectorXd>(joint_limit.data(), static_cast<Eigen::Index>(joint_limit.size()));
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::commission

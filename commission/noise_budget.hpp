@@ -20,16 +20,16 @@
 #include <wheelwright/model/model.hpp>
 #include <wheelwright/model/robot.hpp>
 
-namespace wheelwright {
+namespace wheelwright::commission {
 
 /// The bound on what y − Yθ (for the torque residual τ_f − Y_f θ) can be without a fault, in one output.
 struct OutputNoise {
-  NoiseOrigin origin = NoiseOrigin::estimated;
+  core::NoiseOrigin origin = core::NoiseOrigin::estimated;
   double bound = 0.0;     ///< for driving to come: n̄ with ē, what a detector's rows have as dy
   double learning = 0.0;  ///< for the rows of this log, from which the feasible set is made; what was seen needs
                           ///< no extrapolation, so it is the smaller of the two
-  ExtrapolatedBound how;  ///< how `bound` came about, meaningful where estimated
-  Warrant warrant = Warrant::extrapolated;  ///< of both bounds
+  identify::ExtrapolatedBound how;                      ///< how `bound` came about, meaningful where estimated
+  core::Warrant warrant = core::Warrant::extrapolated;  ///< of both bounds
 };
 
 /// Use of rows: those of the log that bounds are learnt from, or those of later driving.
@@ -37,23 +37,24 @@ enum class RowUse { learning, driving };
 
 /// The bound of an output that is estimated: `how` from what its residual was, never below `plausible`, the largest
 /// error that the rows of the log can hold.
-[[nodiscard]] OutputNoise estimated_noise(const OutputResidual& residual, std::size_t instants, double plausible,
-                                          const ExtrapolationOptions& options);
+[[nodiscard]] OutputNoise estimated_noise(const identify::OutputResidual& residual, std::size_t instants,
+                                          double plausible, const identify::ExtrapolationOptions& options);
 
 /// Raises estimated bounds that leave no set in `prior`, to just above the minimax fit of `rows` (which have none of
 /// them), and returns the factor. Where that fit did not converge the factor is bisected between what it proved, by
 /// `explained`: whether bounds leave a set.
-double raise_until_explained(std::vector<OutputNoise>& noise, RegressionSource& rows, const Box& prior,
+double raise_until_explained(std::vector<OutputNoise>& noise, core::RegressionSource& rows, const Box& prior,
                              const std::function<bool(const std::vector<OutputNoise>&)>& explained);
 
 /// The factor by which estimated bounds must grow for a set to be left, and a little more. `fit`, in units of the
 /// bounds, tells it where it converged; else it is bisected between what `fit` proved, by `leaves_a_set`.
-[[nodiscard]] double noise_that_leaves_a_set(const MinimaxFit& fit, const std::function<bool(double)>& leaves_a_set);
+[[nodiscard]] double noise_that_leaves_a_set(const bounds::MinimaxFit& fit,
+                                             const std::function<bool(double)>& leaves_a_set);
 
 /// The declared part of the noise.
 struct NoiseBudget {
-  bool complete = false;  ///< motion and effort are both declared: the rows' bounds need no estimate
-  SensorErrors sensors;   ///< all zero unless complete
+  bool complete = false;         ///< motion and effort are both declared: the rows' bounds need no estimate
+  filter::SensorErrors sensors;  ///< all zero unless complete
 };
 
 /// For complete declarations: half a count for count-differenced speeds and encoder angles, else the declared bound of
@@ -69,4 +70,4 @@ struct NoiseBudget {
 /// speeds, rad/s for speeds.
 [[nodiscard]] std::optional<double> motion_error(const Robot& robot, const Measurement& measurement);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::commission

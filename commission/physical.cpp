@@ -6,18 +6,18 @@
 #include <wheelwright/core/words.hpp>
 #include <wheelwright/identify/least_squares.hpp>
 
-namespace wheelwright {
+namespace wheelwright::commission {
 namespace {
 
 constexpr double kWorthwhile = 0.9;
 
 }  // namespace
 
-ParameterChoice choose_parameters(RegressionSource& rows, std::size_t basic, std::size_t log_rows,
+ParameterChoice choose_parameters(core::RegressionSource& rows, std::size_t basic, std::size_t log_rows,
                                   const FoldOptions& folds) {
   FoldedSource training(rows, Part::training, log_rows, folds);
   FoldedSource held_out(rows, Part::held_out, log_rows, folds);
-  LeastSquares fit(rows.parameters());
+  identify::LeastSquares fit(rows.parameters());
   RegressionBlock block;
   training.rewind();
   while (training.next(block)) {
@@ -48,10 +48,10 @@ ParameterChoice choose_parameters(RegressionSource& rows, std::size_t basic, std
 namespace {
 
 std::string in_effort_unit(const Robot& robot, const std::string& unit) {
-  if (robot.effort == EffortKind::torque) {
+  if (robot.effort == model::EffortKind::torque) {
     return unit;
   }
-  const std::string effort = robot.effort == EffortKind::current ? "A" : "V";
+  const std::string effort = robot.effort == model::EffortKind::current ? "A" : "V";
   if (unit == "N·m") {
     return effort;
   }
@@ -64,23 +64,23 @@ std::string in_effort_unit(const Robot& robot, const std::string& unit) {
 }  // namespace
 
 std::optional<std::vector<PhysicalScale>> physical_scales(const Robot& robot, const Model& model) {
-  const bool torque = robot.effort == EffortKind::torque;
-  const bool voltage = robot.effort == EffortKind::voltage;
+  const bool torque = robot.effort == model::EffortKind::torque;
+  const bool voltage = robot.effort == model::EffortKind::voltage;
   const bool known =
       robot.motor && robot.motor->torque_constant && (!voltage || (robot.motor->resistance && robot.motor->back_emf));
   if (!torque && !known) {
     return std::nullopt;
   }
   std::vector<PhysicalScale> scales;
-  for (const Parameter& parameter : model.parameters) {
+  for (const model::Parameter& parameter : model.parameters) {
     PhysicalScale scale{1.0 / parameter.per_physical, 0.0};
     if (voltage && parameter.physical.starts_with("viscous")) {
-      const Motor& motor = *robot.motor;
+      const model::Motor& motor = *robot.motor;
       const double braking =
           *motor.torque_constant * *motor.back_emf * motor.gear_ratio * motor.gear_ratio / *motor.resistance;
       const double r = robot.wheel_radius;
       const double arm = robot.lever_arm_is_track ? robot.track_width : 0.5 * robot.track_width;
-      if (!on_two_wheels(robot)) {
+      if (!model::on_two_wheels(robot)) {
         scale.offset = braking;
       } else if (parameter.physical == "viscous_yaw") {
         scale.offset = braking * arm * robot.track_width / (r * r);
@@ -93,11 +93,11 @@ std::optional<std::vector<PhysicalScale>> physical_scales(const Robot& robot, co
   return scales;
 }
 
-std::string parameter_unit(const Robot& robot, const Parameter& parameter) {
-  if (robot.effort == EffortKind::torque) {
+std::string parameter_unit(const Robot& robot, const model::Parameter& parameter) {
+  if (robot.effort == model::EffortKind::torque) {
     return parameter.unit;
   }
-  const std::string effort = robot.effort == EffortKind::current ? "A" : "V";
+  const std::string effort = robot.effort == model::EffortKind::current ? "A" : "V";
   std::string unit = parameter.unit;
   if (parameter.name == "r_mass") {
     return effort + "·s²/m";
@@ -111,8 +111,8 @@ std::string parameter_unit(const Robot& robot, const Parameter& parameter) {
   if (parameter.name.starts_with("r_viscous")) {
     return effort + "·s/m";
   }
-  replace_all(unit, "N·m", effort);
-  replace_all(unit, "N", effort);
+  core::replace_all(unit, "N·m", effort);
+  core::replace_all(unit, "N", effort);
   return unit;
 }
 
@@ -121,4 +121,4 @@ std::string output_unit(const Robot& robot, const std::string& unit) {
   return known.empty() ? unit + " (of effort)" : known;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::commission

@@ -12,7 +12,7 @@
 #include <wheelwright/core/regression.hpp>
 #include <wheelwright/model/robot.hpp>
 
-namespace wheelwright {
+namespace wheelwright::commission {
 
 /// Root mean square errors on held-out blocks, relative to the torque, of the first `basic` parameters alone and of
 /// all.
@@ -23,7 +23,7 @@ struct ParameterChoice {
 };
 
 /// Fits both on the training blocks of `rows` and compares them on the held-out ones; two walks.
-[[nodiscard]] ParameterChoice choose_parameters(RegressionSource& rows, std::size_t basic, std::size_t log_rows,
+[[nodiscard]] ParameterChoice choose_parameters(core::RegressionSource& rows, std::size_t basic, std::size_t log_rows,
                                                 const FoldOptions& folds);
 
 /// physical = scale · θ_L,j − offset.
@@ -38,9 +38,9 @@ struct PhysicalScale {
 [[nodiscard]] std::optional<std::vector<PhysicalScale>> physical_scales(const Robot& robot, const Model& model);
 
 /// Unit of θ_L,j with the effort that was used in place of N·m (or N).
-[[nodiscard]] std::string parameter_unit(const Robot& robot, const Parameter& parameter);
+[[nodiscard]] std::string parameter_unit(const Robot& robot, const model::Parameter& parameter);
 
 /// Unit of an output with the effort that was used in place of N·m (or N).
 [[nodiscard]] std::string output_unit(const Robot& robot, const std::string& unit);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::commission

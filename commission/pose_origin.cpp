@@ -13,7 +13,7 @@
 
 #include <wheelwright/core/linear_algebra.hpp>
 
-namespace wheelwright {
+namespace wheelwright::commission {
 namespace {
 
 constexpr std::size_t kFewestPoseWindows = 8;
@@ -71,7 +71,7 @@ class Combination {
     if (rows_.size() < kFewestPoseWindows || std::sqrt(square_ / n) < kLeastChange) {
       return std::nullopt;
     }
-    const Eigen::Vector2d c = minimum_norm_solution(gram_, moment_);
+    const Eigen::Vector2d c = core::minimum_norm_solution(gram_, moment_);
     double sum = 0.0;
     for (const auto& [right, left, value] : rows_) {
       const double e = value - c[0] * right - c[1] * left;
@@ -95,7 +95,7 @@ using Turned = std::array<std::array<double, 2>, 3>;
 
 }  // namespace
 
-PoseOrigin pose_origin(LogSource& log, const OdometryMeasurement& m, double window, double counts_per_turn) {
+PoseOrigin pose_origin(LogSource& log, const filter::OdometryMeasurement& m, double window, double counts_per_turn) {
   PoseOrigin origin;
   if (!m.heading || m.held_pose) {
     return origin;
@@ -114,7 +114,7 @@ PoseOrigin pose_origin(LogSource& log, const OdometryMeasurement& m, double wind
     heading = way = 0.0;
     turned = {};
   };
-  for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
+  core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
     const double t = block.t[k];
     const std::array<double, 2> now = {block.columns[wheel[0]][k], block.columns[wheel[1]][k]};
     const double theta_now = block.columns[theta][k], x_now = block.columns[x][k], y_now = block.columns[y][k];
@@ -190,4 +190,4 @@ PoseOrigin pose_origin(LogSource& log, const OdometryMeasurement& m, double wind
   return origin;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::commission

@@ -8,7 +8,7 @@
 #include <wheelwright/core/log.hpp>
 #include <wheelwright/filter/odometry_filter.hpp>
 
-namespace wheelwright {
+namespace wheelwright::commission {
 
 /// Agreement of the pose of a log with the wheel angles.
 struct PoseOrigin {
@@ -28,7 +28,7 @@ struct PoseOrigin {
 /// third of what the wheels' own counts (where they are known: half a count each) would leave of an independent
 /// heading. A way repeats them below 10⁻⁵ m. Nothing is claimed of fewer than eight windows, or of a robot that hardly
 /// turns (drives). Walks `log` once.
-[[nodiscard]] PoseOrigin pose_origin(LogSource& log, const OdometryMeasurement& measurement, double window,
+[[nodiscard]] PoseOrigin pose_origin(LogSource& log, const filter::OdometryMeasurement& measurement, double window,
                                      double counts_per_turn = 0.0);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::commission

@@ -13,7 +13,7 @@
 #include <wheelwright/identify/noise_level.hpp>
 #include <wheelwright/model/effect_law.hpp>
 
-namespace wheelwright {
+namespace wheelwright::commission {
 namespace {
 
 constexpr std::size_t kFewestLearned = 50;
@@ -28,8 +28,8 @@ void tell(const SettingOptions& options, std::string_view stage, double share) {
 Setting widened(const Setting& s) {
   Setting wide = s;
   if (!s.robot.parameters) {
-    wide.robot.parameters = possible_parameters(s.robot);
-    wide.model = make_model(wide.robot);
+    wide.robot.parameters = model::possible_parameters(s.robot);
+    wide.model = model::make_model(wide.robot);
   }
   return wide;
 }
@@ -62,9 +62,10 @@ std::optional<MotionNoise> find_motion_noise(LogSource& log, const Setting& s) {
   if (s.measurement.motion != MotionKind::mean_speed) {
     double squares = 0.0, relative = 0.0;
     bool white = true;
-    const auto noises = difference_noise(log, s.measurement.motion_columns);
-    for (const DifferenceNoise& noise : noises) {
-      white = white && (noise.kind == DifferenceNoise::Kind::white || noise.kind == DifferenceNoise::Kind::none);
+    const auto noises = identify::difference_noise(log, s.measurement.motion_columns);
+    for (const identify::DifferenceNoise& noise : noises) {
+      white = white && (noise.kind == identify::DifferenceNoise::Kind::white ||
+                        noise.kind == identify::DifferenceNoise::Kind::none);
       squares += noise.sd * noise.sd / static_cast<double>(noises.size());
       relative = std::max(relative, std::hypot(noise.relative_sd, noise.hidden));
     }
@@ -83,9 +84,9 @@ std::optional<MotionNoise> find_motion_noise(LogSource& log, const Setting& s) {
 
 // What a simulator can have, but a log cannot be corrected for.
 void refuse_simulated(const Robot& robot) {
-  for (const RobotEffect& effect : robot.effects) {
-    const EffectLaw& law = effect_law(effect.name);
-    if (law.mechanism == EffectMechanism::simulation) {
+  for (const model::RobotEffect& effect : robot.effects) {
+    const model::EffectLaw& law = model::effect_law(effect.name);
+    if (law.mechanism == model::EffectMechanism::simulation) {
       throw InvalidArgument(fmt::format("effects.{} is for `simulate` only: from a log {}", effect.name, law.remedy));
     }
   }
@@ -93,7 +94,7 @@ void refuse_simulated(const Robot& robot) {
 
 }  // namespace
 
-TorqueRows make_rows(LogSource& log, const Setting& s, const SignalErrors& errors) {
+TorqueRows make_rows(LogSource& log, const Setting& s, const filter::SignalErrors& errors) {
   return TorqueRows(log, RegressorFilter(s.model, s.filter, s.measurement, errors));
 }
 
@@ -101,9 +102,9 @@ Setting settle(LogSource& log, const Robot& robot, const SettingOptions& options
   refuse_simulated(robot);
   Setting s;
   s.robot = robot;
-  s.model = make_model(robot);
+  s.model = model::make_model(robot);
   const int order = robot.filter.order.value_or(2);
-  s.measurement = find_measurement(log, robot, s.model, order);
+  s.measurement = filter::find_measurement(log, robot, s.model, order);
   tell(options, "looking at the log", 0.05);
   s.survey = survey(log, s.measurement);
   check::that(s.survey.rows >= kFewestLearned, "log",
@@ -119,19 +120,19 @@ Setting settle(LogSource& log, const Robot& robot, const SettingOptions& options
       s.filter.alpha = *robot.filter.alpha;
     }
   }
-  validate(s.filter);
+  filter::validate(s.filter);
   s.folds = options.folds;
   // As long as the filter remembers, but never the better part of a block.
   const double block = s.survey.seconds / static_cast<double>(s.folds.blocks);
   s.folds.purge = std::min(0.5 * s.filter.settle / s.filter.beta, 0.3 * block);
   settle_parameters(log, s);
 
-  const PriorBox prior = prior_box(s.robot, s.model);
+  const model::PriorBox prior = model::prior_box(s.robot, s.model);
   s.prior.sides = prior.bounds;
   s.prior_declared = prior.declared;
   s.motion_noise = find_motion_noise(log, s);
-  if (const auto commands = commanded_motion(log, s.model)) {
-    s.commands_are_noisy = share_noise(log, commands->columns, s.measurement.motion_columns);
+  if (const auto commands = identify::commanded_motion(log, s.model)) {
+    s.commands_are_noisy = identify::share_noise(log, commands->columns, s.measurement.motion_columns);
     if (s.commands_are_noisy) {
       s.notes.push_back(
           "the commanded speeds carry the noise of the measured motion (they were made from it): they are not used as "
@@ -141,24 +142,24 @@ Setting settle(LogSource& log, const Robot& robot, const SettingOptions& options
   const NoiseBudget budget = noise_budget(s.robot, s.measurement);
   s.noise_complete = budget.complete;
   if (budget.complete) {
-    s.declared = propagate(s.model, s.filter, s.measurement, budget.sensors,
-                           {.mode = options.noise_mode,
-                            .confidence = options.confidence,
-                            .rows = static_cast<double>(s.survey.rows),
-                            .largest_step = s.survey.largest_step});
+    s.declared = filter::propagate(s.model, s.filter, s.measurement, budget.sensors,
+                                   {.mode = options.noise_mode,
+                                    .confidence = options.confidence,
+                                    .rows = static_cast<double>(s.survey.rows),
+                                    .largest_step = s.survey.largest_step});
     s.declared.motion.limit =
         coordinate_limit(s.model, acceleration_limit(s.robot, s.survey, s.measurement.motion, budget.sensors.motion));
   }
   return s;
 }
 
-std::optional<RowNoise> row_noise(const Setting& s) {
+std::optional<identify::RowNoise> row_noise(const Setting& s) {
   if (!s.motion_noise) {
     return std::nullopt;
   }
   const double variance = s.motion_noise->sd * s.motion_noise->sd;
-  const NoiseGram gram = noise_gram(s.model, s.filter, s.measurement, s.survey.median_step);
-  RowNoise noise;
+  const filter::NoiseGram gram = filter::noise_gram(s.model, s.filter, s.measurement, s.survey.median_step);
+  identify::RowNoise noise;
   noise.relative_sd = s.motion_noise->relative_sd;
   for (const Eigen::MatrixXd& motion : gram.motion) {
     noise.YY.push_back(variance * motion);
@@ -169,4 +170,4 @@ std::optional<RowNoise> row_noise(const Setting& s) {
   return noise;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::commission

@@ -21,7 +21,7 @@
 #include <wheelwright/identify/estimate.hpp>
 #include <wheelwright/model/robot.hpp>
 
-namespace wheelwright {
+namespace wheelwright::commission {
 
 /// Noise of the motion column, independent from sample to sample, the same in all joints.
 struct MotionNoise {
@@ -40,8 +40,8 @@ struct Setting {
   FilterDesign filter;
   FilterChoice filter_choice;  ///< the curve is empty where the filter was given
   Survey survey;
-  SignalErrors declared;        ///< of the rows, from declared noise only; all zero where that is incomplete
-  bool noise_complete = false;  ///< motion and effort are declared
+  filter::SignalErrors declared;  ///< of the rows, from declared noise only; all zero where that is incomplete
+  bool noise_complete = false;    ///< motion and effort are declared
   std::optional<MotionNoise> motion_noise;  ///< found by differences; else a limit, declared or from the encoder
   bool commands_are_noisy = false;          ///< logged commands share the noise of the motion: they are no instruments
   Box prior;
@@ -54,7 +54,7 @@ struct Setting {
 struct SettingOptions {
   FilterChoiceOptions filter_choice;
   FoldOptions folds;
-  NoiseMode noise_mode = NoiseMode::worst_case;                        ///< for declared noise
+  filter::NoiseMode noise_mode = filter::NoiseMode::worst_case;        ///< for declared noise
   double confidence = 0.999;                                           ///< statistical noise mode
   std::function<void(std::string_view stage, double share)> progress;  ///< may be empty
 };
@@ -64,11 +64,11 @@ struct SettingOptions {
 [[nodiscard]] Setting settle(LogSource& log, const Robot& robot, const SettingOptions& options = {});
 
 /// The rows of `log` in this setting, with the error bounds `errors`.
-[[nodiscard]] TorqueRows make_rows(LogSource& log, const Setting& setting, const SignalErrors& errors = {});
+[[nodiscard]] TorqueRows make_rows(LogSource& log, const Setting& setting, const filter::SignalErrors& errors = {});
 
 /// Contribution of the noise of the motion (at its limit, where only that is known) to the rows' moments
 /// (estimate.hpp), and the efforts' variance for total least squares where their noise is declared; nothing where it is
 /// not known at all.
-[[nodiscard]] std::optional<RowNoise> row_noise(const Setting& setting);
+[[nodiscard]] std::optional<identify::RowNoise> row_noise(const Setting& setting);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::commission

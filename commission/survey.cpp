@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 
-namespace wheelwright {
+namespace wheelwright::commission {
 namespace {
 
 // The last two windows of one joint.
@@ -81,7 +81,7 @@ Survey survey(LogSource& log, const Measurement& measurement) {
   s.largest_acceleration.assign(joints, 0.0);
   s.sharpest_change.assign(joints, 0.0);
   s.reversals.assign(joints, 0.0);
-  const std::vector<std::size_t> pick = positions_of(log, measurement.motion_columns);
+  const std::vector<std::size_t> pick = core::positions_of(log, measurement.motion_columns);
   std::vector<JointWatch> watch(joints);
   const bool is_angle = measurement.motion == MotionKind::angle;
   double segment_start = 0.0;
@@ -91,7 +91,7 @@ Survey survey(LogSource& log, const Measurement& measurement) {
     s.seconds += length;
     s.longest_segment = std::max(s.longest_segment, length);
   };
-  for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
+  core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
     ++s.rows;
     const double t = block.t[k];
     if (starts) {
@@ -134,4 +134,4 @@ std::vector<double> acceleration_limit(const Robot& robot, const Survey& survey,
   return limit;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::commission

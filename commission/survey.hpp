@@ -10,7 +10,7 @@
 #include <wheelwright/filter/measurement.hpp>
 #include <wheelwright/model/robot.hpp>
 
-namespace wheelwright {
+namespace wheelwright::commission {
 
 /// Properties of a log.
 struct Survey {
@@ -43,4 +43,4 @@ inline constexpr std::size_t kSurveyWindow = 10;
 /// Of acceleration_limit().
 inline constexpr double kBeyondSamples = 4.0;
 
-}  // namespace wheelwright
+}  // namespace wheelwright::commission

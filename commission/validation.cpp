@@ -8,9 +8,9 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/statistics.hpp>
 
-namespace wheelwright {
+namespace wheelwright::commission {
 
-FoldedSource::FoldedSource(RegressionSource& rows, Part part, std::size_t log_rows, FoldOptions options)
+FoldedSource::FoldedSource(core::RegressionSource& rows, Part part, std::size_t log_rows, FoldOptions options)
     : source_(&rows), part_(part), log_rows_(std::max<std::size_t>(log_rows, 1)), options_(options) {
   check::that(options.blocks >= 2 && options.hold_out_every >= 2 && options.hold_out_every <= options.blocks, "folds",
               "at least two blocks, of which some but not all are held out");
@@ -82,7 +82,7 @@ class Thinned {
     if (kept_.empty()) {
       return 0.0;
     }
-    return wheelwright::median(kept_);
+    return core::median(kept_);
   }
 
  private:
@@ -101,8 +101,8 @@ struct Running {
 
 }  // namespace
 
-std::vector<OutputValidation> validate_on(RegressionSource& rows, const ThresholdRule& rule) {
-  const ThresholdRule box(rule.set(), rule.estimate(), ParameterSetKind::box);
+std::vector<OutputValidation> validate_on(core::RegressionSource& rows, const detector::ThresholdRule& rule) {
+  const detector::ThresholdRule box(rule.set(), rule.estimate(), detector::ParameterSetKind::box);
   const std::size_t p = rows.parameters();
   std::vector<OutputValidation> results(rows.outputs());
   std::vector<Running> running(rows.outputs());
@@ -118,7 +118,7 @@ std::vector<OutputValidation> validate_on(RegressionSource& rows, const Threshol
       Running& r = running[i];
       const std::span<const double> y(block.Y.row(row).data(), p), dy(block.dY.row(row).data(), p);
       const double residual = block.y[row] - block.Y.row(row).dot(rule.estimate());
-      const Threshold t = rule.at(y, dy, block.dy[row], i);
+      const detector::Threshold t = rule.at(y, dy, block.dy[row], i);
       const Interval prediction = rule.prediction(y, i);
       ++v.instants;
       v.outside += residual < t.lower || residual > t.upper ? 1 : 0;
@@ -156,4 +156,4 @@ std::vector<OutputValidation> validate_on(RegressionSource& rows, const Threshol
   return results;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::commission

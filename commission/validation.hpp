@@ -10,7 +10,7 @@
 #include <wheelwright/core/warrant.hpp>
 #include <wheelwright/detector/threshold.hpp>
 
-namespace wheelwright {
+namespace wheelwright::commission {
 
 /// Division of rows into training and held-out blocks. Samples of a filtered regression are autocorrelated: blocks are
 /// contiguous, and a held-out block begins with a purge as long as the memory of the filter, so that it shares nothing
@@ -25,17 +25,17 @@ struct FoldOptions {
 enum class Part { everything, training, held_out };
 
 /// The rows of one part of a source, which must outlive it.
-class FoldedSource final : public RegressionSource {
+class FoldedSource final : public core::RegressionSource {
  public:
   /// `log_rows`: number of rows of the log (RegressionBlock::sample runs below it).
-  FoldedSource(RegressionSource& rows, Part part, std::size_t log_rows, FoldOptions options = {});
+  FoldedSource(core::RegressionSource& rows, Part part, std::size_t log_rows, FoldOptions options = {});
   [[nodiscard]] std::size_t outputs() const override { return source_->outputs(); }
   [[nodiscard]] std::size_t parameters() const override { return source_->parameters(); }
   bool next(RegressionBlock& block) override;
   void rewind() override;
 
  private:
-  RegressionSource* source_;
+  core::RegressionSource* source_;
   Part part_;
   std::size_t log_rows_;
   FoldOptions options_;
@@ -56,12 +56,13 @@ struct OutputValidation {
   double median_width = 0.0;         ///< median of u − l, unit of the output
   double median_width_box = 0.0;     ///< the same with the interval hull in place of the set
   double smallest_kappa = 0.0;  ///< smallest |κ| of ζ = κ·Yθ that some instant shows for certain, both directions
-  Warrant warrant = Warrant::extrapolated;  ///< of the threshold that was tried
+  core::Warrant warrant = core::Warrant::extrapolated;  ///< of the threshold that was tried
 };
 
 /// Walks `rows` and compares every instant with its threshold. κ: an instant shows ζ = κ·Yθ for certain when
 /// |κ|·min|Yθ| exceeds u − l, the minimum taken over the feasible set; a constant change δ1 of the wheel radius r has κ
 /// = (1 + δ1/r)² − 1.
-[[nodiscard]] std::vector<OutputValidation> validate_on(RegressionSource& rows, const ThresholdRule& rule);
+[[nodiscard]] std::vector<OutputValidation> validate_on(core::RegressionSource& rows,
+                                                        const detector::ThresholdRule& rule);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::commission

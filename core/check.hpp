@@ -9,7 +9,7 @@
 
 #include <wheelwright/core/error.hpp>
 
-namespace wheelwright::check {
+namespace wheelwright::core::check {
 
 /// Throws InvalidArgument "`what`: expected `expected`" unless `condition` holds.
 inline void that(bool condition, std::string_view what, std::string_view expected) {
@@ -42,4 +42,8 @@ inline double non_negative(double value, std::string_view what) {
   return value;
 }
 
-}  // namespace wheelwright::check
+}  // namespace wheelwright::core::check
+
+namespace wheelwright {
+namespace check = core::check;
+}  // namespace wheelwright

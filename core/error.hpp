@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <string>
 
-namespace wheelwright {
+namespace wheelwright::core {
 
 /// Base of every exception of the library.
 class Error : public std::runtime_error {
@@ -27,4 +27,10 @@ class InputError : public Error {
   using Error::Error;
 };
 
+}  // namespace wheelwright::core
+
+namespace wheelwright {
+using core::Error;
+using core::InputError;
+using core::InvalidArgument;
 }  // namespace wheelwright

@@ -11,7 +11,7 @@
 #include <thread>
 #include <vector>
 
-namespace wheelwright {
+namespace wheelwright::core {
 
 /// Calls work(i) once for every i < `count`, on at most `threads` threads, the calling one among them, which also tells
 /// `done` (may be empty) how many turns have begun. The first exception is thrown again when all threads have stopped;
@@ -48,4 +48,4 @@ void for_all(std::size_t count, std::size_t threads, const Work& work,
   }
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::core

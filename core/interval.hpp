@@ -11,7 +11,7 @@
 #include <cmath>
 #include <limits>
 
-namespace wheelwright {
+namespace wheelwright::core {
 
 /// The next double below `x`; −infinity stays.
 inline double round_down(double x) { return std::nextafter(x, -std::numeric_limits<double>::infinity()); }
@@ -53,4 +53,8 @@ inline Interval operator*(Interval x, Interval y) {
   return {round_down(std::min({a, b, c, d})), round_up(std::max({a, b, c, d}))};
 }
 
+}  // namespace wheelwright::core
+
+namespace wheelwright {
+using core::Interval;
 }  // namespace wheelwright

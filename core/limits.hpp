@@ -5,11 +5,11 @@
 
 #include <limits>
 
-namespace wheelwright {
+namespace wheelwright::core {
 
 inline constexpr double kEpsilon = std::numeric_limits<double>::epsilon();    ///< from 1 to the next double
 inline constexpr double kInfinity = std::numeric_limits<double>::infinity();  ///< no bound, or never
 inline constexpr double kNan = std::numeric_limits<double>::quiet_NaN();      ///< no value
 inline constexpr double kTiny = std::numeric_limits<double>::min();           ///< smallest normal double
 
-}  // namespace wheelwright
+}  // namespace wheelwright::core

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-namespace wheelwright {
+namespace wheelwright::core {
 
 Eigen::MatrixXd inverse(const Eigen::MatrixXd& square) { return square.inverse(); }
 
@@ -81,4 +81,4 @@ Eigen::MatrixXd solve_lower(const Eigen::MatrixXd& lower, const Eigen::MatrixXd&
   return lower.triangularView<Eigen::Lower>().solve(B);
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::core

@@ -13,7 +13,7 @@
 
 #include <optional>
 
-namespace wheelwright {
+namespace wheelwright::core {
 
 /// Eigenvalues in ascending order and their eigenvectors, one a column.
 struct EigenPairs {
@@ -156,4 +156,4 @@ class PivotedQr {
 [[nodiscard]] Eigen::MatrixXd solve_upper(const Eigen::MatrixXd& upper, const Eigen::MatrixXd& B);
 [[nodiscard]] Eigen::MatrixXd solve_lower(const Eigen::MatrixXd& lower, const Eigen::MatrixXd& B);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::core

@@ -7,7 +7,7 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/statistics.hpp>
 
-namespace wheelwright {
+namespace wheelwright::core {
 
 std::optional<std::size_t> LogSource::find(std::string_view name) const {
   const auto& names = columns();
@@ -74,7 +74,7 @@ LogTable slice(const LogTable& table, std::size_t first, std::size_t last) {
 }
 
 TableSource::TableSource(const LogTable& table, std::size_t block_rows)
-    : table_(&table), block_rows_(block_rows), median_step_(wheelwright::median_step(table.t)) {
+    : table_(&table), block_rows_(block_rows), median_step_(wheelwright::core::median_step(table.t)) {
   check::that(block_rows > 0, "block_rows", "at least 1");
   check::that(table.names.size() == table.columns.size(), "log", "one name for each column");
   for (std::size_t c = 0; c < table.columns.size(); ++c) {
@@ -141,4 +141,4 @@ LogTable read_all(LogSource& source) {
   return table;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::core

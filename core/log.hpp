@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-namespace wheelwright {
+namespace wheelwright::core {
 
 /// A stretch of consecutive rows of a log. Columns have the names of the log contract (`t` apart), SI units.
 struct LogBlock {
@@ -114,4 +114,12 @@ struct ColumnError {
   double bound = 0.0;
 };
 
+}  // namespace wheelwright::core
+
+namespace wheelwright {
+using core::LogBlock;
+using core::LogSource;
+using core::LogTable;
+using core::read_all;
+using core::TableSource;
 }  // namespace wheelwright

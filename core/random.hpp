@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <random>
 
-namespace wheelwright {
+namespace wheelwright::core {
 
 /// A number in [0, 1), a multiple of 2⁻⁵³.
 [[nodiscard]] inline double uniform(std::mt19937_64& generator) {
@@ -23,4 +23,4 @@ namespace wheelwright {
   return drawn % count;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::core

@@ -5,7 +5,7 @@
 
 #include <wheelwright/core/check.hpp>
 
-namespace wheelwright {
+namespace wheelwright::core {
 
 void RegressionBlock::resize(std::size_t instants, std::size_t n, std::size_t p) {
   outputs = n;
@@ -71,4 +71,4 @@ RegressionBlock read_all(RegressionSource& source) {
   return all;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::core

@@ -9,7 +9,7 @@
 
 #include <Eigen/Core>
 
-namespace wheelwright {
+namespace wheelwright::core {
 
 /// Rows of Y are stored one after the other.
 using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
@@ -72,4 +72,9 @@ class RegressionTable final : public RegressionSource {
 /// Reads all of `source` (from its beginning) into one block.
 [[nodiscard]] RegressionBlock read_all(RegressionSource& source);
 
+}  // namespace wheelwright::core
+
+namespace wheelwright {
+using core::read_all;
+using core::RegressionBlock;
 }  // namespace wheelwright

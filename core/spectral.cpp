@@ -4,7 +4,7 @@
 
 #include "linear_algebra.hpp"
 
-namespace wheelwright {
+namespace wheelwright::core {
 
 EigenPairs symmetric_eigen(const Eigen::MatrixXd& symmetric) {
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(symmetric);
@@ -25,4 +25,4 @@ SingularValues singular_values(const Eigen::MatrixXd& A) {
   return {svd.matrixU(), svd.matrixV(), svd.singularValues()};
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::core

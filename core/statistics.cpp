@@ -13,7 +13,7 @@
 
 #include "check.hpp"
 
-namespace wheelwright {
+namespace wheelwright::core {
 
 namespace bm = boost::math;
 
@@ -97,4 +97,4 @@ std::vector<double> holm(const std::vector<double>& p) {
   return adjusted;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::core

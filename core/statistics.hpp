@@ -10,7 +10,7 @@
 #include <cstddef>
 #include <vector>
 
-namespace wheelwright {
+namespace wheelwright::core {
 
 /// The value of this rank, 0 the smallest. `rank` is less than the number of values.
 [[nodiscard]] double order_statistic(std::vector<double> values, std::size_t rank);
@@ -43,4 +43,4 @@ namespace wheelwright {
 /// probability of at most α, however the tests depend on one another. The order of `p` is kept; values are in [0, 1].
 [[nodiscard]] std::vector<double> holm(const std::vector<double>& p);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::core

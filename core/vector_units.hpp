@@ -5,7 +5,7 @@
 
 #include <cstddef>
 
-namespace wheelwright {
+namespace wheelwright::core {
 
 /// How many of the variants baseline, AVX2, AVX-512 (F and DQ) this processor can run: the first so many.
 [[nodiscard]] inline std::size_t vector_units() {
@@ -18,4 +18,4 @@ namespace wheelwright {
 #endif
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::core

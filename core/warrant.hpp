@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-namespace wheelwright {
+namespace wheelwright::core {
 
 /// Kind of promise of a bound, a threshold or a margin. Results name it per number, and these words are used in no
 /// other sense.
@@ -79,4 +79,4 @@ struct Assumption {
   friend bool operator==(const Assumption&, const Assumption&) = default;
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::core

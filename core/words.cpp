@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/core/words.hpp>
 
-namespace wheelwright {
+namespace wheelwright::core {
 namespace {
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
@@ -68,4 +68,4 @@ bool natural_less(std::string_view a, std::string_view b) {
   return a_ends != b_ends ? a_ends : a < b;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::core

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-namespace wheelwright {
+namespace wheelwright::core {
 
 /// "a, b, c", or with `between` in place of ", ".
 [[nodiscard]] std::string listed(const std::vector<std::string>& words, std::string_view between = ", ");
@@ -24,4 +24,4 @@ void replace_all(std::string& text, std::string_view from, std::string_view to);
 /// Whether `a` comes before `b` where digits count as the number they make: log_2 before log_10.
 [[nodiscard]] bool natural_less(std::string_view a, std::string_view b);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::core

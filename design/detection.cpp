@@ -11,7 +11,10 @@
 #include <wheelwright/detector/events.hpp>
 #include <wheelwright/detector/fault_margin.hpp>
 
-namespace wheelwright {
+namespace wheelwright::design {
+
+using core::kInfinity;
+
 namespace {
 
 constexpr double kNever = 1e6;  // objective where a fault is never certain, times how far it is from it
@@ -25,35 +28,36 @@ struct Judged {
 void check_inspected(const std::vector<InspectedFault>& faults) {
   check::that(!faults.empty(), "faults", "one or more");
   for (const InspectedFault& each : faults) {
-    const FaultType& fault = each.fault;
-    check::that(fault.profile.kind == FaultProfile::Kind::step && !fault.held_effort, "fault '" + fault.name + "'",
+    const detector::FaultType& fault = each.fault;
+    check::that(fault.profile.kind == detector::FaultProfile::Kind::step && !fault.held_effort,
+                "fault '" + fault.name + "'",
                 "one that is there in full from the beginning on (a step, no reading that stays at its value)");
   }
 }
 
-std::vector<Judged> judge(const Plan& plan, const DesignSubject& subject, const ThresholdRule& rule,
-                          const std::vector<InspectedFault>& faults, Persistence persistence) {
+std::vector<Judged> judge(const Plan& plan, const DesignSubject& subject, const detector::ThresholdRule& rule,
+                          const std::vector<InspectedFault>& faults, detector::Persistence persistence) {
   check_inspected(faults);
-  const ReferenceMotion motion = planned_motion(plan, subject);
-  FaultMargin margin(rule);
+  const detector::ReferenceMotion motion = planned_motion(plan, subject);
+  detector::FaultMargin margin(rule);
   std::vector<Judged> all;
   for (const InspectedFault& inspected : faults) {
-    const FaultType& fault = inspected.fault;
+    const detector::FaultType& fault = inspected.fault;
     const std::size_t first = all.size();
     for (const double side : {1.0, -1.0}) {
       if ((side > 0.0 ? fault.range.upper : -fault.range.lower) > 0.0) {
         all.push_back({{fault, side, check::positive(inspected.asked, "asked"), kInfinity, 0.0, 0}, kInfinity});
       }
     }
-    FaultFilter rows(fault, subject.model, subject.filter, motion);
-    std::vector<Lasting> lasting((all.size() - first) * rows.outputs(), Lasting(persistence));
+    detector::FaultFilter rows(fault, subject.model, subject.filter, motion);
+    std::vector<detector::Lasting> lasting((all.size() - first) * rows.outputs(), detector::Lasting(persistence));
     rows.begin_broken(0);
     while (rows.next()) {
       if (!motion.settled[rows.instant()]) {
         continue;
       }
       for (std::size_t i = 0; i < rows.outputs(); ++i) {
-        const FaultRow row = rows.row(i);
+        const detector::FaultRow row = rows.row(i);
         for (std::size_t k = first; k < all.size(); ++k) {
           PromisedFault& p = all[k].promise;
           const double most = std::abs(fault.kappa(p.side > 0.0 ? fault.range.upper : fault.range.lower));
@@ -89,8 +93,10 @@ std::vector<Judged> judge(const Plan& plan, const DesignSubject& subject, const 
 
 }  // namespace
 
-std::vector<PromisedFault> promised_faults(const Plan& plan, const DesignSubject& subject, const ThresholdRule& rule,
-                                           const std::vector<InspectedFault>& faults, Persistence persistence) {
+std::vector<PromisedFault> promised_faults(const Plan& plan, const DesignSubject& subject,
+                                           const detector::ThresholdRule& rule,
+                                           const std::vector<InspectedFault>& faults,
+                                           detector::Persistence persistence) {
   std::vector<PromisedFault> promises;
   for (Judged& judged : judge(plan, subject, rule, faults, persistence)) {
     promises.push_back(std::move(judged.promise));
@@ -98,8 +104,8 @@ std::vector<PromisedFault> promised_faults(const Plan& plan, const DesignSubject
   return promises;
 }
 
-PlanObjective certain_detection(const DesignSubject& subject, const ThresholdRule& rule,
-                                const std::vector<InspectedFault>& faults, Persistence persistence) {
+PlanObjective certain_detection(const DesignSubject& subject, const detector::ThresholdRule& rule,
+                                const std::vector<InspectedFault>& faults, detector::Persistence persistence) {
   return [&subject, rule, faults, persistence](const Plan& plan) {
     double worst = 0.0;
     for (const Judged& judged : judge(plan, subject, rule, faults, persistence)) {
@@ -114,7 +120,7 @@ PlanObjective certain_detection(const DesignSubject& subject, const ThresholdRul
 DetectionDesign design_for_detection(const OnlineModel& model, const DesignSubject& subject, const MotionLimits& limits,
                                      const std::vector<InspectedFault>& faults, const DesignOptions& options) {
   check_inspected(faults);
-  const ThresholdRule rule(Polytope(model.facets, model.box), model.estimate);
+  const detector::ThresholdRule rule(Polytope(model.facets, model.box), model.estimate);
   // What decides is the detector as it was commissioned: its thresholds allow for the errors of the model.
   DesignSubject watched = subject;
   watched.errors = model.errors;
@@ -137,7 +143,7 @@ DetectionDesign design_for_detection(const OnlineModel& model, const DesignSubje
 
 std::vector<InspectedFault> usual_inspection(const OnlineModel& model) {
   std::vector<InspectedFault> faults;
-  for (const FaultType& fault : fault_catalogue(model.model, model.estimate, model.robot.effort)) {
+  for (const detector::FaultType& fault : detector::fault_catalogue(model.model, model.estimate, model.robot.effort)) {
     if (fault.inspected > 0.0) {
       faults.push_back({fault, fault.inspected});
     }
@@ -145,4 +151,4 @@ std::vector<InspectedFault> usual_inspection(const OnlineModel& model) {
   return faults;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::design

@@ -16,17 +16,17 @@
 #include <wheelwright/design/manoeuvre.hpp>
 #include <wheelwright/detector/fault_type.hpp>
 
-namespace wheelwright {
+namespace wheelwright::design {
 
 /// A fault that an inspection is to find, with the size that would be good.
 struct InspectedFault {
-  FaultType fault;
+  detector::FaultType fault;
   double asked = 0.05;  ///< magnitude, > 0; both sides where the fault's range has two
 };
 
 /// A fault that a plan is certain to detect.
 struct PromisedFault {
-  FaultType fault;
+  detector::FaultType fault;
   double side = 1.0;
   double asked = 0.0;
   double smallest = 0.0;   ///< every size from here up to the range's end is seen for certain; infinite where none is
@@ -38,14 +38,15 @@ struct PromisedFault {
 /// `faults` is empty, or one is not there in full from the beginning on: it drifts, pulses, comes once a turn (its
 /// phase is not known), or holds a reading (its value is not known).
 [[nodiscard]] std::vector<PromisedFault> promised_faults(const Plan& plan, const DesignSubject& subject,
-                                                         const ThresholdRule& rule,
+                                                         const detector::ThresholdRule& rule,
                                                          const std::vector<InspectedFault>& faults,
-                                                         Persistence persistence = {});
+                                                         detector::Persistence persistence = {});
 
 /// The largest of smallest/asked; where a fault is never certain, a number above every such ratio that falls as the
 /// fault comes nearer to being certain at its largest size, so that a search has a slope to follow.
-[[nodiscard]] PlanObjective certain_detection(const DesignSubject& subject, const ThresholdRule& rule,
-                                              const std::vector<InspectedFault>& faults, Persistence persistence = {});
+[[nodiscard]] PlanObjective certain_detection(const DesignSubject& subject, const detector::ThresholdRule& rule,
+                                              const std::vector<InspectedFault>& faults,
+                                              detector::Persistence persistence = {});
 
 /// A manoeuvre for certain detection, and what it promises.
 struct DetectionDesign {
@@ -67,4 +68,4 @@ struct DetectionDesign {
 /// other models what there is of these.
 [[nodiscard]] std::vector<InspectedFault> usual_inspection(const OnlineModel& model);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::design

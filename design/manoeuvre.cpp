@@ -12,7 +12,7 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/design/stages.hpp>
 
-namespace wheelwright {
+namespace wheelwright::design {
 namespace {
 
 constexpr double kFirstZeroOfJ0 = 2.404825557695773;
@@ -170,4 +170,4 @@ BoundsDesign design_for_bounds(const DesignSubject& subject, const MotionLimits&
   return design;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::design

@@ -13,7 +13,7 @@
 #include <wheelwright/design/plan.hpp>
 #include <wheelwright/design/subject.hpp>
 
-namespace wheelwright {
+namespace wheelwright::design {
 
 /// A figure eight: constant speed V with v2 = j·w cos(wt), w = 2π/period, j = 2.405 the first zero of the Bessel
 /// function J0, for which it closes; from rest over one second and to rest over the last one.
@@ -80,4 +80,4 @@ struct BoundsDesign {
                                              WidthCriterion criterion = WidthCriterion::geometric_mean,
                                              const DesignOptions& options = {});
 
-}  // namespace wheelwright
+}  // namespace wheelwright::design

@@ -10,12 +10,12 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/linear_algebra.hpp>
 
-namespace wheelwright {
+namespace wheelwright::design {
 
 EffortModel::EffortModel(const DesignSubject& subject)
     : subject_(&subject),
-      input_inverse_(pseudo_inverse(subject.model.input)),
-      joint_of_coordinate_(pseudo_inverse(subject.model.motion)),
+      input_inverse_(core::pseudo_inverse(subject.model.input)),
+      joint_of_coordinate_(core::pseudo_inverse(subject.model.motion)),
       centre_(subject.theta.size()),
       half_(subject.theta.size()) {
   for (Eigen::Index j = 0; j < centre_.size(); ++j) {
@@ -31,13 +31,13 @@ Eigen::MatrixXd EffortModel::per_parameter(const Eigen::VectorXd& v, const Eigen
   const auto view = [](const Eigen::VectorXd& x, Eigen::Index n) {
     return std::span<const double>(x.data(), static_cast<std::size_t>(n));
   };
-  MotionState state;
+  model::MotionState state;
   state.speed = view(v, v.size());
   state.speed_error = view(none, v.size());
   state.joint_speed = view(joint, joint.size());
   state.joint_error = view(none, joint.size());
   state.heading = heading;
-  return input_inverse_ * regressor(subject_->model, state, view(a, a.size()));
+  return input_inverse_ * model::regressor(subject_->model, state, view(a, a.size()));
 }
 
 Eigen::VectorXd EffortModel::largest(const Eigen::VectorXd& v, const Eigen::VectorXd& a, double heading) const {
@@ -124,7 +124,7 @@ double space_use(const Plan& plan, const MotionLimits& limits) {
 
 LimitUse limit_use(const Plan& plan, const DesignSubject& subject, const MotionLimits& limits) {
   LimitUse use;
-  const Eigen::MatrixXd inverse = pseudo_inverse(subject.model.motion);
+  const Eigen::MatrixXd inverse = core::pseudo_inverse(subject.model.motion);
   use.speed = (inverse * plan.speed).cwiseAbs().maxCoeff() / limits.joint_speed;
   if (limits.joint_acceleration) {
     use.acceleration = (inverse * plan.acceleration).cwiseAbs().maxCoeff() / *limits.joint_acceleration;
@@ -141,7 +141,9 @@ LimitUse limit_use(const Plan& plan, const DesignSubject& subject, const MotionL
   return use;
 }
 
-Eigen::MatrixXd joint_speeds(const Plan& plan, const Model& model) { return pseudo_inverse(model.motion) * plan.speed; }
+Eigen::MatrixXd joint_speeds(const Plan& plan, const Model& model) {
+  return core::pseudo_inverse(model.motion) * plan.speed;
+}
 
 LogTable command_table(const Plan& plan, const Model& model) {
   const bool wheels = model.on_two_wheels && model.joints.size() == 2;
@@ -176,8 +178,8 @@ LogTable command_table(const Plan& plan, const Model& model) {
 }
 
 Box promised_bounds(const RegressionBlock& rows, const DesignSubject& subject) {
-  RegressionTable table(rows);
-  return interval_hull(table, subject.prior).hull;
+  core::RegressionTable table(rows);
+  return bounds::interval_hull(table, subject.prior).hull;
 }
 
 Eigen::VectorXd relative_widths(const Box& bounds, const DesignSubject& subject) {
@@ -211,4 +213,4 @@ RowObjective narrow_bounds(const DesignSubject& subject, WidthCriterion criterio
   };
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::design

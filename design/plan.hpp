@@ -37,7 +37,7 @@
 #include <wheelwright/design/subject.hpp>
 #include <wheelwright/model/robot.hpp>
 
-namespace wheelwright {
+namespace wheelwright::design {
 
 /// Effort of each joint for one instant of a motion: |τ| <= max over θ in the subject's effort box of |B⁺ Y(v, v̇) θ|,
 /// with B the model's input matrix.
@@ -153,4 +153,4 @@ enum class WidthCriterion {
 /// The objective "narrow bounds": combined(relative_widths(promised_bounds(rows))). Keeps a reference to `subject`.
 [[nodiscard]] RowObjective narrow_bounds(const DesignSubject& subject, WidthCriterion criterion);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::design

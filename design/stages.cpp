@@ -16,7 +16,7 @@
 #include <wheelwright/core/random.hpp>
 #include <wheelwright/design/plan.hpp>
 
-namespace wheelwright {
+namespace wheelwright::design {
 namespace {
 
 using Function = std::function<double(std::span<const double>)>;
@@ -90,7 +90,7 @@ SearchResult minimise_over_cube(const Function& f, std::size_t dimension,
   std::mt19937_64 generator(options.seed);
   for (std::size_t i = 0; i < options.samples; ++i) {
     std::vector<double> x(dimension);
-    std::generate(x.begin(), x.end(), [&generator] { return uniform(generator); });
+    std::generate(x.begin(), x.end(), [&generator] { return core::uniform(generator); });
     points.push_back(std::move(x));
   }
   for (const auto& x : points) {
@@ -104,7 +104,7 @@ SearchResult minimise_over_cube(const Function& f, std::size_t dimension,
   };
 
   std::vector<double> values(points.size());
-  for_all(
+  core::for_all(
       points.size(), options.threads, [&](std::size_t i) { values[i] = value_at(f, points[i]); },
       [&](std::size_t i) { tell(static_cast<double>(i)); });
   std::vector<std::size_t> order(points.size());
@@ -117,7 +117,7 @@ SearchResult minimise_over_cube(const Function& f, std::size_t dimension,
     descents[i] = {&f, {points[order[i]], values[order[i]], 0}};
   }
   if (options.descents > 0) {
-    for_all(
+    core::for_all(
         count, options.threads, [&](std::size_t i) { descents[i].run(options.steps, options.tolerance); },
         [&](std::size_t i) { tell(static_cast<double>(points.size() + i * options.steps)); });
   }
@@ -317,4 +317,4 @@ Plan StageFamily::plan(std::span<const double> x, double step) const {
   return plan;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::design

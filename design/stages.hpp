@@ -23,7 +23,7 @@
 #include <wheelwright/design/plan.hpp>
 #include <wheelwright/design/subject.hpp>
 
-namespace wheelwright {
+namespace wheelwright::design {
 
 /// Options of the search.
 struct SearchOptions {
@@ -95,4 +95,4 @@ class StageFamily {
   Eigen::MatrixXd motion_;
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::design

@@ -15,27 +15,27 @@
 #include <wheelwright/design/plan.hpp>
 #include <wheelwright/filter/row_stream.hpp>
 
-namespace wheelwright {
+namespace wheelwright::design {
 namespace {
 
 // θ_L,j of the robot's nominal value, where it has one that can be expressed in the effort's unit.
 std::optional<double> nominal_parameter(const Robot& robot, const Model& model, std::size_t j) {
   const auto found = robot.nominal.find(model.parameters[j].physical);
-  const auto scales = physical_scales(robot, model);
+  const auto scales = commission::physical_scales(robot, model);
   if (found == robot.nominal.end() || !scales) {
     return std::nullopt;
   }
   return (found->second + (*scales)[j].offset) / (*scales)[j].scale;
 }
 
-[[noreturn]] void nothing_known(const Parameter& parameter) {
+[[noreturn]] void nothing_known(const model::Parameter& parameter) {
   throw InvalidArgument("nothing is known of " + parameter.physical + ": expected nominal: {" + parameter.physical +
                         ": VALUE} in the robot file (" + parameter.physical_unit + "; a rough value will do)");
 }
 
-SignalErrors worst_case_errors(const DesignSubject& subject, const Measurement& measurement,
-                               const NoiseBudget& budget) {
-  return propagate(subject.model, subject.filter, measurement, budget.sensors);
+filter::SignalErrors worst_case_errors(const DesignSubject& subject, const Measurement& measurement,
+                                       const commission::NoiseBudget& budget) {
+  return filter::propagate(subject.model, subject.filter, measurement, budget.sensors);
 }
 
 // The planned log: motion as the sensors see it without noise, efforts as the robot that is believed in needs them.
@@ -99,7 +99,7 @@ Measurement planned_measurement(const Plan& plan, const DesignSubject& subject) 
 }
 
 // `errors` of logs with the subject's steps as those of logs with the plan's.
-SignalErrors with_steps_of(const Plan& plan, const DesignSubject& subject, SignalErrors errors) {
+filter::SignalErrors with_steps_of(const Plan& plan, const DesignSubject& subject, filter::SignalErrors errors) {
   if (subject.measurement.motion != MotionKind::speed && subject.measurement.nominal_step > 0.0) {
     const double longer = plan.step / subject.measurement.nominal_step;
     errors.joint_sample /= longer;
@@ -111,15 +111,15 @@ SignalErrors with_steps_of(const Plan& plan, const DesignSubject& subject, Signa
 // The filter of a planned log, with the errors that its sensors will make.
 RegressorFilter planned_filter(LogSource& log, const Plan& plan, const DesignSubject& subject) {
   const Measurement measurement = planned_measurement(plan, subject);
-  SignalErrors errors;
+  filter::SignalErrors errors;
   if (subject.errors) {
     errors = with_steps_of(plan, subject, *subject.errors);
   } else {
-    const NoiseBudget budget = noise_budget(subject.robot, subject.measurement);
+    const commission::NoiseBudget budget = commission::noise_budget(subject.robot, subject.measurement);
     errors = worst_case_errors(subject, measurement, budget);
-    errors.motion.limit = coordinate_limit(
-        subject.model,
-        acceleration_limit(subject.robot, survey(log, measurement), measurement.motion, budget.sensors.motion));
+    errors.motion.limit = commission::coordinate_limit(
+        subject.model, commission::acceleration_limit(subject.robot, commission::survey(log, measurement),
+                                                      measurement.motion, budget.sensors.motion));
   }
   return RegressorFilter(subject.model, subject.filter, measurement, errors);
 }
@@ -136,7 +136,7 @@ DesignSubject subject_of(const OnlineModel& model) {
   subject.effort_box = model.box;
   subject.known = model.box;
   subject.step = check::positive(model.measurement.nominal_step, "model: measurement.nominal_step");
-  subject.prior.sides = prior_box(model.robot, model.model).bounds;
+  subject.prior.sides = model::prior_box(model.robot, model.model).bounds;
   for (std::size_t j = 0; j < model.model.p(); ++j) {
     const Interval &side = model.box.sides[j], &prior = subject.prior.sides[j];
     if (side.upper - side.lower > 0.5 * (prior.upper - prior.lower)) {
@@ -149,7 +149,7 @@ DesignSubject subject_of(const OnlineModel& model) {
     }
   }
   // A model from the statistical mode has smaller bounds than the worst case.
-  const NoiseBudget budget = noise_budget(subject.robot, subject.measurement);
+  const commission::NoiseBudget budget = commission::noise_budget(subject.robot, subject.measurement);
   const bool worst_case = budget.complete && (worst_case_errors(subject, subject.measurement, budget).output.array() <=
                                               model.errors.output.array() * (1.0 + 1e-9))
                                                  .all();
@@ -163,7 +163,7 @@ DesignSubject subject_of(const OnlineModel& model) {
 DesignSubject subject_of(const Robot& robot, double step, const FilterDesign& filter) {
   DesignSubject subject;
   subject.robot = robot;
-  subject.model = make_model(robot);
+  subject.model = model::make_model(robot);
   subject.step = check::positive(step, "step");
   subject.filter = filter;
   subject.filter.order = robot.filter.order.value_or(filter.order);
@@ -171,8 +171,8 @@ DesignSubject subject_of(const Robot& robot, double step, const FilterDesign& fi
     subject.filter.beta = subject.filter.alpha = *robot.filter.beta;
   }
   subject.filter.alpha = robot.filter.alpha.value_or(subject.filter.alpha);
-  validate(subject.filter);
-  subject.prior.sides = prior_box(robot, subject.model).bounds;
+  filter::validate(subject.filter);
+  subject.prior.sides = model::prior_box(robot, subject.model).bounds;
   subject.theta.resize(static_cast<Eigen::Index>(subject.model.p()));
   for (std::size_t j = 0; j < subject.model.p(); ++j) {
     const auto nominal = nominal_parameter(robot, subject.model, j);
@@ -188,15 +188,15 @@ DesignSubject subject_of(const Robot& robot, double step, const FilterDesign& fi
   m.changes = robot.effort_changes;
   m.delay = robot.effort_delay;
   m.nominal_step = step;
-  const NoiseBound& angle_noise = !on_two_wheels(robot) ? robot.noise.position : robot.noise.wheel_angle;
-  const bool angles = subject.filter.order == 2 && robot.speed_source != SpeedSource::measured &&
+  const model::NoiseBound& angle_noise = !model::on_two_wheels(robot) ? robot.noise.position : robot.noise.wheel_angle;
+  const bool angles = subject.filter.order == 2 && robot.speed_source != model::SpeedSource::measured &&
                       (angle_noise.value || robot.encoder_counts_per_turn);
   m.motion = angles ? MotionKind::angle : MotionKind::speed;
-  for (const Joint& joint : subject.model.joints) {
+  for (const model::Joint& joint : subject.model.joints) {
     m.motion_columns.push_back(angles ? joint.angle : joint.speed);
     m.effort_columns.push_back("effort of " + joint.speed);
   }
-  if (!noise_budget(robot, m).complete) {
+  if (!commission::noise_budget(robot, m).complete) {
     throw InvalidArgument(
         "the noise is not declared: expected noise: {wheel_speed: …, effort: …} in the robot file (bounds, rad/s and "
         "the unit of the effort), or a commissioned model, which has found it");
@@ -213,12 +213,12 @@ RegressionBlock planned_rows(const Plan& plan, const DesignSubject& subject) {
   return rows;
 }
 
-ReferenceMotion planned_motion(const Plan& plan, const DesignSubject& subject) {
+detector::ReferenceMotion planned_motion(const Plan& plan, const DesignSubject& subject) {
   const LogTable log = planned_log(plan, subject);
   TableSource source(log);
-  ReferenceMotion motion = read_reference(source, planned_filter(source, plan, subject));
+  detector::ReferenceMotion motion = detector::read_reference(source, planned_filter(source, plan, subject));
   motion.measured = false;
   return motion;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::design

@@ -14,7 +14,7 @@
 #include <wheelwright/detector/reference_motion.hpp>
 #include <wheelwright/model/robot.hpp>
 
-namespace wheelwright {
+namespace wheelwright::design {
 
 struct Plan;
 
@@ -25,12 +25,13 @@ struct DesignSubject {
   Model model;
   Measurement measurement;
   FilterDesign filter;
-  Eigen::VectorXd theta;               ///< θ°, θ_L as believed
-  Box effort_box;                      ///< θ_L for which effort limits must hold
-  Box prior;                           ///< in which bounds are sought, as commission() does
-  std::optional<SignalErrors> errors;  ///< of the rows; nothing: from the declared noise and the planned acceleration
-  double step = 0.01;                  ///< sampling step of the log to come, s
-  Warrant warrant = Warrant::guaranteed;  ///< of the promises: that of the model, or of the declared noise
+  Eigen::VectorXd theta;  ///< θ°, θ_L as believed
+  Box effort_box;         ///< θ_L for which effort limits must hold
+  Box prior;              ///< in which bounds are sought, as commission_robot() does
+  std::optional<filter::SignalErrors>
+      errors;          ///< of the rows; nothing: from the declared noise and the planned acceleration
+  double step = 0.01;  ///< sampling step of the log to come, s
+  core::Warrant warrant = core::Warrant::guaranteed;  ///< of the promises: that of the model, or of the declared noise
 
   /// The commissioned bounds, where there are any: what the manoeuvre is to improve on.
   std::optional<Box> known;
@@ -55,6 +56,6 @@ struct DesignSubject {
 [[nodiscard]] RegressionBlock planned_rows(const Plan& plan, const DesignSubject& subject);
 
 /// The same drive as a reference motion for faults, with the error bounds of its rows.
-[[nodiscard]] ReferenceMotion planned_motion(const Plan& plan, const DesignSubject& subject);
+[[nodiscard]] detector::ReferenceMotion planned_motion(const Plan& plan, const DesignSubject& subject);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::design

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/detector/detector.hpp>
 
-namespace wheelwright {
+namespace wheelwright::detector {
 namespace {
 
 constexpr double kGapSteps = 5.0;  // as logs are split: a longer step is a gap
@@ -34,7 +34,7 @@ const Decision& RowDetector::nothing() {
   return decision_;
 }
 
-const Decision& RowDetector::decide(const FilteredRow& row) {
+const Decision& RowDetector::decide(const filter::FilteredRow& row) {
   decision_.valid = true;
   decision_.fault = false;
   const auto p = static_cast<std::size_t>(row.Y.cols());
@@ -62,6 +62,6 @@ const Decision& RowDetector::decide(const FilteredRow& row) {
 }
 
 template class Detector<RegressorFilter>;
-template class Detector<OdometryFilter>;
+template class Detector<filter::OdometryFilter>;
 
-}  // namespace wheelwright
+}  // namespace wheelwright::detector

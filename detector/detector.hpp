@@ -17,7 +17,7 @@
 #include <wheelwright/detector/threshold.hpp>
 #include <wheelwright/filter/row_stream.hpp>
 
-namespace wheelwright {
+namespace wheelwright::detector {
 
 /// D1[ε] of (35) with the time-varying threshold ρ >= 0, and D2[ε] of (39) with a constant μ_o in its place:
 /// |ε| where |ε| > threshold, else 0. The size tells how far the threshold was exceeded (Remark 6).
@@ -76,7 +76,7 @@ class RowDetector {
 
   /// Decides on a row (Y: n × p, dY: n × p, y and dy: n values). Allocates nothing. The result is valid until the next
   /// call of any member.
-  const Decision& decide(const FilteredRow& row);
+  const Decision& decide(const filter::FilteredRow& row);
 
   /// The decision at an instant without a row: not valid, no fault.
   const Decision& nothing();
@@ -97,7 +97,7 @@ class RowDetector {
 
 /// The detector of Dixon, Walker and Dawson (2001), section V, with the tight threshold: filter, threshold and decision
 /// in one object that a robot carries, for one residual. Sample in, decision out. Not for several threads at once.
-template <RowFilter Filter>
+template <filter::RowFilter Filter>
 class Detector {
  public:
   /// `filter` brings the error bounds dY and dy of its rows; ē of an estimated noise level belongs in dy. `threshold`
@@ -129,7 +129,7 @@ class Detector {
   }
 
   /// Decides on a row that was filtered elsewhere (Y: n × p, dY: n × p, y and dy: n values). Allocates nothing.
-  const Decision& decide(const FilteredRow& row) { return rows_.decide(row); }
+  const Decision& decide(const filter::FilteredRow& row) { return rows_.decide(row); }
 
   [[nodiscard]] const Filter& filter() const { return filter_; }
   [[nodiscard]] const ThresholdRule& threshold() const { return rows_.threshold(); }
@@ -145,9 +145,15 @@ class Detector {
 /// Of the torque residual.
 using TorqueDetector = Detector<RegressorFilter>;
 /// Of the kinematic residual: what the torque residual cannot see, such as lateral slip.
-using KinematicDetector = Detector<OdometryFilter>;
+using KinematicDetector = Detector<filter::OdometryFilter>;
 
 extern template class Detector<RegressorFilter>;
-extern template class Detector<OdometryFilter>;
+extern template class Detector<filter::OdometryFilter>;
 
+}  // namespace wheelwright::detector
+
+namespace wheelwright {
+using detector::Decision;
+using detector::Detector;
+using detector::TorqueDetector;
 }  // namespace wheelwright

@@ -6,7 +6,7 @@
 
 #include <wheelwright/core/check.hpp>
 
-namespace wheelwright {
+namespace wheelwright::detector {
 
 PersistenceCounter::PersistenceCounter(Persistence rule) : rule_(rule) {
   check::that(rule.k >= 1 && rule.k <= rule.n && rule.n <= 64, "persistence", "1 <= k <= n <= 64");
@@ -55,4 +55,4 @@ bool EventRecorder::add(std::size_t output, std::size_t sample, double t, double
   return opens;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::detector

@@ -8,7 +8,7 @@
 #include <limits>
 #include <vector>
 
-namespace wheelwright {
+namespace wheelwright::detector {
 
 /// One fault event in one channel.
 struct Event {
@@ -95,4 +95,4 @@ class Lasting {
   std::vector<double> last_;
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::detector

@@ -7,7 +7,7 @@
 
 #include <wheelwright/core/check.hpp>
 
-namespace wheelwright {
+namespace wheelwright::detector {
 namespace {
 
 using std::numbers::pi;
@@ -22,7 +22,7 @@ constexpr double kMostLostOfSign = 0.5;  // of counts where functions need a spe
 
 // What acts on one joint alone, seen in coordinates or outputs: A E_j A⁻¹.
 Eigen::MatrixXd of_joint(const Eigen::MatrixXd& map, std::size_t joint) {
-  const Eigen::MatrixXd inverse = pseudo_inverse(map);
+  const Eigen::MatrixXd inverse = core::pseudo_inverse(map);
   const auto j = static_cast<Eigen::Index>(joint);
   return map.col(j) * inverse.row(j);
 }
@@ -126,7 +126,7 @@ void add_radii(std::vector<FaultType>& all, const Model& model, const WheelSide&
 
 }  // namespace
 
-std::vector<FaultType> fault_catalogue(const Model& model, const Eigen::VectorXd& theta, EffortKind effort) {
+std::vector<FaultType> fault_catalogue(const Model& model, const Eigen::VectorXd& theta, model::EffortKind effort) {
   check::that(static_cast<std::size_t>(theta.size()) == model.p(), "theta", "one value for each parameter");
   std::vector<FaultType> all;
   const auto c = static_cast<Eigen::Index>(model.coordinates.size());
@@ -167,16 +167,18 @@ std::vector<FaultType> fault_catalogue(const Model& model, const Eigen::VectorXd
                    .slip = Eigen::Vector2d(0.0, 1.0)});
   }
   const std::string torque = model.output_units.empty() ? "" : model.output_units.front();
-  const std::string unit = effort == EffortKind::torque ? torque : effort == EffortKind::current ? "A" : "V";
+  const std::string unit = effort == model::EffortKind::torque    ? torque
+                           : effort == model::EffortKind::current ? "A"
+                                                                  : "V";
   for (const WheelSide& side : sides_of(model)) {
     add_efforts(all, model, side, unit);
     add_encoders(all, model, side);
   }
   const auto mass = std::find_if(model.parameters.begin(), model.parameters.end(),
-                                 [](const Parameter& parameter) { return parameter.physical == "mass"; });
+                                 [](const model::Parameter& parameter) { return parameter.physical == "mass"; });
   if (mass != model.parameters.end()) {
     // Where efforts are currents or voltages the mass is known in their unit only: its share is what can be said.
-    const bool physical = effort == EffortKind::torque;
+    const bool physical = effort == model::EffortKind::torque;
     const auto at = mass - model.parameters.begin();
     const double known = std::max(theta[at] / mass->per_physical, 1e-3), whole = physical ? known : 1.0;
     Eigen::VectorXd lost = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(model.p()));
@@ -202,4 +204,4 @@ const FaultType& find_fault(const std::vector<FaultType>& catalogue, const std::
   return *at;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::detector

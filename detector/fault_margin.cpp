@@ -6,7 +6,7 @@
 #include <limits>
 #include <span>
 
-namespace wheelwright {
+namespace wheelwright::detector {
 namespace {
 
 constexpr double kPrecise = 1e-9;     // of a certain size, relative
@@ -146,4 +146,4 @@ double FaultMargin::largest_hidden(const FaultRow& row, double largest, double s
   return hidden;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::detector

@@ -27,7 +27,7 @@
 #include <wheelwright/detector/fault_rows.hpp>
 #include <wheelwright/detector/threshold.hpp>
 
-namespace wheelwright {
+namespace wheelwright::detector {
 
 /// Minimum detectable fault sizes of one instant. One object serves one thread.
 class FaultMargin {
@@ -74,4 +74,4 @@ class FaultMargin {
   std::vector<double> acting_, seen_, error_;
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::detector

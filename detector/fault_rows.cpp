@@ -10,7 +10,7 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/linear_algebra.hpp>
 
-namespace wheelwright {
+namespace wheelwright::detector {
 namespace {
 
 // What an instantaneous part of the signature is made of.
@@ -37,7 +37,7 @@ Eigen::VectorXd joints_of(const Eigen::MatrixXd& inverse, const Eigen::VectorXd&
 }
 
 // Joint speeds from coordinate speeds.
-Eigen::MatrixXd inverse_of(const Model& model) { return pseudo_inverse(model.motion); }
+Eigen::MatrixXd inverse_of(const Model& model) { return core::pseudo_inverse(model.motion); }
 
 Eigen::MatrixXd or_zero(const Eigen::MatrixXd& matrix, std::size_t size) {
   const auto n = static_cast<Eigen::Index>(size);
@@ -143,7 +143,7 @@ Parts parts_of(const Term& term, const FaultType& fault, const Instant& at) {
 }
 
 // Signature at one instant; `held` is what a reading that stands still shows.
-FaultSignals signature(const FaultType& fault, const Model& model, const Instant& at, const RowMatrix& held) {
+FaultSignals signature(const FaultType& fault, const Model& model, const Instant& at, const core::RowMatrix& held) {
   FaultSignals out = FaultSignals::none(model);
   const auto n = static_cast<Eigen::Index>(model.n());
   const double s = at.profile;
@@ -184,7 +184,8 @@ FaultSignals signature(const FaultType& fault, const Model& model, const Instant
 
 FaultSignals FaultSignals::none(const Model& model) {
   const auto n = static_cast<Eigen::Index>(model.n()), p = static_cast<Eigen::Index>(model.p());
-  return {RowMatrix::Zero(n, p), RowMatrix::Zero(n, p), RowMatrix::Zero(n, p), Eigen::VectorXd::Zero(n)};
+  return {core::RowMatrix::Zero(n, p), core::RowMatrix::Zero(n, p), core::RowMatrix::Zero(n, p),
+          Eigen::VectorXd::Zero(n)};
 }
 
 bool polynomial(const FaultType& fault, const Model& model) {
@@ -247,7 +248,7 @@ SignatureErrors::SignatureErrors(const FaultType& fault, const Model& model, con
       lateral_(std::abs(fault.lateral)),
       moves_(fault.motion.size() > 0 || fault.slip.size() > 0),
       whole_(fault.whole && fault.seen.size() > 0) {
-  const SignalErrors& errors = motion.errors;
+  const filter::SignalErrors& errors = motion.errors;
   double shortest = motion.nominal_step;
   for (const double step : motion.step) {
     shortest = step > 0.0 ? std::min(shortest, step) : shortest;
@@ -277,7 +278,7 @@ void SignatureErrors::begin(std::size_t onset) {
 }
 
 SignatureErrors::Row SignatureErrors::row(std::size_t k, std::size_t i, double since) const {
-  const SignalErrors& errors = reference_->errors;
+  const filter::SignalErrors& errors = reference_->errors;
   const auto n = static_cast<Eigen::Index>(model_->n());
   const auto dY = reference_->rows.dY.middleRows(static_cast<Eigen::Index>(k) * n, n);
   const bool angles = reference_->kind != MotionKind::speed;
@@ -343,15 +344,15 @@ FaultFilter::FaultFilter(FaultType fault, const Model& model, const FilterDesign
       model_(&model),
       design_(design),
       motion_(&motion),
-      held_(RowMatrix::Zero(static_cast<Eigen::Index>(model.n()), static_cast<Eigen::Index>(model.p()))),
+      held_(core::RowMatrix::Zero(static_cast<Eigen::Index>(model.n()), static_cast<Eigen::Index>(model.p()))),
       filtered_(FaultSignals::none(model)) {
   validate(fault_, model);
-  validate(design_);
-  kernel_ = FilterKernel(design_, motion.kind, motion.nominal_step);
+  filter::validate(design_);
+  kernel_ = filter::FilterKernel(design_, motion.kind, motion.nominal_step);
   cascades_.resize(model.n() * (3 * model.p() + 1));
   const auto n = static_cast<Eigen::Index>(model.n());
   from_motion_ = inverse_of(model);
-  to_joints_ = pseudo_inverse(model.input);
+  to_joints_ = core::pseudo_inverse(model.input);
   gain_only_ = fault_.effort.size() > 0 && fault_.motion.size() == 0 && fault_.ground.size() == 0 &&
                fault_.slip.size() == 0 && fault_.seen.size() == 0 && fault_.theta.size() == 0 &&
                fault_.offset.size() == 0 && fault_.lateral == 0.0;
@@ -405,9 +406,9 @@ void FaultFilter::begin(std::size_t onset) {
   if (read_errors_) {
     read_errors_->begin(onset);
   }
-  std::fill(cascades_.begin(), cascades_.end(), KernelState{});
+  std::fill(cascades_.begin(), cascades_.end(), filter::KernelState{});
   filtered_ = last_ = FaultSignals::none(*model_);
-  std::fill(widened_.begin(), widened_.end(), KernelState{});
+  std::fill(widened_.begin(), widened_.end(), filter::KernelState{});
   range_.setZero();
   widened_c_.setZero();
   added_ = since_ = 0.0;
@@ -421,7 +422,7 @@ void FaultFilter::begin(std::size_t onset) {
   if (fault_.profile.jumps()) {
     // Motion beyond v, and what is seen, are there at once: their derivatives have an impulse.
     const std::size_t p = model_->p(), size = model_->n() * p;
-    const auto jump = [](KernelState& state, double by) {
+    const auto jump = [](filter::KernelState& state, double by) {
       state.z1 += by;
       state.fast += by;
     };
@@ -439,7 +440,7 @@ void FaultFilter::begin(std::size_t onset) {
 void FaultFilter::begin_broken(std::size_t first) {
   begin(first);
   fresh_ = false;
-  std::fill(cascades_.begin(), cascades_.end(), KernelState{});
+  std::fill(cascades_.begin(), cascades_.end(), filter::KernelState{});
 }
 
 void FaultFilter::filter(const FaultSignals& begin, const FaultSignals& end, const std::array<double, 2>& shares,
@@ -478,7 +479,7 @@ void FaultFilter::widen(const FaultSignals& begin, const FaultSignals& end, bool
   const Eigen::MatrixXd c = change([](const FaultSignals& s) { return s.c; });
   std::size_t at = 0;
   const auto advance = [&](double by) {
-    KernelState& state = widened_[at++];
+    filter::KernelState& state = widened_[at++];
     state.z1 += by;
     state.z2 += steps * h * by;
     state.fast += by;
@@ -505,7 +506,7 @@ double FaultFilter::most_added(const FaultSignals& signals) const {
   return sum.maxCoeff();
 }
 
-FaultSignals FaultFilter::state(double KernelState::*part) const {
+FaultSignals FaultFilter::state(double filter::KernelState::*part) const {
   FaultSignals out = FaultSignals::none(*model_);
   std::size_t at = 0;
   const auto fill = [&](auto& to) {
@@ -618,10 +619,10 @@ SettledRows settled_rows(const FaultType& fault, const Model& model, const Filte
   SettledRows rows;
   const std::vector<double> joint_list(joints.data(), joints.data() + joints.size()),
       speed_list(v.data(), v.data() + v.size()), none(std::max(joint_list.size(), speed_list.size()), 0.0);
-  rows.Y =
-      design.static_gain() *
-      regressor(model, {speed_list, {none.data(), speed_list.size()}, joint_list, {none.data(), joint_list.size()}},
-                {a.data(), static_cast<std::size_t>(a.size())});
+  rows.Y = design.static_gain() *
+           model::regressor(
+               model, {speed_list, {none.data(), speed_list.size()}, joint_list, {none.data(), joint_list.size()}},
+               {a.data(), static_cast<std::size_t>(a.size())});
   rows.signature = signature(
       fault, model,
       {1.0, v, joints, 0.0, a, extra.moved, moved_rate, extra.joint_moved, extra.seen, seen_rate, extra.joint_seen},
@@ -633,4 +634,4 @@ SettledRows settled_rows(const FaultType& fault, const Model& model, const Filte
   return rows;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::detector

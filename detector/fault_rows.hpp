@@ -13,7 +13,7 @@
 #include <wheelwright/detector/reference_motion.hpp>
 #include <wheelwright/filter/kernel.hpp>
 
-namespace wheelwright {
+namespace wheelwright::detector {
 
 /// One output at one instant of a faulty drive. With the fault's size κ,
 ///
@@ -43,7 +43,7 @@ struct ExtraMotion {
 
 /// Terms that a fault adds to the unfiltered equation at one instant, matrices n × p.
 struct FaultSignals {
-  RowMatrix g1, g2, s;
+  core::RowMatrix g1, g2, s;
   Eigen::VectorXd c;
 
   /// Those of no fault, for the rows of `model`.
@@ -113,7 +113,7 @@ class SignatureErrors {
   const Model* model_;
   const ReferenceMotion* reference_;
   FilterDesign design_;
-  FilterKernel kernel_;
+  filter::FilterKernel kernel_;
   Eigen::MatrixXd motion_, effort_, seen_;  // |K|, |H| + |G|, |S|
   Eigen::VectorXd theta_;
   double lateral_ = 0.0;
@@ -151,7 +151,7 @@ class FaultFilter final : public FaultRows {
   [[nodiscard]] std::size_t instant() const override { return k_; }
   [[nodiscard]] FaultRow row(std::size_t i) const override;
   /// What one signal of the filter remembers, entry by entry: `part` of its state.
-  [[nodiscard]] FaultSignals state(double KernelState::*part) const;
+  [[nodiscard]] FaultSignals state(double filter::KernelState::*part) const;
 
  private:
   // The fault and the motion at one instant: s(t), what moves (s u) and what is seen (s S v) beyond v.
@@ -168,10 +168,10 @@ class FaultFilter final : public FaultRows {
   const Model* model_;
   FilterDesign design_;
   const ReferenceMotion* motion_;
-  RowMatrix held_;  // filtered rows at the onset over the static gain
-  FilterKernel kernel_;
+  core::RowMatrix held_;  // filtered rows at the onset over the static gain
+  filter::FilterKernel kernel_;
   Point before_;
-  std::vector<KernelState> cascades_;  // g1, g2, s, c one after the other
+  std::vector<filter::KernelState> cascades_;  // g1, g2, s, c one after the other
   FaultSignals filtered_;
   bool gain_only_ = false;       // a fault of an effort's gain, and nothing else
   Eigen::VectorXd gain_;         // per output: by how much it widens what is in doubt of efforts
@@ -181,15 +181,15 @@ class FaultFilter final : public FaultRows {
   bool proportional_ = false;    // its efforts are multiples of the healthy ones
   double growth_ = 0.0;          // by how many of them, per unit of κ
   double most_kappa_ = 0.0;
-  double added_ = 0.0;                // largest effort per unit of κ since the onset
-  std::vector<KernelState> widened_;  // n × p of range_, then n of c
-  RowMatrix range_;
+  double added_ = 0.0;                        // largest effort per unit of κ since the onset
+  std::vector<filter::KernelState> widened_;  // n × p of range_, then n of c
+  core::RowMatrix range_;
   Eigen::VectorXd widened_c_;
   std::optional<SignatureErrors> read_errors_;  // of a measured motion
   Eigen::VectorXd row_doubt_;
-  double since_ = 0.0;   // steps since the onset, s
-  RowMatrix row_range_;  // range_, what grows in dY and the signature's errors
-  RowMatrix row_dY_;     // with functions in doubt
+  double since_ = 0.0;         // steps since the onset, s
+  core::RowMatrix row_range_;  // range_, what grows in dY and the signature's errors
+  core::RowMatrix row_dY_;     // with functions in doubt
   std::size_t onset_ = 0, k_ = 0, end_ = 0;
   bool fresh_ = false;  // the fault jumps at the onset, between two steps
 };
@@ -197,10 +197,10 @@ class FaultFilter final : public FaultRows {
 /// The same at an operating point: coordinate speeds `v` and accelerations `a` that stay for as long as the filter
 /// remembers, a fault that is fully there. Its `Y` is the filtered regressor.
 struct SettledRows {
-  RowMatrix Y;             ///< n × p
+  core::RowMatrix Y;       ///< n × p
   FaultSignals signature;  ///< filtered
 };
 [[nodiscard]] SettledRows settled_rows(const FaultType& fault, const Model& model, const FilterDesign& design,
                                        const Eigen::VectorXd& v, const Eigen::VectorXd& a);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::detector

@@ -7,7 +7,7 @@
 
 #include <wheelwright/core/check.hpp>
 
-namespace wheelwright {
+namespace wheelwright::detector {
 namespace {
 
 using std::numbers::pi;
@@ -72,4 +72,4 @@ void validate(const FaultType& fault, const Model& model) {
               "nothing where the fault changes motion and efforts at once");
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::detector

@@ -23,7 +23,7 @@
 #include <wheelwright/model/model.hpp>
 #include <wheelwright/model/robot.hpp>
 
-namespace wheelwright {
+namespace wheelwright::detector {
 
 /// Time profile of a fault: s(t) of its signature.
 struct FaultProfile {
@@ -93,9 +93,9 @@ void validate(const FaultType& fault, const Model& model);
 /// `theta` (p), a best guess of θ_L, bounds the mass that can be lost or gained; `effort` names the unit of a bias. The
 /// mass is in kg where efforts are torques, else a share of what `theta` says.
 [[nodiscard]] std::vector<FaultType> fault_catalogue(const Model& model, const Eigen::VectorXd& theta,
-                                                     EffortKind effort = EffortKind::torque);
+                                                     model::EffortKind effort = model::EffortKind::torque);
 
 /// The fault called `name`. Throws InvalidArgument, naming those that there are, where there is none.
 [[nodiscard]] const FaultType& find_fault(const std::vector<FaultType>& catalogue, const std::string& name);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::detector

@@ -16,7 +16,10 @@
 #include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/detector/onset_rows.hpp>
 
-namespace wheelwright {
+namespace wheelwright::detector {
+
+using bounds::HalfSpace;
+
 namespace {
 
 constexpr double kMemory = 12.0;        // of the filter, in units of 1/β
@@ -282,7 +285,7 @@ class Search {
 
   // Variables: θ, d, A, B and C of every output, as shares of their bounds but for θ.
   std::optional<Interval> program(const Interval& kappa) {
-    const double middle = kappa.centre(), eta = round_up(std::max(kappa.upper - middle, middle - kappa.lower));
+    const double middle = kappa.centre(), eta = core::round_up(std::max(kappa.upper - middle, middle - kappa.lower));
     const double size = std::max(std::abs(kappa.lower), std::abs(kappa.upper));
     const double reach = free_offset_ ? offset_bound() : eta;
     Box box = in_.set.hull();
@@ -297,7 +300,7 @@ class Search {
     }
     box.sides.resize(static_cast<std::size_t>(variables_), {-1.0, 1.0});
     std::vector<HalfSpace> all = facets();
-    const SlabRows slabs(box);
+    const bounds::SlabRows slabs(box);
     std::vector<double> a(static_cast<std::size_t>(variables_)), da = a;
     const RegressionBlock& data = in_.motion.rows;
     for (const Row& row : data_) {
@@ -364,13 +367,14 @@ class Search {
 
   std::optional<Interval> solve(const std::vector<HalfSpace>& rows, const Box& box, const Interval& kappa,
                                 double middle, double eta) {
-    Coordinates coordinates{Eigen::VectorXd::Zero(variables_), Eigen::MatrixXd::Identity(variables_, variables_)};
+    bounds::Coordinates coordinates{Eigen::VectorXd::Zero(variables_),
+                                    Eigen::MatrixXd::Identity(variables_, variables_)};
     for (Eigen::Index j = 0; j < p_; ++j) {
       coordinates.centre[j] = in_.centre[j];
       coordinates.transform(j, j) = std::max(in_.half[j], 1e-9 * in_.largest[j] + 1e-300);
     }
     std::vector<HalfSpace> all = rows;
-    for (HalfSpace& side : sides_as_rows(box)) {
+    for (HalfSpace& side : bounds::sides_as_rows(box)) {
       all.push_back(std::move(side));
     }
     const auto m = static_cast<Eigen::Index>(all.size());
@@ -383,17 +387,18 @@ class Search {
       a.col(i) = g / norms[i];
       b[i] = (row.b - row.a.dot(coordinates.centre)) / norms[i];
     }
-    LinearProgram program(Eigen::VectorXd::Constant(variables_, -3.0), Eigen::VectorXd::Constant(variables_, 3.0));
+    bounds::LinearProgram program(Eigen::VectorXd::Constant(variables_, -3.0),
+                                  Eigen::VectorXd::Constant(variables_, 3.0));
     program.add_rows(a, b);
     double ends[2] = {1.0, 1.0};  // of −d, d
     for (int k = 0; k < 2; ++k) {
       Eigen::VectorXd direction = Eigen::VectorXd::Zero(variables_);
       direction[p_] = k == 0 ? -1.0 : 1.0;
       ++programs_;
-      const LpSolution solution = program.maximise(direction);
-      if (solution.status == LpSolution::Status::infeasible) {
+      const bounds::LpSolution solution = program.maximise(direction);
+      if (solution.status == bounds::LpSolution::Status::infeasible) {
         ++programs_;
-        if (find_contradiction(rows, box, coordinates)) {
+        if (bounds::find_contradiction(rows, box, coordinates)) {
           return std::nullopt;
         }
         return kappa;
@@ -401,8 +406,8 @@ class Search {
       if (fault_.whole) {
         return kappa;  // nothing to be narrowed
       }
-      if (solution.status == LpSolution::Status::optimal) {
-        std::vector<WeightedRow> members;
+      if (solution.status == bounds::LpSolution::Status::optimal) {
+        std::vector<bounds::WeightedRow> members;
         for (std::size_t r = 0; r < solution.rows.size(); ++r) {
           const int i = solution.rows[r];
           if (i < static_cast<int>(rows.size())) {
@@ -410,11 +415,11 @@ class Search {
                 {rows[static_cast<std::size_t>(i)], solution.multipliers[static_cast<Eigen::Index>(r)] / norms[i]});
           }
         }
-        ends[k] = certified_upper_bound({direction.data(), static_cast<std::size_t>(variables_)}, members, box);
+        ends[k] = bounds::certified_upper_bound({direction.data(), static_cast<std::size_t>(variables_)}, members, box);
       }
     }
-    const Interval inner{std::max(kappa.lower, round_down(middle - round_up(eta * std::min(ends[0], 1.0)))),
-                         std::min(kappa.upper, round_up(middle + round_up(eta * std::min(ends[1], 1.0))))};
+    const Interval inner{std::max(kappa.lower, core::round_down(middle - core::round_up(eta * std::min(ends[0], 1.0)))),
+                         std::min(kappa.upper, core::round_up(middle + core::round_up(eta * std::min(ends[1], 1.0))))};
     if (inner.lower > inner.upper) {
       return std::nullopt;
     }
@@ -438,7 +443,7 @@ class Search {
 // An encoder whose reading stands still, from somewhere on or for a time: judged by the reading.
 void judge_reading(const Setting& in, FaultFinding& finding) {
   const Model& model = in.filter.model();
-  const Eigen::MatrixXd inverse = pseudo_inverse(model.motion);
+  const Eigen::MatrixXd inverse = core::pseudo_inverse(model.motion);
   const Eigen::VectorXd share = (inverse * finding.fault.seen * model.motion).diagonal();
   Eigen::Index joint = 0;
   if (!(share.minCoeff(&joint) < -0.5)) {
@@ -502,13 +507,13 @@ Isolation isolate(const ReferenceMotion& motion, const RegressorFilter& filter, 
   for (Eigen::Index j = 0; j < p; ++j) {
     const Interval& side = set.hull().sides[static_cast<std::size_t>(j)];
     setting.centre[j] = side.centre();
-    setting.half[j] = round_up(std::max(side.upper - setting.centre[j], setting.centre[j] - side.lower));
+    setting.half[j] = core::round_up(std::max(side.upper - setting.centre[j], setting.centre[j] - side.lower));
     setting.largest[j] = std::max(std::abs(side.lower), std::abs(side.upper));
   }
   Isolation isolation;
   isolation.window = {motion.t[setting.window.begin], motion.t[setting.window.end - 1]};
   isolation.findings.resize(faults.size());
-  for_all(faults.size(), options.threads, [&](std::size_t k) {
+  core::for_all(faults.size(), options.threads, [&](std::size_t k) {
     FaultFinding& finding = isolation.findings[k];
     finding.fault = faults[k];
     validate(finding.fault, filter.model());
@@ -521,4 +526,4 @@ Isolation isolate(const ReferenceMotion& motion, const RegressorFilter& filter, 
   return isolation;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::detector

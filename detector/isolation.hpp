@@ -34,7 +34,7 @@
 #include <wheelwright/detector/fault_type.hpp>
 #include <wheelwright/detector/reference_motion.hpp>
 
-namespace wheelwright {
+namespace wheelwright::detector {
 
 /// Options of the isolation.
 struct IsolationOptions {
@@ -80,4 +80,4 @@ struct Isolation {
                                 const std::vector<FaultType>& faults, double outside, double alarm,
                                 const IsolationOptions& options = {});
 
-}  // namespace wheelwright
+}  // namespace wheelwright::detector

@@ -12,7 +12,10 @@
 #include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/detector/events.hpp>
 
-namespace wheelwright {
+namespace wheelwright::detector {
+
+using core::kInfinity;
+
 namespace {
 
 constexpr double kStill = 0.03, kStraight = 0.1, kAccelerating = 0.5;
@@ -67,7 +70,7 @@ std::vector<std::size_t> choose_onsets(const ReferenceMotion& motion, const Marg
     return onsets;
   }
   const double step =
-      std::max(options.onset_step, settled * median_step(motion.t) / static_cast<double>(options.most_onsets));
+      std::max(options.onset_step, settled * core::median_step(motion.t) / static_cast<double>(options.most_onsets));
   double next = -kInfinity;
   for (std::size_t k = 0; k < motion.instants(); ++k) {
     const bool begins = std::binary_search(motion.segment_starts.begin(), motion.segment_starts.end(), k);
@@ -234,7 +237,7 @@ std::vector<FaultMargins> margins_along(const ReferenceMotion& motion, const std
       }
     }
   }
-  for_all(
+  core::for_all(
       all.size(), options.threads,
       [&](std::size_t i) {
         FaultMargins& each = all[i];
@@ -256,13 +259,14 @@ std::vector<FaultMargins> margins_along(const ReferenceMotion& motion, const std
 namespace {
 
 // dY of a settled row.
-RowMatrix settled_errors(const Model& model, const FilterDesign& design, const SignalErrors& errors,
-                         const Eigen::VectorXd& v) {
-  RowMatrix dY = RowMatrix::Zero(static_cast<Eigen::Index>(model.n()), static_cast<Eigen::Index>(model.p()));
+core::RowMatrix settled_errors(const Model& model, const FilterDesign& design, const filter::SignalErrors& errors,
+                               const Eigen::VectorXd& v) {
+  core::RowMatrix dY =
+      core::RowMatrix::Zero(static_cast<Eigen::Index>(model.n()), static_cast<Eigen::Index>(model.p()));
   if (errors.acceleration.size() == 0) {
     return dY;
   }
-  const Eigen::VectorXd joints = pseudo_inverse(model.motion) * v;
+  const Eigen::VectorXd joints = core::pseudo_inverse(model.motion) * v;
   const std::vector<double> speed(v.begin(), v.end()), joint_speed(joints.begin(), joints.end()),
       speed_error(errors.speed_sample.begin(), errors.speed_sample.end()),
       joint_error(joint_speed.size(), errors.joint_sample);
@@ -286,7 +290,7 @@ RowMatrix settled_errors(const Model& model, const FilterDesign& design, const S
 }  // namespace
 
 OperatingMap operating_map(const FaultType& fault, double side, const Model& model, const FilterDesign& design,
-                           const SignalErrors& errors, const ThresholdRule& rule, OperatingPlane plane) {
+                           const filter::SignalErrors& errors, const ThresholdRule& rule, OperatingPlane plane) {
   check::that(!plane.x.empty() && !plane.y.empty(), "operating plane", "values on both axes");
   const auto c = static_cast<Eigen::Index>(model.coordinates.size());
   const double largest = side > 0.0 ? fault.range.upper : -fault.range.lower;
@@ -306,7 +310,7 @@ OperatingMap operating_map(const FaultType& fault, double side, const Model& mod
       const Eigen::VectorXd rest = Eigen::VectorXd::Zero(c);
       const Eigen::VectorXd v = !map.plane.accelerations ? point : map.plane.at.size() == c ? map.plane.at : rest;
       const SettledRows rows = settled_rows(fault, model, design, v, map.plane.accelerations ? point : rest);
-      const RowMatrix dY = settled_errors(model, design, errors, v);
+      const core::RowMatrix dY = settled_errors(model, design, errors, v);
       for (std::size_t i = 0; i < model.n(); ++i) {
         const auto r = static_cast<Eigen::Index>(i);
         const FaultRow row{{rows.Y.row(r).data(), p},
@@ -328,4 +332,4 @@ OperatingMap operating_map(const FaultType& fault, double side, const Model& mod
   return map;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::detector

@@ -20,7 +20,7 @@
 #include <wheelwright/detector/reference_motion.hpp>
 #include <wheelwright/filter/noise.hpp>
 
-namespace wheelwright {
+namespace wheelwright::detector {
 
 /// Manoeuvre: the kind of motion over a stretch of time.
 enum class ManoeuvreKind {
@@ -124,7 +124,7 @@ struct OperatingMap {
 /// The map of `fault` for a detector with thresholds `rule` whose rows have the errors `errors`, once the filter has
 /// settled at each point (settled_rows()). Throws InvalidArgument for empty axes.
 [[nodiscard]] OperatingMap operating_map(const FaultType& fault, double side, const Model& model,
-                                         const FilterDesign& design, const SignalErrors& errors,
+                                         const FilterDesign& design, const filter::SignalErrors& errors,
                                          const ThresholdRule& rule, OperatingPlane plane);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::detector

@@ -9,7 +9,7 @@
 
 #include <wheelwright/core/check.hpp>
 
-namespace wheelwright {
+namespace wheelwright::detector {
 namespace {
 
 double largest(const Interval& side) { return std::max(std::abs(side.lower), std::abs(side.upper)); }
@@ -23,9 +23,9 @@ Eigen::Vector2d mean_direction(double from, double to) {
 
 }  // namespace
 
-OdometryReference read_odometry(LogSource& log, OdometryFilter filter, const Model& model) {
-  const OdometryMeasurement& measurement = filter.measurement();
-  const std::vector<std::size_t> pick = positions_of(log, measurement.columns());
+OdometryReference read_odometry(LogSource& log, filter::OdometryFilter filter, const Model& model) {
+  const filter::OdometryMeasurement& measurement = filter.measurement();
+  const std::vector<std::size_t> pick = core::positions_of(log, measurement.columns());
   const std::size_t n = measurement.outputs().size(), p = measurement.parameters().size();
   const std::size_t heading_at = measurement.position ? 4 : 2;
   OdometryReference reference;
@@ -117,15 +117,16 @@ OdometryReference read_odometry(LogSource& log, OdometryFilter filter, const Mod
   motion.rows.sample = motion.sample;
   motion.rows.t = motion.t;
   const Eigen::Index rows = count * static_cast<Eigen::Index>(n);
-  motion.rows.Y = Eigen::Map<const RowMatrix>(regressor.data(), rows, columns);
-  motion.rows.dY = Eigen::Map<const RowMatrix>(regressor_error.data(), rows, columns);
+  motion.rows.Y = Eigen::Map<const core::RowMatrix>(regressor.data(), rows, columns);
+  motion.rows.dY = Eigen::Map<const core::RowMatrix>(regressor_error.data(), rows, columns);
   motion.rows.y = Eigen::Map<const Eigen::VectorXd>(y.data(), rows);
   motion.rows.dy = Eigen::Map<const Eigen::VectorXd>(dy.data(), rows);
   return reference;
 }
 
-OdometryFaultRows::OdometryFaultRows(const FaultType& fault, const Model& model, const OdometryMeasurement& measurement,
-                                     const OdometryReference& reference, const Box& hull)
+OdometryFaultRows::OdometryFaultRows(const FaultType& fault, const Model& model,
+                                     const filter::OdometryMeasurement& measurement, const OdometryReference& reference,
+                                     const Box& hull)
     : fault_(fault),
       reference_(&reference),
       measurement_(measurement),
@@ -154,7 +155,8 @@ OdometryFaultRows::OdometryFaultRows(const FaultType& fault, const Model& model,
   const auto share = [](const Eigen::Matrix2d& joint) { return joint.cwiseAbs().rowwise().sum().maxCoeff(); };
   read_share_ = share(joint_motion_) + share(joint_seen_);
   const auto n = static_cast<Eigen::Index>(n_), p = static_cast<Eigen::Index>(p_);
-  rows_ = {RowMatrix::Zero(n, p), RowMatrix::Zero(n, p), RowMatrix::Zero(n, p), Eigen::VectorXd::Zero(n)};
+  rows_ = {core::RowMatrix::Zero(n, p), core::RowMatrix::Zero(n, p), core::RowMatrix::Zero(n, p),
+           Eigen::VectorXd::Zero(n)};
   doubt_ = Eigen::VectorXd::Zero(n);
   range_ = rows_.g1;
 }
@@ -268,4 +270,4 @@ FaultRow OdometryFaultRows::row(std::size_t i) const {
   return row;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::detector

@@ -13,7 +13,7 @@
 #include <wheelwright/detector/reference_motion.hpp>
 #include <wheelwright/filter/odometry_filter.hpp>
 
-namespace wheelwright {
+namespace wheelwright::detector {
 
 /// A drive as the kinematic residual sees it: ReferenceMotion whose rows are windows of odometry (OdometryFilter), at
 /// the samples with a new pose; an instant is settled where it has a row.
@@ -24,7 +24,7 @@ struct OdometryReference {
 
 /// The motion of `log` as `filter` reads it; `model` is the differential drive's. Walks the log once and holds it.
 /// Throws InvalidArgument when the log lacks a column of the filter's measurement.
-[[nodiscard]] OdometryReference read_odometry(LogSource& log, OdometryFilter filter, const Model& model);
+[[nodiscard]] OdometryReference read_odometry(LogSource& log, filter::OdometryFilter filter, const Model& model);
 
 /// Rows of the kinematic residual after a fault's onset. With q_j what a wheel truly rolls beyond what its encoder
 /// would show without a fault in step j (s K in joints, times its way) and σ_j what the encoder shows beyond it (s S),
@@ -36,7 +36,7 @@ class OdometryFaultRows final : public FaultRows {
  public:
   /// `hull` bounds the parameters (OdometryMeasurement::parameters()). Throws InvalidArgument where `fault` does not
   /// fit `model`. `reference` is kept by reference.
-  OdometryFaultRows(const FaultType& fault, const Model& model, const OdometryMeasurement& measurement,
+  OdometryFaultRows(const FaultType& fault, const Model& model, const filter::OdometryMeasurement& measurement,
                     const OdometryReference& reference, const Box& hull);
 
   [[nodiscard]] std::size_t outputs() const override { return n_; }
@@ -60,7 +60,7 @@ class OdometryFaultRows final : public FaultRows {
 
   FaultType fault_;
   const OdometryReference* reference_;
-  OdometryMeasurement measurement_;
+  filter::OdometryMeasurement measurement_;
   Eigen::Matrix2d joint_motion_ = Eigen::Matrix2d::Zero(), joint_seen_ = Eigen::Matrix2d::Zero();  // K, S in joints
   double along_ = 0.0, turning_ = 0.0;                                                             // a_1, a_2
   double most_kappa_ = 0.0;
@@ -72,7 +72,7 @@ class OdometryFaultRows final : public FaultRows {
   std::size_t onset_ = 0, k_ = 0, end_ = 0;
   FaultSignals rows_;
   Eigen::VectorXd doubt_;
-  RowMatrix range_;
+  core::RowMatrix range_;
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::detector

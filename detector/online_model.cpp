@@ -3,7 +3,7 @@
 
 #include <utility>
 
-namespace wheelwright {
+namespace wheelwright::detector {
 namespace {
 
 template <typename Channel>
@@ -19,7 +19,9 @@ RegressorFilter make_filter(const OnlineModel& model) {
   return {model.model, model.filter, model.measurement, model.errors};
 }
 
-OdometryFilter make_filter(const KinematicModel& model) { return {model.measurement, model.window, model.errors}; }
+filter::OdometryFilter make_filter(const KinematicModel& model) {
+  return {model.measurement, model.window, model.errors};
+}
 
 TorqueDetector make_detector(const OnlineModel& model, DetectorOptions options) {
   return detector_of(model, std::move(options));
@@ -36,4 +38,4 @@ Model kinematic_outputs(const KinematicModel& model) {
   return names;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::detector

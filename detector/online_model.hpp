@@ -18,22 +18,22 @@
 #include <wheelwright/model/model.hpp>
 #include <wheelwright/model/robot.hpp>
 
-namespace wheelwright {
+namespace wheelwright::detector {
 
 /// Parameter set of one residual, learnt from a fault-free log, and its alarm rule.
 struct LearntSet {
   Eigen::VectorXd estimate{};  ///< θ̂; for a parameter that the log does not excite, the Chebyshev centre's value
-  std::vector<HalfSpace> facets{};  ///< of the feasible set, p coefficients each
-  Box box{};                        ///< finite box that bounds the set (the certified hull)
+  std::vector<bounds::HalfSpace> facets{};  ///< of the feasible set, p coefficients each
+  Box box{};                                ///< finite box that bounds the set (the certified hull)
   Persistence persistence{};
-  Warrant warrant = Warrant::extrapolated;  ///< of set, hull and thresholds
+  core::Warrant warrant = core::Warrant::extrapolated;  ///< of set, hull and thresholds
 };
 
 /// The channel of the kinematic residual. The estimate is one of OdometryMeasurement::parameters().
 struct KinematicModel : LearntSet {
-  OdometryMeasurement measurement{};
-  double window = 1.0;      ///< W, s
-  OdometryErrors errors{};  ///< of the rows of driving to come
+  filter::OdometryMeasurement measurement{};
+  double window = 1.0;              ///< W, s
+  filter::OdometryErrors errors{};  ///< of the rows of driving to come
 };
 
 /// A commissioned robot as it is watched: the channel of the torque residual (the estimate is θ̂_L), and that of the
@@ -43,14 +43,14 @@ struct OnlineModel : LearntSet {
   Model model{};
   Measurement measurement{};
   FilterDesign filter{};
-  SignalErrors errors{};  ///< dY and dy of the rows, ē included
+  filter::SignalErrors errors{};  ///< dY and dy of the rows, ē included
   std::optional<KinematicModel> kinematic{};
-  std::vector<Assumption> assumptions{};  ///< behind the numbers, with the verdict of the log on each
+  std::vector<core::Assumption> assumptions{};  ///< behind the numbers, with the verdict of the log on each
 };
 
 /// The filter of a channel.
 [[nodiscard]] RegressorFilter make_filter(const OnlineModel& model);
-[[nodiscard]] OdometryFilter make_filter(const KinematicModel& model);
+[[nodiscard]] filter::OdometryFilter make_filter(const KinematicModel& model);
 
 /// The detector of a channel. Where `options` have no persistence it is the model's. Throws InvalidArgument for options
 /// that make no sense.
@@ -60,4 +60,9 @@ struct OnlineModel : LearntSet {
 /// Names and units of the outputs as a Model that has nothing else, for tables and charts.
 [[nodiscard]] Model kinematic_outputs(const KinematicModel& model);
 
+}  // namespace wheelwright::detector
+
+namespace wheelwright {
+using detector::make_detector;
+using detector::OnlineModel;
 }  // namespace wheelwright

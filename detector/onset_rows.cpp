@@ -6,7 +6,7 @@
 
 #include <wheelwright/core/check.hpp>
 
-namespace wheelwright {
+namespace wheelwright::detector {
 namespace {
 
 // x + f y, part by part.
@@ -87,13 +87,13 @@ void OnsetRows::take(const FaultType& fault) {
   FaultFilter filter(fault, *model_, design_, *motion_);
   filter.begin(first_);
   while (filter.instant() + 1 < end_ && filter.next()) {
-    state_[filter.instant() - first_] = {filter.state(&KernelState::z1), filter.state(&KernelState::z2),
-                                         filter.state(&KernelState::fast)};
+    state_[filter.instant() - first_] = {filter.state(&filter::KernelState::z1), filter.state(&filter::KernelState::z2),
+                                         filter.state(&filter::KernelState::fast)};
   }
 }
 
 // The impulse that motion beyond v has where a step sets in.
-RowMatrix OnsetRows::jump(std::size_t k) const {
+core::RowMatrix OnsetRows::jump(std::size_t k) const {
   Eigen::VectorXd moved = Eigen::VectorXd::Zero(motion_->speed.rows());
   if (fault_.motion.size() > 0) {
     moved += fault_.motion * motion_->speed.col(static_cast<Eigen::Index>(k));
@@ -101,7 +101,7 @@ RowMatrix OnsetRows::jump(std::size_t k) const {
   if (fault_.slip.size() > 0) {
     moved += fault_.slip;
   }
-  RowMatrix out = FaultSignals::none(*model_).g1;
+  core::RowMatrix out = FaultSignals::none(*model_).g1;
   for (const Term& term : model_->terms) {
     if (term.kind == Term::Kind::acceleration) {
       out(static_cast<Eigen::Index>(term.output), static_cast<Eigen::Index>(term.parameter)) +=
@@ -116,7 +116,7 @@ OnsetRows::State OnsetRows::left(std::size_t from, std::size_t at) const {
   const double x = way(from, at), decay = std::exp(-design_.beta * x);
   const State& now = state_[at - first_];
   State before = state_[from - first_];
-  const RowMatrix impulse = jump(from);
+  const core::RowMatrix impulse = jump(from);
   before.z1.g1 -= impulse;
   before.fast.g1 -= impulse;
   return {sum(now.z1, -decay, before.z1), sum(sum(now.z2, -decay, before.z2), -decay * x, before.z1),
@@ -129,7 +129,7 @@ void OnsetRows::between(std::size_t a, std::size_t b) {
   errors_.begin(s_);
   bound_ = {FaultSignals::none(*model_), FaultSignals::none(*model_), FaultSignals::none(*model_)};
   const std::size_t from = a > first_ ? a - 1 : a;
-  const RowMatrix counted = jump(s_);
+  const core::RowMatrix counted = jump(s_);
   for (std::size_t k = from; k <= s_; ++k) {
     State state = left(k, s_);
     state.z1.g1 -= counted;
@@ -240,4 +240,4 @@ std::array<double, 3> OnsetRows::left_bounds(double effort) const {
   return {(slow * memory * memory + quick * memory) * effort, slow * memory * effort, quick * short_memory * effort};
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::detector

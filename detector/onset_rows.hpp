@@ -30,7 +30,7 @@
 
 #include <wheelwright/detector/fault_rows.hpp>
 
-namespace wheelwright {
+namespace wheelwright::detector {
 
 /// One output at one instant under a hypothesis.
 struct OnsetRow {
@@ -73,7 +73,7 @@ class OnsetRows {
   struct State {
     FaultSignals z1, z2, fast;  // KernelState, entry by entry
   };
-  [[nodiscard]] RowMatrix jump(std::size_t k) const;
+  [[nodiscard]] core::RowMatrix jump(std::size_t k) const;
   [[nodiscard]] State left(std::size_t from, std::size_t at) const;
   [[nodiscard]] FaultSignals filtered(std::size_t k) const;
   [[nodiscard]] double way(std::size_t from, std::size_t to) const { return way_[to - first_] - way_[from - first_]; }
@@ -82,7 +82,7 @@ class OnsetRows {
   FaultType fault_, step_;
   const Model* model_;
   FilterDesign design_;
-  FilterKernel kernel_;
+  filter::FilterKernel kernel_;
   SignatureErrors errors_;
   bool encoder_;
   const ReferenceMotion* motion_;
@@ -94,4 +94,4 @@ class OnsetRows {
   State bound_;                         // entry by entry
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::detector

@@ -7,12 +7,12 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/limits.hpp>
 
-namespace wheelwright {
+namespace wheelwright::detector {
 namespace {
 
 constexpr double kBeyondEfforts = 3.0;  // efforts of a broken robot, in units of those that the rows can be due to
 
-std::size_t effort_reach(const Measurement& m, const SignalErrors& errors) {
+std::size_t effort_reach(const Measurement& m, const filter::SignalErrors& errors) {
   if (!errors.between_samples) {
     return 0;
   }
@@ -20,11 +20,11 @@ std::size_t effort_reach(const Measurement& m, const SignalErrors& errors) {
   if (m.delay.lower != 0.0 || m.delay.upper != 0.0) {
     return about + 2 + static_cast<std::size_t>(std::ceil(m.delay.width() / m.nominal_step));
   }
-  return m.changes == EffortChanges::at_samples ? 0 : about + (m.hold == Hold::zero_order ? 1 : 3);
+  return m.changes == model::EffortChanges::at_samples ? 0 : about + (m.hold == Hold::zero_order ? 1 : 3);
 }
 
 ReferenceMotion walk(LogSource& log, RegressorFilter filter) {
-  const std::vector<std::size_t> pick = positions_of(log, filter.measurement().columns());
+  const std::vector<std::size_t> pick = core::positions_of(log, filter.measurement().columns());
   const std::size_t n = filter.model().n(), p = filter.model().p();
   const auto coordinates = static_cast<Eigen::Index>(filter.model().coordinates.size());
   const auto joints = static_cast<Eigen::Index>(filter.model().joints.size());
@@ -92,8 +92,8 @@ ReferenceMotion walk(LogSource& log, RegressorFilter filter) {
   motion.rows.sample = motion.sample;
   motion.rows.t = motion.t;
   const Eigen::Index rows = k * static_cast<Eigen::Index>(n), columns = static_cast<Eigen::Index>(p);
-  motion.rows.Y = Eigen::Map<const RowMatrix>(regressor.data(), rows, columns);
-  motion.rows.dY = Eigen::Map<const RowMatrix>(regressor_error.data(), rows, columns);
+  motion.rows.Y = Eigen::Map<const core::RowMatrix>(regressor.data(), rows, columns);
+  motion.rows.dY = Eigen::Map<const core::RowMatrix>(regressor_error.data(), rows, columns);
   motion.rows.y = Eigen::Map<const Eigen::VectorXd>(y.data(), rows);
   motion.rows.dy = Eigen::Map<const Eigen::VectorXd>(dy.data(), rows);
   return motion;
@@ -103,22 +103,22 @@ ReferenceMotion walk(LogSource& log, RegressorFilter filter) {
 
 ReferenceMotion read_reference(LogSource& log, const RegressorFilter& filter) {
   ReferenceMotion motion = walk(log, filter);
-  const SignalErrors& errors = filter.errors();
+  const filter::SignalErrors& errors = filter.errors();
   const Model& model = filter.model();
   const RegressionBlock& rows = motion.rows;
   motion.largest = errors.motion.largest;
   motion.any_dY = rows.dY;
   motion.any_dy = rows.dy;
-  motion.between_dY = motion.effort_dY = motion.effort_doubt = RowMatrix::Zero(rows.dY.rows(), rows.dY.cols());
+  motion.between_dY = motion.effort_dY = motion.effort_doubt = core::RowMatrix::Zero(rows.dY.rows(), rows.dY.cols());
   motion.between_dy = Eigen::VectorXd::Zero(rows.dy.size());
   if (!errors.between_samples || rows.y.size() == 0) {
     return motion;
   }
-  const auto walk_with = [&](const SignalErrors& wider) {
+  const auto walk_with = [&](const filter::SignalErrors& wider) {
     return walk(log, RegressorFilter(model, filter.design(), filter.measurement(), wider)).rows;
   };
   // Readings of one motion are two bounds apart: of a size and of half a range of efforts, of speeds.
-  SignalErrors apart = errors;
+  filter::SignalErrors apart = errors;
   apart.speed_sample *= 2.0;
   apart.joint_sample *= 2.0;
   apart.heading *= 2.0;
@@ -128,7 +128,7 @@ ReferenceMotion read_reference(LogSource& log, const RegressorFilter& filter) {
   const auto known = [&](const RegressionBlock& block) { return block.dY.rows() == rows.dY.rows(); };
   if (!known(any)) {
     // A step that is too long for efforts like these has no rows: nothing is known of it.
-    motion.any_dY.setConstant(kInfinity);
+    motion.any_dY.setConstant(core::kInfinity);
     return motion;
   }
   motion.any_dY = any.dY + (any.Y - rows.Y).cwiseAbs();
@@ -154,15 +154,15 @@ ReferenceMotion read_reference(LogSource& log, const RegressorFilter& filter) {
   const double most = rows.y.cwiseAbs().maxCoeff() + any.dy.maxCoeff() +
                       ((rows.Y.cwiseAbs() + motion.any_dY) * motion.largest).maxCoeff();
   motion.most_effort = kBeyondEfforts * most / filter.design().static_gain();
-  SignalErrors more = apart;
+  filter::SignalErrors more = apart;
   more.motion.effort.array() += motion.most_effort;
   const RegressionBlock wider = walk_with(more);
   if (!(motion.most_effort > 0.0) || !known(wider)) {
-    motion.effort_dY.setConstant(motion.most_effort > 0.0 ? kInfinity : 0.0);
+    motion.effort_dY.setConstant(motion.most_effort > 0.0 ? core::kInfinity : 0.0);
     return motion;
   }
-  const RowMatrix growth = (wider.dY - any.dY).cwiseMax(0.0);
-  const RowMatrix doubt = growth + (wider.Y - any.Y).cwiseAbs();
+  const core::RowMatrix growth = (wider.dY - any.dY).cwiseMax(0.0);
+  const core::RowMatrix doubt = growth + (wider.Y - any.Y).cwiseAbs();
   motion.effort_dY = growth / motion.most_effort;
   for (const Term& term : model.terms) {
     if (term.kind == Term::Kind::function) {
@@ -177,4 +177,4 @@ ReferenceMotion read_reference(LogSource& log, const RegressorFilter& filter) {
   return motion;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::detector

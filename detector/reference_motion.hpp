@@ -13,7 +13,7 @@
 #include <wheelwright/core/regression.hpp>
 #include <wheelwright/filter/regressor_filter.hpp>
 
-namespace wheelwright {
+namespace wheelwright::detector {
 
 /// The motion of a drive at the instants of the filter (the samples; for angles and mean speeds the ends of the steps
 /// between them, with the means over these steps). What follows from it is about every robot whose drive, read by these
@@ -32,16 +32,18 @@ struct ReferenceMotion {
   std::vector<bool> settled;            ///< K: whether a detector decides at this instant, whatever the noise
   std::vector<std::size_t> segment_starts;  ///< ascending instants at which a segment begins
   RegressionBlock rows;                     ///< K instants: Y_f of the motion, with the bounds dY, dy of the sensors
-  SignalErrors errors;                      ///< of the filter
+  filter::SignalErrors errors;              ///< of the filter
   bool measured = false;   ///< rows and signals have the sensors' errors already; a planned motion has none
-  RowMatrix any_dY;        ///< dY, and dy, of any log that these sensors may write of the drive: what bounds the
+  core::RowMatrix any_dY;  ///< dY, and dy, of any log that these sensors may write of the drive: what bounds the
   Eigen::VectorXd any_dy;  ///< motion between samples is read from efforts and speeds that are noisy themselves
-  RowMatrix between_dY;    ///< of any_dY what motion may do between samples: it grows with the efforts; empty: nothing
+  core::RowMatrix
+      between_dY;  ///< of any_dY what motion may do between samples: it grows with the efforts; empty: nothing
   Eigen::VectorXd between_dy;  ///< of any_dy what efforts may do between samples, alike
   double most_effort = 0.0;    ///< three times the efforts that the rows can be due to, for every θ of the set
-  RowMatrix effort_dY;  ///< by how much between_dY grows for each unit that every output's effort is larger by, up to
-                        ///< most_effort; functions of the motion left out
-  RowMatrix
+  core::RowMatrix
+      effort_dY;  ///< by how much between_dY grows for each unit that every output's effort is larger by, up to
+                  ///< most_effort; functions of the motion left out
+  core::RowMatrix
       effort_doubt;  ///< of functions of the motion: what they may be beside Y and dY where efforts are larger by up to
                      ///< most_effort (a speed whose sign is in doubt then)
   Eigen::VectorXd largest;       ///< sup |θ_j| over the set of the filter's MotionBound; empty where it has none
@@ -62,4 +64,4 @@ struct ReferenceMotion {
 /// measurement.
 [[nodiscard]] ReferenceMotion read_reference(LogSource& log, const RegressorFilter& filter);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::detector

@@ -8,7 +8,7 @@
 
 #include <wheelwright/core/check.hpp>
 
-namespace wheelwright {
+namespace wheelwright::detector {
 
 ThresholdRule::ThresholdRule(Polytope set, Eigen::VectorXd estimate, ParameterSetKind kind)
     : set_(std::move(set)),
@@ -28,9 +28,9 @@ ThresholdRule::ThresholdRule(Polytope set, Eigen::VectorXd estimate, ParameterSe
                                                : 0.0});
   }
   if (kind_ == ParameterSetKind::polytope) {
-    table_ = SupportTable::make(set_, {.slots = kSlots});
+    table_ = bounds::SupportTable::make(set_, {.slots = kSlots});
     if (!table_) {
-      walk_.emplace(set_, SupportWalkOptions{.slots = kSlots});
+      walk_.emplace(set_, bounds::SupportWalkOptions{.slots = kSlots});
     }
   }
 }
@@ -74,4 +74,4 @@ Interval ThresholdRule::prediction(std::span<const double> y, std::size_t channe
   return {-below, support(y, 2 * channel)};
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::detector

@@ -14,7 +14,7 @@
 #include <wheelwright/bounds/support_table.hpp>
 #include <wheelwright/bounds/support_walk.hpp>
 
-namespace wheelwright {
+namespace wheelwright::detector {
 
 /// Outer description of the feasible set from which a threshold is computed.
 enum class ParameterSetKind {
@@ -58,7 +58,7 @@ class ThresholdRule {
   [[nodiscard]] const Eigen::VectorXd& estimate() const noexcept { return estimate_; }
   [[nodiscard]] ParameterSetKind kind() const noexcept { return kind_; }
   /// The table that h is read from; nothing for the box and for sets of more vertices than a table takes.
-  [[nodiscard]] const std::optional<SupportTable>& table() const noexcept { return table_; }
+  [[nodiscard]] const std::optional<bounds::SupportTable>& table() const noexcept { return table_; }
 
   /// Directions that are followed from one row to the next: two for each of four channels; further channels share them.
   static constexpr std::size_t kSlots = 8;
@@ -80,8 +80,8 @@ class ThresholdRule {
   };
   std::vector<Parameter> parameters_;
   mutable std::vector<double> direction_, opposite_;
-  mutable std::optional<SupportTable> table_;
-  mutable std::optional<SupportWalk> walk_;  // where there is no table
+  mutable std::optional<bounds::SupportTable> table_;
+  mutable std::optional<bounds::SupportWalk> walk_;  // where there is no table
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::detector

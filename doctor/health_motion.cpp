@@ -14,7 +14,7 @@
 #include <wheelwright/inference/direction_words.hpp>
 #include <wheelwright/inference/identifiability.hpp>
 
-namespace wheelwright {
+namespace wheelwright::doctor {
 namespace {
 
 constexpr double kSome = 0.02;        // share of the rows that makes a manoeuvre count
@@ -40,7 +40,7 @@ double quantile(std::vector<double> values, double q) {
     return 0.0;
   }
   const auto rank = static_cast<std::size_t>(q * static_cast<double>(values.size() - 1));
-  return order_statistic(std::move(values), rank);
+  return core::order_statistic(std::move(values), rank);
 }
 
 void one_way(const char* id, const char* what, const char* plus, const char* minus, double p, double m,
@@ -170,13 +170,14 @@ struct TorqueUnit {
 constexpr TorqueUnit kTorqueUnits[] = {
     {1000.0, "mN·m"}, {141.6, "ozf·in"}, {100.0, "N·cm"}, {10.197, "kgf·cm"}, {8.851, "lbf·in"}};
 
-void check_effort_scale(const HealthView& view, const Setting& s, const Fit& fit, std::vector<LogFinding>& out) {
-  const auto scales = physical_scales(s.robot, s.model);
+void check_effort_scale(const HealthView& view, const commission::Setting& s, const commission::Fit& fit,
+                        std::vector<LogFinding>& out) {
+  const auto scales = commission::physical_scales(s.robot, s.model);
   for (std::size_t j = 0; view.robot_given && scales && j < s.model.p(); ++j) {
     const std::string& name = s.model.parameters[j].physical;
     const auto nominal = s.robot.nominal.find(name);
     if ((name != "mass" && name != "inertia") || nominal == s.robot.nominal.end() || !(nominal->second > 0.0) ||
-        fit.excitation[j].state != Excitation::identified) {
+        fit.excitation[j].state != identify::Excitation::identified) {
       continue;
     }
     const double value = (*scales)[j].scale * fit.estimate[static_cast<Eigen::Index>(j)] - (*scales)[j].offset;
@@ -208,10 +209,11 @@ void check_effort_scale(const HealthView& view, const Setting& s, const Fit& fit
   }
 }
 
-void check_sides(const Setting& s, const Fit& fit, std::vector<LogFinding>& out) {
+void check_sides(const commission::Setting& s, const commission::Fit& fit, std::vector<LogFinding>& out) {
   for (std::size_t j = 0; j < s.model.p(); ++j) {
     const auto at = static_cast<Eigen::Index>(j);
-    if (s.model.parameters[j].physical == "yaw_inertia" && fit.excitation[j].state == Excitation::identified &&
+    if (s.model.parameters[j].physical == "yaw_inertia" &&
+        fit.excitation[j].state == identify::Excitation::identified &&
         fit.estimate[at] < -5.0 * fit.residuals.standard_error[at]) {
       out.push_back({.id = "units.effort_sides",
                      .topic = FindingTopic::units,
@@ -221,28 +223,28 @@ void check_sides(const Setting& s, const Fit& fit, std::vector<LogFinding>& out)
                      .next = "Right and left seem to be swapped, of the efforts or of the motion: check the columns.",
                      .columns = s.measurement.effort_columns,
                      .value = fit.estimate[at],
-                     .unit = parameter_unit(s.robot, s.model.parameters[j])});
+                     .unit = commission::parameter_unit(s.robot, s.model.parameters[j])});
     }
   }
 }
 
 // What the filtered regressor says of each parameter. Returns whether any is excited.
-bool check_excitation(const HealthView& view, LogSource& log, const Setting& s, const Fit& fit,
+bool check_excitation(const HealthView& view, LogSource& log, const commission::Setting& s, const commission::Fit& fit,
                       std::vector<LogFinding>& out) {
   const bool one_clock = std::ranges::is_sorted(view.log->t);
-  std::vector<ParameterWords> words;
-  for (const Parameter& p : s.model.parameters) {
-    words.push_back({p.physical, p.physical_unit, p.excite, kind_of(p.physical)});
+  std::vector<inference::ParameterWords> words;
+  for (const model::Parameter& p : s.model.parameters) {
+    words.push_back({p.physical, p.physical_unit, p.excite, inference::kind_of(p.physical)});
   }
   std::size_t excited = 0;
   for (std::size_t j = 0; j < s.model.p(); ++j) {
-    const ExcitationFinding& found = fit.excitation[j];
-    excited += found.state != Excitation::not_excited ? 1 : 0;
-    if (found.state == Excitation::identified) {
+    const identify::ExcitationFinding& found = fit.excitation[j];
+    excited += found.state != identify::Excitation::not_excited ? 1 : 0;
+    if (found.state == identify::Excitation::identified) {
       continue;
     }
-    const bool missing = found.state == Excitation::not_excited;
-    const auto manoeuvres = missing_manoeuvres({static_cast<Eigen::Index>(j)}, words);
+    const bool missing = found.state == identify::Excitation::not_excited;
+    const auto manoeuvres = inference::missing_manoeuvres({static_cast<Eigen::Index>(j)}, words);
     out.push_back(
         about_motion("motion.excitation", missing ? FindingSeverity::warning : FindingSeverity::notice,
                      fmt::format("{}: {}.", words[j].name, found.reason),
@@ -268,13 +270,14 @@ bool check_excitation(const HealthView& view, LogSource& log, const Setting& s, 
                                  : "Parameters can hardly be told apart: change speed and yaw rate more, and "
                                    "independently of each other.",
                              condition, "1"));
-  InformationOptions options;
+  inference::InformationOptions options;
   options.weights = fit.weights;
-  const InformationOverTime over_time = information_over_time(log_moments(log, s, Part::everything), options);
+  const inference::InformationOverTime over_time =
+      inference::information_over_time(commission::log_moments(log, s, commission::Part::everything), options);
   for (std::size_t j = 0; one_clock && j < s.model.p(); ++j) {
-    const ParameterInformation& info = over_time.parameters[j];
+    const inference::ParameterInformation& info = over_time.parameters[j];
     const double share = s.survey.seconds > 0.0 ? info.seconds / s.survey.seconds : 1.0;
-    if (fit.excitation[j].state == Excitation::not_excited || !(info.information > 0.0) || share > 0.1) {
+    if (fit.excitation[j].state == identify::Excitation::not_excited || !(info.information > 0.0) || share > 0.1) {
       continue;
     }
     LogFinding f =
@@ -293,22 +296,23 @@ bool check_excitation(const HealthView& view, LogSource& log, const Setting& s, 
 }
 
 // Effort against motion in time, where a shift explains the log better than none.
-void check_delay(const HealthView& view, const Setting& s, const Fit& fit, std::vector<LogFinding>& out) {
+void check_delay(const HealthView& view, const commission::Setting& s, const commission::Fit& fit,
+                 std::vector<LogFinding>& out) {
   TableSource source(*view.log);
-  const std::optional<EffortTiming> timing = effort_timing(source, s, fit);
+  const std::optional<commission::EffortTiming> timing = commission::effort_timing(source, s, fit);
   if (!timing) {
     return;
   }
   const double delay = timing->delay, error = timing->standard_error, left = timing->residual_ratio;
-  const bool matters = is_latency(*timing, view.step) ||
+  const bool matters = commission::is_latency(*timing, view.step) ||
                        (std::abs(delay) > 3.0 * error && left < 0.95 && std::abs(delay) > 0.25 * view.step);
   const bool large = matters && std::abs(delay) > 0.75 * view.step;
   LogFinding f{.id = "time.effort_delay",
                .topic = FindingTopic::time,
-               .severity = view.robot_given && is_latency(*timing, view.step) ? FindingSeverity::fatal
-                           : large                                            ? FindingSeverity::warning
-                           : matters                                          ? FindingSeverity::notice
-                                                                              : FindingSeverity::fine};
+               .severity = view.robot_given && commission::is_latency(*timing, view.step) ? FindingSeverity::fatal
+                           : large                                                        ? FindingSeverity::warning
+                           : matters                                                      ? FindingSeverity::notice
+                                                                                          : FindingSeverity::fine};
   f.columns = s.measurement.effort_columns;
   f.value = delay;
   f.unit = std::string("s");
@@ -335,9 +339,9 @@ void check_delay(const HealthView& view, const Setting& s, const Fit& fit, std::
   out.push_back(f);
 }
 
-void check_remainder(const Setting& s, const Fit& fit, std::vector<LogFinding>& out) {
+void check_remainder(const commission::Setting& s, const commission::Fit& fit, std::vector<LogFinding>& out) {
   for (std::size_t i = 0; i < s.model.n(); ++i) {
-    const OutputResidual& o = fit.residuals.outputs[i];
+    const identify::OutputResidual& o = fit.residuals.outputs[i];
     const double share = o.torque_rms > 0.0 ? o.rms / o.torque_rms : 0.0;
     if (share > 0.2) {
       out.push_back(about_motion(
@@ -362,8 +366,8 @@ bool check_motion(const HealthView& view, std::vector<LogFinding>& findings) {
   try {
     TableSource log(*view.log);
     Robot robot = view.robot;
-    const Setting s = settle(log, robot);
-    const Fit fit = fit_log(log, s, Part::everything, kUnusedRisk);
+    const commission::Setting s = commission::settle(log, robot);
+    const commission::Fit fit = commission::fit_log(log, s, commission::Part::everything, kUnusedRisk);
     const bool excited = check_excitation(view, log, s, fit, findings);
     if (excited) {
       check_effort_scale(view, s, fit, findings);
@@ -380,4 +384,4 @@ bool check_motion(const HealthView& view, std::vector<LogFinding>& findings) {
   }
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::doctor

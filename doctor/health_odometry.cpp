@@ -16,7 +16,7 @@
 #include <wheelwright/doctor/log_health.hpp>
 #include <wheelwright/inference/kinematic_calibration.hpp>
 
-namespace wheelwright {
+namespace wheelwright::doctor {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
@@ -180,7 +180,7 @@ std::optional<double> straight_ratio(const std::vector<Window>& windows) {
   if (ratios.size() < kFewest) {
     return std::nullopt;
   }
-  return median(std::move(ratios));
+  return core::median(std::move(ratios));
 }
 
 // Way along the heading in each window, step by step: position noise cancels but for the ends.
@@ -327,14 +327,14 @@ void check_pose_delay(const HealthView& view, std::vector<LogFinding>& out) {
   if (!view.robot_given || view.joints[0].speed == nullptr || view.joints[1].speed == nullptr) {
     return;
   }
-  KinematicOptions options;
+  inference::KinematicOptions options;
   options.wheel_radius = view.robot.wheel_radius;
   options.track_width = view.robot.track_width;
   options.radius = options.axle_offset = view.column("x") != nullptr && view.column("y") != nullptr;
   options.largest_delay = 0.3;
   try {
-    const KinematicQuantity delay = calibrate_kinematics(*view.log, options).delay;
-    if (delay.state == KinematicState::identified) {
+    const inference::KinematicQuantity delay = inference::calibrate_kinematics(*view.log, options).delay;
+    if (delay.state == inference::KinematicState::identified) {
       const bool late = delay.estimate > 3.0 * delay.standard_error && delay.estimate > 1.5 * view.step;
       out.push_back(
           {.id = "time.pose_delay",
@@ -357,7 +357,7 @@ void check_pose_origin(const HealthView& view, std::vector<LogFinding>& out) {
   if (view.column("theta") == nullptr) {
     return;
   }
-  OdometryMeasurement m;
+  filter::OdometryMeasurement m;
   m.heading = true;
   m.position = view.column("x") != nullptr && view.column("y") != nullptr;
   m.nominal_step = view.step;
@@ -367,7 +367,8 @@ void check_pose_origin(const HealthView& view, std::vector<LogFinding>& out) {
     m.motion_columns.push_back(angles ? j.angle_name : j.speed_name);
   }
   TableSource log(*view.log);
-  const PoseOrigin origin = pose_origin(log, m, kWindow, view.robot.encoder_counts_per_turn.value_or(0.0));
+  const commission::PoseOrigin origin =
+      commission::pose_origin(log, m, kWindow, view.robot.encoder_counts_per_turn.value_or(0.0));
   if (origin.sentence.empty()) {
     return;
   }
@@ -479,4 +480,4 @@ void check_odometry(const HealthView& view, std::vector<LogFinding>& findings) {
   }
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::doctor

@@ -14,7 +14,7 @@
 #include <wheelwright/identify/noise_level.hpp>
 #include <wheelwright/inference/standstill_noise.hpp>
 
-namespace wheelwright {
+namespace wheelwright::doctor {
 namespace {
 
 constexpr double kTurn = 2.0 * std::numbers::pi;
@@ -272,9 +272,9 @@ void check_resolution(const HealthView& view, const Column& c, const std::vector
       sample.push_back(is_angle ? (*c.values)[k] - (*c.values)[k - 1] : (*c.values)[k]);
     }
   }
-  const auto encoder = !on_two_wheels(view.robot) || !(view.step > 0.0) ? std::nullopt
-                       : is_angle                                       ? find_encoder_of_angles(sample)
-                                                                        : find_encoder(sample, view.step);
+  const auto encoder = !model::on_two_wheels(view.robot) || !(view.step > 0.0) ? std::nullopt
+                       : is_angle                                              ? filter::find_encoder_of_angles(sample)
+                                  : filter::find_encoder(sample, view.step);
   if (!encoder) {
     return;
   }
@@ -316,10 +316,11 @@ void check_noise(const HealthView& view, const std::vector<Column>& columns, std
     return;
   }
   TableSource source(*view.log);
-  const std::vector<DifferenceNoise> noises = difference_noise(source, names);
+  const std::vector<identify::DifferenceNoise> noises = identify::difference_noise(source, names);
   for (std::size_t i = 0; i < names.size(); ++i) {
-    const DifferenceNoise& noise = noises[i];
-    const bool told = noise.kind == DifferenceNoise::Kind::white || noise.kind == DifferenceNoise::Kind::rough;
+    const identify::DifferenceNoise& noise = noises[i];
+    const bool told =
+        noise.kind == identify::DifferenceNoise::Kind::white || noise.kind == identify::DifferenceNoise::Kind::rough;
     double squares = 0.0, rows = 0.0;
     for (std::size_t k = 0; k < view.log->rows(); ++k) {
       squares += view.moving[k] ? (*asked[i]->values)[k] * (*asked[i]->values)[k] : 0.0;
@@ -347,7 +348,7 @@ void check_noise(const HealthView& view, const std::vector<Column>& columns, std
 
 void check_rest(const HealthView& view, const std::vector<Column>& columns, std::vector<LogFinding>& out) {
   TableSource source(*view.log);
-  const StandstillSigns signs = standstill_signs(source, view.model);
+  const inference::StandstillSigns signs = inference::standstill_signs(source, view.model);
   std::vector<std::string> efforts;
   for (const Column& c : columns) {
     if (c.kind == ColumnKind::effort) {
@@ -357,7 +358,7 @@ void check_rest(const HealthView& view, const std::vector<Column>& columns, std:
   if (efforts.empty() || (signs.commands.empty() && signs.speeds.empty() && signs.angles.empty())) {
     return;
   }
-  const Standstill rest = standstill_noise(source, signs, efforts);
+  const inference::Standstill rest = inference::standstill_noise(source, signs, efforts);
   LogFinding f{.id = "signals.standstill", .topic = FindingTopic::signals};
   const double moving = static_cast<double>(std::ranges::count(view.moving, true));
   const double share = 1.0 - moving / static_cast<double>(view.log->rows());
@@ -445,4 +446,4 @@ void check_signals(const HealthView& view, const ReaderCounts& reader, std::vect
   check_rest(view, columns, findings);
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::doctor

@@ -7,7 +7,7 @@
 
 #include <wheelwright/doctor/log_health.hpp>
 
-namespace wheelwright {
+namespace wheelwright::doctor {
 namespace {
 
 constexpr double kMissing = 1.5;  // median steps from which on a sample is missing
@@ -230,4 +230,4 @@ void check_time(const HealthView& view, const ReaderCounts& reader, std::vector<
   check_steps(view, findings);
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::doctor

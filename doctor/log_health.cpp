@@ -10,12 +10,15 @@
 #include <wheelwright/core/statistics.hpp>
 #include <wheelwright/core/words.hpp>
 
-namespace wheelwright {
+namespace wheelwright::doctor {
+
+using model::EffortKind;
+
 namespace {
 
 // Whether wheel radii and track can be found without efforts.
 bool has_kinematics(const HealthView& view) {
-  return view.has_motion() && view.column("theta") != nullptr && on_two_wheels(view.robot);
+  return view.has_motion() && view.column("theta") != nullptr && model::on_two_wheels(view.robot);
 }
 
 // Columns that are missing, and what the log has instead.
@@ -36,11 +39,11 @@ void check_columns(const HealthView& view, std::vector<LogFinding>& out) {
     out.push_back(f);
   };
   if (!view.has_motion()) {
-    lacking(
-        "signals.no_motion", FindingSeverity::fatal,
-        motion.empty() ? "Some joints have speeds only and others angles only: all need one kind."
-                       : fmt::format("The log lacks {}.", listed(motion)),
-        fmt::format("It has {}: rename columns with --map NAME=COLUMN, or log the motion.", listed(view.log->names)));
+    lacking("signals.no_motion", FindingSeverity::fatal,
+            motion.empty() ? "Some joints have speeds only and others angles only: all need one kind."
+                           : fmt::format("The log lacks {}.", core::listed(motion)),
+            fmt::format("It has {}: rename columns with --map NAME=COLUMN, or log the motion.",
+                        core::listed(view.log->names)));
   }
   if (!effort.empty()) {
     std::vector<std::string> others;
@@ -50,12 +53,12 @@ void check_columns(const HealthView& view, std::vector<LogFinding>& out) {
       }
     }
     lacking("signals.no_effort", has_kinematics(view) ? FindingSeverity::warning : FindingSeverity::fatal,
-            fmt::format("The log lacks {}.", listed(effort)),
+            fmt::format("The log lacks {}.", core::listed(effort)),
             others.empty()
                 ? "Log torques, currents or voltages, or rename columns with --map NAME=COLUMN: without "
                   "efforts only the kinematics can be identified."
                 : fmt::format("It has {}: `effort: {{kind: …}}` in the robot file says which effort is used.",
-                              listed(others)));
+                              core::listed(others)));
   }
 }
 
@@ -66,7 +69,7 @@ std::string names_of(const std::vector<LogFinding>& findings, FindingSeverity se
       ids.push_back(f.id);
     }
   }
-  return listed(ids);
+  return core::listed(ids);
 }
 
 void conclude(const HealthView& view, bool reaches_bounds, LogHealth& health) {
@@ -101,7 +104,7 @@ std::string assumption(const HealthView& view) {
   const char* effort = view.robot.effort == EffortKind::torque    ? "torques"
                        : view.robot.effort == EffortKind::current ? "currents"
                                                                   : "voltages";
-  return !on_two_wheels(view.robot)
+  return !model::on_two_wheels(view.robot)
              ? "no robot file: taken for a single axis"
              : fmt::format(
                    "no robot file: taken for a differential drive with {} as efforts; whether units fit radius, "
@@ -201,7 +204,7 @@ Robot stand_in(const LogTable& log) {
   return robot;
 }
 
-const std::string& effort_name(const Robot& robot, const Joint& joint) {
+const std::string& effort_name(const Robot& robot, const model::Joint& joint) {
   return robot.effort == EffortKind::torque    ? joint.torque
          : robot.effort == EffortKind::current ? joint.current
                                                : joint.voltage;
@@ -234,7 +237,7 @@ double top_of(std::vector<double> values) {
   }
   std::ranges::transform(values, values.begin(), [](double v) { return std::abs(v); });
   const auto rank = static_cast<std::size_t>(0.99 * static_cast<double>(values.size() - 1));
-  return order_statistic(std::move(values), rank);
+  return core::order_statistic(std::move(values), rank);
 }
 
 }  // namespace
@@ -269,8 +272,8 @@ HealthView make_view(const LogTable& log, const std::optional<Robot>& robot) {
   }
   view.robot_given = robot.has_value();
   view.robot = robot ? *robot : stand_in(log);
-  view.model = make_model(view.robot);
-  view.step = median_step(log.t);
+  view.model = model::make_model(view.robot);
+  view.step = core::median_step(log.t);
   std::vector<std::size_t> starts = log.segment_starts;
   if (starts.empty() || starts.front() != 0) {
     starts.insert(starts.begin(), 0);
@@ -278,7 +281,7 @@ HealthView make_view(const LogTable& log, const std::optional<Robot>& robot) {
   for (std::size_t s = 0; s < starts.size(); ++s) {
     view.segments.emplace_back(starts[s], s + 1 < starts.size() ? starts[s + 1] : log.rows());
   }
-  for (const Joint& joint : view.model.joints) {
+  for (const model::Joint& joint : view.model.joints) {
     JointView j;
     j.angle_name = joint.angle;
     j.speed_name = joint.speed;
@@ -357,4 +360,4 @@ std::string unit_for_ratio(double ratio, bool rates) {
   return {};
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::doctor

@@ -15,7 +15,7 @@
 #include <wheelwright/core/log.hpp>
 #include <wheelwright/model/robot.hpp>
 
-namespace wheelwright {
+namespace wheelwright::doctor {
 
 /// Severity of a finding, the least first.
 enum class FindingSeverity {
@@ -92,8 +92,8 @@ struct LogHealth {
 /// excitation is judged; without it, scales of units cannot be judged against radius, track and mass.
 ///
 /// The checks and their thresholds are in docs/doctor.md. Excitation is that of the filtered regressor (25) as
-/// commission() makes it: settle(), fit_log() and identifiability(); the delay between effort and motion is that of
-/// TimeShiftedRows with its standard error. Throws nothing for what a log may hold; InvalidArgument for a robot that
+/// commission_robot() makes it: settle(), fit_log() and identifiability(); the delay between effort and motion is that
+/// of TimeShiftedRows with its standard error. Throws nothing for what a log may hold; InvalidArgument for a robot that
 /// makes no sense or a log whose columns differ in length.
 [[nodiscard]] LogHealth examine(const LogTable& log, const std::optional<Robot>& robot = std::nullopt,
                                 const ReaderCounts& reader = {});
@@ -154,4 +154,4 @@ void check_odometry(const HealthView& view, std::vector<LogFinding>& findings);
 /// tenth. `rates`: the quantity is an angular speed.
 [[nodiscard]] std::string unit_for_ratio(double ratio, bool rates);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::doctor

@@ -28,23 +28,24 @@ int main(int count, char** words) {
   Simulation log(read_scenario(words[1]));
   const Robot& robot = log.scenario().robot;
 
-  const Commissioning result = commission(log, robot);
+  const Commissioning result = commission_robot(log, robot);
   fmt::print("{}: {}\n", robot.name, result.message);
   if (result.status != Commissioning::Status::done) {
     return EXIT_FAILURE;
   }
 
   bool inside = true;
-  const Eigen::VectorXd truth = true_parameters(log.scenario(), result.model.model);
-  const auto scales = physical_scales(robot, result.model.model).value();  // θ_L is r times the physical quantity
+  const Eigen::VectorXd truth = sim::true_parameters(log.scenario(), result.model.model);
+  const auto scales =
+      commission::physical_scales(robot, result.model.model).value();  // θ_L is r times the physical quantity
   for (std::size_t j = 0; j < result.parameters.size(); ++j) {
-    const ParameterResult& p = result.parameters[j];
+    const commission::ParameterResult& p = result.parameters[j];
     const double exact = truth[static_cast<Eigen::Index>(j)], scale = scales[j].scale;
     inside = inside && p.lower <= exact && exact <= p.upper;
     fmt::print("  {:<15} {:8.4f} in [{:.4f}, {:.4f}] {:<10}  truth {:.4f}\n", p.parameter.physical, scale * *p.estimate,
                scale * p.lower, scale * p.upper, p.parameter.physical_unit, scale * exact);
   }
-  for (const OutputValidation& v : result.validation) {
+  for (const commission::OutputValidation& v : result.validation) {
     fmt::print("  held out: {} of {} instants outside, residual {:.2f} % of the torque\n", v.outside, v.instants,
                100.0 * v.nrmse);
   }

@@ -31,13 +31,13 @@ Effect cogging() {
   effect.sentence = "The magnets of the motors pull the wheels into six places a turn.";
   effect.parameters = {{"a", "N·m"}, {"b", "N·m"}};
   effect.excite = "drive slowly for several turns of the wheels";
-  effect.columns = [](const Drive& drive, std::span<const double>) {
+  effect.columns = [](const gap::Drive& drive, std::span<const double>) {
     std::vector<Eigen::VectorXd> sine, cosine;
-    for (const JointSignals& joint : drive.joints) {
+    for (const gap::JointSignals& joint : drive.joints) {
       sine.emplace_back((kMagnets * joint.angle.array()).sin());
       cosine.emplace_back((kMagnets * joint.angle.array()).cos());
     }
-    return std::vector<Column>{catalogue::at_joints(drive, sine), catalogue::at_joints(drive, cosine)};
+    return std::vector<gap::Column>{gap::catalogue::at_joints(drive, sine), gap::catalogue::at_joints(drive, cosine)};
   };
   return effect;
 }
@@ -63,7 +63,7 @@ LogTable drive(Scenario scenario, double torque, std::uint64_t seed) {
 }
 
 Diagnosis diagnosed(const LogTable& log, const LogTable& healthy, const Robot& robot, std::vector<Effect> catalogue) {
-  DiagnoseOptions options;
+  gap::DiagnoseOptions options;
   options.catalogue = std::move(catalogue);
   options.shrink = false;
   TableSource real(log), baseline(healthy);
@@ -79,21 +79,21 @@ int main(int count, char** words) {
   }
   const Scenario scenario = read_scenario(words[1]);
   const LogTable healthy = drive(scenario, 0.0, 1), log = drive(scenario, kTruth, 2);
-  std::vector<Effect> catalogue = effect_catalogue();
+  std::vector<Effect> catalogue = gap::effect_catalogue();
   const Diagnosis before = diagnosed(log, healthy, scenario.robot, catalogue);
   catalogue.push_back(cogging());
   const Diagnosis after = diagnosed(log, healthy, scenario.robot, catalogue);
 
   fmt::print("with the catalogue as it is: {}\n",
-             before.verdict == GapVerdict::unexplained ? "unexplained" : "taken for something else");
-  bool found = after.verdict == GapVerdict::explained && after.causes.size() == 1;
-  for (const GapCause& cause : after.causes) {
+             before.verdict == gap::GapVerdict::unexplained ? "unexplained" : "taken for something else");
+  bool found = after.verdict == gap::GapVerdict::explained && after.causes.size() == 1;
+  for (const gap::GapCause& cause : after.causes) {
     fmt::print("with cogging in it: {}, {:.0f} % of the gap\n", cause.effect, 100.0 * cause.share);
-    for (const GapEstimate& p : cause.parameters) {
+    for (const gap::GapEstimate& p : cause.parameters) {
       fmt::print("  {} = {:.4f} in [{:.4f}, {:.4f}] {}\n", p.name, p.estimate, p.lower, p.upper, p.unit);
     }
     found = found && cause.effect == "cogging" && cause.parameters[0].lower <= kTruth &&
             kTruth <= cause.parameters[0].upper;
   }
-  return found && before.verdict == GapVerdict::unexplained ? EXIT_SUCCESS : EXIT_FAILURE;
+  return found && before.verdict == gap::GapVerdict::unexplained ? EXIT_SUCCESS : EXIT_FAILURE;
 }

@@ -39,7 +39,9 @@ struct UnbalancedWheel {
     m.joints = {{.angle = "phi", .speed = "omega", .torque = "tau", .current = "", .voltage = "", .command = ""}};
     m.motion = m.input = Eigen::MatrixXd::Identity(1, 1);
     // |sin φ − sin φ'| <= |φ − φ'|: the error of the angle bounds that of the term.
-    const auto gravity = [](const MotionState& s) { return TermValue{std::sin(s.heading), s.heading_error}; };
+    const auto gravity = [](const model::MotionState& s) {
+      return model::TermValue{std::sin(s.heading), s.heading_error};
+    };
     m.terms = {{.output = 0, .parameter = 0, .kind = Term::Kind::acceleration},
                {.output = 0, .parameter = 1, .kind = Term::Kind::speed},
                {.output = 0, .parameter = 2, .kind = Term::Kind::function, .function = gravity}};
@@ -78,10 +80,11 @@ int main() {
   const Measurement measurement{MotionKind::angle, {"phi"}, {"tau"}, "phi", Hold::first_order, false, 0.0, kStep};
   const FilterDesign filter{.order = 2, .alpha = 5.0, .beta = 5.0};
   // Taking signals as linear between samples adds |ẍ| h²/8: to φ 1e-5 rad, to τ 2e-5 N·m, to sin φ 5e-5.
-  const SensorErrors sensors{kAngleNoise + 1e-5, kTorqueNoise + 2e-5, kAngleNoise + 6e-5};
-  TorqueRows rows(source, RegressorFilter(model, filter, measurement, propagate(model, filter, measurement, sensors)));
+  const filter::SensorErrors sensors{kAngleNoise + 1e-5, kTorqueNoise + 2e-5, kAngleNoise + 6e-5};
+  TorqueRows rows(source,
+                  RegressorFilter(model, filter, measurement, filter::propagate(model, filter, measurement, sensors)));
 
-  const LeastSquaresFit fit = least_squares(rows);
+  const identify::LeastSquaresFit fit = least_squares(rows);
   const FeasibleSet set = feasible_set(rows, Box{{{0.0, 1.0}, {0.0, 1.0}, {0.0, 10.0}}});
   bool good = set.status == FeasibleSet::Status::nonempty && set.polytope->contains(kTruth);
   for (std::size_t j = 0; j < kTruth.size(); ++j) {

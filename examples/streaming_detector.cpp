@@ -43,7 +43,7 @@ int main(int count, char** words) {
     return EXIT_FAILURE;
   }
   Simulation healthy(read_scenario(words[1]));
-  const Commissioning commissioned = commission(healthy, healthy.scenario().robot);
+  const Commissioning commissioned = commission_robot(healthy, healthy.scenario().robot);
   if (commissioned.status != Commissioning::Status::done) {
     fmt::print(stderr, "{}\n", commissioned.message);
     return EXIT_FAILURE;
@@ -55,7 +55,7 @@ int main(int count, char** words) {
   std::vector<double> sample(wanted.size());
 
   const Scenario scenario = read_scenario(words[2]);
-  const LogTable drive = simulate(scenario);
+  const LogTable drive = sim::simulate(scenario);
   std::vector<const std::vector<double>*> columns;
   for (const std::string& name : wanted) {
     columns.push_back(&drive.column(name));
@@ -72,7 +72,7 @@ int main(int count, char** words) {
     const Decision& decision = detector.step(drive.t[k], sample);
     if (decision.valid && decision.fault) {
       alarm = alarm ? alarm : drive.t[k];
-      for (const ChannelDecision& channel : decision.channels) {
+      for (const detector::ChannelDecision& channel : decision.channels) {
         peak = std::max(peak, std::abs(channel.residual) / channel.threshold.rho());
       }
     }

@@ -39,14 +39,14 @@ int main(int count, char** words) {
     return EXIT_FAILURE;
   }
   Simulation log(read_scenario(words[1]));
-  const OnlineModel model = commission(log, log.scenario().robot).model;
+  const OnlineModel model = commission_robot(log, log.scenario().robot).model;
   if (model.facets.empty()) {
     fmt::print(stderr, "the log made no model\n");
     return EXIT_FAILURE;
   }
   const Polytope set(model.facets, model.box);
-  const ThresholdRule polytope(set, model.estimate, ParameterSetKind::polytope);
-  const ThresholdRule box(set, model.estimate, ParameterSetKind::box);
+  const detector::ThresholdRule polytope(set, model.estimate, detector::ParameterSetKind::polytope);
+  const detector::ThresholdRule box(set, model.estimate, detector::ParameterSetKind::box);
 
   Simulation drive(read_scenario(words[2]));
   TorqueRows stream(drive, RegressorFilter(model.model, model.filter, model.measurement, model.errors));
@@ -59,7 +59,7 @@ int main(int count, char** words) {
   for (Eigen::Index row = 0; row < rows.rows(); ++row) {
     const std::span<const double> y(rows.Y.row(row).data(), p), dy(rows.dY.row(row).data(), p);
     const std::size_t channel = static_cast<std::size_t>(row) % n;
-    const Threshold tight = polytope.at(y, dy, rows.dy[row], channel), loose = box.at(y, dy, rows.dy[row]);
+    const detector::Threshold tight = polytope.at(y, dy, rows.dy[row], channel), loose = box.at(y, dy, rows.dy[row]);
     const std::array of_kind = {tight.width(), 2.0 * tight.rho(), loose.width(), 2.0 * loose.rho()};
     ordered = ordered && of_kind[0] <= of_kind[1] && of_kind[2] <= of_kind[3] && of_kind[0] <= of_kind[2] &&
               of_kind[1] <= of_kind[3];

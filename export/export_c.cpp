@@ -17,7 +17,7 @@
 #include <wheelwright/export/export_c_filter.hpp>
 #include <wheelwright/export/export_c_text.hpp>
 
-namespace wheelwright {
+namespace wheelwright::exporter {
 namespace {
 
 using c_text::hex;
@@ -62,11 +62,11 @@ class Writer {
         rule_(detector.threshold()),
         written_(filter_, thresholds()) {
     check_name(options.name);
-    if (thresholds() && rule_.kind() == ParameterSetKind::polytope && !rule_.table()) {
+    if (thresholds() && rule_.kind() == detector::ParameterSetKind::polytope && !rule_.table()) {
       throw InputError(
           fmt::format("export: the feasible set has too many vertices for a table (more than {} in one group of "
                       "parameters, or it is too flat); export its box instead (--set box)",
-                      SupportTableOptions{}.vertices));
+                      bounds::SupportTableOptions{}.vertices));
     }
   }
 
@@ -106,8 +106,8 @@ class Writer {
     for (char& c : upper) {
       c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
     }
-    replace_all(text_, "PFX", upper);
-    replace_all(text_, "pfx", options_.name);
+    core::replace_all(text_, "PFX", upper);
+    core::replace_all(text_, "pfx", options_.name);
     return std::move(text_);
   }
 
@@ -119,9 +119,9 @@ class Writer {
   }
 
   [[nodiscard]] bool thresholds() const { return !detector_.options().mu; }
-  [[nodiscard]] bool polytope() const { return rule_.kind() == ParameterSetKind::polytope; }
-  [[nodiscard]] std::size_t slots() const { return std::min(2 * model_.n(), ThresholdRule::kSlots); }
-  [[nodiscard]] bool two_sided() const { return detector_.options().test == Test::two_sided; }
+  [[nodiscard]] bool polytope() const { return rule_.kind() == detector::ParameterSetKind::polytope; }
+  [[nodiscard]] std::size_t slots() const { return std::min(2 * model_.n(), detector::ThresholdRule::kSlots); }
+  [[nodiscard]] bool two_sided() const { return detector_.options().test == detector::Test::two_sided; }
   void comment() {
     const auto columns = measurement_.columns();
     line("/* {}.h: on-line fault detector.", options_.name);
@@ -134,7 +134,7 @@ class Writer {
          filter_.design().beta);
     line(" * Effort: {}.", written_.effort_words());
     line(" * Residual: filtered effort minus what the model expects (a kinematic residual is not part of this file).");
-    const Persistence persistence = detector_.options().persistence.value_or(Persistence{});
+    const detector::Persistence persistence = detector_.options().persistence.value_or(detector::Persistence{});
     line(" * Decision: {}, alarm at {} of {} instants outside.",
          !thresholds() ? "constant thresholds"
          : polytope()  ? (two_sided() ? "two-sided, threshold from the feasible set"
@@ -193,7 +193,7 @@ class Writer {
   }
 
   void constants() {
-    const Persistence persistence = detector_.options().persistence.value_or(Persistence{});
+    const detector::Persistence persistence = detector_.options().persistence.value_or(detector::Persistence{});
     line("#define PFX_INPUTS {}     /* numbers of a sample */", measurement_.columns().size());
     line("#define PFX_JOINTS {}", model_.joints.size());
     line("#define PFX_COORDINATES {}", model_.coordinates.size());
@@ -208,24 +208,24 @@ class Writer {
     }
     const auto p = static_cast<double>(model_.p());
     line("#define PFX_SLOTS {}        /* directions that are followed from one sample to the next */", slots());
-    line("#define PFX_ROUNDING {} /* relative, of residual and threshold */", hex(4.0 * (p + 4.0) * kEpsilon));
-    line("#define PFX_HULL_ROUNDING {}", hex(4.0 * (p + 1.0) * kEpsilon));
+    line("#define PFX_ROUNDING {} /* relative, of residual and threshold */", hex(4.0 * (p + 4.0) * core::kEpsilon));
+    line("#define PFX_HULL_ROUNDING {}", hex(4.0 * (p + 1.0) * core::kEpsilon));
     line("#define PFX_HULL_UNDERFLOW {}", hex(2.0 * p * std::numeric_limits<double>::min()));
     if (polytope()) {
       const auto& graphs = rule_.table()->graphs();
       std::size_t largest = 1;
-      for (const VertexGraph& graph : graphs) {
+      for (const bounds::VertexGraph& graph : graphs) {
         largest = std::max(largest, graph.parameters.size());
       }
-      line("#define PFX_SLACK {}", hex(1.0 + (p + 6.0) * kEpsilon));
-      line("#define PFX_SUM {}", hex((p + 2.0) * kEpsilon));
+      line("#define PFX_SLACK {}", hex(1.0 + (p + 6.0) * core::kEpsilon));
+      line("#define PFX_SUM {}", hex((p + 2.0) * core::kEpsilon));
       line("#define PFX_TINY {}", hex(std::numeric_limits<double>::min()));
       if (!graphs.empty()) {
         line("#define PFX_GROUPS {}       /* of parameters that bound each other */", graphs.size());
         line("#define PFX_LARGEST_GROUP {}", largest);
         line("#define PFX_EDGES {}       /* most edges walked for one direction and group */",
              rule_.table()->options().budget);
-        line("#define PFX_TIGHT {}", hex(SupportTable::kTight));
+        line("#define PFX_TIGHT {}", hex(bounds::SupportTable::kTight));
       }
     }
   }
@@ -261,7 +261,7 @@ class Writer {
     }
     const auto& graphs = rule_.table()->graphs();
     for (std::size_t g = 0; g < graphs.size(); ++g) {
-      const VertexGraph& graph = graphs[g];
+      const bounds::VertexGraph& graph = graphs[g];
       const std::size_t q = graph.parameters.size(), stride = q * q + 4 * q;
       line(
           "\n/* Group {} of parameters: the {} vertices of its feasible set, and where their edges lead (pfx_follow). "
@@ -394,7 +394,7 @@ class Writer {
   const RegressorFilter& filter_;
   const Model& model_;
   const Measurement& measurement_;
-  const ThresholdRule& rule_;
+  const detector::ThresholdRule& rule_;
   const c_text::FilterWriter written_;
   std::string text_;
 };
@@ -405,4 +405,4 @@ std::string c_header(const TorqueDetector& detector, const CExportOptions& optio
   return Writer(detector, options).text();
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::exporter

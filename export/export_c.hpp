@@ -7,7 +7,7 @@
 
 #include <wheelwright/detector/detector.hpp>
 
-namespace wheelwright {
+namespace wheelwright::exporter {
 
 /// Name of an exported detector, and the origin that its header states.
 struct CExportOptions {
@@ -28,4 +28,4 @@ struct CExportOptions {
 /// that this file does not know as C; and where the set has more vertices than a table takes (SupportTable).
 [[nodiscard]] std::string c_header(const TorqueDetector& detector, const CExportOptions& options = {});
 
-}  // namespace wheelwright
+}  // namespace wheelwright::exporter

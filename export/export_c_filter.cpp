@@ -17,12 +17,12 @@
 #include <wheelwright/model/differential_drive.hpp>
 #include <wheelwright/model/single_axis.hpp>
 
-namespace wheelwright::c_text {
+namespace wheelwright::exporter::c_text {
 namespace {
 
-constexpr double kOutward = 1.0 + 64.0 * kEpsilon;  // kUp of filter/motion_bound.cpp
-constexpr int kWidenings = 12;                      // kRounds there
-constexpr double kAlikeSteps = 0.05;                // kAlike of filter/regressor_filter.cpp
+constexpr double kOutward = 1.0 + 64.0 * core::kEpsilon;  // kUp of filter/motion_bound.cpp
+constexpr int kWidenings = 12;                            // kRounds there
+constexpr double kAlikeSteps = 0.05;                      // kAlike of filter/regressor_filter.cpp
 
 bool any_kind(const Model& model, Term::Kind kind) {
   return std::ranges::any_of(model.terms, [&](const Term& term) { return term.kind == kind; });
@@ -31,7 +31,7 @@ bool any_kind(const Model& model, Term::Kind kind) {
 bool any_not_zero(const Eigen::VectorXd& x) { return (x.array() != 0.0).any(); }
 
 // Constant tables of StepEnclosure.
-Eigen::MatrixXd friction_rate(const Model& model, const MotionBound& bound) {
+Eigen::MatrixXd friction_rate(const Model& model, const filter::MotionBound& bound) {
   const auto coordinates = static_cast<Eigen::Index>(model.coordinates.size());
   const auto n = static_cast<Eigen::Index>(model.n());
   Eigen::MatrixXd friction = Eigen::MatrixXd::Zero(n, coordinates);
@@ -55,11 +55,11 @@ Eigen::MatrixXd friction_rate(const Model& model, const MotionBound& bound) {
 }
 
 Eigen::MatrixXd joints_from_coordinates(const Model& model) {
-  const Eigen::MatrixXd inverse = pseudo_inverse(model.motion);
+  const Eigen::MatrixXd inverse = core::pseudo_inverse(model.motion);
   const bool determined =
       (inverse * model.motion - Eigen::MatrixXd::Identity(inverse.rows(), inverse.rows())).cwiseAbs().maxCoeff() < 1e-9;
   return determined ? Eigen::MatrixXd(kOutward * inverse.cwiseAbs())
-                    : Eigen::MatrixXd::Constant(inverse.rows(), inverse.cols(), kInfinity);
+                    : Eigen::MatrixXd::Constant(inverse.rows(), inverse.cols(), core::kInfinity);
 }
 
 // "scale * ", or nothing for 1.
@@ -108,12 +108,12 @@ FilterWriter::FilterWriter(const RegressorFilter& filter, bool bounds)
       functions_.push_back({k, function_of(model_, model_.terms[k])});
     }
   }
-  const MotionBound& motion = errors_.motion;
+  const filter::MotionBound& motion = errors_.motion;
   angle_ = measurement_.motion == MotionKind::angle;
   mean_ = measurement_.motion == MotionKind::mean_speed;
   nodes_ = kernel_.nodes();
   held_ = measurement_.hold == Hold::zero_order;
-  between_ = measurement_.changes == EffortChanges::between;
+  between_ = measurement_.changes == model::EffortChanges::between;
   bounds_ = bounds;
   bounded_ = errors_.between_samples;
   mobile_ = bounded_ && motion.mobility.size() > 0;
@@ -157,7 +157,7 @@ FilterWriter::Function FilterWriter::function_of(const Model& model, const Term&
     });
   };
   const Model drive = DifferentialDrive{1.0, 1.0, false, true, true}.model();
-  const Model axis = SingleAxis{.coulomb = true, .offset = true}.model();
+  const Model axis = model::SingleAxis{.coulomb = true, .offset = true}.model();
   const bool two_joints = model.joints.size() >= 2;
   if (is(drive, "viscous_x", 0)) return Function::along_x;
   if (is(drive, "viscous_y", 0)) return Function::along_y;
@@ -442,7 +442,7 @@ void FilterWriter::evaluate(Text& out) const {
 
 // a = N(b(a) + F a h/2), solved for the viscous part.
 void FilterWriter::solve(Text& out) const {
-  const MotionBound& motion = errors_.motion;
+  const filter::MotionBound& motion = errors_.motion;
   const std::size_t coordinates = model_.coordinates.size();
   out.put(
       "\n/* Bounds on accelerations: the inverse inertia, and that times viscous friction, over the feasible set. "
@@ -1030,4 +1030,4 @@ std::string FilterWriter::functions() const {
   return out.take();
 }
 
-}  // namespace wheelwright::c_text
+}  // namespace wheelwright::exporter::c_text

@@ -10,7 +10,7 @@
 
 #include <wheelwright/filter/regressor_filter.hpp>
 
-namespace wheelwright::c_text {
+namespace wheelwright::exporter::c_text {
 
 /// Writes the parts of a header that stand for a filter. Each gives text with `pfx` for the prefix (export_c_text.hpp).
 ///
@@ -64,8 +64,8 @@ class FilterWriter {
   const RegressorFilter& filter_;
   const Model& model_;
   const Measurement& measurement_;
-  const SignalErrors& errors_;
-  FilterKernel kernel_;
+  const filter::SignalErrors& errors_;
+  filter::FilterKernel kernel_;
   std::vector<FunctionTerm> functions_;
 
   // kind of motion; whether signals enter at samples
@@ -99,4 +99,4 @@ class FilterWriter {
   Eigen::MatrixXd rate_, joint_from_;  // of StepEnclosure
 };
 
-}  // namespace wheelwright::c_text
+}  // namespace wheelwright::exporter::c_text

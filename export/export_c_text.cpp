@@ -10,7 +10,7 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/words.hpp>
 
-namespace wheelwright::c_text {
+namespace wheelwright::exporter::c_text {
 
 std::string hex(double x) {
   if (std::isinf(x)) {
@@ -24,7 +24,7 @@ std::string plain(std::string text) {
   constexpr std::array<std::pair<std::string_view, std::string_view>, 7> kWords = {
       {{"·", "*"}, {"²", "^2"}, {"³", "^3"}, {"Ω", "Ohm"}, {"−", "-"}, {"*/", "* /"}, {"/*", "/ *"}}};
   for (const auto& [from, to] : kWords) {
-    replace_all(text, from, to);
+    core::replace_all(text, from, to);
   }
   for (char& c : text) {
     c = c >= ' ' && c <= '~' ? c : '?';
@@ -394,4 +394,4 @@ static inline int pfx_persistent(unsigned long long *window, int outside)
 }
 )";
 
-}  // namespace wheelwright::c_text
+}  // namespace wheelwright::exporter::c_text

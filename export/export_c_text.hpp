@@ -12,7 +12,7 @@
 
 #include <Eigen/Core>
 
-namespace wheelwright::c_text {
+namespace wheelwright::exporter::c_text {
 
 /// A number as it is, to the last bit; infinity as HUGE_VAL. Throws InvalidArgument where it is NaN.
 [[nodiscard]] std::string hex(double x);
@@ -64,4 +64,4 @@ extern const std::string_view kThreshold;
 /// PersistenceCounter.
 extern const std::string_view kPersistence;
 
-}  // namespace wheelwright::c_text
+}  // namespace wheelwright::exporter::c_text

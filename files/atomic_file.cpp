@@ -10,7 +10,7 @@
 
 #include <wheelwright/core/error.hpp>
 
-namespace wheelwright {
+namespace wheelwright::files {
 namespace {
 
 [[noreturn]] void cannot(const std::filesystem::path& place, std::string_view what) {
@@ -90,4 +90,4 @@ void atomic_write(const std::filesystem::path& path, std::string_view content) {
   file.commit();
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::files

@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <string_view>
 
-namespace wheelwright {
+namespace wheelwright::files {
 
 /// A new, empty file beside the place that it is written for, for libraries that write by name. put() renames it; where
 /// that is not reached, nothing is left behind and an older file of the place's name stays as it was.
@@ -54,4 +54,4 @@ class AtomicFile {
 /// Puts `content` at `path`, whole or not at all. Throws InputError as AtomicFile does.
 void atomic_write(const std::filesystem::path& path, std::string_view content);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::files

@@ -16,7 +16,7 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/files/xxh64.hpp>
 
-namespace wheelwright {
+namespace wheelwright::files {
 namespace {
 
 constexpr std::size_t bytes_at_once = std::size_t{1} << 18;
@@ -289,4 +289,4 @@ bool LineReader::next(std::string_view& line) {
   return true;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::files

@@ -11,7 +11,7 @@
 #include <string_view>
 #include <vector>
 
-namespace wheelwright {
+namespace wheelwright::files {
 
 /// A stream of bytes from a plain, gzip or zstd file (told apart by their first bytes, not by their names).
 class ByteSource {
@@ -64,4 +64,4 @@ class LineReader {
   bool terminated_ = false;
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::files

@@ -14,7 +14,7 @@
 #include <wheelwright/files/byte_source.hpp>
 #include <wheelwright/files/words.hpp>
 
-namespace wheelwright {
+namespace wheelwright::files {
 namespace {
 
 constexpr std::size_t longest_json = std::size_t{1} << 30;
@@ -77,7 +77,7 @@ JsonPlace JsonPlace::at(std::string_view key) const {
   }
   const auto member = value_->find(std::string(key));
   if (member == value_->end()) {
-    throw InputError(fmt::format("{}: no member {}: expected it beside {}{}", where(), shown(key), listed(keys()),
+    throw InputError(fmt::format("{}: no member {}: expected it beside {}{}", where(), shown(key), core::listed(keys()),
                                  did_you_mean(key, keys())));
   }
   return {*member, file_, pointer_ + "/" + std::string(key)};
@@ -160,4 +160,4 @@ std::vector<std::string> JsonPlace::texts() const {
   return out;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::files

@@ -15,7 +15,7 @@
 #include <nlohmann/json.hpp>
 #include <nlohmann/json_fwd.hpp>
 
-namespace wheelwright {
+namespace wheelwright::files {
 
 /// JSON whose objects keep the order in which they were filled.
 using Json = nlohmann::ordered_json;
@@ -98,4 +98,8 @@ class JsonPlace {
   return values;
 }
 
+}  // namespace wheelwright::files
+
+namespace wheelwright {
+using files::Json;
 }  // namespace wheelwright

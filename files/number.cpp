@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <limits>
 
-namespace wheelwright {
+namespace wheelwright::files {
 namespace {
 
 constexpr std::array<double, 23> powers_of_ten = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
@@ -126,4 +126,4 @@ std::string number_text(double value) {
   return std::string(buffer.data(), end);
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::files

@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-namespace wheelwright {
+namespace wheelwright::files {
 
 /// Reads the longest decimal number that starts at `first` (sign, digits, point, exponent; nan and inf in any case) and
 /// returns the first character behind it; nullptr where no number starts. The value is the double nearest to the text;
@@ -20,4 +20,4 @@ const char* parse_number(const char* first, const char* last, double& value);
 /// Shortest decimal text that reads back as exactly `value`.
 [[nodiscard]] std::string number_text(double value);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::files

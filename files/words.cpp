@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cctype>
 
-namespace wheelwright {
+namespace wheelwright::files {
 namespace {
 
 std::size_t edit_distance(std::string_view a, std::string_view b) {
@@ -63,4 +63,4 @@ std::string shown(std::string_view text) {
   return out + (text.size() > longest ? "...'" : "'");
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::files

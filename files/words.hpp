@@ -12,7 +12,7 @@
 #include <wheelwright/core/words.hpp>
 #include <wheelwright/files/json.hpp>
 
-namespace wheelwright {
+namespace wheelwright::files {
 
 /// A table of words, one for each value.
 template <typename Value, std::size_t n>
@@ -54,4 +54,4 @@ template <typename Value, std::size_t n>
 /// characters.
 [[nodiscard]] std::string shown(std::string_view text);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::files

@@ -9,7 +9,7 @@
 #include <wheelwright/files/number.hpp>
 #include <wheelwright/files/words.hpp>
 
-namespace wheelwright {
+namespace wheelwright::files {
 namespace {
 
 constexpr std::string_view blanks = " \t\r\n";
@@ -170,4 +170,4 @@ Eigen::Vector3d XmlPlace::vector(std::string_view name) const {
   return {v[0], v[1], v[2]};
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::files

@@ -13,7 +13,7 @@
 
 #include <wheelwright/files/yaml_place.hpp>
 
-namespace wheelwright {
+namespace wheelwright::files {
 
 /// An element of an XML document. What is not as asked for throws InputError
 /// "robot.urdf:12: <mass> of link 'base': value '-3': expected a number > 0".
@@ -62,4 +62,4 @@ class XmlPlace {
   std::shared_ptr<const Node> node_;
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::files

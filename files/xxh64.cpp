@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 #include <xxhash.h>
 
-namespace wheelwright {
+namespace wheelwright::files {
 
 void Xxh64::Free::operator()(XXH64_state_s* state) const { XXH64_freeState(state); }
 
@@ -23,4 +23,4 @@ std::uint64_t Xxh64::digest() const { return XXH64_digest(state_.get()); }
 
 std::string Xxh64::text() const { return fmt::format("xxh64:{:016x}", digest()); }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::files

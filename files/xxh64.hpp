@@ -10,7 +10,7 @@
 
 struct XXH64_state_s;
 
-namespace wheelwright {
+namespace wheelwright::files {
 
 /// XXH64 with seed 0 (Collet, xxHash), fed in pieces of any size, by libxxhash. It identifies recordings; it does not
 /// protect against forgery.
@@ -31,4 +31,4 @@ class Xxh64 {
   std::unique_ptr<XXH64_state_s, Free> state_;
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::files

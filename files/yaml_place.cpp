@@ -11,7 +11,7 @@
 #include <wheelwright/files/number.hpp>
 #include <wheelwright/files/words.hpp>
 
-namespace wheelwright {
+namespace wheelwright::files {
 
 struct YamlPlace::Node {
   YAML::Node node;
@@ -69,7 +69,7 @@ std::vector<std::pair<std::string, YamlPlace>> YamlPlace::members(const std::vec
 std::vector<std::pair<std::string, YamlPlace>> YamlPlace::members() const { return members_of(nullptr); }
 
 std::vector<std::pair<std::string, YamlPlace>> YamlPlace::members_of(const std::vector<std::string>* known) const {
-  const std::string of = known == nullptr ? "" : ", of " + listed(*known);
+  const std::string of = known == nullptr ? "" : ", of " + core::listed(*known);
   if (!node_->node.IsMap()) {
     fail("keys with values" + of);
   }
@@ -77,12 +77,12 @@ std::vector<std::pair<std::string, YamlPlace>> YamlPlace::members_of(const std::
   for (const auto& member : node_->node) {
     const YamlPlace at_key(node_->with(member.first), key_);
     if (!member.first.IsScalar()) {
-      at_key.fail(known == nullptr ? "a key" : "a key, one of " + listed(*known));
+      at_key.fail(known == nullptr ? "a key" : "a key, one of " + core::listed(*known));
     }
     const std::string name = member.first.Scalar();
     if (known != nullptr && std::find(known->begin(), known->end(), name) == known->end()) {
       at_key.say(fmt::format("{}unknown key {}: expected one of {}{}", key_.empty() ? "" : key_ + ": ", shown(name),
-                             listed(*known), did_you_mean(name, *known)));
+                             core::listed(*known), did_you_mean(name, *known)));
     }
     const std::string full = key_.empty() ? name : key_ + "." + name;
     if (std::any_of(out.begin(), out.end(), [&](const auto& before) { return before.first == name; })) {
@@ -116,7 +116,7 @@ std::string YamlPlace::text(std::string_view expected) const {
 }
 
 std::size_t YamlPlace::choice(const std::vector<std::string>& words) const {
-  const std::string expected = (words.size() > 1 ? "one of " : "") + listed(words);
+  const std::string expected = (words.size() > 1 ? "one of " : "") + core::listed(words);
   const std::string word = text(expected);
   const auto it = std::find(words.begin(), words.end(), word);
   if (it == words.end()) {
@@ -152,4 +152,4 @@ void YamlPlace::say(std::string_view message) const {
   throw InputError(fmt::format("{}: {}", node_->where(), message));
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::files

@@ -12,7 +12,7 @@
 
 #include <wheelwright/core/error.hpp>
 
-namespace wheelwright {
+namespace wheelwright::files {
 
 /// A place in a file, for messages and for comments that say where a value came from.
 struct FilePlace {
@@ -81,4 +81,4 @@ class YamlPlace {
   std::string key_;
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::files

@@ -8,7 +8,7 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/model/effect_law.hpp>
 
-namespace wheelwright {
+namespace wheelwright::filter {
 namespace {
 
 constexpr double kPerStep = 8.0;      // kept samples per nominal step, at most
@@ -29,19 +29,19 @@ void validate(const EffortCorrection& c, std::size_t joints) {
 }
 
 EffortCorrection effort_correction(const Robot& robot) {
-  validate_effects(robot);
+  model::validate_effects(robot);
   EffortCorrection c;
-  const double unit = effort_per_torque(robot).value_or(1.0);
-  if (has_effect(robot, "saturation")) {
-    c.limit = unit * effect_value(robot, "saturation", "tau_max");
+  const double unit = model::effort_per_torque(robot).value_or(1.0);
+  if (model::has_effect(robot, "saturation")) {
+    c.limit = unit * model::effect_value(robot, "saturation", "tau_max");
   }
-  c.deadzone = unit * effect_value(robot, "torque_deadzone", "b");
-  if (has_effect(robot, "torque_gain_asymmetric")) {
-    const double g = effect_value(robot, "torque_gain_asymmetric", "g");
+  c.deadzone = unit * model::effect_value(robot, "torque_deadzone", "b");
+  if (model::has_effect(robot, "torque_gain_asymmetric")) {
+    const double g = model::effect_value(robot, "torque_gain_asymmetric", "g");
     c.gain = {1.0 + g, 1.0 - g};
   }
-  c.delay = effect_value(robot, "delay", "T_d") + effect_value(robot, "sensor_time_offset", "dt");
-  c.lag = effect_value(robot, "actuator_lag", "T");
+  c.delay = model::effect_value(robot, "delay", "T_d") + model::effect_value(robot, "sensor_time_offset", "dt");
+  c.lag = model::effect_value(robot, "actuator_lag", "T");
   return c;
 }
 
@@ -150,4 +150,4 @@ void EffortCorrector::step(double t, const double* effort) {
   }
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::filter

@@ -11,7 +11,7 @@
 
 #include <wheelwright/model/robot.hpp>
 
-namespace wheelwright {
+namespace wheelwright::filter {
 
 /// Actuator model between a logged effort u and the effort y that acts. Applied in this order, per joint:
 ///   clip to ±limit,  u − deadzone·sgn u (0 inside),  times gain,  u(t − delay),  lag·ẏ + y = u.
@@ -89,4 +89,4 @@ class EffortCorrector {
   std::vector<Joint> joints_;
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::filter

@@ -8,7 +8,7 @@
 
 #include <wheelwright/core/check.hpp>
 
-namespace wheelwright {
+namespace wheelwright::filter {
 namespace {
 
 constexpr double kMostRounding = 0.25;     // of a count: beyond it a multiple cannot be told from its neighbour
@@ -117,4 +117,4 @@ std::optional<EncoderFinding> find_encoder_of_angles(std::span<const double> ste
   return search(steps, 1.0, true, std::nullopt);
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::filter

@@ -6,7 +6,7 @@
 #include <optional>
 #include <span>
 
-namespace wheelwright {
+namespace wheelwright::filter {
 
 /// Result of the search.
 struct EncoderFinding {
@@ -28,4 +28,4 @@ struct EncoderFinding {
 /// The same for the steps of an angle, rad: whole multiples of 2π/N. EncoderFinding::speed_step is then one count, rad.
 [[nodiscard]] std::optional<EncoderFinding> find_encoder_of_angles(std::span<const double> steps);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::filter

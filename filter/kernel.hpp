@@ -14,7 +14,7 @@
 
 #include <wheelwright/filter/measurement.hpp>
 
-namespace wheelwright {
+namespace wheelwright::filter {
 
 /// I_0, I_1 and I_2 at x >= 0, each to a few units in the last place: a series for I_2 below 1 and the downward
 /// recurrence I_{n−1} = (x I_n + e^{−x})/n, closed forms above.
@@ -195,4 +195,4 @@ class FilterKernel {
   StepWeights weights_;
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::filter

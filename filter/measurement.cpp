@@ -9,7 +9,7 @@
 #include <wheelwright/core/words.hpp>
 #include <wheelwright/filter/encoder.hpp>
 
-namespace wheelwright {
+namespace wheelwright::filter {
 
 double FilterDesign::static_gain() const { return std::pow(alpha / beta, order); }
 
@@ -28,18 +28,19 @@ constexpr std::size_t kMostSpeeds = 200000;   // enough to find an encoder; long
 constexpr double kHalf = 0.5 * (1.0 - 1e-6);  // of a quantum: what rounding to it makes wrong, as printed
 constexpr double kEvenSteps = 0.02;           // steps further apart than this share are not one sampling interval
 
-std::string effort_column(const Joint& joint, EffortKind kind) {
+std::string effort_column(const model::Joint& joint, model::EffortKind kind) {
   switch (kind) {
-    case EffortKind::torque: return joint.torque;
-    case EffortKind::current: return joint.current;
-    case EffortKind::voltage: return joint.voltage;
+    case model::EffortKind::torque: return joint.torque;
+    case model::EffortKind::current: return joint.current;
+    case model::EffortKind::voltage: return joint.voltage;
   }
   return {};
 }
 
 template <typename Pick>
 bool has_all(const LogSource& log, const Model& model, Pick pick) {
-  return std::ranges::all_of(model.joints, [&](const Joint& joint) { return log.find(pick(joint)).has_value(); });
+  return std::ranges::all_of(model.joints,
+                             [&](const model::Joint& joint) { return log.find(pick(joint)).has_value(); });
 }
 
 // Speeds of all joints and whether the steps are even enough to speak of a sampling interval.
@@ -65,7 +66,7 @@ double shortest_step_of(LogSource& log) {
     return 0.0;
   }
   const std::size_t rank = steps.size() / 100;
-  return order_statistic(std::move(steps), rank);
+  return core::order_statistic(std::move(steps), rank);
 }
 
 SpeedSample sample_speeds(LogSource& log, const std::vector<std::string>& columns) {
@@ -125,40 +126,41 @@ Measurement find_measurement(LogSource& log, const Robot& robot, const Model& mo
   m.correction = effort_correction(robot);
 
   std::vector<std::string> angles, speeds;
-  for (const Joint& joint : model.joints) {
+  for (const model::Joint& joint : model.joints) {
     angles.push_back(joint.angle);
     speeds.push_back(joint.speed);
     m.effort_columns.push_back(effort_column(joint, robot.effort));
   }
-  const bool have_angles = has_all(log, model, [](const Joint& j) { return j.angle; });
-  const bool have_speeds = has_all(log, model, [](const Joint& j) { return j.speed; });
+  const bool have_angles = has_all(log, model, [](const model::Joint& j) { return j.angle; });
+  const bool have_speeds = has_all(log, model, [](const model::Joint& j) { return j.speed; });
   if (!have_angles && !have_speeds) {
-    throw InputError("the log has columns t, " + listed(log.columns()) + ": expected the motion of every joint, " +
-                     listed(speeds) + " or " + listed(angles) + " (use --map to rename columns)");
+    throw InputError("the log has columns t, " + core::listed(log.columns()) +
+                     ": expected the motion of every joint, " + core::listed(speeds) + " or " + core::listed(angles) +
+                     " (use --map to rename columns)");
   }
   if (order == 1 && !have_speeds) {
-    throw InvalidArgument("filter order is 1, which works on speeds, but the log has angles only (" + listed(angles) +
-                          "): expected order 2, or a log with " + listed(speeds));
+    throw InvalidArgument("filter order is 1, which works on speeds, but the log has angles only (" +
+                          core::listed(angles) + "): expected order 2, or a log with " + core::listed(speeds));
   }
-  if (!has_all(log, model, [&](const Joint& j) { return effort_column(j, robot.effort); })) {
-    throw InputError("the log has columns t, " + listed(log.columns()) + ": expected the effort of every joint, " +
-                     listed(m.effort_columns) + " (effort.kind in the robot file says which effort is used; --map " +
-                     "renames columns)");
+  if (!has_all(log, model, [&](const model::Joint& j) { return effort_column(j, robot.effort); })) {
+    throw InputError("the log has columns t, " + core::listed(log.columns()) +
+                     ": expected the effort of every joint, " + core::listed(m.effort_columns) +
+                     " (effort.kind in the robot file says which effort is used; --map " + "renames columns)");
   }
   m.motion = order == 2 && have_angles ? MotionKind::angle : MotionKind::speed;
   m.motion_columns = m.motion == MotionKind::angle ? angles : speeds;
-  if (m.motion == MotionKind::speed && order == 2 && robot.speed_source != SpeedSource::measured) {
+  if (m.motion == MotionKind::speed && order == 2 && robot.speed_source != model::SpeedSource::measured) {
     const SpeedSample sample = sample_speeds(log, speeds);
     const auto encoder =
         sample.even ? find_encoder(sample.speeds, m.nominal_step, robot.encoder_counts_per_turn) : std::nullopt;
     const auto& declared = robot.noise.wheel_speed.value;
-    const bool told = robot.encoder_counts_per_turn || robot.speed_source == SpeedSource::encoder_difference;
+    const bool told = robot.encoder_counts_per_turn || robot.speed_source == model::SpeedSource::encoder_difference;
     if (encoder && !told && declared && *declared >= kHalf * encoder->speed_step) {
       m.unused_count = encoder->speed_step;
     } else if (encoder) {
       m.motion = MotionKind::mean_speed;
       m.count = encoder->speed_step;
-    } else if (robot.speed_source == SpeedSource::encoder_difference) {
+    } else if (robot.speed_source == model::SpeedSource::encoder_difference) {
       m.motion = MotionKind::mean_speed;
     }
   }
@@ -168,4 +170,4 @@ Measurement find_measurement(LogSource& log, const Robot& robot, const Model& mo
   return m;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::filter

@@ -13,7 +13,7 @@
 #include <wheelwright/model/model.hpp>
 #include <wheelwright/model/robot.hpp>
 
-namespace wheelwright {
+namespace wheelwright::filter {
 
 /// f(t) = α e^{−βt} (24) for order 1; f₂ = f * f = α² t e^{−βt} for order 2, which works on wheel angles.
 struct FilterDesign {
@@ -55,9 +55,10 @@ struct Measurement {
   double unused_count = 0.0;  ///< speed: what `count` would be if the declared bound of the speeds did not stand above
                               ///< it, rad/s (0: nothing was found)
 
-  EffortCorrection correction{};                   ///< of the efforts, before anything else is made of them
-  EffortChanges changes = EffortChanges::between;  ///< what an effort may do between two samples, beside `hold`
-  Interval delay{0.0, 0.0};                        ///< s, holds the constant time by which logged efforts are late
+  EffortCorrection correction{};  ///< of the efforts, before anything else is made of them
+  model::EffortChanges changes =
+      model::EffortChanges::between;  ///< what an effort may do between two samples, beside `hold`
+  Interval delay{0.0, 0.0};           ///< s, holds the constant time by which logged efforts are late
 
   /// A longer step between two samples is a hole in the log: nothing is known of the effort in it, s; 0 where no step
   /// is known. 1.75 nominal steps, for steps that vary less: as long as two of the shortest together, but at least 1.35
@@ -77,4 +78,10 @@ struct Measurement {
 /// log that has angles only.
 [[nodiscard]] Measurement find_measurement(LogSource& log, const Robot& robot, const Model& model, int order);
 
+}  // namespace wheelwright::filter
+
+namespace wheelwright {
+using filter::FilterDesign;
+using filter::Measurement;
+using filter::MotionKind;
 }  // namespace wheelwright

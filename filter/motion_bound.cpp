@@ -11,11 +11,11 @@
 #include <wheelwright/core/limits.hpp>
 #include <wheelwright/core/linear_algebra.hpp>
 
-namespace wheelwright {
+namespace wheelwright::filter {
 namespace {
 
-constexpr double kUp = 1.0 + 64.0 * kEpsilon;  // above the rounding of a handful of sums
-constexpr int kRounds = 12;                    // of functions that grow with the speed
+constexpr double kUp = 1.0 + 64.0 * core::kEpsilon;  // above the rounding of a handful of sums
+constexpr int kRounds = 12;                          // of functions that grow with the speed
 
 using Intervals = std::vector<std::vector<Interval>>;
 
@@ -33,20 +33,20 @@ void multiply_in_order(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& x, 
 bool holds_zero(const Interval& x) { return x.lower <= 0.0 && x.upper >= 0.0; }
 
 // 1/x for an interval without zero.
-Interval inverse(const Interval& x) { return {round_down(1.0 / x.upper), round_up(1.0 / x.lower)}; }
+Interval inverse(const Interval& x) { return {core::round_down(1.0 / x.upper), core::round_up(1.0 / x.lower)}; }
 
 Intervals inertia(const Model& model, std::span<const Interval> sides) {
-  Intervals m(model.n(), std::vector<Interval>(model.coordinates.size(), point(0.0)));
+  Intervals m(model.n(), std::vector<Interval>(model.coordinates.size(), core::point(0.0)));
   for (const Term& term : model.terms) {
     if (term.kind == Term::Kind::acceleration) {
       Interval& entry = m[term.output][term.coordinate];
-      entry = entry + point(term.scale) * sides[term.parameter];
+      entry = entry + core::point(term.scale) * sides[term.parameter];
     }
   }
   return m;
 }
 
-bool is_zero(const Interval& x) { return std::abs(x.lower) <= kTiny && std::abs(x.upper) <= kTiny; }
+bool is_zero(const Interval& x) { return std::abs(x.lower) <= core::kTiny && std::abs(x.upper) <= core::kTiny; }
 
 // |M⁻¹| where every coordinate has an output of its own; nothing where it has not.
 Eigen::MatrixXd uncoupled(const Intervals& m) {
@@ -67,7 +67,7 @@ Eigen::MatrixXd uncoupled(const Intervals& m) {
       return {};
     }
     taken[own] = true;
-    mobility(static_cast<Eigen::Index>(own), static_cast<Eigen::Index>(i)) = magnitude(inverse(m[i][own]));
+    mobility(static_cast<Eigen::Index>(own), static_cast<Eigen::Index>(i)) = core::magnitude(inverse(m[i][own]));
   }
   return mobility;
 }
@@ -82,8 +82,8 @@ Eigen::MatrixXd coupled(const Intervals& m) {
     return {};
   }
   const Interval d = inverse(determinant);
-  return (Eigen::Matrix2d() << magnitude(m[1][1] * d), magnitude(m[0][1] * d), magnitude(m[1][0] * d),
-          magnitude(m[0][0] * d))
+  return (Eigen::Matrix2d() << core::magnitude(m[1][1] * d), core::magnitude(m[0][1] * d), core::magnitude(m[1][0] * d),
+          core::magnitude(m[0][0] * d))
       .finished();
 }
 
@@ -105,7 +105,7 @@ MotionBound motion_bound(const Model& model, std::span<const Interval> sides) {
   }
   bound.largest.resize(static_cast<Eigen::Index>(model.p()));
   for (std::size_t j = 0; j < model.p(); ++j) {
-    bound.largest[static_cast<Eigen::Index>(j)] = magnitude(sides[j]);
+    bound.largest[static_cast<Eigen::Index>(j)] = core::magnitude(sides[j]);
   }
   return bound;
 }
@@ -126,11 +126,11 @@ StepEnclosure::StepEnclosure(const Model& model, MotionBound bound) : bound_(std
   force_ = Eigen::VectorXd::Zero(n);
   next_ = speed_error_ = Eigen::VectorXd::Zero(coordinates);
   joint_error_ = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(model.joints.size()));
-  const Eigen::MatrixXd inverse = pseudo_inverse(model.motion);
+  const Eigen::MatrixXd inverse = core::pseudo_inverse(model.motion);
   const bool determined =
       (inverse * model.motion - Eigen::MatrixXd::Identity(inverse.rows(), inverse.rows())).cwiseAbs().maxCoeff() < 1e-9;
   joint_from_ = determined ? Eigen::MatrixXd(kUp * inverse.cwiseAbs())
-                           : Eigen::MatrixXd::Constant(inverse.rows(), inverse.cols(), kInfinity);
+                           : Eigen::MatrixXd::Constant(inverse.rows(), inverse.cols(), core::kInfinity);
   if (bound_.mobility.size() > 0) {
     Eigen::MatrixXd friction = Eigen::MatrixXd::Zero(n, coordinates);
     for (const Term& term : model.terms) {
@@ -174,16 +174,16 @@ void StepEnclosure::evaluate(const Model& model, StepMotion& step) const {
   }
   const auto coordinates = static_cast<std::size_t>(step.speed.size());
   const auto joints = static_cast<std::size_t>(step.joint_speed.size());
-  const MotionState state{{step.speed.data(), coordinates},
-                          {speed_error_.data(), coordinates},
-                          {step.joint_speed.data(), joints},
-                          {joint_error_.data(), joints},
-                          step.heading,
-                          step.heading_error + turned};
+  const model::MotionState state{{step.speed.data(), coordinates},
+                                 {speed_error_.data(), coordinates},
+                                 {step.joint_speed.data(), joints},
+                                 {joint_error_.data(), joints},
+                                 step.heading,
+                                 step.heading_error + turned};
   std::size_t next = 0;
   for (const Term& term : model.terms) {
     if (term.kind == Term::Kind::function) {
-      const TermValue value = term.function(state);
+      const model::TermValue value = term.function(state);
       step.values[next++] = {term.scale * value.value, std::abs(term.scale) * value.error};
     }
   }
@@ -202,7 +202,7 @@ void StepEnclosure::force(const Model& model, const StepMotion& step) const {
       const auto c = static_cast<Eigen::Index>(term.coordinate);
       size = std::abs(term.scale) * (std::abs(step.speed[c]) + step.speed_error[c]);
     } else {
-      const TermValue& value = step.values[next++];
+      const model::TermValue& value = step.values[next++];
       size = std::abs(value.value) + value.error;
     }
     force_[static_cast<Eigen::Index>(term.output)] += bound_.largest[static_cast<Eigen::Index>(term.parameter)] * size;
@@ -299,4 +299,4 @@ double StepEnclosure::change(std::size_t coordinate, const Model& model, const S
   return kUp * change;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::filter

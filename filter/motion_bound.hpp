@@ -10,7 +10,7 @@
 #include <wheelwright/core/interval.hpp>
 #include <wheelwright/model/model.hpp>
 
-namespace wheelwright {
+namespace wheelwright::filter {
 
 /// Bounds on the accelerations of a model's coordinates at every instant, samples or not. With M(θ)q̈ = u − F(θ, q̇)
 /// the dynamics (20), M what multiplies accelerations, |q̈| <= |M⁻¹|(|u| + |F|) for every θ of a set; and whatever else
@@ -32,16 +32,17 @@ struct MotionBound {
 
 /// One step between two samples, as far as its samples tell.
 struct StepMotion {
-  double length = 0.0;            ///< s
-  Eigen::VectorXd speed;          ///< per coordinate, mean over the step
-  Eigen::VectorXd speed_error;    ///< bound on its error, what the samples are wrong by
-  Eigen::VectorXd joint_speed;    ///< per joint
-  Eigen::VectorXd joint_error;    ///< per joint
-  Eigen::VectorXd effort;         ///< per output: largest |u| in the step, errors included
-  double heading = 0.0;           ///< rad, in its middle
-  double heading_error = 0.0;     ///< rad
-  Eigen::VectorXd acceleration;   ///< per coordinate: |q̈| is at most this in the step; what enclose() finds
-  std::vector<TermValue> values;  ///< of the model's function terms, in their order, for every instant of the step
+  double length = 0.0;           ///< s
+  Eigen::VectorXd speed;         ///< per coordinate, mean over the step
+  Eigen::VectorXd speed_error;   ///< bound on its error, what the samples are wrong by
+  Eigen::VectorXd joint_speed;   ///< per joint
+  Eigen::VectorXd joint_error;   ///< per joint
+  Eigen::VectorXd effort;        ///< per output: largest |u| in the step, errors included
+  double heading = 0.0;          ///< rad, in its middle
+  double heading_error = 0.0;    ///< rad
+  Eigen::VectorXd acceleration;  ///< per coordinate: |q̈| is at most this in the step; what enclose() finds
+  std::vector<model::TermValue>
+      values;  ///< of the model's function terms, in their order, for every instant of the step
 
   StepMotion() = default;
   /// Room for the signals of `model`.
@@ -74,4 +75,4 @@ class StepEnclosure {
   mutable Eigen::VectorXd force_, next_, speed_error_, joint_error_;
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::filter

@@ -10,7 +10,7 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/filter/kernel.hpp>
 
-namespace wheelwright {
+namespace wheelwright::filter {
 namespace {
 
 // Squared weights with which one sample of the motion, and one of the effort, enter the filtered signals at all later
@@ -23,7 +23,7 @@ struct Energies {
 };
 
 Energies impulse_energies(const FilterDesign& d, MotionKind motion, Hold hold, double h,
-                          EffortChanges changes = EffortChanges::at_samples) {
+                          model::EffortChanges changes = model::EffortChanges::at_samples) {
   FilterKernel kernel(d, motion, h);
   kernel.prepare(h);
   const bool angles = motion != MotionKind::speed;
@@ -42,7 +42,7 @@ Energies impulse_energies(const FilterDesign& d, MotionKind motion, Hold hold, d
       const double linear =
           0.5 * h * (angles ? (sample[0] + 4.0 * sample[1] + sample[2]) / 3.0 : sample[0] + sample[1]);
       const double curved =
-          changes == EffortChanges::between ? h * (sample[0] - 2.0 * sample[1] + sample[2]) / 12.0 : 0.0;
+          changes == model::EffortChanges::between ? h * (sample[0] - 2.0 * sample[1] + sample[2]) / 12.0 : 0.0;
       kernel.take(effort, linear - curved);
     }
     const double a = kernel.value(slope), v = kernel.value(speed), u = kernel.value(effort);
@@ -185,8 +185,8 @@ ErrorInfluence::ErrorInfluence(const Model& model, const FilterDesign& design, c
           term.scale * parameters[static_cast<Eigen::Index>(term.parameter)];
     }
   }
-  z1_ = z2_ = now_ = later_ = RowMatrix::Zero(n, sums);
-  rate_ = rate_later_ = RowMatrix::Zero(c, sums);
+  z1_ = z2_ = now_ = later_ = core::RowMatrix::Zero(n, sums);
+  rate_ = rate_later_ = core::RowMatrix::Zero(c, sums);
   value_ = Eigen::VectorXd::Zero(sums);
 }
 
@@ -204,14 +204,15 @@ void ErrorInfluence::count(double h) {
   now_ = gain * (design_.order == 1 ? z1_ : z2_);
   // ∫ A (θ_a v̇ + θ_v v) dt = ∫ B v dt with B = θ_v A − θ_a Ȧ.
   rate_ = speed_ * now_ - acceleration_ * (later_ - now_) / h;
-  const RowMatrix effort = input_.transpose() * now_;
-  const RowMatrix motion = motion_.transpose() * (angles_ ? RowMatrix(rate_later_ - rate_) : RowMatrix(h * rate_));
+  const core::RowMatrix effort = input_.transpose() * now_;
+  const core::RowMatrix motion =
+      motion_.transpose() * (angles_ ? core::RowMatrix(rate_later_ - rate_) : core::RowMatrix(h * rate_));
   value_ +=
       (sensors_.effort * h * effort.cwiseAbs().colwise().sum() + sensors_.motion * motion.cwiseAbs().colwise().sum())
           .transpose();
 }
 
-void ErrorInfluence::add(const RegressionBlock& rows, const RowMatrix& g) {
+void ErrorInfluence::add(const RegressionBlock& rows, const core::RowMatrix& g) {
   if (rows.instants() == 0) {
     return;
   }
@@ -236,4 +237,4 @@ void ErrorInfluence::add(const RegressionBlock& rows, const RowMatrix& g) {
   }
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::filter

@@ -14,7 +14,7 @@
 #include <wheelwright/filter/motion_bound.hpp>
 #include <wheelwright/model/model.hpp>
 
-namespace wheelwright {
+namespace wheelwright::filter {
 
 /// Propagation that a bound rests on: worst case or statistical.
 enum class NoiseMode {
@@ -105,7 +105,7 @@ class ErrorInfluence {
                  const SensorErrors& sensors, const Eigen::VectorXd& parameters, Eigen::Index sums);
 
   /// Adds rows, in their order, with the weights `g` (rows × sums).
-  void add(const RegressionBlock& rows, const RowMatrix& g);
+  void add(const RegressionBlock& rows, const core::RowMatrix& g);
 
   /// The suprema, per functional.
   [[nodiscard]] const Eigen::VectorXd& value() const { return value_; }
@@ -118,12 +118,12 @@ class ErrorInfluence {
   bool angles_;
   SensorErrors sensors_;
   double nominal_;
-  Eigen::MatrixXd input_;                      // outputs × joints
-  Eigen::MatrixXd motion_;                     // coordinates × joints
-  Eigen::MatrixXd acceleration_, speed_;       // coordinates × outputs: what θ makes of a coordinate's derivatives
-  RowMatrix z1_, z2_;                          // outputs × sums
-  RowMatrix now_, later_, rate_, rate_later_;  // adjoint signals
+  Eigen::MatrixXd input_;                 // outputs × joints
+  Eigen::MatrixXd motion_;                // coordinates × joints
+  Eigen::MatrixXd acceleration_, speed_;  // coordinates × outputs: what θ makes of a coordinate's derivatives
+  core::RowMatrix z1_, z2_;               // outputs × sums
+  core::RowMatrix now_, later_, rate_, rate_later_;  // adjoint signals
   Eigen::VectorXd value_;
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::filter

@@ -9,7 +9,7 @@
 
 #include <wheelwright/core/check.hpp>
 
-namespace wheelwright {
+namespace wheelwright::filter {
 namespace {
 
 constexpr double kSpareSamples = 2.0;  // the ring holds this many times the samples that a window should have
@@ -109,7 +109,7 @@ OdometryFilter::OdometryFilter(OdometryMeasurement measurement, double window, O
               "one for each output, or none");
   check::that(errors_.estimated.size() == 0 || (errors_.estimated.array() >= 0.0).all(), "estimated errors",
               "values >= 0");
-  row_ = {RowMatrix::Zero(n, p), RowMatrix::Zero(n, p), Eigen::VectorXd::Zero(n), Eigen::VectorXd::Zero(n)};
+  row_ = {core::RowMatrix::Zero(n, p), core::RowMatrix::Zero(n, p), Eigen::VectorXd::Zero(n), Eigen::VectorXd::Zero(n)};
 }
 
 void OdometryFilter::restart() {
@@ -335,7 +335,7 @@ bool is_held(LogSource& log, const OdometryMeasurement& m) {
 
 std::optional<OdometryMeasurement> find_odometry(LogSource& log, const Robot& robot, const Model& model,
                                                  const Measurement& torque) {
-  if (!on_two_wheels(robot) || model.joints.size() != 2) {
+  if (!model::on_two_wheels(robot) || model.joints.size() != 2) {
     return std::nullopt;
   }
   OdometryMeasurement m;
@@ -358,4 +358,4 @@ std::optional<OdometryMeasurement> find_odometry(LogSource& log, const Robot& ro
   return m;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::filter

@@ -15,7 +15,7 @@
 #include <wheelwright/filter/regressor_filter.hpp>
 #include <wheelwright/model/robot.hpp>
 
-namespace wheelwright {
+namespace wheelwright::filter {
 
 /// Columns of motion and pose of a log, and the settings of the kinematic residual. Part of a commissioned model.
 struct OdometryMeasurement {
@@ -164,4 +164,4 @@ class OdometryFilter {
 [[nodiscard]] std::optional<OdometryMeasurement> find_odometry(LogSource& log, const Robot& robot, const Model& model,
                                                                const Measurement& torque);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::filter

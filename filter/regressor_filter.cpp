@@ -8,7 +8,7 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/limits.hpp>
 
-namespace wheelwright {
+namespace wheelwright::filter {
 namespace {
 
 constexpr double kAlike = 0.05;  // relative: steps alike enough for a parabola through past efforts
@@ -47,7 +47,7 @@ std::size_t steps_within(double time, double nominal) {
 
 RegressorFilter::RegressorFilter(Model model, FilterDesign design, Measurement measurement, SignalErrors errors)
     : model_(std::move(model)), design_(design), measurement_(std::move(measurement)), errors_(std::move(errors)) {
-  validate(model_);
+  model::validate(model_);
   validate(design_);
   const auto joints = static_cast<Eigen::Index>(model_.joints.size());
   const auto coordinates = static_cast<Eigen::Index>(model_.coordinates.size());
@@ -105,10 +105,10 @@ RegressorFilter::RegressorFilter(Model model, FilterDesign design, Measurement m
   if (!measurement_.correction.empty()) {
     corrector_ =
         EffortCorrector(measurement_.correction, model_.joints.size(), measurement_.hold, measurement_.nominal_step);
-    measurement_.changes = EffortChanges::at_samples;
+    measurement_.changes = model::EffortChanges::at_samples;
   }
-  row_.Y = RowMatrix::Zero(n, p);
-  row_.dY = RowMatrix::Zero(n, p);
+  row_.Y = core::RowMatrix::Zero(n, p);
+  row_.dY = core::RowMatrix::Zero(n, p);
   row_.y = output_zero;
   row_.dy = errors_.output;
 }
@@ -185,8 +185,8 @@ void RegressorFilter::measure_motion(const Sample& now, const Sample& before) {
 // All values that may act between `begin` and `end` where logged efforts are late by anything in the declared range.
 void RegressorFilter::effort_of_range(double begin, double end) {
   const double from = begin + measurement_.delay.lower, to = end + measurement_.delay.upper;
-  low_.setConstant(kInfinity);
-  high_.setConstant(-kInfinity);
+  low_.setConstant(core::kInfinity);
+  high_.setConstant(-core::kInfinity);
   // From the last stamp before the range to the first behind it: a value may change right after its stamp, or before
   // it.
   const std::size_t held = std::min(samples_, ring_.size());
@@ -213,7 +213,7 @@ bool RegressorFilter::measure_effort(std::size_t age) {
   const Sample& before = sample(age + 1);
   const bool held = measurement_.hold == Hold::zero_order;
   const bool mean = measurement_.motion == MotionKind::mean_speed;
-  const bool between = measurement_.changes == EffortChanges::between;
+  const bool between = measurement_.changes == model::EffortChanges::between;
   // Without bounds the nominal hold is taken: the middle of what is possible would be half a step late.
   const bool hull = ranged_ || (held && between && errors_.between_samples);
   StepEffort& e = effort_;
@@ -346,7 +346,7 @@ void RegressorFilter::curve_effort(double a, double b, const Eigen::VectorXd& fi
 // The node between the last two steps, and the way to the end of the last.
 void RegressorFilter::follow_angles() {
   const double h = length_, before = length_before_;
-  const bool linear = measurement_.hold == Hold::first_order && measurement_.changes == EffortChanges::between;
+  const bool linear = measurement_.hold == Hold::first_order && measurement_.changes == model::EffortChanges::between;
   curve_.setZero();
   curve_doubt_.setZero();
   if (linear && !ranged_) {
@@ -372,7 +372,7 @@ void RegressorFilter::follow_angles() {
     kernel_.take(torque_doubt_[i], 0.5 * (before * effort_before_.doubt[k] + h * effort_.doubt[k]) + curve_doubt_[k]);
   }
   for (std::size_t k = 0; k < functions_.size(); ++k) {
-    const TermValue &first = step_before_.values[k], &second = step_.values[k];
+    const model::TermValue &first = step_before_.values[k], &second = step_.values[k];
     kernel_.take(functions_[k].value, 0.5 * (before * first.value + h * second.value));
     kernel_.take(functions_[k].error, 0.5 * (before * first.error + h * second.error));
   }
@@ -387,7 +387,7 @@ void RegressorFilter::follow_angles() {
 // The step between the last two samples.
 void RegressorFilter::follow_speeds() {
   const double h = length_;
-  const bool linear = measurement_.hold == Hold::first_order && measurement_.changes == EffortChanges::between;
+  const bool linear = measurement_.hold == Hold::first_order && measurement_.changes == model::EffortChanges::between;
   curve_.setZero();
   curve_doubt_.setZero();
   if (linear && !ranged_) {
@@ -399,7 +399,7 @@ void RegressorFilter::follow_speeds() {
       curve_doubt_ = h * effort_change_;
     }
   }
-  const bool exact = measurement_.hold == Hold::zero_order && measurement_.changes == EffortChanges::at_samples;
+  const bool exact = measurement_.hold == Hold::zero_order && measurement_.changes == model::EffortChanges::at_samples;
   for (Eigen::Index i = 0; i < effort_change_.size(); ++i) {
     effort_change_[i] = exact && !ranged_ ? 0.0 : 2.0 * (effort_change_[i] + errors_.motion.effort[i]);
   }
@@ -552,4 +552,4 @@ void RegressorFilter::write_row() {
   }
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::filter

@@ -18,12 +18,12 @@
 #include <wheelwright/filter/noise.hpp>
 #include <wheelwright/model/model.hpp>
 
-namespace wheelwright {
+namespace wheelwright::filter {
 
 /// One instant of the filtered regression (25).
 struct FilteredRow {
-  RowMatrix Y;         ///< n × p, Y_f
-  RowMatrix dY;        ///< n × p, Δ >= 0
+  core::RowMatrix Y;   ///< n × p, Y_f
+  core::RowMatrix dY;  ///< n × p, Δ >= 0
   Eigen::VectorXd y;   ///< n, τ_f
   Eigen::VectorXd dy;  ///< n, n̄ >= 0
 };
@@ -180,4 +180,8 @@ class RegressorFilter {
   FilteredRow row_;
 };
 
+}  // namespace wheelwright::filter
+
+namespace wheelwright {
+using filter::RegressorFilter;
 }  // namespace wheelwright

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/filter/row_stream.hpp>
 
-namespace wheelwright {
+namespace wheelwright::filter {
 
 template class RowStream<RegressorFilter>;
 template class RowStream<OdometryFilter>;
 
-}  // namespace wheelwright
+}  // namespace wheelwright::filter

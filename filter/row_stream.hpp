@@ -16,7 +16,7 @@
 #include <wheelwright/filter/odometry_filter.hpp>
 #include <wheelwright/filter/regressor_filter.hpp>
 
-namespace wheelwright {
+namespace wheelwright::filter {
 
 /// Concept of a residual's filter: samples of measurement().columns() in, rows of outputs() × parameters() out. step()
 /// returns whether row() holds an instant, restart() begins a segment. RegressorFilter and OdometryFilter are two; what
@@ -35,7 +35,7 @@ concept RowFilter = requires(F filter, const F& constant, double t, std::span<co
 /// Walks a log through a filter, which restarts at every segment of the log, so nothing is filtered across a gap. The
 /// log must outlive the stream and is rewound by it.
 template <RowFilter Filter>
-class RowStream final : public RegressionSource {
+class RowStream final : public core::RegressionSource {
  public:
   /// Throws InvalidArgument when `log` lacks a column of the filter's measurement.
   RowStream(LogSource& log, Filter filter);
@@ -60,7 +60,7 @@ using OdometryRows = RowStream<OdometryFilter>;
 
 template <RowFilter Filter>
 RowStream<Filter>::RowStream(LogSource& log, Filter filter)
-    : log_(&log), filter_(std::move(filter)), pick_(positions_of(log, filter_.measurement().columns())) {
+    : log_(&log), filter_(std::move(filter)), pick_(core::positions_of(log, filter_.measurement().columns())) {
   sample_.resize(pick_.size());
   rewind();
 }
@@ -115,4 +115,8 @@ bool RowStream<Filter>::next(RegressionBlock& block) {
 extern template class RowStream<RegressorFilter>;
 extern template class RowStream<OdometryFilter>;
 
+}  // namespace wheelwright::filter
+
+namespace wheelwright {
+using filter::TorqueRows;
 }  // namespace wheelwright

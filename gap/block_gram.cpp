@@ -10,7 +10,7 @@
 #include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/gap/signed_least_squares.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 namespace {
 
 constexpr Eigen::Index kChunk = 128;   // rows at a time: what is multiplied stays in the cache
@@ -221,7 +221,7 @@ BlockGram::BlockGram(const std::vector<RowSpace>& spaces, const BlockOptions& op
   gram_.assign(pairs * lanes(), 0.0);
   rows_ = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(blocks_));
   const double infinity = std::numeric_limits<double>::infinity();
-  for_all(blocks_, options.threads, [&](std::size_t b) {
+  core::for_all(blocks_, options.threads, [&](std::size_t b) {
     const auto place = static_cast<double>(b);
     const double from = b == 0 ? -infinity : begin + place * length;
     const double to = b + 1 == blocks_ ? infinity : begin + (place + 1.0) * length;
@@ -425,8 +425,8 @@ Eigen::MatrixXd remainder(const BlockGram& gram, const std::vector<std::size_t>&
   A = unit.asDiagonal() * A * unit.asDiagonal();
   A.diagonal().array() += 1e-10;
   const Eigen::MatrixXd c = unit.asDiagonal() * products(gram, on, of);
-  rest -= c.transpose() * LdltFactors(A).solve(c);
+  rest -= c.transpose() * core::LdltFactors(A).solve(c);
   return rest;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

@@ -9,7 +9,7 @@
 
 #include <Eigen/Core>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 
 /// The rows of one output of one residual space, over all candidate columns.
 struct RowSpace {
@@ -113,4 +113,4 @@ class BlockGram {
 [[nodiscard]] Eigen::MatrixXd remainder(const BlockGram& gram, const std::vector<std::size_t>& of,
                                         const std::vector<std::size_t>& on);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

@@ -8,7 +8,7 @@
 
 #include <wheelwright/core/for_all.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 namespace {
 
 using Members = std::vector<std::size_t>;
@@ -42,8 +42,8 @@ class Search {
       const std::size_t beam = size == 1 ? 1 : size == 2 ? options_.pair_beam : options_.triple_beam;
       level = grow(level, beam);
       std::vector<CauseSet> sets(size == 1 ? level.size() : std::min(level.size(), options_.kept));
-      for_all(sets.size(), options_.threads,
-              [&](std::size_t i) { sets[i] = evaluate(table_, level[i].members, options_.base); });
+      core::for_all(sets.size(), options_.threads,
+                    [&](std::size_t i) { sets[i] = evaluate(table_, level[i].members, options_.base); });
       sizes.push_back(std::move(sets));
     }
     return sizes;
@@ -102,8 +102,9 @@ class Search {
       }
     }
     std::vector<Grown> grown(tasks.size());
-    for_all(tasks.size(), options_.threads,
-            [&](std::size_t k) { grown[k] = polished(with_best(level[tasks[k].from].members, tasks[k].effect)); });
+    core::for_all(tasks.size(), options_.threads, [&](std::size_t k) {
+      grown[k] = polished(with_best(level[tasks[k].from].members, tasks[k].effect));
+    });
     std::map<std::vector<std::size_t>, Grown> best;
     for (Grown& set : grown) {
       std::vector<std::size_t> effects;
@@ -191,4 +192,4 @@ std::vector<std::vector<CauseSet>> search_causes(const CandidateTable& table, co
   return Search(table, options).run();
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

@@ -11,7 +11,7 @@
 
 #include <wheelwright/gap/block_gram.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 
 /// One effect at one point of its shapes, as columns of a BlockGram.
 struct Candidate {
@@ -81,4 +81,4 @@ struct CauseSearchOptions {
 [[nodiscard]] std::vector<std::vector<CauseSet>> search_causes(const CandidateTable& table,
                                                                const CauseSearchOptions& options = {});
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

@@ -5,7 +5,7 @@
 #include <wheelwright/filter/kernel.hpp>
 #include <wheelwright/gap/effect.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 namespace {
 
 using namespace catalogue;
@@ -14,7 +14,7 @@ using Shape = std::span<const double>;
 
 // u through T y' = u − y, from y = u at each segment's start.
 Signal lagged(const Drive& drive, const Signal& u, double T) {
-  const StepWeights w(1.0 / T, drive.step);
+  const filter::StepWeights w(1.0 / T, drive.step);
   Signal y(u.size());
   for (std::size_t s = 0; s < drive.segment_starts.size(); ++s) {
     const auto [first, last] = drive.segment(s);
@@ -328,4 +328,4 @@ std::vector<Effect> actuator_effects(std::size_t joints) {
   return effects;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

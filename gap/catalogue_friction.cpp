@@ -4,7 +4,7 @@
 
 #include <wheelwright/gap/effect.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 namespace {
 
 using namespace catalogue;
@@ -239,4 +239,4 @@ std::vector<Effect> friction_effects(std::size_t joints) {
   return effects;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

@@ -5,7 +5,7 @@
 #include <wheelwright/gap/effect.hpp>
 #include <wheelwright/gap/kinematic_rows.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 namespace {
 
 using namespace catalogue;
@@ -378,4 +378,4 @@ std::vector<Effect> geometry_effects(std::size_t joints) {
   return effects;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

@@ -7,26 +7,27 @@
 #include <wheelwright/gap/effect.hpp>
 #include <wheelwright/model/effect_law.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 namespace {
 
 using Shape = std::span<const double>;
 
-std::string sentence_of(const EffectLaw& law) {
+std::string sentence_of(const model::EffectLaw& law) {
   std::string text = law.noun + ".";
   text.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(text.front())));
   return text;
 }
 
 // The robot of `drive` with the one effect: its linear parameters 1, the others as the shape has them.
-Robot robot_with(const EffectLaw& law, const Model& model, double wheel_radius, double track_width, Shape shape) {
+Robot robot_with(const model::EffectLaw& law, const Model& model, double wheel_radius, double track_width,
+                 Shape shape) {
   Robot robot;
   robot.model = model.name;
   robot.wheel_radius = wheel_radius;
   robot.track_width = track_width;
-  RobotEffect effect{law.name, {}};
+  model::RobotEffect effect{law.name, {}};
   std::size_t next = 0;
-  for (const EffectParameterLaw& parameter : law.parameters_of(robot)) {
+  for (const model::EffectParameterLaw& parameter : law.parameters_of(robot)) {
     const double value = parameter.linear ? 1.0 : shape[next++];
     effect.parameters[parameter.name] = {value, value};
   }
@@ -66,11 +67,11 @@ Column column_of(const Drive& drive, const Model& terms, std::size_t j, const Ei
         for (std::size_t i = 0; i < joints; ++i) {
           joint_speed[i] = drive.joints[i].smooth_speed[k];
         }
-        values[k] = softened(term.function, {.speed = speed,
-                                             .speed_error = speed_error,
-                                             .joint_speed = joint_speed,
-                                             .joint_error = joint_error,
-                                             .heading = heading.size() > 0 ? heading[k] : 0.0});
+        values[k] = model::softened(term.function, {.speed = speed,
+                                                    .speed_error = speed_error,
+                                                    .joint_speed = joint_speed,
+                                                    .joint_error = joint_error,
+                                                    .heading = heading.size() > 0 ? heading[k] : 0.0});
       }
       put(column.effort, term, values);
     }
@@ -78,16 +79,16 @@ Column column_of(const Drive& drive, const Model& terms, std::size_t j, const Ei
   return column;
 }
 
-std::vector<Column> columns_of(const EffectLaw& law, const Drive& drive, Shape shape) {
+std::vector<Column> columns_of(const model::EffectLaw& law, const Drive& drive, Shape shape) {
   Robot robot = robot_with(law, drive.model, drive.wheel_radius, drive.track_width, shape);
   robot.lever_arm_is_track = drive.lever_arm == drive.track_width && drive.track_width > 0.0;
-  const Model terms = effect_terms(drive.model, robot);
+  const Model terms = model::effect_terms(drive.model, robot);
   const Eigen::VectorXd heading = terms.heading_used ? heading_or_odometry(drive) : Eigen::VectorXd();
   const auto& known = law.parameters_of(robot);
   std::vector<Column> columns;
   for (std::size_t j = 0; j < terms.p(); ++j) {
     Column column = column_of(drive, terms, j, heading);
-    const auto parameter = std::ranges::find(known, terms.parameters[j].physical, &EffectParameterLaw::physical);
+    const auto parameter = std::ranges::find(known, terms.parameters[j].physical, &model::EffectParameterLaw::physical);
     const double factor = terms.parameters[j].per_physical * (parameter->times_mass ? drive.physical("mass") : 1.0);
     for (auto* const signals : {&column.effort, &column.effort_rate}) {
       for (Eigen::VectorXd& signal : *signals) {
@@ -99,7 +100,7 @@ std::vector<Column> columns_of(const EffectLaw& law, const Drive& drive, Shape s
   return columns;
 }
 
-Effect effect_of(const EffectLaw& law, const Model& model) {
+Effect effect_of(const model::EffectLaw& law, const Model& model) {
   Effect effect;
   effect.name = law.name;
   effect.noun = law.noun;
@@ -107,7 +108,7 @@ Effect effect_of(const EffectLaw& law, const Model& model) {
   Robot robot;
   robot.model = model.name;
   std::vector<double> shape;
-  for (const EffectParameterLaw& parameter : law.parameters_of(robot)) {
+  for (const model::EffectParameterLaw& parameter : law.parameters_of(robot)) {
     if (parameter.linear) {
       effect.parameters.push_back({parameter.name, parameter.unit, parameter.lower == 0.0 ? 1 : 0});
       continue;
@@ -120,8 +121,8 @@ Effect effect_of(const EffectLaw& law, const Model& model) {
                              .logarithmic = true});
     shape.push_back(parameter.search.lower);
   }
-  const Model terms = effect_terms(model, robot_with(law, model, 1.0, 1.0, shape));
-  for (const Parameter& parameter : terms.parameters) {
+  const Model terms = model::effect_terms(model, robot_with(law, model, 1.0, 1.0, shape));
+  for (const model::Parameter& parameter : terms.parameters) {
     effect.excite += (effect.excite.empty() ? "" : "; ") + parameter.excite;
   }
   effect.applies = terms.heading_used    ? catalogue::needs_heading
@@ -137,10 +138,10 @@ std::vector<Effect> effects_by_law(const Model& model, const std::vector<Effect>
   std::vector<Effect> effects;
   Robot robot;
   robot.model = model.name;
-  if (on_two_wheels(robot) != model.on_two_wheels) {
+  if (model::on_two_wheels(robot) != model.on_two_wheels) {
     return effects;
   }
-  for (const EffectLaw& law : effect_laws()) {
+  for (const model::EffectLaw& law : model::effect_laws()) {
     const bool terms = (model.on_two_wheels ? law.add_terms : law.add_terms_of_axis) != nullptr;
     if (terms && std::ranges::find(own, law.name, &Effect::name) == own.end()) {
       effects.push_back(effect_of(law, model));
@@ -149,4 +150,4 @@ std::vector<Effect> effects_by_law(const Model& model, const std::vector<Effect>
   return effects;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

@@ -9,7 +9,7 @@
 
 #include <wheelwright/core/check.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 namespace {
 
 // Standardised sums over a regime for any arrangement of the blocks of values over those of the regime.
@@ -188,4 +188,4 @@ std::vector<double> model_confidence_set(const std::vector<Eigen::VectorXd>& los
   return p;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

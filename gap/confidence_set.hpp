@@ -11,7 +11,7 @@
 
 #include <wheelwright/gap/drive.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 
 /// p-values, corrected for the number of regimes, that the mean of `values` over each of `regimes` (one value a row) is
 /// above that of the rest by chance: contiguous blocks of `values` are permuted against the regimes, and the
@@ -44,4 +44,4 @@ struct ConfidenceSetOptions {
 [[nodiscard]] std::vector<double> model_confidence_set(const std::vector<Eigen::VectorXd>& losses,
                                                        const ConfidenceSetOptions& options = {});
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

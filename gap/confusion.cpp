@@ -7,7 +7,7 @@
 
 #include <wheelwright/gap/block_gram.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 namespace {
 
 // Σ signature² that the columns `on` leave of Σ weight·column.
@@ -138,4 +138,4 @@ std::vector<std::string> not_excited(const CandidateTable& table, const std::vec
   return sentences;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

@@ -14,7 +14,7 @@
 #include <wheelwright/gap/diagnosis.hpp>
 #include <wheelwright/gap/effect.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 
 /// Signature of one effect in the rows: Σ weight·column of a candidate's own columns.
 struct Signature {
@@ -45,4 +45,4 @@ struct Signature {
 [[nodiscard]] std::vector<std::string> not_excited(const CandidateTable& table, const std::vector<Effect>& catalogue,
                                                    const Drive& drive, double least = 1e-3);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

@@ -18,7 +18,7 @@
 #include <wheelwright/gap/shrink.hpp>
 #include <wheelwright/gap/where.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 namespace {
 
 constexpr std::size_t kShownOfEachSize = 8;
@@ -136,7 +136,7 @@ std::vector<ResidualSeries> series_of(const PreparedGap& prepared, const GapProb
 
 // The prior box of θ with finite sides.
 Box finite_prior(const Robot& robot, const PreparedGap& prepared) {
-  const PriorBox prior = prior_box(robot, prepared.drive.model);
+  const model::PriorBox prior = model::prior_box(robot, prepared.drive.model);
   Box box;
   for (std::size_t j = 0; j < prior.bounds.size(); ++j) {
     const double wide = kWidePrior * std::max(std::abs(prepared.theta[static_cast<Eigen::Index>(j)]), 1e-6);
@@ -322,4 +322,4 @@ std::vector<ShrinkFigure> torque_on(LogSource& fresh, LogSource* baseline, const
   return figures;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

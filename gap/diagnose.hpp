@@ -17,7 +17,7 @@
 #include <wheelwright/gap/gap_rows.hpp>
 #include <wheelwright/gap/selection.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 
 /// Options of diagnose().
 struct DiagnoseOptions {
@@ -50,4 +50,8 @@ struct DiagnoseOptions {
 [[nodiscard]] std::vector<ShrinkFigure> torque_on(LogSource& fresh, LogSource* baseline, const Robot& robot,
                                                   const Diagnosis& found, const DiagnoseOptions& options = {});
 
+}  // namespace wheelwright::gap
+
+namespace wheelwright {
+using gap::diagnose;
 }  // namespace wheelwright

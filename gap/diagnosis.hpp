@@ -17,7 +17,7 @@
 #include <wheelwright/gap/residual_series.hpp>
 #include <wheelwright/model/robot.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 
 /// Verdict of the log on the model.
 enum class GapVerdict {
@@ -137,4 +137,8 @@ struct Diagnosis {
   std::optional<Robot> improved;       ///< the robot with its causes, where the robot file can carry them
 };
 
+}  // namespace wheelwright::gap
+
+namespace wheelwright {
+using gap::Diagnosis;
 }  // namespace wheelwright

@@ -16,7 +16,7 @@
 #include <wheelwright/gap/drive.hpp>
 #include <wheelwright/gap/signed_least_squares.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 namespace {
 
 constexpr int kGoldenSteps = 14;
@@ -44,7 +44,7 @@ void add_effort(const Column& column, double factor, double step, Eigen::MatrixX
 
 // The drive as it is when `rival` is true: efforts that look at efforts settle in a second pass.
 Drive driven_with(Drive drive, const Rival& rival, const std::vector<Effect>& catalogue) {
-  const Eigen::MatrixXd inverse = wheelwright::inverse(drive.model.input);
+  const Eigen::MatrixXd inverse = core::inverse(drive.model.input);
   for (int pass = 0; pass < 2; ++pass) {
     Eigen::MatrixXd total = Eigen::MatrixXd::Zero(drive.rows(), static_cast<Eigen::Index>(drive.model.n()));
     for (const RivalCause& cause : rival.causes) {
@@ -82,7 +82,7 @@ class Rows {
         }
       }
     }
-    const PivotedQr qr(base);
+    const core::PivotedQr qr(base);
     base_ = qr.Q(qr.rank());
   }
 
@@ -372,21 +372,22 @@ Rival typical_rival(const std::vector<std::string>& effects, const std::vector<E
   return rival;
 }
 
-PlannedNoise expected_noise(const DesignSubject& subject) {
+PlannedNoise expected_noise(const design::DesignSubject& subject) {
   constexpr double kUniform = 1.0 / 3.0;  // variance of a uniform error over the square of its bound
   constexpr double kExtreme = 4.0;        // standard deviations that the largest of many rows is from zero
   PlannedNoise noise;
   noise.beta = subject.filter.beta;
   if (subject.errors) {
-    const SignalErrors& errors = *subject.errors;
+    const filter::SignalErrors& errors = *subject.errors;
     noise.output.resize(subject.model.n());
     for (std::size_t i = 0; i < noise.output.size(); ++i) {
       noise.output[i] = errors.output[static_cast<Eigen::Index>(i)] / kExtreme;
     }
   } else {
-    const NoiseBudget budget = noise_budget(subject.robot, subject.measurement);
+    const commission::NoiseBudget budget = commission::noise_budget(subject.robot, subject.measurement);
     check::that(budget.complete, "noise", "declared bounds of motion and effort");
-    const NoiseGram gram = noise_gram(subject.model, {2, noise.beta, noise.beta}, subject.measurement, subject.step);
+    const filter::NoiseGram gram =
+        filter::noise_gram(subject.model, {2, noise.beta, noise.beta}, subject.measurement, subject.step);
     const double motion = budget.sensors.motion, effort = budget.sensors.effort;
     for (std::size_t i = 0; i < subject.model.n(); ++i) {
       const double of_motion = subject.theta.dot(gram.motion[i] * subject.theta) * motion * motion;
@@ -394,7 +395,9 @@ PlannedNoise expected_noise(const DesignSubject& subject) {
       noise.output.push_back(std::sqrt(kUniform * (of_motion + of_effort)));
     }
   }
-  const auto increment = [](const NoiseBound& bound) { return std::sqrt(2.0 * kUniform) * bound.value.value_or(0.0); };
+  const auto increment = [](const model::NoiseBound& bound) {
+    return std::sqrt(2.0 * kUniform) * bound.value.value_or(0.0);
+  };
   noise.pose.forward = noise.pose.lateral = increment(subject.robot.noise.position);
   noise.pose.yaw = increment(subject.robot.noise.heading);
   return noise;
@@ -455,4 +458,4 @@ std::vector<RivalSeparation> discrimination(const Drive& drive, const std::vecto
   return separations;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

@@ -35,7 +35,7 @@
 #include <wheelwright/gap/effect.hpp>
 #include <wheelwright/gap/kinematic_rows.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 
 /// One effect with its parameters, units of the catalogue.
 struct RivalCause {
@@ -74,7 +74,7 @@ struct PlannedNoise {
 /// from sample to sample: noise_gram() for f₂ with the subject's β. Where the subject has bounds on rows in place of
 /// declared noise, a quarter of them, since the bound is an extreme of many rows. Increments of the pose: √2 times its
 /// own noise, where the robot file declares it.
-[[nodiscard]] PlannedNoise expected_noise(const DesignSubject& subject);
+[[nodiscard]] PlannedNoise expected_noise(const design::DesignSubject& subject);
 
 /// Separation of rival `truth`, when it is true, from rival `other`.
 struct RivalSeparation {
@@ -110,4 +110,4 @@ enum class DriveKind {
                                                           const PlannedNoise& noise,
                                                           DriveKind kind = DriveKind::planned);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

@@ -13,7 +13,7 @@
 #include <wheelwright/design/stages.hpp>
 #include <wheelwright/gap/further_drive.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 namespace {
 
 constexpr int kProbes = 12;          // random manoeuvres on which pairs are looked at first
@@ -23,15 +23,15 @@ constexpr double kNotTold = 1.64;    // standard deviations: one chance in twent
 constexpr double kWanted = 3.0;      // deviations worth driving for
 
 // Which ordered pairs any of some random manoeuvres tells apart.
-std::vector<bool> find_decidable(const DesignSubject& subject, const MotionLimits& limits,
+std::vector<bool> find_decidable(const design::DesignSubject& subject, const design::MotionLimits& limits,
                                  const std::vector<Rival>& rivals, const std::vector<Effect>& catalogue,
-                                 const PlannedNoise& noise, const DesignOptions& options) {
-  const StageFamily family(subject, limits, options.stages);
+                                 const PlannedNoise& noise, const design::DesignOptions& options) {
+  const design::StageFamily family(subject, limits, options.stages);
   std::mt19937_64 generator(options.seed);
   std::vector<bool> decidable(rivals.size() * (rivals.size() - 1), false);
   for (int k = 0; k < kProbes; ++k) {
     std::vector<double> x(family.dimension());
-    std::ranges::generate(x, [&] { return uniform(generator); });
+    std::ranges::generate(x, [&] { return core::uniform(generator); });
     const std::vector<RivalSeparation> pairs =
         discrimination(planned_drive(family.plan(x, subject.step), subject), rivals, catalogue, noise);
     for (std::size_t i = 0; i < pairs.size(); ++i) {
@@ -156,16 +156,17 @@ std::optional<std::size_t> DiscriminationDesign::worst() const {
   return index;
 }
 
-PlanObjective tell_apart(const DesignSubject& subject, const std::vector<Rival>& rivals,
-                         const std::vector<Effect>& catalogue, const PlannedNoise& noise, std::vector<bool> decidable) {
+design::PlanObjective tell_apart(const design::DesignSubject& subject, const std::vector<Rival>& rivals,
+                                 const std::vector<Effect>& catalogue, const PlannedNoise& noise,
+                                 std::vector<bool> decidable) {
   check::that(decidable.empty() || decidable.size() == rivals.size() * (rivals.size() - 1), "decidable",
               "one for each ordered pair");
-  return [&subject, rivals, catalogue, noise, decidable](const Plan& plan) {
+  return [&subject, rivals, catalogue, noise, decidable](const design::Plan& plan) {
     return -least(discrimination(planned_drive(plan, subject), rivals, catalogue, noise), decidable);
   };
 }
 
-std::vector<std::string> stage_words(const Plan& plan, const Model& model) {
+std::vector<std::string> stage_words(const design::Plan& plan, const Model& model) {
   constexpr double kShortest = 0.1;  // s
   const Eigen::Index middle = plan.samples() / 2;
   std::vector<std::string> stages;
@@ -222,30 +223,30 @@ std::string splitting_measurement(const Rival& a, const Rival& b, const std::vec
                     : "a sensor that sees one of them directly";
 }
 
-DiscriminationDesign design_for_discrimination(const DesignSubject& subject, const MotionLimits& limits,
+DiscriminationDesign design_for_discrimination(const design::DesignSubject& subject, const design::MotionLimits& limits,
                                                const std::vector<Rival>& rivals, const std::vector<Effect>& catalogue,
-                                               const PlannedNoise& noise, const DesignOptions& options,
+                                               const PlannedNoise& noise, const design::DesignOptions& options,
                                                const Drive* analysed) {
   DiscriminationDesign design;
   design.rivals = rivals;
   design.decidable = find_decidable(subject, limits, rivals, catalogue, noise, options);
   const bool any = std::ranges::find(design.decidable, true) != design.decidable.end();
   // Where nothing can be told apart, what is designed is the first manoeuvre that there is.
-  DesignOptions search = options;
+  design::DesignOptions search = options;
   if (!any) {
     search.samples = search.descents = search.steps = 1;
   }
-  const PlanObjective objective = tell_apart(subject, rivals, catalogue, noise, design.decidable);
-  design.manoeuvre = design_manoeuvre(subject, limits, objective, search);
-  const auto pairs = [&](const Plan& plan) {
+  const design::PlanObjective objective = tell_apart(subject, rivals, catalogue, noise, design.decidable);
+  design.manoeuvre = design::design_manoeuvre(subject, limits, objective, search);
+  const auto pairs = [&](const design::Plan& plan) {
     return discrimination(planned_drive(plan, subject), rivals, catalogue, noise);
   };
   design.promised = pairs(design.manoeuvre.plan);
   if (any && subject.model.on_two_wheels) {
-    design.figure_eight = find_figure_eight(subject, limits, objective);
+    design.figure_eight = design::find_figure_eight(subject, limits, objective);
   }
   if (design.figure_eight) {
-    design.figure_eight_plan = plan_of(*design.figure_eight, subject, limits.duration, subject.step);
+    design.figure_eight_plan = design::plan_of(*design.figure_eight, subject, limits.duration, subject.step);
     design.promised_eight = pairs(*design.figure_eight_plan);
   }
   if (analysed != nullptr) {
@@ -257,4 +258,4 @@ DiscriminationDesign design_for_discrimination(const DesignSubject& subject, con
   return design;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

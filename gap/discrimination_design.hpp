@@ -11,7 +11,7 @@
 #include <wheelwright/design/manoeuvre.hpp>
 #include <wheelwright/gap/discrimination.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 
 /// Two rivals that one drive told nothing about.
 struct InseparablePair {
@@ -26,20 +26,20 @@ struct InseparablePair {
 
 /// The objective: minus the least number of deviations (RivalSeparation::deviations) over the ordered pairs that
 /// `decidable` lists (as discrimination() does; empty: all). Keeps a reference to `subject`.
-[[nodiscard]] PlanObjective tell_apart(const DesignSubject& subject, const std::vector<Rival>& rivals,
-                                       const std::vector<Effect>& catalogue, const PlannedNoise& noise,
-                                       std::vector<bool> decidable = {});
+[[nodiscard]] design::PlanObjective tell_apart(const design::DesignSubject& subject, const std::vector<Rival>& rivals,
+                                               const std::vector<Effect>& catalogue, const PlannedNoise& noise,
+                                               std::vector<bool> decidable = {});
 
 /// A manoeuvre for discrimination, and what it promises.
 struct DiscriminationDesign {
-  Manoeuvre manoeuvre;
+  design::Manoeuvre manoeuvre;
   std::vector<Rival> rivals;
-  std::vector<RivalSeparation> promised;     ///< every ordered pair
-  std::vector<bool> decidable;               ///< of each: whether some motion shows A as what B cannot be
-  std::vector<InseparablePair> inseparable;  ///< unordered
-  std::vector<RivalSeparation> analysed;     ///< of the drive that was analysed; empty where there is none
-  std::optional<FigureEight> figure_eight;   ///< the best one within the same limits (differential drive)
-  std::optional<Plan> figure_eight_plan;
+  std::vector<RivalSeparation> promised;            ///< every ordered pair
+  std::vector<bool> decidable;                      ///< of each: whether some motion shows A as what B cannot be
+  std::vector<InseparablePair> inseparable;         ///< unordered
+  std::vector<RivalSeparation> analysed;            ///< of the drive that was analysed; empty where there is none
+  std::optional<design::FigureEight> figure_eight;  ///< the best one within the same limits (differential drive)
+  std::optional<design::Plan> figure_eight_plan;
   std::vector<RivalSeparation> promised_eight;
 
   /// The decidable pair that is told apart worst, or nothing where none is decidable.
@@ -52,7 +52,7 @@ struct DiscriminationDesign {
 
 /// Stages of constant speed of the first half of `plan` in words, e.g. "1.2 s forwards at 0.8 m/s", and that it comes
 /// back.
-[[nodiscard]] std::vector<std::string> stage_words(const Plan& plan, const Model& model);
+[[nodiscard]] std::vector<std::string> stage_words(const design::Plan& plan, const Model& model);
 
 /// Measurement that separates two rivals which no log of efforts, wheel speeds and pose separates.
 [[nodiscard]] std::string splitting_measurement(const Rival& a, const Rival& b, const std::vector<Effect>& catalogue);
@@ -62,11 +62,9 @@ struct DiscriminationDesign {
 /// A's signature, and θ does not take up the signature but for errors of sampling (3·10⁻⁴ of its sum of squares).
 /// `analysed`: the drive that was analysed, with predicted efforts, for comparison; may be null. Throws InvalidArgument
 /// as discrimination() and design_manoeuvre() do.
-[[nodiscard]] DiscriminationDesign design_for_discrimination(const DesignSubject& subject, const MotionLimits& limits,
-                                                             const std::vector<Rival>& rivals,
-                                                             const std::vector<Effect>& catalogue,
-                                                             const PlannedNoise& noise,
-                                                             const DesignOptions& options = {},
-                                                             const Drive* analysed = nullptr);
+[[nodiscard]] DiscriminationDesign design_for_discrimination(
+    const design::DesignSubject& subject, const design::MotionLimits& limits, const std::vector<Rival>& rivals,
+    const std::vector<Effect>& catalogue, const PlannedNoise& noise, const design::DesignOptions& options = {},
+    const Drive* analysed = nullptr);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

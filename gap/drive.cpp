@@ -15,7 +15,7 @@
 #include <wheelwright/core/statistics.hpp>
 #include <wheelwright/filter/kernel.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 namespace {
 
 constexpr double kUneven = 0.01;        // share of the median step
@@ -209,7 +209,7 @@ double noise_by_differences(const Eigen::VectorXd& x) {
   for (Eigen::Index k = 3; k < x.size(); ++k) {
     magnitude.push_back(std::abs(x[k] - 3.0 * x[k - 1] + 3.0 * x[k - 2] - x[k - 3]));
   }
-  return median(std::move(magnitude)) / (0.6744897501960817 * std::sqrt(20.0));
+  return core::median(std::move(magnitude)) / (0.6744897501960817 * std::sqrt(20.0));
 }
 
 Mask find_rest(const Drive& drive, const JointSignals& joint, double shortest) {
@@ -410,11 +410,11 @@ void smooth_quadratic(std::span<const double> signal, std::size_t window, std::s
 
 Drive make_drive(const LogTable& log, const Robot& robot, const Measurement& measurement, const DriveOptions& options) {
   Drive drive;
-  drive.model = make_model(robot);
+  drive.model = model::make_model(robot);
   check::that(measurement.motion_columns.size() == drive.model.joints.size() &&
                   measurement.effort_columns.size() == drive.model.joints.size(),
               "measurement", "one motion and one effort column for each joint");
-  drive.step = check::positive(median_step(log.t), "the log's median step");
+  drive.step = check::positive(core::median_step(log.t), "the log's median step");
   drive.count = measurement.count;
   drive.efforts_unsigned = measurement.effort_unsigned;
   drive.angles_measured = measurement.motion == MotionKind::angle;
@@ -455,7 +455,7 @@ void predict_efforts(Drive& drive, const Eigen::VectorXd& theta) {
   check::that(theta.size() == static_cast<Eigen::Index>(model.p()) && theta.allFinite(), "predict_efforts theta",
               "p finite numbers");
   check::that(model.input.rows() == model.input.cols(), "Model::input", "a square matrix");
-  const RankRevealingLu input(model.input);
+  const core::RankRevealingLu input(model.input);
   check::that(input.invertible(), "Model::input", "a regular matrix");
   Eigen::MatrixXd output = Eigen::MatrixXd::Zero(drive.rows(), static_cast<Eigen::Index>(model.n()));
   std::vector<double> speed(drive.coordinates.size()), joint(drive.joints.size());
@@ -483,12 +483,12 @@ template <typename Step>
 Eigen::VectorXd walk(const Drive& drive, double beta, const Eigen::VectorXd& signal, const Step& step) {
   check::positive(beta, "beta");
   check::that(signal.size() == drive.rows(), "filtered signal", "one value per instant");
-  const StepWeights weights(beta, drive.step);
+  const filter::StepWeights weights(beta, drive.step);
   const double gain = beta * beta;
   Eigen::VectorXd result(signal.size());
   for (std::size_t s = 0; s < drive.segment_starts.size(); ++s) {
     const auto [first, last] = drive.segment(s);
-    Cascade cascade;
+    filter::Cascade cascade;
     result[first] = 0.0;
     for (Eigen::Index k = first + 1; k < last; ++k) {
       step(cascade, weights, k);
@@ -499,8 +499,9 @@ Eigen::VectorXd walk(const Drive& drive, double beta, const Eigen::VectorXd& sig
 }
 
 Eigen::VectorXd filtered_held(const Drive& drive, double beta, const Eigen::VectorXd& signal) {
-  return walk(drive, beta, signal,
-              [&signal](Cascade& c, const StepWeights& w, Eigen::Index k) { c.held(w, signal[k - 1]); });
+  return walk(drive, beta, signal, [&signal](filter::Cascade& c, const filter::StepWeights& w, Eigen::Index k) {
+    c.held(w, signal[k - 1]);
+  });
 }
 
 Eigen::VectorXd values(const Drive& drive, const Term& term, const Eigen::VectorXd& heading) {
@@ -529,12 +530,13 @@ void add(Eigen::VectorXd& to, double scale, const Eigen::VectorXd& signal) {
 }  // namespace
 
 Eigen::VectorXd filtered(const Drive& drive, double beta, const Eigen::VectorXd& signal) {
-  return walk(drive, beta, signal,
-              [&signal](Cascade& c, const StepWeights& w, Eigen::Index k) { c.linear(w, signal[k - 1], signal[k]); });
+  return walk(drive, beta, signal, [&signal](filter::Cascade& c, const filter::StepWeights& w, Eigen::Index k) {
+    c.linear(w, signal[k - 1], signal[k]);
+  });
 }
 
 Eigen::VectorXd filtered_rate(const Drive& drive, double beta, const Eigen::VectorXd& signal) {
-  return walk(drive, beta, signal, [&signal](Cascade& c, const StepWeights& w, Eigen::Index k) {
+  return walk(drive, beta, signal, [&signal](filter::Cascade& c, const filter::StepWeights& w, Eigen::Index k) {
     c.increment(w, signal[k] - signal[k - 1]);
   });
 }
@@ -600,4 +602,4 @@ Mask moving(const Drive& drive, double beta, double share) {
   return mask;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

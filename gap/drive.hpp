@@ -17,7 +17,7 @@
 #include <wheelwright/model/model.hpp>
 #include <wheelwright/model/robot.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 
 /// Rows of a Drive that have a property.
 using Mask = Eigen::Array<bool, Eigen::Dynamic, 1>;
@@ -141,4 +141,4 @@ void smooth_quadratic(std::span<const double> signal, std::size_t window, std::s
 /// is any number, and no model of motion says anything about it. None for a drive without efforts.
 [[nodiscard]] Mask moving(const Drive& drive, double beta, double share = 0.02);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

@@ -12,7 +12,7 @@
 #include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/model/effect_law.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 namespace {
 
 std::vector<double> points(const ShapeParameter& shape, const Drive& drive) {
@@ -71,9 +71,9 @@ std::vector<std::vector<double>> shape_grid(const Effect& effect, const Drive& d
   return grid;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap
 
-namespace wheelwright::catalogue {
+namespace wheelwright::gap::catalogue {
 namespace {
 
 void add_to(Eigen::VectorXd& to, double factor, const Eigen::VectorXd& signal) {
@@ -178,7 +178,7 @@ std::vector<Eigen::VectorXd> inertial_efforts(const Drive& drive) {
                                                              drive.coordinates[term.coordinate].smooth_acceleration;
     }
   }
-  const Eigen::MatrixXd inverse = wheelwright::inverse(drive.model.input);
+  const Eigen::MatrixXd inverse = core::inverse(drive.model.input);
   std::vector<Eigen::VectorXd> joints;
   for (Eigen::Index j = 0; j < inverse.rows(); ++j) {
     joints.push_back(outputs * inverse.row(j).transpose());
@@ -191,7 +191,7 @@ Column base_column(const Drive& drive, std::string_view name) {
   column.effort.resize(drive.model.n());
   column.effort_rate.resize(drive.model.n());
   for (const Term& term : drive.model.terms) {
-    const Parameter& parameter = drive.model.parameters[term.parameter];
+    const model::Parameter& parameter = drive.model.parameters[term.parameter];
     if (parameter.physical != name || term.kind == Term::Kind::function) {
       continue;
     }
@@ -236,15 +236,15 @@ Applicability needs_heading(const Drive& drive) {
 }
 
 Applicability needs_no(const Drive& drive, std::string_view name) {
-  const auto same = [name](const Parameter& parameter) { return parameter.physical == name; };
+  const auto same = [name](const model::Parameter& parameter) { return parameter.physical == name; };
   return std::ranges::none_of(drive.model.parameters, same)
              ? Applicability{}
              : Applicability{false, "the base model has " + std::string(name) + " itself"};
 }
 
-}  // namespace wheelwright::catalogue
+}  // namespace wheelwright::gap::catalogue
 
-namespace wheelwright {
+namespace wheelwright::gap {
 namespace {
 
 std::vector<Effect> catalogue_of(const Model& model) {
@@ -263,14 +263,14 @@ std::vector<Effect> catalogue_of(const Model& model) {
 std::vector<Effect> effect_catalogue() {
   Robot robot;
   robot.wheel_radius = robot.track_width = 1.0;
-  return catalogue_of(make_model(robot));
+  return catalogue_of(model::make_model(robot));
 }
 
 std::vector<Effect> effect_catalogue(const Model& model) { return catalogue_of(model); }
 
 std::string catalogue_noun(std::string_view name) {
-  const auto law = std::ranges::find(effect_laws(), name, &EffectLaw::name);
-  if (law != effect_laws().end()) {
+  const auto law = std::ranges::find(model::effect_laws(), name, &model::EffectLaw::name);
+  if (law != model::effect_laws().end()) {
     return law->noun;
   }
   static const std::vector<Effect> catalogue = effect_catalogue();
@@ -278,4 +278,4 @@ std::string catalogue_noun(std::string_view name) {
   return effect != catalogue.end() ? effect->noun : std::string();
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

@@ -15,7 +15,7 @@
 #include <wheelwright/core/interval.hpp>
 #include <wheelwright/gap/drive.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 
 /// A coefficient of an effect, the factor of one of its columns.
 struct EffectParameter {
@@ -115,9 +115,9 @@ void validate(const Effect& effect);
 /// Bounds of a shape on `drive`, in its unit: of its magnitude where it has both signs.
 [[nodiscard]] Interval shape_bounds(const ShapeParameter& shape, const Drive& drive);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap
 
-namespace wheelwright::catalogue {
+namespace wheelwright::gap::catalogue {
 
 /// Standard deviation of a signal.
 [[nodiscard]] double deviation(const Eigen::VectorXd& signal);
@@ -190,9 +190,9 @@ void add(Column& a, const Column& b);
 /// Applies where the base model has no parameter of the physical name `name`, which would be the same column.
 [[nodiscard]] Applicability needs_no(const Drive& drive, std::string_view name);
 
-}  // namespace wheelwright::catalogue
+}  // namespace wheelwright::gap::catalogue
 
-namespace wheelwright {
+namespace wheelwright::gap {
 
 /// All effects and parametric causes for a robot on two driven wheels. Coefficients are of effect_catalogue's units:
 /// N·m at the wheel, m, rad, s, kg, relative changes; with current or voltage as effort, A or V stand for N·m.
@@ -218,4 +218,8 @@ namespace wheelwright {
 /// Gains, biases, lags, delays, clocks, dead zones, saturation, backlash, batteries.
 [[nodiscard]] std::vector<Effect> actuator_effects(std::size_t joints = 2);
 
+}  // namespace wheelwright::gap
+
+namespace wheelwright {
+using gap::Effect;
 }  // namespace wheelwright

@@ -11,7 +11,7 @@
 #include <wheelwright/core/statistics.hpp>
 #include <wheelwright/design/stages.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 namespace {
 
 constexpr double kStep = 1e-3;  // of differences, share of a shape
@@ -101,7 +101,7 @@ std::vector<std::vector<Eigen::VectorXd>> CausesModel::parts_of(std::size_t k, c
   return parts;
 }
 
-bool CausesModel::evaluate(const Eigen::VectorXd& shape, bool derivatives, SeparableValues& at) const {
+bool CausesModel::evaluate(const Eigen::VectorXd& shape, bool derivatives, identify::SeparableValues& at) const {
   fill(shape, at.offset, at.columns);
   at.offset_by.clear();
   at.columns_by.clear();
@@ -227,7 +227,7 @@ FittedCauses fit_causes(const PreparedGap& prepared, const GapProblem& problem, 
   const CausesModel model(prepared, problem, set, base);
   Eigen::VectorXd shape = model.start();
   if (shape.size() > 0) {
-    VariableProjectionOptions options;
+    identify::VariableProjectionOptions options;
     options.start = shape;
     options.lower.resize(shape.size());
     options.upper.resize(shape.size());
@@ -236,8 +236,8 @@ FittedCauses fit_causes(const PreparedGap& prepared, const GapProblem& problem, 
       options.upper[static_cast<Eigen::Index>(k)] = model.free()[k].upper;
     }
     options.most_iterations = 20;
-    const SeparableFit fit = variable_projection(model, options);
-    if (fit.end != SearchEnd::failed) {
+    const identify::SeparableFit fit = identify::variable_projection(model, options);
+    if (fit.end != identify::SearchEnd::failed) {
       shape = fit.shape;
     }
   }
@@ -308,7 +308,7 @@ FittedCauses fit_causes(const PreparedGap& prepared, const GapProblem& problem, 
 
   FittedCauses fitted;
   fitted.freedom = static_cast<double>(gram.blocks()) - 1.0;
-  const double t = student_quantile_below(fitted.freedom, 0.975);
+  const double t = core::student_quantile_below(fitted.freedom, 0.975);
   fitted.theta = prepared.theta;
   fitted.theta_error = Eigen::VectorXd::Zero(prepared.theta.size());
   for (std::size_t k = 0; k < theta.size(); ++k) {
@@ -432,23 +432,23 @@ Eigen::VectorXd tuned(const CausesModel& model, const TuneOptions& options) {
     return shape;
   };
   const auto left = [&](std::span<const double> x) {
-    SeparableValues at;
+    identify::SeparableValues at;
     model.evaluate(shape_at(x), false, at);
     const Eigen::VectorXd y = model.response() - at.offset;
-    const Eigen::VectorXd rotated = QrFactors(at.columns).rotate(y);
+    const Eigen::VectorXd rotated = core::QrFactors(at.columns).rotate(y);
     return rotated.tail(rotated.size() - at.columns.cols()).squaredNorm() / static_cast<double>(y.size());
   };
   std::vector<double> start;
   for (Eigen::Index k = 0; k < model.shapes(); ++k) {
     start.push_back(std::clamp(to_cube(model.free()[static_cast<std::size_t>(k)], model.start()[k]), 0.0, 1.0));
   }
-  SearchOptions search;
+  design::SearchOptions search;
   search.samples = options.samples;
   search.descents = options.descents;
   search.steps = options.steps;
   search.seed = options.seed;
   search.threads = options.threads;
-  return shape_at(minimise_over_cube(left, start.size(), {start}, search).x);
+  return shape_at(design::minimise_over_cube(left, start.size(), {start}, search).x);
 }
 
 }  // namespace
@@ -473,4 +473,4 @@ void add_tuned_shapes(ShapeGrids& grids, const PreparedGap& prepared, const GapP
   }
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

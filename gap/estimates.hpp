@@ -14,7 +14,7 @@
 #include <wheelwright/gap/prepared.hpp>
 #include <wheelwright/identify/variable_projection.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 
 /// A continuous shape of one member of a set.
 struct FreeShape {
@@ -31,7 +31,7 @@ struct FreeShape {
 /// The rows of `problem` fitted by `set`, θ (where it is not held) and the effects' coefficients linear, their
 /// continuous shapes free. Rows of all spaces one after the other, in units of their floors. Keeps references to
 /// `prepared` and `problem`.
-class CausesModel final : public SeparableModel {
+class CausesModel final : public identify::SeparableModel {
  public:
   CausesModel(const PreparedGap& prepared, const GapProblem& problem, const CauseSet& set, BaseModel base);
 
@@ -51,7 +51,7 @@ class CausesModel final : public SeparableModel {
   [[nodiscard]] std::vector<std::vector<Eigen::VectorXd>> parts_of(std::size_t k,
                                                                    const std::vector<double>& shape) const;
   /// Values; derivatives by central differences.
-  bool evaluate(const Eigen::VectorXd& shape, bool derivatives, SeparableValues& at) const override;
+  bool evaluate(const Eigen::VectorXd& shape, bool derivatives, identify::SeparableValues& at) const override;
 
  private:
   void fill(const Eigen::VectorXd& shape, Eigen::VectorXd& offset, Eigen::MatrixXd& columns) const;
@@ -106,4 +106,4 @@ struct TuneOptions {
 void add_tuned_shapes(ShapeGrids& grids, const PreparedGap& prepared, const GapProblem& problem,
                       const std::vector<CauseSet>& looked_at, const TuneOptions& options = {});
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

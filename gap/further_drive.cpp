@@ -14,7 +14,7 @@
 #include <wheelwright/filter/measurement.hpp>
 #include <wheelwright/gap/discrimination_design.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 namespace {
 
 constexpr double kShortestRest = 0.1;  // s
@@ -38,7 +38,7 @@ Mask rests(const Eigen::VectorXd& speed, double step) {
 
 }  // namespace
 
-Drive planned_drive(const Plan& plan, const DesignSubject& subject) {
+Drive planned_drive(const design::Plan& plan, const design::DesignSubject& subject) {
   const Model& model = subject.model;
   const Robot& robot = subject.robot;
   check::that(plan.samples() >= 3, "plan", "at least three samples");
@@ -54,7 +54,7 @@ Drive planned_drive(const Plan& plan, const DesignSubject& subject) {
   }
   drive.t = Eigen::VectorXd::LinSpaced(plan.samples(), 0.0, plan.t(plan.samples() - 1));
   drive.segment_starts = {0};
-  const Eigen::MatrixXd inverse = pseudo_inverse(model.motion);
+  const Eigen::MatrixXd inverse = core::pseudo_inverse(model.motion);
   const Eigen::MatrixXd speed = inverse * plan.speed, acceleration = inverse * plan.acceleration;
   for (Eigen::Index j = 0; j < speed.rows(); ++j) {
     JointSignals joint;
@@ -140,10 +140,10 @@ std::string reason_for(const Judged& pair, const Effect& first, const Effect& se
          splitting_measurement({{{first.name, {}, {}}}}, {{{second.name, {}, {}}}}, catalogue);
 }
 
-Drive random_drive(const StageFamily& family, const DesignSubject& subject, const Drive& like,
+Drive random_drive(const design::StageFamily& family, const design::DesignSubject& subject, const Drive& like,
                    std::mt19937_64& generator) {
   std::vector<double> x(family.dimension());
-  std::ranges::generate(x, [&] { return uniform(generator); });
+  std::ranges::generate(x, [&] { return core::uniform(generator); });
   Drive drive = planned_drive(family.plan(x, subject.step), subject);
   drive.has_efforts = like.has_efforts;
   if (!like.has_pose()) {
@@ -154,27 +154,27 @@ Drive random_drive(const StageFamily& family, const DesignSubject& subject, cons
 
 }  // namespace
 
-DesignSubject subject_of(const PreparedGap& prepared, const Robot& robot, const Eigen::VectorXd& theta) {
-  DesignSubject subject;
+design::DesignSubject subject_of(const PreparedGap& prepared, const Robot& robot, const Eigen::VectorXd& theta) {
+  design::DesignSubject subject;
   subject.robot = robot;
   subject.model = prepared.drive.model;
   if (prepared.drive.has_efforts) {
     TableSource source(prepared.log);
-    subject.measurement = find_measurement(source, robot, subject.model, 2);
+    subject.measurement = filter::find_measurement(source, robot, subject.model, 2);
   }
   subject.filter = {2, prepared.row_options.beta, prepared.row_options.beta};
   subject.theta = theta;
   for (const double value : theta) {
     subject.effort_box.sides.push_back({value, value});
   }
-  subject.prior.sides = prior_box(robot, subject.model).bounds;
+  subject.prior.sides = model::prior_box(robot, subject.model).bounds;
   subject.step = prepared.drive.step;
   return subject;
 }
 
-MotionLimits limits_within(const PreparedGap& prepared, const Robot& robot) {
+design::MotionLimits limits_within(const PreparedGap& prepared, const Robot& robot) {
   const Drive& drive = prepared.drive;
-  MotionLimits limits = limits_of(robot);
+  design::MotionLimits limits = design::limits_of(robot);
   limits.duration = std::clamp(static_cast<double>(drive.rows()) * drive.step / 3.0, kShortest, kLongest);
   if (!(limits.joint_speed > 0.0)) {
     limits.joint_speed = largest(drive, &JointSignals::smooth_speed);
@@ -208,8 +208,8 @@ void judge_pairs(std::vector<ConfusablePair>& pairs, const CandidateTable& table
       shapes[e] = {table.candidates[on_log[e]->candidate].shape};
     }
   }
-  const DesignSubject subject = subject_of(prepared, robot, prepared.theta);
-  std::optional<StageFamily> family;
+  const design::DesignSubject subject = subject_of(prepared, robot, prepared.theta);
+  std::optional<design::StageFamily> family;
   try {
     family.emplace(subject, limits_within(prepared, robot), kStages);
   } catch (const InvalidArgument&) {
@@ -244,4 +244,4 @@ void judge_pairs(std::vector<ConfusablePair>& pairs, const CandidateTable& table
   }
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

@@ -12,7 +12,7 @@
 #include <wheelwright/core/for_all.hpp>
 #include <wheelwright/gap/drive.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 namespace {
 
 Eigen::VectorXd picked(const Eigen::VectorXd& signal, const std::vector<Eigen::Index>& rows) {
@@ -300,7 +300,7 @@ CandidateTable add_catalogue(GapRows& rows, const Drive& drive, const std::vecto
       tasks.push_back({e, shape, {}});
     }
   }
-  for_all(tasks.size(), options.threads, [&](std::size_t k) {
+  core::for_all(tasks.size(), options.threads, [&](std::size_t k) {
     for (const Column& column : catalogue[tasks[k].effect].columns(drive, tasks[k].shape)) {
       tasks[k].parts.push_back(rows_of(drive, rows, column, options));
     }
@@ -323,4 +323,4 @@ CandidateTable add_catalogue(GapRows& rows, const Drive& drive, const std::vecto
   return table;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

@@ -15,7 +15,7 @@
 #include <wheelwright/gap/kinematic_rows.hpp>
 #include <wheelwright/gap/residual_series.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 
 /// An effect with its numbers.
 struct FittedEffect {
@@ -89,4 +89,4 @@ using ShapeGrids = std::vector<std::vector<std::vector<double>>>;
 [[nodiscard]] CandidateTable add_catalogue(GapRows& rows, const Drive& drive, const std::vector<Effect>& catalogue,
                                            const ShapeGrids& shapes, const GapRowOptions& options);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

@@ -12,7 +12,11 @@
 #include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/model/effect_law.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
+
+using model::EffectParameterLaw;
+using model::RobotEffect;
+
 namespace {
 
 constexpr double kWider = 3.0;        // times a 95 % interval's half width: a prior
@@ -21,7 +25,7 @@ constexpr double kMotorShare = 0.01;  // of a wheel's share of the mass, as the 
 class Improvement {
  public:
   Improvement(const Robot& robot, const Drive& drive, const Eigen::VectorXd& theta)
-      : drive_(drive), theta_(theta), improved_(robot), unit_(effort_per_torque(robot).value_or(1.0)) {}
+      : drive_(drive), theta_(theta), improved_(robot), unit_(model::effort_per_torque(robot).value_or(1.0)) {}
 
   // What changes θ and the geometry.
   void change_parameters(const FittedEffect& cause) {
@@ -50,8 +54,8 @@ class Improvement {
     if (way != nullptr && way->convert == nullptr) {
       return true;
     }
-    const auto& laws = effect_laws();
-    const auto law = std::ranges::find(laws, name, &EffectLaw::name);
+    const auto& laws = model::effect_laws();
+    const auto law = std::ranges::find(laws, name, &model::EffectLaw::name);
     if (law == laws.end() || law->parameters_of(improved_).empty()) {
       return refuse("a robot file has no effect called " + name);
     }
@@ -96,7 +100,7 @@ class Improvement {
   }
 
   // Whether they are as effects_by_law() makes them.
-  [[nodiscard]] bool same_parameters(const Effect& effect, const EffectLaw& law) const {
+  [[nodiscard]] bool same_parameters(const Effect& effect, const model::EffectLaw& law) const {
     std::vector<std::string> of_effect, of_law;
     for (const bool is_linear : {true, false}) {
       for (const EffectParameterLaw& parameter : law.parameters_of(improved_)) {
@@ -111,7 +115,7 @@ class Improvement {
            (!std::ranges::any_of(law.parameters_of(improved_), &EffectParameterLaw::times_mass) ||
             improved_.nominal.contains("mass"));
   }
-  [[nodiscard]] bool axis() const { return !on_two_wheels(improved_); }
+  [[nodiscard]] bool axis() const { return !model::on_two_wheels(improved_); }
   bool refuse(std::string why) {
     why_not_ = std::move(why);
     return false;
@@ -140,7 +144,7 @@ class Improvement {
     }
   }
   void add(std::string_view physical, double amount) {
-    for (const Parameter& parameter : drive_.model.parameters) {
+    for (const model::Parameter& parameter : drive_.model.parameters) {
       if (parameter.physical == physical) {
         add_to_theta(physical, parameter.per_physical * amount);
       }
@@ -279,7 +283,7 @@ class Improvement {
       return true;
     }
     effect_ = {name, {{"b", {b, b}}}};
-    law_ = &effect_law(name);
+    law_ = &model::effect_law(name);
     return put();
   }
 
@@ -309,7 +313,7 @@ class Improvement {
     }
     // What was not found (0) stays so.
     const bool both = coefficient(0) != 0.0 && coefficient(1) != 0.0;
-    const Eigen::Vector2d found = both ? Eigen::Vector2d(LdltFactors(A).solve(Eigen::VectorXd(b)))
+    const Eigen::Vector2d found = both ? Eigen::Vector2d(core::LdltFactors(A).solve(Eigen::VectorXd(b)))
                                        : Eigen::Vector2d(b.cwiseQuotient(A.diagonal()));
     set("k", coefficient(0) != 0.0 ? found[0] : 0.0);
     set("R_b", coefficient(1) != 0.0 ? found[1] * unit_ : 0.0);
@@ -322,9 +326,9 @@ class Improvement {
     constexpr double kNear = 0.3;  // root mean square
     const double* const viscous = find("viscous_linear");
     const double slope = viscous != nullptr ? 0.5 * drive_.wheel_radius * *viscous : 0.0;
-    const double dry = has_effect(improved_, "coulomb") ? unit_ * effect_value(improved_, "coulomb", "c")
-                       : find("coulomb") != nullptr     ? *find("coulomb")
-                                                        : 0.0;
+    const double dry = model::has_effect(improved_, "coulomb") ? unit_ * model::effect_value(improved_, "coulomb", "c")
+                       : find("coulomb") != nullptr            ? *find("coulomb")
+                                                               : 0.0;
     double both = 0.0, friction = 0.0, lost = 0.0;
     for (const JointSignals& joint : drive_.joints) {
       for (const double w : joint.smooth_speed) {
@@ -358,20 +362,20 @@ class Improvement {
 
   // The same value at the right and at the left wheel.
   [[nodiscard]] RobotEffect of_each_wheel(const RobotEffect& effect) const {
-    RobotEffect each{effect_law(effect.name).of_each_wheel, {}};
-    for (const EffectParameterLaw& parameter : effect_law(each.name).parameters_of(improved_)) {
+    RobotEffect each{model::effect_law(effect.name).of_each_wheel, {}};
+    for (const EffectParameterLaw& parameter : model::effect_law(each.name).parameters_of(improved_)) {
       each.parameters[parameter.name] = effect.parameters.begin()->second;
     }
     return each;
   }
 
   bool put() {
-    if (has_effect(improved_, law_->of_each_wheel)) {
+    if (model::has_effect(improved_, law_->of_each_wheel)) {
       effect_ = of_each_wheel(effect_);
-      law_ = &effect_law(effect_.name);
+      law_ = &model::effect_law(effect_.name);
     }
     for (RobotEffect& same : improved_.effects) {
-      if (effect_law(same.name).of_each_wheel == effect_.name) {
+      if (model::effect_law(same.name).of_each_wheel == effect_.name) {
         same = of_each_wheel(same);
       }
     }
@@ -407,7 +411,7 @@ class Improvement {
   std::string why_not_;
   const FittedEffect* cause_ = nullptr;
   const std::vector<Interval>* intervals_ = nullptr;
-  const EffectLaw* law_ = nullptr;
+  const model::EffectLaw* law_ = nullptr;
   RobotEffect effect_;
 };
 
@@ -567,17 +571,18 @@ const std::map<std::string, Improvement::Way>& Improvement::ways() {
 Robot with_nominal(const Robot& robot, const Model& model, const Eigen::VectorXd& theta) {
   check::that(theta.size() == static_cast<Eigen::Index>(model.p()) && theta.allFinite(), "with_nominal theta",
               "p finite numbers");
-  const std::vector<std::string> possible = possible_parameters(robot);
+  const std::vector<std::string> possible = model::possible_parameters(robot);
   Robot changed = robot;
   std::map<std::string, double> physical;
   for (std::size_t j = 0; j < model.p(); ++j) {
-    const Parameter& parameter = model.parameters[j];
+    const model::Parameter& parameter = model.parameters[j];
     const double value = theta[static_cast<Eigen::Index>(j)] / parameter.per_physical;
     physical[parameter.physical] = value;
     const bool of_effect = std::ranges::any_of(robot.effects, [&](const RobotEffect& effect) {
-      return std::ranges::any_of(effect_law(effect.name).parameters_of(robot), [&](const EffectParameterLaw& law) {
-        return law.linear && law.physical == parameter.physical && effect.parameters.contains(law.name);
-      });
+      return std::ranges::any_of(
+          model::effect_law(effect.name).parameters_of(robot), [&](const EffectParameterLaw& law) {
+            return law.linear && law.physical == parameter.physical && effect.parameters.contains(law.name);
+          });
     });
     if (of_effect || std::ranges::find(possible, parameter.physical) == possible.end()) {
       continue;
@@ -590,7 +595,7 @@ Robot with_nominal(const Robot& robot, const Model& model, const Eigen::VectorXd
     }
   }
   for (RobotEffect& effect : changed.effects) {
-    for (const EffectParameterLaw& law : effect_law(effect.name).parameters_of(robot)) {
+    for (const EffectParameterLaw& law : model::effect_law(effect.name).parameters_of(robot)) {
       const auto value = physical.find(law.physical);
       const auto entry = effect.parameters.find(law.name);
       if (!law.linear || value == physical.end() || entry == effect.parameters.end()) {
@@ -634,7 +639,7 @@ std::optional<Robot> improved_robot(const Robot& robot, const Drive& drive, cons
     return std::nullopt;
   }
   try {
-    static_cast<void>(make_model(improvement.robot()));
+    static_cast<void>(model::make_model(improvement.robot()));
   } catch (const InvalidArgument& error) {
     why_not = error.what();
     return std::nullopt;
@@ -643,4 +648,4 @@ std::optional<Robot> improved_robot(const Robot& robot, const Drive& drive, cons
   return improvement.robot();
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

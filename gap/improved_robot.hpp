@@ -14,7 +14,7 @@
 #include <wheelwright/gap/gap_rows.hpp>
 #include <wheelwright/model/robot.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 
 /// `robot` with the nominal values of `theta` (p entries in the order of `model`, which is make_model(robot)): physical
 /// quantities in `nominal`, friction below 0 taken as 0, and the numbers of its own effects where they are in θ. A
@@ -47,4 +47,4 @@ namespace wheelwright {
                                                   const std::vector<std::vector<Interval>>& intervals,
                                                   std::string& why_not);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

@@ -8,7 +8,7 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/statistics.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 namespace {
 
 using Signal = Eigen::VectorXd;
@@ -63,7 +63,7 @@ double noise_of(const Drive& drive, const Signal& signal) {
   if (size.empty()) {
     return 0.0;
   }
-  return std::max(median(std::move(size)) / (0.6744897501960817 * std::sqrt(20.0)), resolution / std::sqrt(12.0));
+  return std::max(core::median(std::move(size)) / (0.6744897501960817 * std::sqrt(20.0)), resolution / std::sqrt(12.0));
 }
 
 double rms_of(const Signal& signal) {
@@ -192,4 +192,4 @@ IncrementNoise repeatability(const Drive& drive, const Windows& windows, const I
   return {root(sum.forward), root(sum.lateral), root(sum.yaw)};
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

@@ -9,7 +9,7 @@
 
 #include <wheelwright/gap/effect.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 
 /// Consecutive windows, none across segments.
 struct Windows {
@@ -63,4 +63,4 @@ struct IncrementNoise {
 [[nodiscard]] IncrementNoise repeatability(const Drive& drive, const Windows& windows, const Increments& gap,
                                            std::size_t fewest = 30);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 namespace {
 
 double criterion(const CandidateTable& table, const std::vector<std::size_t>& members) {
@@ -50,4 +50,4 @@ NaiveChoice naive_selection(const CandidateTable& table, std::size_t largest) {
   return choice;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

@@ -8,7 +8,7 @@
 
 #include <wheelwright/gap/candidate.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 
 /// A set of causes that the naive rule chose.
 struct NaiveChoice {
@@ -25,4 +25,4 @@ struct NaiveChoice {
 /// effect about two logs in three are given one. A forward search never takes back what it took.
 [[nodiscard]] NaiveChoice naive_selection(const CandidateTable& table, std::size_t largest = 3);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

@@ -11,7 +11,7 @@
 #include <wheelwright/gap/further_drive.hpp>
 #include <wheelwright/gap/prepared.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 namespace {
 
 constexpr std::size_t kMostRivals = 4;  // pairs grow with the square
@@ -90,13 +90,13 @@ NextDrive next_drive(LogSource& log, LogSource* baseline, const Robot& robot, co
   if (next.rivals.size() < 2) {
     return next;
   }
-  const DesignSubject subject = subject_of(prepared, robot, theta);
+  const design::DesignSubject subject = subject_of(prepared, robot, theta);
   PlannedNoise noise;
   noise.beta = prepared.row_options.beta;
   noise.output = {prepared.floor.efforts.data(), prepared.floor.efforts.data() + prepared.floor.efforts.size()};
   noise.pose = prepared.floor.increments;
   noise.window = prepared.row_options.window;
-  DesignOptions search;
+  design::DesignOptions search;
   search.samples = 60;
   search.descents = 2;
   search.steps = 120;
@@ -107,12 +107,12 @@ NextDrive next_drive(LogSource& log, LogSource* baseline, const Robot& robot, co
       options.progress("designing the next manoeuvre", share);
     }
   };
-  const MotionLimits limits = limits_within(prepared, robot);
+  const design::MotionLimits limits = limits_within(prepared, robot);
   const DiscriminationDesign design =
       design_for_discrimination(subject, limits, next.rivals, prepared.catalogue, noise, search, &prepared.drive);
-  next.sentence = listed(design.sentences, " ");
+  next.sentence = core::listed(design.sentences, " ");
   if (design.worst()) {
-    next.commands = command_table(design.manoeuvre.plan, subject.model);
+    next.commands = design::command_table(design.manoeuvre.plan, subject.model);
     next.sentence = fmt::format("A drive of {:.0f} s within {:.2g} m of its start. {}", limits.duration,
                                 design.manoeuvre.plan.reach(), next.sentence);
   }
@@ -136,4 +136,4 @@ NextDrive what_next(LogSource& log, LogSource* baseline, const Robot& robot, Dia
   }
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

@@ -11,7 +11,7 @@
 #include <wheelwright/gap/diagnose.hpp>
 #include <wheelwright/gap/discrimination_design.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 
 /// The next drive to record.
 struct NextDrive {
@@ -31,4 +31,4 @@ struct NextDrive {
 [[nodiscard]] NextDrive what_next(LogSource& log, LogSource* baseline, const Robot& robot, Diagnosis& diagnosis,
                                   const DiagnoseOptions& options);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

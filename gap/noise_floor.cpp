@@ -8,7 +8,7 @@
 #include <wheelwright/core/statistics.hpp>
 #include <wheelwright/gap/drive.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 namespace {
 
 // Robust standard deviation of white noise in `signal`, by third differences (1, −3, 3, −1: variance 20 σ²).
@@ -24,7 +24,7 @@ double by_third_differences(const Drive& drive, const Eigen::VectorXd& signal) {
     return 0.0;
   }
   constexpr double kMedianOfNormal = 0.6744897501960817;
-  return median(std::move(sizes)) / kMedianOfNormal / std::sqrt(20.0);
+  return core::median(std::move(sizes)) / kMedianOfNormal / std::sqrt(20.0);
 }
 
 // Energies of impulse responses: what unit white noise becomes.
@@ -203,4 +203,4 @@ double choose_gap_beta(const Drive& drive, const SignalNoise& noise, double wish
   return 2.0;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

@@ -8,7 +8,7 @@
 #include <wheelwright/gap/drive.hpp>
 #include <wheelwright/gap/gap_rows.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 
 /// Standard deviations of the raw signals' noise, one per joint.
 struct SignalNoise {
@@ -37,4 +37,4 @@ struct SignalNoise {
 [[nodiscard]] double choose_gap_beta(const Drive& drive, const SignalNoise& noise, double wish,
                                      double tolerated = 1e-3);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

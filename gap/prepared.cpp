@@ -16,33 +16,33 @@
 #include <wheelwright/gap/noise_floor.hpp>
 #include <wheelwright/gap/selection.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 namespace {
 
 constexpr double kUsualBeta = 10.0;  // 1/s
 constexpr const char* kTiming = "timing";
 
 // The columns that hold the joints' efforts.
-std::vector<std::string> effort_columns(const Model& model, EffortKind kind) {
+std::vector<std::string> effort_columns(const Model& model, model::EffortKind kind) {
   std::vector<std::string> names;
-  for (const Joint& joint : model.joints) {
-    names.push_back(kind == EffortKind::torque    ? joint.torque
-                    : kind == EffortKind::current ? joint.current
-                                                  : joint.voltage);
+  for (const model::Joint& joint : model.joints) {
+    names.push_back(kind == model::EffortKind::torque    ? joint.torque
+                    : kind == model::EffortKind::current ? joint.current
+                                                         : joint.voltage);
   }
   return names;
 }
 
 // A log with a heading and none of the efforts is compared by its pose alone: zeros stand for the efforts.
 Drive drive_of(const LogTable& log, const Robot& robot) {
-  const Model model = make_model(robot);
+  const Model model = model::make_model(robot);
   const std::vector<std::string> efforts = effort_columns(model, robot.effort);
   const auto logged = [&log](const std::string& name) {
     return std::find(log.names.begin(), log.names.end(), name) != log.names.end();
   };
   if (std::any_of(efforts.begin(), efforts.end(), logged) || !(logged("theta") || logged("gyro_z"))) {
     TableSource source(log);
-    return make_drive(log, robot, find_measurement(source, robot, model, 2));
+    return make_drive(log, robot, filter::find_measurement(source, robot, model, 2));
   }
   LogTable padded = log;
   for (const std::string& name : efforts) {
@@ -50,7 +50,7 @@ Drive drive_of(const LogTable& log, const Robot& robot) {
     padded.columns.emplace_back(log.rows(), 0.0);
   }
   TableSource source(padded);
-  Drive drive = make_drive(padded, robot, find_measurement(source, robot, model, 2));
+  Drive drive = make_drive(padded, robot, filter::find_measurement(source, robot, model, 2));
   drive.has_efforts = false;
   return drive;
 }
@@ -264,7 +264,7 @@ std::vector<FittedEffect> robots_own(const std::vector<FittedEffect>& healthy) {
 }
 
 void expect_efforts(Drive& drive, const Eigen::VectorXd& theta, const std::vector<FittedEffect>& causes) {
-  const Eigen::MatrixXd inverse = wheelwright::inverse(drive.model.input);
+  const Eigen::MatrixXd inverse = core::inverse(drive.model.input);
   Eigen::MatrixXd outputs = Eigen::MatrixXd::Zero(drive.rows(), static_cast<Eigen::Index>(drive.model.n()));
   for (const FittedEffect& cause : causes) {
     if (cause.effect.unit_coefficient) {
@@ -363,4 +363,4 @@ PreparedGap prepare_gap(LogSource& log, LogSource* baseline, const Robot& robot,
   return prepared;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

@@ -13,7 +13,7 @@
 #include <wheelwright/gap/diagnose.hpp>
 #include <wheelwright/gap/gap_rows.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 
 /// A log ready for the search.
 struct PreparedGap {
@@ -66,4 +66,4 @@ void expect_efforts(PreparedGap& prepared, const GapProblem& problem, const Caus
 [[nodiscard]] std::vector<Eigen::VectorXd> residuals(const GapRows& rows, const Subset& subset,
                                                      const Eigen::VectorXd& coefficients);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

@@ -15,7 +15,7 @@
 #include <wheelwright/core/statistics.hpp>
 #include <wheelwright/gap/drive.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 namespace {
 
 using Samples = Eigen::ArrayXd;
@@ -284,18 +284,18 @@ Contradictions find_contradictions(const Drive& drive, double beta, const Mask& 
   check::that(prior.dimension() == drive.model.p(), "find_contradictions: prior", "one side for each parameter");
   check::that(options.confidence > 0.0 && options.confidence < 1.0, "find_contradictions: confidence",
               "a number between 0 and 1");
-  check_finite(prior, "find_contradictions: prior");
+  bounds::check_finite(prior, "find_contradictions: prior");
   Contradictions out;
   const auto instants = static_cast<double>(rows.count());
   if (instants == 0.0) {
     out.statement = "No row of the log could be used.";
     return out;
   }
-  out.factor = normal_upper_quantile((1.0 - options.confidence) / (2.0 * instants * static_cast<double>(n)));
+  out.factor = core::normal_upper_quantile((1.0 - options.confidence) / (2.0 * instants * static_cast<double>(n)));
   for (const double floor : floors) {
     out.bounds.push_back(out.factor * check::positive(floor, "find_contradictions: floor"));
   }
-  RegressionTable table(rows_of(drive, beta, rows, out.bounds));
+  core::RegressionTable table(rows_of(drive, beta, rows, out.bounds));
   const FeasibleSet set = feasible_set(table, prior);
   const std::string within = fmt::format(
       "within {:.2f} times the noise floor, which Gaussian noise leaves on none of {} rows with a confidence "
@@ -307,8 +307,8 @@ Contradictions find_contradictions(const Drive& drive, double beta, const Mask& 
   }
   double sum = 0.0;
   std::map<std::pair<std::size_t, std::size_t>, Contradiction> found;  // a row counts once, whichever side
-  for (const WeightedRow& weighted : set.contradiction) {
-    const RowOrigin& origin = weighted.row.origin;
+  for (const bounds::WeightedRow& weighted : set.contradiction) {
+    const bounds::RowOrigin& origin = weighted.row.origin;
     if (origin.is_prior) {
       continue;
     }
@@ -331,4 +331,4 @@ Contradictions find_contradictions(const Drive& drive, double beta, const Mask& 
   return out;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

@@ -10,7 +10,7 @@
 #include <wheelwright/gap/diagnosis.hpp>
 #include <wheelwright/gap/drive.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 
 /// Moments of a drive that have something in common.
 struct Regime {
@@ -62,4 +62,4 @@ struct Contradictions {
                                                  const std::vector<double>& floors, const Box& prior,
                                                  const ContradictionOptions& options = {});
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

@@ -8,7 +8,7 @@
 
 #include <Eigen/Core>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 
 /// Equation that a residual belongs to.
 enum class GapSpace {
@@ -29,4 +29,4 @@ struct ResidualSeries {
   double floor = 0.0;        ///< standard deviation of the noise, unit of the values
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

@@ -14,7 +14,7 @@
 #include <wheelwright/sim/plant.hpp>
 #include <wheelwright/sim/simulation.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 namespace {
 
 constexpr double kLagsOfMemory = 8.0;      // time constants after which a lag has forgotten
@@ -23,7 +23,7 @@ constexpr int kBootstrapDraws = 1000;
 
 using Signals = std::vector<Eigen::VectorXd>;
 
-DriveParameters parameters_of(const Robot& robot) {
+model::DriveParameters parameters_of(const Robot& robot) {
   const auto value = [&robot](const std::string& name) {
     const auto found = robot.nominal.find(name);
     check::that(found != robot.nominal.end(), "rollouts robot.nominal", "a value for " + name);
@@ -39,11 +39,11 @@ DriveParameters parameters_of(const Robot& robot) {
           .viscous_yaw = value("viscous_yaw") / arms};
 }
 
-DriveEffects effects_of(const Robot& robot) {
-  DriveEffects effects(robot);
+sim::DriveEffects effects_of(const Robot& robot) {
+  sim::DriveEffects effects(robot);
   const auto coulomb = robot.nominal.find("coulomb");
-  if (coulomb != robot.nominal.end() && coulomb->second > 0.0 && !has_effect(robot, "coulomb") &&
-      !has_effect(robot, "coulomb_asymmetric")) {
+  if (coulomb != robot.nominal.end() && coulomb->second > 0.0 && !model::has_effect(robot, "coulomb") &&
+      !model::has_effect(robot, "coulomb_asymmetric")) {
     effects.coulomb.array() += coulomb->second;
     effects.forces = true;
   }
@@ -106,19 +106,19 @@ class Roller {
   Roller(const Drive& drive, const Robot& robot)
       : drive_(drive),
         robot_(robot),
-        geometry_(drive_geometry(robot)),
+        geometry_(model::drive_geometry(robot)),
         parameters_(parameters_of(robot)),
         effects_(effects_of(robot)),
-        unit_(effort_per_torque(robot).value_or(1.0)),
-        late_(effect_value(robot, "sensor_time_offset", "dt") / drive.step),
+        unit_(model::effort_per_torque(robot).value_or(1.0)),
+        late_(model::effect_value(robot, "sensor_time_offset", "dt") / drive.step),
         margin_(static_cast<Eigen::Index>(std::ceil(rollout_margin(robot) / drive.step - 1e-9))),
         held_(drive.joints[0].held_effort.size() > 0) {}
 
   // What the simulator shows `steps` rows after `start`, in one run.
   [[nodiscard]] std::vector<Shown> simulated(const Seen& log, Eigen::Index start,
                                              const std::vector<Eigen::Index>& steps) const {
-    Plant plant(drive_of(robot_), parameters_, {}, effects_);
-    Drivetrain drivetrain(robot_, parameters_, false);
+    sim::Plant plant(sim::drive_of(robot_), parameters_, {}, effects_);
+    sim::Drivetrain drivetrain(robot_, parameters_, false);
     Eigen::Index k = start - margin_;
     plant.reset(state_at(log, static_cast<double>(k)), time(k));
     for (; k < start; ++k) {
@@ -187,12 +187,12 @@ class Roller {
     return both(log.effort, static_cast<double>(k)) / unit_;
   }
 
-  [[nodiscard]] DriveState state_at(const Seen& log, double row) const {
+  [[nodiscard]] sim::DriveState state_at(const Seen& log, double row) const {
     const Eigen::Vector2d wheels = both(log.speed, row + late_).cwiseQuotient(geometry_.encoder_scale);
     const Eigen::Vector2d torque = both(log.effort, row) / unit_;
-    const Eigen::Vector2d slip = slip_share(effects_, torque.cwiseQuotient(geometry_.radius), wheels);
+    const Eigen::Vector2d slip = sim::slip_share(effects_, torque.cwiseQuotient(geometry_.radius), wheels);
     const Eigen::Vector2d rim = wheels.cwiseProduct(geometry_.radius).array() / (1.0 + slip.array());
-    DriveState state;
+    sim::DriveState state;
     state.forward_speed = 0.5 * (rim[0] + rim[1]);
     state.yaw_rate = (rim[0] - rim[1]) / geometry_.track_width;
     state.wheel_angle = both(log.angle, row + late_).cwiseQuotient(geometry_.encoder_scale);
@@ -205,16 +205,16 @@ class Roller {
     return state;
   }
 
-  void step(const Seen& log, Plant& plant, Drivetrain& drivetrain, Eigen::Index k) const {
+  void step(const Seen& log, sim::Plant& plant, sim::Drivetrain& drivetrain, Eigen::Index k) const {
     const Eigen::Vector2d first = torque(log, k);
     drivetrain.advance(plant, first, held_ ? first : torque(log, k + 1), drive_.step);
   }
 
   const Drive& drive_;
   const Robot& robot_;
-  DriveGeometry geometry_;
-  DriveParameters parameters_;
-  DriveEffects effects_;
+  model::DriveGeometry geometry_;
+  model::DriveParameters parameters_;
+  sim::DriveEffects effects_;
   double unit_;
   double late_;  // rows by which the sensors are late
   Eigen::Index margin_;
@@ -250,15 +250,16 @@ void write(RolloutErrors& errors, std::size_t window, const Shown& simulated, co
 }
 
 void check_robot(const Drive& drive, const Robot& robot) {
-  check::that(drive.two_wheels() && on_two_wheels(robot), "rollouts", "a robot on two driven wheels");
+  check::that(drive.two_wheels() && model::on_two_wheels(robot), "rollouts", "a robot on two driven wheels");
 }
 
 }  // namespace
 
 double rollout_margin(const Robot& robot) {
-  const double before = effect_value(robot, "delay", "T_d") + kLagsOfMemory * effect_value(robot, "actuator_lag", "T") +
-                        (has_effect(robot, "backlash") ? kMemoryOfBacklash : 0.0);
-  return std::max(before, effect_value(robot, "sensor_time_offset", "dt"));
+  const double before = model::effect_value(robot, "delay", "T_d") +
+                        kLagsOfMemory * model::effect_value(robot, "actuator_lag", "T") +
+                        (model::has_effect(robot, "backlash") ? kMemoryOfBacklash : 0.0);
+  return std::max(before, model::effect_value(robot, "sensor_time_offset", "dt"));
 }
 
 std::vector<Eigen::Index> rollout_starts(const Drive& drive, const RolloutOptions& options, double margin) {
@@ -286,7 +287,7 @@ std::vector<RolloutErrors> rollouts(const Drive& drive, const Robot& robot, cons
   std::vector<RolloutErrors> errors = empty_errors(drive, steps, starts.size());
   const Seen log = seen(drive);
   const Roller roller(drive, robot);
-  for_all(starts.size(), options.threads, [&](std::size_t w) {
+  core::for_all(starts.size(), options.threads, [&](std::size_t w) {
     const std::vector<Shown> simulated = roller.simulated(log, starts[w], steps);
     const std::vector<Shown> logged = roller.logged(log, starts[w], steps);
     for (std::size_t h = 0; h < steps.size(); ++h) {
@@ -315,7 +316,7 @@ std::vector<RolloutErrors> rollout_noise(const Drive& drive, const Robot& robot,
     noisy.effort[j] += effort[j];
   }
   const Roller roller(drive, robot);
-  for_all(starts.size(), options.threads, [&](std::size_t w) {
+  core::for_all(starts.size(), options.threads, [&](std::size_t w) {
     const std::vector<Shown> with = roller.simulated(noisy, starts[w], steps);
     std::vector<Shown> without = roller.simulated(clean, starts[w], steps);
     for (std::size_t h = 0; h < steps.size(); ++h) {
@@ -354,4 +355,4 @@ RolloutRms rollout_rms(const Eigen::VectorXd& errors, std::uint64_t seed, std::s
   return result;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

@@ -13,7 +13,7 @@
 #include <wheelwright/gap/drive.hpp>
 #include <wheelwright/model/robot.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 
 /// Windows over a log.
 struct RolloutOptions {
@@ -73,4 +73,4 @@ struct RolloutRms {
 /// time, `length` windows a block, from `seed`.
 [[nodiscard]] RolloutRms rollout_rms(const Eigen::VectorXd& errors, std::uint64_t seed, std::size_t length = 2);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

@@ -12,7 +12,7 @@
 #include <wheelwright/gap/block_gram.hpp>
 #include <wheelwright/gap/confidence_set.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 namespace {
 
 // Wilcoxon's signed-rank statistic of what `better` saves against `worse` over blocks, in standard deviations. An
@@ -74,7 +74,7 @@ class Selector {
       : table_(table), kinds_(kinds), floor_(floor_error), options_(options) {
     const auto tried = static_cast<double>(std::max<std::size_t>(kinds.size(), 1));
     level_ = options.significance / (2.0 * tried);  // two tests of each
-    critical_ = normal_upper_quantile(level_);
+    critical_ = core::normal_upper_quantile(level_);
     moves_theta_only_.assign(kinds.size(), true);
     for (std::size_t c = 0; c < table.candidates.size(); ++c) {
       if (beyond_theta(table, c) > options.contained) {
@@ -496,4 +496,4 @@ double unexplained_by(const CandidateTable& table, const std::vector<std::size_t
   return share;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

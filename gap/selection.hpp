@@ -20,7 +20,7 @@
 
 #include <wheelwright/gap/candidate.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 
 /// Options of select_causes(). Gains, remainders and the gap are mean squares in units of the noise floor, held out and
 /// beyond the floor. A further cause is taken where its gain is significant, above `smallest`, and satisfies one of
@@ -91,4 +91,4 @@ struct EffectKind {
 [[nodiscard]] double unexplained_by(const CandidateTable& table, const std::vector<std::size_t>& a,
                                     const std::vector<std::size_t>& b, BaseModel base);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

@@ -18,7 +18,7 @@
 #include <wheelwright/identify/noise_level.hpp>
 #include <wheelwright/sim/plant.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 namespace {
 
 constexpr double kConfidence = 0.95;
@@ -115,7 +115,7 @@ std::vector<ShrinkFigure> torque_figures(const PreparedGap& prepared, const Caus
   const auto n = static_cast<Eigen::Index>(prepared.drive.model.n());
   const auto count = static_cast<Eigen::Index>(blocks);
   Eigen::MatrixXd before = Eigen::MatrixXd::Zero(count, n), after = before, rows = before;
-  for_all(blocks, options.threads, [&](std::size_t block) {
+  core::for_all(blocks, options.threads, [&](std::size_t block) {
     const Part part = part_of(p, block, blocks);
     const Eigen::VectorXd fit = fit_without(p, part, options.blocks.purge);
     const auto at = static_cast<Eigen::Index>(block);
@@ -174,8 +174,8 @@ std::pair<std::vector<Eigen::VectorXd>, std::vector<Eigen::VectorXd>> sensor_noi
     const auto at = static_cast<Eigen::Index>(j);
     // Uniform on ±b has the standard deviation b/√3; counted speeds have the difference of two such errors.
     const double of_two = noise.counted ? 0.5 : 1.0;
-    Noise speed(seed, 2 * j, std::sqrt(3.0 * of_two) * noise.speed[at]);
-    Noise effort(seed, 2 * j + 1, std::sqrt(3.0) * noise.effort[at]);
+    sim::Noise speed(seed, 2 * j, std::sqrt(3.0 * of_two) * noise.speed[at]);
+    sim::Noise effort(seed, 2 * j + 1, std::sqrt(3.0) * noise.effort[at]);
     Eigen::VectorXd of_speed(drive.rows()), of_effort(drive.rows());
     double last = speed.measure(0.0);
     for (Eigen::Index k = 0; k < drive.rows(); ++k) {
@@ -286,7 +286,7 @@ std::vector<ShrinkFigure> rollout_figures(const Robot& robot, const PreparedGap&
 
 // What commissioning says of each output; empty where it cannot be done, and why.
 struct Commissioned {
-  std::vector<OutputValidation> outputs;
+  std::vector<commission::OutputValidation> outputs;
   std::string why_not;
 };
 
@@ -294,7 +294,7 @@ Commissioned commissioned(const LogTable& log, const Robot& robot) {
   Commissioned result;
   try {
     TableSource source(log);
-    Commissioning commissioning = commission(source, robot);
+    Commissioning commissioning = commission_robot(source, robot);
     result.outputs = std::move(commissioning.validation);
     if (result.outputs.empty()) {
       result.why_not = commissioning.message;
@@ -308,9 +308,9 @@ Commissioned commissioned(const LogTable& log, const Robot& robot) {
 // Commissioning chooses parameters of its own where the robot file leaves them open: the model is to stay the one at
 // hand.
 Robot with_parameters_of(Robot robot, const Model& model) {
-  const std::vector<std::string> possible = possible_parameters(robot);
+  const std::vector<std::string> possible = model::possible_parameters(robot);
   robot.parameters.emplace();
-  for (const Parameter& parameter : model.parameters) {
+  for (const model::Parameter& parameter : model.parameters) {
     if (std::ranges::find(possible, parameter.physical) != possible.end()) {
       robot.parameters->push_back(parameter.physical);
     }
@@ -328,7 +328,7 @@ void threshold_figures(GapShrink& shrink, const Robot& robot, const PreparedGap&
       improved_robot(robot, prepared.drive, prepared.drive.theta, robots_own(prepared.healthy), {}, why_not);
   const bool with_floor = prepared.baseline_log.has_value() && nominal.has_value();
   std::vector<Commissioned> runs(with_floor ? 3 : 2);
-  for_all(runs.size(), options.threads, [&](std::size_t k) {
+  core::for_all(runs.size(), options.threads, [&](std::size_t k) {
     const LogTable& log = k == 2 ? *prepared.baseline_log : prepared.log;
     runs[k] = commissioned(log, with_parameters_of(k == 0 ? *found.improved : k == 1 ? robot : *nominal, model));
   });
@@ -340,8 +340,9 @@ void threshold_figures(GapShrink& shrink, const Robot& robot, const PreparedGap&
     }
   }
   for (std::size_t i = 0; i < model.n(); ++i) {
-    const OutputValidation &after = runs[0].outputs[i], &before = runs[1].outputs[i];
-    const OutputValidation* const floor = with_floor && !runs[2].outputs.empty() ? &runs[2].outputs[i] : nullptr;
+    const commission::OutputValidation &after = runs[0].outputs[i], &before = runs[1].outputs[i];
+    const commission::OutputValidation* const floor =
+        with_floor && !runs[2].outputs.empty() ? &runs[2].outputs[i] : nullptr;
     shrink.threshold_width.push_back({model.outputs[i], model.output_units[i], before.median_width, after.median_width,
                                       floor != nullptr ? floor->median_width : 0.0, after.median_width,
                                       after.median_width});
@@ -383,11 +384,11 @@ std::vector<ParameterShift> parameter_shifts(const Robot& robot, const Drive& dr
   }
   const BlockFit without = table.gram->fit(subset_of(table, {}, BaseModel::refitted));
   const BlockFit with = table.gram->fit(subset_of(table, structural, BaseModel::refitted));
-  const double t = student_quantile(kConfidence, static_cast<double>(table.gram->blocks()) - 1.0);
+  const double t = core::student_quantile(kConfidence, static_cast<double>(table.gram->blocks()) - 1.0);
   std::vector<ParameterShift> shifts;
   for (std::size_t j = 0; j < drive.model.p(); ++j) {
     const auto at = static_cast<Eigen::Index>(j);
-    const Parameter& parameter = drive.model.parameters[j];
+    const model::Parameter& parameter = drive.model.parameters[j];
     ParameterShift shift;
     shift.parameter = parameter.physical;
     shift.unit = parameter.physical_unit;
@@ -404,4 +405,4 @@ std::vector<ParameterShift> parameter_shifts(const Robot& robot, const Drive& dr
   return shifts;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

@@ -16,7 +16,7 @@
 #include <wheelwright/gap/rollout.hpp>
 #include <wheelwright/model/robot.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 
 /// Options of measure_shrink().
 struct ShrinkOptions {
@@ -59,4 +59,4 @@ struct ShrinkCauses {
                                                            const CandidateTable& table,
                                                            const std::vector<std::size_t>& structural);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

@@ -6,7 +6,7 @@
 
 #include <wheelwright/core/check.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 namespace {
 
 constexpr double kIndependent = 1e-10;  // share of a squared column that the ones before it must leave
@@ -142,4 +142,4 @@ Eigen::MatrixXd restricted_inverse(const Eigen::MatrixXd& A, const std::vector<b
   return inverse;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

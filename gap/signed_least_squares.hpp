@@ -7,7 +7,7 @@
 
 #include <Eigen/Core>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 
 /// The minimiser of ½ xᵀA x − bᵀx.
 struct SignedSolution {
@@ -24,4 +24,4 @@ struct SignedSolution {
 /// (A restricted to the unknowns that are not `zero`)⁻¹ in its place, zeros elsewhere.
 [[nodiscard]] Eigen::MatrixXd restricted_inverse(const Eigen::MatrixXd& A, const std::vector<bool>& zero);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

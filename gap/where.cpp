@@ -22,7 +22,7 @@
 #include <wheelwright/gap/drive.hpp>
 #include <wheelwright/identify/moments.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 namespace {
 
 // Means over cells of equal duration; `filled` where a cell has a value.
@@ -85,7 +85,7 @@ Spectrum spectrum(const Eigen::VectorXd& t, const Eigen::VectorXd& values, const
   if (t.size() < 16 || !(t[t.size() - 1] > t[0])) {
     return out;
   }
-  const double step = median_step({t.begin(), t.end()});
+  const double step = core::median_step({t.begin(), t.end()});
   if (!(step > 0.0)) {
     return out;
   }
@@ -136,8 +136,8 @@ double filtered_noise_density(double beta, double sd, double frequency) {
 namespace {
 
 constexpr Eigen::Index kFewestLocated = 64;
-constexpr int kNoises = 24;                                               // of each kind
-constexpr std::array kEdges = {0.0, 0.2, 0.5, 1.0, 2.0, 5.0, kInfinity};  // Hz
+constexpr int kNoises = 24;                                                     // of each kind
+constexpr std::array kEdges = {0.0, 0.2, 0.5, 1.0, 2.0, 5.0, core::kInfinity};  // Hz
 constexpr std::size_t kBands = kEdges.size() - 1;
 using Bands = std::array<double, kBands>;
 
@@ -231,7 +231,7 @@ double band_p_value(double power, double mean, double variance) {
     return 1.0;
   }
   const double freedom = 2.0 * mean * mean / variance;
-  return chi_squared_tail(freedom, std::max(0.0, freedom * power / mean));
+  return core::chi_squared_tail(freedom, std::max(0.0, freedom * power / mean));
 }
 
 double share_of(double part, double whole) {
@@ -249,18 +249,18 @@ GapShare entry(const ResidualSeries& series, std::string kind, std::string regim
 
 // p-value that the mean of `excess` is above 0 by chance, with a floor (its square) of relative error `error`.
 double mean_p_value(const Eigen::VectorXd& excess, double floor_square, double error) {
-  BlockSums sums(1);
+  identify::BlockSums sums(1);
   const double mean = excess.mean();
   for (const double e : excess) {
     sums.add(Eigen::VectorXd::Constant(1, e - mean));
   }
-  const LongRunCovariance covariance = long_run_covariance(sums, 12);
+  const identify::LongRunCovariance covariance = identify::long_run_covariance(sums, 12);
   const double n = static_cast<double>(excess.size());
   const double variance = covariance.matrix(0, 0) / (n * n) + std::pow(2.0 * error * floor_square, 2);
   if (!(variance > 0.0) || !(covariance.freedom >= 1.0)) {
     return mean > 0.0 ? 0.0 : 1.0;
   }
-  return student_tail(covariance.freedom, mean / std::sqrt(variance));
+  return core::student_tail(covariance.freedom, mean / std::sqrt(variance));
 }
 
 void add_regimes(std::vector<GapShare>& out, const Drive& drive, const std::vector<Regime>& all,
@@ -314,7 +314,7 @@ void add_bands(std::vector<GapShare>& out, const ResidualSeries& series, const B
     excess[b] = std::max(0.0, measured[b] - room[b]);
     p.push_back(worst);
   }
-  p = holm(p);
+  p = core::holm(p);
   const double whole = std::accumulate(excess.begin(), excess.end(), 0.0);
   const double rooms = std::accumulate(room.begin(), room.end(), 0.0);
   for (std::size_t b = 0; b < kBands; ++b) {
@@ -395,4 +395,4 @@ bool is_finding(const GapShare& share) {
   return share.p_value < 0.05 && (share.kind == "channel" || share.share > share.presence);
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

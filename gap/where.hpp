@@ -14,7 +14,7 @@
 #include <wheelwright/gap/regimes.hpp>
 #include <wheelwright/gap/residual_series.hpp>
 
-namespace wheelwright {
+namespace wheelwright::gap {
 
 /// A one-sided power spectral density.
 struct Spectrum {
@@ -78,4 +78,4 @@ struct WhereOptions {
 /// alone.
 [[nodiscard]] bool is_finding(const GapShare& share);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::gap

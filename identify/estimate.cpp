@@ -12,7 +12,7 @@
 #include <wheelwright/core/statistics.hpp>
 #include <wheelwright/identify/moments.hpp>
 
-namespace wheelwright {
+namespace wheelwright::identify {
 namespace {
 
 constexpr double kSingular = 1e-12;      // reciprocal condition, columns scaled
@@ -65,7 +65,7 @@ class Equations {
  private:
   const std::vector<Eigen::Index>* kept_;
   Eigen::VectorXd rows_, columns_;
-  std::optional<LuFactors> lu_;
+  std::optional<core::LuFactors> lu_;
   bool solvable_ = false;
 };
 
@@ -181,7 +181,7 @@ Estimate bias_compensated(const RegressionMoments& moments, const RowNoise& nois
   if (enough) {
     // Share of signal in every direction: eigenvalues of the signal relative to the whole.
     const Eigen::MatrixXd whole = total.YY(kept, kept);
-    const std::optional<Eigen::VectorXd> shares = generalized_eigenvalues(signal(kept, kept), whole);
+    const std::optional<Eigen::VectorXd> shares = core::generalized_eigenvalues(signal(kept, kept), whole);
     enough = shares && shares->head(q).minCoeff() >= kLeastShare;
   }
   if (!enough) {
@@ -223,8 +223,8 @@ Estimate total_least_squares(const RegressionMoments& moments, const RowNoise& n
   C.topLeftCorner(q, q) = instants * per_instant.YY(kept, kept);
   C(q, q) = instants * per_instant.yy;
   const Eigen::VectorXd scale = column_sizes(A).unaryExpr([](double s) { return s > 0.0 ? 1.0 / s : 1.0; });
-  const std::optional<Eigen::VectorXd> ratios =
-      generalized_eigenvalues(scale.asDiagonal() * C * scale.asDiagonal(), scale.asDiagonal() * A * scale.asDiagonal());
+  const std::optional<Eigen::VectorXd> ratios = core::generalized_eigenvalues(
+      scale.asDiagonal() * C * scale.asDiagonal(), scale.asDiagonal() * A * scale.asDiagonal());
   const bool solved = q > 0 && ratios && (*ratios)[q] > 0.0;
   const double lambda = solved ? 1.0 / (*ratios)[q] : 0.0;
   const Eigen::MatrixXd corrected = total.YY - lambda * instants * per_instant.YY;
@@ -266,12 +266,12 @@ Eigen::VectorXd instrument_strength(const RegressionMoments& moments, const Esti
   if (kept.empty()) {
     return strength;
   }
-  const LdltFactors of_YY(YY), of_ZZ(ZZ);
+  const core::LdltFactors of_YY(YY), of_ZZ(ZZ);
   if (of_YY.reciprocal_condition() < kSingular || of_ZZ.reciprocal_condition() < kSingular) {
     return strength;
   }
   const Eigen::MatrixXd explained = ZY.transpose() * of_ZZ.solve(ZY);
-  const LdltFactors of_explained(explained);
+  const core::LdltFactors of_explained(explained);
   const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(YY.rows(), YY.cols());
   const Eigen::MatrixXd whole = of_YY.solve(identity);
   if (of_explained.reciprocal_condition() < kSingular) {
@@ -340,10 +340,10 @@ ContrastTest contrast_test(const Estimate& first, const Estimate& second, const 
   const Eigen::VectorXd scale = covariance.matrix.diagonal()(tested).cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd correlation = scale.asDiagonal() * covariance.matrix(tested, tested) * scale.asDiagonal();
   const Eigen::VectorXd d = scale.asDiagonal() * test.difference(tested);
-  const double t2 = d.dot(Eigen::VectorXd(minimum_norm_solution(correlation, d)));
+  const double t2 = d.dot(Eigen::VectorXd(core::minimum_norm_solution(correlation, d)));
   test.statistic = std::max(0.0, t2 * (B - q + 1.0) / (B * q));
-  test.p_value = fisher_tail(q, B - q + 1.0, test.statistic);
+  test.p_value = core::fisher_tail(q, B - q + 1.0, test.statistic);
   return test;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::identify

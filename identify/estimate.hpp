@@ -13,7 +13,7 @@
 
 #include <wheelwright/identify/moments.hpp>
 
-namespace wheelwright {
+namespace wheelwright::identify {
 
 /// Estimator of θ̂_L.
 enum class Estimator {
@@ -97,4 +97,4 @@ struct ContrastTest {
 [[nodiscard]] ContrastTest contrast_test(const Estimate& first, const Estimate& second,
                                          const EstimatorOptions& options = {});
 
-}  // namespace wheelwright
+}  // namespace wheelwright::identify

@@ -10,7 +10,7 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/linear_algebra.hpp>
 
-namespace wheelwright {
+namespace wheelwright::identify {
 namespace {
 
 constexpr int kSimulations = 2;  // the second at the parameters that the first gave
@@ -49,7 +49,7 @@ Eigen::VectorXd bias_of_least_squares(const EstimatorEvidence& evidence, const E
   const Eigen::VectorXd scale = whole.diagonal()(in).cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd signal = scale.asDiagonal() * (whole - noise)(in, in) * scale.asDiagonal();
   Eigen::VectorXd bias = Eigen::VectorXd::Zero(whole.rows());
-  const CholeskyFactors factor(signal);
+  const core::CholeskyFactors factor(signal);
   if (!factor.positive()) {
     bias(in).setConstant(std::numeric_limits<double>::infinity());
     return bias;
@@ -79,7 +79,7 @@ void allow_for_noisy_efforts(Estimate& e, const RegressionMoments& moments, cons
     }
   }
   const Eigen::VectorXd scale = total.YY.diagonal()(in).cwiseSqrt().cwiseInverse();
-  const Eigen::MatrixXd inverse = wheelwright::inverse(scale.asDiagonal() * total.YY(in, in) * scale.asDiagonal());
+  const Eigen::MatrixXd inverse = core::inverse(scale.asDiagonal() * total.YY(in, in) * scale.asDiagonal());
   for (std::size_t k = 0; k < in.size(); ++k) {
     const auto at = static_cast<Eigen::Index>(k);
     const double own = 1.0 / (inverse(at, at) * scale[at] * scale[at]);  // Σ of the column beyond the others
@@ -229,4 +229,4 @@ EstimatorChoice choose_estimator(const EstimatorEvidence& evidence, const Estima
   return choice;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::identify

@@ -13,7 +13,7 @@
 
 #include <wheelwright/identify/estimate.hpp>
 
-namespace wheelwright {
+namespace wheelwright::identify {
 
 /// Evidence of a log for the choice.
 struct EstimatorEvidence {
@@ -71,4 +71,4 @@ struct EstimatorChoiceOptions {
 [[nodiscard]] EstimatorChoice choose_estimator(const EstimatorEvidence& evidence,
                                                const EstimatorChoiceOptions& options = {});
 
-}  // namespace wheelwright
+}  // namespace wheelwright::identify

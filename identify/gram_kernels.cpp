@@ -3,7 +3,7 @@
 
 #include <wheelwright/core/vector_units.hpp>
 
-namespace wheelwright::gram_kernels {
+namespace wheelwright::identify::gram_kernels {
 
 extern const GramKernels k_baseline;
 #if defined(__x86_64__)
@@ -19,9 +19,9 @@ std::span<const GramKernels* const> available() {
     &k_avx512,
 #endif
   };
-  return {kAll, vector_units()};
+  return {kAll, core::vector_units()};
 }
 
 const GramKernels& best() { return *available().back(); }
 
-}  // namespace wheelwright::gram_kernels
+}  // namespace wheelwright::identify::gram_kernels

@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <span>
 
-namespace wheelwright::gram_kernels {
+namespace wheelwright::identify::gram_kernels {
 
 /// Columns of `b` come in groups of this many, padded with zeros.
 inline constexpr std::size_t kGroup = 4;
@@ -37,4 +37,4 @@ struct GramKernels {
 /// The last of them.
 [[nodiscard]] const GramKernels& best();
 
-}  // namespace wheelwright::gram_kernels
+}  // namespace wheelwright::identify::gram_kernels

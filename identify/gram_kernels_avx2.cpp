@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/identify/gram_kernels_impl.hpp>
 
-namespace wheelwright::gram_kernels {
+namespace wheelwright::identify::gram_kernels {
 
 namespace {
 struct Variant {};
@@ -10,4 +10,4 @@ struct Variant {};
 extern const GramKernels k_avx2;
 const GramKernels k_avx2{"avx2", GramLoops<4, Variant>::products, GramLoops<4, Variant>::gradient};
 
-}  // namespace wheelwright::gram_kernels
+}  // namespace wheelwright::identify::gram_kernels

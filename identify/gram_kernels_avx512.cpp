@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/identify/gram_kernels_impl.hpp>
 
-namespace wheelwright::gram_kernels {
+namespace wheelwright::identify::gram_kernels {
 namespace {
 
 struct Variant {};
@@ -23,4 +23,4 @@ void gradient(Matrix y, Matrix b, std::size_t columns, std::size_t rows, const d
 extern const GramKernels k_avx512;
 const GramKernels k_avx512{"avx512", products, gradient};
 
-}  // namespace wheelwright::gram_kernels
+}  // namespace wheelwright::identify::gram_kernels

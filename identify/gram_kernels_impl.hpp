@@ -9,7 +9,7 @@
 
 #include <wheelwright/identify/gram_kernels.hpp>
 
-namespace wheelwright::gram_kernels {
+namespace wheelwright::identify::gram_kernels {
 
 template <int W>
 struct VectorOf {
@@ -189,4 +189,4 @@ struct GramLoops {
   }
 };
 
-}  // namespace wheelwright::gram_kernels
+}  // namespace wheelwright::identify::gram_kernels

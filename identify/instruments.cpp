@@ -9,7 +9,7 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/linear_algebra.hpp>
 
-namespace wheelwright {
+namespace wheelwright::identify {
 namespace {
 
 constexpr double kSingularCross = 1e-9;  // reciprocal condition
@@ -31,7 +31,7 @@ bool invertible(const Eigen::MatrixXd& m) {
   if (m.rows() != m.cols() || !m.allFinite()) {
     return false;
   }
-  const RankRevealingLu lu(m);
+  const core::RankRevealingLu lu(m);
   return lu.invertible() && lu.reciprocal_condition() > kSingularCross;
 }
 
@@ -48,7 +48,7 @@ Measurement of_instruments(const Measurement& rows, const std::vector<std::strin
 
 std::optional<InstrumentMotion> commanded_motion(const LogSource& log, const Model& model) {
   InstrumentMotion motion;
-  for (const Joint& joint : model.joints) {
+  for (const model::Joint& joint : model.joints) {
     if (joint.command.empty() || !log.find(joint.command)) {
       return std::nullopt;
     }
@@ -65,8 +65,8 @@ bool MotionSimulation::possible(const Model& model, const Eigen::VectorXd& theta
 MotionSimulation::MotionSimulation(Model model, Eigen::VectorXd theta, Hold hold)
     : model_(std::move(model)), theta_(std::move(theta)), hold_(hold) {
   check::that(possible(model_, theta_), "motion simulation", "a model whose inertia can be inverted");
-  inverse_inertia_ = inverse(inertia(model_, theta_));
-  joints_from_coordinates_ = inverse(model_.motion);
+  inverse_inertia_ = core::inverse(inertia(model_, theta_));
+  joints_from_coordinates_ = core::inverse(model_.motion);
 }
 
 void MotionSimulation::restart(double t, const Eigen::VectorXd& speed, const Eigen::VectorXd& effort) {
@@ -84,7 +84,7 @@ Eigen::VectorXd MotionSimulation::acceleration(const Eigen::VectorXd& speed, con
   const auto span = [](const Eigen::VectorXd& v) {
     return std::span<const double>(v.data(), static_cast<std::size_t>(v.size()));
   };
-  const MotionState state{span(speed), span(exact), span(joints), span(exact), heading, 0.0};
+  const model::MotionState state{span(speed), span(exact), span(joints), span(exact), heading, 0.0};
   Eigen::VectorXd force = model_.input * effort;
   for (const Term& term : model_.terms) {
     if (term.kind == Term::Kind::acceleration) {
@@ -239,4 +239,4 @@ bool InstrumentStream::next(RegressionBlock& block) {
   return true;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::identify

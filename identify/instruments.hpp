@@ -14,7 +14,7 @@
 #include <wheelwright/core/regression.hpp>
 #include <wheelwright/filter/regressor_filter.hpp>
 
-namespace wheelwright {
+namespace wheelwright::identify {
 
 /// Where the motion behind the instruments comes from.
 struct InstrumentMotion {
@@ -66,7 +66,7 @@ class MotionSimulation {
 /// Rows of a log and, beside each, its instruments: p columns of Y_f and then p columns Z_f, which are the same
 /// filter's of another motion. Z has no error bounds. Only instants that both filters give are handed out. The log must
 /// outlive the stream and is rewound by it.
-class InstrumentStream final : public RegressionSource {
+class InstrumentStream final : public core::RegressionSource {
  public:
   /// Throws InvalidArgument when `log` lacks a column, or the motion cannot be made.
   InstrumentStream(LogSource& log, RegressorFilter rows, const InstrumentMotion& motion);
@@ -94,4 +94,4 @@ class InstrumentStream final : public RegressionSource {
   LogBlock scratch_;
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::identify

@@ -8,7 +8,7 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/linear_algebra.hpp>
 
-namespace wheelwright {
+namespace wheelwright::identify {
 namespace {
 
 constexpr Eigen::Index kBatch = 256;      // rows folded at a time
@@ -32,7 +32,7 @@ void LeastSquares::fold() const {
   if (filled_ == columns) {
     return;
   }
-  triangularize(stack_);
+  core::triangularize(stack_);
   filled_ = columns;
 }
 
@@ -83,7 +83,7 @@ LeastSquaresFit LeastSquares::solve(const std::vector<bool>& excluded) const {
     s = s > 0.0 ? s : 1.0;
   }
   const Eigen::MatrixXd scaled = R * scale.cwiseInverse().asDiagonal();
-  const SingularValues svd = singular_values(scaled);
+  const core::SingularValues svd = core::singular_values(scaled);
   const Eigen::VectorXd& sigma = svd.values;
   Eigen::VectorXd inverse = Eigen::VectorXd::Zero(p);
   for (Eigen::Index j = 0; j < p; ++j) {
@@ -103,8 +103,9 @@ LeastSquaresFit LeastSquares::solve(const std::vector<bool>& excluded) const {
     } else {
       Eigen::MatrixXd others(p, p - 1);
       others << R.leftCols(j), R.rightCols(p - 1 - j);
-      const Eigen::VectorXd explained = p == 1 ? Eigen::VectorXd(Eigen::VectorXd::Zero(p))
-                                               : Eigen::VectorXd(others * minimum_norm_solution(others, R.col(j)));
+      const Eigen::VectorXd explained = p == 1
+                                            ? Eigen::VectorXd(Eigen::VectorXd::Zero(p))
+                                            : Eigen::VectorXd(others * core::minimum_norm_solution(others, R.col(j)));
       fit.partial_rms[j] = (R.col(j) - explained).norm() / root;
     }
   }
@@ -114,7 +115,7 @@ LeastSquaresFit LeastSquares::solve(const std::vector<bool>& excluded) const {
   return fit;
 }
 
-LeastSquaresFit least_squares(RegressionSource& rows, const Eigen::VectorXd& weights) {
+LeastSquaresFit least_squares(core::RegressionSource& rows, const Eigen::VectorXd& weights) {
   LeastSquares fit(rows.parameters(), weights);
   RegressionBlock block;
   rows.rewind();
@@ -232,4 +233,4 @@ std::vector<ExcitationFinding> judge_excitation(const LeastSquaresFit& fit, cons
   return findings;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::identify

@@ -13,7 +13,7 @@
 #include <wheelwright/core/regression.hpp>
 #include <wheelwright/identify/moments.hpp>
 
-namespace wheelwright {
+namespace wheelwright::identify {
 
 /// Solution of min Σ w_i² (y − Yθ)².
 struct LeastSquaresFit {
@@ -59,7 +59,7 @@ class LeastSquares {
 };
 
 /// The fit to all of `rows`, one pass.
-[[nodiscard]] LeastSquaresFit least_squares(RegressionSource& rows, const Eigen::VectorXd& weights = {});
+[[nodiscard]] LeastSquaresFit least_squares(core::RegressionSource& rows, const Eigen::VectorXd& weights = {});
 
 /// Residuals of one output.
 struct OutputResidual {
@@ -126,4 +126,8 @@ struct ExcitationFinding {
                                                               const Eigen::VectorXd& standard_error, double t_quantile,
                                                               const Eigen::VectorXd& noise_rms = {});
 
+}  // namespace wheelwright::identify
+
+namespace wheelwright {
+using identify::least_squares;
 }  // namespace wheelwright

@@ -11,7 +11,7 @@
 
 #include <wheelwright/core/check.hpp>
 
-namespace wheelwright {
+namespace wheelwright::identify {
 namespace {
 
 constexpr double kWorse = 1e300;  // NLopt wants finite numbers
@@ -83,4 +83,4 @@ ScalarMinimum minimise_scalar(const std::function<double(double)>& f, double low
   return search.best;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::identify

@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <functional>
 
-namespace wheelwright {
+namespace wheelwright::identify {
 
 /// Stopping rules of the search.
 struct ScalarSearchOptions {
@@ -37,4 +37,4 @@ struct ScalarMinimum {
 [[nodiscard]] ScalarMinimum minimise_scalar(const std::function<double(double)>& f, double lower, double upper,
                                             double start, const ScalarSearchOptions& options = {});
 
-}  // namespace wheelwright
+}  // namespace wheelwright::identify

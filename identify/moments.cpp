@@ -8,7 +8,7 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/linear_algebra.hpp>
 
-namespace wheelwright {
+namespace wheelwright::identify {
 
 BlockSums::BlockSums(std::size_t dimension, std::size_t kept) : capacity_(2 * kept) {
   check::that(dimension > 0, "BlockSums dimension", "at least 1");
@@ -96,7 +96,7 @@ RegressionMoments::RegressionMoments(std::size_t outputs, std::size_t parameters
   Z_.assign(instruments ? kTile * columns_ : 0, 0.0);
 }
 
-gram_kernels::Matrix RegressionMoments::packed(const RowMatrix& from, std::size_t column, std::size_t first,
+gram_kernels::Matrix RegressionMoments::packed(const core::RowMatrix& from, std::size_t column, std::size_t first,
                                                std::size_t count, std::vector<double>& tile) const {
   const auto width = static_cast<std::size_t>(from.cols());
   const double* source = from.data() + first * width + column;
@@ -179,11 +179,11 @@ MomentSums RegressionMoments::nothing() const {
 void RegressionMoments::add_to(MomentSums& into, const double* sums, double factor) const {
   const auto p = static_cast<Eigen::Index>(p_);
   const Eigen::OuterStride<> stride(static_cast<Eigen::Index>(columns_));
-  using Square = Eigen::Map<const RowMatrix, 0, Eigen::OuterStride<>>;
+  using Square = Eigen::Map<const core::RowMatrix, 0, Eigen::OuterStride<>>;
   using Column = Eigen::Map<const Eigen::VectorXd>;
   const std::size_t square = p_ * columns_;
   const auto symmetric = [&](const double* from) {
-    return RowMatrix(Square(from, p, p, stride).selfadjointView<Eigen::Upper>());
+    return core::RowMatrix(Square(from, p, p, stride).selfadjointView<Eigen::Upper>());
   };
   into.YY += factor * symmetric(sums);
   into.Yy += factor * Column(sums + square, p);
@@ -227,7 +227,7 @@ MomentSums RegressionMoments::of_output(std::size_t i) const {
 
 namespace {
 
-RegressionMoments walk(RegressionSource& rows, RegressionMoments sums) {
+RegressionMoments walk(core::RegressionSource& rows, RegressionMoments sums) {
   RegressionBlock block;
   rows.rewind();
   while (rows.next(block)) {
@@ -238,11 +238,11 @@ RegressionMoments walk(RegressionSource& rows, RegressionMoments sums) {
 
 }  // namespace
 
-RegressionMoments moments(RegressionSource& rows) {
+RegressionMoments moments(core::RegressionSource& rows) {
   return walk(rows, RegressionMoments(rows.outputs(), rows.parameters()));
 }
 
-RegressionMoments moments_with_instruments(RegressionSource& rows) {
+RegressionMoments moments_with_instruments(core::RegressionSource& rows) {
   check::that(rows.parameters() % 2 == 0, "rows with instruments", "as many columns of Z as of Y");
   return walk(rows, RegressionMoments(rows.outputs(), rows.parameters() / 2, true));
 }
@@ -252,7 +252,7 @@ Eigen::VectorXd efficient_weights(const RegressionMoments& moments) {
   const double instants = std::max(1.0, static_cast<double>(moments.instants()));
   for (std::size_t i = 0; i < moments.outputs(); ++i) {
     const MomentSums s = moments.of_output(i);
-    const Eigen::VectorXd theta = minimum_norm_solution(s.YY, s.Yy);
+    const Eigen::VectorXd theta = core::minimum_norm_solution(s.YY, s.Yy);
     const double rms = std::sqrt(std::max(0.0, s.yy - s.Yy.dot(theta)) / instants);
     const double scale = std::sqrt(s.yy / instants);
     // A perfect fit has no scale of its own.
@@ -261,4 +261,4 @@ Eigen::VectorXd efficient_weights(const RegressionMoments& moments) {
   return weights;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::identify

@@ -14,7 +14,7 @@
 #include <wheelwright/core/regression.hpp>
 #include <wheelwright/identify/gram_kernels.hpp>
 
-namespace wheelwright {
+namespace wheelwright::identify {
 
 /// At most 2·`kept` block sums: whenever they are full, neighbours are added up and blocks become twice as long.
 class BlockSums {
@@ -101,7 +101,7 @@ class RegressionMoments {
 
  private:
   // Columns [column, column + p) of `count` instants of one output from row `first` on; where they lie, or in `tile`.
-  gram_kernels::Matrix packed(const RowMatrix& from, std::size_t column, std::size_t first, std::size_t count,
+  gram_kernels::Matrix packed(const core::RowMatrix& from, std::size_t column, std::size_t first, std::size_t count,
                               std::vector<double>& tile) const;
   void open_block(double t);
   [[nodiscard]] const double* sums(std::size_t b, std::size_t output) const {
@@ -122,12 +122,12 @@ class RegressionMoments {
 };
 
 /// The moments of all of `rows`, one walk.
-[[nodiscard]] RegressionMoments moments(RegressionSource& rows);
+[[nodiscard]] RegressionMoments moments(core::RegressionSource& rows);
 /// The same for rows with columns Y and, as many again, Z.
-[[nodiscard]] RegressionMoments moments_with_instruments(RegressionSource& rows);
+[[nodiscard]] RegressionMoments moments_with_instruments(core::RegressionSource& rows);
 
 /// One over each output's own residual standard deviation by ordinary least squares: weights that are efficient for
 /// errors that are independent between outputs. 1 for an output that is zero throughout.
 [[nodiscard]] Eigen::VectorXd efficient_weights(const RegressionMoments& moments);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::identify

@@ -8,7 +8,7 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/statistics.hpp>
 
-namespace wheelwright {
+namespace wheelwright::identify {
 namespace {
 
 constexpr std::size_t kOrders = DifferenceNoise::kOrders;
@@ -91,14 +91,14 @@ DifferenceNoise judge_windows(const Sums& sums, std::size_t windows) {
 }  // namespace
 
 std::vector<DifferenceNoise> difference_noise(LogSource& log, const std::vector<std::string>& columns) {
-  const std::vector<std::size_t> pick = positions_of(log, columns);
+  const std::vector<std::size_t> pick = core::positions_of(log, columns);
   const double step = log.median_step();
   std::vector<Sums> sums(columns.size());
   // Last differences of order 0, 1, …, of each column.
   std::vector<std::array<double, kOrders + 1>> last(columns.size());
   std::size_t run = 0, windows = 0;
   double before = 0.0;
-  for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
+  core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
     const bool even = std::abs(block.t[k] - before - step) <= kEvenStep * step;
     run = starts || !even ? 1 : run + 1;
     before = block.t[k];
@@ -162,13 +162,13 @@ struct Pair {
 
 bool share_noise(LogSource& log, const std::vector<std::string>& first, const std::vector<std::string>& second) {
   check::that(first.size() == second.size(), "share_noise", "as many columns of one kind as of the other");
-  const std::vector<std::size_t> pick = positions_of(log, first), pick_second = positions_of(log, second);
+  const std::vector<std::size_t> pick = core::positions_of(log, first), pick_second = core::positions_of(log, second);
   const std::size_t count = first.size();
   const double step = log.median_step();
   std::vector<Pair> pairs(count);
   std::size_t run = 0, windows = 0;
   double before = 0.0;
-  for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
+  core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
     const bool even = std::abs(block.t[k] - before - step) <= kEvenGrid * step;
     run = starts || !even ? 1 : run + 1;
     before = block.t[k];
@@ -204,8 +204,10 @@ ExtrapolatedBound extrapolate(const OutputResidual& residual, std::size_t instan
   check::positive(options.horizon, "extrapolation horizon");
   check::that(instants > 0, "extrapolation", "at least one instant");
   const double n = std::max(residual.effective_instants, 1.0);
-  const double spread = std::sqrt(n / chi_squared_quantile(n, options.risk));
-  const auto z = [&](double count) { return normal_upper_quantile(std::min(0.25, options.risk / (2.0 * count))); };
+  const double spread = std::sqrt(n / core::chi_squared_quantile(n, options.risk));
+  const auto z = [&](double count) {
+    return core::normal_upper_quantile(std::min(0.25, options.risk / (2.0 * count)));
+  };
   const auto seen = static_cast<double>(instants);
   ExtrapolatedBound result;
   result.bound = residual.rms * spread * z(seen * std::max(options.horizon, 1.0));
@@ -220,11 +222,11 @@ ExtrapolatedBound extrapolate(const OutputResidual& residual, std::size_t instan
   return result;
 }
 
-Eigen::VectorXd largest_plausible_error(RegressionSource& rows, const Eigen::VectorXd& theta,
+Eigen::VectorXd largest_plausible_error(core::RegressionSource& rows, const Eigen::VectorXd& theta,
                                         const ResidualSummary& summary, double risk) {
   check::that(risk > 0.0 && risk < 1.0, "risk", "a number inside (0, 1)");
   const auto p = static_cast<double>(theta.size());
-  const double f = fisher_upper_quantile(p, std::max(summary.freedom, 1.0), risk);
+  const double f = core::fisher_upper_quantile(p, std::max(summary.freedom, 1.0), risk);
   const Eigen::MatrixXd scaled = p * f * summary.covariance;
   Eigen::VectorXd largest = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(rows.outputs()));
   RegressionBlock block;
@@ -240,4 +242,4 @@ Eigen::VectorXd largest_plausible_error(RegressionSource& rows, const Eigen::Vec
   return largest;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::identify

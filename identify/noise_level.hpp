@@ -12,7 +12,7 @@
 #include <wheelwright/core/log.hpp>
 #include <wheelwright/identify/least_squares.hpp>
 
-namespace wheelwright {
+namespace wheelwright::identify {
 
 /// Noise of one column of a log.
 struct DifferenceNoise {
@@ -98,7 +98,7 @@ struct ExtrapolatedBound {
 ///
 /// with Σ the covariance of θ̂ and ν its degrees of freedom (Scheffé: all rows at once). Nothing is extrapolated: the
 /// rows are those that were seen. One walk over `rows`.
-[[nodiscard]] Eigen::VectorXd largest_plausible_error(RegressionSource& rows, const Eigen::VectorXd& theta,
+[[nodiscard]] Eigen::VectorXd largest_plausible_error(core::RegressionSource& rows, const Eigen::VectorXd& theta,
                                                       const ResidualSummary& summary, double risk);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::identify

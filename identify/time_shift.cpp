@@ -8,7 +8,7 @@
 
 #include <wheelwright/core/check.hpp>
 
-namespace wheelwright {
+namespace wheelwright::identify {
 namespace {
 
 using ShiftJet = ceres::Jet<double, 1>;
@@ -38,7 +38,7 @@ struct LagStep {
 
 // The lag of the rows of `u` (n rows an instant), each segment from its first value. `out(row)` takes each row.
 template <typename T, typename Out>
-void lag(const Eigen::Ref<const RowMatrix>& u, std::size_t n, const std::vector<double>& t,
+void lag(const Eigen::Ref<const core::RowMatrix>& u, std::size_t n, const std::vector<double>& t,
          const std::vector<std::size_t>& starts, const T& constant, Out out) {
   using Rows = Eigen::Matrix<T, Eigen::Dynamic, Eigen::Dynamic>;
   const auto height = static_cast<Eigen::Index>(n);
@@ -88,11 +88,11 @@ TimeShiftedRows::TimeShiftedRows(const RegressionBlock& rows, TimeEffect effect,
   }
   check::that(!kept_.empty(), "time shift", "segments longer than the largest shift");
   const auto n = static_cast<Eigen::Index>(outputs_);
-  RowMatrix y = rows.y;
+  core::RowMatrix y = rows.y;
   if (effect == TimeEffect::actuator_lag) {
     lagged_.resize(Y_.rows(), Y_.cols());
-    const RowMatrix plain = y;
-    const auto into = [&](RowMatrix& m) {
+    const core::RowMatrix plain = y;
+    const auto into = [&](core::RowMatrix& m) {
       return
           [&m, n](std::size_t k, const Eigen::MatrixXd& z) { m.middleRows(static_cast<Eigen::Index>(k) * n, n) = z; };
     };
@@ -186,4 +186,4 @@ bool TimeShiftedRows::evaluate(const Eigen::VectorXd& shape, bool derivatives, S
   return true;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::identify

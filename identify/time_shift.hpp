@@ -9,7 +9,7 @@
 #include <wheelwright/core/regression.hpp>
 #include <wheelwright/identify/variable_projection.hpp>
 
-namespace wheelwright {
+namespace wheelwright::identify {
 
 /// Time effect between effort and motion. With y the effort as logged and Yθ the effort that the motion needs:
 enum class TimeEffect {
@@ -51,9 +51,9 @@ class TimeShiftedRows final : public SeparableModel {
   std::vector<std::size_t> starts_;  // of segments, and the end
   std::vector<std::size_t> kept_;
   std::vector<bool> keep_;
-  RowMatrix Y_;
-  RowMatrix lagged_;  // actuator_lag: L_a Y_f
+  core::RowMatrix Y_;
+  core::RowMatrix lagged_;  // actuator_lag: L_a Y_f
   Eigen::VectorXd response_;
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::identify

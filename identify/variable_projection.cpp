@@ -16,7 +16,10 @@
 #include <wheelwright/identify/moments.hpp>
 #include <wheelwright/identify/noise_level.hpp>
 
-namespace wheelwright {
+namespace wheelwright::identify {
+
+using core::kInfinity;
+
 namespace {
 
 constexpr double kHopeless = 1e6;  // half width of an interval over the estimate, without bounds to judge by
@@ -25,7 +28,7 @@ constexpr double kHopeless = 1e6;  // half width of an interval over the estimat
 struct Projection {
   SeparableValues at;
   Eigen::VectorXd scale;  // lengths of the columns
-  PivotedQr qr;
+  core::PivotedQr qr;
   int rank = 0;
   Eigen::VectorXd linear, residual;
 
@@ -42,7 +45,7 @@ struct Projection {
   [[nodiscard]] Eigen::VectorXd pseudo_transposed(const Eigen::VectorXd& v) const {
     const Eigen::VectorXd permuted = v.cwiseQuotient(scale)(qr.order().head(rank));
     Eigen::VectorXd c = Eigen::VectorXd::Zero(at.columns.rows());
-    c.head(rank) = solve_lower(qr.R(rank).transpose(), permuted);
+    c.head(rank) = core::solve_lower(qr.R(rank).transpose(), permuted);
     return qr.rotate_back(c);
   }
 };
@@ -97,7 +100,7 @@ class Problem {
     }
     p.scale = p.at.columns.colwise().norm();
     for (double& s : p.scale) s = s > 0.0 ? s : 1.0;
-    p.qr = PivotedQr(p.at.columns * p.scale.cwiseInverse().asDiagonal(), rank_tolerance_);
+    p.qr = core::PivotedQr(p.at.columns * p.scale.cwiseInverse().asDiagonal(), rank_tolerance_);
     p.rank = static_cast<int>(p.qr.rank());
     p.linear = p.qr.solve(p.residual).cwiseQuotient(p.scale);
     // One step of refinement: shapes at which columns are nearly alike (sums of exponentials) want it.
@@ -275,7 +278,7 @@ Eigen::MatrixXd inverse_gram(const Eigen::MatrixXd& J, double tolerance, std::ve
     scale[j] = length > 0.0 ? length : 1.0;
     K.col(j) = J.col(pick[static_cast<std::size_t>(j)]) / scale[j];
   }
-  const PivotedQr qr(QrFactors(K).R(), tolerance);
+  const core::PivotedQr qr(core::QrFactors(K).R(), tolerance);
   const Eigen::Index rank = qr.rank();
   if (rank < m) {
     for (Eigen::Index j = rank; j < m; ++j) {
@@ -284,7 +287,7 @@ Eigen::MatrixXd inverse_gram(const Eigen::MatrixXd& J, double tolerance, std::ve
     return inverse_gram(J, tolerance, used);
   }
   Eigen::MatrixXd root(m, m);
-  root(qr.order(), Eigen::all) = solve_upper(qr.R(m), Eigen::MatrixXd::Identity(m, m));
+  root(qr.order(), Eigen::all) = core::solve_upper(qr.R(m), Eigen::MatrixXd::Identity(m, m));
   const Eigen::MatrixXd gram = root * root.transpose();
   for (Eigen::Index a = 0; a < m; ++a) {
     for (Eigen::Index b = 0; b < m; ++b) {
@@ -327,7 +330,7 @@ void judge(const Problem& problem, const Projection& at, const VariableProjectio
   }
   const LongRunCovariance spread = long_run_covariance(scores);
   fit.freedom = spread.freedom;
-  const double t95 = fit.freedom > 0.0 ? student_quantile(0.95, fit.freedom) : kInfinity;
+  const double t95 = fit.freedom > 0.0 ? core::student_quantile(0.95, fit.freedom) : kInfinity;
 
   const auto fill = [&] {
     const Eigen::MatrixXd inverse = inverse_gram(J, options.rank_tolerance, used);
@@ -431,4 +434,4 @@ std::vector<CostPoint> cost_curve(const SeparableModel& model, const Eigen::Vect
   return curve;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::identify

@@ -10,7 +10,7 @@
 
 #include <Eigen/Core>
 
-namespace wheelwright {
+namespace wheelwright::identify {
 
 /// A separable model at one ω: what stands in y ≈ f(ω) + Φ(ω)θ.
 struct SeparableValues {
@@ -106,4 +106,4 @@ struct CostPoint {
                                                 std::size_t which, double lower, double upper, std::size_t points,
                                                 const Eigen::VectorXd& weights = {});
 
-}  // namespace wheelwright
+}  // namespace wheelwright::identify

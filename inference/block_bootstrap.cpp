@@ -12,7 +12,7 @@
 #include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/core/random.hpp>
 
-namespace wheelwright {
+namespace wheelwright::inference {
 namespace {
 
 constexpr double kLeastLongRun = 0.01;  // of R(0): a flat-top window can give a negative sum
@@ -93,7 +93,7 @@ namespace {
 constexpr double kSingularScore = 1e-12;  // reciprocal condition, columns scaled
 constexpr double kWholeBlock = 1e-6;      // times are rounded: so much more than whole blocks is none
 
-double typical_seconds(const std::vector<MomentBlock>& blocks) {
+double typical_seconds(const std::vector<identify::MomentBlock>& blocks) {
   if (blocks.size() < 2) {
     return blocks.empty() ? 0.0 : blocks[0].last - blocks[0].first;
   }
@@ -137,7 +137,8 @@ Eigen::VectorXd ScoreBlocks::unscaled(const Eigen::VectorXd& at, double other) c
   return theta;
 }
 
-ScoreBlocks score_blocks(const RegressionMoments& moments, const EstimatorOptions& options, bool instruments) {
+ScoreBlocks score_blocks(const identify::RegressionMoments& moments, const identify::EstimatorOptions& options,
+                         bool instruments) {
   const std::size_t p = moments.parameters();
   check::that(options.excluded.empty() || options.excluded.size() == p, "excluded parameters", "one flag for each");
   const bool with_z = instruments && moments.has_instruments();
@@ -153,7 +154,7 @@ ScoreBlocks score_blocks(const RegressionMoments& moments, const EstimatorOption
   }
   const auto q = static_cast<Eigen::Index>(s.kept.size());
   const auto B = static_cast<Eigen::Index>(moments.blocks().size());
-  const MomentSums total = moments.total(w);
+  const identify::MomentSums total = moments.total(w);
   const Eigen::MatrixXd shape = (with_z ? total.ZZ : total.YY)(s.kept, s.kept);
   s.scale = column_lengths(total.YY(s.kept, s.kept));
   const Eigen::VectorXd row_scale = column_lengths(shape).cwiseInverse();
@@ -162,7 +163,7 @@ ScoreBlocks score_blocks(const RegressionMoments& moments, const EstimatorOption
   s.A.resize(q * q, B);
   s.c.resize(q, B);
   for (Eigen::Index b = 0; b < B; ++b) {
-    const MomentSums sums = moments.block(static_cast<std::size_t>(b), w);
+    const identify::MomentSums sums = moments.block(static_cast<std::size_t>(b), w);
     const Eigen::MatrixXd A =
         row_scale.asDiagonal() * (with_z ? sums.ZY : sums.YY)(s.kept, s.kept) * column_scale.asDiagonal();
     s.A.col(b) = A.reshaped();
@@ -177,8 +178,8 @@ ScoreBlocks score_blocks(const RegressionMoments& moments, const EstimatorOption
     s.reason = "there is nothing to estimate";
     return s;
   }
-  const LuFactors lu(s.total_A);
-  const LuFactors shape_lu(s.shape);
+  const core::LuFactors lu(s.total_A);
+  const core::LuFactors shape_lu(s.shape);
   s.solvable = s.total_A.allFinite() && s.total_c.allFinite() && lu.reciprocal_condition() > kSingularScore &&
                shape_lu.reciprocal_condition() > kSingularScore;
   if (!s.solvable) {
@@ -237,7 +238,7 @@ double quantile(std::vector<double> values, double level) {
 
 }  // namespace
 
-BlockBootstrap block_bootstrap(const RegressionMoments& moments, const BlockBootstrapOptions& options) {
+BlockBootstrap block_bootstrap(const identify::RegressionMoments& moments, const BlockBootstrapOptions& options) {
   check::that(options.confidence > 0.0 && options.confidence < 1.0, "confidence", "between 0 and 1");
   check::that(options.resamples >= 20, "resamples", "at least 20");
   check::non_negative(options.seconds, "length of a stretch");
@@ -281,11 +282,11 @@ BlockBootstrap block_bootstrap(const RegressionMoments& moments, const BlockBoot
     A_sum.setZero();
     c_sum.setZero();
     for (Eigen::Index& start : starts) {
-      start = static_cast<Eigen::Index>(uniform_below(generator, blocks.blocks()));
+      start = static_cast<Eigen::Index>(core::uniform_below(generator, blocks.blocks()));
       A_sum += A.col(start);
       c_sum += c.col(start);
     }
-    const LuFactors lu(A_sum.reshaped(q, q));
+    const core::LuFactors lu(A_sum.reshaped(q, q));
     if (!(lu.reciprocal_condition() > kSingularResample)) {
       ++result.singular;
       continue;
@@ -328,4 +329,4 @@ BlockBootstrap block_bootstrap(const RegressionMoments& moments, const BlockBoot
   return result;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::inference

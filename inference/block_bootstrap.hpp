@@ -13,7 +13,7 @@
 #include <wheelwright/identify/estimate.hpp>
 #include <wheelwright/identify/moments.hpp>
 
-namespace wheelwright {
+namespace wheelwright::inference {
 
 /// Spectrum at zero of a mean-zero series with autocovariances R(k), by a flat-top window (Politis and Romano 1995).
 struct SeriesMemory {
@@ -69,15 +69,15 @@ struct ScoreBlocks {
 };
 
 /// The blocks of `moments`; with `instruments`, where the moments have them, the equations of instrumental variables.
-[[nodiscard]] ScoreBlocks score_blocks(const RegressionMoments& moments, const EstimatorOptions& options,
-                                       bool instruments);
+[[nodiscard]] ScoreBlocks score_blocks(const identify::RegressionMoments& moments,
+                                       const identify::EstimatorOptions& options, bool instruments);
 
 /// The same equations over groups of `length` >= 1 neighbouring blocks; the last group may be shorter.
 [[nodiscard]] ScoreBlocks grouped(const ScoreBlocks& blocks, std::size_t length);
 
 /// Options of the resampling.
 struct BlockBootstrapOptions {
-  EstimatorOptions estimator;
+  identify::EstimatorOptions estimator;
   bool instruments = true;       ///< use the instruments where the moments have them
   double confidence = 0.95;      ///< of each interval
   std::size_t resamples = 1000;  ///< at least 20
@@ -109,7 +109,7 @@ struct BlockBootstrap {
 /// 2048 and at least 4 instants long.
 ///
 /// Promise: the confidence as the log grows, for stationary errors of short memory; no symmetry is needed.
-[[nodiscard]] BlockBootstrap block_bootstrap(const RegressionMoments& moments,
+[[nodiscard]] BlockBootstrap block_bootstrap(const identify::RegressionMoments& moments,
                                              const BlockBootstrapOptions& options = {});
 
-}  // namespace wheelwright
+}  // namespace wheelwright::inference

@@ -13,7 +13,7 @@
 #include <wheelwright/core/limits.hpp>
 #include <wheelwright/core/linear_algebra.hpp>
 
-namespace wheelwright {
+namespace wheelwright::inference {
 namespace {
 
 struct ActiveSet {
@@ -27,7 +27,7 @@ struct ActiveSet {
     if (free.empty()) {
       return {};
     }
-    const PivotedQr qr(E(Eigen::all, free));
+    const core::PivotedQr qr(E(Eigen::all, free));
     return qr.rank() == static_cast<Eigen::Index>(free.size()) ? qr.solve(f) : Eigen::VectorXd();
   }
 
@@ -106,7 +106,7 @@ struct Scaled {
   Eigen::VectorXd b;
   Eigen::VectorXd length;  // of each constraint before it was scaled
 
-  Scaled(const LeastSquares& rows, const std::vector<LinearConstraint>& constraints) {
+  Scaled(const identify::LeastSquares& rows, const std::vector<LinearConstraint>& constraints) {
     const Eigen::MatrixXd factor = rows.factor();
     const Eigen::Index p = factor.cols() - 1;
     R = factor.topLeftCorner(p, p);
@@ -138,7 +138,7 @@ struct Scaled {
     const Eigen::Index p = R.cols();
     Eigen::MatrixXd stack(2 * p, p + 1);
     stack << R, c, strength * Eigen::MatrixXd::Identity(p, p), Eigen::VectorXd::Zero(p);
-    const Eigen::MatrixXd folded = QrFactors(stack).R().topRows(p);
+    const Eigen::MatrixXd folded = core::QrFactors(stack).R().topRows(p);
     R = folded.leftCols(p);
     c = folded.col(p);
   }
@@ -151,21 +151,21 @@ struct Equality {
   Equality(const Scaled& s, const Eigen::MatrixXd& A, const Eigen::VectorXd& b) {
     const Eigen::Index p = s.R.cols(), m = A.rows();
     if (m == 0) {
-      x = least_squares_solution(s.R, s.c);
+      x = core::least_squares_solution(s.R, s.c);
       multiplier.resize(0);
       return;
     }
-    const QrFactors qr(A.transpose());
+    const core::QrFactors qr(A.transpose());
     const Eigen::MatrixXd Q = qr.Q();
     const Eigen::MatrixXd U = qr.R();
-    const Eigen::VectorXd held = solve_lower(U.transpose(), b);
+    const Eigen::VectorXd held = core::solve_lower(U.transpose(), b);
     x = Q.leftCols(m) * held;
     if (m < p) {
       const Eigen::MatrixXd moving = s.R * Q.rightCols(p - m);
-      x += Q.rightCols(p - m) * least_squares_solution(moving, s.c - s.R * x);
+      x += Q.rightCols(p - m) * core::least_squares_solution(moving, s.c - s.R * x);
     }
     const Eigen::VectorXd pull = 2.0 * s.R.transpose() * (s.c - s.R * x);
-    multiplier = solve_upper(U, Q.leftCols(m).transpose() * pull);
+    multiplier = core::solve_upper(U, Q.leftCols(m).transpose() * pull);
   }
 };
 
@@ -184,9 +184,10 @@ std::string sentence(const LinearConstraint& constraint, const ActiveConstraint&
 
 }  // namespace
 
-ConstrainedFit constrained_least_squares(const LeastSquares& rows, const std::vector<LinearConstraint>& constraints,
+ConstrainedFit constrained_least_squares(const identify::LeastSquares& rows,
+                                         const std::vector<LinearConstraint>& constraints,
                                          const Eigen::MatrixXd& covariance) {
-  const LeastSquaresFit free = rows.solve();
+  const identify::LeastSquaresFit free = rows.solve();
   Scaled s(rows, constraints);
   const Eigen::Index p = s.R.cols(), m = s.A.rows();
   check::that(covariance.size() == 0 || (covariance.rows() == p && covariance.cols() == p), "covariance", "p × p");
@@ -205,7 +206,7 @@ ConstrainedFit constrained_least_squares(const LeastSquares& rows, const std::ve
   // vector from the cone of the columns of [−R⁻ᵀAᵀ; h].
   std::vector<Eigen::Index> working;
   if (m > 0) {
-    const Eigen::MatrixXd G = -solve_lower(s.R.transpose(), s.A.transpose()).transpose();  // m × p
+    const Eigen::MatrixXd G = -core::solve_lower(s.R.transpose(), s.A.transpose()).transpose();  // m × p
     const Eigen::VectorXd h = -G * s.c - s.b;
     const double reach = std::max(h.cwiseAbs().maxCoeff() / G.rowwise().norm().maxCoeff(), 1e-300);
     Eigen::MatrixXd E(p + 1, m);
@@ -216,7 +217,7 @@ ConstrainedFit constrained_least_squares(const LeastSquares& rows, const std::ve
         nonnegative_least_squares(E * size.cwiseInverse().asDiagonal(), Eigen::VectorXd::Unit(p + 1, p))
             .cwiseQuotient(size);
     const Eigen::VectorXd rest = E * dual - Eigen::VectorXd::Unit(p + 1, p);
-    if (rest.norm() <= 1e3 * kEpsilon * static_cast<double>(p + m)) {
+    if (rest.norm() <= 1e3 * core::kEpsilon * static_cast<double>(p + m)) {
       fit.status = ConstrainedStatus::infeasible;
       for (Eigen::Index i = 0; i < m; ++i) {
         if (dual[i] > 0.0) {
@@ -252,7 +253,7 @@ ConstrainedFit constrained_least_squares(const LeastSquares& rows, const std::ve
     raise(over[i] / far);
     raise(data > 0.0 ? -multiplier[i] / data : 0.0);
     raise(data > 0.0 ? std::abs(multiplier[i] * over[i]) / (data * far) : 0.0);
-    if (multiplier[i] > 0.0 || std::abs(over[i]) <= 16.0 * kEpsilon * far) {
+    if (multiplier[i] > 0.0 || std::abs(over[i]) <= 16.0 * core::kEpsilon * far) {
       const auto index = static_cast<std::size_t>(i);
       const LinearConstraint& constraint = constraints[index];
       ActiveConstraint active{index, std::max(0.0, multiplier[i]) / s.length[i], 0.0, 0.0, {}};
@@ -331,4 +332,4 @@ std::vector<LinearConstraint> physical_consistency(const std::vector<PhysicalQua
   return constraints;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::inference

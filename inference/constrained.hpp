@@ -14,7 +14,7 @@
 #include <wheelwright/core/interval.hpp>
 #include <wheelwright/identify/least_squares.hpp>
 
-namespace wheelwright {
+namespace wheelwright::inference {
 
 /// argmin ‖Ex − f‖ subject to x >= 0, by Lawson and Hanson's active set (1974, algorithm NNLS 23.10); E has few columns
 /// and may have dependent ones. Entries that are not positive are exactly 0, and the columns of positive entries are
@@ -65,7 +65,7 @@ struct ConstrainedFit {
 /// squares (Lawson and Hanson 1974, chapter 23), which ends after finitely many steps; the fit is then solved once more
 /// with the active constraints as equations. `covariance` of the free estimate (p × p, or empty) is for the words only.
 /// Throws InvalidArgument for a constraint of the wrong size, not finite or without coefficients, or for no rows.
-[[nodiscard]] ConstrainedFit constrained_least_squares(const LeastSquares& rows,
+[[nodiscard]] ConstrainedFit constrained_least_squares(const identify::LeastSquares& rows,
                                                        const std::vector<LinearConstraint>& constraints,
                                                        const Eigen::MatrixXd& covariance = {});
 
@@ -84,4 +84,4 @@ struct PhysicalQuantity {
 [[nodiscard]] std::vector<LinearConstraint> physical_consistency(const std::vector<PhysicalQuantity>& parameters,
                                                                  std::optional<double> footprint_radius = {});
 
-}  // namespace wheelwright
+}  // namespace wheelwright::inference

@@ -10,7 +10,7 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/words.hpp>
 
-namespace wheelwright {
+namespace wheelwright::inference {
 
 TermKind kind_of(std::string_view name) {
   static constexpr std::pair<std::string_view, TermKind> kinds[] = {
@@ -93,7 +93,7 @@ std::vector<std::string> missing_manoeuvres(const std::vector<Eigen::Index>& mem
     return own;
   }
   if (only(TermKind::inertia)) {
-    advice.push_back("no motion may tell " + enumerated(names) +
+    advice.push_back("no motion may tell " + core::enumerated(names) +
                      " apart: state one of them, or drive once more with a load of known mass");
   }
   if (has(TermKind::viscous) && has(TermKind::coulomb)) {
@@ -111,4 +111,4 @@ std::vector<std::string> missing_manoeuvres(const std::vector<Eigen::Index>& mem
   return advice.empty() ? own : advice;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::inference

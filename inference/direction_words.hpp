@@ -9,7 +9,7 @@
 
 #include <Eigen/Core>
 
-namespace wheelwright {
+namespace wheelwright::inference {
 
 /// Kind of motion that excites a parameter.
 enum class TermKind {
@@ -47,4 +47,4 @@ struct ParameterWords {
 [[nodiscard]] std::vector<std::string> missing_manoeuvres(const std::vector<Eigen::Index>& members,
                                                           const std::vector<ParameterWords>& parameters);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::inference

@@ -12,7 +12,7 @@
 #include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/core/words.hpp>
 
-namespace wheelwright {
+namespace wheelwright::inference {
 namespace {
 
 constexpr double kRoundings = 64.0;    // ε of a row
@@ -115,8 +115,8 @@ void find_base(const IdentifiabilityInput& input, const ScaledDirections& scaled
       unseen.words = input.parameters[static_cast<std::size_t>(d)].name + ": its motion never occurs in the log";
     } else {
       unseen.words = fmt::format("{} cannot be told apart here: only {} {} seen",
-                                 enumerated(names_of(unseen.members, input.parameters)), enumerated(combinations),
-                                 combinations.size() == 1 ? "is" : "are");
+                                 core::enumerated(names_of(unseen.members, input.parameters)),
+                                 core::enumerated(combinations), combinations.size() == 1 ? "is" : "are");
     }
     unseen.manoeuvres = missing_manoeuvres(unseen.members, input.parameters);
     result.unseen.push_back(std::move(unseen));
@@ -133,7 +133,7 @@ void find_noise(const IdentifiabilityInput& input, const ScaledDirections& scale
   const Eigen::MatrixXd noise = V.transpose() * size.asDiagonal() * input.noise * size.asDiagonal() * V;
   Eigen::MatrixXd excess = -kClearOfNoise * kClearOfNoise * noise;
   excess.diagonal() += result.singular_values.head(result.rank).cwiseAbs2();
-  const EigenPairs eigen = symmetric_eigen(excess);
+  const core::EigenPairs eigen = core::symmetric_eigen(excess);
   for (Eigen::Index k = 0; k < excess.rows() && eigen.values[k] <= 0.0; ++k) {
     --result.noise_rank;
     const Eigen::VectorXd z = V * eigen.vectors.col(k);
@@ -164,8 +164,8 @@ void find_precision(const IdentifiabilityInput& input, Identifiability& result) 
     return;
   }
   const Eigen::VectorXd one_over = input.size(kept).cwiseInverse();
-  const EigenPairs eigen =
-      symmetric_eigen(one_over.asDiagonal() * input.covariance(kept, kept) * one_over.asDiagonal());
+  const core::EigenPairs eigen =
+      core::symmetric_eigen(one_over.asDiagonal() * input.covariance(kept, kept) * one_over.asDiagonal());
   for (Eigen::Index k = 0; k < eigen.values.size(); ++k) {
     Eigen::VectorXd u = Eigen::VectorXd::Zero(p);
     u(kept) = eigen.vectors.col(k);
@@ -191,7 +191,7 @@ void find_precision(const IdentifiabilityInput& input, Identifiability& result) 
 
 }  // namespace
 
-IdentifiabilityInput identifiability_input(const LeastSquares& rows, std::vector<ParameterWords> parameters) {
+IdentifiabilityInput identifiability_input(const identify::LeastSquares& rows, std::vector<ParameterWords> parameters) {
   const Eigen::MatrixXd factor = rows.factor();
   const Eigen::Index p = factor.cols() - 1;
   IdentifiabilityInput input;
@@ -223,7 +223,7 @@ Identifiability identifiability(const IdentifiabilityInput& input) {
     }
   }
   Identifiability result;
-  const SingularValues svd = singular_values(scaled.R);
+  const core::SingularValues svd = core::singular_values(scaled.R);
   scaled.V = svd.V;
   result.singular_values = Eigen::VectorXd::Zero(p);
   result.singular_values.head(svd.values.size()) = svd.values;
@@ -248,13 +248,14 @@ constexpr double kConfounded = 1e-5;      // part of a scaled unit vector in the
 
 }  // namespace
 
-InformationOverTime information_over_time(const RegressionMoments& moments, const InformationOptions& options) {
+InformationOverTime information_over_time(const identify::RegressionMoments& moments,
+                                          const InformationOptions& options) {
   check::non_negative(options.seconds, "length of a window");
   check::that(options.coverage > 0.0 && options.coverage <= 1.0, "coverage", "in (0, 1]");
   const Eigen::VectorXd w = options.weights.size() > 0
                                 ? options.weights
                                 : Eigen::VectorXd::Ones(static_cast<Eigen::Index>(moments.outputs()));
-  const std::vector<MomentBlock>& blocks = moments.blocks();
+  const std::vector<identify::MomentBlock>& blocks = moments.blocks();
   const auto p = static_cast<Eigen::Index>(moments.parameters());
   InformationOverTime result;
   result.parameters.resize(moments.parameters());
@@ -281,7 +282,7 @@ InformationOverTime information_over_time(const RegressionMoments& moments, cons
     G += gram;
   }
   const Eigen::VectorXd one_over = G.diagonal().unaryExpr([](double d) { return d > 0.0 ? 1.0 / std::sqrt(d) : 0.0; });
-  const EigenPairs eigen = symmetric_eigen(one_over.asDiagonal() * G * one_over.asDiagonal());
+  const core::EigenPairs eigen = core::symmetric_eigen(one_over.asDiagonal() * G * one_over.asDiagonal());
   const Eigen::VectorXd inverse = eigen.values.unaryExpr(
       [&](double value) { return value > kNoInformation * eigen.values[p - 1] ? 1.0 / value : 0.0; });
   const auto W = static_cast<Eigen::Index>(result.windows.size());
@@ -318,7 +319,7 @@ InformationOverTime information_over_time(const RegressionMoments& moments, cons
     }
     std::sort(info.shortest.begin(), info.shortest.end());
     for (std::size_t k = 0; k < info.shortest.size(); ++k) {
-      const MomentBlock& window = result.windows[info.shortest[k]];
+      const identify::MomentBlock& window = result.windows[info.shortest[k]];
       if (k > 0 && info.shortest[k] == info.shortest[k - 1] + 1) {
         info.spans.back().second = window.last;
       } else {
@@ -330,4 +331,4 @@ InformationOverTime information_over_time(const RegressionMoments& moments, cons
   return result;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::inference

@@ -15,7 +15,7 @@
 #include <wheelwright/identify/moments.hpp>
 #include <wheelwright/inference/direction_words.hpp>
 
-namespace wheelwright {
+namespace wheelwright::inference {
 
 /// Input. p parameters.
 struct IdentifiabilityInput {
@@ -28,7 +28,7 @@ struct IdentifiabilityInput {
 };
 
 /// R, with the parameters of `rows` seen through the triangular factor of least squares: condition enters once.
-[[nodiscard]] IdentifiabilityInput identifiability_input(const LeastSquares& rows,
+[[nodiscard]] IdentifiabilityInput identifiability_input(const identify::LeastSquares& rows,
                                                          std::vector<ParameterWords> parameters);
 
 /// Why a direction is not seen.
@@ -106,7 +106,7 @@ struct ParameterInformation {
 
 /// Information over time.
 struct InformationOverTime {
-  std::vector<MomentBlock> windows;
+  std::vector<identify::MomentBlock> windows;
   std::vector<ParameterInformation> parameters;  ///< p
 };
 
@@ -114,7 +114,7 @@ struct InformationOverTime {
 /// with d_j = 1 of dᵀ(Σ w²YᵀY)d: the inverse of θ̂_j's variance under white errors. With its minimising d the share of
 /// window k is dᵀ(Σ_{in k} w²YᵀY)d / I_j: at least zero, and all of them add up to one. Windows are made of whole
 /// blocks of the moments.
-[[nodiscard]] InformationOverTime information_over_time(const RegressionMoments& moments,
+[[nodiscard]] InformationOverTime information_over_time(const identify::RegressionMoments& moments,
                                                         const InformationOptions& options = {});
 
-}  // namespace wheelwright
+}  // namespace wheelwright::inference

@@ -17,43 +17,44 @@
 #include <wheelwright/inference/constrained.hpp>
 #include <wheelwright/inference/stribeck.hpp>
 
-namespace wheelwright {
+namespace wheelwright::inference {
 namespace {
 
 constexpr double kMostBias = 0.5;  // standard errors, by noise of the motion: more could pass for a lag
 constexpr double kRisk = 1e-3;     // of Fit::plausible, which is not looked at here
 constexpr double kSlowestStribeck = 0.01, kFastestStribeck = 0.5;  // of the largest joint speed
 
-std::string motion_unit(const Setting& s) {
-  const bool linear = !on_two_wheels(s.robot);  // its own unit: m or rad
+std::string motion_unit(const commission::Setting& s) {
+  const bool linear = !model::on_two_wheels(s.robot);  // its own unit: m or rad
   return s.measurement.motion == MotionKind::angle ? (linear ? "m or rad" : "rad") : (linear ? "per s" : "rad/s");
 }
 
 // What the robot file or the encoder says of a motion column.
-std::optional<KnownNoise> known_motion_noise(const Setting& s) {
-  const auto bound = motion_error(s.robot, s.measurement);
+std::optional<KnownNoise> known_motion_noise(const commission::Setting& s) {
+  const auto bound = commission::motion_error(s.robot, s.measurement);
   if (!bound) {
     return std::nullopt;
   }
   const bool counts = s.measurement.count > 0.0 || s.robot.encoder_counts_per_turn;
   const bool of_angles = s.measurement.motion != MotionKind::speed;
-  const bool linear = !on_two_wheels(s.robot);
+  const bool linear = !model::on_two_wheels(s.robot);
   return KnownNoise{*bound, of_angles ? (linear ? "m or rad" : "rad") : motion_unit(s),
                     of_angles && counts ? "half an encoder count" : "as declared"};
 }
 
-std::vector<ColumnNoise> find_noise(LogSource& log, const Setting& s) {
+std::vector<ColumnNoise> find_noise(LogSource& log, const commission::Setting& s) {
   std::vector<std::string> columns = s.measurement.motion_columns;
   columns.insert(columns.end(), s.measurement.effort_columns.begin(), s.measurement.effort_columns.end());
-  const std::vector<DifferenceNoise> differences = difference_noise(log, columns);
+  const std::vector<identify::DifferenceNoise> differences = identify::difference_noise(log, columns);
   const Standstill standstill = standstill_noise(log, standstill_signs(log, s.model), columns);
   std::vector<ColumnNoise> noise;
   for (std::size_t c = 0; c < columns.size(); ++c) {
     ColumnNoise of_column;
     of_column.column = columns[c];
     const bool motion = c < s.measurement.motion_columns.size();
-    const bool axis = !on_two_wheels(s.robot);
-    of_column.unit = motion ? motion_unit(s) : output_unit(s.robot, axis ? s.model.output_units.front() : "N·m");
+    const bool axis = !model::on_two_wheels(s.robot);
+    of_column.unit =
+        motion ? motion_unit(s) : commission::output_unit(s.robot, axis ? s.model.output_units.front() : "N·m");
     if (motion) {
       of_column.known = known_motion_noise(s);
     } else if (s.robot.noise.effort.value) {
@@ -69,27 +70,27 @@ std::vector<ColumnNoise> find_noise(LogSource& log, const Setting& s) {
 
 std::vector<PhysicalQuantity> quantities(const Model& model) {
   std::vector<PhysicalQuantity> list;
-  for (const Parameter& p : model.parameters) {
+  for (const model::Parameter& p : model.parameters) {
     list.push_back({p.physical, p.per_physical, p.physical_unit});
   }
   return list;
 }
 
-std::vector<ParameterWords> parameter_words(const Setting& s, bool physical) {
+std::vector<ParameterWords> parameter_words(const commission::Setting& s, bool physical) {
   std::vector<ParameterWords> list;
-  for (const Parameter& p : s.model.parameters) {
+  for (const model::Parameter& p : s.model.parameters) {
     std::string name = physical ? p.physical : p.name;
     if (physical) {
       std::ranges::replace(name, '_', ' ');
     }
-    list.push_back(
-        {std::move(name), physical ? p.physical_unit : parameter_unit(s.robot, p), p.excite, kind_of(p.physical)});
+    list.push_back({std::move(name), physical ? p.physical_unit : commission::parameter_unit(s.robot, p), p.excite,
+                    kind_of(p.physical)});
   }
   return list;
 }
 
 // From θ_L to physical quantities: θ_L,j = (physical quantity + offset)/scale.
-void to_physical(IdentifiabilityInput& input, const std::vector<PhysicalScale>& scales) {
+void to_physical(IdentifiabilityInput& input, const std::vector<commission::PhysicalScale>& scales) {
   Eigen::VectorXd scale(static_cast<Eigen::Index>(scales.size()));
   for (std::size_t j = 0; j < scales.size(); ++j) {
     scale[static_cast<Eigen::Index>(j)] = scales[j].scale;
@@ -105,11 +106,12 @@ void to_physical(IdentifiabilityInput& input, const std::vector<PhysicalScale>& 
   input.size = input.size.cwiseProduct(scale.cwiseAbs());
 }
 
-Identifiability judge(const Setting& s, const Fit& fit, const RegressionMoments& moments) {
-  const auto scales = physical_scales(s.robot, s.model);
+Identifiability judge(const commission::Setting& s, const commission::Fit& fit,
+                      const identify::RegressionMoments& moments) {
+  const auto scales = commission::physical_scales(s.robot, s.model);
   IdentifiabilityInput input = identifiability_input(fit.factor, parameter_words(s, scales.has_value()));
   const auto p = static_cast<Eigen::Index>(s.model.p());
-  if (const auto noise = row_noise(s)) {
+  if (const auto noise = commission::row_noise(s)) {
     input.noise = Eigen::MatrixXd::Zero(p, p);
     for (std::size_t i = 0; i < noise->YY.size(); ++i) {
       const double w = fit.weights[static_cast<Eigen::Index>(i)];
@@ -133,18 +135,19 @@ Identifiability judge(const Setting& s, const Fit& fit, const RegressionMoments&
 }
 
 // The shape at its best and along all that was searched; `reference` is the weighted rss without it.
-ShapeFinding finding(ShapeKind kind, std::string name, std::string unit, const SeparableModel& model,
-                     VariableProjectionOptions options, const Fit& fit, double reference, std::size_t points) {
+ShapeFinding finding(ShapeKind kind, std::string name, std::string unit, const identify::SeparableModel& model,
+                     identify::VariableProjectionOptions options, const commission::Fit& fit, double reference,
+                     std::size_t points) {
   options.weights = fit.weights;
-  const SeparableFit found = variable_projection(model, options);
+  const identify::SeparableFit found = identify::variable_projection(model, options);
   const auto ratio = [&](double rss) { return reference > 0.0 ? std::sqrt(rss / reference) : 1.0; };
   ShapeFinding f;
   f.kind = kind;
   f.name = std::move(name);
   f.unit = std::move(unit);
   f.searched = {options.lower[0], options.upper[0]};
-  f.converged = found.end == SearchEnd::converged;
-  if (found.end != SearchEnd::failed) {
+  f.converged = found.end == identify::SearchEnd::converged;
+  if (found.end != identify::SearchEnd::failed) {
     f.state = found.state[0];
     f.estimate = found.shape[0];
     f.standard_error = found.standard_error[0];
@@ -152,8 +155,9 @@ ShapeFinding finding(ShapeKind kind, std::string name, std::string unit, const S
     f.residual_ratio = ratio(found.weighted_rss);
     f.curve.push_back({f.estimate, f.residual_ratio});
   }
-  for (const CostPoint& point : cost_curve(model, Eigen::VectorXd::Constant(1, f.searched.lower), 0, f.searched.lower,
-                                           f.searched.upper, points, fit.weights)) {
+  for (const identify::CostPoint& point :
+       identify::cost_curve(model, Eigen::VectorXd::Constant(1, f.searched.lower), 0, f.searched.lower,
+                            f.searched.upper, points, fit.weights)) {
     f.curve.push_back({point.shape, ratio(point.weighted_rss)});
   }
   std::ranges::stable_sort(f.curve, {}, &ShapePoint::shape);
@@ -161,14 +165,14 @@ ShapeFinding finding(ShapeKind kind, std::string name, std::string unit, const S
 }
 
 // Weighted residual sum of squares of `model` with its shape held at `shape`.
-double rss_at(const SeparableModel& model, double shape, const Fit& fit) {
+double rss_at(const identify::SeparableModel& model, double shape, const commission::Fit& fit) {
   const Eigen::VectorXd at = Eigen::VectorXd::Constant(1, shape);
-  return cost_curve(model, at, 0, shape, shape + 1e-9, 2, fit.weights).front().weighted_rss;
+  return identify::cost_curve(model, at, 0, shape, shape + 1e-9, 2, fit.weights).front().weighted_rss;
 }
 
 // The physically consistent θ nearest to the chosen estimate, in the metric of its covariance. Parameters that are not
 // excited stay at zero.
-ConstrainedFit nearest_consistent(const Fit& fit, const std::vector<LinearConstraint>& constraints) {
+ConstrainedFit nearest_consistent(const commission::Fit& fit, const std::vector<LinearConstraint>& constraints) {
   const auto p = fit.estimate.size();
   Eigen::MatrixXd precision = Eigen::MatrixXd::Identity(p, p);
   std::vector<Eigen::Index> in;
@@ -182,7 +186,7 @@ ConstrainedFit nearest_consistent(const Fit& fit, const std::vector<LinearConstr
     const Eigen::VectorXd scale = covariance.diagonal().cwiseSqrt();
     const Eigen::MatrixXd correlation =
         scale.cwiseInverse().asDiagonal() * covariance * scale.cwiseInverse().asDiagonal();
-    const EigenPairs eigen = symmetric_eigen(correlation);
+    const core::EigenPairs eigen = core::symmetric_eigen(correlation);
     const Eigen::VectorXd lengths = eigen.values.cwiseMax(1e-12).cwiseSqrt().cwiseInverse();
     precision(in, in) =
         lengths.asDiagonal() * eigen.vectors.transpose() * Eigen::MatrixXd(scale.cwiseInverse().asDiagonal());
@@ -191,49 +195,49 @@ ConstrainedFit nearest_consistent(const Fit& fit, const std::vector<LinearConstr
   rows.resize(static_cast<std::size_t>(p), 1, static_cast<std::size_t>(p));
   rows.Y = precision;
   rows.y = precision * fit.estimate;
-  LeastSquares metric(static_cast<std::size_t>(p));
+  identify::LeastSquares metric(static_cast<std::size_t>(p));
   metric.add(rows);
   return constrained_least_squares(metric, constraints, fit.residuals.covariance);
 }
 
-void find_shapes(LogSource& log, const Setting& s, const Fit& fit, const IdentificationOptions& options,
-                 Identification& result) {
-  TorqueRows stream = make_rows(log, s);
+void find_shapes(LogSource& log, const commission::Setting& s, const commission::Fit& fit,
+                 const IdentificationOptions& options, Identification& result) {
+  TorqueRows stream = commission::make_rows(log, s);
   const RegressionBlock rows = read_all(stream);
-  const auto look = [&](ShapeKind kind, const char* name, TimeEffect effect, double lower) {
+  const auto look = [&](ShapeKind kind, const char* name, identify::TimeEffect effect, double lower) {
     try {
-      const TimeShiftedRows model(rows, effect, lower, options.longest_delay);
+      const identify::TimeShiftedRows model(rows, effect, lower, options.longest_delay);
       result.shapes.push_back(
           finding(kind, name, "s", model, model.options(), fit, rss_at(model, 0.0, fit), options.curve_points));
     } catch (const InvalidArgument& error) {
       result.notes.push_back(fmt::format("{} was not looked for: {}", name, error.what()));
     }
   };
-  look(ShapeKind::delay, "delay", TimeEffect::delay, -options.longest_delay);
-  look(ShapeKind::effort_lag, "effort_lag", TimeEffect::effort_lag, 0.0);
-  look(ShapeKind::actuator_lag, "actuator_lag", TimeEffect::actuator_lag, 0.0);
+  look(ShapeKind::delay, "delay", identify::TimeEffect::delay, -options.longest_delay);
+  look(ShapeKind::effort_lag, "effort_lag", identify::TimeEffect::effort_lag, 0.0);
+  look(ShapeKind::actuator_lag, "actuator_lag", identify::TimeEffect::actuator_lag, 0.0);
   const double fastest = *std::ranges::max_element(s.survey.largest_speed);
   if (fastest > 0.0) {
     const StribeckRows model(log, RegressorFilter(s.model, s.filter, s.measurement));
-    VariableProjectionOptions search;
+    identify::VariableProjectionOptions search;
     search.lower = Eigen::VectorXd::Constant(1, kSlowestStribeck * fastest);
     search.upper = Eigen::VectorXd::Constant(1, kFastestStribeck * fastest);
-    const char* unit = !on_two_wheels(s.robot) ? "m/s or rad/s" : "rad/s";
+    const char* unit = !model::on_two_wheels(s.robot) ? "m/s or rad/s" : "rad/s";
     result.shapes.push_back(finding(ShapeKind::stribeck_speed, "stribeck_speed", unit, model, search, fit,
                                     fit.squares.weighted_rss, options.curve_points));
   }
 }
 
 bool shows_kinematics(const LogSource& log, const Robot& robot) {
-  return on_two_wheels(robot) && log.find("theta") && log.find("omega_r") && log.find("omega_l");
+  return model::on_two_wheels(robot) && log.find("theta") && log.find("omega_r") && log.find("omega_l");
 }
 
 bool has_effort(const LogSource& log, const Robot& robot, const Model& model) {
-  return std::ranges::any_of(model.joints, [&](const Joint& joint) {
+  return std::ranges::any_of(model.joints, [&](const model::Joint& joint) {
     return log
-        .find(robot.effort == EffortKind::torque    ? joint.torque
-              : robot.effort == EffortKind::current ? joint.current
-                                                    : joint.voltage)
+        .find(robot.effort == model::EffortKind::torque    ? joint.torque
+              : robot.effort == model::EffortKind::current ? joint.current
+                                                           : joint.voltage)
         .has_value();
   });
 }
@@ -266,7 +270,7 @@ Identification identify(LogSource& log, const Robot& robot, const Identification
       options.progress(stage, share);
     }
   };
-  if (const Model model = make_model(robot); !has_effort(log, robot, model) && shows_kinematics(log, robot)) {
+  if (const Model model = model::make_model(robot); !has_effort(log, robot, model) && shows_kinematics(log, robot)) {
     tell("kinematics", 0.1);
     result.effort = false;
     result.setting.robot = robot;
@@ -275,35 +279,35 @@ Identification identify(LogSource& log, const Robot& robot, const Identification
     calibrate(log, robot, result);
     return result;
   }
-  SettingOptions settle_options = options.setting;
+  commission::SettingOptions settle_options = options.setting;
   settle_options.progress = options.progress;
-  result.setting = settle(log, robot, settle_options);
-  const Setting& s = result.setting;
+  result.setting = commission::settle(log, robot, settle_options);
+  const commission::Setting& s = result.setting;
   result.notes = s.notes;
 
   tell("identifying", 0.25);
-  result.fit = fit_log(log, s, Part::everything, kRisk);
+  result.fit = commission::fit_log(log, s, commission::Part::everything, kRisk);
   tell("noise of the sensors", 0.4);
   result.noise = find_noise(log, s);
 
   tell("robust and constrained fits", 0.5);
   const std::vector<LinearConstraint> constraints = physical_consistency(quantities(s.model), s.robot.footprint_radius);
   result.constrained = nearest_consistent(result.fit, constraints);
-  TorqueRows rows = make_rows(log, s);
+  TorqueRows rows = commission::make_rows(log, s);
   RobustOptions robust;
   robust.constraints = constraints;
   result.robust = robust_fit(rows, robust);
 
   tell("confidence regions", 0.65);
-  const RegressionMoments moments = log_moments(log, s, Part::everything);
+  const identify::RegressionMoments moments = commission::log_moments(log, s, commission::Part::everything);
   if (!result.fit.choice.candidates.empty() && result.fit.choice.best().usable) {
     RegionOptions regions;
     regions.confidence = options.confidence;
     regions.bootstrap.seed = regions.sign_perturbed.seed = options.seed;
     regions.bootstrap.estimator.weights = regions.sign_perturbed.estimator.weights = result.fit.weights;
     std::vector<bool> excluded;
-    for (const ExcitationFinding& finding : result.fit.excitation) {
-      excluded.push_back(finding.state == Excitation::not_excited);
+    for (const identify::ExcitationFinding& finding : result.fit.excitation) {
+      excluded.push_back(finding.state == identify::Excitation::not_excited);
     }
     regions.bootstrap.estimator.excluded = regions.sign_perturbed.estimator.excluded = excluded;
     result.regions = compare_regions(moments, result.fit.choice.best(), regions);
@@ -314,7 +318,7 @@ Identification identify(LogSource& log, const Robot& robot, const Identification
   information.weights = result.fit.weights;
   result.information = information_over_time(moments, information);
 
-  const EstimatorChoice& choice = result.fit.choice;
+  const identify::EstimatorChoice& choice = result.fit.choice;
   const bool noisy =
       choice.in_doubt || choice.predicted_bias.size() == 0 || choice.predicted_bias.cwiseAbs().maxCoeff() > kMostBias;
   if (noisy) {
@@ -339,4 +343,4 @@ Identification identify(LogSource& log, const Robot& robot, const Identification
   return result;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::inference

@@ -22,7 +22,7 @@
 #include <wheelwright/inference/regions.hpp>
 #include <wheelwright/inference/robust.hpp>
 
-namespace wheelwright {
+namespace wheelwright::inference {
 
 /// Noise that needs no finding.
 struct KnownNoise {
@@ -54,7 +54,7 @@ struct ShapeFinding {
   ShapeKind kind = ShapeKind::delay;
   std::string name;  ///< delay, effort_lag, actuator_lag or stribeck_speed
   std::string unit;
-  ShapeState state = ShapeState::flat;
+  identify::ShapeState state = identify::ShapeState::flat;
   bool converged = false;
   double estimate = 0.0;
   double standard_error = 0.0;
@@ -66,7 +66,7 @@ struct ShapeFinding {
 
 /// Options of an identification.
 struct IdentificationOptions {
-  SettingOptions setting;
+  commission::SettingOptions setting;
   double confidence = 0.95;        ///< of the regions
   std::uint64_t seed = 1;          ///< of bootstrap and signs
   bool shapes = true;              ///< whether delay, lags and Stribeck speed are looked for
@@ -81,8 +81,8 @@ struct Identification {
   bool effort =
       true;  ///< the log has efforts: without, only `kinematics`, `setting`'s robot and model, and notes are given
   double confidence = 0.95;
-  Setting setting;
-  Fit fit;
+  commission::Setting setting;
+  commission::Fit fit;
   std::vector<ColumnNoise> noise;   ///< motion columns, then effort columns
   RobustFit robust;                 ///< Huber's loss, physically consistent
   ConstrainedFit constrained;       ///< physically consistent θ nearest to the chosen estimate, by its covariance
@@ -98,4 +98,4 @@ struct Identification {
 /// only. Throws InputError or InvalidArgument for a log or robot that cannot be used at all.
 [[nodiscard]] Identification identify(LogSource& log, const Robot& robot, const IdentificationOptions& options = {});
 
-}  // namespace wheelwright
+}  // namespace wheelwright::inference

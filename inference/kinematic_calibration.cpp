@@ -20,7 +20,7 @@
 #include <wheelwright/identify/moments.hpp>
 #include <wheelwright/identify/noise_level.hpp>
 
-namespace wheelwright {
+namespace wheelwright::inference {
 namespace {
 
 constexpr double kMadToSigma = 1.4826;
@@ -234,7 +234,7 @@ std::vector<Window> cut(const LogTable& log, const KinematicOptions& o, bool pos
 
 double robust_spread(std::vector<double> residuals) {
   for (double& r : residuals) r = std::abs(r);
-  return kMadToSigma * median(std::move(residuals));
+  return kMadToSigma * core::median(std::move(residuals));
 }
 
 class Fit {
@@ -336,7 +336,7 @@ class Fit {
       Eigen::Matrix3d C = Eigen::Matrix3d::Zero();
       SharedVector score = SharedVector::Zero();
       Eigen::Vector3d own = Eigen::Vector3d::Zero();
-      const WindowCost cost(w, *options_, spreads_, position_, kInfinity);
+      const WindowCost cost(w, *options_, spreads_, position_, core::kInfinity);
       const int rows = cost.num_residuals();
       Eigen::VectorXd residual(rows);
       Eigen::Matrix<double, Eigen::Dynamic, kShared, Eigen::RowMajor> J(rows, +kShared);
@@ -372,7 +372,7 @@ class Fit {
       if (!position_) {
         C.bottomRightCorner<2, 2>().setIdentity();
       }
-      const Eigen::Matrix3d start = pseudo_inverse(C);
+      const Eigen::Matrix3d start = core::pseudo_inverse(C);
       info.window.push_back(A - B * start * B.transpose());
       info.score.push_back(score - B * start * own);
       info.total += info.window.back();
@@ -412,7 +412,7 @@ Spread spread_of(const Fit& fit, const Fit::Information& info) {
     H = info.total(pick, pick);
     const Eigen::VectorXd scale = H.diagonal().cwiseSqrt();
     const Eigen::MatrixXd unit = scale.cwiseInverse().asDiagonal() * H * scale.cwiseInverse().asDiagonal();
-    const EigenPairs eigen = symmetric_eigen(unit);
+    const core::EigenPairs eigen = core::symmetric_eigen(unit);
     if (pick.empty() || eigen.values[0] > kRankTolerance) {
       break;
     }
@@ -424,11 +424,11 @@ Spread spread_of(const Fit& fit, const Fit::Information& info) {
   if (m == 0) {
     return s;
   }
-  BlockSums scores(static_cast<std::size_t>(m));
+  identify::BlockSums scores(static_cast<std::size_t>(m));
   Eigen::MatrixXd apart = Eigen::MatrixXd::Zero(m, m);  // covariance of the sum if windows were independent
   for (std::size_t k = 0; k < info.score.size(); ++k) {
     const Eigen::MatrixXd without = H - Eigen::MatrixXd(info.window[k](pick, pick));
-    const LdltFactors solver(without);
+    const core::LdltFactors solver(without);
     Eigen::VectorXd score = info.score[k](pick);
     if (solver.positive()) {
       score = H * solver.solve(score);
@@ -436,16 +436,16 @@ Spread spread_of(const Fit& fit, const Fit::Information& info) {
     scores.add(score);
     apart += score * score.transpose();
   }
-  LongRunCovariance spread = long_run_covariance(scores);
+  identify::LongRunCovariance spread = identify::long_run_covariance(scores);
   // The larger of the two in every direction, in units of the information.
   const Eigen::VectorXd unit = H.diagonal().cwiseSqrt();
   const Eigen::MatrixXd more =
       unit.cwiseInverse().asDiagonal() * (apart - spread.matrix) * unit.cwiseInverse().asDiagonal();
-  const EigenPairs eigen = symmetric_eigen(more);
+  const core::EigenPairs eigen = core::symmetric_eigen(more);
   spread.matrix += unit.asDiagonal() *
                    (eigen.vectors * eigen.values.cwiseMax(0.0).asDiagonal() * eigen.vectors.transpose()) *
                    unit.asDiagonal();
-  const Eigen::MatrixXd inverse = LdltFactors(H).solve(Eigen::MatrixXd(Eigen::MatrixXd::Identity(m, m)));
+  const Eigen::MatrixXd inverse = core::LdltFactors(H).solve(Eigen::MatrixXd(Eigen::MatrixXd::Identity(m, m)));
   const Eigen::MatrixXd covariance = inverse * spread.matrix * inverse;
   for (Eigen::Index a = 0; a < m; ++a) {
     s.known[static_cast<std::size_t>(pick[static_cast<std::size_t>(a)])] = true;
@@ -480,7 +480,7 @@ KinematicCalibration calibrate_kinematics(const LogTable& log, const KinematicOp
   result.freedom = spread.freedom;
 
   const SharedVector& s = fit.shared();
-  const double t95 = spread.freedom > 0.0 ? student_quantile(0.95, spread.freedom) : kInfinity;
+  const double t95 = spread.freedom > 0.0 ? core::student_quantile(0.95, spread.freedom) : core::kInfinity;
   // A quantity with gradient `by` of the shared unknowns; given up where its interval is wider than ± `widest`.
   const auto quantity = [&](double estimate, const SharedVector& by, double widest, const char* reason) {
     KinematicQuantity q;
@@ -496,7 +496,7 @@ KinematicCalibration calibrate_kinematics(const LogTable& log, const KinematicOp
     if (!searched) {
       return q;
     }
-    q.standard_error = known ? std::sqrt(by.dot(spread.covariance * by)) : kInfinity;
+    q.standard_error = known ? std::sqrt(by.dot(spread.covariance * by)) : core::kInfinity;
     const double half = t95 * q.standard_error;
     q.state = half <= widest ? KinematicState::identified : KinematicState::not_identified;
     if (q.state == KinematicState::not_identified) {
@@ -534,4 +534,4 @@ KinematicCalibration calibrate_kinematics(const LogTable& log, const KinematicOp
   return result;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::inference

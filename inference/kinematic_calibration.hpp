@@ -10,7 +10,7 @@
 
 #include <wheelwright/core/log.hpp>
 
-namespace wheelwright {
+namespace wheelwright::inference {
 
 /// Search options and starting values.
 struct KinematicOptions {
@@ -85,4 +85,4 @@ struct KinematicCalibration {
 /// enough poses.
 [[nodiscard]] KinematicCalibration calibrate_kinematics(const LogTable& log, const KinematicOptions& options);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::inference

@@ -12,7 +12,7 @@
 #include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/identify/least_squares.hpp>
 
-namespace wheelwright {
+namespace wheelwright::inference {
 
 double tuning_constant(Loss loss) {
   switch (loss) {
@@ -115,18 +115,18 @@ class Roots final : public ceres::CostFunction {
  private:
   LossFunction loss_;
   Eigen::VectorXd u_;
-  RowMatrix slope_;
+  core::RowMatrix slope_;
 };
 
 /// θ = θ0 + Tz: columns of YT/s are orthonormal up to √N, directions without rows are left out.
 Eigen::MatrixXd whitening(const RegressionBlock& rows, const Eigen::VectorXd& scales) {
-  LeastSquares gram(rows.parameters, scales.cwiseInverse());
+  identify::LeastSquares gram(rows.parameters, scales.cwiseInverse());
   gram.add(rows);
-  const LeastSquaresFit fit = gram.solve();
+  const identify::LeastSquaresFit fit = gram.solve();
   const Eigen::VectorXd rms = fit.column_rms.unaryExpr([](double r) { return r > 0.0 ? r : 1.0; });
   const Eigen::MatrixXd scaled =
       rms.asDiagonal() * fit.inverse_gram * rms.asDiagonal() * static_cast<double>(fit.instants);
-  const EigenPairs eigen = symmetric_eigen(scaled);
+  const core::EigenPairs eigen = core::symmetric_eigen(scaled);
   const Eigen::Index kept = fit.rank;
   return rms.cwiseInverse().asDiagonal() * eigen.vectors.rightCols(kept) *
          eigen.values.tail(kept).cwiseMax(0.0).cwiseSqrt().asDiagonal();
@@ -202,8 +202,8 @@ bool find_box(const std::vector<LinearConstraint>& constraints, Eigen::Index p, 
       sign = 1.0;
       directions.conservativeResize(at + 1, Eigen::NoChange);
       directions.row(at) = a;
-      lower.push_back(-kInfinity);
-      upper.push_back(kInfinity);
+      lower.push_back(-core::kInfinity);
+      upper.push_back(core::kInfinity);
     }
     const auto k = static_cast<std::size_t>(at);
     if (sign > 0.0) {
@@ -221,15 +221,15 @@ bool find_box(const std::vector<LinearConstraint>& constraints, Eigen::Index p, 
       return false;
     }
   }
-  const PivotedQr qr(directions.transpose());
+  const core::PivotedQr qr(directions.transpose());
   if (qr.rank() < m) {
     return false;
   }
   const Eigen::MatrixXd Q = qr.Q();
   box.B.resize(p, p);
   box.B << directions, Q.rightCols(p - m).transpose();
-  box.lower = Eigen::VectorXd::Constant(p, -kInfinity);
-  box.upper = Eigen::VectorXd::Constant(p, kInfinity);
+  box.lower = Eigen::VectorXd::Constant(p, -core::kInfinity);
+  box.upper = Eigen::VectorXd::Constant(p, core::kInfinity);
   for (Eigen::Index k = 0; k < m; ++k) {
     box.lower[k] = lower[static_cast<std::size_t>(k)];
     box.upper[k] = upper[static_cast<std::size_t>(k)];
@@ -240,9 +240,9 @@ bool find_box(const std::vector<LinearConstraint>& constraints, Eigen::Index p, 
 MEstimate m_estimate(const RegressionBlock& rows, const Eigen::VectorXd& scales, const LossFunction& loss,
                      const Eigen::VectorXd& start, const BoxCoordinates& box) {
   const Eigen::VectorXd z = (box.B * start).cwiseMax(box.lower).cwiseMin(box.upper);
-  const PivotedQr B(box.B);
+  const core::PivotedQr B(box.B);
   const Eigen::VectorXd origin = B.solve(z);
   return run(rows, scales, loss, origin, B.inverse(), box.lower - z, box.upper - z);
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::inference

@@ -11,7 +11,7 @@
 #include <wheelwright/core/regression.hpp>
 #include <wheelwright/inference/constrained.hpp>
 
-namespace wheelwright {
+namespace wheelwright::inference {
 
 /// A loss ρ(u), even, with ρ(u) ≈ u²/2 near 0 (Huber 1981; Maronna, Martin and Yohai 2006, chapter 2).
 enum class Loss {
@@ -77,4 +77,4 @@ struct BoxCoordinates {
 [[nodiscard]] MEstimate m_estimate(const RegressionBlock& rows, const Eigen::VectorXd& scales, const LossFunction& loss,
                                    const Eigen::VectorXd& start, const BoxCoordinates& box);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::inference

@@ -10,7 +10,7 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/statistics.hpp>
 
-namespace wheelwright {
+namespace wheelwright::inference {
 
 ErrorBound bound_of_sd(double sd, double relative_sd, const ErrorBoundOptions& options) {
   check::non_negative(sd, "standard deviation");
@@ -22,11 +22,11 @@ ErrorBound bound_of_sd(double sd, double relative_sd, const ErrorBoundOptions& o
   if (relative_sd > 0.0) {
     const double freedom = 2.0 / (relative_sd * relative_sd);
     const double risk = options.law == NoiseLaw::uniform ? options.risk : 0.5 * options.risk;
-    result.sd_limit = sd * std::sqrt(freedom / chi_squared_quantile(freedom, risk));
+    result.sd_limit = sd * std::sqrt(freedom / core::chi_squared_quantile(freedom, risk));
   }
   switch (options.law) {
     case NoiseLaw::uniform: result.factor = std::numbers::sqrt3; break;
-    case NoiseLaw::gaussian: result.factor = normal_upper_quantile(0.25 * options.risk / options.horizon); break;
+    case NoiseLaw::gaussian: result.factor = core::normal_upper_quantile(0.25 * options.risk / options.horizon); break;
     case NoiseLaw::any_variance: result.factor = std::sqrt(2.0 * options.horizon / options.risk); break;
   }
   result.bound = result.factor * result.sd_limit;
@@ -80,7 +80,7 @@ std::string_view to_string(NoiseMethod method) {
 }
 
 NoiseChoice choose_noise(const NoiseEvidence& evidence, const ErrorBoundOptions& options) {
-  using Kind = DifferenceNoise::Kind;
+  using Kind = identify::DifferenceNoise::Kind;
   std::optional<Level> rest, differences;
   if (evidence.standstill && evidence.standstill->kind == StandstillNoise::Kind::noisy) {
     rest = Level{NoiseMethod::standstill, evidence.standstill->sd, evidence.standstill->relative_sd};
@@ -101,7 +101,7 @@ NoiseChoice choose_noise(const NoiseEvidence& evidence, const ErrorBoundOptions&
     }
     return chosen(*differences, NoiseMeaning::estimate,
                   fmt::format("differences of orders {} to {} agree, as white noise in motion makes them",
-                              evidence.differences->level_from, DifferenceNoise::kOrders),
+                              evidence.differences->level_from, identify::DifferenceNoise::kOrders),
                   options);
   }
   const std::string_view not_white = kind == Kind::smooth  ? "differences do not settle (fast motion or slow noise)"
@@ -121,4 +121,4 @@ NoiseChoice choose_noise(const NoiseEvidence& evidence, const ErrorBoundOptions&
   return nothing;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::inference

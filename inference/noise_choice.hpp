@@ -10,7 +10,7 @@
 #include <wheelwright/identify/noise_level.hpp>
 #include <wheelwright/inference/standstill_noise.hpp>
 
-namespace wheelwright {
+namespace wheelwright::inference {
 
 /// Assumed distribution of the noise.
 enum class NoiseLaw {
@@ -55,7 +55,7 @@ enum class NoiseMethod { none, standstill, differences };
 /// Evidence on the noise of one column.
 struct NoiseEvidence {
   std::optional<StandstillNoise> standstill;
-  std::optional<DifferenceNoise> differences;
+  std::optional<identify::DifferenceNoise> differences;
 };
 
 /// Relation of the chosen level to the true one.
@@ -83,4 +83,4 @@ struct NoiseChoice {
 /// extrapolated there.
 [[nodiscard]] NoiseChoice choose_noise(const NoiseEvidence& evidence, const ErrorBoundOptions& options = {});
 
-}  // namespace wheelwright
+}  // namespace wheelwright::inference

@@ -16,7 +16,7 @@
 #include <wheelwright/identify/noise_level.hpp>
 #include <wheelwright/inference/block_bootstrap.hpp>
 
-namespace wheelwright {
+namespace wheelwright::inference {
 namespace {
 
 constexpr double kLostVariance = 0.05;  // at the edges of groups whose length is chosen
@@ -31,7 +31,8 @@ struct Ellipsoid {
 };
 
 Ellipsoid ellipsoid(const Eigen::MatrixXd& Q, const Eigen::VectorXd& b) {
-  const EigenPairs eigen = symmetric_eigen(Eigen::MatrixXd::Identity(b.size(), b.size()) - Q.transpose() * Q);
+  const core::EigenPairs eigen =
+      core::symmetric_eigen(Eigen::MatrixXd::Identity(b.size(), b.size()) - Q.transpose() * Q);
   Ellipsoid e{eigen.vectors, eigen.values, eigen.vectors.transpose() * (Q.transpose() * b), b.squaredNorm(), false};
   e.bounded = e.lambda.allFinite() && e.lambda.minCoeff() > kFlat;
   return e;
@@ -41,7 +42,7 @@ Ellipsoid ellipsoid(const Eigen::MatrixXd& Q, const Eigen::VectorXd& b) {
 // derivative is bisected in log(ξλ_min − 1). Every ξ gives an upper bound.
 double largest_norm(const Ellipsoid& e) {
   if (!e.bounded) {
-    return kInfinity;
+    return core::kInfinity;
   }
   const double least = e.lambda.minCoeff();
   const auto value = [&](double xi) {
@@ -71,7 +72,7 @@ double nth_largest(std::vector<double>& values, std::size_t n) {
 
 }  // namespace
 
-SignPerturbedSums::SignPerturbedSums(const RegressionMoments& moments, const SignPerturbedOptions& options)
+SignPerturbedSums::SignPerturbedSums(const identify::RegressionMoments& moments, const SignPerturbedOptions& options)
     : m_(options.sums), parameters_(moments.parameters()) {
   check::that(options.confidence > 0.0 && options.confidence < 1.0, "confidence", "between 0 and 1");
   check::non_negative(options.seconds, "length of a group with one sign");
@@ -92,7 +93,7 @@ SignPerturbedSums::SignPerturbedSums(const RegressionMoments& moments, const Sig
   const Eigen::MatrixXd influence = blocks.inverse * blocks.scores(blocks.psi);
   const std::size_t length = options.seconds > 0.0 ? blocks.lasting(options.seconds)
                                                    : sign_group_length(influence, kLostVariance, options.groups);
-  edge_share_ = wheelwright::edge_share(influence, length);
+  edge_share_ = wheelwright::inference::edge_share(influence, length);
   const ScoreBlocks groups = grouped(blocks, length);
   groups_ = groups.blocks();
   group_seconds_ = groups.block_seconds;
@@ -111,7 +112,7 @@ SignPerturbedSums::SignPerturbedSums(const RegressionMoments& moments, const Sig
   order_.resize(m_);
   std::generate(order_.begin(), order_.end(), std::ref(generator));
 
-  const CholeskyFactors P(groups.shape);
+  const core::CholeskyFactors P(groups.shape);
   c_ = P.solve_lower(groups.c * signs);
   A_ = groups.A * signs;
   const Eigen::Index q = c_.rows();
@@ -146,15 +147,15 @@ bool SignPerturbedSums::contains(const Eigen::VectorXd& theta) const {
 SignPerturbedBounds SignPerturbedSums::bounds() const {
   const auto p = static_cast<Eigen::Index>(parameters_);
   SignPerturbedBounds result{Eigen::VectorXd::Zero(p), Eigen::VectorXd::Zero(p), Eigen::MatrixXd::Zero(p, p),
-                             kInfinity};
+                             core::kInfinity};
   if (!usable_) {
-    result.lower(kept_).setConstant(-kInfinity);
-    result.upper(kept_).setConstant(kInfinity);
+    result.lower(kept_).setConstant(-core::kInfinity);
+    result.upper(kept_).setConstant(core::kInfinity);
     return result;
   }
   const Eigen::Index q = c_.rows();
   const Eigen::MatrixXd root = A_.col(0).reshaped(q, q);  // z = root (ψ − ψ̂) = −S_0
-  const Eigen::MatrixXd K = inverse(root);
+  const Eigen::MatrixXd K = core::inverse(root);
   std::vector<double> norms;
   std::vector<std::vector<double>> up(static_cast<std::size_t>(q)), down(static_cast<std::size_t>(q));
   for (Eigen::Index i = 1; i < c_.cols(); ++i) {
@@ -167,8 +168,8 @@ SignPerturbedBounds SignPerturbedSums::bounds() const {
     for (Eigen::Index j = 0; j < q; ++j) {
       const double shift = rows.row(j).dot(centre);
       const double reach = std::sqrt(size * (rows.row(j).transpose().array().square() / e.lambda.array()).sum());
-      up[static_cast<std::size_t>(j)].push_back(e.bounded ? shift + reach : kInfinity);
-      down[static_cast<std::size_t>(j)].push_back(e.bounded ? reach - shift : kInfinity);
+      up[static_cast<std::size_t>(j)].push_back(e.bounded ? shift + reach : core::kInfinity);
+      down[static_cast<std::size_t>(j)].push_back(e.bounded ? reach - shift : core::kInfinity);
     }
   }
   result.radius = nth_largest(norms, q_);
@@ -195,7 +196,7 @@ RegionRow nothing(RegionMethod method, double confidence, std::size_t p) {
   return row;
 }
 
-RegionRow student_row(const Estimate& estimate, double confidence, std::size_t p) {
+RegionRow student_row(const identify::Estimate& estimate, double confidence, std::size_t p) {
   RegionRow row = nothing(RegionMethod::student_t, confidence, p);
   row.promise = fmt::format(
       "{:.4g} % of such logs for each parameter, in the long run, while the errors' mean does not depend on the motion "
@@ -204,7 +205,7 @@ RegionRow student_row(const Estimate& estimate, double confidence, std::size_t p
   row.available = estimate.usable;
   row.remark = estimate.reason;
   if (row.available) {
-    const double t = student_quantile(confidence, estimate.freedom);
+    const double t = core::student_quantile(confidence, estimate.freedom);
     row.lower = estimate.theta - t * estimate.standard_error;
     row.upper = estimate.theta + t * estimate.standard_error;
   }
@@ -276,11 +277,11 @@ std::string_view to_string(RegionMethod method) {
   return {};
 }
 
-RegionComparison compare_regions(const RegressionMoments& moments, const Estimate& estimate,
+RegionComparison compare_regions(const identify::RegressionMoments& moments, const identify::Estimate& estimate,
                                  const RegionOptions& options, const std::optional<IntervalBounds>& hull) {
   const std::size_t p = moments.parameters();
   check::that(static_cast<std::size_t>(estimate.theta.size()) == p, "estimate", "one of these moments");
-  const bool instruments = estimate.estimator == Estimator::instrumental_variables;
+  const bool instruments = estimate.estimator == identify::Estimator::instrumental_variables;
   BlockBootstrapOptions bootstrap_options = options.bootstrap;
   bootstrap_options.confidence = options.confidence;
   bootstrap_options.instruments = instruments;
@@ -296,7 +297,7 @@ RegionComparison compare_regions(const RegressionMoments& moments, const Estimat
   comparison.bootstrap_seconds = bootstrap.seconds;
   comparison.sign_seconds = sums.group_seconds();
   comparison.sign_groups = sums.groups();
-  if (!instruments && estimate.estimator != Estimator::least_squares) {
+  if (!instruments && estimate.estimator != identify::Estimator::least_squares) {
     for (std::size_t i : {std::size_t{1}, std::size_t{2}}) {
       std::string& remark = comparison.rows[i].remark;
       remark += remark.empty() ? "" : "; ";
@@ -311,4 +312,4 @@ RegionComparison compare_regions(const RegressionMoments& moments, const Estimat
   return comparison;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::inference

@@ -19,11 +19,11 @@
 #include <wheelwright/identify/moments.hpp>
 #include <wheelwright/inference/block_bootstrap.hpp>
 
-namespace wheelwright {
+namespace wheelwright::inference {
 
 /// Options of the region.
 struct SignPerturbedOptions {
-  EstimatorOptions
+  identify::EstimatorOptions
       estimator;             ///< weights and parameters that are zero; weights made of the log's own residuals keep the
                              ///< probability nearly, given ones exactly
   bool instruments = true;   ///< use the instruments where the moments have them (Volpe, Csáji and Weyer 2015)
@@ -57,7 +57,7 @@ struct SignPerturbedBounds {
 class SignPerturbedSums {
  public:
   /// Draws the signs. Throws InvalidArgument for options out of range or too few `sums` for the confidence.
-  explicit SignPerturbedSums(const RegressionMoments& moments, const SignPerturbedOptions& options = {});
+  explicit SignPerturbedSums(const identify::RegressionMoments& moments, const SignPerturbedOptions& options = {});
 
   /// True if the sums could be formed; if not, nothing is excluded: the region is everything.
   [[nodiscard]] bool usable() const { return usable_; }
@@ -141,8 +141,8 @@ struct RegionComparison {
 /// Compares on the moments of one log. Bootstrap and sign-perturbed sums take instruments when `estimate` is one of
 /// instrumental variables; they have no form for the two estimators that take noise out of Σ YᵀY, are made for least
 /// squares there, and the remark says so.
-[[nodiscard]] RegionComparison compare_regions(const RegressionMoments& moments, const Estimate& estimate,
-                                               const RegionOptions& options = {},
+[[nodiscard]] RegionComparison compare_regions(const identify::RegressionMoments& moments,
+                                               const identify::Estimate& estimate, const RegionOptions& options = {},
                                                const std::optional<IntervalBounds>& hull = std::nullopt);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::inference

@@ -12,7 +12,7 @@
 #include <wheelwright/identify/moments.hpp>
 #include <wheelwright/inference/m_estimate.hpp>
 
-namespace wheelwright {
+namespace wheelwright::inference {
 namespace {
 
 constexpr double kMadOfGaussian = 0.674489750196081743;  // median |Z| of a standard normal Z
@@ -26,7 +26,7 @@ struct HeldRows {
   RegressionBlock block;  // without dY, dy
   std::size_t seen = 0;
 
-  HeldRows(RegressionSource& rows, std::size_t most) {
+  HeldRows(core::RegressionSource& rows, std::size_t most) {
     const std::size_t n = rows.outputs(), p = rows.parameters();
     std::vector<double> Y, y;
     std::size_t stride = 1, held = 0;
@@ -61,7 +61,8 @@ struct HeldRows {
     block.outputs = n;
     block.parameters = p;
     block.t.resize(held);
-    block.Y = Eigen::Map<const RowMatrix>(Y.data(), static_cast<Eigen::Index>(held * n), static_cast<Eigen::Index>(p));
+    block.Y =
+        Eigen::Map<const core::RowMatrix>(Y.data(), static_cast<Eigen::Index>(held * n), static_cast<Eigen::Index>(p));
     block.y = Eigen::Map<const Eigen::VectorXd>(y.data(), static_cast<Eigen::Index>(held * n));
   }
   [[nodiscard]] bool all() const { return block.instants() == seen; }
@@ -69,7 +70,7 @@ struct HeldRows {
 
 /// Folds the rows of `block`, weighted for the residuals at `theta`, into `sums`.
 void add_reweighted(const RegressionBlock& block, const Eigen::VectorXd& theta, const Eigen::VectorXd& scales,
-                    const LossFunction& loss, LeastSquares& sums) {
+                    const LossFunction& loss, identify::LeastSquares& sums) {
   RegressionBlock weighted;
   weighted.outputs = block.outputs;
   weighted.parameters = block.parameters;
@@ -159,7 +160,7 @@ class Gathering {
       weights.rejected = static_cast<double>(rejected_[i]) / count;
       fit.outputs.push_back(weights);
     }
-    const LongRunCovariance scores = long_run_covariance(scores_);
+    const identify::LongRunCovariance scores = identify::long_run_covariance(scores_);
     const Eigen::MatrixXd inverse = inverse_bread(fit.active, constraints);
     fit.covariance = inverse * scores.matrix * inverse;
     fit.standard_error = fit.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
@@ -215,14 +216,14 @@ class Gathering {
     }
     Eigen::MatrixXd face = Eigen::MatrixXd::Identity(p, p);
     if (holding.cols() > 0) {
-      const PivotedQr qr(holding);
+      const core::PivotedQr qr(holding);
       face = qr.Q().rightCols(p - qr.rank());
     }
     if (face.cols() == 0) {
       return Eigen::MatrixXd::Zero(p, p);
     }
     const Eigen::MatrixXd moving = scale.asDiagonal() * face;
-    const EigenPairs eigen = symmetric_eigen(moving.transpose() * bread_ * moving);
+    const core::EigenPairs eigen = core::symmetric_eigen(moving.transpose() * bread_ * moving);
     const Eigen::VectorXd inverse =
         eigen.values.unaryExpr([](double value) { return value > 1e-12 ? 1.0 / value : 0.0; });
     return moving * eigen.vectors * inverse.asDiagonal() * eigen.vectors.transpose() * moving.transpose();
@@ -233,7 +234,7 @@ class Gathering {
   double half_;
   std::size_t most_;
   Eigen::MatrixXd bread_;
-  BlockSums scores_;
+  identify::BlockSums scores_;
   double objective_ = 0.0;
   std::size_t instants_ = 0;
   std::vector<std::optional<Episode>> open_;
@@ -244,7 +245,7 @@ class Gathering {
 /// The steps of a fit, on what they share.
 class Fitting {
  public:
-  Fitting(RegressionSource& rows, const RobustOptions& options)
+  Fitting(core::RegressionSource& rows, const RobustOptions& options)
       : rows_(rows),
         options_(options),
         held_(rows, options.most_instants),
@@ -277,9 +278,9 @@ class Fitting {
 
  private:
   /// Sets the estimate to the least-squares fit of `sums`; false where the constraints contradict each other.
-  bool settle(const LeastSquares& sums) {
+  bool settle(const identify::LeastSquares& sums) {
     if (options_.constraints.empty()) {
-      const LeastSquaresFit fit = sums.solve();
+      const identify::LeastSquaresFit fit = sums.solve();
       theta_ = fit.estimate;
       fit_.rank = fit.rank;
       return true;
@@ -295,7 +296,7 @@ class Fitting {
   }
 
   bool start() {
-    LeastSquares sums(rows_.parameters());
+    identify::LeastSquares sums(rows_.parameters());
     sums.add(held_.block);
     if (!settle(sums)) {
       return false;
@@ -303,7 +304,7 @@ class Fitting {
     std::vector<bool> at_floor(rows_.outputs());
     scales_ = median_scales(held_.block, theta_, at_floor);
     for (int round = 0; round < kScaleRounds; ++round) {
-      LeastSquares weighted(rows_.parameters());
+      identify::LeastSquares weighted(rows_.parameters());
       add_reweighted(held_.block, theta_, scales_, {Loss::huber, kStartTuning}, weighted);
       settle(weighted);
       const Eigen::VectorXd before = scales_;
@@ -329,7 +330,7 @@ class Fitting {
   void finish() {
     fit_.status = RobustStatus::not_converged;
     while (fit_.passes < options_.most_passes && fit_.status == RobustStatus::not_converged) {
-      LeastSquares sums(rows_.parameters());
+      identify::LeastSquares sums(rows_.parameters());
       if (held_.all()) {
         add_reweighted(held_.block, theta_, scales_, loss_, sums);
       } else {
@@ -348,7 +349,7 @@ class Fitting {
     }
   }
 
-  RegressionSource& rows_;
+  core::RegressionSource& rows_;
   const RobustOptions& options_;
   HeldRows held_;
   LossFunction loss_;
@@ -360,7 +361,7 @@ class Fitting {
 
 }  // namespace
 
-RobustFit robust_fit(RegressionSource& rows, const RobustOptions& options) {
+RobustFit robust_fit(core::RegressionSource& rows, const RobustOptions& options) {
   check::non_negative(options.tuning, "tuning constant");
   check::that(options.most_instants >= 8, "most_instants", "at least 8");
   check::that(options.most_passes >= 1, "most_passes", "at least 1");
@@ -373,4 +374,4 @@ RobustFit robust_fit(RegressionSource& rows, const RobustOptions& options) {
   return Fitting(rows, options).run();
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::inference

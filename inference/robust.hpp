@@ -13,7 +13,7 @@
 #include <wheelwright/inference/constrained.hpp>
 #include <wheelwright/inference/m_estimate.hpp>
 
-namespace wheelwright {
+namespace wheelwright::inference {
 
 /// Choices of a robust fit.
 struct RobustOptions {
@@ -100,6 +100,6 @@ struct RobustFit {
 /// start: no method that starts from least squares withstands many of them.
 ///
 /// Throws InvalidArgument for options outside their ranges and for a source without instants.
-[[nodiscard]] RobustFit robust_fit(RegressionSource& rows, const RobustOptions& options = {});
+[[nodiscard]] RobustFit robust_fit(core::RegressionSource& rows, const RobustOptions& options = {});
 
-}  // namespace wheelwright
+}  // namespace wheelwright::inference

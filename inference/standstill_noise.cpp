@@ -10,7 +10,7 @@
 #include <wheelwright/core/log.hpp>
 #include <wheelwright/identify/least_squares.hpp>
 
-namespace wheelwright {
+namespace wheelwright::inference {
 namespace {
 
 constexpr double kZero = 1e-9;  // of a command's largest value
@@ -43,10 +43,10 @@ class StandstillGathering {
   StandstillGathering(LogSource& log, const StandstillSigns& signs, const std::vector<std::string>& columns,
                       const StandstillOptions& options)
       : options_(options),
-        commands_(positions_of(log, signs.commands)),
+        commands_(core::positions_of(log, signs.commands)),
         by_angle_(signs.speeds.empty() && !signs.angles.empty()),
-        motion_(positions_of(log, by_angle_ ? signs.angles : signs.speeds)),
-        picked_(positions_of(log, columns)),
+        motion_(core::positions_of(log, by_angle_ ? signs.angles : signs.speeds)),
+        picked_(core::positions_of(log, columns)),
         zero_(commands_.size(), 0.0),
         largest_(motion_.size(), 0.0),
         statistics_(Eigen::VectorXd::Zero(1), Eigen::VectorXd::Ones(static_cast<Eigen::Index>(columns.size()))),
@@ -113,7 +113,7 @@ class StandstillGathering {
     if (stretches_ == 0) {
       return out;
     }
-    const ResidualSummary summary = statistics_.summary(Eigen::MatrixXd::Identity(1, 1));
+    const identify::ResidualSummary summary = statistics_.summary(Eigen::MatrixXd::Identity(1, 1));
     for (std::size_t c = 0; c < picked_.size(); ++c) {
       out.columns[c] = column(c, summary);
     }
@@ -195,7 +195,7 @@ class StandstillGathering {
     seconds_ += t[last - 1] - t[first];
   }
 
-  [[nodiscard]] StandstillNoise column(std::size_t c, const ResidualSummary& summary) const {
+  [[nodiscard]] StandstillNoise column(std::size_t c, const identify::ResidualSummary& summary) const {
     StandstillNoise noise;
     const auto count = static_cast<double>(samples_);
     for (std::size_t s = 0; s < stretches_; ++s) {
@@ -205,7 +205,7 @@ class StandstillGathering {
       noise.offset_spread += std::pow(means_[c][s] - noise.offset, 2.0) / static_cast<double>(stretches_ - 1);
     }
     noise.offset_spread = std::sqrt(noise.offset_spread);
-    OutputResidual rest = summary.outputs[c];
+    identify::OutputResidual rest = summary.outputs[c];
     // Rounding of the mean is no noise.
     if (!(rest.largest > 1e-12 * std::abs(noise.offset))) {
       noise.kind = StandstillNoise::Kind::constant;
@@ -219,7 +219,7 @@ class StandstillGathering {
     noise.relative_sd = std::sqrt(2.0 / rest.effective_instants);
     noise.correlation = neighbours_[c] / squares_[c];
     noise.largest = rest.largest;
-    noise.bound = extrapolate(rest, samples_, options_.extrapolation);
+    noise.bound = identify::extrapolate(rest, samples_, options_.extrapolation);
     return noise;
   }
 
@@ -230,7 +230,7 @@ class StandstillGathering {
   std::vector<double> zero_, largest_, before_;
   double time_before_ = 0.0;
   Stretch stretch_;
-  ResidualStatistics statistics_;
+  identify::ResidualStatistics statistics_;
   std::vector<std::vector<double>> means_;
   std::vector<double> lengths_, neighbours_, squares_;
   std::size_t stretches_ = 0, samples_ = 0;
@@ -240,9 +240,9 @@ class StandstillGathering {
 }  // namespace
 
 StandstillSigns standstill_signs(const LogSource& log, const Model& model) {
-  const auto columns = [&](std::string Joint::*name) {
+  const auto columns = [&](std::string model::Joint::*name) {
     std::vector<std::string> found;
-    for (const Joint& joint : model.joints) {
+    for (const model::Joint& joint : model.joints) {
       if ((joint.*name).empty() || !log.find(joint.*name)) {
         return std::vector<std::string>{};
       }
@@ -250,7 +250,9 @@ StandstillSigns standstill_signs(const LogSource& log, const Model& model) {
     }
     return found;
   };
-  return {.commands = columns(&Joint::command), .speeds = columns(&Joint::speed), .angles = columns(&Joint::angle)};
+  return {.commands = columns(&model::Joint::command),
+          .speeds = columns(&model::Joint::speed),
+          .angles = columns(&model::Joint::angle)};
 }
 
 Standstill standstill_noise(LogSource& log, const StandstillSigns& signs, const std::vector<std::string>& columns,
@@ -262,10 +264,11 @@ Standstill standstill_noise(LogSource& log, const StandstillSigns& signs, const 
   check::that(options.piece >= options.least_time + 2.0 * options.trim, "piece", "a whole stretch with its ends");
   check::that(!columns.empty(), "columns", "at least one");
   StandstillGathering gathering(log, signs, columns, options);
-  for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) { gathering.size_up(block, k, starts); });
-  for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) { gathering.take(block, k, starts); });
+  core::for_each_row(log,
+                     [&](const LogBlock& block, std::size_t k, bool starts) { gathering.size_up(block, k, starts); });
+  core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) { gathering.take(block, k, starts); });
   gathering.finish();
   return gathering.result();
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::inference

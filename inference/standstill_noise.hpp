@@ -11,7 +11,7 @@
 #include <wheelwright/filter/measurement.hpp>
 #include <wheelwright/identify/noise_level.hpp>
 
-namespace wheelwright {
+namespace wheelwright::inference {
 
 /// By which columns standstill is recognised. Commands, where there are any, must be zero; and the motion, where there
 /// is any, must rest too: a robot that coasts or is pushed does not stand still.
@@ -32,7 +32,7 @@ struct StandstillOptions {
   double slow = 0.005;      ///< of the same: the mean speed of each half of a stretch is below, so slow creeping is
                             ///< told from noise about zero
   double piece = 60.0;      ///< s: longer stretches are cut, so slow drift of an offset is not taken for noise
-  ExtrapolationOptions extrapolation;  ///< of the bounds
+  identify::ExtrapolationOptions extrapolation;  ///< of the bounds
 };
 
 /// One column at standstill.
@@ -45,13 +45,13 @@ struct StandstillNoise {
     noisy,     ///< changes
   };
   Kind kind = Kind::not_seen;
-  double offset = 0.0;         ///< mean over all stretches, unit of the column
-  double offset_spread = 0.0;  ///< standard deviation of the stretches' means; 0 for a single one
-  double sd = 0.0;             ///< within the stretches, about their means
-  double relative_sd = 0.0;    ///< standard error of sd², relative to it, allowing for autocorrelation
-  double correlation = 0.0;    ///< between neighbouring samples
-  double largest = 0.0;        ///< largest deviation from a stretch's mean
-  ExtrapolatedBound bound;     ///< on the deviation, extrapolated over the horizon as noise_level.hpp says
+  double offset = 0.0;                ///< mean over all stretches, unit of the column
+  double offset_spread = 0.0;         ///< standard deviation of the stretches' means; 0 for a single one
+  double sd = 0.0;                    ///< within the stretches, about their means
+  double relative_sd = 0.0;           ///< standard error of sd², relative to it, allowing for autocorrelation
+  double correlation = 0.0;           ///< between neighbouring samples
+  double largest = 0.0;               ///< largest deviation from a stretch's mean
+  identify::ExtrapolatedBound bound;  ///< on the deviation, extrapolated over the horizon as noise_level.hpp says
 };
 
 /// The noise levels of the columns, and the stretches of standstill that they come from.
@@ -72,4 +72,4 @@ struct Standstill {
                                           const std::vector<std::string>& columns,
                                           const StandstillOptions& options = {});
 
-}  // namespace wheelwright
+}  // namespace wheelwright::inference

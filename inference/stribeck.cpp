@@ -8,7 +8,7 @@
 
 #include <wheelwright/core/check.hpp>
 
-namespace wheelwright {
+namespace wheelwright::inference {
 namespace {
 
 using Jet = ceres::Jet<double, 1>;
@@ -28,11 +28,11 @@ StribeckRows::StribeckRows(LogSource& log, RegressorFilter filter)
     : kernel_(filter.design(), filter.measurement().motion, filter.measurement().nominal_step),
       input_(filter.model().input) {
   const Measurement& measurement = filter.measurement();
-  const std::vector<std::size_t> pick = positions_of(log, measurement.columns());
+  const std::vector<std::size_t> pick = core::positions_of(log, measurement.columns());
   const auto joints = filter.model().joints.size();
   std::vector<double> sample(pick.size()), speeds, Y, y;
   std::size_t seen = 0;
-  for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
+  core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
     if (starts) {
       filter.restart();
       seen = 0;
@@ -48,19 +48,19 @@ StribeckRows::StribeckRows(LogSource& log, RegressorFilter filter)
     }
     seen = filter.instants();
     if (gives_row) {
-      const FilteredRow& row = filter.row();
+      const filter::FilteredRow& row = filter.row();
       Y.insert(Y.end(), row.Y.data(), row.Y.data() + row.Y.size());
       y.insert(y.end(), row.y.data(), row.y.data() + row.y.size());
     }
   });
   check::that(!y.empty(), "log", "at least one filtered row");
   response_ = Eigen::Map<const Eigen::VectorXd>(y.data(), static_cast<Eigen::Index>(y.size()));
-  Y_ = Eigen::Map<const RowMatrix>(Y.data(), response_.size(), static_cast<Eigen::Index>(filter.model().p()));
+  Y_ = Eigen::Map<const core::RowMatrix>(Y.data(), response_.size(), static_cast<Eigen::Index>(filter.model().p()));
   speed_ = Eigen::Map<const Eigen::MatrixXd>(speeds.data(), static_cast<Eigen::Index>(joints),
                                              static_cast<Eigen::Index>(instants_.size()));
 }
 
-bool StribeckRows::evaluate(const Eigen::VectorXd& shape, bool derivatives, SeparableValues& at) const {
+bool StribeckRows::evaluate(const Eigen::VectorXd& shape, bool derivatives, identify::SeparableValues& at) const {
   if (!(shape[0] > 0.0)) {
     return false;
   }
@@ -73,10 +73,10 @@ bool StribeckRows::evaluate(const Eigen::VectorXd& shape, bool derivatives, Sepa
   at.columns.leftCols(p) = Y_;
   at.columns_by.assign(derivatives ? 1 : 0, Eigen::MatrixXd::Zero(response_.size(), p + 1));
   const auto joints = static_cast<std::size_t>(speed_.rows());
-  std::vector<KernelState> value(joints), slope(joints);
+  std::vector<filter::KernelState> value(joints), slope(joints);
   std::vector<Jet> before(joints);
   Eigen::VectorXd filtered(speed_.rows()), filtered_slope(speed_.rows());
-  FilterKernel kernel = kernel_;
+  filter::FilterKernel kernel = kernel_;
   Eigen::Index next = 0;
   for (std::size_t k = 0; k < instants_.size(); ++k) {
     const Instant& instant = instants_[k];
@@ -110,4 +110,4 @@ bool StribeckRows::evaluate(const Eigen::VectorXd& shape, bool derivatives, Sepa
   return true;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::inference

@@ -10,7 +10,7 @@
 #include <wheelwright/filter/regressor_filter.hpp>
 #include <wheelwright/identify/variable_projection.hpp>
 
-namespace wheelwright {
+namespace wheelwright::inference {
 
 /// y_f ≈ Y_f θ + c f*(B g(ω; ω_s)), where g_j = exp(−(|ω_j|/ω_s)²) sgn ω_j at each joint, B is Model::input (joint
 /// efforts to outputs) and f the torque filter: p + 1 linear parameters, the last is c (N·m at each joint), and the
@@ -20,7 +20,7 @@ namespace wheelwright {
 /// them as measured efforts are; angles and mean speeds give g of each step's mean speed, as every other function of
 /// the motion. A model with Coulomb friction already in Y keeps it: c is what is added at low speed. Without slow
 /// driving ω_s is flat (ShapeState::flat).
-class StribeckRows final : public SeparableModel {
+class StribeckRows final : public identify::SeparableModel {
  public:
   /// Walks `log` once through `filter` and keeps the rows. Throws InvalidArgument when the log lacks a column of the
   /// filter's measurement or gives no row.
@@ -31,7 +31,7 @@ class StribeckRows final : public SeparableModel {
   [[nodiscard]] Eigen::Index shapes() const override { return 1; }
   [[nodiscard]] Eigen::Index columns() const override { return Y_.cols() + 1; }
   /// Defined for ω_s > 0.
-  bool evaluate(const Eigen::VectorXd& shape, bool derivatives, SeparableValues& at) const override;
+  bool evaluate(const Eigen::VectorXd& shape, bool derivatives, identify::SeparableValues& at) const override;
 
  private:
   // An instant of the filter: the step that ends there, and whether it begins a segment and gives a row.
@@ -39,7 +39,7 @@ class StribeckRows final : public SeparableModel {
     double length;
     bool begins, gives_row;
   };
-  FilterKernel kernel_;
+  filter::FilterKernel kernel_;
   Eigen::MatrixXd input_;
   std::vector<Instant> instants_;
   Eigen::MatrixXd speed_;  // joints × instants
@@ -47,4 +47,4 @@ class StribeckRows final : public SeparableModel {
   Eigen::VectorXd response_;
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::inference

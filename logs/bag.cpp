@@ -21,7 +21,7 @@
 #include <wheelwright/logs/mcap_format.hpp>
 #include <wheelwright/logs/ros_extractor.hpp>
 
-namespace wheelwright {
+namespace wheelwright::logs {
 namespace {
 
 namespace fs = std::filesystem;
@@ -209,7 +209,7 @@ class Bag final : public BagReader {
   BagTopic described(const bag::SourceTopic& topic, std::size_t place) {
     BagTopic found{topic.name, topic.type, topic.encoding, {}, {}, 0};
     if (topic.encoding != "cdr") {
-      found.no_definition = fmt::format("its messages are in {}: only cdr can be read", shown(topic.encoding));
+      found.no_definition = fmt::format("its messages are in {}: only cdr can be read", files::shown(topic.encoding));
       return found;
     }
     if (topic.schema_encoding == "ros2msg" && !topic.schema.empty()) {
@@ -242,7 +242,7 @@ class Bag final : public BagReader {
       found.no_definition.clear();
     } else {
       found.no_definition += fmt::format(
-          ", and {} is not bundled: expected the directory of its .msg file as --msg-path", shown(topic.type));
+          ", and {} is not bundled: expected the directory of its .msg file as --msg-path", files::shown(topic.type));
     }
     return found;
   }
@@ -315,7 +315,7 @@ bool is_bag(const fs::path& path) {
       default: return false;
     }
     std::string head(16, '\0');
-    head.resize(open_bytes(path)->read(head.data(), head.size()));
+    head.resize(files::open_bytes(path)->read(head.data(), head.size()));
     return head.starts_with("\x89MCAP") || head.starts_with("SQLite format 3");
   } catch (const InputError&) {
     return false;
@@ -327,9 +327,9 @@ std::unique_ptr<BagReader> open_bag(const std::vector<fs::path>& paths, const Ba
   return std::make_unique<Bag>(paths, options);
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::logs
 
-namespace wheelwright::bag {
+namespace wheelwright::logs::bag {
 namespace {
 
 constexpr std::size_t bag_piece = std::size_t{1} << 18;
@@ -382,7 +382,7 @@ class PackedSource final : public Source {
       }
     };
     check(to != nullptr);
-    const auto from = open_bytes(path, hashed);
+    const auto from = files::open_bytes(path, hashed);
     std::vector<char> buffer(bag_piece);
     std::uint64_t unpacked = 0;
     try {
@@ -447,4 +447,4 @@ std::string shown_time(std::int64_t time) {
   return fmt::format("{}{}.{:09} s", time < 0 ? "-" : "", seconds < 0 ? -seconds : seconds, rest < 0 ? -rest : rest);
 }
 
-}  // namespace wheelwright::bag
+}  // namespace wheelwright::logs::bag

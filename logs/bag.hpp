@@ -14,7 +14,7 @@
 
 #include <wheelwright/logs/ros_definition.hpp>
 
-namespace wheelwright {
+namespace wheelwright::logs {
 
 /// A stream of messages of one type.
 struct BagTopic {
@@ -83,9 +83,9 @@ class BagReader {
 [[nodiscard]] std::unique_ptr<BagReader> open_bag(const std::vector<std::filesystem::path>& paths,
                                                   const BagOptions& options = {});
 
-}  // namespace wheelwright
+}  // namespace wheelwright::logs
 
-namespace wheelwright::bag {
+namespace wheelwright::logs::bag {
 
 /// A topic as its file has it.
 struct SourceTopic {
@@ -130,4 +130,4 @@ enum class Content { empty, mcap, sqlite, zstd, other };
 /// "1700000000.123456789 s" of a time in ns.
 [[nodiscard]] std::string shown_time(std::int64_t time);
 
-}  // namespace wheelwright::bag
+}  // namespace wheelwright::logs::bag

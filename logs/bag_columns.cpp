@@ -16,7 +16,7 @@
 #include <wheelwright/logs/log_columns.hpp>
 #include <wheelwright/logs/ros_extractor.hpp>
 
-namespace wheelwright {
+namespace wheelwright::logs {
 namespace {
 
 constexpr std::int64_t kSecond = 1'000'000'000;
@@ -193,7 +193,7 @@ class Chooser {
       }
       throw InputError(
           fmt::format("{}: --map {}={}: no topic begins this field: expected TOPIC.FIELD with a topic of {}", path_,
-                      name, field, listed(names)));
+                      name, field, core::listed(names)));
     }
     const BagTopic& own = topic(*found);
     if (!own.definition) {
@@ -222,7 +222,8 @@ class Chooser {
     const bool index = !element.empty() && element.find_first_not_of("0123456789") == std::string::npos;
     if (!index && std::ranges::find(names, element) == names.end()) {
       throw InputError(fmt::format("{}: --map {}={}.{}: the messages name no {}: expected one of {}{}", path_, name,
-                                   topic(k).name, path, shown(element), listed(names), did_you_mean(element, names)));
+                                   topic(k).name, path, files::shown(element), core::listed(names),
+                                   files::did_you_mean(element, names)));
     }
   }
 
@@ -320,7 +321,7 @@ class Chooser {
         choice_.notes.push_back(
             fmt::format("{} has {} {} joints ({}): none was taken; --map omega_{}={}.velocity[{}] "
                         "and the like choose one",
-                        view.topic->name, of_side.size(), side == "r" ? "right" : "left", listed(of_side), side,
+                        view.topic->name, of_side.size(), side == "r" ? "right" : "left", core::listed(of_side), side,
                         view.topic->name, of_side.front()));
       }
     }
@@ -356,8 +357,8 @@ class Chooser {
         places.push_back(topic(offer->topic).name);
       }
       choice_.notes.push_back(fmt::format(
-          "{} was left out since several topics have it ({}): --map {}={}.{} takes one", name, listed(places), name,
-          places.front(),
+          "{} was left out since several topics have it ({}): --map {}={}.{} takes one", name, core::listed(places),
+          name, places.front(),
           rivals.front()->column.is_yaw()
               ? rivals.front()->column.fields.front().substr(0, rivals.front()->column.fields.front().size() - 1) +
                     "yaw"
@@ -402,4 +403,4 @@ BagChoice choose_bag_columns(const std::vector<BagTopicView>& topics, const CsvO
   return Chooser(topics, options, path).choose();
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::logs

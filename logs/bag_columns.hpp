@@ -13,7 +13,7 @@
 #include <wheelwright/logs/bag.hpp>
 #include <wheelwright/logs/csv_format.hpp>
 
-namespace wheelwright {
+namespace wheelwright::logs {
 
 /// Clock of a topic, from its first messages.
 struct TopicTimes {
@@ -89,4 +89,4 @@ struct BagTopicView {
 /// The sides that `name` of a joint tells: "r", "l" or nothing.
 [[nodiscard]] std::string side_of_joint(const std::string& name);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::logs

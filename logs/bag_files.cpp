@@ -21,7 +21,7 @@
 #include <wheelwright/files/byte_source.hpp>
 #include <wheelwright/files/words.hpp>
 
-namespace wheelwright::bag {
+namespace wheelwright::logs::bag {
 namespace {
 
 namespace fs = std::filesystem;
@@ -80,7 +80,7 @@ Parts parts_of(const fs::path& path) {
                      ": holds both *.mcap and *.db3 and no metadata.yaml that says which to read: expected "
                      "the files by name");
   }
-  std::sort(names.begin(), names.end(), natural_less);
+  std::sort(names.begin(), names.end(), core::natural_less);
   for (const std::string& name : names) {
     parts.files.push_back({path / name, names.size() == 1});
   }
@@ -107,7 +107,7 @@ std::string quoted(const std::string& text) {
 
 Metadata read_metadata(const std::filesystem::path& path) {
   const std::string name = path.string();
-  const std::string text = read_bytes(path, longest_metadata);
+  const std::string text = files::read_bytes(path, longest_metadata);
   try {
     const YAML::Node information = YAML::Load(text)["rosbag2_bagfile_information"];
     if (!information.IsDefined() || !information.IsMap()) {
@@ -225,4 +225,4 @@ std::optional<std::string_view> MessageUnpacker::unpack(std::string_view data) {
   }
 }
 
-}  // namespace wheelwright::bag
+}  // namespace wheelwright::logs::bag

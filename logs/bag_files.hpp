@@ -11,7 +11,7 @@
 #include <string_view>
 #include <vector>
 
-namespace wheelwright::bag {
+namespace wheelwright::logs::bag {
 
 /// A file to be read.
 struct Part {
@@ -98,4 +98,4 @@ class MessageUnpacker {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace wheelwright::bag
+}  // namespace wheelwright::logs::bag

@@ -18,7 +18,7 @@
 #include <wheelwright/logs/ros_extractor.hpp>
 #include <wheelwright/logs/stream_aligner.hpp>
 
-namespace wheelwright {
+namespace wheelwright::logs {
 namespace {
 
 constexpr std::int64_t one_second = 1'000'000'000;
@@ -393,4 +393,4 @@ std::unique_ptr<RowFile> bag_file(const std::filesystem::path& path, const LogOp
   return std::make_unique<BagFile>(path, options, origin);
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::logs

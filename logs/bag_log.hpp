@@ -11,7 +11,7 @@
 #include <wheelwright/logs/log_file.hpp>
 #include <wheelwright/logs/row_log.hpp>
 
-namespace wheelwright {
+namespace wheelwright::logs {
 
 /// Origin of the times of all bags of a log, ns: set by the first that is opened.
 using TimeOrigin = std::shared_ptr<std::optional<std::int64_t>>;
@@ -25,4 +25,4 @@ using TimeOrigin = std::shared_ptr<std::optional<std::int64_t>>;
 [[nodiscard]] std::unique_ptr<RowFile> bag_file(const std::filesystem::path& path, const LogOptions& options,
                                                 const TimeOrigin& origin);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::logs

@@ -18,7 +18,7 @@
 #include <wheelwright/logs/mcap_format.hpp>
 #include <wheelwright/logs/mcap_reader.hpp>
 
-namespace wheelwright::bag {
+namespace wheelwright::logs::bag {
 namespace {
 
 class McapSource final : public Source {
@@ -213,11 +213,12 @@ class SqliteSource final : public Source {
       throw InputError(fmt::format("{}: its list of tables cannot be read ({}): expected a whole SQLite database",
                                    shown_, database_.error()));
     }
-    std::transform(names.begin(), names.end(), names.begin(), [](const std::string& name) { return shown(name); });
+    std::transform(names.begin(), names.end(), names.begin(),
+                   [](const std::string& name) { return files::shown(name); });
     throw InputError(
         fmt::format("{}: is an SQLite database but no recording: it has {}: expected the tables topics and "
                     "messages, as rosbag2 writes them",
-                    shown_, names.empty() ? "no tables" : "the tables " + listed(names)));
+                    shown_, names.empty() ? "no tables" : "the tables " + core::listed(names)));
   }
 
   void read_topics() {
@@ -405,4 +406,4 @@ std::unique_ptr<Source> open_sqlite(const fs::path& path, const std::string& sho
   return std::make_unique<SqliteSource>(path, shown, hashed);
 }
 
-}  // namespace wheelwright::bag
+}  // namespace wheelwright::logs::bag

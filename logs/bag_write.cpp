@@ -23,7 +23,7 @@
 #include <wheelwright/logs/ros_definition.hpp>
 #include <wheelwright/logs/ros_write.hpp>
 
-namespace wheelwright {
+namespace wheelwright::logs {
 namespace {
 
 namespace fs = std::filesystem;
@@ -146,7 +146,7 @@ class SqliteSink final : public BagWriter::Sink {
     }
   }
 
-  FileBeside beside_;  // removed last, when the database is closed
+  files::FileBeside beside_;  // removed last, when the database is closed
   std::unique_ptr<bag::Database> database_;
   bag::Statement message_;
   std::vector<std::string> types_;
@@ -249,7 +249,7 @@ void BagWriter::write(std::size_t topic, std::int64_t log_time, std::string_view
 void BagWriter::commit() {
   impl_->sink->commit();
   if (impl_->directory) {
-    atomic_write(impl_->directory->temporary() / "metadata.yaml", bag::metadata_text(impl_->bag));
+    files::atomic_write(impl_->directory->temporary() / "metadata.yaml", bag::metadata_text(impl_->bag));
     impl_->directory->commit();
   }
 }
@@ -413,4 +413,4 @@ std::unique_ptr<LogWriter> create_bag(const std::filesystem::path& path, const s
   return std::make_unique<BagLogWriter>(path, names, options);
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::logs

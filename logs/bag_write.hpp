@@ -12,7 +12,7 @@
 
 #include <wheelwright/logs/mcap_format.hpp>
 
-namespace wheelwright {
+namespace wheelwright::logs {
 
 /// Options for writing a recording.
 struct BagWriterOptions {
@@ -48,4 +48,4 @@ class BagWriter {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::logs

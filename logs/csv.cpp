@@ -18,14 +18,14 @@
 #include <wheelwright/logs/row_log.hpp>
 #include <wheelwright/logs/stream_aligner.hpp>
 
-namespace wheelwright {
+namespace wheelwright::logs {
 namespace {
 
 constexpr std::size_t rows_looked_at = 5000;  ///< rows at the beginning of a file, for columns with rates of their own
 
 /// Content lines of one file behind its header.
 struct FileWalk {
-  FileWalk(const std::filesystem::path& path, bool hashed) : lines(open_bytes(path, hashed), path.string()) {}
+  FileWalk(const std::filesystem::path& path, bool hashed) : lines(files::open_bytes(path, hashed), path.string()) {}
 
   bool next(std::string_view& line) {
     while (lines.next(line)) {
@@ -36,7 +36,7 @@ struct FileWalk {
     return false;
   }
 
-  LineReader lines;
+  files::LineReader lines;
 };
 
 CsvHeader header_of(FileWalk& walk, const CsvOptions& options, const std::string& path) {
@@ -79,7 +79,7 @@ std::vector<std::string> fields_without(const CsvHeader& header, const std::vect
 
 void describe_file(const FileWalk& lines, const CsvHeader& header, const std::vector<std::string>& names,
                    LogFileReport& file) {
-  const ByteSource& source = lines.lines.source();
+  const files::ByteSource& source = lines.lines.source();
   file.format = "csv";
   file.packing = source.packing();
   file.bytes = source.file_bytes();
@@ -467,4 +467,4 @@ std::vector<CsvStream> CsvStreamFinder::streams() const {
   return found;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::logs

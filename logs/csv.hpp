@@ -20,7 +20,7 @@
 #include <wheelwright/logs/recorded_log.hpp>
 #include <wheelwright/logs/row_log.hpp>
 
-namespace wheelwright {
+namespace wheelwright::logs {
 
 /// A log in one or several CSV files. Memory does not grow with the files.
 class CsvLog final : public RowLog {
@@ -98,4 +98,8 @@ class CsvStreamFinder {
   std::vector<std::vector<bool>> filled_;  ///< of each column, in each row
 };
 
+}  // namespace wheelwright::logs
+
+namespace wheelwright {
+using logs::CsvLog;
 }  // namespace wheelwright

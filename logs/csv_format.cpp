@@ -15,7 +15,10 @@
 #include <wheelwright/files/words.hpp>
 #include <wheelwright/logs/log_columns.hpp>
 
-namespace wheelwright {
+namespace wheelwright::logs {
+
+using files::shown;
+
 namespace {
 
 std::string_view trimmed_field(std::string_view text) {
@@ -49,10 +52,10 @@ void check_is_text(std::string_view line, const std::string& place) {
 
 void check_has_names(const std::vector<std::string>& fields, const std::string& place) {
   const bool numbers = std::all_of(fields.begin(), fields.end(),
-                                   [](const std::string& f) { return f.empty() || to_number(f).has_value(); });
+                                   [](const std::string& f) { return f.empty() || files::to_number(f).has_value(); });
   if (numbers) {
     throw InputError(fmt::format("{}: {}: expected a header line with the names of the columns (t, omega_r, ...)",
-                                 place, shown(listed(fields))));
+                                 place, shown(core::listed(fields))));
   }
 }
 
@@ -82,8 +85,8 @@ std::size_t demand_field(const std::vector<std::string>& fields, const std::stri
     }
     return *field;
   }
-  throw InputError(fmt::format("{}: no column {} ({}): expected one of {}{}", place, shown(name), why, listed(fields),
-                               did_you_mean(name, fields)));
+  throw InputError(fmt::format("{}: no column {} ({}): expected one of {}{}", place, shown(name), why,
+                               core::listed(fields), files::did_you_mean(name, fields)));
 }
 
 void recognise(CsvHeader& header, const CsvOptions& options, const std::string& place) {
@@ -161,7 +164,7 @@ CsvHeader read_csv_header(std::string_view line, const CsvOptions& options, cons
   recognise(header, options, place);
   if (!header.found.contains("t")) {
     throw InputError(fmt::format("{}: no column for t (time, s): expected one of {}{}; see --map t=COLUMN", place,
-                                 listed(header.fields), did_you_mean("time", header.fields)));
+                                 core::listed(header.fields), files::did_you_mean("time", header.fields)));
   }
   return header;
 }
@@ -198,7 +201,7 @@ void CsvRowReader::begin_file(const CsvHeader& header, std::string path) {
   const auto take = [&](const std::string& name, int slot) {
     const auto found = header.found.find(name);
     if (found == header.found.end()) {
-      throw InputError(fmt::format("{}: no column for {}: expected one of {}", path_, name, listed(fields_)));
+      throw InputError(fmt::format("{}: no column for {}: expected one of {}", path_, name, core::listed(fields_)));
     }
     int& of_field = slots_[found->second];
     if (of_field >= 0) {
@@ -237,7 +240,7 @@ std::size_t CsvRowReader::read_fields(std::string_view line, Defect& defect) {
       }
       const auto index = static_cast<std::size_t>(slot);
       double& value = values_[index];
-      const char* q = parse_number(p, end, value);
+      const char* q = files::parse_number(p, end, value);
       if (q == nullptr || (q != end && *q != separator)) {
         q = read_odd_field(p, end, field, value, defect);
       } else if (!(std::abs(value) <= limits[index])) {
@@ -280,7 +283,7 @@ const char* CsvRowReader::read_odd_field(const char* p, const char* end, std::si
   }
   const std::string_view text(p, static_cast<std::size_t>(last - p));
   Fault fault = Fault::none;
-  if (p == last || parse_number(p, last, value) != last) {
+  if (p == last || files::parse_number(p, last, value) != last) {
     fault = means_missing(text) ? Fault::empty : Fault::text;
   } else if (!std::isfinite(value)) {
     fault = Fault::not_finite;
@@ -341,4 +344,4 @@ std::string CsvRowReader::describe(const Defect& defect) const {
   return fmt::format("{}: {}", where, cleaner_.expectation(static_cast<std::size_t>(slots_[defect.field])));
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::logs

@@ -13,7 +13,7 @@
 
 #include <wheelwright/logs/row_log.hpp>
 
-namespace wheelwright {
+namespace wheelwright::logs {
 
 /// Options for reading a CSV log.
 struct CsvOptions {
@@ -103,4 +103,4 @@ class CsvRowReader {
   std::vector<bool> missable_;  ///< of each value; empty: none
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::logs

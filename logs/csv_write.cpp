@@ -14,7 +14,7 @@
 #include <wheelwright/logs/csv.hpp>
 #include <wheelwright/logs/log_file.hpp>
 
-namespace wheelwright {
+namespace wheelwright::logs {
 namespace {
 
 constexpr std::size_t rows_written_at_once = 4096;
@@ -22,12 +22,12 @@ constexpr std::size_t rows_written_at_once = 4096;
 /// Takes text, puts bytes into a file.
 class Packer {
  public:
-  explicit Packer(AtomicFile& file) : file_(file) {}
+  explicit Packer(files::AtomicFile& file) : file_(file) {}
   virtual ~Packer() = default;
   virtual void write(std::string_view text, bool last) = 0;
 
  protected:
-  AtomicFile& file_;
+  files::AtomicFile& file_;
 };
 
 class PlainPacker final : public Packer {
@@ -38,7 +38,7 @@ class PlainPacker final : public Packer {
 
 class GzipPacker final : public Packer {
  public:
-  explicit GzipPacker(AtomicFile& file) : Packer(file) {
+  explicit GzipPacker(files::AtomicFile& file) : Packer(file) {
     if (deflateInit2(&stream_, Z_DEFAULT_COMPRESSION, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY) != Z_OK) {
       throw Error("zlib cannot start");
     }
@@ -65,7 +65,7 @@ class GzipPacker final : public Packer {
 
 class ZstdPacker final : public Packer {
  public:
-  explicit ZstdPacker(AtomicFile& file) : Packer(file), context_(ZSTD_createCCtx()) {
+  explicit ZstdPacker(files::AtomicFile& file) : Packer(file), context_(ZSTD_createCCtx()) {
     if (!context_) {
       throw Error("zstd cannot start");
     }
@@ -92,7 +92,7 @@ class ZstdPacker final : public Packer {
   std::array<char, 1 << 16> buffer_;
 };
 
-std::unique_ptr<Packer> packer_for(const std::filesystem::path& path, AtomicFile& file) {
+std::unique_ptr<Packer> packer_for(const std::filesystem::path& path, files::AtomicFile& file) {
   if (path.extension() == ".gz") {
     return std::make_unique<GzipPacker>(file);
   }
@@ -140,7 +140,7 @@ class CsvWriter final : public LogWriter {
   }
 
  private:
-  AtomicFile file_;
+  files::AtomicFile file_;
   std::unique_ptr<Packer> packer_;
   std::size_t columns_;
   std::string text_;
@@ -174,4 +174,4 @@ void write_csv(const std::filesystem::path& path, const LogTable& table) {
   writer->commit();
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::logs

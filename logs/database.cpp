@@ -12,7 +12,7 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/logs/mcap_format.hpp>
 
-namespace wheelwright::bag {
+namespace wheelwright::logs::bag {
 namespace {
 
 /// `path` as SQLite's "file:" address.
@@ -208,4 +208,4 @@ void DatabaseFile::copy(const fs::path& from, const char* name) {
   fs::permissions(path_, fs::perms::owner_read | fs::perms::owner_write, fs::perm_options::add, error);
 }
 
-}  // namespace wheelwright::bag
+}  // namespace wheelwright::logs::bag

@@ -16,7 +16,7 @@
 struct sqlite3;
 struct sqlite3_stmt;
 
-namespace wheelwright::bag {
+namespace wheelwright::logs::bag {
 
 /// A statement and the row that it is at. It must not outlive its database.
 class Statement {
@@ -108,4 +108,4 @@ class DatabaseFile {
   std::string defect_;
 };
 
-}  // namespace wheelwright::bag
+}  // namespace wheelwright::logs::bag

@@ -21,7 +21,7 @@
 #include <wheelwright/logs/log_file.hpp>
 #include <wheelwright/logs/mcap_format.hpp>
 
-namespace wheelwright {
+namespace wheelwright::logs {
 namespace {
 
 using hdf5::Handle;
@@ -238,11 +238,11 @@ class DatasetChooser {
       throw InputError(fmt::format(
           "{}: no dataset of times: expected one called t, time or the like (in s) beside the columns, or --map "
           "t=/GROUP/DATASET: the file has {}",
-          path_, choice_.header.empty() ? "no one-dimensional numeric dataset" : listed(choice_.header)));
+          path_, choice_.header.empty() ? "no one-dimensional numeric dataset" : core::listed(choice_.header)));
     }
     if (homes.size() > 1) {
-      choice_.notes.push_back(
-          fmt::format("there are several logs in it ({}); the first was read, --map t=… takes another", listed(homes)));
+      choice_.notes.push_back(fmt::format(
+          "there are several logs in it ({}); the first was read, --map t=… takes another", core::listed(homes)));
     }
     return homes.front();
   }
@@ -256,8 +256,8 @@ class DatasetChooser {
         }
       }
     }
-    throw InputError(fmt::format("{}: no dataset {} for column {}: the file has {}{}", path_, wheelwright::shown(place),
-                                 name, listed(choice_.header), did_you_mean(place, choice_.header)));
+    throw InputError(fmt::format("{}: no dataset {} for column {}: the file has {}{}", path_, files::shown(place), name,
+                                 core::listed(choice_.header), files::did_you_mean(place, choice_.header)));
   }
 
   void take(const std::string& name, Source source) { choice_.found.insert_or_assign(name, std::move(source)); }
@@ -267,7 +267,7 @@ class DatasetChooser {
     if (column == nullptr) {
       if (const LogColumn* by_name = recognise_log_column(source.name()); by_name != nullptr && !source.unit.empty()) {
         choice_.notes.push_back(fmt::format("{} was not taken as {}: its unit is {}, expected {}", source.shown(),
-                                            by_name->name, wheelwright::shown(source.unit), by_name->unit));
+                                            by_name->name, files::shown(source.unit), by_name->unit));
       }
       return;
     }
@@ -497,7 +497,7 @@ class Hdf5Writer final : public LogWriter {
     }
   }
 
-  FileBeside beside_;  // removed last, when the file is closed
+  files::FileBeside beside_;  // removed last, when the file is closed
   Handle file_;
   std::vector<Handle> datasets_;  ///< time, then the columns
   hsize_t rows_ = 0;
@@ -510,4 +510,4 @@ std::unique_ptr<LogWriter> create_hdf5(const std::filesystem::path& path, const 
   return std::make_unique<Hdf5Writer>(path, names);
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::logs

@@ -17,7 +17,7 @@
 #include <wheelwright/logs/log_file.hpp>
 #include <wheelwright/logs/row_log.hpp>
 
-namespace wheelwright::hdf5 {
+namespace wheelwright::logs::hdf5 {
 
 /// An identifier and the function that gives it back.
 class Handle {
@@ -46,9 +46,9 @@ class Handle {
   herr_t (*close_)(hid_t) = nullptr;
 };
 
-}  // namespace wheelwright::hdf5
+}  // namespace wheelwright::logs::hdf5
 
-namespace wheelwright {
+namespace wheelwright::logs {
 
 /// True if the file begins as HDF5 files do (without a user block).
 [[nodiscard]] bool is_hdf5(const std::filesystem::path& path);
@@ -59,4 +59,4 @@ namespace wheelwright {
 /// file, but nothing is ever text. Throws InputError, naming file and dataset, for what cannot be read.
 [[nodiscard]] std::unique_ptr<RowFile> hdf5_file(const std::filesystem::path& path, const LogOptions& options);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::logs

@@ -7,7 +7,7 @@
 #include <map>
 #include <vector>
 
-namespace wheelwright {
+namespace wheelwright::logs {
 namespace {
 
 struct Row {
@@ -188,4 +188,4 @@ std::string plain_name(std::string_view text) {
   return out;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::logs

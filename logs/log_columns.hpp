@@ -8,7 +8,7 @@
 #include <string>
 #include <string_view>
 
-namespace wheelwright {
+namespace wheelwright::logs {
 
 /// One column of the contract.
 struct LogColumn {
@@ -37,4 +37,4 @@ struct LogColumn {
 /// `text` in lower case, blanks, '-', '.' and '/' as single '_', none at the ends.
 [[nodiscard]] std::string plain_name(std::string_view text);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::logs

@@ -13,7 +13,7 @@
 #include <wheelwright/logs/csv.hpp>
 #include <wheelwright/logs/hdf5_log.hpp>
 
-namespace wheelwright {
+namespace wheelwright::logs {
 
 std::unique_ptr<RecordedLog> open_log(const std::vector<std::filesystem::path>& paths, const LogOptions& options) {
   check::that(!paths.empty(), "paths", "at least one file");
@@ -77,4 +77,4 @@ std::unique_ptr<LogWriter> create_log(const std::filesystem::path& path, const s
                    "without one for a bag directory");
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::logs

@@ -13,7 +13,7 @@
 #include <wheelwright/logs/mcap_format.hpp>
 #include <wheelwright/logs/recorded_log.hpp>
 
-namespace wheelwright {
+namespace wheelwright::logs {
 
 /// Options for reading a log.
 struct LogOptions : CsvOptions {
@@ -75,4 +75,4 @@ void check_column_names(const std::vector<std::string>& names);
 /// Throws InvalidArgument unless `block` has `columns` columns of its length and finite values only.
 void check_block(const LogBlock& block, std::size_t columns);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::logs

@@ -18,7 +18,7 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/error.hpp>
 
-namespace wheelwright::mcap {
+namespace wheelwright::logs::mcap {
 
 static_assert(std::endian::native == std::endian::little, "MCAP has little-endian fields");
 
@@ -256,7 +256,7 @@ void WindowedFile::rewind() {
   start_ = left_ = 0;
   filled_ = 0;
   crc_ = 0;
-  hash_ = Xxh64();
+  hash_ = files::Xxh64();
 }
 
 namespace {
@@ -432,4 +432,4 @@ std::string_view Packer::pack(std::string_view bytes) {
   return {room.data(), size};
 }
 
-}  // namespace wheelwright::mcap
+}  // namespace wheelwright::logs::mcap

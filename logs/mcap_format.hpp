@@ -20,7 +20,7 @@
 
 #include <wheelwright/files/xxh64.hpp>
 
-namespace wheelwright {
+namespace wheelwright::logs {
 
 /// Compression of the records of a chunk. `lz4` is the LZ4 frame format.
 enum class McapCompression { none, zstd, lz4 };
@@ -55,9 +55,9 @@ struct McapMessage {
   std::string_view data;           ///< to be decoded as the channel says
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::logs
 
-namespace wheelwright::mcap {
+namespace wheelwright::logs::mcap {
 
 /// First and last bytes of a file.
 inline constexpr std::string_view magic{"\x89MCAP0\r\n", 8};
@@ -230,7 +230,7 @@ class WindowedFile {
   std::uint64_t sum_end_ = 0;
   std::uint32_t crc_ = 0;
   bool hashed_;
-  Xxh64 hash_;
+  files::Xxh64 hash_;
 };
 
 /// The word for it in the file: "", "zstd" or "lz4".
@@ -277,4 +277,4 @@ class Packer {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace wheelwright::mcap
+}  // namespace wheelwright::logs::mcap

@@ -15,7 +15,7 @@
 #include <wheelwright/logs/mcap_format.hpp>
 #include <wheelwright/logs/mcap_recovery.hpp>
 
-namespace wheelwright {
+namespace wheelwright::logs {
 namespace {
 
 std::string counted(std::uint64_t count, const char* what) {
@@ -282,7 +282,7 @@ struct McapReader::Impl {
       return;
     }
     const std::uint64_t offset = at_;
-    const std::string word = shown(head.compression);
+    const std::string word = files::shown(head.compression);
     move_to(*end, length, "a chunk");
     const auto lost = [&](const std::string& why) {
       damage(offset, *end - offset, "a chunk is left out: " + why);
@@ -566,4 +566,4 @@ void McapReader::rewind() {
   impl_->begin();
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::logs

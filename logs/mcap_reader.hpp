@@ -21,7 +21,7 @@
 
 #include <wheelwright/logs/mcap_format.hpp>
 
-namespace wheelwright {
+namespace wheelwright::logs {
 
 /// A place of the file that is damaged, cut off or beyond a limit.
 struct McapDamage {
@@ -110,4 +110,4 @@ class McapReader {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::logs

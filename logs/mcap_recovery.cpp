@@ -6,7 +6,7 @@
 
 #include <wheelwright/logs/mcap_format.hpp>
 
-namespace wheelwright::mcap {
+namespace wheelwright::logs::mcap {
 namespace {
 
 /// The content of the record at the front of `fields`, with its kind; ok() of `fields` says whether it was there.
@@ -262,4 +262,4 @@ std::uint64_t find_record(WindowedFile& file, const DataSection& section, std::u
   return section.end;
 }
 
-}  // namespace wheelwright::mcap
+}  // namespace wheelwright::logs::mcap

@@ -13,7 +13,7 @@
 
 #include <wheelwright/logs/mcap_format.hpp>
 
-namespace wheelwright::mcap {
+namespace wheelwright::logs::mcap {
 
 /// Summary at the end of a file.
 struct Summary {
@@ -62,4 +62,4 @@ struct DataSection {
 [[nodiscard]] std::uint64_t find_record(WindowedFile& file, const DataSection& section, std::uint64_t from,
                                         const std::function<bool(std::uint16_t)>& messages);
 
-}  // namespace wheelwright::mcap
+}  // namespace wheelwright::logs::mcap

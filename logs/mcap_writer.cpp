@@ -11,7 +11,7 @@
 #include <wheelwright/files/atomic_file.hpp>
 #include <wheelwright/logs/mcap_format.hpp>
 
-namespace wheelwright {
+namespace wheelwright::logs {
 
 using mcap::Bytes;
 using mcap::head_bytes;
@@ -146,7 +146,7 @@ struct McapWriter::Impl {
   }
 
   McapWriterOptions options;
-  AtomicFile file;
+  files::AtomicFile file;
   mcap::Packer packer;
   std::uint64_t offset = 0;
   std::uint32_t crc = 0;  ///< of everything so far
@@ -211,4 +211,4 @@ void McapWriter::write(const McapMessage& message) {
 
 void McapWriter::commit() { impl_->end(); }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::logs

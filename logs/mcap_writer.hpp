@@ -13,7 +13,7 @@
 
 #include <wheelwright/logs/mcap_format.hpp>
 
-namespace wheelwright {
+namespace wheelwright::logs {
 
 /// Options for writing an MCAP file.
 struct McapWriterOptions {
@@ -51,4 +51,4 @@ class McapWriter {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::logs

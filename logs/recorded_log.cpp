@@ -9,10 +9,10 @@
 #include <wheelwright/files/words.hpp>
 #include <wheelwright/logs/log_columns.hpp>
 
-namespace wheelwright {
+namespace wheelwright::logs {
 
-std::vector<ColumnError> interpolation_errors(const LogReport& report) {
-  std::vector<ColumnError> errors;
+std::vector<core::ColumnError> interpolation_errors(const LogReport& report) {
+  std::vector<core::ColumnError> errors;
   for (const LogFileReport& file : report.files) {
     for (const Interpolation& of : file.interpolated) {
       errors.push_back({of.column, of.error});
@@ -92,15 +92,15 @@ void require_columns(const LogSource& source, const std::vector<std::string>& na
     }
     missing += (missing.empty() ? "" : "; ") + wanted;
     for (const std::string& alternative : alternatives) {
-      const std::string nearest = nearest_name(alternative, has);
+      const std::string nearest = files::nearest_name(alternative, has);
       if (!nearest.empty() && !source.find(nearest)) {
-        hint += fmt::format("; did you mean {}? Then add --map {}={}", shown(nearest), alternative, nearest);
+        hint += fmt::format("; did you mean {}? Then add --map {}={}", files::shown(nearest), alternative, nearest);
         break;
       }
     }
   }
   if (!missing.empty()) {
-    throw InputError(fmt::format("{}: no column for {}: the file has {}{}", file, missing, listed(has), hint));
+    throw InputError(fmt::format("{}: no column for {}: the file has {}{}", file, missing, core::listed(has), hint));
   }
 }
 
@@ -122,4 +122,4 @@ void require_columns(const RecordedLog& log, const std::vector<std::string>& nam
   require_columns(log, names, log.report().files.front().path, log.report().files.front().header);
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::logs

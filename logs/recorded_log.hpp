@@ -11,7 +11,7 @@
 
 #include <wheelwright/core/log.hpp>
 
-namespace wheelwright {
+namespace wheelwright::logs {
 
 /// Count of a defect, and the place of the first one.
 struct Occurrences {
@@ -67,7 +67,7 @@ struct LogReport {
 };
 
 /// The interpolation errors of all columns of all files.
-[[nodiscard]] std::vector<ColumnError> interpolation_errors(const LogReport& report);
+[[nodiscard]] std::vector<core::ColumnError> interpolation_errors(const LogReport& report);
 
 /// The repairs of `report` in words, one sentence each, with count and first place; empty where there were none.
 [[nodiscard]] std::vector<std::string> sentences(const LogReport& report);
@@ -88,4 +88,4 @@ void require_columns(const LogSource& source, const std::vector<std::string>& na
 /// The same for a log that knows its files.
 void require_columns(const RecordedLog& log, const std::vector<std::string>& names);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::logs

@@ -8,7 +8,7 @@
 
 #include <wheelwright/logs/ros_definition.hpp>
 
-namespace wheelwright {
+namespace wheelwright::logs {
 namespace {
 
 struct Entry {
@@ -230,4 +230,4 @@ std::optional<RosDefinition> bundled_ros_definition(const std::string& type_name
   return forms.empty() ? std::nullopt : std::optional(std::move(forms.front()));
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::logs

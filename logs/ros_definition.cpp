@@ -16,7 +16,7 @@
 #include <wheelwright/files/byte_source.hpp>
 #include <wheelwright/files/words.hpp>
 
-namespace wheelwright {
+namespace wheelwright::logs {
 namespace {
 
 constexpr std::size_t longest_definition = std::size_t{1} << 20;
@@ -96,7 +96,7 @@ std::optional<RosDefinition> RosDefinitions::find(const std::string& type_name) 
     }
     const std::string source = file->second.string();
     const std::string text =
-        std::filesystem::is_empty(file->second) ? "" : read_bytes(file->second, longest_definition);
+        std::filesystem::is_empty(file->second) ? "" : files::read_bytes(file->second, longest_definition);
     auto messages = ros::read_messages(name, text, source);
     return &read.emplace(name, std::move(messages[name])).first->second;
   };
@@ -137,9 +137,9 @@ RosDefinitions ros_definitions_from(const std::filesystem::path& directory) {
   return definitions;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::logs
 
-namespace wheelwright::ros {
+namespace wheelwright::logs::ros {
 namespace {
 
 constexpr std::array<std::pair<std::string_view, RosKind>, 15> primitives = {{{"bool", RosKind::boolean},
@@ -198,7 +198,7 @@ struct LineReader {
   std::string_view text;
 
   [[noreturn]] void fail(std::string_view expected) const {
-    throw InputError(fmt::format("{}: line {}: {}: expected {}", source, line, shown(text), expected));
+    throw InputError(fmt::format("{}: line {}: {}: expected {}", source, line, files::shown(text), expected));
   }
 
   /// Fills kind, shape and counts from "float64[<=3]", and the name of a message's type.
@@ -365,7 +365,7 @@ struct Assembler {
     std::vector<RosField> fields;
     for (const TextField& item : text.fields) {
       const auto fail = [&](const std::string& why) {
-        throw InputError(fmt::format("{}: line {}: {}: {}", text.source, item.line, shown(item.text), why));
+        throw InputError(fmt::format("{}: line {}: {}: {}", text.source, item.line, files::shown(item.text), why));
       };
       RosField field = item.field;
       if (field.kind == RosKind::message) {
@@ -429,4 +429,4 @@ RosDefinition assemble(const std::string& type_name, const TextMessages& known,
   return std::move(assembler.definition);
 }
 
-}  // namespace wheelwright::ros
+}  // namespace wheelwright::logs::ros

@@ -13,7 +13,7 @@
 #include <string_view>
 #include <vector>
 
-namespace wheelwright {
+namespace wheelwright::logs {
 
 /// Type of an element of a field. `byte` and `char` of the language are `uint8`, as they are in a message's bytes.
 enum class RosKind : std::uint8_t {
@@ -107,9 +107,9 @@ class RosDefinitions {
 /// directory that can be read, or has no definition.
 [[nodiscard]] RosDefinitions ros_definitions_from(const std::filesystem::path& directory);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::logs
 
-namespace wheelwright::ros {
+namespace wheelwright::logs::ros {
 
 /// A field whose type, where it is a message, is still a name.
 struct TextField {
@@ -142,4 +142,4 @@ using TextMessages = std::map<std::string, TextMessage>;
 /// A bundled type in the form of Humble; nullptr where there is none.
 [[nodiscard]] const TextMessage* bundled_message(const std::string& type_name);
 
-}  // namespace wheelwright::ros
+}  // namespace wheelwright::logs::ros

@@ -15,7 +15,7 @@
 #include <wheelwright/core/limits.hpp>
 #include <wheelwright/logs/ros_plan.hpp>
 
-namespace wheelwright::ros {
+namespace wheelwright::logs::ros {
 namespace {
 
 /// A transport may fill the last bytes up to a multiple of 4.
@@ -294,9 +294,9 @@ bool walk(const MessagePlan& plan, const std::string& type, std::string_view cdr
   return Walk{.plan = plan, .places = places, .to = to, .error = error}.read(cdr, type);
 }
 
-}  // namespace wheelwright::ros
+}  // namespace wheelwright::logs::ros
 
-namespace wheelwright {
+namespace wheelwright::logs {
 namespace {
 
 /// The path to the seconds and to the nanoseconds of the stamp; empty where the type has none.
@@ -373,12 +373,12 @@ bool RosExtractor::read(std::string_view cdr, std::span<double> values) {
   if (values.size() != own.count) {
     check::that(false, "RosExtractor::read", fmt::format("as many values as paths, {}", own.count));
   }
-  std::fill(values.begin(), values.end(), kNan);
+  std::fill(values.begin(), values.end(), core::kNan);
   own.stamp.reset();
   own.error.clear();
   const ros::WalkTargets to{.values = values, .more = own.time};
   if (!ros::walk(own.plan, own.definition.name(), cdr, own.places, to, own.error)) {
-    std::fill(values.begin(), values.end(), kNan);
+    std::fill(values.begin(), values.end(), core::kNan);
     return false;
   }
   if (own.stamped) {
@@ -414,4 +414,4 @@ std::optional<std::vector<std::string>> read_names(const RosDefinition& definiti
   return ros::walk(plan, definition.name(), cdr, places, to, error) ? std::optional(std::move(found)) : std::nullopt;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::logs

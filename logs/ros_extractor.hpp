@@ -15,7 +15,7 @@
 #include <wheelwright/logs/ros_definition.hpp>
 #include <wheelwright/logs/ros_plan.hpp>
 
-namespace wheelwright::ros {
+namespace wheelwright::logs::ros {
 
 /// The place of a name that was not found.
 inline constexpr std::size_t nowhere = ~std::size_t{0};
@@ -35,9 +35,9 @@ struct WalkTargets {
 [[nodiscard]] bool walk(const MessagePlan& plan, const std::string& type, std::string_view cdr,
                         std::vector<std::size_t>& places, const WalkTargets& to, std::string& error);
 
-}  // namespace wheelwright::ros
+}  // namespace wheelwright::logs::ros
 
-namespace wheelwright {
+namespace wheelwright::logs {
 
 /// Reads some numbers of every message of one type.
 ///
@@ -84,4 +84,4 @@ class RosExtractor {
 /// none or the message cannot be read.
 [[nodiscard]] std::optional<std::vector<std::string>> read_names(const RosDefinition& definition, std::string_view cdr);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::logs

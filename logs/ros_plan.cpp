@@ -14,7 +14,7 @@
 #include <wheelwright/files/words.hpp>
 #include <wheelwright/logs/ros_extractor.hpp>
 
-namespace wheelwright {
+namespace wheelwright::logs {
 namespace {
 
 constexpr std::size_t most_paths = 10'000;
@@ -36,7 +36,7 @@ struct PathReader {
   std::vector<std::size_t> messages{};  ///< in which the steps are
 
   [[noreturn]] void fail(const std::string& what) const {
-    throw InputError(fmt::format("{}: {}: {}", definition.name(), shown(whole), what));
+    throw InputError(fmt::format("{}: {}: {}", definition.name(), files::shown(whole), what));
   }
 
   std::size_t take_field(const RosMessage& message) {
@@ -47,8 +47,8 @@ struct PathReader {
                                     [&](const RosField& field) { return field.name == name; });
     if (found == message.fields.end()) {
       const auto names = field_names(message);
-      fail(fmt::format("{} has no field {}{}{}", message.name, shown(name), did_you_mean(name, names),
-                       nearest_name(name, names).empty() ? "; it has " + listed(names) : ""));
+      fail(fmt::format("{} has no field {}{}{}", message.name, files::shown(name), files::did_you_mean(name, names),
+                       files::nearest_name(name, names).empty() ? "; it has " + core::listed(names) : ""));
     }
     return static_cast<std::size_t>(found - message.fields.begin());
   }
@@ -57,14 +57,14 @@ struct PathReader {
     const bool given = rest.starts_with('[');
     if (field.shape == RosShape::single) {
       if (given) {
-        fail(fmt::format("{} is no list", shown(field.name)));
+        fail(fmt::format("{} is no list", files::shown(field.name)));
       }
       return;
     }
     const std::string expected = fmt::format("{0}[0] or {0}[NAME]", field.name);
     const std::size_t end = rest.find(']');
     if (!given || end == std::string_view::npos || end < 2) {
-      fail(fmt::format("{} is a list: expected an element of it as {}", shown(field.name), expected));
+      fail(fmt::format("{} is a list: expected an element of it as {}", files::shown(field.name), expected));
     }
     const std::string_view element = rest.substr(1, end - 1);
     rest.remove_prefix(end + 1);
@@ -72,7 +72,7 @@ struct PathReader {
     const auto [last, error] = std::from_chars(element.data(), element.data() + element.size(), index);
     if (error == std::errc() && last == element.data() + element.size()) {
       if (field.count > 0 && index >= field.count) {
-        fail(fmt::format("{} has at most {} elements, from [0] on", shown(field.name), field.count));
+        fail(fmt::format("{} has at most {} elements, from [0] on", files::shown(field.name), field.count));
       }
       step.index = index;
       return;
@@ -87,7 +87,7 @@ struct PathReader {
     fail(
         fmt::format("no field name, names, joint_names or interface_names of strings says which element of {} that is: "
                     "expected its index, as {}[0]",
-                    shown(field.name), field.name));
+                    files::shown(field.name), field.name));
   }
 
   ros::Path read() {
@@ -107,7 +107,7 @@ struct PathReader {
         fail("expected '.' or the end behind ']'");
       }
       if (field.kind != RosKind::message) {
-        fail(fmt::format("{} has no fields", shown(field.name)));
+        fail(fmt::format("{} has no fields", files::shown(field.name)));
       }
       rest.remove_prefix(1);
       message = field.message;
@@ -174,9 +174,9 @@ std::vector<std::string> numeric_paths(const RosDefinition& definition) {
   return paths;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::logs
 
-namespace wheelwright::ros {
+namespace wheelwright::logs::ros {
 namespace {
 
 constexpr std::size_t most_steps = 100'000;
@@ -414,4 +414,4 @@ MessagePlan make_plan(const RosDefinition& definition, const std::vector<Path>& 
   return std::move(planner.plan);
 }
 
-}  // namespace wheelwright::ros
+}  // namespace wheelwright::logs::ros

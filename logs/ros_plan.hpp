@@ -11,7 +11,7 @@
 
 #include <wheelwright/logs/ros_definition.hpp>
 
-namespace wheelwright::ros {
+namespace wheelwright::logs::ros {
 
 /// One field of a path, and which of its elements.
 struct PathStep {
@@ -82,4 +82,4 @@ struct MessagePlan {
 /// path behind a wstring, and for a definition of more than 100 000 steps.
 [[nodiscard]] MessagePlan make_plan(const RosDefinition& definition, const std::vector<Path>& paths);
 
-}  // namespace wheelwright::ros
+}  // namespace wheelwright::logs::ros

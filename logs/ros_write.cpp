@@ -10,7 +10,7 @@
 
 #include <wheelwright/core/check.hpp>
 
-namespace wheelwright {
+namespace wheelwright::logs {
 namespace {
 
 using eprosima::fastcdr::Cdr;
@@ -118,4 +118,4 @@ std::string ros_field_name(std::string_view name) {
   return out.empty() ? "column" : lower(out.front()) ? out : "column_" + out;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::logs

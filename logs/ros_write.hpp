@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-namespace wheelwright {
+namespace wheelwright::logs {
 
 /// std_msgs/msg/Header.
 struct RosHeader {
@@ -113,4 +113,4 @@ class RosEncoder {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::logs

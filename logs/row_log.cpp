@@ -14,7 +14,7 @@
 #include <wheelwright/core/statistics.hpp>
 #include <wheelwright/logs/log_columns.hpp>
 
-namespace wheelwright {
+namespace wheelwright::logs {
 
 RowCleaner::RowCleaner(const std::vector<std::string>& names, LogReport* report) : names_{"t"}, report_(report) {
   names_.insert(names_.end(), names.begin(), names.end());
@@ -150,7 +150,7 @@ double middle_of(std::vector<double>& steps) {
   if (steps.empty()) {
     return 0.0;
   }
-  return median(std::move(steps));
+  return core::median(std::move(steps));
 }
 
 RowLog::RowLog(std::vector<std::unique_ptr<RowFile>> files, RowLogOptions options)
@@ -281,4 +281,4 @@ bool RowLog::next(LogBlock& block) {
   return count > 0;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::logs

@@ -14,7 +14,7 @@
 
 #include <wheelwright/logs/recorded_log.hpp>
 
-namespace wheelwright {
+namespace wheelwright::logs {
 
 /// Outcome of a row.
 enum class RowOutcome {
@@ -158,4 +158,4 @@ class RowLog : public RecordedLog {
 /// A step of more than this times the median step is a gap.
 inline constexpr double gap_factor = 5.0;
 
-}  // namespace wheelwright
+}  // namespace wheelwright::logs

@@ -10,7 +10,7 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/limits.hpp>
 
-namespace wheelwright {
+namespace wheelwright::logs {
 namespace {
 
 constexpr double turn = 2.0 * std::numbers::pi;
@@ -74,7 +74,7 @@ bool StreamAligner::pop(std::int64_t& time, std::span<double> row) {
   }
   Sample& sample = first.samples.front();
   time = sample.time;
-  std::fill(row.begin(), row.end(), kNan);
+  std::fill(row.begin(), row.end(), core::kNan);
   for (std::size_t k = 0; k < sample.values.size(); ++k) {
     row[first.layout.columns[k]] = sample.values[k];
   }
@@ -134,4 +134,4 @@ void StreamAligner::interpolate(Stream& stream, std::int64_t time, std::span<dou
   }
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::logs

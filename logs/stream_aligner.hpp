@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-namespace wheelwright {
+namespace wheelwright::logs {
 
 /// One stream: which columns of a row it gives.
 struct AlignedStream {
@@ -72,4 +72,4 @@ class StreamAligner {
   std::vector<double> error_;
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::logs

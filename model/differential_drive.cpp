@@ -6,7 +6,7 @@
 
 #include <wheelwright/core/check.hpp>
 
-namespace wheelwright {
+namespace wheelwright::model {
 namespace {
 
 // |cos²a − cos²b| = |sin(a + b) sin(a − b)| <= min(1, |a − b|), and the same for sin².
@@ -143,4 +143,4 @@ Model DifferentialDrive::model() const {
   return m;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::model

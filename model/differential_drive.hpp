@@ -7,7 +7,7 @@
 
 #include <wheelwright/model/model.hpp>
 
-namespace wheelwright {
+namespace wheelwright::model {
 
 /// Geometry of a differential-drive robot and the conventions of its model.
 struct DifferentialDrive {
@@ -35,4 +35,8 @@ struct DifferentialDrive {
   [[nodiscard]] Model model() const;
 };
 
+}  // namespace wheelwright::model
+
+namespace wheelwright {
+using model::DifferentialDrive;
 }  // namespace wheelwright

@@ -10,7 +10,7 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/limits.hpp>
 
-namespace wheelwright {
+namespace wheelwright::model {
 
 DriveGeometry drive_geometry(const Robot& robot) {
   const double r = robot.wheel_radius * (1.0 + effect_value(robot, "wheel_radius", "eps"));
@@ -358,7 +358,7 @@ constexpr double longest_drift = 1e6;  // s
 
 EffectParameterLaw linear(const char* name, const char* unit) { return {name, unit, true}; }
 EffectParameterLaw not_negative(const char* name, const char* unit) { return {name, unit, true, 0.0}; }
-EffectParameterLaw shape(const char* name, const char* unit, double upper = kInfinity) {
+EffectParameterLaw shape(const char* name, const char* unit, double upper = core::kInfinity) {
   return {name, unit, false, 0.0, upper, true};
 }
 EffectParameterLaw share(const char* name) { return {name, "1", false, -largest_share, largest_share}; }
@@ -588,4 +588,4 @@ double effect_value(const Robot& robot, const std::string& effect, const std::st
   return found != robot.effects.end() && found->parameters.contains(parameter) ? found->value(parameter) : 0.0;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::model

@@ -16,7 +16,7 @@
 #include <wheelwright/model/model.hpp>
 #include <wheelwright/model/robot.hpp>
 
-namespace wheelwright {
+namespace wheelwright::model {
 
 /// The wheels as the effects of a robot leave them.
 struct DriveGeometry {
@@ -134,4 +134,4 @@ void validate_effects(const Robot& robot);
 /// Value (mid-point) of a parameter of the robot's effect `effect`; 0 where the robot does not have it.
 [[nodiscard]] double effect_value(const Robot& robot, const std::string& effect, const std::string& parameter);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::model

@@ -9,7 +9,7 @@
 
 #include <wheelwright/core/check.hpp>
 
-namespace wheelwright {
+namespace wheelwright::model {
 namespace {
 
 using std::numbers::pi;
@@ -106,4 +106,4 @@ FaultState fault_state(std::span<const Fault> faults, double t) {
   return state;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::model

@@ -12,7 +12,7 @@
 
 #include <wheelwright/model/differential_drive.hpp>
 
-namespace wheelwright {
+namespace wheelwright::model {
 
 /// Physical parameters of a differential-drive robot; friction acts along the world axes, F_d = diag(f1, f2, f3) of
 /// (13).
@@ -88,4 +88,4 @@ struct FaultState {
 /// All of `faults` at time `t` (s).
 [[nodiscard]] FaultState fault_state(std::span<const Fault> faults, double t);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::model

@@ -9,7 +9,7 @@
 
 #include <wheelwright/core/check.hpp>
 
-namespace wheelwright {
+namespace wheelwright::model {
 namespace {
 
 std::string entry(const char* field, std::size_t index) {
@@ -117,4 +117,4 @@ Eigen::MatrixXd regressor(const Model& model, const MotionState& state, std::spa
   return y;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::model

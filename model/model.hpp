@@ -20,7 +20,7 @@
 
 #include <wheelwright/core/interval.hpp>
 
-namespace wheelwright {
+namespace wheelwright::model {
 
 /// One entry θ_L,j of the parameter vector (20).
 struct Parameter {
@@ -141,4 +141,9 @@ void validate(const Model& model);
 [[nodiscard]] Eigen::MatrixXd regressor(const Model& model, const MotionState& state,
                                         std::span<const double> acceleration);
 
+}  // namespace wheelwright::model
+
+namespace wheelwright {
+using model::Model;
+using model::Term;
 }  // namespace wheelwright

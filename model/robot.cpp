@@ -10,7 +10,7 @@
 #include <wheelwright/model/effect_law.hpp>
 #include <wheelwright/model/single_axis.hpp>
 
-namespace wheelwright {
+namespace wheelwright::model {
 namespace {
 
 // An unknown effort constant (A or V per N·m) is taken to lie below this in a default prior.
@@ -186,9 +186,9 @@ PriorBox prior_box(const Robot& robot, const Model& model) {
 
 bool on_two_wheels(const Robot& robot) { return robot.model == kDrive; }
 
-Robot with_column_errors(Robot robot, const std::vector<ColumnError>& errors) {
+Robot with_column_errors(Robot robot, const std::vector<core::ColumnError>& errors) {
   const SensorNoise declared = robot.noise;
-  for (const ColumnError& of : errors) {
+  for (const core::ColumnError& of : errors) {
     const auto widen = [&](NoiseBound SensorNoise::*kind) {
       if (const std::optional<double> bound = (declared.*kind).value) {
         double& widened = *(robot.noise.*kind).value;
@@ -212,4 +212,4 @@ Robot with_column_errors(Robot robot, const std::vector<ColumnError>& errors) {
   return robot;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::model

@@ -12,7 +12,7 @@
 #include <wheelwright/core/log.hpp>
 #include <wheelwright/model/model.hpp>
 
-namespace wheelwright {
+namespace wheelwright::model {
 
 /// Kind of the effort columns.
 enum class EffortKind {
@@ -138,6 +138,11 @@ struct PriorBox {
 
 /// The robot with `errors` (of interpolated columns) added to the noise bounds that it declares, the largest of each
 /// kind; an estimated bound sees them in the log itself.
-[[nodiscard]] Robot with_column_errors(Robot robot, const std::vector<ColumnError>& errors);
+[[nodiscard]] Robot with_column_errors(Robot robot, const std::vector<core::ColumnError>& errors);
 
+}  // namespace wheelwright::model
+
+namespace wheelwright {
+using model::Hold;
+using model::Robot;
 }  // namespace wheelwright

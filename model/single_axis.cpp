@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-namespace wheelwright {
+namespace wheelwright::model {
 namespace {
 
 // At rest, and where the sign of the speed is in doubt, dry friction is anywhere in [−1, 1].
@@ -49,4 +49,4 @@ Model SingleAxis::model() const {
   return m;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::model

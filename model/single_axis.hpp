@@ -5,7 +5,7 @@
 
 #include <wheelwright/model/model.hpp>
 
-namespace wheelwright {
+namespace wheelwright::model {
 
 /// A single axis; log columns `position`, `velocity`, `effort`.
 struct SingleAxis {
@@ -16,4 +16,4 @@ struct SingleAxis {
   [[nodiscard]] Model model() const;
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::model

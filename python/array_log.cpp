@@ -22,17 +22,17 @@ struct Columns {
   std::vector<std::span<const double>> values;
 };
 
-class ArrayWalk final : public RowWalk {
+class ArrayWalk final : public logs::RowWalk {
  public:
   // `pick` are the columns to read: the time, then those of `names`.
   ArrayWalk(const Columns& columns, std::vector<std::size_t> pick, const std::vector<std::string>& names,
-            double longest_step, LogReport* report)
+            double longest_step, logs::LogReport* report)
       : columns_(&columns), pick_(std::move(pick)), cleaner_(names, report), row_(pick_.size()) {
     cleaner_.set_longest_step(longest_step);
     cleaner_.begin_file(std::string(kName) + ", row ");
   }
 
-  bool next(RowOutcome& outcome) override {
+  bool next(logs::RowOutcome& outcome) override {
     if (k_ == columns_->values.front().size()) {
       return false;
     }
@@ -44,8 +44,8 @@ class ArrayWalk final : public RowWalk {
   }
   [[nodiscard]] double t() const override { return cleaner_.t(); }
   [[nodiscard]] const double* values() const override { return row_.data() + 1; }
-  void describe(LogFileReport& file) const override {
-    Xxh64 hash;
+  void describe(logs::LogFileReport& file) const override {
+    files::Xxh64 hash;
     for (const std::size_t c : pick_) {
       hash.update(reinterpret_cast<const char*>(columns_->values[c].data()), columns_->values[c].size_bytes());
       file.bytes += columns_->values[c].size_bytes();
@@ -58,19 +58,19 @@ class ArrayWalk final : public RowWalk {
  private:
   const Columns* columns_;
   std::vector<std::size_t> pick_;
-  RowCleaner cleaner_;
+  logs::RowCleaner cleaner_;
   std::vector<double> row_;
   std::size_t k_ = 0;
 };
 
-class ArrayFile final : public RowFile {
+class ArrayFile final : public logs::RowFile {
  public:
   ArrayFile(std::shared_ptr<std::vector<Doubles>> kept, Columns columns)
       : kept_(std::move(kept)), columns_(std::move(columns)) {}
   [[nodiscard]] std::string path() const override { return kName; }
   [[nodiscard]] const std::vector<std::string>& columns() const override { return columns_.names; }
-  [[nodiscard]] std::unique_ptr<RowWalk> open(const std::vector<std::string>& names, double longest_step,
-                                              LogReport* report) override {
+  [[nodiscard]] std::unique_ptr<logs::RowWalk> open(const std::vector<std::string>& names, double longest_step,
+                                                    logs::LogReport* report) override {
     std::vector<std::size_t> pick = {0};
     for (const std::string& name : names) {
       const auto at = std::find(columns_.names.begin(), columns_.names.end(), name);
@@ -99,7 +99,7 @@ std::string header_line(const std::vector<std::string>& names) {
 
 }  // namespace
 
-std::unique_ptr<RecordedLog> array_log(const py::dict& columns, const CsvOptions& options) {
+std::unique_ptr<logs::RecordedLog> array_log(const py::dict& columns, const logs::CsvOptions& options) {
   std::vector<std::string> given;
   std::vector<py::handle> arrays;
   for (const auto& [name, array] : columns) {
@@ -107,7 +107,7 @@ std::unique_ptr<RecordedLog> array_log(const py::dict& columns, const CsvOptions
     arrays.push_back(array);
   }
   check::that(!given.empty(), "columns", "at least the time and one column");
-  const CsvHeader header = read_csv_header(header_line(given), options, kName);
+  const logs::CsvHeader header = logs::read_csv_header(header_line(given), options, kName);
   std::vector<std::pair<std::size_t, std::string>> order;
   for (const auto& [name, field] : header.found) {
     if (name != "t") {
@@ -134,10 +134,10 @@ std::unique_ptr<RecordedLog> array_log(const py::dict& columns, const CsvOptions
     kept->push_back(array);
   }
   out.header = std::move(given);
-  std::vector<std::unique_ptr<RowFile>> files;
+  std::vector<std::unique_ptr<logs::RowFile>> files;
   files.push_back(std::make_unique<ArrayFile>(kept, std::move(out)));
   const py::gil_scoped_release unlocked;
-  return std::make_unique<RowLog>(std::move(files), RowLogOptions{options.block_rows, options.min_rows});
+  return std::make_unique<logs::RowLog>(std::move(files), logs::RowLogOptions{options.block_rows, options.min_rows});
 }
 
 }  // namespace wheelwright::python

@@ -17,6 +17,7 @@ namespace wheelwright::python {
 /// that are not float64 and contiguous are converted first. Names are understood as in a CSV header. Needs the
 /// interpreter's lock, which it gives up while it looks at the rows; reading does not need it. Throws InputError as
 /// CsvLog does, InvalidArgument for shapes.
-[[nodiscard]] std::unique_ptr<RecordedLog> array_log(const pybind11::dict& columns, const CsvOptions& options);
+[[nodiscard]] std::unique_ptr<logs::RecordedLog> array_log(const pybind11::dict& columns,
+                                                           const logs::CsvOptions& options);
 
 }  // namespace wheelwright::python

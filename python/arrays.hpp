@@ -36,7 +36,7 @@ template <typename T>
 [[nodiscard]] inline py::array view(const std::vector<double>& v, py::handle owner) {
   return view(v.data(), {static_cast<py::ssize_t>(v.size())}, owner);
 }
-[[nodiscard]] inline py::array view(const RowMatrix& m, py::handle owner) {
+[[nodiscard]] inline py::array view(const core::RowMatrix& m, py::handle owner) {
   return view(m.data(), {m.rows(), m.cols()}, owner);
 }
 

@@ -13,12 +13,14 @@
 
 namespace wheelwright::python {
 
+using bounds::MinimaxFit;
+
 namespace {
 
 using ByColumns = py::array_t<double, py::array::f_style | py::array::forcecast>;
 
-RowMatrix sides_of(const Box& box) {
-  RowMatrix m(static_cast<Eigen::Index>(box.dimension()), 2);
+core::RowMatrix sides_of(const Box& box) {
+  core::RowMatrix m(static_cast<Eigen::Index>(box.dimension()), 2);
   for (std::size_t j = 0; j < box.dimension(); ++j) {
     m(static_cast<Eigen::Index>(j), 0) = box.sides[j].lower;
     m(static_cast<Eigen::Index>(j), 1) = box.sides[j].upper;
@@ -32,27 +34,27 @@ Box box_of(const Doubles& sides, const std::string& what) {
   for (py::ssize_t j = 0; j < sides.shape(0); ++j) {
     box.sides.push_back({sides.at(j, 0), sides.at(j, 1)});
   }
-  check_finite(box, what.c_str());
+  bounds::check_finite(box, what.c_str());
   return box;
 }
 
-py::list proof_of(const std::vector<WeightedRow>& rows) {
+py::list proof_of(const std::vector<bounds::WeightedRow>& rows) {
   py::list out;
-  for (const WeightedRow& row : rows) {
+  for (const bounds::WeightedRow& row : rows) {
     py::dict d;
     d["row"] = row.row.origin.is_prior ? py::object(py::none()) : py::object(py::int_(row.row.origin.sample));
     d["output"] = row.row.origin.is_prior ? py::object(py::none()) : py::object(py::int_(row.row.origin.output));
     d["parameter"] = row.row.origin.is_prior ? py::object(py::int_(row.row.origin.parameter)) : py::object(py::none());
-    d["side"] = row.row.origin.side == Side::upper ? "upper" : "lower";
+    d["side"] = row.row.origin.side == bounds::Side::upper ? "upper" : "lower";
     d["multiplier"] = row.multiplier;
     out.append(std::move(d));
   }
   return out;
 }
 
-py::list proofs_of(const std::vector<CertifiedBound>& bounds) {
+py::list proofs_of(const std::vector<bounds::CertifiedBound>& bounds) {
   py::list out;
-  for (const CertifiedBound& bound : bounds) {
+  for (const bounds::CertifiedBound& bound : bounds) {
     out.append(proof_of(bound.binding));
   }
   return out;
@@ -69,14 +71,14 @@ struct Slabs {
       const double middle = l[i] + 0.5 * (u[i] - l[i]);
       const double half = std::max(u[i] - middle, middle - l[i]);
       y.push_back(middle);
-      dy.push_back(half == 0.0 ? 0.0 : round_up(half));
+      dy.push_back(half == 0.0 ? 0.0 : core::round_up(half));
     }
   }
   std::vector<double> y, dy;
 };
 
 // Rows in somebody else's memory, one output, block by block.
-class ArrayRows final : public RegressionSource {
+class ArrayRows final : public core::RegressionSource {
  public:
   ArrayRows(const double* Y, const double* dY, const double* y, const double* dy, std::size_t rows, std::size_t p)
       : Y_(Y), dY_(dY), y_(y), dy_(dy), rows_(rows), p_(p) {}
@@ -107,13 +109,13 @@ class ArrayRows final : public RegressionSource {
   std::size_t rows_, p_, at_ = 0;
 };
 
-IntervalHull hull_of(const ByColumns& Y, const Doubles& lower, const Doubles& upper, const Doubles& prior,
-                     const std::optional<ByColumns>& dY, std::size_t threads) {
+bounds::IntervalHull hull_of(const ByColumns& Y, const Doubles& lower, const Doubles& upper, const Doubles& prior,
+                             const std::optional<ByColumns>& dY, std::size_t threads) {
   const Box box = box_of(prior, "prior");
   const auto p = static_cast<py::ssize_t>(box.dimension());
   check_shape(Y, {-1, p}, "Y");
   const Slabs slabs(lower, upper, Y.shape(0));
-  SlabColumns rows;
+  bounds::SlabColumns rows;
   rows.n = slabs.y.size();
   rows.y = slabs.y.data();
   rows.dy = slabs.dy.data();
@@ -126,10 +128,10 @@ IntervalHull hull_of(const ByColumns& Y, const Doubles& lower, const Doubles& up
       rows.dY.push_back(dY->data() + j * Y.shape(0));
     }
   }
-  IntervalHullOptions options;
+  bounds::IntervalHullOptions options;
   options.threads = threads;
   const py::gil_scoped_release unlocked;
-  return interval_hull(rows, box, options);
+  return bounds::interval_hull(rows, box, options);
 }
 
 std::unique_ptr<SetObject> set_of(const Doubles& Y, const Doubles& lower, const Doubles& upper, const Doubles& prior,
@@ -161,11 +163,11 @@ MinimaxFit fit_of(const Doubles& Y, const Doubles& y, const Doubles& prior, cons
   ArrayRows rows(Y.data(), dY ? dY->data() : nullptr, left.data(), dy ? dy->data() : nullptr, left.size(),
                  box.dimension());
   const py::gil_scoped_release unlocked;
-  return minimax_fit(rows, box);
+  return bounds::minimax_fit(rows, box);
 }
 
 // Points of all blocks combined, a row each; nothing where they are not known or more than `limit`.
-std::optional<RowMatrix> all_vertices(const Polytope& set, std::size_t limit = 1 << 16) {
+std::optional<core::RowMatrix> all_vertices(const Polytope& set, std::size_t limit = 1 << 16) {
   if (!set.has_vertices()) {
     return std::nullopt;
   }
@@ -176,7 +178,7 @@ std::optional<RowMatrix> all_vertices(const Polytope& set, std::size_t limit = 1
       return std::nullopt;
     }
   }
-  RowMatrix points(static_cast<Eigen::Index>(count), static_cast<Eigen::Index>(set.dimension()));
+  core::RowMatrix points(static_cast<Eigen::Index>(count), static_cast<Eigen::Index>(set.dimension()));
   Eigen::Index repeat = 1;
   for (const Polytope::Block& block : set.blocks()) {
     const Eigen::MatrixXd& own = block.vertices->points;
@@ -213,7 +215,7 @@ py::object of_rows(const Doubles& a, std::size_t p, const F& f) {
 
 // Serves one thread: the lock is for Python's others.
 struct RuleObject {
-  ThresholdRule rule;
+  detector::ThresholdRule rule;
   std::mutex use;
 };
 
@@ -238,7 +240,7 @@ py::tuple thresholds(RuleObject& r, const Doubles& Y, const std::optional<Double
     for (std::size_t i = 0; i < count; ++i) {
       const std::span<const double> dy_row =
           errors != nullptr ? std::span<const double>(errors + i * p, p) : std::span<const double>(zeros);
-      const Threshold t = r.rule.at(std::span<const double>(rows + i * p, p), dy_row, output[one ? 0 : i]);
+      const detector::Threshold t = r.rule.at(std::span<const double>(rows + i * p, p), dy_row, output[one ? 0 : i]);
       l[i] = t.lower;
       u[i] = t.upper;
     }
@@ -273,7 +275,7 @@ void bind_set(py::module_& m) {
       .def_property_readonly(
           "vertices",
           [](const SetObject& s) -> py::object {
-            const std::optional<RowMatrix> points = all_vertices(s.polytope());
+            const std::optional<core::RowMatrix> points = all_vertices(s.polytope());
             return points ? py::object(py::array_t<double>({points->rows(), points->cols()}, points->data()))
                           : py::object(py::none());
           },
@@ -339,18 +341,18 @@ const Polytope& SetObject::polytope() const {
 
 void bind_bounds(py::module_& m) {
   bind_set(m);
-  py::class_<IntervalHull>(m, "IntervalHull", "Certified bounds of each parameter; see interval_hull().")
-      .def_readonly("empty", &IntervalHull::empty, "proved empty: the bounds are those of the prior")
+  py::class_<bounds::IntervalHull>(m, "IntervalHull", "Certified bounds of each parameter; see interval_hull().")
+      .def_readonly("empty", &bounds::IntervalHull::empty, "proved empty: the bounds are those of the prior")
       .def_property_readonly(
           "hull",
-          [](const IntervalHull& h) {
-            const RowMatrix sides = sides_of(h.hull);
+          [](const bounds::IntervalHull& h) {
+            const core::RowMatrix sides = sides_of(h.hull);
             return py::array_t<double>({sides.rows(), sides.cols()}, sides.data());
           },
           "shape (p, 2)")
-      .def_property_readonly("lower_proofs", [](const IntervalHull& h) { return proofs_of(h.lower); })
-      .def_property_readonly("upper_proofs", [](const IntervalHull& h) { return proofs_of(h.upper); })
-      .def_property_readonly("contradiction", [](const IntervalHull& h) { return proof_of(h.contradiction); });
+      .def_property_readonly("lower_proofs", [](const bounds::IntervalHull& h) { return proofs_of(h.lower); })
+      .def_property_readonly("upper_proofs", [](const bounds::IntervalHull& h) { return proofs_of(h.upper); })
+      .def_property_readonly("contradiction", [](const bounds::IntervalHull& h) { return proof_of(h.contradiction); });
   m.def(
       "interval_hull", &hull_of, py::arg("Y"), py::arg("lower"), py::arg("upper"), py::arg("prior"),
       py::arg("dY") = std::nullopt, py::arg("threads") = 1,
@@ -376,8 +378,9 @@ void bind_bounds(py::module_& m) {
              const Eigen::VectorXd copied =
                  Eigen::Map<const Eigen::VectorXd>(theta.data(), static_cast<Eigen::Index>(theta.size()));
              return std::unique_ptr<RuleObject>(
-                 new RuleObject{ThresholdRule(set.polytope(), copied,
-                                              kind == "box" ? ParameterSetKind::box : ParameterSetKind::polytope),
+                 new RuleObject{detector::ThresholdRule(set.polytope(), copied,
+                                                        kind == "box" ? detector::ParameterSetKind::box
+                                                                      : detector::ParameterSetKind::polytope),
                                 {}});
            }),
            py::arg("set"), py::arg("estimate"), py::arg("kind") = "polytope",

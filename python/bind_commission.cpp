@@ -22,32 +22,35 @@
 #include "module.hpp"
 
 namespace wheelwright::python {
+
+using commission::ParameterResult;
+
 namespace {
 
 struct CommissionObject {
   std::shared_ptr<const Commissioning> result;
-  LogReport data;
+  logs::LogReport data;
   Eigen::VectorXd estimate, standard_error, lower, upper;
 
   [[nodiscard]] bool has_model() const { return !result->model.facets.empty(); }
-  [[nodiscard]] Json json() const { return wheelwright::to_json(*result, data, software()); }
+  [[nodiscard]] Json json() const { return results::to_json(*result, data, results::software()); }
 };
 
 std::unique_ptr<CommissionObject> run(LogObject& log, const RobotObject& robot, bool statistical, std::size_t outliers,
                                       std::pair<std::size_t, std::size_t> persistence, py::object progress) {
-  CommissionOptions options;
-  options.noise_mode = statistical ? NoiseMode::statistical : NoiseMode::worst_case;
+  commission::CommissionOptions options;
+  options.noise_mode = statistical ? filter::NoiseMode::statistical : filter::NoiseMode::worst_case;
   options.outliers = outliers;
   options.persistence = {persistence.first, persistence.second};
   LongWork work(std::move(progress));
   options.progress = work.teller();
   return work.run([&] {
     const LogWalk walk(log);
-    require_columns(*log.source, needed_columns(robot.robot));
+    logs::require_columns(*log.source, robots::needed_columns(robot.robot));
     WatchedLog source(*log.source, work);
     auto out = std::make_unique<CommissionObject>();
-    out->result = std::make_shared<const Commissioning>(
-        commission(source, with_column_errors(robot.robot, interpolation_errors(log.source->report())), options));
+    out->result = std::make_shared<const Commissioning>(commission_robot(
+        source, model::with_column_errors(robot.robot, logs::interpolation_errors(log.source->report())), options));
     out->data = log.source->report();
     const auto p = static_cast<Eigen::Index>(out->result->parameters.size());
     out->estimate = out->standard_error = out->lower = out->upper = Eigen::VectorXd(p);
@@ -71,7 +74,8 @@ void bind_parameter(py::module_& m) {
           "physical", [](const ParameterResult& p) { return p.parameter.physical; },
           "the physical quantity behind it, e.g. mass")
       .def_property_readonly(
-          "excitation", [](const ParameterResult& p) { return word_of(kExcitationWords, p.excitation); },
+          "excitation",
+          [](const ParameterResult& p) { return files::word_of(results::kExcitationWords, p.excitation); },
           "identified, indistinct (not told from zero) or not_excited")
       .def_readonly("reason", &ParameterResult::reason, "why it is not identified, for people")
       .def_readonly("estimate", &ParameterResult::estimate, "None where the log does not show the parameter")
@@ -79,15 +83,15 @@ void bind_parameter(py::module_& m) {
       .def_readonly("lower", &ParameterResult::lower, "bound, in the sense of warrant")
       .def_readonly("upper", &ParameterResult::upper, "bound, in the sense of warrant")
       .def_property_readonly(
-          "warrant", [](const ParameterResult& p) { return std::string(warrant_word(p.warrant)); },
+          "warrant", [](const ParameterResult& p) { return std::string(core::warrant_word(p.warrant)); },
           "what the bounds stand on: guaranteed, extrapolated or statistical")
       .def_readonly("chebyshev", &ParameterResult::chebyshev, "centre of the feasible set")
       .def_readonly("lower_is_prior", &ParameterResult::lower_is_prior, "the log does not tighten the prior's bound")
       .def_readonly("upper_is_prior", &ParameterResult::upper_is_prior)
       .def_readonly("estimate_inside", &ParameterResult::estimate_inside)
       .def("__repr__", [](const ParameterResult& p) {
-        return "<wheelwright.ParameterResult " + p.parameter.name + ": " + json_text(Json(p.lower)) + " to " +
-               json_text(Json(p.upper)) + " " + p.parameter.unit + ">";
+        return "<wheelwright.ParameterResult " + p.parameter.name + ": " + files::json_text(Json(p.lower)) + " to " +
+               files::json_text(Json(p.upper)) + " " + p.parameter.unit + ">";
       });
 }
 
@@ -107,7 +111,7 @@ void bind_model(py::module_& m) {
           "parameters",
           [](const ModelObject& o) {
             std::vector<std::string> names;
-            for (const Parameter& p : o.model->model.parameters) {
+            for (const model::Parameter& p : o.model->model.parameters) {
               names.push_back(p.name);
             }
             return names;
@@ -137,10 +141,11 @@ void bind_model(py::module_& m) {
           [](const py::object& self) { return view(self.cast<const ModelObject&>().model->estimate, self); },
           "theta of (30), shape (p,), read-only view; the Chebyshev centre's where the log does not show a parameter")
       .def_property_readonly(
-          "warrant", [](const ModelObject& o) { return std::string(warrant_word(o.model->warrant)); },
+          "warrant", [](const ModelObject& o) { return std::string(core::warrant_word(o.model->warrant)); },
           "what bounds and thresholds stand on: guaranteed, extrapolated or statistical")
       .def_property_readonly(
-          "assumptions", [](const ModelObject& o) { return to_python(assumptions_json(o.model->assumptions)); },
+          "assumptions",
+          [](const ModelObject& o) { return to_python(results::assumptions_json(o.model->assumptions)); },
           "what is taken as given: a list of dicts with id, statement, declared_by, test, verdict and detail")
       .def_property_readonly(
           "feasible_set",
@@ -161,7 +166,7 @@ void bind_commission(py::module_& m) {
   bind_model(m);
   py::class_<CommissionObject>(m, "Commission", "The result of commission(): model.json and the numbers in it.")
       .def_property_readonly(
-          "status", [](const CommissionObject& c) { return word_of(kStatusWords, c.result->status); },
+          "status", [](const CommissionObject& c) { return files::word_of(results::kStatusWords, c.result->status); },
           "done, partial (bounds of some parameters are the prior's), empty (no theta explains the log), nothing, or "
           "contradicted (the log contradicts what a model takes for granted: contradictions)")
       .def_property_readonly(
@@ -196,11 +201,12 @@ void bind_commission(py::module_& m) {
           "upper", [](const py::object& self) { return view(self.cast<const CommissionObject&>().upper, self); },
           "upper bounds in the sense of warrant, shape (p,), read-only view")
       .def_property_readonly(
-          "warrant", [](const CommissionObject& c) { return std::string(warrant_word(c.result->model.warrant)); },
+          "warrant", [](const CommissionObject& c) { return std::string(core::warrant_word(c.result->model.warrant)); },
           "what bounds and thresholds stand on: guaranteed (declared sensor bounds, and no assumption that a test "
           "contradicts), extrapolated (noise bounds learnt from the log) or statistical")
       .def_property_readonly(
-          "assumptions", [](const CommissionObject& c) { return to_python(assumptions_json(c.result->assumptions)); },
+          "assumptions",
+          [](const CommissionObject& c) { return to_python(results::assumptions_json(c.result->assumptions)); },
           "what is taken as given: a list of dicts with id, statement, declared_by, test, verdict and detail")
       .def_property_readonly("rank", [](const CommissionObject& c) { return c.result->rank; })
       .def_property_readonly("condition", [](const CommissionObject& c) { return c.result->condition; })
@@ -211,11 +217,12 @@ void bind_commission(py::module_& m) {
           "to_dict", [](const CommissionObject& c) { return to_python(c.json()); },
           "The content of model.json (results/model.schema.json).")
       .def(
-          "save", [](const CommissionObject& c, const std::filesystem::path& path) { write_json(path, c.json()); },
+          "save",
+          [](const CommissionObject& c, const std::filesystem::path& path) { files::write_json(path, c.json()); },
           py::arg("path"), "Writes model.json, whole or not at all.")
       .def("__repr__", [](const CommissionObject& c) {
         return "<wheelwright.Commission of " + c.result->model.robot.name + ": " +
-               word_of(kStatusWords, c.result->status) + ">";
+               files::word_of(results::kStatusWords, c.result->status) + ">";
       });
   m.def("commission", &run, py::arg("log"), py::arg("robot"), py::kw_only(), py::arg("statistical") = false,
         py::arg("outliers") = 0, py::arg("persistence") = std::pair<std::size_t, std::size_t>{1, 1},

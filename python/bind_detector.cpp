@@ -25,27 +25,27 @@ constexpr double kMerge = 0.5;  // s, as detect()
 
 using Rule = std::optional<std::pair<std::size_t, std::size_t>>;
 
-DetectorOptions options_of(const std::string& set, const std::string& test, const Rule& persistence) {
+detector::DetectorOptions options_of(const std::string& set, const std::string& test, const Rule& persistence) {
   check::that(set == "polytope" || set == "box", "set '" + set + "'", "polytope or box");
   check::that(test == "two_sided" || test == "symmetric", "test '" + test + "'", "two_sided or symmetric");
-  DetectorOptions options;
-  options.set = set == "box" ? ParameterSetKind::box : ParameterSetKind::polytope;
-  options.test = test == "symmetric" ? Test::symmetric : Test::two_sided;
+  detector::DetectorOptions options;
+  options.set = set == "box" ? detector::ParameterSetKind::box : detector::ParameterSetKind::polytope;
+  options.test = test == "symmetric" ? detector::Test::symmetric : detector::Test::two_sided;
   if (persistence) {
-    options.persistence = Persistence{persistence->first, persistence->second};
+    options.persistence = detector::Persistence{persistence->first, persistence->second};
   }
   return options;
 }
 
 // An event with the name of its channel.
 struct EventObject {
-  Event event;
+  detector::Event event;
   std::string output;
 };
 
-std::vector<EventObject> named(const std::vector<Event>& events, const std::vector<std::string>& outputs) {
+std::vector<EventObject> named(const std::vector<detector::Event>& events, const std::vector<std::string>& outputs) {
   std::vector<EventObject> out;
-  for (const Event& event : events) {
+  for (const detector::Event& event : events) {
     out.push_back({event, outputs[event.output]});
   }
   return out;
@@ -81,7 +81,7 @@ py::object step(DetectorObject& d, double t, const Doubles& sample) {
   }
   DecisionObject out;
   out.fault = decision.fault;
-  for (const ChannelDecision& c : decision.channels) {
+  for (const detector::ChannelDecision& c : decision.channels) {
     out.residual.push_back(c.residual);
     out.predicted.push_back(c.predicted);
     out.lower.push_back(c.threshold.lower);
@@ -107,16 +107,16 @@ struct DetectionObject {
   ModelObject model;
   std::string log;
   Detection detection;
-  KinematicWatch kinematic;
-  std::vector<Isolation> isolations;
+  commission::KinematicWatch kinematic;
+  std::vector<detector::Isolation> isolations;
 
   [[nodiscard]] bool fault() const {
     return !detection.events.empty() || (kinematic.detection && !kinematic.detection->events.empty());
   }
   [[nodiscard]] Json json() const {
-    Json json = to_json(detection, *model.model, model.path, log, software());
-    add_isolation(json, isolations);
-    add_kinematic(json, kinematic, *model.model);
+    Json json = results::to_json(detection, *model.model, model.path, log, results::software());
+    results::add_isolation(json, isolations);
+    results::add_kinematic(json, kinematic, *model.model);
     return json;
   }
   [[nodiscard]] std::string summary() const {
@@ -128,28 +128,28 @@ struct DetectionObject {
 DetectionObject detect_in(LogObject& log, const ModelObject& given, const std::string& set, const std::string& test,
                           const Rule& persistence, std::size_t threads, py::object progress) {
   LongWork work(std::move(progress));
-  const DetectorOptions options = options_of(set, test, persistence);
+  const detector::DetectorOptions options = options_of(set, test, persistence);
   return work.run([&] {
     auto model = std::make_shared<OnlineModel>(*given.model);
     model->persistence = options.persistence.value_or(model->persistence);
     if (model->kinematic) {
       model->kinematic->persistence = options.persistence.value_or(model->kinematic->persistence);
     }
-    DetectorOptions own = options;
+    detector::DetectorOptions own = options;
     own.persistence.reset();
     const LogWalk walk(log);
-    require_columns(*log.source, model->measurement.columns());
+    logs::require_columns(*log.source, model->measurement.columns());
     WatchedLog source(*log.source, work);
     DetectionObject out{{model, given.path}, log.name(), {}, {}, {}};
     const auto tell = work.teller();
     tell("the torque residual", 0.0);
     out.detection = detect(source, make_detector(*model, own));
     tell("the kinematic residual", 0.4);
-    out.kinematic = watch_kinematics(source, *model, own);
+    out.kinematic = commission::watch_kinematics(source, *model, own);
     tell("what the events can be", 0.8);
-    EventIsolationOptions isolation;
+    commission::EventIsolationOptions isolation;
     isolation.isolation.threads = threads;
-    out.isolations = isolate_events(source, *model, out.detection, isolation);
+    out.isolations = commission::isolate_events(source, *model, out.detection, isolation);
     tell("done", 1.0);
     return out;
   });
@@ -275,9 +275,9 @@ void bind_detector(py::module_& m) {
       .def_property_readonly(
           "kinematic_events",
           [](const DetectionObject& d) {
-            return d.kinematic.detection
-                       ? named(d.kinematic.detection->events, with_kinematic_outputs(*d.model.model).model.outputs)
-                       : std::vector<EventObject>{};
+            return d.kinematic.detection ? named(d.kinematic.detection->events,
+                                                 commission::with_kinematic_outputs(*d.model.model).model.outputs)
+                                         : std::vector<EventObject>{};
           },
           "of wheel odometry against pose or gyro")
       .def_property_readonly("summary", &DetectionObject::summary)
@@ -285,7 +285,8 @@ void bind_detector(py::module_& m) {
           "to_dict", [](const DetectionObject& d) { return to_python(d.json()); },
           "The content of detection.json (results/detection.schema.json).")
       .def(
-          "save", [](const DetectionObject& d, const std::filesystem::path& path) { write_json(path, d.json()); },
+          "save",
+          [](const DetectionObject& d, const std::filesystem::path& path) { files::write_json(path, d.json()); },
           py::arg("path"), "Writes detection.json, whole or not at all.");
   m.def("detect", &detect_in, py::arg("log"), py::arg("model"), py::kw_only(), py::arg("set") = "polytope",
         py::arg("test") = "two_sided", py::arg("persistence") = std::nullopt, py::arg("threads") = 1,

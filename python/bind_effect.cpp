@@ -8,6 +8,11 @@
 #include "effect_object.hpp"
 
 namespace wheelwright::python {
+
+using gap::Drive;
+using gap::JointSignals;
+using gap::ShapeParameter;
+
 namespace {
 
 // A function that may be copied and dropped without the interpreter's lock.
@@ -58,7 +63,7 @@ std::vector<Eigen::VectorXd> signals(const std::vector<std::optional<Doubles>>& 
   return out;
 }
 
-Effect make_effect(const std::string& name, const py::function& columns, std::vector<EffectParameter> parameters,
+Effect make_effect(const std::string& name, const py::function& columns, std::vector<gap::EffectParameter> parameters,
                    std::vector<ShapeParameter> shapes, const std::string& sentence, const std::string& family,
                    bool parametric, bool unit_coefficient, const std::string& excite,
                    const std::optional<py::function>& applies) {
@@ -76,7 +81,7 @@ Effect make_effect(const std::string& name, const py::function& columns, std::ve
   if (applies) {
     effect.applies = applies_in_python(*applies);
   }
-  validate(effect);
+  gap::validate(effect);
   return effect;
 }
 
@@ -89,7 +94,7 @@ struct Part {
 using JointObject = Part<0>;
 using CoordinateObject = Part<1>;
 
-py::array rests(const Mask& mask) {
+py::array rests(const gap::Mask& mask) {
   py::array_t<bool> out(mask.size());
   std::copy(mask.data(), mask.data() + mask.size(), out.mutable_data());
   return out;
@@ -114,14 +119,14 @@ void bind_drive(py::module_& m) {
       "whether it stands still, bool");
   py::class_<CoordinateObject> coordinate(m, "CoordinateSignals",
                                           "One motion coordinate (v1 in m/s, v2 in rad/s); arrays are copies.");
-  const auto of_coordinate = [&coordinate](const char* name, Eigen::VectorXd CoordinateSignals::*member,
+  const auto of_coordinate = [&coordinate](const char* name, Eigen::VectorXd gap::CoordinateSignals::*member,
                                            const char* doc) {
     coordinate.def_property_readonly(
         name, [member](const CoordinateObject& c) { return copy(c.owner->drive().coordinates[c.index].*member); }, doc);
   };
-  of_coordinate("speed", &CoordinateSignals::speed, "as measured");
-  of_coordinate("smooth_speed", &CoordinateSignals::smooth_speed, "smoothed");
-  of_coordinate("smooth_acceleration", &CoordinateSignals::smooth_acceleration, "smoothed, per s");
+  of_coordinate("speed", &gap::CoordinateSignals::speed, "as measured");
+  of_coordinate("smooth_speed", &gap::CoordinateSignals::smooth_speed, "smoothed");
+  of_coordinate("smooth_acceleration", &gap::CoordinateSignals::smooth_acceleration, "smoothed, per s");
 
   py::class_<DriveObject, std::shared_ptr<DriveObject>> drive(
       m, "Drive",
@@ -182,14 +187,13 @@ const Drive& DriveObject::drive() const {
   return *drive_;
 }
 
-std::function<std::vector<Column>(const Drive&, std::span<const double>)> columns_in_python(const std::string& name,
-                                                                                            const py::function& columns,
-                                                                                            std::size_t count) {
+std::function<std::vector<gap::Column>(const Drive&, std::span<const double>)> columns_in_python(
+    const std::string& name, const py::function& columns, std::size_t count) {
   return [name, count, function = kept(columns)](const Drive& drive, std::span<const double> shape) {
     const py::gil_scoped_acquire lock;
     const OpenDrive open(drive);
     const py::object made = (*function)(open.object(), copy(std::vector<double>(shape.begin(), shape.end())));
-    std::vector<Column> out;
+    std::vector<gap::Column> out;
     for (const py::handle each : made) {
       if (!py::isinstance<ColumnObject>(each)) {
         throw InvalidArgument("effect " + name + " returned " + py::repr(each).cast<std::string>() +
@@ -208,12 +212,12 @@ std::function<std::vector<Column>(const Drive&, std::span<const double>)> column
   };
 }
 
-std::function<Applicability(const Drive&)> applies_in_python(const py::function& applies) {
-  return [function = kept(applies)](const Drive& drive) -> Applicability {
+std::function<gap::Applicability(const Drive&)> applies_in_python(const py::function& applies) {
+  return [function = kept(applies)](const Drive& drive) -> gap::Applicability {
     const py::gil_scoped_acquire lock;
     const OpenDrive open(drive);
     const py::object reason = (*function)(open.object());
-    return reason.is_none() ? Applicability{} : Applicability{false, reason.cast<std::string>()};
+    return reason.is_none() ? gap::Applicability{} : gap::Applicability{false, reason.cast<std::string>()};
   };
 }
 
@@ -233,15 +237,16 @@ void bind_effect(py::module_& m) {
            "effort: for each output (sum, difference) the effort that is asked for in addition (15), shape (rows,). "
            "effort_rate: signals whose time derivative is such an effort. forward, lateral (m/s), yaw (rad/s): body "
            "velocity that the wheels do not show.");
-  py::class_<EffectParameter>(m, "EffectParameter", "A coefficient of an effect: what multiplies one of its columns.")
+  py::class_<gap::EffectParameter>(m, "EffectParameter",
+                                   "A coefficient of an effect: what multiplies one of its columns.")
       .def(py::init([](std::string name, std::string unit, int sign) {
-             return EffectParameter{std::move(name), std::move(unit), sign};
+             return gap::EffectParameter{std::move(name), std::move(unit), sign};
            }),
            py::arg("name"), py::arg("unit"), py::arg("sign") = 0,
            "sign: 1 where physics wants it >= 0, -1 for <= 0, 0 for either.")
-      .def_readonly("name", &EffectParameter::name)
-      .def_readonly("unit", &EffectParameter::unit)
-      .def_readonly("sign", &EffectParameter::sign);
+      .def_readonly("name", &gap::EffectParameter::name)
+      .def_readonly("unit", &gap::EffectParameter::unit)
+      .def_readonly("sign", &gap::EffectParameter::sign);
   py::class_<ShapeParameter>(m, "ShapeParameter", "A parameter on which an effect's columns depend nonlinearly.")
       .def(py::init(
                [](std::string name, std::string unit, double lower, double upper, std::size_t scan, bool logarithmic) {
@@ -262,9 +267,10 @@ void bind_effect(py::module_& m) {
       .def_readonly("upper", &ShapeParameter::upper);
   py::class_<Effect>(m, "Effect", "An unmodelled effect: of the catalogue, or a user's own.")
       .def(py::init(&make_effect), py::arg("name"), py::arg("columns"),
-           py::arg("parameters") = std::vector<EffectParameter>{}, py::arg("shapes") = std::vector<ShapeParameter>{},
-           py::kw_only(), py::arg("sentence") = "", py::arg("family") = "", py::arg("parametric") = false,
-           py::arg("unit_coefficient") = false, py::arg("excite") = "", py::arg("applies") = std::nullopt,
+           py::arg("parameters") = std::vector<gap::EffectParameter>{},
+           py::arg("shapes") = std::vector<ShapeParameter>{}, py::kw_only(), py::arg("sentence") = "",
+           py::arg("family") = "", py::arg("parametric") = false, py::arg("unit_coefficient") = false,
+           py::arg("excite") = "", py::arg("applies") = std::nullopt,
            "columns(drive, shape) returns a Column for each of `parameters`, at the values `shape` of `shapes`; it is "
            "called often, from any thread, with the interpreter's lock. applies(drive) returns None, or why the effect "
            "cannot be looked for. family: of effects that are the same cause. unit_coefficient: one column whose "
@@ -279,7 +285,7 @@ void bind_effect(py::module_& m) {
   m.def(
       "effect_catalogue",
       [](const RobotObject* robot) {
-        return robot != nullptr ? effect_catalogue(make_model(robot->robot)) : effect_catalogue();
+        return robot != nullptr ? gap::effect_catalogue(model::make_model(robot->robot)) : gap::effect_catalogue();
       },
       py::arg("robot") = nullptr, "The effects that gap() looks for, for a robot (by default on two driven wheels).");
 }

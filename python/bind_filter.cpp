@@ -39,18 +39,18 @@ std::unique_ptr<RegressionObject> filtered(LogObject& log, const RobotObject& ro
     WatchedLog source(*log.source, work);
     if (model != nullptr) {
       const OnlineModel& m = *model->model;
-      require_columns(*log.source, m.measurement.columns());
+      logs::require_columns(*log.source, m.measurement.columns());
       TorqueRows stream(source, RegressorFilter(m.model, m.filter, m.measurement, m.errors));
       out->rows = read_all(stream);
       out->model = m.model;
       out->filter = m.filter;
     } else {
-      require_columns(*log.source, needed_columns(robot.robot));
-      SettingOptions options;
+      logs::require_columns(*log.source, robots::needed_columns(robot.robot));
+      commission::SettingOptions options;
       options.progress = work.teller();
-      const Setting setting =
-          settle(source, with_column_errors(robot.robot, interpolation_errors(log.source->report())), options);
-      TorqueRows stream = make_rows(source, setting, setting.declared);
+      const commission::Setting setting = commission::settle(
+          source, model::with_column_errors(robot.robot, logs::interpolation_errors(log.source->report())), options);
+      TorqueRows stream = commission::make_rows(source, setting, setting.declared);
       out->rows = read_all(stream);
       out->model = setting.model;
       out->filter = setting.filter;
@@ -59,7 +59,7 @@ std::unique_ptr<RegressionObject> filtered(LogObject& log, const RobotObject& ro
   });
 }
 
-py::array by_instant(const RegressionObject& r, const RowMatrix& m, py::handle owner) {
+py::array by_instant(const RegressionObject& r, const core::RowMatrix& m, py::handle owner) {
   const auto n = static_cast<py::ssize_t>(r.rows.outputs);
   return view(m.data(), {m.rows() / std::max<py::ssize_t>(n, 1), n, m.cols()}, owner);
 }
@@ -69,7 +69,7 @@ py::array by_instant(const RegressionObject& r, const Eigen::VectorXd& v, py::ha
   return view(v.data(), {v.size() / std::max<py::ssize_t>(n, 1), n}, owner);
 }
 
-LeastSquaresFit fit(const Doubles& Y, const Doubles& y) {
+identify::LeastSquaresFit fit(const Doubles& Y, const Doubles& y) {
   check::that(Y.ndim() == 2, "Y", "shape (rows, p)");
   const auto left = values(y, "y", Y.shape(0));
   const auto rows = static_cast<std::size_t>(Y.shape(0)), p = static_cast<std::size_t>(Y.shape(1));
@@ -81,7 +81,7 @@ LeastSquaresFit fit(const Doubles& Y, const Doubles& y) {
   }
   check::that(p > 0, "Y", "a column");
   const py::gil_scoped_release unlocked;
-  LeastSquares squares(p);
+  identify::LeastSquares squares(p);
   RegressionBlock block;
   for (std::size_t first = 0; first < rows; first += 4096) {
     const std::size_t count = std::min<std::size_t>(4096, rows - first);
@@ -96,31 +96,32 @@ LeastSquaresFit fit(const Doubles& Y, const Doubles& y) {
 }
 
 struct IdentificationObject {
-  Identification result;
-  LogReport data;
+  inference::Identification result;
+  logs::LogReport data;
   std::uint64_t seed = 1;
-  [[nodiscard]] Json json() const { return wheelwright::to_json(result, data, software(), seed); }
+  [[nodiscard]] Json json() const { return results::to_json(result, data, results::software(), seed); }
 };
 
 std::unique_ptr<IdentificationObject> identify_log(LogObject& log, const RobotObject& robot, bool shapes,
                                                    std::uint64_t seed, py::object progress) {
   LongWork work(std::move(progress));
-  IdentificationOptions options;
+  inference::IdentificationOptions options;
   options.seed = seed;
   options.shapes = shapes;
   options.progress = work.teller();
   return work.run([&] {
     const LogWalk walk(log);
-    const RecordedLog& given = *log.source;
-    const std::vector<std::string> needed = needed_columns(robot.robot);
+    const logs::RecordedLog& given = *log.source;
+    const std::vector<std::string> needed = robots::needed_columns(robot.robot);
     const bool efforts = std::any_of(needed.begin(), needed.end(),
                                      [&](const std::string& name) { return given.find(name).has_value(); });
-    if (efforts || !on_two_wheels(robot.robot) || !given.find("theta")) {
-      require_columns(given, needed);
+    if (efforts || !model::on_two_wheels(robot.robot) || !given.find("theta")) {
+      logs::require_columns(given, needed);
     }
     WatchedLog source(*log.source, work);
     auto out = std::make_unique<IdentificationObject>();
-    out->result = identify(source, with_column_errors(robot.robot, interpolation_errors(given.report())), options);
+    out->result = inference::identify(
+        source, model::with_column_errors(robot.robot, logs::interpolation_errors(given.report())), options);
     out->data = log.source->report();
     out->seed = seed;
     return out;
@@ -174,7 +175,7 @@ void bind_filter(py::module_& m) {
       .def_property_readonly("parameters",
                              [](const RegressionObject& r) {
                                std::vector<std::string> names;
-                               for (const Parameter& p : r.model.parameters) {
+                               for (const model::Parameter& p : r.model.parameters) {
                                  names.push_back(p.name);
                                }
                                return names;
@@ -190,19 +191,19 @@ void bind_filter(py::module_& m) {
         py::arg("progress") = py::none(),
         "The rows of a log in memory: filter constants of the robot file or chosen as commission() does; with `model` "
         "exactly those that its detector sees. The interpreter's lock is released.");
-  py::class_<LeastSquaresFit>(m, "LeastSquaresFit", "See least_squares().")
+  py::class_<identify::LeastSquaresFit>(m, "LeastSquaresFit", "See least_squares().")
       .def_property_readonly(
-          "estimate", [](const LeastSquaresFit& f) { return copy(f.estimate); }, "shape (p,)")
+          "estimate", [](const identify::LeastSquaresFit& f) { return copy(f.estimate); }, "shape (p,)")
       .def_property_readonly(
           "inverse_gram",
-          [](const LeastSquaresFit& f) {
-            const RowMatrix rows = f.inverse_gram;
+          [](const identify::LeastSquaresFit& f) {
+            const core::RowMatrix rows = f.inverse_gram;
             return py::array_t<double>({rows.rows(), rows.cols()}, rows.data());
           },
           "(Y'Y)^-1, shape (p, p)")
-      .def_readonly("rank", &LeastSquaresFit::rank)
-      .def_readonly("condition", &LeastSquaresFit::condition, "of the columns scaled to unit length")
-      .def_readonly("rss", &LeastSquaresFit::weighted_rss, "sum of squared residuals");
+      .def_readonly("rank", &identify::LeastSquaresFit::rank)
+      .def_readonly("condition", &identify::LeastSquaresFit::condition, "of the columns scaled to unit length")
+      .def_readonly("rss", &identify::LeastSquaresFit::weighted_rss, "sum of squared residuals");
   m.def("least_squares", &fit, py::arg("Y"), py::arg("y"),
         "min |y - Y theta|^2 by sequential QR. Y of shape (rows, p), y (rows,). The interpreter's lock is released.");
   py::class_<IdentificationObject>(m, "Identification", "What `wheelwright identify` says of a log.")
@@ -212,7 +213,8 @@ void bind_filter(py::module_& m) {
           "to_dict", [](const IdentificationObject& i) { return to_python(i.json()); },
           "The content of identification.json (results/identification.schema.json).")
       .def(
-          "save", [](const IdentificationObject& i, const std::filesystem::path& path) { write_json(path, i.json()); },
+          "save",
+          [](const IdentificationObject& i, const std::filesystem::path& path) { files::write_json(path, i.json()); },
           py::arg("path"), "Writes identification.json, whole or not at all.");
   m.def("identify", &identify_log, py::arg("log"), py::arg("robot"), py::kw_only(), py::arg("shapes") = true,
         py::arg("seed") = 1, py::arg("progress") = py::none(),

@@ -25,11 +25,14 @@
 #include "module.hpp"
 
 namespace wheelwright::python {
+
+using gap::GapEstimate;
+
 namespace {
 
 struct DiagnosisObject {
   Diagnosis diagnosis;
-  NextDrive next;
+  gap::NextDrive next;
   Json json;
 };
 
@@ -37,7 +40,7 @@ struct DiagnosisObject {
 struct SeriesObject {
   std::shared_ptr<const DiagnosisObject> owner;
   std::size_t index = 0;
-  [[nodiscard]] const ResidualSeries& series() const { return owner->diagnosis.series[index]; }
+  [[nodiscard]] const gap::ResidualSeries& series() const { return owner->diagnosis.series[index]; }
 };
 
 void check_names(const std::vector<std::string>& without, const std::vector<Effect>& catalogue) {
@@ -48,8 +51,8 @@ void check_names(const std::vector<std::string>& without, const std::vector<Effe
   }
   for (const std::string& name : without) {
     if (std::ranges::find(names, name) == names.end()) {
-      throw InputError("without " + shown(name) + ": no effect of the catalogue: expected one of " + listed(names) +
-                       did_you_mean(name, names));
+      throw InputError("without " + files::shown(name) + ": no effect of the catalogue: expected one of " +
+                       core::listed(names) + files::did_you_mean(name, names));
     }
   }
 }
@@ -58,10 +61,10 @@ std::shared_ptr<DiagnosisObject> gap(LogObject& log, const RobotObject& robot, L
                                      const std::vector<Effect>& effects, const std::vector<std::string>& without,
                                      const std::optional<double>& beta, bool shrink, bool manoeuvre, std::uint64_t seed,
                                      std::size_t threads, py::object progress) {
-  std::vector<Effect> catalogue = effect_catalogue(make_model(robot.robot));
+  std::vector<Effect> catalogue = gap::effect_catalogue(model::make_model(robot.robot));
   catalogue.insert(catalogue.end(), effects.begin(), effects.end());
   check_names(without, catalogue);
-  DiagnoseOptions options;
+  gap::DiagnoseOptions options;
   options.catalogue = catalogue;
   options.without = without;
   options.beta = beta;
@@ -71,16 +74,16 @@ std::shared_ptr<DiagnosisObject> gap(LogObject& log, const RobotObject& robot, L
   LongWork work(std::move(progress));
   options.progress = work.teller();
   return work.run([&] {
-    const std::vector<std::string> needed = needed_columns(robot.robot);
+    const std::vector<std::string> needed = robots::needed_columns(robot.robot);
     const LogWalk walk(log);
-    const Robot measured = with_column_errors(robot.robot, interpolation_errors(log.source->report()));
-    require_columns(*log.source, needed);
+    const Robot measured = model::with_column_errors(robot.robot, logs::interpolation_errors(log.source->report()));
+    logs::require_columns(*log.source, needed);
     WatchedLog source(*log.source, work);
     std::optional<LogWalk> healthy_walk;
     std::optional<WatchedLog> healthy_source;
     if (baseline != nullptr) {
       healthy_walk.emplace(*baseline);
-      require_columns(*baseline->source, needed);
+      logs::require_columns(*baseline->source, needed);
       healthy_source.emplace(*baseline->source, work);
     }
     LogSource* const healthy = healthy_source ? &*healthy_source : nullptr;
@@ -89,12 +92,12 @@ std::shared_ptr<DiagnosisObject> gap(LogObject& log, const RobotObject& robot, L
     d = diagnose(source, healthy, measured, options);
     if (fresh != nullptr) {
       const LogWalk fresh_walk(*fresh);
-      require_columns(*fresh->source, needed);
+      logs::require_columns(*fresh->source, needed);
       WatchedLog fresh_source(*fresh->source, work);
-      d.shrink.fresh_torque_rms = torque_on(fresh_source, healthy, measured, d, options);
+      d.shrink.fresh_torque_rms = gap::torque_on(fresh_source, healthy, measured, d, options);
     }
     if (manoeuvre) {
-      out->next = what_next(source, healthy, measured, d, options);
+      out->next = gap::what_next(source, healthy, measured, d, options);
     }
     for (std::vector<std::string>* texts : {&d.notes, &d.not_excited}) {
       for (std::string& text : *texts) {
@@ -109,17 +112,17 @@ std::shared_ptr<DiagnosisObject> gap(LogObject& log, const RobotObject& robot, L
         d.summary += " " + sentence;
       }
     }
-    GapFiles files;
+    results::GapFiles files;
     files.robot = robot.path;
     files.logs = log.paths();
     files.baseline = baseline != nullptr ? baseline->name() : "";
-    files.software = software();
+    files.software = results::software();
     if (out->next.commands) {
-      files.next_manoeuvre = NextManoeuvre{"", promise};
+      files.next_manoeuvre = results::NextManoeuvre{"", promise};
     }
-    out->json = wheelwright::to_json(d, files);
+    out->json = results::to_json(d, files);
     out->json["improved"] = nullptr;
-    add_rivals(out->json, out->next.rivals, catalogue);
+    results::add_rivals(out->json, out->next.rivals, catalogue);
     return out;
   });
 }
@@ -134,14 +137,14 @@ void bind_cause(py::module_& m) {
       .def("__repr__", [](const GapEstimate& e) {
         return "<wheelwright.GapEstimate " + e.name + ": " + words::estimate_words(e) + ">";
       });
-  py::class_<GapCause>(m, "GapCause", "One cause of the best combination.")
-      .def_readonly("effect", &GapCause::effect)
-      .def_readonly("sentence", &GapCause::sentence)
-      .def_readonly("parametric", &GapCause::parametric)
-      .def_readonly("share", &GapCause::share, "of the gap (Shapley value over the combination)")
+  py::class_<gap::GapCause>(m, "GapCause", "One cause of the best combination.")
+      .def_readonly("effect", &gap::GapCause::effect)
+      .def_readonly("sentence", &gap::GapCause::sentence)
+      .def_readonly("parametric", &gap::GapCause::parametric)
+      .def_readonly("share", &gap::GapCause::share, "of the gap (Shapley value over the combination)")
       .def_property_readonly(
           "parameters",
-          [](const GapCause& c) {
+          [](const gap::GapCause& c) {
             py::dict out;
             for (const GapEstimate& e : c.parameters) {
               out[py::str(e.name)] = e;
@@ -149,29 +152,29 @@ void bind_cause(py::module_& m) {
             return out;
           },
           "by name")
-      .def("__repr__", [](const GapCause& c) { return "<wheelwright.GapCause " + c.effect + ">"; });
+      .def("__repr__", [](const gap::GapCause& c) { return "<wheelwright.GapCause " + c.effect + ">"; });
   py::class_<SeriesObject> series(m, "ResidualSeries",
                                   "Residuals of one channel on the rows that the analysis used; read-only views of "
                                   "shape (rows,), empty where there is none.");
   series
       .def_property_readonly(
           "space",
-          [](const SeriesObject& s) { return s.series().space == GapSpace::dynamic ? "dynamic" : "kinematic"; })
+          [](const SeriesObject& s) { return s.series().space == gap::GapSpace::dynamic ? "dynamic" : "kinematic"; })
       .def_property_readonly("channel", [](const SeriesObject& s) { return s.series().channel; })
       .def_property_readonly("unit", [](const SeriesObject& s) { return s.series().unit; })
       .def_property_readonly(
           "floor", [](const SeriesObject& s) { return s.series().floor; }, "standard deviation of the noise");
-  const auto array = [&series](const char* name, Eigen::VectorXd ResidualSeries::*member, const char* doc) {
+  const auto array = [&series](const char* name, Eigen::VectorXd gap::ResidualSeries::*member, const char* doc) {
     series.def_property_readonly(
         name,
         [member](const py::object& self) { return view(self.cast<const SeriesObject&>().series().*member, self); },
         doc);
   };
-  array("t", &ResidualSeries::t, "s");
-  array("signal", &ResidualSeries::signal, "the left side: filtered effort, or increment of the pose");
-  array("nominal", &ResidualSeries::nominal, "left by the nominal model");
-  array("refitted", &ResidualSeries::refitted, "left by the model with theta fitted again");
-  array("after", &ResidualSeries::after, "left with the causes");
+  array("t", &gap::ResidualSeries::t, "s");
+  array("signal", &gap::ResidualSeries::signal, "the left side: filtered effort, or increment of the pose");
+  array("nominal", &gap::ResidualSeries::nominal, "left by the nominal model");
+  array("refitted", &gap::ResidualSeries::refitted, "left by the model with theta fitted again");
+  array("after", &gap::ResidualSeries::after, "left with the causes");
 }
 
 }  // namespace
@@ -183,7 +186,7 @@ void bind_gap(py::module_& m) {
       m, "Diagnosis", "The sim-to-real gap of a robot: gap.json and the numbers behind it.");
   diagnosis
       .def_property_readonly(
-          "verdict", [](const DiagnosisObject& d) { return std::string(name_of(d.diagnosis.verdict)); },
+          "verdict", [](const DiagnosisObject& d) { return std::string(results::name_of(d.diagnosis.verdict)); },
           "no_gap, explained, ambiguous or unexplained")
       .def_property_readonly("summary", [](const DiagnosisObject& d) { return d.diagnosis.summary; })
       .def_property_readonly(
@@ -228,10 +231,10 @@ void bind_gap(py::module_& m) {
           "to_dict", [](const DiagnosisObject& d) { return to_python(d.json); },
           "The content of gap.json (results/gap.schema.json).")
       .def(
-          "save", [](const DiagnosisObject& d, const std::filesystem::path& path) { write_json(path, d.json); },
+          "save", [](const DiagnosisObject& d, const std::filesystem::path& path) { files::write_json(path, d.json); },
           py::arg("path"), "Writes gap.json, whole or not at all.")
       .def("__repr__", [](const DiagnosisObject& d) {
-        return std::string("<wheelwright.Diagnosis: ") + name_of(d.diagnosis.verdict) + ">";
+        return std::string("<wheelwright.Diagnosis: ") + results::name_of(d.diagnosis.verdict) + ">";
       });
   for (const char* key : {"credible_set", "confusable", "where", "shrink", "parametric", "contradictions",
                           "next_manoeuvre", "not_excited", "floor_error", "floor_origin"}) {

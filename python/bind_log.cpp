@@ -23,13 +23,13 @@ namespace wheelwright::python {
 
 std::vector<std::string> LogObject::paths() const {
   std::vector<std::string> names;
-  for (const LogFileReport& file : source->report().files) {
+  for (const logs::LogFileReport& file : source->report().files) {
     names.push_back(file.path);
   }
   return names;
 }
 
-std::string LogObject::name() const { return listed(paths()); }
+std::string LogObject::name() const { return core::listed(paths()); }
 
 LogWalk::LogWalk(LogObject& log) : log_(&log) {
   check::that(!log.walked.exchange(true), "log " + log.name(),
@@ -41,23 +41,23 @@ namespace {
 using Path = std::filesystem::path;
 using Paths = std::variant<Path, std::vector<Path>>;
 
-LogOptions reader_options(const RobotObject* robot, const std::map<std::string, std::string>& map,
-                          const std::vector<std::string>& extra) {
-  LogOptions options;
+logs::LogOptions reader_options(const RobotObject* robot, const std::map<std::string, std::string>& map,
+                                const std::vector<std::string>& extra) {
+  logs::LogOptions options;
   options.map = map;
   options.extra = extra;
   for (const auto& [name, column] : map) {
     std::vector<std::string> names = extra;
-    for (const LogColumn& each : log_columns()) {
+    for (const logs::LogColumn& each : logs::log_columns()) {
       names.push_back(each.name);
     }
     if (std::find(names.begin(), names.end(), name) == names.end()) {
-      throw InputError("map: " + shown(name) + " is no column of a log: expected one of " + listed(names) +
-                       did_you_mean(name, names));
+      throw InputError("map: " + files::shown(name) + " is no column of a log: expected one of " + core::listed(names) +
+                       files::did_you_mean(name, names));
     }
   }
   if (robot != nullptr) {
-    options.only = useful_columns(robot->robot);
+    options.only = robots::useful_columns(robot->robot);
   }
   return options;
 }
@@ -65,13 +65,13 @@ LogOptions reader_options(const RobotObject* robot, const std::map<std::string, 
 std::unique_ptr<LogObject> read_recorded(const Paths& paths, const RobotObject* robot,
                                          const std::map<std::string, std::string>& map,
                                          const std::vector<std::string>& extra, const std::vector<Path>& msg_path) {
-  LogOptions options = reader_options(robot, map, extra);
+  logs::LogOptions options = reader_options(robot, map, extra);
   options.msg_path = msg_path;
   const auto files = std::holds_alternative<Path>(paths) ? std::vector<Path>{std::get<Path>(paths)}
                                                          : std::get<std::vector<Path>>(paths);
   const py::gil_scoped_release unlocked;
   auto log = std::make_unique<LogObject>();
-  log->source = open_log(files, options);
+  log->source = logs::open_log(files, options);
   return log;
 }
 
@@ -120,7 +120,7 @@ void bind_log(py::module_& m) {
       .def_property_readonly(
           "median_step", [](const LogObject& l) { return l.source->median_step(); }, "s")
       .def_property_readonly(
-          "notes", [](const LogObject& l) { return sentences(l.source->report()); },
+          "notes", [](const LogObject& l) { return logs::sentences(l.source->report()); },
           "what reading repaired or split, a sentence each")
       .def(
           "to_arrays", [](LogObject& l) { return arrays_of(table_of(l)); },
@@ -133,7 +133,7 @@ void bind_log(py::module_& m) {
           [](LogObject& l, const Path& path) {
             const LogTable table = table_of(l);
             const py::gil_scoped_release unlocked;
-            write_csv(path, table);
+            logs::write_csv(path, table);
           },
           py::arg("path"), "Writes the clean rows as CSV (.gz, .zst), whole or not at all.")
       .def("__len__", [](const LogObject& l) { return l.source->report().rows; })

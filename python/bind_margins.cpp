@@ -19,12 +19,15 @@
 #include "module.hpp"
 
 namespace wheelwright::python {
+
+using detector::FaultMargins;
+
 namespace {
 
 struct MarginsObject {
-  MarginSurvey survey;
+  commission::MarginSurvey survey;
   std::string model, log;
-  [[nodiscard]] Json json() const { return wheelwright::to_json(survey, model, log, software()); }
+  [[nodiscard]] Json json() const { return results::to_json(survey, model, log, results::software()); }
 };
 
 using Rule = std::optional<std::pair<std::size_t, std::size_t>>;
@@ -34,38 +37,39 @@ std::unique_ptr<MarginsObject> survey(LogObject& log, const ModelObject& model, 
                                       double noise_share, const std::string& set, const Rule& persistence,
                                       std::size_t threads, py::object progress) {
   check::that(set == "polytope" || set == "box", "set '" + set + "'", "polytope or box");
-  MarginSurveyOptions options;
+  commission::MarginSurveyOptions options;
   options.faults = std::move(faults);
-  options.set = set == "box" ? ParameterSetKind::box : ParameterSetKind::polytope;
+  options.set = set == "box" ? detector::ParameterSetKind::box : detector::ParameterSetKind::polytope;
   options.margins.windows = windows.value_or(options.margins.windows);
   options.margins.onset_step = onset_step;
   options.margins.noise_share = noise_share;
   options.margins.threads = threads;
   if (persistence) {
-    options.persistence = Persistence{persistence->first, persistence->second};
+    options.persistence = detector::Persistence{persistence->first, persistence->second};
   }
   LongWork work(std::move(progress));
   options.margins.progress = work.teller();
   return work.run([&] {
     const LogWalk walk(log);
-    require_columns(*log.source, model.model->measurement.columns());
+    logs::require_columns(*log.source, model.model->measurement.columns());
     WatchedLog source(*log.source, work);
     return std::unique_ptr<MarginsObject>(
-        new MarginsObject{survey_margins(source, *model.model, options), model.path, log.name()});
+        new MarginsObject{commission::survey_margins(source, *model.model, options), model.path, log.name()});
   });
 }
 
-std::optional<ManoeuvreKind> kind_called(const std::optional<std::string>& name) {
+std::optional<detector::ManoeuvreKind> kind_called(const std::optional<std::string>& name) {
   if (!name) {
     return std::nullopt;
   }
   std::string known;
-  for (const ManoeuvreKind kind : {ManoeuvreKind::standstill, ManoeuvreKind::cruising, ManoeuvreKind::accelerating,
-                                   ManoeuvreKind::turning, ManoeuvreKind::spinning}) {
-    if (manoeuvre_words(kind) == *name) {
+  for (const detector::ManoeuvreKind kind :
+       {detector::ManoeuvreKind::standstill, detector::ManoeuvreKind::cruising, detector::ManoeuvreKind::accelerating,
+        detector::ManoeuvreKind::turning, detector::ManoeuvreKind::spinning}) {
+    if (detector::manoeuvre_words(kind) == *name) {
       return kind;
     }
-    known += (known.empty() ? "" : ", ") + std::string(manoeuvre_words(kind));
+    known += (known.empty() ? "" : ", ") + std::string(detector::manoeuvre_words(kind));
   }
   throw InvalidArgument("manoeuvre '" + *name + "': expected one of " + known);
 }
@@ -83,7 +87,7 @@ void bind_fault(py::module_& m) {
           "t",
           [](const FaultMargins& f) {
             std::vector<double> t;
-            for (const OnsetMargin& onset : f.onsets) {
+            for (const detector::OnsetMargin& onset : f.onsets) {
               t.push_back(onset.t);
             }
             return copy(t);
@@ -93,8 +97,8 @@ void bind_fault(py::module_& m) {
           "manoeuvres",
           [](const FaultMargins& f) {
             std::vector<std::string> kinds;
-            for (const OnsetMargin& onset : f.onsets) {
-              kinds.emplace_back(manoeuvre_words(onset.kind));
+            for (const detector::OnsetMargin& onset : f.onsets) {
+              kinds.emplace_back(detector::manoeuvre_words(onset.kind));
             }
             return kinds;
           },
@@ -103,7 +107,7 @@ void bind_fault(py::module_& m) {
           "certain",
           [](const FaultMargins& f) {
             std::size_t windows = 0;
-            for (const OnsetMargin& onset : f.onsets) {
+            for (const detector::OnsetMargin& onset : f.onsets) {
               windows = std::max(windows, onset.certain.size());
             }
             py::array_t<double> out({f.onsets.size(), windows});
@@ -121,7 +125,7 @@ void bind_fault(py::module_& m) {
           "hidden",
           [](const FaultMargins& f) {
             std::vector<double> hidden;
-            for (const OnsetMargin& onset : f.onsets) {
+            for (const detector::OnsetMargin& onset : f.onsets) {
               hidden.push_back(onset.hidden);
             }
             return copy(hidden);
@@ -130,7 +134,7 @@ void bind_fault(py::module_& m) {
       .def(
           "summarise",
           [](const FaultMargins& f, std::size_t window, const std::optional<std::string>& manoeuvre) {
-            const MarginSummary s = summarise(f, window, kind_called(manoeuvre));
+            const detector::MarginSummary s = detector::summarise(f, window, kind_called(manoeuvre));
             py::dict out;
             out["onsets"] = s.onsets;
             out["certain"] = s.certain;
@@ -152,11 +156,12 @@ void bind_fault(py::module_& m) {
 
 void bind_margins(py::module_& m) {
   bind_fault(m);
-  py::class_<ResidualMargins>(m, "ResidualMargins", "Margins in one residual.")
-      .def_readonly("name", &ResidualMargins::name, "torque or kinematic")
-      .def_readonly("outputs", &ResidualMargins::outputs, "names of the channels")
-      .def_readonly("faults", &ResidualMargins::margins, "each fault and side that this residual can see")
-      .def_readonly("blind", &ResidualMargins::blind, "faults that leave no trace in it, whatever their size");
+  py::class_<commission::ResidualMargins>(m, "ResidualMargins", "Margins in one residual.")
+      .def_readonly("name", &commission::ResidualMargins::name, "torque or kinematic")
+      .def_readonly("outputs", &commission::ResidualMargins::outputs, "names of the channels")
+      .def_readonly("faults", &commission::ResidualMargins::margins, "each fault and side that this residual can see")
+      .def_readonly("blind", &commission::ResidualMargins::blind,
+                    "faults that leave no trace in it, whatever their size");
   py::class_<MarginsObject>(m, "Margins", "Detectability along a drive: which faults are certain to be seen.")
       .def_property_readonly(
           "windows", [](const MarginsObject& o) { return copy(o.survey.windows); }, "s, shape (windows,)")
@@ -169,9 +174,9 @@ void bind_margins(py::module_& m) {
           "to_dict", [](const MarginsObject& o) { return to_python(o.json()); },
           "The content of margins.json (results/margins.schema.json).")
       .def(
-          "save", [](const MarginsObject& o, const std::filesystem::path& path) { write_json(path, o.json()); },
+          "save", [](const MarginsObject& o, const std::filesystem::path& path) { files::write_json(path, o.json()); },
           py::arg("path"), "Writes margins.json, whole or not at all.");
-  const MarginOptions usual;
+  const detector::MarginOptions usual;
   m.def("margins", &survey, py::arg("log"), py::arg("model"), py::kw_only(),
         py::arg("faults") = std::vector<std::string>{}, py::arg("windows") = std::nullopt,
         py::arg("onset_step") = usual.onset_step, py::arg("noise_share") = usual.noise_share,

@@ -13,11 +13,11 @@ namespace {
 
 RobotObject read_file(const std::filesystem::path& path) { return {read_robot(path), path.string()}; }
 
-RobotObject from_keys(const py::kwargs& keys) { return {robot_from_json(to_json(keys, "Robot"), "Robot"), ""}; }
+RobotObject from_keys(const py::kwargs& keys) { return {robots::robot_from_json(to_json(keys, "Robot"), "Robot"), ""}; }
 
 py::list parameters(const RobotObject& r) {
   py::list out;
-  for (const Parameter& p : make_model(r.robot).parameters) {
+  for (const model::Parameter& p : model::make_model(r.robot).parameters) {
     py::dict row;
     row["name"] = p.name;
     row["unit"] = p.unit;
@@ -45,14 +45,18 @@ void bind_robot(py::module_& m) {
                              "one dict for each parameter of theta_L (20): name, unit, physical, physical_unit and "
                              "per_physical (theta_j = per_physical * physical quantity)")
       .def(
-          "to_dict", [](const RobotObject& r) { return to_python(to_json(r.robot)); }, "the keys of the robot file")
+          "to_dict", [](const RobotObject& r) { return to_python(robots::to_json(r.robot)); },
+          "the keys of the robot file")
       .def(
-          "to_yaml", [](const RobotObject& r) { return robot_yaml(r.robot); }, "the text of a robot file")
+          "to_yaml", [](const RobotObject& r) { return robots::robot_yaml(r.robot); }, "the text of a robot file")
       .def(
-          "save", [](const RobotObject& r, const std::filesystem::path& path) { write_robot(path, r.robot); },
+          "save", [](const RobotObject& r, const std::filesystem::path& path) { robots::write_robot(path, r.robot); },
           py::arg("path"), "Writes a robot file, whole or not at all.")
       .def(
-          "__eq__", [](const RobotObject& a, const RobotObject& b) { return to_json(a.robot) == to_json(b.robot); },
+          "__eq__",
+          [](const RobotObject& a, const RobotObject& b) {
+            return robots::to_json(a.robot) == robots::to_json(b.robot);
+          },
           py::is_operator())
       .def("__repr__", [](const RobotObject& r) { return "<wheelwright.Robot " + r.robot.name + ">"; });
   m.def("read_robot", &read_file, py::arg("path"),

@@ -31,9 +31,10 @@ using Path = std::filesystem::path;
 
 std::unique_ptr<LogObject> simulated(const std::variant<Path, py::dict>& given,
                                      const std::optional<std::uint64_t>& seed) {
-  Scenario scenario = std::holds_alternative<Path>(given)
-                          ? read_scenario(std::get<Path>(given))
-                          : parse_scenario(json_text(to_json(std::get<py::dict>(given), "scenario")), "scenario", ".");
+  Scenario scenario =
+      std::holds_alternative<Path>(given)
+          ? read_scenario(std::get<Path>(given))
+          : results::parse_scenario(files::json_text(to_json(std::get<py::dict>(given), "scenario")), "scenario", ".");
   scenario.seed = seed.value_or(scenario.seed);
   LongWork work{py::none()};
   const LogTable table = work.run([&] {
@@ -41,7 +42,7 @@ std::unique_ptr<LogObject> simulated(const std::variant<Path, py::dict>& given,
     WatchedLog source(simulation, work);
     return read_all(source);
   });
-  CsvOptions options;
+  logs::CsvOptions options;
   options.min_rows = 1;
   auto log = std::make_unique<LogObject>();
   log->source = array_log(arrays_of(table), options);
@@ -55,10 +56,10 @@ struct DesignObject {
   std::string summary;
 };
 
-MotionLimits limits_for(const Robot& robot, double duration, const std::optional<double>& speed,
-                        const std::optional<double>& acceleration, const std::optional<double>& effort,
-                        const std::optional<double>& radius, const std::optional<std::array<double, 4>>& box) {
-  MotionLimits limits = limits_of(robot);
+design::MotionLimits limits_for(const Robot& robot, double duration, const std::optional<double>& speed,
+                                const std::optional<double>& acceleration, const std::optional<double>& effort,
+                                const std::optional<double>& radius, const std::optional<std::array<double, 4>>& box) {
+  design::MotionLimits limits = design::limits_of(robot);
   limits.duration = duration;
   limits.joint_speed = speed.value_or(limits.joint_speed);
   limits.joint_acceleration = acceleration ? acceleration : limits.joint_acceleration;
@@ -67,26 +68,27 @@ MotionLimits limits_for(const Robot& robot, double duration, const std::optional
   if (box) {
     limits.box = {Interval{(*box)[0], (*box)[1]}, Interval{(*box)[2], (*box)[3]}};
   }
-  validate(limits);
+  design::validate(limits);
   return limits;
 }
 
-WidthCriterion criterion_called(const std::string& name) {
+design::WidthCriterion criterion_called(const std::string& name) {
   check::that(name == "geometric_mean" || name == "mean" || name == "largest", "criterion '" + name + "'",
               "geometric_mean, mean or largest");
-  return name == "mean"      ? WidthCriterion::mean
-         : name == "largest" ? WidthCriterion::largest
-                             : WidthCriterion::geometric_mean;
+  return name == "mean"      ? design::WidthCriterion::mean
+         : name == "largest" ? design::WidthCriterion::largest
+                             : design::WidthCriterion::geometric_mean;
 }
 
-std::vector<InspectedFault> inspected(const std::map<std::string, double>& faults, const OnlineModel& model) {
+std::vector<design::InspectedFault> inspected(const std::map<std::string, double>& faults, const OnlineModel& model) {
   if (faults.empty()) {
-    return usual_inspection(model);
+    return design::usual_inspection(model);
   }
-  const std::vector<FaultType> catalogue = fault_catalogue(model.model, model.estimate, model.robot.effort);
-  std::vector<InspectedFault> out;
+  const std::vector<detector::FaultType> catalogue =
+      detector::fault_catalogue(model.model, model.estimate, model.robot.effort);
+  std::vector<design::InspectedFault> out;
   for (const auto& [name, size] : faults) {
-    out.push_back({find_fault(catalogue, name), check::positive(size, "faults['" + name + "']")});
+    out.push_back({detector::find_fault(catalogue, name), check::positive(size, "faults['" + name + "']")});
   }
   return out;
 }
@@ -103,24 +105,25 @@ std::unique_ptr<DesignObject> design(const std::variant<const ModelObject*, cons
   check::that(aim == "bounds" || from_model, "aim 'detection'", "a commissioned Model, not a Robot");
   check::positive(rate, "rate");
   const Robot& robot = from_model ? std::get<0>(of)->model->robot : std::get<1>(of)->robot;
-  const MotionLimits limits = limits_for(robot, duration, speed, acceleration, effort, radius, box);
-  const WidthCriterion wanted = criterion_called(criterion);
+  const design::MotionLimits limits = limits_for(robot, duration, speed, acceleration, effort, radius, box);
+  const design::WidthCriterion wanted = criterion_called(criterion);
   LongWork work(std::move(progress));
-  DesignOptions options;
+  design::DesignOptions options;
   options.stages = stages;
   options.seed = seed;
   options.threads = threads;
   options.progress = work.teller();
   return work.run([&] {
-    const DesignSubject subject = from_model ? subject_of(*std::get<0>(of)->model) : subject_of(robot, 1.0 / rate);
+    const design::DesignSubject subject =
+        from_model ? design::subject_of(*std::get<0>(of)->model) : design::subject_of(robot, 1.0 / rate);
     auto out = std::make_unique<DesignObject>();
     const auto finish = [&](const auto& made) {
-      out->json["software"] = software();
+      out->json["software"] = results::software();
       out->json["seed"] = seed;
-      out->json["warrant"] = warrant_word(subject.warrant);
-      out->commands = command_table(made.manoeuvre.plan, subject.model);
+      out->json["warrant"] = core::warrant_word(subject.warrant);
+      out->commands = design::command_table(made.manoeuvre.plan, subject.model);
       if (made.figure_eight_plan) {
-        out->figure_eight = command_table(*made.figure_eight_plan, subject.model);
+        out->figure_eight = design::command_table(*made.figure_eight_plan, subject.model);
       }
     };
     if (aim == "detection") {
@@ -129,13 +132,14 @@ std::unique_ptr<DesignObject> design(const std::variant<const ModelObject*, cons
       options.descents = 3;
       options.steps = 250;
       const OnlineModel& model = *std::get<0>(of)->model;
-      const DetectionDesign made = design_for_detection(model, subject, limits, inspected(faults, model), options);
-      out->json = to_json(made, limits);
+      const design::DetectionDesign made =
+          design::design_for_detection(model, subject, limits, inspected(faults, model), options);
+      out->json = results::to_json(made, limits);
       out->summary = words::summary(made);
       finish(made);
     } else {
-      const BoundsDesign made = design_for_bounds(subject, limits, wanted, options);
-      out->json = to_json(made, subject, limits);
+      const design::BoundsDesign made = design::design_for_bounds(subject, limits, wanted, options);
+      out->json = results::to_json(made, subject, limits);
       out->summary = words::summary(made, subject);
       finish(made);
     }
@@ -165,13 +169,13 @@ void bind_sim(py::module_& m) {
       .def(
           "to_dict", [](const DesignObject& d) { return to_python(d.json); }, "The content of design.json.")
       .def(
-          "save", [](const DesignObject& d, const Path& path) { write_json(path, d.json); }, py::arg("path"),
+          "save", [](const DesignObject& d, const Path& path) { files::write_json(path, d.json); }, py::arg("path"),
           "Writes design.json, whole or not at all.");
   m.def("design", &design, py::arg("of"), py::arg("aim") = "bounds", py::kw_only(), py::arg("duration") = 20.0,
         py::arg("speed") = std::nullopt, py::arg("acceleration") = std::nullopt, py::arg("effort") = std::nullopt,
         py::arg("radius") = std::nullopt, py::arg("box") = std::nullopt, py::arg("rate") = 100.0,
         py::arg("criterion") = "geometric_mean", py::arg("faults") = std::map<std::string, double>{},
-        py::arg("stages") = DesignOptions{}.stages, py::arg("seed") = 1, py::arg("threads") = 1,
+        py::arg("stages") = design::DesignOptions{}.stages, py::arg("seed") = 1, py::arg("threads") = 1,
         py::arg("progress") = py::none(),
         "Designs a drive for a Model (or, for bounds, a Robot with nominal values and declared noise), as "
         "`wheelwright design` does.\n\n"

@@ -8,12 +8,12 @@ namespace wheelwright::python {
 DetectorRun run_detector(LogSource& log, TorqueDetector& detector, double merge) {
   DetectorRun run;
   run.outputs = detector.filter().model().n();
-  EventRecorder recorder(run.outputs, merge);
-  walk_detector(log, detector, [&](std::size_t row, double t, bool, const Decision& decision) {
+  detector::EventRecorder recorder(run.outputs, merge);
+  commission::walk_detector(log, detector, [&](std::size_t row, double t, bool, const Decision& decision) {
     run.t.push_back(t);
     run.row.push_back(static_cast<std::int64_t>(row));
     for (std::size_t i = 0; i < run.outputs; ++i) {
-      const ChannelDecision& c = decision.channels[i];
+      const detector::ChannelDecision& c = decision.channels[i];
       run.residual.push_back(c.residual);
       run.predicted.push_back(c.predicted);
       run.lower.push_back(c.threshold.lower);

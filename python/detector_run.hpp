@@ -18,7 +18,7 @@ struct DetectorRun {
   std::vector<std::int64_t> row;  ///< of the log
   std::vector<double> residual, predicted, lower, upper;
   std::vector<std::uint8_t> outside, alarm;
-  std::vector<Event> events;
+  std::vector<detector::Event> events;
   std::size_t outputs = 0;
 };
 

@@ -52,7 +52,7 @@ Json to_json(const py::handle& value, const std::string& what) {
   } catch (const py::error_already_set& error) {
     throw InvalidArgument(what + ": " + error.what() + ": expected values that JSON can hold");
   }
-  return parse_json(text, what);
+  return files::parse_json(text, what);
 }
 
 namespace {
@@ -73,7 +73,7 @@ PYBIND11_MODULE(_core, m) {
   namespace py = pybind11;
   using namespace wheelwright::python;
   m.doc() = "The compiled part of the package wheelwright.";
-  m.attr("software") = wheelwright::software();
+  m.attr("software") = wheelwright::results::software();
   const py::object value_error = py::reinterpret_borrow<py::object>(PyExc_ValueError);
   const py::object exception = py::reinterpret_borrow<py::object>(PyExc_Exception);
   static const py::object error =

@@ -43,7 +43,7 @@ struct RobotObject {
 
 /// A log as Python holds it.
 struct LogObject {
-  std::unique_ptr<RecordedLog> source;
+  std::unique_ptr<logs::RecordedLog> source;
   std::atomic<bool> walked = false;  ///< a call is at it: see LogWalk
 
   /// Its files as they were named; "arrays" for a log that came from none.
@@ -79,9 +79,9 @@ struct SetObject {
   [[nodiscard]] const Polytope& polytope() const;
 
   FeasibleSet set;
-  RowMatrix A;        ///< a facet a row
-  Eigen::VectorXd b;  ///< right-hand sides
-  RowMatrix hull;     ///< p × 2: lower, upper
+  core::RowMatrix A;     ///< a facet a row
+  Eigen::VectorXd b;     ///< right-hand sides
+  core::RowMatrix hull;  ///< p × 2: lower, upper
 };
 
 /// `value` as dict, list, str, float, int, bool or None, exactly what a reader of its JSON text gets: NaN and infinity

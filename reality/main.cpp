@@ -61,10 +61,10 @@ Json write_case(const Request& request, std::uint64_t index, const fs::path& out
   const Case c = make_case(request, index);
   fs::create_directories(out / "logs" / name);
   fs::create_directories(out / "fresh" / name);
-  write_csv(out / "logs" / name / "baseline.csv.gz", c.baseline);
-  write_csv(out / "logs" / name / "real.csv.gz", c.real);
-  write_csv(out / "fresh" / name / "real.csv.gz", c.fresh);
-  atomic_write(out / "logs" / name / "robot.yaml", robot_yaml(c.robot, name));
+  logs::write_csv(out / "logs" / name / "baseline.csv.gz", c.baseline);
+  logs::write_csv(out / "logs" / name / "real.csv.gz", c.real);
+  logs::write_csv(out / "fresh" / name / "real.csv.gz", c.fresh);
+  files::atomic_write(out / "logs" / name / "robot.yaml", robot_yaml(c.robot, name));
   return answer(c);
 }
 
@@ -99,7 +99,7 @@ int generate(const Request& request, std::uint64_t first, std::uint64_t cases, u
   for (const auto& [index, json] : answers) {
     all[fmt::format("case_{:03}", index)] = json;
   }
-  write_json(out / "answers.json", all);
+  files::write_json(out / "answers.json", all);
   if (failure) {
     std::rethrow_exception(failure);
   }

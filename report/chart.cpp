@@ -112,7 +112,7 @@ double tick_for(std::span<const double> t, const std::vector<bool>& starts) {
   }
   double tick = 1e-6;
   if (!steps.empty()) {
-    const double usual = median(std::move(steps));
+    const double usual = core::median(std::move(steps));
     while (usual > 0.0 && usual < 100.0 * tick && tick > 1e-12) {
       tick *= 0.1;
     }

@@ -15,10 +15,8 @@
 #include <wheelwright/words/commission_words.hpp>
 #include <wheelwright/words/text.hpp>
 
-namespace wheelwright {
+namespace wheelwright::report {
 using namespace words;
-
-using namespace report;
 
 namespace {
 
@@ -41,21 +39,21 @@ const char* status_class(Standing standing) {
 // Moments that decide: rows of a contradiction as lines, samples that set a bound as pins. Of one output, or of all.
 std::vector<ChartMark> deciding_marks(const Commissioning& result, std::optional<std::size_t> output = {}) {
   std::vector<ChartMark> marks;
-  const auto add = [&](const RowOrigin& o, const std::string& label, bool pin) {
+  const auto add = [&](const bounds::RowOrigin& o, const std::string& label, bool pin) {
     if (!o.is_prior && o.output == output.value_or(o.output)) {
       marks.push_back({o.t, o.t, label, pin});
     }
   };
-  for (const WeightedRow& w : result.feasible.contradiction) {
+  for (const bounds::WeightedRow& w : result.feasible.contradiction) {
     add(w.row.origin, output_name(result.model.model, w.row.origin.output), false);
   }
   if (result.feasible.contradiction.empty()) {
     const std::vector<ParameterViews> views = parameter_views(result);
     for (std::size_t j = 0; j < views.size(); ++j) {
-      for (const RowOrigin& o : result.parameters[j].lower_binding) {
+      for (const bounds::RowOrigin& o : result.parameters[j].lower_binding) {
         add(o, spaced(views[j].best().name) + " ≥", true);
       }
-      for (const RowOrigin& o : result.parameters[j].upper_binding) {
+      for (const bounds::RowOrigin& o : result.parameters[j].upper_binding) {
         add(o, spaced(views[j].best().name) + " ≤", true);
       }
     }
@@ -79,14 +77,14 @@ std::string residual_section(const Commissioning& result, const Detection& own, 
          thinning_note(own.instants, own.trace.t.size(), "instants");
 }
 
-std::string kinematic_section(const KinematicCommissioning& k) {
-  std::string out = k.message.empty() ? std::string() : paragraph(escape(capital(k.message)) + ".");
+std::string kinematic_section(const commission::KinematicCommissioning& k) {
+  std::string out = k.message.empty() ? std::string() : paragraph(escape(core::capital(k.message)) + ".");
   if (!k.model) {
     return out;
   }
   out += warrant_note(k.model->warrant);
   std::vector<std::vector<Cell>> rows;
-  for (const KinematicParameter& p : k.parameters) {
+  for (const commission::KinematicParameter& p : k.parameters) {
     const std::string unit = p.unit == "1" ? "" : p.unit;
     rows.push_back({escape(p.name), numeric(p.estimate ? number(*p.estimate, 5) : "–"), numeric(number(p.lower, 5)),
                     numeric(number(p.upper, 5)), numeric(number(p.nominal, 5)), escape(unit)});
@@ -96,9 +94,9 @@ std::string kinematic_section(const KinematicCommissioning& k) {
   const auto names = k.model->measurement.outputs(), units = k.model->measurement.output_units();
   rows.clear();
   for (std::size_t i = 0; i < k.noise.size(); ++i) {
-    const OutputValidation v = i < k.validation.size() ? k.validation[i] : OutputValidation{};
+    const commission::OutputValidation v = i < k.validation.size() ? k.validation[i] : commission::OutputValidation{};
     rows.push_back({escape(names[i]), escape(units[i]),
-                    k.noise[i].origin == NoiseOrigin::declared ? "declared" : "estimated",
+                    k.noise[i].origin == core::NoiseOrigin::declared ? "declared" : "estimated",
                     numeric(number(k.noise[i].bound)), numeric(count(v.instants)), numeric(count(v.outside)),
                     numeric(number(v.residual_rms)), numeric(number(v.median_width))});
   }
@@ -168,4 +166,4 @@ std::string failure_report(const std::string& error_message, const ReportContext
   return page(content);
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::report

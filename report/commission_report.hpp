@@ -8,7 +8,7 @@
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/report/context.hpp>
 
-namespace wheelwright {
+namespace wheelwright::report {
 
 /// One self-contained HTML page: the result in words, parameters, residual inside [l, u] and prediction over the whole
 /// log (where `context.own_log` is given), raw signals, validation, noise and filter, data. It loads nothing when
@@ -18,4 +18,4 @@ namespace wheelwright {
 /// The page of any command that stopped with an error: the error, what is known of the log, and its raw signals.
 [[nodiscard]] std::string failure_report(const std::string& error_message, const ReportContext& context);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::report

@@ -12,7 +12,7 @@
 #include <wheelwright/commission/detector_walk.hpp>
 #include <wheelwright/core/log.hpp>
 
-namespace wheelwright {
+namespace wheelwright::report {
 
 /// A seed that was used, and for what.
 struct ReportSeed {
@@ -33,4 +33,4 @@ struct ReportContext {
   std::optional<Detection> own_log;   ///< commission_report: the model's detector on the log it was made from
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::report

@@ -28,7 +28,7 @@ std::string smallest_change(const Commissioning& result, double kappa) {
   if (!(kappa > 0.0) || !std::isfinite(kappa)) {
     return "none";
   }
-  return on_two_wheels(result.model.robot) ? percent(radius_change(kappa)) : "–";
+  return model::on_two_wheels(result.model.robot) ? percent(radius_change(kappa)) : "–";
 }
 
 std::string joint_list(const std::vector<double>& values) {
@@ -36,7 +36,7 @@ std::string joint_list(const std::vector<double>& values) {
   for (const double x : values) {
     items.push_back(number(x));
   }
-  return items.empty() ? "–" : enumerated(items);
+  return items.empty() ? "–" : core::enumerated(items);
 }
 
 }  // namespace
@@ -47,7 +47,7 @@ std::string validation_section(const Commissioning& result) {
   }
   std::vector<std::vector<Cell>> rows;
   for (std::size_t i = 0; i < result.validation.size(); ++i) {
-    const OutputValidation& v = result.validation[i];
+    const commission::OutputValidation& v = result.validation[i];
     rows.push_back({unit_cell(result, i), numeric(count(v.instants)), numeric(count(v.outside)),
                     numeric(percent(v.coverage, 4)), numeric(percent(v.coverage_noise_free)), numeric(percent(v.nrmse)),
                     numeric(percent(v.utilisation)), numeric(ratio(v.median_width, v.torque_rms)),
@@ -86,10 +86,10 @@ std::string validation_section(const Commissioning& result) {
 std::string noise_section(const Commissioning& result) {
   std::vector<std::vector<Cell>> rows;
   for (std::size_t i = 0; i < result.noise.size(); ++i) {
-    const OutputNoise& n = result.noise[i];
+    const commission::OutputNoise& n = result.noise[i];
     std::string how;
-    if (n.origin == NoiseOrigin::declared) {
-      how = result.noise_mode == NoiseMode::worst_case
+    if (n.origin == core::NoiseOrigin::declared) {
+      how = result.noise_mode == filter::NoiseMode::worst_case
                 ? "declared bounds of the sensors, worst case through the filter"
                 : "declared bounds of the sensors, statistical: independent samples at the stated confidence";
     } else {
@@ -139,14 +139,14 @@ std::string contradiction_section(const Commissioning& result, const TimeAxis& a
   }
   std::vector<std::vector<Cell>> rows;
   const std::vector<ParameterViews> views = parameter_views(result);
-  std::vector<WeightedRow> in_time = result.feasible.contradiction;
-  std::stable_sort(in_time.begin(), in_time.end(), [](const WeightedRow& a, const WeightedRow& b) {
-    const RowOrigin &x = a.row.origin, &y = b.row.origin;
+  std::vector<bounds::WeightedRow> in_time = result.feasible.contradiction;
+  std::stable_sort(in_time.begin(), in_time.end(), [](const bounds::WeightedRow& a, const bounds::WeightedRow& b) {
+    const bounds::RowOrigin &x = a.row.origin, &y = b.row.origin;
     return x.is_prior != y.is_prior ? y.is_prior : x.t < y.t;
   });
-  for (const WeightedRow& w : in_time) {
-    const RowOrigin& o = w.row.origin;
-    const std::string side = o.side == Side::upper ? "upper" : "lower";
+  for (const bounds::WeightedRow& w : in_time) {
+    const bounds::RowOrigin& o = w.row.origin;
+    const std::string side = o.side == bounds::Side::upper ? "upper" : "lower";
     if (o.is_prior) {
       const std::string name =
           o.parameter < views.size() ? views[o.parameter].theta.name : "parameter " + std::to_string(o.parameter + 1);
@@ -164,7 +164,7 @@ std::string contradiction_section(const Commissioning& result, const TimeAxis& a
 }
 
 std::string data_section(const Commissioning& result, const ReportContext& context, const TimeAxis& axis) {
-  const Survey& s = result.survey;
+  const commission::Survey& s = result.survey;
   std::string out = definitions({
       {"Rows", count(s.rows) + " in " + plural(s.segments, "segment")},
       {"Driving time",
@@ -184,7 +184,7 @@ std::string data_section(const Commissioning& result, const ReportContext& conte
   if (!result.notes.empty()) {
     std::vector<std::string> notes;
     for (const std::string& note : result.notes) {
-      notes.push_back(capital(note) + (note.ends_with('.') ? "" : "."));
+      notes.push_back(core::capital(note) + (note.ends_with('.') ? "" : "."));
     }
     out += "<h3>Assumptions and choices</h3>\n" + bullets(notes);
   }
@@ -194,41 +194,42 @@ std::string data_section(const Commissioning& result, const ReportContext& conte
 namespace {
 
 // Classes of the style sheet, which is in every page: none of them is one of the words.
-const char* badge_class(Warrant warrant) {
+const char* badge_class(core::Warrant warrant) {
   switch (warrant) {
-    case Warrant::guaranteed: return "from-sensors";
-    case Warrant::extrapolated: return "from-log";
-    case Warrant::statistical: return "from-chance";
+    case core::Warrant::guaranteed: return "from-sensors";
+    case core::Warrant::extrapolated: return "from-log";
+    case core::Warrant::statistical: return "from-chance";
   }
   return "from-log";
 }
 
 }  // namespace
 
-std::string warrant_badge(Warrant warrant) {
-  return fmt::format("<span class=\"badge {}\">{}</span>", badge_class(warrant), warrant_word(warrant));
+std::string warrant_badge(core::Warrant warrant) {
+  return fmt::format("<span class=\"badge {}\">{}</span>", badge_class(warrant), core::warrant_word(warrant));
 }
 
-std::string warrant_note(Warrant warrant) {
-  std::string meaning(warrant_meaning(warrant));
+std::string warrant_note(core::Warrant warrant) {
+  std::string meaning(core::warrant_meaning(warrant));
   meaning.erase(0, meaning.find(' ') + 1);  // the word itself is in the badge
-  return paragraph(warrant_badge(warrant) + " " + escape(capital(meaning)));
+  return paragraph(warrant_badge(warrant) + " " + escape(core::capital(meaning)));
 }
 
-std::string assumptions_section(const std::vector<Assumption>& assumptions) {
+std::string assumptions_section(const std::vector<core::Assumption>& assumptions) {
   if (assumptions.empty()) {
     return {};
   }
-  std::vector<Assumption> sorted = assumptions;
-  std::ranges::stable_partition(sorted, [](const Assumption& a) { return a.verdict == AssumptionVerdict::fails; });
+  std::vector<core::Assumption> sorted = assumptions;
+  std::ranges::stable_partition(sorted,
+                                [](const core::Assumption& a) { return a.verdict == core::AssumptionVerdict::fails; });
   std::vector<std::vector<Cell>> rows;
-  for (const Assumption& a : sorted) {
-    const char* status = a.verdict == AssumptionVerdict::holds   ? "holds"
-                         : a.verdict == AssumptionVerdict::fails ? "broken"
-                                                                 : "open";
+  for (const core::Assumption& a : sorted) {
+    const char* status = a.verdict == core::AssumptionVerdict::holds   ? "holds"
+                         : a.verdict == core::AssumptionVerdict::fails ? "broken"
+                                                                       : "open";
     rows.push_back({escape(a.statement), a.declared_by.empty() ? "–" : "<code>" + escape(a.declared_by) + "</code>",
                     a.test.empty() ? "none" : escape(a.test),
-                    fmt::format("<span class=\"verdict-{}\">{}</span>", status, verdict_word(a.verdict)) +
+                    fmt::format("<span class=\"verdict-{}\">{}</span>", status, core::verdict_word(a.verdict)) +
                         (a.detail.empty() ? "" : "<small>" + escape(a.detail) + "</small>")});
   }
   return paragraph(

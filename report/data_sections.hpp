@@ -30,12 +30,12 @@ namespace wheelwright::report {
 [[nodiscard]] std::string data_section(const Commissioning& result, const ReportContext& context, const TimeAxis& axis);
 
 /// The word as a badge, of another colour for each. HTML.
-[[nodiscard]] std::string warrant_badge(Warrant warrant);
+[[nodiscard]] std::string warrant_badge(core::Warrant warrant);
 
 /// The badge and what the word means, as a paragraph. HTML.
-[[nodiscard]] std::string warrant_note(Warrant warrant);
+[[nodiscard]] std::string warrant_note(core::Warrant warrant);
 
 /// The assumptions with their verdicts, those that fail first, as a table; empty for none. HTML.
-[[nodiscard]] std::string assumptions_section(const std::vector<Assumption>& assumptions);
+[[nodiscard]] std::string assumptions_section(const std::vector<core::Assumption>& assumptions);
 
 }  // namespace wheelwright::report

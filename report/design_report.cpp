@@ -15,18 +15,19 @@
 #include <wheelwright/words/margin_words.hpp>
 #include <wheelwright/words/text.hpp>
 
-namespace wheelwright {
-using namespace words;
+namespace wheelwright::report {
 
-using namespace report;
+using design::DesignSubject;
+
+using namespace words;
 
 namespace {
 
-const char* criterion_words(WidthCriterion criterion) {
+const char* criterion_words(design::WidthCriterion criterion) {
   switch (criterion) {
-    case WidthCriterion::geometric_mean: return "the geometric mean of the relative widths of the bounds";
-    case WidthCriterion::mean: return "the mean relative width of the bounds";
-    case WidthCriterion::largest: break;
+    case design::WidthCriterion::geometric_mean: return "the geometric mean of the relative widths of the bounds";
+    case design::WidthCriterion::mean: return "the mean relative width of the bounds";
+    case design::WidthCriterion::largest: break;
   }
   return "the largest relative width of the bounds";
 }
@@ -38,8 +39,8 @@ std::string half_width(const Interval& side, double scale, double centre) {
 }
 
 // Bounds of each parameter, in the words of a data sheet where they can be had.
-std::string bounds_table(const BoundsDesign& design, const DesignSubject& subject) {
-  const auto scales = physical_scales(subject.robot, subject.model);
+std::string bounds_table(const design::BoundsDesign& design, const DesignSubject& subject) {
+  const auto scales = commission::physical_scales(subject.robot, subject.model);
   std::vector<Cell> header = {"Parameter", "unit", numeric("believed"), numeric("promised")};
   if (subject.known) {
     header.push_back(numeric("model now"));
@@ -50,12 +51,13 @@ std::string bounds_table(const BoundsDesign& design, const DesignSubject& subjec
   }
   std::vector<std::vector<Cell>> rows;
   for (std::size_t j = 0; j < subject.model.p(); ++j) {
-    const Parameter& parameter = subject.model.parameters[j];
+    const model::Parameter& parameter = subject.model.parameters[j];
     const double scale = scales ? (*scales)[j].scale : 1.0;
     const double centre = subject.theta[static_cast<Eigen::Index>(j)] * scale - (scales ? (*scales)[j].offset : 0.0);
-    std::vector<Cell> row = {escape(spaced(scales ? parameter.physical : parameter.name)),
-                             escape(scales ? parameter.physical_unit : parameter_unit(subject.robot, parameter)),
-                             numeric(number(centre)), numeric(half_width(design.promised.sides[j], scale, centre))};
+    std::vector<Cell> row = {
+        escape(spaced(scales ? parameter.physical : parameter.name)),
+        escape(scales ? parameter.physical_unit : commission::parameter_unit(subject.robot, parameter)),
+        numeric(number(centre)), numeric(half_width(design.promised.sides[j], scale, centre))};
     if (subject.known) {
       row.push_back(numeric(half_width(subject.known->sides[j], scale, centre)));
     }
@@ -81,7 +83,8 @@ std::string bounds_table(const BoundsDesign& design, const DesignSubject& subjec
               : "");
 }
 
-std::string limits_table(const LimitUse& use, const MotionLimits& limits, const DesignSubject& subject) {
+std::string limits_table(const design::LimitUse& use, const design::MotionLimits& limits,
+                         const DesignSubject& subject) {
   const bool axis = subject.model.joints.size() == 1;
   std::vector<std::vector<Cell>> rows;
   const auto add = [&rows](const char* what, const std::string& limit, double share) {
@@ -94,7 +97,7 @@ std::string limits_table(const LimitUse& use, const MotionLimits& limits, const 
         with_unit(number(*limits.joint_acceleration), axis ? "rad/s² or m/s²" : "rad/s²"), use.acceleration);
   }
   if (limits.effort) {
-    add("Effort", with_unit(number(*limits.effort), output_unit(subject.robot, "N·m")), use.effort);
+    add("Effort", with_unit(number(*limits.effort), commission::output_unit(subject.robot, "N·m")), use.effort);
   }
   if (limits.radius) {
     add("Distance from the start", with_unit(number(*limits.radius), "m"), use.space);
@@ -109,8 +112,8 @@ std::string limits_table(const LimitUse& use, const MotionLimits& limits, const 
   return table({"Limit", numeric("value"), numeric("used")}, rows);
 }
 
-std::string speed_charts(const Plan& plan, const Model& model, const TimeAxis& axis) {
-  const LogTable commands = command_table(plan, model);
+std::string speed_charts(const design::Plan& plan, const Model& model, const TimeAxis& axis) {
+  const LogTable commands = design::command_table(plan, model);
   const auto chart = [&](const char* title, const char* unit, const std::vector<const char*>& names) {
     Chart c;
     c.title = title;
@@ -129,9 +132,9 @@ std::string speed_charts(const Plan& plan, const Model& model, const TimeAxis& a
          chart("Forward speed v1", "m/s", {"v1"}) + chart("Yaw rate v2", "rad/s", {"v2"});
 }
 
-std::vector<std::string> design_words(const BoundsDesign& design, const DesignSubject& subject,
-                                      const MotionLimits& limits) {
-  const Plan& plan = design.manoeuvre.plan;
+std::vector<std::string> design_words(const design::BoundsDesign& design, const DesignSubject& subject,
+                                      const design::MotionLimits& limits) {
+  const design::Plan& plan = design.manoeuvre.plan;
   std::vector<std::string> sentences;
   sentences.push_back(
       fmt::format("Drive the table of commands once, from standstill: it takes {}, keeps within {} of "
@@ -149,18 +152,18 @@ std::vector<std::string> design_words(const BoundsDesign& design, const DesignSu
   return sentences;
 }
 
-std::string faults_table(const DetectionDesign& design, const DesignSubject& subject) {
+std::string faults_table(const design::DetectionDesign& design, const DesignSubject& subject) {
   std::vector<Cell> header = {"Fault", numeric("asked"), numeric("certain from"), numeric("after"), "channel"};
   if (design.figure_eight) {
     header.push_back(numeric("figure eight"));
   }
   std::vector<std::vector<Cell>> rows;
   for (std::size_t k = 0; k < design.promised.size(); ++k) {
-    const PromisedFault& p = design.promised[k];
+    const design::PromisedFault& p = design.promised[k];
     const bool found = std::isfinite(p.smallest);
     const bool sides = p.fault.range.lower < 0.0 && !p.fault.whole;
     std::vector<Cell> row = {
-        escape(capital(spaced(p.fault.name)) + (sides ? p.side > 0.0 ? ", growing" : ", shrinking" : "")),
+        escape(core::capital(spaced(p.fault.name)) + (sides ? p.side > 0.0 ? ", growing" : ", shrinking" : "")),
         numeric(escape(magnitude_words(p.fault, p.asked))), numeric(escape(magnitude_words(p.fault, p.smallest))),
         numeric(found ? with_unit(number(p.t), "s") : "–"),
         found ? escape(spaced(subject.model.outputs[p.output])) : "–"};
@@ -177,7 +180,7 @@ std::string faults_table(const DetectionDesign& design, const DesignSubject& sub
              "its wheels follow the commands.</span>");
 }
 
-std::string separations_table(const DiscriminationDesign& design) {
+std::string separations_table(const gap::DiscriminationDesign& design) {
   std::vector<Cell> header = {"True cause", "told from", numeric("standard deviations"), numeric("found with"),
                               numeric("residual ratio")};
   if (!design.analysed.empty()) {
@@ -188,7 +191,7 @@ std::string separations_table(const DiscriminationDesign& design) {
   }
   std::vector<std::vector<Cell>> rows;
   for (std::size_t k = 0; k < design.promised.size(); ++k) {
-    const RivalSeparation& pair = design.promised[k];
+    const gap::RivalSeparation& pair = design.promised[k];
     const double chance = pair.probability();
     std::vector<Cell> row = {escape(spaced(design.rivals[pair.truth].name())),
                              escape(spaced(design.rivals[pair.other].name())), numeric(number(pair.deviations())),
@@ -210,9 +213,9 @@ std::string separations_table(const DiscriminationDesign& design) {
 }
 
 // Path, commands, limits and data: what every design shows.
-void add_plan(PageContent& content, const Manoeuvre& manoeuvre, const DesignSubject& subject,
-              const MotionLimits& limits, const ReportContext& context) {
-  const LogTable commands = command_table(manoeuvre.plan, subject.model);
+void add_plan(PageContent& content, const design::Manoeuvre& manoeuvre, const DesignSubject& subject,
+              const design::MotionLimits& limits, const ReportContext& context) {
+  const LogTable commands = design::command_table(manoeuvre.plan, subject.model);
   const TimeAxis axis(commands.t);
   if (std::string path = driven_path(commands); !path.empty()) {
     content.sections.push_back(
@@ -226,8 +229,8 @@ void add_plan(PageContent& content, const Manoeuvre& manoeuvre, const DesignSubj
 
 }  // namespace
 
-std::string design_report(const DetectionDesign& design, const DesignSubject& subject, const MotionLimits& limits,
-                          const ReportContext& context) {
+std::string design_report(const design::DetectionDesign& design, const DesignSubject& subject,
+                          const design::MotionLimits& limits, const ReportContext& context) {
   PageContent content;
   content.title = context.title.empty() ? "Inspection of " + subject.robot.name : context.title;
   content.status = "good";
@@ -247,8 +250,8 @@ std::string design_report(const DetectionDesign& design, const DesignSubject& su
   return page(content);
 }
 
-std::string design_report(const DiscriminationDesign& design, const DesignSubject& subject, const MotionLimits& limits,
-                          const ReportContext& context) {
+std::string design_report(const gap::DiscriminationDesign& design, const DesignSubject& subject,
+                          const design::MotionLimits& limits, const ReportContext& context) {
   PageContent content;
   content.title = context.title.empty() ? "Manoeuvre to tell causes apart for " + subject.robot.name : context.title;
   const bool told = design.inseparable.empty();
@@ -270,15 +273,17 @@ std::string design_report(const DiscriminationDesign& design, const DesignSubjec
   return page(content);
 }
 
-std::string design_report(const BoundsDesign& design, const DesignSubject& subject, const MotionLimits& limits,
-                          const ReportContext& context) {
+std::string design_report(const design::BoundsDesign& design, const DesignSubject& subject,
+                          const design::MotionLimits& limits, const ReportContext& context) {
   PageContent content;
   content.title = context.title.empty() ? "Manoeuvre for " + subject.robot.name : context.title;
   content.status = "good";
   content.verdict = "A manoeuvre for narrow bounds.";
   if (design.figure_eight) {
-    const double mine = combined(relative_widths(design.promised, subject), WidthCriterion::geometric_mean);
-    const double eight = combined(relative_widths(design.promised_eight, subject), WidthCriterion::geometric_mean);
+    const double mine =
+        design::combined(design::relative_widths(design.promised, subject), design::WidthCriterion::geometric_mean);
+    const double eight = design::combined(design::relative_widths(design.promised_eight, subject),
+                                          design::WidthCriterion::geometric_mean);
     content.verdict = fmt::format(
         "A manoeuvre whose bounds are, in the geometric mean, {} as wide as those of the best figure eight.",
         percent(mine / eight, 2));
@@ -291,4 +296,4 @@ std::string design_report(const BoundsDesign& design, const DesignSubject& subje
   return page(content);
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::report

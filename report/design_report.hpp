@@ -10,20 +10,20 @@
 #include <wheelwright/gap/discrimination_design.hpp>
 #include <wheelwright/report/context.hpp>
 
-namespace wheelwright {
+namespace wheelwright::report {
 
 /// One self-contained HTML page: what was designed in words, the promised bounds beside those of the model and of a
 /// figure eight, the path, the commands over time, how much of each limit is used. `context.signals` and `own_log` are
 /// not used.
-[[nodiscard]] std::string design_report(const BoundsDesign& design, const DesignSubject& subject,
-                                        const MotionLimits& limits, const ReportContext& context);
+[[nodiscard]] std::string design_report(const design::BoundsDesign& design, const design::DesignSubject& subject,
+                                        const design::MotionLimits& limits, const ReportContext& context);
 
 /// The same for an inspection: from which size on each fault is certainly found, beside what a figure eight would find.
-[[nodiscard]] std::string design_report(const DetectionDesign& design, const DesignSubject& subject,
-                                        const MotionLimits& limits, const ReportContext& context);
+[[nodiscard]] std::string design_report(const design::DetectionDesign& design, const design::DesignSubject& subject,
+                                        const design::MotionLimits& limits, const ReportContext& context);
 
 /// The same for telling causes apart: how well each rival is told from each other one, beside a figure eight.
-[[nodiscard]] std::string design_report(const DiscriminationDesign& design, const DesignSubject& subject,
-                                        const MotionLimits& limits, const ReportContext& context);
+[[nodiscard]] std::string design_report(const gap::DiscriminationDesign& design, const design::DesignSubject& subject,
+                                        const design::MotionLimits& limits, const ReportContext& context);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::report

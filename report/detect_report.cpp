@@ -13,10 +13,8 @@
 #include <wheelwright/words/detect_words.hpp>
 #include <wheelwright/words/text.hpp>
 
-namespace wheelwright {
+namespace wheelwright::report {
 using namespace words;
-
-using namespace report;
 
 namespace {
 
@@ -31,7 +29,7 @@ std::string event_table(const Detection& detection, const OnlineModel& model, co
   constexpr std::size_t most_rows = 500;
   std::vector<std::vector<Cell>> rows;
   for (std::size_t k = 0; k < detection.events.size() && k < most_rows; ++k) {
-    const Event& e = detection.events[k];
+    const detector::Event& e = detection.events[k];
     rows.push_back({time_button(e.start, e.end, "event " + std::to_string(k + 1), axis),
                     escape(output_name(model.model, e.output)), numeric(axis.text(e.start)),
                     numeric(axis.text(e.alarm)), numeric(axis.text(e.end)), numeric(axis.text(e.peak_time)),
@@ -72,8 +70,8 @@ std::string kinematic_section(const KinematicFindings& kinematic, const OnlineMo
   }
   const Detection& d = *kinematic.detection;
   OnlineModel names = model;
-  names.robot.effort = EffortKind::torque;
-  names.model = kinematic_outputs(*model.kinematic);
+  names.robot.effort = model::EffortKind::torque;
+  names.model = detector::kinematic_outputs(*model.kinematic);
   std::vector<std::vector<ChartMark>> marks(d.trace.outputs.size());
   for (std::size_t k = 0; k < d.events.size(); ++k) {
     if (d.events[k].output < marks.size()) {
@@ -91,24 +89,24 @@ std::string kinematic_section(const KinematicFindings& kinematic, const OnlineMo
                                   thinning_note(d.instants, d.trace.t.size(), "instants"));
 }
 
-std::string isolation_section(const std::vector<Isolation>& isolations, const Detection& detection,
+std::string isolation_section(const std::vector<detector::Isolation>& isolations, const Detection& detection,
                               const TimeAxis& axis) {
-  using Verdict = FaultFinding::Verdict;
+  using Verdict = detector::FaultFinding::Verdict;
   std::vector<std::vector<Cell>> rows;
   for (std::size_t k = 0; k < isolations.size() && k < detection.events.size(); ++k) {
     std::vector<std::string> possible, excluded, open;
-    for (const FaultFinding& f : isolations[k].findings) {
+    for (const detector::FaultFinding& f : isolations[k].findings) {
       switch (f.verdict) {
-        case Verdict::consistent: possible.push_back(capital(sentence(f))); break;
+        case Verdict::consistent: possible.push_back(core::capital(commission::sentence(f))); break;
         case Verdict::excluded: excluded.push_back(spaced(f.fault.name)); break;
         case Verdict::not_examined: open.push_back(spaced(f.fault.name)); break;
       }
     }
-    const Event& e = detection.events[k];
+    const detector::Event& e = detection.events[k];
     std::string others = fmt::format("<details><summary>{} excluded</summary>{}</details>", excluded.size(),
-                                     escape(enumerated(excluded)));
+                                     escape(core::enumerated(excluded)));
     if (!open.empty()) {
-      others += "<small>not examined: " + escape(enumerated(open)) + "</small>";
+      others += "<small>not examined: " + escape(core::enumerated(open)) + "</small>";
     }
     rows.push_back({time_button(e.start, e.end, "event " + std::to_string(k + 1), axis),
                     possible.empty() ? "Nothing in the catalogue explains it." : bullets(possible), others});
@@ -123,12 +121,12 @@ std::string isolation_section(const std::vector<Isolation>& isolations, const De
 }  // namespace
 
 std::string detect_report(const Detection& detection, const OnlineModel& model, const ReportContext& context,
-                          const KinematicFindings& kinematic, const std::vector<Isolation>& isolations) {
+                          const KinematicFindings& kinematic, const std::vector<detector::Isolation>& isolations) {
   const TimeAxis axis = axis_for(detection, context);
   std::vector<std::vector<ChartMark>> marks(detection.trace.outputs.size());
   std::vector<ChartMark> all_marks;
   for (std::size_t k = 0; k < detection.events.size(); ++k) {
-    const Event& e = detection.events[k];
+    const detector::Event& e = detection.events[k];
     const ChartMark mark{e.start, e.end, std::to_string(k + 1)};
     all_marks.push_back(mark);
     if (e.output < marks.size()) {
@@ -144,10 +142,10 @@ std::string detect_report(const Detection& detection, const OnlineModel& model, 
   content.verdict = detect_verdict(detection, kinematic_events);
   content.sentences = detect_words(detection, model, isolations, axis);
   if (kinematic_events > 0) {
-    const Event& first = kinematic.detection->events.front();
+    const detector::Event& first = kinematic.detection->events.front();
     content.sentences.push_back(fmt::format(
         "{} of these in the kinematic residual, the first alarm at {}: pose or gyro did not move as the wheels rolled.",
-        capital(plural(kinematic_events, "event")), axis.text(first.alarm)));
+        core::capital(plural(kinematic_events, "event")), axis.text(first.alarm)));
   }
   content.software = context.software;
   content.warrant = model.warrant;
@@ -186,4 +184,4 @@ std::string detect_report(const Detection& detection, const OnlineModel& model, 
   return page(content);
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::report

@@ -11,7 +11,7 @@
 #include <wheelwright/commission/detector_walk.hpp>
 #include <wheelwright/report/context.hpp>
 
-namespace wheelwright {
+namespace wheelwright::report {
 
 /// Findings of the kinematic residual.
 struct KinematicFindings {
@@ -25,6 +25,6 @@ struct KinematicFindings {
 /// name is escaped, every number is finite. `context.own_log` is not used.
 [[nodiscard]] std::string detect_report(const Detection& detection, const OnlineModel& model,
                                         const ReportContext& context, const KinematicFindings& kinematic = {},
-                                        const std::vector<Isolation>& isolations = {});
+                                        const std::vector<detector::Isolation>& isolations = {});
 
-}  // namespace wheelwright
+}  // namespace wheelwright::report

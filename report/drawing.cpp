@@ -128,9 +128,9 @@ std::string interval_bar(const ParameterView& v) {
   return out + "</svg>";
 }
 
-std::string filter_curve(const FilterChoice& choice) {
+std::string filter_curve(const commission::FilterChoice& choice) {
   std::vector<std::pair<double, double>> points;  // log10 β, log10 criterion
-  for (const FilterCandidate& c : choice.curve) {
+  for (const commission::FilterCandidate& c : choice.curve) {
     if (c.design.beta > 0.0 && c.criterion > 0.0 && std::isfinite(c.criterion) && std::isfinite(c.design.beta)) {
       points.emplace_back(std::log10(c.design.beta), std::log10(c.criterion));
     }

@@ -23,7 +23,7 @@ namespace wheelwright::report {
 [[nodiscard]] std::string interval_bar(const words::ParameterView& view);
 
 /// The curve behind the choice of the filter, criterion over β, both logarithmic; empty for fewer than two candidates.
-[[nodiscard]] std::string filter_curve(const FilterChoice& choice);
+[[nodiscard]] std::string filter_curve(const commission::FilterChoice& choice);
 
 /// The driven path seen from above, from columns x and y; empty where the log lacks them or does not move.
 [[nodiscard]] std::string driven_path(const LogTable& signals);

@@ -15,6 +15,9 @@
 #include <wheelwright/words/text.hpp>
 
 namespace wheelwright::report {
+
+using study::FleetResult;
+
 using namespace words;
 namespace {
 
@@ -71,10 +74,10 @@ struct Bin {
 }  // namespace
 
 std::string fleet_strip(const FleetResult& fleet, std::size_t parameter) {
-  const ParameterPopulation& population = fleet.population.parameters.at(parameter);
-  const FleetColumn& column = fleet.table.columns[population.column];
-  std::vector<const FleetEntry*> shown;
-  for (const FleetEntry& e : column.entries) {
+  const study::ParameterPopulation& population = fleet.population.parameters.at(parameter);
+  const study::FleetColumn& column = fleet.table.columns[population.column];
+  std::vector<const study::FleetEntry*> shown;
+  for (const study::FleetEntry& e : column.entries) {
     if (std::isfinite(e.estimate)) {
       shown.push_back(&e);
     }
@@ -84,14 +87,14 @@ std::string fleet_strip(const FleetResult& fleet, std::size_t parameter) {
   }
   std::stable_sort(shown.begin(), shown.end(), [](const auto* a, const auto* b) { return a->estimate < b->estimate; });
   std::set<std::size_t> outside;
-  for (const RobotOutside& o : fleet.population.outside) {
+  for (const study::RobotOutside& o : fleet.population.outside) {
     if (o.column == population.column) {
       outside.insert(o.robot);
     }
   }
   Axis axis;
   std::vector<double> lower, upper;
-  for (const FleetEntry* e : shown) {
+  for (const study::FleetEntry* e : shown) {
     axis.take(e->estimate);
     lower.push_back(e->lower);
     upper.push_back(e->upper);
@@ -147,8 +150,8 @@ std::string fleet_strip(const FleetResult& fleet, std::size_t parameter) {
 }
 
 std::string slope_strip(const FleetResult& fleet, std::size_t column, std::size_t most) {
-  std::vector<const ParameterDrift*> shown;
-  for (const ParameterDrift& d : fleet.drift) {
+  std::vector<const study::ParameterDrift*> shown;
+  for (const study::ParameterDrift& d : fleet.drift) {
     if (d.column == column && d.has_trend && shown.size() < most) {
       shown.push_back(&d);
     }
@@ -158,12 +161,12 @@ std::string slope_strip(const FleetResult& fleet, std::size_t column, std::size_
   }
   Axis axis;
   axis.take(0.0);
-  for (const ParameterDrift* d : shown) {
+  for (const study::ParameterDrift* d : shown) {
     axis.take(d->slope - 2.0 * d->slope_error);
     axis.take(d->slope + 2.0 * d->slope_error);
   }
   axis.pad(0.05);
-  const FleetColumn& of = fleet.table.columns[column];
+  const study::FleetColumn& of = fleet.table.columns[column];
   std::string out =
       frame(axis, "slopes of " + spaced(of.name), of.unit + (shown.front()->dated ? " per week" : " per log"),
             fmt::format("{}, worst first", plural(shown.size(), "robot")));
@@ -171,7 +174,7 @@ std::string slope_strip(const FleetResult& fleet, std::size_t column, std::size_
   out += fmt::format("<line x1=\"{}\" x2=\"{}\" y1=\"{:.1f}\" y2=\"{:.1f}\" style=\"stroke:var(--ink)\"/>", kFleetLeft,
                      kFleetWidth - kFleetRight, axis.y(0.0), axis.y(0.0));
   for (std::size_t k = 0; k < shown.size(); ++k) {
-    const ParameterDrift& d = *shown[k];
+    const study::ParameterDrift& d = *shown[k];
     const double x = kFleetLeft + (static_cast<double>(k) + 0.5) * step;
     out += fmt::format(
         "<path d=\"M{0:.1f} {1:.1f}V{2:.1f}\" style=\"stroke:var(--first);stroke-width:{3:.1f}\"/><circle "
@@ -182,12 +185,6 @@ std::string slope_strip(const FleetResult& fleet, std::size_t column, std::size_
   }
   return out + "</svg>";
 }
-
-}  // namespace wheelwright::report
-
-namespace wheelwright {
-
-using namespace report;
 
 namespace {
 
@@ -215,16 +212,16 @@ std::string population_section(const FleetResult& fleet) {
   std::vector<std::vector<Cell>> rows;
   std::string strips;
   for (std::size_t j = 0; j < fleet.population.parameters.size(); ++j) {
-    const ParameterPopulation& p = fleet.population.parameters[j];
-    const FleetColumn& column = fleet.table.columns[p.column];
+    const study::ParameterPopulation& p = fleet.population.parameters[j];
+    const study::FleetColumn& column = fleet.table.columns[p.column];
     const auto cell = [&](double x) { return numeric(p.described ? number(x) : std::string("–")); };
     const auto range = outward(p.central.lower, p.central.upper);
-    rows.push_back({escape(capital(spaced(column.name))) + "<small>" + escape(column.unit) + "</small>",
+    rows.push_back({escape(core::capital(spaced(column.name))) + "<small>" + escape(column.unit) + "</small>",
                     numeric(count(p.shown)), cell(p.fit.centre), cell(p.fit.spread), cell(p.typical_error),
                     numeric(p.described ? "[" + range.first + ", " + range.second + "]" : "–")});
     const std::string strip = fleet_strip(fleet, j);
     if (!strip.empty()) {
-      strips += "<h3>" + escape(capital(spaced(column.name))) + "</h3>" + strip;
+      strips += "<h3>" + escape(core::capital(spaced(column.name))) + "</h3>" + strip;
     }
   }
   if (rows.empty()) {
@@ -252,8 +249,8 @@ std::string outside_section(const FleetResult& fleet) {
   return limited(
              {"Robot", "Parameter", numeric("Estimate"), numeric("Deviations"), numeric("p, adjusted"), "For certain"},
              fleet.population.outside,
-             [&](const RobotOutside& o) -> std::vector<Cell> {
-               const FleetColumn& column = fleet.table.columns[o.column];
+             [&](const study::RobotOutside& o) -> std::vector<Cell> {
+               const study::FleetColumn& column = fleet.table.columns[o.column];
                return {robot_name(fleet, o.robot),
                        escape(spaced(column.name)),
                        numeric(escape(with_unit(number(o.value, 4), column.unit))),
@@ -270,13 +267,13 @@ std::string outside_section(const FleetResult& fleet) {
 }
 
 std::string drift_section(const FleetResult& fleet) {
-  std::vector<ParameterDrift> drifting;
+  std::vector<study::ParameterDrift> drifting;
   std::copy_if(fleet.drift.begin(), fleet.drift.end(), std::back_inserter(drifting),
-               [&](const ParameterDrift& d) { return d.drifts(fleet.drift_level); });
+               [&](const study::ParameterDrift& d) { return d.drifts(fleet.drift_level); });
   std::string out = limited({"Robot", "Parameter", numeric("Certain change"), numeric("Trend"),
                              numeric("95 % interval"), numeric("p, adjusted")},
-                            drifting, [&](const ParameterDrift& d) -> std::vector<Cell> {
-                              const FleetColumn& column = fleet.table.columns[d.column];
+                            drifting, [&](const study::ParameterDrift& d) -> std::vector<Cell> {
+                              const study::FleetColumn& column = fleet.table.columns[d.column];
                               const std::string per = column.unit + (d.dated ? "/week" : " a log");
                               return {robot_name(fleet, d.robot),
                                       escape(spaced(column.name)),
@@ -292,7 +289,7 @@ std::string drift_section(const FleetResult& fleet) {
       "A change is certain where the bounds of two logs do not meet: it assumes nothing but the noise bounds. "
       "A trend is a line through the logs’ estimates" +
       std::string(
-          repeats_known(fleet.drift)
+          study::repeats_known(fleet.drift)
               ? "; how much logs differ beyond their standard errors was learnt from the whole fleet."
               : "; with two logs a robot, a change that most robots share cannot be told from what differs between "
                 "logs (floor, payload, temperature)."));
@@ -300,7 +297,7 @@ std::string drift_section(const FleetResult& fleet) {
     const bool any = std::any_of(drifting.begin(), drifting.end(), [&](const auto& d) { return d.column == j; });
     const std::string strip = any ? slope_strip(fleet, j) : std::string();
     if (!strip.empty()) {
-      out += "<h3>" + escape(capital(spaced(fleet.table.columns[j].name))) + "</h3>" + strip;
+      out += "<h3>" + escape(core::capital(spaced(fleet.table.columns[j].name))) + "</h3>" + strip;
     }
   }
   return out;
@@ -308,28 +305,28 @@ std::string drift_section(const FleetResult& fleet) {
 
 std::string alarm_section(const FleetResult& fleet) {
   return limited({"Robot", "Log", numeric("Alarms"), numeric("First"), numeric("Instants outside")}, fleet.alarms,
-                 [&](const FleetAlarm& a) -> std::vector<Cell> {
+                 [&](const study::FleetAlarm& a) -> std::vector<Cell> {
                    return {robot_name(fleet, a.robot), escape(a.log), numeric(count(a.events)),
                            numeric(escape(with_unit(number(a.first), "s"))), numeric(escape(percent(a.outside_share)))};
                  });
 }
 
 std::string failed_section(const FleetResult& fleet) {
-  return limited({"Robot", "Log", "Why"}, fleet.failed, [&](const FleetFinding& f) -> std::vector<Cell> {
+  return limited({"Robot", "Log", "Why"}, fleet.failed, [&](const study::FleetFinding& f) -> std::vector<Cell> {
     return {robot_name(fleet, f.robot), escape(f.log), escape(f.text)};
   });
 }
 
 std::string threshold_section(const FleetResult& fleet) {
   std::vector<std::vector<Cell>> rows;
-  const auto take = [&](const FleetSpread& s, const auto& text) {
+  const auto take = [&](const study::FleetSpread& s, const auto& text) {
     if (!s.values.empty()) {
-      rows.push_back({escape(capital(spaced(s.name))), numeric(count(s.values.size())), numeric(text(s.quantile(0.0))),
-                      numeric(text(s.quantile(0.5))), numeric(text(s.quantile(0.95))), numeric(text(s.largest)),
-                      robot_name(fleet, s.largest_robot)});
+      rows.push_back({escape(core::capital(spaced(s.name))), numeric(count(s.values.size())),
+                      numeric(text(s.quantile(0.0))), numeric(text(s.quantile(0.5))), numeric(text(s.quantile(0.95))),
+                      numeric(text(s.largest)), robot_name(fleet, s.largest_robot)});
     }
   };
-  for (const FleetSpread& s : fleet.widths) {
+  for (const study::FleetSpread& s : fleet.widths) {
     take(s, [&](double x) { return escape(with_unit(number(x), s.unit)); });
   }
   take(fleet.smallest, [](double x) { return escape(percent(x)); });
@@ -339,16 +336,16 @@ std::string threshold_section(const FleetResult& fleet) {
 }
 
 std::string prior_section(const FleetResult& fleet) {
-  const PooledPrior& prior = fleet.prior;
-  std::string out = paragraph(escape(capital(prior.message)) + ".");
+  const study::PooledPrior& prior = fleet.prior;
+  std::string out = paragraph(escape(core::capital(prior.message)) + ".");
   if (!prior.exists) {
     return out;
   }
   std::vector<std::vector<Cell>> rows;
-  for (const PooledParameter& p : prior.parameters) {
-    const FleetColumn& column = fleet.table.columns[p.column];
+  for (const study::PooledParameter& p : prior.parameters) {
+    const study::FleetColumn& column = fleet.table.columns[p.column];
     const auto before = outward(p.before.lower, p.before.upper), box = outward(p.box.lower, p.box.upper);
-    rows.push_back({escape(capital(spaced(column.name))) + "<small>" + escape(column.unit) + "</small>",
+    rows.push_back({escape(core::capital(spaced(column.name))) + "<small>" + escape(column.unit) + "</small>",
                     numeric("[" + before.first + ", " + before.second + "]"),
                     numeric(p.included ? "[" + box.first + ", " + box.second + "]" : "–"), escape(p.reason)});
   }
@@ -363,10 +360,10 @@ std::string prior_section(const FleetResult& fleet) {
 }  // namespace
 
 std::string fleet_report(const FleetResult& fleet, const ReportContext& context) {
-  const std::vector<std::string> said = sentences(fleet);
+  const std::vector<std::string> said = study::sentences(fleet);
   PageContent content;
   content.title = context.title.empty() ? "Fleet of " + plural(fleet.table.robots.size(), "robot") : context.title;
-  const bool nobody = fleet.count(RobotStatus::commissioned) + fleet.count(RobotStatus::partial) == 0;
+  const bool nobody = fleet.count(study::RobotStatus::commissioned) + fleet.count(study::RobotStatus::partial) == 0;
   content.status = fleet.well() ? "good" : nobody ? "bad" : "caution";
   content.verdict = said.front();
   content.sentences.assign(said.begin() + 1, said.end());
@@ -389,4 +386,4 @@ std::string fleet_report(const FleetResult& fleet, const ReportContext& context)
   return page(content);
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::report

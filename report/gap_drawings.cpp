@@ -75,14 +75,14 @@ const char* figure_words(const std::string& name) {
 
 }  // namespace
 
-std::string shrink_bars(const std::vector<ShrinkFigure>& figures) {
+std::string shrink_bars(const std::vector<gap::ShrinkFigure>& figures) {
   if (figures.empty()) {
     return {};
   }
   constexpr double left = 130.0, longest = 170.0, height = 11.0, group = 50.0, width = left + longest + 240.0;
   std::string out = open_svg(width, group * static_cast<double>(figures.size()) + 6.0, "before, after and floor");
   double y = 8.0;
-  for (const ShrinkFigure& f : figures) {
+  for (const gap::ShrinkFigure& f : figures) {
     const double largest = std::max({std::isfinite(f.before) ? f.before : 0.0, std::isfinite(f.after) ? f.after : 0.0,
                                      std::isfinite(f.upper) ? f.upper : 0.0, f.floor, 1e-300});
     const char* known = figure_words(f.name);
@@ -118,7 +118,7 @@ std::string shrink_bars(const std::vector<ShrinkFigure>& figures) {
   return out + "</svg>";
 }
 
-std::string share_bars(const std::vector<GapShare>& shares, std::size_t most) {
+std::string share_bars(const std::vector<gap::GapShare>& shares, std::size_t most) {
   const std::size_t n = std::min(most, shares.size());
   if (n == 0) {
     return {};
@@ -132,9 +132,9 @@ std::string share_bars(const std::vector<GapShare>& shares, std::size_t most) {
   std::string out =
       open_svg(left + longest + 145.0, row * static_cast<double>(n) + 8.0, "share of the structural part");
   for (std::size_t k = 0; k < n; ++k) {
-    const GapShare& s = shares[k];
+    const gap::GapShare& s = shares[k];
     const double y = 4.0 + row * static_cast<double>(k);
-    const bool finding = is_finding(s);
+    const bool finding = gap::is_finding(s);
     out += svg_text(left - 8.0, y + 11.5, "end", s.regime, finding);
     out +=
         rectangle(left, y, std::max(0.8, longest * s.share), 14.0, finding ? "class=\"full\"" : "class=\"bar open\"");
@@ -151,26 +151,27 @@ std::string share_bars(const std::vector<GapShare>& shares, std::size_t most) {
   return out + line(left, 0.0, left, row * static_cast<double>(n) + 6.0, "class=\"axis\"") + "</svg>";
 }
 
-std::string spectrum_drawing(const ResidualSeries& series, double beta) {
-  std::array<Spectrum, 4> lines;
+std::string spectrum_drawing(const gap::ResidualSeries& series, double beta) {
+  std::array<gap::Spectrum, 4> lines;
   const std::array<const Eigen::VectorXd*, 3> values = {&series.nominal, &series.refitted, &series.after};
   double low = 1e300, high = 0.0, first = 0.0, last = 0.0;
   for (std::size_t k = 0; k < values.size(); ++k) {
     if (values[k]->size() == series.t.size()) {
-      lines[k] = spectrum(series.t, *values[k]);
+      lines[k] = gap::spectrum(series.t, *values[k]);
     }
   }
-  const Spectrum& one = lines[1].frequency.size() > 0 ? lines[1] : lines[0];
+  const gap::Spectrum& one = lines[1].frequency.size() > 0 ? lines[1] : lines[0];
   if (one.frequency.size() < 4) {
     return {};
   }
   first = one.frequency[0];
   last = one.frequency[one.frequency.size() - 1];
-  if (series.space == GapSpace::dynamic && series.floor > 0.0 && beta > 0.0) {
+  if (series.space == gap::GapSpace::dynamic && series.floor > 0.0 && beta > 0.0) {
     lines[3].frequency = one.frequency;
-    lines[3].density = one.frequency.unaryExpr([&](double f) { return filtered_noise_density(beta, series.floor, f); });
+    lines[3].density =
+        one.frequency.unaryExpr([&](double f) { return gap::filtered_noise_density(beta, series.floor, f); });
   }
-  for (const Spectrum& s : lines) {
+  for (const gap::Spectrum& s : lines) {
     for (const double d : s.density) {
       if (d > 0.0) {
         low = std::min(low, d);
@@ -195,7 +196,7 @@ std::string spectrum_drawing(const ResidualSeries& series, double beta) {
   }
   double at = top + 12.0;
   for (std::size_t k = 0; k < lines.size(); ++k) {
-    const Spectrum& s = lines[k];
+    const gap::Spectrum& s = lines[k];
     if (s.frequency.size() == 0) {
       continue;
     }
@@ -223,7 +224,7 @@ std::string spectrum_drawing(const ResidualSeries& series, double beta) {
   return out + "</svg>";
 }
 
-std::string position_map(const ResidualSeries& series, const LogTable& signals, double delay) {
+std::string position_map(const gap::ResidualSeries& series, const LogTable& signals, double delay) {
   const auto column = [&](std::string_view name) -> const std::vector<double>* {
     const auto found = std::find(signals.names.begin(), signals.names.end(), name);
     return found == signals.names.end() ? nullptr
@@ -288,9 +289,9 @@ std::string position_map(const ResidualSeries& series, const LogTable& signals, 
   return out + "</svg>";
 }
 
-std::string confusability_matrix(const std::vector<ConfusablePair>& pairs, std::size_t most) {
-  std::vector<const ConfusablePair*> sorted;
-  for (const ConfusablePair& pair : pairs) {
+std::string confusability_matrix(const std::vector<gap::ConfusablePair>& pairs, std::size_t most) {
+  std::vector<const gap::ConfusablePair*> sorted;
+  for (const gap::ConfusablePair& pair : pairs) {
     sorted.push_back(&pair);
   }
   std::stable_sort(sorted.begin(), sorted.end(),
@@ -301,7 +302,7 @@ std::string confusability_matrix(const std::vector<ConfusablePair>& pairs, std::
       names.push_back(name);
     }
   };
-  for (const ConfusablePair* pair : sorted) {
+  for (const gap::ConfusablePair* pair : sorted) {
     take(pair->first);
     take(pair->second);
   }
@@ -319,8 +320,8 @@ std::string confusability_matrix(const std::vector<ConfusablePair>& pairs, std::
   const auto index = [&](const std::string& name) {
     return static_cast<std::size_t>(std::find(names.begin(), names.end(), name) - names.begin());
   };
-  std::map<std::pair<std::size_t, std::size_t>, const ConfusablePair*> cells;
-  for (const ConfusablePair* pair : sorted) {
+  std::map<std::pair<std::size_t, std::size_t>, const gap::ConfusablePair*> cells;
+  for (const gap::ConfusablePair* pair : sorted) {
     const std::size_t a = index(pair->first), b = index(pair->second);
     if (a < names.size() && b < names.size() && a != b) {
       cells.emplace(std::make_pair(std::max(a, b), std::min(a, b)), pair);

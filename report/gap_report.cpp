@@ -18,26 +18,24 @@
 #include <wheelwright/words/gap_words.hpp>
 #include <wheelwright/words/text.hpp>
 
-namespace wheelwright {
+namespace wheelwright::report {
 using namespace words;
-
-using namespace report;
 
 namespace {
 
-const char* status_of(GapVerdict verdict) {
+const char* status_of(gap::GapVerdict verdict) {
   switch (verdict) {
-    case GapVerdict::no_gap:
-    case GapVerdict::explained: return "good";
-    case GapVerdict::ambiguous: return "caution";
-    case GapVerdict::unexplained: return "bad";
+    case gap::GapVerdict::no_gap:
+    case gap::GapVerdict::explained: return "good";
+    case gap::GapVerdict::ambiguous: return "caution";
+    case gap::GapVerdict::unexplained: return "bad";
   }
   return "bad";
 }
 
-std::string channel_title(const ResidualSeries& s) {
-  return s.space == GapSpace::dynamic ? "Torque residual of the " + spaced(s.channel) + " channel"
-                                      : "Pose against wheel odometry, " + spaced(s.channel);
+std::string channel_title(const gap::ResidualSeries& s) {
+  return s.space == gap::GapSpace::dynamic ? "Torque residual of the " + spaced(s.channel) + " channel"
+                                           : "Pose against wheel odometry, " + spaced(s.channel);
 }
 
 std::string p_words(double p) { return p < 0.001 ? "< 0.001" : decimal(p, 3); }
@@ -47,13 +45,13 @@ std::string causes_section(const Diagnosis& d) {
     return {};
   }
   std::vector<std::vector<Cell>> rows;
-  for (const GapCause& cause : d.causes) {
+  for (const gap::GapCause& cause : d.causes) {
     std::string parameters;
-    for (const GapEstimate& p : cause.parameters) {
+    for (const gap::GapEstimate& p : cause.parameters) {
       parameters +=
           (parameters.empty() ? "" : "<br>") + escape(parameter_words(p.name)) + " " + escape(estimate_words(p));
     }
-    rows.push_back({escape(capital(effect_noun(cause.effect))) + "<small>" + escape(cause.sentence) + "</small>",
+    rows.push_back({escape(core::capital(effect_noun(cause.effect))) + "<small>" + escape(cause.sentence) + "</small>",
                     "<code>" + escape(cause.effect) + "</code>", numeric(percent(cause.share)), parameters});
   }
   return table({"Cause", "name", numeric("share of<br>the gap"), "parameters [95 % interval]"}, rows) +
@@ -68,9 +66,9 @@ std::string apart_section(const Diagnosis& d, const std::string& next_manoeuvre)
   std::string out;
   if (!d.credible.empty()) {
     std::vector<std::vector<Cell>> rows;
-    for (const CredibleCauses& c : d.credible) {
-      rows.push_back(
-          {escape(capital(effect_nouns(c.effects))), numeric(number(c.held_out_error)), numeric(p_words(c.p_value))});
+    for (const gap::CredibleCauses& c : d.credible) {
+      rows.push_back({escape(core::capital(effect_nouns(c.effects))), numeric(number(c.held_out_error)),
+                      numeric(p_words(c.p_value))});
     }
     out +=
         "<h3>Causes that this log leaves standing</h3>" +
@@ -89,9 +87,9 @@ std::string apart_section(const Diagnosis& d, const std::string& next_manoeuvre)
             "How much of one cause's signature, in per cent, the other can make up once θ is fitted again, however the "
             "verdict came out. Framed: no log without further sensors separates them.");
     std::vector<std::vector<Cell>> rows;
-    for (const ConfusablePair& pair : d.confusable) {
+    for (const gap::ConfusablePair& pair : d.confusable) {
       if (!pair.reason.empty() && pair.similarity >= 0.5) {
-        rows.push_back({escape(capital(effect_noun(pair.first))) + " · " + escape(effect_noun(pair.second)),
+        rows.push_back({escape(core::capital(effect_noun(pair.first))) + " · " + escape(effect_noun(pair.second)),
                         numeric(percent(pair.similarity, 2)), escape(pair.reason)});
       }
     }
@@ -115,7 +113,7 @@ std::vector<std::size_t> breaks_of(const Eigen::VectorXd& t) {
   if (steps.empty()) {
     return out;
   }
-  const double usual = median(steps);
+  const double usual = core::median(steps);
   for (std::size_t k = 0; k < steps.size(); ++k) {
     if (steps[k] > 5.0 * usual || steps[k] < 0.0) {
       out.push_back(k + 1);
@@ -125,7 +123,7 @@ std::vector<std::size_t> breaks_of(const Eigen::VectorXd& t) {
 }
 
 std::string residual_chart(const Diagnosis& d, std::size_t index, const TimeAxis& axis) {
-  const ResidualSeries& s = d.series[index];
+  const gap::ResidualSeries& s = d.series[index];
   LogTable table;
   table.t.assign(s.t.begin(), s.t.end());
   table.segment_starts = breaks_of(s.t);
@@ -156,8 +154,8 @@ std::string residual_chart(const Diagnosis& d, std::size_t index, const TimeAxis
     const Line line = thin.names[c] == "before" ? Line::second : thin.names[c] == "after" ? Line::first : Line::third;
     chart.series.push_back({thin.names[c], thin.columns[c], line});
   }
-  for (const Contradiction& c : d.contradictions) {
-    if (c.channel == s.channel && s.space == GapSpace::dynamic) {
+  for (const gap::Contradiction& c : d.contradictions) {
+    if (c.channel == s.channel && s.space == gap::GapSpace::dynamic) {
       chart.marks.push_back({c.t, c.t, "contradiction"});
     }
   }
@@ -179,7 +177,7 @@ std::string residual_section(const Diagnosis& d, const TimeAxis& axis) {
 }
 
 std::string shrink_section(const Diagnosis& d) {
-  const std::pair<const char*, const std::vector<ShrinkFigure>*> groups[] = {
+  const std::pair<const char*, const std::vector<gap::ShrinkFigure>*> groups[] = {
       {"Filtered torque, root mean square", &d.shrink.torque_rms},
       {"Filtered torque on a fresh log, to which nothing was fitted", &d.shrink.fresh_torque_rms},
       {"Open-loop simulation, root mean square error", &d.shrink.rollout},
@@ -200,9 +198,10 @@ std::string shrink_section(const Diagnosis& d) {
 }
 
 // Buttons for the shares whose regime is a stretch of time, "t = 20 to 25 s".
-std::string time_links(const std::vector<GapShare>& shares, const ResidualSeries& series, const TimeAxis& axis) {
+std::string time_links(const std::vector<gap::GapShare>& shares, const gap::ResidualSeries& series,
+                       const TimeAxis& axis) {
   std::string out;
-  for (const GapShare& share : shares) {
+  for (const gap::GapShare& share : shares) {
     double from = 0.0, to = 0.0;
     if (share.kind == "time" && series.t.size() > 0 &&
         std::sscanf(share.regime.c_str(), "t = %lf to %lf s", &from, &to) == 2) {
@@ -217,25 +216,26 @@ std::string time_links(const std::vector<GapShare>& shares, const ResidualSeries
 
 std::string where_section(const Diagnosis& d, const TimeAxis& axis) {
   std::string out;
-  std::vector<GapShare> channels;
-  for (const GapShare& s : d.where) {
+  std::vector<gap::GapShare> channels;
+  for (const gap::GapShare& s : d.where) {
     if (s.kind == "channel") {
       channels.push_back(s);
-      channels.back().regime = (s.space == GapSpace::dynamic ? "torque, " : "pose, ") + spaced(s.channel);
+      channels.back().regime = (s.space == gap::GapSpace::dynamic ? "torque, " : "pose, ") + spaced(s.channel);
     }
   }
   if (channels.size() > 1) {
     out += "<h3>By channel</h3>" + share_bars(channels);
   }
-  for (const ResidualSeries& s : d.series) {
-    std::vector<GapShare> regimes, bands;
-    for (const GapShare& share : d.where) {
+  for (const gap::ResidualSeries& s : d.series) {
+    std::vector<gap::GapShare> regimes, bands;
+    for (const gap::GapShare& share : d.where) {
       if (share.channel == s.channel && share.space == s.space && share.kind != "channel") {
         (share.kind == "frequency" ? bands : regimes).push_back(share);
       }
     }
     // Findings first: what is large only because it is always there tells nothing.
-    std::stable_partition(regimes.begin(), regimes.end(), [](const GapShare& share) { return is_finding(share); });
+    std::stable_partition(regimes.begin(), regimes.end(),
+                          [](const gap::GapShare& share) { return gap::is_finding(share); });
     const std::string by_regime = share_bars(regimes, 14) + time_links(regimes, s, axis),
                       by_band = share_bars(bands) + spectrum_drawing(s, d.beta);
     if (!by_regime.empty() || !by_band.empty()) {
@@ -259,9 +259,9 @@ std::string where_section(const Diagnosis& d, const TimeAxis& axis) {
 
 std::string place_section(const Diagnosis& d, const ReportContext& context) {
   std::string out;
-  for (const ResidualSeries& s : d.series) {
+  for (const gap::ResidualSeries& s : d.series) {
     if (context.signals) {
-      const double delay = s.space == GapSpace::dynamic && d.beta > 0.0 ? 2.0 / d.beta : 0.0;
+      const double delay = s.space == gap::GapSpace::dynamic && d.beta > 0.0 ? 2.0 / d.beta : 0.0;
       if (const std::string map = position_map(s, *context.signals, delay); !map.empty()) {
         out += fmt::format("<div><h3>{}</h3>{}</div>", escape(channel_title(s)), map);
       }
@@ -277,10 +277,10 @@ std::string parameters_section(const Diagnosis& d) {
     return {};
   }
   std::vector<std::vector<Cell>> rows;
-  for (const ParameterShift& p : d.parametric) {
+  for (const gap::ParameterShift& p : d.parametric) {
     const auto [low, high] = outward(p.lower, p.upper);
     const double base = p.nominal.value_or(p.estimate);
-    rows.push_back({escape(capital(spaced(p.parameter))), escape(unit_of(p.unit)),
+    rows.push_back({escape(core::capital(spaced(p.parameter))), escape(unit_of(p.unit)),
                     numeric(p.nominal ? number(*p.nominal, 4) : "–"), numeric(number(p.without_causes, 4)),
                     numeric(base != 0.0 ? fmt::format("{}{}\u00a0%", p.without_causes >= base ? "+" : "−",
                                                       number(100.0 * std::abs(p.without_causes / base - 1.0), 2))
@@ -300,7 +300,7 @@ std::string contradiction_section(const Diagnosis& d, const TimeAxis& axis) {
     return {};
   }
   std::vector<std::vector<Cell>> rows;
-  for (const Contradiction& c : d.contradictions) {
+  for (const gap::Contradiction& c : d.contradictions) {
     rows.push_back({time_button(c.t - 1.0, c.t + 1.0, axis.text(c.t), axis), escape(spaced(c.channel)),
                     numeric(percent(c.weight, 2))});
   }
@@ -325,7 +325,7 @@ std::string data_section(const Diagnosis& d, const ReportContext& context, const
 
 std::string signals_section(const Diagnosis& d, const ReportContext& context, const TimeAxis& axis) {
   std::vector<ChartMark> marks;
-  for (const Contradiction& c : d.contradictions) {
+  for (const gap::Contradiction& c : d.contradictions) {
     marks.push_back({c.t, c.t, "contradiction"});
   }
   return context.signals ? signal_charts(*context.signals, marks, axis, context.rows) : std::string();
@@ -367,4 +367,4 @@ std::string gap_report(const Diagnosis& d, const std::string& robot, const Repor
   return page(content);
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::report

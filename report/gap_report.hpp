@@ -8,7 +8,7 @@
 #include <wheelwright/gap/diagnosis.hpp>
 #include <wheelwright/report/context.hpp>
 
-namespace wheelwright {
+namespace wheelwright::report {
 
 /// One self-contained page: the verdict in words; the causes with their parameters; what cannot be told apart on this
 /// log, and which drive would; the residual over time before, after θ is fitted again and after the causes are added,
@@ -18,4 +18,4 @@ namespace wheelwright {
 [[nodiscard]] std::string gap_report(const Diagnosis& diagnosis, const std::string& robot, const ReportContext& context,
                                      const std::string& next_manoeuvre = {});
 
-}  // namespace wheelwright
+}  // namespace wheelwright::report

@@ -11,14 +11,15 @@
 #include <wheelwright/report/signals.hpp>
 #include <wheelwright/words/text.hpp>
 
-namespace wheelwright {
-using namespace words;
+namespace wheelwright::report {
 
-using namespace report;
+using doctor::FindingSeverity;
+
+using namespace words;
 
 namespace {
 
-std::string stretches(const LogFinding& finding, const TimeAxis& axis) {
+std::string stretches(const doctor::LogFinding& finding, const TimeAxis& axis) {
   constexpr std::size_t kShown = 6;
   std::string html;
   for (std::size_t k = 0; k < std::min(kShown, finding.when.size()); ++k) {
@@ -36,20 +37,20 @@ std::string stretches(const LogFinding& finding, const TimeAxis& axis) {
   return html;
 }
 
-std::string findings_table(const LogHealth& health, const TimeAxis& axis) {
+std::string findings_table(const doctor::LogHealth& health, const TimeAxis& axis) {
   std::vector<std::vector<Cell>> rows;
-  for (const LogFinding& f : health.findings) {
+  for (const doctor::LogFinding& f : health.findings) {
     if (f.severity != FindingSeverity::fine) {
-      rows.push_back({escape(to_string(f.severity)), "<code>" + escape(f.id) + "</code>", escape_with_code(f.sentence),
-                      escape_with_code(f.next), stretches(f, axis)});
+      rows.push_back({escape(doctor::to_string(f.severity)), "<code>" + escape(f.id) + "</code>",
+                      escape_with_code(f.sentence), escape_with_code(f.next), stretches(f, axis)});
     }
   }
   return rows.empty() ? "" : table({"severity", "finding", "what was found", "what to do next", "when"}, rows);
 }
 
-std::string fine_table(const LogHealth& health) {
+std::string fine_table(const doctor::LogHealth& health) {
   std::vector<std::vector<Cell>> rows;
-  for (const LogFinding& f : health.findings) {
+  for (const doctor::LogFinding& f : health.findings) {
     if (f.severity == FindingSeverity::fine) {
       rows.push_back({"<code>" + escape(f.id) + "</code>", escape_with_code(f.sentence)});
     }
@@ -57,9 +58,9 @@ std::string fine_table(const LogHealth& health) {
   return rows.empty() ? "" : table({"check", "what was found"}, rows);
 }
 
-std::vector<ChartMark> marks_of(const LogHealth& health) {
+std::vector<ChartMark> marks_of(const doctor::LogHealth& health) {
   std::vector<ChartMark> marks;
-  for (const LogFinding& f : health.findings) {
+  for (const doctor::LogFinding& f : health.findings) {
     for (const Interval& when : f.when) {
       if (f.severity != FindingSeverity::fine) {
         marks.push_back({when.lower, when.upper, f.id});
@@ -69,37 +70,38 @@ std::vector<ChartMark> marks_of(const LogHealth& health) {
   return marks;
 }
 
-std::vector<std::string> sentences(const LogHealth& health) {
+std::vector<std::string> sentences(const doctor::LogHealth& health) {
   std::vector<std::string> out;
-  for (const LogFinding& f : health.findings) {
+  for (const doctor::LogFinding& f : health.findings) {
     if (f.severity >= FindingSeverity::warning) {
       out.push_back(f.sentence + (f.next.empty() ? "" : " What to do: " + f.next));
     }
   }
-  for (const LogFinding& f : health.findings) {
+  for (const doctor::LogFinding& f : health.findings) {
     if (f.id == "time.rate" && f.severity == FindingSeverity::fine) {
       out.push_back(f.sentence);
     }
   }
-  out.push_back(fmt::format(
-      "{}, {}, {} that found nothing to mention.", capital(plural(health.count(FindingSeverity::warning), "warning")),
-      plural(health.count(FindingSeverity::notice), "notice"), plural(health.count(FindingSeverity::fine), "check")));
+  out.push_back(fmt::format("{}, {}, {} that found nothing to mention.",
+                            core::capital(plural(health.count(FindingSeverity::warning), "warning")),
+                            plural(health.count(FindingSeverity::notice), "notice"),
+                            plural(health.count(FindingSeverity::fine), "check")));
   if (!health.assumed.empty()) {
-    out.push_back(capital(health.assumed) + ".");
+    out.push_back(core::capital(health.assumed) + ".");
   }
   return out;
 }
 
 }  // namespace
 
-std::string health_report(const LogHealth& health, const ReportContext& context) {
+std::string health_report(const doctor::LogHealth& health, const ReportContext& context) {
   const TimeAxis axis = context.signals && context.signals->rows() > 0 ? TimeAxis(context.signals->t) : TimeAxis();
   PageContent content;
   content.title = context.title.empty() ? "Examination of a log" : context.title;
   const bool clean = health.count(FindingSeverity::warning) == 0;
-  content.status = health.verdict == LogVerdict::unusable              ? "bad"
-                   : health.verdict == LogVerdict::commission && clean ? "good"
-                                                                       : "caution";
+  content.status = health.verdict == doctor::LogVerdict::unusable              ? "bad"
+                   : health.verdict == doctor::LogVerdict::commission && clean ? "good"
+                                                                               : "caution";
   content.verdict = health.sentence;
   content.sentences = sentences(health);
   content.software = context.software;
@@ -116,4 +118,4 @@ std::string health_report(const LogHealth& health, const ReportContext& context)
   return page(content);
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::report

@@ -8,10 +8,10 @@
 #include <wheelwright/doctor/log_health.hpp>
 #include <wheelwright/report/context.hpp>
 
-namespace wheelwright {
+namespace wheelwright::report {
 
 /// The findings of `health`, the gravest first, with the stretches of the log that they are about as buttons that zoom
 /// the raw signals of `context` to them. One self-contained HTML page.
-[[nodiscard]] std::string health_report(const LogHealth& health, const ReportContext& context);
+[[nodiscard]] std::string health_report(const doctor::LogHealth& health, const ReportContext& context);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::report

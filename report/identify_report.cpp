@@ -17,6 +17,9 @@
 #include <wheelwright/words/text.hpp>
 
 namespace wheelwright::report {
+
+using inference::Identification;
+
 using namespace words;
 namespace {
 
@@ -57,11 +60,11 @@ std::string ticks_below(const Span& x, double top, double bottom, double unit, d
 
 }  // namespace
 
-std::string information_bars(const InformationOverTime& information, const std::vector<std::string>& names,
+std::string information_bars(const inference::InformationOverTime& information, const std::vector<std::string>& names,
                              const TimeAxis& axis) {
   const std::size_t windows = information.windows.size();
-  const bool any =
-      std::ranges::any_of(information.parameters, [](const ParameterInformation& p) { return p.information > 0.0; });
+  const bool any = std::ranges::any_of(information.parameters,
+                                       [](const inference::ParameterInformation& p) { return p.information > 0.0; });
   if (windows == 0 || !any) {
     return {};
   }
@@ -82,7 +85,7 @@ std::string information_bars(const InformationOverTime& information, const std::
       width, bottom + 34.0);
   out += ticks_below(x, top, bottom, 1.0, 10.0);
   for (std::size_t j = 0; j < information.parameters.size(); ++j) {
-    const ParameterInformation& p = information.parameters[j];
+    const inference::ParameterInformation& p = information.parameters[j];
     const double base = top + row * static_cast<double>(j + 1) - 6.0, full = row - 12.0;
     out += fmt::format("<text class=\"ink\" x=\"{}\" y=\"{:.1f}\" text-anchor=\"end\">{}</text>", left - 8.0,
                        base - 0.5 * full + 4.0, escape(spaced(j < names.size() ? names[j] : "")));
@@ -102,10 +105,10 @@ std::string information_bars(const InformationOverTime& information, const std::
                            axis.repeats() ? "window of the log, in order" : "time, s");
 }
 
-std::string shape_curve(const ShapeFinding& shape) {
+std::string shape_curve(const inference::ShapeFinding& shape) {
   Span y{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity(), 150.0, 12.0};
-  std::vector<ShapePoint> points;
-  for (const ShapePoint& point : shape.curve) {
+  std::vector<inference::ShapePoint> points;
+  for (const inference::ShapePoint& point : shape.curve) {
     if (std::isfinite(point.residual_ratio) && std::isfinite(point.shape)) {
       points.push_back(point);
       y.low = std::min(y.low, point.residual_ratio);
@@ -133,11 +136,11 @@ std::string shape_curve(const ShapeFinding& shape) {
         left, width - 14.0, y(at / 100.0), left - 5.0, y(at / 100.0) + 4.0, tick_text(at, step));
   }
   out += "<polyline class=\"curve\" points=\"";
-  for (const ShapePoint& point : points) {
+  for (const inference::ShapePoint& point : points) {
     out += fmt::format("{:.1f},{:.1f} ", x(point.shape), y(point.residual_ratio));
   }
   out += "\"/>";
-  if (shape.converged && shape.state == ShapeState::identified) {
+  if (shape.converged && shape.state == identify::ShapeState::identified) {
     out += fmt::format("<circle class=\"dot chosen\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"4\"/>", x(shape.estimate),
                        y(shape.residual_ratio));
   }
@@ -148,10 +151,10 @@ std::string shape_curve(const ShapeFinding& shape) {
 
 namespace {
 
-std::string name_of(std::string_view identifier) { return capital(spaced(identifier)); }
+std::string name_of(std::string_view identifier) { return core::capital(spaced(identifier)); }
 
 bool excluded(const Identification& r, std::size_t j) {
-  return j < r.fit.excitation.size() && r.fit.excitation[j].state == Excitation::not_excited;
+  return j < r.fit.excitation.size() && r.fit.excitation[j].state == identify::Excitation::not_excited;
 }
 
 std::string plus_minus(double value, double half) {
@@ -163,7 +166,7 @@ std::string plus_minus(double value, double half) {
 std::vector<Cell> estimate_row(const Identification& r, std::string name, const Eigen::VectorXd& theta,
                                const Eigen::VectorXd& error, double freedom) {
   const std::vector<ShownParameter> shown = shown_parameters(r);
-  const double t = student_quantile(r.confidence, std::max(freedom, 1.0));
+  const double t = core::student_quantile(r.confidence, std::max(freedom, 1.0));
   std::vector<Cell> row = {std::move(name)};
   for (std::size_t j = 0; j < shown.size(); ++j) {
     const auto at = static_cast<Eigen::Index>(j);
@@ -173,9 +176,9 @@ std::vector<Cell> estimate_row(const Identification& r, std::string name, const 
   return row;
 }
 
-std::vector<Cell> region_row(const Identification& r, const RegionRow& region) {
+std::vector<Cell> region_row(const Identification& r, const inference::RegionRow& region) {
   const std::vector<ShownParameter> shown = shown_parameters(r);
-  std::vector<Cell> row = {fmt::format("{}<small>{} %{}</small>", escape(name_of(to_string(region.method))),
+  std::vector<Cell> row = {fmt::format("{}<small>{} %{}</small>", escape(name_of(inference::to_string(region.method))),
                                        number(100.0 * region.confidence, 3),
                                        region.all_at_once ? ", all at once" : "")};
   for (std::size_t j = 0; j < shown.size(); ++j) {
@@ -191,11 +194,11 @@ std::vector<Cell> region_row(const Identification& r, const RegionRow& region) {
   return row;
 }
 
-std::string test_words(const EstimatorChoice& choice) {
+std::string test_words(const identify::EstimatorChoice& choice) {
   if (!choice.tested_against || !choice.test.made) {
     return {};
   }
-  const std::string other = spaced(to_string(choice.candidates[*choice.tested_against].estimate.estimator));
+  const std::string other = spaced(identify::to_string(choice.candidates[*choice.tested_against].estimate.estimator));
   const double p = choice.test.p_value;
   return paragraph(
       fmt::format("Least squares against {} (Durbin, Wu and Hausman’s test): p = {}, {}.", escape(other), number(p, 2),
@@ -203,9 +206,9 @@ std::string test_words(const EstimatorChoice& choice) {
                            : "no more than chance makes"));
 }
 
-std::string combinations(const std::vector<KnownCombination>& list) {
+std::string combinations(const std::vector<inference::KnownCombination>& list) {
   std::vector<std::vector<Cell>> rows;
-  for (const KnownCombination& c : list) {
+  for (const inference::KnownCombination& c : list) {
     rows.push_back({escape(c.words), numeric(c.relative_error > 0.0 ? "± " + percent(c.relative_error, 2) : "–")});
   }
   return rows.empty() ? "" : table({"Combination", numeric("standard error, relative")}, rows);
@@ -214,7 +217,7 @@ std::string combinations(const std::vector<KnownCombination>& list) {
 }  // namespace
 
 std::string comparison_section(const Identification& r) {
-  const EstimatorChoice& choice = r.fit.choice;
+  const identify::EstimatorChoice& choice = r.fit.choice;
   if (choice.candidates.empty()) {
     return {};
   }
@@ -225,13 +228,13 @@ std::string comparison_section(const Identification& r) {
   std::vector<std::vector<Cell>> rows;
   std::vector<std::string> remarks;
   for (std::size_t c = 0; c < choice.candidates.size(); ++c) {
-    const Estimate& e = choice.candidates[c].estimate;
+    const identify::Estimate& e = choice.candidates[c].estimate;
     if (!e.usable) {
-      remarks.push_back(name_of(to_string(e.estimator)) + ": " + e.reason + ".");
+      remarks.push_back(name_of(identify::to_string(e.estimator)) + ": " + e.reason + ".");
       continue;
     }
     rows.push_back(estimate_row(r,
-                                escape(name_of(to_string(e.estimator))) + "<small>" +
+                                escape(name_of(identify::to_string(e.estimator))) + "<small>" +
                                     escape(choice.candidates[c].origin) + "</small>" +
                                     (c == choice.chosen ? "<span class=\"tag\">taken</span>" : ""),
                                 e.theta, e.standard_error, e.freedom));
@@ -241,16 +244,16 @@ std::string comparison_section(const Identification& r) {
   if (!binding(r.constrained).empty()) {
     rows.push_back(estimate_row(r, "Physically consistent", r.constrained.estimate, {}, 1.0));
   }
-  for (const RegionRow& region : r.regions.rows) {
+  for (const inference::RegionRow& region : r.regions.rows) {
     if (region.available) {
       rows.push_back(region_row(r, region));
-      remarks.push_back(name_of(to_string(region.method)) + ": " + region.promise + ".");
+      remarks.push_back(name_of(inference::to_string(region.method)) + ": " + region.promise + ".");
     }
     if (!region.remark.empty()) {
-      remarks.push_back(name_of(to_string(region.method)) + ": " + region.remark + ".");
+      remarks.push_back(name_of(inference::to_string(region.method)) + ": " + region.remark + ".");
     }
   }
-  return paragraph(escape(capital(choice.reason)) + ".") + test_words(choice) + table(header, rows) +
+  return paragraph(escape(core::capital(choice.reason)) + ".") + test_words(choice) + table(header, rows) +
          paragraph(
              "± is half of the 95 % interval of Student’s t, which allows for autocorrelated residuals. The intervals "
              "below are about the estimate that was taken; what each of them promises:") +
@@ -258,7 +261,7 @@ std::string comparison_section(const Identification& r) {
 }
 
 std::string identifiability_section(const Identification& r) {
-  const Identifiability& i = r.identifiability;
+  const inference::Identifiability& i = r.identifiability;
   if (i.singular_values.size() == 0) {
     return {};
   }
@@ -268,11 +271,11 @@ std::string identifiability_section(const Identification& r) {
       "length one the condition is {}: 1 is best, and beyond some hundreds two parameters are hardly told apart.",
       plural(p, "direction"), i.rank, i.noise_rank, number(i.condition, 3)));
   std::vector<std::string> missing;
-  for (const UnseenDirection& u : i.unseen) {
-    std::string text = capital(u.words);
+  for (const inference::UnseenDirection& u : i.unseen) {
+    std::string text = core::capital(u.words);
     text += text.ends_with('.') ? "" : ".";
     for (const std::string& m : u.manoeuvres) {
-      text.append(" ").append(capital(m)).append(".");
+      text.append(" ").append(core::capital(m)).append(".");
     }
     missing.push_back(text);
   }
@@ -295,7 +298,7 @@ std::string information_section(const Identification& r, const TimeAxis& axis) {
   }
   std::vector<std::vector<Cell>> rows;
   for (std::size_t j = 0; j < r.information.parameters.size() && j < names.size(); ++j) {
-    const ParameterInformation& p = r.information.parameters[j];
+    const inference::ParameterInformation& p = r.information.parameters[j];
     std::string spans;
     for (const auto& [first, last] : p.spans) {
       spans += (spans.empty() ? "" : ", ") +
@@ -321,17 +324,17 @@ std::string robust_section(const Identification& r, const TimeAxis& axis) {
   const auto output = [&](std::size_t i) { return i < model.outputs.size() ? model.outputs[i] : std::string(); };
   std::vector<std::vector<Cell>> weights, episodes;
   for (std::size_t i = 0; i < r.robust.outputs.size(); ++i) {
-    const OutputWeights& w = r.robust.outputs[i];
+    const inference::OutputWeights& w = r.robust.outputs[i];
     weights.push_back({escape(output(i)), numeric(number(w.scale)), numeric(percent(w.down_weighted, 2)),
                        numeric(percent(w.gaussian_share, 2))});
   }
-  for (const Episode& e : r.robust.episodes) {
+  for (const inference::Episode& e : r.robust.episodes) {
     episodes.push_back({time_button(e.first_time, e.last_time, axis.text(e.worst_time), axis), escape(output(e.output)),
                         numeric(number(e.worst)), numeric(count(e.instants)), numeric(std::to_string(e.worst_sample))});
   }
   std::vector<std::string> bound;
-  for (const ActiveConstraint& a : binding(r.constrained)) {
-    bound.push_back(capital(a.words));
+  for (const inference::ActiveConstraint& a : binding(r.constrained)) {
+    bound.push_back(core::capital(a.words));
   }
   return paragraph(
              "A fit with Huber’s loss gives little weight to what is far off. Many more small weights than Gaussian "
@@ -354,7 +357,7 @@ std::string shapes_section(const Identification& r) {
   std::string out = paragraph(
       "Each of these was added alone to the model. Curves: rms of the residual with the quantity held at each value, "
       "over that without it. A curve that hardly moves is one that the log does not show.");
-  for (const ShapeFinding& shape : r.shapes) {
+  for (const inference::ShapeFinding& shape : r.shapes) {
     out += paragraph(escape(in_words(shape)));
     const std::string curve = shape_curve(shape);
     out += curve.empty() ? "" : "<div class=\"wide\">" + curve + "</div>\n";
@@ -366,13 +369,13 @@ std::string kinematics_section(const Identification& r) {
   if (!r.kinematics) {
     return {};
   }
-  const KinematicCalibration& k = *r.kinematics;
+  const inference::KinematicCalibration& k = *r.kinematics;
   std::vector<std::vector<Cell>> rows;
-  const auto add = [&](const char* name, const KinematicQuantity& q, const char* unit) {
-    const bool told = q.state == KinematicState::identified;
+  const auto add = [&](const char* name, const inference::KinematicQuantity& q, const char* unit) {
+    const bool told = q.state == inference::KinematicState::identified;
     rows.push_back({name, unit, numeric(told ? beside(q.estimate, q.lower, q.upper) : "–"),
                     numeric(told ? outward(q.lower, q.upper).first + " to " + outward(q.lower, q.upper).second : "–"),
-                    escape(q.state == KinematicState::fixed ? "not looked for" : q.reason)});
+                    escape(q.state == inference::KinematicState::fixed ? "not looked for" : q.reason)});
   };
   add("Track width at the robot file’s wheel radius", k.track_at_nominal_radius, "m");
   add("Track width with the radii below", k.track_width, "m");
@@ -390,8 +393,8 @@ std::string kinematics_section(const Identification& r) {
 
 std::string column_noise_section(const Identification& r) {
   std::vector<std::vector<Cell>> rows;
-  for (const ColumnNoise& n : r.noise) {
-    const bool found = n.choice.method != NoiseMethod::none;
+  for (const inference::ColumnNoise& n : r.noise) {
+    const bool found = n.choice.method != inference::NoiseMethod::none;
     const bool effort =
         std::ranges::find(r.setting.measurement.effort_columns, n.column) != r.setting.measurement.effort_columns.end();
     const bool counts = n.known && !effort && r.setting.measurement.motion != MotionKind::speed;
@@ -400,7 +403,7 @@ std::string column_noise_section(const Identification& r) {
                                           escape(n.known->origin))
                             : std::string("–"),
                     counts || !found ? numeric("–") : numeric(number(n.choice.sd, 2) + " " + escape(n.unit)),
-                    counts || !found ? "–" : escape(std::string(to_string(n.choice.method))),
+                    counts || !found ? "–" : escape(std::string(inference::to_string(n.choice.method))),
                     escape(counts ? "what rounding does is known; at rest and in differences it does not show"
                                   : n.choice.assumption),
                     counts ? "" : escape(n.choice.reason)});
@@ -409,12 +412,6 @@ std::string column_noise_section(const Identification& r) {
              ? ""
              : table({"Column", "known", numeric("standard deviation found"), "by", "assuming", "because"}, rows);
 }
-
-}  // namespace wheelwright::report
-
-namespace wheelwright {
-
-using namespace report;
 
 namespace {
 
@@ -458,4 +455,4 @@ std::string identify_report(const Identification& result, const ReportContext& c
   return page(content);
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::report

@@ -61,13 +61,13 @@ std::string path(const std::vector<std::pair<double, double>>& points, const Mar
 
 }  // namespace
 
-std::string delay_curves(const FaultMargins& margins, const MarginSurvey& survey) {
+std::string delay_curves(const detector::FaultMargins& margins, const commission::MarginSurvey& survey) {
   std::vector<Curve> curves;
-  double low = kInfinity, high = 0.0;
+  double low = core::kInfinity, high = 0.0;
   for (const auto& [kind, count] : survey.manoeuvres) {
-    Curve curve{std::string(manoeuvre_words(kind)), {}, {}};
+    Curve curve{std::string(detector::manoeuvre_words(kind)), {}, {}};
     for (std::size_t w = 0; w < survey.windows.size(); ++w) {
-      const MarginSummary summary = summarise(margins, w, kind);
+      const detector::MarginSummary summary = detector::summarise(margins, w, kind);
       const auto add = [&](std::vector<std::pair<double, double>>& to, double size) {
         if (summary.onsets > 0 && std::isfinite(size) && size > 0.0) {
           to.emplace_back(survey.windows[w], size);
@@ -134,9 +134,9 @@ std::string delay_curves(const FaultMargins& margins, const MarginSurvey& survey
   return out + "</svg>";
 }
 
-std::string margin_map(const OperatingMap& map, const FaultType& fault, const std::string& x_label,
+std::string margin_map(const detector::OperatingMap& map, const detector::FaultType& fault, const std::string& x_label,
                        const std::string& y_label) {
-  double low = kInfinity, high = 0.0;
+  double low = core::kInfinity, high = 0.0;
   for (const double size : map.smallest.reshaped()) {
     if (std::isfinite(size) && size > 0.0) {
       low = std::min(low, size);
@@ -187,29 +187,23 @@ std::string margin_map(const OperatingMap& map, const FaultType& fault, const st
   return out + "</svg>";
 }
 
-}  // namespace wheelwright::report
-
-namespace wheelwright {
-
-using namespace report;
-
 namespace {
 
-std::string name_of(const FaultMargins& margins) {
+std::string name_of(const detector::FaultMargins& margins) {
   const bool sides = !margins.fault.whole && margins.fault.range.lower < 0.0;
   return spaced(margins.fault.name) + (sides ? margins.side > 0.0 ? ", growing" : ", shrinking" : "");
 }
 
-std::string margins_table(const MarginSurvey& survey, const ResidualMargins& residual) {
+std::string margins_table(const commission::MarginSurvey& survey, const commission::ResidualMargins& residual) {
   const std::size_t window = shown_window(survey);
   std::vector<Cell> header = {"Fault"};
   for (const auto& [kind, count] : survey.manoeuvres) {
-    header.push_back(numeric(capital(std::string(manoeuvre_words(kind))) +
+    header.push_back(numeric(core::capital(std::string(detector::manoeuvre_words(kind))) +
                              fmt::format("<small>{}</small>", plural(count, "onset"))));
   }
   std::vector<std::vector<Cell>> rows;
-  for (const FaultMargins& margins : residual.margins) {
-    std::vector<Cell> row = {escape(capital(name_of(margins))) + "<small>" + escape(margins.fault.sentence) +
+  for (const detector::FaultMargins& margins : residual.margins) {
+    std::vector<Cell> row = {escape(core::capital(name_of(margins))) + "<small>" + escape(margins.fault.sentence) +
                              "</small>"};
     for (const auto& [kind, count] : survey.manoeuvres) {
       row.push_back(numeric(escape(certain_words(margins, window, kind))));
@@ -222,7 +216,7 @@ std::string margins_table(const MarginSurvey& survey, const ResidualMargins& res
     for (const std::string& name : residual.blind) {
       names.push_back(spaced(name));
     }
-    out += paragraph("Leaves no trace in this residual, whatever its size: " + escape(enumerated(names)) + ".");
+    out += paragraph("Leaves no trace in this residual, whatever its size: " + escape(core::enumerated(names)) + ".");
   }
   return out +
          paragraph(fmt::format(
@@ -232,12 +226,12 @@ std::string margins_table(const MarginSurvey& survey, const ResidualMargins& res
              survey.windows[window], survey.persistence.k, survey.persistence.n));
 }
 
-std::string curves(const MarginSurvey& survey, const ResidualMargins& residual) {
+std::string curves(const commission::MarginSurvey& survey, const commission::ResidualMargins& residual) {
   std::string out;
-  for (const FaultMargins& margins : residual.margins) {
+  for (const detector::FaultMargins& margins : residual.margins) {
     const std::string drawing = margins.fault.whole ? "" : delay_curves(margins, survey);
     if (!drawing.empty()) {
-      out += "<div><h3>" + escape(capital(name_of(margins))) + "</h3>" + drawing + "</div>";
+      out += "<div><h3>" + escape(core::capital(name_of(margins))) + "</h3>" + drawing + "</div>";
     }
   }
   return "<div class=\"pairs\">" + out + "</div>" +
@@ -246,14 +240,14 @@ std::string curves(const MarginSurvey& survey, const ResidualMargins& residual) 
              "size reads the other way round, too: how long a fault of that size can go unseen.</span>");
 }
 
-std::string maps(const ResidualMargins& residual, const OnlineModel& model) {
+std::string maps(const commission::ResidualMargins& residual, const OnlineModel& model) {
   std::string out;
   const auto& names = model.model.coordinates;
   const std::string first = names.front(), second = names.size() > 1 ? names[1] : "";
-  for (const FaultMaps& each : residual.maps) {
-    const auto margins = std::find_if(residual.margins.begin(), residual.margins.end(), [&](const FaultMargins& m) {
-      return m.fault.name == each.fault && m.side == each.side;
-    });
+  for (const commission::FaultMaps& each : residual.maps) {
+    const auto margins = std::find_if(
+        residual.margins.begin(), residual.margins.end(),
+        [&](const detector::FaultMargins& m) { return m.fault.name == each.fault && m.side == each.side; });
     if (margins == residual.margins.end() || margins->fault.whole) {
       continue;
     }
@@ -261,7 +255,7 @@ std::string maps(const ResidualMargins& residual, const OnlineModel& model) {
     const std::string accelerations =
         margin_map(each.accelerations, margins->fault, "d" + first + "/dt", second.empty() ? "" : "d" + second + "/dt");
     if (!speeds.empty() || !accelerations.empty()) {
-      out += "<div><h3>" + escape(capital(name_of(*margins))) + "</h3>" + speeds + accelerations + "</div>";
+      out += "<div><h3>" + escape(core::capital(name_of(*margins))) + "</h3>" + speeds + accelerations + "</div>";
     }
   }
   return "<div class=\"pairs\">" + out + "</div>" +
@@ -273,7 +267,8 @@ std::string maps(const ResidualMargins& residual, const OnlineModel& model) {
 
 }  // namespace
 
-std::string margins_report(const MarginSurvey& survey, const OnlineModel& model, const ReportContext& context) {
+std::string margins_report(const commission::MarginSurvey& survey, const OnlineModel& model,
+                           const ReportContext& context) {
   const TimeAxis axis(context.signals ? context.signals->t : std::vector<double>{});
   PageContent content;
   content.title = context.title.empty() ? "What is certainly seen: " + model.robot.name : context.title;
@@ -292,8 +287,9 @@ std::string margins_report(const MarginSurvey& survey, const OnlineModel& model,
   if (!sentences.empty()) {
     content.sentences.push_back("For one: " + sentences.front());
   }
-  for (const ResidualMargins& residual : survey.residuals) {
-    content.sections.push_back({residual.name, capital(residual.name) + " residual", margins_table(survey, residual)});
+  for (const commission::ResidualMargins& residual : survey.residuals) {
+    content.sections.push_back(
+        {residual.name, core::capital(residual.name) + " residual", margins_table(survey, residual)});
     content.sections.push_back(
         {residual.name + "-delay", "How soon: " + residual.name + " residual", curves(survey, residual)});
     if (!residual.maps.empty()) {
@@ -311,4 +307,4 @@ std::string margins_report(const MarginSurvey& survey, const OnlineModel& model,
   return page(content);
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::report

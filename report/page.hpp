@@ -30,8 +30,8 @@ struct PageContent {
   std::string verdict;
   std::vector<std::string> sentences;
   std::vector<Section> sections;
-  std::string software;              ///< for the footer
-  std::optional<Warrant> warrant{};  ///< of the page's numbers, told beneath the verdict
+  std::string software;                    ///< for the footer
+  std::optional<core::Warrant> warrant{};  ///< of the page's numbers, told beneath the verdict
 };
 
 /// The page as HTML.

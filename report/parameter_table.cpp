@@ -23,8 +23,8 @@ namespace wheelwright::report {
 using namespace words;
 namespace {
 
-std::string heading(const EstimatorCandidate& c, bool chosen) {
-  std::string text = escape(spaced(to_string(c.estimate.estimator)));
+std::string heading(const identify::EstimatorCandidate& c, bool chosen) {
+  std::string text = escape(spaced(identify::to_string(c.estimate.estimator)));
   if (!c.origin.empty()) {
     text += "<br><small>" + escape(c.origin) + "</small>";
   }
@@ -34,13 +34,13 @@ std::string heading(const EstimatorCandidate& c, bool chosen) {
   return fmt::format("<th scope=\"col\" class=\"n\">{}</th>", text);
 }
 
-std::string cell(const EstimatorCandidate& c, std::size_t j, const PhysicalScale& scale) {
+std::string cell(const identify::EstimatorCandidate& c, std::size_t j, const commission::PhysicalScale& scale) {
   const auto at = static_cast<Eigen::Index>(j);
   const double error = c.estimate.usable ? std::abs(scale.scale) * c.estimate.standard_error[at] : 0.0;
   if (!(error > 0.0)) {
     return "<td class=\"n\">–</td>";
   }
-  const double half = error * student_quantile(0.95, std::max(c.estimate.freedom, 1.0));
+  const double half = error * core::student_quantile(0.95, std::max(c.estimate.freedom, 1.0));
   const double value = scale.scale * c.estimate.theta[at] - scale.offset;
   return fmt::format("<td class=\"n\">{} ± {}</td>", beside(value, value - half, value + half), number(half, 2));
 }
@@ -48,23 +48,23 @@ std::string cell(const EstimatorCandidate& c, std::size_t j, const PhysicalScale
 }  // namespace
 
 std::string estimator_table(const Commissioning& result) {
-  const EstimatorChoice& choice = result.estimators;
+  const identify::EstimatorChoice& choice = result.estimators;
   if (choice.candidates.empty() || result.parameters.empty()) {
     return {};
   }
-  const auto scales = physical_scales(result.model.robot, result.model.model);
+  const auto scales = commission::physical_scales(result.model.robot, result.model.model);
   const std::vector<ParameterViews> views = parameter_views(result);
-  std::string out = paragraph(escape(capital(choice.reason)) + ".");
+  std::string out = paragraph(escape(core::capital(choice.reason)) + ".");
   out += "<div class=\"wide\"><table><thead><tr><th scope=\"col\">Parameter</th><th scope=\"col\">unit</th>";
   for (std::size_t k = 0; k < choice.candidates.size(); ++k) {
     out += heading(choice.candidates[k], k == choice.chosen);
   }
   out += "</tr></thead><tbody>\n";
   for (std::size_t j = 0; j < views.size(); ++j) {
-    const PhysicalScale scale = scales ? (*scales)[j] : PhysicalScale{};
+    const commission::PhysicalScale scale = scales ? (*scales)[j] : commission::PhysicalScale{};
     out += fmt::format("<tr><th scope=\"row\">{}</th><td class=\"unit\">{}</td>", escape(views[j].best().name),
                        escape(views[j].best().unit));
-    for (const EstimatorCandidate& c : choice.candidates) {
+    for (const identify::EstimatorCandidate& c : choice.candidates) {
       out += cell(c, j, scale);
     }
     out += "</tr>\n";
@@ -75,9 +75,10 @@ std::string estimator_table(const Commissioning& result) {
       "measured motion pulls the least-squares estimates of inertias towards zero; instruments and bias compensation "
       "do not have that bias.</p>\n";
   std::vector<std::string> unusable;
-  for (const EstimatorCandidate& c : choice.candidates) {
+  for (const identify::EstimatorCandidate& c : choice.candidates) {
     if (!c.estimate.usable) {
-      unusable.push_back(capital(spaced(to_string(c.estimate.estimator))) + ": " + c.estimate.reason + ".");
+      unusable.push_back(core::capital(spaced(identify::to_string(c.estimate.estimator))) + ": " + c.estimate.reason +
+                         ".");
     }
   }
   return out + bullets(unusable);
@@ -88,9 +89,9 @@ namespace {
 constexpr double binding_margin = 1.0;  // s, shown on either side of a binding sample
 
 // "12.3 s, 45.6 s sum, 7.8 s difference": each output once.
-std::string binding_samples(const std::vector<RowOrigin>& rows, const Model& model, const TimeAxis& axis) {
+std::string binding_samples(const std::vector<bounds::RowOrigin>& rows, const Model& model, const TimeAxis& axis) {
   std::map<std::size_t, std::string> by_output;
-  for (const RowOrigin& row : rows) {
+  for (const bounds::RowOrigin& row : rows) {
     if (!row.is_prior) {
       std::string& times = by_output[row.output];
       times += times.empty() ? "" : ", ";
@@ -104,10 +105,11 @@ std::string binding_samples(const std::vector<RowOrigin>& rows, const Model& mod
   return out;
 }
 
-std::string set_by(const char* side, const std::vector<RowOrigin>& rows, bool is_prior, const Commissioning& result,
-                   const TimeAxis& axis) {
+std::string set_by(const char* side, const std::vector<bounds::RowOrigin>& rows, bool is_prior,
+                   const Commissioning& result, const TimeAxis& axis) {
   const std::string samples = binding_samples(rows, result.model.model, axis);
-  const bool touches_prior = std::any_of(rows.begin(), rows.end(), [](const RowOrigin& row) { return row.is_prior; });
+  const bool touches_prior =
+      std::any_of(rows.begin(), rows.end(), [](const bounds::RowOrigin& row) { return row.is_prior; });
   std::string text = samples;
   if (is_prior) {
     text = "<span class=\"tag\">the prior’s own</span>";
@@ -141,7 +143,7 @@ std::string head_cell(const ParameterView& v) {
   return fmt::format("<th scope=\"row\">{}</th><td class=\"unit\">{}</td>", escape(v.name), escape(v.unit));
 }
 
-std::string rows_of(const ParameterViews& views, const ParameterResult& r, bool with_nominal,
+std::string rows_of(const ParameterViews& views, const commission::ParameterResult& r, bool with_nominal,
                     const Commissioning& result, const TimeAxis& axis) {
   const int span = views.physical ? 2 : 1;
   std::string out = fmt::format("<tr{}>", span == 2 ? " class=\"joined\"" : "");
@@ -160,15 +162,15 @@ std::string rows_of(const ParameterViews& views, const ParameterResult& r, bool 
 std::string remarks(const Commissioning& result, const std::vector<ParameterViews>& views) {
   std::vector<std::string> items;
   for (std::size_t j = 0; j < views.size(); ++j) {
-    const ParameterResult& r = result.parameters[j];
+    const commission::ParameterResult& r = result.parameters[j];
     const std::string& name = views[j].best().name;
-    if (r.excitation != Excitation::identified && !r.reason.empty()) {
+    if (r.excitation != identify::Excitation::identified && !r.reason.empty()) {
       items.push_back(name + ": " + r.reason + ".");
     }
     if (!r.estimate_inside && views[j].theta.has_set) {
-      items.push_back(
-          "The estimate of " + name +
-          fmt::format(" lies outside the {} interval; the Chebyshev centre lies inside.", warrant_word(r.warrant)));
+      items.push_back("The estimate of " + name +
+                      fmt::format(" lies outside the {} interval; the Chebyshev centre lies inside.",
+                                  core::warrant_word(r.warrant)));
     }
   }
   if (physical_values_unknown(result)) {
@@ -195,12 +197,13 @@ std::string parameter_table(const Commissioning& result, const TimeAxis& axis) {
       "</th><th scope=\"col\" class=\"n\">estimate</th><th scope=\"col\" class=\"n\">{}</th>"
       "<th scope=\"col\" class=\"n\">95 % statistical</th><th scope=\"col\" class=\"n\">centre</th>{}"
       "<th scope=\"col\">intervals</th><th scope=\"col\">bound set by</th></tr></thead><tbody>\n",
-      warrant_badge(interval_warrant(result)), with_nominal ? "<th scope=\"col\" class=\"n\">nominal</th>" : "");
+      warrant_badge(commission::interval_warrant(result)),
+      with_nominal ? "<th scope=\"col\" class=\"n\">nominal</th>" : "");
   for (std::size_t j = 0; j < views.size(); ++j) {
     out += rows_of(views[j], result.parameters[j], with_nominal, result, axis);
   }
   out += "</tbody></table></div>\n";
-  out += "<p class=\"note\">" + escape(statistical_remark()) + "</p>\n";
+  out += "<p class=\"note\">" + escape(core::statistical_remark()) + "</p>\n";
   out +=
       "<p class=\"note\">Box: interval of the bounds (dashed: a side is the prior’s; arrow: it goes on beyond the "
       "drawing). Black dot and whiskers: estimate with its 95 % interval. Ring: Chebyshev centre of the "

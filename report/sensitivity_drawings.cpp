@@ -124,7 +124,7 @@ void names_fit(const std::vector<std::string>& names, std::size_t inputs) {
 
 }  // namespace
 
-std::string tornado(const OneAtATime& study, const std::vector<std::string>& inputs, const AxisLabel& quantity,
+std::string tornado(const study::OneAtATime& study, const std::vector<std::string>& inputs, const AxisLabel& quantity,
                     std::size_t most) {
   names_fit(inputs, study.inputs.size());
   constexpr double row = 22.0, top = 6.0, span = 340.0;
@@ -145,7 +145,7 @@ std::string tornado(const OneAtATime& study, const std::vector<std::string>& inp
   std::string out = open_svg(left + span + 20.0, bottom + 58.0, quantity.name + " at both ends of each input");
   out += across(x, top, bottom);
   for (std::size_t k = 0; k < n; ++k) {
-    const InputCurve& curve = study.inputs[study.order[k]];
+    const study::InputCurve& curve = study.inputs[study.order[k]];
     const double y = top + row * static_cast<double>(k) + 4.0, middle = y + 7.0;
     out += svg_text(left - 8.0, y + 11.5, "end", inputs[study.order[k]], true);
     double least = study.nominal, greatest = study.nominal;
@@ -215,10 +215,10 @@ std::string sensitivity_curve(const Eigen::VectorXd& x, const Eigen::VectorXd& y
   return out + "</svg>";
 }
 
-std::string sobol_bars(const SobolIndices& indices, const std::vector<std::string>& inputs, std::size_t most) {
+std::string sobol_bars(const study::SobolIndices& indices, const std::vector<std::string>& inputs, std::size_t most) {
   names_fit(inputs, indices.total.size());
   const std::size_t n = std::min(most, indices.total.size());
-  if (indices.status != SobolStatus::estimated || n == 0) {
+  if (indices.status != study::SobolStatus::estimated || n == 0) {
     return {};
   }
   std::vector<std::size_t> order(indices.total.size());
@@ -231,7 +231,7 @@ std::string sobol_bars(const SobolIndices& indices, const std::vector<std::strin
   x.take(0.0);
   x.take(1.0);
   for (std::size_t k = 0; k < n; ++k) {
-    for (const SobolIndex& index : {indices.first[order[k]], indices.total[order[k]]}) {
+    for (const study::SobolIndex& index : {indices.first[order[k]], indices.total[order[k]]}) {
       x.take(index.estimate);
       x.take(std::max(index.lower, -0.5));
       x.take(std::min(index.upper, 1.5));
@@ -242,7 +242,7 @@ std::string sobol_bars(const SobolIndices& indices, const std::vector<std::strin
   for (std::size_t k = 0; k < n; ++k) {
     const double y = top + row * static_cast<double>(k) + 4.0;
     out += svg_text(left - 8.0, y + 17.0, "end", inputs[order[k]], true);
-    const auto draw = [&](const SobolIndex& index, double at, const char* style) {
+    const auto draw = [&](const study::SobolIndex& index, double at, const char* style) {
       out += bar(x(0.0), x(index.estimate), at, 11.0, style) +
              whisker(x(std::max(index.lower, x.low)), x(std::min(index.upper, x.high)), at + 5.5);
     };
@@ -255,7 +255,7 @@ std::string sobol_bars(const SobolIndices& indices, const std::vector<std::strin
   return out + "</svg>";
 }
 
-std::string morris_scatter(const std::vector<ElementaryEffects>& effects, const std::vector<std::string>& inputs,
+std::string morris_scatter(const std::vector<study::ElementaryEffects>& effects, const std::vector<std::string>& inputs,
                            const AxisLabel& quantity) {
   names_fit(inputs, effects.size());
   constexpr double left = 70.0, top = 10.0, side = 280.0, right = left + side;
@@ -284,7 +284,7 @@ std::string morris_scatter(const std::vector<ElementaryEffects>& effects, const 
   const double diagonal = std::min(x.high, y.high);
   out += stroke(x(0.0), y(0.0), x(diagonal), y(diagonal), "class=\"nominal\"");
   for (std::size_t k = 0; k < order.size(); ++k) {
-    const ElementaryEffects& e = effects[order[k]];
+    const study::ElementaryEffects& e = effects[order[k]];
     const std::string label = std::to_string(k + 1);
     out += whisker(x(std::max(e.lower, 0.0)), x(e.upper), y(e.deviation));
     out +=
@@ -299,7 +299,7 @@ std::string morris_scatter(const std::vector<ElementaryEffects>& effects, const 
   return out + "</svg>";
 }
 
-std::string sensitivity_map(const GridMap& map, const Eigen::VectorXd& x, const Eigen::VectorXd& y,
+std::string sensitivity_map(const study::GridMap& map, const Eigen::VectorXd& x, const Eigen::VectorXd& y,
                             const AxisLabel& x_label, const AxisLabel& y_label, const AxisLabel& quantity) {
   check::that(x.size() == map.values.rows() && y.size() == map.values.cols(), "values of a map's inputs",
               fmt::format("{} and {}, as the map", map.values.rows(), map.values.cols()));

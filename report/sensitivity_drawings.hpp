@@ -23,7 +23,7 @@ struct AxisLabel {
 /// One bar for each input about the quantity's nominal value, the largest swing on top, at most `most`: pale towards
 /// the value at the input's lower end, full towards that at its upper end, a thin line over the whole range of values
 /// where they go beyond both. `inputs` names them in the design's order, with their ranges if wanted.
-[[nodiscard]] std::string tornado(const OneAtATime& study, const std::vector<std::string>& inputs,
+[[nodiscard]] std::string tornado(const study::OneAtATime& study, const std::vector<std::string>& inputs,
                                   const AxisLabel& quantity, std::size_t most = 16);
 
 /// A quantity over one input: `x` (ascending, logarithmic where told and positive) against `y`, both in their units,
@@ -34,17 +34,17 @@ struct AxisLabel {
 
 /// Two bars for each input, the first-order index full and the total index pale, with their intervals as whiskers, the
 /// largest total index on top, at most `most`. Empty unless the indices were estimated.
-[[nodiscard]] std::string sobol_bars(const SobolIndices& indices, const std::vector<std::string>& inputs,
+[[nodiscard]] std::string sobol_bars(const study::SobolIndices& indices, const std::vector<std::string>& inputs,
                                      std::size_t most = 16);
 
 /// σ over μ*, with μ*'s interval as whiskers, a number at each point and the names beside; above the line σ = μ* an
 /// effect changes as much as it is large (interactions, or curvature).
-[[nodiscard]] std::string morris_scatter(const std::vector<ElementaryEffects>& effects,
+[[nodiscard]] std::string morris_scatter(const std::vector<study::ElementaryEffects>& effects,
                                          const std::vector<std::string>& inputs, const AxisLabel& quantity);
 
 /// A map over two inputs, `x` and `y` being their values in their units at the map's coordinates: the darker a cell,
 /// the larger the quantity, on a linear scale whose ends are written out; cells without a value are crossed.
-[[nodiscard]] std::string sensitivity_map(const GridMap& map, const Eigen::VectorXd& x, const Eigen::VectorXd& y,
+[[nodiscard]] std::string sensitivity_map(const study::GridMap& map, const Eigen::VectorXd& x, const Eigen::VectorXd& y,
                                           const AxisLabel& x_label, const AxisLabel& y_label,
                                           const AxisLabel& quantity);
 

@@ -13,10 +13,11 @@
 #include <wheelwright/report/sensitivity_drawings.hpp>
 #include <wheelwright/words/text.hpp>
 
-namespace wheelwright {
-using namespace words;
+namespace wheelwright::report {
 
-using namespace report;
+using study::Study;
+
+using namespace words;
 
 namespace {
 
@@ -25,38 +26,38 @@ constexpr std::size_t kSentences = 6;  // at the head of the page
 constexpr std::size_t kFindings = 10;
 constexpr double kLarge = 0.05;  // share of left-out points from which indices mean little
 
-AxisLabel axis(const StudyQuantity& quantity) { return {quantity.name, unit_of(quantity.unit)}; }
-AxisLabel axis(const StudyInput& input) { return {input.name, unit_of(input.unit)}; }
+AxisLabel axis(const study::StudyQuantity& quantity) { return {quantity.name, unit_of(quantity.unit)}; }
+AxisLabel axis(const study::StudyInput& input) { return {input.name, unit_of(input.unit)}; }
 
-std::string range_of(const StudyInput& input) {
+std::string range_of(const study::StudyInput& input) {
   return words::with_unit(fmt::format("{} … {}", number(input.lower), number(input.upper)), unit_of(input.unit));
 }
 
 std::vector<std::string> names_of(const Study& study) {
   std::vector<std::string> names;
-  for (const StudyInput& input : study.inputs) {
+  for (const study::StudyInput& input : study.inputs) {
     names.push_back(input.name);
   }
   return names;
 }
 
 // The input that matters most for a quantity, in a sentence; empty where no method says it.
-std::string sentence(const Study& study, const StudyResult& result, std::size_t q) {
-  const StudyQuantity& quantity = study.quantities[q];
-  if (!result.sobol.empty() && result.sobol[q].status == SobolStatus::estimated) {
+std::string sentence(const Study& study, const study::StudyResult& result, std::size_t q) {
+  const study::StudyQuantity& quantity = study.quantities[q];
+  if (!result.sobol.empty() && result.sobol[q].status == study::SobolStatus::estimated) {
     const auto& total = result.sobol[q].total;
-    const auto most = std::ranges::max_element(total, {}, &SobolIndex::estimate);
+    const auto most = std::ranges::max_element(total, {}, &study::SobolIndex::estimate);
     return fmt::format("{}: most of its variance comes with {} (total index {}, 95 % interval {} to {})", quantity.name,
                        study.inputs[static_cast<std::size_t>(most - total.begin())].name, decimal(most->estimate, 2),
                        decimal(most->lower, 2), decimal(most->upper, 2));
   }
   if (!result.one_at_a_time.empty() && !result.one_at_a_time[q].order.empty()) {
-    const OneAtATime& found = result.one_at_a_time[q];
-    const InputCurve& curve = found.inputs[found.order.front()];
+    const study::OneAtATime& found = result.one_at_a_time[q];
+    const study::InputCurve& curve = found.inputs[found.order.front()];
     if (!std::isfinite(curve.swing) || curve.swing == 0.0) {
       return {};
     }
-    const StudyInput& input = study.inputs[found.order.front()];
+    const study::StudyInput& input = study.inputs[found.order.front()];
     return fmt::format("{}: {} as it is; {} swings it most, {} to {} for {}", quantity.name,
                        words::with_unit(number(found.nominal), unit_of(quantity.unit)), input.name, number(curve.low),
                        number(curve.high), range_of(input));
@@ -64,17 +65,17 @@ std::string sentence(const Study& study, const StudyResult& result, std::size_t 
   return {};
 }
 
-std::string curves(const Study& study, const OneAtATime& found, const StudyQuantity& quantity) {
+std::string curves(const Study& study, const study::OneAtATime& found, const study::StudyQuantity& quantity) {
   std::string out;
   for (std::size_t k = 0; k < std::min(kCurves, found.order.size()); ++k) {
     const std::size_t i = found.order[k];
-    const InputCurve& curve = found.inputs[i];
+    const study::InputCurve& curve = found.inputs[i];
     if (!(curve.swing > 0.0)) {
       continue;
     }
     Eigen::VectorXd x(curve.coordinates.size());
     for (Eigen::Index at = 0; at < x.size(); ++at) {
-      x[at] = value(study.inputs[i], curve.coordinates[at]);
+      x[at] = study::value(study.inputs[i], curve.coordinates[at]);
     }
     out += "<div>" +
            sensitivity_curve(x, curve.values, study.inputs[i].nominal, found.nominal, study.inputs[i].logarithmic,
@@ -84,11 +85,11 @@ std::string curves(const Study& study, const OneAtATime& found, const StudyQuant
   return out;
 }
 
-std::string sobol_part(const Study& study, const SobolIndices& found) {
-  if (found.status == SobolStatus::constant) {
+std::string sobol_part(const Study& study, const study::SobolIndices& found) {
+  if (found.status == study::SobolStatus::constant) {
     return paragraph("It does not depend on the inputs.");
   }
-  if (found.status == SobolStatus::too_few) {
+  if (found.status == study::SobolStatus::too_few) {
     return paragraph("Too few points have a value for shares of the variance.");
   }
   std::string out = "<div>" + sobol_bars(found, names_of(study)) + "</div>";
@@ -101,11 +102,11 @@ std::string sobol_part(const Study& study, const SobolIndices& found) {
   return out;
 }
 
-std::string maps(const Study& study, const StudyResult& result, std::size_t q) {
+std::string maps(const Study& study, const study::StudyResult& result, std::size_t q) {
   if (!study.methods.grid) {
     return {};
   }
-  const Grid& grid = *study.methods.grid;
+  const study::Grid& grid = *study.methods.grid;
   std::vector<Eigen::Index> varied;
   for (std::size_t i = 0; i < grid.levels.size(); ++i) {
     if (grid.levels[i] > 1) {
@@ -119,11 +120,12 @@ std::string maps(const Study& study, const StudyResult& result, std::size_t q) {
   for (const Eigen::Index levels : grid.levels) {
     middle.push_back(levels / 2);
   }
-  const GridMap map = grid_map(grid, result.grid.col(static_cast<Eigen::Index>(q)), varied[0], varied[1], middle);
+  const study::GridMap map =
+      study::grid_map(grid, result.grid.col(static_cast<Eigen::Index>(q)), varied[0], varied[1], middle);
   const auto values = [&](const Eigen::VectorXd& coordinates, Eigen::Index i) {
     Eigen::VectorXd x(coordinates.size());
     for (Eigen::Index at = 0; at < x.size(); ++at) {
-      x[at] = value(study.inputs[static_cast<std::size_t>(i)], coordinates[at]);
+      x[at] = study::value(study.inputs[static_cast<std::size_t>(i)], coordinates[at]);
     }
     return x;
   };
@@ -134,8 +136,8 @@ std::string maps(const Study& study, const StudyResult& result, std::size_t q) {
          "</div>";
 }
 
-Section quantity_section(const Study& study, const StudyResult& result, std::size_t q) {
-  const StudyQuantity& quantity = study.quantities[q];
+Section quantity_section(const Study& study, const study::StudyResult& result, std::size_t q) {
+  const study::StudyQuantity& quantity = study.quantities[q];
   std::string body;
   if (!result.one_at_a_time.empty()) {
     body += "<h3>One input at a time</h3><div class=\"pairs\"><div>" +
@@ -155,23 +157,23 @@ Section quantity_section(const Study& study, const StudyResult& result, std::siz
           words::with_unit(quantity.name, quantity.unit == "1" ? "" : "in " + quantity.unit), body};
 }
 
-std::string one_sided(const OneSided& derivative) {
+std::string one_sided(const study::OneSided& derivative) {
   const bool both = derivative.left == derivative.right ||
                     std::abs(derivative.left - derivative.right) <= 1e-6 * std::abs(derivative.left);
   return both ? number(derivative.right) : number(derivative.left) + " / " + number(derivative.right);
 }
 
-Section local_section(const LocalSensitivity& local) {
+Section local_section(const study::LocalSensitivity& local) {
   std::vector<Cell> header = {"Input"};
   for (std::size_t j = 0; j < local.parameters.size(); ++j) {
     header.push_back(
         numeric(escape(spaced(local.parameters[j])) + "<small>width, " + escape(local.units[j]) + "</small>"));
   }
   std::vector<std::vector<Cell>> rows;
-  for (const LocalDerivative& input : local.inputs) {
+  for (const study::LocalDerivative& input : local.inputs) {
     std::vector<Cell> row = {escape(input.input) + "<small>" +
                              escape(words::with_unit(number(input.value), unit_of(input.unit))) + "</small>"};
-    for (const ParameterDerivative& d : input.parameters) {
+    for (const study::ParameterDerivative& d : input.parameters) {
       row.push_back(numeric(escape(one_sided(d.width)) +
                             (d.elasticity ? "<small>elasticity " + escape(number(*d.elasticity)) + "</small>"
                                           : "<small>not differentiable</small>")));
@@ -186,7 +188,7 @@ Section local_section(const LocalSensitivity& local) {
       "bounds. "
       "Two numbers are the rates below and above the value. Elasticity: per cent of width per per cent of the "
       "input.</span>");
-  const std::vector<std::string> kinks = not_differentiable(local);
+  const std::vector<std::string> kinks = study::not_differentiable(local);
   if (!kinks.empty()) {
     body += "<h3>Where there is no derivative</h3>" + bullets(kinks);
   }
@@ -195,7 +197,7 @@ Section local_section(const LocalSensitivity& local) {
 
 Section inputs_section(const Study& study) {
   std::vector<std::vector<Cell>> rows;
-  for (const StudyInput& input : study.inputs) {
+  for (const study::StudyInput& input : study.inputs) {
     rows.push_back({escape(input.name), numeric(escape(number(input.lower))), numeric(escape(number(input.nominal))),
                     numeric(escape(number(input.upper))), escape(unit_of(input.unit)),
                     input.logarithmic ? "logarithmic" : "linear"});
@@ -206,14 +208,14 @@ Section inputs_section(const Study& study) {
 
 }  // namespace
 
-std::string sensitivity_report(const Study& study, const StudyResult& result,
-                               const std::optional<LocalSensitivity>& local, const std::vector<std::string>& notes,
-                               const ReportContext& context) {
+std::string sensitivity_report(const Study& study, const study::StudyResult& result,
+                               const std::optional<study::LocalSensitivity>& local,
+                               const std::vector<std::string>& notes, const ReportContext& context) {
   PageContent content;
   content.title = study.name.empty() ? "Sensitivity of " + study.subject.robot.name : study.name;
   content.software = context.software;
   std::size_t without = 0;
-  for (const StudyFinding& finding : result.findings) {
+  for (const study::StudyFinding& finding : result.findings) {
     without += finding.points;
   }
   content.status = without == 0 ? "good" : "caution";
@@ -246,4 +248,4 @@ std::string sensitivity_report(const Study& study, const StudyResult& result,
   return page(content);
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::report

@@ -11,13 +11,13 @@
 #include <wheelwright/study/local_derivatives.hpp>
 #include <wheelwright/study/study.hpp>
 
-namespace wheelwright {
+namespace wheelwright::report {
 
 /// One self-contained HTML page: what matters most for each quantity in words, tornado charts and curves, shares of the
 /// variance, elementary effects, maps, the bounds' derivatives and where there are none, and what could not be
 /// evaluated.
-[[nodiscard]] std::string sensitivity_report(const Study& study, const StudyResult& result,
-                                             const std::optional<LocalSensitivity>& local,
+[[nodiscard]] std::string sensitivity_report(const study::Study& study, const study::StudyResult& result,
+                                             const std::optional<study::LocalSensitivity>& local,
                                              const std::vector<std::string>& notes, const ReportContext& context);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::report

@@ -131,7 +131,7 @@ class Recorder {
 
 LogTable raw_signals(LogSource& log, std::size_t most) {
   Recorder recorder(log.columns(), most);
-  for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) { recorder.add(block, k, starts); });
+  core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) { recorder.add(block, k, starts); });
   return recorder.finish();
 }
 
@@ -280,12 +280,12 @@ std::string signal_charts(const LogTable& signals, const std::vector<ChartMark>&
   return out;
 }
 
-std::string residual_charts(const Trace& trace, const Robot& robot, const Model& model,
+std::string residual_charts(const commission::Trace& trace, const Robot& robot, const Model& model,
                             const std::vector<std::vector<ChartMark>>& marks, const TimeAxis& axis,
                             const std::string& clock_id) {
   std::string out = clock(clock_id, trace.t, trace.breaks, axis);
   for (std::size_t i = 0; i < trace.outputs.size(); ++i) {
-    const OutputTrace& o = trace.outputs[i];
+    const commission::OutputTrace& o = trace.outputs[i];
     const double span = extent(o.lower, o.upper);
     Chart chart{.title = "Residual of the output " + output_name(model, i),
                 .unit = output_unit_of(robot, model, i),
@@ -306,11 +306,11 @@ std::string residual_charts(const Trace& trace, const Robot& robot, const Model&
   return out;
 }
 
-std::string torque_charts(const Trace& trace, const Robot& robot, const Model& model, const TimeAxis& axis,
+std::string torque_charts(const commission::Trace& trace, const Robot& robot, const Model& model, const TimeAxis& axis,
                           const std::string& clock_id) {
   std::string out;
   for (std::size_t i = 0; i < trace.outputs.size(); ++i) {
-    const OutputTrace& o = trace.outputs[i];
+    const commission::OutputTrace& o = trace.outputs[i];
     const Chart chart{
         .title = "Filtered effort of the output " + output_name(model, i),
         .unit = output_unit_of(robot, model, i),

@@ -32,13 +32,13 @@ namespace wheelwright::report {
 
 /// The residual of each output inside [l, u], with the marks of that output. `clock` becomes the id of the trace's
 /// times.
-[[nodiscard]] std::string residual_charts(const Trace& trace, const Robot& robot, const Model& model,
+[[nodiscard]] std::string residual_charts(const commission::Trace& trace, const Robot& robot, const Model& model,
                                           const std::vector<std::vector<ChartMark>>& marks, const TimeAxis& axis,
                                           const std::string& clock);
 
 /// Filtered torque, measured against predicted, for each output. residual_charts() put its times on the page as
 /// `clock`.
-[[nodiscard]] std::string torque_charts(const Trace& trace, const Robot& robot, const Model& model,
+[[nodiscard]] std::string torque_charts(const commission::Trace& trace, const Robot& robot, const Model& model,
                                         const TimeAxis& axis, const std::string& clock);
 
 /// A note that `all` things were drawn as `drawn` points; empty where none is missing. HTML.

@@ -10,17 +10,18 @@
 #include <wheelwright/results/model_json.hpp>
 #include <wheelwright/results/model_words.hpp>
 
-namespace wheelwright {
+namespace wheelwright::results {
 
 std::string proof_scope(const ModelClaims& claims) {
-  const auto tested = std::ranges::count(claims.assumptions, AssumptionVerdict::holds, &Assumption::verdict);
+  const auto tested =
+      std::ranges::count(claims.assumptions, core::AssumptionVerdict::holds, &core::Assumption::verdict);
   return fmt::format(
       "What is proved is arithmetic: the bounds follow from the rows of the log within the stated noise. "
       "That the assumptions hold is not proved{}. The bounds are {}.",
       claims.assumptions.empty() ? ", and the model does not list them"
                                  : fmt::format(": commissioning took {}, of which {} were tested on the log and held",
                                                claims.assumptions.size(), tested),
-      warrant_word(claims.warrant));
+      core::warrant_word(claims.warrant));
 }
 
 std::string verdict(const ModelCheck& check, const ModelClaims& claims) {
@@ -36,23 +37,24 @@ std::string verdict(const ModelCheck& check, const ModelClaims& claims) {
                      check.bounds.size(), claims.facets.size());
 }
 
-Json to_json(const ModelCheck& check, const ModelClaims& claims, const LogReport& data, const CheckedFiles& files,
+Json to_json(const ModelCheck& check, const ModelClaims& claims, const logs::LogReport& data, const CheckedFiles& files,
              const std::string& software) {
   Json log_files = Json::array(), bounds = Json::array();
-  for (const LogFileReport& file : data.files) {
+  for (const logs::LogFileReport& file : data.files) {
     log_files.push_back({{"path", file.path}, {"hash", file.hash}, {"bytes", file.bytes}, {"rows", file.rows}});
   }
   for (const BoundVerdict& each : check.bounds) {
-    const Parameter& parameter = claims.model.parameters[each.parameter];
-    bounds.push_back({{"parameter", parameter.name},
-                      {"unit", parameter_unit(claims.robot, parameter)},
-                      {"side", word_of(kSideWords, each.side)},
-                      {"stated", each.stated},
-                      {"shown", or_null(each.shown)},
-                      {"proved", each.proved},
-                      {"shortfall", or_null(each.shortfall)},
-                      {"rows", (each.side == Side::upper ? claims.upper : claims.lower)[each.parameter].proof.size()},
-                      {"reason", each.reason}});
+    const model::Parameter& parameter = claims.model.parameters[each.parameter];
+    bounds.push_back(
+        {{"parameter", parameter.name},
+         {"unit", commission::parameter_unit(claims.robot, parameter)},
+         {"side", files::word_of(kSideWords, each.side)},
+         {"stated", each.stated},
+         {"shown", files::or_null(each.shown)},
+         {"proved", each.proved},
+         {"shortfall", files::or_null(each.shortfall)},
+         {"rows", (each.side == bounds::Side::upper ? claims.upper : claims.lower)[each.parameter].proof.size()},
+         {"reason", each.reason}});
   }
   const FacetVerdicts& facets = check.facets;
   Json json = {
@@ -61,7 +63,7 @@ Json to_json(const ModelCheck& check, const ModelClaims& claims, const LogReport
       {"model", files.model},
       {"proved", check.proved()},
       {"message", verdict(check, claims)},
-      {"warrant", warrant_word(claims.warrant)},
+      {"warrant", core::warrant_word(claims.warrant)},
       {"scope", proof_scope(claims)},
       {"data", {{"same", check.same_log}, {"rows", data.rows}, {"segments", data.segments}, {"files", log_files}}},
       {"bounds", bounds},
@@ -78,9 +80,9 @@ Json to_json(const ModelCheck& check, const ModelClaims& claims, const LogReport
   if (check.emptiness) {
     json["contradiction"] = {{"rows", claims.contradiction.size()},
                              {"proved", check.emptiness->proved},
-                             {"shortfall", or_null(check.emptiness->shortfall)}};
+                             {"shortfall", files::or_null(check.emptiness->shortfall)}};
   }
   return json;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::results

@@ -9,7 +9,7 @@
 #include <wheelwright/files/json.hpp>
 #include <wheelwright/results/model_check.hpp>
 
-namespace wheelwright {
+namespace wheelwright::results {
 
 /// The files of a check, as they were named.
 struct CheckedFiles {
@@ -24,7 +24,7 @@ struct CheckedFiles {
 [[nodiscard]] std::string verdict(const ModelCheck& check, const ModelClaims& claims);
 
 /// The answer as JSON (results/check.schema.json); `software` is name and version.
-[[nodiscard]] Json to_json(const ModelCheck& check, const ModelClaims& claims, const LogReport& data,
+[[nodiscard]] Json to_json(const ModelCheck& check, const ModelClaims& claims, const logs::LogReport& data,
                            const CheckedFiles& files, const std::string& software);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::results

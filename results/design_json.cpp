@@ -8,14 +8,14 @@
 
 #include <wheelwright/commission/physical.hpp>
 
-namespace wheelwright {
+namespace wheelwright::results {
 namespace {
 
-const char* name(WidthCriterion criterion) {
+const char* name(design::WidthCriterion criterion) {
   switch (criterion) {
-    case WidthCriterion::geometric_mean: return "geometric_mean";
-    case WidthCriterion::mean: return "mean";
-    case WidthCriterion::largest: break;
+    case design::WidthCriterion::geometric_mean: return "geometric_mean";
+    case design::WidthCriterion::mean: return "mean";
+    case design::WidthCriterion::largest: break;
   }
   return "largest";
 }
@@ -23,7 +23,8 @@ const char* name(WidthCriterion criterion) {
 Json optional(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
 
 // What all designs have.
-Json frame(const Manoeuvre& manoeuvre, const std::optional<FigureEight>& eight, const MotionLimits& limits) {
+Json frame(const design::Manoeuvre& manoeuvre, const std::optional<design::FigureEight>& eight,
+           const design::MotionLimits& limits) {
   Json out = {{"schema", "wheelwright/design/1"}};
   out["limits"] = {{"duration", limits.duration},
                    {"speed", limits.joint_speed},
@@ -35,7 +36,7 @@ Json frame(const Manoeuvre& manoeuvre, const std::optional<FigureEight>& eight, 
     const auto& [x, y] = *limits.box;
     out["limits"]["box"] = {x.lower, x.upper, y.lower, y.upper};
   }
-  const LimitUse& use = manoeuvre.use;
+  const design::LimitUse& use = manoeuvre.use;
   out["use"] = {{"speed", use.speed}, {"acceleration", use.acceleration}, {"effort", use.effort}, {"space", use.space}};
   out["largest_distance"] = manoeuvre.plan.reach();
   out["objective"] = manoeuvre.objective;
@@ -49,14 +50,15 @@ Json frame(const Manoeuvre& manoeuvre, const std::optional<FigureEight>& eight, 
 
 }  // namespace
 
-Json to_json(const BoundsDesign& design, const DesignSubject& subject, const MotionLimits& limits) {
-  const auto scales = physical_scales(subject.robot, subject.model);
+Json to_json(const design::BoundsDesign& design, const design::DesignSubject& subject,
+             const design::MotionLimits& limits) {
+  const auto scales = commission::physical_scales(subject.robot, subject.model);
   Json out = frame(design.manoeuvre, design.figure_eight, limits);
   out["for"] = "bounds";
   out["criterion"] = name(design.criterion);
   out["parameters"] = Json::array();
   for (std::size_t j = 0; j < subject.model.p(); ++j) {
-    const Parameter& parameter = subject.model.parameters[j];
+    const model::Parameter& parameter = subject.model.parameters[j];
     const auto bounds = [&](const Box& box) {
       const Interval& side = box.sides[j];
       return Json{{"lower", side.lower},
@@ -66,7 +68,7 @@ Json to_json(const BoundsDesign& design, const DesignSubject& subject, const Mot
     };
     out["parameters"].push_back(
         {{"name", parameter.name},
-         {"unit", parameter_unit(subject.robot, parameter)},
+         {"unit", commission::parameter_unit(subject.robot, parameter)},
          {"physical", parameter.physical},
          {"physical_unit", parameter.physical_unit},
          {"believed", subject.theta[static_cast<Eigen::Index>(j)]},
@@ -77,13 +79,13 @@ Json to_json(const BoundsDesign& design, const DesignSubject& subject, const Mot
   return out;
 }
 
-Json to_json(const DetectionDesign& design, const MotionLimits& limits) {
+Json to_json(const design::DetectionDesign& design, const design::MotionLimits& limits) {
   Json out = frame(design.manoeuvre, design.figure_eight, limits);
   out["for"] = "detection";
   out["faults"] = Json::array();
   for (std::size_t k = 0; k < design.promised.size(); ++k) {
-    const PromisedFault& p = design.promised[k];
-    const auto size = [](const PromisedFault& of) {
+    const design::PromisedFault& p = design.promised[k];
+    const auto size = [](const design::PromisedFault& of) {
       return std::isfinite(of.smallest) ? Json{{"smallest", of.smallest}, {"t", of.t}} : Json(nullptr);
     };
     out["faults"].push_back({{"fault", p.fault.name},
@@ -96,18 +98,18 @@ Json to_json(const DetectionDesign& design, const MotionLimits& limits) {
   return out;
 }
 
-Json to_json(const DiscriminationDesign& design, const MotionLimits& limits) {
+Json to_json(const gap::DiscriminationDesign& design, const design::MotionLimits& limits) {
   Json out = frame(design.manoeuvre, design.figure_eight, limits);
   out["for"] = "discrimination";
   out["rivals"] = Json::array();
-  for (const Rival& rival : design.rivals) {
+  for (const gap::Rival& rival : design.rivals) {
     Json causes = Json::array();
-    for (const RivalCause& cause : rival.causes) {
+    for (const gap::RivalCause& cause : rival.causes) {
       causes.push_back({{"effect", cause.effect}, {"coefficients", cause.coefficients}, {"shape", cause.shape}});
     }
     out["rivals"].push_back({{"name", rival.name()}, {"causes", std::move(causes)}});
   }
-  const auto promise = [](const std::vector<RivalSeparation>& of, std::size_t k) {
+  const auto promise = [](const std::vector<gap::RivalSeparation>& of, std::size_t k) {
     return of.empty() ? Json(nullptr)
                       : Json{{"delta", of[k].delta},
                              {"deviations", of[k].deviations()},
@@ -116,7 +118,7 @@ Json to_json(const DiscriminationDesign& design, const MotionLimits& limits) {
   };
   out["pairs"] = Json::array();
   for (std::size_t k = 0; k < design.promised.size(); ++k) {
-    const RivalSeparation& pair = design.promised[k];
+    const gap::RivalSeparation& pair = design.promised[k];
     out["pairs"].push_back({{"true", design.rivals[pair.truth].name()},
                             {"other", design.rivals[pair.other].name()},
                             {"decidable", static_cast<bool>(design.decidable[k])},
@@ -125,7 +127,7 @@ Json to_json(const DiscriminationDesign& design, const MotionLimits& limits) {
                             {"analysed", promise(design.analysed, k)}});
   }
   out["inseparable"] = Json::array();
-  for (const InseparablePair& pair : design.inseparable) {
+  for (const gap::InseparablePair& pair : design.inseparable) {
     out["inseparable"].push_back({{"rivals", {design.rivals[pair.first].name(), design.rivals[pair.second].name()}},
                                   {"by_any_motion", pair.by_any_motion},
                                   {"special_case", pair.special_case},
@@ -136,4 +138,4 @@ Json to_json(const DiscriminationDesign& design, const MotionLimits& limits) {
   return out;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::results

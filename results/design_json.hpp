@@ -10,17 +10,18 @@
 #include <wheelwright/files/json.hpp>
 #include <wheelwright/gap/discrimination_design.hpp>
 
-namespace wheelwright {
+namespace wheelwright::results {
 
 /// The result as JSON, schema "wheelwright/design/1": limits and their use, θ as believed, and bounds in the units of
 /// θ_L (promised; of the model, where there is one; of the figure eight, where there is one), with the physical half
 /// widths.
-[[nodiscard]] Json to_json(const BoundsDesign& design, const DesignSubject& subject, const MotionLimits& limits);
+[[nodiscard]] Json to_json(const design::BoundsDesign& design, const design::DesignSubject& subject,
+                           const design::MotionLimits& limits);
 
 /// The same for an inspection: smallest sizes that are certainly found, by the plan and by the figure eight.
-[[nodiscard]] Json to_json(const DetectionDesign& design, const MotionLimits& limits);
+[[nodiscard]] Json to_json(const design::DetectionDesign& design, const design::MotionLimits& limits);
 
 /// The same for telling causes apart: how well each rival, being true, is told from each other one.
-[[nodiscard]] Json to_json(const DiscriminationDesign& design, const MotionLimits& limits);
+[[nodiscard]] Json to_json(const gap::DiscriminationDesign& design, const design::MotionLimits& limits);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::results

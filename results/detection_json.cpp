@@ -8,9 +8,9 @@
 
 #include <wheelwright/results/model_json.hpp>
 
-namespace wheelwright {
+namespace wheelwright::results {
 
-Json to_json(const Event& e, const OnlineModel& model) {
+Json to_json(const detector::Event& e, const OnlineModel& model) {
   return {{"output", model.model.outputs[e.output]},
           {"start", e.start},
           {"alarm", e.alarm},
@@ -28,7 +28,7 @@ Json to_json(const Detection& d, const OnlineModel& model, const std::string& mo
                {"software", software},
                {"model", model_file},
                {"log", log},
-               {"warrant", warrant_word(model.warrant)},
+               {"warrant", core::warrant_word(model.warrant)},
                {"assumptions", assumptions_json(model.assumptions)},
                {"fault", !d.events.empty()},
                {"rows", d.rows},
@@ -42,17 +42,17 @@ Json to_json(const Detection& d, const OnlineModel& model, const std::string& mo
                                {"utilisation", d.utilisation[i]},
                                {"nrmse", d.nrmse[i]}});
   }
-  for (const Event& event : d.events) {
+  for (const detector::Event& event : d.events) {
     json["events"].push_back(to_json(event, model));
   }
   return json;
 }
 
-void add_isolation(Json& json, const std::vector<Isolation>& isolations) {
-  using Verdict = FaultFinding::Verdict;
+void add_isolation(Json& json, const std::vector<detector::Isolation>& isolations) {
+  using Verdict = detector::FaultFinding::Verdict;
   for (std::size_t k = 0; k < isolations.size(); ++k) {
     Json &event = json["events"][k], consistent = Json::array(), excluded = Json::array(), open = Json::array();
-    for (const FaultFinding& f : isolations[k].findings) {
+    for (const detector::FaultFinding& f : isolations[k].findings) {
       if (f.verdict == Verdict::excluded) {
         excluded.push_back(f.fault.name);
       } else if (f.verdict == Verdict::not_examined) {
@@ -69,14 +69,14 @@ void add_isolation(Json& json, const std::vector<Isolation>& isolations) {
     event["isolation"] = std::move(consistent);
     event["excluded"] = std::move(excluded);
     event["not_examined"] = std::move(open);
-    event["explanation"] = sentence(isolations[k]);
+    event["explanation"] = commission::sentence(isolations[k]);
   }
 }
 
-void add_kinematic(Json& json, const KinematicWatch& watch, const OnlineModel& model) {
+void add_kinematic(Json& json, const commission::KinematicWatch& watch, const OnlineModel& model) {
   const Detection none;
   const Detection& d = watch.detection ? *watch.detection : none;
-  const OnlineModel view = with_kinematic_outputs(model);
+  const OnlineModel view = commission::with_kinematic_outputs(model);
   const Json own = to_json(d, view, {}, {}, {});
   for (const Json& output : own.at("outputs")) {
     json["outputs"].push_back(output);
@@ -86,11 +86,11 @@ void add_kinematic(Json& json, const KinematicWatch& watch, const OnlineModel& m
   std::ranges::stable_sort(events, {}, [](const Json& event) { return event.at("alarm").get<double>(); });
   json["events"] = events;
   json["fault"] = !events.empty();
-  json["kinematic"] = {{"warrant", warrant_word(view.warrant)},
+  json["kinematic"] = {{"warrant", core::warrant_word(view.warrant)},
                        {"watched", watch.detection.has_value()},
                        {"message", watch.message},
                        {"instants", d.instants},
                        {"seconds", d.seconds}};
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::results

@@ -9,7 +9,7 @@
 #include <wheelwright/commission/detector_walk.hpp>
 #include <wheelwright/files/json.hpp>
 
-namespace wheelwright {
+namespace wheelwright::results {
 
 /// A detection as JSON (results/detection.schema.json). `model_file` and `log` say what was used, `software` is name and
 /// version.
@@ -17,12 +17,12 @@ namespace wheelwright {
                            const std::string& log, const std::string& software);
 
 /// One event as JSON.
-[[nodiscard]] Json to_json(const Event& event, const OnlineModel& model);
+[[nodiscard]] Json to_json(const detector::Event& event, const OnlineModel& model);
 
 /// Adds what its first events are isolated to to a detection as JSON, before add_kinematic().
-void add_isolation(Json& detection, const std::vector<Isolation>& isolations);
+void add_isolation(Json& detection, const std::vector<detector::Isolation>& isolations);
 
 /// Adds outputs and events of the kinematic residual to a detection as JSON; events stay in the order of their alarms.
-void add_kinematic(Json& detection, const KinematicWatch& watch, const OnlineModel& model);
+void add_kinematic(Json& detection, const commission::KinematicWatch& watch, const OnlineModel& model);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::results

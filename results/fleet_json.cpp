@@ -14,14 +14,17 @@
 #include <wheelwright/results/model_json.hpp>
 #include <wheelwright/robots/online_model_file.hpp>
 
-namespace wheelwright {
+namespace wheelwright::results {
+
+using files::JsonPlace;
+
 namespace {
 
-constexpr Words<RobotStatus, 5> status_words = {{{RobotStatus::commissioned, "commissioned"},
-                                                 {RobotStatus::partial, "partial"},
-                                                 {RobotStatus::contradicted, "contradicted"},
-                                                 {RobotStatus::nothing, "nothing"},
-                                                 {RobotStatus::unreadable, "unreadable"}}};
+constexpr files::Words<study::RobotStatus, 5> status_words = {{{study::RobotStatus::commissioned, "commissioned"},
+                                                               {study::RobotStatus::partial, "partial"},
+                                                               {study::RobotStatus::contradicted, "contradicted"},
+                                                               {study::RobotStatus::nothing, "nothing"},
+                                                               {study::RobotStatus::unreadable, "unreadable"}}};
 
 Json maybe(const std::optional<double>& x) { return x ? Json(*x) : Json(nullptr); }
 
@@ -29,9 +32,9 @@ std::optional<double> maybe(const JsonPlace& object, std::string_view key) {
   return object.has(key) ? std::optional(object.at(key).number()) : std::nullopt;
 }
 
-Json log_json(const LogRecord& log) {
+Json log_json(const study::LogRecord& log) {
   Json parameters = Json::array();
-  for (const RecordedParameter& p : log.parameters) {
+  for (const study::RecordedParameter& p : log.parameters) {
     parameters.push_back({{"name", p.name},
                           {"unit", p.unit},
                           {"is_prior_key", p.is_prior_key},
@@ -43,24 +46,24 @@ Json log_json(const LogRecord& log) {
                           {"lower_is_prior", p.lower_is_prior},
                           {"upper_is_prior", p.upper_is_prior},
                           {"prior", {p.prior.lower, p.prior.upper}},
-                          {"warrant", warrant_word(p.warrant)}});
+                          {"warrant", core::warrant_word(p.warrant)}});
   }
   return {{"log", log.log},
           {"when", log.when},
-          {"status", word_of(status_words, log.status)},
+          {"status", files::word_of(status_words, log.status)},
           {"message", log.message},
           {"seconds", log.seconds},
           {"rows", log.rows},
           {"parameters", std::move(parameters)}};
 }
 
-LogRecord log_from(const JsonPlace& at) {
-  LogRecord log{.log = at.at("log").text(),
-                .when = at.at("when").number(),
-                .status = value_of(status_words, at.at("status")),
-                .message = at.at("message").text(),
-                .seconds = at.at("seconds").number(),
-                .rows = at.at("rows").count()};
+study::LogRecord log_from(const JsonPlace& at) {
+  study::LogRecord log{.log = at.at("log").text(),
+                       .when = at.at("when").number(),
+                       .status = files::value_of(status_words, at.at("status")),
+                       .message = at.at("message").text(),
+                       .seconds = at.at("seconds").number(),
+                       .rows = at.at("rows").count()};
   const JsonPlace parameters = at.at("parameters");
   for (std::size_t j = 0; j < parameters.size(); ++j) {
     const JsonPlace p = parameters.at(j);
@@ -75,18 +78,18 @@ LogRecord log_from(const JsonPlace& at) {
                               .lower_is_prior = p.at("lower_is_prior").boolean(),
                               .upper_is_prior = p.at("upper_is_prior").boolean(),
                               .prior = {p.at("prior").at(std::size_t{0}).number(), p.at("prior").at(1).number()},
-                              .warrant = warrant_at(p, Warrant::extrapolated)});
+                              .warrant = robots::warrant_at(p, core::Warrant::extrapolated)});
   }
   return log;
 }
 
-Json population_json(const FleetResult& fleet) {
+Json population_json(const study::FleetResult& fleet) {
   Json list = Json::array();
-  for (const ParameterPopulation& p : fleet.population.parameters) {
-    const FleetColumn& column = fleet.table.columns[p.column];
+  for (const study::ParameterPopulation& p : fleet.population.parameters) {
+    const study::FleetColumn& column = fleet.table.columns[p.column];
     Json entry = {{"parameter", column.name},
                   {"unit", column.unit},
-                  {"warrant", warrant_word(column.warrant)},
+                  {"warrant", core::warrant_word(column.warrant)},
                   {"robots", p.shown},
                   {"described", p.described}};
     if (p.described) {
@@ -101,9 +104,9 @@ Json population_json(const FleetResult& fleet) {
   return list;
 }
 
-Json outside_json(const FleetResult& fleet) {
+Json outside_json(const study::FleetResult& fleet) {
   Json list = Json::array();
-  for (const RobotOutside& o : fleet.population.outside) {
+  for (const study::RobotOutside& o : fleet.population.outside) {
     list.push_back({{"robot", fleet.table.robots[o.robot]},
                     {"parameter", fleet.table.columns[o.column].name},
                     {"estimate", o.value},
@@ -111,15 +114,15 @@ Json outside_json(const FleetResult& fleet) {
                     {"p_value", o.p},
                     {"adjusted_p_value", o.adjusted_p},
                     {"certain", o.certain},
-                    {"warrant", warrant_word(fleet.table.columns[o.column].warrant)},
+                    {"warrant", core::warrant_word(fleet.table.columns[o.column].warrant)},
                     {"certainly_beyond", o.certainly_beyond}});
   }
   return list;
 }
 
-Json drift_json(const FleetResult& fleet) {
+Json drift_json(const study::FleetResult& fleet) {
   Json list = Json::array();
-  for (const ParameterDrift& d : fleet.drift) {
+  for (const study::ParameterDrift& d : fleet.drift) {
     if (!d.drifts(fleet.drift_level)) {
       continue;
     }
@@ -128,7 +131,7 @@ Json drift_json(const FleetResult& fleet) {
                   {"unit", fleet.table.columns[d.column].unit},
                   {"logs", d.logs},
                   {"per", d.dated ? "week" : "log"},
-                  {"warrant", warrant_word(fleet.table.columns[d.column].warrant)},
+                  {"warrant", core::warrant_word(fleet.table.columns[d.column].warrant)},
                   {"certain", nullptr},
                   {"trend", nullptr}};
     if (d.certain != 0.0) {
@@ -143,7 +146,7 @@ Json drift_json(const FleetResult& fleet) {
   return list;
 }
 
-Json spread_json(const FleetSpread& spread, const FleetResult& fleet) {
+Json spread_json(const study::FleetSpread& spread, const study::FleetResult& fleet) {
   return {{"name", spread.name},
           {"unit", spread.unit},
           {"robots", spread.values.size()},
@@ -153,13 +156,13 @@ Json spread_json(const FleetSpread& spread, const FleetResult& fleet) {
           {"largest_robot", spread.values.empty() ? Json(nullptr) : Json(fleet.table.robots[spread.largest_robot])}};
 }
 
-Json prior_json(const FleetResult& fleet) {
-  const PooledPrior& prior = fleet.prior;
+Json prior_json(const study::FleetResult& fleet) {
+  const study::PooledPrior& prior = fleet.prior;
   Json json = {{"exists", prior.exists},     {"message", prior.message},     {"asked", prior.asked},
                {"coverage", prior.coverage}, {"learning", prior.learning},   {"scored", prior.scored},
                {"rank", prior.rank},         {"boundless", prior.boundless}, {"needed", prior.needed},
                {"parameters", Json::array()}};
-  for (const PooledParameter& p : prior.parameters) {
+  for (const study::PooledParameter& p : prior.parameters) {
     const bool boxed = prior.exists && p.included;
     json["parameters"].push_back({{"parameter", fleet.table.columns[p.column].name},
                                   {"unit", fleet.table.columns[p.column].unit},
@@ -185,10 +188,10 @@ std::string csv_field(const std::string& text) {
 
 }  // namespace
 
-std::string record_text(const RobotRecord& record) {
+std::string record_text(const study::RobotRecord& record) {
   Json json = {{"robot", record.robot}, {"dated", record.dated}, {"commissioning", log_json(record.commissioning)}};
   json["outputs"] = Json::array();
-  for (const RecordedOutput& o : record.outputs) {
+  for (const study::RecordedOutput& o : record.outputs) {
     json["outputs"].push_back({{"name", o.name},
                                {"unit", o.unit},
                                {"median_width", o.median_width},
@@ -197,7 +200,7 @@ std::string record_text(const RobotRecord& record) {
   }
   json["smallest_radius_change"] = maybe(record.smallest_radius_change);
   json["checks"] = Json::array();
-  for (const CheckRecord& c : record.checks) {
+  for (const study::CheckRecord& c : record.checks) {
     json["checks"].push_back({{"log", log_json(c.log)},
                               {"checked", c.checked},
                               {"not_checked", c.not_checked},
@@ -208,15 +211,15 @@ std::string record_text(const RobotRecord& record) {
   }
   json["notes"] = record.notes;
   json["findings"] = record.findings;
-  return json_text(json, -1);
+  return files::json_text(json, -1);
 }
 
-RobotRecord record_from_text(std::string_view text, const std::string& where) {
-  const Json json = parse_json(text, where);
+study::RobotRecord record_from_text(std::string_view text, const std::string& where) {
+  const Json json = files::parse_json(text, where);
   const JsonPlace at(json, where);
-  RobotRecord record{.robot = at.at("robot").text(),
-                     .dated = at.at("dated").boolean(),
-                     .commissioning = log_from(at.at("commissioning"))};
+  study::RobotRecord record{.robot = at.at("robot").text(),
+                            .dated = at.at("dated").boolean(),
+                            .commissioning = log_from(at.at("commissioning"))};
   const JsonPlace outputs = at.at("outputs");
   for (std::size_t i = 0; i < outputs.size(); ++i) {
     const JsonPlace o = outputs.at(i);
@@ -243,8 +246,9 @@ RobotRecord record_from_text(std::string_view text, const std::string& where) {
   return record;
 }
 
-Json to_json(const FleetResult& fleet, const std::string& list, const std::string& software) {
-  Json json = {{"schema", kFleetSchema}, {"software", software}, {"list", list}, {"sentences", sentences(fleet)}};
+Json to_json(const study::FleetResult& fleet, const std::string& list, const std::string& software) {
+  Json json = {
+      {"schema", kFleetSchema}, {"software", software}, {"list", list}, {"sentences", study::sentences(fleet)}};
   Json status = Json::object();
   for (const auto& [value, word] : status_words) {
     status[std::string(word)] = fleet.count(value);
@@ -261,7 +265,7 @@ Json to_json(const FleetResult& fleet, const std::string& list, const std::strin
   json["outside"] = outside_json(fleet);
   json["drift"] = drift_json(fleet);
   json["alarms"] = Json::array();
-  for (const FleetAlarm& a : fleet.alarms) {
+  for (const study::FleetAlarm& a : fleet.alarms) {
     json["alarms"].push_back({{"robot", fleet.table.robots[a.robot]},
                               {"log", a.log},
                               {"events", a.events},
@@ -269,11 +273,11 @@ Json to_json(const FleetResult& fleet, const std::string& list, const std::strin
                               {"outside_share", a.outside_share}});
   }
   json["failed"] = Json::array();
-  for (const FleetFinding& f : fleet.failed) {
+  for (const study::FleetFinding& f : fleet.failed) {
     json["failed"].push_back({{"robot", fleet.table.robots[f.robot]}, {"log", f.log}, {"reason", f.text}});
   }
   json["thresholds"] = Json::array();
-  for (const FleetSpread& spread : fleet.widths) {
+  for (const study::FleetSpread& spread : fleet.widths) {
     json["thresholds"].push_back(spread_json(spread, fleet));
   }
   json["smallest_radius_change"] = spread_json(fleet.smallest, fleet);
@@ -285,14 +289,15 @@ std::string fleet_csv_header() {
   return "robot,status,parameter,unit,estimate,standard_error,lower,upper,lower_is_prior,upper_is_prior,warrant\n";
 }
 
-std::string fleet_csv_rows(const RobotRecord& record) {
-  const std::string begin = csv_field(record.robot) + "," + word_of(status_words, record.commissioning.status) + ",";
-  const auto text = [](const std::optional<double>& x) { return x ? number_text(*x) : std::string(); };
+std::string fleet_csv_rows(const study::RobotRecord& record) {
+  const std::string begin =
+      csv_field(record.robot) + "," + files::word_of(status_words, record.commissioning.status) + ",";
+  const auto text = [](const std::optional<double>& x) { return x ? files::number_text(*x) : std::string(); };
   std::string out;
-  for (const RecordedParameter& p : record.commissioning.parameters) {
+  for (const study::RecordedParameter& p : record.commissioning.parameters) {
     out += begin + fmt::format("{},{},{},{},{},{},{:d},{:d},{}\n", p.name, p.unit, text(p.estimate),
-                               text(p.standard_error), number_text(p.lower), number_text(p.upper), p.lower_is_prior,
-                               p.upper_is_prior, warrant_word(p.warrant));
+                               text(p.standard_error), files::number_text(p.lower), files::number_text(p.upper),
+                               p.lower_is_prior, p.upper_is_prior, core::warrant_word(p.warrant));
   }
   return out.empty() ? begin + ",,,,,,,,\n" : out;
 }
@@ -317,8 +322,8 @@ std::string comment(std::string text) {
 
 }  // namespace
 
-std::string pooled_prior_yaml(const FleetResult& fleet, const std::string& software) {
-  const PooledPrior& prior = fleet.prior;
+std::string pooled_prior_yaml(const study::FleetResult& fleet, const std::string& software) {
+  const study::PooledPrior& prior = fleet.prior;
   std::string out = comment("Pooled prior of a fleet, by " + software + ": copy it into the next robot's file.");
   out += comment((prior.exists ? "Coverage: " : "No box: ") + prior.message + ".");
   if (prior.exists) {
@@ -327,11 +332,11 @@ std::string pooled_prior_yaml(const FleetResult& fleet, const std::string& softw
         "exchangeable: the next robot is of the same kind, not one that was chosen for being different.");
   }
   std::string rows;
-  for (const PooledParameter& p : prior.parameters) {
-    const FleetColumn& column = fleet.table.columns[p.column];
+  for (const study::PooledParameter& p : prior.parameters) {
+    const study::FleetColumn& column = fleet.table.columns[p.column];
     if (prior.exists && p.included) {
-      rows += fmt::format("  {}: [{}, {}]  # {}\n", column.name, number_text(p.box.lower), number_text(p.box.upper),
-                          column.unit);
+      rows += fmt::format("  {}: [{}, {}]  # {}\n", column.name, files::number_text(p.box.lower),
+                          files::number_text(p.box.upper), column.unit);
     } else if (prior.exists) {
       out += comment("Left out: " + column.name + ", " + p.reason + ".");
     }
@@ -339,4 +344,4 @@ std::string pooled_prior_yaml(const FleetResult& fleet, const std::string& softw
   return out + (rows.empty() ? "prior: {}\n" : "prior:\n" + rows);
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::results

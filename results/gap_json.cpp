@@ -12,16 +12,19 @@
 #include <wheelwright/files/json.hpp>
 #include <wheelwright/gap/where.hpp>
 
-namespace wheelwright {
+namespace wheelwright::results {
+
+using files::or_null;
+
 namespace {
 
-const char* name_of(GapSpace space) { return space == GapSpace::dynamic ? "dynamic" : "kinematic"; }
+const char* name_of(gap::GapSpace space) { return space == gap::GapSpace::dynamic ? "dynamic" : "kinematic"; }
 
-Json causes_json(const std::vector<GapCause>& causes) {
+Json causes_json(const std::vector<gap::GapCause>& causes) {
   Json list = Json::array();
-  for (const GapCause& cause : causes) {
+  for (const gap::GapCause& cause : causes) {
     Json parameters = Json::object();
-    for (const GapEstimate& p : cause.parameters) {
+    for (const gap::GapEstimate& p : cause.parameters) {
       parameters[p.name] = {{"estimate", or_null(p.estimate)},
                             {"lower", or_null(p.lower)},
                             {"upper", or_null(p.upper)},
@@ -36,19 +39,19 @@ Json causes_json(const std::vector<GapCause>& causes) {
   return list;
 }
 
-Json figures_json(const std::vector<ShrinkFigure>& figures) {
+Json figures_json(const std::vector<gap::ShrinkFigure>& figures) {
   Json all = Json::object();
-  for (const ShrinkFigure& f : figures) {
+  for (const gap::ShrinkFigure& f : figures) {
     all[f.name] = {{"before", or_null(f.before)}, {"after", or_null(f.after)}, {"floor", or_null(f.floor)},
                    {"lower", or_null(f.lower)},   {"upper", or_null(f.upper)}, {"unit", f.unit}};
   }
   return all;
 }
 
-Json where_json(const std::vector<GapShare>& where) {
+Json where_json(const std::vector<gap::GapShare>& where) {
   Json list = Json::array();
-  for (const GapShare& s : where) {
-    if (s.kind == "channel" || s.kind == "frequency" || is_finding(s)) {
+  for (const gap::GapShare& s : where) {
+    if (s.kind == "channel" || s.kind == "frequency" || gap::is_finding(s)) {
       list.push_back({{"space", name_of(s.space)},
                       {"channel", s.channel},
                       {"regime", s.regime},
@@ -61,9 +64,9 @@ Json where_json(const std::vector<GapShare>& where) {
   return list;
 }
 
-Json parametric_json(const std::vector<ParameterShift>& shifts) {
+Json parametric_json(const std::vector<gap::ParameterShift>& shifts) {
   Json list = Json::array();
-  for (const ParameterShift& p : shifts) {
+  for (const gap::ParameterShift& p : shifts) {
     list.push_back({{"parameter", p.parameter},
                     {"nominal", p.nominal ? or_null(*p.nominal) : Json(nullptr)},
                     {"estimate", or_null(p.estimate)},
@@ -84,29 +87,29 @@ void append(std::string& line, const Eigen::VectorXd& values, Eigen::Index k) {
 
 }  // namespace
 
-const char* name_of(GapVerdict verdict) {
+const char* name_of(gap::GapVerdict verdict) {
   switch (verdict) {
-    case GapVerdict::no_gap: return "no_gap";
-    case GapVerdict::explained: return "explained";
-    case GapVerdict::ambiguous: return "ambiguous";
-    case GapVerdict::unexplained: return "unexplained";
+    case gap::GapVerdict::no_gap: return "no_gap";
+    case gap::GapVerdict::explained: return "explained";
+    case gap::GapVerdict::ambiguous: return "ambiguous";
+    case gap::GapVerdict::unexplained: return "unexplained";
   }
   return "";
 }
 
 Json to_json(const Diagnosis& d, const GapFiles& files) {
   Json credible = Json::array(), confusable = Json::array(), contradictions = Json::array();
-  for (const CredibleCauses& c : d.credible) {
+  for (const gap::CredibleCauses& c : d.credible) {
     credible.push_back(
         {{"effects", c.effects}, {"held_out_error", or_null(c.held_out_error)}, {"p_value", or_null(c.p_value)}});
   }
-  for (const ConfusablePair& pair : d.confusable) {
+  for (const gap::ConfusablePair& pair : d.confusable) {
     confusable.push_back({{"effects", {pair.first, pair.second}},
                           {"similarity", or_null(pair.similarity)},
                           {"inseparable", pair.inseparable},
                           {"reason", pair.reason}});
   }
-  for (const Contradiction& c : d.contradictions) {
+  for (const gap::Contradiction& c : d.contradictions) {
     contradictions.push_back({{"t", c.t}, {"channel", c.channel}, {"weight", c.weight}});
   }
   Json next = nullptr;
@@ -144,10 +147,10 @@ Json to_json(const Diagnosis& d, const GapFiles& files) {
           {"software", files.software}};
 }
 
-void write_residuals(const std::filesystem::path& path, const std::vector<ResidualSeries>& series) {
-  AtomicFile file(path);
+void write_residuals(const std::filesystem::path& path, const std::vector<gap::ResidualSeries>& series) {
+  files::AtomicFile file(path);
   std::string text = "space,channel,unit,t,signal,nominal,refitted,after,floor\n";
-  for (const ResidualSeries& s : series) {
+  for (const gap::ResidualSeries& s : series) {
     const std::string head = fmt::format("{},{},{},", name_of(s.space), s.channel, s.unit);
     for (Eigen::Index k = 0; k < s.t.size(); ++k) {
       text += head;
@@ -166,4 +169,4 @@ void write_residuals(const std::filesystem::path& path, const std::vector<Residu
   file.commit();
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::results

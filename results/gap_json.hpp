@@ -11,7 +11,7 @@
 #include <wheelwright/files/json.hpp>
 #include <wheelwright/gap/diagnosis.hpp>
 
-namespace wheelwright {
+namespace wheelwright::results {
 
 /// Name of the format: the value of its key `schema`.
 inline constexpr const char* kGapSchema = "wheelwright/gap/1";
@@ -33,7 +33,7 @@ struct GapFiles {
 };
 
 /// Name of a verdict in files: "no_gap", "explained", "ambiguous", "unexplained".
-[[nodiscard]] const char* name_of(GapVerdict verdict);
+[[nodiscard]] const char* name_of(gap::GapVerdict verdict);
 
 /// The diagnosis as JSON (results/gap.schema.json). Of `where`, the channels, the frequency bands and the regimes that
 /// are findings (is_finding) are written; its series are not: see write_residuals().
@@ -42,6 +42,6 @@ struct GapFiles {
 /// Writes `series` as CSV with the header space,channel,unit,t,signal,nominal,refitted,after,floor: one line per row
 /// and channel, seven significant digits (time: microseconds); a signal that a series lacks is empty. The file appears
 /// whole or not at all. Throws InputError when it cannot be written.
-void write_residuals(const std::filesystem::path& path, const std::vector<ResidualSeries>& series);
+void write_residuals(const std::filesystem::path& path, const std::vector<gap::ResidualSeries>& series);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::results

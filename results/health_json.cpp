@@ -6,17 +6,17 @@
 
 #include <nlohmann/json.hpp>
 
-namespace wheelwright {
+namespace wheelwright::results {
 namespace {
 
-Json finding_json(const LogFinding& finding) {
+Json finding_json(const doctor::LogFinding& finding) {
   Json when = Json::array();
   for (const Interval& stretch : finding.when) {
     when.push_back({stretch.lower, stretch.upper});
   }
   return {{"id", finding.id},
-          {"topic", to_string(finding.topic)},
-          {"severity", to_string(finding.severity)},
+          {"topic", doctor::to_string(finding.topic)},
+          {"severity", doctor::to_string(finding.severity)},
           {"sentence", finding.sentence},
           {"next", finding.next},
           {"columns", finding.columns},
@@ -28,7 +28,7 @@ Json finding_json(const LogFinding& finding) {
 
 }  // namespace
 
-ReaderCounts reader_counts(const LogReport& report) {
+doctor::ReaderCounts reader_counts(const logs::LogReport& report) {
   return {.rows_read = report.rows_read,
           .incomplete = report.empty.count + report.not_finite.count,
           .duplicates = report.duplicates.count,
@@ -36,16 +36,16 @@ ReaderCounts reader_counts(const LogReport& report) {
           .unwrapped = report.angle_wraps.count};
 }
 
-Json to_json(const LogHealth& health, const HealthFiles& files) {
+Json to_json(const doctor::LogHealth& health, const HealthFiles& files) {
   Json findings = Json::array();
-  for (const LogFinding& finding : health.findings) {
+  for (const doctor::LogFinding& finding : health.findings) {
     findings.push_back(finding_json(finding));
   }
   return {{"schema", kHealthSchema},
           {"software", files.software},
           {"robot", files.robot.empty() ? Json(nullptr) : Json(files.robot)},
           {"logs", files.logs},
-          {"verdict", to_string(health.verdict)},
+          {"verdict", doctor::to_string(health.verdict)},
           {"sentence", health.sentence},
           {"assumed", health.assumed},
           {"rows", health.rows},
@@ -55,4 +55,4 @@ Json to_json(const LogHealth& health, const HealthFiles& files) {
           {"findings", std::move(findings)}};
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::results

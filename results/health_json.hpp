@@ -10,7 +10,7 @@
 #include <wheelwright/files/json.hpp>
 #include <wheelwright/logs/recorded_log.hpp>
 
-namespace wheelwright {
+namespace wheelwright::results {
 
 /// Name of the format: the value of its key `schema`.
 inline constexpr const char* kHealthSchema = "wheelwright/doctor/1";
@@ -23,9 +23,9 @@ struct HealthFiles {
 };
 
 /// Defects that the reader of CSV logs dropped.
-[[nodiscard]] ReaderCounts reader_counts(const LogReport& report);
+[[nodiscard]] doctor::ReaderCounts reader_counts(const logs::LogReport& report);
 
 /// The examination as JSON (results/doctor.schema.json), findings in their order.
-[[nodiscard]] Json to_json(const LogHealth& health, const HealthFiles& files);
+[[nodiscard]] Json to_json(const doctor::LogHealth& health, const HealthFiles& files);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::results

@@ -12,15 +12,18 @@
 #include <wheelwright/robots/robot_file.hpp>
 #include <wheelwright/words/identification_words.hpp>
 
-namespace wheelwright {
+namespace wheelwright::results {
+
+using files::word_of;
+
 using namespace words;
 
 Json numbers(const Eigen::VectorXd& v) { return std::vector<double>(v.begin(), v.end()); }
 
-Json candidates_json(const EstimatorChoice& choice) {
+Json candidates_json(const identify::EstimatorChoice& choice) {
   Json list = Json::array();
-  for (const EstimatorCandidate& c : choice.candidates) {
-    Json candidate = {{"estimator", to_string(c.estimate.estimator)},
+  for (const identify::EstimatorCandidate& c : choice.candidates) {
+    Json candidate = {{"estimator", identify::to_string(c.estimate.estimator)},
                       {"origin", c.origin},
                       {"usable", c.estimate.usable},
                       {"reason", c.estimate.reason},
@@ -36,43 +39,46 @@ Json candidates_json(const EstimatorChoice& choice) {
   return list;
 }
 
-Json endogeneity_json(const EstimatorChoice& choice) {
+Json endogeneity_json(const identify::EstimatorChoice& choice) {
   if (!choice.tested_against || !choice.test.made) {
     return nullptr;
   }
-  return {{"against", to_string(choice.candidates[*choice.tested_against].estimate.estimator)},
+  return {{"against", identify::to_string(choice.candidates[*choice.tested_against].estimate.estimator)},
           {"F", choice.test.statistic},
           {"p_value", choice.test.p_value}};
 }
 
 namespace {
 
-constexpr Words<IdentificationStanding, 3> kStandingWords{{{IdentificationStanding::good, "good"},
-                                                           {IdentificationStanding::caution, "caution"},
-                                                           {IdentificationStanding::bad, "bad"}}};
-constexpr Words<NoiseMeaning, 4> kMeaningWords{{{NoiseMeaning::estimate, "estimate"},
-                                                {NoiseMeaning::upper_limit, "upper_limit"},
-                                                {NoiseMeaning::lower_limit, "lower_limit"},
-                                                {NoiseMeaning::unknown, "unknown"}}};
-constexpr Words<RobustStatus, 3> kRobustWords{{{RobustStatus::converged, "converged"},
-                                               {RobustStatus::not_converged, "not_converged"},
-                                               {RobustStatus::infeasible, "infeasible"}}};
-constexpr Words<ConstrainedStatus, 3> kConstrainedWords{{{ConstrainedStatus::solved, "solved"},
-                                                         {ConstrainedStatus::undetermined, "undetermined"},
-                                                         {ConstrainedStatus::infeasible, "infeasible"}}};
-constexpr Words<Unseen, 4> kUnseenWords{{{Unseen::not_moved, "not_moved"},
-                                         {Unseen::not_separated, "not_separated"},
-                                         {Unseen::noise, "noise"},
-                                         {Unseen::imprecise, "imprecise"}}};
-constexpr Words<ShapeState, 4> kShapeWords{{{ShapeState::identified, "identified"},
-                                            {ShapeState::at_lower, "at_lower"},
-                                            {ShapeState::at_upper, "at_upper"},
-                                            {ShapeState::flat, "flat"}}};
-constexpr Words<KinematicState, 3> kKinematicWords{{{KinematicState::identified, "identified"},
-                                                    {KinematicState::not_identified, "not_identified"},
-                                                    {KinematicState::fixed, "fixed"}}};
+constexpr files::Words<IdentificationStanding, 3> kStandingWords{{{IdentificationStanding::good, "good"},
+                                                                  {IdentificationStanding::caution, "caution"},
+                                                                  {IdentificationStanding::bad, "bad"}}};
+constexpr files::Words<inference::NoiseMeaning, 4> kMeaningWords{{{inference::NoiseMeaning::estimate, "estimate"},
+                                                                  {inference::NoiseMeaning::upper_limit, "upper_limit"},
+                                                                  {inference::NoiseMeaning::lower_limit, "lower_limit"},
+                                                                  {inference::NoiseMeaning::unknown, "unknown"}}};
+constexpr files::Words<inference::RobustStatus, 3> kRobustWords{
+    {{inference::RobustStatus::converged, "converged"},
+     {inference::RobustStatus::not_converged, "not_converged"},
+     {inference::RobustStatus::infeasible, "infeasible"}}};
+constexpr files::Words<inference::ConstrainedStatus, 3> kConstrainedWords{
+    {{inference::ConstrainedStatus::solved, "solved"},
+     {inference::ConstrainedStatus::undetermined, "undetermined"},
+     {inference::ConstrainedStatus::infeasible, "infeasible"}}};
+constexpr files::Words<inference::Unseen, 4> kUnseenWords{{{inference::Unseen::not_moved, "not_moved"},
+                                                           {inference::Unseen::not_separated, "not_separated"},
+                                                           {inference::Unseen::noise, "noise"},
+                                                           {inference::Unseen::imprecise, "imprecise"}}};
+constexpr files::Words<identify::ShapeState, 4> kShapeWords{{{identify::ShapeState::identified, "identified"},
+                                                             {identify::ShapeState::at_lower, "at_lower"},
+                                                             {identify::ShapeState::at_upper, "at_upper"},
+                                                             {identify::ShapeState::flat, "flat"}}};
+constexpr files::Words<inference::KinematicState, 3> kKinematicWords{
+    {{inference::KinematicState::identified, "identified"},
+     {inference::KinematicState::not_identified, "not_identified"},
+     {inference::KinematicState::fixed, "fixed"}}};
 
-using Scales = std::optional<std::vector<PhysicalScale>>;
+using Scales = std::optional<std::vector<commission::PhysicalScale>>;
 
 // θ as physical quantities; null where there is no scale or no θ.
 Json physical(const Eigen::VectorXd& theta, const Scales& scales) {
@@ -86,23 +92,23 @@ Json physical(const Eigen::VectorXd& theta, const Scales& scales) {
   return list;
 }
 
-Json parameters_json(const Identification& r, const Scales& scales) {
+Json parameters_json(const inference::Identification& r, const Scales& scales) {
   Json list = Json::array();
-  const Fit& fit = r.fit;
+  const commission::Fit& fit = r.fit;
   for (std::size_t j = 0; j < fit.excitation.size(); ++j) {
     const auto at = static_cast<Eigen::Index>(j);
-    const Parameter& p = r.setting.model.parameters[j];
-    const bool given = fit.excitation[j].state != Excitation::not_excited;
+    const model::Parameter& p = r.setting.model.parameters[j];
+    const bool given = fit.excitation[j].state != identify::Excitation::not_excited;
     const double error = fit.residuals.standard_error.size() > at ? fit.residuals.standard_error[at] : NAN;
     Json entry = {{"name", p.name},
-                  {"unit", parameter_unit(r.setting.robot, p)},
+                  {"unit", commission::parameter_unit(r.setting.robot, p)},
                   {"excitation", word_of(kExcitationWords, fit.excitation[j].state)},
                   {"reason", fit.excitation[j].reason},
                   {"estimate", given ? Json(fit.estimate[at]) : Json(nullptr)},
                   {"standard_error", given ? Json(error) : Json(nullptr)},
                   {"physical", nullptr}};
     if (scales) {
-      const PhysicalScale& s = (*scales)[j];
+      const commission::PhysicalScale& s = (*scales)[j];
       entry["physical"] = {{"name", p.physical},
                            {"unit", p.physical_unit},
                            {"scale", s.scale},
@@ -115,11 +121,11 @@ Json parameters_json(const Identification& r, const Scales& scales) {
   return list;
 }
 
-Json estimators_json(const EstimatorChoice& choice) {
+Json estimators_json(const identify::EstimatorChoice& choice) {
   if (choice.candidates.empty()) {
     return nullptr;
   }
-  Json json = {{"chosen", to_string(choice.best().estimator)},
+  Json json = {{"chosen", identify::to_string(choice.best().estimator)},
                {"reason", choice.reason},
                {"in_doubt", choice.in_doubt},
                {"predicted_bias", nullptr},
@@ -131,10 +137,10 @@ Json estimators_json(const EstimatorChoice& choice) {
   return json;
 }
 
-Json regions_json(const RegionComparison& regions, const Scales& scales) {
+Json regions_json(const inference::RegionComparison& regions, const Scales& scales) {
   Json methods = Json::array();
-  for (const RegionRow& row : regions.rows) {
-    methods.push_back({{"method", to_string(row.method)},
+  for (const inference::RegionRow& row : regions.rows) {
+    methods.push_back({{"method", inference::to_string(row.method)},
                        {"available", row.available},
                        {"all_at_once", row.all_at_once},
                        {"confidence", row.confidence},
@@ -151,9 +157,9 @@ Json regions_json(const RegionComparison& regions, const Scales& scales) {
           {"methods", methods}};
 }
 
-Json active_json(const std::vector<ActiveConstraint>& active) {
+Json active_json(const std::vector<inference::ActiveConstraint>& active) {
   Json list = Json::array();
-  for (const ActiveConstraint& a : active) {
+  for (const inference::ActiveConstraint& a : active) {
     list.push_back({{"words", a.words},
                     {"multiplier", a.multiplier},
                     {"excess", a.excess},
@@ -162,7 +168,7 @@ Json active_json(const std::vector<ActiveConstraint>& active) {
   return list;
 }
 
-Json robust_json(const RobustFit& fit, const Setting& s, const Scales& scales) {
+Json robust_json(const inference::RobustFit& fit, const commission::Setting& s, const Scales& scales) {
   if (fit.instants == 0) {
     return nullptr;
   }
@@ -176,14 +182,14 @@ Json robust_json(const RobustFit& fit, const Setting& s, const Scales& scales) {
                {"episodes", Json::array()},
                {"active", active_json(fit.active)}};
   for (std::size_t i = 0; i < fit.outputs.size(); ++i) {
-    const OutputWeights& w = fit.outputs[i];
+    const inference::OutputWeights& w = fit.outputs[i];
     json["outputs"].push_back({{"output", s.model.outputs[i]},
-                               {"unit", output_unit(s.robot, s.model.output_units[i])},
+                               {"unit", commission::output_unit(s.robot, s.model.output_units[i])},
                                {"scale", w.scale},
                                {"down_weighted", w.down_weighted},
                                {"gaussian_share", w.gaussian_share}});
   }
-  for (const Episode& e : fit.episodes) {
+  for (const inference::Episode& e : fit.episodes) {
     json["episodes"].push_back({{"output", s.model.outputs[e.output]},
                                 {"first", e.first_time},
                                 {"last", e.last_time},
@@ -195,7 +201,7 @@ Json robust_json(const RobustFit& fit, const Setting& s, const Scales& scales) {
   return json;
 }
 
-Json constrained_json(const ConstrainedFit& fit, const Scales& scales) {
+Json constrained_json(const inference::ConstrainedFit& fit, const Scales& scales) {
   if (fit.estimate.size() == 0 && fit.active.empty()) {
     return nullptr;
   }
@@ -206,13 +212,13 @@ Json constrained_json(const ConstrainedFit& fit, const Scales& scales) {
           {"active", active_json(fit.active)}};
 }
 
-Json noise_json(const std::vector<ColumnNoise>& noise) {
+Json noise_json(const std::vector<inference::ColumnNoise>& noise) {
   Json list = Json::array();
-  for (const ColumnNoise& n : noise) {
+  for (const inference::ColumnNoise& n : noise) {
     Json entry = {{"column", n.column},
                   {"known", nullptr},
                   {"found",
-                   {{"method", to_string(n.choice.method)},
+                   {{"method", inference::to_string(n.choice.method)},
                     {"meaning", word_of(kMeaningWords, n.choice.meaning)},
                     {"unit", n.unit},
                     {"sd", n.choice.sd},
@@ -228,21 +234,21 @@ Json noise_json(const std::vector<ColumnNoise>& noise) {
   return list;
 }
 
-Json combinations_json(const std::vector<KnownCombination>& list) {
+Json combinations_json(const std::vector<inference::KnownCombination>& list) {
   Json json = Json::array();
-  for (const KnownCombination& c : list) {
+  for (const inference::KnownCombination& c : list) {
     json.push_back(
         {{"words", c.words}, {"coefficients", numbers(c.coefficients)}, {"relative_error", c.relative_error}});
   }
   return json;
 }
 
-Json identifiability_json(const Identifiability& i, bool physical_words) {
+Json identifiability_json(const inference::Identifiability& i, bool physical_words) {
   if (i.singular_values.size() == 0) {
     return nullptr;
   }
   Json unseen = Json::array();
-  for (const UnseenDirection& u : i.unseen) {
+  for (const inference::UnseenDirection& u : i.unseen) {
     unseen.push_back({{"why", word_of(kUnseenWords, u.why)},
                       {"words", u.words},
                       {"manoeuvres", u.manoeuvres},
@@ -261,12 +267,12 @@ Json identifiability_json(const Identifiability& i, bool physical_words) {
           {"known", combinations_json(i.known)}};
 }
 
-Json information_json(const InformationOverTime& information) {
+Json information_json(const inference::InformationOverTime& information) {
   Json windows = Json::array(), parameters = Json::array();
-  for (const MomentBlock& w : information.windows) {
+  for (const identify::MomentBlock& w : information.windows) {
     windows.push_back({w.first, w.last});
   }
-  for (const ParameterInformation& p : information.parameters) {
+  for (const inference::ParameterInformation& p : information.parameters) {
     Json spans = Json::array();
     for (const auto& [first, last] : p.spans) {
       spans.push_back({first, last});
@@ -274,17 +280,17 @@ Json information_json(const InformationOverTime& information) {
     parameters.push_back(
         {{"information", p.information}, {"seconds", p.seconds}, {"spans", spans}, {"share", numbers(p.share)}});
   }
-  return {{"coverage", InformationOptions{}.coverage}, {"windows", windows}, {"parameters", parameters}};
+  return {{"coverage", inference::InformationOptions{}.coverage}, {"windows", windows}, {"parameters", parameters}};
 }
 
-Json shapes_json(const std::vector<ShapeFinding>& shapes) {
+Json shapes_json(const std::vector<inference::ShapeFinding>& shapes) {
   Json list = Json::array();
-  for (const ShapeFinding& f : shapes) {
+  for (const inference::ShapeFinding& f : shapes) {
     Json curve = Json::array();
-    for (const ShapePoint& point : f.curve) {
+    for (const inference::ShapePoint& point : f.curve) {
       curve.push_back({point.shape, point.residual_ratio});
     }
-    const bool told = f.converged && f.state == ShapeState::identified;
+    const bool told = f.converged && f.state == identify::ShapeState::identified;
     list.push_back({{"name", f.name},
                     {"unit", f.unit},
                     {"state", word_of(kShapeWords, f.state)},
@@ -301,11 +307,11 @@ Json shapes_json(const std::vector<ShapeFinding>& shapes) {
   return list;
 }
 
-Json kinematics_json(const std::optional<KinematicCalibration>& k) {
+Json kinematics_json(const std::optional<inference::KinematicCalibration>& k) {
   if (!k) {
     return nullptr;
   }
-  const auto quantity = [](const KinematicQuantity& q, const char* unit) -> Json {
+  const auto quantity = [](const inference::KinematicQuantity& q, const char* unit) -> Json {
     return {{"unit", unit},           {"state", word_of(kKinematicWords, q.state)},
             {"estimate", q.estimate}, {"standard_error", q.standard_error},
             {"lower", q.lower},       {"upper", q.upper},
@@ -327,9 +333,9 @@ Json kinematics_json(const std::optional<KinematicCalibration>& k) {
           {"position_spread", k->position_spread}};
 }
 
-Json data_json(const Survey& survey, const LogReport& data) {
+Json data_json(const commission::Survey& survey, const logs::LogReport& data) {
   Json files = Json::array();
-  for (const LogFileReport& f : data.files) {
+  for (const logs::LogFileReport& f : data.files) {
     files.push_back({{"path", f.path}, {"hash", f.hash}, {"bytes", f.bytes}, {"rows", f.rows}});
   }
   return {{"files", files},
@@ -337,24 +343,25 @@ Json data_json(const Survey& survey, const LogReport& data) {
           {"segments", survey.segments},
           {"seconds", survey.seconds},
           {"median_step", survey.median_step},
-          {"repairs", sentences(data)}};
+          {"repairs", logs::sentences(data)}};
 }
 
 }  // namespace
 
-Json to_json(const Identification& r, const LogReport& data, const std::string& software, std::uint64_t seed) {
-  const Setting& s = r.setting;
-  const Scales scales = physical_scales(s.robot, s.model);
+Json to_json(const inference::Identification& r, const logs::LogReport& data, const std::string& software,
+             std::uint64_t seed) {
+  const commission::Setting& s = r.setting;
+  const Scales scales = commission::physical_scales(s.robot, s.model);
   const FilterDesign& f = s.filter;
   return {{"schema", kIdentificationSchema},
           {"software", software},
           {"seed", seed},
           {"confidence", r.confidence},
           {"standing", word_of(kStandingWords, standing(r))},
-          {"message", verdict(r)},
-          {"findings", findings(r)},
+          {"message", words::verdict(r)},
+          {"findings", words::findings(r)},
           {"next", next_steps(r)},
-          {"robot", to_json(s.robot)},
+          {"robot", robots::to_json(s.robot)},
           {"filter", r.effort ? Json{{"order", f.order},
                                      {"alpha", f.alpha},
                                      {"beta", f.beta},
@@ -375,4 +382,4 @@ Json to_json(const Identification& r, const LogReport& data, const std::string& 
           {"notes", r.notes}};
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::results

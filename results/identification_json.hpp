@@ -11,16 +11,16 @@
 #include <wheelwright/inference/identification.hpp>
 #include <wheelwright/logs/recorded_log.hpp>
 
-namespace wheelwright {
+namespace wheelwright::results {
 
 /// The numbers of `v` as an array.
 [[nodiscard]] Json numbers(const Eigen::VectorXd& v);
 
 /// All candidates of `choice`, in their order (definition estimator_candidate of model.schema.json).
-[[nodiscard]] Json candidates_json(const EstimatorChoice& choice);
+[[nodiscard]] Json candidates_json(const identify::EstimatorChoice& choice);
 
 /// Durbin, Wu and Hausman's test (definition endogeneity_test); null where it was not made.
-[[nodiscard]] Json endogeneity_json(const EstimatorChoice& choice);
+[[nodiscard]] Json endogeneity_json(const identify::EstimatorChoice& choice);
 
 /// Name of the format: the value of its key `schema`.
 inline constexpr const char* kIdentificationSchema = "wheelwright/identification/1";
@@ -28,7 +28,7 @@ inline constexpr const char* kIdentificationSchema = "wheelwright/identification
 /// The whole result as JSON (results/identification.schema.json): θ_L in its own units throughout, and the physical
 /// quantities beside it where the robot file tells their scale. `data` says which log it came from, `software` is name
 /// and version, `seed` that of bootstrap and signs.
-[[nodiscard]] Json to_json(const Identification& result, const LogReport& data, const std::string& software,
-                           std::uint64_t seed);
+[[nodiscard]] Json to_json(const inference::Identification& result, const logs::LogReport& data,
+                           const std::string& software, std::uint64_t seed);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::results

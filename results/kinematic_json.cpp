@@ -12,12 +12,12 @@
 #include <wheelwright/results/model_json.hpp>
 #include <wheelwright/results/model_words.hpp>
 
-namespace wheelwright {
+namespace wheelwright::results {
 namespace {
 
-using Status = KinematicCommissioning::Status;
+using Status = commission::KinematicCommissioning::Status;
 
-constexpr Words<Status, 4> kKinematicStatusWords{
+constexpr files::Words<Status, 4> kKinematicStatusWords{
     {{Status::done, "done"}, {Status::partial, "partial"}, {Status::absent, "absent"}, {Status::nothing, "nothing"}}};
 
 Json box_json(const Box& box) {
@@ -28,8 +28,8 @@ Json box_json(const Box& box) {
   return sides;
 }
 
-Json measurement_json(const OdometryMeasurement& m) {
-  return {{"motion", word_of(kMotionWords, m.motion)},
+Json measurement_json(const filter::OdometryMeasurement& m) {
+  return {{"motion", files::word_of(robots::kMotionWords, m.motion)},
           {"motion_columns", m.motion_columns},
           {"position", m.position},
           {"heading", m.heading},
@@ -39,44 +39,44 @@ Json measurement_json(const OdometryMeasurement& m) {
           {"nominal_step", m.nominal_step}};
 }
 
-Json noise_json(const KinematicCommissioning& r, const OdometryMeasurement& m) {
+Json noise_json(const commission::KinematicCommissioning& r, const filter::OdometryMeasurement& m) {
   const auto outputs = m.outputs(), units = m.output_units();
   Json list = Json::array();
   for (std::size_t i = 0; i < r.noise.size(); ++i) {
-    const OutputNoise& n = r.noise[i];
+    const commission::OutputNoise& n = r.noise[i];
     list.push_back({{"output", outputs[i]},
                     {"unit", units[i]},
-                    {"origin", word_of(kNoiseOriginWords, n.origin)},
+                    {"origin", files::word_of(robots::kNoiseOriginWords, n.origin)},
                     {"bound", n.bound},
                     {"learning", n.learning},
-                    {"warrant", warrant_word(n.warrant)}});
+                    {"warrant", core::warrant_word(n.warrant)}});
   }
   return {{"outputs", list}, {"declared_too_small", r.declared_too_small}, {"raise", r.raise}};
 }
 
-Json parameters_json(const KinematicCommissioning& r) {
+Json parameters_json(const commission::KinematicCommissioning& r) {
   Json list = Json::array();
-  for (const KinematicParameter& p : r.parameters) {
+  for (const commission::KinematicParameter& p : r.parameters) {
     list.push_back({{"name", p.name},
                     {"unit", p.unit},
-                    {"estimate", or_null(p.estimate)},
+                    {"estimate", files::or_null(p.estimate)},
                     {"lower", p.lower},
                     {"upper", p.upper},
-                    {"warrant", warrant_word(p.warrant)},
-                    {"standard_error", or_null(p.standard_error)},
+                    {"warrant", core::warrant_word(p.warrant)},
+                    {"standard_error", files::or_null(p.standard_error)},
                     {"nominal", p.nominal},
-                    {"excitation", word_of(kExcitationWords, p.excitation)},
+                    {"excitation", files::word_of(kExcitationWords, p.excitation)},
                     {"reason", p.reason}});
   }
   return list;
 }
 
-Json validation_json(const KinematicCommissioning& r, const OdometryMeasurement& m, const FoldOptions& folds,
-                     double window) {
+Json validation_json(const commission::KinematicCommissioning& r, const filter::OdometryMeasurement& m,
+                     const commission::FoldOptions& folds, double window) {
   const auto names = m.outputs();
   Json outputs = Json::array();
   for (std::size_t i = 0; i < r.validation.size(); ++i) {
-    const OutputValidation& v = r.validation[i];
+    const commission::OutputValidation& v = r.validation[i];
     outputs.push_back({{"output", names[i]},
                        {"instants", v.instants},
                        {"coverage", v.coverage},
@@ -92,21 +92,21 @@ Json validation_json(const KinematicCommissioning& r, const OdometryMeasurement&
 
 }  // namespace
 
-std::optional<Json> kinematic_json(const KinematicCommissioning& r, const FoldOptions& folds) {
+std::optional<Json> kinematic_json(const commission::KinematicCommissioning& r, const commission::FoldOptions& folds) {
   if (r.status == Status::absent) {
     return std::nullopt;
   }
-  Json json = {{"status", word_of(kKinematicStatusWords, r.status)}, {"message", r.message}};
+  Json json = {{"status", files::word_of(kKinematicStatusWords, r.status)}, {"message", r.message}};
   if (!r.model) {
     return json;
   }
-  const KinematicModel& m = *r.model;
+  const detector::KinematicModel& m = *r.model;
   Json a = Json::array(), b = Json::array();
-  for (const HalfSpace& facet : m.facets) {
+  for (const bounds::HalfSpace& facet : m.facets) {
     a.push_back(numbers(facet.a));
     b.push_back(facet.b);
   }
-  json["warrant"] = warrant_word(m.warrant);
+  json["warrant"] = core::warrant_word(m.warrant);
   json["window"] = m.window;
   json["outputs"] = m.measurement.outputs();
   json["measurement"] = measurement_json(m.measurement);
@@ -127,4 +127,4 @@ std::optional<Json> kinematic_json(const KinematicCommissioning& r, const FoldOp
   return json;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::results

@@ -8,10 +8,11 @@
 #include <wheelwright/commission/kinematic.hpp>
 #include <wheelwright/files/json.hpp>
 
-namespace wheelwright {
+namespace wheelwright::results {
 
 /// The section as JSON (results/model.schema.json, definition `kinematic`); nothing where the log had neither pose nor
 /// gyro.
-[[nodiscard]] std::optional<Json> kinematic_json(const KinematicCommissioning& result, const FoldOptions& folds);
+[[nodiscard]] std::optional<Json> kinematic_json(const commission::KinematicCommissioning& result,
+                                                 const commission::FoldOptions& folds);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::results

@@ -10,7 +10,11 @@
 #include <wheelwright/results/model_json.hpp>
 #include <wheelwright/words/margin_words.hpp>
 
-namespace wheelwright {
+namespace wheelwright::results {
+
+using commission::Guarantee;
+using files::or_null;
+
 using namespace words;
 namespace {
 
@@ -22,28 +26,29 @@ Json sizes_json(const std::vector<double>& sizes) {
   return list;
 }
 
-const char* name_of(ManoeuvreKind kind) {
+const char* name_of(detector::ManoeuvreKind kind) {
   switch (kind) {
-    case ManoeuvreKind::standstill: return "standstill";
-    case ManoeuvreKind::cruising: return "cruising";
-    case ManoeuvreKind::accelerating: return "accelerating";
-    case ManoeuvreKind::turning: return "turning";
-    case ManoeuvreKind::spinning: return "spinning";
+    case detector::ManoeuvreKind::standstill: return "standstill";
+    case detector::ManoeuvreKind::cruising: return "cruising";
+    case detector::ManoeuvreKind::accelerating: return "accelerating";
+    case detector::ManoeuvreKind::turning: return "turning";
+    case detector::ManoeuvreKind::spinning: return "spinning";
   }
   return "";
 }
 
-Json summary_json(const FaultMargins& margins, const MarginSurvey& survey, const std::vector<std::string>& outputs) {
+Json summary_json(const detector::FaultMargins& margins, const commission::MarginSurvey& survey,
+                  const std::vector<std::string>& outputs) {
   Json list = Json::array();
   for (const auto& [kind, count] : survey.manoeuvres) {
     for (std::size_t w = 0; w < survey.windows.size(); ++w) {
-      const MarginSummary all = summarise(margins, w, kind);
+      const detector::MarginSummary all = detector::summarise(margins, w, kind);
       if (all.onsets == 0) {
         continue;
       }
       Json channels = Json::object();
       for (std::size_t i = 0; i < outputs.size(); ++i) {
-        channels[outputs[i]] = or_null(summarise(margins, w, kind, i).worst);
+        channels[outputs[i]] = or_null(detector::summarise(margins, w, kind, i).worst);
       }
       list.push_back({{"manoeuvre", name_of(kind)},
                       {"window", survey.windows[w]},
@@ -58,9 +63,9 @@ Json summary_json(const FaultMargins& margins, const MarginSurvey& survey, const
   return list;
 }
 
-Json onsets_json(const FaultMargins& margins) {
+Json onsets_json(const detector::FaultMargins& margins) {
   Json list = Json::array();
-  for (const OnsetMargin& onset : margins.onsets) {
+  for (const detector::OnsetMargin& onset : margins.onsets) {
     list.push_back({{"t", onset.t},
                     {"manoeuvre", name_of(onset.kind)},
                     {"certain", sizes_json(onset.certain)},
@@ -69,7 +74,7 @@ Json onsets_json(const FaultMargins& margins) {
   return list;
 }
 
-Json map_json(const OperatingMap& map) {
+Json map_json(const detector::OperatingMap& map) {
   Json smallest = Json::array();
   for (Eigen::Index a = 0; a < map.smallest.rows(); ++a) {
     Json row = Json::array();
@@ -81,7 +86,8 @@ Json map_json(const OperatingMap& map) {
   return {{"first", map.plane.x}, {"second", map.plane.y}, {"smallest", std::move(smallest)}};
 }
 
-Json fault_json(const FaultMargins& margins, const MarginSurvey& survey, const ResidualMargins& residual) {
+Json fault_json(const detector::FaultMargins& margins, const commission::MarginSurvey& survey,
+                const commission::ResidualMargins& residual) {
   Json json = {{"fault", margins.fault.name},
                {"sentence", margins.fault.sentence},
                {"unit", margins.fault.unit},
@@ -90,7 +96,7 @@ Json fault_json(const FaultMargins& margins, const MarginSurvey& survey, const R
                {"largest", margins.largest()},
                {"summary", summary_json(margins, survey, residual.outputs)},
                {"onsets", onsets_json(margins)}};
-  for (const FaultMaps& maps : residual.maps) {
+  for (const commission::FaultMaps& maps : residual.maps) {
     if (maps.fault == margins.fault.name && maps.side == margins.side) {
       json["map"] = {{"speeds", map_json(maps.speeds)}, {"accelerations", map_json(maps.accelerations)}};
     }
@@ -100,7 +106,7 @@ Json fault_json(const FaultMargins& margins, const MarginSurvey& survey, const R
 
 }  // namespace
 
-Json to_json(const MarginSurvey& survey, const std::string& model, const std::string& log,
+Json to_json(const commission::MarginSurvey& survey, const std::string& model, const std::string& log,
              const std::string& software) {
   Json json = {{"schema", kMarginsSchema},
                {"software", software},
@@ -117,13 +123,13 @@ Json to_json(const MarginSurvey& survey, const std::string& model, const std::st
     json["manoeuvres"].push_back({{"manoeuvre", name_of(kind)}, {"onsets", count}});
   }
   json["residuals"] = Json::array();
-  for (const ResidualMargins& residual : survey.residuals) {
+  for (const commission::ResidualMargins& residual : survey.residuals) {
     Json faults = Json::array();
-    for (const FaultMargins& margins : residual.margins) {
+    for (const detector::FaultMargins& margins : residual.margins) {
       faults.push_back(fault_json(margins, survey, residual));
     }
     json["residuals"].push_back({{"residual", residual.name},
-                                 {"warrant", warrant_word(residual.warrant)},
+                                 {"warrant", core::warrant_word(residual.warrant)},
                                  {"outputs", residual.outputs},
                                  {"blind", residual.blind},
                                  {"faults", std::move(faults)}});
@@ -143,22 +149,22 @@ const char* name_of(Guarantee guarantee) {
   return "";
 }
 
-Warrant warrant_of(Guarantee guarantee) {
+core::Warrant warrant_of(Guarantee guarantee) {
   switch (guarantee) {
-    case Guarantee::never: return Warrant::guaranteed;
-    case Guarantee::hourly: return Warrant::statistical;
-    case Guarantee::extrapolated: return Warrant::extrapolated;
+    case Guarantee::never: return core::Warrant::guaranteed;
+    case Guarantee::hourly: return core::Warrant::statistical;
+    case Guarantee::extrapolated: return core::Warrant::extrapolated;
   }
-  return Warrant::extrapolated;
+  return core::Warrant::extrapolated;
 }
 
 Json filter_json(const FilterDesign& filter) {
   return {{"order", filter.order}, {"alpha", filter.alpha}, {"beta", filter.beta}};
 }
 
-Json candidate_json(const DetectorCandidate& candidate) {
+Json candidate_json(const commission::DetectorCandidate& candidate) {
   Json faults = Json::array();
-  for (const StatedMargin& margin : candidate.faults) {
+  for (const commission::StatedMargin& margin : candidate.faults) {
     faults.push_back({{"fault", margin.fault},
                       {"side", margin.side > 0.0 ? "positive" : "negative"},
                       {"unit", margin.unit},
@@ -170,7 +176,7 @@ Json candidate_json(const DetectorCandidate& candidate) {
   }
   return {{"filter", filter_json(candidate.filter)},
           {"guarantee", name_of(candidate.guarantee)},
-          {"warrant", warrant_word(warrant_of(candidate.guarantee))},
+          {"warrant", core::warrant_word(warrant_of(candidate.guarantee))},
           {"persistence", {{"k", candidate.persistence.k}, {"n", candidate.persistence.n}}},
           {"origin", candidate.origin},
           {"failure", candidate.failure},
@@ -185,10 +191,10 @@ std::string robot_file_line(const FilterDesign& filter) {
   return fmt::format("filter: {{order: {}, alpha: {}, beta: {}}}", filter.order, filter.alpha, filter.beta);
 }
 
-Json to_json(const DetectorChoice& choice, const std::string& robot, const std::vector<std::string>& logs,
+Json to_json(const commission::DetectorChoice& choice, const std::string& robot, const std::vector<std::string>& logs,
              const std::string& software) {
   Json candidates = Json::array();
-  for (const DetectorCandidate& candidate : choice.candidates) {
+  for (const commission::DetectorCandidate& candidate : choice.candidates) {
     candidates.push_back(candidate_json(candidate));
   }
   const bool chosen = choice.chosen.has_value();
@@ -205,4 +211,4 @@ Json to_json(const DetectorChoice& choice, const std::string& robot, const std::
           {"candidates", std::move(candidates)}};
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::results

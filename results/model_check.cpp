@@ -11,12 +11,12 @@
 
 #include <wheelwright/results/rebuilt_rows.hpp>
 
-namespace wheelwright {
+namespace wheelwright::results {
 namespace {
 
 /// The bounds proved, the boxes over which rows were built, and what could not be built.
 struct Proof {
-  HullCheck hull;
+  bounds::HullCheck hull;
   std::vector<Box> boxes;  // the prior, and those proved on the way
   std::vector<std::string> missing_lower, missing_upper;
 };
@@ -28,14 +28,14 @@ Proof prove_bounds(const ModelClaims& claims, const RebuiltRows& rebuilt) {
   Box box = claims.prior;
   while (true) {
     proof.boxes.push_back(box);
-    std::vector<BoundClaim> lower, upper;
+    std::vector<bounds::BoundClaim> lower, upper;
     proof.missing_lower.assign(p, {});
     proof.missing_upper.assign(p, {});
     for (std::size_t j = 0; j < p; ++j) {
       lower.push_back({claims.lower[j].value, rebuilt.proof(claims.lower[j].proof, box, proof.missing_lower[j])});
       upper.push_back({claims.upper[j].value, rebuilt.proof(claims.upper[j].proof, box, proof.missing_upper[j])});
     }
-    proof.hull = check_hull(lower, upper, box);
+    proof.hull = bounds::check_hull(lower, upper, box);
     if (proof.hull.contradiction || proof.hull.all_proved() || proof.hull.proved == box || !rebuilt.depends_on(box) ||
         proof.boxes.size() > 8) {
       return proof;
@@ -53,8 +53,8 @@ std::string sign_parts_remark(const ModelClaims& claims) {
 }
 
 /// Why a proof is none, with the names of rows and parameters.
-std::string explain(const CertificateCheck& check, const std::string& missing, const std::vector<NamedRow>& proof,
-                    const ModelClaims& claims) {
+std::string explain(const bounds::CertificateCheck& check, const std::string& missing,
+                    const std::vector<NamedRow>& proof, const ModelClaims& claims) {
   if (!missing.empty()) {
     return missing;
   }
@@ -78,10 +78,10 @@ std::string explain(const CertificateCheck& check, const std::string& missing, c
 
 void judge_bounds(const ModelClaims& claims, const Proof& proof, ModelCheck& result) {
   for (std::size_t j = 0; j < claims.model.p(); ++j) {
-    for (const Side side : {Side::lower, Side::upper}) {
-      const bool is_upper = side == Side::upper;
+    for (const bounds::Side side : {bounds::Side::lower, bounds::Side::upper}) {
+      const bool is_upper = side == bounds::Side::upper;
       const PublishedBound& claim = (is_upper ? claims.upper : claims.lower)[j];
-      const CertificateCheck& check = (is_upper ? proof.hull.upper : proof.hull.lower)[j];
+      const bounds::CertificateCheck& check = (is_upper ? proof.hull.upper : proof.hull.lower)[j];
       const std::string& missing = (is_upper ? proof.missing_upper : proof.missing_lower)[j];
       BoundVerdict verdict{j, side, claim.value, is_upper ? check.bound : -check.bound, check.proved, check.shortfall,
                            {}};
@@ -102,11 +102,11 @@ void judge_bounds(const ModelClaims& claims, const Proof& proof, ModelCheck& res
 }
 
 void judge_hull(const ModelClaims& claims, const Proof& proof, ModelCheck& result) {
-  const auto scales = physical_scales(claims.robot, claims.model);
+  const auto scales = commission::physical_scales(claims.robot, claims.model);
   for (std::size_t j = 0; j < claims.model.p(); ++j) {
     const Interval& proved = proof.hull.proved.sides[j];
     const Interval& hull = claims.hull.sides[j];
-    const Parameter& parameter = claims.model.parameters[j];
+    const model::Parameter& parameter = claims.model.parameters[j];
     // A hull that is the stated bounds was judged with them.
     const bool other = hull.lower != claims.lower[j].value || hull.upper != claims.upper[j].value;
     if (other && !(hull.lower <= proved.lower && proved.upper <= hull.upper)) {
@@ -115,7 +115,7 @@ void judge_hull(const ModelClaims& claims, const Proof& proof, ModelCheck& resul
                       hull.lower, hull.upper, proved.lower, proved.upper));
     }
     if (const auto stated = claims.physical.find(parameter.physical); stated != claims.physical.end() && scales) {
-      const PhysicalScale& s = (*scales)[j];
+      const commission::PhysicalScale& s = (*scales)[j];
       const Interval exact = Interval{s.scale, s.scale} * Interval{claims.lower[j].value, claims.upper[j].value} -
                              Interval{s.offset, s.offset};
       if (!(stated->second.lower <= exact.lower && exact.upper <= stated->second.upper)) {
@@ -128,7 +128,7 @@ void judge_hull(const ModelClaims& claims, const Proof& proof, ModelCheck& resul
 }
 
 /// Whether the facet is the row that it names or follows from it; otherwise a sentence.
-std::string judge_facet(const HalfSpace& facet, const RebuiltRows& rebuilt, const Proof& proof,
+std::string judge_facet(const bounds::HalfSpace& facet, const RebuiltRows& rebuilt, const Proof& proof,
                         const ModelClaims& claims, FacetVerdicts& verdicts) {
   const std::span<const double> a(facet.a.data(), static_cast<std::size_t>(facet.a.size()));
   const Box& within = proof.hull.contradiction ? claims.prior : proof.hull.proved;
@@ -144,8 +144,8 @@ std::string judge_facet(const HalfSpace& facet, const RebuiltRows& rebuilt, cons
       ++(facet.origin.is_prior ? verdicts.sides : verdicts.rows);
       return {};
     }
-    const std::vector<WeightedRow> alone{{*row, 1.0}};
-    const CertificateCheck check = check_bound(a, alone, within, facet.b);
+    const std::vector<bounds::WeightedRow> alone{{*row, 1.0}};
+    const bounds::CertificateCheck check = bounds::check_bound(a, alone, within, facet.b);
     if (check.proved) {
       ++verdicts.implied;
       return {};
@@ -168,8 +168,8 @@ void judge_facets(const ModelClaims& claims, const RebuiltRows& rebuilt, const P
 
 void judge_emptiness(const ModelClaims& claims, const RebuiltRows& rebuilt, ModelCheck& result) {
   std::string missing;
-  const std::vector<WeightedRow> rows = rebuilt.proof(claims.contradiction, claims.prior, missing);
-  result.emptiness = check_emptiness(rows, claims.prior);
+  const std::vector<bounds::WeightedRow> rows = rebuilt.proof(claims.contradiction, claims.prior, missing);
+  result.emptiness = bounds::check_emptiness(rows, claims.prior);
   if (!result.emptiness->proved || !missing.empty()) {
     result.emptiness->proved = false;
     result.failures.push_back("that no parameters explain the log is not proved: " +
@@ -177,14 +177,15 @@ void judge_emptiness(const ModelClaims& claims, const RebuiltRows& rebuilt, Mode
   }
 }
 
-void judge_log(const ModelClaims& claims, const LogReport& data, ModelCheck& result) {
-  result.same_log = std::ranges::equal(claims.files, data.files, {}, &LogFileReport::hash, &LogFileReport::hash);
+void judge_log(const ModelClaims& claims, const logs::LogReport& data, ModelCheck& result) {
+  result.same_log =
+      std::ranges::equal(claims.files, data.files, {}, &logs::LogFileReport::hash, &logs::LogFileReport::hash);
   if (result.same_log && data.rows == claims.rows && data.segments == claims.segments) {
     return;
   }
-  const auto names = [](const std::vector<LogFileReport>& files) {
+  const auto names = [](const std::vector<logs::LogFileReport>& files) {
     std::string text;
-    for (const LogFileReport& file : files) {
+    for (const logs::LogFileReport& file : files) {
       text += fmt::format("{}{} ({})", text.empty() ? "" : ", ", file.path, file.hash);
     }
     return text;
@@ -200,7 +201,7 @@ void judge_log(const ModelClaims& claims, const LogReport& data, ModelCheck& res
 }
 
 void judge_prior(const ModelClaims& claims, ModelCheck& result) {
-  const PriorBox known = prior_box(claims.robot, claims.model);
+  const model::PriorBox known = model::prior_box(claims.robot, claims.model);
   for (std::size_t j = 0; j < claims.model.p(); ++j) {
     const Interval& stated = claims.prior.sides[j];
     if (known.bounds[j].lower < stated.lower || stated.upper < known.bounds[j].upper) {
@@ -220,9 +221,9 @@ void tell_premises(const ModelClaims& claims, ModelCheck& result) {
     result.premises.push_back(
         fmt::format("an error of at most {:.4g} {} in the filtered effort, {} channel ({})",
                     claims.errors.output[static_cast<Eigen::Index>(i)],
-                    output_unit(claims.robot, claims.model.output_units[i]), claims.model.outputs[i],
-                    claims.origin[i] == NoiseOrigin::declared ? "from the declared bounds of the sensors"
-                                                              : "estimated from the residuals of this log"));
+                    commission::output_unit(claims.robot, claims.model.output_units[i]), claims.model.outputs[i],
+                    claims.origin[i] == core::NoiseOrigin::declared ? "from the declared bounds of the sensors"
+                                                                    : "estimated from the residuals of this log"));
   }
   if (!claims.dropped.empty()) {
     result.premises.push_back(
@@ -233,14 +234,14 @@ void tell_premises(const ModelClaims& claims, ModelCheck& result) {
 
 }  // namespace
 
-std::string name_of(const RowOrigin& origin, const Model& model) {
-  const char* side = origin.side == Side::upper ? "upper" : "lower";
+std::string name_of(const bounds::RowOrigin& origin, const Model& model) {
+  const char* side = origin.side == bounds::Side::upper ? "upper" : "lower";
   return origin.is_prior
              ? fmt::format("the prior's {} bound of {}", side, model.parameters[origin.parameter].name)
              : fmt::format("row {} (t = {} s, {}, {})", origin.sample, origin.t, model.outputs[origin.output], side);
 }
 
-ModelCheck check_model(const ModelClaims& claims, LogSource& log, const LogReport& data) {
+ModelCheck check_model(const ModelClaims& claims, LogSource& log, const logs::LogReport& data) {
   ModelCheck result;
   judge_log(claims, data, result);
   judge_prior(claims, result);
@@ -259,4 +260,4 @@ ModelCheck check_model(const ModelClaims& claims, LogSource& log, const LogRepor
   return result;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::results

@@ -12,12 +12,12 @@
 #include <wheelwright/core/log.hpp>
 #include <wheelwright/results/model_file.hpp>
 
-namespace wheelwright {
+namespace wheelwright::results {
 
 /// A published bound and what became of it.
 struct BoundVerdict {
   std::size_t parameter = 0;
-  Side side = Side::upper;
+  bounds::Side side = bounds::Side::upper;
   double stated = 0.0;
   double shown = 0.0;  ///< the bound that is proved, rounded outward; ±∞ where none is
   bool proved = false;
@@ -35,8 +35,8 @@ struct FacetVerdicts {
 
 /// Result of check_model().
 struct ModelCheck {
-  std::vector<BoundVerdict> bounds;           ///< lower and upper bound of each parameter
-  std::optional<CertificateCheck> emptiness;  ///< where the model says that no θ explains the log
+  std::vector<BoundVerdict> bounds;                   ///< lower and upper bound of each parameter
+  std::optional<bounds::CertificateCheck> emptiness;  ///< where the model says that no θ explains the log
   FacetVerdicts facets;
   bool same_log = false;              ///< same bytes, file by file
   std::vector<std::string> failures;  ///< everything that is not proved, a sentence each
@@ -52,9 +52,9 @@ struct ModelCheck {
 /// and the physical intervals contain the proved bounds; or, where the set is said to be empty, that it is. `data` says
 /// which files the log is. Rows of columns with noise whose sign the prior leaves open are rebuilt over the box that
 /// they prove. Throws InvalidArgument when the log lacks a column.
-[[nodiscard]] ModelCheck check_model(const ModelClaims& claims, LogSource& log, const LogReport& data);
+[[nodiscard]] ModelCheck check_model(const ModelClaims& claims, LogSource& log, const logs::LogReport& data);
 
 /// "row 5017 (t = 50.17 s, sum, upper)", or "the prior's lower bound of r_mass".
-[[nodiscard]] std::string name_of(const RowOrigin& origin, const Model& model);
+[[nodiscard]] std::string name_of(const bounds::RowOrigin& origin, const Model& model);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::results

@@ -9,7 +9,10 @@
 #include <wheelwright/results/model_words.hpp>
 #include <wheelwright/robots/robot_file.hpp>
 
-namespace wheelwright {
+namespace wheelwright::results {
+
+using files::JsonPlace;
+
 namespace {
 
 /// Position in `list` of an entry whose name (`name_of`) is the text at `place`.
@@ -24,13 +27,13 @@ std::size_t position(const List& list, NameOf name_of, const JsonPlace& place) {
   place.fail("a name of the robot's model");
 }
 
-RowOrigin read_origin(const JsonPlace& place, const Model& model) {
-  RowOrigin origin;
-  origin.side = value_of(kSideWords, place.at("side"));
+bounds::RowOrigin read_origin(const JsonPlace& place, const Model& model) {
+  bounds::RowOrigin origin;
+  origin.side = files::value_of(kSideWords, place.at("side"));
   origin.is_prior = place.has("prior");
   if (origin.is_prior) {
     origin.parameter = position(
-        model.parameters, [](const Parameter& p) { return p.name; }, place.at("prior"));
+        model.parameters, [](const model::Parameter& p) { return p.name; }, place.at("prior"));
   } else {
     origin.sample = place.at("row").count();
     origin.t = place.at("t").number();
@@ -54,7 +57,7 @@ void read_noise(const JsonPlace& noise, ModelClaims& claims) {
                      ": no member 'motion': this model was written before models carried certificates; commission "
                      "again to have one that can be checked");
   }
-  claims.errors = motion_errors_at(noise.at("motion"), claims.model);
+  claims.errors = robots::motion_errors_at(noise.at("motion"), claims.model);
   const JsonPlace outputs = noise.at("outputs");
   if (outputs.size() != claims.model.n()) {
     outputs.fail("one entry for each of the " + std::to_string(claims.model.n()) + " outputs");
@@ -62,9 +65,9 @@ void read_noise(const JsonPlace& noise, ModelClaims& claims) {
   claims.errors.output.resize(static_cast<Eigen::Index>(outputs.size()));
   for (std::size_t i = 0; i < outputs.size(); ++i) {
     claims.errors.output[static_cast<Eigen::Index>(i)] = outputs.at(i).at("learning").number();
-    claims.origin.push_back(value_of(kNoiseOriginWords, outputs.at(i).at("origin")));
+    claims.origin.push_back(files::value_of(robots::kNoiseOriginWords, outputs.at(i).at("origin")));
   }
-  const SignalErrors& e = claims.errors;
+  const filter::SignalErrors& e = claims.errors;
   const auto bounds = {e.output,
                        e.acceleration,
                        e.speed,
@@ -96,7 +99,7 @@ void read_set(const JsonPlace& place, ModelClaims& claims) {
   if (status != "nonempty" && status != "empty") {
     place.at("status").fail("nonempty or empty");
   }
-  claims.prior = box_at(place.at("prior"), p);
+  claims.prior = robots::box_at(place.at("prior"), p);
   claims.sign_parts = place.at("sign_parts").count();
   const JsonPlace dropped = place.at("dropped");
   for (std::size_t k = 0; k < dropped.size(); ++k) {
@@ -108,8 +111,8 @@ void read_set(const JsonPlace& place, ModelClaims& claims) {
     claims.hull = claims.prior;
     return;
   }
-  claims.hull = box_at(place.at("hull"), p);
-  claims.facets = facets_at(place, p);
+  claims.hull = robots::box_at(place.at("hull"), p);
+  claims.facets = robots::facets_at(place, p);
   const JsonPlace origin = place.at("origin");
   if (origin.size() != claims.facets.size()) {
     origin.fail("one entry for each of the " + std::to_string(claims.facets.size()) + " rows of A");
@@ -122,7 +125,7 @@ void read_set(const JsonPlace& place, ModelClaims& claims) {
 void read_data(const JsonPlace& place, ModelClaims& claims) {
   const JsonPlace files = place.at("files");
   for (std::size_t k = 0; k < files.size(); ++k) {
-    LogFileReport file;
+    logs::LogFileReport file;
     file.path = files.at(k).at("path").text();
     file.hash = files.at(k).at("hash").text();
     file.bytes = files.at(k).at("bytes").count();
@@ -136,17 +139,17 @@ void read_data(const JsonPlace& place, ModelClaims& claims) {
 }  // namespace
 
 ModelClaims claims_from_json(const Json& json, const std::string& file) {
-  const JsonPlace root = model_root(json, file);
+  const JsonPlace root = robots::model_root(json, file);
   ModelClaims claims;
-  claims.robot = robot_from_json(root.at("robot").value(), root.at("robot").where());
-  claims.model = make_model(claims.robot);
-  claims.filter = filter_at(root.at("filter"));
-  claims.measurement = measurement_at(root.at("measurement"), claims.model, claims.robot);
+  claims.robot = robots::robot_from_json(root.at("robot").value(), root.at("robot").where());
+  claims.model = model::make_model(claims.robot);
+  claims.filter = robots::filter_at(root.at("filter"));
+  claims.measurement = robots::measurement_at(root.at("measurement"), claims.model, claims.robot);
   read_noise(root.at("noise"), claims);
   read_set(root.at("feasible_set"), claims);
   read_parameters(root.at("parameters"), claims);
-  claims.warrant = model_warrant(root);
-  claims.assumptions = assumptions_at(root);
+  claims.warrant = robots::model_warrant(root);
+  claims.assumptions = robots::assumptions_at(root);
   if (root.has("physical")) {
     const JsonPlace physical = root.at("physical");
     for (const std::string& name : physical.keys()) {
@@ -157,6 +160,8 @@ ModelClaims claims_from_json(const Json& json, const std::string& file) {
   return claims;
 }
 
-ModelClaims read_claims(const std::filesystem::path& path) { return claims_from_json(read_json(path), path.string()); }
+ModelClaims read_claims(const std::filesystem::path& path) {
+  return claims_from_json(files::read_json(path), path.string());
+}
 
-}  // namespace wheelwright
+}  // namespace wheelwright::results

@@ -13,15 +13,15 @@
 #include <wheelwright/logs/recorded_log.hpp>
 #include <wheelwright/robots/online_model_file.hpp>
 
-namespace wheelwright {
+namespace wheelwright::results {
 
 /// The whole result as JSON (results/model.schema.json). `data` says which log it came from, `software` is name and
 /// version.
-[[nodiscard]] Json to_json(const Commissioning& result, const LogReport& data, const std::string& software);
+[[nodiscard]] Json to_json(const Commissioning& result, const logs::LogReport& data, const std::string& software);
 
 /// A row of a log, or a side of the prior box, and its multiplier in a proof, as model.json names them.
 struct NamedRow {
-  RowOrigin origin;
+  bounds::RowOrigin origin;
   double multiplier = 0.0;
 };
 
@@ -38,22 +38,22 @@ struct ModelClaims {
   Model model;
   Measurement measurement;
   FilterDesign filter;
-  SignalErrors errors;              ///< of the rows of the log: Commissioning::row_errors
-  std::vector<NoiseOrigin> origin;  ///< of errors.output, one for each output
-  Box prior;                        ///< in which the set was sought
+  filter::SignalErrors errors;            ///< of the rows of the log: Commissioning::row_errors
+  std::vector<core::NoiseOrigin> origin;  ///< of errors.output, one for each output
+  Box prior;                              ///< in which the set was sought
   FeasibleSet::Status set = FeasibleSet::Status::nonempty;
-  std::vector<PublishedBound> lower, upper;  ///< of each parameter
-  std::vector<NamedRow> contradiction;       ///< where the set is empty
-  std::vector<HalfSpace> facets;             ///< of the set, with their origins; else none
-  Box hull;                                  ///< of the set; the prior where it is empty
-  std::map<std::string, Interval> physical;  ///< bounds by physical name; none where there is no scale
-  std::vector<std::size_t> dropped;          ///< rows left out as outliers
-  std::size_t sign_parts = 1;                ///< FeasibleSet::sign_parts
-  std::vector<LogFileReport> files;          ///< path, hash, bytes and rows of each file of the log
-  std::size_t rows = 0;                      ///< of the log
-  std::size_t segments = 0;                  ///< of the log
-  Warrant warrant = Warrant::extrapolated;   ///< of the bounds, as the model states it
-  std::vector<Assumption> assumptions;       ///< that it took; none of a model from before it listed them
+  std::vector<PublishedBound> lower, upper;             ///< of each parameter
+  std::vector<NamedRow> contradiction;                  ///< where the set is empty
+  std::vector<bounds::HalfSpace> facets;                ///< of the set, with their origins; else none
+  Box hull;                                             ///< of the set; the prior where it is empty
+  std::map<std::string, Interval> physical;             ///< bounds by physical name; none where there is no scale
+  std::vector<std::size_t> dropped;                     ///< rows left out as outliers
+  std::size_t sign_parts = 1;                           ///< FeasibleSet::sign_parts
+  std::vector<logs::LogFileReport> files;               ///< path, hash, bytes and rows of each file of the log
+  std::size_t rows = 0;                                 ///< of the log
+  std::size_t segments = 0;                             ///< of the log
+  core::Warrant warrant = core::Warrant::extrapolated;  ///< of the bounds, as the model states it
+  std::vector<core::Assumption> assumptions;            ///< that it took; none of a model from before it listed them
 };
 
 /// Reads the claims of a model.json, also of one that holds no model. Throws InputError, naming file and key, when it
@@ -64,4 +64,4 @@ struct ModelClaims {
 /// The same from JSON; `file` is for messages.
 [[nodiscard]] ModelClaims claims_from_json(const Json& json, const std::string& file);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::results

@@ -14,16 +14,18 @@
 #include <wheelwright/results/model_words.hpp>
 #include <wheelwright/robots/robot_file.hpp>
 
-namespace wheelwright {
+namespace wheelwright::results {
 
-Json assumptions_json(const std::vector<Assumption>& assumptions) {
+using files::word_of;
+
+Json assumptions_json(const std::vector<core::Assumption>& assumptions) {
   Json list = Json::array();
-  for (const Assumption& a : assumptions) {
+  for (const core::Assumption& a : assumptions) {
     list.push_back({{"id", a.id},
                     {"statement", a.statement},
                     {"declared_by", a.declared_by},
                     {"test", a.test},
-                    {"verdict", word_of(kVerdictWords, a.verdict)},
+                    {"verdict", word_of(robots::kVerdictWords, a.verdict)},
                     {"detail", a.detail}});
   }
   return list;
@@ -33,7 +35,7 @@ namespace {
 
 constexpr std::size_t kMostVertices = 256;
 
-Json origin_json(const RowOrigin& origin, const Model& model) {
+Json origin_json(const bounds::RowOrigin& origin, const Model& model) {
   if (origin.is_prior) {
     return {{"prior", model.parameters[origin.parameter].name}, {"side", word_of(kSideWords, origin.side)}};
   }
@@ -44,9 +46,9 @@ Json origin_json(const RowOrigin& origin, const Model& model) {
 }
 
 // The rows that prove a bound with their multipliers; the check needs no more.
-Json proof_json(const std::vector<WeightedRow>& rows, const Model& model) {
+Json proof_json(const std::vector<bounds::WeightedRow>& rows, const Model& model) {
   Json list = Json::array();
-  for (const WeightedRow& weighted : rows) {
+  for (const bounds::WeightedRow& weighted : rows) {
     if (weighted.multiplier > 0.0) {
       Json row = origin_json(weighted.row.origin, model);
       row["multiplier"] = weighted.multiplier;
@@ -57,7 +59,7 @@ Json proof_json(const std::vector<WeightedRow>& rows, const Model& model) {
 }
 
 // What bounds motion and efforts between samples; null where the rows do not hold it.
-Json between_samples_json(const SignalErrors& errors) {
+Json between_samples_json(const filter::SignalErrors& errors) {
   if (!errors.between_samples) {
     return nullptr;
   }
@@ -72,7 +74,7 @@ Json between_samples_json(const SignalErrors& errors) {
 }
 
 // What the motion in the rows can be wrong by; what the effort can is said elsewhere.
-Json motion_errors_json(const SignalErrors& errors) {
+Json motion_errors_json(const filter::SignalErrors& errors) {
   return {{"acceleration", numbers(errors.acceleration)},
           {"speed", numbers(errors.speed)},
           {"speed_sample", numbers(errors.speed_sample)},
@@ -81,21 +83,21 @@ Json motion_errors_json(const SignalErrors& errors) {
           {"between_samples", between_samples_json(errors)}};
 }
 
-Json filter_json(const FilterDesign& filter, const FilterChoice& choice) {
+Json filter_json(const FilterDesign& filter, const commission::FilterChoice& choice) {
   Json json = {{"order", filter.order},   {"alpha", filter.alpha},   {"beta", filter.beta},
                {"settle", filter.settle}, {"delay", filter.delay()}, {"chosen", !choice.curve.empty()}};
-  for (const FilterCandidate& c : choice.curve) {
+  for (const commission::FilterCandidate& c : choice.curve) {
     json["curve"].push_back({{"beta", c.design.beta}, {"criterion", c.criterion}});
   }
   return json;
 }
 
 Json measurement_json(const Measurement& m) {
-  return {{"motion", word_of(kMotionWords, m.motion)},
+  return {{"motion", word_of(robots::kMotionWords, m.motion)},
           {"motion_columns", m.motion_columns},
           {"effort_columns", m.effort_columns},
           {"heading_column", m.heading_column},
-          {"hold", word_of(kHoldWords, m.hold)},
+          {"hold", word_of(robots::kHoldWords, m.hold)},
           {"effort_unsigned", m.effort_unsigned},
           {"count", m.count},
           {"nominal_step", m.nominal_step},
@@ -103,16 +105,16 @@ Json measurement_json(const Measurement& m) {
 }
 
 Json noise_json(const Commissioning& r, const Model& model) {
-  Json json = {{"mode", word_of(kNoiseModeWords, r.noise_mode)}, {"outputs", Json::array()}};
+  Json json = {{"mode", word_of(robots::kNoiseModeWords, r.noise_mode)}, {"outputs", Json::array()}};
   for (std::size_t i = 0; i < r.noise.size(); ++i) {
-    const OutputNoise& n = r.noise[i];
+    const commission::OutputNoise& n = r.noise[i];
     Json output = {{"output", model.outputs[i]},
-                   {"unit", output_unit(r.model.robot, model.output_units[i])},
-                   {"origin", word_of(kNoiseOriginWords, n.origin)},
+                   {"unit", commission::output_unit(r.model.robot, model.output_units[i])},
+                   {"origin", word_of(robots::kNoiseOriginWords, n.origin)},
                    {"bound", n.bound},
                    {"learning", n.learning},
-                   {"warrant", warrant_word(n.warrant)}};
-    if (n.origin == NoiseOrigin::estimated) {
+                   {"warrant", core::warrant_word(n.warrant)}};
+    if (n.origin == core::NoiseOrigin::estimated) {
       output["over_rms"] = n.how.over_rms;
       output["over_largest"] = n.how.over_largest;
       output["heavy_tail"] = n.how.heavy_tail;
@@ -124,17 +126,17 @@ Json noise_json(const Commissioning& r, const Model& model) {
 }
 
 Json parameter_json(const Commissioning& r, std::size_t j, const Robot& robot, const Model& model) {
-  const ParameterResult& p = r.parameters[j];
-  const auto proof = [&](const std::vector<CertifiedBound>& bounds) {
+  const commission::ParameterResult& p = r.parameters[j];
+  const auto proof = [&](const std::vector<bounds::CertifiedBound>& bounds) {
     return j < bounds.size() ? proof_json(bounds[j].binding, model) : Json::array();
   };
   return {{"name", p.parameter.name},
-          {"unit", parameter_unit(robot, p.parameter)},
-          {"estimate", or_null(p.estimate)},
+          {"unit", commission::parameter_unit(robot, p.parameter)},
+          {"estimate", files::or_null(p.estimate)},
           {"lower", p.lower},
           {"upper", p.upper},
-          {"warrant", warrant_word(p.warrant)},
-          {"standard_error", or_null(p.standard_error)},
+          {"warrant", core::warrant_word(p.warrant)},
+          {"standard_error", files::or_null(p.standard_error)},
           {"chebyshev_centre", p.chebyshev},
           {"excitation", word_of(kExcitationWords, p.excitation)},
           {"reason", p.reason},
@@ -145,21 +147,21 @@ Json parameter_json(const Commissioning& r, std::size_t j, const Robot& robot, c
 }
 
 Json physical_json(const Commissioning& r, const Robot& robot, const Model& model) {
-  const auto scales = physical_scales(robot, model);
+  const auto scales = commission::physical_scales(robot, model);
   if (!scales) {
     return nullptr;
   }
   Json json = Json::object();
   for (std::size_t j = 0; j < r.parameters.size(); ++j) {
-    const ParameterResult& p = r.parameters[j];
-    const PhysicalScale& s = (*scales)[j];
+    const commission::ParameterResult& p = r.parameters[j];
+    const commission::PhysicalScale& s = (*scales)[j];
     const auto physical = [&](double theta) { return s.scale * theta - s.offset; };
     const Interval scaled = Interval{s.scale, s.scale} * Interval{p.lower, p.upper} - Interval{s.offset, s.offset};
     Json entry = {{"unit", p.parameter.physical_unit},
                   {"estimate", p.estimate ? Json(physical(*p.estimate)) : Json(nullptr)},
                   {"lower", scaled.lower},
                   {"upper", scaled.upper},
-                  {"warrant", warrant_word(p.warrant)},
+                  {"warrant", core::warrant_word(p.warrant)},
                   {"standard_error", p.standard_error ? Json(s.scale * *p.standard_error) : Json(nullptr)}};
     if (const auto nominal = robot.nominal.find(p.parameter.physical); nominal != robot.nominal.end()) {
       entry["nominal"] = nominal->second;
@@ -171,11 +173,11 @@ Json physical_json(const Commissioning& r, const Robot& robot, const Model& mode
 
 Json identification_json(const Commissioning& r) {
   Json json = {{"rank", r.rank}, {"condition", r.condition}, {"freedom", r.residuals.freedom}};
-  const EstimatorChoice& choice = r.estimators;
+  const identify::EstimatorChoice& choice = r.estimators;
   if (choice.candidates.empty()) {
     return json;
   }
-  json["estimator"] = to_string(choice.best().estimator);
+  json["estimator"] = identify::to_string(choice.best().estimator);
   json["reason"] = choice.reason;
   json["in_doubt"] = choice.in_doubt;
   if (const Json test = endogeneity_json(choice); !test.is_null()) {
@@ -201,7 +203,7 @@ Json set_json(const Commissioning& r, const Model& model) {
     return json;
   }
   Json a = Json::array(), b = Json::array(), origin = Json::array();
-  for (const HalfSpace& facet : r.feasible.polytope->facets()) {
+  for (const bounds::HalfSpace& facet : r.feasible.polytope->facets()) {
     a.push_back(numbers(facet.a));
     b.push_back(facet.b);
     origin.push_back(origin_json(facet.origin, model));
@@ -229,10 +231,10 @@ Json set_json(const Commissioning& r, const Model& model) {
 Json validation_json(const Commissioning& r, const Model& model) {
   Json outputs = Json::array();
   for (std::size_t i = 0; i < r.validation.size(); ++i) {
-    const OutputValidation& v = r.validation[i];
+    const commission::OutputValidation& v = r.validation[i];
     const auto share = [&](double width) { return v.torque_rms > 0.0 ? width / v.torque_rms : 0.0; };
     outputs.push_back({{"output", model.outputs[i]},
-                       {"warrant", warrant_word(v.warrant)},
+                       {"warrant", core::warrant_word(v.warrant)},
                        {"instants", v.instants},
                        {"coverage", v.coverage},
                        {"coverage_noise_free", v.coverage_noise_free},
@@ -253,8 +255,8 @@ Json validation_json(const Commissioning& r, const Model& model) {
 
 Json contradictions_json(const Commissioning& r) {
   Json list = Json::array();
-  for (const LogContradiction& c : r.contradictions) {
-    list.push_back({{"id", to_string(c.kind)},
+  for (const commission::LogContradiction& c : r.contradictions) {
+    list.push_back({{"id", commission::to_string(c.kind)},
                     {"withdraws", c.withdraws},
                     {"subject", c.subject},
                     {"value", c.value},
@@ -265,9 +267,9 @@ Json contradictions_json(const Commissioning& r) {
   return list;
 }
 
-Json data_json(const Commissioning& r, const LogReport& data) {
+Json data_json(const Commissioning& r, const logs::LogReport& data) {
   Json files = Json::array();
-  for (const LogFileReport& f : data.files) {
+  for (const logs::LogFileReport& f : data.files) {
     files.push_back({{"path", f.path}, {"hash", f.hash}, {"bytes", f.bytes}, {"rows", f.rows}});
   }
   return {{"files", files},
@@ -276,20 +278,20 @@ Json data_json(const Commissioning& r, const LogReport& data) {
           {"seconds", r.survey.seconds},
           {"median_step", r.survey.median_step},
           {"largest_step", r.survey.largest_step},
-          {"repairs", sentences(data)}};
+          {"repairs", logs::sentences(data)}};
 }
 
 }  // namespace
 
-Json to_json(const Commissioning& r, const LogReport& data, const std::string& software) {
+Json to_json(const Commissioning& r, const logs::LogReport& data, const std::string& software) {
   const OnlineModel& m = r.model;
   const bool has_model = !m.facets.empty() && r.status != Commissioning::Status::nothing;
-  Json json = {{"schema", kModelSchema},
+  Json json = {{"schema", robots::kModelSchema},
                {"software", software},
                {"status", word_of(kStatusWords, r.status)},
                {"message", r.message},
-               {"warrant", warrant_word(m.warrant)},
-               {"robot", to_json(m.robot)},
+               {"warrant", core::warrant_word(m.warrant)},
+               {"robot", robots::to_json(m.robot)},
                {"filter", filter_json(m.filter, r.filter_choice)},
                {"measurement", measurement_json(m.measurement)},
                {"noise", noise_json(r, m.model)},
@@ -318,4 +320,4 @@ Json to_json(const Commissioning& r, const LogReport& data, const std::string& s
   return json;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::results

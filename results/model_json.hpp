@@ -8,9 +8,9 @@
 #include <wheelwright/core/warrant.hpp>
 #include <wheelwright/files/json.hpp>
 
-namespace wheelwright {
+namespace wheelwright::results {
 
 /// The list as results have it under `assumptions`.
-[[nodiscard]] Json assumptions_json(const std::vector<Assumption>& assumptions);
+[[nodiscard]] Json assumptions_json(const std::vector<core::Assumption>& assumptions);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::results

@@ -7,16 +7,19 @@
 #include <wheelwright/files/words.hpp>
 #include <wheelwright/robots/model_words.hpp>
 
-namespace wheelwright {
+namespace wheelwright::results {
 
-inline constexpr Words<Commissioning::Status, 5> kStatusWords{{{Commissioning::Status::done, "done"},
-                                                               {Commissioning::Status::partial, "partial"},
-                                                               {Commissioning::Status::empty, "empty"},
-                                                               {Commissioning::Status::nothing, "nothing"},
-                                                               {Commissioning::Status::contradicted, "contradicted"}}};
-inline constexpr Words<Excitation, 3> kExcitationWords{{{Excitation::identified, "identified"},
-                                                        {Excitation::indistinct, "indistinct"},
-                                                        {Excitation::not_excited, "not_excited"}}};
-inline constexpr Words<Side, 2> kSideWords{{{Side::upper, "upper"}, {Side::lower, "lower"}}};
+inline constexpr files::Words<Commissioning::Status, 5> kStatusWords{
+    {{Commissioning::Status::done, "done"},
+     {Commissioning::Status::partial, "partial"},
+     {Commissioning::Status::empty, "empty"},
+     {Commissioning::Status::nothing, "nothing"},
+     {Commissioning::Status::contradicted, "contradicted"}}};
+inline constexpr files::Words<identify::Excitation, 3> kExcitationWords{
+    {{identify::Excitation::identified, "identified"},
+     {identify::Excitation::indistinct, "indistinct"},
+     {identify::Excitation::not_excited, "not_excited"}}};
+inline constexpr files::Words<bounds::Side, 2> kSideWords{
+    {{bounds::Side::upper, "upper"}, {bounds::Side::lower, "lower"}}};
 
-}  // namespace wheelwright
+}  // namespace wheelwright::results

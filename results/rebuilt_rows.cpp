@@ -10,13 +10,13 @@
 #include <wheelwright/bounds/slab_rows.hpp>
 #include <wheelwright/filter/row_stream.hpp>
 
-namespace wheelwright {
+namespace wheelwright::results {
 namespace {
 
 /// The instants of the log's regression that the claims name.
 RegressionBlock named_instants(const ModelClaims& claims, LogSource& log) {
   std::set<std::size_t> wanted;
-  const auto want = [&](const RowOrigin& origin) {
+  const auto want = [&](const bounds::RowOrigin& origin) {
     if (!origin.is_prior) {
       wanted.insert(origin.sample);
     }
@@ -27,7 +27,7 @@ RegressionBlock named_instants(const ModelClaims& claims, LogSource& log) {
     }
   }
   std::ranges::for_each(claims.contradiction, [&](const NamedRow& row) { want(row.origin); });
-  std::ranges::for_each(claims.facets, [&](const HalfSpace& facet) { want(facet.origin); });
+  std::ranges::for_each(claims.facets, [&](const bounds::HalfSpace& facet) { want(facet.origin); });
 
   RegressionBlock kept, block;
   kept.resize(wanted.size(), claims.model.n(), claims.model.p());
@@ -53,11 +53,11 @@ RegressionBlock named_instants(const ModelClaims& claims, LogSource& log) {
 }
 
 /// A side of the prior box.
-HalfSpace side_of(const Box& prior, const RowOrigin& origin) {
+bounds::HalfSpace side_of(const Box& prior, const bounds::RowOrigin& origin) {
   const Interval& side = prior.sides[origin.parameter];
-  const bool is_upper = origin.side == Side::upper;
-  HalfSpace row{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(prior.dimension())),
-                is_upper ? side.upper : -side.lower, origin};
+  const bool is_upper = origin.side == bounds::Side::upper;
+  bounds::HalfSpace row{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(prior.dimension())),
+                        is_upper ? side.upper : -side.lower, origin};
   row.a[static_cast<Eigen::Index>(origin.parameter)] = is_upper ? 1.0 : -1.0;
   return row;
 }
@@ -68,7 +68,7 @@ RebuiltRows::RebuiltRows(const ModelClaims& claims, LogSource& log)
     : claims_(claims), instants_(named_instants(claims, log)) {}
 
 bool RebuiltRows::depends_on(const Box& box) const {
-  const SlabRows slabs(box);
+  const bounds::SlabRows slabs(box);
   for (std::size_t j = 0; j < box.dimension(); ++j) {
     const auto column = instants_.dY.col(static_cast<Eigen::Index>(j)).head(instants_.rows());
     if (slabs.sign_is_open(j) && (column.array() > 0.0).any()) {
@@ -78,7 +78,8 @@ bool RebuiltRows::depends_on(const Box& box) const {
   return false;
 }
 
-std::optional<HalfSpace> RebuiltRows::row(const RowOrigin& origin, const Box& box, std::string& why) const {
+std::optional<bounds::HalfSpace> RebuiltRows::row(const bounds::RowOrigin& origin, const Box& box,
+                                                  std::string& why) const {
   if (origin.is_prior) {
     return side_of(claims_.prior, origin);
   }
@@ -96,15 +97,15 @@ std::optional<HalfSpace> RebuiltRows::row(const RowOrigin& origin, const Box& bo
     why = fmt::format("row {} is at t = {} s in this log, not at {} s", origin.sample, instants_.t[k], origin.t);
     return std::nullopt;
   }
-  HalfSpace upper, lower;
+  bounds::HalfSpace upper, lower;
   const auto row = static_cast<Eigen::Index>(k * instants_.outputs + origin.output);
-  SlabRows(box).half_spaces(instants_, row, upper, lower);
-  return origin.side == Side::upper ? upper : lower;
+  bounds::SlabRows(box).half_spaces(instants_, row, upper, lower);
+  return origin.side == bounds::Side::upper ? upper : lower;
 }
 
-std::vector<WeightedRow> RebuiltRows::proof(const std::vector<NamedRow>& named, const Box& box,
-                                            std::string& why) const {
-  std::vector<WeightedRow> rows;
+std::vector<bounds::WeightedRow> RebuiltRows::proof(const std::vector<NamedRow>& named, const Box& box,
+                                                    std::string& why) const {
+  std::vector<bounds::WeightedRow> rows;
   for (const NamedRow& name : named) {
     std::string missing;
     if (auto half_space = row(name.origin, box, missing)) {
@@ -117,4 +118,4 @@ std::vector<WeightedRow> RebuiltRows::proof(const std::vector<NamedRow>& named, 
   return rows;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::results

@@ -10,7 +10,7 @@
 #include <wheelwright/core/log.hpp>
 #include <wheelwright/results/model_file.hpp>
 
-namespace wheelwright {
+namespace wheelwright::results {
 
 /// The rows of the log's regression that the claims of a model name, filtered again with the claimed filter and errors.
 class RebuiltRows {
@@ -24,16 +24,17 @@ class RebuiltRows {
 
   /// The half-space that holds for every admissible θ of `box` (SlabRows; sides are those of the prior). Nothing where
   /// this log has no such row, or one at another time, or where it was left out: `why` says which.
-  [[nodiscard]] std::optional<HalfSpace> row(const RowOrigin& origin, const Box& box, std::string& why) const;
+  [[nodiscard]] std::optional<bounds::HalfSpace> row(const bounds::RowOrigin& origin, const Box& box,
+                                                     std::string& why) const;
 
   /// The rows of a proof, in their order. One that cannot be built takes no part (a multiplier of 0); the first of them
   /// is told in `why`.
-  [[nodiscard]] std::vector<WeightedRow> proof(const std::vector<NamedRow>& named, const Box& box,
-                                               std::string& why) const;
+  [[nodiscard]] std::vector<bounds::WeightedRow> proof(const std::vector<NamedRow>& named, const Box& box,
+                                                       std::string& why) const;
 
  private:
   const ModelClaims& claims_;
   RegressionBlock instants_;
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::results

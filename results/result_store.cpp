@@ -11,12 +11,12 @@
 #include <wheelwright/files/words.hpp>
 #include <wheelwright/logs/database.hpp>
 
-namespace wheelwright {
+namespace wheelwright::results {
 namespace {
 
 namespace fs = std::filesystem;
-using bag::Database;
-using bag::Statement;
+using logs::bag::Database;
+using logs::bag::Statement;
 
 constexpr std::int64_t format = 1;
 constexpr std::int64_t application = 0x57485231;  // "WHR1", what SQLite's files say of whose they are
@@ -122,7 +122,7 @@ class SqliteResults::Tables {
     insert_.reset();
     if (!written && get(key) != result) {
       throw InputError(fmt::format("{}: another result of {} than {}: expected one result for an item", from,
-                                   shown(key), from == shown_ ? "is there already" : shown_ + " has"));
+                                   files::shown(key), from == shown_ ? "is there already" : shown_ + " has"));
     }
   }
 
@@ -260,4 +260,4 @@ void SqliteResults::merge(const std::vector<fs::path>& files) {
   tables_->demand(transaction.commit());
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::results

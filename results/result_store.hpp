@@ -15,7 +15,7 @@
 
 #include <wheelwright/study/work.hpp>
 
-namespace wheelwright {
+namespace wheelwright::results {
 
 /// Inputs that every result of a run depends on, beside the item itself: names and values, e.g. {"--beta", "40"}. Names
 /// differ.
@@ -38,7 +38,7 @@ struct StoredItems {
 /// there. Each is a transaction of its own in the write-ahead log, which the system has when put() returns. **Power
 /// loss**: the file stays sound and may lack what was put since SQLite last flushed its log, about 4 MB of results;
 /// they are evaluated again. Only one process has a store open; a file system without locks cannot promise that.
-class SqliteResults final : public ResultStore {
+class SqliteResults final : public study::ResultStore {
  public:
   enum class Opening {
     resume,  ///< goes on with the results that are there
@@ -83,4 +83,4 @@ class SqliteResults final : public ResultStore {
   std::unique_ptr<Tables> tables_;
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::results

@@ -17,7 +17,10 @@
 #include <wheelwright/robots/robot_file.hpp>
 #include <wheelwright/robots/robot_keys.hpp>
 
-namespace wheelwright {
+namespace wheelwright::results {
+
+using files::YamlPlace;
+
 namespace {
 
 constexpr std::size_t longest_scenario = std::size_t{1} << 20;
@@ -77,19 +80,19 @@ std::string robot_text(std::string_view text, const YamlPlace& place) {
 }
 
 // Wheel-speed commands of a CSV file as body speeds; the table begins at time 0.
-SpeedTable read_commands(const std::filesystem::path& path, const DifferentialDrive& drive) {
+sim::SpeedTable read_commands(const std::filesystem::path& path, const DifferentialDrive& drive) {
   const std::vector<std::string> names = {"command_r", "command_l"};
-  CsvOptions options;
+  logs::CsvOptions options;
   options.only = names;
   options.min_rows = 2;
   CsvLog log({path}, options);
-  require_columns(log, names);
+  logs::require_columns(log, names);
   const LogTable table = read_all(log);
   if (table.segment_starts.size() > 1) {
     throw InputError(path.string() + ": time has a gap or goes back before the row at " +
                      std::to_string(table.t[table.segment_starts[1]]) + " s: expected one drive, evenly sampled");
   }
-  SpeedTable speeds;
+  sim::SpeedTable speeds;
   for (std::size_t k = 0; k < table.rows(); ++k) {
     speeds.t.push_back(table.t[k] - table.t.front());
     speeds.speed.push_back(drive.body_speed({table.column("command_r")[k], table.column("command_l")[k]}));
@@ -124,7 +127,7 @@ struct ScenarioReader {
       }
     }
     if (effects) {
-      read_effects(*effects, scenario.robot);
+      robots::read_effects(*effects, scenario.robot);
     }
     if (commands) {
       if (!(scenario.robot.wheel_radius > 0.0 && scenario.robot.track_width > 0.0)) {
@@ -132,13 +135,13 @@ struct ScenarioReader {
                          ": trajectory of kind table: expected a robot of two wheels, with wheel_radius and "
                          "track_width");
       }
-      scenario.trajectory.table = read_commands(*commands, drive_of(scenario.robot));
+      scenario.trajectory.table = read_commands(*commands, sim::drive_of(scenario.robot));
       if (!seen.contains("duration")) {
         scenario.duration = scenario.trajectory.table.t.back();
       }
     }
     try {
-      validate(scenario);
+      sim::validate(scenario);
     } catch (const InvalidArgument& error) {
       throw InputError(file + ": " + error.what());
     }
@@ -147,7 +150,7 @@ struct ScenarioReader {
   void read_part(const std::string& key, const YamlPlace& place) {
     if (key == "robot") {
       scenario.robot = place.is_scalar() ? read_robot(folder / place.text("a robot file, or its keys"))
-                                         : parse_robot(robot_text(text, place), file);
+                                         : robots::parse_robot(robot_text(text, place), file);
     } else if (key == "parameters") {
       read_parameters(place);
     } else if (key == "trajectory") {
@@ -193,7 +196,7 @@ struct ScenarioReader {
   }
 
   void read_parameters(const YamlPlace& place) {
-    DriveParameters& p = scenario.parameters;
+    model::DriveParameters& p = scenario.parameters;
     std::set<std::string> seen;
     for (const auto& [name, value] :
          place.members({"mass", "yaw_inertia", "viscous_linear", "viscous_x", "viscous_y", "viscous_yaw"})) {
@@ -223,12 +226,12 @@ struct ScenarioReader {
   }
 
   void read_trajectory(const YamlPlace& place) {
-    Trajectory& trajectory = scenario.trajectory;
+    sim::Trajectory& trajectory = scenario.trajectory;
     for (const auto& [name, value] : place.members({"kind", "speed", "yaw_rate", "period", "file"})) {
       if (name == "file") {
         commands = folder / value.text("a CSV file with t, command_r, command_l");
       } else if (name == "kind") {
-        trajectory.kind = static_cast<Trajectory::Kind>(value.choice(
+        trajectory.kind = static_cast<sim::Trajectory::Kind>(value.choice(
             {"straight", "circle", "figure_eight", "multi_sine", "spin", "stops", "commissioning", "table"}));
       } else if (name == "period") {
         trajectory.period = value.positive();
@@ -236,13 +239,13 @@ struct ScenarioReader {
         (name == "speed" ? trajectory.speed : trajectory.yaw_rate) = not_negative(value);
       }
     }
-    if (commands.has_value() != (trajectory.kind == Trajectory::Kind::table)) {
+    if (commands.has_value() != (trajectory.kind == sim::Trajectory::Kind::table)) {
       place.fail(commands ? "kind: table beside a file" : "a key file beside kind: table");
     }
   }
 
   void read_controller(const YamlPlace& place) {
-    ControllerGains& gains = scenario.controller;
+    sim::ControllerGains& gains = scenario.controller;
     for (const auto& [name, value] :
          place.members({"along", "across", "heading", "speed", "integral", "torque_limit"})) {
       if (name == "torque_limit") {
@@ -258,21 +261,22 @@ struct ScenarioReader {
     }
   }
 
-  static Fault fault(const YamlPlace& place) {
-    Fault fault;
+  static model::Fault fault(const YamlPlace& place) {
+    model::Fault fault;
     bool kind = false, magnitude = false;
     for (const auto& [name, value] : place.members({"kind", "magnitude", "onset", "shape", "rise_time", "end"})) {
       if (name == "kind") {
         kind = true;
-        fault.kind = static_cast<Fault::Kind>(value.choice({"wheel_radius", "wheel_radius_right", "wheel_radius_left",
-                                                            "slip_x", "slip_y", "slip_yaw", "matched", "unmatched"}));
+        fault.kind =
+            static_cast<model::Fault::Kind>(value.choice({"wheel_radius", "wheel_radius_right", "wheel_radius_left",
+                                                          "slip_x", "slip_y", "slip_yaw", "matched", "unmatched"}));
       } else if (name == "magnitude") {
         magnitude = true;
         fault.magnitude = any_number(value);
       } else if (name == "onset") {
         fault.profile.onset = any_number(value);
       } else if (name == "shape") {
-        fault.profile.shape = static_cast<TimeProfile::Shape>(value.choice({"step", "ramp", "smooth"}));
+        fault.profile.shape = static_cast<model::TimeProfile::Shape>(value.choice({"step", "ramp", "smooth"}));
       } else if (name == "rise_time") {
         fault.profile.rise_time = not_negative(value);
       } else {
@@ -286,13 +290,13 @@ struct ScenarioReader {
   }
 
   void read_sensors(const YamlPlace& place) {
-    Sensors& sensors = scenario.sensors;
+    sim::Sensors& sensors = scenario.sensors;
     for (const auto& [name, value] : place.members({"sampling", "noise", "wheel_speed", "wheel_angle", "effort",
                                                     "position", "heading", "encoder_counts_per_turn", "log"})) {
       if (name == "sampling") {
-        sensors.sampling = static_cast<Sampling>(value.choice({"instant", "interval"}));
+        sensors.sampling = static_cast<sim::Sampling>(value.choice({"instant", "interval"}));
       } else if (name == "noise") {
-        sensors.noise = static_cast<NoiseShape>(value.choice({"uniform", "truncated_gaussian", "two_point"}));
+        sensors.noise = static_cast<sim::NoiseShape>(value.choice({"uniform", "truncated_gaussian", "two_point"}));
       } else if (name == "encoder_counts_per_turn") {
         sensors.encoder_counts_per_turn = value.positive();
       } else if (name == "log") {
@@ -314,7 +318,7 @@ struct ScenarioReader {
     for (const YamlPlace& element : place.elements("a list of angles, speeds, pose, commands")) {
       wanted.at(element.choice(groups)) = true;
     }
-    Sensors& sensors = scenario.sensors;
+    sim::Sensors& sensors = scenario.sensors;
     sensors.angles = wanted[0];
     sensors.speeds = wanted[1];
     sensors.pose = wanted[2];
@@ -331,7 +335,7 @@ Scenario parse_scenario(std::string_view text, const std::string& file, const st
 }
 
 Scenario read_scenario(const std::filesystem::path& path) {
-  return parse_scenario(read_bytes(path, longest_scenario), path.string(), path.parent_path());
+  return parse_scenario(files::read_bytes(path, longest_scenario), path.string(), path.parent_path());
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::results

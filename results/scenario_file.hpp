@@ -9,7 +9,7 @@
 
 #include <wheelwright/sim/simulation.hpp>
 
-namespace wheelwright {
+namespace wheelwright::results {
 
 /// Reads a scenario file. `robot` and `parameters` are needed, every other key has the default of the struct:
 ///
@@ -40,4 +40,8 @@ namespace wheelwright {
 [[nodiscard]] Scenario parse_scenario(std::string_view text, const std::string& file,
                                       const std::filesystem::path& folder = {});
 
+}  // namespace wheelwright::results
+
+namespace wheelwright {
+using results::read_scenario;
 }  // namespace wheelwright

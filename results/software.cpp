@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/results/software.hpp>
 
-namespace wheelwright {
+namespace wheelwright::results {
 
 std::string software() { return std::string("wheelwright ") + WHEELWRIGHT_VERSION; }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::results

@@ -5,9 +5,9 @@
 
 #include <string>
 
-namespace wheelwright {
+namespace wheelwright::results {
 
 /// Name and version of the program.
 [[nodiscard]] std::string software();
 
-}  // namespace wheelwright
+}  // namespace wheelwright::results

@@ -17,7 +17,11 @@
 #include <wheelwright/results/scenario_file.hpp>
 #include <wheelwright/robots/robot_file.hpp>
 
-namespace wheelwright {
+namespace wheelwright::results {
+
+using files::or_null;
+using files::YamlPlace;
+
 namespace {
 
 constexpr std::size_t kLongestFile = std::size_t{1} << 20;
@@ -99,7 +103,7 @@ struct StudyReader {
 
   void read_subject(const std::optional<YamlPlace>& scenario, const std::optional<YamlPlace>& log,
                     const std::optional<YamlPlace>& robot) {
-    StudyCase& subject = result.study.subject;
+    study::StudyCase& subject = result.study.subject;
     if (scenario) {
       subject.scenario = read_scenario(source(*scenario, "a scenario file"));
       subject.robot = subject.scenario->robot;
@@ -119,8 +123,8 @@ struct StudyReader {
       if (paths.empty()) {
         log->fail("at least one log");
       }
-      const std::unique_ptr<RecordedLog> opened = open_log(paths, {});
-      subject.robot = with_column_errors(subject.robot, interpolation_errors(opened->report()));
+      const std::unique_ptr<logs::RecordedLog> opened = logs::open_log(paths, {});
+      subject.robot = model::with_column_errors(subject.robot, logs::interpolation_errors(opened->report()));
       subject.log = std::make_shared<const LogTable>(read_all(*opened));
     }
   }
@@ -135,7 +139,7 @@ struct StudyReader {
       names.push_back(name);
     }
     try {
-      const std::string note = settle_filter(result.study.subject, names);
+      const std::string note = study::settle_filter(result.study.subject, names);
       if (!note.empty()) {
         result.notes.push_back(note);
       }
@@ -152,10 +156,10 @@ struct StudyReader {
   }
 
   void read_input(const std::string& name, const YamlPlace& place) {
-    StudyInput input;
+    study::StudyInput input;
     input.name = name;
-    input.unit = unit_of_input(name);
-    std::optional<double> nominal = nominal_of_input(result.study.subject, name);
+    input.unit = study::unit_of_input(name);
+    std::optional<double> nominal = study::nominal_of_input(result.study.subject, name);
     std::optional<std::pair<double, double>> range, relative;
     if (place.is_mapping()) {
       for (const auto& [key, value] : place.members({"range", "relative", "scale", "nominal"})) {
@@ -189,10 +193,10 @@ struct StudyReader {
     input.nominal =
         nominal ? std::clamp(*nominal, input.lower, input.upper)
                 : (input.logarithmic ? std::sqrt(input.lower * input.upper) : 0.5 * (input.lower + input.upper));
-    validate(input);
+    study::validate(input);
     for (const double end : {input.lower, input.upper}) {
-      StudyCase trial = result.study.subject;
-      set_input(trial, name, end);
+      study::StudyCase trial = result.study.subject;
+      study::set_input(trial, name, end);
     }
     if (nominal && std::abs(input.nominal - *nominal) > 1e-6 * std::abs(*nominal)) {
       result.notes.push_back(name +
@@ -208,21 +212,21 @@ struct StudyReader {
       for (const YamlPlace& each : quantities->elements("a list of quantities")) {
         names.push_back(each.text("the name of a quantity"));
         try {
-          static_cast<void>(study_quantities({names.back()}, result.study.subject.robot));
+          static_cast<void>(study::study_quantities({names.back()}, result.study.subject.robot));
         } catch (const InvalidArgument& error) {
           each.say(error.what());
         }
       }
     }
     try {
-      result.study.quantities = study_quantities(names, result.study.subject.robot);
+      result.study.quantities = study::study_quantities(names, result.study.subject.robot);
     } catch (const InvalidArgument& error) {
       throw InputError(file + ": " + error.what());
     }
   }
 
   void read_methods() {
-    StudyMethods& out = result.study.methods;
+    study::StudyMethods& out = result.study.methods;
     if (!methods) {
       out.local = true;
       out.one_at_a_time = 5;
@@ -237,7 +241,7 @@ struct StudyReader {
           out.one_at_a_time = whole_from(value, 2);
         }
       } else if (key == "morris") {
-        out.morris = MorrisOptions{};
+        out.morris = study::MorrisOptions{};
         out.morris->seed = seed;
         for (const auto& [name, value] : place.members({"trajectories", "levels"})) {
           (name == "levels" ? out.morris->levels : out.morris->trajectories) = whole_from(value, 2);
@@ -249,14 +253,14 @@ struct StudyReader {
       }
     }
     try {
-      static_cast<void>(design_of(result.study));
+      static_cast<void>(study::design_of(result.study));
     } catch (const InvalidArgument& error) {
       methods->say(error.what());
     }
   }
 
   void read_sobol(const YamlPlace& place) {
-    SobolOptions options;
+    study::SobolOptions options;
     options.seed = seed;
     for (const auto& [name, value] : place.members({"points", "replicates", "confidence"})) {
       if (name == "confidence") {
@@ -269,8 +273,8 @@ struct StudyReader {
   }
 
   void read_grid(const YamlPlace& place) {
-    Grid grid;
-    grid.nominal = nominal_point(result.study.inputs);
+    study::Grid grid;
+    grid.nominal = study::nominal_point(result.study.inputs);
     grid.levels.assign(result.study.inputs.size(), 5);
     for (const auto& [name, value] : place.members({"levels"})) {
       if (!value.is_mapping()) {
@@ -278,7 +282,7 @@ struct StudyReader {
         continue;
       }
       std::vector<std::string> names;
-      for (const StudyInput& input : result.study.inputs) {
+      for (const study::StudyInput& input : result.study.inputs) {
         names.push_back(input.name);
       }
       grid.levels.assign(result.study.inputs.size(), 1);
@@ -293,7 +297,7 @@ struct StudyReader {
 }  // namespace
 
 StudyFile read_study(const std::filesystem::path& path) {
-  return parse_study(read_bytes(path, kLongestFile), path.string(), path.parent_path());
+  return parse_study(files::read_bytes(path, kLongestFile), path.string(), path.parent_path());
 }
 
 StudyFile parse_study(std::string_view text, const std::string& file, const std::filesystem::path& folder) {
@@ -304,9 +308,9 @@ StudyFile parse_study(std::string_view text, const std::string& file, const std:
 
 namespace {
 
-Json inputs_json(const Study& study) {
+Json inputs_json(const study::Study& study) {
   Json list = Json::array();
-  for (const StudyInput& input : study.inputs) {
+  for (const study::StudyInput& input : study.inputs) {
     list.push_back({{"name", input.name},
                     {"unit", input.unit},
                     {"lower", input.lower},
@@ -317,14 +321,14 @@ Json inputs_json(const Study& study) {
   return list;
 }
 
-Json one_at_a_time_json(const Study& study, std::size_t q, const StudyResult& result) {
-  const OneAtATime& found = result.one_at_a_time[q];
+Json one_at_a_time_json(const study::Study& study, std::size_t q, const study::StudyResult& result) {
+  const study::OneAtATime& found = result.one_at_a_time[q];
   Json inputs = Json::array();
   for (const std::size_t i : found.order) {
-    const InputCurve& curve = found.inputs[i];
+    const study::InputCurve& curve = found.inputs[i];
     Json points = Json::array();
     for (Eigen::Index k = 0; k < curve.coordinates.size(); ++k) {
-      points.push_back({value(study.inputs[i], curve.coordinates[k]), or_null(curve.values[k])});
+      points.push_back({study::value(study.inputs[i], curve.coordinates[k]), or_null(curve.values[k])});
     }
     inputs.push_back({{"input", study.inputs[i].name},
                       {"low", or_null(curve.low)},
@@ -335,10 +339,10 @@ Json one_at_a_time_json(const Study& study, std::size_t q, const StudyResult& re
   return {{"nominal", or_null(found.nominal)}, {"inputs", std::move(inputs)}};
 }
 
-Json morris_json(const Study& study, const std::vector<ElementaryEffects>& found) {
+Json morris_json(const study::Study& study, const std::vector<study::ElementaryEffects>& found) {
   Json inputs = Json::array();
   for (std::size_t i = 0; i < found.size(); ++i) {
-    const ElementaryEffects& e = found[i];
+    const study::ElementaryEffects& e = found[i];
     inputs.push_back({{"input", study.inputs[i].name},
                       {"mean", or_null(e.mean)},
                       {"mean_absolute", or_null(e.mean_absolute)},
@@ -350,18 +354,18 @@ Json morris_json(const Study& study, const std::vector<ElementaryEffects>& found
   return {{"inputs", std::move(inputs)}};
 }
 
-Json index_json(const SobolIndex& index) {
+Json index_json(const study::SobolIndex& index) {
   return {{"estimate", or_null(index.estimate)}, {"lower", or_null(index.lower)}, {"upper", or_null(index.upper)}};
 }
 
-Json sobol_json(const Study& study, const SobolIndices& found) {
+Json sobol_json(const study::Study& study, const study::SobolIndices& found) {
   Json inputs = Json::array();
   for (std::size_t i = 0; i < found.first.size(); ++i) {
     inputs.push_back({{"input", study.inputs[i].name},
                       {"first", index_json(found.first[i])},
                       {"total", index_json(found.total[i])}});
   }
-  return {{"status", to_string(found.status)},
+  return {{"status", study::to_string(found.status)},
           {"mean", or_null(found.mean)},
           {"variance", or_null(found.variance)},
           {"inputs", std::move(inputs)},
@@ -370,13 +374,13 @@ Json sobol_json(const Study& study, const SobolIndices& found) {
           {"left_out", or_null(found.left_out)}};
 }
 
-Json grid_json(const Study& study, const StudyResult& result) {
-  const Grid& grid = *study.methods.grid;
+Json grid_json(const study::Study& study, const study::StudyResult& result) {
+  const study::Grid& grid = *study.methods.grid;
   Json levels = Json::array();
   for (std::size_t i = 0; i < study.inputs.size(); ++i) {
     Json values = Json::array();
-    for (const double u : grid_coordinates(grid, static_cast<Eigen::Index>(i))) {
-      values.push_back(grid.levels[i] == 1 ? study.inputs[i].nominal : value(study.inputs[i], u));
+    for (const double u : study::grid_coordinates(grid, static_cast<Eigen::Index>(i))) {
+      values.push_back(grid.levels[i] == 1 ? study.inputs[i].nominal : study::value(study.inputs[i], u));
     }
     levels.push_back({{"input", study.inputs[i].name}, {"values", std::move(values)}});
   }
@@ -391,16 +395,16 @@ Json grid_json(const Study& study, const StudyResult& result) {
   return {{"levels", std::move(levels)}, {"points", std::move(points)}};
 }
 
-Json one_sided_json(const OneSided& derivative) {
+Json one_sided_json(const study::OneSided& derivative) {
   return {{"left", or_null(derivative.left)}, {"right", or_null(derivative.right)}};
 }
 
-Json local_json(const LocalSensitivity& local) {
+Json local_json(const study::LocalSensitivity& local) {
   Json inputs = Json::array();
-  for (const LocalDerivative& input : local.inputs) {
+  for (const study::LocalDerivative& input : local.inputs) {
     Json parameters = Json::array();
     for (std::size_t j = 0; j < input.parameters.size(); ++j) {
-      const ParameterDerivative& d = input.parameters[j];
+      const study::ParameterDerivative& d = input.parameters[j];
       parameters.push_back({{"parameter", local.parameters[j]},
                             {"unit", local.units[j]},
                             {"lower", one_sided_json(d.lower)},
@@ -413,14 +417,15 @@ Json local_json(const LocalSensitivity& local) {
     inputs.push_back(
         {{"input", input.input}, {"unit", input.unit}, {"value", input.value}, {"parameters", std::move(parameters)}});
   }
-  return {{"warrant", warrant_word(local.warrant)}, {"inputs", std::move(inputs)}, {"notes", local.notes}};
+  return {{"warrant", core::warrant_word(local.warrant)}, {"inputs", std::move(inputs)}, {"notes", local.notes}};
 }
 
 }  // namespace
 
-Json to_json(const StudyFile& file, const StudyResult& result, const std::optional<LocalSensitivity>& local,
-             const std::string& name, const std::string& software) {
-  const Study& study = file.study;
+Json to_json(const StudyFile& file, const study::StudyResult& result,
+             const std::optional<study::LocalSensitivity>& local, const std::string& name,
+             const std::string& software) {
+  const study::Study& study = file.study;
   Json quantities = Json::array();
   for (std::size_t q = 0; q < study.quantities.size(); ++q) {
     Json one = {{"name", study.quantities[q].name}, {"unit", study.quantities[q].unit}};
@@ -436,7 +441,7 @@ Json to_json(const StudyFile& file, const StudyResult& result, const std::option
     quantities.push_back(std::move(one));
   }
   Json without = Json::array();
-  for (const StudyFinding& finding : result.findings) {
+  for (const study::StudyFinding& finding : result.findings) {
     without.push_back({{"sentence", finding.sentence}, {"points", finding.points}});
   }
   Json sources = Json::array();
@@ -463,4 +468,4 @@ Json to_json(const StudyFile& file, const StudyResult& result, const std::option
   return out;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::results

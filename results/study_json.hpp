@@ -17,11 +17,11 @@
 #include <wheelwright/study/local_derivatives.hpp>
 #include <wheelwright/study/study.hpp>
 
-namespace wheelwright {
+namespace wheelwright::results {
 
 /// A study and what it was made of.
 struct StudyFile {
-  Study study;
+  study::Study study;
   std::string text;                              ///< the file as it is
   std::vector<std::filesystem::path> sources{};  ///< scenario, logs and robot file, as far as it names them
   std::vector<std::string> notes{};              ///< what was chosen, for people
@@ -63,8 +63,8 @@ inline constexpr const char* kSensitivitySchema = "wheelwright/sensitivity/1";
 
 /// The study and its result as JSON (results/sensitivity.schema.json). `file` is the study file as it was named. Values
 /// that are not there, and sizes of faults where none is certain, are null.
-[[nodiscard]] Json to_json(const StudyFile& study, const StudyResult& result,
-                           const std::optional<LocalSensitivity>& local, const std::string& file,
+[[nodiscard]] Json to_json(const StudyFile& study, const study::StudyResult& result,
+                           const std::optional<study::LocalSensitivity>& local, const std::string& file,
                            const std::string& software);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::results

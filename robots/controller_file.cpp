@@ -12,7 +12,11 @@
 #include <wheelwright/files/words.hpp>
 #include <wheelwright/files/yaml_place.hpp>
 
-namespace wheelwright {
+namespace wheelwright::robots {
+
+using files::OriginNumber;
+using files::YamlPlace;
+
 namespace {
 
 constexpr std::size_t longest_parameters = std::size_t{1} << 22;
@@ -25,7 +29,7 @@ using Parameters = std::map<std::string, YamlPlace>;
 struct Controller {
   std::string name;
   Parameters parameters;
-  FilePlace place;
+  files::FilePlace place;
 };
 
 struct ParameterWalk {
@@ -61,7 +65,7 @@ struct ParameterWalk {
       return std::find(own.begin(), own.end(), member.first) != own.end();
     });
     if (drive) {
-      Controller found{name, {}, {at.where(), "controller " + shown(name)}};
+      Controller found{name, {}, {at.where(), "controller " + files::shown(name)}};
       flatten(at, "", found.parameters, 0);
       controllers.push_back(std::move(found));
       return;
@@ -71,7 +75,8 @@ struct ParameterWalk {
         find(place, key == "ros__parameters" ? name : key, depth + 1);
       } else if (key == "update_rate") {
         const double rate = place.positive();
-        rates.push_back(fmt::format("control at {:.6g} Hz: {}: update_rate of {}", rate, place.where(), shown(name)));
+        rates.push_back(
+            fmt::format("control at {:.6g} Hz: {}: update_rate of {}", rate, place.where(), files::shown(name)));
       }
     }
   }
@@ -121,7 +126,8 @@ struct ControllerReader {
       for (const YamlPlace& place : places) {
         const std::string name = place.text("the name of a joint");
         if (name.find("$(") != std::string::npos || name.find("${") != std::string::npos) {
-          place.say(fmt::format("{}: {}: is put in by a launch file: expected the name itself", key, shown(name)));
+          place.say(
+              fmt::format("{}: {}: is put in by a launch file: expected the name itself", key, files::shown(name)));
         }
         if (name.empty()) {
           place.fail("the name of a joint");
@@ -194,11 +200,12 @@ DriveFacts parse_ros2_control(std::string_view text, const std::string& file, co
   }
   if (controller.empty() && names.size() > 1) {
     throw InputError(fmt::format("{}: {} controllers of a drive: {}: expected one, or --controller NAME", file,
-                                 names.size(), listed(names)));
+                                 names.size(), core::listed(names)));
   }
   if (wanted == names.end()) {
-    throw InputError(fmt::format("--controller {}: {} has no such controller: expected one of {}{}", shown(controller),
-                                 file, listed(names), did_you_mean(controller, names)));
+    throw InputError(fmt::format("--controller {}: {} has no such controller: expected one of {}{}",
+                                 files::shown(controller), file, core::listed(names),
+                                 files::did_you_mean(controller, names)));
   }
   const Controller& chosen = walk.controllers[static_cast<std::size_t>(wanted - names.begin())];
   DriveFacts out = ControllerReader{chosen}.read();
@@ -207,12 +214,12 @@ DriveFacts parse_ros2_control(std::string_view text, const std::string& file, co
 }
 
 DriveFacts read_ros2_control(const std::filesystem::path& path, const std::string& controller) {
-  return parse_ros2_control(read_bytes(path, longest_parameters), path.string(), controller);
+  return parse_ros2_control(files::read_bytes(path, longest_parameters), path.string(), controller);
 }
 
 namespace {
 
-std::string lower_letters(const XmlPlace& plugin) {
+std::string lower_letters(const files::XmlPlace& plugin) {
   std::string out;
   for (const char c : plugin.attribute("filename").value_or("") + " " + plugin.attribute("name").value_or("")) {
     if (std::isalpha(static_cast<unsigned char>(c)) != 0) {
@@ -223,12 +230,12 @@ std::string lower_letters(const XmlPlace& plugin) {
 }
 
 struct PluginReader {
-  const XmlPlace& plugin;
+  const files::XmlPlace& plugin;
 
   /// The values of the first of `names` that is there.
-  [[nodiscard]] std::vector<XmlPlace> all(const std::vector<std::string>& names) const {
+  [[nodiscard]] std::vector<files::XmlPlace> all(const std::vector<std::string>& names) const {
     for (const std::string& name : names) {
-      if (std::vector<XmlPlace> found = plugin.children(name); !found.empty()) {
+      if (std::vector<files::XmlPlace> found = plugin.children(name); !found.empty()) {
         return found;
       }
     }
@@ -237,7 +244,7 @@ struct PluginReader {
 
   [[nodiscard]] std::vector<std::string> joints(const std::vector<std::string>& names) const {
     std::vector<std::string> out;
-    for (const XmlPlace& place : all(names)) {
+    for (const files::XmlPlace& place : all(names)) {
       if (place.text().empty()) {
         place.fail("is empty: expected the name of a joint");
       }
@@ -247,7 +254,7 @@ struct PluginReader {
   }
 
   [[nodiscard]] std::optional<OriginNumber> number(const std::vector<std::string>& names, double factor = 1.0) const {
-    const std::vector<XmlPlace> found = all(names);
+    const std::vector<files::XmlPlace> found = all(names);
     if (found.empty()) {
       return std::nullopt;
     }
@@ -256,7 +263,7 @@ struct PluginReader {
     }
     const double value = found.front().number();
     if (!(value > 0.0)) {
-      found.front().fail(fmt::format("{}: expected a number > 0", shown(found.front().text())));
+      found.front().fail(fmt::format("{}: expected a number > 0", files::shown(found.front().text())));
     }
     return OriginNumber{factor * value, found.front().place()};
   }
@@ -264,7 +271,7 @@ struct PluginReader {
 
 }  // namespace
 
-std::optional<DriveFacts> read_drive_plugin(const XmlPlace& plugin) {
+std::optional<DriveFacts> read_drive_plugin(const files::XmlPlace& plugin) {
   const std::string who = lower_letters(plugin);
   if (who.find("skidsteer") != std::string::npos || who.find("mecanum") != std::string::npos) {
     plugin.fail("drives more than two wheels: there is no model of such a robot yet; expected a differential drive");
@@ -296,4 +303,4 @@ std::optional<DriveFacts> read_drive_plugin(const XmlPlace& plugin) {
   return out;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::robots

@@ -11,7 +11,7 @@
 #include <wheelwright/files/xml_place.hpp>
 #include <wheelwright/robots/robot_description.hpp>
 
-namespace wheelwright {
+namespace wheelwright::robots {
 
 /// Reads the parameters of a diff_drive_controller from a ros2_control parameter file (YAML; nested or dotted keys;
 /// that of ROS 1 too): wheel_separation and wheel_radius with their multipliers, names of the wheels' joints, limits of
@@ -31,6 +31,6 @@ namespace wheelwright {
 /// (wheel_diameter, max_wheel_torque) and its predecessor (leftJoint, wheelSeparation, ...) write them. Throws
 /// InputError, naming file, line and element, for values that are not numbers > 0, and for plugins that drive more than
 /// two wheels.
-[[nodiscard]] std::optional<DriveFacts> read_drive_plugin(const XmlPlace& plugin);
+[[nodiscard]] std::optional<DriveFacts> read_drive_plugin(const files::XmlPlace& plugin);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::robots

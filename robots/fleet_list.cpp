@@ -18,7 +18,7 @@
 #include <wheelwright/files/number.hpp>
 #include <wheelwright/files/words.hpp>
 
-namespace wheelwright {
+namespace wheelwright::robots {
 namespace {
 
 namespace fs = std::filesystem;
@@ -75,7 +75,7 @@ std::map<std::string, std::size_t> columns_of(const std::vector<std::string>& he
       throw InputError(
           fmt::format("{}: unknown column {}: expected a header with robot,log and any of when, robot_file, "
                       "role{}",
-                      where, shown(header[c]), did_you_mean(header[c], kColumns)));
+                      where, files::shown(header[c]), files::did_you_mean(header[c], kColumns)));
     }
     if (!at.emplace(header[c], c).second) {
       throw InputError(where + ": the column " + header[c] + " stands twice");
@@ -96,10 +96,10 @@ std::optional<double> when_of(const std::string& text, const std::string& where)
   if (const auto date = days_of_date(text)) {
     return date;
   }
-  const auto days = to_number(text);
+  const auto days = files::to_number(text);
   if (!days || !(*days > -1e9 && *days < 1e9)) {
     throw InputError(
-        fmt::format("{}: when: {}: expected a date like 2026-03-01 or a number of days", where, shown(text)));
+        fmt::format("{}: when: {}: expected a date like 2026-03-01 or a number of days", where, files::shown(text)));
   }
   return days;
 }
@@ -119,7 +119,7 @@ FleetListRobot robot_of(const std::string& name, std::vector<ListRow> rows) {
   for (ListRow& row : rows) {
     if (!row.robot_file.empty() && !robot.robot_file.empty() && robot.robot_file != row.robot_file) {
       robot.findings.push_back(fmt::format("line {}: robot_file {}: the robot has {} already, which is used", row.line,
-                                           shown(row.robot_file), robot.robot_file.string()));
+                                           files::shown(row.robot_file), robot.robot_file.string()));
     } else if (!row.robot_file.empty()) {
       robot.robot_file = row.robot_file;
     }
@@ -152,7 +152,7 @@ FleetListRobot robot_of(const std::string& name, std::vector<ListRow> rows) {
 }
 
 std::vector<FleetListRobot> read_list(const fs::path& path) {
-  LineReader lines(open_bytes(path), path.string());
+  files::LineReader lines(files::open_bytes(path), path.string());
   std::string_view line;
   std::map<std::string, std::size_t> column;
   std::vector<std::string> header, order;
@@ -181,8 +181,8 @@ std::vector<FleetListRobot> read_list(const fs::path& path) {
       throw InputError(where + (name.empty() ? ": robot" : ": log") + " is empty: expected a name");
     }
     if (!role.empty() && role != "commission" && role != "check") {
-      throw InputError(where + ": role: " + shown(role) + ": expected commission or check" +
-                       did_you_mean(role, {"commission", "check"}));
+      throw InputError(where + ": role: " + files::shown(role) + ": expected commission or check" +
+                       files::did_you_mean(role, {"commission", "check"}));
     }
     const std::string file = field("robot_file");
     if (!rows.contains(name)) {
@@ -220,7 +220,7 @@ std::vector<fs::path> entries_of(const fs::path& directory) {
     }
   }
   std::ranges::sort(entries, [](const fs::path& a, const fs::path& b) {
-    return natural_less(a.filename().string(), b.filename().string());
+    return core::natural_less(a.filename().string(), b.filename().string());
   });
   return entries;
 }
@@ -334,7 +334,7 @@ std::vector<FleetListRobot> read_fleet(const std::filesystem::path& path) {
 std::string key_of(const FleetListRobot& robot) {
   std::string key = robot.name;
   const auto take = [&](const char* role, const FleetListLog& log) {
-    key += fmt::format("\n{} {} at {}: {}", role, log.path.string(), number_text(log.when), state_of(log.path));
+    key += fmt::format("\n{} {} at {}: {}", role, log.path.string(), files::number_text(log.when), state_of(log.path));
   };
   if (!robot.robot_file.empty()) {
     key += fmt::format("\nrobot file {}: {}", robot.robot_file.string(), state_of(robot.robot_file));
@@ -352,4 +352,4 @@ std::string key_of(const FleetListRobot& robot) {
   return key;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::robots

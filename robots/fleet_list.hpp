@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-namespace wheelwright {
+namespace wheelwright::robots {
 
 /// A log of a fleet.
 struct FleetListLog {
@@ -51,4 +51,4 @@ struct FleetListRobot {
 /// Days from 1970-01-01 to a date of the Gregorian calendar, "2026-03-01" or "20260301"; nothing for what is none.
 [[nodiscard]] std::optional<double> days_of_date(std::string_view text);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::robots

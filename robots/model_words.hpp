@@ -8,20 +8,23 @@
 #include <wheelwright/filter/measurement.hpp>
 #include <wheelwright/filter/noise.hpp>
 
-namespace wheelwright {
+namespace wheelwright::robots {
 
-inline constexpr Words<Warrant, 3> kWarrantWords{{{Warrant::guaranteed, warrant_word(Warrant::guaranteed)},
-                                                  {Warrant::extrapolated, warrant_word(Warrant::extrapolated)},
-                                                  {Warrant::statistical, warrant_word(Warrant::statistical)}}};
-inline constexpr Words<AssumptionVerdict, 3> kVerdictWords{{{AssumptionVerdict::holds, "holds"},
-                                                            {AssumptionVerdict::not_tested, "not_tested"},
-                                                            {AssumptionVerdict::fails, "fails"}}};
-inline constexpr Words<NoiseOrigin, 2> kNoiseOriginWords{
-    {{NoiseOrigin::declared, "declared"}, {NoiseOrigin::estimated, "estimated"}}};
-inline constexpr Words<NoiseMode, 2> kNoiseModeWords{
-    {{NoiseMode::worst_case, "worst_case"}, {NoiseMode::statistical, "statistical"}}};
-inline constexpr Words<MotionKind, 3> kMotionWords{
+inline constexpr files::Words<core::Warrant, 3> kWarrantWords{
+    {{core::Warrant::guaranteed, core::warrant_word(core::Warrant::guaranteed)},
+     {core::Warrant::extrapolated, core::warrant_word(core::Warrant::extrapolated)},
+     {core::Warrant::statistical, core::warrant_word(core::Warrant::statistical)}}};
+inline constexpr files::Words<core::AssumptionVerdict, 3> kVerdictWords{
+    {{core::AssumptionVerdict::holds, "holds"},
+     {core::AssumptionVerdict::not_tested, "not_tested"},
+     {core::AssumptionVerdict::fails, "fails"}}};
+inline constexpr files::Words<core::NoiseOrigin, 2> kNoiseOriginWords{
+    {{core::NoiseOrigin::declared, "declared"}, {core::NoiseOrigin::estimated, "estimated"}}};
+inline constexpr files::Words<filter::NoiseMode, 2> kNoiseModeWords{
+    {{filter::NoiseMode::worst_case, "worst_case"}, {filter::NoiseMode::statistical, "statistical"}}};
+inline constexpr files::Words<MotionKind, 3> kMotionWords{
     {{MotionKind::angle, "angle"}, {MotionKind::mean_speed, "mean_speed"}, {MotionKind::speed, "speed"}}};
-inline constexpr Words<Hold, 2> kHoldWords{{{Hold::zero_order, "zero_order"}, {Hold::first_order, "first_order"}}};
+inline constexpr files::Words<Hold, 2> kHoldWords{
+    {{Hold::zero_order, "zero_order"}, {Hold::first_order, "first_order"}}};
 
-}  // namespace wheelwright
+}  // namespace wheelwright::robots

@@ -12,17 +12,22 @@
 #include <wheelwright/robots/model_words.hpp>
 #include <wheelwright/robots/robot_file.hpp>
 
-namespace wheelwright {
+namespace wheelwright::robots {
+
+using core::Warrant;
+using files::JsonPlace;
+using files::vector_at;
+
 namespace {
 
 /// What bounds motion and efforts between samples; null where nothing does.
-void read_between_samples(const JsonPlace& place, const Model& model, SignalErrors& errors) {
+void read_between_samples(const JsonPlace& place, const Model& model, filter::SignalErrors& errors) {
   const JsonPlace between = place.at("between_samples");
   if (between.value().is_null()) {
     return;
   }
   errors.between_samples = true;
-  MotionBound& bound = errors.motion;
+  filter::MotionBound& bound = errors.motion;
   bound.limit = vector_at(between.at("acceleration"));
   bound.largest = vector_at(between.at("largest"));
   bound.effort = vector_at(between.at("effort"), model.n());
@@ -46,8 +51,8 @@ void read_between_samples(const JsonPlace& place, const Model& model, SignalErro
   }
 }
 
-SignalErrors read_errors(const JsonPlace& place, const Model& model) {
-  SignalErrors errors = motion_errors_at(place, model);
+filter::SignalErrors read_errors(const JsonPlace& place, const Model& model) {
+  filter::SignalErrors errors = motion_errors_at(place, model);
   errors.output = vector_at(place.at("output"), model.n());
   return errors;
 }
@@ -60,9 +65,9 @@ double bound_at(const JsonPlace& place) {
   return value;
 }
 
-OdometryMeasurement read_odometry(const JsonPlace& place) {
-  OdometryMeasurement m;
-  m.motion = value_of(kMotionWords, place.at("motion"));
+filter::OdometryMeasurement read_odometry(const JsonPlace& place) {
+  filter::OdometryMeasurement m;
+  m.motion = files::value_of(kMotionWords, place.at("motion"));
   m.motion_columns = place.at("motion_columns").texts();
   m.position = place.at("position").boolean();
   m.heading = place.at("heading").boolean();
@@ -82,11 +87,11 @@ Warrant kinematic_warrant(const JsonPlace& place) {
 }  // namespace
 
 Warrant warrant_at(const JsonPlace& place, Warrant absent) {
-  return place.has("warrant") ? value_of(kWarrantWords, place.at("warrant")) : absent;
+  return place.has("warrant") ? files::value_of(kWarrantWords, place.at("warrant")) : absent;
 }
 
-std::vector<Assumption> assumptions_at(const JsonPlace& place) {
-  std::vector<Assumption> list;
+std::vector<core::Assumption> assumptions_at(const JsonPlace& place) {
+  std::vector<core::Assumption> list;
   if (!place.has("assumptions")) {
     return list;
   }
@@ -97,7 +102,7 @@ std::vector<Assumption> assumptions_at(const JsonPlace& place) {
                     .statement = each.at("statement").text(),
                     .declared_by = each.at("declared_by").text(),
                     .test = each.at("test").text(),
-                    .verdict = value_of(kVerdictWords, each.at("verdict")),
+                    .verdict = files::value_of(kVerdictWords, each.at("verdict")),
                     .detail = each.at("detail").text()});
   }
   return list;
@@ -109,7 +114,7 @@ FilterDesign filter_at(const JsonPlace& place) {
                       .beta = place.at("beta").number(),
                       .settle = place.at("settle").number()};
   try {
-    validate(filter);
+    filter::validate(filter);
   } catch (const InvalidArgument& error) {
     throw InputError(place.where() + ": " + error.what());
   }
@@ -118,30 +123,30 @@ FilterDesign filter_at(const JsonPlace& place) {
 
 Measurement measurement_at(const JsonPlace& place, const Model& model, const Robot& robot) {
   Measurement m;
-  m.motion = value_of(kMotionWords, place.at("motion"));
+  m.motion = files::value_of(kMotionWords, place.at("motion"));
   m.motion_columns = place.at("motion_columns").texts();
   m.effort_columns = place.at("effort_columns").texts();
   m.heading_column = place.at("heading_column").text();
-  m.hold = value_of(kHoldWords, place.at("hold"));
+  m.hold = files::value_of(kHoldWords, place.at("hold"));
   m.effort_unsigned = place.at("effort_unsigned").boolean();
   m.count = place.at("count").number();
   m.nominal_step = place.at("nominal_step").number();
   m.shortest_step = place.at("shortest_step").number();
   m.changes = robot.effort_changes;
   m.delay = robot.effort_delay;
-  m.correction = effort_correction(robot);
+  m.correction = filter::effort_correction(robot);
   if (m.motion_columns.size() != model.joints.size() || m.effort_columns.size() != model.joints.size()) {
     place.fail("one motion column and one effort column for each joint of the model");
   }
   return m;
 }
 
-SignalErrors motion_errors_at(const JsonPlace& place, const Model& model) {
+filter::SignalErrors motion_errors_at(const JsonPlace& place, const Model& model) {
   const auto optional_vector = [&](std::string_view key) {
     const Eigen::VectorXd values = vector_at(place.at(key));
     return values.size() == 0 ? values : vector_at(place.at(key), model.coordinates.size());
   };
-  SignalErrors errors;
+  filter::SignalErrors errors;
   errors.acceleration = optional_vector("acceleration");
   errors.speed = optional_vector("speed");
   errors.speed_sample = optional_vector("speed_sample");
@@ -151,10 +156,10 @@ SignalErrors motion_errors_at(const JsonPlace& place, const Model& model) {
   return errors;
 }
 
-std::vector<HalfSpace> facets_at(const JsonPlace& place, std::size_t p) {
+std::vector<bounds::HalfSpace> facets_at(const JsonPlace& place, std::size_t p) {
   const JsonPlace a = place.at("A");
   const Eigen::VectorXd b = vector_at(place.at("b"), a.size());
-  std::vector<HalfSpace> facets;
+  std::vector<bounds::HalfSpace> facets;
   for (std::size_t k = 0; k < a.size(); ++k) {
     facets.push_back({vector_at(a.at(k), p), b[static_cast<Eigen::Index>(k)], {}});
   }
@@ -179,7 +184,7 @@ Box box_at(const JsonPlace& place, std::size_t p) {
 bool all_declared(const JsonPlace& noise) {
   const JsonPlace outputs = noise.at("outputs");
   for (std::size_t i = 0; i < outputs.size(); ++i) {
-    if (value_of(kNoiseOriginWords, outputs.at(i).at("origin")) != NoiseOrigin::declared) {
+    if (files::value_of(kNoiseOriginWords, outputs.at(i).at("origin")) != core::NoiseOrigin::declared) {
       return false;
     }
   }
@@ -190,7 +195,8 @@ Warrant model_warrant(const JsonPlace& root) {
   if (root.has("warrant") || !root.has("noise")) {
     return warrant_at(root, Warrant::extrapolated);
   }
-  const bool worst_case = value_of(kNoiseModeWords, root.at("noise").at("mode")) == NoiseMode::worst_case;
+  const bool worst_case =
+      files::value_of(kNoiseModeWords, root.at("noise").at("mode")) == filter::NoiseMode::worst_case;
   return !all_declared(root.at("noise")) ? Warrant::extrapolated
          : worst_case                    ? Warrant::guaranteed
                                          : Warrant::statistical;
@@ -205,11 +211,11 @@ JsonPlace model_root(const Json& json, const std::string& file) {
   return root;
 }
 
-std::optional<KinematicModel> kinematic_from_json(const JsonPlace& place) {
+std::optional<detector::KinematicModel> kinematic_from_json(const JsonPlace& place) {
   if (!place.has("detector")) {
     return std::nullopt;
   }
-  KinematicModel model;
+  detector::KinematicModel model;
   model.measurement = read_odometry(place.at("measurement"));
   model.window = place.at("window").number();
   model.warrant = kinematic_warrant(place);
@@ -226,7 +232,7 @@ std::optional<KinematicModel> kinematic_from_json(const JsonPlace& place) {
   model.facets = facets_at(set, p);
   model.box = box_at(set.at("hull"), p);
   try {
-    static_cast<void>(make_filter(model));
+    static_cast<void>(detector::make_filter(model));
   } catch (const InvalidArgument& error) {
     throw InputError(place.where() + ": " + error.what());
   }
@@ -240,7 +246,7 @@ OnlineModel model_from_json(const Json& json, const std::string& file) {
   }
   OnlineModel model;
   model.robot = robot_from_json(root.at("robot").value(), root.at("robot").where());
-  model.model = make_model(model.robot);
+  model.model = model::make_model(model.robot);
   const std::size_t p = model.model.p();
   model.filter = filter_at(root.at("filter"));
   model.measurement = measurement_at(root.at("measurement"), model.model, model.robot);
@@ -258,6 +264,8 @@ OnlineModel model_from_json(const Json& json, const std::string& file) {
   return model;
 }
 
-OnlineModel read_model(const std::filesystem::path& path) { return model_from_json(read_json(path), path.string()); }
+OnlineModel read_model(const std::filesystem::path& path) {
+  return model_from_json(files::read_json(path), path.string());
+}
 
-}  // namespace wheelwright
+}  // namespace wheelwright::robots

@@ -12,7 +12,7 @@
 #include <wheelwright/detector/online_model.hpp>
 #include <wheelwright/files/json.hpp>
 
-namespace wheelwright {
+namespace wheelwright::robots {
 
 /// Name of the format: the value of its key `schema`.
 inline constexpr const char* kModelSchema = "wheelwright/model/1";
@@ -27,23 +27,27 @@ inline constexpr const char* kModelSchema = "wheelwright/model/1";
 /// Parts of model.json, for those who read more of it. All throw InputError, naming file and key.
 ///
 /// The document's root, after a look at its schema.
-[[nodiscard]] JsonPlace model_root(const Json& json, const std::string& file);
+[[nodiscard]] files::JsonPlace model_root(const Json& json, const std::string& file);
 /// Warrant of the numbers of a model; for a model file without one, as its noise implies.
-[[nodiscard]] Warrant model_warrant(const JsonPlace& root);
+[[nodiscard]] core::Warrant model_warrant(const files::JsonPlace& root);
 /// The word of the member `warrant` of `place`; `absent` where there is none, as in files from before there was one.
-[[nodiscard]] Warrant warrant_at(const JsonPlace& place, Warrant absent);
+[[nodiscard]] core::Warrant warrant_at(const files::JsonPlace& place, core::Warrant absent);
 /// The list at the member `assumptions` of `place`; empty where there is none.
-[[nodiscard]] std::vector<Assumption> assumptions_at(const JsonPlace& place);
-[[nodiscard]] FilterDesign filter_at(const JsonPlace& place);
-[[nodiscard]] Measurement measurement_at(const JsonPlace& place, const Model& model, const Robot& robot);
+[[nodiscard]] std::vector<core::Assumption> assumptions_at(const files::JsonPlace& place);
+[[nodiscard]] FilterDesign filter_at(const files::JsonPlace& place);
+[[nodiscard]] Measurement measurement_at(const files::JsonPlace& place, const Model& model, const Robot& robot);
 /// Bounds on the motion, those on the effort left out.
-[[nodiscard]] SignalErrors motion_errors_at(const JsonPlace& place, const Model& model);
+[[nodiscard]] filter::SignalErrors motion_errors_at(const files::JsonPlace& place, const Model& model);
 /// The members A and b.
-[[nodiscard]] std::vector<HalfSpace> facets_at(const JsonPlace& place, std::size_t p);
-[[nodiscard]] Box box_at(const JsonPlace& place, std::size_t p);
+[[nodiscard]] std::vector<bounds::HalfSpace> facets_at(const files::JsonPlace& place, std::size_t p);
+[[nodiscard]] Box box_at(const files::JsonPlace& place, std::size_t p);
 /// The channel in the section `kinematic`; nothing where it holds no model.
-[[nodiscard]] std::optional<KinematicModel> kinematic_from_json(const JsonPlace& place);
+[[nodiscard]] std::optional<detector::KinematicModel> kinematic_from_json(const files::JsonPlace& place);
 /// True if each of the `outputs` of an object `noise` has the origin "declared", and there is one.
-[[nodiscard]] bool all_declared(const JsonPlace& noise);
+[[nodiscard]] bool all_declared(const files::JsonPlace& noise);
 
+}  // namespace wheelwright::robots
+
+namespace wheelwright {
+using robots::read_model;
 }  // namespace wheelwright

@@ -8,7 +8,7 @@
 
 #include <wheelwright/model/robot.hpp>
 
-namespace wheelwright {
+namespace wheelwright::robots {
 
 /// Columns that a robot of this model can use, so that a defect elsewhere in a file does no harm.
 [[nodiscard]] std::vector<std::string> useful_columns(const Robot& robot);
@@ -16,4 +16,4 @@ namespace wheelwright {
 /// Columns that commissioning needs, as require_columns() takes them: each joint's effort, and its speed or angle.
 [[nodiscard]] std::vector<std::string> needed_columns(const Robot& robot);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::robots

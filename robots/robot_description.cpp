@@ -12,7 +12,10 @@
 #include <wheelwright/files/xml_place.hpp>
 #include <wheelwright/robots/controller_file.hpp>
 
-namespace wheelwright {
+namespace wheelwright::robots {
+
+using files::XmlPlace;
+
 namespace {
 
 constexpr double rounding = 1e-3;  // of the largest moment: files are written with three digits
@@ -25,7 +28,7 @@ auto* named(Items& items, const std::string& name) {
 
 template <typename Items>
 void require_unique(const Items& items) {
-  std::map<std::string, const FilePlace*> seen;
+  std::map<std::string, const files::FilePlace*> seen;
   for (const auto& item : items) {
     const auto [before, fresh] = seen.emplace(item.name, &item.place);
     if (!fresh) {
@@ -82,13 +85,13 @@ void require_tree(const RobotTree& tree) {
   for (const TreeJoint& joint : tree.joints) {
     for (const std::string& link : {joint.parent, joint.child}) {
       if (!above.contains(link)) {
-        joint.place.fail(fmt::format("there is no link {}{}", shown(link), did_you_mean(link, names)));
+        joint.place.fail(fmt::format("there is no link {}{}", files::shown(link), files::did_you_mean(link, names)));
       }
     }
     const TreeJoint*& parent = above[joint.child];
     if (parent != nullptr) {
-      joint.place.fail(
-          fmt::format("its child {} is that of {} too: expected a tree", shown(joint.child), parent->place.text()));
+      joint.place.fail(fmt::format("its child {} is that of {} too: expected a tree", files::shown(joint.child),
+                                   parent->place.text()));
     }
     parent = &joint;
   }
@@ -105,7 +108,8 @@ void require_tree(const RobotTree& tree) {
     if (root.empty()) {
       root = top;
     } else if (top != root) {
-      link.place.fail(fmt::format("hangs on {}, and other links on {}: expected one tree", shown(top), shown(root)));
+      link.place.fail(
+          fmt::format("hangs on {}, and other links on {}: expected one tree", files::shown(top), files::shown(root)));
     }
   }
 }
@@ -224,17 +228,17 @@ struct UrdfReader {
     return out;
   }
 
-  static std::optional<OriginNumber> number(const std::optional<XmlPlace>& element, const std::string& name) {
+  static std::optional<files::OriginNumber> number(const std::optional<XmlPlace>& element, const std::string& name) {
     if (!element || !element->attribute(name)) {
       return std::nullopt;
     }
     const double value = element->number(name);
     if (!(value >= 0.0)) {
-      element->fail(fmt::format("{} {}: expected a number >= 0", name, shown(*element->attribute(name))));
+      element->fail(fmt::format("{} {}: expected a number >= 0", name, files::shown(*element->attribute(name))));
     }
-    FilePlace place = element->place();
+    files::FilePlace place = element->place();
     place.element = name + " in " + place.element;
-    return OriginNumber{value, place};
+    return files::OriginNumber{value, place};
   }
 
   TreeJoint joint(const XmlPlace& element) {
@@ -289,7 +293,7 @@ struct UrdfReader {
         if (!(value != 0.0)) {
           at->fail("0: expected motor turns per turn of the joint");
         }
-        out.reduction = OriginNumber{std::abs(value), at->place()};
+        out.reduction = files::OriginNumber{std::abs(value), at->place()};
       }
     }
   }
@@ -302,9 +306,9 @@ struct UrdfReader {
         if (std::find(counts.begin(), counts.end(), param.attribute("name").value_or("")) != counts.end()) {
           const double value = param.number();
           if (!(value > 0.0)) {
-            param.fail(shown(param.text()) + ": expected counts of the encoder per turn, > 0");
+            param.fail(files::shown(param.text()) + ": expected counts of the encoder per turn, > 0");
           }
-          tree.encoder_counts = OriginNumber{value, param.place()};
+          tree.encoder_counts = files::OriginNumber{value, param.place()};
         }
       }
     }
@@ -361,7 +365,7 @@ RobotTree parse_urdf(std::string_view text, const std::string& file) {
 }
 
 RobotTree read_urdf(const std::filesystem::path& path) {
-  return parse_urdf(read_bytes(path, longest_urdf), path.string());
+  return parse_urdf(files::read_bytes(path, longest_urdf), path.string());
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::robots

@@ -15,14 +15,14 @@
 #include <wheelwright/files/xml_place.hpp>
 #include <wheelwright/files/yaml_place.hpp>
 
-namespace wheelwright {
+namespace wheelwright::robots {
 
 /// Mass of a link and how it is spread.
 struct TreeInertial {
   double mass = 0.0;                                 ///< kg
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< of mass, m, in the robot's frame
   Eigen::Matrix3d tensor = Eigen::Matrix3d::Zero();  ///< about the centre of mass, kg·m², in the robot's axes
-  FilePlace place;                                   ///< of the inertial
+  files::FilePlace place;                            ///< of the inertial
 };
 
 /// A collision or visual shape of a link.
@@ -32,7 +32,7 @@ struct TreeShape {
   double radius = 0.0;                               ///< m; cylinder and sphere
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< m, in the robot's frame
   Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();   ///< of a cylinder, in the robot's frame
-  FilePlace place;                                   ///< of the <cylinder>, <mesh>, ...
+  files::FilePlace place;                            ///< of the <cylinder>, <mesh>, ...
 };
 
 /// A body.
@@ -40,7 +40,7 @@ struct TreeLink {
   std::string name;
   std::optional<TreeInertial> inertial;
   std::vector<TreeShape> shapes;
-  FilePlace place;
+  files::FilePlace place;
 };
 
 /// A joint; all joints stand at their zero position.
@@ -51,34 +51,34 @@ struct TreeJoint {
   std::string child;                                 ///< name of a link
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< m, in the robot's frame
   Eigen::Vector3d axis = Eigen::Vector3d::UnitX();   ///< unit, in the robot's frame
-  std::optional<OriginNumber> damping;               ///< N·m·s/rad
-  std::optional<OriginNumber> friction;              ///< dry, N·m
-  std::optional<OriginNumber> effort;                ///< limit, N·m
-  std::optional<OriginNumber> velocity;              ///< limit, rad/s
-  FilePlace place;
+  std::optional<files::OriginNumber> damping;        ///< N·m·s/rad
+  std::optional<files::OriginNumber> friction;       ///< dry, N·m
+  std::optional<files::OriginNumber> effort;         ///< limit, N·m
+  std::optional<files::OriginNumber> velocity;       ///< limit, rad/s
+  files::FilePlace place;
 };
 
 /// Data of a differential drive from a simulator's plugin or a controller's parameters.
 struct DriveFacts {
-  std::vector<std::string> left, right;          ///< names of joints
-  std::optional<OriginNumber> wheel_radius;      ///< m
-  std::optional<OriginNumber> track_width;       ///< m
-  std::optional<OriginNumber> speed;             ///< limit of |v1|, m/s
-  std::optional<OriginNumber> yaw_rate;          ///< limit of |v2|, rad/s
-  std::optional<OriginNumber> acceleration;      ///< limit of |v̇1|, m/s²
-  std::optional<OriginNumber> yaw_acceleration;  ///< limit of |v̇2|, rad/s²
-  std::optional<OriginNumber> wheel_effort;      ///< limit, N·m
-  std::vector<std::string> remarks;              ///< what a reader of the robot file may want to know, with its place
-  FilePlace place;
+  std::vector<std::string> left, right;                 ///< names of joints
+  std::optional<files::OriginNumber> wheel_radius;      ///< m
+  std::optional<files::OriginNumber> track_width;       ///< m
+  std::optional<files::OriginNumber> speed;             ///< limit of |v1|, m/s
+  std::optional<files::OriginNumber> yaw_rate;          ///< limit of |v2|, rad/s
+  std::optional<files::OriginNumber> acceleration;      ///< limit of |v̇1|, m/s²
+  std::optional<files::OriginNumber> yaw_acceleration;  ///< limit of |v̇2|, rad/s²
+  std::optional<files::OriginNumber> wheel_effort;      ///< limit, N·m
+  std::vector<std::string> remarks;  ///< what a reader of the robot file may want to know, with its place
+  files::FilePlace place;
 };
 
 /// Data of a joint from a <ros2_control> or <transmission> element.
 struct JointInterfaces {
   std::string joint;
-  std::vector<std::string> commands;      ///< "velocity", "effort", ...
-  std::vector<std::string> states;        ///< what is measured
-  std::optional<OriginNumber> reduction;  ///< motor turns per turn of the joint
-  FilePlace place;
+  std::vector<std::string> commands;             ///< "velocity", "effort", ...
+  std::vector<std::string> states;               ///< what is measured
+  std::optional<files::OriginNumber> reduction;  ///< motor turns per turn of the joint
+  files::FilePlace place;
 };
 
 /// A robot description in the frame of the root link: x ahead, y to the left, z up, as ROS has it (REP 103).
@@ -88,8 +88,8 @@ struct RobotTree {
   std::vector<TreeJoint> joints;
   std::vector<DriveFacts> plugins;
   std::vector<JointInterfaces> interfaces;
-  std::optional<OriginNumber> encoder_counts;  ///< per turn, of a <ros2_control> hardware parameter
-  FilePlace place;                             ///< of the <robot> or <model>
+  std::optional<files::OriginNumber> encoder_counts;  ///< per turn, of a <ros2_control> hardware parameter
+  files::FilePlace place;                             ///< of the <robot> or <model>
 
   /// The link called `wanted`; nullptr where there is none.
   [[nodiscard]] const TreeLink* link(const std::string& wanted) const;
@@ -113,8 +113,8 @@ void require_tree(const RobotTree& tree);
 
 /// The shape `body`, a <cylinder>, <sphere>, <mesh>, ... at `at` in the frame of its link. `radius` reads the radius of
 /// a cylinder or sphere. Throws InputError, naming file, line and element, unless that is > 0.
-[[nodiscard]] TreeShape read_shape(const XmlPlace& body, bool collision, const Eigen::Isometry3d& at,
-                                   const std::function<double(const XmlPlace&)>& radius);
+[[nodiscard]] TreeShape read_shape(const files::XmlPlace& body, bool collision, const Eigen::Isometry3d& at,
+                                   const std::function<double(const files::XmlPlace&)>& radius);
 
 /// Takes inertial and shapes of `link` from its own frame into the one in which `frame` is that frame.
 void move(TreeLink& link, const Eigen::Isometry3d& frame);
@@ -130,4 +130,4 @@ void move(TreeLink& link, const Eigen::Isometry3d& frame);
 /// The same from text; `file` is for messages.
 [[nodiscard]] RobotTree parse_urdf(std::string_view text, const std::string& file);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::robots

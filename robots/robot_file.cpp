@@ -13,7 +13,10 @@
 #include <wheelwright/files/yaml_place.hpp>
 #include <wheelwright/robots/robot_keys.hpp>
 
-namespace wheelwright {
+namespace wheelwright::robots {
+
+using files::YamlPlace;
+
 namespace {
 
 constexpr std::size_t longest_robot_file = std::size_t{1} << 20;
@@ -114,7 +117,7 @@ struct RobotReader {
       }
     } else if (key == "parameters") {
       robot.parameters.emplace();
-      for (const YamlPlace& element : place.elements("a list of " + listed(physical))) {
+      for (const YamlPlace& element : place.elements("a list of " + core::listed(physical))) {
         const std::string name = physical[element.choice(physical)];
         if (std::find(robot.parameters->begin(), robot.parameters->end(), name) != robot.parameters->end()) {
           element.fail("each name once");
@@ -122,7 +125,7 @@ struct RobotReader {
         robot.parameters->push_back(name);
       }
       if (robot.parameters->empty()) {
-        place.fail("at least one of " + listed(physical));
+        place.fail("at least one of " + core::listed(physical));
       }
     } else if (key == "kinematic") {
       for (const auto& [name, value] : place.members({"window"})) {
@@ -140,7 +143,7 @@ struct RobotReader {
   }
 
   void read_motor(const YamlPlace& place) {
-    Motor motor;
+    model::Motor motor;
     for (const auto& [name, value] : place.members({"torque_constant", "resistance", "back_emf", "gear_ratio"})) {
       const double number = value.positive();
       if (name == "torque_constant") {
@@ -160,11 +163,11 @@ struct RobotReader {
     if (key == "effort") {
       for (const auto& [name, value] : place.members({"kind", "hold", "unsigned", "changes", "delay"})) {
         if (name == "kind") {
-          robot.effort = static_cast<EffortKind>(value.choice({"torque", "current", "voltage"}));
+          robot.effort = static_cast<model::EffortKind>(value.choice({"torque", "current", "voltage"}));
         } else if (name == "hold") {
           robot.hold = static_cast<Hold>(value.choice({"zero_order", "first_order"}));
         } else if (name == "changes") {
-          robot.effort_changes = static_cast<EffortChanges>(value.choice({"between", "at_samples"}));
+          robot.effort_changes = static_cast<model::EffortChanges>(value.choice({"between", "at_samples"}));
         } else if (name == "delay") {
           robot.effort_delay = delay(value);
         } else {
@@ -178,7 +181,7 @@ struct RobotReader {
     } else if (key == "encoder_counts_per_turn") {
       robot.encoder_counts_per_turn = place.positive();
     } else if (key == "speed_source") {
-      robot.speed_source = static_cast<SpeedSource>(place.choice({"auto", "encoder_difference", "measured"}));
+      robot.speed_source = static_cast<model::SpeedSource>(place.choice({"auto", "encoder_difference", "measured"}));
     }
   }
 
@@ -208,11 +211,11 @@ struct RobotReader {
       return;
     }
     for (const auto& [name, value] : place.members({"wheel_speed", "wheel_angle", "effort", "position", "heading"})) {
-      NoiseBound& bound = name == "wheel_speed"   ? robot.noise.wheel_speed
-                          : name == "wheel_angle" ? robot.noise.wheel_angle
-                          : name == "effort"      ? robot.noise.effort
-                          : name == "position"    ? robot.noise.position
-                                                  : robot.noise.heading;
+      model::NoiseBound& bound = name == "wheel_speed"   ? robot.noise.wheel_speed
+                                 : name == "wheel_angle" ? robot.noise.wheel_angle
+                                 : name == "effort"      ? robot.noise.effort
+                                 : name == "position"    ? robot.noise.position
+                                                         : robot.noise.heading;
       if (!(value.is_scalar() && value.text() == "estimate")) {
         bound.value = value.number("a bound >= 0, or estimate", [](double number) { return number >= 0.0; });
       }
@@ -259,19 +262,19 @@ Robot read_from(const YamlPlace& root) {
 Robot parse_robot(std::string_view text, const std::string& file) { return read_from(YamlPlace::parse(text, file)); }
 
 Robot read_robot(const std::filesystem::path& path) {
-  return parse_robot(read_bytes(path, longest_robot_file), path.string());
+  return parse_robot(files::read_bytes(path, longest_robot_file), path.string());
 }
 
 Robot robot_from_json(const Json& object, const std::string& where) {
   // JSON is YAML: one reader, one set of rules.
-  return read_from(YamlPlace::parse(json_text(object), where, false));
+  return read_from(YamlPlace::parse(files::json_text(object), where, false));
 }
 
 namespace {
 
-Json noise_bound(const NoiseBound& bound) { return bound.value ? Json(*bound.value) : Json("estimate"); }
+Json noise_bound(const model::NoiseBound& bound) { return bound.value ? Json(*bound.value) : Json("estimate"); }
 
-Json noise_of(const SensorNoise& noise) {
+Json noise_of(const model::SensorNoise& noise) {
   return {{"wheel_speed", noise_bound(noise.wheel_speed)},
           {"wheel_angle", noise_bound(noise.wheel_angle)},
           {"effort", noise_bound(noise.effort)},
@@ -279,7 +282,7 @@ Json noise_of(const SensorNoise& noise) {
           {"heading", noise_bound(noise.heading)}};
 }
 
-Json filter_of(const FilterWish& filter) {
+Json filter_of(const model::FilterWish& filter) {
   Json out = Json::object();
   if (filter.order) {
     out["order"] = *filter.order;
@@ -293,7 +296,7 @@ Json filter_of(const FilterWish& filter) {
   return out.empty() ? Json("auto") : out;
 }
 
-Json motor_of(const Motor& motor) {
+Json motor_of(const model::Motor& motor) {
   Json out = {{"gear_ratio", motor.gear_ratio}};
   if (motor.torque_constant) {
     out["torque_constant"] = *motor.torque_constant;
@@ -307,9 +310,9 @@ Json motor_of(const Motor& motor) {
   return out;
 }
 
-Json effects_of(const std::vector<RobotEffect>& effects) {
+Json effects_of(const std::vector<model::RobotEffect>& effects) {
   Json out = Json::array();
-  for (const RobotEffect& effect : effects) {
+  for (const model::RobotEffect& effect : effects) {
     Json entry = {{"effect", effect.name}};
     for (const auto& [name, known] : effect.parameters) {
       entry[name] = known.lower == known.upper ? Json(known.lower) : Json::array({known.lower, known.upper});
@@ -320,7 +323,9 @@ Json effects_of(const std::vector<RobotEffect>& effects) {
 }
 
 /// A key of a YAML file and its value: JSON on one line is YAML's flow style.
-std::string yaml_line(const std::string& key, const Json& value) { return key + ": " + json_text(value, -1) + "\n"; }
+std::string yaml_line(const std::string& key, const Json& value) {
+  return key + ": " + files::json_text(value, -1) + "\n";
+}
 
 }  // namespace
 
@@ -383,6 +388,8 @@ std::string robot_yaml(const Robot& robot) {
   return text;
 }
 
-void write_robot(const std::filesystem::path& path, const Robot& robot) { atomic_write(path, robot_yaml(robot)); }
+void write_robot(const std::filesystem::path& path, const Robot& robot) {
+  files::atomic_write(path, robot_yaml(robot));
+}
 
-}  // namespace wheelwright
+}  // namespace wheelwright::robots

@@ -10,7 +10,7 @@
 #include <wheelwright/files/json.hpp>
 #include <wheelwright/model/robot.hpp>
 
-namespace wheelwright {
+namespace wheelwright::robots {
 
 /// Reads a robot file. Its keys, all optional but those that the model needs (wheel_radius and track_width for
 /// differential_drive):
@@ -46,4 +46,8 @@ void write_robot(const std::filesystem::path& path, const Robot& robot);
 /// lines.
 [[nodiscard]] Robot robot_from_json(const Json& object, const std::string& where);
 
+}  // namespace wheelwright::robots
+
+namespace wheelwright {
+using robots::read_robot;
 }  // namespace wheelwright

@@ -11,7 +11,10 @@
 #include <wheelwright/files/words.hpp>
 #include <wheelwright/model/effect_law.hpp>
 
-namespace wheelwright {
+namespace wheelwright::robots {
+
+using model::EffectParameterLaw;
+
 namespace {
 
 // The smallest of the limits that there are.
@@ -59,7 +62,7 @@ void add_limits(RobotWithOrigins& out, const WheelJoints* wheels, const std::vec
     if (facts == nullptr) {
       continue;
     }
-    const auto add = [](std::vector<Limit>& to, const std::optional<OriginNumber>& number, double factor,
+    const auto add = [](std::vector<Limit>& to, const std::optional<files::OriginNumber>& number, double factor,
                         const std::string& how) {
       if (number) {
         to.push_back({factor * number->value, number->place.text() + how});
@@ -71,7 +74,7 @@ void add_limits(RobotWithOrigins& out, const WheelJoints* wheels, const std::vec
     add(acceleration, facts->yaw_acceleration, half / r, " D/(2r)");
     add(effort, facts->wheel_effort, 1.0, "");
   }
-  if (out.robot.effort == EffortKind::torque) {
+  if (out.robot.effort == model::EffortKind::torque) {
     set_limit(out, "effort", std::move(effort));
   } else if (!effort.empty()) {
     out.remarks.push_back("limits.effort: not taken, because it is a torque and efforts are not: " +
@@ -105,8 +108,9 @@ void add_effort(RobotWithOrigins& out, const RobotTree* tree, const WheelJoints*
                                  ": default, because the wheels have no effort interface: the log needs torque, "
                                  "current or voltage from elsewhere";
   }
-  const std::vector<std::pair<std::string, EffortKind>> words = {
-      {"effort", EffortKind::torque}, {"current", EffortKind::current}, {"voltage", EffortKind::voltage}};
+  const std::vector<std::pair<std::string, model::EffortKind>> words = {{"effort", model::EffortKind::torque},
+                                                                        {"current", model::EffortKind::current},
+                                                                        {"voltage", model::EffortKind::voltage}};
   bool found = false;
   for (const auto& [word, kind] : words) {
     const JointInterfaces* state = with(&JointInterfaces::states, word);
@@ -128,7 +132,7 @@ void add_effort(RobotWithOrigins& out, const RobotTree* tree, const WheelJoints*
   out.origins["effort.unsigned"] = "default, because no file tells";
   for (const JointInterfaces* each : of_wheels) {
     if (each->reduction && !robot.motor) {
-      robot.motor = Motor{};
+      robot.motor = model::Motor{};
       robot.motor->gear_ratio = each->reduction->value;
       out.origins["motor.gear_ratio"] = each->reduction->place.text();
     }
@@ -147,13 +151,13 @@ std::string limits_of(const EffectParameterLaw& law) {
   return law.lower == 0.0 ? "a number >= 0" : "a number";
 }
 
-double number(const EffectParameterLaw& law, const YamlPlace& place, const std::string& expected) {
+double number(const EffectParameterLaw& law, const files::YamlPlace& place, const std::string& expected) {
   return place.number(expected, [&](double value) {
     return value >= law.lower && value <= law.upper && (!law.positive || value > 0.0);
   });
 }
 
-Interval value_of(const EffectParameterLaw& law, const std::string& effect, const YamlPlace& place) {
+Interval value_of(const EffectParameterLaw& law, const std::string& effect, const files::YamlPlace& place) {
   const std::string one = limits_of(law) + (law.unit == "1" ? "" : " (" + law.unit + ")");
   if (place.is_scalar()) {
     const bool offset = effect == "sensor_time_offset";
@@ -191,7 +195,7 @@ std::vector<std::string> keys_of(const std::vector<EffectParameterLaw>& paramete
 // Keys of all effects together: with them the name of the effect is found before its own keys are checked.
 std::vector<std::string> all_keys(const Robot& robot) {
   std::vector<std::string> keys = {"effect"};
-  for (const EffectLaw& law : effect_laws()) {
+  for (const model::EffectLaw& law : model::effect_laws()) {
     for (const EffectParameterLaw& parameter : law.parameters_of(robot)) {
       if (std::ranges::find(keys, parameter.name) == keys.end()) {
         keys.push_back(parameter.name);
@@ -201,9 +205,9 @@ std::vector<std::string> all_keys(const Robot& robot) {
   return keys;
 }
 
-RobotEffect read_effect(const YamlPlace& place, const Robot& robot) {
-  RobotEffect effect;
-  const std::vector<std::string> names = effect_names(robot);
+model::RobotEffect read_effect(const files::YamlPlace& place, const Robot& robot) {
+  model::RobotEffect effect;
+  const std::vector<std::string> names = model::effect_names(robot);
   if (place.is_scalar()) {
     place.fail("{effect: NAME, parameter: value, ...}");
   }
@@ -213,9 +217,9 @@ RobotEffect read_effect(const YamlPlace& place, const Robot& robot) {
     }
   }
   if (effect.name.empty()) {
-    place.fail("the key effect, one of " + listed(names));
+    place.fail("the key effect, one of " + core::listed(names));
   }
-  const std::vector<EffectParameterLaw>& known = effect_law(effect.name).parameters_of(robot);
+  const std::vector<EffectParameterLaw>& known = model::effect_law(effect.name).parameters_of(robot);
   for (const auto& [key, value] : place.members(keys_of(known))) {
     if (key != "effect") {
       const auto law = std::ranges::find(known, key, &EffectParameterLaw::name);
@@ -227,17 +231,17 @@ RobotEffect read_effect(const YamlPlace& place, const Robot& robot) {
 
 }  // namespace
 
-void read_effects(const YamlPlace& place, Robot& robot) {
-  for (const YamlPlace& element : place.elements("a list of {effect: NAME, parameter: value, ...}")) {
+void read_effects(const files::YamlPlace& place, Robot& robot) {
+  for (const files::YamlPlace& element : place.elements("a list of {effect: NAME, parameter: value, ...}")) {
     robot.effects.push_back(read_effect(element, robot));
     Robot alone = robot;  // what else can be wrong is said by the model's own rules
-    alone.effort = EffortKind::torque;
+    alone.effort = model::EffortKind::torque;
     try {
-      validate_effects(alone);
+      model::validate_effects(alone);
     } catch (const InvalidArgument& error) {
       element.say(error.what());
     }
   }
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::robots

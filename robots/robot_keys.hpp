@@ -10,7 +10,7 @@
 #include <wheelwright/robots/robot_origin.hpp>
 #include <wheelwright/robots/wheel_geometry.hpp>
 
-namespace wheelwright {
+namespace wheelwright::robots {
 
 /// Sets kind and hold of the efforts, and the gear ratio, from the interfaces of the wheels' joints; the defaults of
 /// the robot file where there are none. `tree` and `wheels` may be nullptr (no description).
@@ -26,6 +26,6 @@ void add_limits(RobotWithOrigins& out, const WheelJoints* wheels, const std::vec
 /// what is known of a parameter that is bounded from a log; every other one takes a single value. Throws InputError,
 /// naming file, line and key, for unknown or repeated effects and parameters (with the nearest name), wrong types and
 /// impossible values.
-void read_effects(const YamlPlace& place, Robot& robot);
+void read_effects(const files::YamlPlace& place, Robot& robot);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::robots

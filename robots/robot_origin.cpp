@@ -12,7 +12,10 @@
 #include <wheelwright/robots/robot_keys.hpp>
 #include <wheelwright/robots/wheel_geometry.hpp>
 
-namespace wheelwright {
+namespace wheelwright::robots {
+
+using files::OriginNumber;
+
 namespace {
 
 constexpr double contradiction = 0.1;    // of the value: two sources that cannot both be meant
@@ -188,10 +191,10 @@ struct Maker {
         fmt::format("{}: {:.6g} kg·m² of {} links about the middle of the axle + (J_R + J_L) D²/(4r²) = {:.6g} kg·m²",
                     tree->place.text(), lump.yaw_inertia, lump.links, robot.nominal["yaw_inertia"] - lump.yaw_inertia);
     if (!lump.massless.empty()) {
-      out.remarks.push_back("links without a mass: " + listed(lump.massless));
+      out.remarks.push_back("links without a mass: " + core::listed(lump.massless));
     }
     if (!lump.moving.empty()) {
-      out.remarks.push_back("joints that may move, taken at zero: " + listed(lump.moving));
+      out.remarks.push_back("joints that may move, taken at zero: " + core::listed(lump.moving));
     }
     offset("com_longitudinal", "a", lump.ahead, "before");
     offset("com_lateral", "b", lump.left, "left of");
@@ -272,7 +275,7 @@ struct Maker {
 RobotWithOrigins robot_from(const RobotTree* description, const DriveFacts* controller, const RobotHints& hints) {
   Maker maker{.tree = description, .controller = controller, .hints = hints};
   maker.make();
-  for (const FilePlace* place :
+  for (const files::FilePlace* place :
        {description != nullptr ? &description->place : nullptr, controller != nullptr ? &controller->place : nullptr}) {
     if (place != nullptr) {
       maker.out.files.push_back(place->where.substr(0, place->where.rfind(':')));
@@ -316,23 +319,23 @@ std::string robot_yaml(const RobotWithOrigins& made) {
     return it == made.origins.end() ? std::string("default") : it->second;
   };
   std::string out =
-      comment("A robot file made of " + listed(made.files) + ". Above each value stands where it came from.", "");
+      comment("A robot file made of " + core::listed(made.files) + ". Above each value stands where it came from.", "");
   const Json object = to_json(made.robot);
   for (const auto& member : object.items()) {
     if (is_group(member.key())) {
       out += member.key() + ":\n";
       for (const auto& inner : member.value().items()) {
         out += comment(origin(member.key() + "." + inner.key()), "  ");
-        out += "  " + inner.key() + ": " + json_text(inner.value(), -1) + "\n";
+        out += "  " + inner.key() + ": " + files::json_text(inner.value(), -1) + "\n";
       }
     } else if (member.key() == "effects") {
       out += "effects:\n";
       for (const Json& effect : member.value()) {
         out += comment(origin("effects." + effect.at("effect").get<std::string>()), "  ");
-        out += "  - " + json_text(effect, -1) + "\n";
+        out += "  - " + files::json_text(effect, -1) + "\n";
       }
     } else {
-      out += comment(origin(member.key()), "") + member.key() + ": " + json_text(member.value(), -1) + "\n";
+      out += comment(origin(member.key()), "") + member.key() + ": " + files::json_text(member.value(), -1) + "\n";
     }
   }
   for (const std::string& remark : made.remarks) {
@@ -341,4 +344,4 @@ std::string robot_yaml(const RobotWithOrigins& made) {
   return out;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::robots

@@ -12,7 +12,7 @@
 #include <wheelwright/model/robot.hpp>
 #include <wheelwright/robots/robot_description.hpp>
 
-namespace wheelwright {
+namespace wheelwright::robots {
 
 /// Facts that the caller knows beside the files.
 struct RobotHints {
@@ -53,4 +53,4 @@ struct RobotWithOrigins {
 /// The text of a robot file with an origin behind every value as a comment. parse_robot makes the same Robot of it.
 [[nodiscard]] std::string robot_yaml(const RobotWithOrigins& robot);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::robots

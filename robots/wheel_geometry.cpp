@@ -9,7 +9,7 @@
 
 #include <wheelwright/files/words.hpp>
 
-namespace wheelwright {
+namespace wheelwright::robots {
 namespace {
 
 constexpr double across = 0.99939;  // cos 2°
@@ -61,12 +61,12 @@ TreeJoint by_name(const RobotTree& tree, const std::string& name, const std::str
     }
   }
   if (found == nullptr) {
-    throw InputError(fmt::format("{}: {} has no joint {}: expected one of {}{}", by, tree.place.text(), shown(name),
-                                 listed(names), did_you_mean(name, names)));
+    throw InputError(fmt::format("{}: {} has no joint {}: expected one of {}{}", by, tree.place.text(),
+                                 files::shown(name), core::listed(names), files::did_you_mean(name, names)));
   }
   if (!turns(*found)) {
     found->place.fail(fmt::format("is {}, and {} calls it a wheel: expected a joint that turns, one of {}",
-                                  shown(found->type), by, listed(names)));
+                                  files::shown(found->type), by, core::listed(names)));
   }
   return *found;
 }
@@ -297,8 +297,8 @@ void require_links(const RobotTree& tree, const std::vector<std::string>& massle
   for (const std::string& name : massless) {
     const TreeLink* link = tree.link(name);
     if (link == nullptr) {
-      throw InputError(fmt::format("--massless {}: {} has no such link{}", shown(name), tree.place.text(),
-                                   did_you_mean(name, names)));
+      throw InputError(fmt::format("--massless {}: {} has no such link{}", files::shown(name), tree.place.text(),
+                                   files::did_you_mean(name, names)));
     }
     if (link->inertial) {
       link->inertial->place.fail("has a mass, and --massless says that it has none: expected one of both");
@@ -361,4 +361,4 @@ LumpedBody lumped_body(const RobotTree& tree, const WheelJoints& wheels, const A
   return out;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::robots

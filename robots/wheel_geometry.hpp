@@ -11,7 +11,7 @@
 
 #include <wheelwright/robots/robot_description.hpp>
 
-namespace wheelwright {
+namespace wheelwright::robots {
 
 /// The joints of the two driven wheels, and why these.
 struct WheelJoints {
@@ -109,4 +109,4 @@ struct LumpedBody {
 [[nodiscard]] LumpedBody lumped_body(const RobotTree& tree, const WheelJoints& wheels, const Axle& axle,
                                      const std::vector<std::string>& massless);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::robots

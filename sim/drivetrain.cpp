@@ -6,7 +6,7 @@
 
 #include <wheelwright/model/effect_law.hpp>
 
-namespace wheelwright {
+namespace wheelwright::sim {
 namespace {
 
 constexpr double longest_piece = 0.5e-3;  // s
@@ -14,9 +14,11 @@ constexpr double motor_share = 0.01;      // of the inertia that a wheel carries
 
 }  // namespace
 
-Drivetrain::Drivetrain(const Robot& robot, const DriveParameters& parameters, bool fine) {
-  const auto value = [&](const char* effect, const char* parameter) { return effect_value(robot, effect, parameter); };
-  if (has_effect(robot, "saturation")) {
+Drivetrain::Drivetrain(const Robot& robot, const model::DriveParameters& parameters, bool fine) {
+  const auto value = [&](const char* effect, const char* parameter) {
+    return model::effect_value(robot, effect, parameter);
+  };
+  if (model::has_effect(robot, "saturation")) {
     limit_ = value("saturation", "tau_max");
   }
   deadzone_ = value("torque_deadzone", "b");
@@ -141,4 +143,4 @@ WheelMemory::Wheels WheelMemory::at(double t) const {
   return {t, a.angle + part * (b.angle - a.angle), a.speed + part * (b.speed - a.speed)};
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::sim

@@ -12,7 +12,7 @@
 #include <wheelwright/model/robot.hpp>
 #include <wheelwright/sim/plant.hpp>
 
-namespace wheelwright {
+namespace wheelwright::sim {
 
 /// The actuators of a simulated robot. In this order: `saturation`, `torque_deadzone`, `torque_gain_asymmetric`,
 /// `battery_sag` (τ (1 − k t − R_b Σ|τ|), not below 0), `delay`, `actuator_lag` (exact), `backlash` (after a reversal
@@ -22,7 +22,7 @@ namespace wheelwright {
 class Drivetrain {
  public:
   /// `parameters` are those of the plant. `fine` asks for pieces of ½ ms even where there is nothing to do.
-  Drivetrain(const Robot& robot, const DriveParameters& parameters, bool fine);
+  Drivetrain(const Robot& robot, const model::DriveParameters& parameters, bool fine);
 
   /// Forgets all torques.
   void reset();
@@ -81,4 +81,4 @@ class WheelMemory {
   std::deque<Wheels> samples_;
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::sim

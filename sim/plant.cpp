@@ -13,7 +13,7 @@
 #include <wheelwright/core/random.hpp>
 #include <wheelwright/model/effect_law.hpp>
 
-namespace wheelwright {
+namespace wheelwright::sim {
 namespace {
 
 // splitmix64 (Steele, Lea and Flood 2014): spreads seed and stream over all 64 bits.
@@ -29,7 +29,7 @@ std::uint64_t mix(std::uint64_t x) {
 Noise::Noise(std::uint64_t seed, std::uint64_t stream, double bound, NoiseShape shape)
     : generator_(mix(mix(seed) ^ stream)), bound_(check::non_negative(bound, "noise bound")), shape_(shape) {}
 
-double Noise::uniform() { return 2.0 * wheelwright::uniform(generator_) - 1.0; }
+double Noise::uniform() { return 2.0 * core::uniform(generator_) - 1.0; }
 
 double Noise::unit() {
   double x = uniform();
@@ -66,22 +66,22 @@ constexpr double largest_slip = 0.2;
 
 double soft_sign(double x, double x0) { return x0 > 0.0 ? std::clamp(x / x0, -1.0, 1.0) : 0.0; }
 
-bool is_force(const RobotEffect& effect) {
-  const EffectLaw& law = effect_law(effect.name);
-  return law.mechanism == EffectMechanism::term || law.mechanism == EffectMechanism::simulation;
+bool is_force(const model::RobotEffect& effect) {
+  const model::EffectLaw& law = model::effect_law(effect.name);
+  return law.mechanism == model::EffectMechanism::term || law.mechanism == model::EffectMechanism::simulation;
 }
 
-using TakeOver = void (*)(DriveEffects& effects, const RobotEffect& effect);
+using TakeOver = void (*)(DriveEffects& effects, const model::RobotEffect& effect);
 
 // 0 where the robot file does not name it.
-double given(const RobotEffect& effect, const char* parameter) {
+double given(const model::RobotEffect& effect, const char* parameter) {
   return effect.parameters.contains(parameter) ? effect.value(parameter) : 0.0;
 }
 
 // The effects that have a formula here.
 const std::map<std::string_view, TakeOver>& own_formulas() {
   using D = DriveEffects;
-  using E = RobotEffect;
+  using E = model::RobotEffect;
   static const std::map<std::string_view, TakeOver> all = {
       {"coulomb", [](D& d, const E& e) { d.coulomb.array() += given(e, "c"); }},
       {"coulomb_asymmetric", [](D& d, const E& e) { d.coulomb += Eigen::Vector2d(given(e, "c_R"), given(e, "c_L")); }},
@@ -128,20 +128,20 @@ const std::map<std::string_view, TakeOver>& own_formulas() {
   return all;
 }
 
-DriveEffects::ByTerms act_by_terms(const Robot& robot, const RobotEffect& effect) {
+DriveEffects::ByTerms act_by_terms(const Robot& robot, const model::RobotEffect& effect) {
   Robot with = robot;
   with.effects = {effect};
   Robot without = robot;
   without.effects.clear();
-  const Model base = make_model(without);
-  DriveEffects::ByTerms out{effect_terms(base, with), {}, {}, inverse(base.input)};
+  const Model base = model::make_model(without);
+  DriveEffects::ByTerms out{model::effect_terms(base, with), {}, {}, core::inverse(base.input)};
   for (const Term& term : out.terms.terms) {
     check::that(term.kind != Term::Kind::acceleration, "effects." + effect.name,
                 "no terms of acceleration, for which the simulator has no formula of this effect");
   }
-  const auto& known = effect_law(effect.name).parameters_of(robot);
-  for (const Parameter& parameter : out.terms.parameters) {
-    const auto law = std::ranges::find(known, parameter.physical, &EffectParameterLaw::physical);
+  const auto& known = model::effect_law(effect.name).parameters_of(robot);
+  for (const model::Parameter& parameter : out.terms.parameters) {
+    const auto law = std::ranges::find(known, parameter.physical, &model::EffectParameterLaw::physical);
     out.sizes.push_back(parameter.per_physical * effect.value(law->name));
     out.times_mass.push_back(law->times_mass);
   }
@@ -156,15 +156,16 @@ Eigen::Vector2d torques_of(const DriveEffects::ByTerms& effect, const Differenti
     const double forward = 0.5 * drive.wheel_radius * (width[0] + width[1]);
     const std::array<double, 2> speed_error{forward, 2.0 * forward / drive.track_width};
     const std::array<double, 2> wheel_error{width[0], width[1]};
-    const MotionState state{.speed = speed,
-                            .speed_error = speed_error,
-                            .joint_speed = wheels,
-                            .joint_error = wheel_error,
-                            .heading = x.heading};
+    const model::MotionState state{.speed = speed,
+                                   .speed_error = speed_error,
+                                   .joint_speed = wheels,
+                                   .joint_error = wheel_error,
+                                   .heading = x.heading};
     Eigen::Vector2d outputs = Eigen::Vector2d::Zero();
     for (const Term& term : effect.terms.terms) {
       const double size = effect.sizes[term.parameter] * (effect.times_mass[term.parameter] ? mass : 1.0);
-      const double value = term.kind == Term::Kind::speed ? speed[term.coordinate] : softened(term.function, state);
+      const double value =
+          term.kind == Term::Kind::speed ? speed[term.coordinate] : model::softened(term.function, state);
       outputs[static_cast<Eigen::Index>(term.output)] += size * term.scale * value;
     }
     return Eigen::Vector2d(effect.wheel_torques * outputs);
@@ -176,19 +177,19 @@ Eigen::Vector2d torques_of(const DriveEffects::ByTerms& effect, const Differenti
 
 DriveEffects::DriveEffects(const Robot& robot) {
   forces = std::ranges::any_of(robot.effects, is_force);
-  const DriveGeometry geometry = drive_geometry(robot);
+  const model::DriveGeometry geometry = model::drive_geometry(robot);
   radius = geometry.radius.array() - robot.wheel_radius;
   track = geometry.track_width - robot.track_width;
-  for (const RobotEffect& effect : robot.effects) {
+  for (const model::RobotEffect& effect : robot.effects) {
     if (const auto own = own_formulas().find(effect.name); own != own_formulas().end()) {
       own->second(*this, effect);
-    } else if (effect_law(effect.name).mechanism == EffectMechanism::term) {
+    } else if (model::effect_law(effect.name).mechanism == model::EffectMechanism::term) {
       by_terms.push_back(act_by_terms(robot, effect));
     }
   }
 }
 
-DryThreshold dry_threshold(const DriveEffects& e, const DifferentialDrive& drive, const DriveParameters& p,
+DryThreshold dry_threshold(const DriveEffects& e, const DifferentialDrive& drive, const model::DriveParameters& p,
                            double step) {
   const double r = drive.wheel_radius, arm = 0.5 * drive.track_width;
   const double mobility = 2.0 * std::max(1.0 / p.mass, arm * arm / p.yaw_inertia) / (r * r);
@@ -198,7 +199,7 @@ DryThreshold dry_threshold(const DriveEffects& e, const DifferentialDrive& drive
           2.0 * step * mobility};
 }
 
-EffectLoad effect_load(const DriveEffects& e, const DifferentialDrive& drive, const DriveParameters& p,
+EffectLoad effect_load(const DriveEffects& e, const DifferentialDrive& drive, const model::DriveParameters& p,
                        const DryThreshold& threshold, const EffectState& x) {
   EffectLoad load;
   const double warm = e.drift * -std::expm1(-x.t / e.drift_time);
@@ -256,19 +257,19 @@ double phi3(double z) {
 
 }  // namespace
 
-Plant::Plant(const DifferentialDrive& drive, const DriveParameters& parameters, std::vector<Fault> faults,
+Plant::Plant(const DifferentialDrive& drive, const model::DriveParameters& parameters, std::vector<model::Fault> faults,
              const DriveEffects& effects)
     : drive_(drive),
       parameters_(parameters),
       faults_(std::move(faults)),
       effects_(effects),
       half_track_(0.5 * (drive.track_width + effects.track)) {
-  validate(parameters_);
-  validate(faults_, drive_);
+  model::validate(parameters_);
+  model::validate(faults_, drive_);
   threshold_ = dry_threshold(effects_, drive_, parameters_, longest_step_of_effects);
-  for (const Fault& fault : faults_) {
-    const TimeProfile& p = fault.profile;
-    const double rise = p.shape == TimeProfile::Shape::step ? 0.0 : p.rise_time;
+  for (const model::Fault& fault : faults_) {
+    const model::TimeProfile& p = fault.profile;
+    const double rise = p.shape == model::TimeProfile::Shape::step ? 0.0 : p.rise_time;
     for (const double t : {p.onset, p.onset + rise, p.end, p.end + rise}) {
       if (std::isfinite(t)) {
         breaks_.push_back(t);
@@ -311,15 +312,15 @@ void Plant::enter_interval() {
            fault_.unmatched == 0.0 && parameters_.viscous_x == parameters_.viscous_y;
 }
 
-FaultState Plant::fault_at(double t) const {
-  FaultState fault = fault_state(faults_, t);
+model::FaultState Plant::fault_at(double t) const {
+  model::FaultState fault = model::fault_state(faults_, t);
   fault.radius += effects_.radius;
   return fault;
 }
 
 Eigen::Vector2d Plant::wheel_speed() const { return wheel_speed(state_, moving_ ? fault_at(t_) : fault_, torque_); }
 
-Eigen::Vector2d Plant::wheel_speed(const DriveState& state, const FaultState& fault,
+Eigen::Vector2d Plant::wheel_speed(const DriveState& state, const model::FaultState& fault,
                                    const Eigen::Vector2d& torque) const {
   const double c = std::cos(state.pose[2]), s = std::sin(state.pose[2]);
   const double rolling = state.forward_speed - (c * fault.slip[0] + s * fault.slip[1] + fault.matched);
@@ -333,8 +334,8 @@ Eigen::Vector2d Plant::wheel_speed(const DriveState& state, const FaultState& fa
   return speed;
 }
 
-Plant::Derivative Plant::derivative(const DriveState& state, const FaultState& fault, const Eigen::Vector2d& torque,
-                                    double t) const {
+Plant::Derivative Plant::derivative(const DriveState& state, const model::FaultState& fault,
+                                    const Eigen::Vector2d& torque, double t) const {
   const double c = std::cos(state.pose[2]), s = std::sin(state.pose[2]);
   const double across = -s * fault.slip[0] + c * fault.slip[1] - fault.unmatched;
   const double x_rate = state.forward_speed * c - across * s, y_rate = state.forward_speed * s + across * c;
@@ -439,10 +440,10 @@ void Plant::runge_kutta(const Eigen::Vector2d& torque, const Eigen::Vector2d& sl
   for (int i = 0; i < steps; ++i) {
     const double s = i * step;
     const auto at = [&](double by) { return moving_ ? fault_at(t_ + s + by) : fault_; };
-    const auto rate = [&](const DriveState& state, const FaultState& fault, double by) {
+    const auto rate = [&](const DriveState& state, const model::FaultState& fault, double by) {
       return derivative(state, fault, torque + (s + by) * slope, t_ + s + by);
     };
-    const FaultState middle = at(0.5 * step);
+    const model::FaultState middle = at(0.5 * step);
     const Derivative k1 = rate(state_, at(0.0), 0.0);
     const Derivative k2 = rate(moved(state_, k1, 0.5 * step), middle, 0.5 * step);
     const Derivative k3 = rate(moved(state_, k2, 0.5 * step), middle, 0.5 * step);
@@ -456,4 +457,4 @@ void Plant::runge_kutta(const Eigen::Vector2d& torque, const Eigen::Vector2d& sl
   }
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::sim

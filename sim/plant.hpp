@@ -16,7 +16,7 @@
 #include <wheelwright/model/faults.hpp>
 #include <wheelwright/model/robot.hpp>
 
-namespace wheelwright {
+namespace wheelwright::sim {
 
 /// Distribution of the noise inside its bound.
 enum class NoiseShape {
@@ -97,7 +97,7 @@ struct DryThreshold {
   double per_torque = 0.0;  ///< of effects by their terms, rad/s per N·m that they ask for
 };
 [[nodiscard]] DryThreshold dry_threshold(const DriveEffects& effects, const DifferentialDrive& drive,
-                                         const DriveParameters& parameters, double step);
+                                         const model::DriveParameters& parameters, double step);
 
 /// Losses between the wheel torques and the body.
 struct EffectLoad {
@@ -117,7 +117,7 @@ struct EffectState {
 
 /// The load at one instant; forces of inertia (com_lateral) apart.
 [[nodiscard]] EffectLoad effect_load(const DriveEffects& effects, const DifferentialDrive& drive,
-                                     const DriveParameters& parameters, const DryThreshold& threshold,
+                                     const model::DriveParameters& parameters, const DryThreshold& threshold,
                                      const EffectState& state);
 
 /// Slip of the wheels as a share of their speeds, force/stiffness, at most a fifth, for the wheel forces `force` (N).
@@ -145,7 +145,7 @@ struct DriveState {
 class Plant {
  public:
   /// Throws InvalidArgument when parameters or faults do not pass their `validate`.
-  Plant(const DifferentialDrive& drive, const DriveParameters& parameters, std::vector<Fault> faults,
+  Plant(const DifferentialDrive& drive, const model::DriveParameters& parameters, std::vector<model::Fault> faults,
         const DriveEffects& effects = {});
 
   /// Sets the state and the time (s) it holds at.
@@ -177,19 +177,19 @@ class Plant {
     Eigen::Vector2d angle;
   };
   [[nodiscard]] static Response response(double a, double time);
-  [[nodiscard]] FaultState fault_at(double t) const;
-  [[nodiscard]] Eigen::Vector2d wheel_speed(const DriveState& state, const FaultState& fault,
+  [[nodiscard]] model::FaultState fault_at(double t) const;
+  [[nodiscard]] Eigen::Vector2d wheel_speed(const DriveState& state, const model::FaultState& fault,
                                             const Eigen::Vector2d& torque) const;
-  [[nodiscard]] Derivative derivative(const DriveState& state, const FaultState& fault, const Eigen::Vector2d& torque,
-                                      double t) const;
+  [[nodiscard]] Derivative derivative(const DriveState& state, const model::FaultState& fault,
+                                      const Eigen::Vector2d& torque, double t) const;
   void prepare(double h);
   void exact_step(const Eigen::Vector2d& torque, const Eigen::Vector2d& slope, double h);
   void runge_kutta(const Eigen::Vector2d& torque, const Eigen::Vector2d& slope, double h);
   void enter_interval();
 
   DifferentialDrive drive_;
-  DriveParameters parameters_;
-  std::vector<Fault> faults_;
+  model::DriveParameters parameters_;
+  std::vector<model::Fault> faults_;
   DriveEffects effects_;
   DryThreshold threshold_;
   double half_track_ = 0.0;     // with the effects' track width
@@ -197,7 +197,7 @@ class Plant {
   std::size_t interval_ = 0;    // breaks_[interval_ − 1] <= t_ < breaks_[interval_]
   bool moving_ = false;         // whether a fault changes with time inside the interval
   bool exact_ = true;           // whether the interval has the closed form
-  FaultState fault_;            // of the interval where nothing moves
+  model::FaultState fault_;     // of the interval where nothing moves
 
   DriveState state_;
   double t_ = 0.0;
@@ -207,4 +207,4 @@ class Plant {
   std::array<Response, 4> forward_{}, yaw_{};  // at the three Gauss nodes and at the end of the step
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::sim

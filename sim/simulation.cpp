@@ -9,7 +9,7 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/model/effect_law.hpp>
 
-namespace wheelwright {
+namespace wheelwright::sim {
 namespace {
 
 void validate_sensors(const Sensors& sensors) {
@@ -39,22 +39,22 @@ DifferentialDrive drive_of(const Robot& robot) {
 }
 
 void validate(const Scenario& scenario) {
-  check::that(on_two_wheels(scenario.robot), "robot.model is '" + scenario.robot.model + "'",
+  check::that(model::on_two_wheels(scenario.robot), "robot.model is '" + scenario.robot.model + "'",
               "differential_drive, which is what can be simulated");
-  static_cast<void>(make_model(scenario.robot));
-  check::that(scenario.robot.effort != EffortKind::voltage, "robot.effort",
+  static_cast<void>(model::make_model(scenario.robot));
+  check::that(scenario.robot.effort != model::EffortKind::voltage, "robot.effort",
               "torque or current: voltages cannot be simulated");
   const bool constant_known = scenario.robot.motor && scenario.robot.motor->torque_constant;
-  check::that(scenario.robot.effort == EffortKind::torque || constant_known, "robot.motor.torque_constant",
+  check::that(scenario.robot.effort == model::EffortKind::torque || constant_known, "robot.motor.torque_constant",
               "a number > 0 where the effort is a current");
-  validate(scenario.parameters);
-  validate(nominal_parameters(scenario));
-  const double b = effect_value(scenario.robot, "com_lateral", "b");
+  model::validate(scenario.parameters);
+  model::validate(nominal_parameters(scenario));
+  const double b = model::effect_value(scenario.robot, "com_lateral", "b");
   check::that(scenario.parameters.mass * b * b < scenario.parameters.yaw_inertia, "effects.com_lateral.b",
               "a centre of mass with m b² below the yaw inertia about the axle");
   validate(scenario.trajectory);
   validate_gains(scenario.controller);
-  validate(scenario.faults, drive_of(scenario.robot));
+  model::validate(scenario.faults, drive_of(scenario.robot));
   validate_sensors(scenario.sensors);
   if (scenario.torque_limit) {
     check::positive(*scenario.torque_limit, "torque_limit");
@@ -76,8 +76,8 @@ void validate(const Scenario& scenario) {
   }
 }
 
-DriveParameters nominal_parameters(const Scenario& scenario) {
-  DriveParameters nominal = scenario.parameters;
+model::DriveParameters nominal_parameters(const Scenario& scenario) {
+  model::DriveParameters nominal = scenario.parameters;
   const auto take = [&scenario](const char* name, double& value) {
     if (const auto found = scenario.robot.nominal.find(name); found != scenario.robot.nominal.end()) {
       value = found->second;
@@ -94,11 +94,11 @@ DriveParameters nominal_parameters(const Scenario& scenario) {
 }
 
 Eigen::VectorXd true_parameters(const Scenario& scenario, const Model& model) {
-  const DriveParameters& truth = scenario.parameters;
+  const model::DriveParameters& truth = scenario.parameters;
   const double yaw_convention = drive_of(scenario.robot).lever_arm() / (0.5 * scenario.robot.track_width);
   Eigen::VectorXd theta(static_cast<Eigen::Index>(model.p()));
   for (std::size_t j = 0; j < model.p(); ++j) {
-    const Parameter& parameter = model.parameters[j];
+    const model::Parameter& parameter = model.parameters[j];
     double physical = 0.0;
     if (parameter.physical == "mass") {
       physical = truth.mass;
@@ -113,7 +113,7 @@ Eigen::VectorXd true_parameters(const Scenario& scenario, const Model& model) {
       physical = truth.viscous_y;
     } else if (parameter.physical == "viscous_yaw") {
       physical = yaw_convention * truth.viscous_yaw;
-    } else if (const auto of_effect = effect_truth(scenario.robot, parameter.physical, truth.mass)) {
+    } else if (const auto of_effect = model::effect_truth(scenario.robot, parameter.physical, truth.mass)) {
       physical = *of_effect;
     } else {
       throw InvalidArgument("model: a differential drive has no parameter '" + parameter.physical + "'");
@@ -138,8 +138,8 @@ Simulation::Simulation(Scenario scenario, std::size_t block_rows)
     : scenario_(std::move(scenario)),
       block_rows_(block_rows),
       drive_(drive_of(validated(scenario_).robot)),
-      late_(effect_value(scenario_.robot, "sensor_time_offset", "dt")),
-      encoder_scale_(drive_geometry(scenario_.robot).encoder_scale),
+      late_(model::effect_value(scenario_.robot, "sensor_time_offset", "dt")),
+      encoder_scale_(model::drive_geometry(scenario_.robot).encoder_scale),
       plant_(drive_, scenario_.parameters, scenario_.faults, DriveEffects(scenario_.robot)),
       drivetrain_(scenario_.robot, scenario_.parameters, late_ > 0.0),
       memory_(late_ + 1.0 / scenario_.rate),
@@ -148,7 +148,7 @@ Simulation::Simulation(Scenario scenario, std::size_t block_rows)
   // Rows at 0, 1/rate, … up to the duration; intervals between them.
   const auto steps = static_cast<std::uint64_t>(std::floor(scenario_.duration * scenario_.rate * (1.0 + 1e-12)));
   periods_ = scenario_.sensors.sampling == Sampling::instant ? steps + 1 : steps;
-  if (scenario_.robot.effort == EffortKind::current) {
+  if (scenario_.robot.effort == model::EffortKind::current) {
     effort_per_torque_ = 1.0 / (*scenario_.robot.motor->torque_constant * scenario_.robot.motor->gear_ratio);
   }
   if (scenario_.sensors.encoder_counts_per_turn) {
@@ -167,8 +167,8 @@ void Simulation::make_names() {
   };
   add(sensors.angles, {"phi_r", "phi_l"});
   add(sensors.speeds, {"omega_r", "omega_l"});
-  add(scenario_.robot.effort == EffortKind::torque, {"tau_r", "tau_l"});
-  add(scenario_.robot.effort == EffortKind::current, {"current_r", "current_l"});
+  add(scenario_.robot.effort == model::EffortKind::torque, {"tau_r", "tau_l"});
+  add(scenario_.robot.effort == model::EffortKind::current, {"current_r", "current_l"});
   add(sensors.pose, {"x", "y", "theta"});
   add(sensors.commands, {"command_r", "command_l"});
 }
@@ -339,4 +339,4 @@ LogTable simulate(const Scenario& scenario) {
   return read_all(simulation);
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::sim

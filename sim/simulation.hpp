@@ -20,7 +20,7 @@
 #include <wheelwright/sim/plant.hpp>
 #include <wheelwright/sim/trajectory.hpp>
 
-namespace wheelwright {
+namespace wheelwright::sim {
 
 /// Meaning of a row of the log.
 enum class Sampling {
@@ -47,15 +47,15 @@ struct Sensors {
 
 /// A simulated drive of a differential-drive robot.
 struct Scenario {
-  Robot robot;                 ///< geometry, effort (torque, or current with the motor's constants), hold; `nominal` is
-                               ///< what the controller believes, where it is given
-  DriveParameters parameters;  ///< the truth, physical (ℓ = D/2)
+  Robot robot;  ///< geometry, effort (torque, or current with the motor's constants), hold; `nominal` is
+                ///< what the controller believes, where it is given
+  model::DriveParameters parameters;  ///< the truth, physical (ℓ = D/2)
   Trajectory trajectory;
   ControllerGains controller;
   std::optional<double> torque_limit;                            ///< saturation of each wheel, N·m
   Eigen::Vector3d initial_pose = Eigen::Vector3d::Zero();        ///< of the reference, m, m, rad
   Eigen::Vector3d initial_pose_error = Eigen::Vector3d::Zero();  ///< robot minus reference, m, m, rad
-  std::vector<Fault> faults;
+  std::vector<model::Fault> faults;
   Sensors sensors;
   double duration = 60.0;      ///< s
   double rate = 100.0;         ///< samples and control periods per second, Hz
@@ -71,7 +71,7 @@ void validate(const Scenario& scenario);
 [[nodiscard]] DifferentialDrive drive_of(const Robot& robot);
 
 /// Parameters that the controller assumes: the robot's nominal values where they are given, else the truth.
-[[nodiscard]] DriveParameters nominal_parameters(const Scenario& scenario);
+[[nodiscard]] model::DriveParameters nominal_parameters(const Scenario& scenario);
 
 /// θ_L of the scenario's truth in the order of `model.parameters`, units of θ_L; in the model's own lever-arm
 /// convention (with ℓ = D inertia and friction of yaw come out doubled); those of effects are the mid-points of the
@@ -153,4 +153,9 @@ class Simulation final : public LogSource {
 /// The whole log of `scenario` in memory.
 [[nodiscard]] LogTable simulate(const Scenario& scenario);
 
+}  // namespace wheelwright::sim
+
+namespace wheelwright {
+using sim::Scenario;
+using sim::Simulation;
 }  // namespace wheelwright

@@ -8,7 +8,7 @@
 
 #include <wheelwright/core/check.hpp>
 
-namespace wheelwright {
+namespace wheelwright::sim {
 namespace {
 
 using std::numbers::pi;
@@ -128,7 +128,7 @@ Eigen::Vector3d advance_reference(const Trajectory& trajectory, const Eigen::Vec
           pose[2] + 2.0 * half_turn};
 }
 
-TrackingController::TrackingController(const DifferentialDrive& drive, const DriveParameters& nominal,
+TrackingController::TrackingController(const DifferentialDrive& drive, const model::DriveParameters& nominal,
                                        const ControllerGains& gains, std::optional<double> torque_limit)
     : drive_(drive), nominal_(nominal), gains_(gains), torque_limit_(torque_limit) {}
 
@@ -163,4 +163,4 @@ TrackingController::Command TrackingController::step(const Eigen::Vector3d& refe
   return command;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::sim

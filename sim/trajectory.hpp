@@ -11,7 +11,7 @@
 #include <wheelwright/model/differential_drive.hpp>
 #include <wheelwright/model/faults.hpp>
 
-namespace wheelwright {
+namespace wheelwright::sim {
 
 /// Speeds over time, linear between the rows; at rest before the first row and after the last one.
 struct SpeedTable {
@@ -75,8 +75,8 @@ struct ControllerGains {
 class TrackingController {
  public:
   /// `nominal` is what the controller believes of the robot; `torque_limit` (N·m) saturates each wheel where given.
-  TrackingController(const DifferentialDrive& drive, const DriveParameters& nominal, const ControllerGains& gains,
-                     std::optional<double> torque_limit);
+  TrackingController(const DifferentialDrive& drive, const model::DriveParameters& nominal,
+                     const ControllerGains& gains, std::optional<double> torque_limit);
 
   /// What the controller asks for.
   struct Command {
@@ -93,10 +93,10 @@ class TrackingController {
 
  private:
   DifferentialDrive drive_;
-  DriveParameters nominal_;
+  model::DriveParameters nominal_;
   ControllerGains gains_;
   std::optional<double> torque_limit_;
   Eigen::Vector2d integral_ = Eigen::Vector2d::Zero();
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::sim

@@ -15,7 +15,7 @@
 #include <wheelwright/core/limits.hpp>
 #include <wheelwright/filter/motion_bound.hpp>
 
-namespace wheelwright {
+namespace wheelwright::study {
 namespace {
 
 constexpr double kSmooth = 1e-3;  // forward and backward rates of a row, relative
@@ -24,52 +24,54 @@ constexpr double kNoise = 1e-6;   // of a rate, in sizes of the set per relative
 constexpr double kJump = 1e3;     // beyond this, in the same unit, a row jumps
 
 // The active half-space `row` where the input has been moved; nothing where it is gone.
-std::optional<HalfSpace> moved(const HalfSpace& row, const RowsBeside& beside) {
-  HalfSpace result = row;
+std::optional<bounds::HalfSpace> moved(const bounds::HalfSpace& row, const RowsBeside& beside) {
+  bounds::HalfSpace result = row;
   if (row.origin.is_prior) {
     const Interval& side = beside.prior.sides[row.origin.parameter];
-    result.b = row.origin.side == Side::upper ? side.upper : -side.lower;
+    result.b = row.origin.side == bounds::Side::upper ? side.upper : -side.lower;
     return result;
   }
   const auto at = beside.rows.find({row.origin.sample, row.origin.output});
   if (at == beside.rows.end()) {
     return std::nullopt;
   }
-  return row.origin.side == Side::upper ? at->second.upper : at->second.lower;
+  return row.origin.side == bounds::Side::upper ? at->second.upper : at->second.lower;
 }
 
-RowRate rate(const HalfSpace& from, const HalfSpace& to, double step) {
+RowRate rate(const bounds::HalfSpace& from, const bounds::HalfSpace& to, double step) {
   return {(to.a - from.a) / step, (to.b - from.b) / step};
 }
 
 }  // namespace
 
 bool noise_is_declared(const Commissioning& c) {
-  return std::ranges::all_of(c.noise, [](const OutputNoise& o) { return o.origin == NoiseOrigin::declared; });
+  return std::ranges::all_of(c.noise,
+                             [](const commission::OutputNoise& o) { return o.origin == core::NoiseOrigin::declared; });
 }
 
-Box prior_of(const Robot& robot) { return Box{prior_box(robot, make_model(robot)).bounds}; }
+Box prior_of(const Robot& robot) { return Box{model::prior_box(robot, model::make_model(robot)).bounds}; }
 
-MotionBound motion_at(const Commissioning& c, const RobotAt& at, std::span<const Interval> sides) {
-  const Model model = make_model(at.robot);
+filter::MotionBound motion_at(const Commissioning& c, const RobotAt& at, std::span<const Interval> sides) {
+  const Model model = model::make_model(at.robot);
   const Measurement& measurement = c.model.measurement;
-  MotionBound bound = sides.empty() ? MotionBound{} : motion_bound(model, sides);
-  bound.limit = coordinate_limit(model, acceleration_limit(at.robot, c.survey, measurement.motion,
-                                                           noise_budget(at.robot, measurement).sensors.motion));
+  filter::MotionBound bound = sides.empty() ? filter::MotionBound{} : filter::motion_bound(model, sides);
+  bound.limit = commission::coordinate_limit(
+      model, commission::acceleration_limit(at.robot, c.survey, measurement.motion,
+                                            commission::noise_budget(at.robot, measurement).sensors.motion));
   return bound;
 }
 
-TorqueRows rows_of(LogSource& log, const Commissioning& c, const RobotAt& at, const MotionBound& motion,
+TorqueRows rows_of(LogSource& log, const Commissioning& c, const RobotAt& at, const filter::MotionBound& motion,
                    double confidence) {
-  const Model model = make_model(at.robot);
+  const Model model = model::make_model(at.robot);
   const Measurement& measurement = c.model.measurement;
-  SignalErrors errors = c.row_errors;
+  filter::SignalErrors errors = c.row_errors;
   if (noise_is_declared(c)) {
-    errors = propagate(model, at.filter, measurement, noise_budget(at.robot, measurement).sensors,
-                       {.mode = c.noise_mode,
-                        .confidence = confidence,
-                        .rows = static_cast<double>(c.survey.rows),
-                        .largest_step = c.survey.largest_step});
+    errors = filter::propagate(model, at.filter, measurement, commission::noise_budget(at.robot, measurement).sensors,
+                               {.mode = c.noise_mode,
+                                .confidence = confidence,
+                                .rows = static_cast<double>(c.survey.rows),
+                                .largest_step = c.survey.largest_step});
     const Eigen::VectorXd effort = errors.motion.effort;
     errors.motion = motion;
     errors.motion.effort = effort;
@@ -80,8 +82,8 @@ TorqueRows rows_of(LogSource& log, const Commissioning& c, const RobotAt& at, co
   return TorqueRows(log, RegressorFilter(model, filter, measurement, errors));
 }
 
-LogRows pick_rows(RegressionSource& rows, const Box& prior, const LogRows& wanted) {
-  const SlabRows slabs(prior);
+LogRows pick_rows(core::RegressionSource& rows, const Box& prior, const LogRows& wanted) {
+  const bounds::SlabRows slabs(prior);
   LogRows found;
   RegressionBlock block;
   rows.rewind();
@@ -102,11 +104,11 @@ LogRows active_rows(const HullOptima& optima) {
   LogRows rows;
   for (const auto* bounds : {&optima.lower, &optima.upper}) {
     for (const HullOptimum& optimum : *bounds) {
-      for (const WeightedRow& active : optimum.active) {
-        const RowOrigin& origin = active.row.origin;
+      for (const bounds::WeightedRow& active : optimum.active) {
+        const bounds::RowOrigin& origin = active.row.origin;
         if (!origin.is_prior) {
           RowSides& both = rows[{origin.sample, origin.output}];
-          (origin.side == Side::upper ? both.upper : both.lower) = active.row;
+          (origin.side == bounds::Side::upper ? both.upper : both.lower) = active.row;
         }
       }
     }
@@ -118,7 +120,7 @@ RowRates row_rates(const HullOptima& optima, const HullOptimum& optimum, double 
                    const RowsBeside& below, const RowsBeside& above, bool curved) {
   RowRates rates;
   const Polytope::Block& block = optima.set.blocks()[optimum.block];
-  for (const WeightedRow& active : optimum.active) {
+  for (const bounds::WeightedRow& active : optimum.active) {
     const auto low = moved(active.row, below), high = moved(active.row, above);
     if (!low || !high) {
       rates.trouble = row_in_words(active.row.origin) + " is there on one side of the value only";
@@ -178,7 +180,7 @@ Beside beside(const Commissioning& c, const LocalInput& input, double relative_s
   }
   const PriorRate& rate = *input.prior;
   const auto& parameters = c.model.model.parameters;
-  const auto of = std::ranges::find(parameters, rate.parameter, &Parameter::physical);
+  const auto of = std::ranges::find(parameters, rate.parameter, &model::Parameter::physical);
   const auto j = static_cast<std::size_t>(of - parameters.begin());
   if (b.reach == 0.0) {
     b.reach = c.prior.sides[j].width() / of->per_physical;
@@ -199,19 +201,19 @@ struct MovedSides {
   std::string kink{};     // why a side that matters has no derivative, but one to each side
 };
 
-bool differ(const MotionBound& a, const MotionBound& b) {
+bool differ(const filter::MotionBound& a, const filter::MotionBound& b) {
   return a.mobility.size() != b.mobility.size() ||
          (a.mobility.size() > 0 && (a.mobility != b.mobility || a.largest != b.largest));
 }
 
 MovedSides moved_sides(const Model& model, const std::vector<Interval>& sides, const BoundRates& rates, double step) {
   MovedSides moved{sides, sides};
-  const MotionBound bound = motion_bound(model, sides);
+  const filter::MotionBound bound = filter::motion_bound(model, sides);
   for (std::size_t j = 0; j < sides.size(); ++j) {
     const auto move = [&](double Interval::*side, double outward, const BoundRate& rate) {
       std::vector<Interval> wider = sides;
-      wider[j].*side += outward * (1e-3 * magnitude(sides[j]) + kTiny);
-      if (!differ(bound, motion_bound(model, wider))) {
+      wider[j].*side += outward * (1e-3 * core::magnitude(sides[j]) + core::kTiny);
+      if (!differ(bound, filter::motion_bound(model, wider))) {
         return;
       }
       if (std::isnan(rate.value.left) || std::isnan(rate.value.right)) {
@@ -233,9 +235,9 @@ MovedSides moved_sides(const Model& model, const std::vector<Interval>& sides, c
 // The parameter whose prior's lower side is 0, holds a bound, and goes down: below 0 errors of the rows' column count
 // with the other sign. p where there is none.
 std::size_t opened_sign(const HullOptimum& optimum, const Box& at, const Box& moved) {
-  for (const WeightedRow& active : optimum.active) {
-    const RowOrigin& origin = active.row.origin;
-    if (origin.is_prior && origin.side == Side::lower && at.sides[origin.parameter].lower == 0.0 &&
+  for (const bounds::WeightedRow& active : optimum.active) {
+    const bounds::RowOrigin& origin = active.row.origin;
+    if (origin.is_prior && origin.side == bounds::Side::lower && at.sides[origin.parameter].lower == 0.0 &&
         moved.sides[origin.parameter].lower < 0.0) {
       return origin.parameter;
     }
@@ -250,10 +252,10 @@ bool agree(const OneSided& d, double noise) {
 BoundRate derive(const HullOptima& optima, const HullOptimum& optimum, const RowRates& rates, double noise,
                  const std::string& name, const std::string& kink_before) {
   if (!optimum.found) {
-    return {{kNan, kNan}, why_not_regular(optimum, name)};
+    return {{core::kNan, core::kNan}, why_not_regular(optimum, name)};
   }
   if (!rates.trouble.empty()) {
-    return {{kNan, kNan}, rates.trouble};
+    return {{core::kNan, core::kNan}, rates.trouble};
   }
   BoundRate result{bound_derivative(optima, optimum, rates.left, rates.right)};
   if (!agree(result.value, noise)) {
@@ -268,7 +270,7 @@ BoundRate derive(const HullOptima& optima, const HullOptimum& optimum, const Row
 }
 
 BoundRates unknown(std::size_t p, const std::string& why) {
-  const std::vector<BoundRate> all(p, {{kNan, kNan}, of_set_before(why)});
+  const std::vector<BoundRate> all(p, {{core::kNan, core::kNan}, of_set_before(why)});
   return {all, all};
 }
 
@@ -284,7 +286,7 @@ std::vector<BoundPass> bound_passes(LogSource& log, const Commissioning& c, doub
     add_active_rows(pass.optima, rows, dropped);
     passes.push_back(std::move(pass));
   };
-  for (const EarlierSet& earlier : c.earlier) {
+  for (const commission::EarlierSet& earlier : c.earlier) {
     add(earlier.set, earlier.dropped);
   }
   add(c.feasible, c.dropped);
@@ -328,7 +330,7 @@ BoundRates bound_rates(LogSource& log, const Commissioning& c, const std::vector
                               noise, model.parameters[j].name, kink);
       const auto open = [&](const Box& moved, double& side) {
         if (const std::size_t k = opened_sign(optimum, c.prior, moved); k < model.p()) {
-          side = kNan;
+          side = core::kNan;
           rate.why_not = fmt::format("the prior's lower side of {} is 0 and is met: below it, a sign is open",
                                      model.parameters[k].physical);
         }
@@ -347,4 +349,4 @@ BoundRates bound_rates(LogSource& log, const Commissioning& c, const std::vector
   return rates;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::study

@@ -26,11 +26,11 @@
 #include <wheelwright/study/hull_derivatives.hpp>
 #include <wheelwright/study/local_derivatives.hpp>
 
-namespace wheelwright {
+namespace wheelwright::study {
 
 /// The two half-spaces of a row.
 struct RowSides {
-  HalfSpace upper, lower;
+  bounds::HalfSpace upper, lower;
 };
 
 /// Some rows of a log, by sample and output.
@@ -56,17 +56,17 @@ struct RowRates {
 
 /// Bound on the acceleration of the robot `at` between samples, for rows that stand on declared noise: by the limit of
 /// its accelerations and, where there are `sides` (p), by the dynamics with all parameters inside them.
-[[nodiscard]] MotionBound motion_at(const Commissioning& commissioning, const RobotAt& at,
-                                    std::span<const Interval> sides);
+[[nodiscard]] filter::MotionBound motion_at(const Commissioning& commissioning, const RobotAt& at,
+                                            std::span<const Interval> sides);
 
 /// The rows of `log` for the robot and filter `at`, all else as `commissioning` chose it: the same columns and
 /// instants; errors are propagated anew where noise is declared, with `motion` between samples, else they stay.
 /// `confidence` as CommissionOptions has it.
 [[nodiscard]] TorqueRows rows_of(LogSource& log, const Commissioning& commissioning, const RobotAt& at,
-                                 const MotionBound& motion, double confidence);
+                                 const filter::MotionBound& motion, double confidence);
 
 /// The half-spaces that the rows named in `wanted` are in the box `prior`; those that are not there are left out.
-[[nodiscard]] LogRows pick_rows(RegressionSource& rows, const Box& prior, const LogRows& wanted);
+[[nodiscard]] LogRows pick_rows(core::RegressionSource& rows, const Box& prior, const LogRows& wanted);
 
 /// The rows of the log that are active at an optimum, with the sides that are.
 [[nodiscard]] LogRows active_rows(const HullOptima& optima);
@@ -109,4 +109,4 @@ struct BoundRates {
                                      const std::vector<BoundPass>& passes, const LocalInput& input, double step,
                                      double confidence);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::study

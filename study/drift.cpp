@@ -9,7 +9,7 @@
 #include <wheelwright/core/statistics.hpp>
 #include <wheelwright/study/population.hpp>
 
-namespace wheelwright {
+namespace wheelwright::study {
 namespace {
 
 constexpr double days_a_week = 7.0;
@@ -19,8 +19,8 @@ constexpr std::size_t fewest_pairs = 10;  // robots with two logs that teach how
 void take_certain(ParameterDrift& drift, std::span<const DriftPoint> points) {
   for (std::size_t a = 0; a < points.size(); ++a) {
     for (std::size_t b = a + 1; b < points.size(); ++b) {
-      const double up = round_down(points[b].lower - points[a].upper);
-      const double down = round_up(points[b].upper - points[a].lower);
+      const double up = core::round_down(points[b].lower - points[a].upper);
+      const double down = core::round_up(points[b].upper - points[a].lower);
       const double change = up > 0.0 ? up : down < 0.0 ? down : 0.0;
       if (std::abs(change) > std::abs(drift.certain)) {
         drift.certain = change;
@@ -99,10 +99,10 @@ std::map<std::size_t, Repeats> repeats_of(std::span<const ParameterDrift> drift)
     }
     Ratios& r = ratios[d.column];
     if (d.freedom > 0.0) {
-      r.line.push_back(d.chi_square / chi_squared_median(d.freedom));
+      r.line.push_back(d.chi_square / core::chi_squared_median(d.freedom));
       r.line_freedom += d.freedom;
     }
-    r.mean.push_back(d.chi_mean / chi_squared_median(d.freedom + 1.0));
+    r.mean.push_back(d.chi_mean / core::chi_squared_median(d.freedom + 1.0));
     r.mean_freedom += d.freedom + 1.0;
   }
   std::map<std::size_t, Repeats> out;
@@ -112,7 +112,7 @@ std::map<std::size_t, Repeats> repeats_of(std::span<const ParameterDrift> drift)
     if (!line && values.size() < fewest_pairs) {
       continue;
     }
-    out[column] = {std::max(1.0, median(std::move(values))),
+    out[column] = {std::max(1.0, core::median(std::move(values))),
                    worth_of_a_median * (line ? r.line_freedom : r.mean_freedom)};
   }
   return out;
@@ -176,13 +176,13 @@ void judge_drift(std::vector<ParameterDrift>& drift) {
     const double z = std::abs(d.slope) / d.slope_error;
     const double doubt = 1.0 / d.own_freedom + (known.freedom > 0.0 ? 1.0 / known.freedom : 0.0);
     const double freedom = doubt > 0.0 ? 1.0 / doubt : std::numeric_limits<double>::infinity();
-    d.p = 2.0 * student_tail(freedom, z);
-    const double factor = student_quantile_below(freedom, 0.975);
+    d.p = 2.0 * core::student_tail(freedom, z);
+    const double factor = core::student_quantile_below(freedom, 0.975);
     d.lower = d.slope - factor * d.slope_error;
     d.upper = d.slope + factor * d.slope_error;
     p.push_back(d.p);
   }
-  const std::vector<double> adjusted = holm(p);
+  const std::vector<double> adjusted = core::holm(p);
   std::size_t k = 0;
   for (ParameterDrift& d : drift) {
     if (d.has_trend) {
@@ -203,4 +203,4 @@ bool repeats_known(std::span<const ParameterDrift> drift) {
   return std::any_of(drift.begin(), drift.end(), [](const auto& d) { return d.has_trend && d.freedom > 0.0; });
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::study

@@ -11,7 +11,7 @@
 
 #include <wheelwright/study/robot_record.hpp>
 
-namespace wheelwright {
+namespace wheelwright::study {
 
 /// A parameter as one log shows it.
 struct DriftPoint {
@@ -79,4 +79,4 @@ void judge_drift(std::vector<ParameterDrift>& drift);
 /// True if some robot of `drift` has three logs, so that repeats are known apart from drift.
 [[nodiscard]] bool repeats_known(std::span<const ParameterDrift> drift);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::study

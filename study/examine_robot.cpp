@@ -8,7 +8,7 @@
 #include <wheelwright/commission/detector_walk.hpp>
 #include <wheelwright/commission/physical.hpp>
 
-namespace wheelwright {
+namespace wheelwright::study {
 namespace {
 
 std::optional<double> finite(const std::optional<double>& x) { return x && std::isfinite(*x) ? x : std::nullopt; }
@@ -28,7 +28,7 @@ RobotStatus status_of(Commissioning::Status status) {
 Interval over(double lower, double upper, double unit) {
   const double a = lower / unit, b = upper / unit;
   const double low = std::min(a, b), high = std::max(a, b);
-  return {low == 0.0 ? 0.0 : round_down(low), high == 0.0 ? 0.0 : round_up(high)};
+  return {low == 0.0 ? 0.0 : core::round_down(low), high == 0.0 ? 0.0 : core::round_up(high)};
 }
 
 LogRecord record_of(const FleetLog& log, const Commissioning& result) {
@@ -48,12 +48,12 @@ LogRecord failure_of(const FleetLog& log, const char* message) {
 void take_outputs(RobotRecord& record, const Commissioning& result) {
   double kappa = INFINITY;
   for (std::size_t i = 0; i < result.validation.size(); ++i) {
-    const OutputValidation& v = result.validation[i];
+    const commission::OutputValidation& v = result.validation[i];
     if (v.instants == 0) {
       continue;
     }
     record.outputs.push_back({.name = result.model.model.outputs[i],
-                              .unit = output_unit(result.model.robot, result.model.model.output_units[i]),
+                              .unit = commission::output_unit(result.model.robot, result.model.model.output_units[i]),
                               .median_width = v.median_width,
                               .instants = v.instants,
                               .false_alarms = v.outside});
@@ -64,16 +64,16 @@ void take_outputs(RobotRecord& record, const Commissioning& result) {
   }
 }
 
-void take_events(CheckRecord& check, const std::vector<Event>& events) {
+void take_events(CheckRecord& check, const std::vector<detector::Event>& events) {
   check.events += events.size();
-  for (const Event& event : events) {
+  for (const detector::Event& event : events) {
     check.first = std::min(check.first.value_or(event.alarm), event.alarm);
   }
 }
 
 // The detector's walk. A kinematic residual is watched where the log has its columns.
-void watch(CheckRecord& check, LogSource& log, const OnlineModel& model, const DetectorOptions& options) {
-  const DetectionOptions thin{.most_points = 2};
+void watch(CheckRecord& check, LogSource& log, const OnlineModel& model, const detector::DetectorOptions& options) {
+  const commission::DetectionOptions thin{.most_points = 2};
   const Detection torque = detect(log, make_detector(model, options), thin);
   check.checked = true;
   check.instants = torque.instants;
@@ -112,7 +112,7 @@ CheckRecord check_log(const FleetLog& log, const std::optional<OnlineModel>& mod
     }
   }
   try {
-    check.log = record_of(log, commission(*opened.log, opened.robot, options.commission));
+    check.log = record_of(log, commission_robot(*opened.log, opened.robot, options.commission));
   } catch (const std::exception& error) {
     check.log = failure_of(log, error.what());
   }
@@ -127,16 +127,16 @@ std::vector<RecordedParameter> recorded_parameters(const Commissioning& result) 
     return out;
   }
   const Robot& robot = result.model.robot;
-  const bool physical = effort_per_torque(robot).has_value();
+  const bool physical = model::effort_per_torque(robot).has_value();
   for (std::size_t j = 0; j < result.parameters.size(); ++j) {
-    const ParameterResult& p = result.parameters[j];
+    const commission::ParameterResult& p = result.parameters[j];
     const double unit = physical ? p.parameter.per_physical : 1.0;
     const Interval bounds = over(p.lower, p.upper, unit);
     const Interval prior =
         j < result.prior.sides.size() ? over(result.prior.sides[j].lower, result.prior.sides[j].upper, unit) : bounds;
     const std::optional<double> estimate = finite(p.estimate), error = finite(p.standard_error);
     out.push_back({.name = physical ? p.parameter.physical : p.parameter.name,
-                   .unit = physical ? p.parameter.physical_unit : parameter_unit(robot, p.parameter),
+                   .unit = physical ? p.parameter.physical_unit : commission::parameter_unit(robot, p.parameter),
                    .is_prior_key = physical,
                    .estimate = estimate ? std::optional(*estimate / unit) : std::nullopt,
                    .standard_error = error ? std::optional(*error / std::abs(unit)) : std::nullopt,
@@ -148,12 +148,12 @@ std::vector<RecordedParameter> recorded_parameters(const Commissioning& result) 
                    .prior = prior,
                    .warrant = p.warrant});
   }
-  for (const KinematicParameter& p :
-       result.kinematic.model ? result.kinematic.parameters : std::vector<KinematicParameter>{}) {
+  for (const commission::KinematicParameter& p :
+       result.kinematic.model ? result.kinematic.parameters : std::vector<commission::KinematicParameter>{}) {
     if (!std::isfinite(p.lower) || !std::isfinite(p.upper)) {
       continue;
     }
-    const bool shown = p.excitation == Excitation::identified;
+    const bool shown = p.excitation == identify::Excitation::identified;
     out.push_back({.name = "kinematic." + p.name,
                    .unit = p.unit == "1" ? "" : p.unit,
                    .estimate = shown ? finite(p.estimate) : std::nullopt,
@@ -173,7 +173,7 @@ RobotRecord examine_robot(const RobotLogs& logs, const ExamineOptions& options) 
   std::optional<OnlineModel> model;
   try {
     const OpenedLog opened = logs.commissioning.open();
-    const Commissioning result = commission(*opened.log, opened.robot, options.commission);
+    const Commissioning result = commission_robot(*opened.log, opened.robot, options.commission);
     record.commissioning = record_of(logs.commissioning, result);
     record.notes = result.notes;
     if (result.has_model()) {
@@ -189,4 +189,4 @@ RobotRecord examine_robot(const RobotLogs& logs, const ExamineOptions& options) 
   return record;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::study

@@ -12,7 +12,7 @@
 #include <wheelwright/core/log.hpp>
 #include <wheelwright/study/robot_record.hpp>
 
-namespace wheelwright {
+namespace wheelwright::study {
 
 /// A log at hand, with its robot (whose noise bounds hold what reading the log added).
 struct OpenedLog {
@@ -38,8 +38,8 @@ struct RobotLogs {
 
 /// Options of examine_robot().
 struct ExamineOptions {
-  CommissionOptions commission{};
-  DetectorOptions detector{};
+  commission::CommissionOptions commission{};
+  detector::DetectorOptions detector{};
 };
 
 /// Commissions the robot, walks its detector over every check, and commissions each check by itself. Whatever a log or
@@ -50,4 +50,4 @@ struct ExamineOptions {
 /// The record's parameters of a commissioning; none where it gave no bounds.
 [[nodiscard]] std::vector<RecordedParameter> recorded_parameters(const Commissioning& result);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::study

@@ -9,7 +9,7 @@
 
 #include <wheelwright/core/statistics.hpp>
 
-namespace wheelwright {
+namespace wheelwright::study {
 namespace {
 
 template <typename Items, typename Keep>
@@ -64,7 +64,7 @@ double FleetSpread::quantile(double share) const {
   }
   const auto rank =
       static_cast<std::size_t>(std::clamp(share, 0.0, 1.0) * static_cast<double>(values.size() - 1) + 0.5);
-  return order_statistic(values, rank);
+  return core::order_statistic(values, rank);
 }
 
 std::size_t FleetResult::robots_outside() const {
@@ -162,4 +162,4 @@ std::vector<std::string> sentences(const FleetResult& fleet) {
   return out;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::study

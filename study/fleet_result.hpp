@@ -13,7 +13,7 @@
 #include <wheelwright/study/population.hpp>
 #include <wheelwright/study/robot_record.hpp>
 
-namespace wheelwright {
+namespace wheelwright::study {
 
 /// Something to look at in one robot's entry: a log that failed, a contradiction, an alarm.
 struct FleetFinding {
@@ -88,4 +88,4 @@ void judge_fleet(FleetResult& fleet, const FleetOptions& options = {});
 /// The fleet in sentences for people, most important first: "487 of 500 robots were commissioned", …
 [[nodiscard]] std::vector<std::string> sentences(const FleetResult& fleet);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::study

@@ -14,7 +14,11 @@
 #include <wheelwright/core/limits.hpp>
 #include <wheelwright/core/linear_algebra.hpp>
 
-namespace wheelwright {
+namespace wheelwright::study {
+
+using bounds::HalfSpace;
+using bounds::Side;
+
 namespace {
 
 constexpr double kActive = 1e-9;    // slack, relative to the block's size
@@ -37,12 +41,12 @@ bool is_active(const Polytope::Block& block, const HullOptimum& optimum, const H
   if (slack > std::max(kActive * block.coordinates.transform.norm() * row.a.norm(), rounding)) {
     return false;  // nearly every row of a log, without a further look
   }
-  const double norm = (block.coordinates.transform.transpose() * pick(row.a, block.parameters)).norm();
+  const double norm = (block.coordinates.transform.transpose() * bounds::pick(row.a, block.parameters)).norm();
   return norm > 0.0 && slack <= std::max(kActive * norm, rounding);
 }
 
 void add_if_active(const Polytope::Block& block, HullOptimum& optimum, const HalfSpace& row) {
-  const auto same = [&](const WeightedRow& known) { return known.row.origin == row.origin; };
+  const auto same = [&](const bounds::WeightedRow& known) { return known.row.origin == row.origin; };
   if (is_active(block, optimum, row) && std::ranges::none_of(optimum.active, same)) {
     optimum.active.push_back({row, 0.0});
   }
@@ -62,10 +66,10 @@ void locate(const HullOptima& optima, HullOptimum& optimum) {
   const Polytope::Block& block = optima.set.blocks()[optimum.block];
   const Eigen::VectorXd c = block.coordinates.transform.transpose() * direction(block, optimum);
   const Eigen::VectorXd limit = Eigen::VectorXd::Constant(c.size(), 8.0);
-  LinearProgram program(-limit, limit);
+  bounds::LinearProgram program(-limit, limit);
   program.add_rows(block.normals, block.offsets);
-  LinearProgram::Basis basis;
-  if (program.maximise(c / c.norm(), basis).status != LpSolution::Status::optimal ||
+  bounds::LinearProgram::Basis basis;
+  if (program.maximise(c / c.norm(), basis).status != bounds::LpSolution::Status::optimal ||
       std::ranges::any_of(basis, [](int row) { return row < 0; })) {
     return;
   }
@@ -76,7 +80,7 @@ void locate(const HullOptima& optima, HullOptimum& optimum) {
     rows.row(r) = block.normals.col(facet).transpose();
     offsets[r] = block.offsets[facet];
   }
-  const RankRevealingLu lu(rows), transposed(rows.transpose());
+  const core::RankRevealingLu lu(rows), transposed(rows.transpose());
   if (!lu.invertible()) {
     return;
   }
@@ -91,7 +95,7 @@ void locate(const HullOptima& optima, HullOptimum& optimum) {
     offsets[r] = (row.b - row.a.dot(theta)) / norm;
     const double multiplier = std::max(lambda[r], 0.0);
     optimum.unique_maximiser = optimum.unique_maximiser && multiplier > kPositive * c.norm();
-    optimum.active.push_back({spread(row, block.parameters, p), multiplier / norm});
+    optimum.active.push_back({bounds::spread(row, block.parameters, p), multiplier / norm});
   }
   theta += block.coordinates.transform * lu.solve(offsets);
   optimum.basis = optimum.active.size();
@@ -101,7 +105,7 @@ void locate(const HullOptima& optima, HullOptimum& optimum) {
   }
   optimum.found = true;
   for (const HalfSpace& facet : block.facets) {
-    add_if_active(block, optimum, spread(facet, block.parameters, p));
+    add_if_active(block, optimum, bounds::spread(facet, block.parameters, p));
   }
   for (const std::size_t j : block.parameters) {
     add_if_active(block, optimum, side_of(optima.prior, j, Side::lower));
@@ -120,33 +124,33 @@ double directional(const HullOptima& optima, const HullOptimum& optimum, std::sp
   double largest = 0.0, sum = 0.0;
   bool couples = false;
   Eigen::VectorXd elsewhere = Eigen::VectorXd::Zero(optimum.at.size());
-  const Eigen::VectorXd theta = pick(optimum.at, block.parameters);
+  const Eigen::VectorXd theta = bounds::pick(optimum.at, block.parameters);
   for (Eigen::Index i = 0; i < m; ++i) {
     const RowRate& rate = rates[static_cast<std::size_t>(i)];
-    const WeightedRow& row = optimum.active[static_cast<std::size_t>(i)];
+    const bounds::WeightedRow& row = optimum.active[static_cast<std::size_t>(i)];
     g[i] = sign * rate.b;
     if (rate.a.size() > 0) {
       Eigen::VectorXd others = rate.a;
       for (const std::size_t j : block.parameters) {
         others[static_cast<Eigen::Index>(j)] = 0.0;
       }
-      g[i] -= sign * pick(rate.a, block.parameters).dot(theta);
+      g[i] -= sign * bounds::pick(rate.a, block.parameters).dot(theta);
       couples = couples || !others.isZero(0.0);
       elsewhere -= sign * row.multiplier * others;
     }
     sum += row.multiplier * g[i];
-    const Eigen::VectorXd normal = T.transpose() * pick(row.row.a, block.parameters);
+    const Eigen::VectorXd normal = T.transpose() * bounds::pick(row.row.a, block.parameters);
     normals.col(i) = normal / normal.norm();
     g[i] /= normal.norm();
     if (rate.a.size() > 0) {
-      turned.col(i) = sign / normal.norm() * (T.transpose() * pick(rate.a, block.parameters));
+      turned.col(i) = sign / normal.norm() * (T.transpose() * bounds::pick(rate.a, block.parameters));
     }
     largest = std::max({largest, std::abs(g[i]), turned.col(i).norm()});
   }
   if (couples) {
     // The objective leaves the other blocks free: rows that come to depend on them meet the worst of all their θ.
     if (!optimum.is_regular()) {
-      return kNan;
+      return core::kNan;
     }
     sum += optima.set.support({elsewhere.data(), static_cast<std::size_t>(elsewhere.size())});
   }
@@ -177,14 +181,14 @@ double directional(const HullOptima& optima, const HullOptimum& optimum, std::sp
   for (const double reach : {1e2, 1e4, 1e6}) {
     Eigen::VectorXd limit = Eigen::VectorXd::Constant(variables, reach);
     limit.tail(variables - q).setConstant(32.0);
-    LinearProgram program(-limit, limit);
+    bounds::LinearProgram program(-limit, limit);
     program.add_rows(rows, offsets);
-    const LpSolution solution = program.maximise(objective);
-    if (solution.status == LpSolution::Status::optimal) {
+    const bounds::LpSolution solution = program.maximise(objective);
+    if (solution.status == bounds::LpSolution::Status::optimal) {
       return largest * c.norm() * solution.value;
     }
   }
-  return kNan;
+  return core::kNan;
 }
 
 }  // namespace
@@ -208,10 +212,10 @@ HullOptima hull_optima(const Polytope& set, const Box& prior) {
   return optima;
 }
 
-void add_active_rows(HullOptima& optima, RegressionSource& rows, std::vector<std::size_t> excluded) {
+void add_active_rows(HullOptima& optima, core::RegressionSource& rows, std::vector<std::size_t> excluded) {
   check::that(rows.parameters() == optima.set.dimension(), "rows", "as many parameters as the set");
   std::ranges::sort(excluded);
-  const SlabRows slabs(optima.prior);
+  const bounds::SlabRows slabs(optima.prior);
   HalfSpace upper, lower;
   RegressionBlock block;
   rows.rewind();
@@ -238,13 +242,13 @@ OneSided bound_derivative(const HullOptima& optima, const HullOptimum& optimum, 
   check::that(left.size() == optimum.active.size() && right.size() == optimum.active.size(), "rates",
               "one for each active row");
   if (!optimum.found) {
-    return {kNan, kNan};
+    return {core::kNan, core::kNan};
   }
   const double sign = optimum.side == Side::upper ? 1.0 : -1.0;
   return {-sign * directional(optima, optimum, left, -1.0), sign * directional(optima, optimum, right, 1.0)};
 }
 
-std::string row_in_words(const RowOrigin& origin) {
+std::string row_in_words(const bounds::RowOrigin& origin) {
   const char* side = origin.side == Side::upper ? "upper" : "lower";
   return origin.is_prior ? fmt::format("the prior's {} side of parameter {}", side, origin.parameter)
                          : fmt::format("row {} (t = {:.6g} s)", origin.sample, origin.t);
@@ -270,4 +274,4 @@ std::string why_not_regular(const HullOptimum& optimum, const std::string& name)
   return words;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::study

@@ -19,7 +19,7 @@
 #include <wheelwright/bounds/polytope.hpp>
 #include <wheelwright/core/regression.hpp>
 
-namespace wheelwright {
+namespace wheelwright::study {
 
 /// One-sided derivatives; NaN where there is none.
 struct OneSided {
@@ -29,17 +29,17 @@ struct OneSided {
 
 /// Optimal vertex of one bound of one parameter, and its active rows.
 struct HullOptimum {
-  std::size_t parameter = 0;  ///< j
-  Side side = Side::upper;    ///< which bound of θ_j
-  double value = 0.0;         ///< the certified bound
-  bool found = false;         ///< false: no vertex is known (a set that is flat to rounding); nothing below holds
-  std::size_t block = 0;      ///< of Polytope::blocks()
-  Eigen::VectorXd at;         ///< p, θ*: an optimal vertex, from its equations; the set's centre in other blocks
+  std::size_t parameter = 0;                ///< j
+  bounds::Side side = bounds::Side::upper;  ///< which bound of θ_j
+  double value = 0.0;                       ///< the certified bound
+  bool found = false;     ///< false: no vertex is known (a set that is flat to rounding); nothing below holds
+  std::size_t block = 0;  ///< of Polytope::blocks()
+  Eigen::VectorXd at;     ///< p, θ*: an optimal vertex, from its equations; the set's centre in other blocks
   /// The rows and prior sides that θ* meets with equality (to 1e-9 of the block's size), p coefficients each. The first
   /// `basis` of them define θ*; their multipliers >= 0 are a solution of Σ λ_i a_i = ±e_j, those of the others are 0.
   /// An upper bound moves by +λ_i per unit of b_i (for a row of the log: per unit of its bound dy), a lower bound by
   /// −λ_i.
-  std::vector<WeightedRow> active;
+  std::vector<bounds::WeightedRow> active;
   std::size_t basis = 0;
   bool unique_maximiser = true;  ///< all multipliers of the basis are > 0 (1e-9 of their scale): θ* is the only optimum
   /// True if just the basis is active and the maximiser is unique: then the bound has a derivative with respect to
@@ -62,7 +62,7 @@ struct HullOptima {
 
 /// Walks `rows` once, and adds those that an optimum meets with equality and that its set could do without. `rows` are
 /// those that the set was made of; the row numbers `excluded` (any order) are left out.
-void add_active_rows(HullOptima& optima, RegressionSource& rows, std::vector<std::size_t> excluded = {});
+void add_active_rows(HullOptima& optima, core::RegressionSource& rows, std::vector<std::size_t> excluded = {});
 
 /// Rates of an active row: a' and b'.
 struct RowRate {
@@ -83,6 +83,6 @@ struct RowRate {
 [[nodiscard]] std::string why_not_regular(const HullOptimum& optimum, const std::string& name);
 
 /// "row 812 (t = 8.12 s)" or "the prior's upper side of parameter 2".
-[[nodiscard]] std::string row_in_words(const RowOrigin& origin);
+[[nodiscard]] std::string row_in_words(const bounds::RowOrigin& origin);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::study

@@ -12,20 +12,20 @@
 #include <wheelwright/study/bound_rates.hpp>
 #include <wheelwright/study/study_case.hpp>
 
-namespace wheelwright {
+namespace wheelwright::study {
 namespace {
 
 struct Sensor {
   const char* name;
   const char* unit;
-  NoiseBound SensorNoise::*bound;
+  model::NoiseBound model::SensorNoise::*bound;
 };
 
-constexpr Sensor kSensors[] = {{"wheel_speed", "rad/s", &SensorNoise::wheel_speed},
-                               {"wheel_angle", "rad", &SensorNoise::wheel_angle},
-                               {"effort", "", &SensorNoise::effort},
-                               {"position", "m", &SensorNoise::position},
-                               {"heading", "rad", &SensorNoise::heading}};
+constexpr Sensor kSensors[] = {{"wheel_speed", "rad/s", &model::SensorNoise::wheel_speed},
+                               {"wheel_angle", "rad", &model::SensorNoise::wheel_angle},
+                               {"effort", "", &model::SensorNoise::effort},
+                               {"position", "m", &model::SensorNoise::position},
+                               {"heading", "rad", &model::SensorNoise::heading}};
 
 // The sensor behind "declared." or "noise.".
 const Sensor* sensor_of(std::string_view name) {
@@ -39,8 +39,8 @@ const Sensor* sensor_of(std::string_view name) {
   return nullptr;
 }
 
-const char* effort_unit(EffortKind kind) {
-  return kind == EffortKind::torque ? "N·m" : kind == EffortKind::current ? "A" : "V";
+const char* effort_unit(model::EffortKind kind) {
+  return kind == model::EffortKind::torque ? "N·m" : kind == model::EffortKind::current ? "A" : "V";
 }
 
 LocalInput prior_input(const RobotAt& at, const Model& model, const std::string& name) {
@@ -48,9 +48,9 @@ LocalInput prior_input(const RobotAt& at, const Model& model, const std::string&
   const bool lower = name.ends_with(kLower), upper = name.ends_with(kUpper);
   const std::string physical =
       name.substr(kFamily.size(), name.size() - kFamily.size() - (lower || upper ? kLower.size() : 0));
-  const auto found = std::ranges::find(model.parameters, physical, &Parameter::physical);
+  const auto found = std::ranges::find(model.parameters, physical, &model::Parameter::physical);
   check::that(found != model.parameters.end(), "input " + name, "prior.NAME of a parameter of the model");
-  const PriorBox box = prior_box(at.robot, model);
+  const model::PriorBox box = model::prior_box(at.robot, model);
   const auto j = static_cast<std::size_t>(found - model.parameters.begin());
   const Interval side{box.bounds[j].lower / found->per_physical, box.bounds[j].upper / found->per_physical};
   if (lower) {
@@ -78,9 +78,10 @@ LocalInput local_input(const RobotAt& at, const Model& model, const std::string&
     return prior_input(at, model, name);
   }
   if (const Sensor* sensor = sensor_of(name)) {
-    const NoiseBound& bound = robot.noise.*(sensor->bound);
+    const model::NoiseBound& bound = robot.noise.*(sensor->bound);
     check::that(bound.value.has_value(), "input " + name, "a bound in the robot file");
-    return {name, sensor->bound == &SensorNoise::effort ? effort_unit(robot.effort) : sensor->unit, *bound.value};
+    return {name, sensor->bound == &model::SensorNoise::effort ? effort_unit(robot.effort) : sensor->unit,
+            *bound.value};
   }
   if (name == "filter.alpha" || name == "filter.beta") {
     return {name, "1/s", name == "filter.alpha" ? at.filter.alpha : at.filter.beta};
@@ -126,7 +127,7 @@ std::vector<std::string> robot_inputs(const RobotAt& at) {
     names.emplace_back("encoder_counts_per_turn");
   }
   names.insert(names.end(), {"filter.alpha", "filter.beta"});
-  if (on_two_wheels(at.robot)) {
+  if (model::on_two_wheels(at.robot)) {
     names.insert(names.end(), {"wheel_radius", "track_width"});
   }
   return names;
@@ -150,20 +151,20 @@ ParameterDerivative join(const BoundRate& lower, const BoundRate& upper, const L
 std::vector<std::string> default_inputs(const RobotAt& at, const Model& model, const HullOptima& optima) {
   std::vector<std::string> names = robot_inputs(at);
   std::erase_if(names, [&](const std::string& name) { return local_input(at, model, name).value == 0.0; });
-  const std::vector<bool> declared = prior_box(at.robot, model).declared;
+  const std::vector<bool> declared = model::prior_box(at.robot, model).declared;
   for (std::size_t j = 0; j < model.p(); ++j) {
-    for (const Side side : {Side::lower, Side::upper}) {
+    for (const bounds::Side side : {bounds::Side::lower, bounds::Side::upper}) {
       bool holds = declared[j];
       for (const auto* bounds : {&optima.lower, &optima.upper}) {
         for (const HullOptimum& optimum : *bounds) {
-          for (const WeightedRow& active : optimum.active) {
-            const RowOrigin& origin = active.row.origin;
+          for (const bounds::WeightedRow& active : optimum.active) {
+            const bounds::RowOrigin& origin = active.row.origin;
             holds = holds || (origin.is_prior && origin.parameter == j && origin.side == side);
           }
         }
       }
       if (holds) {
-        names.push_back("prior." + model.parameters[j].physical + (side == Side::lower ? ".lower" : ".upper"));
+        names.push_back("prior." + model.parameters[j].physical + (side == bounds::Side::lower ? ".lower" : ".upper"));
       }
     }
   }
@@ -177,7 +178,7 @@ LocalSensitivity local_derivatives(LogSource& log, const Commissioning& c, const
   LocalSensitivity result;
   result.warrant = c.model.warrant;
   const Model& model = c.model.model;
-  for (const ParameterResult& p : c.parameters) {
+  for (const commission::ParameterResult& p : c.parameters) {
     result.parameters.push_back(p.parameter.name);
     result.units.push_back(p.parameter.unit);
     result.lower.push_back(p.lower);
@@ -188,7 +189,7 @@ LocalSensitivity local_derivatives(LogSource& log, const Commissioning& c, const
     return result;
   }
   const auto is_union = [](const FeasibleSet& set) { return set.sign_parts > 1 || set.convexified; };
-  if (is_union(c.feasible) || std::ranges::any_of(c.earlier, is_union, &EarlierSet::set)) {
+  if (is_union(c.feasible) || std::ranges::any_of(c.earlier, is_union, &commission::EarlierSet::set)) {
     result.notes.emplace_back(
         "signs of parameters with noisy columns are open: the set is a union of parts, and derivatives of its bounds "
         "are not offered");
@@ -233,4 +234,4 @@ std::vector<std::string> not_differentiable(const LocalSensitivity& result) {
   return sentences;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::study

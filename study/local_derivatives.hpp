@@ -21,7 +21,7 @@
 #include <wheelwright/model/robot.hpp>
 #include <wheelwright/study/hull_derivatives.hpp>
 
-namespace wheelwright {
+namespace wheelwright::study {
 
 /// A commissioned robot and its filter: what an input changes.
 struct RobotAt {
@@ -90,7 +90,7 @@ struct LocalSensitivity {
   std::optional<HullOptima> optima{};   ///< what holds them; nothing where there are no derivatives
   std::vector<LocalDerivative> inputs;  ///< in the order asked for; none where there are no derivatives
   std::vector<std::string> notes;       ///< what is held fixed, and why there are none where there are none, for people
-  Warrant warrant = Warrant::extrapolated;  ///< of the bounds
+  core::Warrant warrant = core::Warrant::extrapolated;  ///< of the bounds
 };
 
 /// Derivatives of all bounds of `commissioning`, which was made from `log`. None (see notes) where its set is empty or
@@ -102,4 +102,4 @@ struct LocalSensitivity {
 /// Where bounds are not differentiable, one sentence each: input, parameter, reason. None where all are.
 [[nodiscard]] std::vector<std::string> not_differentiable(const LocalSensitivity& result);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::study

@@ -12,7 +12,7 @@
 #include <wheelwright/core/limits.hpp>
 #include <wheelwright/core/statistics.hpp>
 
-namespace wheelwright {
+namespace wheelwright::study {
 namespace {
 
 constexpr std::size_t fewest_learning = 5;
@@ -53,7 +53,7 @@ bool shown(const FleetEntry& e) { return e.upper - e.lower <= hidden_width * (e.
 // Centre, scales and the hull of the priors. `learns` says of each robot of the table whether it is of the first half.
 PooledParameter learn(const FleetColumn& column, std::size_t at, const std::vector<bool>& learns, std::size_t learning,
                       double most_hidden) {
-  PooledParameter out{.column = at, .before = {kInfinity, -kInfinity}};
+  PooledParameter out{.column = at, .before = {core::kInfinity, -core::kInfinity}};
   std::vector<double> middles, below, above;
   std::size_t seen = 0;
   for (const FleetEntry& e : column.entries) {
@@ -69,7 +69,7 @@ PooledParameter learn(const FleetColumn& column, std::size_t at, const std::vect
     out.reason = fmt::format("{:.3g} % of the learning robots do not show it", 100.0 * out.hidden);
     return out;
   }
-  out.centre = median(middles);
+  out.centre = core::median(middles);
   for (const FleetEntry& e : column.entries) {
     if (learns[e.robot] && shown(e)) {
       below.push_back(std::max(out.centre - e.lower, 0.0));
@@ -77,8 +77,8 @@ PooledParameter learn(const FleetColumn& column, std::size_t at, const std::vect
     }
   }
   const double least = 1e-9 * std::max(std::abs(out.centre), std::numeric_limits<double>::min());
-  out.scale_below = std::max(median(below), least);
-  out.scale_above = std::max(median(above), least);
+  out.scale_below = std::max(core::median(below), least);
+  out.scale_above = std::max(core::median(above), least);
   out.included = true;
   return out;
 }
@@ -100,7 +100,7 @@ std::vector<double> scores_of(const FleetTable& table, const std::vector<PooledP
   }
   for (std::size_t i = 0; i < scores.size(); ++i) {
     if (met[i] < included) {
-      scores[i] = kInfinity;
+      scores[i] = core::kInfinity;
     }
   }
   return scores;
@@ -167,7 +167,7 @@ PooledPrior pooled_prior(const FleetTable& table, const PooledPriorOptions& opti
       ++included;
       const Interval centre = {p.centre, p.centre};
       // The score was rounded to nearest: one more step outward encloses it.
-      const Interval grown = radius * Interval{round_down(1.0), round_up(1.0)};
+      const Interval grown = radius * Interval{core::round_down(1.0), core::round_up(1.0)};
       const double low = (centre - grown * Interval{p.scale_below, p.scale_below}).lower;
       const double high = (centre + grown * Interval{p.scale_above, p.scale_above}).upper;
       p.box = {std::max(low, p.before.lower), std::min(high, p.before.upper)};
@@ -182,4 +182,4 @@ PooledPrior pooled_prior(const FleetTable& table, const PooledPriorOptions& opti
   return out;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::study

@@ -11,7 +11,7 @@
 #include <wheelwright/core/interval.hpp>
 #include <wheelwright/study/robot_record.hpp>
 
-namespace wheelwright {
+namespace wheelwright::study {
 
 /// Options of pooled_prior().
 struct PooledPriorOptions {
@@ -69,4 +69,4 @@ struct PooledPrior {
 /// Throws InvalidArgument for a coverage outside (0, 1) or a share outside [0, 1].
 [[nodiscard]] PooledPrior pooled_prior(const FleetTable& table, const PooledPriorOptions& options = {});
 
-}  // namespace wheelwright
+}  // namespace wheelwright::study

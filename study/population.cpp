@@ -13,7 +13,7 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/statistics.hpp>
 
-namespace wheelwright {
+namespace wheelwright::study {
 namespace {
 
 constexpr double kHuber = 1.5;
@@ -52,7 +52,7 @@ class RobustFit {
     range_ = *high - *low;
     const double size = std::max(std::abs(*low), std::abs(*high));
     floor_ = std::max(1e-24 * size * size, std::numeric_limits<double>::min());
-    centre_ = median(x_);
+    centre_ = core::median(x_);
   }
 
   RandomEffects solve() {
@@ -131,7 +131,7 @@ Interval central_range(const FleetColumn& column, double share) {
   }
   const auto cut = static_cast<std::size_t>(0.5 * (1.0 - share) * static_cast<double>(lower.size()));
   const std::size_t last = upper.size() - 1;
-  return {order_statistic(std::move(lower), cut), order_statistic(std::move(upper), last - cut)};
+  return {core::order_statistic(std::move(lower), cut), core::order_statistic(std::move(upper), last - cut)};
 }
 
 // Share of the robots that are not outside which are certainly below, or certainly above, whichever is larger.
@@ -147,7 +147,7 @@ double certainly_beyond(const FleetColumn& column, const FleetEntry& robot, cons
   return all == 0 ? 0.0 : static_cast<double>(std::max(below, above)) / static_cast<double>(all);
 }
 
-double two_sided(double t, double freedom) { return 2.0 * student_tail(freedom, std::abs(t)); }
+double two_sided(double t, double freedom) { return 2.0 * core::student_tail(freedom, std::abs(t)); }
 
 struct Shown {
   std::vector<const FleetEntry*> entries;
@@ -187,7 +187,7 @@ Population describe_population(const FleetTable& table, const PopulationOptions&
       continue;
     }
     parameter.fit = fit_random_effects(shown.values, shown.errors);
-    parameter.typical_error = median(shown.errors);
+    parameter.typical_error = core::median(shown.errors);
     parameter.central = central_range(column, options.central);
     for (std::size_t i = 0; i < shown.entries.size(); ++i) {
       const RandomEffects others =
@@ -205,7 +205,7 @@ Population describe_population(const FleetTable& table, const PopulationOptions&
     }
   }
   population.tests = p.size();
-  const std::vector<double> adjusted = holm(p);
+  const std::vector<double> adjusted = core::holm(p);
   std::map<std::size_t, std::set<std::size_t>> strangers;  // of each column
   for (std::size_t k = 0; k < candidates.size(); ++k) {
     if (adjusted[which[k]] > options.level) {
@@ -228,4 +228,4 @@ Population describe_population(const FleetTable& table, const PopulationOptions&
   return population;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::study

@@ -11,7 +11,7 @@
 #include <wheelwright/core/interval.hpp>
 #include <wheelwright/study/robot_record.hpp>
 
-namespace wheelwright {
+namespace wheelwright::study {
 
 /// Result of fit_random_effects().
 struct RandomEffects {
@@ -91,4 +91,4 @@ struct Population {
 /// (0, 1) or fewest < 4.
 [[nodiscard]] Population describe_population(const FleetTable& table, const PopulationOptions& options = {});
 
-}  // namespace wheelwright
+}  // namespace wheelwright::study

@@ -14,7 +14,7 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/study/work_on_ranks.hpp>
 
-namespace wheelwright {
+namespace wheelwright::study {
 
 std::string packed(const std::exception_ptr& failure) {
   try {
@@ -337,4 +337,4 @@ bool RankCoordinator::all_ended() {
   return team_.held() == 0 && std::ranges::all_of(shares_, [](const Share& share) { return share.ended; });
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::study

@@ -19,7 +19,7 @@
 #include <wheelwright/study/work.hpp>
 #include <wheelwright/study/work_on_ranks.hpp>
 
-namespace wheelwright {
+namespace wheelwright::study {
 
 /// The exception as bytes: its kind (InputError, Error or another) and its text.
 [[nodiscard]] std::string packed(const std::exception_ptr& failure);
@@ -119,4 +119,4 @@ class RankCoordinator {
   ItemTeam team_;
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::study

@@ -3,12 +3,12 @@
 
 #include <limits>
 
-namespace wheelwright {
+namespace wheelwright::study {
 
 std::size_t column_of(FleetTable& table, const RecordedParameter& parameter) {
   for (std::size_t j = 0; j < table.columns.size(); ++j) {
     if (table.columns[j].name == parameter.name && table.columns[j].unit == parameter.unit) {
-      table.columns[j].warrant = weaker(table.columns[j].warrant, parameter.warrant);
+      table.columns[j].warrant = core::weaker(table.columns[j].warrant, parameter.warrant);
       return j;
     }
   }
@@ -36,4 +36,4 @@ void add(FleetTable& table, const RobotRecord& record) {
   }
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::study

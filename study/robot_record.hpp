@@ -11,7 +11,7 @@
 #include <wheelwright/core/interval.hpp>
 #include <wheelwright/core/warrant.hpp>
 
-namespace wheelwright {
+namespace wheelwright::study {
 
 /// Status of a robot's commissioning.
 enum class RobotStatus {
@@ -36,8 +36,8 @@ struct RecordedParameter {
   double upper = 0.0;
   bool lower_is_prior = false;  ///< the log does not tighten this side
   bool upper_is_prior = false;
-  Interval prior{};                         ///< in which the bounds were sought; [lower, upper] where that is not known
-  Warrant warrant = Warrant::extrapolated;  ///< of lower and upper
+  Interval prior{};  ///< in which the bounds were sought; [lower, upper] where that is not known
+  core::Warrant warrant = core::Warrant::extrapolated;  ///< of lower and upper
 
   friend bool operator==(const RecordedParameter&, const RecordedParameter&) = default;
 };
@@ -110,8 +110,9 @@ struct FleetColumn {
   std::string name;
   std::string unit;
   bool is_prior_key = false;
-  std::vector<FleetEntry> entries{};        ///< ascending robots
-  Warrant warrant = Warrant::extrapolated;  ///< the weakest of all logs' bounds of it, those of checks included
+  std::vector<FleetEntry> entries{};  ///< ascending robots
+  core::Warrant warrant =
+      core::Warrant::extrapolated;  ///< the weakest of all logs' bounds of it, those of checks included
 };
 
 /// Robots in the order in which they were added.
@@ -127,4 +128,4 @@ struct FleetTable {
 /// Appends the robot of `record` with the parameters of its commissioning.
 void add(FleetTable& table, const RobotRecord& record);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::study

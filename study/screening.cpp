@@ -15,7 +15,7 @@
 #include <wheelwright/core/random.hpp>
 #include <wheelwright/core/statistics.hpp>
 
-namespace wheelwright {
+namespace wheelwright::study {
 namespace {
 
 std::size_t at_index(Eigen::Index i) { return static_cast<std::size_t>(i); }
@@ -152,7 +152,7 @@ std::vector<OneAtATime> one_at_a_time(const Eigen::MatrixXd& values, Eigen::Inde
   validate(inputs, levels);
   check::that(values.rows() == 1 + inputs * levels, fmt::format("{} rows of values", values.rows()),
               fmt::format("{}, one for each row of the design", 1 + inputs * levels));
-  const Eigen::MatrixXd finite = values.unaryExpr([](double y) { return std::isfinite(y) ? y : kNan; });
+  const Eigen::MatrixXd finite = values.unaryExpr([](double y) { return std::isfinite(y) ? y : core::kNan; });
   std::vector<OneAtATime> out;
   for (Eigen::Index q = 0; q < finite.cols(); ++q) {
     out.push_back(curves(finite.col(q), inputs, levels));
@@ -185,13 +185,14 @@ Trajectories trajectories(Eigen::Index inputs, const MorrisOptions& options) {
     std::vector<Eigen::Index> order(static_cast<std::size_t>(inputs));
     std::iota(order.begin(), order.end(), Eigen::Index{0});
     for (Eigen::Index i = inputs - 1; i > 0; --i) {
-      std::swap(order[static_cast<std::size_t>(i)], order[uniform_below(generator, static_cast<std::uint64_t>(i + 1))]);
+      std::swap(order[static_cast<std::size_t>(i)],
+                order[core::uniform_below(generator, static_cast<std::uint64_t>(i + 1))]);
     }
     Eigen::RowVectorXd from(inputs), to(inputs);
     std::vector<bool> up(order.size());
     for (Eigen::Index i = 0; i < inputs; ++i) {
-      const auto level = static_cast<Eigen::Index>(uniform_below(generator, static_cast<std::uint64_t>(half)));
-      up[static_cast<std::size_t>(i)] = uniform_below(generator, 2) == 1;
+      const auto level = static_cast<Eigen::Index>(core::uniform_below(generator, static_cast<std::uint64_t>(half)));
+      up[static_cast<std::size_t>(i)] = core::uniform_below(generator, 2) == 1;
       from[i] = static_cast<double>(level) / last;
       to[i] = static_cast<double>(level + half) / last;
       if (!up[static_cast<std::size_t>(i)]) {
@@ -211,7 +212,13 @@ Trajectories trajectories(Eigen::Index inputs, const MorrisOptions& options) {
 }
 
 ElementaryEffects summary(const std::vector<double>& effects, double confidence) {
-  ElementaryEffects out{kNan, kNan, kNan, kNan, kNan, kNan, static_cast<Eigen::Index>(effects.size())};
+  ElementaryEffects out{core::kNan,
+                        core::kNan,
+                        core::kNan,
+                        core::kNan,
+                        core::kNan,
+                        core::kNan,
+                        static_cast<Eigen::Index>(effects.size())};
   if (effects.empty()) {
     return out;
   }
@@ -222,7 +229,7 @@ ElementaryEffects summary(const std::vector<double>& effects, double confidence)
     const auto n = static_cast<double>(out.effects);
     out.deviation = std::sqrt((e - out.mean).square().sum() / (n - 1.0));
     out.standard_error = std::sqrt((e.abs() - out.mean_absolute).square().sum() / (n - 1.0) / n);
-    const double t = student_quantile(confidence, n - 1.0);
+    const double t = core::student_quantile(confidence, n - 1.0);
     out.lower = std::max(0.0, out.mean_absolute - t * out.standard_error);
     out.upper = out.mean_absolute + t * out.standard_error;
   }
@@ -262,4 +269,4 @@ std::vector<std::vector<ElementaryEffects>> morris_effects(const Eigen::MatrixXd
   return out;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::study

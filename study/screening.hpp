@@ -9,7 +9,7 @@
 
 #include <Eigen/Core>
 
-namespace wheelwright {
+namespace wheelwright::study {
 
 /// A full factorial over the unit cube. Points are numbered from 0, the last input's level runs fastest.
 struct Grid {
@@ -110,4 +110,4 @@ struct ElementaryEffects {
                                                                          Eigen::Index inputs,
                                                                          const MorrisOptions& options = {});
 
-}  // namespace wheelwright
+}  // namespace wheelwright::study

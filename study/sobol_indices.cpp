@@ -15,7 +15,7 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/statistics.hpp>
 
-namespace wheelwright {
+namespace wheelwright::study {
 namespace {
 
 constexpr int kBits = 64;
@@ -185,7 +185,7 @@ SobolIndices indices_of(const Eigen::ArrayXd& values, Eigen::Index inputs, const
     without.col(r) = rest.indices();
   }
   const double freedom = static_cast<double>(count - 1);
-  const double t = student_quantile(options.confidence, freedom);
+  const double t = core::student_quantile(options.confidence, freedom);
   const Eigen::ArrayXd estimate = all.indices();
   const auto index = [&](Eigen::Index j) {
     const Eigen::ArrayXd row = without.row(j);
@@ -239,4 +239,4 @@ std::vector<SobolIndices> sobol_indices(const Eigen::MatrixXd& values, Eigen::In
   return out;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::study

@@ -10,7 +10,7 @@
 
 #include <Eigen/Core>
 
-namespace wheelwright {
+namespace wheelwright::study {
 
 /// `replicates` independent randomisations of the first `points` points of Sobol's sequence (Boost's, with the
 /// direction numbers of joe2008; the point at 0, which Boost leaves out, is the first): one point a row, the replicates
@@ -94,4 +94,4 @@ struct SobolIndices {
 [[nodiscard]] std::vector<SobolIndices> sobol_indices(const Eigen::MatrixXd& values, Eigen::Index inputs,
                                                       const SobolOptions& options = {});
 
-}  // namespace wheelwright
+}  // namespace wheelwright::study

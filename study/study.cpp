@@ -12,7 +12,7 @@
 #include <wheelwright/commission/setting.hpp>
 #include <wheelwright/core/check.hpp>
 
-namespace wheelwright {
+namespace wheelwright::study {
 namespace {
 
 Eigen::Index inputs_of(const Study& study) { return static_cast<Eigen::Index>(study.inputs.size()); }
@@ -52,7 +52,7 @@ std::string settle_filter(StudyCase& subject, const std::vector<std::string>& in
   }
   const LogTable table = drive_of_case(subject);
   TableSource log(table);
-  const FilterDesign design = settle(log, subject.robot).filter;
+  const FilterDesign design = commission::settle(log, subject.robot).filter;
   subject.robot.filter.order = design.order;
   subject.robot.filter.beta = design.beta;
   if (std::ranges::find(inputs, "filter.alpha") != inputs.end()) {
@@ -206,4 +206,4 @@ StudyResult StudyValues::result() const {
   return result;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::study

@@ -16,7 +16,7 @@
 #include <wheelwright/study/study_case.hpp>
 #include <wheelwright/study/study_quantity.hpp>
 
-namespace wheelwright {
+namespace wheelwright::study {
 
 /// Methods of a study.
 struct StudyMethods {
@@ -108,4 +108,4 @@ class StudyValues {
   std::vector<StudyFinding> findings_;
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::study

@@ -12,7 +12,7 @@
 #include <wheelwright/core/random.hpp>
 #include <wheelwright/sim/simulation.hpp>
 
-namespace wheelwright {
+namespace wheelwright::study {
 
 void validate(const StudyInput& input) {
   const std::string of = "input " + input.name + ": ";
@@ -43,16 +43,16 @@ namespace {
 struct NoisySensor {
   const char* name;
   const char* unit;
-  NoiseBound SensorNoise::*declared;
-  double Sensors::*simulated;
+  model::NoiseBound model::SensorNoise::*declared;
+  double sim::Sensors::*simulated;
 };
 
 constexpr NoisySensor kNoisySensors[] = {
-    {"wheel_speed", "rad/s", &SensorNoise::wheel_speed, &Sensors::wheel_speed},
-    {"wheel_angle", "rad", &SensorNoise::wheel_angle, &Sensors::wheel_angle},
-    {"effort", "", &SensorNoise::effort, &Sensors::effort},
-    {"position", "m", &SensorNoise::position, &Sensors::position},
-    {"heading", "rad", &SensorNoise::heading, &Sensors::heading},
+    {"wheel_speed", "rad/s", &model::SensorNoise::wheel_speed, &sim::Sensors::wheel_speed},
+    {"wheel_angle", "rad", &model::SensorNoise::wheel_angle, &sim::Sensors::wheel_angle},
+    {"effort", "", &model::SensorNoise::effort, &sim::Sensors::effort},
+    {"position", "m", &model::SensorNoise::position, &sim::Sensors::position},
+    {"heading", "rad", &model::SensorNoise::heading, &sim::Sensors::heading},
 };
 
 const NoisySensor& noisy_sensor(const std::string& name) {
@@ -67,14 +67,14 @@ const NoisySensor& noisy_sensor(const std::string& name) {
 
 struct Truth {
   const char* name;
-  double DriveParameters::*value;
+  double model::DriveParameters::*value;
 };
 
 constexpr Truth kTruths[] = {
-    {"mass", &DriveParameters::mass},
-    {"yaw_inertia", &DriveParameters::yaw_inertia},
-    {"viscous_linear", &DriveParameters::viscous_x},
-    {"viscous_yaw", &DriveParameters::viscous_yaw},
+    {"mass", &model::DriveParameters::mass},
+    {"yaw_inertia", &model::DriveParameters::yaw_inertia},
+    {"viscous_linear", &model::DriveParameters::viscous_x},
+    {"viscous_yaw", &model::DriveParameters::viscous_yaw},
 };
 
 const Truth& truth_of(const std::string& name) {
@@ -132,8 +132,10 @@ std::size_t whole(double x, const std::string& name) {
   return static_cast<std::size_t>(std::llround(x));
 }
 
-std::vector<std::size_t> effort_columns(const LogTable& log, EffortKind kind) {
-  const std::string prefix = kind == EffortKind::torque ? "tau" : kind == EffortKind::current ? "current" : "voltage";
+std::vector<std::size_t> effort_columns(const LogTable& log, model::EffortKind kind) {
+  const std::string prefix = kind == model::EffortKind::torque    ? "tau"
+                             : kind == model::EffortKind::current ? "current"
+                                                                  : "voltage";
   std::vector<std::size_t> columns;
   for (std::size_t c = 0; c < log.names.size(); ++c) {
     if (log.names[c].starts_with(prefix) || log.names[c] == "effort") {
@@ -144,7 +146,7 @@ std::vector<std::size_t> effort_columns(const LogTable& log, EffortKind kind) {
 }
 
 // Efforts of `count` different instants become wrong by ten times their root mean square.
-void put_outliers(LogTable& log, EffortKind kind, std::size_t count, std::uint64_t seed) {
+void put_outliers(LogTable& log, model::EffortKind kind, std::size_t count, std::uint64_t seed) {
   const std::vector<std::size_t> columns = effort_columns(log, kind);
   if (count == 0 || columns.empty()) {
     return;
@@ -154,7 +156,7 @@ void put_outliers(LogTable& log, EffortKind kind, std::size_t count, std::uint64
   // Floyd's sampling without replacement.
   std::vector<std::size_t> rows;
   for (std::size_t j = log.rows() - count; j < log.rows(); ++j) {
-    const auto at = std::min(static_cast<std::size_t>(uniform(generator) * static_cast<double>(j + 1)), j);
+    const auto at = std::min(static_cast<std::size_t>(core::uniform(generator) * static_cast<double>(j + 1)), j);
     rows.push_back(std::ranges::find(rows, at) == rows.end() ? at : j);
   }
   for (const std::size_t row : rows) {
@@ -170,18 +172,18 @@ void put_outliers(LogTable& log, EffortKind kind, std::size_t count, std::uint64
 
 LogTable cut(const LogTable& log, double seconds) {
   const auto end = std::upper_bound(log.t.begin(), log.t.end(), log.t.front() + seconds);
-  return slice(log, 0, static_cast<std::size_t>(end - log.t.begin()));
+  return core::slice(log, 0, static_cast<std::size_t>(end - log.t.begin()));
 }
 
 LogTable thinned(const LogTable& log, const Robot& robot, double rate) {
-  const double step = median_step(log.t);
+  const double step = core::median_step(log.t);
   const auto every = static_cast<std::size_t>(std::max(1.0, std::round(1.0 / (rate * step))));
   if (every == 1) {
     return log;
   }
   const bool angles = std::ranges::any_of(
       log.names, [](const std::string& name) { return name.starts_with("phi") || name == "position"; });
-  check::that(angles || robot.speed_source == SpeedSource::measured, "input rate",
+  check::that(angles || robot.speed_source == model::SpeedSource::measured, "input rate",
               "a log with wheel angles, or speed_source: measured in the robot file: means over a step cannot be "
               "thinned");
   LogTable out;
@@ -278,7 +280,7 @@ std::optional<double> nominal_of_input(const StudyCase& subject, const std::stri
                : robot.encoder_counts_per_turn;
   }
   if (name == "rate") {
-    return subject.scenario ? subject.scenario->rate : 1.0 / median_step(subject.log->t);
+    return subject.scenario ? subject.scenario->rate : 1.0 / core::median_step(subject.log->t);
   }
   if (name == "duration") {
     return subject.scenario ? subject.scenario->duration : subject.log->t.back() - subject.log->t.front();
@@ -307,7 +309,7 @@ void set_input(StudyCase& subject, const std::string& name, double x) {
     Interval& prior = prior_of(subject, name);
     prior = widened(prior, check::positive(x, "input " + name));
   } else if (kind.name == "truth.NAME") {
-    DriveParameters& truth = subject.scenario->parameters;
+    model::DriveParameters& truth = subject.scenario->parameters;
     truth.*truth_of(name).value = x;
     if (name == "truth.viscous_linear") {
       truth.viscous_y = x;
@@ -329,7 +331,7 @@ void set_input(StudyCase& subject, const std::string& name, double x) {
       (name == "rate" ? subject.rate : subject.duration) = x;
     }
   } else if (name == "excitation") {
-    check::that(subject.scenario->trajectory.kind != Trajectory::Kind::table, "input excitation",
+    check::that(subject.scenario->trajectory.kind != sim::Trajectory::Kind::table, "input excitation",
                 "a trajectory that is not of kind table");
     subject.scenario->trajectory.speed *= check::positive(x, "input " + name);
     subject.scenario->trajectory.yaw_rate *= x;
@@ -345,7 +347,7 @@ LogTable drive_of_case(const StudyCase& subject) {
   if (subject.scenario) {
     Scenario scenario = *subject.scenario;
     scenario.seed = subject.seed.value_or(scenario.seed);
-    log = simulate(scenario);
+    log = sim::simulate(scenario);
   } else {
     check::that(subject.log != nullptr && subject.log->rows() > 1, "log", "a recorded log, or a scenario");
     log = subject.duration ? cut(*subject.log, *subject.duration) : *subject.log;
@@ -365,4 +367,4 @@ double Robot::*length_of(std::string_view name) {
   return found != lengths.end() ? found->second : nullptr;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::study

@@ -15,7 +15,7 @@
 #include <wheelwright/model/robot.hpp>
 #include <wheelwright/sim/simulation.hpp>
 
-namespace wheelwright {
+namespace wheelwright::study {
 
 /// One input of a study. Designs live in the unit cube; value() says what a coordinate stands for.
 struct StudyInput {
@@ -84,4 +84,4 @@ void set_input(StudyCase& subject, const std::string& name, double x);
 /// The length of a robot that the input `name` moves (wheel_radius, track_width); null where it is none.
 [[nodiscard]] double Robot::*length_of(std::string_view name);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::study

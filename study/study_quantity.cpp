@@ -18,7 +18,7 @@
 #include <wheelwright/detector/fault_type.hpp>
 #include <wheelwright/gap/diagnose.hpp>
 
-namespace wheelwright {
+namespace wheelwright::study {
 namespace {
 
 using Kind = StudyQuantity::Kind;
@@ -62,7 +62,7 @@ struct Reader {
     for (const auto& [family, kind] : families()) {
       known.push_back(family);
     }
-    fail(name, "one of " + listed(known));
+    fail(name, "one of " + core::listed(known));
   }
 
   void read_member(const std::string& name, const std::string& family, Kind kind, const std::string& member) {
@@ -100,17 +100,17 @@ struct Reader {
     std::vector<std::string> names;
     const std::size_t before = found.size();
     for (std::size_t j = 0; j < model.p(); ++j) {
-      const Parameter& parameter = model.parameters[j];
+      const model::Parameter& parameter = model.parameters[j];
       names.push_back(parameter.name);
       if (member.empty() || member == parameter.name || member == parameter.physical) {
         q.name = family + "." + parameter.name;
-        q.unit = parameter_unit(robot, parameter);
+        q.unit = commission::parameter_unit(robot, parameter);
         q.index = j;
         found.push_back(q);
       }
     }
     if (found.size() == before) {
-      fail(q.name, family + " of one of the parameters " + listed(names));
+      fail(q.name, family + " of one of the parameters " + core::listed(names));
     }
   }
 
@@ -119,13 +119,13 @@ struct Reader {
     for (std::size_t i = 0; i < model.n(); ++i) {
       if (member.empty() || member == model.outputs[i]) {
         q.name = family + "." + model.outputs[i];
-        q.unit = output_unit(robot, model.output_units[i]);
+        q.unit = commission::output_unit(robot, model.output_units[i]);
         q.index = i;
         found.push_back(q);
       }
     }
     if (found.size() == before) {
-      fail(q.name, family + " of one of the outputs " + listed(model.outputs));
+      fail(q.name, family + " of one of the outputs " + core::listed(model.outputs));
     }
   }
 
@@ -133,8 +133,8 @@ struct Reader {
     const std::size_t equals = member.find('=');
     q.subject = member.substr(0, equals);
     const Eigen::VectorXd theta = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(model.p()));
-    const std::vector<FaultType> faults = fault_catalogue(model, theta, robot.effort);
-    q.unit = q.kind == Kind::delay ? "s" : find_fault(faults, q.subject).unit;
+    const std::vector<detector::FaultType> faults = detector::fault_catalogue(model, theta, robot.effort);
+    q.unit = q.kind == Kind::delay ? "s" : detector::find_fault(faults, q.subject).unit;
     if (q.kind == Kind::delay) {
       const std::string text = equals == std::string::npos ? "" : member.substr(equals + 1);
       char* end = nullptr;
@@ -156,11 +156,11 @@ bool asks(const std::vector<StudyQuantity>& quantities, std::initializer_list<Ki
 
 double share_outside(const Commissioning& result) {
   std::size_t outside = 0, instants = 0;
-  for (const OutputValidation& v : result.validation) {
+  for (const commission::OutputValidation& v : result.validation) {
     outside += v.outside;
     instants += v.instants;
   }
-  return instants > 0 ? static_cast<double>(outside) / static_cast<double>(instants) : kNan;
+  return instants > 0 ? static_cast<double>(outside) / static_cast<double>(instants) : core::kNan;
 }
 
 struct Thresholds {
@@ -171,7 +171,7 @@ Thresholds thresholds_over(LogSource& log, const OnlineModel& model) {
   Thresholds t{std::vector<double>(model.model.n(), 0.0), std::vector<double>(model.model.n(), 0.0)};
   std::size_t instants = 0;
   Detector detector = make_detector(model);
-  walk_detector(log, detector, [&](std::size_t, double, bool, const Decision& decision) {
+  commission::walk_detector(log, detector, [&](std::size_t, double, bool, const Decision& decision) {
     ++instants;
     for (std::size_t i = 0; i < decision.channels.size(); ++i) {
       const double rho = decision.channels[i].threshold.rho();
@@ -180,15 +180,15 @@ Thresholds thresholds_over(LogSource& log, const OnlineModel& model) {
     }
   });
   for (std::size_t i = 0; i < t.mean.size(); ++i) {
-    t.mean[i] = instants > 0 ? t.mean[i] / static_cast<double>(instants) : kNan;
-    t.peak[i] = instants > 0 ? t.peak[i] : kNan;
+    t.mean[i] = instants > 0 ? t.mean[i] / static_cast<double>(instants) : core::kNan;
+    t.peak[i] = instants > 0 ? t.peak[i] : core::kNan;
   }
   return t;
 }
 
-MarginSurvey survey_faults(LogSource& log, const OnlineModel& model, const std::vector<StudyQuantity>& quantities,
-                           const EvaluateOptions& options) {
-  MarginSurveyOptions ask;
+commission::MarginSurvey survey_faults(LogSource& log, const OnlineModel& model,
+                                       const std::vector<StudyQuantity>& quantities, const EvaluateOptions& options) {
+  commission::MarginSurveyOptions ask;
   ask.map_points = 0;
   ask.margins.most_onsets = options.most_onsets;
   std::vector<double>& windows = ask.margins.windows;
@@ -204,17 +204,17 @@ MarginSurvey survey_faults(LogSource& log, const OnlineModel& model, const std::
       ask.faults.push_back(q.subject);
     }
   }
-  return survey_margins(log, model, ask);
+  return commission::survey_margins(log, model, ask);
 }
 
 // Of the residual that sees the fault best, on the side on which it sees it worst.
 template <typename Answer>
-double over_sides(const MarginSurvey& survey, const std::string& fault, const Answer& answer) {
+double over_sides(const commission::MarginSurvey& survey, const std::string& fault, const Answer& answer) {
   double best = std::numeric_limits<double>::infinity();
-  for (const ResidualMargins& residual : survey.residuals) {
+  for (const commission::ResidualMargins& residual : survey.residuals) {
     double worst = 0.0;
     bool seen = false;
-    for (const FaultMargins& margins : residual.margins) {
+    for (const detector::FaultMargins& margins : residual.margins) {
       if (margins.fault.name == fault) {
         seen = true;
         worst = std::max(worst, answer(margins));
@@ -225,14 +225,15 @@ double over_sides(const MarginSurvey& survey, const std::string& fault, const An
   return best;
 }
 
-double fault_value(const MarginSurvey& survey, const StudyQuantity& q, double window) {
+double fault_value(const commission::MarginSurvey& survey, const StudyQuantity& q, double window) {
   const auto at = static_cast<std::size_t>(std::ranges::find(survey.windows, window) - survey.windows.begin());
   if (q.kind == Kind::smallest_fault) {
-    return over_sides(survey, q.subject, [&](const FaultMargins& margins) { return summarise(margins, at).median; });
+    return over_sides(survey, q.subject,
+                      [&](const detector::FaultMargins& margins) { return detector::summarise(margins, at).median; });
   }
-  return over_sides(survey, q.subject, [&](const FaultMargins& margins) {
+  return over_sides(survey, q.subject, [&](const detector::FaultMargins& margins) {
     for (std::size_t w = 0; w < survey.windows.size(); ++w) {
-      if (summarise(margins, w).median <= q.size) {
+      if (detector::summarise(margins, w).median <= q.size) {
         return survey.windows[w];
       }
     }
@@ -240,28 +241,28 @@ double fault_value(const MarginSurvey& survey, const StudyQuantity& q, double wi
   });
 }
 
-const char* verdict_name(GapVerdict verdict) {
+const char* verdict_name(gap::GapVerdict verdict) {
   switch (verdict) {
-    case GapVerdict::no_gap: return "no_gap";
-    case GapVerdict::explained: return "explained";
-    case GapVerdict::ambiguous: return "ambiguous";
-    case GapVerdict::unexplained: return "unexplained";
+    case gap::GapVerdict::no_gap: return "no_gap";
+    case gap::GapVerdict::explained: return "explained";
+    case gap::GapVerdict::ambiguous: return "ambiguous";
+    case gap::GapVerdict::unexplained: return "unexplained";
   }
   return "";
 }
 
 void read_off(LogSource& log, const StudyCase& subject, const std::vector<StudyQuantity>& quantities,
               const EvaluateOptions& options, CaseResult& result) {
-  CommissionOptions commissioning;
+  commission::CommissionOptions commissioning;
   commissioning.outliers = subject.outliers_allowed;
-  const Commissioning c = commission(log, subject.robot, commissioning);
+  const Commissioning c = commission_robot(log, subject.robot, commissioning);
   const bool model = !c.model.facets.empty();
   if (!model) {
     result.finding = c.message;
   }
   std::optional<Thresholds> thresholds;
-  std::optional<MarginSurvey> margins;
-  std::optional<GapVerdict> verdict;
+  std::optional<commission::MarginSurvey> margins;
+  std::optional<gap::GapVerdict> verdict;
   if (model && asks(quantities, {Kind::threshold_mean, Kind::threshold_peak})) {
     thresholds = thresholds_over(log, c.model);
   }
@@ -269,7 +270,7 @@ void read_off(LogSource& log, const StudyCase& subject, const std::vector<StudyQ
     margins = survey_faults(log, c.model, quantities, options);
   }
   if (asks(quantities, {Kind::gap})) {
-    DiagnoseOptions diagnosis;
+    gap::DiagnoseOptions diagnosis;
     diagnosis.shrink = false;
     verdict = diagnose(log, nullptr, subject.robot, diagnosis).verdict;
   }
@@ -285,8 +286,8 @@ void read_off(LogSource& log, const StudyCase& subject, const std::vector<StudyQ
         case Kind::lower: value = c.parameters[q.index].lower; break;
         case Kind::upper: value = c.parameters[q.index].upper; break;
         case Kind::width: value = c.parameters[q.index].upper - c.parameters[q.index].lower; break;
-        case Kind::estimate: value = c.parameters[q.index].estimate.value_or(kNan); break;
-        case Kind::standard_error: value = c.parameters[q.index].standard_error.value_or(kNan); break;
+        case Kind::estimate: value = c.parameters[q.index].estimate.value_or(core::kNan); break;
+        case Kind::standard_error: value = c.parameters[q.index].standard_error.value_or(core::kNan); break;
         case Kind::threshold_mean: value = thresholds->mean[q.index]; break;
         case Kind::threshold_peak: value = thresholds->peak[q.index]; break;
         case Kind::smallest_fault:
@@ -304,9 +305,9 @@ void read_off(LogSource& log, const StudyCase& subject, const std::vector<StudyQ
 std::vector<StudyQuantity> study_quantities(const std::vector<std::string>& names, const Robot& robot) {
   static const std::vector<std::string> usual = {"width", "threshold.mean", "smallest_fault.wheel_radius",
                                                  "false_alarms", "commissioned"};
-  Reader reader{robot, make_model(robot)};
+  Reader reader{robot, model::make_model(robot)};
   for (const std::string& name : names.empty() ? usual : names) {
-    if (names.empty() && name.starts_with("smallest_fault") && !on_two_wheels(robot)) {
+    if (names.empty() && name.starts_with("smallest_fault") && !model::on_two_wheels(robot)) {
       continue;
     }
     reader.read(name);
@@ -317,11 +318,11 @@ std::vector<StudyQuantity> study_quantities(const std::vector<std::string>& name
 CaseResult evaluate_case(const StudyCase& subject, const std::vector<StudyQuantity>& quantities,
                          const EvaluateOptions& options) {
   CaseResult result;
-  result.values.assign(quantities.size(), kNan);
+  result.values.assign(quantities.size(), core::kNan);
   const auto without_model = [&](const std::string& why) {
     result.finding = why;
     for (std::size_t i = 0; i < quantities.size(); ++i) {
-      result.values[i] = quantities[i].kind == Kind::commissioned ? 0.0 : kNan;
+      result.values[i] = quantities[i].kind == Kind::commissioned ? 0.0 : core::kNan;
     }
   };
   try {
@@ -334,4 +335,4 @@ CaseResult evaluate_case(const StudyCase& subject, const std::vector<StudyQuanti
   return result;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::study

@@ -10,7 +10,7 @@
 #include <wheelwright/model/robot.hpp>
 #include <wheelwright/study/study_case.hpp>
 
-namespace wheelwright {
+namespace wheelwright::study {
 
 /// One number that a point gives.
 struct StudyQuantity {
@@ -66,4 +66,4 @@ struct CaseResult {
 [[nodiscard]] CaseResult evaluate_case(const StudyCase& subject, const std::vector<StudyQuantity>& quantities,
                                        const EvaluateOptions& options = {});
 
-}  // namespace wheelwright
+}  // namespace wheelwright::study

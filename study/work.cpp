@@ -13,7 +13,7 @@
 
 #include <wheelwright/core/check.hpp>
 
-namespace wheelwright {
+namespace wheelwright::study {
 namespace {
 
 /// Items of a shard on their way from the work to the store; several threads take and hand back at once.
@@ -104,4 +104,4 @@ RunCount run_work(const Work& work, ResultStore& store, const RunOptions& option
   return flow.finish();
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::study

@@ -9,7 +9,7 @@
 #include <string>
 #include <string_view>
 
-namespace wheelwright {
+namespace wheelwright::study {
 
 /// Items of work, numbered from 0.
 struct Work {
@@ -59,4 +59,4 @@ struct RunCount {
 /// a shard that is none.
 RunCount run_work(const Work& work, ResultStore& store, const RunOptions& options = {});
 
-}  // namespace wheelwright
+}  // namespace wheelwright::study

@@ -15,7 +15,7 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/study/rank_coordinator.hpp>
 
-namespace wheelwright {
+namespace wheelwright::study {
 
 MpiSession::MpiSession() {
   int begun = 0;
@@ -218,4 +218,4 @@ RunCount run_work_on_ranks(const MpiSession& mpi, const Work& work, const std::s
   return Helper(work, fingerprint, options.threads).run();
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::study

@@ -17,7 +17,7 @@
 
 #include <wheelwright/study/work.hpp>
 
-namespace wheelwright {
+namespace wheelwright::study {
 
 /// MPI, started by the constructor and ended by the destructor; one per process, since MPI starts once. Every process
 /// that mpirun started has to make one, and to come to its end. Only the thread that made it calls MPI.
@@ -115,4 +115,4 @@ class ItemTeam {
 RunCount run_work_on_ranks(const MpiSession& mpi, const Work& work, const std::string& fingerprint,
                            const std::function<ResultStore&()>& open, const RunOptions& options = {});
 
-}  // namespace wheelwright
+}  // namespace wheelwright::study

@@ -54,8 +54,8 @@ std::string escaped(const std::string& text) {
 void print_types() {
   const char* before = "{";
   for (const char* const type : types) {
-    for (const RosDefinition& form : bundled_ros_forms(type)) {
-      fmt::print("{}\"{} {}\": \"{}\"", before, type, form.origin, escaped(ros_definition_text(form)));
+    for (const logs::RosDefinition& form : logs::bundled_ros_forms(type)) {
+      fmt::print("{}\"{} {}\": \"{}\"", before, type, form.origin, escaped(logs::ros_definition_text(form)));
       before = ",\n";
     }
   }
@@ -63,15 +63,15 @@ void print_types() {
 }
 
 template <typename Message>
-void write_some(BagWriter& bag, const Message& message, const std::string& definition) {
+void write_some(logs::BagWriter& bag, const Message& message, const std::string& definition) {
   const auto topic = bag.add_topic(fmt::format("/{}", Message::type), Message::type, definition);
-  RosEncoder encoder;
+  logs::RosEncoder encoder;
   bag.write(topic, 5, encoder.encode(message));
 }
 
 template <typename Message>
-void write_some(BagWriter& bag, const Message& message) {
-  write_some(bag, message, ros_definition_text(bundled_ros_definition(Message::type).value()));
+void write_some(logs::BagWriter& bag, const Message& message) {
+  write_some(bag, message, logs::ros_definition_text(logs::bundled_ros_definition(Message::type).value()));
 }
 
 void write(const char* path) {
@@ -81,8 +81,8 @@ void write(const char* path) {
       number = static_cast<double>(random()) * 1e-15 - 9000.0;
     }
   };
-  BagWriter bag(path);
-  RosJointState joints;
+  logs::BagWriter bag(path);
+  logs::RosJointState joints;
   joints.header = {1'234'567'890'123'456'789, "odd"};
   joints.name = {"left", "right_wheel", ""};
   joints.position.resize(3);
@@ -90,7 +90,7 @@ void write(const char* path) {
   fill(joints.position);
   fill(joints.velocity);
   write_some(bag, joints);
-  RosOdometry odometry;
+  logs::RosOdometry odometry;
   odometry.header = {1, "o"};
   odometry.child_frame_id = "child";
   fill(odometry.pose.position);
@@ -100,15 +100,15 @@ void write(const char* path) {
   fill(odometry.twist.angular);
   fill(odometry.twist_covariance);
   write_some(bag, odometry);
-  RosPoseStamped pose;
+  logs::RosPoseStamped pose;
   fill(pose.pose.position);
   fill(pose.pose.orientation);
   write_some(bag, pose);
-  RosTwistStamped twist;
+  logs::RosTwistStamped twist;
   fill(twist.twist.linear);
   fill(twist.twist.angular);
   write_some(bag, twist);
-  RosImu imu;
+  logs::RosImu imu;
   fill(imu.orientation);
   fill(imu.orientation_covariance);
   fill(imu.angular_velocity);
@@ -116,10 +116,10 @@ void write(const char* path) {
   fill(imu.linear_acceleration);
   fill(imu.linear_acceleration_covariance);
   write_some(bag, imu);
-  RosColumns columns;
+  logs::RosColumns columns;
   columns.values.resize(3);
   fill(columns.values);
-  write_some(bag, columns, columns_definition({"rho", "lower", "upper"}));
+  write_some(bag, columns, logs::columns_definition({"rho", "lower", "upper"}));
   bag.commit();
 }
 
@@ -136,15 +136,15 @@ void expand(const std::string& path, std::vector<std::string>& paths) {
 }
 
 void read(const char* path) {
-  const auto bag = open_bag({path});
-  BagMessage message;
+  const auto bag = logs::open_bag({path});
+  logs::BagMessage message;
   while (bag->next(message)) {
-    const BagTopic& topic = bag->topics()[message.topic];
+    const logs::BagTopic& topic = bag->topics()[message.topic];
     std::vector<std::string> paths;
-    for (const std::string& list : numeric_paths(topic.definition.value())) {
+    for (const std::string& list : logs::numeric_paths(topic.definition.value())) {
       expand(list, paths);
     }
-    RosExtractor extractor(*topic.definition, paths);
+    logs::RosExtractor extractor(*topic.definition, paths);
     std::vector<double> values(paths.size());
     if (!extractor.read(message.data, values)) {
       throw Error(topic.name + ": " + extractor.error());

@@ -47,6 +47,9 @@ MAY_INCLUDE = {
     "bench": None,
 }
 
+# Rooms whose namespace is not called as they are.
+SPACE = {"export": "exporter"}
+
 # Results are functions of their arguments (seeds are arguments); doors and roof open files.
 BANNED_HEADERS = {
     "fstream": "only doors and results open files",
@@ -134,6 +137,15 @@ def check_code(room, relative, text, report):
         report(relative, 1, "no #pragma once")
 
 
+def check_space(room, relative, text, report):
+    """Code of a room is in the room's namespace; in wheelwright itself stands what a header lends it."""
+    space = "wheelwright::" + SPACE.get(room, room)
+    for opened in re.finditer(r"^namespace (wheelwright(?:::\w+)*) \{\n", text, re.M):
+        lent = relative.suffix == ".hpp" and re.compile(r"(?:(?:using \w+|namespace \w+ = \w+)::\w+;\n)+\}").match(text, opened.end())
+        if not f"{opened.group(1)}::".startswith(f"{space}::") and not (opened.group(1) == "wheelwright" and lent):
+            report(relative, text[: opened.start()].count("\n") + 1, f"namespace {opened.group(1)} in {room}/: expected {space}")
+
+
 def check_links(room, relative, text, report):
     """What the room's CMakeLists.txt links is what the table lets it include."""
     allowed = MAY_INCLUDE[room]
@@ -146,25 +158,40 @@ def check_links(room, relative, text, report):
             report(relative, number, f"{room}/ may not use {other}")
 
 
-def public_headers(root):
-    """room -> headers that its CMakeLists.txt installs; rooms without any are not in it."""
+def listed_headers(root, kinds):
+    """room -> headers after the words `kinds` in its CMakeLists.txt; rooms without any are not in it."""
     headers = {}
     for room in HOUSE:
         path = root / room / "CMakeLists.txt"
         if path.is_file():
-            for listed in re.findall(r"\bHEADERS\s+((?:[\w.]+\.hpp\s*)+)", path.read_text(encoding="utf-8")):
+            for listed in re.findall(rf"\b(?:{kinds})\s+((?:[\w.]+\.hpp\s*)+)", path.read_text(encoding="utf-8")):
                 headers.setdefault(room, set()).update(listed.split())
     return headers
 
 
-def check_private(room, relative, text, public, report):
-    """Headers that are not installed are their own room's; tests and benchmarks may look into every room."""
+def installed_headers(root):
+    return listed_headers(root, "HEADERS")
+
+
+def public_headers(root):
+    """Those that other rooms may include: installed, or shared with the rooms above."""
+    return listed_headers(root, "HEADERS|SHARED")
+
+
+def check_private(room, relative, text, public, installed, report):
+    """Headers that no list names are their own room's; tests and benchmarks may look into every room. What is installed
+    includes what is installed."""
     if room in ("tests", "bench", "tools"):
         return
+    lent = relative.name in installed.get(room, ())
     for number, line in enumerate(text.splitlines(), 1):
         ours = re.match(r'^\s*#\s*include\s*<wheelwright/(\w+)/([\w.]+)>', line)
-        if ours and ours.group(1) in public and ours.group(1) != room and ours.group(2) not in public[ours.group(1)]:
+        if not ours or ours.group(1) not in public:
+            continue
+        if ours.group(1) != room and ours.group(2) not in public[ours.group(1)]:
             report(relative, number, f"{ours.group(1)}/{ours.group(2)} is private to its room")
+        elif lent and ours.group(2) not in installed.get(ours.group(1), ()):
+            report(relative, number, f"{ours.group(1)}/{ours.group(2)} is not installed, {relative} is")
 
 
 def check_types(relative, text, types, report):
@@ -179,7 +206,7 @@ def check_types(relative, text, types, report):
 def check(root):
     findings = []
     types = {}
-    public = public_headers(Path(root))
+    public, installed = public_headers(Path(root)), installed_headers(Path(root))
     report = lambda path, line, message: findings.append(f"{path}:{line}: {message}")
     for path in files(root):
         relative = path.relative_to(root)
@@ -200,7 +227,9 @@ def check(root):
                 report(relative, number, f"names {named.group(0)}, a path of one machine")
         if path.suffix in (".hpp", ".cpp"):
             check_code(room, relative, text, report)
-            check_private(room, relative, text, public, report)
+            check_private(room, relative, text, public, installed, report)
+            if room in (*HOUSE, "app", "python", "reality"):
+                check_space(room, relative, text, report)
         if path.suffix == ".hpp" and room in HOUSE:
             check_types(relative, text, types, report)
         if path.name == "CMakeLists.txt" and room in MAY_INCLUDE:
@@ -214,11 +243,13 @@ def self_test():
     clean = {
         "core/a.hpp": head + "#include <vector>\n// a random comment on rand() and std::cout\nstruct A {\n};\n",
         "bounds/b.hpp": head + "#include <wheelwright/core/a.hpp>\nstruct A;\nstruct B {};\nstruct B<2> {};\n",
+        "model/m.hpp": head + "namespace wheelwright::model {\nint f();\n}\n\nnamespace wheelwright {\nusing model::f;\n}\n",
         "files/c.cpp": spdx + "#include <fstream>\n#include <wheelwright/core/a.hpp>\n",
         "inference/robust.cpp": spdx + "#include <ceres/ceres.h>\n",
         "study/work_on_ranks.cpp": spdx + "#include <chrono>\n#include <mpi.h>\n",
         "detector/CMakeLists.txt": "# SPDX-License-Identifier: Apache-2.0\nwheelwright_room(detector\n  USES core filter\n  LINK x)\n",
-        "filter/CMakeLists.txt": "# SPDX-License-Identifier: Apache-2.0\nwheelwright_room(filter\n  HEADERS a.hpp\n    b.hpp\n  SOURCES c.cpp)\n",
+        "filter/CMakeLists.txt": "# SPDX-License-Identifier: Apache-2.0\nwheelwright_room(filter\n  HEADERS a.hpp\n    b.hpp\n  SHARED s.hpp\n  SOURCES c.cpp)\n",
+        "detector/shared.cpp": spdx + "#include <wheelwright/filter/s.hpp>\n",
         "docs/framework.md": "framework/works on http://host/working and a/" + "work\n",
     }
     violations = {
@@ -227,7 +258,10 @@ def self_test():
         "roof in a door": ("logs/x.cpp", spdx + "#include <wheelwright/report/s.hpp>\n"),
         "door in report": ("report/x.cpp", spdx + "#include <wheelwright/robots/s.hpp>\n"),
         "private header": ("detector/y.cpp", spdx + "#include <wheelwright/filter/b.hpp>\n#include <wheelwright/filter/c.hpp>\n"),
+        "not installed": ("filter/a.hpp", head + "#include <wheelwright/filter/s.hpp>\n"),
         "linked upwards": ("identify/CMakeLists.txt", "# SPDX-License-Identifier: Apache-2.0\nwheelwright_room(identify\n  USES core bounds)\n"),
+        "another room's namespace": ("bounds/x.cpp", spdx + "namespace wheelwright::core {\n}\n"),
+        "no room's namespace": ("bounds/x.hpp", head + "namespace wheelwright {\nint f();\n}\n"),
         "file opened": ("commission/x.cpp", spdx + "#include <fstream>\n"),
         "printing": ("filter/x.cpp", spdx + "void f() { std::cout << 1; }\n"),
         "clock": ("identify/x.cpp", spdx + "#include <chrono>\n"),

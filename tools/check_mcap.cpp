@@ -26,8 +26,8 @@ std::string hex(std::string_view bytes) {
   return text;
 }
 
-void write(const std::filesystem::path& path, McapCompression compression, std::size_t chunk_bytes) {
-  McapWriter writer(path, {compression, chunk_bytes, "ros2", "wheelwright"});
+void write(const std::filesystem::path& path, logs::McapCompression compression, std::size_t chunk_bytes) {
+  logs::McapWriter writer(path, {compression, chunk_bytes, "ros2", "wheelwright"});
   const auto joints = writer.add_schema("sensor_msgs/msg/JointState", "ros2msg", "float64[] position\n");
   writer.add_channel(joints, "/joint_states", "cdr", {{"offered_qos_profiles", ""}});
   writer.add_channel(0, "/note", "json");
@@ -40,16 +40,16 @@ void write(const std::filesystem::path& path, McapCompression compression, std::
 }
 
 void read(const std::filesystem::path& path) {
-  McapReader reader(path);
-  McapMessage message;
+  logs::McapReader reader(path);
+  logs::McapMessage message;
   while (reader.next(message)) {
-    const McapChannel& channel = reader.channels().at(message.channel_id);
-    const McapSchema* schema = reader.schema_of(channel);
+    const logs::McapChannel& channel = reader.channels().at(message.channel_id);
+    const logs::McapSchema* schema = reader.schema_of(channel);
     fmt::print("{} {} {} {} {} {} {} {} {}\n", channel.topic, channel.message_encoding, schema ? schema->name : "-",
                schema ? schema->encoding : "-", schema ? hex(schema->text) : "-", message.sequence, message.log_time,
                message.publish_time, hex(message.data));
   }
-  for (const std::string& line : sentences(reader.report())) {
+  for (const std::string& line : logs::sentences(reader.report())) {
     fmt::print("{}\n", line);
   }
 }
@@ -61,10 +61,10 @@ int main(int count, char** words) {
     const std::string verb = count == 3 ? words[1] : "";
     if (verb == "write") {
       const std::filesystem::path folder = words[2];
-      write(folder / "none.mcap", McapCompression::none, 4096);
-      write(folder / "zstd.mcap", McapCompression::zstd, 4096);
-      write(folder / "lz4.mcap", McapCompression::lz4, 4096);
-      write(folder / "loose.mcap", McapCompression::none, 0);
+      write(folder / "none.mcap", logs::McapCompression::none, 4096);
+      write(folder / "zstd.mcap", logs::McapCompression::zstd, 4096);
+      write(folder / "lz4.mcap", logs::McapCompression::lz4, 4096);
+      write(folder / "loose.mcap", logs::McapCompression::none, 0);
     } else if (verb == "read") {
       read(words[2]);
     } else {

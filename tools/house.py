@@ -43,7 +43,7 @@ def lines_of(files, rooms):
 
 def installed(root, files):
     """Headers that are installed, and those of them that no other room, binding or example includes."""
-    public = {f"{room}/{name}" for room, names in check_layers.public_headers(root).items() for name in names}
+    public = {f"{room}/{name}" for room, names in check_layers.installed_headers(root).items() for name in names}
     users = defaultdict(set)
     for name, text in files.items():
         for header in re.findall(r"#include <wheelwright/([\w/]+\.hpp)>", text):

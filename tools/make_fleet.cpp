@@ -53,7 +53,7 @@ Scenario nominal_drive(double seconds) {
   s.robot.noise.effort.value = 0.02;
   s.robot.filter.beta = 8.0;
   s.parameters = {.mass = 21.0, .yaw_inertia = 0.9, .viscous_x = 4.0, .viscous_y = 4.0, .viscous_yaw = 0.5};
-  s.trajectory = {.kind = Trajectory::Kind::commissioning, .speed = 0.6, .yaw_rate = 1.2, .period = seconds / 5.0};
+  s.trajectory = {.kind = sim::Trajectory::Kind::commissioning, .speed = 0.6, .yaw_rate = 1.2, .period = seconds / 5.0};
   s.duration = seconds;
   s.rate = 100.0;
   s.sensors.speeds = s.sensors.pose = s.sensors.commands = false;
@@ -64,7 +64,7 @@ Scenario nominal_drive(double seconds) {
 
 void write(const std::filesystem::path& path, const Scenario& scenario) {
   Simulation drive(scenario);
-  const auto writer = create_log(path, drive.columns());
+  const auto writer = logs::create_log(path, drive.columns());
   LogBlock block;
   while (drive.next(block)) {
     writer->write(block);
@@ -77,7 +77,7 @@ int make(const std::filesystem::path& directory, std::map<std::string, double> o
   const auto checks = static_cast<std::uint64_t>(options["--checks"]);
   std::filesystem::create_directories(directory / "logs");
   const Scenario nominal = nominal_drive(options["--seconds"]);
-  write_robot(directory / "robot.yaml", nominal.robot);
+  robots::write_robot(directory / "robot.yaml", nominal.robot);
   std::string list = "robot,log,when\n";
   for (std::uint64_t i = 0; i < robots; ++i) {
     Draw draw(static_cast<std::uint64_t>(options["--seed"]) * 1000003 + i);
@@ -95,7 +95,7 @@ int make(const std::filesystem::path& directory, std::map<std::string, double> o
       list += fmt::format("robot_{},{},{}\n", i + 1, log, 7 * k);
     }
   }
-  atomic_write(directory / "fleet.csv", list);
+  files::atomic_write(directory / "fleet.csv", list);
   return 0;
 }
 

@@ -24,7 +24,7 @@ constexpr double idle_utilisation = 0.1;
 
 std::size_t false_alarms(const Commissioning& result) {
   std::size_t sum = 0;
-  for (const OutputValidation& v : result.validation) {
+  for (const commission::OutputValidation& v : result.validation) {
     sum += v.outside;
   }
   return sum;
@@ -32,7 +32,7 @@ std::size_t false_alarms(const Commissioning& result) {
 
 std::size_t held_out_instants(const Commissioning& result) {
   std::size_t most = 0;
-  for (const OutputValidation& v : result.validation) {
+  for (const commission::OutputValidation& v : result.validation) {
     most = std::max(most, v.instants);
   }
   return most;
@@ -49,7 +49,7 @@ std::vector<std::string> idle_outputs(const Commissioning& result) {
 }
 
 std::string bounds_text(const ParameterView& v) {
-  const std::string word(warrant_word(v.warrant));
+  const std::string word(core::warrant_word(v.warrant));
   const auto [lower, upper] = outward(v.lower, v.upper);
   if (v.lower_is_prior && v.upper_is_prior) {
     return "bounded by the prior alone";
@@ -65,25 +65,25 @@ std::string estimates(const Commissioning& result) {
   const std::vector<ParameterViews> views = parameter_views(result);
   for (std::size_t j = 0; j < views.size(); ++j) {
     const ParameterView& v = views[j].best();
-    if (v.estimate && result.parameters[j].excitation != Excitation::not_excited) {
+    if (v.estimate && result.parameters[j].excitation != identify::Excitation::not_excited) {
       items.push_back(with_unit(v.name + " " + estimate_text(v), v.unit) + " (" + bounds_text(v) + ")");
     }
   }
   if (physical_values_unknown(result)) {
-    return "In units of the effort that was logged, since the motor’s constants are not given: " + enumerated(items) +
-           ".";
+    return "In units of the effort that was logged, since the motor’s constants are not given: " +
+           core::enumerated(items) + ".";
   }
-  return capital(enumerated(items)) + ".";
+  return core::capital(core::enumerated(items)) + ".";
 }
 
 std::string footing(const Commissioning& result) {
   std::vector<std::string> declared, estimated, broken;
   for (std::size_t i = 0; i < result.noise.size(); ++i) {
-    (result.noise[i].origin == NoiseOrigin::declared ? declared : estimated)
+    (result.noise[i].origin == core::NoiseOrigin::declared ? declared : estimated)
         .push_back(output_name(result.model.model, i));
   }
-  for (const Assumption& a : result.assumptions) {
-    if (a.verdict == AssumptionVerdict::fails) {
+  for (const core::Assumption& a : result.assumptions) {
+    if (a.verdict == core::AssumptionVerdict::fails) {
       broken.push_back(a.statement);
     }
   }
@@ -92,7 +92,7 @@ std::string footing(const Commissioning& result) {
            fmt::format("{}", fmt::join(broken, " "));
   }
   if (estimated.empty()) {
-    return result.noise_mode == NoiseMode::worst_case
+    return result.noise_mode == filter::NoiseMode::worst_case
                ? "The guarantee stands on the sensors’ declared noise bounds: it holds for every noise within them, "
                  "while "
                  "the assumptions listed below hold."
@@ -103,8 +103,8 @@ std::string footing(const Commissioning& result) {
     return "The bounds stand on noise bounds that were extrapolated from the residuals of this log: they hold while "
            "noise and driving stay like it.";
   }
-  return "The bounds stand on the sensors’ declared noise for " + enumerated(declared) +
-         ", and on bounds extrapolated from the residuals of this log for " + enumerated(estimated) + ".";
+  return "The bounds stand on the sensors’ declared noise for " + core::enumerated(declared) +
+         ", and on bounds extrapolated from the residuals of this log for " + core::enumerated(estimated) + ".";
 }
 
 std::string held_out(const Commissioning& result) {
@@ -114,7 +114,7 @@ std::string held_out(const Commissioning& result) {
   }
   const std::size_t alarms = false_alarms(result);
   double most = 0.0;
-  for (const OutputValidation& v : result.validation) {
+  for (const commission::OutputValidation& v : result.validation) {
     most = std::max(most, v.utilisation);
   }
   if (alarms == 0) {
@@ -135,7 +135,7 @@ std::string sees(const Commissioning& result) {
            "all "
            "that the robot did.";
   }
-  if (on_two_wheels(result.model.robot)) {
+  if (model::on_two_wheels(result.model.robot)) {
     return fmt::format(
         "The smallest change of both wheel radii that is certain to be seen is {}, at the best moment of the held-out "
         "driving (|δ1|/r = √(1+κ) − 1 with κ = {}); `wheelwright margins` says it for other faults, and while doing "
@@ -151,8 +151,8 @@ std::string unseen(const Commissioning& result) {
   std::vector<std::string> names, todo;
   const std::vector<ParameterViews> views = parameter_views(result);
   for (std::size_t j = 0; j < views.size(); ++j) {
-    const ParameterResult& r = result.parameters[j];
-    if (r.excitation == Excitation::not_excited) {
+    const commission::ParameterResult& r = result.parameters[j];
+    if (r.excitation == identify::Excitation::not_excited) {
       names.push_back(views[j].best().name);
       if (!r.parameter.excite.empty() && std::find(todo.begin(), todo.end(), r.parameter.excite) == todo.end()) {
         todo.push_back(r.parameter.excite);
@@ -162,9 +162,9 @@ std::string unseen(const Commissioning& result) {
   if (names.empty()) {
     return {};
   }
-  std::string text = "The log says nothing about " + enumerated(names) + ".";
+  std::string text = "The log says nothing about " + core::enumerated(names) + ".";
   if (!todo.empty()) {
-    text += " What to do: " + enumerated(todo) + ", and commission again.";
+    text += " What to do: " + core::enumerated(todo) + ", and commission again.";
   }
   if (result.has_model()) {
     text += " Until then their bounds are the prior’s, and thresholds are wide wherever they matter.";
@@ -174,7 +174,7 @@ std::string unseen(const Commissioning& result) {
 
 std::string contradiction(const Commissioning& result) {
   std::vector<double> t;
-  for (const WeightedRow& w : result.feasible.contradiction) {
+  for (const bounds::WeightedRow& w : result.feasible.contradiction) {
     if (!w.row.origin.is_prior) {
       t.push_back(w.row.origin.t);
     }
@@ -183,15 +183,15 @@ std::string contradiction(const Commissioning& result) {
     return {};
   }
   return fmt::format("{} of the log already contradict{} the model by {} (the table “Contradiction” gives {}).",
-                     capital(t.size() == 1 ? "one sample" : plural(t.size(), "sample")), t.size() == 1 ? "s" : "",
+                     core::capital(t.size() == 1 ? "one sample" : plural(t.size(), "sample")), t.size() == 1 ? "s" : "",
                      t.size() == 1 ? "itself" : "themselves", t.size() == 1 ? "it" : "them");
 }
 
 // Each contradiction that withdraws a model (or does not) with what to do about it.
 void tell_contradictions(const Commissioning& result, bool withdraws, std::vector<std::string>& out) {
-  for (const LogContradiction& c : result.contradictions) {
+  for (const commission::LogContradiction& c : result.contradictions) {
     if (c.withdraws == withdraws) {
-      out.push_back(fmt::format("{}. What to do: {}.", capital(c.sentence), c.next));
+      out.push_back(fmt::format("{}. What to do: {}.", core::capital(c.sentence), c.next));
     }
   }
 }
@@ -204,7 +204,7 @@ std::vector<std::string> words_with_model(const Commissioning& result) {
   }
   out.push_back(footing(result));
   out.push_back(held_out(result));
-  out.push_back(sees(result) + (smallest_certain_kappa(result) && result.model.warrant != Warrant::guaranteed
+  out.push_back(sees(result) + (smallest_certain_kappa(result) && result.model.warrant != core::Warrant::guaranteed
                                     ? " " + certain_meaning(result.model.warrant)
                                     : ""));
   if (false_alarms(result) > 0) {
@@ -215,7 +215,7 @@ std::vector<std::string> words_with_model(const Commissioning& result) {
     out.push_back(
         fmt::format("The threshold of {} is much wider than its residual and can hardly fire: declared noise "
                     "bounds that are smaller, where the sensors allow it, would tighten it.",
-                    enumerated(idle)));
+                    core::enumerated(idle)));
   } else if (smallest_certain_kappa(result).value_or(coarse_kappa) >= coarse_kappa) {
     out.emplace_back(
         "Only coarse faults are certain to be seen: a longer log with stronger acceleration and tighter curves, or a "
@@ -228,7 +228,7 @@ std::vector<std::string> words_with_model(const Commissioning& result) {
 
 std::optional<double> smallest_certain_kappa(const Commissioning& result) {
   double least = std::numeric_limits<double>::infinity();
-  for (const OutputValidation& v : result.validation) {
+  for (const commission::OutputValidation& v : result.validation) {
     if (v.instants > 0 && v.smallest_kappa > 0.0) {
       least = std::min(least, v.smallest_kappa);
     }

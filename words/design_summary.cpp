@@ -9,8 +9,8 @@
 #include <wheelwright/words/margin_words.hpp>
 
 namespace wheelwright::words {
-std::string summary(const BoundsDesign& design, const DesignSubject& subject) {
-  const auto scales = physical_scales(subject.robot, subject.model);
+std::string summary(const design::BoundsDesign& design, const design::DesignSubject& subject) {
+  const auto scales = commission::physical_scales(subject.robot, subject.model);
   std::string out = fmt::format("{:.1f} s, within {:.2f} m of the start; {} manoeuvres were looked at\n",
                                 design.manoeuvre.plan.t(design.manoeuvre.plan.samples() - 1),
                                 design.manoeuvre.plan.reach(), design.manoeuvre.evaluations);
@@ -18,7 +18,7 @@ std::string summary(const BoundsDesign& design, const DesignSubject& subject) {
                      subject.known ? fmt::format(" {:>12}", "model now") : "",
                      design.figure_eight ? fmt::format(" {:>14}", "figure eight") : "");
   for (std::size_t j = 0; j < subject.model.p(); ++j) {
-    const Parameter& parameter = subject.model.parameters[j];
+    const model::Parameter& parameter = subject.model.parameters[j];
     const double scale = scales ? std::abs((*scales)[j].scale) : 1.0;
     const auto half = [&](const Box& box) { return 0.5 * scale * (box.sides[j].upper - box.sides[j].lower); };
     out += fmt::format("  {:<20} {:>12.4g}", scales ? parameter.physical : parameter.name, half(design.promised));
@@ -28,19 +28,19 @@ std::string summary(const BoundsDesign& design, const DesignSubject& subject) {
     if (design.figure_eight) {
       out += fmt::format(" {:>14.4g}", half(design.promised_eight));
     }
-    out += "  " + (scales ? parameter.physical_unit : parameter_unit(subject.robot, parameter)) + "\n";
+    out += "  " + (scales ? parameter.physical_unit : commission::parameter_unit(subject.robot, parameter)) + "\n";
   }
   return out;
 }
 
-std::string summary(const DetectionDesign& design) {
-  const Plan& plan = design.manoeuvre.plan;
+std::string summary(const design::DetectionDesign& design) {
+  const design::Plan& plan = design.manoeuvre.plan;
   std::string out = fmt::format("{:.1f} s, within {:.2f} m of the start; {} manoeuvres were looked at\n",
                                 plan.t(plan.samples() - 1), plan.reach(), design.manoeuvre.evaluations);
   out += fmt::format("  {:<26} {:>10} {:>12} {:>8}{}\n", "certainly found from", "asked", "promised", "after",
                      design.figure_eight ? fmt::format(" {:>14}", "figure eight") : "");
   for (std::size_t k = 0; k < design.promised.size(); ++k) {
-    const PromisedFault& p = design.promised[k];
+    const design::PromisedFault& p = design.promised[k];
     out += fmt::format("  {:<26} {:>10} {:>12} {:>8}", p.fault.name + (p.side > 0.0 ? " +" : " -"),
                        magnitude_words(p.fault, p.asked),
                        std::isfinite(p.smallest) ? magnitude_words(p.fault, p.smallest) : "none",
@@ -54,8 +54,8 @@ std::string summary(const DetectionDesign& design) {
   return out;
 }
 
-std::string summary(const DiscriminationDesign& design) {
-  const Plan& plan = design.manoeuvre.plan;
+std::string summary(const gap::DiscriminationDesign& design) {
+  const design::Plan& plan = design.manoeuvre.plan;
   std::string out = fmt::format("{:.1f} s, within {:.2f} m of the start; {} manoeuvres were looked at\n",
                                 plan.t(plan.samples() - 1), plan.reach(), design.manoeuvre.evaluations);
   for (const std::string& stage : design.stages) {
@@ -64,7 +64,7 @@ std::string summary(const DiscriminationDesign& design) {
   out += fmt::format("  {:<52} {:>12}{}\n", "standard deviations from going wrong", "promised",
                      design.figure_eight ? fmt::format(" {:>14}", "figure eight") : "");
   for (std::size_t k = 0; k < design.promised.size(); ++k) {
-    const RivalSeparation& pair = design.promised[k];
+    const gap::RivalSeparation& pair = design.promised[k];
     out +=
         fmt::format("  {:<52} {:>12.2f}",
                     design.rivals[pair.truth].name() + ", not " + design.rivals[pair.other].name(), pair.deviations());

@@ -12,12 +12,12 @@
 namespace wheelwright::words {
 
 /// The result for a terminal.
-[[nodiscard]] std::string summary(const BoundsDesign& design, const DesignSubject& subject);
+[[nodiscard]] std::string summary(const design::BoundsDesign& design, const design::DesignSubject& subject);
 
 /// The result for a terminal.
-[[nodiscard]] std::string summary(const DetectionDesign& design);
+[[nodiscard]] std::string summary(const design::DetectionDesign& design);
 
 /// The result for a terminal.
-[[nodiscard]] std::string summary(const DiscriminationDesign& design);
+[[nodiscard]] std::string summary(const gap::DiscriminationDesign& design);
 
 }  // namespace wheelwright::words

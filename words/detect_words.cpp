@@ -27,21 +27,21 @@ std::string contradicting(const Detection& detection, const OnlineModel& model) 
     }
   }
   return fmt::format("Of {} of driving, {} contradict the fault-free model.",
-                     with_unit(number(detection.seconds, 4), "s"), parts.empty() ? "0 s" : enumerated(parts));
+                     with_unit(number(detection.seconds, 4), "s"), parts.empty() ? "0 s" : core::enumerated(parts));
 }
 
 // What the first event can be, in a sentence; empty where it was not asked.
-std::string first_isolation(const std::vector<Isolation>& isolations) {
+std::string first_isolation(const std::vector<detector::Isolation>& isolations) {
   if (isolations.empty()) {
     return {};
   }
   std::vector<std::string> possible;
-  for (const FaultFinding& f : isolations.front().findings) {
-    if (f.verdict == FaultFinding::Verdict::consistent) {
+  for (const detector::FaultFinding& f : isolations.front().findings) {
+    if (f.verdict == detector::FaultFinding::Verdict::consistent) {
       possible.push_back(f.fault.sentence.empty() ? spaced(f.fault.name) : f.fault.sentence);
     }
   }
-  const std::size_t excluded = isolations.front().count(FaultFinding::Verdict::excluded);
+  const std::size_t excluded = isolations.front().count(detector::FaultFinding::Verdict::excluded);
   if (possible.empty()) {
     return fmt::format("No fault of the catalogue explains the first event: {} are excluded by proof.", excluded);
   }
@@ -56,12 +56,13 @@ std::string detect_verdict(const Detection& detection, std::size_t kinematic_eve
     return "Nothing was watched: the log has no instant with a decision.";
   }
   const std::size_t events = detection.events.size() + kinematic_events;
-  return events == 0 ? "No fault was seen."
-                     : fmt::format("{}: the robot did not behave like its model.", capital(plural(events, "event")));
+  return events == 0
+             ? "No fault was seen."
+             : fmt::format("{}: the robot did not behave like its model.", core::capital(plural(events, "event")));
 }
 
 std::vector<std::string> detect_words(const Detection& detection, const OnlineModel& model,
-                                      const std::vector<Isolation>& isolations, const TimeAxis& axis) {
+                                      const std::vector<detector::Isolation>& isolations, const TimeAxis& axis) {
   const std::string watched = fmt::format("{} instants were watched over {} of driving.", count(detection.instants),
                                           with_unit(number(detection.seconds, 4), "s"));
   if (detection.instants == 0) {
@@ -80,10 +81,12 @@ std::vector<std::string> detect_words(const Detection& detection, const OnlineMo
         "`wheelwright margins` says which faults this log would have shown."};
   }
   std::vector<std::string> out;
-  const Event& first = *std::min_element(detection.events.begin(), detection.events.end(),
-                                         [](const Event& a, const Event& b) { return a.alarm < b.alarm; });
-  const Event& worst = *std::max_element(detection.events.begin(), detection.events.end(),
-                                         [](const Event& a, const Event& b) { return a.peak_ratio < b.peak_ratio; });
+  const detector::Event& first =
+      *std::min_element(detection.events.begin(), detection.events.end(),
+                        [](const detector::Event& a, const detector::Event& b) { return a.alarm < b.alarm; });
+  const detector::Event& worst =
+      *std::max_element(detection.events.begin(), detection.events.end(),
+                        [](const detector::Event& a, const detector::Event& b) { return a.peak_ratio < b.peak_ratio; });
   out.push_back(fmt::format(
       "The first alarm came at {} in the output {}{}.", axis.text(first.alarm), output_name(model.model, first.output),
       first.start < first.alarm ? fmt::format("; the residual had left its threshold at {}", axis.text(first.start))

@@ -19,6 +19,7 @@ namespace wheelwright::words {
 /// contradicts the fault-free model, what this means, and the faults of the catalogue that remain possible for the
 /// first event. Text, not HTML.
 [[nodiscard]] std::vector<std::string> detect_words(const Detection& detection, const OnlineModel& model,
-                                                    const std::vector<Isolation>& isolations, const TimeAxis& axis);
+                                                    const std::vector<detector::Isolation>& isolations,
+                                                    const TimeAxis& axis);
 
 }  // namespace wheelwright::words

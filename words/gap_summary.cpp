@@ -15,18 +15,18 @@ namespace {
 
 std::string causes_words(const Diagnosis& d) {
   std::string out;
-  for (const GapCause& cause : d.causes) {
-    out += fmt::format("  {}: {}\n", capital(words::effect_noun(cause.effect)), cause.sentence);
-    for (const GapEstimate& p : cause.parameters) {
+  for (const gap::GapCause& cause : d.causes) {
+    out += fmt::format("  {}: {}\n", core::capital(words::effect_noun(cause.effect)), cause.sentence);
+    for (const gap::GapEstimate& p : cause.parameters) {
       out += fmt::format("      {} {}\n", words::parameter_words(p.name), words::estimate_words(p));
     }
   }
   return out;
 }
 
-std::string figures_words(const std::vector<ShrinkFigure>& figures, const std::string& what) {
+std::string figures_words(const std::vector<gap::ShrinkFigure>& figures, const std::string& what) {
   std::string out;
-  for (const ShrinkFigure& f : figures) {
+  for (const gap::ShrinkFigure& f : figures) {
     if (!std::isfinite(f.before) || !std::isfinite(f.after)) {
       continue;
     }
@@ -39,7 +39,7 @@ std::string figures_words(const std::vector<ShrinkFigure>& figures, const std::s
 
 std::string shifts_words(const Diagnosis& d) {
   std::string out;
-  for (const ParameterShift& p : d.parametric) {
+  for (const gap::ParameterShift& p : d.parametric) {
     const auto [low, high] = words::outward(p.lower, p.upper);
     out += fmt::format("  {:<20} {:>9} {}{}, {} [{}, {}] with the causes\n", words::spaced(p.parameter),
                        words::number(p.without_causes), p.unit,
@@ -56,12 +56,12 @@ std::string titled(const std::string& title, const std::string& body) {
 // The regimes in which most of what is left lies.
 std::string places(const Diagnosis& d) {
   std::vector<std::string> names;
-  for (const GapShare& s : d.where) {
-    if (s.kind != "channel" && s.kind != "time" && is_finding(s) && names.size() < 3) {
+  for (const gap::GapShare& s : d.where) {
+    if (s.kind != "channel" && s.kind != "time" && gap::is_finding(s) && names.size() < 3) {
       names.push_back(s.regime);
     }
   }
-  return enumerated(names);
+  return core::enumerated(names);
 }
 
 std::string next_step(const Diagnosis& d, const GapResults& r) {
@@ -69,16 +69,16 @@ std::string next_step(const Diagnosis& d, const GapResults& r) {
   const std::string improved =
       r.improved ? fmt::format("wheelwright commission LOG --robot {}", file("robot_improved.yaml")) : std::string();
   switch (d.verdict) {
-    case GapVerdict::no_gap:
+    case gap::GapVerdict::no_gap:
       return fmt::format("wheelwright commission LOG --robot {}; nothing is to be added to it.", r.robot);
-    case GapVerdict::explained:
+    case gap::GapVerdict::explained:
       return !improved.empty() ? improved + ", for thresholds that are not widened by what the model lacked."
              : r.out.empty()   ? "run this with --out DIR, which writes the robot file with the causes in it."
                                : "the robot file cannot carry these causes (see the notes): mend them, or model them.";
-    case GapVerdict::ambiguous:
+    case gap::GapVerdict::ambiguous:
       return r.commands ? fmt::format("drive {}, then wheelwright gap on that log.", file("next_manoeuvre.csv"))
                         : std::string("a measurement that tells the causes apart; until then any of them is a guess.");
-    case GapVerdict::unexplained: {
+    case gap::GapVerdict::unexplained: {
       const std::string where = places(d);
       return "add a term to the model: what is left lies in " +
              (where.empty() ? std::string("no regime more than in others") : where) + ".";

@@ -14,6 +14,9 @@
 #include <wheelwright/words/text.hpp>
 
 namespace wheelwright::words {
+
+using gap::GapVerdict;
+
 namespace {
 
 constexpr std::array<std::pair<std::string_view, std::string_view>, 8> kParameterNames{{
@@ -36,34 +39,34 @@ std::string channel_words(const std::string& channel) {
   return channel == "sum" || channel == "difference" ? channel + " channel" : spaced(channel);
 }
 
-const GapEstimate* first_estimate(const GapCause& cause) {
+const gap::GapEstimate* first_estimate(const gap::GapCause& cause) {
   return cause.parameters.empty() ? nullptr : &cause.parameters.front();
 }
 
 // "0.312 N·m [0.290, 0.330]" for one parameter, "a = …, b = …" for several.
-std::string parameters_of(const GapCause& cause) {
+std::string parameters_of(const gap::GapCause& cause) {
   if (cause.parameters.size() == 1) {
     return estimate_words(*first_estimate(cause));
   }
   std::vector<std::string> parts;
-  for (const GapEstimate& p : cause.parameters) {
+  for (const gap::GapEstimate& p : cause.parameters) {
     parts.push_back(parameter_words(p.name) + " " + estimate_words(p));
   }
-  return enumerated(parts);
+  return core::enumerated(parts);
 }
 
-std::string cause_sentence(const GapCause& cause, bool alone) {
-  std::string out = capital(effect_noun(cause.effect));
+std::string cause_sentence(const gap::GapCause& cause, bool alone) {
+  std::string out = core::capital(effect_noun(cause.effect));
   out += cause.parametric ? "" : alone ? ", which the model lacks," : "";
   out += fmt::format(" {} {} of the gap", alone ? "explains" : "accounts for", whole_percent(cause.share));
   return cause.parameters.empty() ? out + "." : out + ": " + parameters_of(cause) + ".";
 }
 
 // The channel whose residual was largest against its signal.
-const ShrinkFigure* worst_channel(const Diagnosis& d) {
-  const ShrinkFigure* worst = nullptr;
+const gap::ShrinkFigure* worst_channel(const Diagnosis& d) {
+  const gap::ShrinkFigure* worst = nullptr;
   double largest = -1.0;
-  for (const ShrinkFigure& f : d.shrink.torque_rms) {
+  for (const gap::ShrinkFigure& f : d.shrink.torque_rms) {
     const double rms = signal_rms(d, f.name), relative = rms > 0.0 ? f.before / rms : 0.0;
     if (relative > largest) {
       largest = relative;
@@ -73,13 +76,13 @@ const ShrinkFigure* worst_channel(const Diagnosis& d) {
   return worst;
 }
 
-std::string residual_size(const Diagnosis& d, const ShrinkFigure& f, double value) {
+std::string residual_size(const Diagnosis& d, const gap::ShrinkFigure& f, double value) {
   const double rms = signal_rms(d, f.name);
   return rms > 0.0 ? small_percent(value / rms) : with_unit(number(value), f.unit);
 }
 
 std::string shrink_sentence(const Diagnosis& d) {
-  const ShrinkFigure* f = worst_channel(d);
+  const gap::ShrinkFigure* f = worst_channel(d);
   if (f == nullptr || !std::isfinite(f->before) || !std::isfinite(f->after)) {
     return {};
   }
@@ -97,20 +100,20 @@ std::string shrink_sentence(const Diagnosis& d) {
 
 std::string where_sentence(const Diagnosis& d) {
   std::vector<std::string> places;
-  for (const GapShare& s : d.where) {
-    if (s.kind != "channel" && s.kind != "time" && is_finding(s) && places.size() < 3) {
+  for (const gap::GapShare& s : d.where) {
+    if (s.kind != "channel" && s.kind != "time" && gap::is_finding(s) && places.size() < 3) {
       places.push_back(fmt::format("{} ({} of it in {} of the {}, {})", s.regime, whole_percent(s.share),
                                    whole_percent(s.presence), s.kind == "frequency" ? "noise" : "time",
                                    channel_words(s.channel)));
     }
   }
   return places.empty() ? std::string()
-                        : "What fitting θ again cannot remove is concentrated at: " + enumerated(places) + ".";
+                        : "What fitting θ again cannot remove is concentrated at: " + core::enumerated(places) + ".";
 }
 
 std::vector<std::string> credible_names(const Diagnosis& d) {
   std::vector<std::string> names;
-  for (const CredibleCauses& c : d.credible) {
+  for (const gap::CredibleCauses& c : d.credible) {
     names.push_back(effect_nouns(c.effects));
   }
   return names;
@@ -128,7 +131,7 @@ std::string parameter_words(std::string_view parameter) {
 }
 
 std::string effect_noun(std::string_view effect) {
-  const std::string noun = catalogue_noun(effect);
+  const std::string noun = gap::catalogue_noun(effect);
   return noun.empty() ? spaced(effect) : noun;
 }
 
@@ -140,7 +143,7 @@ std::string effect_nouns(const std::vector<std::string>& effects) {
   return out.empty() ? "none" : out;
 }
 
-std::string estimate_words(const GapEstimate& e) {
+std::string estimate_words(const gap::GapEstimate& e) {
   const std::string unit = e.unit == "1" ? "" : e.unit;
   if (!std::isfinite(e.lower) || !std::isfinite(e.upper)) {
     return with_unit(number(e.estimate), unit);
@@ -150,7 +153,7 @@ std::string estimate_words(const GapEstimate& e) {
 }
 
 double signal_rms(const Diagnosis& d, std::string_view channel) {
-  for (const ResidualSeries& s : d.series) {
+  for (const gap::ResidualSeries& s : d.series) {
     if (s.channel == channel && s.signal.size() > 0) {
       return std::sqrt(s.signal.squaredNorm() / static_cast<double>(s.signal.size()));
     }
@@ -161,17 +164,17 @@ double signal_rms(const Diagnosis& d, std::string_view channel) {
 std::string gap_verdict(const Diagnosis& d) {
   std::vector<std::string> names;
   double share = 0.0;
-  for (const GapCause& cause : d.causes) {
+  for (const gap::GapCause& cause : d.causes) {
     names.push_back(effect_noun(cause.effect));
     share += cause.share;
   }
   switch (d.verdict) {
     case GapVerdict::no_gap: return "No gap: the model explains the log to the noise floor.";
     case GapVerdict::explained:
-      return names.empty() ? "The gap is explained."
-             : names.size() == 1
-                 ? cause_sentence(d.causes.front(), true)
-                 : fmt::format("{} together explain {} of the gap.", capital(enumerated(names)), whole_percent(share));
+      return names.empty()       ? "The gap is explained."
+             : names.size() == 1 ? cause_sentence(d.causes.front(), true)
+                                 : fmt::format("{} together explain {} of the gap.",
+                                               core::capital(core::enumerated(names)), whole_percent(share));
     case GapVerdict::ambiguous:
       return d.credible.size() > 1
                  ? fmt::format("The gap has one of {} causes, which this log cannot tell apart.", d.credible.size())
@@ -180,7 +183,7 @@ std::string gap_verdict(const Diagnosis& d) {
       return names.empty()
                  ? "There is a gap, and no effect of the catalogue explains it."
                  : fmt::format("The gap is not explained: {} of it stays when {} {} added.", whole_percent(d.remaining),
-                               enumerated(names), names.size() == 1 ? "is" : "are");
+                               core::enumerated(names), names.size() == 1 ? "is" : "are");
   }
   return {};
 }
@@ -201,7 +204,7 @@ std::vector<std::string> gap_sentences(const Diagnosis& d, const std::string& ne
         ". What follows is of the first of these: it fits best, but not by more than chance.");
   }
   if (d.verdict != GapVerdict::explained || d.causes.size() > 1) {  // a single one is the headline
-    for (const GapCause& cause : d.causes) {
+    for (const gap::GapCause& cause : d.causes) {
       add(cause_sentence(cause, d.causes.size() == 1));
     }
   }
@@ -214,7 +217,7 @@ std::vector<std::string> gap_sentences(const Diagnosis& d, const std::string& ne
   if (d.verdict == GapVerdict::explained && d.credible.size() > 1) {
     const std::vector<std::string> names = credible_names(d);
     add(fmt::format("Within the confidence of 90 % {} would do as well on this log.",
-                    enumerated({names.begin() + 1, names.end()})));
+                    core::enumerated({names.begin() + 1, names.end()})));
   }
   add(next_manoeuvre);
   return out;

@@ -22,7 +22,7 @@ namespace wheelwright::words {
 [[nodiscard]] std::string parameter_words(std::string_view parameter);
 
 /// "0.312 N·m [0.290, 0.330]".
-[[nodiscard]] std::string estimate_words(const GapEstimate& estimate);
+[[nodiscard]] std::string estimate_words(const gap::GapEstimate& estimate);
 
 /// The headline: what the log says, in one sentence for each verdict.
 [[nodiscard]] std::string gap_verdict(const Diagnosis& diagnosis);

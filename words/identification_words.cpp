@@ -14,6 +14,12 @@
 #include <wheelwright/identify/noise_level.hpp>
 
 namespace wheelwright::words {
+
+using identify::Excitation;
+using inference::Identification;
+using inference::ShapeFinding;
+using inference::ShapeKind;
+
 namespace {
 
 constexpr double kFarApart = 3.0;      // standard errors between two estimates that should agree
@@ -27,14 +33,15 @@ std::string spoken(std::string name) {
 }
 
 std::string sentence(const std::string& text) {
-  return text.empty() || text.ends_with('.') ? capital(text) : capital(text) + ".";
+  return text.empty() || text.ends_with('.') ? core::capital(text) : core::capital(text) + ".";
 }
 
 double half_interval(const Identification& r, std::size_t j) {
   const auto at = static_cast<Eigen::Index>(j);
-  const ResidualSummary& s = r.fit.residuals;
-  return at < s.standard_error.size() ? student_quantile(r.confidence, std::max(s.freedom, 1.0)) * s.standard_error[at]
-                                      : std::numeric_limits<double>::infinity();
+  const identify::ResidualSummary& s = r.fit.residuals;
+  return at < s.standard_error.size()
+             ? core::student_quantile(r.confidence, std::max(s.freedom, 1.0)) * s.standard_error[at]
+             : std::numeric_limits<double>::infinity();
 }
 
 // Indices of the parameters in `state`.
@@ -54,7 +61,7 @@ std::string names_of(const Identification& r, const std::vector<std::size_t>& li
   for (const std::size_t j : list) {
     names.push_back(spoken(shown[j].name));
   }
-  return enumerated(names);
+  return core::enumerated(names);
 }
 
 // The shape that explains most, of those that matter.
@@ -86,7 +93,7 @@ std::string value_text(const ShapeFinding& shape, double value) {
 }
 
 double half_interval(const ShapeFinding& shape) {
-  return student_quantile(0.95, std::max(shape.freedom, 1.0)) * shape.standard_error;
+  return core::student_quantile(0.95, std::max(shape.freedom, 1.0)) * shape.standard_error;
 }
 
 // Best and least known parameter, by half interval over estimate.
@@ -113,9 +120,9 @@ std::string spread_sentence(const Identification& r) {
 }
 
 std::string regions_sentence(const Identification& r) {
-  const RegionRow* student = nullptr;
+  const inference::RegionRow* student = nullptr;
   std::vector<std::string> parts;
-  const auto widest = [&](const RegionRow& row) {
+  const auto widest = [&](const inference::RegionRow& row) {
     double ratio = 0.0;
     for (Eigen::Index j = 0; j < row.lower.size(); ++j) {
       const double own = student->upper[j] - student->lower[j];
@@ -123,35 +130,36 @@ std::string regions_sentence(const Identification& r) {
     }
     return ratio;
   };
-  for (const RegionRow& row : r.regions.rows) {
+  for (const inference::RegionRow& row : r.regions.rows) {
     if (!row.available) {
       continue;
     }
-    if (row.method == RegionMethod::student_t) {
+    if (row.method == inference::RegionMethod::student_t) {
       student = &row;
     } else if (student != nullptr) {
       const double ratio = widest(row);
-      parts.push_back(std::isfinite(ratio) ? fmt::format("{} up to {:.2g} times as wide",
-                                                         spoken(std::string(to_string(row.method))), ratio)
-                                           : fmt::format("{} unbounded", spoken(std::string(to_string(row.method)))));
+      parts.push_back(std::isfinite(ratio)
+                          ? fmt::format("{} up to {:.2g} times as wide",
+                                        spoken(std::string(inference::to_string(row.method))), ratio)
+                          : fmt::format("{} unbounded", spoken(std::string(inference::to_string(row.method)))));
     }
   }
   return parts.empty() ? std::string()
                        : fmt::format(
                              "Against the intervals of Student's t, those of {}: what they assume stands "
                              "beside them.",
-                             enumerated(parts));
+                             core::enumerated(parts));
 }
 
 // Where least squares and the fit that ignores outliers differ.
 std::string robust_sentence(const Identification& r) {
-  if (r.robust.status == RobustStatus::infeasible) {
+  if (r.robust.status == inference::RobustStatus::infeasible) {
     return "The physical constraints contradict each other: there is no robust fit.";
   }
   if (r.robust.estimate.size() == 0 || r.fit.choice.candidates.empty() || !r.fit.choice.candidates[0].estimate.usable) {
     return {};
   }
-  const Estimate& plain = r.fit.choice.candidates[0].estimate;
+  const identify::Estimate& plain = r.fit.choice.candidates[0].estimate;
   const auto shown = shown_parameters(r);
   double furthest = 0.0;
   std::size_t which = 0;
@@ -176,7 +184,7 @@ std::string robust_sentence(const Identification& r) {
 }
 
 bool has_outliers(const Identification& r) {
-  return std::ranges::any_of(r.robust.outputs, [](const OutputWeights& w) {
+  return std::ranges::any_of(r.robust.outputs, [](const inference::OutputWeights& w) {
     return w.gaussian_share > 0.0 && w.down_weighted > kManyOutliers * w.gaussian_share;
   });
 }
@@ -189,7 +197,7 @@ std::string information_sentence(const Identification& r) {
   const double log = r.information.windows.back().last - r.information.windows.front().first;
   std::size_t least = r.information.parameters.size();
   for (std::size_t j = 0; j < r.information.parameters.size(); ++j) {
-    const ParameterInformation& p = r.information.parameters[j];
+    const inference::ParameterInformation& p = r.information.parameters[j];
     if (p.information > 0.0 &&
         (least == r.information.parameters.size() || p.seconds < r.information.parameters[least].seconds)) {
       least = j;
@@ -204,7 +212,7 @@ std::string information_sentence(const Identification& r) {
       log, r.information.parameters[least].seconds, spoken(shown[least].name));
 }
 
-std::string quantity(const KinematicQuantity& q) {
+std::string quantity(const inference::KinematicQuantity& q) {
   return fmt::format("{:.5g} m (95 %: {:.5g} to {:.5g} m)", q.estimate, q.lower, q.upper);
 }
 
@@ -212,13 +220,13 @@ std::string kinematics_sentence(const Identification& r) {
   if (!r.kinematics) {
     return {};
   }
-  const KinematicQuantity& at_nominal = r.kinematics->track_at_nominal_radius;
-  if (at_nominal.state == KinematicState::not_identified) {
+  const inference::KinematicQuantity& at_nominal = r.kinematics->track_at_nominal_radius;
+  if (at_nominal.state == inference::KinematicState::not_identified) {
     return sentence("the pose does not tell the track width: " + at_nominal.reason);
   }
   std::string text = fmt::format(
       "The heading turns as a track width of {} at the robot file's wheel radius would have it", quantity(at_nominal));
-  if (r.kinematics->radius_right.state == KinematicState::identified) {
+  if (r.kinematics->radius_right.state == inference::KinematicState::identified) {
     text += fmt::format("; the wheel radii are {} right and {} left", quantity(r.kinematics->radius_right),
                         quantity(r.kinematics->radius_left));
   }
@@ -228,7 +236,7 @@ std::string kinematics_sentence(const Identification& r) {
 // What would show the parameters that the log does not show.
 void add_unseen(const Identification& r, std::vector<std::string>& steps) {
   std::vector<bool> named(r.fit.excitation.size(), false);
-  for (const UnseenDirection& u : r.identifiability.unseen) {
+  for (const inference::UnseenDirection& u : r.identifiability.unseen) {
     std::string step = sentence(u.words);
     for (const std::string& manoeuvre : u.manoeuvres) {
       step.append(" ").append(sentence(manoeuvre));
@@ -282,9 +290,9 @@ void add_noise(const Identification& r, std::vector<std::string>& steps) {
         "Noise of the motion may bias the estimate. Log the commanded speeds (command_r, command_l: they become "
         "instruments), or state encoder_counts_per_turn or noise: in the robot file.");
   }
-  for (const ColumnNoise& n : r.noise) {
-    const bool loud = n.known && n.known->unit == n.unit && n.choice.method == NoiseMethod::differences &&
-                      n.choice.meaning == NoiseMeaning::estimate && n.choice.sd > n.known->bound;
+  for (const inference::ColumnNoise& n : r.noise) {
+    const bool loud = n.known && n.known->unit == n.unit && n.choice.method == inference::NoiseMethod::differences &&
+                      n.choice.meaning == inference::NoiseMeaning::estimate && n.choice.sd > n.known->bound;
     if (loud) {
       steps.push_back(
           fmt::format("{} is noisier than its bound {} ({:.2g} {}): its standard deviation is {:.2g}. Raise "
@@ -298,7 +306,7 @@ void add_outliers(const Identification& r, std::vector<std::string>& steps) {
   if (!has_outliers(r) || r.robust.episodes.empty()) {
     return;
   }
-  const Episode& e = r.robust.episodes.front();
+  const inference::Episode& e = r.robust.episodes.front();
   steps.push_back(
       fmt::format("Residuals have heavy tails; the worst is at {:.2f} s ({:.2g} robust standard deviations). "
                   "Look at what happened there: a knock, slip, a lost message.",
@@ -315,7 +323,7 @@ void add_loose(const Identification& r, std::vector<std::string>& steps) {
       steps.push_back(fmt::format(
           "{} is known to ± {:.2g} % only: a longer log helps{}. `wheelwright design` plans a "
           "drive.",
-          capital(spoken(shown[j].name)), 100.0 * half / value, excite.empty() ? "" : ", and to " + excite));
+          core::capital(spoken(shown[j].name)), 100.0 * half / value, excite.empty() ? "" : ", and to " + excite));
     }
   }
 }
@@ -324,9 +332,9 @@ void add_kinematics(const Identification& r, std::vector<std::string>& steps) {
   if (!r.kinematics) {
     return;
   }
-  const KinematicQuantity& t = r.kinematics->track_at_nominal_radius;
+  const inference::KinematicQuantity& t = r.kinematics->track_at_nominal_radius;
   const double nominal = r.setting.robot.track_width;
-  if (t.state == KinematicState::identified && (t.lower > nominal || t.upper < nominal) &&
+  if (t.state == inference::KinematicState::identified && (t.lower > nominal || t.upper < nominal) &&
       std::abs(t.estimate - nominal) > kOtherTrack * nominal) {
     steps.push_back(fmt::format(
         "The robot file's track width of {:.4g} m is not what the yaw rate goes by: with its wheel radius, that is "
@@ -338,26 +346,26 @@ void add_kinematics(const Identification& r, std::vector<std::string>& steps) {
 }  // namespace
 
 std::vector<ShownParameter> shown_parameters(const Identification& r) {
-  const Setting& s = r.setting;
-  const auto scales = physical_scales(s.robot, s.model);
+  const commission::Setting& s = r.setting;
+  const auto scales = commission::physical_scales(s.robot, s.model);
   std::vector<ShownParameter> shown;
   for (std::size_t j = 0; j < s.model.p(); ++j) {
-    const Parameter& p = s.model.parameters[j];
+    const model::Parameter& p = s.model.parameters[j];
     shown.push_back(scales ? ShownParameter{p.physical, p.physical_unit, (*scales)[j]}
-                           : ShownParameter{p.name, parameter_unit(s.robot, p), {}});
+                           : ShownParameter{p.name, commission::parameter_unit(s.robot, p), {}});
   }
   return shown;
 }
 
-std::vector<ActiveConstraint> binding(const ConstrainedFit& fit) {
-  std::vector<ActiveConstraint> list;
+std::vector<inference::ActiveConstraint> binding(const inference::ConstrainedFit& fit) {
+  std::vector<inference::ActiveConstraint> list;
   std::ranges::copy_if(fit.active, std::back_inserter(list),
-                       [](const ActiveConstraint& a) { return a.multiplier > 0.0; });
+                       [](const inference::ActiveConstraint& a) { return a.multiplier > 0.0; });
   return list;
 }
 
 bool matters(const ShapeFinding& shape) {
-  if (shape.state != ShapeState::identified || !(shape.residual_ratio < kShapeMatters)) {
+  if (shape.state != identify::ShapeState::identified || !(shape.residual_ratio < kShapeMatters)) {
     return false;
   }
   return shape.kind == ShapeKind::stribeck_speed || std::abs(shape.estimate) > half_interval(shape);
@@ -365,7 +373,7 @@ bool matters(const ShapeFinding& shape) {
 
 IdentificationStanding standing(const Identification& r) {
   if (!r.effort) {
-    return r.kinematics && r.kinematics->track_at_nominal_radius.state == KinematicState::identified
+    return r.kinematics && r.kinematics->track_at_nominal_radius.state == inference::KinematicState::identified
                ? IdentificationStanding::good
                : IdentificationStanding::bad;
   }
@@ -378,7 +386,7 @@ IdentificationStanding standing(const Identification& r) {
 }
 
 std::string in_words(const ShapeFinding& shape) {
-  const std::string name = capital(spoken(shape.name)) + ": ";
+  const std::string name = core::capital(spoken(shape.name)) + ": ";
   const bool stribeck = shape.kind == ShapeKind::stribeck_speed;
   const std::string explains =
       fmt::format("the residual with it is {:.3g} % of that without", 100.0 * shape.residual_ratio);
@@ -386,8 +394,8 @@ std::string in_words(const ShapeFinding& shape) {
     return name + "the search did not end; no value is given.";
   }
   switch (shape.state) {
-    case ShapeState::flat: return name + "the log does not show it: any value explains it equally well.";
-    case ShapeState::at_upper:
+    case identify::ShapeState::flat: return name + "the log does not show it: any value explains it equally well.";
+    case identify::ShapeState::at_upper:
       return name + (stribeck
                          ? fmt::format("the log does not show it: the best is the largest that was tried, {}, which "
                                        "is no bend at low speed ({}).",
@@ -395,7 +403,7 @@ std::string in_words(const ShapeFinding& shape) {
                          : fmt::format("the largest that was tried, {}, is the best ({}): it is beyond, or something "
                                        "else is missing.",
                                        value_text(shape, shape.estimate), explains));
-    case ShapeState::at_lower:
+    case identify::ShapeState::at_lower:
       if (stribeck) {
         return name + fmt::format("the log does not show it: the best is the smallest that was tried, {} ({}).",
                                   value_text(shape, shape.estimate), explains);
@@ -405,7 +413,7 @@ std::string in_words(const ShapeFinding& shape) {
                                        "something else is missing.",
                                        value_text(shape, shape.estimate), explains)
                          : std::string("none: the log is explained best without it."));
-    case ShapeState::identified: break;
+    case identify::ShapeState::identified: break;
   }
   const double half = half_interval(shape);
   const std::string value = fmt::format("{} ± {}", value_text(shape, shape.estimate), value_text(shape, half));
@@ -458,7 +466,7 @@ std::vector<std::string> findings(const Identification& r) {
     add("Estimated by " + r.fit.choice.reason + ".");
     add(regions_sentence(r));
     add(robust_sentence(r));
-    for (const ActiveConstraint& a : binding(r.constrained)) {
+    for (const inference::ActiveConstraint& a : binding(r.constrained)) {
       add(sentence(a.words));
     }
     const auto matter = std::ranges::count_if(r.shapes, matters);
@@ -487,7 +495,7 @@ std::vector<std::string> next_steps(const Identification& r) {
   add_outliers(r, steps);
   add_loose(r, steps);
   add_kinematics(r, steps);
-  for (const RegionRow& row : r.regions.rows) {
+  for (const inference::RegionRow& row : r.regions.rows) {
     if (row.available && row.remark.find("short") != std::string::npos) {
       steps.push_back("Drive longer: " + row.remark + ".");
       break;

@@ -77,9 +77,9 @@ int decimals(double spread) {
 std::string fixed_number(double x, int digits) { return std::isfinite(x) ? fmt::format("{:.{}f}", x, digits) : "-"; }
 
 // Estimators and intervals by method are the lines; one block for each parameter keeps lines short.
-std::string comparison(const Identification& r) {
+std::string comparison(const inference::Identification& r) {
   const auto shown = shown_parameters(r);
-  const EstimatorChoice& choice = r.fit.choice;
+  const identify::EstimatorChoice& choice = r.fit.choice;
   std::vector<std::vector<std::string>> rows;
   std::vector<std::string> header = {""}, units = {""};
   std::vector<int> digits;
@@ -92,7 +92,7 @@ std::string comparison(const Identification& r) {
   }
   rows.push_back(header);
   rows.push_back(units);
-  const auto excluded = [&](std::size_t j) { return r.fit.excitation[j].state == Excitation::not_excited; };
+  const auto excluded = [&](std::size_t j) { return r.fit.excitation[j].state == identify::Excitation::not_excited; };
   const auto line = [&](std::string name, const Eigen::VectorXd& theta) {
     std::vector<std::string> row = {std::move(name)};
     for (std::size_t j = 0; j < shown.size(); ++j) {
@@ -102,33 +102,33 @@ std::string comparison(const Identification& r) {
     rows.push_back(row);
   };
   for (std::size_t c = 0; c < choice.candidates.size(); ++c) {
-    const Estimate& e = choice.candidates[c].estimate;
+    const identify::Estimate& e = choice.candidates[c].estimate;
     if (e.usable) {
-      line(words::spaced(to_string(e.estimator)) + (c == choice.chosen ? " (taken)" : ""), e.theta);
+      line(words::spaced(identify::to_string(e.estimator)) + (c == choice.chosen ? " (taken)" : ""), e.theta);
     }
   }
   line("robust", r.robust.estimate);
   if (!binding(r.constrained).empty()) {
     line("physically consistent", r.constrained.estimate);
   }
-  for (const RegionRow& region : r.regions.rows) {
+  for (const inference::RegionRow& region : r.regions.rows) {
     if (!region.available) {
       continue;
     }
     for (const bool upper : {false, true}) {
       line(upper ? "  to"
-                 : fmt::format("{} {:g} %{}", words::spaced(to_string(region.method)), 100.0 * region.confidence,
-                               region.all_at_once ? ", all at once" : ""),
+                 : fmt::format("{} {:g} %{}", words::spaced(inference::to_string(region.method)),
+                               100.0 * region.confidence, region.all_at_once ? ", all at once" : ""),
            upper ? region.upper : region.lower);
     }
   }
   return aligned(rows);
 }
 
-std::string promises(const Identification& r) {
+std::string promises(const inference::Identification& r) {
   std::string out;
-  for (const RegionRow& row : r.regions.rows) {
-    const std::string name = "  " + words::spaced(to_string(row.method)) + ": ";
+  for (const inference::RegionRow& row : r.regions.rows) {
+    const std::string name = "  " + words::spaced(inference::to_string(row.method)) + ": ";
     out += wrapped(
         row.available ? row.promise + (row.remark.empty() ? "" : "; " + row.remark) : "not available: " + row.remark,
         name);
@@ -136,9 +136,9 @@ std::string promises(const Identification& r) {
   return out;
 }
 
-std::string noise_lines(const Identification& r) {
+std::string noise_lines(const inference::Identification& r) {
   std::string out;
-  for (const ColumnNoise& n : r.noise) {
+  for (const inference::ColumnNoise& n : r.noise) {
     const bool of_angles = n.known && (n.known->unit != n.unit || n.known->origin == "half an encoder count" ||
                                        r.setting.measurement.motion == MotionKind::angle);
     std::string text = n.known ? fmt::format("{}: ± {:.2g} {}", n.known->origin, n.known->bound, n.known->unit) : "";
@@ -146,10 +146,10 @@ std::string noise_lines(const Identification& r) {
         std::ranges::find(r.setting.measurement.effort_columns, n.column) != r.setting.measurement.effort_columns.end();
     if (!n.known || effort || !of_angles) {
       text += text.empty() ? "" : "; ";
-      text += n.choice.method == NoiseMethod::none
+      text += n.choice.method == inference::NoiseMethod::none
                   ? "not found: " + n.choice.reason
                   : fmt::format("standard deviation {:.2g} {} by {} ({})", n.choice.sd, n.unit,
-                                to_string(n.choice.method), n.choice.assumption);
+                                inference::to_string(n.choice.method), n.choice.assumption);
     }
     out += wrapped(text, "  " + n.column + ": ");
   }
@@ -158,7 +158,7 @@ std::string noise_lines(const Identification& r) {
 
 }  // namespace
 
-std::string summary(const Identification& r) {
+std::string summary(const inference::Identification& r) {
   std::string text = wrapped(r.setting.robot.name + ": " + verdict(r), "");
   for (const std::string& finding : findings(r)) {
     text += wrapped(finding, "  ");
@@ -171,7 +171,7 @@ std::string summary(const Identification& r) {
   }
   if (!r.shapes.empty()) {
     text += "\nlooked for beside the model\n";
-    for (const ShapeFinding& shape : r.shapes) {
+    for (const inference::ShapeFinding& shape : r.shapes) {
       text += wrapped(in_words(shape), "  ");
     }
   }

@@ -10,6 +10,6 @@
 namespace wheelwright::words {
 
 /// Words first, then one table of estimates and intervals by every method, then what to do next.
-[[nodiscard]] std::string summary(const Identification& result);
+[[nodiscard]] std::string summary(const inference::Identification& result);
 
 }  // namespace wheelwright::words

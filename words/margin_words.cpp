@@ -13,16 +13,17 @@ namespace {
 
 // What is best known of one fault on one side in one manoeuvre, over the residuals.
 struct Best {
-  MarginSummary summary;
+  detector::MarginSummary summary;
   std::string residual;
 };
 
-Best best_of(const MarginSurvey& survey, const FaultMargins& of, std::size_t window, ManoeuvreKind kind) {
+Best best_of(const commission::MarginSurvey& survey, const detector::FaultMargins& of, std::size_t window,
+             detector::ManoeuvreKind kind) {
   Best best;
-  for (const ResidualMargins& residual : survey.residuals) {
-    for (const FaultMargins& each : residual.margins) {
+  for (const commission::ResidualMargins& residual : survey.residuals) {
+    for (const detector::FaultMargins& each : residual.margins) {
       if (each.fault.name == of.fault.name && each.side == of.side) {
-        const MarginSummary summary = summarise(each, window, kind);
+        const detector::MarginSummary summary = detector::summarise(each, window, kind);
         if (summary.onsets > 0 && (best.residual.empty() || summary.worst < best.summary.worst ||
                                    (summary.worst == best.summary.worst && summary.best < best.summary.best))) {
           best = {summary, residual.name};
@@ -34,7 +35,8 @@ Best best_of(const MarginSurvey& survey, const FaultMargins& of, std::size_t win
 }
 
 // The first window in which `size` is certain at every onset of the manoeuvre, s.
-double delay_of(const MarginSurvey& survey, const FaultMargins& of, ManoeuvreKind kind, double size) {
+double delay_of(const commission::MarginSurvey& survey, const detector::FaultMargins& of, detector::ManoeuvreKind kind,
+                double size) {
   for (std::size_t w = 0; w < survey.windows.size(); ++w) {
     const Best best = best_of(survey, of, w, kind);
     if (!best.residual.empty() && best.summary.worst <= size) {
@@ -44,7 +46,7 @@ double delay_of(const MarginSurvey& survey, const FaultMargins& of, ManoeuvreKin
   return survey.windows.back();
 }
 
-std::string sentence(const MarginSurvey& survey, const FaultMargins& of) {
+std::string sentence(const commission::MarginSurvey& survey, const detector::FaultMargins& of) {
   const std::size_t window = shown_window(survey);
   std::vector<std::string> seen, at_best, unseen;
   for (const auto& [kind, onsets] : survey.manoeuvres) {
@@ -52,7 +54,7 @@ std::string sentence(const MarginSurvey& survey, const FaultMargins& of) {
     if (best.residual.empty()) {
       continue;
     }
-    const std::string where(manoeuvre_words(kind));
+    const std::string where(detector::manoeuvre_words(kind));
     if (std::isfinite(best.summary.worst)) {
       const std::string size = of.fault.whole ? "" : "from " + magnitude_words(of.fault, best.summary.worst) + " on ";
       seen.push_back(fmt::format("{}within {:g} s while {} ({})", size, delay_of(survey, of, kind, best.summary.worst),
@@ -72,20 +74,20 @@ std::string sentence(const MarginSurvey& survey, const FaultMargins& of) {
     name += of.side > 0.0 ? " (+)" : " (−)";
   }
   std::string out = name + ": ";
-  out +=
-      seen.empty() ? "not certain to be seen at every moment of any manoeuvre" : "certainly seen " + enumerated(seen);
+  out += seen.empty() ? "not certain to be seen at every moment of any manoeuvre"
+                      : "certainly seen " + core::enumerated(seen);
   if (!at_best.empty()) {
-    out += fmt::format("; at some moments only while {}", enumerated(at_best));
+    out += fmt::format("; at some moments only while {}", core::enumerated(at_best));
   }
   if (!unseen.empty()) {
-    out += fmt::format("; not certain while {}", enumerated(unseen));
+    out += fmt::format("; not certain while {}", core::enumerated(unseen));
   }
   return out + ".";
 }
 
 }  // namespace
 
-std::string magnitude_words(const FaultType& fault, double magnitude) {
+std::string magnitude_words(const detector::FaultType& fault, double magnitude) {
   if (!std::isfinite(magnitude)) {
     return "–";
   }
@@ -96,8 +98,8 @@ std::string magnitude_words(const FaultType& fault, double magnitude) {
   return fmt::format("{:.6g} {}", shown, fault.unit == "1" ? "%" : fault.unit);
 }
 
-std::string certain_words(const FaultMargins& margins, std::size_t window, ManoeuvreKind kind) {
-  const MarginSummary summary = summarise(margins, window, kind);
+std::string certain_words(const detector::FaultMargins& margins, std::size_t window, detector::ManoeuvreKind kind) {
+  const detector::MarginSummary summary = detector::summarise(margins, window, kind);
   if (summary.onsets == 0) {
     return "";
   }
@@ -112,7 +114,7 @@ std::string certain_words(const FaultMargins& margins, std::size_t window, Manoe
                                            : fmt::format("{} at {} of {}", size, summary.certain, summary.onsets);
 }
 
-std::size_t shown_window(const MarginSurvey& survey) {
+std::size_t shown_window(const commission::MarginSurvey& survey) {
   std::size_t shown = 0;
   for (std::size_t w = 0; w < survey.windows.size(); ++w) {
     shown = survey.windows[w] <= 1.0 ? w : shown;
@@ -120,21 +122,23 @@ std::size_t shown_window(const MarginSurvey& survey) {
   return shown;
 }
 
-std::string certain_meaning(Warrant warrant) {
-  return warrant == Warrant::guaranteed ? "“Certain” is meant as guaranteed: for all parameters that the commissioning "
-                                          "log allows and for every noise "
-                                          "within the sensors’ declared bounds, while the assumptions listed hold."
-         : warrant == Warrant::statistical ? "“Certain” is meant statistically: for all parameters that the "
-                                             "commissioning log allows, at the confidence "
-                                             "at which the sensors’ declared noise was taken through the filter."
-                                           : "“Certain” is extrapolated: it takes the noise bounds that were learnt "
-                                             "from the commissioning log for true "
-                                             "and holds as far as noise and driving stay like that log.";
+std::string certain_meaning(core::Warrant warrant) {
+  return warrant == core::Warrant::guaranteed
+             ? "“Certain” is meant as guaranteed: for all parameters that the commissioning "
+               "log allows and for every noise "
+               "within the sensors’ declared bounds, while the assumptions listed hold."
+         : warrant == core::Warrant::statistical
+             ? "“Certain” is meant statistically: for all parameters that the "
+               "commissioning log allows, at the confidence "
+               "at which the sensors’ declared noise was taken through the filter."
+             : "“Certain” is extrapolated: it takes the noise bounds that were learnt "
+               "from the commissioning log for true "
+               "and holds as far as noise and driving stay like that log.";
 }
 
-std::vector<std::string> margin_sentences(const MarginSurvey& survey) {
+std::vector<std::string> margin_sentences(const commission::MarginSurvey& survey) {
   std::vector<std::string> sentences;
-  for (const FaultMargins& of : survey.residuals.front().margins) {
+  for (const detector::FaultMargins& of : survey.residuals.front().margins) {
     sentences.push_back(sentence(survey, of));
   }
   return sentences;

@@ -16,14 +16,14 @@ namespace {
 
 Model model_of(const Commissioning& result) {
   Model model;
-  for (const ParameterResult& r : result.parameters) {
+  for (const commission::ParameterResult& r : result.parameters) {
     model.parameters.push_back(r.parameter);
   }
   return model;
 }
 
 // θ_L = r·m is told as such.
-std::string label(const Parameter& parameter) {
+std::string label(const model::Parameter& parameter) {
   return parameter.name == "r_" + parameter.physical ? "r·" + spaced(parameter.physical) : spaced(parameter.name);
 }
 
@@ -35,9 +35,9 @@ std::pair<double, double> uncertainty(const ParameterView& v) {
   return {v.lower, v.upper};
 }
 
-ParameterView theta_view(const Commissioning& result, const ParameterResult& r) {
+ParameterView theta_view(const Commissioning& result, const commission::ParameterResult& r) {
   ParameterView view{.name = label(r.parameter),
-                     .unit = parameter_unit(result.model.robot, r.parameter),
+                     .unit = commission::parameter_unit(result.model.robot, r.parameter),
                      .estimate = r.estimate,
                      .spread = {},
                      .lower = r.lower,
@@ -49,12 +49,13 @@ ParameterView theta_view(const Commissioning& result, const ParameterResult& r) 
                      .has_set = result.status != Commissioning::Status::empty,
                      .warrant = r.warrant};
   if (r.estimate && r.standard_error) {
-    view.spread = student_quantile(0.95, std::max(result.residuals.freedom, 1.0)) * *r.standard_error;
+    view.spread = core::student_quantile(0.95, std::max(result.residuals.freedom, 1.0)) * *r.standard_error;
   }
   return view;
 }
 
-ParameterView physical_view(ParameterView view, const PhysicalScale& scale, const Parameter& parameter) {
+ParameterView physical_view(ParameterView view, const commission::PhysicalScale& scale,
+                            const model::Parameter& parameter) {
   const auto physical = [&](double theta) { return scale.scale * theta - scale.offset; };
   view.name = spaced(parameter.physical);
   view.unit = parameter.physical_unit;
@@ -88,17 +89,17 @@ std::string centre_text(const ParameterView& view) {
 }
 
 bool physical_values_unknown(const Commissioning& result) {
-  return !physical_scales(result.model.robot, model_of(result)).has_value();
+  return !commission::physical_scales(result.model.robot, model_of(result)).has_value();
 }
 
 std::vector<ParameterViews> parameter_views(const Commissioning& result) {
-  const auto scales = physical_scales(result.model.robot, model_of(result));
+  const auto scales = commission::physical_scales(result.model.robot, model_of(result));
   std::vector<ParameterViews> views;
   for (std::size_t j = 0; j < result.parameters.size(); ++j) {
-    const ParameterResult& r = result.parameters[j];
+    const commission::ParameterResult& r = result.parameters[j];
     ParameterViews v{.theta = theta_view(result, r), .physical = {}};
     if (scales) {
-      const PhysicalScale& scale = (*scales)[j];
+      const commission::PhysicalScale& scale = (*scales)[j];
       const auto nominal = result.model.robot.nominal.find(r.parameter.physical);
       const bool known = nominal != result.model.robot.nominal.end();
       if (known) {
@@ -119,7 +120,7 @@ std::string output_name(const Model& model, std::size_t i) {
 }
 
 std::string output_unit_of(const Robot& robot, const Model& model, std::size_t i) {
-  return i < model.output_units.size() ? output_unit(robot, model.output_units[i]) : std::string();
+  return i < model.output_units.size() ? commission::output_unit(robot, model.output_units[i]) : std::string();
 }
 
 }  // namespace wheelwright::words

@@ -24,8 +24,8 @@ struct ParameterView {
   std::optional<double> nominal;  ///< of the robot file
   bool lower_is_prior = false;
   bool upper_is_prior = false;
-  bool has_set = true;                      ///< false: the feasible set is empty, and nothing is bounded
-  Warrant warrant = Warrant::extrapolated;  ///< of lower and upper
+  bool has_set = true;                                  ///< false: the feasible set is empty, and nothing is bounded
+  core::Warrant warrant = core::Warrant::extrapolated;  ///< of lower and upper
 };
 
 /// A parameter as θ_L,j, and as a physical quantity where the robot file tells the scale and the two differ.

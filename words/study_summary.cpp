@@ -20,26 +20,26 @@ std::string with_unit(const std::string& unit) { return unit.empty() || unit == 
 
 std::string shown(double x) { return words::number(x, 3); }
 
-std::string interval(const SobolIndex& index) {
+std::string interval(const study::SobolIndex& index) {
   return fmt::format("{} [{}, {}]", words::decimal(index.estimate, 2), words::decimal(index.lower, 2),
                      words::decimal(index.upper, 2));
 }
 
-std::string one_at_a_time_lines(const Study& study, const OneAtATime& found) {
+std::string one_at_a_time_lines(const study::Study& study, const study::OneAtATime& found) {
   std::string out;
   for (const std::size_t i : found.order) {
-    const StudyInput& input = study.inputs[i];
-    const InputCurve& curve = found.inputs[i];
+    const study::StudyInput& input = study.inputs[i];
+    const study::InputCurve& curve = found.inputs[i];
     const std::string range = fmt::format("{} … {}{}", shown(input.lower), shown(input.upper), with_unit(input.unit));
     out += "  " + padded(input.name, 26) + padded(range, 26) + shown(curve.low) + " … " + shown(curve.high) + "\n";
   }
   return out;
 }
 
-std::string sobol_lines(const Study& study, const SobolIndices& found) {
-  if (found.status != SobolStatus::estimated) {
-    return found.status == SobolStatus::constant ? "  does not depend on the inputs\n"
-                                                 : "  too few points have a value for Sobol indices\n";
+std::string sobol_lines(const study::Study& study, const study::SobolIndices& found) {
+  if (found.status != study::SobolStatus::estimated) {
+    return found.status == study::SobolStatus::constant ? "  does not depend on the inputs\n"
+                                                        : "  too few points have a value for Sobol indices\n";
   }
   std::string out = "  " + padded("share of the variance", 26) + padded("alone", 26) + "with all interactions\n";
   for (std::size_t i = 0; i < found.first.size(); ++i) {
@@ -53,11 +53,11 @@ std::string sobol_lines(const Study& study, const SobolIndices& found) {
   return out;
 }
 
-std::string morris_lines(const Study& study, const std::vector<ElementaryEffects>& found) {
+std::string morris_lines(const study::Study& study, const std::vector<study::ElementaryEffects>& found) {
   std::string out =
       "  " + padded("elementary effects", 26) + padded("μ* over the whole range", 26) + "σ (curvature, interactions)\n";
   for (std::size_t i = 0; i < found.size(); ++i) {
-    const ElementaryEffects& e = found[i];
+    const study::ElementaryEffects& e = found[i];
     out += "  " + padded(study.inputs[i].name, 26) +
            padded(fmt::format("{} [{}, {}]", shown(e.mean_absolute), shown(e.lower), shown(e.upper)), 26) +
            shown(e.deviation) + "\n";
@@ -65,7 +65,7 @@ std::string morris_lines(const Study& study, const std::vector<ElementaryEffects
   return out;
 }
 
-std::string local_lines(const LocalSensitivity& local) {
+std::string local_lines(const study::LocalSensitivity& local) {
   if (local.inputs.empty()) {
     return {};
   }
@@ -74,14 +74,14 @@ std::string local_lines(const LocalSensitivity& local) {
     out += padded(parameter, 18);
   }
   out += "\n";
-  for (const LocalDerivative& input : local.inputs) {
+  for (const study::LocalDerivative& input : local.inputs) {
     out += "  " + padded(input.input, 34);
-    for (const ParameterDerivative& d : input.parameters) {
+    for (const study::ParameterDerivative& d : input.parameters) {
       out += padded(d.elasticity ? shown(*d.elasticity) : "–", 18);
     }
     out += "\n";
   }
-  const std::vector<std::string> kinks = not_differentiable(local);
+  const std::vector<std::string> kinks = study::not_differentiable(local);
   if (!kinks.empty()) {
     out += fmt::format("  –: not differentiable there ({} in all; the report and the JSON say why)\n", kinks.size());
   }
@@ -90,7 +90,8 @@ std::string local_lines(const LocalSensitivity& local) {
 
 }  // namespace
 
-std::string summary(const Study& study, const StudyResult& result, const std::optional<LocalSensitivity>& local) {
+std::string summary(const study::Study& study, const study::StudyResult& result,
+                    const std::optional<study::LocalSensitivity>& local) {
   std::string out;
   for (std::size_t q = 0; q < study.quantities.size(); ++q) {
     out += study.quantities[q].name + with_unit(study.quantities[q].unit);
@@ -109,7 +110,7 @@ std::string summary(const Study& study, const StudyResult& result, const std::op
   }
   out += local ? local_lines(*local) : std::string();
   std::size_t without = 0;
-  for (const StudyFinding& finding : result.findings) {
+  for (const study::StudyFinding& finding : result.findings) {
     without += finding.points;
   }
   if (without > 0) {

@@ -13,7 +13,7 @@ namespace wheelwright::words {
 
 /// One table for each quantity: what each input does to it, by every method that the study asks for; the widths'
 /// elasticities; and what could not be evaluated.
-[[nodiscard]] std::string summary(const Study& study, const StudyResult& result,
-                                  const std::optional<LocalSensitivity>& local);
+[[nodiscard]] std::string summary(const study::Study& study, const study::StudyResult& result,
+                                  const std::optional<study::LocalSensitivity>& local);
 
 }  // namespace wheelwright::words

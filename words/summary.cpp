@@ -27,20 +27,20 @@ std::string line(const std::string& name, const std::optional<double>& estimate,
 
 std::string parameter_table(const Commissioning& r) {
   const Robot& robot = r.model.robot;
-  const auto scales = physical_scales(robot, r.model.model);
-  const double t = student_quantile(0.95, std::max(r.residuals.freedom, 1.0));
+  const auto scales = commission::physical_scales(robot, r.model.model);
+  const double t = core::student_quantile(0.95, std::max(r.residuals.freedom, 1.0));
   std::string text = fmt::format("  {:<20} {:>11}   {} interval   ± 95 % statistical\n", "parameter", "estimate",
-                                 warrant_word(interval_warrant(r)));
+                                 core::warrant_word(commission::interval_warrant(r)));
   for (std::size_t j = 0; j < r.parameters.size(); ++j) {
-    const ParameterResult& p = r.parameters[j];
-    const PhysicalScale s = scales ? (*scales)[j] : PhysicalScale{};
+    const commission::ParameterResult& p = r.parameters[j];
+    const commission::PhysicalScale s = scales ? (*scales)[j] : commission::PhysicalScale{};
     const auto value = [&](double theta) { return s.scale * theta - s.offset; };
     const auto estimate = p.estimate ? std::optional(value(*p.estimate)) : std::nullopt;
     const auto half = p.standard_error && std::isfinite(*p.standard_error)
                           ? std::optional(t * std::abs(s.scale) * *p.standard_error)
                           : std::nullopt;
     text += line(scales ? p.parameter.physical : p.parameter.name, estimate, value(p.lower), value(p.upper), half,
-                 scales ? p.parameter.physical_unit : parameter_unit(robot, p.parameter), p.lower_is_prior,
+                 scales ? p.parameter.physical_unit : commission::parameter_unit(robot, p.parameter), p.lower_is_prior,
                  p.upper_is_prior);
     if (!p.reason.empty()) {
       text += fmt::format("  {:<20} {}\n", "", p.reason);
@@ -50,7 +50,8 @@ std::string parameter_table(const Commissioning& r) {
     text +=
         "  (physical values need the motor's constants in the robot file: motor: {torque_constant, gear_ratio, …})\n";
   }
-  text += fmt::format("  {}\n  {}\n", warrant_meaning(interval_warrant(r)), statistical_remark());
+  text +=
+      fmt::format("  {}\n  {}\n", core::warrant_meaning(commission::interval_warrant(r)), core::statistical_remark());
   return text;
 }
 
@@ -60,23 +61,25 @@ std::string smallest_fault(const Robot& robot, double kappa) {
   if (!std::isfinite(kappa) || kappa > useless) {
     return "no fault that scales the effort is certainly seen: the threshold is as wide as the effort itself";
   }
-  return on_two_wheels(robot) ? fmt::format("a change of the wheel radius by {:.2g} % is certainly seen",
-                                            100.0 * (std::sqrt(1.0 + kappa) - 1.0))
-                              : fmt::format("a change of the effort by {:.2g} % is certainly seen", 100.0 * kappa);
+  return model::on_two_wheels(robot)
+             ? fmt::format("a change of the wheel radius by {:.2g} % is certainly seen",
+                           100.0 * (std::sqrt(1.0 + kappa) - 1.0))
+             : fmt::format("a change of the effort by {:.2g} % is certainly seen", 100.0 * kappa);
 }
 
-std::string kinematic_table(const KinematicCommissioning& k) {
+std::string kinematic_table(const commission::KinematicCommissioning& k) {
   std::string text;
   if (k.model) {
-    text += fmt::format("  {:<20} {:>11}   {} interval\n", "pose or gyro", "estimate", warrant_word(k.model->warrant));
+    text += fmt::format("  {:<20} {:>11}   {} interval\n", "pose or gyro", "estimate",
+                        core::warrant_word(k.model->warrant));
   }
-  for (const KinematicParameter& p : k.parameters) {
+  for (const commission::KinematicParameter& p : k.parameters) {
     text += line(p.name, p.estimate, p.lower, p.upper, std::nullopt, p.unit == "1" ? "" : p.unit, false, false);
   }
   const auto outputs = k.model ? k.model->measurement.outputs() : std::vector<std::string>();
   const auto units = k.model ? k.model->measurement.output_units() : std::vector<std::string>();
   for (std::size_t i = 0; i < k.validation.size(); ++i) {
-    const OutputValidation& v = k.validation[i];
+    const commission::OutputValidation& v = k.validation[i];
     text += fmt::format("  held out, {}: {} false alarms in {} instants, median width of the threshold {:.3g} {}\n",
                         outputs[i], v.outside, v.instants, v.median_width, units[i]);
   }
@@ -84,12 +87,14 @@ std::string kinematic_table(const KinematicCommissioning& k) {
 }
 
 // How many assumptions hold, and those that fail, with what shows it.
-std::string assumption_lines(const std::vector<Assumption>& assumptions) {
-  using Verdict = AssumptionVerdict;
-  const auto number = [&](Verdict verdict) { return std::ranges::count(assumptions, verdict, &Assumption::verdict); };
+std::string assumption_lines(const std::vector<core::Assumption>& assumptions) {
+  using Verdict = core::AssumptionVerdict;
+  const auto number = [&](Verdict verdict) {
+    return std::ranges::count(assumptions, verdict, &core::Assumption::verdict);
+  };
   std::string text = fmt::format("  assumptions: {} hold on this log, {} not tested, {} fail (model.json lists them)\n",
                                  number(Verdict::holds), number(Verdict::not_tested), number(Verdict::fails));
-  for (const Assumption& a : assumptions) {
+  for (const core::Assumption& a : assumptions) {
     if (a.verdict == Verdict::fails) {
       text += fmt::format("    fails: {} {}\n", a.statement, a.detail);
     }
@@ -99,8 +104,8 @@ std::string assumption_lines(const std::vector<Assumption>& assumptions) {
 
 std::string contradiction_table(const Commissioning& r) {
   std::string text = "  samples that contradict one another:\n";
-  for (const WeightedRow& row : r.feasible.contradiction) {
-    const RowOrigin& o = row.row.origin;
+  for (const bounds::WeightedRow& row : r.feasible.contradiction) {
+    const bounds::RowOrigin& o = row.row.origin;
     text += o.is_prior
                 ? fmt::format("    prior bound of {}\n", r.model.model.parameters[o.parameter].physical)
                 : fmt::format("    t = {:.3f} s, row {}, {} channel\n", o.t, o.sample, r.model.model.outputs[o.output]);
@@ -110,7 +115,7 @@ std::string contradiction_table(const Commissioning& r) {
 
 std::string contradiction_notes(const Commissioning& r) {
   std::string text;
-  for (const LogContradiction& c : r.contradictions) {
+  for (const commission::LogContradiction& c : r.contradictions) {
     text += fmt::format("  {}: {}\n    → {}\n", c.withdraws ? "contradiction" : "doubt", c.sentence, c.next);
   }
   return text;
@@ -134,7 +139,7 @@ std::string summary(const Commissioning& r) {
     text += fmt::format("  estimated by {}\n", r.estimators.reason);
   }
   for (std::size_t i = 0; i < r.validation.size(); ++i) {
-    const OutputValidation& v = r.validation[i];
+    const commission::OutputValidation& v = r.validation[i];
     if (v.instants == 0) {
       text += fmt::format("  held out, {}: too little driving to hold any out\n", r.model.model.outputs[i]);
       continue;
@@ -143,7 +148,7 @@ std::string summary(const Commissioning& r) {
                         r.model.model.outputs[i], v.outside, v.instants, 100.0 * v.nrmse);
     text += "; " + smallest_fault(r.model.robot, v.smallest_kappa) + "\n";
   }
-  if (!r.validation.empty() && r.model.warrant != Warrant::guaranteed) {
+  if (!r.validation.empty() && r.model.warrant != core::Warrant::guaranteed) {
     text += fmt::format("  {}\n", certain_meaning(r.model.warrant));
   }
   text += kinematic_table(r.kinematic);
@@ -154,7 +159,7 @@ std::string summary(const Commissioning& r) {
   return text;
 }
 
-std::string event_line(const Event& e, const OnlineModel& model) {
+std::string event_line(const detector::Event& e, const OnlineModel& model) {
   return fmt::format("t = {:.3f} s: fault in the {} channel (first outside at {:.3f} s, {:.2f} times the threshold)",
                      e.alarm, model.model.outputs[e.output], e.start, e.peak_ratio);
 }
@@ -202,7 +207,7 @@ std::string summary(const Detection& d, const OnlineModel& model) {
       text += fmt::format("  … and {} more (--json lists them all)\n", d.events.size() - most);
     }
   }
-  text += fmt::format("  thresholds: {}\n", warrant_word(model.warrant));
+  text += fmt::format("  thresholds: {}\n", core::warrant_word(model.warrant));
   for (std::size_t i = 0; i < d.utilisation.size(); ++i) {
     text += fmt::format("  {}: residual {:.2g} % of the torque, at most {:.0f} % of its threshold used\n",
                         model.model.outputs[i], 100.0 * d.nrmse[i], 100.0 * d.utilisation[i]);
@@ -210,15 +215,15 @@ std::string summary(const Detection& d, const OnlineModel& model) {
   return text;
 }
 
-std::string summary(const std::vector<Isolation>& isolations, const Detection& detection) {
+std::string summary(const std::vector<detector::Isolation>& isolations, const Detection& detection) {
   std::string text;
   for (std::size_t k = 0; k < isolations.size(); ++k) {
-    text += fmt::format("alarm at {:.3f} s: {}\n", detection.events[k].alarm, sentence(isolations[k]));
+    text += fmt::format("alarm at {:.3f} s: {}\n", detection.events[k].alarm, commission::sentence(isolations[k]));
   }
   return text;
 }
 
-std::string summary(const KinematicWatch& watch, const OnlineModel& model) {
+std::string summary(const commission::KinematicWatch& watch, const OnlineModel& model) {
   if (!watch.detection) {
     return "kinematic residual: not watched, " + watch.message + "\n";
   }
@@ -226,7 +231,7 @@ std::string summary(const KinematicWatch& watch, const OnlineModel& model) {
   if (d.instants == 0) {
     return "kinematic residual: no decision, the log is shorter than its window\n";
   }
-  const OnlineModel view = with_kinematic_outputs(model);
+  const OnlineModel view = commission::with_kinematic_outputs(model);
   std::string text = fmt::format(
       "kinematic residual: {} in {:.1f} s ({} instants)\n",
       d.events.empty() ? "no fault" : fmt::format("{} fault event{}", d.events.size(), d.events.size() == 1 ? "" : "s"),
@@ -238,7 +243,7 @@ std::string summary(const KinematicWatch& watch, const OnlineModel& model) {
   if (d.events.size() > most) {
     text += fmt::format("  … and {} more (--json lists them all)\n", d.events.size() - most);
   }
-  text += fmt::format("  thresholds: {}\n", warrant_word(view.warrant));
+  text += fmt::format("  thresholds: {}\n", core::warrant_word(view.warrant));
   for (std::size_t i = 0; i < d.utilisation.size(); ++i) {
     text +=
         fmt::format("  {}: at most {:.0f} % of its threshold used\n", view.model.outputs[i], 100.0 * d.utilisation[i]);

@@ -18,16 +18,16 @@ namespace wheelwright::words {
 [[nodiscard]] std::string summary(const Detection& detection, const OnlineModel& model);
 
 /// Summary of the kinematic residual for a terminal.
-[[nodiscard]] std::string summary(const KinematicWatch& watch, const OnlineModel& model);
+[[nodiscard]] std::string summary(const commission::KinematicWatch& watch, const OnlineModel& model);
 
 /// Summary of the isolation of the first events for a terminal.
-[[nodiscard]] std::string summary(const std::vector<Isolation>& isolations, const Detection& detection);
+[[nodiscard]] std::string summary(const std::vector<detector::Isolation>& isolations, const Detection& detection);
 
 /// Why a detector of `model` decided at no instant of `rows` rows with the median step `step` (s), with what to do
 /// about it.
 [[nodiscard]] std::string why_undecided(const OnlineModel& model, std::size_t rows, double step);
 
 /// One event in a line.
-[[nodiscard]] std::string event_line(const Event& event, const OnlineModel& model);
+[[nodiscard]] std::string event_line(const detector::Event& event, const OnlineModel& model);
 
 }  // namespace wheelwright::words

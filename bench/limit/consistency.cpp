@@ -8,7 +8,7 @@
 
 #include <wheelwright/core/check.hpp>
 
-namespace wheelwright {
+namespace wheelwright::bench {
 namespace {
 
 // What evaluating a weighted sum, and the running integrals behind a signature, can be wrong by, relative to the sum of
@@ -43,7 +43,7 @@ struct CombinedRow {
   }
 };
 
-Eigen::VectorXd magnitudes(const RowMatrix& matrix, const Eigen::VectorXd& weights) {
+Eigen::VectorXd magnitudes(const core::RowMatrix& matrix, const Eigen::VectorXd& weights) {
   return matrix.cwiseAbs().transpose() * weights.cwiseAbs();
 }
 
@@ -69,7 +69,7 @@ double reach(const Polytope& set, Eigen::VectorXd a, const Eigen::VectorXd& erro
 // healthy one can, rounding included; > 0 is a proof.
 class Proof {
  public:
-  Proof(const Polytope& set, const RawEquations& e, const FaultSignals& sign, double side,
+  Proof(const Polytope& set, const RawEquations& e, const detector::FaultSignals& sign, double side,
         const Eigen::VectorXd& largest, const Eigen::VectorXd& weights)
       : set_(&set),
         row_(e, weights),
@@ -110,14 +110,14 @@ class Proof {
 
 }  // namespace
 
-ConsistencyTest::ConsistencyTest(Model model, Measurement measurement, SensorErrors sensors, Polytope set,
-                                 ConsistencyOptions options)
+ConsistencyTest::ConsistencyTest(Model model, filter::Measurement measurement, filter::SensorErrors sensors,
+                                 Polytope set, ConsistencyOptions options)
     : model_(std::move(model)),
       measurement_(std::move(measurement)),
       sensors_(sensors),
       options_(options),
       set_(std::move(set)) {
-  validate(model_);
+  model::validate(model_);
   check::non_negative(sensors_.motion, "motion error bound");
   check::non_negative(sensors_.effort, "effort error bound");
   check::non_negative(options_.before, "ConsistencyOptions::before");
@@ -174,8 +174,8 @@ std::vector<Disturbance> ConsistencyTest::exact(const RawEquations& equations, c
   return all;
 }
 
-Consistency ConsistencyTest::consistent(const ReferenceMotion& motion, const Eigen::MatrixXd& effort, std::size_t first,
-                                        std::size_t last) {
+Consistency ConsistencyTest::consistent(const detector::ReferenceMotion& motion, const Eigen::MatrixXd& effort,
+                                        std::size_t first, std::size_t last) {
   const RawEquations e = raw_equations(model_, measurement_, sensors_, motion, first, last);
   const Eigen::VectorXd u = raw_efforts(e, model_, measurement_, motion, effort);
   const auto p = static_cast<Eigen::Index>(model_.p());
@@ -199,8 +199,9 @@ Consistency ConsistencyTest::consistent(const ReferenceMotion& motion, const Eig
   return result;
 }
 
-DetectableSize ConsistencyTest::smallest_detectable(const ReferenceMotion& motion, const FaultType& fault, double side,
-                                                    std::size_t onset, double window) {
+DetectableSize ConsistencyTest::smallest_detectable(const detector::ReferenceMotion& motion,
+                                                    const detector::FaultType& fault, double side, std::size_t onset,
+                                                    double window) {
   check::that(side == 1.0 || side == -1.0, "side", "1 or −1");
   check::that(onset < motion.instants(), "onset", "an instant of the motion");
   const auto next = std::upper_bound(motion.segment_starts.begin(), motion.segment_starts.end(), onset);
@@ -214,7 +215,7 @@ DetectableSize ConsistencyTest::smallest_detectable(const ReferenceMotion& motio
   }
   check::that(last > onset, "window", "at least one sampling interval of the segment");
   const RawEquations e = raw_equations(model_, measurement_, sensors_, motion, first, last);
-  const FaultSignals sign = raw_signature(e, fault, model_, motion, onset);
+  const detector::FaultSignals sign = raw_signature(e, fault, model_, motion, onset);
   const auto p = static_cast<Eigen::Index>(model_.p());
   const Eigen::Map<const Eigen::VectorXd> centre(set_.centre().data(), p);
 
@@ -222,7 +223,7 @@ DetectableSize ConsistencyTest::smallest_detectable(const ReferenceMotion& motio
   const auto separate = [&](SeparationSolver& solver, double kappa, std::vector<Disturbance> disturbances,
                             const Eigen::VectorXd* member) {
     const double k = side * kappa;
-    const RowMatrix healthy = e.Y + k * sign.s, faulty = e.Y + k * sign.g1 + k * k * sign.g2;
+    const core::RowMatrix healthy = e.Y + k * sign.s, faulty = e.Y + k * sign.g1 + k * k * sign.g2;
     SeparationProblem problem{.set = &set_,
                               .healthy = &healthy,
                               .faulty = &faulty,
@@ -283,4 +284,4 @@ DetectableSize ConsistencyTest::smallest_detectable(const ReferenceMotion& motio
   return result;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::bench

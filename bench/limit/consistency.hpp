@@ -56,7 +56,7 @@
 #include "limit/raw_equations.hpp"
 #include "limit/separation.hpp"
 
-namespace wheelwright {
+namespace wheelwright::bench {
 
 /// Verdict on a window of samples: explained by a healthy robot or not.
 struct Consistency {
@@ -88,19 +88,20 @@ struct ConsistencyOptions {
 class ConsistencyTest {
  public:
   /// `sensors` bounds the errors of raw samples: of angles also where the log has mean speeds. `set` is P.
-  ConsistencyTest(Model model, Measurement measurement, SensorErrors sensors, Polytope set,
+  ConsistencyTest(Model model, filter::Measurement measurement, filter::SensorErrors sensors, Polytope set,
                   ConsistencyOptions options = {});
 
   /// Asks for the samples between the instants `first` and `last` of `motion`; `effort` (joints × rows of the log) as
   /// read_efforts() gives it.
-  [[nodiscard]] Consistency consistent(const ReferenceMotion& motion, const Eigen::MatrixXd& effort, std::size_t first,
-                                       std::size_t last);
+  [[nodiscard]] Consistency consistent(const detector::ReferenceMotion& motion, const Eigen::MatrixXd& effort,
+                                       std::size_t first, std::size_t last);
 
   /// The smallest size of `fault` (`side` 1: positive, −1: negative magnitudes) that any test could see for certain
   /// within `window` s of its onset at an instant of `motion`. A fault that is there or not is asked for at its one
   /// size.
-  [[nodiscard]] DetectableSize smallest_detectable(const ReferenceMotion& motion, const FaultType& fault, double side,
-                                                   std::size_t onset, double window);
+  [[nodiscard]] DetectableSize smallest_detectable(const detector::ReferenceMotion& motion,
+                                                   const detector::FaultType& fault, double side, std::size_t onset,
+                                                   double window);
 
   [[nodiscard]] const Polytope& set() const { return set_; }
 
@@ -110,11 +111,11 @@ class ConsistencyTest {
                                                double times) const;
 
   Model model_;
-  Measurement measurement_;
-  SensorErrors sensors_;
+  filter::Measurement measurement_;
+  filter::SensorErrors sensors_;
   ConsistencyOptions options_;
   Polytope set_;
   Eigen::VectorXd largest_;  // |θ_j| over P
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::bench

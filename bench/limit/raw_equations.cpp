@@ -9,7 +9,10 @@
 
 #include <wheelwright/core/check.hpp>
 
-namespace wheelwright {
+namespace wheelwright::bench {
+
+using core::RowMatrix;
+
 namespace {
 
 // Weights of the errors of three consecutive samples (those of instant i−1, i, i+1 of the motion) in one equation.
@@ -17,7 +20,7 @@ struct Stencil {
   std::array<double, 3> slope{}, level{};
 };
 
-Stencil stencil(const Measurement& measurement, const ReferenceMotion& motion, std::size_t i) {
+Stencil stencil(const filter::Measurement& measurement, const detector::ReferenceMotion& motion, std::size_t i) {
   const std::array<double, 2> shares = motion.shares(i);
   const double length = shares[0] + shares[1];
   if (measurement.motion == MotionKind::speed) {
@@ -28,8 +31,9 @@ Stencil stencil(const Measurement& measurement, const ReferenceMotion& motion, s
 }
 
 // Weights of the efforts of samples of instant i−1, i, i+1 in equation i.
-std::array<double, 3> effort_weights(const Measurement& measurement, const ReferenceMotion& motion, std::size_t i) {
-  const bool held = measurement.hold == Hold::zero_order, curved = measurement.changes == EffortChanges::between;
+std::array<double, 3> effort_weights(const filter::Measurement& measurement, const detector::ReferenceMotion& motion,
+                                     std::size_t i) {
+  const bool held = measurement.hold == Hold::zero_order, curved = measurement.changes == model::EffortChanges::between;
   if (measurement.motion == MotionKind::mean_speed) {
     return held ? std::array{0.125, 0.75, 0.125} : std::array{0.0, 0.5, 0.5};
   }
@@ -45,25 +49,26 @@ std::array<double, 3> effort_weights(const Measurement& measurement, const Refer
   return {a / (3.0 * sum) - curve / a, 2.0 / 3.0 + curve * (1.0 / a + 1.0 / b), b / (3.0 * sum) - curve / b};
 }
 
-std::vector<TermValue> function_values(const Term& term, const SignalErrors& errors, const ReferenceMotion& motion,
-                                       std::size_t first, std::size_t last) {
+std::vector<model::TermValue> function_values(const Term& term, const filter::SignalErrors& errors,
+                                              const detector::ReferenceMotion& motion, std::size_t first,
+                                              std::size_t last) {
   const auto c = static_cast<std::size_t>(motion.speed.rows()), j = static_cast<std::size_t>(motion.joint_speed.rows());
   const std::vector<double> joint_error(j, errors.joint_sample);
-  std::vector<TermValue> values;
+  std::vector<model::TermValue> values;
   for (std::size_t i = first; i <= last; ++i) {
     const auto at = static_cast<Eigen::Index>(i);
-    TermValue value = term.function({{motion.speed.col(at).data(), c},
-                                     {errors.speed_sample.data(), c},
-                                     {motion.joint_speed.col(at).data(), j},
-                                     joint_error,
-                                     motion.heading[i],
-                                     errors.heading});
+    model::TermValue value = term.function({{motion.speed.col(at).data(), c},
+                                            {errors.speed_sample.data(), c},
+                                            {motion.joint_speed.col(at).data(), j},
+                                            joint_error,
+                                            motion.heading[i],
+                                            errors.heading});
     values.push_back({term.scale * value.value, std::abs(term.scale) * value.error});
   }
   return values;
 }
 
-void add_functions(RawEquations& e, const Term& term, const std::vector<TermValue>& values) {
+void add_functions(RawEquations& e, const Term& term, const std::vector<model::TermValue>& values) {
   for (std::size_t i = 0; i < values.size(); ++i) {
     ErrorSource source{.bound = values[i].error};
     for (const std::size_t k : {i - 1, i}) {  // i − 1 wraps around where there is none
@@ -81,15 +86,16 @@ void add_functions(RawEquations& e, const Term& term, const std::vector<TermValu
 
 }  // namespace
 
-RawEquations raw_equations(const Model& model, const Measurement& measurement, const SensorErrors& sensors,
-                           const ReferenceMotion& motion, std::size_t first, std::size_t last) {
+RawEquations raw_equations(const Model& model, const filter::Measurement& measurement,
+                           const filter::SensorErrors& sensors, const detector::ReferenceMotion& motion,
+                           std::size_t first, std::size_t last) {
   check::that(measurement.correction.empty(), "measurement",
               "efforts as the wheels get them: raw equations do not correct saturation, dead zones, gains or lags");
   check::that(first < last && last < motion.instants() &&
                   std::upper_bound(motion.segment_starts.begin(), motion.segment_starts.end(), first) ==
                       std::upper_bound(motion.segment_starts.begin(), motion.segment_starts.end(), last),
               "stretch", "two instants of one segment, one after the other");
-  const SignalErrors errors = propagate(model, {}, measurement, sensors);
+  const filter::SignalErrors errors = filter::propagate(model, {}, measurement, sensors);
   const std::size_t n = model.n(), p = model.p(), joints = model.joints.size(), count = last - first;
   RawEquations e{.outputs = n, .parameters = p, .first = first};
   for (std::size_t k = 0; k < count; ++k) {
@@ -151,8 +157,8 @@ RawEquations raw_equations(const Model& model, const Measurement& measurement, c
   return e;
 }
 
-Eigen::VectorXd raw_efforts(const RawEquations& equations, const Model& model, const Measurement& measurement,
-                            const ReferenceMotion& motion, const Eigen::MatrixXd& effort) {
+Eigen::VectorXd raw_efforts(const RawEquations& equations, const Model& model, const filter::Measurement& measurement,
+                            const detector::ReferenceMotion& motion, const Eigen::MatrixXd& effort) {
   Eigen::VectorXd u = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(equations.rows()));
   const auto n = static_cast<Eigen::Index>(equations.outputs);
   for (std::size_t k = 0; k < equations.count(); ++k) {
@@ -172,7 +178,7 @@ Eigen::VectorXd raw_efforts(const RawEquations& equations, const Model& model, c
   return u;
 }
 
-Eigen::MatrixXd read_efforts(LogSource& log, const Measurement& measurement) {
+Eigen::MatrixXd read_efforts(LogSource& log, const filter::Measurement& measurement) {
   check::that(!measurement.effort_unsigned, "effort", "signed, for raw equations");
   std::vector<std::size_t> pick;
   for (const auto& name : measurement.effort_columns) {
@@ -195,19 +201,20 @@ Eigen::MatrixXd read_efforts(LogSource& log, const Measurement& measurement) {
   return Eigen::Map<const Eigen::MatrixXd>(values.data(), joints, static_cast<Eigen::Index>(values.size()) / joints);
 }
 
-FaultSignals raw_signature(const RawEquations& equations, const FaultType& fault, const Model& model,
-                           const ReferenceMotion& motion, std::size_t onset) {
+detector::FaultSignals raw_signature(const RawEquations& equations, const detector::FaultType& fault,
+                                     const Model& model, const detector::ReferenceMotion& motion, std::size_t onset) {
   check::that(!fault.held_effort, "fault '" + fault.name + "'", "one whose signature needs no filter");
   const std::size_t last = equations.first + equations.count();
   check::that(onset >= equations.first && onset < last, "onset", "an instant inside the stretch");
   // A filter that forgets nothing integrates: its rows differ by the integral over the interval.
   constexpr double kForgetsNothing = 1e-14;  // 1/s
-  FaultFilter integral(fault, model, {.order = 1, .alpha = 1.0, .beta = kForgetsNothing}, motion);
+  detector::FaultFilter integral(fault, model, {.order = 1, .alpha = 1.0, .beta = kForgetsNothing}, motion);
   const auto rows = static_cast<Eigen::Index>(equations.rows()), p = static_cast<Eigen::Index>(equations.parameters),
              n = static_cast<Eigen::Index>(equations.outputs);
-  FaultSignals mean{RowMatrix::Zero(rows, p), RowMatrix::Zero(rows, p), RowMatrix::Zero(rows, p),
-                    Eigen::VectorXd::Zero(rows)};
-  FaultSignals before{RowMatrix::Zero(n, p), RowMatrix::Zero(n, p), RowMatrix::Zero(n, p), Eigen::VectorXd::Zero(n)};
+  detector::FaultSignals mean{RowMatrix::Zero(rows, p), RowMatrix::Zero(rows, p), RowMatrix::Zero(rows, p),
+                              Eigen::VectorXd::Zero(rows)};
+  detector::FaultSignals before{RowMatrix::Zero(n, p), RowMatrix::Zero(n, p), RowMatrix::Zero(n, p),
+                                Eigen::VectorXd::Zero(n)};
   if (fault.profile.jumps()) {
     const Eigen::VectorXd v = motion.speed.col(static_cast<Eigen::Index>(onset));
     Eigen::VectorXd moved = Eigen::VectorXd::Zero(v.size()), seen = moved;
@@ -239,7 +246,7 @@ FaultSignals raw_signature(const RawEquations& equations, const FaultType& fault
     const std::size_t k = integral.instant() - 1 - equations.first;
     const double length = equations.length[k];
     for (Eigen::Index i = 0; i < n; ++i) {
-      const FaultRow row = integral.row(static_cast<std::size_t>(i));
+      const detector::FaultRow row = integral.row(static_cast<std::size_t>(i));
       const Eigen::Index at = static_cast<Eigen::Index>(k) * n + i;
       const auto rate = [&](std::span<const double> now, RowMatrix& was, RowMatrix& to) {
         const Eigen::Map<const Eigen::RowVectorXd> values(now.data(), p);
@@ -256,4 +263,4 @@ FaultSignals raw_signature(const RawEquations& equations, const FaultType& fault
   return mean;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::bench

@@ -34,7 +34,7 @@
 #include <wheelwright/filter/noise.hpp>
 #include <wheelwright/model/model.hpp>
 
-namespace wheelwright {
+namespace wheelwright::bench {
 
 /// One error, of one sample, with its weights in the equations.
 struct ErrorSource {
@@ -55,7 +55,7 @@ struct RawEquations {
   std::size_t parameters = 0;         ///< p
   std::size_t first = 0;              ///< instant at which the stretch begins
   std::vector<double> length{};       ///< N: H_k, s
-  RowMatrix Y{};                      ///< N·n × p
+  core::RowMatrix Y{};                ///< N·n × p
   std::vector<ErrorSource> joint{};   ///< of the joints' motion: the same error in all columns of Y
   std::vector<ErrorSource> column{};  ///< the same, relaxed: every term of Y has errors of its own; one parameter each
   std::vector<ErrorSource> function{};  ///< of functions of the motion; one parameter each
@@ -70,23 +70,24 @@ struct RawEquations {
 /// The equations between instants `first` and `last` of `motion` (one segment), with the errors of `sensors` (for mean
 /// speeds and angles: of the angle). Throws InvalidArgument unless first < last are instants of one segment, and for a
 /// measurement with a correction of its efforts.
-[[nodiscard]] RawEquations raw_equations(const Model& model, const Measurement& measurement,
-                                         const SensorErrors& sensors, const ReferenceMotion& motion, std::size_t first,
-                                         std::size_t last);
+[[nodiscard]] RawEquations raw_equations(const Model& model, const filter::Measurement& measurement,
+                                         const filter::SensorErrors& sensors, const detector::ReferenceMotion& motion,
+                                         std::size_t first, std::size_t last);
 
 /// u of these equations from efforts (joints × rows of the log, read_efforts).
 [[nodiscard]] Eigen::VectorXd raw_efforts(const RawEquations& equations, const Model& model,
-                                          const Measurement& measurement, const ReferenceMotion& motion,
-                                          const Eigen::MatrixXd& effort);
+                                          const filter::Measurement& measurement,
+                                          const detector::ReferenceMotion& motion, const Eigen::MatrixXd& effort);
 
 /// The effort columns of a log, joints × rows. Throws InvalidArgument for a missing column, or efforts without sign.
-[[nodiscard]] Eigen::MatrixXd read_efforts(LogSource& log, const Measurement& measurement);
+[[nodiscard]] Eigen::MatrixXd read_efforts(LogSource& log, const filter::Measurement& measurement);
 
 /// Terms that a fault with onset at instant `onset` of the motion adds to these equations: matrices N·n × p, zero
 /// before. Means of FaultFilter's signature over the intervals; what jumps at the onset is in the equation that ends
 /// there. Throws InvalidArgument for a fault that needs a filtered value (FaultType::held_effort), or an onset that is
 /// not inside the stretch.
-[[nodiscard]] FaultSignals raw_signature(const RawEquations& equations, const FaultType& fault, const Model& model,
-                                         const ReferenceMotion& motion, std::size_t onset);
+[[nodiscard]] detector::FaultSignals raw_signature(const RawEquations& equations, const detector::FaultType& fault,
+                                                   const Model& model, const detector::ReferenceMotion& motion,
+                                                   std::size_t onset);
 
-}  // namespace wheelwright
+}  // namespace wheelwright::bench

@@ -11,7 +11,7 @@
 
 #include <wheelwright/core/check.hpp>
 
-namespace wheelwright {
+namespace wheelwright::bench {
 namespace {
 
 constexpr double kLeastShare = -1.0;
@@ -73,7 +73,7 @@ Separation SeparationSolver::solve(const SeparationProblem& problem) {
   // A disturbance that θ_j bounds is x = t − θ_j with t >= 0 and a row t − 2(θ_j − θ̂_j) <= 2θ̂_j; where θ is fixed, it
   // is bounded by a number.
   std::vector<std::size_t> bounded;
-  RowMatrix healthy = *problem.healthy;
+  core::RowMatrix healthy = *problem.healthy;
   Eigen::VectorXd right = problem.deviation;
   for (std::size_t d = 0; d < problem.disturbances.size() && !problem.fixed; ++d) {
     const Disturbance& disturbance = problem.disturbances[d];
@@ -91,7 +91,7 @@ Separation SeparationSolver::solve(const SeparationProblem& problem) {
   Columns columns;
   std::size_t facet_row = rows;
   const std::size_t bounded_row = rows + sets * facets;
-  const auto parameters = [&](const RowMatrix& matrix, double sign, bool bounds) {
+  const auto parameters = [&](const core::RowMatrix& matrix, double sign, bool bounds) {
     for (std::size_t j = 0; j < p; ++j) {
       const Interval side = set.hull().sides[j];
       const double unit = 0.5 * (side.upper - side.lower);
@@ -144,7 +144,7 @@ Separation SeparationSolver::solve(const SeparationProblem& problem) {
   std::vector<double> row_lower(right.data(), right.data() + right.size()), row_upper = row_lower;
   for (std::size_t k = 0; k < sets; ++k) {
     for (std::size_t f = 0; f < facets; ++f) {
-      const HalfSpace& facet = set.facets()[f];
+      const bounds::HalfSpace& facet = set.facets()[f];
       row_lower.push_back(-COIN_DBL_MAX);
       row_upper.push_back(std::max(0.0, facet.b - facet.a.dot(centre)) / facet_scale[f]);
     }
@@ -191,4 +191,4 @@ Separation SeparationSolver::solve(const SeparationProblem& problem) {
   return answer;
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::bench

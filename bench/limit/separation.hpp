@@ -12,7 +12,7 @@
 #include <wheelwright/bounds/polytope.hpp>
 #include <wheelwright/core/regression.hpp>
 
-namespace wheelwright {
+namespace wheelwright::bench {
 
 /// A disturbance x and what it adds to the rows: |x| <= 1, or |x| <= θ_j where `parameter` names a j with θ_j >= 0.
 struct Disturbance {
@@ -29,12 +29,12 @@ struct Disturbance {
 /// separates it from everything admissible, normalised to λᵀζ = 1.
 struct SeparationProblem {
   const Polytope* set = nullptr;
-  const RowMatrix* healthy = nullptr;       ///< Y, rows × p
-  const RowMatrix* faulty = nullptr;        ///< A, or none
-  std::vector<Disturbance> disturbances{};  ///< D
-  Eigen::VectorXd deviation{};              ///< ζ
-  bool fixed = false;                       ///< θ is `member` rather than all of P
-  Eigen::VectorXd member{};                 ///< p
+  const core::RowMatrix* healthy = nullptr;  ///< Y, rows × p
+  const core::RowMatrix* faulty = nullptr;   ///< A, or none
+  std::vector<Disturbance> disturbances{};   ///< D
+  Eigen::VectorXd deviation{};               ///< ζ
+  bool fixed = false;                        ///< θ is `member` rather than all of P
+  Eigen::VectorXd member{};                  ///< p
 };
 
 /// Its answer, to the solver's tolerance; what is to be a proof must be evaluated from `weights`.
@@ -58,4 +58,4 @@ class SeparationSolver {
   std::size_t programs_ = 0;
 };
 
-}  // namespace wheelwright
+}  // namespace wheelwright::bench

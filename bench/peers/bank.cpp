@@ -110,7 +110,8 @@ Bank::Bank(const Subject& subject, const std::vector<LogTable>& calibration)
   const auto window = static_cast<std::size_t>(std::lround(kChiWindow * subject.scenario.rate));
   using Kind = TightThreshold::Kind;
   statistics_.push_back(std::make_unique<TightThreshold>(subject.rule(), Kind::two_sided));
-  statistics_.push_back(std::make_unique<TightThreshold>(subject.rule(ParameterSetKind::box), Kind::two_sided));
+  statistics_.push_back(
+      std::make_unique<TightThreshold>(subject.rule(detector::ParameterSetKind::box), Kind::two_sided));
   statistics_.push_back(std::make_unique<TightThreshold>(subject.rule(), Kind::symmetric));
   statistics_.push_back(std::make_unique<TightThreshold>(subject.statistical_rule(), Kind::statistical));
   statistics_.push_back(std::make_unique<ConstantThreshold>());

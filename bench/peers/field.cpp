@@ -18,10 +18,10 @@ constexpr double kUncertainty = 0.2;  // of θ, as in the paper
 constexpr double kFirstOnset = 3.0;   // s
 constexpr double kLastOnset = 1.5;    // s before the end of a drive
 
-Trajectory trajectory(Driving driving, Random& random) {
+sim::Trajectory trajectory(Driving driving, Random& random) {
   const auto between = [&](double low, double high) { return low + (high - low) * random.unit(); };
-  Trajectory r;
-  r.kind = random.unit() < 0.5 ? Trajectory::Kind::figure_eight : Trajectory::Kind::multi_sine;
+  sim::Trajectory r;
+  r.kind = random.unit() < 0.5 ? sim::Trajectory::Kind::figure_eight : sim::Trajectory::Kind::multi_sine;
   switch (driving) {
     case Driving::gentle:
       r.speed = between(0.25, 0.35);
@@ -34,7 +34,7 @@ Trajectory trajectory(Driving driving, Random& random) {
       r.period = between(8.0, 12.0);
       break;
     case Driving::hard:
-      r.kind = Trajectory::Kind::multi_sine;
+      r.kind = sim::Trajectory::Kind::multi_sine;
       r.speed = between(0.8, 1.0);
       r.yaw_rate = between(1.6, 2.2);
       r.period = between(3.5, 5.0);
@@ -47,7 +47,7 @@ Trajectory trajectory(Driving driving, Random& random) {
 std::array<double, kOutputs> residual_variance(LogSource& log, const OnlineModel& m) {
   TorqueRows stream(log, RegressorFilter(m.model, m.filter, m.measurement, m.errors));
   const RegressionBlock rows = read_all(stream);
-  LeastSquares squares(m.model.p());
+  identify::LeastSquares squares(m.model.p());
   squares.add(rows);
   const Eigen::VectorXd e = rows.y - rows.Y * squares.solve().estimate;
   std::array<double, kOutputs> variance{};
@@ -70,32 +70,32 @@ Subject make_subject(std::uint64_t seed, Regime regime) {
   s.scenario = testing_support::random_robot(seed);
   s.scenario.sensors.encoder_counts_per_turn = s.scenario.robot.encoder_counts_per_turn;
   s.scenario.sensors.effort = *s.scenario.robot.noise.effort.value;
-  const bool uniform = s.scenario.sensors.noise == NoiseShape::uniform;
+  const bool uniform = s.scenario.sensors.noise == sim::NoiseShape::uniform;
   s.torque_sd = s.scenario.sensors.effort / (uniform ? std::numbers::sqrt3 : 3.0);
   s.angle_sd = 2.0 * std::numbers::pi / *s.scenario.sensors.encoder_counts_per_turn / std::sqrt(12.0);
 
   Scenario learning = s.scenario;
   learning.seed = seed + 1'000'000;
   learning.duration = 60.0;
-  learning.trajectory = {.kind = Trajectory::Kind::commissioning, .speed = 1.0, .yaw_rate = 2.0, .period = 6.0};
+  learning.trajectory = {.kind = sim::Trajectory::Kind::commissioning, .speed = 1.0, .yaw_rate = 2.0, .period = 6.0};
   Simulation log(learning);
-  const Commissioning result = commission(log, learning.robot);
+  const Commissioning result = commission_robot(log, learning.robot);
   if (result.status != Commissioning::Status::done) {
     throw InvalidArgument("robot " + std::to_string(seed) + ": " + result.message);
   }
   s.model = result.model;
-  CommissionOptions options;
-  options.noise_mode = NoiseMode::statistical;
-  const Commissioning statistical = commission(log, learning.robot, options);
+  commission::CommissionOptions options;
+  options.noise_mode = filter::NoiseMode::statistical;
+  const Commissioning statistical = commission_robot(log, learning.robot, options);
   if (statistical.status != Commissioning::Status::done) {
     throw InvalidArgument("robot " + std::to_string(seed) + ", statistical bounds: " + statistical.message);
   }
   s.statistical = statistical.model;
   // As confident over all samples of the study as the set is over those of its log.
-  s.statistical.errors = propagate(
+  s.statistical.errors = filter::propagate(
       s.model.model, s.model.filter, s.model.measurement,
       {.motion = std::numbers::pi / *s.scenario.sensors.encoder_counts_per_turn, .effort = s.scenario.sensors.effort},
-      {.mode = NoiseMode::statistical,
+      {.mode = filter::NoiseMode::statistical,
        .confidence = options.confidence,
        .rows = 1e7,
        .largest_step = 1.0 / s.scenario.rate});
@@ -105,7 +105,7 @@ Subject make_subject(std::uint64_t seed, Regime regime) {
     return s;
   }
   Random random(seed + 2'000'000);
-  const Eigen::VectorXd nominal = true_parameters(s.scenario, s.model.model);
+  const Eigen::VectorXd nominal = sim::true_parameters(s.scenario, s.model.model);
   s.model.facets.clear();
   s.model.box.sides.clear();
   s.covariance = Eigen::MatrixXd::Zero(nominal.size(), nominal.size());
@@ -139,12 +139,12 @@ Scenario make_drive(const Subject& subject, Driving driving, std::uint64_t seed,
 
 std::vector<TriedFault> tried_faults(const Subject& subject, Driving driving, std::uint64_t seed) {
   const OnlineModel& m = subject.model;
-  const std::vector<FaultType> catalogue = fault_catalogue(m.model, m.estimate);
+  const std::vector<detector::FaultType> catalogue = detector::fault_catalogue(m.model, m.estimate);
   std::vector<TriedFault> tried;
-  std::vector<FaultType> types;
+  std::vector<detector::FaultType> types;
   for (const char* name : {"wheel_radius", "wheel_radius_right", "matched", "unmatched", "slip_yaw",
                            "effort_loss_right", "effort_bias_left", "encoder_scale_right"}) {
-    for (const FaultType& type : catalogue) {
+    for (const detector::FaultType& type : catalogue) {
       if (type.name == name) {
         types.push_back(type);
       }
@@ -155,21 +155,24 @@ std::vector<TriedFault> tried_faults(const Subject& subject, Driving driving, st
       }
     }
   }
-  std::vector<FaultMargins> pooled;
+  std::vector<detector::FaultMargins> pooled;
   for (std::uint64_t k = 0; k < 3; ++k) {
     Scenario drive = make_drive(subject, driving, seed + k, 30.0);
     drive.parameters = subject.scenario.parameters;
     drive.sensors.encoder_counts_per_turn.reset();
     drive.sensors.effort = 0.0;
     Simulation log(drive);
-    ReferenceMotion motion = read_reference(log, RegressorFilter(m.model, m.filter, m.measurement, m.errors));
+    detector::ReferenceMotion motion =
+        detector::read_reference(log, RegressorFilter(m.model, m.filter, m.measurement, m.errors));
     for (std::size_t i = 0; i < motion.instants(); ++i) {
       motion.settled[i] = motion.settled[i] && motion.t[i] >= kFirstOnset && motion.t[i] <= drive.duration - kLastOnset;
     }
-    std::vector<FaultMargins> each = margins_along(
-        motion, types, subject.rule(),
-        [&](const FaultType& fault) { return std::make_unique<FaultFilter>(fault, m.model, m.filter, motion); },
-        {.windows = {1.0}, .onset_step = 1.0});
+    std::vector<detector::FaultMargins> each =
+        detector::margins_along(motion, types, subject.rule(),
+                                [&](const detector::FaultType& fault) {
+                                  return std::make_unique<detector::FaultFilter>(fault, m.model, m.filter, motion);
+                                },
+                                {.windows = {1.0}, .onset_step = 1.0});
     if (k == 0) {
       pooled = std::move(each);
       continue;
@@ -179,9 +182,9 @@ std::vector<TriedFault> tried_faults(const Subject& subject, Driving driving, st
     }
   }
   for (TriedFault& fault : tried) {
-    for (const FaultMargins& margins : pooled) {
+    for (const detector::FaultMargins& margins : pooled) {
       if (margins.fault.name == fault.type.name) {
-        fault.certain[margins.side > 0.0 ? 0 : 1] = summarise(margins, 0).median;
+        fault.certain[margins.side > 0.0 ? 0 : 1] = detector::summarise(margins, 0).median;
       }
     }
   }

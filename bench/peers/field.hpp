@@ -39,10 +39,11 @@ struct Subject {
   double torque_sd = 0.0;                   ///< of the noise of an effort, N·m
   double angle_sd = 0.0;                    ///< of the noise of an angle, rad
 
-  [[nodiscard]] ThresholdRule rule(ParameterSetKind kind = ParameterSetKind::polytope) const {
+  [[nodiscard]] detector::ThresholdRule rule(
+      detector::ParameterSetKind kind = detector::ParameterSetKind::polytope) const {
     return {Polytope(model.facets, model.box), model.estimate, kind};
   }
-  [[nodiscard]] ThresholdRule statistical_rule() const {
+  [[nodiscard]] detector::ThresholdRule statistical_rule() const {
     return {Polytope(statistical.facets, statistical.box), model.estimate};
   }
 };
@@ -55,8 +56,8 @@ struct Subject {
 
 /// A fault that is tried: with its simulated counterpart.
 struct TriedFault {
-  FaultType type;
-  std::optional<Fault::Kind> simulated;
+  detector::FaultType type;
+  std::optional<model::Fault::Kind> simulated;
   std::array<double, 2> certain{};  ///< median over onsets of the smallest size certain within 1 s: growing, shrinking;
                                     ///< infinite where none is in half of them
 };

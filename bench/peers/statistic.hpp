@@ -16,13 +16,13 @@ inline constexpr std::size_t kOutputs = 2;
 
 /// One row of the log and what the filter made of it: all detectors see the same.
 struct Observation {
-  double t = 0.0;                            ///< s
-  std::array<double, kOutputs> position{};   ///< of the coordinates, from the wheel angles as logged, m, rad
-  std::array<double, kOutputs> effort{};     ///< left side of (15) as logged, N·m, N·m²
-  bool valid = false;                        ///< whether there is a filtered row
-  const FilteredRow* row = nullptr;          ///< where valid
-  const FilteredRow* statistical = nullptr;  ///< the same with statistical bounds dY and dy, where valid
-  std::array<double, kOutputs> residual{};   ///< ε = τ_f − Y_f θ̂, where valid
+  double t = 0.0;                                    ///< s
+  std::array<double, kOutputs> position{};           ///< of the coordinates, from the wheel angles as logged, m, rad
+  std::array<double, kOutputs> effort{};             ///< left side of (15) as logged, N·m, N·m²
+  bool valid = false;                                ///< whether there is a filtered row
+  const filter::FilteredRow* row = nullptr;          ///< where valid
+  const filter::FilteredRow* statistical = nullptr;  ///< the same with statistical bounds dY and dy, where valid
+  std::array<double, kOutputs> residual{};           ///< ε = τ_f − Y_f θ̂, where valid
 };
 
 /// A detector without its limits. It raises an alarm where one of its values exceeds the limit of that value.

@@ -20,17 +20,18 @@ class TightThreshold final : public Statistic {
     symmetric,   ///< |ε| <= ρ
     statistical  ///< two-sided, with bounds on the noise that hold with a stated probability only
   };
-  TightThreshold(ThresholdRule rule, Kind kind) : rule_(std::move(rule)), kind_(kind) {}
+  TightThreshold(detector::ThresholdRule rule, Kind kind) : rule_(std::move(rule)), kind_(kind) {}
   [[nodiscard]] std::size_t size() const override { return kOutputs; }
   void restart() override {}
   void step(const Observation& now, std::span<double> values) override {
     for (std::size_t i = 0; i < kOutputs; ++i) {
       values[i] = 0.0;
       if (now.valid) {
-        const FilteredRow& in = kind_ == Kind::statistical ? *now.statistical : *now.row;
+        const filter::FilteredRow& in = kind_ == Kind::statistical ? *now.statistical : *now.row;
         const auto row = static_cast<Eigen::Index>(i);
         const auto p = static_cast<std::size_t>(in.Y.cols());
-        const Threshold limit = rule_.at({in.Y.row(row).data(), p}, {in.dY.row(row).data(), p}, in.dy[row], i);
+        const detector::Threshold limit =
+            rule_.at({in.Y.row(row).data(), p}, {in.dY.row(row).data(), p}, in.dy[row], i);
         const double e = now.residual[i];
         const bool outside = kind_ == Kind::symmetric ? std::abs(e) > limit.rho() : e < limit.lower || e > limit.upper;
         values[i] = outside ? 1.0 : 0.0;
@@ -39,7 +40,7 @@ class TightThreshold final : public Statistic {
   }
 
  private:
-  ThresholdRule rule_;
+  detector::ThresholdRule rule_;
   Kind kind_;
 };
 

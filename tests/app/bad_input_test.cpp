@@ -5,7 +5,7 @@
 
 #include "app/program.hpp"
 
-namespace wheelwright::bad_input_test {
+namespace wheelwright::app::bad_input_test {
 namespace {
 
 using ::testing::AllOf;
@@ -139,7 +139,7 @@ TEST_F(BadInput, NaNAndInfinityAreDroppedAndCounted) {
     EXPECT_THAT(outcome.out,
                 HasSubstr("1 row dropped: a value that is needed is NaN or infinite (first at log.csv:500, "
                           "column tau_l)"));
-    const Json model = read_json(path("result/model.json"));
+    const Json model = files::read_json(path("result/model.json"));
     EXPECT_EQ(model.at("data").at("rows"), 2999);
     EXPECT_THAT(model.at("data").at("repairs").dump(), HasSubstr("1 row dropped"));
     EXPECT_THAT(bytes(path("result/report.html")), HasSubstr("1 row dropped"));
@@ -151,7 +151,7 @@ TEST_F(BadInput, TimeThatGoesBackwardsIsCounted) {
   const Outcome outcome = run("commission log.csv --robot robot.yaml --out result");
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_THAT(outcome.out, HasSubstr("1 new segment where time goes backwards (first at log.csv:500)"));
-  EXPECT_EQ(read_json(path("result/model.json")).at("data").at("segments"), 3);  // back, and forth again
+  EXPECT_EQ(files::read_json(path("result/model.json")).at("data").at("segments"), 3);  // back, and forth again
 }
 
 TEST_F(BadInput, TimeThatIsRepeatedIsCounted) {
@@ -296,4 +296,4 @@ TEST_F(BadInput, FollowNamesTheRowsItLeavesOut) {
 }
 
 }  // namespace
-}  // namespace wheelwright::bad_input_test
+}  // namespace wheelwright::app::bad_input_test

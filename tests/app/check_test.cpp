@@ -5,7 +5,10 @@
 
 #include "app/program.hpp"
 
-namespace wheelwright::check_test {
+namespace wheelwright::app::check_test {
+
+using files::read_json;
+
 namespace {
 
 using ::testing::AllOf;
@@ -23,7 +26,7 @@ class Check : public testing::ProgramTest {
   Outcome changed(const std::function<void(Json&)>& change, const std::string& options = "") const {
     Json model = read_json(path("model/model.json"));
     change(model);
-    write_json(path("changed.json"), model);
+    files::write_json(path("changed.json"), model);
     return run("check changed.json " + shipped() + " " + options);
   }
 
@@ -282,7 +285,7 @@ TEST_F(Check, EveryKindOfModel) {
   EXPECT_THAT(run("check model/model.json log.csv").out, HasSubstr("proved: no parameters explain"));
   Json model = read_json(path("model/model.json"));
   model["feasible_set"]["contradiction"].erase(0);
-  write_json(path("changed.json"), model);
+  files::write_json(path("changed.json"), model);
   const Outcome less = run("check changed.json log.csv");
   EXPECT_EQ(less.code, 1);
   EXPECT_THAT(less.out, HasSubstr("that no parameters explain the log is not proved"));
@@ -331,7 +334,7 @@ TEST_F(Check, AModelWithoutCertificatesStillDetects) {
       }
     }
   }
-  write_json(path("old.json"), model);
+  files::write_json(path("old.json"), model);
   if (has_validator()) {
     EXPECT_EQ(misfit("model.schema.json", "old.json"), "");
   }
@@ -340,4 +343,4 @@ TEST_F(Check, AModelWithoutCertificatesStillDetects) {
 }
 
 }  // namespace
-}  // namespace wheelwright::check_test
+}  // namespace wheelwright::app::check_test

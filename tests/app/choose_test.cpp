@@ -2,7 +2,7 @@
 // `wheelwright choose`, as a user runs it.
 #include "app/program.hpp"
 
-namespace wheelwright::choose_test {
+namespace wheelwright::app::choose_test {
 namespace {
 
 using ::testing::AllOf;
@@ -29,18 +29,18 @@ TEST_F(Choose, GivesADetectorAndWhatTheOthersCost) {
   ASSERT_EQ(told.code, 0) << told.err;
   EXPECT_THAT(told.out, IsEmpty());
   EXPECT_THAT(names_in("choice"), ElementsAre("choice.json", "model.json", "report.html"));
-  const Json json = read_json(path("choice/choice.json"));
+  const Json json = files::read_json(path("choice/choice.json"));
   if (has_validator()) {
     EXPECT_EQ(misfit("choice.schema.json", "choice/choice.json"), "");
     EXPECT_EQ(misfit("model.schema.json", "choice/model.json"), "");
   }
   // The model is the chosen filter's; its line in a robot file gives commissioning the same thresholds.
-  const Json model = read_json(path("choice/model.json"));
+  const Json model = files::read_json(path("choice/model.json"));
   EXPECT_EQ(model.at("filter").at("beta"), json.at("chosen").at("beta"));
   const std::string line = json.at("robot_file").get<std::string>();
   put("chosen.yaml", bytes(path("robot.yaml")) + line + "\n");
   ASSERT_EQ(run("commission learn.csv --robot chosen.yaml --out again --quiet").code, 0);
-  EXPECT_EQ(read_json(path("again/model.json")).at("parameters"), model.at("parameters"));
+  EXPECT_EQ(files::read_json(path("again/model.json")).at("parameters"), model.at("parameters"));
 }
 
 TEST_F(Choose, TellsWhatIsWrongWithAQuestion) {
@@ -58,4 +58,4 @@ TEST_F(Choose, TellsWhatIsWrongWithAQuestion) {
 }
 
 }  // namespace
-}  // namespace wheelwright::choose_test
+}  // namespace wheelwright::app::choose_test

@@ -2,7 +2,7 @@
 // `wheelwright convert`, as a user runs it: the same log in every format is the same log.
 #include "app/program.hpp"
 
-namespace wheelwright::convert_test {
+namespace wheelwright::app::convert_test {
 namespace {
 
 using ::testing::AllOf;
@@ -87,4 +87,4 @@ TEST_F(Convert, DetectWritesItsSeriesForOthersToPlot) {
 }
 
 }  // namespace
-}  // namespace wheelwright::convert_test
+}  // namespace wheelwright::app::convert_test

@@ -2,7 +2,7 @@
 // The manoeuvre that tells causes apart, from names and from a gap.json.
 #include "app/program.hpp"
 
-namespace wheelwright::design_discrimination_test {
+namespace wheelwright::app::design_discrimination_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -28,7 +28,7 @@ TEST_F(DesignDiscrimination, TellsNamedCausesApart) {
   ASSERT_EQ(done.code, 0) << done.err;
   EXPECT_THAT(names_in("plan"),
               ::testing::ElementsAre("design.json", "figure_eight.csv", "manoeuvre.csv", "report.html"));
-  const Json design = read_json(path("plan/design.json"));
+  const Json design = files::read_json(path("plan/design.json"));
   EXPECT_EQ(design.at("for"), "discrimination");
   EXPECT_DOUBLE_EQ(design.at("rivals")[0].at("causes")[0].at("coefficients")[0].get<double>(), 0.2);
   EXPECT_EQ(design.at("pairs").size(), 2U);
@@ -57,4 +57,4 @@ TEST_F(DesignDiscrimination, SaysWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace wheelwright::design_discrimination_test
+}  // namespace wheelwright::app::design_discrimination_test

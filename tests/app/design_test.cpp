@@ -2,7 +2,7 @@
 // Design a manoeuvre, drive it in simulation, commission its log: three commands in a row.
 #include "app/program.hpp"
 
-namespace wheelwright::design_test {
+namespace wheelwright::app::design_test {
 namespace {
 
 using ::testing::AllOf;
@@ -42,7 +42,7 @@ TEST_F(SlowDesign, DesignSimulateCommissionInARow) {
   EXPECT_THAT(names_in("plan"),
               ::testing::ElementsAre("design.json", "figure_eight.csv", "manoeuvre.csv", "report.html"));
   EXPECT_EQ(testing::lines_of(bytes(path("plan/manoeuvre.csv"))).front(), "t,command_r,command_l,v1,v2,x,y,theta");
-  const Json design = read_json(path("plan/design.json"));
+  const Json design = files::read_json(path("plan/design.json"));
   for (const auto& [limit, share] : design.at("use").items()) {
     EXPECT_LE(share.get<double>(), 1.0) << limit;
   }
@@ -53,7 +53,7 @@ TEST_F(SlowDesign, DesignSimulateCommissionInARow) {
     ASSERT_EQ(run("simulate " + name + ".yaml --out " + name + ".csv --quiet").code, 0);
     const Outcome done = run("commission " + name + ".csv --robot robot.yaml --quiet --out " + name);
     ASSERT_EQ(done.code, 0) << done.err;
-    models.push_back(read_json(path(name) / "model.json"));
+    models.push_back(files::read_json(path(name) / "model.json"));
   }
   double product = 1.0;
   for (const std::string name : {"mass", "yaw_inertia", "viscous_linear", "viscous_yaw"}) {
@@ -93,4 +93,4 @@ TEST_F(Design, WhatIsMissingIsAskedFor) {
 }
 
 }  // namespace
-}  // namespace wheelwright::design_test
+}  // namespace wheelwright::app::design_test

@@ -2,7 +2,7 @@
 // `wheelwright doctor`, as a user runs it.
 #include "app/program.hpp"
 
-namespace wheelwright::doctor_test {
+namespace wheelwright::app::doctor_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -34,7 +34,7 @@ TEST_F(Doctor, WritesWhatItFound) {
   ASSERT_EQ(done.code, 0) << done.err;
   EXPECT_THAT(done.out, IsEmpty());
   EXPECT_THAT(names_in("examined"), ElementsAre("doctor.json", "report.html"));
-  const Json json = read_json(path("examined/doctor.json"));
+  const Json json = files::read_json(path("examined/doctor.json"));
   EXPECT_EQ(json.at("verdict"), "commission");
   EXPECT_EQ(json.at("rows"), 12001);
   EXPECT_EQ(Json::parse(run("doctor " + shipped() + " --robot robot.yaml --json").out), json);
@@ -56,7 +56,7 @@ TEST_F(Doctor, SaysNoToALogThatCannotBeCommissioned) {
   EXPECT_EQ(told.code, 1) << told.err;
   EXPECT_THAT(told.out, HasSubstr("fatal: signals.constant"));
   EXPECT_THAT(told.out, HasSubstr("notice: time.duplicates"));
-  EXPECT_EQ(read_json(path("examined/doctor.json")).at("verdict"), "unusable");
+  EXPECT_EQ(files::read_json(path("examined/doctor.json")).at("verdict"), "unusable");
   if (has_validator()) {
     EXPECT_EQ(misfit("doctor.schema.json", "examined/doctor.json"), "");
   }
@@ -74,4 +74,4 @@ TEST_F(Doctor, NamesMissingColumnsAndBadInput) {
 }
 
 }  // namespace
-}  // namespace wheelwright::doctor_test
+}  // namespace wheelwright::app::doctor_test

@@ -6,7 +6,7 @@
 #include "app/program.hpp"
 #include "support/c_detector.hpp"
 
-namespace wheelwright::export_test {
+namespace wheelwright::app::export_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -18,7 +18,7 @@ using testing_support::Seen;
 class Export : public testing::ProgramTest {
  protected:
   /// The exported header in `folder` and the library's detector along the log of the fault that ships as a scenario.
-  Seen seen(const std::string& header, const std::string& name, DetectorOptions options) const {
+  Seen seen(const std::string& header, const std::string& name, detector::DetectorOptions options) const {
     const OnlineModel model = read_model(path("model/model.json"));
     const auto columns = model.measurement.columns();
     Detector ours = make_detector(model, options);
@@ -59,10 +59,10 @@ TEST_F(Export, DecidesAsDetectDoes) {
       run("export model/model.json --language c --set box --test symmetric --persistence 2/3 --name left");
   ASSERT_EQ(box.code, 0) << box.err;
   EXPECT_THAT(box.out, HasSubstr("left_step(&state, t, sample, &decision);"));
-  DetectorOptions options;
-  options.set = ParameterSetKind::box;
-  options.test = wheelwright::Test::symmetric;
-  options.persistence = Persistence{.k = 2, .n = 3};
+  detector::DetectorOptions options;
+  options.set = detector::ParameterSetKind::box;
+  options.test = detector::Test::symmetric;
+  options.persistence = detector::Persistence{.k = 2, .n = 3};
   const Seen second = seen(box.out, "left", options);
   EXPECT_EQ(second.different, 0u);
   EXPECT_GT(second.alarms, 10u);
@@ -112,4 +112,4 @@ TEST_F(Export, HelpNamesItsOptions) {
 }
 
 }  // namespace
-}  // namespace wheelwright::export_test
+}  // namespace wheelwright::app::export_test

@@ -8,7 +8,7 @@
 
 #include "app/program.hpp"
 
-namespace wheelwright::fleet_test {
+namespace wheelwright::app::fleet_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -101,7 +101,7 @@ TEST_F(FleetCommand, FindsWhatIsWrongAndStopsForNothing) {
     EXPECT_EQ(misfit("fleet.schema.json", "result/fleet.json"), "");
     Json changed = json;
     changed["robots"]["all"] = -1;
-    write_json(path("changed.json"), changed);
+    files::write_json(path("changed.json"), changed);
     EXPECT_NE(misfit("fleet.schema.json", "changed.json"), "");
   }
   const std::string page = bytes(path("result/report.html"));
@@ -178,4 +178,4 @@ TEST_F(FleetCommand, TellsWhyNothingCouldBeExamined) {
 }
 
 }  // namespace
-}  // namespace wheelwright::fleet_test
+}  // namespace wheelwright::app::fleet_test

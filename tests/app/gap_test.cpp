@@ -6,7 +6,7 @@
 
 #include <wheelwright/robots/robot_file.hpp>
 
-namespace wheelwright::gap_test {
+namespace wheelwright::app::gap_test {
 namespace {
 
 using ::testing::AllOf;
@@ -47,7 +47,7 @@ TEST_F(Gap, ADryBearingIsNamedAndTheImprovedRobotFileIsNotContradicted) {
   if (has_validator()) {
     EXPECT_EQ(misfit("gap.schema.json", "gap/gap.json"), "");
   }
-  const Json gap = read_json(path("gap/gap.json"));
+  const Json gap = files::read_json(path("gap/gap.json"));
   EXPECT_EQ(gap.at("verdict"), "explained");
   ASSERT_EQ(gap.at("causes").size(), 1U);
   EXPECT_EQ(gap.at("causes")[0].at("effect"), "coulomb");
@@ -63,13 +63,13 @@ TEST_F(Gap, ADryBearingIsNamedAndTheImprovedRobotFileIsNotContradicted) {
   // The log contradicts the plain robot, and says how one gets on; the improved one explains it.
   const Outcome plain = run("commission real.csv --robot robot.yaml --out plain --quiet");
   EXPECT_EQ(plain.code, 1);
-  const Json none = read_json(path("plain/model.json"));
+  const Json none = files::read_json(path("plain/model.json"));
   EXPECT_EQ(none.at("status"), "empty");
   EXPECT_THAT(none.at("message").get<std::string>(), HasSubstr("`gap`"));
   EXPECT_THAT(none.at("validation").at("outputs"), IsEmpty());
   const Outcome done = run("commission real.csv --robot gap/robot_improved.yaml --out model --quiet");
   EXPECT_EQ(done.code, 0) << done.err;
-  const Json model = read_json(path("model/model.json"));
+  const Json model = files::read_json(path("model/model.json"));
   EXPECT_EQ(model.at("status"), "done");
   EXPECT_THAT(model.at("contradictions"), IsEmpty());
   ASSERT_EQ(model.at("validation").at("outputs").size(), 2U);
@@ -92,7 +92,7 @@ TEST_F(Gap, AHealthyRobotHasNone) {
   const Outcome told = run("gap again.csv --robot robot.yaml --baseline healthy.csv --no-shrink --out gap");
   ASSERT_EQ(told.code, 0) << told.err;
   EXPECT_THAT(told.out, AllOf(HasSubstr("No gap"), HasSubstr("nothing is to be added")));
-  EXPECT_EQ(read_json(path("gap/gap.json")).at("verdict"), "no_gap");
+  EXPECT_EQ(files::read_json(path("gap/gap.json")).at("verdict"), "no_gap");
   EXPECT_FALSE(std::filesystem::exists(path("gap/robot_improved.yaml")));
 }
 
@@ -129,4 +129,4 @@ TEST_F(Gap, SaysWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace wheelwright::gap_test
+}  // namespace wheelwright::app::gap_test

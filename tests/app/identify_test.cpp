@@ -4,7 +4,10 @@
 
 #include "app/program.hpp"
 
-namespace wheelwright::identify_test {
+namespace wheelwright::app::identify_test {
+
+using files::read_json;
+
 namespace {
 
 using ::testing::AllOf;
@@ -126,9 +129,9 @@ TEST_F(Identify, FitsItsSchema) {
 
   Json changed = read_json(path("drive/identification.json"));
   changed["standing"] = "great";
-  write_json(path("changed.json"), changed);
+  files::write_json(path("changed.json"), changed);
   EXPECT_NE(misfit("identification.schema.json", "changed.json"), "");
 }
 
 }  // namespace
-}  // namespace wheelwright::identify_test
+}  // namespace wheelwright::app::identify_test

@@ -7,7 +7,7 @@
 #include "app/progress.hpp"
 #include "app/units.hpp"
 
-namespace wheelwright::manners_test {
+namespace wheelwright::app::manners_test {
 namespace {
 
 using ::testing::AllOf;
@@ -222,4 +222,4 @@ TEST(Progress, SaysWhatIsLeftWhenThatCanBeKnown) {
 }
 
 }  // namespace
-}  // namespace wheelwright::manners_test
+}  // namespace wheelwright::app::manners_test

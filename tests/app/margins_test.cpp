@@ -4,7 +4,7 @@
 
 #include "app/program.hpp"
 
-namespace wheelwright::margins_test {
+namespace wheelwright::app::margins_test {
 namespace {
 
 using ::testing::AllOf;
@@ -48,7 +48,7 @@ TEST_F(Margins, SayBeforehandWhatWillBeSeen) {
   ASSERT_EQ(told.code, 0) << told.err;
   EXPECT_THAT(told.out, IsEmpty());
   EXPECT_THAT(names_in("margins"), ::testing::ElementsAre("margins.json", "report.html"));
-  const Json json = read_json(path("margins/margins.json"));
+  const Json json = files::read_json(path("margins/margins.json"));
   if (has_validator()) {
     EXPECT_EQ(misfit("margins.schema.json", "margins/margins.json"), "");
   }
@@ -103,4 +103,4 @@ TEST_F(Margins, TellWhatIsWrongWithAQuestion) {
 }
 
 }  // namespace
-}  // namespace wheelwright::margins_test
+}  // namespace wheelwright::app::margins_test

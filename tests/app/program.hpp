@@ -65,7 +65,7 @@ class ProgramTest : public ScratchTest {
 
   /// The shipped log, unpacked, line by line; the header is the first.
   static std::vector<std::string> healthy_lines() {
-    return lines_of(read_bytes(examples() / "healthy.csv.gz", std::size_t{1} << 26));
+    return lines_of(files::read_bytes(examples() / "healthy.csv.gz", std::size_t{1} << 26));
   }
 
   /// Puts `lines` into a file.

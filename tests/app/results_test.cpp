@@ -3,7 +3,10 @@
 // their schemas.
 #include "app/program.hpp"
 
-namespace wheelwright::results_test {
+namespace wheelwright::app::results_test {
+
+using files::read_json;
+
 namespace {
 
 using ::testing::AllOf;
@@ -245,7 +248,7 @@ TEST_F(Results, SchemasRefuseWhatIsNotThere) {
   const auto refused = [&](const std::string& pointer, const Json& value) {
     Json changed = model;
     changed[Json::json_pointer(pointer)] = value;
-    write_json(path("changed.json"), changed);
+    files::write_json(path("changed.json"), changed);
     return misfit("model.schema.json", "changed.json") != "";
   };
   EXPECT_TRUE(refused("/schema", "wheelwright/model/2"));
@@ -260,4 +263,4 @@ TEST_F(Results, SchemasRefuseWhatIsNotThere) {
 }
 
 }  // namespace
-}  // namespace wheelwright::results_test
+}  // namespace wheelwright::app::results_test

@@ -6,7 +6,7 @@
 
 #include "robots/robot_samples.hpp"
 
-namespace wheelwright::robot_test {
+namespace wheelwright::app::robot_test {
 namespace {
 
 using ::testing::AllOf;
@@ -78,4 +78,4 @@ TEST_F(RobotCommand, RefusalsLeaveNothing) {
 }
 
 }  // namespace
-}  // namespace wheelwright::robot_test
+}  // namespace wheelwright::app::robot_test

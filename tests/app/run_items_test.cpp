@@ -38,7 +38,7 @@ class RunItemsTest : public wheelwright::testing::ScratchTest {
 
   ItemsRun run(const ScaleOptions& scale = {}) { return run_items(items(), common_, scale); }
 
-  static std::string texts(SqliteResults& results) {
+  static std::string texts(results::SqliteResults& results) {
     std::string all;
     results.each(
         [&](std::size_t item, std::string_view text) { all += std::to_string(item) + "=" + std::string(text) + "\n"; });
@@ -50,7 +50,7 @@ class RunItemsTest : public wheelwright::testing::ScratchTest {
 };
 
 TEST(ShardOf, CountsFromOne) {
-  const std::optional<Shard> shard = shard_of("3/7");
+  const std::optional<study::Shard> shard = shard_of("3/7");
   ASSERT_TRUE(shard);
   EXPECT_EQ(shard->index, 2U);
   EXPECT_EQ(shard->count, 7U);
@@ -68,7 +68,7 @@ TEST_F(RunItemsTest, AnyThreadsAndAnyShardsGiveTheSame) {
   EXPECT_EQ(texts(*run().results), expected);
   common_.out = path("out");
   for (std::size_t index = 0; index < 7; ++index) {
-    EXPECT_EQ(run({.shard = Shard{index, 7}}).results, nullptr);
+    EXPECT_EQ(run({.shard = study::Shard{index, 7}}).results, nullptr);
   }
   calls_ = 0;
   EXPECT_EQ(texts(*run({.merge = true}).results), expected);
@@ -91,7 +91,7 @@ TEST_F(RunItemsTest, FreshEvaluatesAll) {
 TEST_F(RunItemsTest, AMergeSaysWhatIsMissing) {
   EXPECT_THAT(input_error([&] { static_cast<void>(run({.merge = true})); }), HasSubstr("no shard-"));
   for (const std::size_t index : {0U, 1U, 3U}) {
-    static_cast<void>(run({.shard = Shard{index, 4}}));
+    static_cast<void>(run({.shard = study::Shard{index, 4}}));
   }
   EXPECT_THAT(
       input_error([&] { static_cast<void>(run({.merge = true})); }),
@@ -103,7 +103,7 @@ TEST_F(RunItemsTest, AMergeSaysWhatIsMissing) {
 
 TEST_F(RunItemsTest, OptionsThatDoNotGoTogether) {
   EXPECT_THAT(input_error([&] {
-                static_cast<void>(run({.shard = Shard{0, 2}, .merge = true}));
+                static_cast<void>(run({.shard = study::Shard{0, 2}, .merge = true}));
               }),
               AllOf(HasSubstr("--shard"), HasSubstr("--merge")));
   common_.out.clear();

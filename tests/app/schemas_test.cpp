@@ -3,7 +3,7 @@
 #include "app/program.hpp"
 #include "robots/robot_samples.hpp"
 
-namespace wheelwright::schemas_test {
+namespace wheelwright::app::schemas_test {
 namespace {
 
 using testing::Outcome;
@@ -31,7 +31,7 @@ class Schemas : public testing::ProgramTest {
     } else {
       good[at] = value;
     }
-    write_json(path("changed.json"), good);
+    files::write_json(path("changed.json"), good);
     return misfit(schema, "changed.json") != "";
   }
 };
@@ -87,4 +87,4 @@ TEST_F(Schemas, Robot) {
 }
 
 }  // namespace
-}  // namespace wheelwright::schemas_test
+}  // namespace wheelwright::app::schemas_test

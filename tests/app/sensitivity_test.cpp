@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/program.hpp"
 
-namespace wheelwright::sensitivity_test {
+namespace wheelwright::app::sensitivity_test {
 namespace {
 
 using testing::Outcome;
@@ -39,7 +39,7 @@ TEST_F(Sensitivity, WritesResultPageAndTables) {
                            "per cent of width"}) {
     EXPECT_NE(done.out.find(part), std::string::npos) << part << "\n" << done.out;
   }
-  const Json result = read_json(path("result/sensitivity.json"));
+  const Json result = files::read_json(path("result/sensitivity.json"));
   EXPECT_EQ(result.at("quantities").size(), 4U + 2U + 1U + 1U);
   const Json& width = result.at("quantities").at(0);
   // More noise, wider bounds, at every level and by the duals.
@@ -89,4 +89,4 @@ TEST_F(Sensitivity, SaysWhatIsWrongInTheStudy) {
 }
 
 }  // namespace
-}  // namespace wheelwright::sensitivity_test
+}  // namespace wheelwright::app::sensitivity_test

@@ -2,7 +2,7 @@
 // Help, exit codes, and what goes to which stream.
 #include "app/program.hpp"
 
-namespace wheelwright::usage_test {
+namespace wheelwright::app::usage_test {
 namespace {
 
 using ::testing::AllOf;
@@ -90,9 +90,9 @@ TEST_F(Usage, JsonIsAllThatGoesToStandardOutput) {
   EXPECT_EQ(Json::parse(simulated.out).at("rows"), 6001);
   const std::string shipped = fmt::format("'{}'", (examples() / "healthy.csv.gz").string());
   const Outcome commissioned = run("commission " + shipped + " --robot robot.yaml --json --out model");
-  EXPECT_EQ(Json::parse(commissioned.out), read_json(path("model/model.json")));
+  EXPECT_EQ(Json::parse(commissioned.out), files::read_json(path("model/model.json")));
   const Outcome detected = run("detect fault.csv --model model/model.json --json --out result");
-  EXPECT_EQ(Json::parse(detected.out), read_json(path("result/detection.json")));
+  EXPECT_EQ(Json::parse(detected.out), files::read_json(path("result/detection.json")));
   const Outcome followed = run("detect --follow --model model/model.json --json", path("fault.csv"));
   for (const std::string& line : testing::lines_of(followed.out)) {
     EXPECT_TRUE(Json::parse(line).contains("alarm")) << line;
@@ -108,4 +108,4 @@ TEST_F(Usage, QuietIsSilent) {
 }
 
 }  // namespace
-}  // namespace wheelwright::usage_test
+}  // namespace wheelwright::app::usage_test

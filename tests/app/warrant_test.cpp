@@ -4,7 +4,7 @@
 
 #include "app/program.hpp"
 
-namespace wheelwright::warrant_test {
+namespace wheelwright::app::warrant_test {
 namespace {
 
 using ::testing::AllOf;
@@ -76,9 +76,9 @@ TEST_F(Warrants, OfBoundsThatWereLearntNothingSaysGuaranteed) {
   EXPECT_THAT(run("detect learn.csv --model m/model.json").out, HasSubstr("thresholds: extrapolated"));
   EXPECT_THAT(run("export m/model.json --language c").out, HasSubstr("thresholds extrapolated"));
   for (const std::string file : {"m/model.json", "d/detection.json", "c/check.json", "p/design.json"}) {
-    EXPECT_EQ(read_json(path(file)).at("warrant"), "extrapolated") << file;
+    EXPECT_EQ(files::read_json(path(file)).at("warrant"), "extrapolated") << file;
   }
-  for (const Json& residual : read_json(path("g/margins.json")).at("residuals")) {
+  for (const Json& residual : files::read_json(path("g/margins.json")).at("residuals")) {
     EXPECT_EQ(residual.at("warrant"), "extrapolated");
   }
 }
@@ -104,7 +104,7 @@ TEST_F(Warrants, CheckSaysThatItProvesArithmeticAndListsWhatWasAssumed) {
   EXPECT_EQ(told.code, 0) << told.out;
   EXPECT_THAT(told.out,
               AllOf(HasSubstr("What is proved is arithmetic"), HasSubstr("That the assumptions hold is not proved")));
-  const Json model = read_json(path("m/model.json")), check = read_json(path("c/check.json"));
+  const Json model = files::read_json(path("m/model.json")), check = files::read_json(path("c/check.json"));
   EXPECT_EQ(check.at("assumptions"), model.at("assumptions"));
   EXPECT_GT(model.at("assumptions").size(), 8u);
   for (const Json& assumption : model.at("assumptions")) {
@@ -118,4 +118,4 @@ TEST_F(Warrants, CheckSaysThatItProvesArithmeticAndListsWhatWasAssumed) {
 }
 
 }  // namespace
-}  // namespace wheelwright::warrant_test
+}  // namespace wheelwright::app::warrant_test

@@ -13,7 +13,7 @@
 
 #include "detector/detectability.hpp"
 
-namespace wheelwright::consistency_test {
+namespace wheelwright::bench::consistency_test {
 namespace {
 
 using namespace testing_support;
@@ -21,9 +21,9 @@ using namespace testing_support;
 // u = θ v of one joint, in speeds that are sampled, with a θ between two bounds.
 struct Viscous {
   Model model;
-  Measurement measurement;
+  filter::Measurement measurement;
   Polytope set;
-  ReferenceMotion motion;
+  detector::ReferenceMotion motion;
 
   Viscous(double lower, double upper, const std::vector<double>& speeds) : set({}, box(lower, upper)) {
     model.name = "viscous";
@@ -37,7 +37,7 @@ struct Viscous {
     measurement.motion_columns = {"v"};
     measurement.effort_columns = {"u"};
     measurement.nominal_step = 0.01;
-    measurement.changes = EffortChanges::at_samples;
+    measurement.changes = model::EffortChanges::at_samples;
     LogTable table;
     table.names = {"v", "u"};
     table.columns = {speeds, std::vector<double>(speeds.size(), 0.0)};
@@ -45,7 +45,7 @@ struct Viscous {
       table.t.push_back(0.01 * static_cast<double>(k));
     }
     TableSource log(table);
-    motion = read_reference(log, RegressorFilter(model, {}, measurement));
+    motion = detector::read_reference(log, RegressorFilter(model, {}, measurement));
   }
 
   static Box box(double lower, double upper) {
@@ -54,14 +54,14 @@ struct Viscous {
     return b;
   }
 
-  [[nodiscard]] DetectableSize limit(const FaultType& fault, double side, SensorErrors errors) const {
+  [[nodiscard]] DetectableSize limit(const detector::FaultType& fault, double side, filter::SensorErrors errors) const {
     return ConsistencyTest(model, measurement, errors, set, {.before = 0.02})
         .smallest_detectable(motion, fault, side, 5, 0.1);
   }
 };
 
-const FaultType kBias{.name = "bias", .range = {-10.0, 10.0}, .offset = Eigen::VectorXd::Ones(1)};
-const FaultType kGain{.name = "gain", .range = {-0.9, 10.0}, .effort = Eigen::MatrixXd::Ones(1, 1)};
+const detector::FaultType kBias{.name = "bias", .range = {-10.0, 10.0}, .offset = Eigen::VectorXd::Ones(1)};
+const detector::FaultType kGain{.name = "gain", .range = {-0.9, 10.0}, .effort = Eigen::MatrixXd::Ones(1, 1)};
 
 // Without healthy samples before the onset, θ° may be anywhere.
 TEST(Consistency, LimitOfOneParameterIsTheClosedForm) {
@@ -104,18 +104,19 @@ TEST(Consistency, LimitWithExactParametersIsThatOfTheBestSample) {
 }
 
 // What the declared bounds of a robot are, sample by sample.
-SensorErrors declared(const Commissioned& c) {
+filter::SensorErrors declared(const Commissioned& c) {
   return {.motion = std::numbers::pi / *c.scenario.robot.encoder_counts_per_turn,
           .effort = *c.scenario.robot.noise.effort.value};
 }
 
-Measurement measurement_of(const Commissioned& c) { return c.model.measurement; }
+filter::Measurement measurement_of(const Commissioned& c) { return c.model.measurement; }
 
-ReferenceMotion motion_of(const Commissioned& c, LogSource& log) {
-  return read_reference(log, RegressorFilter(c.model.model, c.model.filter, measurement_of(c), c.model.errors));
+detector::ReferenceMotion motion_of(const Commissioned& c, LogSource& log) {
+  return detector::read_reference(log,
+                                  RegressorFilter(c.model.model, c.model.filter, measurement_of(c), c.model.errors));
 }
 
-std::size_t instant_at(const ReferenceMotion& motion, double t) {
+std::size_t instant_at(const detector::ReferenceMotion& motion, double t) {
   return static_cast<std::size_t>(std::lower_bound(motion.instant.begin(), motion.instant.end(), t) -
                                   motion.instant.begin());
 }
@@ -124,12 +125,14 @@ TEST(Consistency, HealthySamplesAreNeverRefuted) {
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     const Commissioned c = commissioned_robot(seed);
     const FaultyRun run = random_run(c, 100 + seed, breakages()[0]);
-    const LogTable table = log_of(
-        FaultyRun{
-            .robot = &c, .drive = run.drive, .fault = run.fault, .simulated = Fault::Kind::wheel_radius, .onset = 9.99},
-        0.0, true);
+    const LogTable table = log_of(FaultyRun{.robot = &c,
+                                            .drive = run.drive,
+                                            .fault = run.fault,
+                                            .simulated = model::Fault::Kind::wheel_radius,
+                                            .onset = 9.99},
+                                  0.0, true);
     TableSource log(table);
-    const ReferenceMotion motion = motion_of(c, log);
+    const detector::ReferenceMotion motion = motion_of(c, log);
     const Eigen::MatrixXd effort = read_efforts(log, measurement_of(c));
     ConsistencyTest test(c.model.model, measurement_of(c), declared(c), Polytope(c.model.facets, c.model.box));
     Random random(seed);
@@ -159,7 +162,7 @@ TEST(Consistency, ALittleMoreThanTheLimitIsAlwaysRefutedAndNoTestDoesBetter) {
       const double made = reading ? 0.0 : run.side * 0.3;
       const LogTable bare = log_of(run, made, false);
       TableSource reference(bare);
-      const ReferenceMotion motion = motion_of(c, reference);
+      const detector::ReferenceMotion motion = motion_of(c, reference);
       const std::size_t onset = instant_at(motion, run.onset);
       const DetectableSize size = test.smallest_detectable(motion, run.fault, run.side, onset, window);
       EXPECT_LE(size.lower, size.upper) << breakage.fault;
@@ -171,7 +174,7 @@ TEST(Consistency, ALittleMoreThanTheLimitIsAlwaysRefutedAndNoTestDoesBetter) {
       }
       const LogTable broken = log_of(run, run.side * magnitude, true);
       TableSource log(broken);
-      const ReferenceMotion seen = motion_of(c, log);
+      const detector::ReferenceMotion seen = motion_of(c, log);
       const Consistency found =
           test.consistent(seen, read_efforts(log, measurement_of(c)), instant_at(seen, run.onset - 0.15),
                           std::min(instant_at(seen, run.onset + window + 0.03), seen.instants() - 1));
@@ -189,11 +192,11 @@ TEST(Consistency, RejectsWhatMakesNoSense) {
   EXPECT_THROW((void)test.smallest_detectable(drive.motion, kBias, 0.5, 5, 0.1), InvalidArgument);
   EXPECT_THROW((void)test.smallest_detectable(drive.motion, kBias, 1.0, 29, 0.1), InvalidArgument);
   EXPECT_THROW(ConsistencyTest(drive.model, drive.measurement, {.effort = -0.1}, drive.set), InvalidArgument);
-  Measurement late = drive.measurement;
+  filter::Measurement late = drive.measurement;
   late.correction.lag = 0.05;
   ConsistencyTest corrected(drive.model, late, {.effort = 0.1}, drive.set);
   EXPECT_THROW((void)corrected.consistent(drive.motion, Eigen::MatrixXd::Zero(1, 30), 5, 7), InvalidArgument);
 }
 
 }  // namespace
-}  // namespace wheelwright::consistency_test
+}  // namespace wheelwright::bench::consistency_test

@@ -108,8 +108,8 @@ TEST(Innovations, VanishForAnExactLogWithLinearEfforts) {
 
 TEST(ConfidenceThreshold, IsTheStandardErrorOfAPrediction) {
   ConfidenceThreshold threshold((Eigen::MatrixXd(2, 2) << 1.0, 0.5, 0.5, 4.0).finished(), {2.0, 7.0});
-  FilteredRow row;
-  row.Y = (RowMatrix(2, 2) << 1.0, 2.0, 3.0, 0.0).finished();
+  filter::FilteredRow row;
+  row.Y = (core::RowMatrix(2, 2) << 1.0, 2.0, 3.0, 0.0).finished();
   Observation now;
   now.valid = true;
   now.row = &row;

@@ -11,7 +11,7 @@
 
 #include "bounds/rows.hpp"
 
-namespace wheelwright::box_rounding_test {
+namespace wheelwright::bounds::box_rounding_test {
 namespace {
 
 using Rational = boost::multiprecision::cpp_rational;
@@ -47,4 +47,4 @@ TEST(BoxRounding, ProductsBelowTheSmallestNumberAreCovered) {
 }
 
 }  // namespace
-}  // namespace wheelwright::box_rounding_test
+}  // namespace wheelwright::bounds::box_rounding_test

@@ -16,7 +16,10 @@
 #include "bounds/exact.hpp"
 #include "bounds/rows.hpp"
 
-namespace wheelwright::check_certificate_test {
+namespace wheelwright::bounds::check_certificate_test {
+
+using core::kInfinity;
+
 namespace {
 
 using ::testing::HasSubstr;
@@ -39,9 +42,9 @@ TEST(CheckBound, TheBoxAloneProvesItsSupport) {
   EXPECT_EQ(tight.bound, 7.0);
   EXPECT_EQ(tight.shortfall, 0.0);
   EXPECT_THAT(tight.reason, IsEmpty());
-  const CertificateCheck inward = check_bound(a, {}, box, round_down(7.0));
+  const CertificateCheck inward = check_bound(a, {}, box, core::round_down(7.0));
   EXPECT_FALSE(inward.proved);
-  EXPECT_EQ(inward.shortfall, 7.0 - round_down(7.0));
+  EXPECT_EQ(inward.shortfall, 7.0 - core::round_down(7.0));
 }
 
 // { ±θ_1 ± … ± θ_p <= 1 } is the ball of the ℓ1 norm: θ_1 <= 1 by two rows of opposite signs in all the rest.
@@ -53,7 +56,7 @@ TEST(CheckBound, TheBallOfTheL1NormIsTight) {
     const CertificateCheck check = check_bound(axis, rows, cube(p, 1e300), 1.0);
     EXPECT_TRUE(check.proved);
     EXPECT_EQ(check.bound, 1.0);
-    EXPECT_FALSE(check_bound(axis, rows, cube(p, 1e300), round_down(1.0)).proved);
+    EXPECT_FALSE(check_bound(axis, rows, cube(p, 1e300), core::round_down(1.0)).proved);
   }
 }
 
@@ -68,9 +71,9 @@ TEST(CheckBound, TheRemainderOfARoundedMultiplierCountsExactly) {
   EXPECT_EQ(check.parameter, 0u);
   EXPECT_FALSE(check.row.has_value());
   EXPECT_TRUE(check_bound(std::array{1.0}, std::vector{weighted({3.0}, 1.0, third)}, cube(1, 8.0), check.bound).proved);
-  EXPECT_FALSE(
-      check_bound(std::array{1.0}, std::vector{weighted({3.0}, 1.0, third)}, cube(1, 8.0), round_down(check.bound))
-          .proved);
+  EXPECT_FALSE(check_bound(std::array{1.0}, std::vector{weighted({3.0}, 1.0, third)}, cube(1, 8.0),
+                           core::round_down(check.bound))
+                   .proved);
 }
 
 // 3 · fl(0.1) lies between fl(0.3) and the next double: neither 3 * 0.1 nor 0.3 in floating point would tell.
@@ -80,9 +83,9 @@ TEST(CheckBound, NothingIsRoundedBeforeTheComparison) {
   const CertificateCheck low = check_bound(std::array{1.0}, scaled, cube(1, 1.0), 0.3);
   EXPECT_FALSE(low.proved);
   EXPECT_GT(low.shortfall, 0.0);
-  EXPECT_LT(low.shortfall, round_up(0.3) - 0.3);
-  EXPECT_EQ(low.bound, round_up(0.3));
-  EXPECT_TRUE(check_bound(std::array{1.0}, scaled, cube(1, 1.0), round_up(0.3)).proved);
+  EXPECT_LT(low.shortfall, core::round_up(0.3) - 0.3);
+  EXPECT_EQ(low.bound, core::round_up(0.3));
+  EXPECT_TRUE(check_bound(std::array{1.0}, scaled, cube(1, 1.0), core::round_up(0.3)).proved);
   EXPECT_TRUE(check_bound(std::array{1.0}, rows, cube(1, 1.0), 0.1 * 9.0).proved);
 }
 
@@ -123,7 +126,7 @@ TEST(CheckBound, WhatNoCertificateMayHoldIsNamed) {
   WeightedRow side = weighted({0.0, 1.0}, 5.0, 0.0);
   side.row.origin = {.is_prior = true, .parameter = 1};
   EXPECT_TRUE(check_bound(a, std::vector{good, side}, cube(2, 5.0), 4.0).proved);
-  side.row.b = round_down(5.0);
+  side.row.b = core::round_down(5.0);
   EXPECT_THAT(second(side), HasSubstr("side of the box"));
 }
 
@@ -159,8 +162,8 @@ TEST(CheckEmptiness, TouchingIsNotEmptyAnUlpApartIs) {
   };
   EXPECT_FALSE(apart(1.0).proved);
   EXPECT_EQ(apart(1.0).shortfall, 0.0);
-  EXPECT_TRUE(apart(round_up(1.0)).proved);
-  EXPECT_EQ(apart(round_up(1.0)).shortfall, 1.0 - round_up(1.0));
+  EXPECT_TRUE(apart(core::round_up(1.0)).proved);
+  EXPECT_EQ(apart(core::round_up(1.0)).shortfall, 1.0 - core::round_up(1.0));
   EXPECT_TRUE(apart(2.0).proved);
   // A remainder of 2⁻²⁰ over a box of 1e9 is more than the gap.
   const std::vector loose{weighted({1.0}, 1.0, 1.0 + 0x1p-20), weighted({-1.0}, -2.0, 1.0)};
@@ -198,7 +201,7 @@ TEST(CheckHullAgainstRationals, ProvesWhatIsPublishedAndNothingMore) {
   Random random(11);
   for (const double width : {10.0, 1e12}) {
     for (const std::size_t p : {1, 2, 3, 5, 8}) {
-      RegressionTable rows = drive(random, p, 60 * p, 0.1).table();
+      core::RegressionTable rows = drive(random, p, 60 * p, 0.1).table();
       const Box prior = cube(p, width);
       const FeasibleSet set = feasible_set(rows, prior);
       ASSERT_EQ(set.status, FeasibleSet::Status::nonempty);
@@ -270,7 +273,7 @@ TEST(CheckHull, TamperedCertificatesAreRefused) {
   Random random(13);
   constexpr std::size_t p = 4;
   Rows data = drive(random, p, 200, 0.1);
-  RegressionTable rows = data.table();
+  core::RegressionTable rows = data.table();
   const Box prior = cube(p, 10.0);
   const auto [lower, upper] = claims_of(feasible_set(rows, prior));
   ASSERT_TRUE(check_hull(lower, upper, prior).all_proved());
@@ -305,11 +308,11 @@ TEST(CheckHull, TheSidesOfThePriorNeedNoRows) {
   const std::vector<BoundClaim> lower{{-1.0, {}}, {0.0, {}}};
   std::vector<BoundClaim> upper{{2.0, {}}, {4.0, {}}};
   EXPECT_TRUE(check_hull(lower, upper, prior).all_proved());
-  upper[1].value = round_down(4.0);
+  upper[1].value = core::round_down(4.0);
   const HullCheck check = check_hull(lower, upper, prior);
   EXPECT_TRUE(check.upper[0].proved);
   EXPECT_FALSE(check.upper[1].proved);
-  EXPECT_EQ(check.upper[1].shortfall, 4.0 - round_down(4.0));
+  EXPECT_EQ(check.upper[1].shortfall, 4.0 - core::round_down(4.0));
   // A certificate that no one may write is none, even where the claim is trivial.
   upper[1] = {4.0, {weighted({0.0, 1.0}, 1.0, -1.0)}};
   EXPECT_FALSE(check_hull(lower, upper, prior).upper[1].proved);
@@ -327,4 +330,4 @@ TEST(CheckHull, AContradictionIsTold) {
 }
 
 }  // namespace
-}  // namespace wheelwright::check_certificate_test
+}  // namespace wheelwright::bounds::check_certificate_test

@@ -9,7 +9,7 @@
 
 #include "bounds/rows.hpp"
 
-namespace wheelwright::closed_form_test {
+namespace wheelwright::bounds::closed_form_test {
 namespace {
 
 using testing_rows::Rows;
@@ -17,7 +17,7 @@ using testing_rows::Rows;
 TEST(ClosedForm, unit_rows_give_the_box) {
   Rows rows(3);
   rows.add({1, 0, 0}, 1.0, 0.5).add({0, 1, 0}, -2.0, 0.25).add({0, 0, 1}, 0.0, 1.0);
-  RegressionTable table = rows.table();
+  core::RegressionTable table = rows.table();
   const FeasibleSet set = feasible_set(table, testing_rows::cube(3, 100.0));
   ASSERT_EQ(set.status, FeasibleSet::Status::nonempty);
   const std::vector<Interval> expected{{0.5, 1.5}, {-2.25, -1.75}, {-1.0, 1.0}};
@@ -42,7 +42,7 @@ TEST(ClosedForm, all_sign_rows_give_the_l1_ball) {
       }
       rows.add(signs, 0.0, 1.0);
     }
-    RegressionTable table = rows.table();
+    core::RegressionTable table = rows.table();
     const FeasibleSet set = feasible_set(table, testing_rows::cube(p, 1000.0));
     ASSERT_EQ(set.status, FeasibleSet::Status::nonempty) << p;
     EXPECT_EQ(set.polytope->facets().size(), std::size_t{1} << p);
@@ -72,7 +72,7 @@ TEST(ClosedForm, minimax_fit_of_powers) {
       }
       rows.add(Y, std::pow(x, power), 0.0);
     }
-    RegressionTable table = rows.table();
+    core::RegressionTable table = rows.table();
     return minimax_fit(table, testing_rows::cube(static_cast<std::size_t>(degree) + 1, 10.0));
   };
   const MinimaxFit square = fit(1, 2, {-1.0, 0.0, 1.0});
@@ -112,4 +112,4 @@ TEST(ClosedForm, klee_minty_cube) {
 }
 
 }  // namespace
-}  // namespace wheelwright::closed_form_test
+}  // namespace wheelwright::bounds::closed_form_test

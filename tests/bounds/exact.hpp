@@ -13,7 +13,7 @@
 #include <wheelwright/bounds/infeasibility.hpp>
 #include <wheelwright/bounds/slab_rows.hpp>
 
-namespace wheelwright::exact {
+namespace wheelwright::bounds::exact {
 
 using Rational = boost::multiprecision::cpp_rational;
 
@@ -95,10 +95,10 @@ inline Rational dot(const std::vector<Rational>& a, const std::vector<Rational>&
 inline double rounded_up(const Rational& x) {
   auto guess = static_cast<double>(x);
   while (rational(guess) < x) {
-    guess = round_up(guess);
+    guess = core::round_up(guess);
   }
-  while (rational(round_down(guess)) >= x) {
-    guess = round_down(guess);
+  while (rational(core::round_down(guess)) >= x) {
+    guess = core::round_down(guess);
   }
   return guess;
 }
@@ -200,4 +200,4 @@ inline bool contradict(std::span<const WeightedRow> members, const Box& box) {
   return bound < 0;
 }
 
-}  // namespace wheelwright::exact
+}  // namespace wheelwright::bounds::exact

@@ -20,7 +20,7 @@
 #include "bounds/qsopt_oracle.hpp"
 #include "bounds/rows.hpp"
 
-namespace wheelwright::exact_lp {
+namespace wheelwright::bounds::exact_lp {
 
 using testing_rows::Random;
 
@@ -115,7 +115,7 @@ inline Problem rounded(Problem problem) {
   for (Eigen::Index r = 0; r < problem.rows.rows(); ++r) {
     double size = std::abs(problem.rows.y[r]) + problem.rows.dy[r];
     for (std::size_t j = 0; j < problem.prior.dimension(); ++j) {
-      size += std::abs(problem.rows.Y(r, static_cast<Eigen::Index>(j))) * magnitude(problem.prior.sides[j]);
+      size += std::abs(problem.rows.Y(r, static_cast<Eigen::Index>(j))) * core::magnitude(problem.prior.sides[j]);
     }
     problem.rows.dy[r] += 8.0 * std::numeric_limits<double>::epsilon() * size;
   }
@@ -140,7 +140,7 @@ struct Verdict {
 inline Verdict judge(const Problem& problem, std::uint64_t seed, std::size_t trials) {
   const std::size_t p = problem.prior.dimension();
   Verdict verdict;
-  RegressionTable table(problem.rows);
+  core::RegressionTable table(problem.rows);
   const FeasibleSet set = feasible_set(table, problem.prior);
   qsopt::ExactProgram exact = qsopt::exact_set(problem.rows, problem.prior);
   std::optional<qsopt::ExactProgram> widened;
@@ -245,4 +245,4 @@ inline void judge_one(Tally& tally, Family family, std::size_t p, std::uint64_t 
             fmt::format("{}, p {}, seed {}", name_of(family), p, seed));
 }
 
-}  // namespace wheelwright::exact_lp
+}  // namespace wheelwright::bounds::exact_lp

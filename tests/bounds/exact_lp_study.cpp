@@ -12,14 +12,14 @@
 #include "bounds/exact_lp.hpp"
 
 int main(int count, char** arguments) try {
-  using namespace wheelwright::exact_lp;
+  using namespace wheelwright::bounds::exact_lp;
   const long long problems = count == 3 ? std::atoll(arguments[1]) : 0;
   if (problems <= 0) {
     fmt::print(stderr, "usage: exact-lp-study PROBLEMS SEED\n");
     return 2;
   }
   const auto first = static_cast<std::uint64_t>(std::atoll(arguments[2]));
-  wheelwright::qsopt::start();
+  wheelwright::bounds::qsopt::start();
   constexpr std::size_t kinds = families.size(), dimensions = 12;
   std::array<Tally, kinds> each;
   Tally all;

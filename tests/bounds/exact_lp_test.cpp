@@ -8,7 +8,7 @@
 
 #include "bounds/exact_lp.hpp"
 
-namespace wheelwright::exact_lp_test {
+namespace wheelwright::bounds::exact_lp_test {
 namespace {
 
 using exact_lp::Family;
@@ -63,7 +63,7 @@ TEST_P(ExactLp, minimax_bracket_encloses_the_exact_fit) {
     exact_lp::Problem each = exact_lp::problem(GetParam(), p, 1);
     each.rows.dy.setZero();
     const mpq_class exact = qsopt::exact_minimax(each.rows, each.prior, each.rows.y.cwiseAbs().maxCoeff());
-    RegressionTable table(each.rows);
+    core::RegressionTable table(each.rows);
     const MinimaxFit fit = minimax_fit(table, each.prior);
     EXPECT_TRUE(mpq_class(fit.lower) <= exact) << p << ": by " << mpq_class(fit.lower - exact).get_d();
     EXPECT_TRUE(exact <= mpq_class(fit.upper)) << p << ": by " << mpq_class(exact - fit.upper).get_d();
@@ -94,4 +94,4 @@ INSTANTIATE_TEST_SUITE_P(Families, ExactLp, ::testing::ValuesIn(exact_lp::famili
 INSTANTIATE_TEST_SUITE_P(Families, SlowExactLp, ::testing::ValuesIn(exact_lp::families), test_name);
 
 }  // namespace
-}  // namespace wheelwright::exact_lp_test
+}  // namespace wheelwright::bounds::exact_lp_test

@@ -10,7 +10,7 @@
 #include "bounds/exact.hpp"
 #include "bounds/rows.hpp"
 
-namespace wheelwright::exact_test {
+namespace wheelwright::bounds::exact_test {
 namespace {
 
 using exact::rational;
@@ -78,7 +78,7 @@ TEST_P(AgainstRationals, hull_and_support_are_never_inside_the_exact_ones) {
   for (std::size_t p = 1; p <= 3; ++p) {
     for (std::uint64_t seed = 1; seed <= 15; ++seed) {
       const Problem each = problem(1000 * seed + static_cast<std::uint64_t>(kind), p, kind);
-      RegressionTable table = each.rows.table();
+      core::RegressionTable table = each.rows.table();
       const FeasibleSet set = feasible_set(table, each.prior);
       ASSERT_EQ(set.status, FeasibleSet::Status::nonempty) << p << ' ' << seed;
       const auto rows = exact::rows_of(half_spaces(table.block(), each.prior), each.prior);
@@ -114,7 +114,7 @@ TEST_P(WithInterior, hull_is_tight) {
   for (std::size_t p = 1; p <= 3; ++p) {
     for (std::uint64_t seed = 1; seed <= 10; ++seed) {
       const Problem each = problem(1000 * seed + static_cast<std::uint64_t>(kind), p, kind);
-      RegressionTable table = each.rows.table();
+      core::RegressionTable table = each.rows.table();
       const FeasibleSet set = feasible_set(table, each.prior);
       const auto vertices = exact::vertices(exact::rows_of(half_spaces(table.block(), each.prior), each.prior), p);
       for (std::size_t j = 0; j < p; ++j) {
@@ -141,9 +141,9 @@ TEST(NearlyEmpty, sliver_is_enclosed) {
       const Problem each = problem(seed, p, 0);
       RegressionBlock block = each.rows.block(0, each.rows.instants());
       block.dy.setZero();
-      RegressionTable bare(block);
+      core::RegressionTable bare(block);
       block.dy.setConstant(minimax_fit(bare, each.prior).upper * (1.0 + 1e-9));
-      RegressionTable tight(block);
+      core::RegressionTable tight(block);
       const FeasibleSet set = feasible_set(tight, each.prior);
       ASSERT_EQ(set.status, FeasibleSet::Status::nonempty) << p << ' ' << seed;
       const auto vertices = exact::vertices(exact::rows_of(half_spaces(block, each.prior), each.prior), p);
@@ -180,7 +180,7 @@ TEST(HigherDimensions, certified_hull_encloses_exact_vertices) {
       }
       rows.add(Y, y, 0.1);
     }
-    RegressionTable table = rows.table();
+    core::RegressionTable table = rows.table();
     const FeasibleSet set = feasible_set(table, prior);
     ASSERT_EQ(set.status, FeasibleSet::Status::nonempty);
     const auto all = exact::rows_of(half_spaces(table.block(), prior), prior);
@@ -251,7 +251,7 @@ TEST(Farkas, contradiction_is_exact_and_irreducible) {
     Problem each = problem(seed, p, 0);
     const std::size_t wrong = each.rows.instants();
     each.rows.add(random.vector(p), 10.0, 0.25);
-    RegressionTable table = each.rows.table();
+    core::RegressionTable table = each.rows.table();
     const FeasibleSet set = feasible_set(table, each.prior);
     ASSERT_EQ(set.status, FeasibleSet::Status::empty) << seed;
     ASSERT_FALSE(set.polytope.has_value());
@@ -275,4 +275,4 @@ TEST(Farkas, contradiction_is_exact_and_irreducible) {
 }
 
 }  // namespace
-}  // namespace wheelwright::exact_test
+}  // namespace wheelwright::bounds::exact_test

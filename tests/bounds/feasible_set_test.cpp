@@ -11,7 +11,10 @@
 #include "bounds/exact.hpp"
 #include "bounds/rows.hpp"
 
-namespace wheelwright::feasible_set_test {
+namespace wheelwright::bounds::feasible_set_test {
+
+using core::RegressionTable;
+
 namespace {
 
 using testing_rows::BlockSource;
@@ -223,4 +226,4 @@ TEST(Outliers, fewest_are_dropped_and_the_truth_is_kept) {
 }
 
 }  // namespace
-}  // namespace wheelwright::feasible_set_test
+}  // namespace wheelwright::bounds::feasible_set_test

@@ -13,7 +13,7 @@
 
 #include "bounds/rows.hpp"
 
-namespace wheelwright::interval_hull_test {
+namespace wheelwright::bounds::interval_hull_test {
 namespace {
 
 using testing_rows::BlockSource;
@@ -82,7 +82,7 @@ TEST(IntervalHull, IsThatOfTheFeasibleSetInMemoryAndFromASource) {
   for (const bool noisy : {false, true}) {
     for (const std::size_t p : {1, 3, 6}) {
       const Rows rows = slow_rows(p, p, 30000, noisy);
-      RegressionTable table = rows.table();
+      core::RegressionTable table = rows.table();
       const FeasibleSet set = feasible_set(table, positive(p));
       const Columns columns(table.block());
       const IntervalHull memory = interval_hull(columns.view, positive(p)), source = interval_hull(table, positive(p));
@@ -103,7 +103,7 @@ TEST(IntervalHull, IsThatOfTheFeasibleSetInMemoryAndFromASource) {
 
 TEST(IntervalHull, DoesNotDependOnThreadsOrBlocks) {
   const Rows rows = slow_rows(5, 4, 150000, false);
-  RegressionTable table = rows.table();
+  core::RegressionTable table = rows.table();
   const Columns columns(table.block());
   IntervalHullOptions two;
   two.threads = 2;
@@ -115,7 +115,7 @@ TEST(IntervalHull, DoesNotDependOnThreadsOrBlocks) {
 // With little room for rows that matter, more passes give the same hull.
 TEST(IntervalHull, TakesMorePassesWhereThereIsLittleRoom) {
   const Rows rows = slow_rows(6, 4, 300000, false, 0.2);
-  RegressionTable table = rows.table();
+  core::RegressionTable table = rows.table();
   const Columns columns(table.block());
   IntervalHullOptions little;
   little.most_rows = 64;
@@ -168,7 +168,7 @@ TEST(MinimaxInMemory, ClosedFormsAndTheSource) {
     Rows rows = slow_rows(8, 4, 40000, noisy);
     RegressionBlock block = rows.block(0, 40000);
     block.dy.setZero();
-    RegressionTable table(block);
+    core::RegressionTable table(block);
     const MinimaxFit source = minimax_fit(table, positive(4)), memory = minimax_fit(Columns(block).view, positive(4));
     EXPECT_TRUE(source.converged && memory.converged);
     EXPECT_LE(std::max(source.lower, memory.lower), std::min(source.upper, memory.upper));
@@ -177,4 +177,4 @@ TEST(MinimaxInMemory, ClosedFormsAndTheSource) {
 }
 
 }  // namespace
-}  // namespace wheelwright::interval_hull_test
+}  // namespace wheelwright::bounds::interval_hull_test

@@ -12,7 +12,7 @@
 
 #include "bounds/rows.hpp"
 
-namespace wheelwright::kernels {
+namespace wheelwright::bounds::kernels {
 namespace {
 
 using testing_rows::Random;
@@ -184,4 +184,4 @@ TEST(Kernels, ScansFindTheSameRowsInEveryVariantAndThoseOfThePlainFormula) {
 }
 
 }  // namespace
-}  // namespace wheelwright::kernels
+}  // namespace wheelwright::bounds::kernels

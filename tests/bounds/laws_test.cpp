@@ -7,7 +7,7 @@
 #include "bounds/parameter_set.hpp"
 #include "bounds/rows.hpp"
 
-namespace wheelwright::laws_test {
+namespace wheelwright::bounds::laws_test {
 namespace {
 
 using testing_rows::Random;
@@ -180,7 +180,7 @@ TYPED_TEST(SupportFunction, gives_widths_that_no_direction_reverses) {
 TEST(Box, contains_its_sides_and_nothing_beyond) {
   const Box box{{{0.0, 1.0}, {-2.0, 3.0}}};
   EXPECT_TRUE(box.contains(std::vector<double>{0.0, 3.0}));
-  EXPECT_FALSE(box.contains(std::vector<double>{round_up(1.0), 0.0}));
+  EXPECT_FALSE(box.contains(std::vector<double>{core::round_up(1.0), 0.0}));
   EXPECT_FALSE(box.contains(std::vector<double>{0.5, std::nan("")}));
   EXPECT_EQ(hull(box, Box{{{0.5, 2.0}, {0.0, 0.0}}}), (Box{{{0.0, 2.0}, {-2.0, 3.0}}}));
   EXPECT_THROW(check_finite(Box{{{1.0, 0.0}}}, "box"), InvalidArgument);
@@ -229,4 +229,4 @@ TEST(Polytope, rejects_the_empty_set_and_bad_shapes) {
 }
 
 }  // namespace
-}  // namespace wheelwright::laws_test
+}  // namespace wheelwright::bounds::laws_test

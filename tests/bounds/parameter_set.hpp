@@ -10,7 +10,7 @@
 
 #include <wheelwright/bounds/box.hpp>
 
-namespace wheelwright {
+namespace wheelwright::bounds {
 
 /// A non-empty compact convex set of p parameters, known through its support function h(a) = max { a·θ : θ in set }.
 ///
@@ -42,7 +42,7 @@ template <ParameterSet Set>
     x = -x;
   }
   const double sum = set.support(a) + set.support(opposite);
-  return sum == 0.0 ? 0.0 : round_up(sum);
+  return sum == 0.0 ? 0.0 : core::round_up(sum);
 }
 
-}  // namespace wheelwright
+}  // namespace wheelwright::bounds

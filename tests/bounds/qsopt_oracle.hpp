@@ -20,7 +20,7 @@ extern "C" {
 #include <wheelwright/bounds/box.hpp>
 #include <wheelwright/core/regression.hpp>
 
-namespace wheelwright::qsopt {
+namespace wheelwright::bounds::qsopt {
 
 /// To be called before the first rational is made: the library gives GMP its own memory. Messages go nowhere.
 inline void start() {
@@ -157,4 +157,4 @@ inline mpq_class exact_minimax(const RegressionBlock& rows, const Box& box, doub
   return -*value;
 }
 
-}  // namespace wheelwright::qsopt
+}  // namespace wheelwright::bounds::qsopt

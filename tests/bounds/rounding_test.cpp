@@ -21,7 +21,7 @@
 #include "bounds/exact.hpp"
 #include "bounds/rows.hpp"
 
-namespace wheelwright::rounding_test {
+namespace wheelwright::bounds::rounding_test {
 namespace {
 
 using exact::Rational;
@@ -220,7 +220,7 @@ TEST(Rounding, CertificateOfAQuotient) {
     const WeightedRow row{{Eigen::VectorXd::Constant(1, a), b, {}}, 1.0 / a};
     const std::vector<WeightedRow> rows{row};
     // A box that does not help, and one that ends just beyond the answer, so that next to nothing is added.
-    for (const double end : {2.0, round_up(round_up(b / a))}) {
+    for (const double end : {2.0, core::round_up(core::round_up(b / a))}) {
       const double bound = certified_upper_bound(axis, rows, Box{{{0.0, end}}});
       ASSERT_TRUE(rational(b) / rational(a) <= rational(bound)) << k << ' ' << end;
     }
@@ -240,10 +240,10 @@ TEST(Rounding, HullOfOneRow) {
   Random random(4);
   for (int k = 0; k < 400; ++k) {
     const double a = 0.5 + random.unit(), y = random.symmetric(), dy = 0.01 * random.unit();
-    RegressionTable table = testing_rows::Rows(1).add({a}, y, dy).table();
+    core::RegressionTable table = testing_rows::Rows(1).add({a}, y, dy).table();
     const Box prior{{{-16.0, 16.0}}};
     const Rational low = (rational(y) - rational(dy)) / rational(a), high = (rational(y) + rational(dy)) / rational(a);
-    const IntervalHull hull = interval_hull(static_cast<RegressionSource&>(table), prior);
+    const IntervalHull hull = interval_hull(static_cast<core::RegressionSource&>(table), prior);
     ASSERT_FALSE(hull.empty);
     EXPECT_TRUE(rational(hull.hull.sides[0].lower) <= low && high <= rational(hull.hull.sides[0].upper)) << k;
     const Polytope set({{Eigen::VectorXd::Constant(1, a), y, {}}}, prior);
@@ -276,7 +276,7 @@ TEST(Rounding, RowsWithErrorsInVariables) {
     const Rational limit = product - rational(side) * rational(dy);
     auto y = static_cast<double>(limit);
     while (rational(side) * rational(y) < rational(side) * limit) {
-      y = side > 0.0 ? round_up(y) : round_down(y);
+      y = side > 0.0 ? core::round_up(y) : core::round_down(y);
     }
     HalfSpace upper, lower;
     slabs.half_spaces(Y, dY, y, dy, {}, upper, lower);
@@ -291,4 +291,4 @@ TEST(Rounding, RowsWithErrorsInVariables) {
 }
 
 }  // namespace
-}  // namespace wheelwright::rounding_test
+}  // namespace wheelwright::bounds::rounding_test

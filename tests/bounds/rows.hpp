@@ -10,7 +10,7 @@
 #include <wheelwright/bounds/box.hpp>
 #include <wheelwright/core/regression.hpp>
 
-namespace wheelwright::testing_rows {
+namespace wheelwright::bounds::testing_rows {
 
 /// Uniform numbers that are the same with every standard library.
 class Random {
@@ -75,7 +75,7 @@ class Rows {
     return block;
   }
   [[nodiscard]] std::size_t instants() const { return y_.size() / outputs_; }
-  [[nodiscard]] RegressionTable table() const { return RegressionTable(block(0, instants())); }
+  [[nodiscard]] core::RegressionTable table() const { return core::RegressionTable(block(0, instants())); }
   [[nodiscard]] std::size_t outputs() const { return outputs_; }
   [[nodiscard]] std::size_t parameters() const { return p_; }
 
@@ -86,7 +86,7 @@ class Rows {
 };
 
 /// Hands rows out in blocks of a given number of instants.
-class BlockSource final : public RegressionSource {
+class BlockSource final : public core::RegressionSource {
  public:
   BlockSource(const Rows& rows, std::size_t instants) : rows_(rows), instants_(instants) {}
   [[nodiscard]] std::size_t outputs() const override { return rows_.outputs(); }
@@ -107,4 +107,4 @@ class BlockSource final : public RegressionSource {
   std::size_t instants_, position_ = 0;
 };
 
-}  // namespace wheelwright::testing_rows
+}  // namespace wheelwright::bounds::testing_rows

@@ -11,7 +11,7 @@
 #include "bounds/exact.hpp"
 #include "bounds/rows.hpp"
 
-namespace wheelwright::support_table_test {
+namespace wheelwright::bounds::support_table_test {
 namespace {
 
 using exact::rational;
@@ -210,4 +210,4 @@ TEST(SupportTable, IsNoneWhereThereIsNoRoom) {
 }
 
 }  // namespace
-}  // namespace wheelwright::support_table_test
+}  // namespace wheelwright::bounds::support_table_test

@@ -12,7 +12,7 @@
 #include "bounds/exact.hpp"
 #include "bounds/rows.hpp"
 
-namespace wheelwright::support_walk_test {
+namespace wheelwright::bounds::support_walk_test {
 namespace {
 
 using exact::rational;
@@ -165,4 +165,4 @@ TEST(SupportWalk, ABudgetOfNothingIsNoWorseThanTheHull) {
 }
 
 }  // namespace
-}  // namespace wheelwright::support_walk_test
+}  // namespace wheelwright::bounds::support_walk_test

@@ -14,7 +14,10 @@
 
 #include "support/drives.hpp"
 
-namespace wheelwright::answered_contradictions_test {
+namespace wheelwright::commission::answered_contradictions_test {
+
+using sim::simulate;
+
 namespace {
 
 using ::testing::HasSubstr;
@@ -25,14 +28,14 @@ using testing_support::noisy_drive;
 // Commands that change at samples, whose noise is learnt from the log, as `wheelwright robot` writes it.
 Scenario learnt_drive(std::uint64_t seed, double duration = 30.0) {
   Scenario s = noisy_drive(seed, duration);
-  s.robot.effort_changes = EffortChanges::at_samples;
+  s.robot.effort_changes = model::EffortChanges::at_samples;
   s.robot.noise = {};
   return s;
 }
 
 Commissioning commissioned(const LogTable& table, const Robot& robot) {
   TableSource log(table);
-  return commission(log, robot);
+  return commission_robot(log, robot);
 }
 
 const LogContradiction* find(const Commissioning& result, Kind kind) {
@@ -56,7 +59,7 @@ LogTable late(LogTable table, std::ptrdiff_t rows) {
     std::vector<double>& tau = table.column(name);
     std::rotate(tau.begin(), rows > 0 ? tau.end() - rows : tau.begin() - rows, tau.end());
   }
-  return slice(table, 20, table.rows() - 20);
+  return core::slice(table, 20, table.rows() - 20);
 }
 
 TEST(AnsweredContradiction, ADeadCurrentSensorIsNoRobotOfNoMass) {
@@ -136,7 +139,7 @@ TEST(AnsweredContradiction, DryFrictionInsideTheDeclaredNoiseTakesTheGuarantee) 
   s.robot.noise.effort.value = 0.05;
   const Commissioning without = commissioned(simulate(s), s.robot);
   EXPECT_EQ(find(without, Kind::dry_friction), nullptr);
-  EXPECT_EQ(without.model.warrant, Warrant::guaranteed);
+  EXPECT_EQ(without.model.warrant, core::Warrant::guaranteed);
   LogTable table = simulate(s);
   const std::vector<double> right = table.column("phi_r"), left = table.column("phi_l");
   const auto add_friction = [](std::vector<double>& tau, const std::vector<double>& angle) {
@@ -150,7 +153,7 @@ TEST(AnsweredContradiction, DryFrictionInsideTheDeclaredNoiseTakesTheGuarantee) 
   const Commissioning with = commissioned(table, s.robot);
   ASSERT_NE(find(with, Kind::dry_friction), nullptr) << with.message;
   EXPECT_FALSE(find(with, Kind::dry_friction)->withdraws);
-  EXPECT_EQ(with.model.warrant, Warrant::extrapolated);
+  EXPECT_EQ(with.model.warrant, core::Warrant::extrapolated);
 }
 
 TEST(AnsweredContradiction, TorquesOneSampleLateOrEarlyAreTold) {
@@ -197,9 +200,9 @@ TEST(AnsweredContradiction, SpeedsDifferencedBackwardsAreToldByTheirLag) {
   Scenario s = learnt_drive(7, 60.0);
   s.sensors.encoder_counts_per_turn = 65536.0;
   s.robot.encoder_counts_per_turn.reset();
-  s.robot.effort_changes = EffortChanges::at_samples;
+  s.robot.effort_changes = model::EffortChanges::at_samples;
   const LogTable angles = simulate(s);
-  LogTable speeds = slice(angles, 1, angles.rows());
+  LogTable speeds = core::slice(angles, 1, angles.rows());
   for (const auto& [angle, speed] : {std::pair{"phi_r", "omega_r"}, std::pair{"phi_l", "omega_l"}}) {
     const std::vector<double>& phi = angles.column(angle);
     std::vector<double>& column = speeds.column(angle);
@@ -287,7 +290,7 @@ TEST(AnsweredContradiction, HalvesOfDifferentMassDisagree) {
 TEST(AnsweredContradiction, ABestGuessFarOutsideADeclaredSetWithdrawsTheModel) {
   Scenario s = noisy_drive(13);
   Simulation log(s);
-  Commissioning result = commission(log, s.robot);
+  Commissioning result = commission_robot(log, s.robot);
   ASSERT_EQ(result.status, Status::done) << result.message;
   Setting setting = settle(log, s.robot);
   ASSERT_TRUE(setting.noise_complete);
@@ -310,7 +313,7 @@ TEST(AnsweredContradiction, ABestGuessFarOutsideADeclaredSetWithdrawsTheModel) {
 TEST(AnsweredContradiction, HeldOutRowsOutsideTheThresholdsAreTold) {
   Scenario s = learnt_drive(14);
   Simulation log(s);
-  Commissioning result = commission(log, s.robot);
+  Commissioning result = commission_robot(log, s.robot);
   ASSERT_EQ(result.status, Status::done) << result.message;
   const Setting setting = settle(log, s.robot);
   result.validation[0].instants = 1000;
@@ -351,4 +354,4 @@ TEST(AnsweredContradiction, AHeavyRobotIsCommissionedAndTheDefaultPriorIsNamed) 
 }
 
 }  // namespace
-}  // namespace wheelwright::answered_contradictions_test
+}  // namespace wheelwright::commission::answered_contradictions_test

@@ -12,17 +12,21 @@
 
 #include "support/drives.hpp"
 
-namespace wheelwright::assumptions_test {
+namespace wheelwright::commission::assumptions_test {
+
+using core::Warrant;
+using core::weaker;
+
 namespace {
 
 using testing_support::noisy_drive;
-using Verdict = AssumptionVerdict;
+using Verdict = core::AssumptionVerdict;
 
-Commissioning commissioned(const Scenario& scenario, NoiseMode mode = NoiseMode::worst_case) {
+Commissioning commissioned(const Scenario& scenario, filter::NoiseMode mode = filter::NoiseMode::worst_case) {
   Simulation log(scenario);
   CommissionOptions options;
   options.noise_mode = mode;
-  return commission(log, scenario.robot, options);
+  return commission_robot(log, scenario.robot, options);
 }
 
 Scenario undeclared() {
@@ -46,8 +50,8 @@ std::set<Warrant> warrants(const Commissioning& c) {
   return all;
 }
 
-const Assumption& of(const std::vector<Assumption>& list, const std::string& id) {
-  const auto found = std::ranges::find(list, id, &Assumption::id);
+const core::Assumption& of(const std::vector<core::Assumption>& list, const std::string& id) {
+  const auto found = std::ranges::find(list, id, &core::Assumption::id);
   if (found == list.end()) {
     throw Error("no assumption " + id);
   }
@@ -60,11 +64,11 @@ TEST(Warrants, DeclaredBoundsAreGuaranteed) {
 
 TEST(Warrants, BoundsLearntFromTheLogAreExtrapolatedInEitherMode) {
   EXPECT_EQ(warrants(commissioned(undeclared())), (std::set{Warrant::extrapolated}));
-  EXPECT_EQ(warrants(commissioned(undeclared(), NoiseMode::statistical)), (std::set{Warrant::extrapolated}));
+  EXPECT_EQ(warrants(commissioned(undeclared(), filter::NoiseMode::statistical)), (std::set{Warrant::extrapolated}));
 }
 
 TEST(Warrants, DeclaredBoundsAtAConfidenceAreStatistical) {
-  const Commissioning c = commissioned(noisy_drive(1), NoiseMode::statistical);
+  const Commissioning c = commissioned(noisy_drive(1), filter::NoiseMode::statistical);
   EXPECT_EQ(warrants(c), (std::set{Warrant::statistical}));
   EXPECT_EQ(of(c.assumptions, "noise_independent").verdict, Verdict::not_tested);
 }
@@ -96,7 +100,7 @@ TEST(Assumptions, AreTheSameInResultAndModelEachNamedOnce) {
   const Commissioning c = commissioned(noisy_drive(1));
   EXPECT_EQ(c.assumptions, c.model.assumptions);
   std::set<std::string> ids;
-  for (const Assumption& a : c.assumptions) {
+  for (const core::Assumption& a : c.assumptions) {
     EXPECT_TRUE(ids.insert(a.id).second) << a.id;
     EXPECT_TRUE(a.statement.ends_with('.')) << a.statement;
     EXPECT_TRUE(a.verdict == Verdict::not_tested || !a.test.empty()) << a.id << ": a verdict without a test";
@@ -106,7 +110,7 @@ TEST(Assumptions, AreTheSameInResultAndModelEachNamedOnce) {
 // docs/assumptions.md has a row for each that code can list, and the key that declares it.
 TEST(Assumptions, AreInTheirTable) {
   const std::string page =
-      read_bytes(std::filesystem::path(WHEELWRIGHT_SOURCE_DIR) / "docs/assumptions.md", std::size_t{1} << 20);
+      files::read_bytes(std::filesystem::path(WHEELWRIGHT_SOURCE_DIR) / "docs/assumptions.md", std::size_t{1} << 20);
   Scenario limited = noisy_drive(1);
   limited.robot.limits = {{"effort", 1e3}, {"speed", 1e3}, {"acceleration", 1e3}};
   limited.sensors.pose = true;
@@ -116,8 +120,8 @@ TEST(Assumptions, AreInTheirTable) {
   speeds.robot.encoder_counts_per_turn.reset();
   speeds.robot.noise.wheel_speed.value = 0.05;
   for (const Commissioning& c : {commissioned(limited), commissioned(speeds), commissioned(undeclared()),
-                                 commissioned(noisy_drive(1), NoiseMode::statistical)}) {
-    for (const Assumption& a : c.assumptions) {
+                                 commissioned(noisy_drive(1), filter::NoiseMode::statistical)}) {
+    for (const core::Assumption& a : c.assumptions) {
       EXPECT_NE(page.find("| `" + a.id + "` |"), std::string::npos) << a.id;
     }
   }
@@ -127,7 +131,7 @@ TEST(Assumptions, SayHowTheRobotFileDeclaresItsEfforts) {
   Commissioning c;
   c.model.robot.hold = Hold::zero_order;
   EXPECT_NE(of(assumptions_of(c), "effort_hold").statement.find("unknown moment"), std::string::npos);
-  c.model.robot.effort_changes = EffortChanges::at_samples;
+  c.model.robot.effort_changes = model::EffortChanges::at_samples;
   EXPECT_EQ(of(assumptions_of(c), "effort_hold").statement.find("unknown moment"), std::string::npos);
   c.model.robot.hold = Hold::first_order;
   EXPECT_NE(of(assumptions_of(c), "effort_hold").statement.find("straight"), std::string::npos);
@@ -186,4 +190,4 @@ TEST(Assumptions, OfAnEmptySetSomeFail) {
 }
 
 }  // namespace
-}  // namespace wheelwright::assumptions_test
+}  // namespace wheelwright::commission::assumptions_test

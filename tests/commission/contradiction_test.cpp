@@ -11,7 +11,7 @@
 
 #include "support/drives.hpp"
 
-namespace wheelwright::contradiction_test {
+namespace wheelwright::commission::contradiction_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -20,13 +20,13 @@ using testing_support::noisy_drive;
 
 Commissioning commissioned(const Scenario& s, const Robot& robot) {
   Simulation log(s);
-  return commission(log, robot);
+  return commission_robot(log, robot);
 }
 
 // One torque is wrong by ten times what is declared, on top of noise that is as declared.
 TEST(Contradiction, NamesSamplesThatCannotBeTrueTogether) {
   const Scenario s = noisy_drive(4);
-  LogTable table = simulate(s);
+  LogTable table = sim::simulate(s);
   const double declared = *s.robot.noise.effort.value;
   for (double& torque : table.column("tau_r")) {
     torque += 10.0 * declared;
@@ -35,7 +35,7 @@ TEST(Contradiction, NamesSamplesThatCannotBeTrueTogether) {
     Robot robot = s.robot;
     *robot.noise.effort.value *= factor;
     TableSource log(table);
-    return commission(log, robot);
+    return commission_robot(log, robot);
   };
   const Commissioning result = raised(1.0);
   ASSERT_EQ(result.status, Status::empty) << result.message;
@@ -44,8 +44,8 @@ TEST(Contradiction, NamesSamplesThatCannotBeTrueTogether) {
 
   ASSERT_FALSE(result.feasible.contradiction.empty());
   EXPECT_LE(result.feasible.contradiction.size(), 5u);
-  EXPECT_TRUE(proves_empty(result.feasible.contradiction, result.feasible.hull));
-  for (const WeightedRow& row : result.feasible.contradiction) {
+  EXPECT_TRUE(bounds::proves_empty(result.feasible.contradiction, result.feasible.hull));
+  for (const bounds::WeightedRow& row : result.feasible.contradiction) {
     EXPECT_GE(row.multiplier, 0.0);
     if (!row.row.origin.is_prior) {
       ASSERT_LT(row.row.origin.sample, table.rows());
@@ -63,17 +63,17 @@ TEST(Contradiction, NamesSamplesThatCannotBeTrueTogether) {
 
 TEST(Contradiction, AFaultMidwayContradictsTheModel) {
   Scenario s = noisy_drive(5, 30.0);
-  s.faults = {{.kind = Fault::Kind::wheel_radius_left,
+  s.faults = {{.kind = model::Fault::Kind::wheel_radius_left,
                .magnitude = -0.03,
-               .profile = {.shape = TimeProfile::Shape::smooth, .onset = 15.0, .rise_time = 1.0}}};
+               .profile = {.shape = model::TimeProfile::Shape::smooth, .onset = 15.0, .rise_time = 1.0}}};
   const Commissioning result = commissioned(s, s.robot);
   ASSERT_EQ(result.status, Status::empty) << result.message;
-  EXPECT_TRUE(proves_empty(result.feasible.contradiction, result.feasible.hull));
+  EXPECT_TRUE(bounds::proves_empty(result.feasible.contradiction, result.feasible.hull));
 }
 
 TEST(Unexcited, AStraightDriveSaysNothingOfYaw) {
   Scenario s = noisy_drive(6);
-  s.trajectory.kind = Trajectory::Kind::straight;
+  s.trajectory.kind = sim::Trajectory::Kind::straight;
   for (const bool declared : {true, false}) {
     Robot robot = s.robot;
     if (!declared) {
@@ -85,7 +85,7 @@ TEST(Unexcited, AStraightDriveSaysNothingOfYaw) {
     EXPECT_THAT(result.message, HasSubstr("r_viscous_yaw"));
     for (const ParameterResult& p : result.parameters) {
       const bool yaw = p.parameter.physical == "yaw_inertia" || p.parameter.physical == "viscous_yaw";
-      EXPECT_EQ(p.excitation == Excitation::not_excited, yaw) << p.parameter.name;
+      EXPECT_EQ(p.excitation == identify::Excitation::not_excited, yaw) << p.parameter.name;
       EXPECT_EQ(p.estimate.has_value(), !yaw) << p.parameter.name;
       EXPECT_EQ(p.standard_error.has_value(), !yaw) << p.parameter.name;
       if (yaw) {
@@ -100,12 +100,12 @@ TEST(Unexcited, ARobotThatStandsStillSaysNothing) {
   Scenario s = noisy_drive(7);
   s.trajectory.speed = 0.0;
   s.trajectory.yaw_rate = 0.0;
-  s.trajectory.kind = Trajectory::Kind::straight;
+  s.trajectory.kind = sim::Trajectory::Kind::straight;
   const Commissioning result = commissioned(s, s.robot);
   ASSERT_EQ(result.status, Status::nothing) << result.message;
   EXPECT_THAT(result.message, HasSubstr("nothing"));
   for (const ParameterResult& p : result.parameters) {
-    EXPECT_EQ(p.excitation, Excitation::not_excited);
+    EXPECT_EQ(p.excitation, identify::Excitation::not_excited);
     EXPECT_FALSE(p.estimate.has_value());
   }
   EXPECT_TRUE(result.model.facets.empty());
@@ -115,18 +115,18 @@ TEST(Unusable, AShortLogIsRefused) {
   Scenario s = noisy_drive(8, 12.0);
   s.duration = 0.3;
   Simulation log(s);
-  EXPECT_THROW(static_cast<void>(commission(log, s.robot)), InvalidArgument);
+  EXPECT_THROW(static_cast<void>(commission_robot(log, s.robot)), InvalidArgument);
 }
 
 TEST(Unusable, AMissingColumnIsNamed) {
-  const LogTable whole = simulate(noisy_drive(9));
+  const LogTable whole = sim::simulate(noisy_drive(9));
   LogTable table = whole;
   table.names.erase(table.names.begin() + 2);
   table.columns.erase(table.columns.begin() + 2);
   ASSERT_EQ(whole.names[2], "tau_r");
   TableSource log(table);
   try {
-    static_cast<void>(commission(log, noisy_drive(9).robot));
+    static_cast<void>(commission_robot(log, noisy_drive(9).robot));
     FAIL() << "no exception";
   } catch (const InputError& error) {
     EXPECT_THAT(error.what(), HasSubstr("tau_r"));
@@ -134,4 +134,4 @@ TEST(Unusable, AMissingColumnIsNamed) {
 }
 
 }  // namespace
-}  // namespace wheelwright::contradiction_test
+}  // namespace wheelwright::commission::contradiction_test

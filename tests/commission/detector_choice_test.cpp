@@ -14,7 +14,7 @@
 #include "detector/detectability.hpp"
 #include "support/drives.hpp"
 
-namespace wheelwright::detector_choice_test {
+namespace wheelwright::commission::detector_choice_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -113,8 +113,8 @@ TEST(DetectorChoice, BoundsThatMayFailAreNeverWider) {
     ASSERT_EQ(never.candidates[0].failure + hourly.candidates[0].failure, "");
     EXPECT_EQ(never.candidates[0].guarantee, Guarantee::never);
     EXPECT_EQ(hourly.candidates[0].guarantee, Guarantee::hourly);
-    const SignalErrors& wide = never.commissioning->model.errors;
-    const SignalErrors& tight = hourly.commissioning->model.errors;
+    const filter::SignalErrors& wide = never.commissioning->model.errors;
+    const filter::SignalErrors& tight = hourly.commissioning->model.errors;
     EXPECT_TRUE((tight.output.array() <= wide.output.array()).all());
     EXPECT_TRUE((tight.speed.array() <= wide.speed.array()).all());
     EXPECT_TRUE((tight.acceleration.array() <= wide.acceleration.array()).all());
@@ -227,4 +227,4 @@ TEST(DetectorChoice, KeepsWhatItPromises) {
 }
 
 }  // namespace
-}  // namespace wheelwright::detector_choice_test
+}  // namespace wheelwright::commission::detector_choice_test

@@ -7,7 +7,7 @@
 
 #include "support/drives.hpp"
 
-namespace wheelwright::effects_test {
+namespace wheelwright::commission::effects_test {
 namespace {
 
 // Noise inside its declared bounds: the truth is inside the guaranteed ones, and without the effects nothing explains
@@ -18,23 +18,23 @@ TEST(CommissionEffects, TheTruthIsInsideAndTheBasicModelIsRefuted) {
   const Robot plain = s.robot;
   s.robot.effects = {{"coulomb", {{"c", {0.3, 0.3}}}}, {"actuator_lag", {{"T", {0.04, 0.04}}}}};
   Simulation log(s);
-  const Commissioning with = commission(log, s.robot);
+  const Commissioning with = commission_robot(log, s.robot);
   ASSERT_EQ(with.status, Commissioning::Status::done) << with.message;
-  const Eigen::VectorXd truth = true_parameters(s, make_model(s.robot));
+  const Eigen::VectorXd truth = sim::true_parameters(s, model::make_model(s.robot));
   ASSERT_EQ(with.parameters.size(), static_cast<std::size_t>(truth.size()));
   for (std::size_t j = 0; j < with.parameters.size(); ++j) {
     EXPECT_LE(with.parameters[j].lower, truth[static_cast<Eigen::Index>(j)]) << with.parameters[j].parameter.name;
     EXPECT_GE(with.parameters[j].upper, truth[static_cast<Eigen::Index>(j)]) << with.parameters[j].parameter.name;
   }
-  EXPECT_EQ(commission(log, plain).status, Commissioning::Status::empty);
+  EXPECT_EQ(commission_robot(log, plain).status, Commissioning::Status::empty);
 }
 
 TEST(CommissionEffects, WhatALogCannotBeCorrectedForIsRefused) {
   Scenario s = testing_support::noisy_drive(3);
   s.robot.effects = {{"backlash", {{"gap", {0.02, 0.02}}}}};
   Simulation log(s);
-  EXPECT_THROW(static_cast<void>(commission(log, s.robot)), InvalidArgument);
+  EXPECT_THROW(static_cast<void>(commission_robot(log, s.robot)), InvalidArgument);
 }
 
 }  // namespace
-}  // namespace wheelwright::effects_test
+}  // namespace wheelwright::commission::effects_test

@@ -14,7 +14,7 @@
 #include "support/drives.hpp"
 #include "support/random.hpp"
 
-namespace wheelwright::filter_choice_test {
+namespace wheelwright::commission::filter_choice_test {
 namespace {
 
 using testing_support::Autoregression;
@@ -25,7 +25,7 @@ using testing_support::Shown;
 // A commissioning drive with white noise on the speeds and autoregressive noise on the torques.
 struct World {
   Scenario scenario = exact_drive(Shown::speeds, Hold::first_order);
-  Model model = make_model(scenario.robot);
+  Model model = model::make_model(scenario.robot);
   LogTable exact;
   Measurement measurement;
 
@@ -34,7 +34,7 @@ struct World {
     scenario.trajectory.period = duration / 5.0;
     Simulation log(scenario);
     exact = read_all(log);
-    measurement = find_measurement(log, scenario.robot, model, 2);
+    measurement = filter::find_measurement(log, scenario.robot, model, 2);
   }
   [[nodiscard]] LogTable noisy(std::uint64_t seed, double speed, double torque, double phi) const {
     LogTable log = exact;
@@ -144,8 +144,9 @@ TEST(FilterChoice, PredictsTheErrorOfTheEstimate) {
         const LogTable log = world.noisy(10 + static_cast<std::uint64_t>(run), speed_noise, 0.2, 0.5);
         TableSource source(log);
         TorqueRows rows(source, RegressorFilter(world.model, design, world.measurement));
-        const RegressionMoments sums = moments(rows);
-        const Estimate e = ordinary_least_squares(sums, {.weights = efficient_weights(sums), .excluded = {}});
+        const identify::RegressionMoments sums = identify::moments(rows);
+        const identify::Estimate e =
+            identify::ordinary_least_squares(sums, {.weights = identify::efficient_weights(sums), .excluded = {}});
         squares += (e.theta - world.theta()).cwiseAbs2() / runs;
         if (run % 10 == 0) {
           FilterEvaluation evaluate(source, world.model, world.measurement, FilterCriterion::predicted_error,
@@ -231,4 +232,4 @@ TEST(FilterChoice, WidthHoldsEveryResidualOfTheLog) {
 }
 
 }  // namespace
-}  // namespace wheelwright::filter_choice_test
+}  // namespace wheelwright::commission::filter_choice_test

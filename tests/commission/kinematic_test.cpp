@@ -13,7 +13,7 @@
 
 #include "support/kinematic_drives.hpp"
 
-namespace wheelwright::kinematic_test {
+namespace wheelwright::commission::kinematic_test {
 namespace {
 
 using testing_support::posed_drive;
@@ -23,7 +23,7 @@ using Status = KinematicCommissioning::Status;
 
 KinematicCommissioning commissioned(const Scenario& s) {
   Simulation log(s);
-  return commission(log, s.robot).kinematic;
+  return commission_robot(log, s.robot).kinematic;
 }
 
 TEST(Kinematic, TheTruthIsInTheSetUnderDeclaredNoise) {
@@ -33,7 +33,7 @@ TEST(Kinematic, TheTruthIsInTheSetUnderDeclaredNoise) {
     ASSERT_EQ(result.status, Status::done) << result.message;
     ASSERT_FALSE(result.declared_too_small);
     for (const OutputNoise& o : result.noise) {
-      ASSERT_EQ(o.origin, NoiseOrigin::declared);
+      ASSERT_EQ(o.origin, core::NoiseOrigin::declared);
     }
     const Eigen::VectorXd truth = true_kinematics(s.robot);
     for (std::size_t j = 0; j < 4; ++j) {
@@ -45,7 +45,7 @@ TEST(Kinematic, TheTruthIsInTheSetUnderDeclaredNoise) {
       ASSERT_TRUE(p.estimate.has_value());
       EXPECT_NEAR(*p.estimate, value, 0.01 * value) << p.name;
     }
-    for (const HalfSpace& facet : result.model->facets) {
+    for (const bounds::HalfSpace& facet : result.model->facets) {
       EXPECT_LE(facet.a.dot(truth), facet.b);
     }
     ASSERT_EQ(result.validation.size(), 3u);
@@ -61,15 +61,15 @@ TEST(Kinematic, BoundsAreEstimatedWhereNoiseIsNotDeclared) {
   s.robot.noise.position.value.reset();
   const KinematicCommissioning heading_only = commissioned(s);
   ASSERT_EQ(heading_only.status, Status::done) << heading_only.message;
-  EXPECT_EQ(heading_only.noise[0].origin, NoiseOrigin::estimated);
-  EXPECT_EQ(heading_only.noise[1].origin, NoiseOrigin::estimated);
-  EXPECT_EQ(heading_only.noise[2].origin, NoiseOrigin::declared);
+  EXPECT_EQ(heading_only.noise[0].origin, core::NoiseOrigin::estimated);
+  EXPECT_EQ(heading_only.noise[1].origin, core::NoiseOrigin::estimated);
+  EXPECT_EQ(heading_only.noise[2].origin, core::NoiseOrigin::declared);
   s.robot.noise.heading.value.reset();
   const KinematicCommissioning none = commissioned(s);
   ASSERT_EQ(none.status, Status::done) << none.message;
   const Eigen::VectorXd truth = true_kinematics(s.robot);
   for (std::size_t i = 0; i < 3; ++i) {
-    EXPECT_EQ(none.noise[i].origin, NoiseOrigin::estimated);
+    EXPECT_EQ(none.noise[i].origin, core::NoiseOrigin::estimated);
     EXPECT_GE(none.noise[i].bound, none.noise[i].learning);
   }
   for (std::size_t j = 0; j < 4; ++j) {
@@ -81,19 +81,19 @@ TEST(Kinematic, BoundsAreEstimatedWhereNoiseIsNotDeclared) {
 // A heading that comes late, which no yaw gain explains.
 TEST(Kinematic, SaysWhenTheDeclaredNoiseIsTooSmall) {
   Scenario s = posed_drive(5);
-  LogTable log = simulate(s);
+  LogTable log = sim::simulate(s);
   double late = 0.0;
   for (double& heading : log.column("theta")) {  // by 0.3 s
     late += 0.03 * (heading - late);
     heading = late;
   }
   TableSource source(log);
-  const KinematicCommissioning result = commission(source, s.robot).kinematic;
+  const KinematicCommissioning result = commission_robot(source, s.robot).kinematic;
   ASSERT_EQ(result.status, Status::done) << result.message;
   EXPECT_TRUE(result.declared_too_small);
   EXPECT_NE(result.message.find("declared noise"), std::string::npos);
   for (const OutputNoise& o : result.noise) {
-    EXPECT_EQ(o.origin, NoiseOrigin::estimated);
+    EXPECT_EQ(o.origin, core::NoiseOrigin::estimated);
     EXPECT_GT(o.bound, 0.0);
   }
 }
@@ -102,7 +102,7 @@ TEST(Kinematic, IsAbsentWithoutAPose) {
   Scenario s = posed_drive(6);
   s.sensors.pose = false;
   Simulation log(s);
-  const Commissioning result = commission(log, s.robot);
+  const Commissioning result = commission_robot(log, s.robot);
   EXPECT_EQ(result.kinematic.status, Status::absent);
   EXPECT_FALSE(result.model.kinematic.has_value());
   EXPECT_NE(result.kinematic.message.find("gyro_z"), std::string::npos);
@@ -112,7 +112,7 @@ TEST(Kinematic, IsAbsentWithoutAPose) {
 // Odometry as a base driver publishes it, from the same encoder: margins on it would be those of a perfect sensor.
 TEST(Kinematic, APoseFromTheWheelsIsNoMeasurementOfItsOwn) {
   const Scenario s = posed_drive(11);
-  LogTable log = simulate(s);
+  LogTable log = sim::simulate(s);
   const double r = s.robot.wheel_radius, gain = r / s.robot.track_width;
   const std::vector<double>&right = log.column("phi_r"), &left = log.column("phi_l");
   std::vector<double>&x = log.column("x"), &y = log.column("y"), &theta = log.column("theta");
@@ -125,7 +125,7 @@ TEST(Kinematic, APoseFromTheWheelsIsNoMeasurementOfItsOwn) {
       y[k] = y[k - 1] + 0.5 * r * (a + b) * std::sin(0.5 * (theta[k] + theta[k - 1]));
     }
     TableSource source(log);
-    return commission(source, s.robot);
+    return commission_robot(source, s.robot);
   };
   const Commissioning all = integrate(true);
   EXPECT_EQ(all.kinematic.status, Status::absent);
@@ -156,7 +156,7 @@ TEST(Kinematic, AHealthyRobotRaisesNoAlarm) {
     Scenario s = posed_drive(seed);
     const KinematicCommissioning result = commissioned(s);
     s.seed = 100 + seed;
-    s.trajectory.kind = Trajectory::Kind::multi_sine;
+    s.trajectory.kind = sim::Trajectory::Kind::multi_sine;
     Simulation drive(s);
     const Detection d = detect(drive, make_detector(*result.model));
     EXPECT_GT(d.instants, 500u);
@@ -168,18 +168,18 @@ TEST(Kinematic, AHealthyRobotRaisesNoAlarm) {
 TEST(Kinematic, SeesLateralSlipThatTheTorqueCannot) {
   Scenario learn = posed_drive(8);
   Simulation learning(learn);
-  const Commissioning result = commission(learning, learn.robot);
+  const Commissioning result = commission_robot(learning, learn.robot);
   ASSERT_TRUE(result.model.kinematic.has_value());
 
   Scenario slip = straight_drive(9, 20.0);
   const double onset = 10.0, window = result.model.kinematic->window;
-  slip.faults = {{.kind = Fault::Kind::unmatched, .magnitude = 0.05, .profile = {.onset = onset}}};
+  slip.faults = {{.kind = model::Fault::Kind::unmatched, .magnitude = 0.05, .profile = {.onset = onset}}};
   Simulation log(slip);
   const Detection torque = detect(log, make_detector(result.model));
   EXPECT_TRUE(torque.events.empty());
   const Detection kinematic = detect(log, make_detector(*result.model.kinematic));
   ASSERT_FALSE(kinematic.events.empty());
-  const Event& first = kinematic.events.front();
+  const detector::Event& first = kinematic.events.front();
   EXPECT_EQ(first.output, 1u);  // lateral
   EXPECT_GT(first.start, onset);
   // |ρ_U| W = 5 cm exceeds the width of the threshold.
@@ -203,4 +203,4 @@ TEST(Kinematic, SaysHowLongTheWindowIs) {
 }
 
 }  // namespace
-}  // namespace wheelwright::kinematic_test
+}  // namespace wheelwright::commission::kinematic_test

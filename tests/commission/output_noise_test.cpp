@@ -3,11 +3,11 @@
 
 #include <wheelwright/commission/noise_budget.hpp>
 
-namespace wheelwright {
+namespace wheelwright::commission {
 namespace {
 
 TEST(OutputNoise, AConvergedFitTellsTheFactor) {
-  MinimaxFit fit;
+  bounds::MinimaxFit fit;
   fit.converged = true;
   fit.lower = 1.4999, fit.upper = 1.5;
   EXPECT_DOUBLE_EQ(noise_that_leaves_a_set(fit,
@@ -24,7 +24,7 @@ TEST(OutputNoise, AFitThatStoppedEarlyIsFinished) {
   const auto leaves = [](double factor) { return factor >= kTruth; };
   for (const double lower : {0.2, 1.0, 1.3}) {
     for (const double upper : {1.6, 9.02, 1e6}) {
-      MinimaxFit fit;
+      bounds::MinimaxFit fit;
       fit.converged = false;
       fit.lower = lower, fit.upper = upper;
       const double factor = noise_that_leaves_a_set(fit, leaves);
@@ -35,4 +35,4 @@ TEST(OutputNoise, AFitThatStoppedEarlyIsFinished) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::commission

@@ -9,14 +9,14 @@
 
 #include "support/drives.hpp"
 
-namespace wheelwright::recovery_test {
+namespace wheelwright::commission::recovery_test {
 namespace {
 
 using testing_support::exact_drive;
 using testing_support::filter_of;
 using testing_support::Shown;
 
-Eigen::VectorXd truth_of(const Scenario& s) { return true_parameters(s, make_model(s.robot)); }
+Eigen::VectorXd truth_of(const Scenario& s) { return sim::true_parameters(s, model::make_model(s.robot)); }
 
 // The estimate from the log of `driven`, read as `reader` says.
 Eigen::VectorXd identified(const Scenario& driven, const Scenario& reader, int order) {
@@ -91,10 +91,10 @@ TEST(Recovery, CommissioningGivesTheSameAndBoundsTheTruth) {
       Simulation log(s);
       if (shown == Shown::mean_speeds) {
         s.robot.hold = Hold::first_order;
-        s.robot.effort_changes = EffortChanges::between;
+        s.robot.effort_changes = model::EffortChanges::between;
       }
       s.robot.noise.wheel_angle.value = s.robot.noise.wheel_speed.value = s.robot.noise.effort.value = 0.0;
-      const Commissioning result = commission(log, s.robot);
+      const Commissioning result = commission_robot(log, s.robot);
       ASSERT_EQ(result.status, Commissioning::Status::done) << result.message;
       const Eigen::VectorXd truth = truth_of(s);
       for (std::size_t j = 0; j < result.parameters.size(); ++j) {
@@ -112,4 +112,4 @@ TEST(Recovery, CommissioningGivesTheSameAndBoundsTheTruth) {
 }
 
 }  // namespace
-}  // namespace wheelwright::recovery_test
+}  // namespace wheelwright::commission::recovery_test

@@ -9,7 +9,7 @@
 
 #include "support/drives.hpp"
 
-namespace wheelwright::slow_guarantee_test {
+namespace wheelwright::commission::slow_guarantee_test {
 namespace {
 
 using testing_support::noisy_drive;
@@ -26,7 +26,7 @@ Scenario varied_drive(std::uint64_t seed, double duration) {
                   .viscous_x = vary(13, 1.0, 10.0),
                   .viscous_yaw = vary(17, 0.1, 1.5)};
   s.parameters.viscous_y = s.parameters.viscous_x;
-  s.trajectory.kind = seed % 3 == 0 ? Trajectory::Kind::multi_sine : Trajectory::Kind::commissioning;
+  s.trajectory.kind = seed % 3 == 0 ? sim::Trajectory::Kind::multi_sine : sim::Trajectory::Kind::commissioning;
   s.sensors.noise = testing_support::kNoiseShapes[seed / 2 % 3];
   s.robot.hold = seed % 5 < 3 ? Hold::zero_order : Hold::first_order;
   return s;
@@ -36,11 +36,11 @@ void expect_truth_inside(std::uint64_t first, std::uint64_t last, const Commissi
   for (std::uint64_t seed = first; seed < last; ++seed) {
     const Scenario s = varied_drive(seed, 8.0 + static_cast<double>(seed % 5));
     Simulation log(s);
-    const Commissioning result = commission(log, s.robot, options);
+    const Commissioning result = commission_robot(log, s.robot, options);
     ASSERT_EQ(result.status, Commissioning::Status::done) << "seed " << seed << ": " << result.message;
-    ASSERT_EQ(result.noise[0].origin, NoiseOrigin::declared);
-    const Eigen::VectorXd truth = true_parameters(s, result.model.model);
-    for (const HalfSpace& facet : result.model.facets) {
+    ASSERT_EQ(result.noise[0].origin, core::NoiseOrigin::declared);
+    const Eigen::VectorXd truth = sim::true_parameters(s, result.model.model);
+    for (const bounds::HalfSpace& facet : result.model.facets) {
       ASSERT_LE(facet.a.dot(truth), facet.b) << "seed " << seed;
     }
     for (std::size_t j = 0; j < result.parameters.size(); ++j) {
@@ -64,7 +64,7 @@ INSTANTIATE_TEST_SUITE_P(Fifths, SlowGuaranteePart, ::testing::Range<std::uint64
 
 TEST(SlowGuarantee, TheTruthIsInTheStatisticalSetInTwoHundredRuns) {
   CommissionOptions options;
-  options.noise_mode = NoiseMode::statistical;
+  options.noise_mode = filter::NoiseMode::statistical;
   expect_truth_inside(2000, 2200, options);
 }
 
@@ -103,10 +103,10 @@ TEST(SlowGuarantee, TenMillionSamplesWithoutAnAlarm) {
   for (std::uint64_t robot = 1; robot <= 10; ++robot) {
     const Scenario learned = varied_drive(robot, 20.0);
     Simulation log(learned);
-    const Commissioning result = commission(log, learned.robot);
+    const Commissioning result = commission_robot(log, learned.robot);
     ASSERT_EQ(result.status, Commissioning::Status::done) << result.message;
-    constexpr std::array kinds = {Trajectory::Kind::figure_eight, Trajectory::Kind::multi_sine, Trajectory::Kind::stops,
-                                  Trajectory::Kind::commissioning};
+    constexpr std::array kinds = {sim::Trajectory::Kind::figure_eight, sim::Trajectory::Kind::multi_sine,
+                                  sim::Trajectory::Kind::stops, sim::Trajectory::Kind::commissioning};
     for (std::size_t k = 0; k < kinds.size(); ++k) {
       Scenario drive = learned;
       drive.seed = 1000 * robot + k;
@@ -122,4 +122,4 @@ TEST(SlowGuarantee, TenMillionSamplesWithoutAnAlarm) {
 }
 
 }  // namespace
-}  // namespace wheelwright::slow_guarantee_test
+}  // namespace wheelwright::commission::slow_guarantee_test

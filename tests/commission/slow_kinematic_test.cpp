@@ -11,7 +11,7 @@
 
 #include "support/kinematic_drives.hpp"
 
-namespace wheelwright::slow_kinematic_test {
+namespace wheelwright::commission::slow_kinematic_test {
 namespace {
 
 using testing_support::posed_drive;
@@ -30,7 +30,7 @@ Scenario varied_drive(std::uint64_t seed, double duration) {
   s.sensors.heading = s.robot.noise.heading.value.emplace(vary(17, 0.0, 0.01));
   s.robot.kinematic_window = vary(19, 0.2, 1.5);
   s.sensors.noise = testing_support::kNoiseShapes[seed / 2 % 3];
-  s.trajectory.kind = seed % 3 == 0 ? Trajectory::Kind::multi_sine : Trajectory::Kind::commissioning;
+  s.trajectory.kind = seed % 3 == 0 ? sim::Trajectory::Kind::multi_sine : sim::Trajectory::Kind::commissioning;
   return s;
 }
 
@@ -41,15 +41,15 @@ TEST_P(SlowKinematicPart, TheTruthIsInTheSetAndAHealthyRobotRaisesNoAlarm) {
   for (std::uint64_t seed = 50 * GetParam(); seed < 50 * GetParam() + 50; ++seed) {
     Scenario s = varied_drive(seed, 15.0);
     Simulation learning(s);
-    const Commissioning result = commission(learning, s.robot);
+    const Commissioning result = commission_robot(learning, s.robot);
     ASSERT_TRUE(result.model.kinematic.has_value()) << "seed " << seed << ": " << result.kinematic.message;
     ASSERT_FALSE(result.kinematic.declared_too_small) << "seed " << seed;
     const Eigen::VectorXd truth = true_kinematics(s.robot);
-    for (const HalfSpace& facet : result.model.kinematic->facets) {
+    for (const bounds::HalfSpace& facet : result.model.kinematic->facets) {
       ASSERT_LE(facet.a.dot(truth), facet.b) << "seed " << seed;
     }
     s.seed = seed + 10000;
-    s.trajectory.kind = static_cast<Trajectory::Kind>(seed % 6);
+    s.trajectory.kind = static_cast<sim::Trajectory::Kind>(seed % 6);
     Simulation drive(s);
     const Detection d = detect(drive, make_detector(*result.model.kinematic));
     ASSERT_TRUE(d.events.empty()) << "seed " << seed << ", output " << d.events.front().output << " at "
@@ -68,13 +68,13 @@ TEST(SlowKinematic, LateralSlipIsSeenWithinAWindowWhereItMustBe) {
   for (std::uint64_t seed = 0; seed < 60; ++seed) {
     const Scenario learn = varied_drive(seed, 15.0);
     Simulation learning(learn);
-    const Commissioning result = commission(learning, learn.robot);
+    const Commissioning result = commission_robot(learning, learn.robot);
     ASSERT_TRUE(result.model.kinematic.has_value());
     Scenario s = learn;
     s.trajectory = straight_drive(seed, 20.0).trajectory;
     s.seed = seed + 500;
     const double slip = (seed % 2 == 0 ? 1.0 : -1.0) * (0.005 + 0.001 * static_cast<double>(seed)), onset = 8.0;
-    s.faults = {{.kind = Fault::Kind::unmatched, .magnitude = slip, .profile = {.onset = onset}}};
+    s.faults = {{.kind = model::Fault::Kind::unmatched, .magnitude = slip, .profile = {.onset = onset}}};
     Simulation log(s);
     ASSERT_TRUE(detect(log, make_detector(result.model)).events.empty()) << "torque, seed " << seed;
     const double window = result.model.kinematic->window;
@@ -87,7 +87,7 @@ TEST(SlowKinematic, LateralSlipIsSeenWithinAWindowWhereItMustBe) {
       }
     }
     double first = std::numeric_limits<double>::infinity();
-    for (const Event& e : d.events) {
+    for (const detector::Event& e : d.events) {
       ASSERT_GT(e.start, onset) << "seed " << seed;
       first = e.output == 1 ? std::min(first, e.alarm) : first;
     }
@@ -103,4 +103,4 @@ TEST(SlowKinematic, LateralSlipIsSeenWithinAWindowWhereItMustBe) {
 }
 
 }  // namespace
-}  // namespace wheelwright::slow_kinematic_test
+}  // namespace wheelwright::commission::slow_kinematic_test

@@ -18,7 +18,7 @@
 
 #include "support/skip.hpp"
 
-namespace wheelwright::slow_recordings_test {
+namespace wheelwright::commission::slow_recordings_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -53,9 +53,10 @@ TEST_F(SlowRecordings, HealthyBaselinesRaiseNoEventInTheirSecondHalf) {
     const Robot robot = read_robot(entry.path() / "robot.yaml");
     CsvLog file({entry.path() / "baseline.csv.gz"});
     const LogTable table = read_all(file);
-    const LogTable first = slice(table, 0, table.rows() / 2), second = slice(table, table.rows() / 2, table.rows());
+    const LogTable first = core::slice(table, 0, table.rows() / 2),
+                   second = core::slice(table, table.rows() / 2, table.rows());
     TableSource learning(first), watching(second);
-    const Commissioning result = commission(learning, robot);
+    const Commissioning result = commission_robot(learning, robot);
     ASSERT_EQ(result.status, Commissioning::Status::done) << name << ": " << result.message;
     const Detection detection = detect(watching, make_detector(result.model));
     EXPECT_GT(detection.instants, second.rows() / 2) << name;
@@ -73,7 +74,7 @@ TEST_F(SlowRecordings, LumpedMassAndInertiaOfTheBaselinesAreThoseOfTheRobotFile)
     const std::string name = entry.path().filename();
     const Robot robot = read_robot(entry.path() / "robot.yaml");
     CsvLog log({entry.path() / "baseline.csv.gz"});
-    const Commissioning result = commission(log, robot);
+    const Commissioning result = commission_robot(log, robot);
     ASSERT_EQ(result.status, Commissioning::Status::done) << name << ": " << result.message;
     for (const char* physical : {"mass", "yaw_inertia"}) {
       const ParameterResult& p = parameter(result, physical);
@@ -88,7 +89,7 @@ TEST_F(SlowRecordings, LumpedMassAndInertiaOfTheBaselinesAreThoseOfTheRobotFile)
 // Janot, Gautier and Brunot (2019) publish these values for the linear axis.
 TEST_F(SlowRecordings, TheElectroMechanicalAxisIsIdentifiedFromPositionsAlone) {
   CsvLog log({root / "data/emps/emps.csv"});
-  const Commissioning result = commission(log, read_robot(root / "data/emps.yaml"));
+  const Commissioning result = commission_robot(log, read_robot(root / "data/emps.yaml"));
   ASSERT_EQ(result.status, Commissioning::Status::done) << result.message;
   struct Published {
     const char* name;
@@ -108,24 +109,26 @@ TEST_F(SlowRecordings, TheElectroMechanicalAxisIsIdentifiedFromPositionsAlone) {
 // authors report that the model explains 99.8 % of the force's variation, a relative error of 0.045.
 TEST_F(SlowRecordings, IntervalsOfTheAxisHoldAllPublishedValues) {
   const Robot robot = read_robot(root / "data/emps.yaml");
-  CsvOptions reader;
+  logs::CsvOptions reader;
   reader.only = {"t", "position", "effort"};
   CsvLog log({root / "data/emps/emps.csv"}, reader);
-  IdentificationOptions options;
+  inference::IdentificationOptions options;
   options.shapes = false;
-  const Identification result = identify(log, robot, options);
+  const inference::Identification result = inference::identify(log, robot, options);
   const std::map<std::string, double> published = {
       {"inertia", 95.1089}, {"viscous", 203.5034}, {"coulomb", 20.3935}, {"offset", -3.1648}};
   ASSERT_EQ(result.setting.model.p(), published.size());
-  for (const RegionRow& row : result.regions.rows) {
+  for (const inference::RegionRow& row : result.regions.rows) {
     ASSERT_TRUE(row.available) << row.remark;
     for (std::size_t j = 0; j < published.size(); ++j) {
       const std::string& name = result.setting.model.parameters[j].physical;
-      EXPECT_LE(row.lower[static_cast<Eigen::Index>(j)], published.at(name)) << name << ", " << to_string(row.method);
-      EXPECT_GE(row.upper[static_cast<Eigen::Index>(j)], published.at(name)) << name << ", " << to_string(row.method);
+      EXPECT_LE(row.lower[static_cast<Eigen::Index>(j)], published.at(name))
+          << name << ", " << inference::to_string(row.method);
+      EXPECT_GE(row.upper[static_cast<Eigen::Index>(j)], published.at(name))
+          << name << ", " << inference::to_string(row.method);
     }
   }
-  const Commissioning commissioned = commission(log, robot);
+  const Commissioning commissioned = commission_robot(log, robot);
   ASSERT_EQ(commissioned.validation.size(), 1U);
   EXPECT_GT(commissioned.validation[0].instants, 1000U);
   EXPECT_LT(commissioned.validation[0].nrmse, 0.05);
@@ -142,7 +145,7 @@ TEST_F(SlowRecordings, EveryRobotOfTheFleetGivesAModelOrSaysWhatContradictsIt) {
     ++runs;
     const std::string name = entry.path().filename();
     CsvLog log({entry.path()});
-    const Commissioning result = commission(log, robot);
+    const Commissioning result = commission_robot(log, robot);
     const bool withdrawn = std::ranges::any_of(result.contradictions, &LogContradiction::withdraws);
     EXPECT_EQ(result.status == Commissioning::Status::contradicted, withdrawn) << name << ": " << result.message;
     if (withdrawn) {
@@ -205,4 +208,4 @@ TEST_F(SlowRecordings, NoHealthyBaselineIsContradictedAndEveryLateOneIs) {
 }
 
 }  // namespace
-}  // namespace wheelwright::slow_recordings_test
+}  // namespace wheelwright::commission::slow_recordings_test

@@ -11,7 +11,7 @@
 
 #include "support/drives.hpp"
 
-namespace wheelwright::trace_test {
+namespace wheelwright::commission::trace_test {
 namespace {
 
 using testing_support::noisy_drive;
@@ -24,10 +24,10 @@ struct World {
   World() {
     const Scenario healthy = noisy_drive(1, 15.0);
     Simulation log(healthy);
-    learned = commission(log, healthy.robot);
-    faulty.faults = {{.kind = Fault::Kind::wheel_radius_left, .magnitude = -0.03, .profile = {.onset = 16.0}}};
+    learned = commission_robot(log, healthy.robot);
+    faulty.faults = {{.kind = model::Fault::Kind::wheel_radius_left, .magnitude = -0.03, .profile = {.onset = 16.0}}};
     faulty.gaps = {{9.0, 9.7}};
-    table = simulate(faulty);
+    table = sim::simulate(faulty);
   }
 };
 
@@ -53,7 +53,7 @@ TEST(Detect, GivesTheDecisionsOfTheStreamBitForBit) {
     ASSERT_LT(instants, all.trace.t.size());
     ASSERT_EQ(all.trace.t[instants], world.table.t[k]);
     for (std::size_t i = 0; i < 2; ++i) {
-      const ChannelDecision& c = d.channels[i];
+      const detector::ChannelDecision& c = d.channels[i];
       const OutputTrace& trace = all.trace.outputs[i];
       ASSERT_EQ(trace.residual_low[instants], c.residual);
       ASSERT_EQ(trace.residual_high[instants], c.residual);
@@ -123,4 +123,4 @@ TEST(Detect, ALogWithoutTheColumnsIsRefused) {
 }
 
 }  // namespace
-}  // namespace wheelwright::trace_test
+}  // namespace wheelwright::commission::trace_test

@@ -20,7 +20,7 @@ int main() {
   table.names = {"omega_r"};
   table.columns = {{1.0, 2.0}};
   table.t = {0.0, 0.5};
-  if (wheelwright::median_step(table.t) != 0.5) {
+  if (wheelwright::core::median_step(table.t) != 0.5) {
     return EXIT_FAILURE;
   }
   try {

@@ -11,7 +11,7 @@
 
 #include "support/random.hpp"
 
-namespace wheelwright::interval_test {
+namespace wheelwright::core::interval_test {
 namespace {
 
 using Rational = boost::multiprecision::cpp_rational;
@@ -81,4 +81,4 @@ TEST(Check, NaNFails) {
 }
 
 }  // namespace
-}  // namespace wheelwright::interval_test
+}  // namespace wheelwright::core::interval_test

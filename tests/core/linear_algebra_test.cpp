@@ -7,7 +7,7 @@
 
 #include <wheelwright/core/linear_algebra.hpp>
 
-namespace wheelwright {
+namespace wheelwright::core {
 namespace {
 
 using Eigen::Index;
@@ -154,4 +154,4 @@ TEST(LinearAlgebra, TrianglesDoNotReadTheOtherSide) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::core

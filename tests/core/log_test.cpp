@@ -8,7 +8,7 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/core/log.hpp>
 
-namespace wheelwright::log_test {
+namespace wheelwright::core::log_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -107,4 +107,4 @@ TEST(LogTable, KnowsItsColumns) {
 }
 
 }  // namespace
-}  // namespace wheelwright::log_test
+}  // namespace wheelwright::core::log_test

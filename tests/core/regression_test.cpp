@@ -11,7 +11,7 @@
 #include "support/random.hpp"
 #include "support/rows.hpp"
 
-namespace wheelwright::regression_test {
+namespace wheelwright::core::regression_test {
 namespace {
 
 using testing_support::block_of;
@@ -31,7 +31,7 @@ struct Stream {
   LogTable table = [] {
     Scenario s = noisy_drive(1, 10.0);
     s.gaps = {{4.0, 5.0}};
-    return simulate(s);
+    return sim::simulate(s);
   }();
   std::unique_ptr<TableSource> log;
 
@@ -41,28 +41,28 @@ struct Stream {
   }
 };
 
-template <Part part>
+template <commission::Part part>
 struct Folded {
   Stream stream;
   std::unique_ptr<RegressionSource> rows;
 
   std::unique_ptr<RegressionSource> make(std::size_t block_rows) {
     rows = stream.make(block_rows);
-    return std::make_unique<FoldedSource>(*rows, part, stream.table.rows(), FoldOptions{});
+    return std::make_unique<commission::FoldedSource>(*rows, part, stream.table.rows(), commission::FoldOptions{});
   }
 };
 
-using Sources =
-    ::testing::Types<Table, Stream, Folded<Part::everything>, Folded<Part::training>, Folded<Part::held_out>>;
+using Sources = ::testing::Types<Table, Stream, Folded<commission::Part::everything>,
+                                 Folded<commission::Part::training>, Folded<commission::Part::held_out>>;
 
 }  // namespace
-}  // namespace wheelwright::regression_test
+}  // namespace wheelwright::core::regression_test
 
 namespace wheelwright::testing_support {
-INSTANTIATE_TYPED_TEST_SUITE_P(AllSources, RegressionSourceLaws, regression_test::Sources);
+INSTANTIATE_TYPED_TEST_SUITE_P(AllSources, RegressionSourceLaws, core::regression_test::Sources);
 }  // namespace wheelwright::testing_support
 
-namespace wheelwright::regression_test {
+namespace wheelwright::core::regression_test {
 namespace {
 
 TEST(RegressionTable, RefusesWhatIsNoRegression) {
@@ -87,8 +87,9 @@ TEST(Folds, PartsAreDisjointContiguousAndPurged) {
   Random random(2);
   constexpr std::size_t instants = 1000;
   RegressionTable table(block_of(random.matrix(instants, 2), random.matrix(instants, 1), 1));
-  const FoldOptions options{.blocks = 10, .hold_out_every = 3, .purge = 0.25};
-  FoldedSource training(table, Part::training, instants, options), held(table, Part::held_out, instants, options);
+  const commission::FoldOptions options{.blocks = 10, .hold_out_every = 3, .purge = 0.25};
+  commission::FoldedSource training(table, commission::Part::training, instants, options),
+      held(table, commission::Part::held_out, instants, options);
   const std::vector<std::size_t> learnt = read_all(training).sample, unseen = read_all(held).sample;
   std::vector<std::size_t> expected_learnt, expected_unseen;
   for (std::size_t k = 0; k < instants; ++k) {
@@ -104,11 +105,12 @@ TEST(Folds, PartsAreDisjointContiguousAndPurged) {
 
 TEST(Folds, MisuseIsRefused) {
   RegressionTable table(block_of(Eigen::MatrixXd::Ones(10, 1), Eigen::VectorXd::Ones(10), 1));
-  for (const FoldOptions& bad : {FoldOptions{.blocks = 1}, FoldOptions{.hold_out_every = 1},
-                                 FoldOptions{.blocks = 3, .hold_out_every = 4}, FoldOptions{.purge = -1.0}}) {
-    EXPECT_THROW(FoldedSource(table, Part::training, 10, bad), InvalidArgument);
+  for (const commission::FoldOptions& bad :
+       {commission::FoldOptions{.blocks = 1}, commission::FoldOptions{.hold_out_every = 1},
+        commission::FoldOptions{.blocks = 3, .hold_out_every = 4}, commission::FoldOptions{.purge = -1.0}}) {
+    EXPECT_THROW(commission::FoldedSource(table, commission::Part::training, 10, bad), InvalidArgument);
   }
 }
 
 }  // namespace
-}  // namespace wheelwright::regression_test
+}  // namespace wheelwright::core::regression_test

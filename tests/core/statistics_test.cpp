@@ -8,7 +8,7 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/core/statistics.hpp>
 
-namespace wheelwright {
+namespace wheelwright::core {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -95,4 +95,4 @@ TEST(Holm, IsTheTextbookExample) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::core

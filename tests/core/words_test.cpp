@@ -3,7 +3,7 @@
 
 #include <wheelwright/core/words.hpp>
 
-namespace wheelwright {
+namespace wheelwright::core {
 namespace {
 
 TEST(Words, AreListed) {
@@ -24,4 +24,4 @@ TEST(NaturalOrder, CountsAsPeopleDo) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::core

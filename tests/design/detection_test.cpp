@@ -13,7 +13,7 @@
 #include "design/robots.hpp"
 #include "support/drives.hpp"
 
-namespace wheelwright::detection_test {
+namespace wheelwright::design::detection_test {
 namespace {
 
 using testing_support::noisy_drive;
@@ -27,7 +27,7 @@ Prepared prepared() {
   Scenario s = noisy_drive(4, 20.0);
   s.robot.limits = {{"speed", 8.0}, {"acceleration", 20.0}, {"effort", 6.0}};
   Simulation log(s);
-  return {s, commission(log, s.robot).model};
+  return {s, commission_robot(log, s.robot).model};
 }
 
 MotionLimits limits(const Robot& robot) {
@@ -38,10 +38,10 @@ MotionLimits limits(const Robot& robot) {
 }
 
 // Of the model's detector for `plan`.
-double promised(const Prepared& p, const Plan& plan, Persistence persistence, const InspectedFault& fault) {
+double promised(const Prepared& p, const Plan& plan, detector::Persistence persistence, const InspectedFault& fault) {
   DesignSubject subject = subject_of(p.model);
   subject.errors = p.model.errors;
-  const ThresholdRule rule(Polytope(p.model.facets, p.model.box), p.model.estimate);
+  const detector::ThresholdRule rule(Polytope(p.model.facets, p.model.box), p.model.estimate);
   return promised_faults(plan, subject, rule, {fault}, persistence).front().smallest;
 }
 
@@ -49,15 +49,15 @@ double promised(const Prepared& p, const Plan& plan, Persistence persistence, co
 double first_alarm(const Prepared& p, const Plan& plan, const PromisedFault& fault, double size) {
   Scenario s = p.scenario;
   s.trajectory = {};
-  s.trajectory.kind = Trajectory::Kind::table;
+  s.trajectory.kind = sim::Trajectory::Kind::table;
   for (Eigen::Index k = 0; k < plan.samples(); ++k) {
     s.trajectory.table.t.push_back(plan.t(k));
     s.trajectory.table.speed.push_back(plan.speed.col(k));
   }
   s.duration = plan.t(plan.samples() - 1);
   s.seed = 91;
-  const Fault::Kind kind =
-      fault.fault.name == "wheel_radius" ? Fault::Kind::wheel_radius : Fault::Kind::wheel_radius_right;
+  const model::Fault::Kind kind =
+      fault.fault.name == "wheel_radius" ? model::Fault::Kind::wheel_radius : model::Fault::Kind::wheel_radius_right;
   if (size > 0.0) {
     s.faults = {{.kind = kind, .magnitude = fault.side * size * s.robot.wheel_radius, .profile = {.onset = -1.0}}};
   }
@@ -68,7 +68,7 @@ double first_alarm(const Prepared& p, const Plan& plan, const PromisedFault& fau
     pick.push_back(log.find(name).value());
   }
   std::vector<double> sample(pick.size());
-  double first = kInfinity;
+  double first = core::kInfinity;
   LogBlock block;
   while (log.next(block)) {
     for (std::size_t k = 0; k < block.rows(); ++k) {
@@ -115,7 +115,7 @@ TEST(Detection, AnInspectionBeatsTheFigureEightAndKeepsItsPromise) {
               design.manoeuvre.plan.t(design.manoeuvre.plan.samples() - 1))
         << fault.fault.name << " " << fault.side * fault.smallest;
   }
-  EXPECT_EQ(first_alarm(p, design.manoeuvre.plan, design.promised[0], 0.0), kInfinity);
+  EXPECT_EQ(first_alarm(p, design.manoeuvre.plan, design.promised[0], 0.0), core::kInfinity);
 }
 
 TEST(Detection, WhatCannotBeCertainHasASlope) {
@@ -125,11 +125,11 @@ TEST(Detection, WhatCannotBeCertainHasASlope) {
   faults.resize(1);
   // Too slow, ahead and in turning, for any radius of this range to be certain: the faster plan is nearer to it.
   faults[0].fault.range = {0.0, 0.02};
-  const ThresholdRule rule(Polytope(p.model.facets, p.model.box), p.model.estimate);
+  const detector::ThresholdRule rule(Polytope(p.model.facets, p.model.box), p.model.estimate);
   const PlanObjective objective = certain_detection(subject, rule, faults);
   const Plan slow = plan_of(FigureEight{0.05, 12.0}, subject, 6.0, 0.02),
              fast = plan_of(FigureEight{0.2, 6.0}, subject, 6.0, 0.02);
-  EXPECT_EQ(promised_faults(slow, subject, rule, faults)[0].smallest, kInfinity);
+  EXPECT_EQ(promised_faults(slow, subject, rule, faults)[0].smallest, core::kInfinity);
   EXPECT_GT(objective(slow), 1e6);
   EXPECT_LT(objective(fast), objective(slow));
   EXPECT_THROW(static_cast<void>(promised_faults(slow, subject, rule, {})), InvalidArgument);
@@ -142,7 +142,7 @@ TEST(Detection, PersistenceCosts) {
   const Plan plan = plan_of(FigureEight{0.2, 4.0}, subject_of(p.model), 6.0, 0.02);
   const double once = promised(p, plan, {1, 1}, fault), some = promised(p, plan, {3, 5}, fault),
                many = promised(p, plan, {60, 64}, fault);
-  ASSERT_LT(many, kInfinity);
+  ASSERT_LT(many, core::kInfinity);
   EXPECT_NEAR(promised(p, plan, {1, 5}, fault), once, 1e-5 * once);
   EXPECT_GT(some, once);
   EXPECT_GT(many, 1.01 * some);
@@ -160,12 +160,12 @@ TEST(Detection, PersistenceCosts) {
 TEST(Detection, OnlyFaultsThatAreThereInFullAreInspected) {
   const Prepared p = prepared();
   const Plan plan = plan_of(FigureEight{0.2, 4.0}, subject_of(p.model), 6.0, 0.02);
-  const auto catalogue = fault_catalogue(p.model.model, p.model.estimate);
+  const auto catalogue = detector::fault_catalogue(p.model.model, p.model.estimate);
   for (const char* name :
        {"wheel_radius_bump_right", "wheel_radius_drift", "encoder_dropout_left", "effort_stuck_left"}) {
-    EXPECT_THROW(promised(p, plan, {}, {find_fault(catalogue, name), 0.05}), InvalidArgument) << name;
+    EXPECT_THROW(promised(p, plan, {}, {detector::find_fault(catalogue, name), 0.05}), InvalidArgument) << name;
   }
-  EXPECT_LT(promised(p, plan, {}, {find_fault(catalogue, "encoder_frozen_left"), 1.0}), kInfinity);
+  EXPECT_LT(promised(p, plan, {}, {detector::find_fault(catalogue, "encoder_frozen_left"), 1.0}), core::kInfinity);
 }
 
 // Slip that was there before the drive adds its friction, and no impulse of the mass: the sum over the samples of the
@@ -174,8 +174,10 @@ TEST(Detection, AFaultThatWasThereBeforeDoesNotJump) {
   const Prepared p = prepared();
   const DesignSubject subject = subject_of(p.model);
   const FilterDesign& f = subject.filter;
-  const ReferenceMotion motion = planned_motion(plan_of(FigureEight{0.2, 4.0}, subject, 6.0, 0.02), subject);
-  FaultFilter rows(find_fault(fault_catalogue(p.model.model, p.model.estimate), "matched"), subject.model, f, motion);
+  const detector::ReferenceMotion motion = planned_motion(plan_of(FigureEight{0.2, 4.0}, subject, 6.0, 0.02), subject);
+  detector::FaultFilter rows(
+      detector::find_fault(detector::fault_catalogue(p.model.model, p.model.estimate), "matched"), subject.model, f,
+      motion);
   rows.begin_broken(0);
   ASSERT_EQ(f.order, 2);
   ASSERT_NE(motion.kind, MotionKind::speed);
@@ -185,7 +187,7 @@ TEST(Detection, AFaultThatWasThereBeforeDoesNotJump) {
     const double x = motion.instant[rows.instant()] - motion.instant.front();
     sum += h * f.alpha * f.alpha * gamma / apart *
            (x * std::exp(-f.beta * x) - (std::exp(-f.beta * x) - std::exp(-gamma * x)) / apart);
-    const FaultRow row = rows.row(0);
+    const detector::FaultRow row = rows.row(0);
     EXPECT_EQ(row.g1[0], 0.0);
     EXPECT_NEAR(row.g1[2], sum, 1e-9);
   }
@@ -194,7 +196,8 @@ TEST(Detection, AFaultThatWasThereBeforeDoesNotJump) {
 
 TEST(Detection, SaysWhichFaultCannotBeInspected) {
   const Prepared p = prepared();
-  const FaultType stuck = find_fault(fault_catalogue(p.model.model, p.model.estimate), "effort_stuck_left");
+  const detector::FaultType stuck =
+      detector::find_fault(detector::fault_catalogue(p.model.model, p.model.estimate), "effort_stuck_left");
   try {
     static_cast<void>(design_for_detection(p.model, subject_of(p.model), limits(p.scenario.robot), {{stuck, 1.0}}));
     FAIL();
@@ -204,4 +207,4 @@ TEST(Detection, SaysWhichFaultCannotBeInspected) {
 }
 
 }  // namespace
-}  // namespace wheelwright::detection_test
+}  // namespace wheelwright::design::detection_test

@@ -13,7 +13,7 @@
 
 #include "design/robots.hpp"
 
-namespace wheelwright::objective_test {
+namespace wheelwright::design::objective_test {
 namespace {
 
 using testing_support::small_robot;
@@ -21,7 +21,7 @@ using testing_support::small_robot;
 // Efforts that change at samples: what acts between two of them is known.
 DesignSubject subject() {
   Robot robot = small_robot();
-  robot.effort_changes = EffortChanges::at_samples;
+  robot.effort_changes = model::EffortChanges::at_samples;
   return subject_of(robot, 0.02);
 }
 
@@ -63,8 +63,8 @@ TEST(Promise, NoNoiseWithinTheBoundsGivesAWiderHull) {
     for (Eigen::Index k = 0; k < noisy.y.size(); ++k) {
       noisy.y[k] += trial % 2 == 0 ? in_bounds() : shift;
     }
-    RegressionTable table(noisy);
-    const IntervalHull found = interval_hull(table, s.prior);
+    core::RegressionTable table(noisy);
+    const bounds::IntervalHull found = bounds::interval_hull(table, s.prior);
     ASSERT_FALSE(found.empty);
     for (std::size_t j = 0; j < 4; ++j) {
       const Interval &a = found.hull.sides[j], &b = promised.sides[j];
@@ -162,4 +162,4 @@ TEST(FigureEightPlan, TheBestOneKeepsToTheLimitsAndBeatsASlowerOne) {
 }
 
 }  // namespace
-}  // namespace wheelwright::objective_test
+}  // namespace wheelwright::design::objective_test

@@ -9,7 +9,7 @@
 
 #include <wheelwright/core/error.hpp>
 
-namespace wheelwright::search_test {
+namespace wheelwright::design::search_test {
 namespace {
 
 // Many local minima (Rastrigin), the lowest, 0, at 0.3 in each coordinate.
@@ -75,4 +75,4 @@ TEST(Search, MisuseIsTold) {
 }
 
 }  // namespace
-}  // namespace wheelwright::search_test
+}  // namespace wheelwright::design::search_test

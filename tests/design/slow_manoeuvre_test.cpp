@@ -12,7 +12,7 @@
 
 #include "design/robots.hpp"
 
-namespace wheelwright::slow_manoeuvre_test {
+namespace wheelwright::design::slow_manoeuvre_test {
 namespace {
 
 using testing_support::large_robot;
@@ -29,7 +29,7 @@ Scenario driven(const Robot& robot, const Plan& plan, std::uint64_t seed) {
                   .viscous_x = 1.2 * robot.nominal.at("viscous_linear"),
                   .viscous_y = 1.2 * robot.nominal.at("viscous_linear"),
                   .viscous_yaw = 1.2 * robot.nominal.at("viscous_yaw")};
-  s.trajectory.kind = Trajectory::Kind::table;
+  s.trajectory.kind = sim::Trajectory::Kind::table;
   for (Eigen::Index k = 0; k < plan.samples(); ++k) {
     s.trajectory.table.t.push_back(plan.t(k));
     s.trajectory.table.speed.push_back(plan.speed.col(k));
@@ -46,12 +46,12 @@ Scenario driven(const Robot& robot, const Plan& plan, std::uint64_t seed) {
 // Widths of the commissioned bounds, which hold the truth.
 Eigen::VectorXd widths(const Scenario& scenario) {
   Simulation log(scenario);
-  const Commissioning result = commission(log, scenario.robot);
+  const Commissioning result = commission_robot(log, scenario.robot);
   EXPECT_EQ(result.status, Commissioning::Status::done);
-  const Eigen::VectorXd truth = true_parameters(scenario, result.model.model);
+  const Eigen::VectorXd truth = sim::true_parameters(scenario, result.model.model);
   Eigen::VectorXd w(truth.size());
   for (Eigen::Index j = 0; j < w.size(); ++j) {
-    const ParameterResult& p = result.parameters[static_cast<std::size_t>(j)];
+    const commission::ParameterResult& p = result.parameters[static_cast<std::size_t>(j)];
     EXPECT_LE(p.lower, truth[j]);
     EXPECT_GE(p.upper, truth[j]);
     w[j] = p.upper - p.lower;
@@ -116,4 +116,4 @@ TEST(SlowManoeuvre, AnyFunctionOfTheRowsCanBeTheAim) {
 }
 
 }  // namespace
-}  // namespace wheelwright::slow_manoeuvre_test
+}  // namespace wheelwright::design::slow_manoeuvre_test

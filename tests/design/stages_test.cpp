@@ -13,7 +13,7 @@
 
 #include "design/robots.hpp"
 
-namespace wheelwright::stages_test {
+namespace wheelwright::design::stages_test {
 namespace {
 
 using testing_support::large_robot;
@@ -155,4 +155,4 @@ TEST(Stages, ImpossibleLimitsAreMisuse) {
 }
 
 }  // namespace
-}  // namespace wheelwright::stages_test
+}  // namespace wheelwright::design::stages_test

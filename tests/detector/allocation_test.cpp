@@ -10,7 +10,7 @@
 #include "support/kinematic_drives.hpp"
 #include "support/skip.hpp"
 
-namespace wheelwright::allocation_test {
+namespace wheelwright::detector::allocation_test {
 namespace {
 
 #ifdef WHEELWRIGHT_COUNTS_ALLOCATIONS
@@ -30,12 +30,12 @@ TEST(Allocation, IsCountedForNewAndForEigen) {
 
 void expect_no_allocation(const Scenario& drive, const Robot& robot, DetectorOptions options) {
   Simulation learning(drive);
-  const Commissioning result = commission(learning, robot);
+  const Commissioning result = commission_robot(learning, robot);
   ASSERT_NE(result.model.facets.size(), 0u) << result.message;
   Detector detector = make_detector(result.model, std::move(options));
   Scenario other = drive;
   other.seed = 99;
-  const LogTable table = simulate(other);
+  const LogTable table = sim::simulate(other);
   const auto names = result.model.measurement.columns();
   std::vector<const std::vector<double>*> columns;
   for (const auto& name : names) {
@@ -58,7 +58,7 @@ void expect_no_allocation(const Scenario& drive, const Robot& robot, DetectorOpt
 TEST(Allocation, ADetectorStepHasNone) {
   const Scenario drive = noisy_drive(1);
   expect_no_allocation(drive, drive.robot, {});
-  expect_no_allocation(drive, drive.robot, {.set = ParameterSetKind::box, .test = wheelwright::Test::symmetric});
+  expect_no_allocation(drive, drive.robot, {.set = ParameterSetKind::box, .test = detector::Test::symmetric});
   expect_no_allocation(drive, drive.robot,
                        {.persistence = Persistence{.k = 3, .n = 5}, .mu = Eigen::Vector2d(0.1, 0.1)});
 }
@@ -77,10 +77,10 @@ TEST(Allocation, NorWithFunctionTermsAndAHeading) {
 TEST(Allocation, NorHasAStepOfTheKinematicDetector) {
   const Scenario drive = testing_support::posed_drive(1, 12.0);
   Simulation learning(drive);
-  const Commissioning result = commission(learning, drive.robot);
+  const Commissioning result = commission_robot(learning, drive.robot);
   ASSERT_TRUE(result.model.kinematic.has_value()) << result.kinematic.message;
   KinematicDetector detector = make_detector(*result.model.kinematic);
-  const LogTable table = simulate(drive);
+  const LogTable table = sim::simulate(drive);
   const std::vector<std::string> names = result.model.kinematic->measurement.columns();
   std::vector<const std::vector<double>*> columns;
   for (const auto& name : names) {
@@ -109,4 +109,4 @@ TEST(Allocation, IsCountedHere) {
 #endif
 
 }  // namespace
-}  // namespace wheelwright::allocation_test
+}  // namespace wheelwright::detector::allocation_test

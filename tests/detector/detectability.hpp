@@ -49,7 +49,7 @@ inline Scenario random_robot(std::uint64_t seed) {
 inline Commissioned commissioned_robot(std::uint64_t seed) {
   Commissioned c{random_robot(seed), {}};
   Simulation log(c.scenario);
-  const Commissioning result = commission(log, c.scenario.robot);
+  const Commissioning result = commission_robot(log, c.scenario.robot);
   if (result.status != Commissioning::Status::done) {
     throw InvalidArgument("seed " + std::to_string(seed) + ": " + result.message);
   }
@@ -59,17 +59,17 @@ inline Commissioned commissioned_robot(std::uint64_t seed) {
 
 /// Realisation of a catalogue fault in a run.
 struct Breakage {
-  std::string fault;                     ///< of the catalogue
-  std::optional<Fault::Kind> simulated;  ///< the simulator's, where the robot itself breaks
+  std::string fault;                            ///< of the catalogue
+  std::optional<model::Fault::Kind> simulated;  ///< the simulator's, where the robot itself breaks
 };
 
 inline const std::vector<Breakage>& breakages() {
-  static const std::vector<Breakage> all = {{"wheel_radius", Fault::Kind::wheel_radius},
-                                            {"wheel_radius_right", Fault::Kind::wheel_radius_right},
-                                            {"wheel_radius_left", Fault::Kind::wheel_radius_left},
-                                            {"matched", Fault::Kind::matched},
-                                            {"unmatched", Fault::Kind::unmatched},
-                                            {"slip_yaw", Fault::Kind::slip_yaw},
+  static const std::vector<Breakage> all = {{"wheel_radius", model::Fault::Kind::wheel_radius},
+                                            {"wheel_radius_right", model::Fault::Kind::wheel_radius_right},
+                                            {"wheel_radius_left", model::Fault::Kind::wheel_radius_left},
+                                            {"matched", model::Fault::Kind::matched},
+                                            {"unmatched", model::Fault::Kind::unmatched},
+                                            {"slip_yaw", model::Fault::Kind::slip_yaw},
                                             {"effort_loss_right", std::nullopt},
                                             {"effort_bias_left", std::nullopt},
                                             {"encoder_scale_right", std::nullopt},
@@ -81,8 +81,8 @@ inline const std::vector<Breakage>& breakages() {
 struct FaultyRun {
   const Commissioned* robot;
   Scenario drive;  ///< without the fault
-  FaultType fault;
-  std::optional<Fault::Kind> simulated;
+  detector::FaultType fault;
+  std::optional<model::Fault::Kind> simulated;
   double onset = 0.0;  ///< s, between two samples of the log
   double side = 1.0;
 };
@@ -95,7 +95,7 @@ inline LogTable log_of(const FaultyRun& run, double magnitude, bool noisy) {
     s.sensors.effort = 0.0;
   }
   if (run.simulated) {
-    const bool radius = *run.simulated <= Fault::Kind::wheel_radius_left;
+    const bool radius = *run.simulated <= model::Fault::Kind::wheel_radius_left;
     s.faults = {{.kind = *run.simulated,
                  .magnitude = magnitude * (radius ? s.robot.wheel_radius : 1.0),
                  .profile = {.onset = run.onset}}};
@@ -136,19 +136,22 @@ inline Promise promise(const FaultyRun& run, double magnitude, double window, do
   FaultyRun reference = run;
   const LogTable table = log_of(reference, run.simulated ? magnitude : 0.0, false);
   TableSource log(table);
-  ReferenceMotion motion = read_reference(log, RegressorFilter(m.model, m.filter, m.measurement, m.errors));
+  detector::ReferenceMotion motion =
+      detector::read_reference(log, RegressorFilter(m.model, m.filter, m.measurement, m.errors));
   // One onset: the first instant that the fault has reached.
   const auto onset = static_cast<std::size_t>(
       std::lower_bound(motion.instant.begin(), motion.instant.end(), run.onset) - motion.instant.begin());
   for (std::size_t k = 0; k < motion.instants(); ++k) {
     motion.settled[k] = k == onset;
   }
-  const ThresholdRule rule(Polytope(m.facets, m.box), m.estimate);
-  const auto margins = margins_along(
-      motion, {run.fault}, rule,
-      [&](const FaultType& fault) { return std::make_unique<FaultFilter>(fault, m.model, m.filter, motion); },
-      {.windows = {window}, .noise_share = share});
-  for (const FaultMargins& each : margins) {
+  const detector::ThresholdRule rule(Polytope(m.facets, m.box), m.estimate);
+  const auto margins =
+      detector::margins_along(motion, {run.fault}, rule,
+                              [&](const detector::FaultType& fault) {
+                                return std::make_unique<detector::FaultFilter>(fault, m.model, m.filter, motion);
+                              },
+                              {.windows = {window}, .noise_share = share});
+  for (const detector::FaultMargins& each : margins) {
     if (each.side == run.side && each.onsets.size() == 1 && each.onsets[0].certain.size() == 1) {
       return {each.onsets[0].certain[0], each.onsets[0].hidden};
     }
@@ -192,15 +195,16 @@ inline FaultyRun random_run(const Commissioned& robot, std::uint64_t seed, const
   Random random(seed);
   FaultyRun run{.robot = &robot, .drive = robot.scenario, .fault = {}, .simulated = breakage.simulated};
   run.drive.seed = seed;
-  const std::vector<Trajectory::Kind> kinds = {Trajectory::Kind::multi_sine, Trajectory::Kind::figure_eight,
-                                               Trajectory::Kind::commissioning, Trajectory::Kind::stops};
+  const std::vector<sim::Trajectory::Kind> kinds = {sim::Trajectory::Kind::multi_sine,
+                                                    sim::Trajectory::Kind::figure_eight,
+                                                    sim::Trajectory::Kind::commissioning, sim::Trajectory::Kind::stops};
   run.drive.trajectory.kind = kinds[random.below(kinds.size())];
   run.drive.trajectory.period = 4.0 + 6.0 * random.unit();
   run.drive.trajectory.speed = 0.4 + 0.4 * random.unit();
   run.drive.trajectory.yaw_rate = 0.6 + 1.0 * random.unit();
   run.drive.duration = 10.0;
   run.onset = (std::floor((4.0 + 3.0 * random.unit()) * run.drive.rate) + 0.01) / run.drive.rate;
-  for (const FaultType& fault : fault_catalogue(robot.model.model, robot.model.estimate)) {
+  for (const detector::FaultType& fault : detector::fault_catalogue(robot.model.model, robot.model.estimate)) {
     if (fault.name == breakage.fault) {
       run.fault = fault;
     }

@@ -13,7 +13,7 @@
 #include "support/drives.hpp"
 #include "support/random.hpp"
 
-namespace wheelwright::detector_test {
+namespace wheelwright::detector::detector_test {
 namespace {
 
 using testing_support::exact_drive;
@@ -26,8 +26,8 @@ constexpr double kStep = 0.01;
 // The robot of the examples with θ known to 5 %.
 struct Known {
   Scenario scenario = exact_drive(Shown::angles, Hold::first_order);
-  Model model = make_model(scenario.robot);
-  Eigen::VectorXd theta = true_parameters(scenario, model);
+  Model model = model::make_model(scenario.robot);
+  Eigen::VectorXd theta = sim::true_parameters(scenario, model);
 
   [[nodiscard]] ThresholdRule rule() const {
     Box box;
@@ -41,8 +41,9 @@ struct Known {
   }
 };
 
-FilteredRow random_row(Random& random) {
-  FilteredRow row{RowMatrix(random.matrix(2, 4)), RowMatrix::Zero(2, 4), random.matrix(2, 1), Eigen::VectorXd(2)};
+filter::FilteredRow random_row(Random& random) {
+  filter::FilteredRow row{core::RowMatrix(random.matrix(2, 4)), core::RowMatrix::Zero(2, 4), random.matrix(2, 1),
+                          Eigen::VectorXd(2)};
   row.dY.setConstant(0.01);
   row.dy.setConstant(0.02);
   return row;
@@ -51,11 +52,11 @@ FilteredRow random_row(Random& random) {
 TEST(Detector, DecidesByTheThresholdOfItsRow) {
   const Known known;
   Random random(1);
-  Detector two_sided = known.detector(), symmetric = known.detector({.test = wheelwright::Test::symmetric});
+  Detector two_sided = known.detector(), symmetric = known.detector({.test = detector::Test::symmetric});
   const ThresholdRule rule = known.rule();
   int outside = 0, two_sided_only = 0;
   for (int k = 0; k < 2000; ++k) {
-    const FilteredRow row = random_row(random);
+    const filter::FilteredRow row = random_row(random);
     const Decision a = two_sided.decide(row), b = symmetric.decide(row);
     for (Eigen::Index i = 0; i < 2; ++i) {
       const ChannelDecision &c = a.channels[static_cast<std::size_t>(i)], &d = b.channels[static_cast<std::size_t>(i)];
@@ -81,9 +82,9 @@ TEST(Detector, DecidesByTheThresholdOfItsRow) {
 TEST(Detector, ConstantThresholdsAreThoseOfTheSecondResidualFunction) {
   const Known known;
   Random random(2);
-  Detector detector = known.detector({.test = wheelwright::Test::symmetric, .mu = Eigen::Vector2d(0.5, 0.0)});
+  Detector detector = known.detector({.test = detector::Test::symmetric, .mu = Eigen::Vector2d(0.5, 0.0)});
   for (int k = 0; k < 500; ++k) {
-    const FilteredRow row = random_row(random);
+    const filter::FilteredRow row = random_row(random);
     const Decision& d = detector.decide(row);
     for (std::size_t i = 0; i < 2; ++i) {
       const double mu = i == 0 ? 0.5 : 0.0, size = std::abs(d.channels[i].residual);
@@ -136,7 +137,7 @@ void expect_same(const Decision& a, const Decision& b) {
 
 TEST(Detector, RestartsAtAGap) {
   const Known known;
-  const LogTable log = simulate(known.scenario);
+  const LogTable log = sim::simulate(known.scenario);
   // Times are moved by whole multiples of a power of two, which leaves their differences as they are to rounding.
   Detector through = known.detector(), after = known.detector(), uninterrupted = known.detector();
   walk(through, log, 0, 700, 0.0);
@@ -157,7 +158,7 @@ TEST(Detector, RestartsAtAGap) {
 
 TEST(Detector, RestartsWhereTimeGoesBackAndWhenItIsTold) {
   const Known known;
-  const LogTable log = simulate(known.scenario);
+  const LogTable log = sim::simulate(known.scenario);
   Detector back = known.detector(), told = known.detector(), fresh = known.detector();
   const Decision expected = walk(fresh, log, 0, 600, 0.0);
   walk(back, log, 0, 900, 0.0);
@@ -170,7 +171,8 @@ TEST(Detector, RestartsWhereTimeGoesBackAndWhenItIsTold) {
 TEST(Detector, RestartForgetsThePersistence) {
   const Known known;
   Detector detector = known.detector({.persistence = Persistence{.k = 2, .n = 2}});
-  FilteredRow row{RowMatrix::Zero(2, 4), RowMatrix::Zero(2, 4), Eigen::Vector2d(1.0, 0.0), Eigen::Vector2d::Zero()};
+  filter::FilteredRow row{core::RowMatrix::Zero(2, 4), core::RowMatrix::Zero(2, 4), Eigen::Vector2d(1.0, 0.0),
+                          Eigen::Vector2d::Zero()};
   EXPECT_FALSE(detector.decide(row).fault);
   detector.restart();
   EXPECT_FALSE(detector.decide(row).fault);
@@ -180,7 +182,8 @@ TEST(Detector, RestartForgetsThePersistence) {
 TEST(Detector, ANumberThatIsNoneIsNoHealth) {
   const Known known;
   Detector detector = known.detector();
-  FilteredRow row{RowMatrix::Zero(2, 4), RowMatrix::Zero(2, 4), Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero()};
+  filter::FilteredRow row{core::RowMatrix::Zero(2, 4), core::RowMatrix::Zero(2, 4), Eigen::Vector2d::Zero(),
+                          Eigen::Vector2d::Zero()};
   row.y[0] = std::numeric_limits<double>::infinity();
   EXPECT_TRUE(detector.decide(row).fault);
 }
@@ -198,4 +201,4 @@ TEST(Detector, MisuseIsRefused) {
 }
 
 }  // namespace
-}  // namespace wheelwright::detector_test
+}  // namespace wheelwright::detector::detector_test

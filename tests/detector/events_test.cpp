@@ -12,7 +12,7 @@
 
 #include "support/random.hpp"
 
-namespace wheelwright::events_test {
+namespace wheelwright::detector::events_test {
 namespace {
 
 using testing_support::Random;
@@ -140,4 +140,4 @@ TEST(EventRecorder, WithoutAnAlarmThereIsNoEvent) {
 }
 
 }  // namespace
-}  // namespace wheelwright::events_test
+}  // namespace wheelwright::detector::events_test

@@ -12,7 +12,7 @@
 
 #include "support/random.hpp"
 
-namespace wheelwright::fault_margin_test {
+namespace wheelwright::detector::fault_margin_test {
 namespace {
 
 using testing_support::Random;
@@ -48,8 +48,9 @@ TEST(FaultMargin, OfOneParameterIsTheClosedForm) {
       FaultMargin margin(ThresholdRule(interval(lower, upper), Eigen::VectorXd::Constant(1, 2.0)));
       const OwnRow row = radius_row({y}, 0.0);
       const double growth = std::sqrt(upper / lower) - 1.0, shrinkage = 1.0 - std::sqrt(lower / upper);
-      EXPECT_NEAR(margin.smallest_certain(row.view(), 2.0, 1.0).value_or(kInfinity), growth, 1e-8 * growth);
-      EXPECT_NEAR(margin.smallest_certain(row.view(), 0.9, -1.0).value_or(kInfinity), shrinkage, 1e-8 * shrinkage);
+      EXPECT_NEAR(margin.smallest_certain(row.view(), 2.0, 1.0).value_or(core::kInfinity), growth, 1e-8 * growth);
+      EXPECT_NEAR(margin.smallest_certain(row.view(), 0.9, -1.0).value_or(core::kInfinity), shrinkage,
+                  1e-8 * shrinkage);
     }
   }
 }
@@ -68,7 +69,7 @@ TEST(FaultMargin, WithExactParametersIsTwiceTheNoise) {
     row.dy = noise;
     FaultMargin margin(ThresholdRule(Polytope({}, box), theta));
     for (const double side : {1.0, -1.0}) {
-      const double smallest = margin.smallest_certain(row.view(), 1.0, side).value_or(kInfinity);
+      const double smallest = margin.smallest_certain(row.view(), 1.0, side).value_or(core::kInfinity);
       EXPECT_NEAR(smallest, 2.0 * noise / response, 1e-8 * noise + 1e-13) << noise;
     }
   }
@@ -78,7 +79,7 @@ TEST(FaultMargin, WithExactParametersIsTwiceTheNoise) {
 TEST(FaultMargin, CountsTheRegressorsErrorTwice) {
   FaultMargin margin(ThresholdRule(interval(1.0, 1.0), Eigen::VectorXd::Constant(1, 1.0)));
   const OwnRow row{.y = {1.0}, .g1 = {1.0}, .g2 = {0.0}, .s = {0.0}, .dY = {0.05}, .dy = 0.1};
-  EXPECT_NEAR(margin.smallest_certain(row.view(), 1.0, 1.0).value_or(kInfinity), 2.0 * 0.05 + 2.0 * 0.1, 1e-8);
+  EXPECT_NEAR(margin.smallest_certain(row.view(), 1.0, 1.0).value_or(core::kInfinity), 2.0 * 0.05 + 2.0 * 0.1, 1e-8);
   // Noise-free sensors show it once it is over what the threshold allows for Δ and n̄; noise at its bounds at once.
   EXPECT_NEAR(margin.largest_hidden(row.view(), 1.0, 1.0, 0.0), 0.05 + 0.1, 1e-3);
   EXPECT_NEAR(margin.largest_hidden(row.view(), 1.0, 1.0, 1.0), 0.0, 1e-8);
@@ -104,7 +105,7 @@ TEST(FaultMargin, HidesNothingBehindTheSignOfAParameter) {
 }
 
 Polytope random_set(Random& random, Eigen::Index p) {
-  std::vector<HalfSpace> rows;
+  std::vector<bounds::HalfSpace> rows;
   const Eigen::VectorXd inside = Eigen::VectorXd::Constant(p, 1.0);
   for (int k = 0; k < 10; ++k) {
     const Eigen::VectorXd a = random.matrix(p, 1);
@@ -271,4 +272,4 @@ TEST(FaultMargin, HiddenSizesAreHiddenAndTight) {
 }
 
 }  // namespace
-}  // namespace wheelwright::fault_margin_test
+}  // namespace wheelwright::detector::fault_margin_test

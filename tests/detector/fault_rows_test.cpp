@@ -12,7 +12,10 @@
 #include "support/drives.hpp"
 #include "support/fault_oracle.hpp"
 
-namespace wheelwright::fault_rows_test {
+namespace wheelwright::detector::fault_rows_test {
+
+using model::Fault;
+
 namespace {
 
 using testing_support::exact_drive;
@@ -84,9 +87,9 @@ Prepared prepared(Shown shown, double rate, Hold hold = Hold::zero_order) {
   s.scenario = exact_drive(shown, hold);
   s.scenario.rate = rate;
   s.scenario.duration = 10.0;
-  s.model = make_model(s.scenario.robot);
+  s.model = model::make_model(s.scenario.robot);
   s.design = filter_of(s.scenario).design();
-  s.theta = true_parameters(s.scenario, s.model);
+  s.theta = sim::true_parameters(s.scenario, s.model);
   return s;
 }
 
@@ -113,7 +116,7 @@ double simulated_error(const Simulated& each, Shown shown, double rate, bool dri
   Fault simulated{.kind = each.kind, .magnitude = each.magnitude, .profile = {.onset = kOnset}};
   if (drift) {
     fault.profile = {.kind = FaultProfile::Kind::drift, .rise = 1.0};
-    simulated.profile.shape = TimeProfile::Shape::ramp;
+    simulated.profile.shape = model::TimeProfile::Shape::ramp;
     simulated.profile.rise_time = 1.0;
   }
   s.scenario.faults = {simulated};
@@ -125,7 +128,8 @@ double simulated_error(const Simulated& each, Shown shown, double rate, bool dri
 TEST(FaultCatalogue, HasTheMassAsAShareWhereEffortsAreNoTorques) {
   const Model model = DifferentialDrive{.wheel_radius = 0.1, .track_width = 0.4}.model();
   const Eigen::VectorXd theta = Eigen::VectorXd::LinSpaced(static_cast<Eigen::Index>(model.p()), 2.0, 3.0);
-  const auto in_torque = fault_catalogue(model, theta), in_current = fault_catalogue(model, theta, EffortKind::current);
+  const auto in_torque = fault_catalogue(model, theta),
+             in_current = fault_catalogue(model, theta, model::EffortKind::current);
   const FaultType &mass = find_fault(in_torque, "payload_lost"), &share = find_fault(in_current, "payload_lost");
   EXPECT_EQ(mass.unit, "kg");
   EXPECT_EQ(share.unit, "1");
@@ -242,12 +246,12 @@ TEST(FaultRows, SettleToClosedForms) {
 // ζ of (16) for every combination of speed, acceleration and radii, by the paper's own formula.
 TEST(FaultRows, SettleToZetaOfThePaper) {
   const Prepared s = prepared(Shown::angles, 100.0);
-  const DifferentialDrive drive = drive_of(s.scenario.robot);
+  const DifferentialDrive drive = sim::drive_of(s.scenario.robot);
   const Eigen::Vector2d v(0.4, -0.7), a(0.3, 0.9);
   for (const char* name : {"wheel_radius", "wheel_radius_right", "wheel_radius_left"}) {
     const std::string right = "wheel_radius_right", left = "wheel_radius_left";
     const double x = 0.07;
-    FaultState state;
+    model::FaultState state;
     state.radius = x * drive.wheel_radius * Eigen::Vector2d(name != left ? 1.0 : 0.0, name != right ? 1.0 : 0.0);
     const Eigen::Vector2d expected = zeta(drive, s.scenario.parameters, state, {0.0, v, a});
     const SettledRows rows = settled_rows(find_fault(s.model, name), s.model, s.design, v, a);
@@ -257,15 +261,15 @@ TEST(FaultRows, SettleToZetaOfThePaper) {
 }
 
 // v|v|, e^{−ω²} sgn ω and sgn v as further terms of the drive's first output.
-Model with_term(Model model, const TermFunction& function) {
+Model with_term(Model model, const model::TermFunction& function) {
   model.terms.push_back({.output = 0, .parameter = 0, .kind = Term::Kind::function, .function = function});
   return model;
 }
-TermValue drag(const MotionState& s) { return {s.speed[0] * std::abs(s.speed[0]), 0.0}; }
-TermValue stribeck(const MotionState& s) {
+model::TermValue drag(const model::MotionState& s) { return {s.speed[0] * std::abs(s.speed[0]), 0.0}; }
+model::TermValue stribeck(const model::MotionState& s) {
   return {std::exp(-s.joint_speed[0] * s.joint_speed[0]) * std::copysign(1.0, s.joint_speed[0]), 0.0};
 }
-TermValue sign_of_speed(const MotionState& s) {
+model::TermValue sign_of_speed(const model::MotionState& s) {
   return {static_cast<double>((s.speed[0] > 0.0) - (s.speed[0] < 0.0)), 0.0};
 }
 
@@ -294,7 +298,7 @@ TEST(FaultRows, HoldFunctionsOfTheMotionToTheSecondOrder) {
   const Prepared s = prepared(Shown::angles, 100.0);
   const Eigen::Vector2d v(0.4, 0.0), a(0.0, 0.0);
   const FaultType radius = find_fault(s.model, "wheel_slip_right");
-  const auto added = [&](const TermFunction& function, double kappa) {
+  const auto added = [&](const model::TermFunction& function, double kappa) {
     const SettledRows with = settled_rows(radius, with_term(s.model, function), s.design, v, a),
                       without = settled_rows(radius, s.model, s.design, v, a);
     return (kappa * (with.signature.g1 - without.signature.g1) +
@@ -358,10 +362,11 @@ TEST(FaultRows, OfAMotionReadWithNoiseStateTheirErrors) {
       thin(log.t);
       std::for_each(log.columns.begin(), log.columns.end(), thin);
       TableSource source(log);
-      const Measurement measurement = find_measurement(source, s.scenario.robot, s.model, s.design.order);
-      SensorErrors sensors;
+      const Measurement measurement = filter::find_measurement(source, s.scenario.robot, s.model, s.design.order);
+      filter::SensorErrors sensors;
       sensors.motion = kBound;
-      const RegressorFilter filter(s.model, s.design, measurement, propagate(s.model, s.design, measurement, sensors));
+      const RegressorFilter filter(s.model, s.design, measurement,
+                                   filter::propagate(s.model, s.design, measurement, sensors));
       const ReferenceMotion motion = read_reference(source, filter);
       double most = 0.0;
       for (int pattern = 0; pattern < 4; ++pattern) {
@@ -414,4 +419,4 @@ TEST(FaultRows, RefuseFaultsThatMakeNoSense) {
 }
 
 }  // namespace
-}  // namespace wheelwright::fault_rows_test
+}  // namespace wheelwright::detector::fault_rows_test

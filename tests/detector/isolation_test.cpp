@@ -13,7 +13,7 @@
 
 #include "detector/detectability.hpp"
 
-namespace wheelwright::isolation_test {
+namespace wheelwright::detector::isolation_test {
 namespace {
 
 using testing_support::Breakage;
@@ -130,10 +130,10 @@ class PreciseRobot : public ::testing::Test {
     s.robot.noise.effort.value = 0.005;
     s.sensors.effort = 0.0025;
     Simulation log(s);
-    const Commissioning result = commission(log, s.robot);
+    const Commissioning result = commission_robot(log, s.robot);
     ASSERT_EQ(result.status, Commissioning::Status::done) << result.message;
     model() = result.model;
-    s.trajectory.kind = Trajectory::Kind::multi_sine;
+    s.trajectory.kind = sim::Trajectory::Kind::multi_sine;
     s.seed = 6;
     drive() = s;
   }
@@ -151,7 +151,7 @@ class PreciseRobot : public ::testing::Test {
     Simulation log(drive());
     return read_all(log);
   }
-  static LogTable broken(Fault::Kind kind, double magnitude) {
+  static LogTable broken(model::Fault::Kind kind, double magnitude) {
     Scenario s = drive();
     s.faults = {{.kind = kind, .magnitude = magnitude, .profile = {.onset = kOnset}}};
     Simulation log(s);
@@ -173,7 +173,7 @@ class PreciseRobot : public ::testing::Test {
 
 TEST_F(PreciseRobot, SizesAWheelRadiusToAShareOfItself) {
   const double r = drive().robot.wheel_radius;
-  const auto isolation = isolated(model(), broken(Fault::Kind::wheel_radius_right, 0.1 * r), kOnset);
+  const auto isolation = isolated(model(), broken(model::Fault::Kind::wheel_radius_right, 0.1 * r), kOnset);
   ASSERT_TRUE(isolation);
   const FaultFinding& truth = finding(*isolation, "wheel_radius_right");
   ASSERT_EQ(truth.verdict, Verdict::consistent);
@@ -229,7 +229,7 @@ TEST_F(PreciseRobot, ExplainsNothingWhereTheCatalogueHasNothing) {
 
 TEST_F(PreciseRobot, GivesWiderAnswersForALimitedBudgetAndTheSameOnSeveralThreads) {
   const double r = drive().robot.wheel_radius;
-  const LogTable table = broken(Fault::Kind::wheel_radius, -0.12 * r);
+  const LogTable table = broken(model::Fault::Kind::wheel_radius, -0.12 * r);
   const auto full = isolated(model(), table, kOnset), poor = isolated(model(), table, kOnset, {.budget = 5}),
              threads = isolated(model(), table, kOnset, {.threads = 3});
   ASSERT_TRUE(full && poor && threads);
@@ -252,12 +252,13 @@ TEST_F(PreciseRobot, GivesWiderAnswersForALimitedBudgetAndTheSameOnSeveralThread
 TEST(IsolationWords, NoSizeOfLateralSlipExplainsAnythingOnAStraightLine) {
   Scenario s = testing_support::noisy_drive(9, 14.0);
   Simulation learning(s);
-  const Commissioning result = commission(learning, s.robot);
+  const Commissioning result = commission_robot(learning, s.robot);
   ASSERT_EQ(result.status, Commissioning::Status::done) << result.message;
-  s.trajectory = {.kind = Trajectory::Kind::straight, .speed = 0.5};
+  s.trajectory = {.kind = sim::Trajectory::Kind::straight, .speed = 0.5};
   s.duration = 10.0;
-  s.faults = {
-      {.kind = Fault::Kind::wheel_radius, .magnitude = -0.4 * s.robot.wheel_radius, .profile = {.onset = 5.003}}};
+  s.faults = {{.kind = model::Fault::Kind::wheel_radius,
+               .magnitude = -0.4 * s.robot.wheel_radius,
+               .profile = {.onset = 5.003}}};
   Simulation log(s);
   const auto isolation = isolated(result.model, read_all(log), 5.003);
   ASSERT_TRUE(isolation);
@@ -268,7 +269,7 @@ TEST(IsolationWords, NoSizeOfLateralSlipExplainsAnythingOnAStraightLine) {
 TEST(IsolationWords, MisuseThrows) {
   const Commissioned robot = commissioned_robot(1);
   const RegressorFilter filter = filter_of(robot.model);
-  const LogTable table = simulate(robot.scenario);
+  const LogTable table = sim::simulate(robot.scenario);
   TableSource log(table);
   const ReferenceMotion motion = read_reference(log, filter);
   const Polytope set(robot.model.facets, robot.model.box);
@@ -278,4 +279,4 @@ TEST(IsolationWords, MisuseThrows) {
 }
 
 }  // namespace
-}  // namespace wheelwright::isolation_test
+}  // namespace wheelwright::detector::isolation_test

@@ -8,14 +8,14 @@
 
 #include "support/kinematic_drives.hpp"
 
-namespace wheelwright::kinematic_detector_test {
+namespace wheelwright::detector::kinematic_detector_test {
 namespace {
 
 using testing_support::posed_drive;
 using testing_support::true_kinematics;
 
-OdometryMeasurement pose_and_angles() {
-  OdometryMeasurement m;
+filter::OdometryMeasurement pose_and_angles() {
+  filter::OdometryMeasurement m;
   m.motion = MotionKind::angle;
   m.motion_columns = {"phi_r", "phi_l"};
   m.position = m.heading = true;
@@ -28,7 +28,7 @@ struct Known {
   Scenario scenario = posed_drive(1, 12.0);
   Eigen::VectorXd theta = true_kinematics(scenario.robot);
 
-  [[nodiscard]] OdometryFilter filter() const {
+  [[nodiscard]] filter::OdometryFilter filter() const {
     return {pose_and_angles(), 1.0, {.motion = 1e-3, .position = 2e-3, .heading = 3e-3}};
   }
   [[nodiscard]] ThresholdRule rule() const {
@@ -51,9 +51,9 @@ std::vector<double> sample_of(const LogTable& log, std::size_t k) {
 
 TEST(KinematicDetector, DecidesOnTheRowsOfTheStreamBitForBit) {
   const Known known;
-  const LogTable log = simulate(known.scenario);
+  const LogTable log = sim::simulate(known.scenario);
   TableSource source(log);
-  OdometryRows stream(source, known.filter());
+  filter::OdometryRows stream(source, known.filter());
   const RegressionBlock rows = read_all(stream);
   const ThresholdRule rule = known.rule();
   KinematicDetector detector = known.detector();
@@ -86,7 +86,7 @@ TEST(KinematicDetector, DecidesOnTheRowsOfTheStreamBitForBit) {
 
 TEST(KinematicDetector, WaitsForAWindowAfterAGap) {
   const Known known;
-  const LogTable log = simulate(known.scenario);
+  const LogTable log = sim::simulate(known.scenario);
   KinematicDetector detector = known.detector();
   std::size_t first = 0;
   for (std::size_t k = 0; k < 900; ++k) {
@@ -110,4 +110,4 @@ TEST(KinematicDetector, WantsASetOfItsOwnParameters) {
 }
 
 }  // namespace
-}  // namespace wheelwright::kinematic_detector_test
+}  // namespace wheelwright::detector::kinematic_detector_test

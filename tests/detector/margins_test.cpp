@@ -10,7 +10,7 @@
 
 #include "detector/detectability.hpp"
 
-namespace wheelwright::margins_test {
+namespace wheelwright::detector::margins_test {
 namespace {
 
 using testing_support::Breakage;
@@ -42,7 +42,7 @@ struct Tally {
 // the motion and the motion the size.
 std::optional<double> certain_on_its_own_motion(const FaultyRun& run, double window) {
   double size = promise(run, 0.0, window, 1.0).certain;
-  for (int turn = 0; turn < 12 && size < kInfinity; ++turn) {
+  for (int turn = 0; turn < 12 && size < core::kInfinity; ++turn) {
     const double needed = promise(run, run.side * size, window, 1.0).certain;
     if (needed <= size) {
       return size;
@@ -126,4 +126,4 @@ TEST_P(SlowMarginsPart, AreKeptInFiveHundredRuns) {
 INSTANTIATE_TEST_SUITE_P(Quarters, SlowMarginsPart, ::testing::Range<std::uint64_t>(0, 4));
 
 }  // namespace
-}  // namespace wheelwright::margins_test
+}  // namespace wheelwright::detector::margins_test

@@ -15,7 +15,10 @@
 #include "support/drives.hpp"
 #include "support/random.hpp"
 
-namespace wheelwright::odometry_faults_test {
+namespace wheelwright::detector::odometry_faults_test {
+
+using model::Fault;
+
 namespace {
 
 using testing_support::exact_drive;
@@ -34,7 +37,7 @@ FaultType find_fault(const Model& model, const std::string& name) {
   throw InvalidArgument("no fault '" + name + "'");
 }
 
-OdometryMeasurement measurement_at(double rate) {
+filter::OdometryMeasurement measurement_at(double rate) {
   return {.motion = MotionKind::angle,
           .motion_columns = {"phi_r", "phi_l"},
           .position = true,
@@ -62,20 +65,20 @@ double error(const Simulated& each, double rate, bool drift) {
   s.rate = rate;
   s.duration = 10.0;
   s.sensors.pose = true;
-  const Model model = make_model(s.robot);
+  const Model model = model::make_model(s.robot);
   FaultType fault = find_fault(model, each.name);
   Fault simulated{.kind = each.kind, .magnitude = each.magnitude, .profile = {.onset = kOnset}};
   if (drift) {
     fault.profile = {.kind = FaultProfile::Kind::drift, .rise = 1.0};
-    simulated.profile.shape = TimeProfile::Shape::ramp;
+    simulated.profile.shape = model::TimeProfile::Shape::ramp;
     simulated.profile.rise_time = 1.0;
   }
   s.faults = {simulated};
   Simulation log(s);
   const double r = s.robot.wheel_radius, c = r / s.robot.track_width;
   const Eigen::Vector4d truth(r, r, c, c);
-  const OdometryMeasurement measurement = measurement_at(rate);
-  const OdometryReference reference = read_odometry(log, OdometryFilter(measurement, 1.0), model);
+  const filter::OdometryMeasurement measurement = measurement_at(rate);
+  const OdometryReference reference = read_odometry(log, filter::OdometryFilter(measurement, 1.0), model);
   OdometryFaultRows rows(fault, model, measurement, reference, around(truth, 0.0));
   const auto& t = reference.motion.t;
   rows.begin(static_cast<std::size_t>(std::lower_bound(t.begin(), t.end(), kOnset - 1e-9) - t.begin()));
@@ -123,7 +126,7 @@ TEST(OdometryFaults, LateralSlipOnAStraightLineIsForThePose) {
   learning.robot.noise.position.value = 0.002;
   learning.robot.noise.heading.value = 0.002;
   Simulation log(learning);
-  const Commissioning result = commission(log, learning.robot);
+  const Commissioning result = commission_robot(log, learning.robot);
   ASSERT_EQ(result.status, Commissioning::Status::done) << result.message;
   ASSERT_TRUE(result.model.kinematic) << result.kinematic.message;
   const OnlineModel& m = result.model;
@@ -131,7 +134,7 @@ TEST(OdometryFaults, LateralSlipOnAStraightLineIsForThePose) {
   Scenario straight = learning;
   straight.sensors = exact_drive(Shown::angles, Hold::zero_order).sensors;
   straight.sensors.pose = true;
-  straight.trajectory = {.kind = Trajectory::Kind::straight, .speed = 0.5};
+  straight.trajectory = {.kind = sim::Trajectory::Kind::straight, .speed = 0.5};
   straight.duration = 12.0;
   Simulation drive(straight);
   const FaultType slip = find_fault(m.model, "unmatched");
@@ -141,11 +144,12 @@ TEST(OdometryFaults, LateralSlipOnAStraightLineIsForThePose) {
   for (const FaultMargins& each : margins_along(
            motion, {slip}, ThresholdRule(Polytope(m.facets, m.box), m.estimate),
            [&](const FaultType& f) { return std::make_unique<FaultFilter>(f, m.model, m.filter, motion); }, options)) {
-    EXPECT_EQ(summarise(each, 0).best, kInfinity);
+    EXPECT_EQ(summarise(each, 0).best, core::kInfinity);
   }
 
   const KinematicModel& k = *m.kinematic;
-  const OdometryReference seen = read_odometry(drive, OdometryFilter(k.measurement, k.window, k.errors), m.model);
+  const OdometryReference seen =
+      read_odometry(drive, filter::OdometryFilter(k.measurement, k.window, k.errors), m.model);
   const auto margins = margins_along(
       seen.motion, {slip}, ThresholdRule(Polytope(k.facets, k.box), k.estimate),
       [&](const FaultType& f) { return std::make_unique<OdometryFaultRows>(f, m.model, k.measurement, seen, k.box); },
@@ -168,7 +172,7 @@ TEST(OdometryFaults, LateralSlipOnAStraightLineIsForThePose) {
       pick.push_back(broken.find(name).value());
     }
     std::vector<double> sample(pick.size());
-    double first = kInfinity;
+    double first = core::kInfinity;
     LogBlock block;
     while (broken.next(block)) {
       for (std::size_t row = 0; row < block.rows(); ++row) {
@@ -201,7 +205,7 @@ void keep_promises(std::uint64_t first, std::uint64_t last, int& certain) {
     learning.sensors.position = *learning.robot.noise.position.value;
     learning.sensors.heading = *learning.robot.noise.heading.value;
     Simulation log(learning);
-    const Commissioning result = commission(log, learning.robot);
+    const Commissioning result = commission_robot(log, learning.robot);
     ASSERT_TRUE(result.model.kinematic) << "seed " << seed << ": " << result.kinematic.message;
     const OnlineModel& m = result.model;
     const KinematicModel& k = *m.kinematic;
@@ -212,10 +216,11 @@ void keep_promises(std::uint64_t first, std::uint64_t last, int& certain) {
       Scenario drive = learning;
       drive.seed = 7000 + seed;
       drive.duration = 9.0;
-      drive.trajectory = {.kind = random.unit() < 0.5 ? Trajectory::Kind::multi_sine : Trajectory::Kind::figure_eight,
-                          .speed = 0.5,
-                          .yaw_rate = 0.8,
-                          .period = 6.0};
+      drive.trajectory = {
+          .kind = random.unit() < 0.5 ? sim::Trajectory::Kind::multi_sine : sim::Trajectory::Kind::figure_eight,
+          .speed = 0.5,
+          .yaw_rate = 0.8,
+          .period = 6.0};
       const bool radius = kind.kind <= Fault::Kind::wheel_radius_left;
       const auto with = [&](double size, bool noisy) {
         Scenario s = drive;
@@ -230,7 +235,8 @@ void keep_promises(std::uint64_t first, std::uint64_t last, int& certain) {
       };
       const auto promised = [&](double size) {
         Simulation own(with(size, false));
-        OdometryReference reference = read_odometry(own, OdometryFilter(k.measurement, k.window, k.errors), m.model);
+        OdometryReference reference =
+            read_odometry(own, filter::OdometryFilter(k.measurement, k.window, k.errors), m.model);
         const auto& t = reference.motion.t;
         const auto at = static_cast<std::size_t>(std::lower_bound(t.begin(), t.end(), onset) - t.begin());
         for (std::size_t i = 0; i < t.size(); ++i) {
@@ -265,7 +271,7 @@ void keep_promises(std::uint64_t first, std::uint64_t last, int& certain) {
         pick.push_back(broken.find(name).value());
       }
       std::vector<double> sample(pick.size());
-      double alarm = kInfinity;
+      double alarm = core::kInfinity;
       LogBlock block;
       while (broken.next(block)) {
         for (std::size_t row = 0; row < block.rows(); ++row) {
@@ -294,4 +300,4 @@ TEST(SlowOdometryFaults, PromisesAreKeptInThreeHundredRuns) {
 }
 
 }  // namespace
-}  // namespace wheelwright::odometry_faults_test
+}  // namespace wheelwright::detector::odometry_faults_test

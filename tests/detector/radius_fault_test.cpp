@@ -8,7 +8,7 @@
 
 #include "support/drives.hpp"
 
-namespace wheelwright::radius_fault_test {
+namespace wheelwright::detector::radius_fault_test {
 namespace {
 
 using testing_support::exact_drive;
@@ -17,7 +17,7 @@ using testing_support::noisy_drive;
 using testing_support::Shown;
 
 void set_radius_fault(Scenario& s, double share) {
-  s.faults = {{.kind = Fault::Kind::wheel_radius, .magnitude = share * s.robot.wheel_radius, .profile = {}}};
+  s.faults = {{.kind = model::Fault::Kind::wheel_radius, .magnitude = share * s.robot.wheel_radius, .profile = {}}};
 }
 
 double kappa_of(double share) { return (1.0 + share) * (1.0 + share) - 1.0; }
@@ -27,7 +27,7 @@ double relative_error(Shown shown, Hold hold, double share, double rate) {
   Scenario s = exact_drive(shown, hold);
   s.rate = rate;
   set_radius_fault(s, share);
-  const Eigen::VectorXd theta = true_parameters(s, make_model(s.robot));
+  const Eigen::VectorXd theta = sim::true_parameters(s, model::make_model(s.robot));
   Simulation log(s);
   TorqueRows rows(log, filter_of(s));
   const RegressionBlock block = read_all(rows);
@@ -54,12 +54,12 @@ TEST(RadiusFault, GivesAResidualOfKappaTimesTheTorque) {
 TEST(RadiusFault, IsDetectedWhereItIsCertain) {
   const Scenario healthy = noisy_drive(1, 20.0);
   Simulation learning(healthy);
-  const Commissioning result = commission(learning, healthy.robot);
+  const Commissioning result = commission_robot(learning, healthy.robot);
   ASSERT_EQ(result.status, Commissioning::Status::done) << result.message;
   for (const double share : {0.25, -0.2, 0.12, -0.1}) {
     const double kappa = std::abs(kappa_of(share));
     Scenario faulty = noisy_drive(2, 40.0);
-    faulty.trajectory = {.kind = Trajectory::Kind::multi_sine, .speed = 0.6, .yaw_rate = 1.2, .period = 9.0};
+    faulty.trajectory = {.kind = sim::Trajectory::Kind::multi_sine, .speed = 0.6, .yaw_rate = 1.2, .period = 9.0};
     set_radius_fault(faulty, share);
     Simulation log(faulty);
     const OnlineModel& model = result.model;
@@ -86,4 +86,4 @@ TEST(RadiusFault, IsDetectedWhereItIsCertain) {
 }
 
 }  // namespace
-}  // namespace wheelwright::radius_fault_test
+}  // namespace wheelwright::detector::radius_fault_test

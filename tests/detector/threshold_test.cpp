@@ -13,7 +13,7 @@
 
 #include "support/random.hpp"
 
-namespace wheelwright::threshold_test {
+namespace wheelwright::detector::threshold_test {
 namespace {
 
 using Rational = boost::multiprecision::cpp_rational;
@@ -21,12 +21,12 @@ using testing_support::Random;
 
 // A set by its inequalities, which every number below is held against exactly.
 struct Inequalities {
-  std::vector<HalfSpace> rows;
+  std::vector<bounds::HalfSpace> rows;
   Box box;
 
   [[nodiscard]] Polytope polytope() const { return Polytope(rows, box); }
   [[nodiscard]] bool contains(const std::vector<double>& theta) const {
-    for (const HalfSpace& row : rows) {
+    for (const bounds::HalfSpace& row : rows) {
       Rational left = 0;
       for (std::size_t j = 0; j < theta.size(); ++j) {
         left += Rational(row.a[static_cast<Eigen::Index>(j)]) * Rational(theta[j]);
@@ -88,9 +88,9 @@ double room(const ThresholdRule& rule, const Row& row) {
   for (std::size_t j = 0; j < row.y.size(); ++j) {
     const Interval& side = rule.set().hull().sides[j];
     size += std::abs(row.y[j] * rule.estimate()[static_cast<Eigen::Index>(j)]) +
-            4.0 * (std::abs(row.y[j]) + row.dy[j]) * magnitude(side);
+            4.0 * (std::abs(row.y[j]) + row.dy[j]) * core::magnitude(side);
   }
-  return 16.0 * (static_cast<double>(row.y.size()) + 4.0) * kEpsilon * size;
+  return 16.0 * (static_cast<double>(row.y.size()) + 4.0) * core::kEpsilon * size;
 }
 
 // [lower, upper] is not cut, and is widened by rounding alone.
@@ -175,7 +175,7 @@ void expect_residuals_held(const Inequalities& set, const Eigen::VectorXd& estim
       const Rational torque = middle + Rational(side) * away;
       auto measured = static_cast<double>(torque);
       while (Rational(side) * Rational(measured) > Rational(side) * torque) {
-        measured = side > 0.0 ? round_down(measured) : round_up(measured);
+        measured = side > 0.0 ? core::round_down(measured) : core::round_up(measured);
       }
       const Threshold t = rule.at(row.y, row.dy, row.output);
       ASSERT_LE(Rational(t.lower), Rational(measured) - exact_prediction) << k;
@@ -254,4 +254,4 @@ TEST(Threshold, MisuseIsRefused) {
 }
 
 }  // namespace
-}  // namespace wheelwright::threshold_test
+}  // namespace wheelwright::detector::threshold_test

@@ -19,7 +19,7 @@
 #include "support/kinematic_drives.hpp"
 #include "support/skip.hpp"
 
-namespace wheelwright::log_health_test {
+namespace wheelwright::doctor::log_health_test {
 namespace {
 
 using testing_support::posed_drive;
@@ -58,7 +58,7 @@ class LogHealthTest : public ::testing::Test {
  protected:
   const Scenario scenario = sound_scenario();
   const Robot robot = scenario.robot;
-  LogTable log = with_gyro(simulate(scenario), robot);
+  LogTable log = with_gyro(sim::simulate(scenario), robot);
 
   void scale(const std::vector<std::string>& columns, double factor) {
     for (const std::string& name : columns) {
@@ -125,7 +125,7 @@ TEST_F(LogHealthTest, ASoundLogHasNoWarning) {
 TEST_F(LogHealthTest, JitterIsMeasured) {
   Scenario shaken = sound_scenario();
   shaken.time_jitter = 0.4;  // uniform shifts u of a period: steps 1 + u' − u scatter by 0.4·√(2/3)
-  log = simulate(shaken);
+  log = sim::simulate(shaken);
   const LogFinding found = expect("time.jitter", kWarning);
   EXPECT_NEAR(found.value, 0.4 * std::sqrt(2.0 / 3.0), 0.05);
 }
@@ -159,7 +159,7 @@ TEST_F(LogHealthTest, CoarseTimeStampsAreNotJitter) {
   Scenario odd = sound_scenario();
   odd.rate = 300.0;  // steps of 3 1/3 ms, stamped in ms
   odd.duration = 10.0;
-  log = simulate(odd);
+  log = sim::simulate(odd);
   std::ranges::transform(log.t, log.t.begin(), [](double t) { return std::round(1000.0 * t) / 1000.0; });
   EXPECT_NEAR(expect("time.coarse_stamps", kNotice).value, 1e-3, 1e-9);
 }
@@ -170,9 +170,9 @@ TEST_F(LogHealthTest, TimeInMilliseconds) {
 }
 
 TEST_F(LogHealthTest, AShortLogIsShort) {
-  log = slice(log, 0, 700);
+  log = core::slice(log, 0, 700);
   expect("time.length", kWarning);
-  log = slice(log, 0, 30);
+  log = core::slice(log, 0, 30);
   expect("time.length", kFatal);
 }
 
@@ -279,21 +279,21 @@ TEST_F(LogHealthTest, CoarseAndNoisyEfforts) {
   Scenario noisy = sound_scenario();
   noisy.sensors.effort = 1.5;
   noisy.robot.noise.effort.value = 1.5;
-  log = simulate(noisy);
+  log = sim::simulate(noisy);
   expect("signals.noise", kWarning);
 }
 
 TEST_F(LogHealthTest, MissingManoeuvresAreNamed) {
   Scenario straight = sound_scenario();
-  straight.trajectory = {.kind = Trajectory::Kind::straight, .speed = 0.6, .yaw_rate = 0.0, .period = 8.0};
-  log = simulate(straight);
+  straight.trajectory = {.kind = sim::Trajectory::Kind::straight, .speed = 0.6, .yaw_rate = 0.0, .period = 8.0};
+  log = sim::simulate(straight);
   expect("motion.turning", kWarning);
   const LogFinding missing = expect("motion.excitation", kWarning);
   EXPECT_THAT(missing.sentence, ::testing::HasSubstr("yaw"));
   expect("signals.standstill", kNotice);
   Scenario circle = sound_scenario();
-  circle.trajectory = {.kind = Trajectory::Kind::circle, .speed = 0.6, .yaw_rate = 0.8, .period = 8.0};
-  log = simulate(circle);
+  circle.trajectory = {.kind = sim::Trajectory::Kind::circle, .speed = 0.6, .yaw_rate = 0.8, .period = 8.0};
+  log = sim::simulate(circle);
   EXPECT_THAT(expect("motion.turning", kWarning).next, ::testing::HasSubstr("right"));
   expect("motion.speeds", kNotice);
 }
@@ -405,11 +405,11 @@ TEST(LogHealthRecordings, NoneIsFatal) {
         std::pair{"warthog.yaml", "warthog/warthog_pose.csv"}, std::pair{"husky.yaml", "warthog/husky_pose.csv"},
         std::pair{"regbot.yaml", "regbot_fleet/run_00.csv"}}) {
     CsvLog file({data / log});
-    const LogHealth health = examine(read_all(file), read_robot(data / robot), reader_counts(file.report()));
+    const LogHealth health = examine(read_all(file), read_robot(data / robot), results::reader_counts(file.report()));
     EXPECT_EQ(told(health, kFatal), "") << log;
     EXPECT_NE(health.verdict, LogVerdict::unusable) << log;
   }
 }
 
 }  // namespace
-}  // namespace wheelwright::log_health_test
+}  // namespace wheelwright::doctor::log_health_test

@@ -17,7 +17,10 @@
 #include "support/scratch.hpp"
 #include "support/skip.hpp"
 
-namespace wheelwright::export_c_test {
+namespace wheelwright::exporter::export_c_test {
+
+using model::EffortChanges;
+
 namespace {
 
 using ::testing::HasSubstr;
@@ -50,7 +53,7 @@ struct Case {
   bool lost = false;      // single rows are missing, and steps of 1.6 steps
   double gap = 0.3;       // s
   Interval delay{0.0, 0.0};
-  DetectorOptions options{};
+  detector::DetectorOptions options{};
   Eigen::Index half_spaces = 4;  // for each parameter
 };
 
@@ -75,7 +78,7 @@ Model coupled() {
 
 /// Three axes, each for itself.
 Model three_axes() {
-  Model m = SingleAxis{}.model();
+  Model m = model::SingleAxis{}.model();
   m.joints.resize(3, m.joints.front());
   m.motion = Eigen::Vector3d(1.0, 0.5, -2.0).asDiagonal();
   m.input = Eigen::Vector3d(1.0, 3.0, 0.7).asDiagonal();
@@ -107,7 +110,7 @@ Polytope set_of(const Case& c) {
   for (const double x : theta) {
     box.sides.push_back({x < 0.1 ? -0.2 : 0.7 * x, x < 0.1 ? 0.2 : 1.4 * x});
   }
-  std::vector<HalfSpace> rows;
+  std::vector<bounds::HalfSpace> rows;
   for (Eigen::Index k = 0; k < c.half_spaces * theta.size(); ++k) {
     const Eigen::VectorXd a = random.matrix(theta.size(), 1);
     rows.push_back({a, a.dot(theta) + 0.02 + 0.03 * random.unit(), {}});
@@ -125,20 +128,21 @@ TorqueDetector detector_of(const Case& c) {
   m.delay = c.delay;
   m.count = c.motion == MotionKind::mean_speed ? 2.0 * 3.141592653589793 / (4096.0 * 0.01) : 0.0;
   m.heading_column = c.heading ? "theta" : "";
-  for (const Joint& joint : c.model.joints) {
+  for (const model::Joint& joint : c.model.joints) {
     m.motion_columns.push_back(c.motion == MotionKind::angle ? joint.angle : joint.speed);
     m.effort_columns.push_back(joint.torque);
   }
-  SignalErrors errors;
+  filter::SignalErrors errors;
   if (c.noisy) {
-    const SensorErrors sensors{.motion = c.motion == MotionKind::speed ? 0.01 : 2e-4, .effort = 0.01, .heading = 0.01};
-    errors = propagate(c.model, c.design, m, sensors);
+    const filter::SensorErrors sensors{
+        .motion = c.motion == MotionKind::speed ? 0.01 : 2e-4, .effort = 0.01, .heading = 0.01};
+    errors = filter::propagate(c.model, c.design, m, sensors);
   }
   const Polytope set = set_of(c);
   errors.between_samples = c.between != Between::nothing;
   if (c.between == Between::mobility || c.between == Between::both) {
     const Eigen::VectorXd effort = errors.motion.effort;
-    errors.motion = motion_bound(c.model, set.hull().sides);
+    errors.motion = filter::motion_bound(c.model, set.hull().sides);
     EXPECT_GT(errors.motion.mobility.size(), 0);
     errors.motion.effort = effort;
   }
@@ -146,7 +150,7 @@ TorqueDetector detector_of(const Case& c) {
     errors.motion.limit = Eigen::VectorXd::LinSpaced(static_cast<Eigen::Index>(c.model.coordinates.size()), 0.6, 3.0);
   }
   const Eigen::VectorXd estimate = truth(c) * 1.02;
-  return Detector(RegressorFilter(c.model, c.design, m, errors), ThresholdRule(set, estimate, c.options.set),
+  return Detector(RegressorFilter(c.model, c.design, m, errors), detector::ThresholdRule(set, estimate, c.options.set),
                   c.options);
 }
 
@@ -183,8 +187,8 @@ struct World {
       if (case_.model.heading_coordinate >= 0) {
         heading_ += h * v[case_.model.heading_coordinate];
       }
-      const MotionState state{speed, {none.data(), coordinates}, joint, {none.data(), joints}, heading_, 0.0};
-      const Eigen::VectorXd outputs = regressor(case_.model, state, acceleration) * theta_;
+      const model::MotionState state{speed, {none.data(), coordinates}, joint, {none.data(), joints}, heading_, 0.0};
+      const Eigen::VectorXd outputs = model::regressor(case_.model, state, acceleration) * theta_;
       const Eigen::VectorXd effort = case_.model.input.fullPivLu().solve(outputs);
       const double fault = row_ % 1000 >= 500 ? 1.4 : 1.0;
       for (std::size_t j = 0; j < joints; ++j) {
@@ -256,18 +260,18 @@ class ExportC : public testing::ScratchTest {
   }
 };
 
-DetectorOptions of_set(ParameterSetKind set, wheelwright::Test test = wheelwright::Test::two_sided) {
-  DetectorOptions options;
+detector::DetectorOptions of_set(detector::ParameterSetKind set, detector::Test test = detector::Test::two_sided) {
+  detector::DetectorOptions options;
   options.set = set;
   options.test = test;
   return options;
 }
 
-constexpr auto kBox = ParameterSetKind::box;
+constexpr auto kBox = detector::ParameterSetKind::box;
 
 TEST_F(ExportC, DecidesAsTheLibraryWithEveryKindOfMotion) {
-  for (const ParameterSetKind set : {kBox, ParameterSetKind::polytope}) {
-    const DetectorOptions options = of_set(set);
+  for (const detector::ParameterSetKind set : {kBox, detector::ParameterSetKind::polytope}) {
+    const detector::DetectorOptions options = of_set(set);
     expect_same({.model = drive(false, false), .options = options}, "angles");
     expect_same({.model = drive(false, false), .hold = Hold::zero_order, .jitter = 0.2, .options = options},
                 "angles, jitter, commanded efforts");
@@ -288,9 +292,11 @@ TEST_F(ExportC, DecidesAsTheLibraryWithEveryFunctionTerm) {
   expect_same({.model = drive(true, true), .motion = MotionKind::mean_speed, .heading = true, .options = of_set(kBox)},
               "measured heading");
   expect_same({.model = drive(true, false), .heading = true}, "angles with a measured heading");
-  expect_same({.model = SingleAxis{.coulomb = true, .offset = true}.model(), .hold = Hold::zero_order}, "single axis");
-  expect_same({.model = SingleAxis{}.model(), .design = {.order = 1}, .motion = MotionKind::speed, .noisy = false},
-              "plain axis");
+  expect_same({.model = model::SingleAxis{.coulomb = true, .offset = true}.model(), .hold = Hold::zero_order},
+              "single axis");
+  expect_same(
+      {.model = model::SingleAxis{}.model(), .design = {.order = 1}, .motion = MotionKind::speed, .noisy = false},
+      "plain axis");
 }
 
 constexpr FilterDesign kFirstOrder{.order = 1, .alpha = 20.0, .beta = 11.0};
@@ -355,7 +361,7 @@ TEST_F(ExportC, DecidesAsTheLibraryAboutWhatHappensBetweenSpeeds) {
                  .jitter = 0.1,
                  .lost = true},
                 "linear, odometry");
-    expect_same({.model = SingleAxis{.coulomb = true, .offset = true}.model(),
+    expect_same({.model = model::SingleAxis{.coulomb = true, .offset = true}.model(),
                  .design = design,
                  .motion = kSpeed,
                  .hold = Hold::zero_order,
@@ -389,7 +395,7 @@ TEST_F(ExportC, StartsAnewAfterAStepThatIsTooLong) {
     EXPECT_LT(valid, same(longer, 1, 2500).valid) << what;
   };
   expect_loss(c, "speeds");
-  c.model = SingleAxis{}.model();
+  c.model = model::SingleAxis{}.model();
   c.motion = MotionKind::angle;
   c.design = {};
   c.noisy = false;
@@ -398,12 +404,12 @@ TEST_F(ExportC, StartsAnewAfterAStepThatIsTooLong) {
 
 TEST_F(ExportC, DecidesAsTheLibraryWithEveryRule) {
   Case c{.model = drive(false, true)};
-  c.options.persistence = Persistence{.k = 3, .n = 5};
+  c.options.persistence = detector::Persistence{.k = 3, .n = 5};
   expect_same(c, "3 of 5");
-  c.options.test = wheelwright::Test::symmetric;
+  c.options.test = detector::Test::symmetric;
   expect_same(c, "symmetric");
   c.effort_unsigned = true;
-  c.options.persistence = Persistence{.k = 40, .n = 64};
+  c.options.persistence = detector::Persistence{.k = 40, .n = 64};
   expect_same(c, "unsigned efforts, 40 of 64");
   c.options.mu = Eigen::Vector2d(0.03, 0.01);
   expect_same(c, "constant thresholds");
@@ -476,8 +482,10 @@ TEST_F(ExportC, SaysWhatItCannotWrite) {
   late.delay = {0.0, 0.01};
   EXPECT_THAT(testing::input_error([&] { static_cast<void>(c_header(detector_of(late))); }),
               HasSubstr("late by 0 to 0.01 s, which has no C form"));
-  Case own{.model = SingleAxis{.offset = true}.model()};
-  own.model.terms.back().function = [](const MotionState& state) { return TermValue{state.speed[0], 0.0}; };
+  Case own{.model = model::SingleAxis{.offset = true}.model()};
+  own.model.terms.back().function = [](const model::MotionState& state) {
+    return model::TermValue{state.speed[0], 0.0};
+  };
   const Detector other = detector_of(own);
   EXPECT_THAT(testing::input_error([&] { static_cast<void>(c_header(other)); }), HasSubstr("offset"));
   // Too many vertices for a table: the box still goes.
@@ -499,7 +507,7 @@ class SlowExportC : public ExportC {};
 
 TEST_F(SlowExportC, EveryCombinationHasTheSameBits) {
   const std::vector<Model> models = {drive(false, false), drive(true, true),
-                                     SingleAxis{.coulomb = true, .offset = true}.model(), coupled()};
+                                     model::SingleAxis{.coulomb = true, .offset = true}.model(), coupled()};
   struct Kind {
     MotionKind motion;
     FilterDesign design;
@@ -541,7 +549,8 @@ TEST_F(SlowExportC, EveryCombinationHasTheSameBits) {
 
 TEST_F(SlowExportC, AMillionSamplesHaveTheSameBits) {
   const Seen polytope =
-      same({.model = drive(true, true), .jitter = 0.02, .options = {.persistence = Persistence{2, 3}}}, 10, 100000);
+      same({.model = drive(true, true), .jitter = 0.02, .options = {.persistence = detector::Persistence{2, 3}}}, 10,
+           100000);
   EXPECT_EQ(polytope.rows, 1000000u);
   EXPECT_EQ(polytope.different, 0u);
   EXPECT_GT(polytope.valid, 500000u);
@@ -553,4 +562,4 @@ TEST_F(SlowExportC, AMillionSamplesHaveTheSameBits) {
 }
 
 }  // namespace
-}  // namespace wheelwright::export_c_test
+}  // namespace wheelwright::exporter::export_c_test

@@ -11,7 +11,7 @@
 
 #include "support/scratch.hpp"
 
-namespace wheelwright::json_file_test {
+namespace wheelwright::files::json_file_test {
 namespace {
 
 using ::testing::AllOf;
@@ -84,4 +84,4 @@ TEST_F(JsonFile, TextThatIsNoJson) {
 }
 
 }  // namespace
-}  // namespace wheelwright::json_file_test
+}  // namespace wheelwright::files::json_file_test

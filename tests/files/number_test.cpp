@@ -11,7 +11,7 @@
 
 #include <gtest/gtest.h>
 
-namespace wheelwright::number_test {
+namespace wheelwright::files::number_test {
 namespace {
 
 std::uint64_t bits(double value) { return std::bit_cast<std::uint64_t>(value); }
@@ -80,4 +80,4 @@ TEST(Number, TextReadsBackExactly) {
 }
 
 }  // namespace
-}  // namespace wheelwright::number_test
+}  // namespace wheelwright::files::number_test

@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-namespace wheelwright::xxh64_test {
+namespace wheelwright::files::xxh64_test {
 namespace {
 
 std::uint64_t hash_of(std::string_view text) {
@@ -50,4 +50,4 @@ TEST(Xxh64, DoesNotDependOnThePieces) {
 TEST(Xxh64, TextHasSixteenDigits) { EXPECT_EQ(Xxh64().text(), "xxh64:ef46db3751d8e999"); }
 
 }  // namespace
-}  // namespace wheelwright::xxh64_test
+}  // namespace wheelwright::files::xxh64_test

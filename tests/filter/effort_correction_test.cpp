@@ -7,7 +7,7 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/filter/effort_correction.hpp>
 
-namespace wheelwright::effort_correction_test {
+namespace wheelwright::filter::effort_correction_test {
 namespace {
 
 constexpr double kStep = 0.01;
@@ -112,4 +112,4 @@ TEST(EffortCorrection, ARobotWithoutSuchEffectsHasNone) {
 }
 
 }  // namespace
-}  // namespace wheelwright::effort_correction_test
+}  // namespace wheelwright::filter::effort_correction_test

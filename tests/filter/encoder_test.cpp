@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-namespace wheelwright::encoder_test {
+namespace wheelwright::filter::encoder_test {
 namespace {
 
 double printed(double x, int decimals) {
@@ -108,7 +108,7 @@ TEST(FindEncoder, AQuantumThatIsFoundReplacesNoDeclaredBound) {
   robot.wheel_radius = 0.1;
   robot.track_width = 0.4;
   const double count = 2.0 * std::numbers::pi / (4096.0 * 0.01);
-  const auto found = [&] { return find_measurement(source, robot, make_model(robot), 2); };
+  const auto found = [&] { return find_measurement(source, robot, model::make_model(robot), 2); };
   EXPECT_EQ(found().motion, MotionKind::mean_speed);
   robot.noise.wheel_speed.value = 0.5 * count;
   EXPECT_EQ(found().motion, MotionKind::speed);
@@ -137,4 +137,4 @@ TEST(FindEncoder, KnownCountsAreChecked) {
 }
 
 }  // namespace
-}  // namespace wheelwright::encoder_test
+}  // namespace wheelwright::filter::encoder_test

@@ -12,7 +12,7 @@
 
 #include "support/drives.hpp"
 
-namespace wheelwright::error_influence_test {
+namespace wheelwright::filter::error_influence_test {
 namespace {
 
 using testing_support::exact_drive;
@@ -47,11 +47,11 @@ TEST_P(Influence, IsTheSumOfTheResponsesToAllSamples) {
   for (std::vector<double>& column : table.columns) {
     column.erase(column.begin(), column.begin() + kFirst);
   }
-  const Eigen::VectorXd theta = true_parameters(s, make_model(s.robot));
+  const Eigen::VectorXd theta = sim::true_parameters(s, model::make_model(s.robot));
   const RegressionBlock healthy = rows_of(table, filter);
   ASSERT_GT(healthy.instants(), 200U);
   constexpr Eigen::Index kSums = 2;
-  RowMatrix g(healthy.rows(), kSums);
+  core::RowMatrix g(healthy.rows(), kSums);
   for (Eigen::Index r = 0; r < g.rows(); ++r) {
     const double t = healthy.t[static_cast<std::size_t>(r) / healthy.outputs];
     g(r, 0) = std::sin(3.0 * t);
@@ -85,4 +85,4 @@ TEST_P(Influence, IsTheSumOfTheResponsesToAllSamples) {
 INSTANTIATE_TEST_SUITE_P(Kinds, Influence, ::testing::Values(Shown::angles, Shown::speeds));
 
 }  // namespace
-}  // namespace wheelwright::error_influence_test
+}  // namespace wheelwright::filter::error_influence_test

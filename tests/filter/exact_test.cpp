@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 #include <boost/multiprecision/cpp_bin_float.hpp>
 
-namespace wheelwright::exact_test {
+namespace wheelwright::filter::exact_test {
 namespace {
 
 using Real = boost::multiprecision::number<boost::multiprecision::cpp_bin_float<60>>;
@@ -116,4 +116,4 @@ TEST(ExactFilter, HeldInputIsLinearInputWithEqualEnds) {
 }
 
 }  // namespace
-}  // namespace wheelwright::exact_test
+}  // namespace wheelwright::filter::exact_test

@@ -11,7 +11,7 @@
 #include <wheelwright/model/differential_drive.hpp>
 #include <wheelwright/model/single_axis.hpp>
 
-namespace wheelwright::noise_test {
+namespace wheelwright::filter::noise_test {
 namespace {
 
 Measurement axis(MotionKind motion) {
@@ -32,7 +32,7 @@ struct Worst {
 
 template <typename Draw>
 Worst noise_through(const FilterDesign& design, MotionKind motion, Draw draw, int samples) {
-  RegressorFilter filter(SingleAxis{}.model(), design, axis(motion));
+  RegressorFilter filter(model::SingleAxis{}.model(), design, axis(motion));
   Worst worst;
   for (int k = 0; k < samples; ++k) {
     const double t = 0.01 * k;
@@ -106,7 +106,7 @@ TEST(StatisticalNorms, ApproachTheClosedFormsForSmallSteps) {
 }
 
 TEST(Propagate, StatisticalBoundsAreNeverWiderThanTheWorstCase) {
-  const Model model = SingleAxis{}.model();
+  const Model model = model::SingleAxis{}.model();
   const FilterDesign design;
   const SensorErrors sensors{.motion = 1e-3, .effort = 0.1};
   const SignalErrors worst = propagate(model, design, axis(MotionKind::angle), sensors);
@@ -200,4 +200,4 @@ TEST(StatisticalNoise, OfTwoJointsIsNeverBelowWhatTheyCanDoTogether) {
 }
 
 }  // namespace
-}  // namespace wheelwright::noise_test
+}  // namespace wheelwright::filter::noise_test

@@ -13,7 +13,7 @@
 
 #include "support/random.hpp"
 
-namespace wheelwright::odometry_filter_test {
+namespace wheelwright::filter::odometry_filter_test {
 namespace {
 
 using testing_support::Random;
@@ -389,7 +389,7 @@ TEST(OdometryFilter, AHeldPoseCountsWhereItIsNew) {
   robot.wheel_radius = 0.1;
   robot.track_width = 0.4;
   Measurement torque;
-  const auto found = find_odometry(source, robot, make_model(robot), torque);
+  const auto found = find_odometry(source, robot, model::make_model(robot), torque);
   ASSERT_TRUE(found.has_value());
   EXPECT_TRUE(found->held_pose);
   const RegressionBlock rows = rows_of(log, {*found, 1.0});
@@ -401,7 +401,7 @@ TEST(OdometryFilter, FindsWhatALogHas) {
   Robot robot;
   robot.wheel_radius = 0.1;
   robot.track_width = 0.4;
-  const Model model = make_model(robot);
+  const Model model = model::make_model(robot);
   Measurement torque;
   torque.motion = MotionKind::mean_speed;
   torque.motion_columns = {"omega_r", "omega_l"};
@@ -433,4 +433,4 @@ TEST(OdometryFilter, SaysWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace wheelwright::odometry_filter_test
+}  // namespace wheelwright::filter::odometry_filter_test

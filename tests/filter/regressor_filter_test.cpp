@@ -10,7 +10,7 @@
 #include <wheelwright/model/differential_drive.hpp>
 #include <wheelwright/model/single_axis.hpp>
 
-namespace wheelwright::regressor_filter_test {
+namespace wheelwright::filter::regressor_filter_test {
 namespace {
 
 const DifferentialDrive kRobot{.wheel_radius = 0.1, .track_width = 0.4};
@@ -136,7 +136,7 @@ TEST(TorqueRows, BatchAndStreamingGiveTheSameBits) {
       if (online.step(log.t[k], sample)) {
         ASSERT_EQ(rows_a.sample[next], k);
         const auto at = static_cast<Eigen::Index>(2 * next);
-        EXPECT_EQ(online.row().Y, RowMatrix(rows_a.Y.middleRows(at, 2)));
+        EXPECT_EQ(online.row().Y, core::RowMatrix(rows_a.Y.middleRows(at, 2)));
         EXPECT_EQ(online.row().y, Eigen::VectorXd(rows_a.y.segment(at, 2)));
         ++next;
       }
@@ -149,20 +149,20 @@ TEST(TorqueRows, NothingIsFilteredAcrossASplit) {
   const LogTable log = drive(MotionKind::speed, 0.01, 4.0, Clock::even);
   LogTable split = log;
   split.segment_starts = {0, 200};
-  const LogTable second = slice(log, 200, log.rows());
+  const LogTable second = core::slice(log, 200, log.rows());
   TableSource split_source(split), second_source(second);
   const RegressorFilter filter(kRobot.model(), {}, wheels(MotionKind::speed));
   TorqueRows a(split_source, filter), b(second_source, filter);
   const RegressionBlock rows_a = read_all(a), rows_b = read_all(b);
   const auto tail = rows_b.rows();
-  EXPECT_EQ(RowMatrix(rows_a.Y.bottomRows(tail)), rows_b.Y);
+  EXPECT_EQ(core::RowMatrix(rows_a.Y.bottomRows(tail)), rows_b.Y);
   EXPECT_EQ(Eigen::VectorXd(rows_a.y.tail(tail)), rows_b.y);
 }
 
 TEST(RegressorFilter, FunctionTermsAreFilteredLikeTheMotion) {
   // Constant speed: Coulomb friction, viscous friction and the effort are all the same filtered constant, which is 1 up
   // to (βh)²/12 of how the kernel is interpolated.
-  SingleAxis axis{.coulomb = true, .offset = true};
+  model::SingleAxis axis{.coulomb = true, .offset = true};
   Measurement m;
   m.motion = MotionKind::angle;
   m.motion_columns = {"position"};
@@ -187,4 +187,4 @@ TEST(RegressorFilter, SpeedlessOrderOneIsRefused) {
 }
 
 }  // namespace
-}  // namespace wheelwright::regressor_filter_test
+}  // namespace wheelwright::filter::regressor_filter_test

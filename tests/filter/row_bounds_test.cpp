@@ -12,7 +12,7 @@
 
 #include <wheelwright/model/single_axis.hpp>
 
-namespace wheelwright::row_bounds_test {
+namespace wheelwright::filter::row_bounds_test {
 namespace {
 
 // m v̇ + f v + c sgn v = τ with τ linear between events (constant where there is dry friction).
@@ -87,14 +87,15 @@ Outcome watch(const Case& c, unsigned seed) {
   std::uniform_real_distribution<double> unit(-1.0, 1.0);
   const double m = 3.0, f = m / c.time_constant, amplitude = 2.0;
   Plant plant{m, f, c.dry * amplitude};
-  SingleAxis axis{.coulomb = c.dry > 0.0};
+  model::SingleAxis axis{.coulomb = c.dry > 0.0};
   Measurement measurement;
   measurement.motion = c.motion;
   measurement.motion_columns = {"position"};
   measurement.effort_columns = {"effort"};
   measurement.nominal_step = c.h;
   measurement.hold = c.commands == Commands::linear ? Hold::first_order : Hold::zero_order;
-  measurement.changes = c.commands == Commands::between ? EffortChanges::between : EffortChanges::at_samples;
+  measurement.changes =
+      c.commands == Commands::between ? model::EffortChanges::between : model::EffortChanges::at_samples;
   const Model model = axis.model();
   const FilterDesign design{.order = c.order, .alpha = c.beta, .beta = c.beta};
   SensorErrors sensors{.motion = 1e-6, .effort = 1e-4};
@@ -244,4 +245,4 @@ std::vector<Case> cases() {
 INSTANTIATE_TEST_SUITE_P(Everywhere, RowBounds, testing::ValuesIn(cases()));
 
 }  // namespace
-}  // namespace wheelwright::row_bounds_test
+}  // namespace wheelwright::filter::row_bounds_test

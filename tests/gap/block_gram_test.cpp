@@ -12,7 +12,7 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/gap/signed_least_squares.hpp>
 
-namespace wheelwright::block_gram_test {
+namespace wheelwright::gap::block_gram_test {
 namespace {
 
 constexpr double kDuration = 40.0;
@@ -219,4 +219,4 @@ TEST(SignedLeastSquares, IsTheBestOfAllActiveSets) {
 }
 
 }  // namespace
-}  // namespace wheelwright::block_gram_test
+}  // namespace wheelwright::gap::block_gram_test

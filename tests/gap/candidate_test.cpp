@@ -11,7 +11,7 @@
 #include <gtest/gtest.h>
 #include <Eigen/QR>
 
-namespace wheelwright::candidate_test {
+namespace wheelwright::gap::candidate_test {
 namespace {
 
 constexpr Eigen::Index kRows = 600;
@@ -224,4 +224,4 @@ TEST(CauseSet, SubtractsWhatHasNoCoefficient) {
 }
 
 }  // namespace
-}  // namespace wheelwright::candidate_test
+}  // namespace wheelwright::gap::candidate_test

@@ -16,7 +16,7 @@
 #include <wheelwright/gap/drive.hpp>
 #include <wheelwright/gap/kinematic_rows.hpp>
 
-namespace wheelwright::catalogue_test {
+namespace wheelwright::gap::catalogue_test {
 namespace {
 
 constexpr double kR = 0.1, kD = 0.4, kL = 0.2, kM = 20.0, kI = 0.8, kF1 = 5.0, kF3 = 0.6, kH = 0.005, kBeta = 10.0;
@@ -375,4 +375,4 @@ TEST(Catalogue, SingleAxisHasItsOwnEffects) {
 }
 
 }  // namespace
-}  // namespace wheelwright::catalogue_test
+}  // namespace wheelwright::gap::catalogue_test

@@ -14,7 +14,7 @@
 
 #include <wheelwright/core/error.hpp>
 
-namespace wheelwright::confidence_set_test {
+namespace wheelwright::gap::confidence_set_test {
 namespace {
 
 constexpr Eigen::Index kBlocks = 24;
@@ -167,4 +167,4 @@ TEST(ConfidenceSet, NeedsBlocksOfEveryModel) {
 }
 
 }  // namespace
-}  // namespace wheelwright::confidence_set_test
+}  // namespace wheelwright::gap::confidence_set_test

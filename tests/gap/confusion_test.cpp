@@ -16,7 +16,7 @@
 
 #include "gap/noisy_log.hpp"
 
-namespace wheelwright::confusion_test {
+namespace wheelwright::gap::confusion_test {
 namespace {
 
 using testing::Contains;
@@ -95,7 +95,7 @@ TEST(ConfusablePairs, AreOthersWhereThetaIsHeld) {
 // effect of which it is a special case. Straight ahead, a caster's drag is dry friction; in turns it is not.
 TEST(JudgePairs, TellsWhatThisLogLacksFromWhatNoLogHas) {
   Scenario s = gap_example::noisy_scenario(gap_example::robot_with("coulomb", {{"c", 0.3}}), 1);
-  s.trajectory.kind = Trajectory::Kind::straight;
+  s.trajectory.kind = sim::Trajectory::Kind::straight;
   DiagnoseOptions options;
   options.catalogue = gap_example::only({"coulomb", "coulomb_asymmetric", "caster_drag"});
   options.catalogue->push_back(options.catalogue->front());
@@ -125,7 +125,7 @@ TEST(NotExcited, NamesWhatALogCannotShowAndWhatWould) {
   const auto sentences = [](double yaw_rate) {
     Scenario s = gap_example::noisy_scenario(gap_example::counted_robot(), 1);
     s.sensors.encoder_counts_per_turn.reset();
-    s.trajectory.kind = yaw_rate > 0.0 ? Trajectory::Kind::multi_sine : Trajectory::Kind::straight;
+    s.trajectory.kind = yaw_rate > 0.0 ? sim::Trajectory::Kind::multi_sine : sim::Trajectory::Kind::straight;
     s.trajectory.yaw_rate = yaw_rate;
     DiagnoseOptions options;
     options.catalogue = gap_example::only({"coulomb", "lateral_scrub", "com_longitudinal", "payload"});
@@ -141,4 +141,4 @@ TEST(NotExcited, NamesWhatALogCannotShowAndWhatWould) {
 }
 
 }  // namespace
-}  // namespace wheelwright::confusion_test
+}  // namespace wheelwright::gap::confusion_test

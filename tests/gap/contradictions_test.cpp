@@ -11,7 +11,7 @@
 
 #include "gap/made_up_drive.hpp"
 
-namespace wheelwright::contradictions_test {
+namespace wheelwright::gap::contradictions_test {
 namespace {
 
 constexpr double kBeta = 5.0, kMass = 20.0, kInertia = 0.8, kDrag = 4.0, kYawDrag = 0.5;
@@ -23,7 +23,7 @@ Drive driven(double friction, double seconds = 60.0) {
   robot.track_width = 0.4;
   robot.parameters = {{"mass", "yaw_inertia", "viscous_linear", "viscous_yaw"}};
   Drive d = gap_example::made_up_drive(seconds);
-  d.model = make_model(robot);
+  d.model = model::make_model(robot);
   for (CoordinateSignals& c : d.coordinates) {
     c.speed = c.smooth_speed;
   }
@@ -106,4 +106,4 @@ TEST(Contradictions, RefuseWhatMakesNoSense) {
 }
 
 }  // namespace
-}  // namespace wheelwright::contradictions_test
+}  // namespace wheelwright::gap::contradictions_test

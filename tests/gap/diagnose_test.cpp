@@ -15,7 +15,7 @@
 
 #include "gap/noisy_log.hpp"
 
-namespace wheelwright::diagnose_test {
+namespace wheelwright::gap::diagnose_test {
 namespace {
 
 using gap_example::counted_robot;
@@ -41,7 +41,7 @@ Diagnosis diagnosis_of(const Scenario& scenario, bool with_baseline, const Robot
 // No noise, no effect: at every rate, with and without stamps at the middle of the interval.
 TEST(Diagnose, TheGapOfPerfectDataIsNothing) {
   for (const double rate : {50.0, 100.0}) {
-    for (const Sampling sampling : {Sampling::instant, Sampling::interval}) {
+    for (const sim::Sampling sampling : {sim::Sampling::instant, sim::Sampling::interval}) {
       Scenario s = simulated_drive(plain_robot(), 40.0, rate);
       s.sensors.sampling = sampling;
       const Diagnosis found = diagnosis_of(s, false, plain_robot());
@@ -183,4 +183,4 @@ TEST(Diagnose, SaysThatALogIsTooShort) {
 }
 
 }  // namespace
-}  // namespace wheelwright::diagnose_test
+}  // namespace wheelwright::gap::diagnose_test

@@ -19,7 +19,10 @@
 
 #include "design/robots.hpp"
 
-namespace wheelwright::discrimination_test {
+namespace wheelwright::gap::discrimination_test {
+
+using design::DesignSubject;
+
 namespace {
 
 using testing_support::small_robot;
@@ -29,11 +32,11 @@ DesignSubject subject(double step = 0.02) {
   robot.hold = Hold::first_order;
   robot.noise.position.value = 0.004;
   robot.noise.heading.value = 0.01;
-  return subject_of(robot, step);
+  return design::subject_of(robot, step);
 }
 
-MotionLimits limits(double duration = 8.0) {
-  MotionLimits l = limits_of(small_robot());
+design::MotionLimits limits(double duration = 8.0) {
+  design::MotionLimits l = design::limits_of(small_robot());
   l.duration = duration;
   l.radius = 2.0;
   return l;
@@ -41,8 +44,8 @@ MotionLimits limits(double duration = 8.0) {
 
 // A motion from functions of time.
 template <typename Speed>
-Plan plan_of_speeds(const DesignSubject& s, double duration, const Speed& speed) {
-  Plan plan;
+design::Plan plan_of_speeds(const DesignSubject& s, double duration, const Speed& speed) {
+  design::Plan plan;
   plan.step = s.step;
   const auto n = static_cast<Eigen::Index>(std::lround(duration / s.step)) + 1;
   plan.speed.resize(2, n);
@@ -53,7 +56,7 @@ Plan plan_of_speeds(const DesignSubject& s, double duration, const Speed& speed)
   for (Eigen::Index k = 1; k + 1 < n; ++k) {
     plan.acceleration.col(k) = (plan.speed.col(k + 1) - plan.speed.col(k - 1)) / (2.0 * s.step);
   }
-  integrate_pose(plan, s.model);
+  design::integrate_pose(plan, s.model);
   return plan;
 }
 
@@ -73,7 +76,7 @@ PlannedNoise torque_only(const DesignSubject& s) {
 
 TEST(PlannedDrive, EffortsObeyTheModel) {
   const DesignSubject s = subject();
-  const StageFamily family(s, limits(), 2);
+  const design::StageFamily family(s, limits(), 2);
   const Drive drive = planned_drive(family.plan(std::vector{0.9, 0.6, 0.5, 0.1, 0.7, 0.2}, s.step), s);
   for (const Eigen::Index k : {0, 40, 77, 150, 333}) {
     const std::vector speed{drive.coordinates[0].speed[k], drive.coordinates[1].speed[k]};
@@ -83,7 +86,7 @@ TEST(PlannedDrive, EffortsObeyTheModel) {
     const Eigen::VectorXd left =
         drive.model.input * Eigen::Vector2d(drive.joints[0].effort[k], drive.joints[1].effort[k]);
     const Eigen::VectorXd right =
-        regressor(drive.model, {speed, zero, joint, zero, drive.heading[k], 0.0}, acceleration) * s.theta;
+        model::regressor(drive.model, {speed, zero, joint, zero, drive.heading[k], 0.0}, acceleration) * s.theta;
     EXPECT_NEAR((left - right).norm(), 0.0, 1e-12 * (1.0 + right.norm()));
   }
   EXPECT_TRUE(drive.joints[0].resting[0]);  // the 0.1 s before it begins
@@ -117,7 +120,7 @@ TEST(Discrimination, DryFrictionAtOneSpeedAndAtTwo) {
 
 TEST(Discrimination, NothingTellsARivalFromItself) {
   const DesignSubject s = subject();
-  const StageFamily family(s, limits(), 2);
+  const design::StageFamily family(s, limits(), 2);
   const Drive drive = planned_drive(family.plan(std::vector{0.9, 0.6, 0.5, 0.1, 0.7, 0.2}, s.step), s);
   const std::vector<Effect> catalogue = effect_catalogue();
   for (const char* name : {"coulomb", "delay", "torque_deadzone", "wheel_radius_asymmetric"}) {
@@ -134,7 +137,7 @@ TEST(Discrimination, LagIsDelayInSlowMotionOnly) {
   const std::vector<Rival> rivals{rival("actuator_lag", {}, {0.03}), rival("delay", {}, {0.03})};
   const auto share_at = [&](double w) {
     // Several frequencies: at a single one inertia and friction take up any phase.
-    const Plan plan = plan_of_speeds(s, 12.0, [w](double t) {
+    const design::Plan plan = plan_of_speeds(s, 12.0, [w](double t) {
       const double window = std::pow(std::sin(std::numbers::pi * t / 12.0), 4);
       return Eigen::Vector2d(0.2 * window * (std::sin(w * t) + std::sin(2.9 * w * t)),
                              0.3 * window * (std::sin(1.3 * w * t) + std::sin(3.7 * w * t)));
@@ -151,7 +154,7 @@ TEST(Discrimination, DecidesAtThePromisedRate) {
   const DesignSubject s = subject();
   const std::vector<Effect> catalogue = effect_catalogue();
   PlannedNoise noise = torque_only(s);
-  const StageFamily family(s, limits(16.0), 3);
+  const design::StageFamily family(s, limits(16.0), 3);
   const Drive drive = planned_drive(family.plan(std::vector{0.9, 0.6, 0.5, 0.1, 0.7, 0.2, 0.8, 0.1, 0.4}, s.step), s);
   std::vector<Rival> rivals{rival("coulomb", {0.1}), rival("caster_drag", {1.0}, {0.2, 0.002})};
   double deviations = discrimination(drive, rivals, catalogue, noise)[0].deviations();
@@ -202,7 +205,7 @@ TEST(Discrimination, DecidesAtThePromisedRate) {
 
 TEST(Discrimination, RefusesWhatCannotBeCompared) {
   const DesignSubject s = subject();
-  const StageFamily family(s, limits(), 2);
+  const design::StageFamily family(s, limits(), 2);
   const Drive drive = planned_drive(family.plan(std::vector{0.9, 0.6, 0.5, 0.1, 0.7, 0.2}, s.step), s);
   const std::vector<Effect> catalogue = effect_catalogue();
   const PlannedNoise noise = expected_noise(s);
@@ -216,8 +219,8 @@ TEST(Discrimination, RefusesWhatCannotBeCompared) {
   EXPECT_THROW((void)discrimination(drive, {good, rival("delay", {}, {0.1})}, catalogue, silent), InvalidArgument);
 }
 
-DesignOptions quick() {
-  DesignOptions options;
+design::DesignOptions quick() {
+  design::DesignOptions options;
   options.stages = 3;
   options.samples = 30;
   options.descents = 2;
@@ -265,8 +268,8 @@ TEST(SlowDiscriminationDesign, BeatsTheFigureEightAndRandomManoeuvres) {
   const DesignSubject s = subject();
   const std::vector<Effect> catalogue = effect_catalogue();
   const PlannedNoise noise = torque_only(s);
-  const MotionLimits within = limits();
-  const StageFamily family(s, within, 3);
+  const design::MotionLimits within = limits();
+  const design::StageFamily family(s, within, 3);
   const Drive typical = planned_drive(family.plan(std::vector<double>(family.dimension(), 0.8), s.step), s);
   const std::vector<std::pair<const char*, const char*>> pairs{
       {"coulomb", "caster_drag"}, {"viscous_asymmetric", "torque_gain_asymmetric"}, {"actuator_lag", "delay"}};
@@ -277,7 +280,7 @@ TEST(SlowDiscriminationDesign, BeatsTheFigureEightAndRandomManoeuvres) {
     const double mine = design.promised[*design.worst()].deviations();
     EXPECT_NEAR(mine, -design.manoeuvre.objective, 1e-9 * mine);
     EXPECT_LE(design.manoeuvre.use.largest(), 1.0);
-    const PlanObjective objective = tell_apart(s, rivals, catalogue, noise, design.decidable);
+    const design::PlanObjective objective = tell_apart(s, rivals, catalogue, noise, design.decidable);
     ASSERT_TRUE(design.figure_eight_plan);
     EXPECT_GT(mine, -objective(*design.figure_eight_plan)) << a;
     std::mt19937_64 generator(99);
@@ -293,4 +296,4 @@ TEST(SlowDiscriminationDesign, BeatsTheFigureEightAndRandomManoeuvres) {
 }
 
 }  // namespace
-}  // namespace wheelwright::discrimination_test
+}  // namespace wheelwright::gap::discrimination_test

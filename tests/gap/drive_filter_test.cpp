@@ -10,7 +10,7 @@
 
 #include <wheelwright/filter/regressor_filter.hpp>
 
-namespace wheelwright::drive_filter_test {
+namespace wheelwright::gap::drive_filter_test {
 namespace {
 
 constexpr double kStep = 0.01, kBeta = 8.0, kSettle = 16.0;
@@ -56,7 +56,7 @@ Measurement measurement_of(MotionKind kind, Hold hold) {
 // The rows of both filters at the same instants: RegressorFilter gives a step's row at its end, and for angles the
 // drive's instant is the middle of the step.
 struct Both {
-  RowMatrix drive, regressor;  // instants × (y and Y of both outputs)
+  core::RowMatrix drive, regressor;  // instants × (y and Y of both outputs)
 };
 
 Both rows_of_both(MotionKind kind, Hold hold, double step) {
@@ -192,4 +192,4 @@ TEST(DriveFilter, AConstantKeepsItsValueAndItsRateIsZero) {
 }
 
 }  // namespace
-}  // namespace wheelwright::drive_filter_test
+}  // namespace wheelwright::gap::drive_filter_test

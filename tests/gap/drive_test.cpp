@@ -8,7 +8,7 @@
 
 #include <wheelwright/core/error.hpp>
 
-namespace wheelwright::drive_test {
+namespace wheelwright::gap::drive_test {
 namespace {
 
 Robot axis() {
@@ -116,10 +116,10 @@ TEST(Drive, PredictedEffortIsTheModelOnTheSmoothMotion) {
 TEST(Drive, MisuseIsRefused) {
   const auto zero = [](double) { return 0.0; };
   LogTable log = log_of(even(10, 0.01), zero, zero);
-  EXPECT_THROW((void)make_drive(slice(log, 0, 2), axis(), measurement()), InvalidArgument);
+  EXPECT_THROW((void)make_drive(core::slice(log, 0, 2), axis(), measurement()), InvalidArgument);
   log.names[1] = "torque";
   EXPECT_THROW((void)make_drive(log, axis(), measurement()), InvalidArgument);
 }
 
 }  // namespace
-}  // namespace wheelwright::drive_test
+}  // namespace wheelwright::gap::drive_test

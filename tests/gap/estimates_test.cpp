@@ -14,7 +14,7 @@
 
 #include "gap/noisy_log.hpp"
 
-namespace wheelwright::estimates_test {
+namespace wheelwright::gap::estimates_test {
 namespace {
 
 using gap_example::noisy_scenario;
@@ -159,4 +159,4 @@ TEST(ShapleyShares, AreEachCausesOwnWhereTheyDoNotOverlapAndTheMeanOfBothOrdersW
 }
 
 }  // namespace
-}  // namespace wheelwright::estimates_test
+}  // namespace wheelwright::gap::estimates_test

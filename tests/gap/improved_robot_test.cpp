@@ -13,7 +13,10 @@
 
 #include "gap/simulated_gap.hpp"
 
-namespace wheelwright::improved_robot_test {
+namespace wheelwright::gap::improved_robot_test {
+
+using model::effect_value;
+
 namespace {
 
 using gap_example::drive_of_log;
@@ -23,7 +26,7 @@ using gap_example::plain_robot;
 using gap_example::simulated_drive;
 
 const Drive& plain_drive() {
-  static const Drive drive = drive_of_log(simulate(simulated_drive(plain_robot())), plain_robot());
+  static const Drive drive = drive_of_log(sim::simulate(simulated_drive(plain_robot())), plain_robot());
   return drive;
 }
 
@@ -56,19 +59,20 @@ TEST_P(EffectOfASimulator, ComesBackInTheRobotFile) {
   Robot world = plain_robot();
   world.effects.push_back({c.name, {}});
   for (const auto& [name, value] : c.truth) {
-    world.effects.front().parameters[name.empty() ? effect_law(c.name).parameters.front().name : name] = {value, value};
+    world.effects.front().parameters[name.empty() ? model::effect_law(c.name).parameters.front().name : name] = {value,
+                                                                                                                 value};
   }
   world.wheel_radius *= 1.0 + c.larger;
-  const Drive drive = drive_of_log(simulate(simulated_drive(world)), plain_robot());
+  const Drive drive = drive_of_log(sim::simulate(simulated_drive(world)), plain_robot());
   const auto [theta, causes] = fit_effects(drive, {{effect_called(c.name), c.shape, {}}}, true);
   std::string why_not;
   const auto robot = improved_robot(plain_robot(), drive, theta, causes, {}, why_not);
   ASSERT_TRUE(robot) << why_not;
-  const DriveGeometry true_geometry = drive_geometry(world), geometry = drive_geometry(*robot);
+  const model::DriveGeometry true_geometry = model::drive_geometry(world), geometry = model::drive_geometry(*robot);
   EXPECT_LT((geometry.radius - true_geometry.radius).norm(), 2e-4 * world.wheel_radius);
   EXPECT_LT((geometry.encoder_scale - true_geometry.encoder_scale).norm(), 4e-4);
   for (const auto& [name, value] : c.truth) {
-    if (effect_law(c.name).mechanism != EffectMechanism::geometry) {
+    if (model::effect_law(c.name).mechanism != model::EffectMechanism::geometry) {
       EXPECT_NEAR(effect_value(*robot, c.name, name), value, c.tolerance * std::abs(value)) << name;
     }
   }
@@ -118,7 +122,7 @@ TEST(ImprovedRobot, AGainAtOneSideBecomesACommonAndAnAntisymmetricOne) {
 
 TEST(ImprovedRobot, OneLargerWheelIsThatWheelOnly) {
   const Robot right = improved({fitted("wheel_radius_asymmetric", {0.05, 0.0}, {0.0})});
-  const DriveGeometry geometry = drive_geometry(right);
+  const model::DriveGeometry geometry = model::drive_geometry(right);
   EXPECT_NEAR(geometry.radius[0], 0.0975 * 1.05, 1e-12);
   EXPECT_NEAR(geometry.radius[1], 0.0975, 1e-12);
   // b = r² f1/2 at each joint, through unequal radii: the cross term of Σ b ω_j/r_j to first order.
@@ -190,7 +194,7 @@ TEST(ImprovedRobot, SaysWhyARobotFileCannotCarryACause) {
 TEST(WithNominal, TakesThetaAndWidensAPriorThatExcludesIt) {
   Robot robot = plain_robot();
   robot.prior["mass"] = {20.0, 22.0};
-  const Model model = make_model(robot);
+  const Model model = model::make_model(robot);
   Eigen::VectorXd theta = plain_drive().theta;
   theta[0] *= 2.0;
   theta[2] = -0.1;
@@ -203,4 +207,4 @@ TEST(WithNominal, TakesThetaAndWidensAPriorThatExcludesIt) {
 }
 
 }  // namespace
-}  // namespace wheelwright::improved_robot_test
+}  // namespace wheelwright::gap::improved_robot_test

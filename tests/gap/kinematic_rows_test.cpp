@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-namespace wheelwright::kinematic_rows_test {
+namespace wheelwright::gap::kinematic_rows_test {
 namespace {
 
 constexpr double kR = 0.1, kD = 0.4, kV = 0.5, kW = 0.8, kStep = 0.005;
@@ -107,4 +107,4 @@ TEST(KinematicRows, RepeatedMotionShowsTheNoiseAndNotWhatIsMissing) {
 }
 
 }  // namespace
-}  // namespace wheelwright::kinematic_rows_test
+}  // namespace wheelwright::gap::kinematic_rows_test

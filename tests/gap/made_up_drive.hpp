@@ -9,7 +9,7 @@
 
 #include <wheelwright/gap/drive.hpp>
 
-namespace wheelwright::gap_example {
+namespace wheelwright::gap::gap_example {
 
 /// A robot on two wheels (r = 0.1 m, D = 0.4 m) that drives in incommensurate sines, stands still for 2 s in every 20,
 /// and has a pose.
@@ -77,4 +77,4 @@ inline Eigen::VectorXd noise_like(const Drive& drive, double beta, double sd, st
   return filtered(drive, beta, white) * (sd / std::sqrt(0.25 * beta * drive.step));
 }
 
-}  // namespace wheelwright::gap_example
+}  // namespace wheelwright::gap::gap_example

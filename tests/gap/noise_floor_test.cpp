@@ -13,7 +13,7 @@
 
 #include "gap/simulated_gap.hpp"
 
-namespace wheelwright::noise_floor_test {
+namespace wheelwright::gap::noise_floor_test {
 namespace {
 
 using gap_example::drive_of_log;
@@ -27,7 +27,7 @@ Scenario long_drive(Hold hold = Hold::first_order) {
   Robot robot = plain_robot();
   robot.hold = hold;
   Scenario s = simulated_drive(robot, 600.0, 50.0);
-  s.sensors.noise = NoiseShape::truncated_gaussian;
+  s.sensors.noise = sim::NoiseShape::truncated_gaussian;
   return s;
 }
 
@@ -57,8 +57,8 @@ void expect_floor(const Scenario& scenario, const char* what, double bias = 1.0)
   silent.sensors.encoder_counts_per_turn.reset();
   Robot robot = scenario.robot;
   robot.encoder_counts_per_turn = scenario.sensors.encoder_counts_per_turn;
-  const Drive noisy = drive_of_log(simulate(scenario), robot);
-  const Drive clean = drive_of_log(simulate(silent), silent.robot);
+  const Drive noisy = drive_of_log(sim::simulate(scenario), robot);
+  const Drive clean = drive_of_log(sim::simulate(silent), silent.robot);
   const Eigen::Vector2d measured = sample_deviation(noisy, clean);
   const Eigen::VectorXd floor = noise_floor(noisy, signal_noise(noisy), kBeta).efforts;
   EXPECT_NEAR(floor[0], bias * measured[0], 0.05 * measured[0]);
@@ -71,7 +71,7 @@ TEST(NoiseFloor, IsTheDeviationOfFilteredEffortNoise) {
   expect_floor(s, "Gaussian");
   // (1, −3, 3, −1) of uniform numbers has the excess kurtosis −1.2 · 164/400, which moves the median of its size by 5
   // %.
-  s.sensors.noise = NoiseShape::uniform;
+  s.sensors.noise = sim::NoiseShape::uniform;
   expect_floor(s, "uniform", 1.05);
 }
 
@@ -91,7 +91,7 @@ TEST(NoiseFloor, IsWhatTheNoiseOfTheSpeedsMakesOfTheModel) {
 
 TEST(NoiseFloor, IsWhatEncoderCountsMakeOfTheModel) {
   Scenario s = long_drive();
-  s.sensors.sampling = Sampling::interval;
+  s.sensors.sampling = sim::Sampling::interval;
   s.sensors.encoder_counts_per_turn = 1024.0;
   expect_floor(s, "counts");
 }
@@ -99,7 +99,7 @@ TEST(NoiseFloor, IsWhatEncoderCountsMakeOfTheModel) {
 // Without noise the rows are wrong by what a signal that bends between its instants loses as a polygon.
 TEST(NoiseFloor, IsTheErrorOfTheStepWhereThereIsNoNoise) {
   for (const double rate : {50.0, 100.0, 200.0}) {
-    const Drive drive = drive_of_log(simulate(simulated_drive(plain_robot(), 60.0, rate)), plain_robot());
+    const Drive drive = drive_of_log(sim::simulate(simulated_drive(plain_robot(), 60.0, rate)), plain_robot());
     const Eigen::MatrixXd left = rows_of_log(drive);
     const Eigen::VectorXd floor = noise_floor(drive, signal_noise(drive), kBeta).efforts;
     for (Eigen::Index i = 0; i < 2; ++i) {
@@ -131,8 +131,8 @@ Scenario slow_drive(double noise) {
 
 TEST(Attenuation, IsByWhichShareLeastSquaresUnderestimatesTheMass) {
   for (const double noise : {0.4, 1.0}) {
-    const Drive noisy = drive_of_log(simulate(slow_drive(noise)), plain_robot());
-    const Drive clean = drive_of_log(simulate(slow_drive(0.0)), plain_robot());
+    const Drive noisy = drive_of_log(sim::simulate(slow_drive(noise)), plain_robot());
+    const Drive clean = drive_of_log(sim::simulate(slow_drive(0.0)), plain_robot());
     const double mass = fit_base(clean, kBeta)[0], biased = fit_base(noisy, kBeta)[0];
     const double bias = 1.0 - biased / mass;
     EXPECT_NEAR(mass, 0.0975 * 21.0, 1e-3 * mass);
@@ -142,7 +142,7 @@ TEST(Attenuation, IsByWhichShareLeastSquaresUnderestimatesTheMass) {
 }
 
 TEST(Attenuation, ChoosesTheFilter) {
-  const Drive drive = drive_of_log(simulate(slow_drive(0.05)), plain_robot());
+  const Drive drive = drive_of_log(sim::simulate(slow_drive(0.05)), plain_robot());
   SignalNoise noise = signal_noise(drive);
   double last = 1e9;
   for (const double times : {0.01, 0.3, 1.0, 3.0, 1000.0}) {
@@ -164,7 +164,7 @@ TEST(SignalNoise, ForgetsMotionAndJumps) {
   Scenario s = long_drive();
   s.duration = 120.0;
   s.sensors.effort = 0.3;
-  LogTable log = simulate(s);
+  LogTable log = sim::simulate(s);
   const Drive plain = drive_of_log(log, plain_robot());
   const auto column =
       static_cast<std::size_t>(std::find(log.names.begin(), log.names.end(), "tau_r") - log.names.begin());
@@ -177,4 +177,4 @@ TEST(SignalNoise, ForgetsMotionAndJumps) {
 }
 
 }  // namespace
-}  // namespace wheelwright::noise_floor_test
+}  // namespace wheelwright::gap::noise_floor_test

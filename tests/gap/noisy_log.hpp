@@ -17,7 +17,7 @@
 
 #include "gap/simulated_gap.hpp"
 
-namespace wheelwright::gap_example {
+namespace wheelwright::gap::gap_example {
 
 inline constexpr double kCounts = 16384.0;  // per turn
 
@@ -31,7 +31,7 @@ inline Robot counted_robot() {
 /// The same with one effect of the simulator.
 inline Robot robot_with(const std::string& effect, const std::map<std::string, double>& parameters) {
   Robot robot = counted_robot();
-  RobotEffect has{effect, {}};
+  model::RobotEffect has{effect, {}};
   for (const auto& [name, value] : parameters) {
     has.parameters[name] = {value, value};
   }
@@ -42,7 +42,7 @@ inline Robot robot_with(const std::string& effect, const std::map<std::string, d
 /// 40 s of `world` with encoder counts and noise of torque and pose.
 inline Scenario noisy_scenario(const Robot& world, std::uint64_t seed, double rate = 50.0) {
   Scenario s = simulated_drive(world, 40.0, rate);
-  s.sensors.sampling = Sampling::interval;
+  s.sensors.sampling = sim::Sampling::interval;
   s.sensors.encoder_counts_per_turn = kCounts;
   s.sensors.effort = 0.05;
   s.sensors.position = 0.002;
@@ -85,4 +85,4 @@ inline std::vector<Effect> only(const std::vector<std::string>& names) {
   return effects;
 }
 
-}  // namespace wheelwright::gap_example
+}  // namespace wheelwright::gap::gap_example

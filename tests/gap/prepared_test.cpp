@@ -12,7 +12,7 @@
 
 #include "gap/noisy_log.hpp"
 
-namespace wheelwright::prepared_test {
+namespace wheelwright::gap::prepared_test {
 namespace {
 
 using gap_example::counted_robot;
@@ -41,7 +41,8 @@ std::string message_of(const Call& call) {
 }
 
 TEST(FitBase, FindsThetaOfAPerfectLog) {
-  const Drive drive = gap_example::drive_of_log(simulate(simulated_drive(plain_robot(), 40.0, 200.0)), plain_robot());
+  const Drive drive =
+      gap_example::drive_of_log(sim::simulate(simulated_drive(plain_robot(), 40.0, 200.0)), plain_robot());
   const Eigen::VectorXd theta = fit_base(drive, 10.0);
   for (Eigen::Index j = 0; j < 4; ++j) {
     EXPECT_NEAR(theta[j], kTheta[j], 2e-3 * kTheta[j]) << j;
@@ -136,4 +137,4 @@ TEST(PrepareGap, SaysWhatIsWrongAndWhatToDo) {
 }
 
 }  // namespace
-}  // namespace wheelwright::prepared_test
+}  // namespace wheelwright::gap::prepared_test

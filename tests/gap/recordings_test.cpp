@@ -15,7 +15,7 @@
 
 #include "support/skip.hpp"
 
-namespace wheelwright::recordings_test {
+namespace wheelwright::gap::recordings_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -125,4 +125,4 @@ TEST_F(GapRecordings, UnsignedEffortsAreNoLoadFriction) {
 }
 
 }  // namespace
-}  // namespace wheelwright::recordings_test
+}  // namespace wheelwright::gap::recordings_test

@@ -13,7 +13,7 @@
 
 #include "gap/simulated_gap.hpp"
 
-namespace wheelwright::rollout_test {
+namespace wheelwright::gap::rollout_test {
 namespace {
 
 using gap_example::drive_of_log;
@@ -33,7 +33,7 @@ double largest(const std::vector<RolloutErrors>& errors) {
 // Largest error of a robot on its own noise-free log at `rate`, smoothed over five samples.
 double own_error(const Robot& world, double rate) {
   const Drive drive =
-      drive_of_log(simulate(simulated_drive(world, 12.0, rate)), plain_robot(), {.smoothing_window = 4.0 / rate});
+      drive_of_log(sim::simulate(simulated_drive(world, 12.0, rate)), plain_robot(), {.smoothing_window = 4.0 / rate});
   const std::vector<Eigen::Index> starts = rollout_starts(drive, {}, rollout_margin(world));
   EXPECT_GE(starts.size(), 15u);
   return largest(rollouts(drive, world, starts));
@@ -47,20 +47,20 @@ TEST(Rollout, OfTheLogsOwnRobotVanishesWithTheStep) {
 }
 
 TEST(Rollout, EffectsActAsInTheSimulation) {
-  const std::vector<RobotEffect> effects = {{"slope", {{"g_x", {0.2, 0.2}}, {"g_y", {-0.1, -0.1}}}},
-                                            {"com_longitudinal", {{"a", {0.05, 0.05}}}},
-                                            {"torque_gain_asymmetric", {{"g", {0.1, 0.1}}}},
-                                            {"delay", {{"T_d", {0.05, 0.05}}}},
-                                            {"actuator_lag", {{"T", {0.05, 0.05}}}},
-                                            {"sensor_time_offset", {{"dt", {0.04, 0.04}}}},
-                                            {"battery_sag", {{"k", {0.01, 0.01}}, {"R_b", {0.02, 0.02}}}},
-                                            {"friction_drift", {{"k", {0.5, 0.5}}, {"T", {8.0, 8.0}}}},
-                                            {"longitudinal_slip", {{"stiffness", {1000.0, 1000.0}}}},
-                                            {"encoder_scale", {{"s_R", {0.02, 0.02}}, {"s_L", {-0.01, -0.01}}}}};
-  for (const RobotEffect& effect : effects) {
+  const std::vector<model::RobotEffect> effects = {{"slope", {{"g_x", {0.2, 0.2}}, {"g_y", {-0.1, -0.1}}}},
+                                                   {"com_longitudinal", {{"a", {0.05, 0.05}}}},
+                                                   {"torque_gain_asymmetric", {{"g", {0.1, 0.1}}}},
+                                                   {"delay", {{"T_d", {0.05, 0.05}}}},
+                                                   {"actuator_lag", {{"T", {0.05, 0.05}}}},
+                                                   {"sensor_time_offset", {{"dt", {0.04, 0.04}}}},
+                                                   {"battery_sag", {{"k", {0.01, 0.01}}, {"R_b", {0.02, 0.02}}}},
+                                                   {"friction_drift", {{"k", {0.5, 0.5}}, {"T", {8.0, 8.0}}}},
+                                                   {"longitudinal_slip", {{"stiffness", {1000.0, 1000.0}}}},
+                                                   {"encoder_scale", {{"s_R", {0.02, 0.02}}, {"s_L", {-0.01, -0.01}}}}};
+  for (const model::RobotEffect& effect : effects) {
     Robot world = plain_robot();
     world.effects = {effect};
-    const Drive drive = drive_of_log(simulate(simulated_drive(world, 9.0, 200.0)), plain_robot());
+    const Drive drive = drive_of_log(sim::simulate(simulated_drive(world, 9.0, 200.0)), plain_robot());
     const std::vector<Eigen::Index> starts = rollout_starts(drive, {.fewest = 4}, rollout_margin(world));
     const double own = largest(rollouts(drive, world, starts));
     EXPECT_LT(own, 3e-3) << effect.name;
@@ -73,7 +73,7 @@ TEST(Rollout, EffectsActAsInTheSimulation) {
 TEST(Rollout, OfAWrongMassHasTheClosedForm) {
   Robot robot = plain_robot();
   robot.nominal = {{"mass", 20.0}, {"yaw_inertia", 1.0}, {"viscous_linear", 0.0}, {"viscous_yaw", 0.0}};
-  robot.speed_source = SpeedSource::measured;
+  robot.speed_source = model::SpeedSource::measured;
   LogTable log;
   log.names = {"omega_r", "omega_l", "tau_r", "tau_l", "x", "y", "theta"};
   log.columns.resize(7);
@@ -113,7 +113,7 @@ TEST(Rollout, OfAWrongMassHasTheClosedForm) {
 
 // Noise of one initial speed alone: v decays with f/m on the way, and the log's end has the noise too.
 TEST(Rollout, NoiseOfTheStartGoesOnToTheEnd) {
-  const Drive drive = drive_of_log(simulate(simulated_drive(plain_robot(), 12.0)), plain_robot());
+  const Drive drive = drive_of_log(sim::simulate(simulated_drive(plain_robot(), 12.0)), plain_robot());
   const std::vector<Eigen::Index> starts = rollout_starts(drive, {});
   const Eigen::VectorXd none = Eigen::VectorXd::Zero(drive.rows());
   const Eigen::VectorXd offset = Eigen::VectorXd::Constant(drive.rows(), 0.1);
@@ -126,28 +126,28 @@ TEST(Rollout, NoiseOfTheStartGoesOnToTheEnd) {
 TEST(Rollout, WindowsLieWithinSegmentsAndAreManyWhereTheLogAllows) {
   Scenario s = simulated_drive(plain_robot(), 30.0);
   s.gaps = {{10.0, 11.0}};
-  const Drive drive = drive_of_log(simulate(s), plain_robot());
+  const Drive drive = drive_of_log(sim::simulate(s), plain_robot());
   const std::vector<Eigen::Index> starts = rollout_starts(drive, {}, 0.5);
   EXPECT_GE(starts.size(), 20u);
   for (const Eigen::Index k : starts) {
     const double begin = drive.t[k] - 0.5, end = drive.t[k] + 5.5;
     EXPECT_TRUE(begin >= 0.0 && end <= 30.0 && (end < 10.0 || begin >= 11.0)) << drive.t[k];
   }
-  const Drive longer = drive_of_log(simulate(simulated_drive(plain_robot(), 130.0, 50.0)), plain_robot());
+  const Drive longer = drive_of_log(sim::simulate(simulated_drive(plain_robot(), 130.0, 50.0)), plain_robot());
   const std::size_t count = rollout_starts(longer, {}).size();
   EXPECT_GE(count, 30u);
   EXPECT_LE(count, 45u);
 }
 
 TEST(Rollout, ResultsDoNotDependOnThreads) {
-  const Drive drive = drive_of_log(simulate(simulated_drive(plain_robot(), 12.0)), plain_robot());
+  const Drive drive = drive_of_log(sim::simulate(simulated_drive(plain_robot(), 12.0)), plain_robot());
   const std::vector<Eigen::Index> starts = rollout_starts(drive, {});
   EXPECT_EQ(rollouts(drive, plain_robot(), starts, {.threads = 2})[1].position,
             rollouts(drive, plain_robot(), starts)[1].position);
 }
 
 TEST(Rollout, NeedsNominalValues) {
-  const Drive drive = drive_of_log(simulate(simulated_drive(plain_robot(), 8.0)), plain_robot());
+  const Drive drive = drive_of_log(sim::simulate(simulated_drive(plain_robot(), 8.0)), plain_robot());
   Robot unknown = plain_robot();
   unknown.nominal.erase("mass");
   EXPECT_THROW(static_cast<void>(rollouts(drive, unknown, {10})), InvalidArgument);
@@ -171,4 +171,4 @@ TEST(RolloutRms, IntervalIsThatOfIndependentValues) {
 }
 
 }  // namespace
-}  // namespace wheelwright::rollout_test
+}  // namespace wheelwright::gap::rollout_test

@@ -19,7 +19,7 @@
 
 #include "gap/noisy_log.hpp"
 
-namespace wheelwright::selection_test {
+namespace wheelwright::gap::selection_test {
 namespace {
 
 using gap_example::counted_robot;
@@ -81,7 +81,7 @@ Case effect_case(const std::string& name, const std::map<std::string, double>& p
   return {name, [=] { return noisy_scenario(robot_with(name, parameters), 3); }, {name}};
 }
 
-Case parameter_case(const std::string& name, const std::function<void(DriveParameters&)>& change) {
+Case parameter_case(const std::string& name, const std::function<void(model::DriveParameters&)>& change) {
   const auto scenario = [change] {
     Scenario s = noisy_scenario(counted_robot(), 4);
     change(s.parameters);
@@ -126,23 +126,23 @@ INSTANTIATE_TEST_SUITE_P(
         effect_case("actuator_lag", {{"T", 0.04}}), with_baseline(effect_case("wheel_radius", {{"eps", 0.03}})),
         with_baseline(effect_case("track_width", {{"eps", 0.05}})),
         parameter_case("payload",
-                       [](DriveParameters& p) {
+                       [](model::DriveParameters& p) {
                          p.mass = 26.0;
                          p.yaw_inertia = 0.98;
                        }),
         parameter_case("armature",
-                       [](DriveParameters& p) {
+                       [](model::DriveParameters& p) {
                          const double more = 2.0 * 0.02 / (kRadius * kRadius);  // two wheels of 0.02 kg·m²
                          p.mass += more;
                          p.yaw_inertia += more * kHalfTrack * kHalfTrack;
                        }),
         parameter_case("viscous",
-                       [](DriveParameters& p) {
+                       [](model::DriveParameters& p) {
                          p.viscous_x = p.viscous_y = 8.0;
                          p.viscous_yaw *= 2.0;
                        }),
         parameter_case("torque_gain",
-                       [](DriveParameters& p) {
+                       [](model::DriveParameters& p) {
                          for (double* x : {&p.mass, &p.yaw_inertia, &p.viscous_x, &p.viscous_y, &p.viscous_yaw}) {
                            *x *= 1.2;
                          }
@@ -195,7 +195,7 @@ Effect tether() {
 
 TEST(SelectCauses, FindsAUsersOwnEffect) {
   const Scenario s = noisy_scenario(counted_robot(), 8);
-  LogTable log = simulate(s), healthy = simulate(gap_example::healthy_scenario(s));
+  LogTable log = sim::simulate(s), healthy = sim::simulate(gap_example::healthy_scenario(s));
   const auto column = [&log](const std::string& name) -> std::vector<double>& {
     return log
         .columns[static_cast<std::size_t>(std::find(log.names.begin(), log.names.end(), name) - log.names.begin())];
@@ -308,4 +308,4 @@ TEST(UnexplainedBy, IsTheShareThatAnotherSetCannotMakeUp) {
 }
 
 }  // namespace
-}  // namespace wheelwright::selection_test
+}  // namespace wheelwright::gap::selection_test

@@ -12,7 +12,7 @@
 
 #include "gap/simulated_gap.hpp"
 
-namespace wheelwright::shrink_test {
+namespace wheelwright::gap::shrink_test {
 namespace {
 
 using gap_example::effect_called;
@@ -31,7 +31,7 @@ Robot file() {
 PreparedGap prepared_log(const Robot& world, std::uint64_t seed, double period) {
   Scenario s = simulated_drive(world, 40.0);
   s.trajectory.period = period;
-  s.sensors.sampling = Sampling::interval;
+  s.sensors.sampling = sim::Sampling::interval;
   s.sensors.encoder_counts_per_turn = kCounts;
   s.sensors.effort = 0.05;
   s.sensors.position = 0.002;
@@ -217,4 +217,4 @@ TEST(ParameterShifts, ShowWhatTheMissingCauseHadPoisoned) {
 }
 
 }  // namespace
-}  // namespace wheelwright::shrink_test
+}  // namespace wheelwright::gap::shrink_test

@@ -14,7 +14,7 @@
 #include <wheelwright/gap/gap_rows.hpp>
 #include <wheelwright/sim/simulation.hpp>
 
-namespace wheelwright::gap_example {
+namespace wheelwright::gap::gap_example {
 
 /// Viscous friction of the robot's yaw that its wheels' joints make: f1 (D/2)², N·m·s/rad.
 inline constexpr double kYawFriction = 4.0 * 0.1905 * 0.1905;
@@ -33,7 +33,7 @@ inline Scenario simulated_drive(const Robot& robot, double duration = 24.0, doub
   Scenario s;
   s.robot = robot;
   s.parameters = {.mass = 21.0, .yaw_inertia = 0.9, .viscous_x = 4.0, .viscous_y = 4.0, .viscous_yaw = kYawFriction};
-  s.trajectory = {.kind = Trajectory::Kind::multi_sine, .speed = 0.8, .yaw_rate = 1.6, .period = 8.0};
+  s.trajectory = {.kind = sim::Trajectory::Kind::multi_sine, .speed = 0.8, .yaw_rate = 1.6, .period = 8.0};
   s.duration = duration;
   s.rate = rate;
   s.sensors.angles = s.sensors.commands = false;
@@ -43,8 +43,8 @@ inline Scenario simulated_drive(const Robot& robot, double duration = 24.0, doub
 /// The log of `scenario` read by `robot`.
 inline Drive drive_of_log(const LogTable& log, const Robot& robot, const DriveOptions& options = {}) {
   TableSource source(log);
-  const Model model = make_model(robot);
-  Drive drive = make_drive(log, robot, find_measurement(source, robot, model, 2), options);
+  const Model model = model::make_model(robot);
+  Drive drive = make_drive(log, robot, filter::find_measurement(source, robot, model, 2), options);
   Eigen::VectorXd theta(static_cast<Eigen::Index>(model.p()));
   for (std::size_t j = 0; j < model.p(); ++j) {
     theta[static_cast<Eigen::Index>(j)] =
@@ -101,4 +101,4 @@ inline std::pair<Eigen::VectorXd, std::vector<FittedEffect>> fit_effects(const D
   return {theta, effects};
 }
 
-}  // namespace wheelwright::gap_example
+}  // namespace wheelwright::gap::gap_example

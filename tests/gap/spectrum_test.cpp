@@ -8,7 +8,7 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/gap/where.hpp>
 
-namespace wheelwright::spectrum_test {
+namespace wheelwright::gap::spectrum_test {
 namespace {
 
 TEST(GapSpectrum, OfASineIsItsMeanSquareAtItsFrequency) {
@@ -60,4 +60,4 @@ TEST(GapSpectrum, TooShortALogHasNone) {
 }
 
 }  // namespace
-}  // namespace wheelwright::spectrum_test
+}  // namespace wheelwright::gap::spectrum_test

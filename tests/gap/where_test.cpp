@@ -16,7 +16,7 @@
 
 #include "gap/made_up_drive.hpp"
 
-namespace wheelwright::where_test {
+namespace wheelwright::gap::where_test {
 namespace {
 
 using gap_example::made_up_drive;
@@ -192,4 +192,4 @@ TEST(Where, RefusesWhatMakesNoSense) {
 }
 
 }  // namespace
-}  // namespace wheelwright::where_test
+}  // namespace wheelwright::gap::where_test

@@ -331,7 +331,7 @@ TEST(FastRobots, FifteenMillisecondsAtFiftyHertz) {
   expect_kept("m/f = 15 ms at 50 Hz, commands change at samples", [](std::uint64_t seed) {
     Case c = ordinary(seed, 50.0, 25.0);
     c.sense = Sense::speed;
-    c.speed_source = SpeedSource::measured;
+    c.speed_source = model::SpeedSource::measured;
     c.motion_bound = 0.01;
     c.truth.viscous_linear = c.truth.mass / 0.015;
     c.truth.viscous_yaw = c.truth.yaw_inertia / 0.015;

@@ -28,7 +28,7 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
 
 void check_truth(const Scene& scene, const Commissioning& result, Verdict& verdict) {
   std::vector<Wide> theta;
-  for (const ParameterResult& p : result.parameters) {
+  for (const commission::ParameterResult& p : result.parameters) {
     const auto truth = scene.truth.find(p.parameter.physical);
     if (truth == scene.truth.end()) {
       verdict.outside += p.parameter.physical + "(unknown) ";
@@ -44,7 +44,7 @@ void check_truth(const Scene& scene, const Commissioning& result, Verdict& verdi
       verdict.width = (p.upper - p.lower) / static_cast<double>(value);
     }
   }
-  for (const HalfSpace& facet : result.model.facets) {
+  for (const bounds::HalfSpace& facet : result.model.facets) {
     Wide sum = 0;
     for (std::size_t j = 0; j < theta.size(); ++j) {
       sum += static_cast<Wide>(facet.a[static_cast<Eigen::Index>(j)]) * theta[j];
@@ -93,7 +93,7 @@ double oracle_width(const Case& c, const Scene& scene, const Commissioning& resu
     return 0.0;
   }
   const auto n = static_cast<Eigen::Index>(block.t.size());
-  block.Y = Eigen::Map<const RowMatrix>(rows.data(), n, 2);
+  block.Y = Eigen::Map<const core::RowMatrix>(rows.data(), n, 2);
   block.dY.resize(n, 2);
   block.dY.col(0).setConstant(n_acceleration);
   block.dY.col(1).setConstant(n_speed);
@@ -105,7 +105,7 @@ double oracle_width(const Case& c, const Scene& scene, const Commissioning& resu
       if (result.parameters[j].parameter.physical == physical) prior.sides.push_back(result.prior.sides[j]);
     }
   }
-  RegressionTable table(std::move(block));
+  core::RegressionTable table(std::move(block));
   const FeasibleSet set = feasible_set(table, prior);
   return set.status == FeasibleSet::Status::nonempty ? (set.hull.sides[0].upper - set.hull.sides[0].lower) / mass : 0.0;
 }
@@ -149,19 +149,19 @@ bool sees(const OnlineModel& model, const LogTable& log, double onset, double en
 }
 
 // Whether what is said of the first alarm leaves the fault possible, of its size and at its time.
-bool isolated(const OnlineModel& model, const LogTable& log, const FaultType& fault, const Breakdown& truth) {
+bool isolated(const OnlineModel& model, const LogTable& log, const detector::FaultType& fault, const Breakdown& truth) {
   TableSource source(log);
   const Detection detection = detect(source, make_detector(model));
   if (detection.events.empty() || detection.events.front().start < truth.onset) {
     return true;  // a false alarm is told elsewhere
   }
-  const Event& event = detection.events.front();
+  const detector::Event& event = detection.events.front();
   const RegressorFilter filter(model.model, model.filter, model.measurement, model.errors);
-  const ReferenceMotion motion = read_reference(source, filter);
-  const Isolation isolation =
-      isolate(motion, filter, Polytope(model.facets, model.box), {fault}, event.start, event.alarm);
-  const FaultFinding& found = isolation.findings.front();
-  return found.verdict == FaultFinding::Verdict::consistent &&
+  const detector::ReferenceMotion motion = detector::read_reference(source, filter);
+  const detector::Isolation isolation =
+      detector::isolate(motion, filter, Polytope(model.facets, model.box), {fault}, event.start, event.alarm);
+  const detector::FaultFinding& found = isolation.findings.front();
+  return found.verdict == detector::FaultFinding::Verdict::consistent &&
          (!found.magnitude || found.magnitude->contains(truth.size)) &&
          (found.onset.contains(truth.onset) || (found.earlier && truth.onset < found.onset.lower));
 }
@@ -179,19 +179,19 @@ void try_faults(Case c, const OnlineModel& model, Verdict& verdict) {
   c.watch_rows = std::min(c.watch_rows, kMostRows);
   const LogTable healthy = play(c).watched;
   TableSource log(healthy);
-  MarginSurveyOptions options;
+  commission::MarginSurveyOptions options;
   options.margins.windows = {window};
   options.margins.onset_step = (healthy.t.back() - healthy.t.front()) / static_cast<double>(kOnsets);
   options.margins.most_onsets = kOnsets;
   for (const Kind kind : kKinds) options.faults.push_back(fault_of(kind));
   options.map_points = 0;
-  const MarginSurvey survey = survey_margins(log, model, options);
-  for (const ResidualMargins& residual : survey.residuals) {
-    for (const FaultMargins& fault : residual.margins) {
+  const commission::MarginSurvey survey = commission::survey_margins(log, model, options);
+  for (const commission::ResidualMargins& residual : survey.residuals) {
+    for (const detector::FaultMargins& fault : residual.margins) {
       const Kind kind =
           *std::find_if(kKinds.begin(), kKinds.end(), [&](Kind k) { return fault_of(k) == fault.fault.name; });
       bool looked = false;
-      for (const OnsetMargin& onset : fault.onsets) {
+      for (const detector::OnsetMargin& onset : fault.onsets) {
         if (residual.name != "torque" || onset.certain.empty() || !(onset.certain[0] < fault.largest())) {
           continue;
         }
@@ -202,7 +202,10 @@ void try_faults(Case c, const OnlineModel& model, Verdict& verdict) {
         const bool seen = sees(model, broken, onset.t, end);
         ++tally.certain;
         tally.missed += seen ? 0 : 1;
-        if (seen && !looked) {
+        // A lost effort scales what a smooth effort strays from its straight line, too, which the declared bound, of
+        // healthy efforts, does not cover.
+        const bool kept = kind != Kind::effort_loss || c.changes != Changes::smooth;
+        if (seen && !looked && kept) {
           looked = true;
           ++tally.isolated;
           tally.excluded += isolated(model, broken, fault.fault, breakdown) ? 0 : 1;
@@ -226,7 +229,7 @@ Verdict judge(const Case& c, const JudgeOptions& options) {
   const auto start = std::chrono::steady_clock::now();
   try {
     TableSource log(scene.learned);
-    const Commissioning result = commission(log, scene.robot);
+    const Commissioning result = commission_robot(log, scene.robot);
     verdict.commission_seconds = seconds_since(start);
     verdict.message = result.message;
     switch (result.status) {
@@ -236,9 +239,9 @@ Verdict judge(const Case& c, const JudgeOptions& options) {
       case Commissioning::Status::done:
       case Commissioning::Status::partial: break;
     }
-    verdict.end = result.model.warrant == Warrant::guaranteed       ? Verdict::End::guaranteed
-                  : interval_warrant(result) == Warrant::guaranteed ? Verdict::End::intervals
-                                                                    : Verdict::End::learnt;
+    verdict.end = result.model.warrant == core::Warrant::guaranteed                   ? Verdict::End::guaranteed
+                  : commission::interval_warrant(result) == core::Warrant::guaranteed ? Verdict::End::intervals
+                                                                                      : Verdict::End::learnt;
     check_truth(scene, result, verdict);
     const auto watching = std::chrono::steady_clock::now();
     watch(scene.watched, result.model, verdict);

@@ -138,12 +138,12 @@ Case random_case(std::uint64_t seed, std::uint64_t number) {
       c.counts = std::round(dice.decade(64.0, 65536.0));
       c.motion_bound = std::numbers::pi / *c.counts;
       angle = swing * c.motion_bound;
-      c.speed_source = dice.chance(0.5) ? SpeedSource::automatic : SpeedSource::encoder_difference;
+      c.speed_source = dice.chance(0.5) ? model::SpeedSource::automatic : model::SpeedSource::encoder_difference;
       break;
     case Sense::speed:
       c.motion_bound = dice.decade(1e-4, 1e-1);
       angle = swing * c.motion_bound / omega;
-      c.speed_source = dice.chance(0.5) ? SpeedSource::automatic : SpeedSource::measured;
+      c.speed_source = dice.chance(0.5) ? model::SpeedSource::automatic : model::SpeedSource::measured;
       break;
     case Sense::whole_rpm:
       c.motion_bound = kTurn / 120.0 * (1.0 + 1e-12);

@@ -309,9 +309,9 @@ Scene play(const Case& c, bool exact) {
   r.track_width = t.axis ? 0.0 : t.track;
   const bool held = c.changes == Changes::at_samples || c.changes == Changes::between;
   r.hold = held != (c.broken == Broken::hold_wrong) ? Hold::zero_order : Hold::first_order;
-  r.effort_changes = c.changes == Changes::between ? EffortChanges::between : EffortChanges::at_samples;
+  r.effort_changes = c.changes == Changes::between ? model::EffortChanges::between : model::EffortChanges::at_samples;
   if (c.broken == Broken::unlogged_commands) {
-    r.effort_changes = EffortChanges::between;
+    r.effort_changes = model::EffortChanges::between;
   }
   if (c.delay_declared) {
     r.effort_delay = {0.0, c.delay * (1.0 + 1e-9)};

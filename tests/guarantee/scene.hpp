@@ -79,7 +79,7 @@ struct Case {
   double motion_bound = 1e-3;    ///< rad or rad/s; half a count for counting sensors
   std::optional<double> counts;  ///< per turn
   bool declare_counts = true;
-  SpeedSource speed_source = SpeedSource::automatic;
+  model::SpeedSource speed_source = model::SpeedSource::automatic;
   double effort_bound = 0.01;          ///< N·m
   Noise noise = Noise::uniform;        ///< while learning
   Noise noise_watch = Noise::uniform;  ///< while watching

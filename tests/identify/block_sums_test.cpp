@@ -11,7 +11,7 @@
 
 #include "support/random.hpp"
 
-namespace wheelwright::block_sums_test {
+namespace wheelwright::identify::block_sums_test {
 namespace {
 
 using testing_support::Autoregression;
@@ -123,4 +123,4 @@ TEST(LongRunCovariance, TooFewValuesGiveNoCovariance) {
 }
 
 }  // namespace
-}  // namespace wheelwright::block_sums_test
+}  // namespace wheelwright::identify::block_sums_test

@@ -11,7 +11,7 @@
 
 #include "support/random.hpp"
 
-namespace wheelwright::difference_noise_test {
+namespace wheelwright::identify::difference_noise_test {
 namespace {
 
 using testing_support::Autoregression;
@@ -170,4 +170,4 @@ TEST(DifferenceNoise, AsksForEnoughRowsAndKnownColumns) {
 }
 
 }  // namespace
-}  // namespace wheelwright::difference_noise_test
+}  // namespace wheelwright::identify::difference_noise_test

@@ -14,7 +14,7 @@
 #include "support/random.hpp"
 #include "support/rows.hpp"
 
-namespace wheelwright::estimate_test {
+namespace wheelwright::identify::estimate_test {
 namespace {
 
 using testing_support::block_of;
@@ -117,7 +117,7 @@ TEST(Estimates, CoverTheTruthWhereLeastSquaresDoesNot) {
                                    bias_compensated(m, noise_of(0.4, 0.3)), total_least_squares(m, noise_of(0.4, 0.3))};
     for (int e = 0; e < 4; ++e) {
       ASSERT_TRUE(estimates[e].usable);
-      const double t = student_quantile(0.95, estimates[e].freedom);
+      const double t = core::student_quantile(0.95, estimates[e].freedom);
       for (Eigen::Index j = 0; j < 3; ++j) {
         covered[e] += std::abs(estimates[e].theta[j] - w.theta[j]) <= t * estimates[e].standard_error[j] ? 1.0 : 0.0;
       }
@@ -167,4 +167,4 @@ TEST(ContrastTest, FindsNothingBetweenEqualEstimates) {
 }
 
 }  // namespace
-}  // namespace wheelwright::estimate_test
+}  // namespace wheelwright::identify::estimate_test

@@ -11,7 +11,7 @@
 #include "support/random.hpp"
 #include "support/rows.hpp"
 
-namespace wheelwright::estimator_choice_test {
+namespace wheelwright::identify::estimator_choice_test {
 namespace {
 
 using testing_support::block_of;
@@ -110,7 +110,7 @@ TEST(EstimatorChoice, DoesNotTakeNoiseOfTheMotionForWeakInstruments) {
     const EstimatorChoice choice = choose_estimator(evidence(log, true, false));
     ASSERT_EQ(choice.best().estimator, Estimator::instrumental_variables);
     EXPECT_LT(choice.candidates[choice.chosen].strength.maxCoeff(), 0.05);
-    const double t = student_quantile(0.95, choice.best().freedom);
+    const double t = core::student_quantile(0.95, choice.best().freedom);
     for (Eigen::Index j = 0; j < 2; ++j) {
       covered += std::abs(choice.best().theta[j] - Log::theta()[j]) <= t * choice.best().standard_error[j] ? 0.5 : 0.0;
     }
@@ -155,4 +155,4 @@ TEST(SharedNoise, IsSeenInCommandsMadeFromTheMeasurement) {
 }
 
 }  // namespace
-}  // namespace wheelwright::estimator_choice_test
+}  // namespace wheelwright::identify::estimator_choice_test

@@ -7,7 +7,7 @@
 #include "support/random.hpp"
 #include "support/rows.hpp"
 
-namespace wheelwright::excitation_test {
+namespace wheelwright::identify::excitation_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -15,7 +15,7 @@ using testing_support::block_of;
 using testing_support::Random;
 
 LeastSquaresFit fit_of(const Eigen::MatrixXd& Y, const Eigen::VectorXd& theta) {
-  RegressionTable table(block_of(Y, Y * theta, 1));
+  core::RegressionTable table(block_of(Y, Y * theta, 1));
   return least_squares(table);
 }
 
@@ -58,4 +58,4 @@ TEST(Excitation, AnIntervalThatHoldsZeroIsIndistinct) {
 }
 
 }  // namespace
-}  // namespace wheelwright::excitation_test
+}  // namespace wheelwright::identify::excitation_test

@@ -11,7 +11,7 @@
 
 #include "support/drives.hpp"
 
-namespace wheelwright::instruments_test {
+namespace wheelwright::identify::instruments_test {
 namespace {
 
 using testing_support::exact_drive;
@@ -20,7 +20,7 @@ using testing_support::Shown;
 
 // The drive with its exact speeds logged as commands too.
 LogTable with_commands(const Scenario& scenario) {
-  LogTable log = simulate(scenario);
+  LogTable log = sim::simulate(scenario);
   log.names.insert(log.names.end(), {"command_r", "command_l"});
   log.columns.push_back(log.column("omega_r"));
   log.columns.push_back(log.column("omega_l"));
@@ -49,10 +49,10 @@ TEST(InstrumentStream, GivesTheRowsOfTheLogAndOfTheCommandedMotion) {
 
 TEST(InstrumentStream, MatchesInstantsWhereTheFiltersSettleDifferently) {
   const Scenario scenario = exact_drive(Shown::angles, Hold::zero_order);
-  LogTable table = simulate(scenario);
+  LogTable table = sim::simulate(scenario);
   Scenario speeds = scenario;
   speeds.sensors.speeds = true;
-  const LogTable both = simulate(speeds);
+  const LogTable both = sim::simulate(speeds);
   table.names.insert(table.names.end(), {"command_r", "command_l"});
   table.columns.push_back(both.column("omega_r"));
   table.columns.push_back(both.column("omega_l"));
@@ -66,16 +66,16 @@ TEST(InstrumentStream, MatchesInstantsWhereTheFiltersSettleDifferently) {
 
 TEST(CommandedMotion, IsThereOnlyWithAllItsColumns) {
   const Scenario scenario = exact_drive(Shown::speeds, Hold::first_order);
-  const LogTable table = simulate(scenario);
+  const LogTable table = sim::simulate(scenario);
   const TableSource log(table);
-  EXPECT_FALSE(commanded_motion(log, make_model(scenario.robot)));
-  EXPECT_FALSE(commanded_motion(log, SingleAxis{}.model()));
+  EXPECT_FALSE(commanded_motion(log, model::make_model(scenario.robot)));
+  EXPECT_FALSE(commanded_motion(log, model::SingleAxis{}.model()));
 }
 
 // One axis under a constant force: v = F/f·(1 − e^{−ft/m}).
 TEST(MotionSimulation, FollowsTheClosedFormOfOneAxis) {
   const Eigen::VectorXd theta = Eigen::Vector2d(2.0, 3.0);
-  MotionSimulation simulation(SingleAxis{}.model(), theta, Hold::zero_order);
+  MotionSimulation simulation(model::SingleAxis{}.model(), theta, Hold::zero_order);
   const Eigen::VectorXd force = Eigen::VectorXd::Constant(1, 6.0);
   simulation.restart(0.0, Eigen::VectorXd::Zero(1), force);
   for (int k = 1; k <= 200; ++k) {
@@ -88,9 +88,9 @@ TEST(MotionSimulation, FollowsTheClosedFormOfOneAxis) {
 
 TEST(MotionSimulation, RepeatsTheDriveThatTheSimulatedWorldMade) {
   const Scenario scenario = exact_drive(Shown::speeds, Hold::first_order);
-  const LogTable log = simulate(scenario);
-  const Model model = make_model(scenario.robot);
-  MotionSimulation simulation(model, true_parameters(scenario, model), Hold::first_order);
+  const LogTable log = sim::simulate(scenario);
+  const Model model = model::make_model(scenario.robot);
+  MotionSimulation simulation(model, sim::true_parameters(scenario, model), Hold::first_order);
   const auto at = [&](const char* right, const char* left, std::size_t k) -> Eigen::VectorXd {
     return Eigen::Vector2d(log.column(right)[k], log.column(left)[k]);
   };
@@ -105,11 +105,11 @@ TEST(MotionSimulation, RepeatsTheDriveThatTheSimulatedWorldMade) {
 }
 
 TEST(MotionSimulation, IsRefusedWhereItCannotBe) {
-  const Model model = SingleAxis{}.model();
+  const Model model = model::SingleAxis{}.model();
   EXPECT_FALSE(MotionSimulation::possible(model, Eigen::Vector2d(0.0, 1.0)));
   EXPECT_FALSE(MotionSimulation::possible(model, Eigen::VectorXd::Ones(3)));
   EXPECT_THROW(MotionSimulation(model, Eigen::Vector2d(0.0, 1.0), Hold::zero_order), InvalidArgument);
 }
 
 }  // namespace
-}  // namespace wheelwright::instruments_test
+}  // namespace wheelwright::identify::instruments_test

@@ -11,7 +11,7 @@
 #include "support/random.hpp"
 #include "support/rows.hpp"
 
-namespace wheelwright::least_squares_test {
+namespace wheelwright::identify::least_squares_test {
 namespace {
 
 using testing_support::block_of;
@@ -54,7 +54,7 @@ TEST(LeastSquares, IsThatOfAFactorisationOfTheWholeMatrix) {
   for (const Eigen::Index rows : {6, 254, 256, 258, 512, 2000}) {
     for (const std::size_t outputs : {std::size_t{1}, std::size_t{2}}) {
       const Problem a = problem(static_cast<std::uint64_t>(rows), rows, 5, outputs);
-      RegressionTable table(a.block());
+      core::RegressionTable table(a.block());
       const LeastSquaresFit fit = least_squares(table);
       const Eigen::VectorXd expected = a.Y.colPivHouseholderQr().solve(a.y);
       const double rss = (a.y - a.Y * expected).squaredNorm();
@@ -71,7 +71,7 @@ TEST(LeastSquares, WeightsScaleTheRowsOfTheirOutput) {
   const Problem a = problem(3, 600, 4, 2);
   const Eigen::Vector2d weights(0.25, 40.0);
   const Eigen::VectorXd w = row_weights(a, weights);
-  RegressionTable table(a.block());
+  core::RegressionTable table(a.block());
   const LeastSquaresFit fit = least_squares(table, weights);
   const Eigen::MatrixXd scaled = w.asDiagonal() * a.Y;
   const Eigen::VectorXd expected = scaled.householderQr().solve(w.cwiseProduct(a.y));
@@ -90,7 +90,7 @@ TEST(LeastSquares, WeightsScaleTheRowsOfTheirOutput) {
 
 TEST(LeastSquares, ColumnsAreMeasuredAloneAndBesideTheOthers) {
   const Problem a = problem(11, 500, 3, 1);
-  RegressionTable table(a.block());
+  core::RegressionTable table(a.block());
   const LeastSquaresFit fit = least_squares(table);
   const double root = std::sqrt(500.0);
   for (Eigen::Index j = 0; j < 3; ++j) {
@@ -105,7 +105,7 @@ TEST(LeastSquares, ColumnsAreMeasuredAloneAndBesideTheOthers) {
 TEST(LeastSquares, AnsweringHalfOfADoubledColumnEach) {
   Problem a = problem(13, 400, 3, 1);
   a.Y.col(2) = -2.0 * a.Y.col(1);
-  RegressionTable table(a.block());
+  core::RegressionTable table(a.block());
   const LeastSquaresFit fit = least_squares(table);
   EXPECT_EQ(fit.rank, 2);
   EXPECT_GT(fit.condition, 1e12);
@@ -141,7 +141,7 @@ TEST(LeastSquares, TheConditionNumberEntersOnce) {
   Eigen::MatrixXd Y(3, 2);
   Y << 1.0, 1.0, small, 0.0, 0.0, small;
   const Eigen::Vector2d truth(1.0, 2.0);
-  RegressionTable table(block_of(Y, Y * truth, 1));
+  core::RegressionTable table(block_of(Y, Y * truth, 1));
   const LeastSquaresFit fit = least_squares(table);
   EXPECT_EQ(fit.rank, 2);
   EXPECT_NEAR(fit.estimate[0], 1.0, 1e-6);
@@ -159,4 +159,4 @@ TEST(LeastSquares, MisuseIsRefused) {
 }
 
 }  // namespace
-}  // namespace wheelwright::least_squares_test
+}  // namespace wheelwright::identify::least_squares_test

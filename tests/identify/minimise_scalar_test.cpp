@@ -9,7 +9,7 @@
 
 #include <wheelwright/core/error.hpp>
 
-namespace wheelwright::minimise_scalar_test {
+namespace wheelwright::identify::minimise_scalar_test {
 namespace {
 
 TEST(MinimiseScalar, FindsTheMinimumOfAConvexFunctionFromAnywhere) {
@@ -68,4 +68,4 @@ TEST(MinimiseScalar, PassesExceptionsOnAndChecksItsArguments) {
 }
 
 }  // namespace
-}  // namespace wheelwright::minimise_scalar_test
+}  // namespace wheelwright::identify::minimise_scalar_test

@@ -12,7 +12,7 @@
 #include "support/random.hpp"
 #include "support/rows.hpp"
 
-namespace wheelwright::moments_test {
+namespace wheelwright::identify::moments_test {
 namespace {
 
 using testing_support::block_of;
@@ -24,8 +24,8 @@ TEST(GramKernels, EveryVariantGivesTheSameDigits) {
   ASSERT_GE(variants.size(), 1U);
   for (const std::size_t columns : {4U, 8U, 12U, 16U, 20U}) {
     for (const std::size_t rows : {0U, 1U, 7U, 100U}) {
-      const RowMatrix b = random.matrix(static_cast<Eigen::Index>(rows), static_cast<Eigen::Index>(columns));
-      const RowMatrix y = random.matrix(static_cast<Eigen::Index>(rows), 1);
+      const core::RowMatrix b = random.matrix(static_cast<Eigen::Index>(rows), static_cast<Eigen::Index>(columns));
+      const core::RowMatrix y = random.matrix(static_cast<Eigen::Index>(rows), 1);
       const std::size_t p = columns - 1;
       const gram_kernels::Matrix of_b{b.data(), columns}, of_y{y.data(), 1};
       const auto run = [&](const gram_kernels::GramKernels& kernels, bool upper) {
@@ -141,7 +141,7 @@ TEST(EfficientWeights, AreOneOverEachOutputsNoise) {
   for (Eigen::Index i = 0; i < y.size(); ++i) {
     y[i] += (i % 2 == 0 ? 0.1 : 4.0) * random.normal();
   }
-  RegressionTable table(block_of(Y, y, 2));
+  core::RegressionTable table(block_of(Y, y, 2));
   const Eigen::VectorXd w = efficient_weights(moments(table));
   // The standard deviation of 10,000 normal values is known to 0.7 %: four times that.
   EXPECT_NEAR(w[0], 10.0, 0.03 * 10.0);
@@ -149,4 +149,4 @@ TEST(EfficientWeights, AreOneOverEachOutputsNoise) {
 }
 
 }  // namespace
-}  // namespace wheelwright::moments_test
+}  // namespace wheelwright::identify::moments_test

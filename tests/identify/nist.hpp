@@ -152,7 +152,7 @@ struct NistLimits {
 inline NistLimits nist_limits(const Eigen::MatrixXd& Y, const NistProblem& problem, double response, double published) {
   using Long = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic>;
   const Eigen::Index p = Y.cols();
-  const double gamma = (static_cast<double>(p) + 4.0 * std::sqrt(static_cast<double>(Y.rows() * p))) * kEpsilon;
+  const double gamma = (static_cast<double>(p) + 4.0 * std::sqrt(static_cast<double>(Y.rows() * p))) * core::kEpsilon;
   const double root = std::sqrt(static_cast<double>(Y.rows() - p)), residual = problem.residual_sd * root;
   const Eigen::VectorXd norm = Y.colwise().norm(), x = problem.certified.cwiseAbs();
   const Long scaled = Y.cast<long double>() * norm.cast<long double>().cwiseInverse().asDiagonal();

@@ -8,7 +8,7 @@
 #include "identify/nist.hpp"
 #include "support/rows.hpp"
 
-namespace wheelwright::nist_linear_test {
+namespace wheelwright::identify::nist_linear_test {
 namespace {
 
 using testing_support::block_of;
@@ -37,7 +37,7 @@ struct Solved {
 };
 
 Solved solve(const NistProblem& problem) {
-  RegressionTable rows(block_of(columns_of(problem), problem.y, 1));
+  core::RegressionTable rows(block_of(columns_of(problem), problem.y, 1));
   const LeastSquaresFit fit = least_squares(rows);
   const auto freedom = static_cast<double>(problem.y.size() - problem.certified.size());
   const double sd = std::sqrt(fit.weighted_rss / freedom);
@@ -67,4 +67,4 @@ INSTANTIATE_TEST_SUITE_P(StRD, NistLinear,
                          [](const auto& problem) { return std::string(problem.param); });
 
 }  // namespace
-}  // namespace wheelwright::nist_linear_test
+}  // namespace wheelwright::identify::nist_linear_test

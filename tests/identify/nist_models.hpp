@@ -190,7 +190,7 @@ inline std::vector<NistModel> nist_models() {
 }
 
 /// A NIST problem as a separable model: split as `model` says, or with every parameter a shape (`split` false).
-class NistRegression final : public SeparableModel {
+class NistRegression final : public identify::SeparableModel {
  public:
   NistRegression(const NistProblem& problem, NistModel model, bool split)
       : problem_(&problem), model_(std::move(model)), split_(split), y_(problem.y) {
@@ -217,7 +217,7 @@ class NistRegression final : public SeparableModel {
   [[nodiscard]] Eigen::VectorXd shape_of(const Eigen::VectorXd& b) const {
     return Eigen::VectorXd::NullaryExpr(shapes(), [&](Eigen::Index j) { return b[parameter(j)]; });
   }
-  bool evaluate(const Eigen::VectorXd& shape, bool, SeparableValues& at) const override {
+  bool evaluate(const Eigen::VectorXd& shape, bool, identify::SeparableValues& at) const override {
     const Eigen::Index rows = y_.size();
     const auto q = static_cast<std::size_t>(shapes());
     at.offset.setZero(rows);

@@ -7,7 +7,7 @@
 
 #include "identify/nist_models.hpp"
 
-namespace wheelwright::nist_nonlinear_test {
+namespace wheelwright::identify::nist_nonlinear_test {
 namespace {
 
 using testing_support::digits;
@@ -68,7 +68,7 @@ void expect_certified(const NistProblem& problem, const NistModel& model, const 
   NistLimits limits = nist_limits(jacobian(problem, model), problem, y.norm(), 0.5e-10);
   const double freedom = static_cast<double>(problem.y.size() - problem.certified.size());
   if (by_cost) {
-    const double eta = 2.0 * kEpsilon * (1.0 + y.norm() / (problem.residual_sd * std::sqrt(freedom)));
+    const double eta = 2.0 * core::kEpsilon * (1.0 + y.norm() / (problem.residual_sd * std::sqrt(freedom)));
     const Eigen::VectorXd flat = 10.0 * std::sqrt(eta * freedom) * problem.certified_sd;
     limits.estimate += flat;
     limits.sd += flat;
@@ -126,4 +126,4 @@ TEST(NistBoxBod, SaysThatItIsLostOnThePlateau) {
 }
 
 }  // namespace
-}  // namespace wheelwright::nist_nonlinear_test
+}  // namespace wheelwright::identify::nist_nonlinear_test

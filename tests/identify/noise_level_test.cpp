@@ -12,7 +12,7 @@
 #include "support/random.hpp"
 #include "support/rows.hpp"
 
-namespace wheelwright::noise_level_test {
+namespace wheelwright::identify::noise_level_test {
 namespace {
 
 using testing_support::Autoregression;
@@ -136,7 +136,7 @@ TEST(LargestPlausibleError, CoversTheTrueOne) {
         return std::sin(0.01 * static_cast<double>((j + 1) * k)) + (j == 2 ? 0.5 : 0.0);
       });
       const Eigen::VectorXd e = Eigen::VectorXd::NullaryExpr(count, [&] { return noise.next(); });
-      RegressionTable table(block_of(Y, Y * Eigen::Vector3d(1.0, 2.0, 3.0) + e, 1));
+      core::RegressionTable table(block_of(Y, Y * Eigen::Vector3d(1.0, 2.0, 3.0) + e, 1));
       const LeastSquaresFit fit = least_squares(table);
       ResidualStatistics statistics(fit.estimate, Eigen::VectorXd::Ones(1));
       statistics.add(table.block());
@@ -151,12 +151,12 @@ TEST(LargestPlausibleError, CoversTheTrueOne) {
 
 TEST(StudentQuantile, IsThatOfTheTables) {
   // Abramowitz and Stegun 1964, table 26.10.
-  EXPECT_NEAR(student_quantile(0.95, 1.0), 12.706, 5e-4);
-  EXPECT_NEAR(student_quantile(0.95, 24.0), 2.064, 5e-4);
-  EXPECT_NEAR(student_quantile(0.99, 10.0), 3.169, 5e-4);
-  EXPECT_THROW(static_cast<void>(student_quantile(1.0, 3.0)), InvalidArgument);
-  EXPECT_THROW(static_cast<void>(student_quantile(0.9, 0.0)), InvalidArgument);
+  EXPECT_NEAR(core::student_quantile(0.95, 1.0), 12.706, 5e-4);
+  EXPECT_NEAR(core::student_quantile(0.95, 24.0), 2.064, 5e-4);
+  EXPECT_NEAR(core::student_quantile(0.99, 10.0), 3.169, 5e-4);
+  EXPECT_THROW(static_cast<void>(core::student_quantile(1.0, 3.0)), InvalidArgument);
+  EXPECT_THROW(static_cast<void>(core::student_quantile(0.9, 0.0)), InvalidArgument);
 }
 
 }  // namespace
-}  // namespace wheelwright::noise_level_test
+}  // namespace wheelwright::identify::noise_level_test

@@ -11,7 +11,7 @@
 #include "support/random.hpp"
 #include "support/rows.hpp"
 
-namespace wheelwright::residual_statistics_test {
+namespace wheelwright::identify::residual_statistics_test {
 namespace {
 
 using testing_support::Autoregression;
@@ -85,12 +85,12 @@ TEST(Covariance, IsHonestUnderAutocorrelatedResiduals) {
   for (std::uint64_t seed = 1; seed <= runs; ++seed) {
     Autoregression noise(seed, 0.98);
     const Eigen::VectorXd e = Eigen::VectorXd::NullaryExpr(count, [&] { return 0.3 * noise.next(); });
-    RegressionTable table(block_of(Y, Y * truth + e, 1));
+    core::RegressionTable table(block_of(Y, Y * truth + e, 1));
     const LeastSquaresFit fit = least_squares(table);
     ResidualStatistics statistics(fit.estimate, Eigen::VectorXd::Ones(1));
     statistics.add(table.block());
     const ResidualSummary s = statistics.summary(fit.inverse_gram);
-    const double t = student_quantile(0.95, s.freedom);
+    const double t = core::student_quantile(0.95, s.freedom);
     const Eigen::Array4d error = (fit.estimate - truth).array().abs();
     covered += (error <= t * s.standard_error.array()).cast<int>();
     const Eigen::Array4d white = (fit.inverse_gram.diagonal() * fit.weighted_rss / count).cwiseSqrt();
@@ -105,4 +105,4 @@ TEST(Covariance, IsHonestUnderAutocorrelatedResiduals) {
 }
 
 }  // namespace
-}  // namespace wheelwright::residual_statistics_test
+}  // namespace wheelwright::identify::residual_statistics_test

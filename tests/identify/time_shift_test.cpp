@@ -14,7 +14,7 @@
 #include "support/random.hpp"
 #include "support/rows.hpp"
 
-namespace wheelwright::time_shift_test {
+namespace wheelwright::identify::time_shift_test {
 namespace {
 
 using testing_support::Autoregression;
@@ -177,7 +177,7 @@ TEST(TimeShift, DelayOfASimulatedDriveIsFound) {
   TorqueRows stream(source, filter_of(scenario));
   const TimeShiftedRows model(read_all(stream), TimeEffect::delay, -0.1, 0.1);
   const SeparableFit fit = variable_projection(model, model.options());
-  const Eigen::VectorXd truth = true_parameters(scenario, make_model(scenario.robot));
+  const Eigen::VectorXd truth = sim::true_parameters(scenario, model::make_model(scenario.robot));
   EXPECT_NEAR(fit.shape[0], 0.03, 1e-4);
   for (Eigen::Index j = 0; j < truth.size(); ++j) {
     EXPECT_NEAR(fit.linear[j], truth[j], 2e-3 * std::abs(truth[j]));
@@ -204,7 +204,7 @@ TEST(Stribeck, SpeedAndSizeAreFound) {
       }
     }
     TableSource source(log);
-    const StribeckRows model(source, filter_of(scenario));
+    const inference::StribeckRows model(source, filter_of(scenario));
     VariableProjectionOptions options;
     options.lower = Eigen::VectorXd::Constant(1, 0.05);
     options.upper = Eigen::VectorXd::Constant(1, 20.0);
@@ -216,7 +216,7 @@ TEST(Stribeck, SpeedAndSizeAreFound) {
     const double tolerance = shown == Shown::speeds ? 5e-4 : 0.03;
     EXPECT_NEAR(fit.shape[0], kSpeed, tolerance * kSpeed);
     EXPECT_NEAR(fit.linear[fit.linear.size() - 1], kSize, tolerance * kSize);
-    const Eigen::VectorXd truth = true_parameters(scenario, make_model(scenario.robot));
+    const Eigen::VectorXd truth = sim::true_parameters(scenario, model::make_model(scenario.robot));
     for (Eigen::Index j = 0; j < truth.size(); ++j) {
       EXPECT_NEAR(fit.linear[j], truth[j], tolerance * std::abs(truth[j]));
     }
@@ -227,11 +227,15 @@ double size_at_1_7(double omega) {
   const double sign = static_cast<double>(omega > 0.0) - static_cast<double>(omega < 0.0);
   return sign * std::exp(-(omega / 1.7) * (omega / 1.7));
 }
-TermValue both(const MotionState& s) { return {size_at_1_7(s.joint_speed[0]) + size_at_1_7(s.joint_speed[1]), 0.0}; }
-TermValue unlike(const MotionState& s) { return {size_at_1_7(s.joint_speed[0]) - size_at_1_7(s.joint_speed[1]), 0.0}; }
+model::TermValue both(const model::MotionState& s) {
+  return {size_at_1_7(s.joint_speed[0]) + size_at_1_7(s.joint_speed[1]), 0.0};
+}
+model::TermValue unlike(const model::MotionState& s) {
+  return {size_at_1_7(s.joint_speed[0]) - size_at_1_7(s.joint_speed[1]), 0.0};
+}
 
 // The column at ω_s = 1.7 is `expected` and stands beside the plain rows; its slope is that of differences.
-void expect_column(const StribeckRows& rows, const RegressionBlock& plain, const Eigen::VectorXd& expected) {
+void expect_column(const inference::StribeckRows& rows, const RegressionBlock& plain, const Eigen::VectorXd& expected) {
   SeparableValues at;
   ASSERT_TRUE(rows.evaluate(Eigen::VectorXd::Constant(1, 1.7), true, at));
   ASSERT_EQ(at.columns.rows(), expected.size());
@@ -262,7 +266,7 @@ TEST(Stribeck, ItsColumnIsThatOfTheRegressorFilter) {
   const RegressionBlock with_term = read_all(stream);
   TorqueRows plain_stream(simulation, plain);
   const RegressionBlock rows = read_all(plain_stream);
-  expect_column(StribeckRows(simulation, plain), rows, with_term.Y.col(static_cast<Eigen::Index>(last)));
+  expect_column(inference::StribeckRows(simulation, plain), rows, with_term.Y.col(static_cast<Eigen::Index>(last)));
 }
 
 // With measured speeds it is what RegressorFilter makes of efforts of this size at the samples.
@@ -280,7 +284,7 @@ TEST(Stribeck, ItsColumnIsThatOfEffortsOfItsSize) {
   TableSource of_its_size(log);
   TorqueRows stream(of_its_size, plain);
   const RegressionBlock friction = read_all(stream);
-  expect_column(StribeckRows(simulation, plain), rows, friction.y);
+  expect_column(inference::StribeckRows(simulation, plain), rows, friction.y);
 }
 
 TEST(Stribeck, FastDrivingLeavesItsSpeedFlat) {
@@ -298,7 +302,7 @@ TEST(Stribeck, FastDrivingLeavesItsSpeedFlat) {
     log.columns[3].push_back(1.0 + 0.3 * std::sin(3.0 * t) + 0.05 * random.normal());
   }
   TableSource source(log);
-  const StribeckRows model(source, filter_of(exact_drive(Shown::speeds, Hold::first_order)));
+  const inference::StribeckRows model(source, filter_of(exact_drive(Shown::speeds, Hold::first_order)));
   VariableProjectionOptions options;
   options.lower = Eigen::VectorXd::Constant(1, 0.1);
   options.upper = Eigen::VectorXd::Constant(1, 1.0);
@@ -307,4 +311,4 @@ TEST(Stribeck, FastDrivingLeavesItsSpeedFlat) {
 }
 
 }  // namespace
-}  // namespace wheelwright::time_shift_test
+}  // namespace wheelwright::identify::time_shift_test

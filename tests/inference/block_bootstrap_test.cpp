@@ -12,7 +12,7 @@
 #include "support/random.hpp"
 #include "support/rows.hpp"
 
-namespace wheelwright::block_bootstrap_test {
+namespace wheelwright::inference::block_bootstrap_test {
 namespace {
 
 using testing_support::Autoregression;
@@ -21,7 +21,7 @@ using testing_support::Random;
 
 const Eigen::Vector2d kTheta(1.0, -2.0);
 
-RegressionMoments driven(std::uint64_t seed, Eigen::Index instants, double phi) {
+identify::RegressionMoments driven(std::uint64_t seed, Eigen::Index instants, double phi) {
   Autoregression motion(9000 + seed, 0.95), error(100 + seed, phi);
   Eigen::MatrixXd Y(instants, 2);
   Eigen::VectorXd y(instants);
@@ -29,7 +29,7 @@ RegressionMoments driven(std::uint64_t seed, Eigen::Index instants, double phi) 
     Y.row(k) << motion.next(), 1.0;
     y[k] = Y.row(k) * kTheta + error.next();
   }
-  RegressionMoments moments(1, 2);
+  identify::RegressionMoments moments(1, 2);
   moments.add(block_of(Y, y, 1));
   return moments;
 }
@@ -63,7 +63,7 @@ TEST(BlockBootstrap, CoversUnderAutocorrelatedErrors) {
 // many degrees of freedom. A bootstrap quantile of 4000 draws is known to about 2 %, a standard error of 2000 blocks to
 // 1.6 %.
 TEST(BlockBootstrap, AgreesWithStudentForManyIndependentErrors) {
-  const RegressionMoments moments = driven(3, 8000, 0.0);
+  const identify::RegressionMoments moments = driven(3, 8000, 0.0);
   BlockBootstrapOptions options;
   options.resamples = 4000;
   const BlockBootstrap b = block_bootstrap(moments, options);
@@ -78,7 +78,7 @@ TEST(BlockBootstrap, AgreesWithStudentForManyIndependentErrors) {
 }
 
 TEST(BlockBootstrap, IsTheSameForTheSameSeed) {
-  const RegressionMoments moments = driven(4, 1000, 0.5);
+  const identify::RegressionMoments moments = driven(4, 1000, 0.5);
   BlockBootstrapOptions options;
   options.resamples = 50;
   options.seed = 17;
@@ -94,7 +94,7 @@ TEST(BlockBootstrap, IsTheSameForTheSameSeed) {
 TEST(BlockBootstrap, OfExactRowsIsOnePoint) {
   Random random(5);
   const Eigen::MatrixXd Y = random.matrix(400, 2);
-  RegressionMoments moments(1, 2);
+  identify::RegressionMoments moments(1, 2);
   moments.add(block_of(Y, Y * kTheta, 1));
   BlockBootstrapOptions options;
   options.resamples = 50;
@@ -140,4 +140,4 @@ TEST(BlockLength, IsOneForIndependentValues) {
 }
 
 }  // namespace
-}  // namespace wheelwright::block_bootstrap_test
+}  // namespace wheelwright::inference::block_bootstrap_test

@@ -14,15 +14,15 @@
 #include "support/random.hpp"
 #include "support/rows.hpp"
 
-namespace wheelwright::constrained_test {
+namespace wheelwright::inference::constrained_test {
 namespace {
 
 using ::testing::HasSubstr;
 using testing_support::block_of;
 using testing_support::Random;
 
-LeastSquares rows_of(const Eigen::MatrixXd& Y, const Eigen::VectorXd& y) {
-  LeastSquares rows(static_cast<std::size_t>(Y.cols()));
+identify::LeastSquares rows_of(const Eigen::MatrixXd& Y, const Eigen::VectorXd& y) {
+  identify::LeastSquares rows(static_cast<std::size_t>(Y.cols()));
   rows.add(block_of(Y, y, 1));
   return rows;
 }
@@ -197,7 +197,7 @@ TEST(PhysicalConsistency, TheFootprintBindsAndSaysSo) {
   const Eigen::MatrixXd Y = random.matrix(500, 4);
   const Eigen::Vector4d truth(20.0 * r, 5.0 * r, 3.0 * r, -1.0);
   const Eigen::VectorXd y = Y * truth + 0.01 * random.matrix(500, 1);
-  const LeastSquares rows = rows_of(Y, y);
+  const identify::LeastSquares rows = rows_of(Y, y);
   const ConstrainedFit fit =
       constrained_least_squares(rows, constraints, rows.solve().inverse_gram * 0.01 * 0.01 / 3.0);
   ASSERT_EQ(fit.active.size(), 1u);
@@ -242,7 +242,7 @@ TEST(NonnegativeLeastSquares, FulfilsItsOptimalityConditions) {
 }
 
 TEST(ConstrainedLeastSquares, MisuseIsRefused) {
-  const LeastSquares rows = rows_of(Eigen::MatrixXd::Identity(4, 2), Eigen::VectorXd::Ones(4));
+  const identify::LeastSquares rows = rows_of(Eigen::MatrixXd::Identity(4, 2), Eigen::VectorXd::Ones(4));
   EXPECT_THROW((void)constrained_least_squares(rows, {{Eigen::Vector3d::Ones(), 0.0, "", ""}}), InvalidArgument);
   EXPECT_THROW((void)constrained_least_squares(rows, {{Eigen::Vector2d::Zero(), 0.0, "", ""}}), InvalidArgument);
   EXPECT_THROW((void)constrained_least_squares(rows, {{Eigen::Vector2d::Ones(), std::nan(""), "", ""}}),
@@ -251,4 +251,4 @@ TEST(ConstrainedLeastSquares, MisuseIsRefused) {
 }
 
 }  // namespace
-}  // namespace wheelwright::constrained_test
+}  // namespace wheelwright::inference::constrained_test

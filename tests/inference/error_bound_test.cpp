@@ -11,7 +11,7 @@
 
 #include "support/random.hpp"
 
-namespace wheelwright::error_bound_test {
+namespace wheelwright::inference::error_bound_test {
 namespace {
 
 using testing_support::Random;
@@ -72,4 +72,4 @@ TEST(ErrorBound, ChecksItsArguments) {
 }
 
 }  // namespace
-}  // namespace wheelwright::error_bound_test
+}  // namespace wheelwright::inference::error_bound_test

@@ -11,7 +11,7 @@
 #include "support/random.hpp"
 #include "support/rows.hpp"
 
-namespace wheelwright::identifiability_test {
+namespace wheelwright::inference::identifiability_test {
 namespace {
 
 using testing_support::block_of;
@@ -25,8 +25,8 @@ const std::vector<ParameterWords> kAxis = {words("mass", "kg", "accelerate"), wo
                                            words("viscous", "N·s/m", "move at different speeds"),
                                            words("coulomb", "N", "move in both directions")};
 
-LeastSquares folded(const Eigen::MatrixXd& Y) {
-  LeastSquares rows(static_cast<std::size_t>(Y.cols()));
+identify::LeastSquares folded(const Eigen::MatrixXd& Y) {
+  identify::LeastSquares rows(static_cast<std::size_t>(Y.cols()));
   rows.add(block_of(Y, Eigen::VectorXd::Zero(Y.rows()), 1));
   return rows;
 }
@@ -169,4 +169,4 @@ TEST(DirectionWords, ReadAsSentences) {
 }
 
 }  // namespace
-}  // namespace wheelwright::identifiability_test
+}  // namespace wheelwright::inference::identifiability_test

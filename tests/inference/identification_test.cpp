@@ -14,7 +14,11 @@
 
 #include "support/drives.hpp"
 
-namespace wheelwright::identification_test {
+namespace wheelwright::inference::identification_test {
+
+using identify::ShapeState;
+using sim::simulate;
+
 using namespace words;
 namespace {
 
@@ -37,7 +41,7 @@ std::vector<double>& column(LogTable& table, const std::string& name) {
 }
 
 Eigen::VectorXd truth_of(const Identification& result, const Scenario& s) {
-  return true_parameters(s, result.setting.model);
+  return sim::true_parameters(s, result.setting.model);
 }
 
 // Eight drives of four parameters: more than 6 misses of 32 at 95 %, or more than 2 of 8, have a probability below 1 %.
@@ -112,7 +116,7 @@ TEST(Identification, ADelayThatWasPutIntoTheLogIsFound) {
 
 TEST(Identification, WithoutTurningTheYawParametersAreUnseenAndTheAdviceIsToTurn) {
   Scenario s = noisy_drive(1, 20.0);
-  s.trajectory.kind = Trajectory::Kind::straight;
+  s.trajectory.kind = sim::Trajectory::Kind::straight;
   const Identification result = identified(simulate(s), s.robot);
   EXPECT_EQ(standing(result), IdentificationStanding::caution);
   EXPECT_THAT(verdict(result), HasSubstr("not shown: yaw inertia and viscous yaw"));
@@ -120,7 +124,7 @@ TEST(Identification, WithoutTurningTheYawParametersAreUnseenAndTheAdviceIsToTurn
   EXPECT_THAT(next_steps(result), Contains(HasSubstr("Drive in curves")));
   for (std::size_t j = 0; j < 4; ++j) {
     const bool yaw = result.setting.model.parameters[j].physical.find("yaw") != std::string::npos;
-    EXPECT_EQ(result.fit.excitation[j].state == Excitation::not_excited, yaw) << j;
+    EXPECT_EQ(result.fit.excitation[j].state == identify::Excitation::not_excited, yaw) << j;
   }
 }
 
@@ -230,4 +234,4 @@ TEST(ShapeWords, SayWhereTheLogDoesNotShowIt) {
 }
 
 }  // namespace
-}  // namespace wheelwright::identification_test
+}  // namespace wheelwright::inference::identification_test

@@ -11,14 +11,14 @@
 #include "support/random.hpp"
 #include "support/rows.hpp"
 
-namespace wheelwright::information_over_time_test {
+namespace wheelwright::inference::information_over_time_test {
 namespace {
 
 using testing_support::block_of;
 using testing_support::Random;
 
-RegressionMoments moments_of(const Eigen::MatrixXd& Y) {
-  RegressionMoments moments(1, static_cast<std::size_t>(Y.cols()));
+identify::RegressionMoments moments_of(const Eigen::MatrixXd& Y) {
+  identify::RegressionMoments moments(1, static_cast<std::size_t>(Y.cols()));
   moments.add(block_of(Y, Eigen::VectorXd::Zero(Y.rows()), 1));
   return moments;
 }
@@ -65,7 +65,7 @@ TEST(InformationOverTime, FindsTheSecondsThatTellColumnsApart) {
       Y(k, 1) = 0.0;
     }
   }
-  const RegressionMoments moments = moments_of(Y);
+  const identify::RegressionMoments moments = moments_of(Y);
   InformationOptions options;
   options.seconds = 1.0;
   const InformationOverTime info = information_over_time(moments, options);
@@ -110,4 +110,4 @@ TEST(InformationOverTime, IsNoneWhereParametersAreConfounded) {
 }
 
 }  // namespace
-}  // namespace wheelwright::information_over_time_test
+}  // namespace wheelwright::inference::information_over_time_test

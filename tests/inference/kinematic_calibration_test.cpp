@@ -13,7 +13,7 @@
 #include "support/random.hpp"
 #include "support/skip.hpp"
 
-namespace wheelwright::kinematic_calibration_test {
+namespace wheelwright::inference::kinematic_calibration_test {
 namespace {
 
 using testing_support::Random;
@@ -232,4 +232,4 @@ INSTANTIATE_TEST_SUITE_P(Recordings, SlowSkidSteer,
                          [](const auto& recording) { return std::string(recording.index == 0 ? "Warthog" : "Husky"); });
 
 }  // namespace
-}  // namespace wheelwright::kinematic_calibration_test
+}  // namespace wheelwright::inference::kinematic_calibration_test

@@ -3,11 +3,11 @@
 
 #include <gtest/gtest.h>
 
-namespace wheelwright::noise_choice_test {
+namespace wheelwright::inference::noise_choice_test {
 namespace {
 
-DifferenceNoise differences(DifferenceNoise::Kind kind, double sd) {
-  DifferenceNoise n;
+identify::DifferenceNoise differences(identify::DifferenceNoise::Kind kind, double sd) {
+  identify::DifferenceNoise n;
   n.kind = kind;
   n.sd = sd;
   n.relative_sd = 0.05;
@@ -24,7 +24,7 @@ StandstillNoise standstill(StandstillNoise::Kind kind, double sd) {
   return n;
 }
 
-using Kind = DifferenceNoise::Kind;
+using Kind = identify::DifferenceNoise::Kind;
 using Rest = StandstillNoise::Kind;
 
 struct Case {
@@ -69,4 +69,4 @@ TEST(NoiseChoice, MakesItsBoundAsItSays) {
 }
 
 }  // namespace
-}  // namespace wheelwright::noise_choice_test
+}  // namespace wheelwright::inference::noise_choice_test

@@ -9,14 +9,14 @@
 #include "support/random.hpp"
 #include "support/rows.hpp"
 
-namespace wheelwright::regions_test {
+namespace wheelwright::inference::regions_test {
 namespace {
 
 using testing_support::Autoregression;
 using testing_support::block_of;
 using testing_support::Random;
 
-RegressionMoments moments_of(std::uint64_t seed, Eigen::Index instants, double phi) {
+identify::RegressionMoments moments_of(std::uint64_t seed, Eigen::Index instants, double phi) {
   Random random(seed);
   Autoregression error(seed + 50, phi);
   const Eigen::MatrixXd Y = random.matrix(instants, 2);
@@ -24,14 +24,14 @@ RegressionMoments moments_of(std::uint64_t seed, Eigen::Index instants, double p
   for (double& value : y) {
     value += error.next();
   }
-  RegressionMoments moments(1, 2);
+  identify::RegressionMoments moments(1, 2);
   moments.add(block_of(Y, y, 1));
   return moments;
 }
 
 TEST(Regions, StandSideBySideWithTheirPromises) {
-  const RegressionMoments moments = moments_of(1, 4000, 0.3);
-  const Estimate estimate = ordinary_least_squares(moments);
+  const identify::RegressionMoments moments = moments_of(1, 4000, 0.3);
+  const identify::Estimate estimate = identify::ordinary_least_squares(moments);
   const IntervalBounds hull{Eigen::Vector2d(0.5, -2.5), Eigen::Vector2d(1.5, -1.5), Eigen::VectorXd::Constant(1, 4.5),
                             "N·m"};
   RegionOptions options;
@@ -46,7 +46,7 @@ TEST(Regions, StandSideBySideWithTheirPromises) {
       EXPECT_GE(row.upper[j], estimate.theta[j]);
     }
   }
-  const double t = student_quantile(0.95, estimate.freedom);
+  const double t = core::student_quantile(0.95, estimate.freedom);
   EXPECT_EQ(found.rows[0].upper[0], estimate.theta[0] + t * estimate.standard_error[0]);
   // Scores of an independent regressor are nearly white: the two asymptotic intervals agree, and the one for both
   // parameters at once is wider by about √χ²_2(0.95)/1.96 = 1.25.
@@ -68,13 +68,13 @@ TEST(Regions, SayWhatIsDoubtful) {
     Y(k, 0) = motion.next();
     y[k] = Y(k, 0) + error.next();
   }
-  RegressionMoments moments(1, 1);
+  identify::RegressionMoments moments(1, 1);
   moments.add(block_of(Y, y, 1));
-  const RegionComparison slow = compare_regions(moments, ordinary_least_squares(moments));
+  const RegionComparison slow = compare_regions(moments, identify::ordinary_least_squares(moments));
   EXPECT_NE(slow.rows[2].remark.find("short for its errors' memory"), std::string::npos);
 
-  Estimate other = ordinary_least_squares(moments_of(3, 400, 0.0));
-  other.estimator = Estimator::bias_compensated;
+  identify::Estimate other = identify::ordinary_least_squares(moments_of(3, 400, 0.0));
+  other.estimator = identify::Estimator::bias_compensated;
   const RegionComparison compensated = compare_regions(moments_of(3, 400, 0.0), other);
   EXPECT_NE(compensated.rows[1].remark.find("noise of the motion"), std::string::npos);
   EXPECT_EQ(compensated.rows.size(), 3U);
@@ -84,9 +84,9 @@ TEST(Regions, AreUnboundedWhereNothingIsKnown) {
   Random random(4);
   Eigen::MatrixXd Y = random.matrix(400, 2);
   Y.col(1) = Y.col(0);
-  RegressionMoments moments(1, 2);
+  identify::RegressionMoments moments(1, 2);
   moments.add(block_of(Y, random.matrix(400, 1), 1));
-  const RegionComparison found = compare_regions(moments, ordinary_least_squares(moments));
+  const RegionComparison found = compare_regions(moments, identify::ordinary_least_squares(moments));
   for (const RegionRow& row : found.rows) {
     EXPECT_FALSE(row.available);
     EXPECT_FALSE(row.remark.empty());
@@ -95,4 +95,4 @@ TEST(Regions, AreUnboundedWhereNothingIsKnown) {
 }
 
 }  // namespace
-}  // namespace wheelwright::regions_test
+}  // namespace wheelwright::inference::regions_test

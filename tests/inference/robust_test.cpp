@@ -17,7 +17,7 @@
 #include "support/random.hpp"
 #include "support/rows.hpp"
 
-namespace wheelwright::robust_test {
+namespace wheelwright::inference::robust_test {
 namespace {
 
 using testing_support::Autoregression;
@@ -34,7 +34,7 @@ struct Problem {
   std::size_t outputs = 2;
 
   [[nodiscard]] RobustFit fit(const RobustOptions& options) const {
-    RegressionTable table(block_of(Y, y, outputs));
+    core::RegressionTable table(block_of(Y, y, outputs));
     return robust_fit(table, options);
   }
 };
@@ -400,9 +400,9 @@ TEST(RobustFit, MisuseIsRefused) {
   EXPECT_THROW((void)a.fit({.constraints = {{Eigen::Vector2d::Ones(), 0.0, "", ""}}}), InvalidArgument);
   RegressionBlock none;
   none.resize(0, 1, 2);
-  RegressionTable empty(none);
+  core::RegressionTable empty(none);
   EXPECT_THROW((void)robust_fit(empty), InvalidArgument);
 }
 
 }  // namespace
-}  // namespace wheelwright::robust_test
+}  // namespace wheelwright::inference::robust_test

@@ -15,7 +15,10 @@
 #include "support/random.hpp"
 #include "support/rows.hpp"
 
-namespace wheelwright::sign_perturbed_sums_test {
+namespace wheelwright::inference::sign_perturbed_sums_test {
+
+using identify::RegressionMoments;
+
 namespace {
 
 using testing_support::block_of;
@@ -64,8 +67,8 @@ TEST(SignPerturbedSums, HaveTheirProbabilityWithFewHeavyTailedErrorsWhereStudent
       EXPECT_EQ(sums.groups(), 25U);
       EXPECT_EQ(sums.probability(), 0.95);
       members += sums.contains(kTheta) ? 1 : 0;
-      const Estimate e = ordinary_least_squares(moments);
-      student += std::abs(e.theta[0] - 1.0) <= student_quantile(0.95, e.freedom) * e.standard_error[0] ? 1 : 0;
+      const identify::Estimate e = identify::ordinary_least_squares(moments);
+      student += std::abs(e.theta[0] - 1.0) <= core::student_quantile(0.95, e.freedom) * e.standard_error[0] ? 1 : 0;
     }
     EXPECT_NEAR(static_cast<double>(members) / runs, 0.95, 0.0195);
     EXPECT_LT(static_cast<double>(student) / runs, 0.93);
@@ -227,4 +230,4 @@ TEST(SignPerturbedSums, LeaveParametersOut) {
 }
 
 }  // namespace
-}  // namespace wheelwright::sign_perturbed_sums_test
+}  // namespace wheelwright::inference::sign_perturbed_sums_test

@@ -12,7 +12,7 @@
 
 #include "support/random.hpp"
 
-namespace wheelwright::standstill_noise_test {
+namespace wheelwright::inference::standstill_noise_test {
 namespace {
 
 using testing_support::Autoregression;
@@ -144,7 +144,7 @@ TEST(StandstillSigns, AreThoseThatAllJointsHave) {
   Robot robot;
   robot.wheel_radius = 0.1;
   robot.track_width = 0.4;
-  const Model model = make_model(robot);
+  const Model model = model::make_model(robot);
   TableSource one(log);
   EXPECT_TRUE(standstill_signs(one, model).speeds.empty());
   log.names.push_back("omega_l");
@@ -158,4 +158,4 @@ TEST(StandstillSigns, AreThoseThatAllJointsHave) {
 }
 
 }  // namespace
-}  // namespace wheelwright::standstill_noise_test
+}  // namespace wheelwright::inference::standstill_noise_test

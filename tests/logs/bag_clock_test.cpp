@@ -6,7 +6,7 @@
 
 #include <wheelwright/logs/bag_columns.hpp>
 
-namespace wheelwright::bag_clock_test {
+namespace wheelwright::logs::bag_clock_test {
 namespace {
 
 using testing::HasSubstr;
@@ -74,4 +74,4 @@ TEST(BagClocks, NoMessagesAreNoClockAndNoCrash) {
 }
 
 }  // namespace
-}  // namespace wheelwright::bag_clock_test
+}  // namespace wheelwright::logs::bag_clock_test

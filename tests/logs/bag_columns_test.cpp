@@ -10,7 +10,7 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/logs/bag_columns.hpp>
 
-namespace wheelwright::bag_columns_test {
+namespace wheelwright::logs::bag_columns_test {
 namespace {
 
 using testing::Contains;
@@ -207,4 +207,4 @@ TEST(SideOfJoint, IsAWordOfTheNameAndNeverBoth) {
 }
 
 }  // namespace
-}  // namespace wheelwright::bag_columns_test
+}  // namespace wheelwright::logs::bag_columns_test

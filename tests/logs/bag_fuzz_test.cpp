@@ -11,7 +11,7 @@
 
 #include <wheelwright/logs/ros_extractor.hpp>
 
-namespace wheelwright::bag_fuzz_test {
+namespace wheelwright::logs::bag_fuzz_test {
 namespace {
 
 using testing::all_items;
@@ -156,4 +156,4 @@ TEST_F(BagFuzz, PackedFilesCutOffAnywhere) {
 }
 
 }  // namespace
-}  // namespace wheelwright::bag_fuzz_test
+}  // namespace wheelwright::logs::bag_fuzz_test

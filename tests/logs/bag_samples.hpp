@@ -28,9 +28,9 @@ struct BagItem {
 };
 
 /// Everything that a reader hands out.
-inline std::vector<BagItem> all_items(BagReader& reader) {
+inline std::vector<BagItem> all_items(logs::BagReader& reader) {
   std::vector<BagItem> items;
-  BagMessage message;
+  logs::BagMessage message;
   while (reader.next(message)) {
     items.push_back({reader.topics()[message.topic].name, message.log_time, std::string(message.data)});
   }
@@ -38,9 +38,9 @@ inline std::vector<BagItem> all_items(BagReader& reader) {
 }
 
 /// Losses according to its reports.
-inline std::string all_losses(const BagReader& reader) {
+inline std::string all_losses(const logs::BagReader& reader) {
   std::string text;
-  for (const BagReport& report : reader.reports()) {
+  for (const logs::BagReport& report : reader.reports()) {
     for (const std::string& loss : report.losses) {
       text += loss + "\n";
     }

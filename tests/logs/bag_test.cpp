@@ -15,7 +15,7 @@
 #include <wheelwright/logs/ros_extractor.hpp>
 #include <wheelwright/logs/ros_write.hpp>
 
-namespace wheelwright::bag_test {
+namespace wheelwright::logs::bag_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -64,7 +64,7 @@ TEST_F(Bag, DatabaseOfHumbleTakesBundledDefinitions) {
   EXPECT_EQ(report.storage, "sqlite3");
   EXPECT_EQ(report.messages, 9U);
   EXPECT_EQ(report.bytes, fs::file_size(path("a.db3")));
-  Xxh64 hash;
+  files::Xxh64 hash;
   const std::string content = bytes(path("a.db3"));
   hash.update(content.data(), content.size());
   EXPECT_EQ(report.hash, hash.text());
@@ -293,4 +293,4 @@ TEST_F(Bag, NamesWithOddCharactersAreOpened) {
 }
 
 }  // namespace
-}  // namespace wheelwright::bag_test
+}  // namespace wheelwright::logs::bag_test

@@ -10,7 +10,7 @@
 
 #include "support/scratch.hpp"
 
-namespace wheelwright::csv_streams_test {
+namespace wheelwright::logs::csv_streams_test {
 namespace {
 
 using ::testing::Contains;
@@ -106,4 +106,4 @@ TEST_F(MergedCsv, DefectsAreStillToldWithTheirLine) {
 }
 
 }  // namespace
-}  // namespace wheelwright::csv_streams_test
+}  // namespace wheelwright::logs::csv_streams_test

@@ -12,7 +12,7 @@
 
 #include "support/scratch.hpp"
 
-namespace wheelwright::csv_test {
+namespace wheelwright::logs::csv_test {
 namespace {
 
 using ::testing::AllOf;
@@ -486,4 +486,4 @@ TEST(CsvRowParser, LearnsTheMedianStep) {
 }
 
 }  // namespace
-}  // namespace wheelwright::csv_test
+}  // namespace wheelwright::logs::csv_test

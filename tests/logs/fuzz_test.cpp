@@ -11,7 +11,7 @@
 
 #include "support/scratch.hpp"
 
-namespace wheelwright::fuzz_test {
+namespace wheelwright::logs::fuzz_test {
 namespace {
 
 using Fuzz = testing::ScratchTest;
@@ -122,8 +122,8 @@ TEST_F(Fuzz, Robot) {
   for (int k = 0; k < 5000; ++k) {
     const std::string text = mutated(good, random, ":{}[],-&*!|>'\"%@`#? \n\t.0123456789eE~");
     try {
-      const Robot robot = parse_robot(text, "robot.yaml");
-      ASSERT_EQ(to_json(robot_from_json(to_json(robot), "r")), to_json(robot));
+      const Robot robot = robots::parse_robot(text, "robot.yaml");
+      ASSERT_EQ(robots::to_json(robots::robot_from_json(robots::to_json(robot), "r")), robots::to_json(robot));
       ++accepted;
     } catch (const InputError& error) {
       ASSERT_NE(std::string(error.what()).find("robot.yaml"), std::string::npos) << error.what();
@@ -140,8 +140,8 @@ TEST_F(Fuzz, JsonText) {
       R"({"schema": "wheelwright/model/1", "parameters": [{"name": "m", "lower": 1.5}], "x": null})";
   for (int k = 0; k < 5000; ++k) {
     try {
-      const Json value = parse_json(mutated(good, random, "{}[],:\"\\0123456789eE-+.tfn "), "m.json");
-      ASSERT_EQ(parse_json(json_text(value), "again"), value);
+      const Json value = files::parse_json(mutated(good, random, "{}[],:\"\\0123456789eE-+.tfn "), "m.json");
+      ASSERT_EQ(files::parse_json(files::json_text(value), "again"), value);
     } catch (const InputError& error) {
       ASSERT_NE(std::string(error.what()).find("m.json"), std::string::npos) << error.what();
     }
@@ -149,4 +149,4 @@ TEST_F(Fuzz, JsonText) {
 }
 
 }  // namespace
-}  // namespace wheelwright::fuzz_test
+}  // namespace wheelwright::logs::fuzz_test

@@ -19,7 +19,7 @@
 
 #include "support/scratch.hpp"
 
-namespace wheelwright::log_file_test {
+namespace wheelwright::logs::log_file_test {
 namespace {
 
 using ::testing::AllOf;
@@ -204,7 +204,7 @@ TEST_F(TwoTopics, OtherTopicsComeToTheTimesOfTheWheelsWithinTheirBound) {
 
   Robot robot;
   robot.noise.position.value = 0.002;
-  const Robot widened = with_column_errors(robot, interpolation_errors(report));
+  const Robot widened = model::with_column_errors(robot, interpolation_errors(report));
   EXPECT_DOUBLE_EQ(*widened.noise.position.value, 0.002 + bound);
   EXPECT_FALSE(widened.noise.heading.value) << "an estimate stays one";
 }
@@ -378,4 +378,4 @@ TEST_F(LogFile, DamagedHdf5IsReadOrRefused) {
 }
 
 }  // namespace
-}  // namespace wheelwright::log_file_test
+}  // namespace wheelwright::logs::log_file_test

@@ -11,7 +11,7 @@
 #include "logs/mcap_samples.hpp"
 #include "support/scratch.hpp"
 
-namespace wheelwright::mcap_file_test {
+namespace wheelwright::logs::mcap_file_test {
 namespace {
 
 using testing::McapKind;
@@ -145,7 +145,7 @@ TEST_F(McapFile, RoundTrip) {
       EXPECT_EQ(report.profile, "ros2");
       EXPECT_EQ(report.library, "test");
       const std::string content = bytes(path("a.mcap"));
-      Xxh64 hash;
+      files::Xxh64 hash;
       hash.update(content.data(), content.size());
       EXPECT_EQ(report.hash, hash.text());
       reader.rewind();
@@ -319,4 +319,4 @@ TEST_F(McapFile, WriterRefuses) {
 }
 
 }  // namespace
-}  // namespace wheelwright::mcap_file_test
+}  // namespace wheelwright::logs::mcap_file_test

@@ -6,7 +6,7 @@
 #include "logs/mcap_samples.hpp"
 #include "support/scratch.hpp"
 
-namespace wheelwright::mcap_fuzz_test {
+namespace wheelwright::logs::mcap_fuzz_test {
 namespace {
 
 using testing::McapKind;
@@ -131,4 +131,4 @@ INSTANTIATE_TEST_SUITE_P(Kinds, McapFuzz, ::testing::ValuesIn(testing::mcap_kind
                          [](const auto& kind) { return kind.param.name; });
 
 }  // namespace
-}  // namespace wheelwright::mcap_fuzz_test
+}  // namespace wheelwright::logs::mcap_fuzz_test

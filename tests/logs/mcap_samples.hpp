@@ -24,7 +24,7 @@ struct OwnedMessage {
   bool operator==(const OwnedMessage&) const = default;
 };
 
-inline OwnedMessage owned(const McapMessage& m) {
+inline OwnedMessage owned(const logs::McapMessage& m) {
   return {m.channel_id, m.sequence, m.log_time, m.publish_time, std::string(m.data)};
 }
 
@@ -45,8 +45,8 @@ inline std::vector<OwnedMessage> sample_messages(std::size_t count) {
 
 /// Writes `messages` with two schemas and three channels, the last without a schema.
 inline void write_sample(const std::filesystem::path& path, const std::vector<OwnedMessage>& messages,
-                         const McapWriterOptions& options) {
-  McapWriter writer(path, options);
+                         const logs::McapWriterOptions& options) {
+  logs::McapWriter writer(path, options);
   const auto joints = writer.add_schema("sensor_msgs/msg/JointState", "ros2msg", "float64[] position\n");
   const auto imu = writer.add_schema("sensor_msgs/msg/Imu", "ros2idl", "module sensor_msgs {};");
   writer.add_channel(joints, "/joint_states", "cdr", {{"offered_qos_profiles", ""}, {"a", "b"}});
@@ -59,9 +59,9 @@ inline void write_sample(const std::filesystem::path& path, const std::vector<Ow
 }
 
 /// Everything that a reader hands out.
-inline std::vector<OwnedMessage> all_messages(McapReader& reader) {
+inline std::vector<OwnedMessage> all_messages(logs::McapReader& reader) {
   std::vector<OwnedMessage> messages;
-  McapMessage message;
+  logs::McapMessage message;
   while (reader.next(message)) {
     messages.push_back(owned(message));
   }
@@ -79,17 +79,17 @@ inline std::string joined(const std::vector<std::string>& lines) {
 /// The ways in which a file may hold its messages.
 struct McapKind {
   const char* name;
-  McapCompression compression;
+  logs::McapCompression compression;
   std::size_t chunk_bytes;
 
-  [[nodiscard]] McapWriterOptions options() const { return {compression, chunk_bytes, "ros2", "test"}; }
+  [[nodiscard]] logs::McapWriterOptions options() const { return {compression, chunk_bytes, "ros2", "test"}; }
 };
 
 inline const std::vector<McapKind>& mcap_kinds() {
-  static const std::vector<McapKind> kinds = {{"none", McapCompression::none, 300},
-                                              {"zstd", McapCompression::zstd, 300},
-                                              {"lz4", McapCompression::lz4, 300},
-                                              {"no_chunks", McapCompression::none, 0}};
+  static const std::vector<McapKind> kinds = {{"none", logs::McapCompression::none, 300},
+                                              {"zstd", logs::McapCompression::zstd, 300},
+                                              {"lz4", logs::McapCompression::lz4, 300},
+                                              {"no_chunks", logs::McapCompression::none, 0}};
   return kinds;
 }
 

@@ -12,7 +12,7 @@
 
 #include "support/skip.hpp"
 
-namespace wheelwright::recordings_test {
+namespace wheelwright::logs::recordings_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -37,7 +37,7 @@ class Recordings : public ::testing::Test {
 TEST_F(Recordings, RobotFiles) {
   EXPECT_EQ(read_robot(root / "data/emps.yaml").noise.position.value, 2e-6);
   EXPECT_TRUE(read_robot(root / "data/warthog.yaml").effort_unsigned);
-  EXPECT_EQ(read_robot(root / "data/regbot.yaml").effort, EffortKind::current);
+  EXPECT_EQ(read_robot(root / "data/regbot.yaml").effort, model::EffortKind::current);
   EXPECT_EQ(read_robot(root / "data/husky.yaml").track_width, 0.57);
   const auto cases = all("withheld-dev", "robot.yaml");
   EXPECT_EQ(cases.size(), 24u);
@@ -87,4 +87,4 @@ TEST_F(Recordings, PackedBaselines) {
 }
 
 }  // namespace
-}  // namespace wheelwright::recordings_test
+}  // namespace wheelwright::logs::recordings_test

@@ -11,7 +11,7 @@
 
 #include <wheelwright/logs/ros_extractor.hpp>
 
-namespace wheelwright::ros_allocation_test {
+namespace wheelwright::logs::ros_allocation_test {
 namespace {
 
 #ifdef WHEELWRIGHT_COUNTS_ALLOCATIONS
@@ -40,4 +40,4 @@ TEST(RosExtractorAllocation, ReadingAMessageHasNone) {
 #endif
 
 }  // namespace
-}  // namespace wheelwright::ros_allocation_test
+}  // namespace wheelwright::logs::ros_allocation_test

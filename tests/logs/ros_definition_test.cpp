@@ -7,7 +7,7 @@
 
 #include <wheelwright/logs/ros_definition.hpp>
 
-namespace wheelwright::ros_definition_test {
+namespace wheelwright::logs::ros_definition_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -161,4 +161,4 @@ TEST(RosDefinition, TextsChangedAtRandomAreReadOrRefused) {
 }
 
 }  // namespace
-}  // namespace wheelwright::ros_definition_test
+}  // namespace wheelwright::logs::ros_definition_test

@@ -14,7 +14,7 @@
 #include <wheelwright/logs/ros_extractor.hpp>
 #include <wheelwright/logs/ros_write.hpp>
 
-namespace wheelwright::ros_extractor_test {
+namespace wheelwright::logs::ros_extractor_test {
 namespace {
 
 using testing::HandCdr;
@@ -445,4 +445,4 @@ TEST(RosEncoder, FieldNames) {
 }
 
 }  // namespace
-}  // namespace wheelwright::ros_extractor_test
+}  // namespace wheelwright::logs::ros_extractor_test

@@ -9,7 +9,7 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/logs/stream_aligner.hpp>
 
-namespace wheelwright::stream_aligner_test {
+namespace wheelwright::logs::stream_aligner_test {
 namespace {
 
 constexpr std::int64_t ms = 1'000'000;
@@ -165,4 +165,4 @@ TEST(StreamAligner, RefusesNonsense) {
 }
 
 }  // namespace
-}  // namespace wheelwright::stream_aligner_test
+}  // namespace wheelwright::logs::stream_aligner_test

@@ -12,7 +12,7 @@
 
 #include "support/fault_oracle.hpp"
 
-namespace wheelwright::faults_test {
+namespace wheelwright::model::faults_test {
 namespace {
 
 using Kind = Fault::Kind;
@@ -180,4 +180,4 @@ TEST(ValidateFaults, RefusesWhatIsNoProfile) {
 }
 
 }  // namespace
-}  // namespace wheelwright::faults_test
+}  // namespace wheelwright::model::faults_test

@@ -15,7 +15,7 @@
 
 #include "support/fault_oracle.hpp"
 
-namespace wheelwright::model_test {
+namespace wheelwright::model::model_test {
 namespace {
 
 using testing::ElementsAre;
@@ -250,4 +250,4 @@ TEST(Regressor, RefusesTheWrongNumberOfCoordinates) {
 }
 
 }  // namespace
-}  // namespace wheelwright::model_test
+}  // namespace wheelwright::model::model_test

@@ -14,7 +14,7 @@
 #include "robots/robot_samples.hpp"
 #include "support/scratch.hpp"
 
-namespace wheelwright::urdf_test {
+namespace wheelwright::reality::urdf_test {
 namespace {
 
 using UrdfInTheEngine = testing::ScratchTest;
@@ -46,8 +46,8 @@ TEST_F(UrdfInTheEngine, MassMatrixOfTheRollingRobotIsTheNominalOne) {
   for (int k = 0; k < 5; ++k) {
     const testing::SampleRobot sample;
     const std::string urdf = sample_urdf(sample, random_frames(sample, random));
-    const RobotTree tree = parse_urdf(urdf, "robot.urdf");
-    const Robot robot = robot_from(&tree, nullptr).robot;
+    const robots::RobotTree tree = robots::parse_urdf(urdf, "robot.urdf");
+    const Robot robot = robots::robot_from(&tree, nullptr).robot;
 
     char message[500] = "";
     const std::unique_ptr<mjModel, void (*)(mjModel*)> model(
@@ -77,4 +77,4 @@ TEST_F(UrdfInTheEngine, MassMatrixOfTheRollingRobotIsTheNominalOne) {
 }
 
 }  // namespace
-}  // namespace wheelwright::urdf_test
+}  // namespace wheelwright::reality::urdf_test

@@ -20,7 +20,7 @@
 #include "report/gap_example.hpp"
 #include "support/skip.hpp"
 
-namespace wheelwright::browser_test {
+namespace wheelwright::report::browser_test {
 namespace {
 
 namespace example = report_example;
@@ -217,4 +217,4 @@ TEST_F(Browser, SaysWhenItIsTooOld) {
 }
 
 }  // namespace
-}  // namespace wheelwright::browser_test
+}  // namespace wheelwright::report::browser_test

@@ -14,7 +14,7 @@
 #include <wheelwright/model/differential_drive.hpp>
 #include <wheelwright/report/context.hpp>
 
-namespace wheelwright::report_example {
+namespace wheelwright::report::report_example {
 
 inline constexpr double kRadius = 0.1;
 
@@ -32,11 +32,11 @@ inline Commissioning done() {
   Commissioning c;
   c.message = "commissioned";
   c.model.robot = robot();
-  c.model.model = make_model(c.model.robot);
+  c.model.model = model::make_model(c.model.robot);
   c.model.filter = {.order = 2, .alpha = 20.0, .beta = 20.0};
   const double estimate[] = {21.3, 0.91, 4.2, 0.52}, half[] = {0.4, 0.02, 0.3, 0.05};
   for (std::size_t j = 0; j < 4; ++j) {
-    ParameterResult p;
+    commission::ParameterResult p;
     p.parameter = c.model.model.parameters[j];
     p.estimate = kRadius * estimate[j];
     p.standard_error = kRadius * half[j] / 8.0;
@@ -57,7 +57,7 @@ inline Commissioning done() {
               .largest_acceleration = {8.0, 9.0},
               .sharpest_change = {9.0, 11.0},
               .reversals = {4.0, 6.0}};
-  OutputNoise noise;
+  commission::OutputNoise noise;
   noise.bound = 0.05;
   noise.learning = 0.04;
   noise.how = {.bound = 0.05, .over_largest = 1.3, .over_rms = 5.6, .heavy_tail = false};
@@ -72,17 +72,17 @@ inline Commissioning done() {
     c.filter_choice.curve.push_back(
         {{.order = 2, .alpha = beta, .beta = beta}, 0.02 * (1.0 + std::pow(beta / 30.0, 2))});
   }
-  OutputValidation v{.instants = 3500,
-                     .outside = 0,
-                     .coverage = 1.0,
-                     .coverage_noise_free = 0.71,
-                     .nrmse = 0.02,
-                     .utilisation = 0.62,
-                     .torque_rms = 1.0,
-                     .residual_rms = 0.02,
-                     .median_width = 0.12,
-                     .median_width_box = 0.15,
-                     .smallest_kappa = 0.0837};
+  commission::OutputValidation v{.instants = 3500,
+                                 .outside = 0,
+                                 .coverage = 1.0,
+                                 .coverage_noise_free = 0.71,
+                                 .nrmse = 0.02,
+                                 .utilisation = 0.62,
+                                 .torque_rms = 1.0,
+                                 .residual_rms = 0.02,
+                                 .median_width = 0.12,
+                                 .median_width_box = 0.15,
+                                 .smallest_kappa = 0.0837};
   c.validation = {v, v};
   c.validation[1].smallest_kappa = 0.12;
   c.minimax = 0.4;
@@ -95,8 +95,8 @@ inline Commissioning partial() {
   Commissioning c = done();
   c.status = Commissioning::Status::partial;
   for (const std::size_t j : {std::size_t{1}, std::size_t{3}}) {
-    ParameterResult& p = c.parameters[j];
-    p.excitation = Excitation::not_excited;
+    commission::ParameterResult& p = c.parameters[j];
+    p.excitation = identify::Excitation::not_excited;
     p.reason = "its motion never occurs in the log: " + p.parameter.excite;
     p.estimate.reset();
     p.standard_error.reset();
@@ -111,8 +111,8 @@ inline Commissioning partial() {
 inline Commissioning nothing() {
   Commissioning c = partial();
   c.status = Commissioning::Status::nothing;
-  for (ParameterResult& p : c.parameters) {
-    p.excitation = Excitation::not_excited;
+  for (commission::ParameterResult& p : c.parameters) {
+    p.excitation = identify::Excitation::not_excited;
     p.estimate.reset();
   }
   return c;
@@ -124,15 +124,16 @@ inline Commissioning empty() {
   c.status = Commissioning::Status::empty;
   c.minimax = 1.8;
   c.validation.clear();
-  for (OutputNoise& noise : c.noise) {
-    noise.origin = NoiseOrigin::declared;
+  for (commission::OutputNoise& noise : c.noise) {
+    noise.origin = core::NoiseOrigin::declared;
   }
   c.feasible.status = FeasibleSet::Status::empty;
-  WeightedRow row{{Eigen::VectorXd::Ones(4), 1.0, {.sample = 1250, .t = 12.5, .output = 0, .side = Side::upper}}, 0.7};
+  bounds::WeightedRow row{
+      {Eigen::VectorXd::Ones(4), 1.0, {.sample = 1250, .t = 12.5, .output = 0, .side = bounds::Side::upper}}, 0.7};
   c.feasible.contradiction.push_back(row);
-  row.row.origin = {.sample = 3125, .t = 31.25, .output = 0, .side = Side::lower};
+  row.row.origin = {.sample = 3125, .t = 31.25, .output = 0, .side = bounds::Side::lower};
   c.feasible.contradiction.push_back(row);
-  row.row.origin = {.is_prior = true, .parameter = 0, .side = Side::lower};
+  row.row.origin = {.is_prior = true, .parameter = 0, .side = bounds::Side::lower};
   c.feasible.contradiction.push_back(row);
   return c;
 }
@@ -152,7 +153,7 @@ inline Detection detection(std::size_t bins, bool fault) {
     const double t = 0.01 * static_cast<double>(k);
     d.trace.t.push_back(t);
     for (std::size_t i = 0; i < 2; ++i) {
-      OutputTrace& o = d.trace.outputs[i];
+      commission::OutputTrace& o = d.trace.outputs[i];
       const double added = fault && i == 0 && k >= 2 * bins / 3 ? 1.4 : 0.0;
       o.torque.push_back(2.123456 * std::sin(0.7 * t) + added);
       o.predicted.push_back(2.0 * std::sin(0.7 * t));
@@ -232,4 +233,4 @@ inline testing::AssertionResult lacks(const std::string& page, const std::vector
   return testing::AssertionSuccess();
 }
 
-}  // namespace wheelwright::report_example
+}  // namespace wheelwright::report::report_example

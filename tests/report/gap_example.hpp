@@ -12,12 +12,13 @@
 
 #include <wheelwright/gap/diagnosis.hpp>
 
-namespace wheelwright::gap_example {
+namespace wheelwright::report::gap_example {
 
 /// Residuals of `seconds` at 50 Hz: a sine of 8 left by the nominal model, a square wave of 5 after fitting, noise of
 /// 1.
-inline ResidualSeries series(std::string channel, std::string unit, double seconds, GapSpace space, unsigned seed) {
-  ResidualSeries s;
+inline gap::ResidualSeries series(std::string channel, std::string unit, double seconds, gap::GapSpace space,
+                                  unsigned seed) {
+  gap::ResidualSeries s;
   s.space = space;
   s.channel = std::move(channel);
   s.unit = std::move(unit);
@@ -40,7 +41,7 @@ inline ResidualSeries series(std::string channel, std::string unit, double secon
 /// Dry friction of 0.312 N·m [0.290, 0.330] that explains 93 % of the gap.
 inline Diagnosis explained(double seconds = 60.0) {
   Diagnosis d;
-  d.verdict = GapVerdict::explained;
+  d.verdict = gap::GapVerdict::explained;
   d.summary = "Dry friction explains the gap.";
   d.causes = {{.effect = "coulomb",
                .sentence = "Dry friction at every joint: a torque of constant size against the motion.",
@@ -53,11 +54,11 @@ inline Diagnosis explained(double seconds = 60.0) {
                   {"caster_drag", "stribeck", 0.44, false, ""},
                   {"payload", "armature", 1.0, true, "the pose of a load cell would split them"},
                   {"slope", "torque_bias", 0.35, false, ""}};
-  const auto share = [](GapSpace space, std::string channel, std::string kind, std::string regime, double part,
+  const auto share = [](gap::GapSpace space, std::string channel, std::string kind, std::string regime, double part,
                         double presence, double p) {
-    return GapShare{space, std::move(channel), std::move(regime), std::move(kind), part, presence, p};
+    return gap::GapShare{space, std::move(channel), std::move(regime), std::move(kind), part, presence, p};
   };
-  const GapSpace dynamic = GapSpace::dynamic;
+  const gap::GapSpace dynamic = gap::GapSpace::dynamic;
   d.where = {share(dynamic, "sum", "channel", "all", 0.71, 1.0, 0.0004),
              share(dynamic, "sum", "direction", "right wheel forwards", 0.64, 0.62, 0.4),
              share(dynamic, "sum", "frequency", "0.2 to 0.5 Hz", 0.58, 0.22, 0.0001),
@@ -87,7 +88,7 @@ inline Diagnosis explained(double seconds = 60.0) {
 /// Dry friction or a dragging castor.
 inline Diagnosis ambiguous() {
   Diagnosis d = explained();
-  d.verdict = GapVerdict::ambiguous;
+  d.verdict = gap::GapVerdict::ambiguous;
   d.credible.push_back({{"caster_drag"}, 1.06, 0.31});
   return d;
 }
@@ -109,7 +110,7 @@ inline Diagnosis two_causes() {
 /// A gap that dry friction lessens and nothing explains.
 inline Diagnosis unexplained() {
   Diagnosis d = explained();
-  d.verdict = GapVerdict::unexplained;
+  d.verdict = gap::GapVerdict::unexplained;
   d.causes[0].share = 0.4;
   d.remaining = 0.6;
   return d;
@@ -118,7 +119,7 @@ inline Diagnosis unexplained() {
 /// Noise.
 inline Diagnosis no_gap() {
   Diagnosis d = explained();
-  d.verdict = GapVerdict::no_gap;
+  d.verdict = gap::GapVerdict::no_gap;
   d.causes.clear();
   d.credible.clear();
   d.contradictions.clear();
@@ -126,4 +127,4 @@ inline Diagnosis no_gap() {
   return d;
 }
 
-}  // namespace wheelwright::gap_example
+}  // namespace wheelwright::report::gap_example

@@ -11,11 +11,10 @@
 #include "report/example.hpp"
 #include "report/gap_example.hpp"
 
-namespace wheelwright::gap_report_test {
+namespace wheelwright::report::gap_report_test {
 using namespace words;
 namespace {
 
-using namespace report;
 namespace example = report_example;
 
 std::size_t times(const std::string& text, const std::string& what) {
@@ -91,7 +90,7 @@ TEST(GapReport, TextsAreEscaped) {
 }
 
 TEST(GapDrawings, AFindingLooksOtherThanChance) {
-  GapShare finding{GapSpace::dynamic, "sum", "reversals", "reversal", 0.5, 0.1, 0.001}, chance = finding;
+  gap::GapShare finding{gap::GapSpace::dynamic, "sum", "reversals", "reversal", 0.5, 0.1, 0.001}, chance = finding;
   chance.p_value = 0.5;
   EXPECT_TRUE(example::holds(share_bars({finding}), {"class=\"full\"", "50 % in 10 %"}));
   EXPECT_TRUE(example::lacks(share_bars({chance}), {"class=\"full\""}));
@@ -106,7 +105,7 @@ TEST(GapDrawings, AMatrixHasACellForEachPairAndPrintsItsNumber) {
 }
 
 TEST(GapDrawings, AMapNeedsAPlace) {
-  const ResidualSeries s = gap_example::explained().series[0];
+  const gap::ResidualSeries s = gap_example::explained().series[0];
   EXPECT_FALSE(position_map(s, example::signals(3000), 0.2).empty());
   LogTable still = example::signals(3000);
   for (auto& column : still.columns) {
@@ -119,8 +118,8 @@ TEST(GapDrawings, AMapNeedsAPlace) {
 TEST(GapDrawings, ASpectrumNeedsALog) {
   EXPECT_TRUE(
       example::holds(spectrum_drawing(gap_example::explained().series[0], 10.0), {"noise floor", "frequency, Hz"}));
-  EXPECT_TRUE(spectrum_drawing(ResidualSeries{}, 10.0).empty());
+  EXPECT_TRUE(spectrum_drawing(gap::ResidualSeries{}, 10.0).empty());
 }
 
 }  // namespace
-}  // namespace wheelwright::gap_report_test
+}  // namespace wheelwright::report::gap_report_test

@@ -24,33 +24,33 @@
 #include "report/gap_example.hpp"
 #include "support/drives.hpp"
 
-namespace wheelwright::page_test {
+namespace wheelwright::report::page_test {
 using namespace words;
 namespace {
 
 namespace example = report_example;
 
 // A drive with a pose, whose efforts are late by two samples; without turning where `straight`.
-Identification identified(bool straight) {
+inference::Identification identified(bool straight) {
   Scenario s = testing_support::exact_drive(testing_support::Shown::speeds, Hold::first_order);
   s.sensors.pose = true;
   s.sensors.effort = 0.02;
   s.robot.noise.wheel_speed.value = 1e-4;
-  s.trajectory.kind = straight ? Trajectory::Kind::straight : s.trajectory.kind;
-  LogTable table = simulate(s);
+  s.trajectory.kind = straight ? sim::Trajectory::Kind::straight : s.trajectory.kind;
+  LogTable table = sim::simulate(s);
   for (std::size_t c = 0; c < table.names.size(); ++c) {
     if (table.names[c].starts_with("tau")) {
       std::rotate(table.columns[c].begin(), table.columns[c].end() - 2, table.columns[c].end());
     }
   }
   TableSource log(table);
-  return identify(log, s.robot);
+  return inference::identify(log, s.robot);
 }
 
 struct Designed {
-  DesignSubject subject;
-  MotionLimits limits;
-  BoundsDesign design;
+  design::DesignSubject subject;
+  design::MotionLimits limits;
+  design::BoundsDesign design;
 };
 
 Designed designed() {
@@ -60,16 +60,16 @@ Designed designed() {
   robot.noise.wheel_speed.value = robot.noise.effort.value = 0.02;
   robot.filter.beta = 10.0;
   robot.limits = {{"speed", 8.0}, {"acceleration", 20.0}, {"effort", 6.0}};
-  Designed d{subject_of(robot, 0.02), limits_of(robot), {}};
+  Designed d{design::subject_of(robot, 0.02), design::limits_of(robot), {}};
   d.limits.duration = 6.0;
   d.limits.radius = 1.0;
-  d.design = design_for_bounds(d.subject, d.limits, WidthCriterion::geometric_mean,
-                               {.stages = 1, .samples = 8, .descents = 1, .steps = 10});
+  d.design = design::design_for_bounds(d.subject, d.limits, design::WidthCriterion::geometric_mean,
+                                       {.stages = 1, .samples = 8, .descents = 1, .steps = 10});
   return d;
 }
 
 std::vector<std::pair<std::string, std::string>> all_pages() {
-  static const Identification whole = identified(false), straight = identified(true);
+  static const inference::Identification whole = identified(false), straight = identified(true);
   static const Designed plan = designed();
   const ReportContext context = example::context(900);
   return {{"done", commission_report(example::done(), context)},
@@ -156,7 +156,7 @@ TEST(EveryPage, EscapesEveryName) {
   Commissioning contradicted = example::empty();
   contradicted.model.model.outputs[0] = contradicted.parameters[0].parameter.name = evil;
   const Detection fault = example::detection(300, true);
-  Identification identification = identified(true);
+  inference::Identification identification = identified(true);
   for (std::string* text :
        {&identification.setting.robot.name, &identification.setting.model.outputs[0],
         &identification.setting.model.parameters[0].physical, &identification.setting.model.parameters[0].physical_unit,
@@ -262,4 +262,4 @@ TEST(Thinned, KeepsEveryPeakAndEverySegment) {
 }
 
 }  // namespace
-}  // namespace wheelwright::page_test
+}  // namespace wheelwright::report::page_test

@@ -11,7 +11,7 @@
 
 #include <wheelwright/report/signals.hpp>
 
-namespace wheelwright::raw_signals_test {
+namespace wheelwright::report::raw_signals_test {
 namespace {
 
 // Two columns of noise in segments of uneven lengths.
@@ -70,4 +70,4 @@ TEST(RawSignals, OfALongLogKeepThePeaksOfEverySegment) {
 }
 
 }  // namespace
-}  // namespace wheelwright::raw_signals_test
+}  // namespace wheelwright::report::raw_signals_test

@@ -12,7 +12,10 @@
 #include <wheelwright/core/limits.hpp>
 #include <wheelwright/report/sensitivity_drawings.hpp>
 
-namespace wheelwright::sensitivity_drawings_test {
+namespace wheelwright::report::sensitivity_drawings_test {
+
+using core::kNan;
+
 namespace {
 
 using ::testing::HasSubstr;
@@ -50,10 +53,10 @@ void expect_well_formed(const std::string& svg) {
   EXPECT_FALSE(std::regex_search(svg, std::regex("[\" ,ML]-?(nan|inf)"))) << svg;
 }
 
-OneAtATime study() {
+study::OneAtATime study() {
   Eigen::MatrixXd values(7, 1);
   values << 5.0, 4.0, 5.0, 6.0, 9.0, kNan, 1.0;
-  return one_at_a_time(values, 2, 3).at(0);
+  return study::one_at_a_time(values, 2, 3).at(0);
 }
 
 TEST(Tornado, HasTheLargestSwingOnTop) {
@@ -65,12 +68,14 @@ TEST(Tornado, HasTheLargestSwingOnTop) {
 
 TEST(Tornado, IsNoneWithoutValues) {
   EXPECT_EQ(report::tornado({}, {}, kQuantity), "");
-  EXPECT_EQ(report::tornado(one_at_a_time(Eigen::MatrixXd::Constant(7, 1, kNan), 2, 3).at(0), kInputs, kQuantity), "");
+  EXPECT_EQ(
+      report::tornado(study::one_at_a_time(Eigen::MatrixXd::Constant(7, 1, kNan), 2, 3).at(0), kInputs, kQuantity), "");
   EXPECT_THROW((void)report::tornado(study(), {"one"}, kQuantity), InvalidArgument);
 }
 
 TEST(Tornado, ShowsAConstantQuantity) {
-  expect_well_formed(report::tornado(one_at_a_time(Eigen::MatrixXd::Zero(7, 1), 2, 3).at(0), kInputs, kQuantity));
+  expect_well_formed(
+      report::tornado(study::one_at_a_time(Eigen::MatrixXd::Zero(7, 1), 2, 3).at(0), kInputs, kQuantity));
 }
 
 TEST(SensitivityCurve, BreaksWhereValuesAreMissing) {
@@ -95,8 +100,8 @@ TEST(SensitivityCurve, IsNoneWithoutValues) {
   expect_well_formed(report::sensitivity_curve(x, one, 0.5, 1.0, false, {}, kQuantity));
 }
 
-SobolIndices indices() {
-  SobolIndices out{.status = SobolStatus::estimated};
+study::SobolIndices indices() {
+  study::SobolIndices out{.status = study::SobolStatus::estimated};
   out.first = {{0.2, 0.05, 0.1, 0.3}, {0.5, 0.1, 0.3, 0.7}};
   out.total = {{0.3, 0.05, 0.2, 0.4}, {0.8, 5.0, -9.2, 10.8}};
   return out;
@@ -114,16 +119,16 @@ TEST(SobolBars, HaveWhiskersAndOrder) {
 }
 
 TEST(SobolBars, AreNoneUnlessEstimated) {
-  SobolIndices constant = indices();
-  constant.status = SobolStatus::constant;
+  study::SobolIndices constant = indices();
+  constant.status = study::SobolStatus::constant;
   EXPECT_EQ(report::sobol_bars(constant, kInputs), "");
   EXPECT_EQ(report::sobol_bars({}, {}), "");
   EXPECT_THROW((void)report::sobol_bars(indices(), {"one"}), InvalidArgument);
 }
 
 TEST(MorrisScatter, NumbersInputsBySize) {
-  const std::vector<ElementaryEffects> effects = {{0.1, 0.5, 0.2, 0.1, 0.3, 0.7, 20},
-                                                  {2.0, 2.0, 0.0, 0.0, 2.0, 2.0, 20}};
+  const std::vector<study::ElementaryEffects> effects = {{0.1, 0.5, 0.2, 0.1, 0.3, 0.7, 20},
+                                                         {2.0, 2.0, 0.0, 0.0, 2.0, 2.0, 20}};
   const std::string svg = report::morris_scatter(effects, kInputs, kQuantity);
   expect_well_formed(svg);
   EXPECT_THAT(svg, HasSubstr(">1 α &amp; β<"));
@@ -131,15 +136,15 @@ TEST(MorrisScatter, NumbersInputsBySize) {
 }
 
 TEST(MorrisScatter, IsNoneWithoutEffects) {
-  const ElementaryEffects none{kNan, kNan, kNan, kNan, kNan, kNan, 0};
+  const study::ElementaryEffects none{kNan, kNan, kNan, kNan, kNan, kNan, 0};
   EXPECT_EQ(report::morris_scatter({none, none}, kInputs, kQuantity), "");
   EXPECT_EQ(report::morris_scatter({}, {}, kQuantity), "");
   expect_well_formed(report::morris_scatter({none, {}}, kInputs, kQuantity));
 }
 
 TEST(SensitivityMap, CrossesCellsWithoutAValue) {
-  const GridMap map{Eigen::Vector2d(0.0, 1.0), Eigen::Vector2d(0.0, 1.0),
-                    (Eigen::Matrix2d() << 1.0, 2.0, kNan, 4.0).finished()};
+  const study::GridMap map{Eigen::Vector2d(0.0, 1.0), Eigen::Vector2d(0.0, 1.0),
+                           (Eigen::Matrix2d() << 1.0, 2.0, kNan, 4.0).finished()};
   const std::string svg = report::sensitivity_map(map, map.x, map.y, {"a < b", "s"}, {"c", ""}, kQuantity);
   expect_well_formed(svg);
   EXPECT_THAT(svg, HasSubstr("no value"));
@@ -148,14 +153,14 @@ TEST(SensitivityMap, CrossesCellsWithoutAValue) {
 }
 
 TEST(SensitivityMap, IsNoneWithoutValues) {
-  const GridMap map{Eigen::Vector2d(0.0, 1.0), Eigen::Vector2d(0.0, 1.0), Eigen::Matrix2d::Constant(kNan)};
+  const study::GridMap map{Eigen::Vector2d(0.0, 1.0), Eigen::Vector2d(0.0, 1.0), Eigen::Matrix2d::Constant(kNan)};
   EXPECT_EQ(report::sensitivity_map(map, map.x, map.y, {}, {}, kQuantity), "");
   EXPECT_EQ(report::sensitivity_map({}, {}, {}, {}, {}, kQuantity), "");
   EXPECT_THROW((void)report::sensitivity_map(map, map.x.head(1), map.y, {}, {}, kQuantity), InvalidArgument);
-  GridMap flat = map;
+  study::GridMap flat = map;
   flat.values.setConstant(3.0);
   expect_well_formed(report::sensitivity_map(flat, map.x, map.y, {}, {}, kQuantity));
 }
 
 }  // namespace
-}  // namespace wheelwright::sensitivity_drawings_test
+}  // namespace wheelwright::report::sensitivity_drawings_test

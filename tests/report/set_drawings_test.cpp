@@ -13,7 +13,7 @@
 
 #include "report/example.hpp"
 
-namespace wheelwright::set_drawings_test {
+namespace wheelwright::report::set_drawings_test {
 namespace {
 
 namespace example = report_example;
@@ -37,10 +37,10 @@ std::vector<std::set<std::string>> polygons(const std::string& html) {
 Commissioning half_a_box() {
   Commissioning c = example::done();
   Box box;
-  for (const ParameterResult& p : c.parameters) {
+  for (const commission::ParameterResult& p : c.parameters) {
     box.sides.push_back({p.lower, p.upper});
   }
-  HalfSpace row{Eigen::VectorXd::Zero(4), 1.0, {}};
+  bounds::HalfSpace row{Eigen::VectorXd::Zero(4), 1.0, {}};
   for (const int j : {0, 2}) {
     const Interval& side = box.sides[static_cast<std::size_t>(j)];
     row.a[j] = 1.0 / side.width();
@@ -67,4 +67,4 @@ TEST(SetProjections, StandOnThePage) {
 }
 
 }  // namespace
-}  // namespace wheelwright::set_drawings_test
+}  // namespace wheelwright::report::set_drawings_test

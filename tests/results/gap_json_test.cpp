@@ -15,7 +15,7 @@
 #include "report/gap_example.hpp"
 #include "support/scratch.hpp"
 
-namespace wheelwright::gap_json_test {
+namespace wheelwright::results::gap_json_test {
 namespace {
 
 GapFiles files() {
@@ -27,7 +27,7 @@ GapFiles files() {
 }
 
 TEST(GapJson, HasTheContractsKeys) {
-  const Json json = to_json(gap_example::explained(), files());
+  const Json json = to_json(report::gap_example::explained(), files());
   for (const char* key : {"schema", "verdict", "causes", "credible_set", "confusable", "where", "shrink", "parametric",
                           "next_manoeuvre"}) {
     EXPECT_TRUE(json.contains(key)) << key;
@@ -48,13 +48,13 @@ TEST(GapJson, HasTheContractsKeys) {
 }
 
 TEST(GapJson, NamesEveryVerdict) {
-  EXPECT_EQ(to_json(gap_example::no_gap(), files())["verdict"], "no_gap");
-  EXPECT_EQ(to_json(gap_example::ambiguous(), files())["verdict"], "ambiguous");
-  EXPECT_EQ(to_json(gap_example::unexplained(), files())["verdict"], "unexplained");
+  EXPECT_EQ(to_json(report::gap_example::no_gap(), files())["verdict"], "no_gap");
+  EXPECT_EQ(to_json(report::gap_example::ambiguous(), files())["verdict"], "ambiguous");
+  EXPECT_EQ(to_json(report::gap_example::unexplained(), files())["verdict"], "unexplained");
 }
 
 TEST(GapJson, KeepsChannelsBandsAndFindingsInTheirOrder) {
-  const Json json = to_json(gap_example::explained(), files());
+  const Json json = to_json(report::gap_example::explained(), files());
   std::vector<std::string> regimes;
   for (const Json& entry : json["where"]) {
     regimes.push_back(entry["regime"]);
@@ -65,10 +65,10 @@ TEST(GapJson, KeepsChannelsBandsAndFindingsInTheirOrder) {
 }
 
 TEST(GapJson, SchemaNamesEveryKeyAndRequiresIt) {
-  const Json schema = read_json(std::filesystem::path(WHEELWRIGHT_SOURCE_DIR) / "results" / "gap.schema.json");
+  const Json schema = files::read_json(std::filesystem::path(WHEELWRIGHT_SOURCE_DIR) / "results" / "gap.schema.json");
   GapFiles f = files();
   f.next_manoeuvre = NextManoeuvre{"next.csv", "Turn on the spot."};
-  const Json json = to_json(gap_example::two_causes(), f);
+  const Json json = to_json(report::gap_example::two_causes(), f);
   const auto same_keys = [](const Json& object, const Json& rule) {
     std::set<std::string> has, known, required;
     for (const auto& [key, value] : object.items()) {
@@ -107,7 +107,7 @@ using GapJsonFile = testing::ScratchTest;
 
 TEST_F(GapJsonFile, HasALinePerRowAndChannel) {
   const auto file = path("residuals.csv");
-  Diagnosis d = gap_example::explained(1.0);
+  Diagnosis d = report::gap_example::explained(1.0);
   d.series[1].after.resize(0);
   write_residuals(file, d.series);
   std::ifstream in(file);
@@ -135,4 +135,4 @@ TEST_F(GapJsonFile, HasALinePerRowAndChannel) {
 }
 
 }  // namespace
-}  // namespace wheelwright::gap_json_test
+}  // namespace wheelwright::results::gap_json_test

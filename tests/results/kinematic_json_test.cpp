@@ -12,7 +12,7 @@
 
 #include "support/kinematic_drives.hpp"
 
-namespace wheelwright::kinematic_json_test {
+namespace wheelwright::results::kinematic_json_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -20,17 +20,18 @@ using testing_support::posed_drive;
 
 Commissioning commissioned(const Scenario& s) {
   Simulation log(s);
-  CommissionOptions options;
+  commission::CommissionOptions options;
   options.persistence = {2, 3};
-  return commission(log, s.robot, options);
+  return commission_robot(log, s.robot, options);
 }
 
 OnlineModel there_and_back(const Commissioning& result) {
-  return model_from_json(parse_json(json_text(to_json(result, {}, "test")), "model.json"), "model.json");
+  return robots::model_from_json(files::parse_json(files::json_text(to_json(result, {}, "test")), "model.json"),
+                                 "model.json");
 }
 
-void expect_same_decisions(const KinematicModel& a, const KinematicModel& b, const LogTable& log) {
-  KinematicDetector one = make_detector(a), other = make_detector(b);
+void expect_same_decisions(const detector::KinematicModel& a, const detector::KinematicModel& b, const LogTable& log) {
+  detector::KinematicDetector one = make_detector(a), other = make_detector(b);
   std::size_t valid = 0;
   for (std::size_t k = 0; k < log.rows(); ++k) {
     std::vector<double> sample;
@@ -62,7 +63,7 @@ TEST(KinematicJson, GivesTheDetectorBackBitForBit) {
     EXPECT_EQ(back.kinematic->window, result.model.kinematic->window);
     EXPECT_EQ(back.kinematic->persistence.k, 2u);
     EXPECT_EQ(back.kinematic->persistence.n, 3u);
-    expect_same_decisions(*result.model.kinematic, *back.kinematic, simulate(s));
+    expect_same_decisions(*result.model.kinematic, *back.kinematic, sim::simulate(s));
   }
 }
 
@@ -91,7 +92,7 @@ TEST(KinematicJson, RefusesWhatIsImpossible) {
     Json json = good;
     json.at("kinematic")[Json::json_pointer(pointer)] = value;
     try {
-      static_cast<void>(model_from_json(json, "model.json"));
+      static_cast<void>(robots::model_from_json(json, "model.json"));
       ADD_FAILURE() << pointer << " was taken";
     } catch (const InputError& error) {
       EXPECT_THAT(error.what(), HasSubstr(word));
@@ -107,15 +108,15 @@ TEST(KinematicJson, RefusesWhatIsImpossible) {
 }
 
 TEST(KinematicJson, TheRobotFileMayGiveTheWindow) {
-  const Robot robot = parse_robot(
+  const Robot robot = robots::parse_robot(
       "model: differential_drive\nwheel_radius: 0.1\ntrack_width: 0.4\nkinematic: {window: 0.7}\n", "robot.yaml");
   EXPECT_EQ(robot.kinematic_window, 0.7);
-  EXPECT_EQ(robot_from_json(to_json(robot), "robot").kinematic_window, 0.7);
-  EXPECT_THROW(static_cast<void>(parse_robot("model: differential_drive\nwheel_radius: 0.1\ntrack_width: 0.4\n"
-                                             "kinematic: {window: 0}\n",
-                                             "robot.yaml")),
+  EXPECT_EQ(robots::robot_from_json(robots::to_json(robot), "robot").kinematic_window, 0.7);
+  EXPECT_THROW(static_cast<void>(robots::parse_robot("model: differential_drive\nwheel_radius: 0.1\ntrack_width: 0.4\n"
+                                                     "kinematic: {window: 0}\n",
+                                                     "robot.yaml")),
                InputError);
 }
 
 }  // namespace
-}  // namespace wheelwright::kinematic_json_test
+}  // namespace wheelwright::results::kinematic_json_test

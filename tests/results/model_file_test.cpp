@@ -14,7 +14,10 @@
 
 #include "support/scratch.hpp"
 
-namespace wheelwright::model_file_test {
+namespace wheelwright::results::model_file_test {
+
+using robots::model_from_json;
+
 namespace {
 
 using ::testing::AllOf;
@@ -41,13 +44,13 @@ constexpr const char* kSensors = "wheel_speed: 0.02, effort: 0.02, heading: 0.00
 
 Commissioning commissioned(const Scenario& scenario) {
   Simulation log(scenario);
-  CommissionOptions options;
+  commission::CommissionOptions options;
   options.persistence = {2, 3};
-  return commission(log, scenario.robot, options);
+  return commission_robot(log, scenario.robot, options);
 }
 
 /// The bits of all numbers and flags of all decisions along `log`.
-std::vector<std::uint64_t> decisions(const OnlineModel& model, const LogTable& log, DetectorOptions options) {
+std::vector<std::uint64_t> decisions(const OnlineModel& model, const LogTable& log, detector::DetectorOptions options) {
   Detector detector = make_detector(model, options);
   std::vector<std::uint64_t> bits;
   std::vector<double> sample;
@@ -58,7 +61,7 @@ std::vector<std::uint64_t> decisions(const OnlineModel& model, const LogTable& l
     }
     const Decision& decision = detector.step(log.t[k], sample);
     bits.push_back(decision.valid ? 1 : 0);
-    for (const ChannelDecision& c : decision.channels) {
+    for (const detector::ChannelDecision& c : decision.channels) {
       for (const double value : {c.residual, c.predicted, c.threshold.lower, c.threshold.upper, c.dead_zone}) {
         bits.push_back(std::bit_cast<std::uint64_t>(value));
       }
@@ -71,15 +74,15 @@ std::vector<std::uint64_t> decisions(const OnlineModel& model, const LogTable& l
 void expect_same_detector(const Scenario& scenario) {
   const Commissioning result = commissioned(scenario);
   ASSERT_FALSE(result.model.facets.empty()) << result.message;
-  const std::string text = json_text(to_json(result, LogReport{}, "test"));
-  const OnlineModel back = model_from_json(parse_json(text, "model.json"), "model.json");
+  const std::string text = files::json_text(to_json(result, logs::LogReport{}, "test"));
+  const OnlineModel back = model_from_json(files::parse_json(text, "model.json"), "model.json");
 
   Scenario faulty = scenario;
   faulty.seed = 7;
-  faulty.faults = {{Fault::Kind::wheel_radius, -0.03, {.onset = 0.5 * scenario.duration}}};
-  const LogTable log = simulate(faulty);
-  for (const ParameterSetKind set : {ParameterSetKind::polytope, ParameterSetKind::box}) {
-    DetectorOptions options;
+  faulty.faults = {{model::Fault::Kind::wheel_radius, -0.03, {.onset = 0.5 * scenario.duration}}};
+  const LogTable log = sim::simulate(faulty);
+  for (const detector::ParameterSetKind set : {detector::ParameterSetKind::polytope, detector::ParameterSetKind::box}) {
+    detector::DetectorOptions options;
     options.set = set;
     EXPECT_EQ(decisions(result.model, log, options), decisions(back, log, options));
   }
@@ -117,14 +120,15 @@ TEST(ModelFile, GivesBackTheDetectorWithFrictionOfTheWorldAxes) {
 // What is checked later is what was found: bounds, proofs, facets and premises, bit for bit.
 TEST(ModelFile, GivesBackTheClaimsWithTheirProofs) {
   const Commissioning result = commissioned(scenario_of("commissioning", 40.0, kDeclared, kSensors));
-  const std::string text = json_text(to_json(result, LogReport{}, "test"));
-  const ModelClaims claims = claims_from_json(parse_json(text, "model.json"), "model.json");
-  const auto expect_bounds = [](const std::vector<PublishedBound>& read, const std::vector<CertifiedBound>& found) {
+  const std::string text = files::json_text(to_json(result, logs::LogReport{}, "test"));
+  const ModelClaims claims = claims_from_json(files::parse_json(text, "model.json"), "model.json");
+  const auto expect_bounds = [](const std::vector<PublishedBound>& read,
+                                const std::vector<bounds::CertifiedBound>& found) {
     ASSERT_EQ(read.size(), found.size());
     for (std::size_t j = 0; j < read.size(); ++j) {
       EXPECT_EQ(read[j].value, found[j].value);
-      std::vector<WeightedRow> rows = found[j].binding;
-      std::erase_if(rows, [](const WeightedRow& row) { return !(row.multiplier > 0.0); });
+      std::vector<bounds::WeightedRow> rows = found[j].binding;
+      std::erase_if(rows, [](const bounds::WeightedRow& row) { return !(row.multiplier > 0.0); });
       ASSERT_EQ(read[j].proof.size(), rows.size());
       for (std::size_t i = 0; i < rows.size(); ++i) {
         EXPECT_EQ(read[j].proof[i].origin, rows[i].row.origin);
@@ -141,11 +145,11 @@ TEST(ModelFile, GivesBackTheClaimsWithTheirProofs) {
     EXPECT_EQ(claims.facets[k].origin, result.model.facets[k].origin);
   }
   EXPECT_EQ(claims.hull, result.feasible.hull);
-  EXPECT_EQ(claims.prior.sides, prior_box(result.model.robot, result.model.model).bounds);
+  EXPECT_EQ(claims.prior.sides, model::prior_box(result.model.robot, result.model.model).bounds);
   EXPECT_EQ(claims.set, FeasibleSet::Status::nonempty);
   for (std::size_t i = 0; i < result.noise.size(); ++i) {
     EXPECT_EQ(claims.errors.output[static_cast<Eigen::Index>(i)], result.noise[i].learning);
-    EXPECT_EQ(claims.origin[i], NoiseOrigin::declared);
+    EXPECT_EQ(claims.origin[i], core::NoiseOrigin::declared);
   }
   EXPECT_EQ(claims.errors.acceleration, result.model.errors.acceleration);
   EXPECT_EQ(claims.errors.speed, result.model.errors.speed);
@@ -156,10 +160,10 @@ TEST(ModelFile, GivesBackWhatItsNumbersStandOn) {
   const Commissioning declared = commissioned(scenario_of("multi_sine", 20.0, kDeclared, kSensors));
   const Commissioning learnt = commissioned(scenario_of("multi_sine", 20.0, "", kSensors));
   for (const auto& [result, warrant] :
-       {std::pair(&declared, Warrant::guaranteed), std::pair(&learnt, Warrant::extrapolated)}) {
+       {std::pair(&declared, core::Warrant::guaranteed), std::pair(&learnt, core::Warrant::extrapolated)}) {
     ASSERT_EQ(result->model.warrant, warrant) << result->message;
-    Json json = to_json(*result, LogReport{}, "test");
-    const std::string word(warrant_word(warrant));
+    Json json = to_json(*result, logs::LogReport{}, "test");
+    const std::string word(core::warrant_word(warrant));
     EXPECT_EQ(json.at("warrant"), word);
     for (const Json& parameter : json.at("parameters")) {
       EXPECT_EQ(parameter.at("warrant"), word);
@@ -171,8 +175,8 @@ TEST(ModelFile, GivesBackWhatItsNumbersStandOn) {
     EXPECT_EQ(model_from_json(json, "f").assumptions, result->assumptions);
     EXPECT_EQ(claims_from_json(json, "f").warrant, warrant);
     EXPECT_EQ(claims_from_json(json, "f").assumptions, result->assumptions);
-    if (warrant == Warrant::extrapolated) {
-      EXPECT_EQ(json_text(json).find("guarantee"), std::string::npos);
+    if (warrant == core::Warrant::extrapolated) {
+      EXPECT_EQ(files::json_text(json).find("guarantee"), std::string::npos);
     }
 
     // A model from before warrants were told: what its noise says, and no assumptions.
@@ -182,9 +186,9 @@ TEST(ModelFile, GivesBackWhatItsNumbersStandOn) {
     EXPECT_TRUE(model_from_json(json, "f").assumptions.empty());
     json["noise"]["mode"] = "statistical";
     EXPECT_EQ(model_from_json(json, "f").warrant,
-              warrant == Warrant::guaranteed ? Warrant::statistical : Warrant::extrapolated);
+              warrant == core::Warrant::guaranteed ? core::Warrant::statistical : core::Warrant::extrapolated);
     json.erase("noise");
-    EXPECT_EQ(model_from_json(json, "f").warrant, Warrant::extrapolated);
+    EXPECT_EQ(model_from_json(json, "f").warrant, core::Warrant::extrapolated);
   }
 }
 
@@ -192,7 +196,7 @@ class ModelFileErrors : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     written_ = std::make_unique<Json>(
-        to_json(commissioned(scenario_of("multi_sine", 20.0, kDeclared, kSensors)), LogReport{}, "test"));
+        to_json(commissioned(scenario_of("multi_sine", 20.0, kDeclared, kSensors)), logs::LogReport{}, "test"));
   }
   static void TearDownTestSuite() { written_.reset(); }
 
@@ -278,10 +282,10 @@ TEST_F(ModelFileErrors, ALogThatShowsNothingMakesNoModel) {
   scenario.trajectory.speed = scenario.trajectory.yaw_rate = 0.0;
   const Commissioning result = commissioned(scenario);
   ASSERT_EQ(result.status, Commissioning::Status::nothing);
-  const Json json = to_json(result, LogReport{}, "test");
+  const Json json = to_json(result, logs::LogReport{}, "test");
   EXPECT_THAT(testing::input_error([&] { (void)model_from_json(json, "still.json"); }),
               HasSubstr("still.json: holds no model: " + result.message));
 }
 
 }  // namespace
-}  // namespace wheelwright::model_file_test
+}  // namespace wheelwright::results::model_file_test

@@ -16,7 +16,7 @@
 
 #include "support/scratch.hpp"
 
-namespace wheelwright::result_store_test {
+namespace wheelwright::results::result_store_test {
 namespace {
 
 using ::testing::AllOf;
@@ -227,7 +227,7 @@ TEST_F(ResultStoreTest, ShardsMergedAreTheWhole) {
   for (std::size_t index = 0; index < 7; ++index) {
     parts.push_back(path("shard-" + std::to_string(index)));
     SqliteResults store(parts.back(), kPlan, items(50));
-    run_work({50, [](std::size_t item) { return std::to_string(item * item); }}, store, {1, {index, 7}, {}});
+    study::run_work({50, [](std::size_t item) { return std::to_string(item * item); }}, store, {1, {index, 7}, {}});
   }
   SqliteResults whole(file(), kPlan, items(50));
   whole.put(3, "9");  // the same result may be there already
@@ -264,4 +264,4 @@ TEST_F(ResultStoreTest, AMergeThatFailsChangesNothing) {
 }
 
 }  // namespace
-}  // namespace wheelwright::result_store_test
+}  // namespace wheelwright::results::result_store_test

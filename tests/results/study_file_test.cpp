@@ -5,7 +5,7 @@
 
 #include <wheelwright/core/error.hpp>
 
-namespace wheelwright::study_file_test {
+namespace wheelwright::results::study_file_test {
 namespace {
 
 const std::filesystem::path kFolder = std::filesystem::path(WHEELWRIGHT_SOURCE_DIR) / "examples" / "studies";
@@ -39,7 +39,7 @@ TEST(StudyFile, ReadsWhatIsThere) {
                                 "  morris: {trajectories: 4}\n"
                                 "  sobol: {points: 8, replicates: 4, confidence: 0.9}\n"
                                 "  grid: {levels: {noise.effort: 3, filter.beta: 2}}\n");
-  const Study& study = file.study;
+  const study::Study& study = file.study;
   EXPECT_EQ(study.name, "a study");
   ASSERT_EQ(study.inputs.size(), 3U);
   EXPECT_EQ(study.inputs[0].nominal, 0.02);
@@ -56,7 +56,7 @@ TEST(StudyFile, ReadsWhatIsThere) {
   EXPECT_EQ(study.methods.sobol->replicates, 4);
   EXPECT_EQ(study.methods.sobol->confidence, 0.9);
   EXPECT_EQ(study.methods.grid->levels, (std::vector<Eigen::Index>{3, 1, 2}));
-  const StudyDesign design = design_of(study);
+  const study::StudyDesign design = study::design_of(study);
   EXPECT_EQ(design.one_at_a_time.count, 10);
   EXPECT_EQ(design.morris.count, 16);
   EXPECT_EQ(design.sobol.count, 8 * 4 * 5);
@@ -74,7 +74,7 @@ TEST(StudyFile, AFilterThatIsVariedHasANominalValue) {
 
 TEST(StudyFile, ShippedStudiesAreRead) {
   for (const auto& entry : std::filesystem::directory_iterator(kFolder)) {
-    EXPECT_NO_THROW(static_cast<void>(design_of(read_study(entry.path()).study))) << entry.path();
+    EXPECT_NO_THROW(static_cast<void>(study::design_of(read_study(entry.path()).study))) << entry.path();
   }
 }
 
@@ -106,4 +106,4 @@ TEST(StudyFile, SaysFileLineKeyValueAndWhatWasExpected) {
 }
 
 }  // namespace
-}  // namespace wheelwright::study_file_test
+}  // namespace wheelwright::results::study_file_test

@@ -9,7 +9,7 @@
 #include <wheelwright/results/scenario_file.hpp>
 #include <wheelwright/robots/robot_file.hpp>
 
-namespace wheelwright::effects_file_test {
+namespace wheelwright::robots::effects_file_test {
 namespace {
 
 const std::string kHead = "wheel_radius: 0.0975\ntrack_width: 0.381\n";
@@ -36,11 +36,11 @@ TEST(EffectsFile, ValuesAndIntervalsAreRead) {
                                       "  - {effect: actuator_lag, T: 0.037}\n",
                                   "robot.yaml");
   ASSERT_EQ(robot.effects.size(), 3U);
-  EXPECT_EQ(effect_value(robot, "coulomb", "c"), 0.31);
-  EXPECT_DOUBLE_EQ(effect_value(robot, "stribeck", "c_s"), 0.175);
+  EXPECT_EQ(model::effect_value(robot, "coulomb", "c"), 0.31);
+  EXPECT_DOUBLE_EQ(model::effect_value(robot, "stribeck", "c_s"), 0.175);
   EXPECT_EQ(robot.effects[1].parameters.at("c_s").lower, 0.1);
-  EXPECT_EQ(effect_value(robot, "actuator_lag", "T"), 0.037);
-  const PriorBox box = prior_box(robot, make_model(robot));
+  EXPECT_EQ(model::effect_value(robot, "actuator_lag", "T"), 0.037);
+  const model::PriorBox box = model::prior_box(robot, model::make_model(robot));
   EXPECT_DOUBLE_EQ(box.bounds[4].upper, 0.93);  // coulomb: three times the single value
   EXPECT_LE(box.bounds[5].lower, 0.1);          // rounded outward
   EXPECT_DOUBLE_EQ(box.bounds[5].lower, 0.1);
@@ -52,22 +52,22 @@ TEST(EffectsFile, ARobotFileReadsBackEqual) {
   for (const std::string model : {"differential_drive", "single_axis"}) {
     Robot kind;
     kind.model = model;
-    for (const std::string& name : effect_names(kind)) {
+    for (const std::string& name : model::effect_names(kind)) {
       Robot robot = kind;
       if (model == "differential_drive") {
         robot.wheel_radius = 0.0975;
         robot.track_width = 0.381;
       }
-      RobotEffect effect{name, {}};
+      model::RobotEffect effect{name, {}};
       double value = 0.1 / 3.0;
-      for (const EffectParameterLaw& law : effect_law(name).parameters_of(robot)) {
+      for (const model::EffectParameterLaw& law : model::effect_law(name).parameters_of(robot)) {
         effect.parameters[law.name] = law.linear ? Interval{value, 7.0 * value} : Interval{value, value};
         value *= 1.1;
       }
       robot.effects = {effect};
       EXPECT_EQ(parse_robot(robot_yaml(robot), name).effects, robot.effects) << name;
       EXPECT_EQ(robot_from_json(to_json(robot), name).effects, robot.effects) << name;
-      EXPECT_NO_THROW(static_cast<void>(make_model(robot))) << name;
+      EXPECT_NO_THROW(static_cast<void>(model::make_model(robot))) << name;
     }
   }
 }
@@ -93,14 +93,14 @@ TEST(EffectsFile, ErrorsNameFileLineAndKey) {
 }
 
 TEST(EffectsFile, AScenarioAddsItsOwn) {
-  const Scenario scenario = parse_scenario(
+  const Scenario scenario = results::parse_scenario(
       "robot: {wheel_radius: 0.1, track_width: 0.4, effects: [{effect: coulomb, c: 0.1}]}\n"
       "parameters: {mass: 20, yaw_inertia: 0.9, viscous_linear: 4, viscous_yaw: 0.5}\n"
       "effects: [{effect: delay, T_d: 0.02}]\n",
       "scenario.yaml");
   ASSERT_EQ(scenario.robot.effects.size(), 2U);
-  EXPECT_EQ(effect_value(scenario.robot, "delay", "T_d"), 0.02);
+  EXPECT_EQ(model::effect_value(scenario.robot, "delay", "T_d"), 0.02);
 }
 
 }  // namespace
-}  // namespace wheelwright::effects_file_test
+}  // namespace wheelwright::robots::effects_file_test

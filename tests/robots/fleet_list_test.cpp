@@ -6,7 +6,7 @@
 
 #include "support/scratch.hpp"
 
-namespace wheelwright::fleet_list_test {
+namespace wheelwright::robots::fleet_list_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -135,4 +135,4 @@ TEST_F(FleetList, AKeyIsAnotherWhereALogChanged) {
 }
 
 }  // namespace
-}  // namespace wheelwright::fleet_list_test
+}  // namespace wheelwright::robots::fleet_list_test

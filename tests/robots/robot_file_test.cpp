@@ -8,7 +8,7 @@
 
 #include "support/scratch.hpp"
 
-namespace wheelwright::robot_file_test {
+namespace wheelwright::robots::robot_file_test {
 namespace {
 
 using ::testing::AllOf;
@@ -43,10 +43,10 @@ TEST(RobotFile, ReadsEveryKey) {
   EXPECT_EQ(robot.footprint_radius, 0.4);
   EXPECT_TRUE(robot.lever_arm_is_track);
   EXPECT_FALSE(robot.anisotropic_friction);
-  EXPECT_EQ(robot.effort, EffortKind::voltage);
+  EXPECT_EQ(robot.effort, model::EffortKind::voltage);
   EXPECT_EQ(robot.hold, Hold::zero_order);
   EXPECT_TRUE(robot.effort_unsigned);
-  EXPECT_EQ(robot.effort_changes, EffortChanges::at_samples);
+  EXPECT_EQ(robot.effort_changes, model::EffortChanges::at_samples);
   EXPECT_EQ(robot.effort_delay, (Interval{-0.001, 0.02}));
   EXPECT_EQ(robot.nominal.at("viscous_yaw"), 0.5);
   EXPECT_EQ(robot.prior.at("mass"), (Interval{5.0, 60.0}));
@@ -58,7 +58,7 @@ TEST(RobotFile, ReadsEveryKey) {
   EXPECT_EQ(robot.filter.alpha, 20.0);
   EXPECT_EQ(robot.filter.beta, 25.0);
   EXPECT_EQ(robot.encoder_counts_per_turn, 4096.0);
-  EXPECT_EQ(robot.speed_source, SpeedSource::encoder_difference);
+  EXPECT_EQ(robot.speed_source, model::SpeedSource::encoder_difference);
   EXPECT_EQ(robot.limits.at("effort"), 6.0);
   EXPECT_EQ(robot.limits.at("speed"), 2.0);
   EXPECT_EQ(robot.motor.value().gear_ratio, 9.69);
@@ -76,7 +76,7 @@ TEST(RobotFile, DefaultsAreThoseOfRobot) {
 
 TEST(RobotFile, AnEffortsDelayIsANumberOrBoundsAndNoneByDefault) {
   EXPECT_EQ(parse_robot(least, "f").effort_delay, (Interval{0.0, 0.0}));
-  EXPECT_EQ(parse_robot(least, "f").effort_changes, EffortChanges::between);
+  EXPECT_EQ(parse_robot(least, "f").effort_changes, model::EffortChanges::between);
   EXPECT_EQ(parse_robot("effort: {delay: 0.005}\n" + least, "f").effort_delay, (Interval{0.005, 0.005}));
 }
 
@@ -102,7 +102,7 @@ TEST_F(RobotFiles, RoundTripsThroughYamlAndJson) {
     write_robot(path("robot.yaml"), robot);
     EXPECT_EQ(to_json(read_robot(path("robot.yaml"))), to_json(robot)) << bytes(path("robot.yaml"));
     EXPECT_EQ(to_json(robot_from_json(to_json(robot), "model.json: /robot")), to_json(robot));
-    EXPECT_EQ(to_json(robot_from_json(parse_json(json_text(to_json(robot)), "x"), "x")), to_json(robot));
+    EXPECT_EQ(to_json(robot_from_json(files::parse_json(files::json_text(to_json(robot)), "x"), "x")), to_json(robot));
   }
 }
 
@@ -227,4 +227,4 @@ TEST(RobotFile, JsonObjectErrorsNameTheKey) {
 }
 
 }  // namespace
-}  // namespace wheelwright::robot_file_test
+}  // namespace wheelwright::robots::robot_file_test

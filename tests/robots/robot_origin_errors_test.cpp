@@ -13,7 +13,7 @@
 #include "robots/robot_samples.hpp"
 #include "support/scratch.hpp"
 
-namespace wheelwright::robot_origin_errors_test {
+namespace wheelwright::robots::robot_origin_errors_test {
 namespace {
 
 using ::testing::AllOf;
@@ -240,4 +240,4 @@ TEST(RobotOriginFuzz, Controller) {
 }
 
 }  // namespace
-}  // namespace wheelwright::robot_origin_errors_test
+}  // namespace wheelwright::robots::robot_origin_errors_test

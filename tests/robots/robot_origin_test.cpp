@@ -12,7 +12,7 @@
 #include "robots/robot_samples.hpp"
 #include "support/scratch.hpp"
 
-namespace wheelwright::robot_origin_test {
+namespace wheelwright::robots::robot_origin_test {
 namespace {
 
 using ::testing::AllOf;
@@ -195,4 +195,4 @@ TEST(RobotOrigin, VisualShapeIsSecondChoiceAndSaidSo) {
 }
 
 }  // namespace
-}  // namespace wheelwright::robot_origin_test
+}  // namespace wheelwright::robots::robot_origin_test

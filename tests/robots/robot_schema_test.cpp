@@ -10,12 +10,14 @@
 
 #include "support/scratch.hpp"
 
-namespace wheelwright::robot_schema_test {
+namespace wheelwright::robots::robot_schema_test {
 namespace {
 
 using ::testing::HasSubstr;
 
-Json schema() { return read_json(std::filesystem::path(WHEELWRIGHT_SOURCE_DIR) / "results" / "robot.schema.json"); }
+Json schema() {
+  return files::read_json(std::filesystem::path(WHEELWRIGHT_SOURCE_DIR) / "results" / "robot.schema.json");
+}
 
 TEST(RobotSchema, NamesTheKeysThatTheReaderKnows) {
   const std::string message = testing::input_error([] { (void)parse_robot("unheard_of: 1\n", "f"); });
@@ -55,4 +57,4 @@ TEST(RobotSchema, CoversWhatIsWritten) {
 }
 
 }  // namespace
-}  // namespace wheelwright::robot_schema_test
+}  // namespace wheelwright::robots::robot_schema_test

@@ -14,7 +14,7 @@
 #include <wheelwright/model/effect_law.hpp>
 #include <wheelwright/sim/simulation.hpp>
 
-namespace wheelwright::effects_test {
+namespace wheelwright::sim::effects_test {
 namespace {
 
 struct Case {
@@ -23,8 +23,8 @@ struct Case {
   bool scale = false;  // torques alone show no more than a scale of θ_L, which is wrong without the effect
 };
 
-RobotEffect effect_of(const Case& c) {
-  RobotEffect effect{c.effect, {}};
+model::RobotEffect effect_of(const Case& c) {
+  model::RobotEffect effect{c.effect, {}};
   for (const auto& [name, value] : c.parameters) {
     effect.parameters[name] = {value, value};
   }
@@ -59,9 +59,9 @@ struct Fit {
 // Least squares of the log of `driven`, read as `robot` says.
 Fit fit(const Scenario& driven, const Robot& robot) {
   Simulation log(driven);
-  const Model model = make_model(robot);
+  const Model model = model::make_model(robot);
   const FilterDesign design{.order = 2, .alpha = 8.0, .beta = 8.0};
-  TorqueRows rows(log, RegressorFilter(model, design, find_measurement(log, robot, model, 2)));
+  TorqueRows rows(log, RegressorFilter(model, design, filter::find_measurement(log, robot, model, 2)));
   Fit result{least_squares(rows).estimate};
   RegressionBlock block;
   double squares = 0.0, count = 0.0;
@@ -84,7 +84,7 @@ TEST_P(Effects, WhatIsSimulatedIsIdentified) {
     const Robot plain = s.robot;
     s.robot.effects = {effect_of(GetParam())};
     const Fit with = fit(s, s.robot), without = fit(s, plain);
-    const Model model = make_model(s.robot);
+    const Model model = model::make_model(s.robot);
     const Eigen::VectorXd truth = true_parameters(s, model);
     for (Eigen::Index j = 0; j < truth.size(); ++j) {
       EXPECT_NEAR(with.estimate[j], truth[j], kTolerance * std::abs(truth[j]))
@@ -114,4 +114,4 @@ INSTANTIATE_TEST_SUITE_P(
     [](const ::testing::TestParamInfo<Case>& one) { return one.param.effect; });
 
 }  // namespace
-}  // namespace wheelwright::effects_test
+}  // namespace wheelwright::sim::effects_test

@@ -7,7 +7,7 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/sim/plant.hpp>
 
-namespace wheelwright::noise_test {
+namespace wheelwright::sim::noise_test {
 namespace {
 
 TEST(Noise, NeverExceedsItsBoundInAMillionDraws) {
@@ -76,4 +76,4 @@ TEST(Noise, WithoutABoundTheMeasurementIsExact) {
 }
 
 }  // namespace
-}  // namespace wheelwright::noise_test
+}  // namespace wheelwright::sim::noise_test

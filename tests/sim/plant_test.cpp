@@ -10,14 +10,15 @@
 
 #include "support/fault_oracle.hpp"
 
-namespace wheelwright::plant_test {
+namespace wheelwright::sim::plant_test {
 namespace {
 
-using Kind = Fault::Kind;
-using Shape = TimeProfile::Shape;
+using Kind = model::Fault::Kind;
+using Shape = model::TimeProfile::Shape;
 
 const DifferentialDrive drive{.wheel_radius = 0.1, .track_width = 0.4};
-const DriveParameters body{.mass = 20.0, .yaw_inertia = 0.9, .viscous_x = 4.0, .viscous_y = 4.0, .viscous_yaw = 0.5};
+const model::DriveParameters body{
+    .mass = 20.0, .yaw_inertia = 0.9, .viscous_x = 4.0, .viscous_y = 4.0, .viscous_yaw = 0.5};
 
 DriveState moving() {
   DriveState state;
@@ -45,7 +46,7 @@ TEST(Plant, ConstantTorqueGivesTheExponentialApproach) {
 }
 
 TEST(Plant, WithoutFrictionSpeedIsLinearInTime) {
-  DriveParameters free = body;
+  model::DriveParameters free = body;
   free.viscous_x = free.viscous_y = free.viscous_yaw = 0.0;
   Plant plant(drive, free, {});
   plant.advance({0.5, 0.5}, {0.5, 0.5}, 2.0);
@@ -106,8 +107,8 @@ TEST(Plant, PowerOfTheMotorsIsKineticEnergyAndFriction) {
 }
 
 TEST(Plant, OneStepIsAsGoodAsMany) {
-  const std::vector<Fault> none, radius = {{Kind::wheel_radius_right, -0.02, {}}};
-  for (const std::vector<Fault>& faults : {none, radius}) {
+  const std::vector<model::Fault> none, radius = {{Kind::wheel_radius_right, -0.02, {}}};
+  for (const std::vector<model::Fault>& faults : {none, radius}) {
     Plant one(drive, body, faults), many(drive, body, faults);
     one.reset(moving(), 0.0);
     many.reset(moving(), 0.0);
@@ -138,13 +139,13 @@ TEST(Plant, RungeKuttaAgreesWithTheClosedForm) {
 // The plant integrates Newton's law in body speeds; ζ is written in encoder speeds. Both must tell the same torque:
 // [1 1; ℓ −ℓ]τ = r (M̄ v̇ + F̄ v) + ζ with v̇ from central differences of what the encoders see.
 TEST(Plant, EncoderSpeedsSatisfyEquationFifteenUnderEveryFault) {
-  DriveParameters anisotropic = body;
+  model::DriveParameters anisotropic = body;
   anisotropic.viscous_y = 9.0;
-  for (const DriveParameters& p : {body, anisotropic}) {
+  for (const model::DriveParameters& p : {body, anisotropic}) {
     for (const Kind kind : {Kind::wheel_radius, Kind::wheel_radius_right, Kind::wheel_radius_left, Kind::slip_x,
                             Kind::slip_y, Kind::slip_yaw, Kind::matched, Kind::unmatched}) {
       for (const Shape shape : {Shape::step, Shape::ramp, Shape::smooth}) {
-        const std::vector<Fault> faults = {{kind, 0.03, {shape, 0.1, 0.8}}};
+        const std::vector<model::Fault> faults = {{kind, 0.03, {shape, 0.1, 0.8}}};
         Plant plant(drive, p, faults);
         plant.reset(moving(), 0.0);
         const Eigen::Vector2d torque(0.7, 0.2);
@@ -153,7 +154,7 @@ TEST(Plant, EncoderSpeedsSatisfyEquationFifteenUnderEveryFault) {
         const Eigen::Vector2d before = plant.encoder_speed();
         plant.advance(torque, torque, h);
         DriveMotion motion{plant.state().pose[2], plant.encoder_speed(), {}};
-        const FaultState fault = fault_state(faults, plant.time());
+        const model::FaultState fault = model::fault_state(faults, plant.time());
         plant.advance(torque, torque, h);
         motion.acceleration = (plant.encoder_speed() - before) / (2.0 * h);
 
@@ -164,7 +165,7 @@ TEST(Plant, EncoderSpeedsSatisfyEquationFifteenUnderEveryFault) {
                                   (s.transpose() * friction.asDiagonal() * s * motion.speed));
         const Eigen::Vector2d z = zeta(drive, p, fault, motion);
         EXPECT_LT((drive.channels(torque) - healthy - z).norm(), 1e-7)  // h² times the third derivative
-            << to_string(kind) << ' ' << static_cast<int>(shape);
+            << model::to_string(kind) << ' ' << static_cast<int>(shape);
       }
     }
   }
@@ -173,7 +174,7 @@ TEST(Plant, EncoderSpeedsSatisfyEquationFifteenUnderEveryFault) {
 TEST(Plant, PoseFollowsEquationFourUnderEveryFault) {
   for (const Kind kind : {Kind::wheel_radius, Kind::wheel_radius_right, Kind::slip_x, Kind::slip_y, Kind::slip_yaw,
                           Kind::matched, Kind::unmatched}) {
-    const std::vector<Fault> faults = {{kind, 0.03, {Shape::smooth, 0.1, 0.8}}};
+    const std::vector<model::Fault> faults = {{kind, 0.03, {Shape::smooth, 0.1, 0.8}}};
     Plant plant(drive, body, faults);
     plant.reset(moving(), 0.0);
     plant.advance({0.7, 0.2}, {0.7, 0.2}, 0.4);
@@ -181,10 +182,10 @@ TEST(Plant, PoseFollowsEquationFourUnderEveryFault) {
     const Eigen::Vector3d before = plant.state().pose;
     plant.advance({0.7, 0.2}, {0.7, 0.2}, h);
     const DriveMotion motion{plant.state().pose[2], plant.encoder_speed(), {}};
-    const Eigen::Vector3d q_rate =
-        kinematic_matrix(motion.heading) * motion.speed + delta(drive, fault_state(faults, plant.time()), motion);
+    const Eigen::Vector3d q_rate = kinematic_matrix(motion.heading) * motion.speed +
+                                   delta(drive, model::fault_state(faults, plant.time()), motion);
     plant.advance({0.7, 0.2}, {0.7, 0.2}, h);
-    EXPECT_LT(((plant.state().pose - before) / (2.0 * h) - q_rate).norm(), 1e-8) << to_string(kind);
+    EXPECT_LT(((plant.state().pose - before) / (2.0 * h) - q_rate).norm(), 1e-8) << model::to_string(kind);
   }
 }
 
@@ -210,9 +211,9 @@ TEST(Plant, MomentumIsContinuousWhenAStepFaultMakesTheEncodersJump) {
 }
 
 TEST(Plant, RefusesParametersAndFaultsThatAreNone) {
-  EXPECT_THROW(Plant(drive, DriveParameters{}, {}), InvalidArgument);
+  EXPECT_THROW(Plant(drive, model::DriveParameters{}, {}), InvalidArgument);
   EXPECT_THROW(Plant(drive, body, {{Kind::wheel_radius, -0.2, {}}}), InvalidArgument);
 }
 
 }  // namespace
-}  // namespace wheelwright::plant_test
+}  // namespace wheelwright::sim::plant_test

@@ -12,7 +12,7 @@
 
 #include "support/scratch.hpp"
 
-namespace wheelwright::scenario_file_test {
+namespace wheelwright::sim::scenario_file_test {
 namespace {
 
 const std::string head =
@@ -24,7 +24,7 @@ const std::string head =
 
 std::string message(const std::string& text) {
   try {
-    static_cast<void>(parse_scenario(text, "s.yaml"));
+    static_cast<void>(results::parse_scenario(text, "s.yaml"));
   } catch (const InputError& error) {
     return error.what();
   }
@@ -32,7 +32,7 @@ std::string message(const std::string& text) {
 }
 
 TEST(ScenarioFile, EveryKeyArrives) {
-  const Scenario s = parse_scenario(head + R"(
+  const Scenario s = results::parse_scenario(head + R"(
 trajectory: {kind: figure_eight, speed: 0.7, yaw_rate: 1.1, period: 12}
 controller: {along: 1.5, across: 5, heading: 3, speed: 9, integral: 7, torque_limit: 6}
 start: {pose: [1, 2, 0.5], error: [0.1, -0.1, 0.2]}
@@ -55,7 +55,7 @@ time_jitter: 0.1
 gaps: [[10, 12], [40, 41.5]]
 seed: 77
 )",
-                                    "s.yaml");
+                                             "s.yaml");
   EXPECT_EQ(s.robot.wheel_radius, 0.0975);
   EXPECT_EQ(s.robot.hold, Hold::zero_order);
   EXPECT_EQ(s.parameters.mass, 21.0);
@@ -69,8 +69,8 @@ seed: 77
   EXPECT_EQ(s.initial_pose, Eigen::Vector3d(1.0, 2.0, 0.5));
   EXPECT_EQ(s.initial_pose_error, Eigen::Vector3d(0.1, -0.1, 0.2));
   ASSERT_EQ(s.faults.size(), 2U);
-  EXPECT_EQ(s.faults[0].kind, Fault::Kind::wheel_radius_left);
-  EXPECT_EQ(s.faults[0].profile.shape, TimeProfile::Shape::ramp);
+  EXPECT_EQ(s.faults[0].kind, model::Fault::Kind::wheel_radius_left);
+  EXPECT_EQ(s.faults[0].profile.shape, model::TimeProfile::Shape::ramp);
   EXPECT_EQ(s.faults[0].profile.rise_time, 2.0);
   EXPECT_EQ(s.faults[1].profile.end, 31.0);
   EXPECT_EQ(s.sensors.sampling, Sampling::interval);
@@ -90,14 +90,14 @@ seed: 77
 
 TEST(ScenarioFile, FaultKindsAreCalledAsInTheLibrary) {
   for (int kind = 0; kind < 8; ++kind) {
-    const auto expected = static_cast<Fault::Kind>(kind);
-    const Scenario s =
-        parse_scenario(head + "faults: [{kind: " + std::string(to_string(expected)) + ", magnitude: 0.01}]", "s.yaml");
+    const auto expected = static_cast<model::Fault::Kind>(kind);
+    const Scenario s = results::parse_scenario(
+        head + "faults: [{kind: " + std::string(model::to_string(expected)) + ", magnitude: 0.01}]", "s.yaml");
     EXPECT_EQ(s.faults.at(0).kind, expected);
   }
   int kind = 0;
   for (const char* name : {"straight", "circle", "figure_eight", "multi_sine", "spin", "stops", "commissioning"}) {
-    const Scenario s = parse_scenario(head + "trajectory: {kind: " + name + "}", "s.yaml");
+    const Scenario s = results::parse_scenario(head + "trajectory: {kind: " + name + "}", "s.yaml");
     EXPECT_EQ(s.trajectory.kind, static_cast<Trajectory::Kind>(kind++)) << name;
   }
 }
@@ -199,4 +199,4 @@ TEST(ScenarioFile, ExamplesCanBeDriven) {
 }
 
 }  // namespace
-}  // namespace wheelwright::scenario_file_test
+}  // namespace wheelwright::sim::scenario_file_test

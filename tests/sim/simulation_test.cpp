@@ -11,7 +11,7 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/sim/simulation.hpp>
 
-namespace wheelwright::simulation_test {
+namespace wheelwright::sim::simulation_test {
 namespace {
 
 using Kind = Trajectory::Kind;
@@ -51,7 +51,7 @@ double largest_difference(const LogTable& a, const LogTable& b, std::string_view
 // Largest violation of the model over one sampling period, integrated exactly for torque held (or linear) between
 // stamps: with f = F̄11, ∫ of (15) is  ∫[1 1; ℓ −ℓ]τ = r (M̄ Δv + F̄ Δq)  where Δq is made of wheel angles.
 double integrated_violation(const Scenario& s, const LogTable& log) {
-  const Model model = make_model(s.robot);
+  const Model model = model::make_model(s.robot);
   const Eigen::VectorXd theta = true_parameters(s, model);
   const bool held = s.robot.hold == Hold::zero_order;
   double worst = 0.0;
@@ -89,9 +89,9 @@ TEST(Simulation, NoiseFreeLogSatisfiesTheModelExactlyInBothHoldsAndConventions) 
 
 TEST(Simulation, LeverArmOfTheTrackDoublesTheTrueYawParameters) {
   Scenario s = scenario();
-  const Eigen::VectorXd half = true_parameters(s, make_model(s.robot));
+  const Eigen::VectorXd half = true_parameters(s, model::make_model(s.robot));
   s.robot.lever_arm_is_track = true;
-  const Eigen::VectorXd full = true_parameters(s, make_model(s.robot));
+  const Eigen::VectorXd full = true_parameters(s, model::make_model(s.robot));
   EXPECT_LT((full - half.cwiseProduct(Eigen::Vector4d(1.0, 2.0, 1.0, 2.0))).norm(), 1e-15);
   EXPECT_DOUBLE_EQ(half[0], 0.0975 * 21.0);
 }
@@ -104,7 +104,7 @@ TEST(Simulation, AnisotropicFrictionIsFoundInTheRegressorOfFiveParameters) {
   s.parameters.viscous_y = 9.0;
   s.trajectory.kind = Kind::figure_eight;
   const LogTable log = simulate(s);
-  const Model model = make_model(s.robot);
+  const Model model = model::make_model(s.robot);
   ASSERT_EQ(model.p(), 5U);
   const auto error_with = [&](std::size_t stride) {
     Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(5, 5);
@@ -115,7 +115,7 @@ TEST(Simulation, AnisotropicFrictionIsFoundInTheRegressorOfFiveParameters) {
     const auto instant = [&](std::size_t i, const Eigen::Vector2d& acceleration) {
       const Eigen::Vector2d v = model.motion * wheels(i);
       const std::array<double, 2> speed = {v[0], v[1]}, error = {0.0, 0.0}, rate = {acceleration[0], acceleration[1]};
-      return regressor(model, {.speed = speed, .speed_error = error, .heading = log.column("theta")[i]}, rate);
+      return model::regressor(model, {.speed = speed, .speed_error = error, .heading = log.column("theta")[i]}, rate);
     };
     for (std::size_t i = 0; i + stride < log.rows(); i += stride) {
       const double h = log.t[i + stride] - log.t[i];
@@ -326,7 +326,7 @@ TEST(Simulation, GapsSplitTheLogAndTheRobotDrivesOn) {
 TEST(Simulation, FaultyLogIsTheHealthyOneUntilTheOnset) {
   Scenario s = scenario();
   const LogTable healthy = simulate(s);
-  s.faults = {{Fault::Kind::wheel_radius_left, -0.01, {TimeProfile::Shape::step, 20.0}}};
+  s.faults = {{model::Fault::Kind::wheel_radius_left, -0.01, {model::TimeProfile::Shape::step, 20.0}}};
   const LogTable faulty = simulate(s);
   const auto& a = healthy.column("omega_l");
   const auto& b = faulty.column("omega_l");
@@ -337,7 +337,7 @@ TEST(Simulation, FaultyLogIsTheHealthyOneUntilTheOnset) {
 TEST(Simulation, CurrentIsTorqueOverTheMotorsConstant) {
   Scenario s = scenario();
   const LogTable torque = simulate(s);
-  s.robot.effort = EffortKind::current;
+  s.robot.effort = model::EffortKind::current;
   s.robot.motor.emplace().torque_constant = 0.05;
   s.robot.motor->gear_ratio = 20.0;
   s.robot.effort_unsigned = true;
@@ -382,12 +382,12 @@ TEST(Simulation, RefusesAScenarioThatMakesNoSense) {
   refused([](Scenario& s) { s.sensors.angles = s.sensors.speeds = false; }, "sensors");
   refused([](Scenario& s) { s.gaps = {{1.0, 1.02}}; }, "gaps[0]");
   refused([](Scenario& s) { s.gaps = {{1.0, 2.0}, {1.5, 3.0}}; }, "gaps[1]");
-  refused([](Scenario& s) { s.robot.effort = EffortKind::voltage; }, "robot.effort");
-  refused([](Scenario& s) { s.robot.effort = EffortKind::current; }, "torque_constant");
+  refused([](Scenario& s) { s.robot.effort = model::EffortKind::voltage; }, "robot.effort");
+  refused([](Scenario& s) { s.robot.effort = model::EffortKind::current; }, "torque_constant");
   refused([](Scenario& s) { s.trajectory.period = 0.0; }, "trajectory.period");
-  refused([](Scenario& s) { s.faults = {{Fault::Kind::wheel_radius, -0.1, {}}}; }, "faults");
+  refused([](Scenario& s) { s.faults = {{model::Fault::Kind::wheel_radius, -0.1, {}}}; }, "faults");
   EXPECT_THROW(Simulation(scenario(), 0), InvalidArgument);
 }
 
 }  // namespace
-}  // namespace wheelwright::simulation_test
+}  // namespace wheelwright::sim::simulation_test

@@ -9,7 +9,7 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/sim/trajectory.hpp>
 
-namespace wheelwright::trajectory_test {
+namespace wheelwright::sim::trajectory_test {
 namespace {
 
 using Kind = Trajectory::Kind;
@@ -102,4 +102,4 @@ TEST(Trajectory, RefusesWhatIsNone) {
 }
 
 }  // namespace
-}  // namespace wheelwright::trajectory_test
+}  // namespace wheelwright::sim::trajectory_test

@@ -9,7 +9,7 @@
 
 #include "study/fleets.hpp"
 
-namespace wheelwright::drift_test {
+namespace wheelwright::study::drift_test {
 namespace {
 
 using testing_support::Random;
@@ -169,4 +169,4 @@ TEST(Drift, OfARecordGoesByParameter) {
 }
 
 }  // namespace
-}  // namespace wheelwright::drift_test
+}  // namespace wheelwright::study::drift_test

@@ -12,7 +12,7 @@
 #include "study/simulated.hpp"
 #include "support/random.hpp"
 
-namespace wheelwright::examine_robot_test {
+namespace wheelwright::study::examine_robot_test {
 namespace {
 
 using testing_support::broken;
@@ -129,7 +129,7 @@ TEST(ExamineRobot, APriorOfTheFleetTightensTheNextRobot) {
   ASSERT_TRUE(prior.exists) << prior.message;
   Scenario scenario = noisy_drive(999, 3.0);
   scenario.parameters.mass = 20.1;
-  scenario.robot.effort_changes = EffortChanges::between;  // a weak log: when its commands change is not known
+  scenario.robot.effort_changes = model::EffortChanges::between;  // a weak log: when its commands change is not known
   Robot informed = scenario.robot;
   for (const PooledParameter& p : prior.parameters) {
     if (p.included) {
@@ -137,8 +137,8 @@ TEST(ExamineRobot, APriorOfTheFleetTightensTheNextRobot) {
     }
   }
   Simulation alone_log(scenario), informed_log(scenario);
-  const auto alone = recorded_parameters(commission(alone_log, scenario.robot));
-  const auto with = recorded_parameters(commission(informed_log, informed));
+  const auto alone = recorded_parameters(commission_robot(alone_log, scenario.robot));
+  const auto with = recorded_parameters(commission_robot(informed_log, informed));
   ASSERT_EQ(alone.size(), with.size());
   double tightest = 1.0;
   for (std::size_t j = 0; j < with.size(); ++j) {
@@ -151,4 +151,4 @@ TEST(ExamineRobot, APriorOfTheFleetTightensTheNextRobot) {
 }
 
 }  // namespace
-}  // namespace wheelwright::examine_robot_test
+}  // namespace wheelwright::study::examine_robot_test

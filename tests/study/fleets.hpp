@@ -14,11 +14,11 @@ namespace wheelwright::testing_support {
 
 /// A record of one log with the parameters "mass" and "yaw_inertia": the truth, an estimate that is off by a normal
 /// error of `error`, and guaranteed bounds that hold the truth, about 4 errors wide on each side.
-inline RobotRecord drawn_record(const std::string& name, const std::vector<double>& truth, double error,
-                                Random& random) {
+inline study::RobotRecord drawn_record(const std::string& name, const std::vector<double>& truth, double error,
+                                       Random& random) {
   static const std::vector<std::string> names = {"mass", "yaw_inertia", "viscous_linear", "viscous_yaw"};
-  RobotRecord record{.robot = name, .dated = false, .commissioning = {}};
-  record.commissioning.status = RobotStatus::commissioned;
+  study::RobotRecord record{.robot = name, .dated = false, .commissioning = {}};
+  record.commissioning.status = study::RobotStatus::commissioned;
   for (std::size_t j = 0; j < truth.size(); ++j) {
     const double below = error * (1.0 + 3.0 * random.unit()), above = error * (1.0 + 3.0 * random.unit());
     record.commissioning.parameters.push_back({.name = names.at(j),

@@ -11,7 +11,7 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/study/screening.hpp>
 
-namespace wheelwright::grid_test {
+namespace wheelwright::study::grid_test {
 namespace {
 
 const Grid kGrid{{3, 1, 2, 4}, Eigen::Vector4d(0.5, 0.3, 0.5, 0.5)};
@@ -100,4 +100,4 @@ TEST(Grid, RefusesWhatIsNoGrid) {
 }
 
 }  // namespace
-}  // namespace wheelwright::grid_test
+}  // namespace wheelwright::study::grid_test

@@ -7,7 +7,7 @@
 
 #include "support/random.hpp"
 
-namespace wheelwright::hull_derivatives_test {
+namespace wheelwright::study::hull_derivatives_test {
 namespace {
 
 using testing_support::Random;
@@ -32,34 +32,34 @@ struct Moving {
     }
     prior.sides.assign(p, {0.0, 10.0});
   }
-  [[nodiscard]] RegressionTable at(double s) const {
+  [[nodiscard]] core::RegressionTable at(double s) const {
     RegressionBlock block = now;
     block.Y += s * rate.Y;
     block.y += s * rate.y;
     block.dy += s * rate.dy;
-    return RegressionTable(block);
+    return core::RegressionTable(block);
   }
   [[nodiscard]] FeasibleSet set(double s) const {
-    RegressionTable rows = at(s);
+    core::RegressionTable rows = at(s);
     return feasible_set(rows, prior);
   }
   [[nodiscard]] std::vector<RowRate> rates(const HullOptimum& optimum) const {
     std::vector<RowRate> rates;
-    for (const WeightedRow& active : optimum.active) {
-      const RowOrigin& origin = active.row.origin;
+    for (const bounds::WeightedRow& active : optimum.active) {
+      const bounds::RowOrigin& origin = active.row.origin;
       if (origin.is_prior) {
         rates.push_back({});
         continue;
       }
       const auto k = static_cast<Eigen::Index>(origin.sample);
-      const double sign = origin.side == Side::upper ? 1.0 : -1.0;
+      const double sign = origin.side == bounds::Side::upper ? 1.0 : -1.0;
       rates.push_back({sign * rate.Y.row(k).transpose(), sign * rate.y[k] + rate.dy[k]});
     }
     return rates;
   }
   [[nodiscard]] HullOptima optima() const {
     HullOptima result = hull_optima(*set(0.0).polytope, prior);
-    RegressionTable rows = at(0.0);
+    core::RegressionTable rows = at(0.0);
     add_active_rows(result, rows);
     return result;
   }
@@ -91,7 +91,7 @@ void expect_sides(const Moving& moving, const HullOptima& optima, double step, d
     for (const HullOptimum* optimum : {&optima.lower[j], &optima.upper[j]}) {
       const auto value = [&](const FeasibleSet& set) {
         const Interval& side = set.hull.sides[j];
-        return optimum->side == Side::upper ? side.upper : side.lower;
+        return optimum->side == bounds::Side::upper ? side.upper : side.lower;
       };
       const std::vector<RowRate> rates = moving.rates(*optimum);
       const OneSided found = bound_derivative(optima, *optimum, rates, rates);
@@ -113,7 +113,7 @@ TEST(HullDerivatives, EqualCentralDifferencesOfTheHull) {
     for (std::size_t j = 0; j < p; ++j) {
       for (const HullOptimum* optimum : {&optima.lower[j], &optima.upper[j]}) {
         ASSERT_TRUE(optimum->is_regular()) << why_not_regular(*optimum, "θ");
-        const bool upper = optimum->side == Side::upper;
+        const bool upper = optimum->side == bounds::Side::upper;
         const std::vector<RowRate> rates = moving.rates(*optimum);
         const OneSided found = bound_derivative(optima, *optimum, rates, rates);
         EXPECT_EQ(found.left, found.right);
@@ -132,9 +132,9 @@ TEST(HullDerivatives, TheVertexSolvesItsEquationsAndTheMultipliersTheDual) {
     const HullOptima optima = random_set(seed, 4, 60).optima();
     for (std::size_t j = 0; j < 4; ++j) {
       for (const HullOptimum* optimum : {&optima.lower[j], &optima.upper[j]}) {
-        const double sign = optimum->side == Side::upper ? 1.0 : -1.0;
+        const double sign = optimum->side == bounds::Side::upper ? 1.0 : -1.0;
         Eigen::VectorXd rest = sign * Eigen::VectorXd::Unit(4, static_cast<Eigen::Index>(j));
-        for (const WeightedRow& active : optimum->active) {
+        for (const bounds::WeightedRow& active : optimum->active) {
           EXPECT_NEAR(active.row.a.dot(optimum->at), active.row.b, 1e-13);
           rest -= active.multiplier * active.row.a;
         }
@@ -195,7 +195,7 @@ TEST(HullDerivatives, RowsThatMeetInAVertexGiveTheOneSidedDifferences) {
       for (const HullOptimum* optimum : {&regular.lower[j], &regular.upper[j]}) {
         for (int extra = 0; extra < 2; ++extra) {
           Eigen::VectorXd normal = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(p));
-          for (const WeightedRow& active : optimum->active) {
+          for (const bounds::WeightedRow& active : optimum->active) {
             normal += random.unit() * active.row.a;
           }
           normals.push_back(normal);
@@ -288,4 +288,4 @@ TEST(HullDerivatives, ParallelFacetsOfRandomSetsGiveTheOneSidedDifferences) {
 }
 
 }  // namespace
-}  // namespace wheelwright::hull_derivatives_test
+}  // namespace wheelwright::study::hull_derivatives_test

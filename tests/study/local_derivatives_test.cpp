@@ -10,7 +10,7 @@
 
 #include "support/drives.hpp"
 
-namespace wheelwright::local_derivatives_test {
+namespace wheelwright::study::local_derivatives_test {
 namespace {
 
 using testing_support::noisy_drive;
@@ -24,7 +24,7 @@ Scenario speed_drive(std::uint64_t seed) {
   s.sensors.effort = 0.02;
   s.robot.noise.wheel_speed.value = 0.01;
   s.robot.noise.effort.value = 0.02;
-  s.robot.speed_source = SpeedSource::measured;
+  s.robot.speed_source = model::SpeedSource::measured;
   s.robot.filter = {.order = 1, .alpha = 8.0, .beta = 8.0};
   s.robot.prior = {{"mass", {5.0, 60.0}}, {"viscous_yaw", {0.45, 0.55}}};
   s.seed = seed;
@@ -60,10 +60,10 @@ Robot with(Robot robot, const std::string& input, double x) {
 
 // Both bounds of all parameters, by commissioning anew.
 std::vector<double> bounds(LogSource& log, const Robot& robot) {
-  const Commissioning result = commission(log, robot);
+  const Commissioning result = commission_robot(log, robot);
   EXPECT_EQ(result.status, Commissioning::Status::done) << result.message;
   std::vector<double> all;
-  for (const ParameterResult& p : result.parameters) {
+  for (const commission::ParameterResult& p : result.parameters) {
     all.insert(all.end(), {p.lower, p.upper});
   }
   return all;
@@ -106,9 +106,9 @@ int compare(LogSource& log, const Robot& robot, const LocalSensitivity& local, d
 
 TEST(LocalDerivatives, EqualDifferencesOfCommissioningWithMeasuredSpeeds) {
   const Scenario s = speed_drive(5);
-  LogTable table = simulate(s);
+  LogTable table = sim::simulate(s);
   TableSource log(table);
-  const Commissioning result = commission(log, s.robot);
+  const Commissioning result = commission_robot(log, s.robot);
   ASSERT_EQ(result.status, Commissioning::Status::done) << result.message;
   const LocalSensitivity local = local_derivatives(
       log, result,
@@ -125,9 +125,9 @@ TEST(LocalDerivatives, EqualDifferencesOfCommissioningWithEncoders) {
   Scenario s = noisy_drive(3, 8.0);
   s.robot.hold = Hold::first_order;
   s.robot.filter = {.order = 2, .alpha = {}, .beta = 8.0};
-  LogTable table = simulate(s);
+  LogTable table = sim::simulate(s);
   TableSource log(table);
-  const Commissioning result = commission(log, s.robot);
+  const Commissioning result = commission_robot(log, s.robot);
   ASSERT_EQ(result.status, Commissioning::Status::done) << result.message;
   const LocalSensitivity local = local_derivatives(
       log, result,
@@ -139,9 +139,9 @@ TEST(LocalDerivatives, EqualDifferencesOfCommissioningWithEncoders) {
 // What theory says without a number: (25) is linear in the gain of the filter; θ_L = r·m, and Y ∝ r.
 TEST(LocalDerivatives, ObeyTheScalingsOfTheModel) {
   const Scenario s = noisy_drive(4, 8.0);
-  LogTable table = simulate(s);
+  LogTable table = sim::simulate(s);
   TableSource log(table);
-  const Commissioning result = commission(log, s.robot);
+  const Commissioning result = commission_robot(log, s.robot);
   ASSERT_EQ(result.status, Commissioning::Status::done) << result.message;
   const LocalSensitivity local = local_derivatives(log, result, {.inputs = {"filter.alpha", "wheel_radius"}});
   for (std::size_t j = 0; j < local.parameters.size(); ++j) {
@@ -158,10 +158,10 @@ TEST(LocalDerivatives, EstimatedNoiseIsHeldFixedAndSaysSo) {
   Scenario s = noisy_drive(3, 8.0);
   s.robot.noise = {};
   s.robot.encoder_counts_per_turn.reset();
-  LogTable table = simulate(s);
+  LogTable table = sim::simulate(s);
   TableSource log(table);
-  const Commissioning result = commission(log, s.robot);
-  ASSERT_EQ(result.noise.front().origin, NoiseOrigin::estimated);
+  const Commissioning result = commission_robot(log, s.robot);
+  ASSERT_EQ(result.noise.front().origin, core::NoiseOrigin::estimated);
   const LocalSensitivity local = local_derivatives(log, result);
   ASSERT_EQ(local.notes.size(), 2U);
   EXPECT_NE(local.notes[1].find("noise is estimated"), std::string::npos);
@@ -175,10 +175,11 @@ TEST(LocalDerivatives, SayWhereThereIsNone) {
   s.robot.noise.wheel_speed.value = 0.6;
   s.robot.noise.effort.value = 1.0;
   s.robot.prior = {{"viscous_yaw", {0.0, 10.0}}};
-  LogTable table = simulate(s);
+  LogTable table = sim::simulate(s);
   TableSource log(table);
-  const LocalSensitivity local = local_derivatives(
-      log, commission(log, s.robot), {.inputs = {"prior.viscous_yaw.lower", "prior.viscous_yaw", "declared.effort"}});
+  const LocalSensitivity local =
+      local_derivatives(log, commission_robot(log, s.robot),
+                        {.inputs = {"prior.viscous_yaw.lower", "prior.viscous_yaw", "declared.effort"}});
   ASSERT_EQ(local.lower[3], 0.0);
   const ParameterDerivative& side = local.inputs[0].parameters[3];
   EXPECT_NEAR(side.lower.right, s.robot.wheel_radius, 1e-12);
@@ -197,7 +198,7 @@ TEST(LocalDerivatives, SayWhereThereIsNone) {
 // A log twice the same: every row that holds a bound stands there twice, and both move with the robot file together.
 TEST(LocalDerivatives, ADriveThatIsLoggedTwiceHasTheDerivativesOfOne) {
   const Scenario s = speed_drive(6);
-  LogTable once = simulate(s), twice = once;
+  LogTable once = sim::simulate(s), twice = once;
   const double shift = once.t.back() - once.t.front() + 10.0;
   twice.segment_starts = once.segment_starts;
   twice.segment_starts.push_back(once.rows());
@@ -209,8 +210,8 @@ TEST(LocalDerivatives, ADriveThatIsLoggedTwiceHasTheDerivativesOfOne) {
   }
   TableSource log(once), log_twice(twice);
   const LocalOptions options{.inputs = {"declared.effort", "filter.beta", "wheel_radius"}};
-  const LocalSensitivity one = local_derivatives(log, commission(log, s.robot), options);
-  const LocalSensitivity two = local_derivatives(log_twice, commission(log_twice, s.robot), options);
+  const LocalSensitivity one = local_derivatives(log, commission_robot(log, s.robot), options);
+  const LocalSensitivity two = local_derivatives(log_twice, commission_robot(log_twice, s.robot), options);
   for (std::size_t i = 0; i < one.inputs.size(); ++i) {
     for (std::size_t j = 0; j < one.parameters.size(); ++j) {
       const OneSided &a = one.inputs[i].parameters[j].width, &b = two.inputs[i].parameters[j].width;
@@ -222,4 +223,4 @@ TEST(LocalDerivatives, ADriveThatIsLoggedTwiceHasTheDerivativesOfOne) {
 }
 
 }  // namespace
-}  // namespace wheelwright::local_derivatives_test
+}  // namespace wheelwright::study::local_derivatives_test

@@ -16,7 +16,7 @@
 namespace wheelwright::testing {
 
 /// Results in memory. A failed test where two threads call it at once, or an item is put twice.
-class MemoryStore : public ResultStore {
+class MemoryStore : public study::ResultStore {
  public:
   bool has(std::size_t item) override {
     const Alone alone(inside_);

@@ -14,7 +14,7 @@
 
 #include "study/test_functions.hpp"
 
-namespace wheelwright::morris_test {
+namespace wheelwright::study::morris_test {
 namespace {
 
 namespace example = sensitivity_example;
@@ -134,8 +134,8 @@ TEST(MorrisEffects, AreCountedWhereValuesAreMissing) {
   const auto f = example::additive(Eigen::Vector3d(1.0, 2.0, 3.0));
   const MorrisOptions options{.trajectories = 6};
   Eigen::MatrixXd values = example::evaluate(f, morris_design(3, options)).replicate(1, 3);
-  values(1, 0) = kNan;                          // the end of one move, the start of the next
-  values.col(1).tail(5 * 4).setConstant(kNan);  // one trajectory is left
+  values(1, 0) = core::kNan;                          // the end of one move, the start of the next
+  values.col(1).tail(5 * 4).setConstant(core::kNan);  // one trajectory is left
   values.col(2).setConstant(std::numeric_limits<double>::infinity());
   const auto found = morris_effects(values, 3, options);
   Eigen::Index count = 0;
@@ -157,9 +157,9 @@ TEST(MorrisEffects, RefuseWhatIsNoScreening) {
   EXPECT_THROW((void)morris_design(2, {.trajectories = 1}), InvalidArgument);
   EXPECT_THROW((void)morris_design(2, {.levels = 5}), InvalidArgument);
   EXPECT_THROW((void)morris_design(2, {.levels = 0}), InvalidArgument);
-  EXPECT_THROW((void)morris_design(2, {.confidence = kNan}), InvalidArgument);
+  EXPECT_THROW((void)morris_design(2, {.confidence = core::kNan}), InvalidArgument);
   EXPECT_THROW((void)morris_effects(Eigen::MatrixXd::Zero(59, 1), 2), InvalidArgument);
 }
 
 }  // namespace
-}  // namespace wheelwright::morris_test
+}  // namespace wheelwright::study::morris_test

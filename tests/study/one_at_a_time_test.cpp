@@ -12,7 +12,7 @@
 
 #include "study/test_functions.hpp"
 
-namespace wheelwright::one_at_a_time_test {
+namespace wheelwright::study::one_at_a_time_test {
 namespace {
 
 namespace example = sensitivity_example;
@@ -60,8 +60,8 @@ TEST(OneAtATime, SwingsAsFarAsTheNominalPoint) {
 
 TEST(OneAtATime, KeepsGapsWhereValuesAreMissing) {
   Eigen::MatrixXd values(7, 2);  // two inputs, three levels
-  values.col(0) << 1.0, 0.0, kNan, 3.0, kNan, std::numeric_limits<double>::infinity(), kNan;
-  values.col(1).setConstant(kNan);
+  values.col(0) << 1.0, 0.0, core::kNan, 3.0, core::kNan, std::numeric_limits<double>::infinity(), core::kNan;
+  values.col(1).setConstant(core::kNan);
   const auto found = one_at_a_time(values, 2, 3);
   EXPECT_EQ(found[0].inputs[0].missing, 1);
   EXPECT_EQ(found[0].inputs[0].swing, 3.0);
@@ -76,10 +76,10 @@ TEST(OneAtATime, KeepsGapsWhereValuesAreMissing) {
 TEST(OneAtATime, RefusesWhatIsNoStudy) {
   EXPECT_THROW((void)one_at_a_time_design(Eigen::VectorXd()), InvalidArgument);
   EXPECT_THROW((void)one_at_a_time_design(Eigen::Vector2d(0.5, 1.5)), InvalidArgument);
-  EXPECT_THROW((void)one_at_a_time_design(Eigen::Vector2d(0.5, kNan)), InvalidArgument);
+  EXPECT_THROW((void)one_at_a_time_design(Eigen::Vector2d(0.5, core::kNan)), InvalidArgument);
   EXPECT_THROW((void)one_at_a_time_design(Eigen::Vector2d(0.5, 0.5), 1), InvalidArgument);
   EXPECT_THROW((void)one_at_a_time(Eigen::MatrixXd::Zero(10, 1), 2), InvalidArgument);
 }
 
 }  // namespace
-}  // namespace wheelwright::one_at_a_time_test
+}  // namespace wheelwright::study::one_at_a_time_test

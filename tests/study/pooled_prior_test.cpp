@@ -11,7 +11,7 @@
 
 #include "study/fleets.hpp"
 
-namespace wheelwright::pooled_prior_test {
+namespace wheelwright::study::pooled_prior_test {
 namespace {
 
 using testing_support::drawn_record;
@@ -184,4 +184,4 @@ TEST(PooledPrior, RefusesOptionsThatMakeNoSense) {
 }
 
 }  // namespace
-}  // namespace wheelwright::pooled_prior_test
+}  // namespace wheelwright::study::pooled_prior_test

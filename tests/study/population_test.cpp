@@ -12,7 +12,7 @@
 
 #include "study/fleets.hpp"
 
-namespace wheelwright::population_test {
+namespace wheelwright::study::population_test {
 namespace {
 
 using testing_support::drawn_record;
@@ -144,4 +144,4 @@ TEST(Population, RefusesOptionsThatMakeNoSense) {
 }
 
 }  // namespace
-}  // namespace wheelwright::population_test
+}  // namespace wheelwright::study::population_test

@@ -11,7 +11,7 @@
 
 #include "support/random.hpp"
 
-namespace wheelwright::random_effects_test {
+namespace wheelwright::study::random_effects_test {
 namespace {
 
 using testing_support::Random;
@@ -103,4 +103,4 @@ TEST(RandomEffects, RefusesWhatMakesNoSense) {
 }
 
 }  // namespace
-}  // namespace wheelwright::random_effects_test
+}  // namespace wheelwright::study::random_effects_test

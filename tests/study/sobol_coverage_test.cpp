@@ -14,7 +14,7 @@
 
 #include "study/test_functions.hpp"
 
-namespace wheelwright::sobol_coverage_test {
+namespace wheelwright::study::sobol_coverage_test {
 namespace {
 
 namespace example = sensitivity_example;
@@ -76,4 +76,4 @@ TEST(SobolIntervals, AreNotTooWide) {
 }
 
 }  // namespace
-}  // namespace wheelwright::sobol_coverage_test
+}  // namespace wheelwright::study::sobol_coverage_test

@@ -11,7 +11,7 @@
 
 #include "study/test_functions.hpp"
 
-namespace wheelwright::sobol_indices_test {
+namespace wheelwright::study::sobol_indices_test {
 namespace {
 
 namespace example = sensitivity_example;
@@ -115,9 +115,9 @@ TEST(SobolIndices, LeaveOutWholeBasePointsWithoutAValue) {
   const auto f = example::ishigami();
   const Eigen::MatrixXd whole = example::evaluate(f, sobol_design(3, options));
   Eigen::MatrixXd values = whole.replicate(1, 3);
-  values(5 * 3 + 2, 0) = kNan;                                  // one of the third base point's
+  values(5 * 3 + 2, 0) = core::kNan;                            // one of the third base point's
   values(5 * 20, 0) = std::numeric_limits<double>::infinity();  // and one of the 21st's
-  values.col(1).segment(5 * 3, 5).setConstant(kNan);
+  values.col(1).segment(5 * 3, 5).setConstant(core::kNan);
   values.col(1).segment(5 * 20, 5).setConstant(-1e300 * 1e300);
   const auto found = sobol_indices(values, 3, options);
   EXPECT_EQ(found[0].base_points, 62);
@@ -136,7 +136,7 @@ TEST(SobolIndices, DoWithoutAWholeReplicate) {
   const auto f = example::ishigami();
   Eigen::MatrixXd values = example::evaluate(f, sobol_design(3, four));
   const SobolIndices expected = sobol_indices(values.topRows(16 * 3 * 5), 3, three).at(0);
-  values.bottomRows(16 * 5).setConstant(kNan);
+  values.bottomRows(16 * 5).setConstant(core::kNan);
   const SobolIndices found = sobol_indices(values, 3, four).at(0);
   EXPECT_DOUBLE_EQ(found.left_out, 0.25);
   EXPECT_EQ(found.first[0].lower, expected.first[0].lower);
@@ -146,9 +146,9 @@ TEST(SobolIndices, DoWithoutAWholeReplicate) {
 TEST(SobolIndices, SayWhereThereAreTooFewValues) {
   const SobolOptions options{.points = 16, .replicates = 4};
   Eigen::MatrixXd values = example::evaluate(example::ishigami(), sobol_design(3, options)).replicate(1, 3);
-  values.col(0).setConstant(kNan);
-  values.col(1).tail(16 * 3 * 5).setConstant(kNan);  // one replicate is left
-  values.col(2).tail(16 * 3 * 5).setConstant(0.3);   // one replicate has all the variance
+  values.col(0).setConstant(core::kNan);
+  values.col(1).tail(16 * 3 * 5).setConstant(core::kNan);  // one replicate is left
+  values.col(2).tail(16 * 3 * 5).setConstant(0.3);         // one replicate has all the variance
   for (const SobolIndices& found : sobol_indices(values, 3, options)) {
     EXPECT_EQ(found.status, SobolStatus::too_few);
     EXPECT_EQ(found.first.at(2).upper, 0.0);
@@ -167,4 +167,4 @@ TEST(SobolIndices, RefuseWhatIsNoStudy) {
 }
 
 }  // namespace
-}  // namespace wheelwright::sobol_indices_test
+}  // namespace wheelwright::study::sobol_indices_test

@@ -10,7 +10,7 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/study/sobol_indices.hpp>
 
-namespace wheelwright::sobol_points_test {
+namespace wheelwright::study::sobol_points_test {
 namespace {
 
 TEST(SobolPoints, StratifyEveryCoordinate) {
@@ -72,4 +72,4 @@ TEST(SobolPoints, RefuseWhatIsNoDesign) {
 }
 
 }  // namespace
-}  // namespace wheelwright::sobol_points_test
+}  // namespace wheelwright::study::sobol_points_test

@@ -11,7 +11,7 @@
 
 #include "support/drives.hpp"
 
-namespace wheelwright::study_case_test {
+namespace wheelwright::study::study_case_test {
 namespace {
 
 using testing_support::noisy_drive;
@@ -26,7 +26,7 @@ StudyCase simulated() {
 
 StudyCase recorded() {
   StudyCase subject = simulated();
-  subject.log = std::make_shared<LogTable>(simulate(*subject.scenario));
+  subject.log = std::make_shared<LogTable>(sim::simulate(*subject.scenario));
   subject.scenario.reset();
   return subject;
 }
@@ -146,4 +146,4 @@ TEST(StudyCase, SaysWhatItExpected) {
 }
 
 }  // namespace
-}  // namespace wheelwright::study_case_test
+}  // namespace wheelwright::study::study_case_test

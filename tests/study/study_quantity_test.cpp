@@ -10,7 +10,7 @@
 
 #include "support/drives.hpp"
 
-namespace wheelwright::study_quantity_test {
+namespace wheelwright::study::study_quantity_test {
 namespace {
 
 StudyCase simulated() {
@@ -57,7 +57,7 @@ TEST(StudyQuantity, ReadsTheCommissioning) {
   EXPECT_EQ(result.finding, "");
   const LogTable table = drive_of_case(subject);
   TableSource log(table);
-  const Commissioning c = commission(log, subject.robot);
+  const Commissioning c = commission_robot(log, subject.robot);
   for (std::size_t j = 0; j < 4; ++j) {
     EXPECT_EQ(result.values[j], c.parameters[j].lower);
     EXPECT_EQ(result.values[4 + j], c.parameters[j].upper);
@@ -114,4 +114,4 @@ TEST(StudyQuantity, WithoutAModelThereIsAFinding) {
 }
 
 }  // namespace
-}  // namespace wheelwright::study_quantity_test
+}  // namespace wheelwright::study::study_quantity_test

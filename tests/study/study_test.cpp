@@ -10,7 +10,7 @@
 
 #include "support/drives.hpp"
 
-namespace wheelwright::study_test {
+namespace wheelwright::study::study_test {
 namespace {
 
 Study small() {
@@ -96,4 +96,4 @@ TEST(Study, AStudyWithoutMethodsOrInputsIsRefused) {
 }
 
 }  // namespace
-}  // namespace wheelwright::study_test
+}  // namespace wheelwright::study::study_test

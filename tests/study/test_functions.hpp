@@ -12,7 +12,7 @@
 
 #include <Eigen/Core>
 
-namespace wheelwright::sensitivity_example {
+namespace wheelwright::study::sensitivity_example {
 
 struct TestFunction {
   std::string name;
@@ -74,4 +74,4 @@ inline TestFunction additive(Eigen::VectorXd c = Eigen::Vector4d(4.0, 3.0, 2.0, 
   return f;
 }
 
-}  // namespace wheelwright::sensitivity_example
+}  // namespace wheelwright::study::sensitivity_example

@@ -4,7 +4,10 @@
 
 #include <wheelwright/study/robot_record.hpp>
 
-namespace wheelwright::fleet_warrant_test {
+namespace wheelwright::study::fleet_warrant_test {
+
+using core::Warrant;
+
 namespace {
 
 RobotRecord record_with(Warrant warrant) {
@@ -25,4 +28,4 @@ TEST(FleetWarrants, AColumnHasTheWeakestOfItsRobots) {
 }
 
 }  // namespace
-}  // namespace wheelwright::fleet_warrant_test
+}  // namespace wheelwright::study::fleet_warrant_test

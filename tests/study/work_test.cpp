@@ -13,7 +13,7 @@
 
 #include "memory_store.hpp"
 
-namespace wheelwright::work_test {
+namespace wheelwright::study::work_test {
 namespace {
 
 using testing::MemoryStore;
@@ -149,4 +149,4 @@ TEST(Work, RefusesWhatMakesNoSense) {
 }
 
 }  // namespace
-}  // namespace wheelwright::work_test
+}  // namespace wheelwright::study::work_test

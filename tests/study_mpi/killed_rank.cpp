@@ -19,21 +19,22 @@ int main(int argc, char** argv) {
   if (argc != 3) {
     return 2;
   }
-  const MpiSession mpi;
+  const study::MpiSession mpi;
   const int killed = std::atoi(argv[2]);
   int calls = 0;
-  const Work work{300, [&](std::size_t item) {
-                    if (mpi.rank() == killed && ++calls == 20) {
-                      std::raise(SIGKILL);
-                    }
-                    // Long enough that each rank has its share.
-                    std::this_thread::sleep_for(std::chrono::milliseconds(2));
-                    return wheelwright::testing::text_of(item);
-                  }};
-  std::unique_ptr<SqliteResults> store;
-  const RunCount count = run_work_on_ranks(mpi, work, "", [&]() -> ResultStore& {
-    store = std::make_unique<SqliteResults>(argv[1], StoredPlan{},
-                                            StoredItems{300, [](std::size_t item) { return std::to_string(item); }});
+  const study::Work work{300, [&](std::size_t item) {
+                           if (mpi.rank() == killed && ++calls == 20) {
+                             std::raise(SIGKILL);
+                           }
+                           // Long enough that each rank has its share.
+                           std::this_thread::sleep_for(std::chrono::milliseconds(2));
+                           return wheelwright::testing::text_of(item);
+                         }};
+  std::unique_ptr<results::SqliteResults> store;
+  const study::RunCount count = study::run_work_on_ranks(mpi, work, "", [&]() -> study::ResultStore& {
+    store = std::make_unique<results::SqliteResults>(
+        argv[1], results::StoredPlan{},
+        results::StoredItems{300, [](std::size_t item) { return std::to_string(item); }});
     return *store;
   });
   if (mpi.rank() != 0) {

@@ -15,7 +15,7 @@
 
 #include "study/memory_store.hpp"
 
-namespace wheelwright {
+namespace wheelwright::study {
 namespace {
 
 using ::testing::AllOf;
@@ -191,11 +191,11 @@ TEST(WorkOnRanks, AllHaveToHaveTheSamePlan) {
 }
 
 }  // namespace
-}  // namespace wheelwright
+}  // namespace wheelwright::study
 
 int main(int argc, char** argv) {
   ::testing::InitGoogleMock(&argc, argv);
-  const wheelwright::MpiSession session;
-  wheelwright::mpi = &session;
+  const wheelwright::study::MpiSession session;
+  wheelwright::study::mpi = &session;
   return RUN_ALL_TESTS();
 }

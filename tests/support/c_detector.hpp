@@ -127,7 +127,7 @@ inline Seen compare(TorqueDetector& ours, CDetector& theirs, const std::vector<d
     const Decision& d = ours.step(t[k], {samples.data() + k * inputs, inputs});
     bool equal = out[0] == (d.valid ? 1.0 : 0.0) && out[1] == (d.fault ? 1.0 : 0.0);
     out += 2;
-    for (const ChannelDecision& c : d.channels) {
+    for (const detector::ChannelDecision& c : d.channels) {
       if (d.valid) {
         equal = equal && same(out[0], c.residual) && same(out[1], c.predicted) && same(out[2], c.threshold.lower) &&
                 same(out[3], c.threshold.upper) && same(out[4], c.dead_zone) && out[5] == (c.outside ? 1.0 : 0.0) &&

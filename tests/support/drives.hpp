@@ -19,7 +19,8 @@ namespace wheelwright::testing_support {
 inline const std::vector<std::string> kFour = {"mass", "yaw_inertia", "viscous_linear", "viscous_yaw"};
 
 /// All shapes of noise; two_point is at its bound in every sample.
-inline constexpr std::array kNoiseShapes{NoiseShape::uniform, NoiseShape::truncated_gaussian, NoiseShape::two_point};
+inline constexpr std::array kNoiseShapes{sim::NoiseShape::uniform, sim::NoiseShape::truncated_gaussian,
+                                         sim::NoiseShape::two_point};
 
 /// Motion columns of a drive's log.
 enum class Shown {
@@ -35,19 +36,19 @@ inline Scenario exact_drive(Shown shown, Hold hold) {
   s.robot.wheel_radius = 0.0975;
   s.robot.track_width = 0.381;
   s.robot.hold = hold;
-  s.robot.effort_changes = EffortChanges::at_samples;
+  s.robot.effort_changes = model::EffortChanges::at_samples;
   s.robot.parameters = kFour;
   s.robot.filter.beta = 8.0;
   s.parameters = {.mass = 21.0, .yaw_inertia = 0.9, .viscous_x = 4.0, .viscous_y = 4.0, .viscous_yaw = 0.5};
-  s.trajectory = {.kind = Trajectory::Kind::commissioning, .speed = 0.6, .yaw_rate = 1.2, .period = 4.0};
+  s.trajectory = {.kind = sim::Trajectory::Kind::commissioning, .speed = 0.6, .yaw_rate = 1.2, .period = 4.0};
   s.duration = 20.0;
   s.rate = 100.0;
   s.sensors.angles = shown == Shown::angles;
   s.sensors.speeds = shown != Shown::angles;
   s.sensors.pose = s.sensors.commands = false;
   if (shown == Shown::mean_speeds) {
-    s.sensors.sampling = Sampling::interval;
-    s.robot.speed_source = SpeedSource::encoder_difference;
+    s.sensors.sampling = sim::Sampling::interval;
+    s.robot.speed_source = model::SpeedSource::encoder_difference;
   }
   return s;
 }
@@ -66,12 +67,12 @@ inline Scenario noisy_drive(std::uint64_t seed, double duration = 12.0) {
 }
 
 /// The filter that the scenario's robot asks for on its own log, with the bounds `errors` on its rows.
-inline RegressorFilter filter_of(const Scenario& scenario, SignalErrors errors = {}, int order = 2) {
+inline RegressorFilter filter_of(const Scenario& scenario, filter::SignalErrors errors = {}, int order = 2) {
   Simulation log(scenario);
-  const Model model = make_model(scenario.robot);
+  const Model model = model::make_model(scenario.robot);
   const double beta = scenario.robot.filter.beta.value_or(8.0);
   return RegressorFilter(model, {.order = order, .alpha = beta, .beta = beta},
-                         find_measurement(log, scenario.robot, model, order), std::move(errors));
+                         filter::find_measurement(log, scenario.robot, model, order), std::move(errors));
 }
 
 }  // namespace wheelwright::testing_support

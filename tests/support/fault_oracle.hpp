@@ -41,14 +41,16 @@ inline Eigen::Matrix2d torque_gain(const DifferentialDrive& drive, const Eigen::
 
 /// δ(t) of (6) in the world frame, m/s, m/s, rad/s: what q̇ = S v + δ has beyond pure rolling; ρ_M (10), ρ_U (11) and
 /// unequal radii (Remark 1) included.
-inline Eigen::Vector3d delta(const DifferentialDrive& drive, const FaultState& fault, const DriveMotion& motion) {
+inline Eigen::Vector3d delta(const DifferentialDrive& drive, const model::FaultState& fault,
+                             const DriveMotion& motion) {
   const double c = std::cos(motion.heading), s = std::sin(motion.heading);
   return fault.slip + kinematic_matrix(motion.heading) * (radius_gain(drive, fault.radius) * motion.speed) +
          fault.matched * Eigen::Vector3d(c, s, 0.0) + fault.unmatched * Eigen::Vector3d(s, -c, 0.0);
 }
 
 /// δ̇(t), m/s², m/s², rad/s², along the motion (θ̇ = v2 + δ_θ).
-inline Eigen::Vector3d delta_rate(const DifferentialDrive& drive, const FaultState& fault, const DriveMotion& motion) {
+inline Eigen::Vector3d delta_rate(const DifferentialDrive& drive, const model::FaultState& fault,
+                                  const DriveMotion& motion) {
   const double c = std::cos(motion.heading), s = std::sin(motion.heading);
   const Eigen::Vector2d gained = radius_gain(drive, fault.radius) * motion.speed;
   const Eigen::Vector2d gained_rate =
@@ -63,8 +65,8 @@ inline Eigen::Vector3d delta_rate(const DifferentialDrive& drive, const FaultSta
 /// τ_R/(r+δ1R) and τ_L/(r+δ1L), and
 ///   ζ = A (M̄ v̇ + F̄ v + SᵀM δ̇ + SᵀF_d δ) − r (M̄ v̇ + F̄ v),  A = [1 1; ℓ −ℓ] diag(r+δ1R, r+δ1L) [1 1; ℓ −ℓ]⁻¹,
 /// which is (16) when they are equal.
-inline Eigen::Vector2d zeta(const DifferentialDrive& drive, const DriveParameters& p, const FaultState& fault,
-                            const DriveMotion& motion) {
+inline Eigen::Vector2d zeta(const DifferentialDrive& drive, const model::DriveParameters& p,
+                            const model::FaultState& fault, const DriveMotion& motion) {
   const Eigen::Matrix<double, 3, 2> s = kinematic_matrix(motion.heading);
   const Eigen::Vector3d mass(p.mass, p.mass, p.yaw_inertia), friction(p.viscous_x, p.viscous_y, p.viscous_yaw);
   const Eigen::Matrix2d mbar = s.transpose() * mass.asDiagonal() * s, fbar = s.transpose() * friction.asDiagonal() * s;

@@ -23,7 +23,7 @@ inline Scenario posed_drive(std::uint64_t seed, double duration = 20.0) {
 /// The same robot on a straight line.
 inline Scenario straight_drive(std::uint64_t seed, double duration) {
   Scenario s = posed_drive(seed, duration);
-  s.trajectory = {.kind = Trajectory::Kind::straight, .speed = 0.6, .yaw_rate = 0.0, .period = 8.0};
+  s.trajectory = {.kind = sim::Trajectory::Kind::straight, .speed = 0.6, .yaw_rate = 0.0, .period = 8.0};
   return s;
 }
 

@@ -91,7 +91,7 @@ TYPED_TEST_P(RegressionSourceLaws, AUsedBlockIsAsGoodAsAFreshOne) {
       ASSERT_EQ(used.sample[k], expected.sample[at]);
       const auto n = static_cast<Eigen::Index>(expected.outputs);
       const auto here = static_cast<Eigen::Index>(k) * n, there = static_cast<Eigen::Index>(at) * n;
-      ASSERT_EQ(RowMatrix(used.Y.middleRows(here, n)), RowMatrix(expected.Y.middleRows(there, n)));
+      ASSERT_EQ(core::RowMatrix(used.Y.middleRows(here, n)), core::RowMatrix(expected.Y.middleRows(there, n)));
       ASSERT_EQ(Eigen::VectorXd(used.y.segment(here, n)), Eigen::VectorXd(expected.y.segment(there, n)));
     }
   }

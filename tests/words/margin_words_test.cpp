@@ -6,12 +6,11 @@
 
 #include <wheelwright/words/margin_words.hpp>
 
-namespace wheelwright::margin_words_test {
-using namespace words;
+namespace wheelwright::words::margin_words_test {
 namespace {
 
 TEST(MarginWords, AreTwoDigitsUpwards) {
-  const FaultType share{.name = "share", .unit = "1"}, mass{.name = "mass", .unit = "kg"};
+  const detector::FaultType share{.name = "share", .unit = "1"}, mass{.name = "mass", .unit = "kg"};
   EXPECT_EQ(magnitude_words(share, 0.0461), "4.7 %");
   EXPECT_EQ(magnitude_words(share, 0.05), "5 %");
   EXPECT_EQ(magnitude_words(share, 0.991), "100 %");
@@ -22,4 +21,4 @@ TEST(MarginWords, AreTwoDigitsUpwards) {
 }
 
 }  // namespace
-}  // namespace wheelwright::margin_words_test
+}  // namespace wheelwright::words::margin_words_test

@@ -10,8 +10,7 @@
 
 #include <wheelwright/report/chart.hpp>
 
-namespace wheelwright::report {
-using namespace words;
+namespace wheelwright::words {
 namespace {
 
 // Reads what the text functions write; no exponents.
@@ -89,7 +88,7 @@ TEST(Plural, CountsInWords) {
   EXPECT_EQ(plural(0, "event"), "no events");
   EXPECT_EQ(plural(1, "event"), "1 event");
   EXPECT_EQ(plural(12000, "event"), "12\u202f000 events");
-  EXPECT_EQ(enumerated({"a", "b", "c"}), "a, b and c");
+  EXPECT_EQ(core::enumerated({"a", "b", "c"}), "a, b and c");
 }
 
 TEST(TimeAxis, CountsFromTheStartOfAnEpochClock) {
@@ -112,4 +111,4 @@ TEST(TimeAxis, LaysRunsEndToEnd) {
 }
 
 }  // namespace
-}  // namespace wheelwright::report
+}  // namespace wheelwright::words

@@ -14,14 +14,13 @@
 
 #include "report/example.hpp"
 
-namespace wheelwright::report {
-using namespace words;
+namespace wheelwright::words {
 namespace {
 
 using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
-namespace example = report_example;
+namespace example = report::report_example;
 
 std::string spoken(const Commissioning& result) {
   std::string text;
@@ -61,18 +60,18 @@ TEST(CommissionWords, RadiusChangeInvertsKappa) {
 
 TEST(CommissionWords, SayWhatTheGuaranteeStandsOn) {
   Commissioning c = example::done();
-  for (OutputNoise& noise : c.noise) {
-    noise.origin = NoiseOrigin::declared;
+  for (commission::OutputNoise& noise : c.noise) {
+    noise.origin = core::NoiseOrigin::declared;
   }
-  settle_warrants(c);
+  commission::settle_warrants(c);
   EXPECT_THAT(spoken(c), AllOf(HasSubstr("declared noise bounds"), HasSubstr("every noise"),
                                HasSubstr("(guaranteed 20.90 to 21.70)"), Not(HasSubstr("extrapolated"))));
-  c.noise_mode = NoiseMode::statistical;
-  settle_warrants(c);
+  c.noise_mode = filter::NoiseMode::statistical;
+  commission::settle_warrants(c);
   EXPECT_THAT(spoken(c), AllOf(HasSubstr("confidence"), HasSubstr("(statistical 20.90 to 21.70)"),
                                Not(HasSubstr("uarantee")), Not(HasSubstr("extrapolated"))));
   c.validation.front().outside = 2;
-  settle_warrants(c);
+  commission::settle_warrants(c);
   EXPECT_THAT(spoken(c), AllOf(HasSubstr("the log contradicts these"), HasSubstr("(extrapolated 20.90 to 21.70)"),
                                Not(HasSubstr("uarantee"))));
 }
@@ -91,7 +90,7 @@ TEST(CommissionWords, OfAnEmptySetSayTheContradictionAndWhatToDo) {
   EXPECT_EQ(standing(c), Standing::bad);
   EXPECT_THAT(spoken(c),
               AllOf(HasSubstr("1.80 times as large"), HasSubstr("2 samples of the log"), HasSubstr("What to do")));
-  const std::string page = commission_report(c, example::context(300));
+  const std::string page = report::commission_report(c, example::context(300));
   EXPECT_TRUE(example::holds(page, {"12.500\u00a0s", "31.250\u00a0s", "side of the prior"}));
   EXPECT_TRUE(example::holds(page, {"[12.500000,12.500000,\"sum\",0]"}));  // marked on the raw signals
 }
@@ -114,14 +113,14 @@ TEST(CommissionWords, FalseAlarmsAndIdleThresholdsAreNotPraised) {
   EXPECT_THAT(spoken(idle), HasSubstr("threshold of sum is much wider"));
 
   Commissioning blind = example::done();
-  for (OutputValidation& v : blind.validation) {
+  for (commission::OutputValidation& v : blind.validation) {
     v.smallest_kappa = std::numeric_limits<double>::infinity();
   }
   EXPECT_EQ(standing(blind), Standing::caution);
   EXPECT_THAT(spoken(blind), HasSubstr("no change of scale"));
 
   Commissioning coarse = example::done();
-  for (OutputValidation& v : coarse.validation) {
+  for (commission::OutputValidation& v : coarse.validation) {
     v.smallest_kappa = 0.97;
   }
   EXPECT_EQ(standing(coarse), Standing::caution);
@@ -144,41 +143,41 @@ TEST(CommissionWords, DoNotCallABoundOfThePriorOneOfTheLog) {
 
 TEST(CommissionReport, ShowsNoPhysicalValuesWithoutTheMotorsConstants) {
   Commissioning c = example::done();
-  c.model.robot.effort = EffortKind::current;
-  const std::string page = commission_report(c, example::context(300));
+  c.model.robot.effort = model::EffortKind::current;
+  const std::string page = report::commission_report(c, example::context(300));
   EXPECT_TRUE(example::holds(page, {"not identifiable", "A·s²/m"}));
   EXPECT_TRUE(example::lacks(page, {"\u00a0kg"}));
-  EXPECT_TRUE(example::lacks(commission_report(example::done(), example::context(300)), {"not identifiable"}));
+  EXPECT_TRUE(example::lacks(report::commission_report(example::done(), example::context(300)), {"not identifiable"}));
 }
 
 TEST(CommissionReport, BoundsNothingOfAnEmptySet) {
-  const ReportContext context = example::context(300);
-  EXPECT_TRUE(example::holds(commission_report(example::done(), context), {"20.90 to 21.70", "class=\"bar\""}));
-  EXPECT_TRUE(example::lacks(commission_report(example::empty(), context), {"20.90 to 21.70", "class=\"bar"}));
+  const report::ReportContext context = example::context(300);
+  EXPECT_TRUE(example::holds(report::commission_report(example::done(), context), {"20.90 to 21.70", "class=\"bar\""}));
+  EXPECT_TRUE(example::lacks(report::commission_report(example::empty(), context), {"20.90 to 21.70", "class=\"bar"}));
 }
 
 TEST(CommissionReport, PhysicalValuesFollowFromTheta) {
   // θ_1 = r m: 2.13 kg·m at r = 0.1 m is 21.3 kg.
-  const std::string page = commission_report(example::done(), example::context(300));
+  const std::string page = report::commission_report(example::done(), example::context(300));
   EXPECT_TRUE(example::holds(page, {">21.30<", ">2.130<", "20.90 to 21.70", "2.090 to 2.170"}));
 }
 
 TEST(FailureReport, ShowsTheErrorAndTheRawSignals) {
-  const std::string page = failure_report("the log lacks the column tau_r", example::context(300));
+  const std::string page = report::failure_report("the log lacks the column tau_r", example::context(300));
   EXPECT_TRUE(example::holds(page, {"the log lacks the column tau_r", "\"omega_r\"", "Wheel speeds"}));
 }
 
 TEST(DetectReport, SaysWhenAndWhereTheFirstEventCame) {
   const OnlineModel model = example::done().model;
-  const std::string page = detect_report(example::detection(900, true), model, example::context(900));
+  const std::string page = report::detect_report(example::detection(900, true), model, example::context(900));
   EXPECT_TRUE(example::holds(
       page, {"1 event", "first alarm came at 6.020\u00a0s in the output sum",
              "Of 9.000\u00a0s of driving, 3.00\u00a0s in the output sum contradict the fault-free model.",
              "[6.000000,9.000000,\"1\",0]"}));
-  const std::string healthy = detect_report(example::detection(900, false), model, example::context(900));
+  const std::string healthy = report::detect_report(example::detection(900, false), model, example::context(900));
   EXPECT_TRUE(example::holds(healthy, {"No fault was seen", "30.0 %"}));
   EXPECT_TRUE(example::lacks(healthy, {"first alarm"}));
 }
 
 }  // namespace
-}  // namespace wheelwright::report
+}  // namespace wheelwright::words
