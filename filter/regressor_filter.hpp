@@ -3,7 +3,6 @@
 /// Recursive torque filter: from samples to rows {τ_f, Y_f}, for batch and on-line use.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <span>
 #include <vector>
@@ -11,10 +10,9 @@
 #include <Eigen/Core>
 
 #include <wheelwright/core/regression.hpp>
-#include <wheelwright/filter/effort_correction.hpp>
+#include <wheelwright/filter/element_filter.hpp>
 #include <wheelwright/filter/kernel.hpp>
 #include <wheelwright/filter/measurement.hpp>
-#include <wheelwright/filter/motion_bound.hpp>
 #include <wheelwright/filter/noise.hpp>
 #include <wheelwright/model/model.hpp>
 
@@ -63,7 +61,7 @@ class RegressorFilter {
   RegressorFilter(Model model, FilterDesign design, Measurement measurement, SignalErrors errors = {});
 
   /// Forgets all samples: the next one starts a segment.
-  void restart();
+  void restart() { elements_.restart(); }
 
   /// Takes the sample at time `t` (s): motion of each joint, effort of each joint, heading where
   /// Measurement::heading_column names one (the order of Measurement::columns()). `t` must exceed that of the sample
@@ -75,108 +73,53 @@ class RegressorFilter {
 
   /// The instant at the last sample.
   [[nodiscard]] const FilteredRow& row() const { return row_; }
-  [[nodiscard]] const Model& model() const { return model_; }
+  [[nodiscard]] const Model& model() const { return elements_.model(); }
   [[nodiscard]] const FilterDesign& design() const { return design_; }
-  [[nodiscard]] const Measurement& measurement() const { return measurement_; }
+  [[nodiscard]] const Measurement& measurement() const { return elements_.measurement(); }
   /// Outputs and parameters of a row.
-  [[nodiscard]] std::size_t outputs() const { return model_.n(); }
-  [[nodiscard]] std::size_t parameters() const { return model_.p(); }
+  [[nodiscard]] std::size_t outputs() const { return model().n(); }
+  [[nodiscard]] std::size_t parameters() const { return model().p(); }
   /// What dY and dy are made of; zeros where nothing was given.
-  [[nodiscard]] const SignalErrors& errors() const { return errors_; }
+  [[nodiscard]] const SignalErrors& errors() const { return elements_.errors(); }
 
   /// Number of instants since the segment began: one for each step between two samples (for speeds: for each sample)
   /// that the filter has taken.
-  [[nodiscard]] std::size_t instants() const { return instants_; }
+  [[nodiscard]] std::size_t instants() const { return elements_.instants(); }
   /// Time of the last instant, s: the end of the last step taken.
-  [[nodiscard]] double instant() const { return t_; }
+  [[nodiscard]] double instant() const { return elements_.instant(); }
   /// Speeds of the model's coordinates at that instant: means over the step that ends there, for speeds the sample.
-  [[nodiscard]] const Eigen::VectorXd& speed() const { return speed_; }
+  [[nodiscard]] const Eigen::VectorXd& speed() const { return elements_.speed(); }
   /// Speeds of the joints, alike.
-  [[nodiscard]] const Eigen::VectorXd& joint_speed() const { return joint_speed_; }
+  [[nodiscard]] const Eigen::VectorXd& joint_speed() const { return elements_.joint_speed(); }
   /// Heading at that instant, rad: measured where there is a column for it, else odometry from the segment's start. In
   /// the middle of the step for angles and mean speeds.
-  [[nodiscard]] double heading() const { return heading_; }
+  [[nodiscard]] double heading() const { return elements_.heading(); }
   /// True if row() is there only because the segment began at standstill, exactly: other noise might have hidden that.
   [[nodiscard]] bool rests_on_standstill() const {
-    return angles_ && at_rest_ && (t_ - t0_) * design_.beta < design_.settle && errors_.joint_sample > 0.0;
+    return elements_.angles() && elements_.at_rest() &&
+           (elements_.instant() - elements_.first_instant()) * design_.beta < design_.settle &&
+           errors().joint_sample > 0.0;
   }
   /// Length of the last step, s.
-  [[nodiscard]] double step_length() const { return length_; }
+  [[nodiscard]] double step_length() const { return elements_.step_length(); }
 
  private:
-  // What a sample brings: motion and effort of the joints.
-  struct Sample {
-    double t = 0.0;
-    Eigen::VectorXd joint;
-    Eigen::VectorXd effort;  // at the stamp
-    Eigen::VectorXd over;    // held efforts: what acts in the step that ends at the stamp
-    double heading = 0.0;
-  };
-  // Integrals of a step's effort with weights that fall from 1 to 0 and rise from 0 to 1, over its length; doubt alike.
-  struct StepEffort {
-    Eigen::VectorXd falling, rising, doubt;
-  };
-  struct FunctionTerm {
-    std::size_t term;
-    KernelState value{};
-    KernelState error{};
-  };
-
-  [[nodiscard]] const Sample& sample(std::size_t age) const {
-    return ring_[(newest_ + ring_.size() - age) % ring_.size()];
-  }
-  void read(double t, std::span<const double> sample);
-  void read_effort(Sample& now, std::span<const double> sample);
-  [[nodiscard]] bool take();
-  bool describe(std::size_t age);
-  void measure_motion(const Sample& now, const Sample& before);
-  bool measure_effort(std::size_t age);
-  void effort_of_range(double begin, double end);
-  [[nodiscard]] bool effort_is_covered(double end) const;
   void begin();
-  void follow_angles();
-  void follow_speeds();
-  void curve_effort(double a, double b, const Eigen::VectorXd& first, const Eigen::VectorXd& middle,
-                    const Eigen::VectorXd& last, double corrected, double covered);
+  void follow();
   [[nodiscard]] bool settled() const;
   void write_row();
 
-  Model model_;
+  ElementFilter elements_;
   FilterDesign design_;
-  Measurement measurement_;
-  SignalErrors errors_;
-  StepEnclosure enclosure_;
-  EffortCorrector corrector_;
-  bool angles_ = false;    // steps between angles, measured or those behind mean speeds
-  std::size_t ahead_ = 0;  // samples that efforts are known ahead of the motion that is filtered
-  bool ranged_ = false;    // efforts are late by an unknown time
-
-  std::vector<Sample> ring_;
-  std::size_t newest_ = 0;
-  std::size_t samples_ = 0;  // of this segment
-  std::size_t instants_ = 0;
-  bool after_loss_ = false;  // the segment begins after lost rows
-  bool at_rest_ = false;     // the segment begins at standstill
-
   FilterKernel kernel_;
-  double t0_ = 0.0;  // first instant
-  double t_ = 0.0;   // last instant
-  double length_ = 0.0, length_before_ = 0.0;
-  double heading_ = 0.0;
-  Eigen::VectorXd speed_, speed_before_, joint_speed_;
-  StepMotion step_, step_before_;
-  StepEffort effort_, effort_before_;
-  Eigen::VectorXd curve_, curve_doubt_;  // of the efforts about the node
-  std::vector<KernelState> motion_;      // driven by the coordinates' speeds
-  std::vector<KernelState> slope_;       // driven by their derivatives
+  std::vector<KernelState> motion_;  // driven by the coordinates' speeds
+  std::vector<KernelState> slope_;   // driven by their derivatives
   std::vector<KernelState> torque_, torque_doubt_;
+  std::vector<KernelState> functions_, function_doubt_;
   std::vector<KernelState> motion_doubt_;   // speeds: error of the trapezoidal rule
   std::vector<SlopeMajorant> slope_doubt_;  // angles: the same, by the slope of the kernel
   std::vector<double> first_doubt_;         // of a segment's first step, where the kernel rises from 0
   KernelState area_, start_;                // of a constant 1, and of the first node alone
-  double first_length_ = 0.0;
-  std::vector<FunctionTerm> functions_;
-  Eigen::VectorXd low_, high_, scratch_, effort_change_;
   FilteredRow row_;
 };
 

@@ -1,0 +1,401 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/commission/risk_set.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <variant>
+
+#include <wheelwright/bounds/slab_rows.hpp>
+#include <wheelwright/core/check.hpp>
+#include <wheelwright/core/limits.hpp>
+#include <wheelwright/filter/element_filter.hpp>
+#include <wheelwright/filter/predictable_regressor.hpp>
+#include <wheelwright/filter/sample_weights.hpp>
+
+namespace wheelwright::commission {
+namespace {
+
+using core::RowMatrix;
+using filter::ElementFilter;
+using filter::PredictableRegressor;
+using filter::SampleWeight;
+using filter::SampleWeights;
+using filter::WeakSummation;
+
+// Times of the first and last element of every segment.
+struct Stretch {
+  double first = 0.0, last = 0.0;
+  std::size_t elements = 0;
+};
+
+// begin() where a segment does, element(stretch) for each element, end() where a segment's last element was.
+template <typename Begin, typename Each, typename End>
+void walk(LogSource& log, ElementFilter& filter, Begin&& begin, Each&& each, End&& end) {
+  const std::vector<std::size_t> pick = core::positions_of(log, filter.measurement().columns());
+  std::vector<double> sample(pick.size());
+  bool open = false;
+  filter.restart();
+  core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
+    if (starts) {
+      filter.restart();
+    }
+    for (std::size_t c = 0; c < pick.size(); ++c) {
+      sample[c] = block.columns[pick[c]][k];
+    }
+    const bool element = filter.step(block.t[k], sample);
+    if (filter.began()) {
+      if (open) {
+        end();
+      }
+      begin();
+      open = true;
+    }
+    if (element) {
+      each();
+    }
+  });
+  if (open) {
+    end();
+  }
+}
+
+// Weights rise from 0 over a time after a segment's first element and fall to 0 before its last.
+double taper(const Stretch& stretch, double from, double t) {
+  constexpr double kOver = 1.0;  // s
+  return std::clamp(std::min(t - from, stretch.last - t) / kOver, 0.0, 1.0);
+}
+
+// What one delay's instruments make of the log, for one block of parameters.
+struct Ellipsoid {
+  double delay = 0.0;
+  std::vector<Eigen::Index> block;
+  Eigen::MatrixXd M, V, V0;
+  double squared_radius = 0.0, log_volume = 0.0;
+  bool usable = false;
+};
+
+// Parameters that share an output, together.
+std::vector<std::vector<Eigen::Index>> blocks_of(const Model& model) {
+  std::vector<bounds::HalfSpace> rows(model.n());
+  for (bounds::HalfSpace& row : rows) {
+    row.a = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(model.p()));
+  }
+  for (const Term& term : model.terms) {
+    rows[term.output].a[static_cast<Eigen::Index>(term.parameter)] = 1.0;
+  }
+  std::vector<std::vector<Eigen::Index>> result;
+  for (const std::vector<std::size_t>& block : bounds::independent_blocks(rows, model.p())) {
+    result.emplace_back(block.begin(), block.end());
+  }
+  return result;
+}
+
+constexpr double kSpread = 0.01;      // η of (a + b)(a + b)ᵀ <= (1 + η) aaᵀ + (1 + 1/η) bbᵀ
+constexpr double kExpected = 0.1;     // V0 is this share of the V that the log's beginning makes expect
+constexpr double kRounding = 1e-10;   // relative, of all sums
+
+class Learner {
+ public:
+  Learner(LogSource& log, const ElementFilter& filter, const filter::ErrorClasses& classes,
+          filter::ParameterBox box, const RiskSetOptions& options)
+      : log_(log), filter_(filter), classes_(classes), box_(std::move(box)), options_(options) {
+    walk(
+        log_, filter_, [&] { stretches_.push_back({}); },
+        [&] {
+          Stretch& s = stretches_.back();
+          const double t = filter_.element().t;
+          s.first = s.elements++ == 0 ? t : s.first;
+          s.last = t;
+        },
+        [] {});
+    correlation_ = std::max(classes_.motion.correlation, classes_.effort.correlation);
+    std::size_t elements = 0;
+    for (const Stretch& s : stretches_) {
+      elements += s.elements;
+    }
+    learning_ = static_cast<std::size_t>(options.learning * static_cast<double>(elements));
+    expected_ = learning_ > 0 ? static_cast<double>(elements) / static_cast<double>(learning_) : 0.0;
+  }
+
+  // Of every delay and block.
+  [[nodiscard]] std::vector<Ellipsoid> ellipsoids(const std::vector<std::vector<Eigen::Index>>& blocks) {
+    const std::size_t count = options_.delays.size();
+    const auto p = box_.middle.size();
+    const Eigen::MatrixXd none = Eigen::MatrixXd::Zero(p, p);
+    std::vector<Eigen::MatrixXd> V(count, none), V0 = V, spread = V, spread0 = V;
+    std::vector<PredictableRegressor> foreseen;
+    std::vector<SampleWeights> weights;
+    std::vector<WeakSummation> sums;
+    for (const double delay : options_.delays) {
+      foreseen.emplace_back(filter_, delay, correlation_);
+      weights.emplace_back(filter_, box_, p);
+      sums.emplace_back(filter_, p);
+    }
+    std::size_t taken = 0, stretch = 0;
+    bool learning = learning_ > 0;
+    double from = 0.0;
+    std::size_t b = 0;
+    const auto sink = [&](const SampleWeight& s) {
+      const filter::SampleClass c = sample_class(classes_, s);
+      if (!c.averages) {
+        return;
+      }
+      const double square = c.multiplicity * c.bound * c.bound;
+      (learning ? V0 : V)[b].noalias() += square * s.middle * s.middle.transpose();
+      if (s.sensor == SampleWeight::Sensor::motion) {
+        (learning ? spread0 : spread)[b].diagonal() += (square * static_cast<double>(p)) * s.spread.cwiseAbs2();
+      }
+    };
+    RowMatrix g;
+    walk(
+        log_, filter_,
+        [&] {
+          for (b = 0; b < count; ++b) {
+            foreseen[b].begin();
+            weights[b].begin();
+            sums[b].begin();
+          }
+          from = stretches_[stretch].first;
+        },
+        [&] {
+          const double t = filter_.element().t;
+          if (learning && ++taken > learning_) {
+            for (b = 0; b < count; ++b) {
+              weights[b].end(sink);
+              weights[b].begin();
+            }
+            learning = false;
+            from = t;
+          }
+          const double share = taper(stretches_[stretch], from, t);
+          for (b = 0; b < count; ++b) {
+            foreseen[b].take(filter_);
+            g = foreseen[b].value() * share;
+            weights[b].take(filter_, g, sink);
+            if (!learning) {
+              sums[b].take(filter_, g);
+            }
+          }
+        },
+        [&] {
+          for (b = 0; b < count; ++b) {
+            weights[b].end(sink);
+            sums[b].end(filter_);
+          }
+          ++stretch;
+        });
+    std::vector<Ellipsoid> result;
+    const double risk = options_.risk / static_cast<double>(count * blocks.size());
+    for (b = 0; b < count; ++b) {
+      for (const std::vector<Eigen::Index>& block : blocks) {
+        Ellipsoid e{options_.delays[b], block, sums[b].sums().Y(block, block), {}, {}};
+        e.V = (1.0 + kSpread) * V[b](block, block);
+        e.V += (1.0 + 1.0 / kSpread) * spread[b](block, block);
+        e.V0 = kExpected * expected_ * (V0[b](block, block) + spread0[b](block, block));
+        finish(e, risk);
+        result.push_back(std::move(e));
+      }
+    }
+    return result;
+  }
+
+  // Sums for columns of `directions`, each with the bandwidth of `of`.
+  [[nodiscard]] std::vector<RiskFacet> facets(const std::vector<Ellipsoid>& ellipsoids,
+                                              const std::vector<Eigen::VectorXd>& directions,
+                                              const std::vector<std::size_t>& of) {
+    const auto count = static_cast<Eigen::Index>(directions.size());
+    std::vector<PredictableRegressor> foreseen;
+    for (const Ellipsoid& e : ellipsoids) {
+      foreseen.emplace_back(filter_, e.delay, correlation_);
+    }
+    SampleWeights weights(filter_, box_, count);
+    WeakSummation sums(filter_, count);
+    std::vector<filter::ErrorShare> shares(directions.size());
+    const auto sink = [&](const SampleWeight& s) {
+      const filter::SampleClass c = sample_class(classes_, s);
+      for (std::size_t d = 0; d < shares.size(); ++d) {
+        const auto i = static_cast<Eigen::Index>(d);
+        add(shares[d], c, std::abs(s.middle[i]) + s.spread[i]);
+      }
+    };
+    std::size_t taken = 0, stretch = 0;
+    bool learning = learning_ > 0;
+    double from = 0.0;
+    RowMatrix g(static_cast<Eigen::Index>(filter_.model().n()), count);
+    walk(
+        log_, filter_,
+        [&] {
+          for (PredictableRegressor& f : foreseen) {
+            f.begin();
+          }
+          weights.begin();
+          sums.begin();
+          from = stretches_[stretch].first;
+        },
+        [&] {
+          const double t = filter_.element().t;
+          if (learning && ++taken > learning_) {
+            learning = false;
+            from = t;
+          }
+          for (PredictableRegressor& f : foreseen) {
+            f.take(filter_);
+          }
+          if (learning) {
+            return;
+          }
+          for (Eigen::Index d = 0; d < count; ++d) {
+            const std::size_t b = of[static_cast<std::size_t>(d)];
+            g.col(d).noalias() = foreseen[b].value() * directions[static_cast<std::size_t>(d)];
+          }
+          g *= taper(stretches_[stretch], from, t);
+          weights.take(filter_, g, sink);
+          sums.take(filter_, g);
+        },
+        [&] {
+          weights.end(sink);
+          sums.end(filter_);
+          ++stretch;
+        });
+    std::vector<RiskFacet> result(directions.size());
+    for (std::size_t d = 0; d < result.size(); ++d) {
+      const auto i = static_cast<Eigen::Index>(d);
+      const Ellipsoid& e = ellipsoids[of[d]];
+      RiskFacet& f = result[d];
+      f.Y = sums.sums().Y.row(i);
+      f.dY = sums.sums().dY.row(i);
+      f.y = sums.sums().y[i];
+      f.delay = e.delay;
+      f.weights = directions[d];
+      f.share = shares[d];
+      const Eigen::VectorXd x = f.weights(e.block);
+      const double prior = x.dot(e.V0 * x);
+      f.radius = std::min(std::sqrt((f.share.squares + prior) * e.squared_radius), f.share.worst - f.share.straight);
+      const double size = std::abs(f.y) + f.Y.cwiseAbs().dot(box_.middle.cwiseAbs() + box_.radius);
+      f.dy = f.radius + f.share.straight + sums.sums().dy[i] + kRounding * (size + f.share.worst);
+    }
+    return result;
+  }
+
+ private:
+  static void finish(Ellipsoid& e, double risk) {
+    const double floor = 1e-6 * e.V0.diagonal().maxCoeff();
+    e.V0.diagonal() += 1e-3 * e.V0.diagonal() + Eigen::VectorXd::Constant(e.V0.rows(), floor > 0.0 ? floor : 1.0);
+    const Eigen::VectorXd scale = e.V0.diagonal().cwiseSqrt().cwiseInverse();
+    const auto log_det = [&](const Eigen::MatrixXd& A) {
+      const Eigen::LLT<Eigen::MatrixXd> llt(scale.asDiagonal() * A * scale.asDiagonal());
+      return llt.info() == Eigen::Success ? 2.0 * llt.matrixLLT().diagonal().array().log().sum()
+                                          : std::numeric_limits<double>::quiet_NaN();
+    };
+    e.log_volume = log_det(e.V + e.V0) - log_det(e.V0);
+    e.squared_radius = 2.0 * std::log(1.0 / risk) + e.log_volume;
+    e.usable = std::isfinite(e.squared_radius);
+  }
+
+  LogSource& log_;
+  ElementFilter filter_;
+  const filter::ErrorClasses& classes_;
+  filter::ParameterBox box_;
+  const RiskSetOptions& options_;
+  std::vector<Stretch> stretches_;
+  std::size_t learning_ = 0;
+  double expected_ = 0.0, correlation_ = 0.0;
+};
+
+}  // namespace
+
+RiskSet risk_set(LogSource& log, const Model& model, const Measurement& measurement,
+                 const filter::SignalErrors& errors, const filter::ErrorClasses& classes,
+                 const bounds::Polytope& guaranteed, const RiskSetOptions& options) {
+  check::that(options.risk > 0.0 && options.risk < 1.0, "risk", "between 0 and 1");
+  check::that(!options.delays.empty(), "delays of the weights", "at least one");
+  validate(classes);
+  RiskSet result;
+  const auto p = static_cast<Eigen::Index>(model.p());
+  filter::ParameterBox box{Eigen::VectorXd(p), Eigen::VectorXd(p)};
+  for (Eigen::Index j = 0; j < p; ++j) {
+    const Interval& side = guaranteed.hull().sides[static_cast<std::size_t>(j)];
+    box.middle[j] = 0.5 * (side.lower + side.upper);
+    box.radius[j] = std::nextafter(std::max(side.upper - box.middle[j], box.middle[j] - side.lower), core::kInfinity);
+  }
+  Learner learner(log, ElementFilter(model, measurement, errors), classes, box, options);
+  const std::vector<std::vector<Eigen::Index>> blocks = blocks_of(model);
+  const std::vector<Ellipsoid> ellipsoids = learner.ellipsoids(blocks);
+
+  std::vector<Eigen::VectorXd> directions;  // of instruments
+  std::vector<std::size_t> of;
+  // Takes the ellipsoid that is narrowest along `w`, and returns its half width.
+  const auto consider = [&](const Eigen::VectorXd& w, const std::vector<Eigen::Index>& block) {
+    double best = core::kInfinity;
+    std::size_t which = 0;
+    Eigen::VectorXd at;
+    for (std::size_t b = 0; b < ellipsoids.size(); ++b) {
+      const Ellipsoid& e = ellipsoids[b];
+      if (!e.usable || e.block != block) {
+        continue;
+      }
+      const Eigen::FullPivLU<Eigen::MatrixXd> lu(e.M.transpose());
+      if (!lu.isInvertible()) {
+        continue;
+      }
+      const Eigen::VectorXd x = lu.solve(w(block));
+      const double half = std::sqrt(x.dot((e.V + e.V0) * x) * e.squared_radius);
+      if (half < best) {
+        best = half;
+        which = b;
+        at = Eigen::VectorXd::Zero(p);
+        at(block) = x;
+      }
+    }
+    if (best < core::kInfinity) {
+      directions.push_back(at);
+      of.push_back(which);
+      result.log_volume = std::max(result.log_volume, ellipsoids[which].log_volume);
+    }
+    return best;
+  };
+  // Parameters, then sums and differences of any two, each in units of what is known of it.
+  for (const std::vector<Eigen::Index>& block : blocks) {
+    Eigen::VectorXd width = box.radius;
+    for (const Eigen::Index j : block) {
+      width[j] = std::min(consider(Eigen::VectorXd::Unit(p, j), block), box.radius[j]);
+    }
+    for (std::size_t a = 0; a < block.size(); ++a) {
+      for (std::size_t b = a + 1; b < block.size(); ++b) {
+        const Eigen::Index j = block[a], k = block[b];
+        for (const double sign : {1.0, -1.0}) {
+          if (width[j] > 0.0 && width[k] > 0.0) {
+            consider(Eigen::VectorXd::Unit(p, j) / width[j] + sign * Eigen::VectorXd::Unit(p, k) / width[k], block);
+          }
+        }
+      }
+    }
+  }
+  if (directions.empty()) {
+    result.reason = "the log does not show all parameters";
+    return result;
+  }
+  result.facets = learner.facets(ellipsoids, directions, of);
+  std::vector<bounds::HalfSpace> rows = guaranteed.facets();
+  const bounds::SlabRows slabs(guaranteed.hull());
+  for (std::size_t d = 0; d < result.facets.size(); ++d) {
+    const RiskFacet& f = result.facets[d];
+    bounds::HalfSpace upper, lower;
+    bounds::RowOrigin origin;
+    origin.sample = d;
+    slabs.half_spaces({f.Y.data(), static_cast<std::size_t>(p)}, {f.dY.data(), static_cast<std::size_t>(p)}, f.y, f.dy,
+                      origin, upper, lower);
+    rows.push_back(std::move(upper));
+    rows.push_back(std::move(lower));
+  }
+  auto set = bounds::Polytope::intersect(rows, guaranteed.hull());
+  if (std::holds_alternative<bounds::Polytope>(set)) {
+    result.set = std::get<bounds::Polytope>(std::move(set));
+  } else {
+    result.reason = "the log contradicts what is assumed of its errors";
+  }
+  return result;
+}
+
+}  // namespace wheelwright::commission

@@ -1,0 +1,509 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/filter/element_filter.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <wheelwright/core/check.hpp>
+#include <wheelwright/core/limits.hpp>
+
+namespace wheelwright::filter {
+namespace {
+
+constexpr double kAlike = 0.05;  // relative: steps alike enough for a parabola through past efforts
+
+double sign(double x) { return static_cast<double>(x > 0.0) - static_cast<double>(x < 0.0); }
+
+// result = matrix · x, each sum from the first column to the last: the same digits in every language and build.
+void multiply(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& x, Eigen::VectorXd& result) {
+  for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
+    double sum = matrix(i, 0) * x[0];
+    for (Eigen::Index j = 1; j < matrix.cols(); ++j) {
+      sum += matrix(i, j) * x[j];
+    }
+    result[i] = sum;
+  }
+}
+
+// The same with |matrix|.
+void multiply_sizes(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& x, Eigen::VectorXd& result) {
+  for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
+    double sum = std::abs(matrix(i, 0)) * x[0];
+    for (Eigen::Index j = 1; j < matrix.cols(); ++j) {
+      sum += std::abs(matrix(i, j)) * x[j];
+    }
+    result[i] = sum;
+  }
+}
+
+double cube(double x) { return x * x * x; }
+
+std::size_t steps_within(double time, double nominal) {
+  return time > 0.0 ? static_cast<std::size_t>(std::ceil(time / nominal)) + 1 : 0;
+}
+
+}  // namespace
+
+ElementFilter::ElementFilter(Model model, Measurement measurement, SignalErrors errors)
+    : model_(std::move(model)), measurement_(std::move(measurement)), errors_(std::move(errors)) {
+  model::validate(model_);
+  const auto joints = static_cast<Eigen::Index>(model_.joints.size());
+  const auto coordinates = static_cast<Eigen::Index>(model_.coordinates.size());
+  const auto n = static_cast<Eigen::Index>(model_.n());
+  check::that(measurement_.motion_columns.size() == model_.joints.size() &&
+                  measurement_.effort_columns.size() == model_.joints.size(),
+              "measurement", "one motion and one effort column for each joint");
+  check::that(measurement_.delay.lower <= measurement_.delay.upper, "effort delay", "lower <= upper");
+  ranged_ = measurement_.delay.lower != 0.0 || measurement_.delay.upper != 0.0;
+  check::that(!ranged_ || measurement_.nominal_step > 0.0, "effort delay", "a measurement with a nominal step");
+  check::that(!ranged_ || measurement_.correction.empty(), "effort delay",
+              "efforts that no effect of the robot corrects (effects know a delay of their own)");
+  angles_ = measurement_.motion != MotionKind::speed;
+  const bool mean = measurement_.motion == MotionKind::mean_speed;
+  std::size_t back = 3;
+  ahead_ = mean ? 1 : 0;
+  if (ranged_) {
+    ahead_ = steps_within(measurement_.delay.upper + (mean ? 0.5 : 0.0) * measurement_.nominal_step,
+                          measurement_.nominal_step);
+    back += steps_within(-measurement_.delay.lower, measurement_.nominal_step);
+  }
+  if (errors_.acceleration.size() == 0) {
+    errors_.acceleration = errors_.speed = errors_.speed_sample = Eigen::VectorXd::Zero(coordinates);
+  }
+  if (errors_.output.size() == 0) {
+    errors_.output = Eigen::VectorXd::Zero(n);
+  }
+  if (errors_.motion.effort.size() == 0) {
+    errors_.motion.effort = Eigen::VectorXd::Zero(n);
+  }
+  enclosure_ = StepEnclosure(model_, errors_.between_samples ? errors_.motion : MotionBound{});
+  const Eigen::VectorXd joint_zero = Eigen::VectorXd::Zero(joints), output_zero = Eigen::VectorXd::Zero(n);
+  ring_.assign(ahead_ + back, Sample{0.0, joint_zero, joint_zero, joint_zero, 0.0});
+  speed_ = speed_before_ = Eigen::VectorXd::Zero(coordinates);
+  joint_speed_ = low_ = high_ = scratch_ = joint_zero;
+  step_ = step_before_ = StepMotion(model_);
+  effort_ = effort_before_ = {output_zero, output_zero, output_zero};
+  curve_ = curve_doubt_ = effort_change_ = output_zero;
+  for (std::size_t k = 0; k < model_.terms.size(); ++k) {
+    if (model_.terms[k].kind == Term::Kind::function) {
+      functions_.push_back(k);
+    }
+  }
+  if (!measurement_.correction.empty()) {
+    corrector_ =
+        EffortCorrector(measurement_.correction, model_.joints.size(), measurement_.hold, measurement_.nominal_step);
+    measurement_.changes = model::EffortChanges::at_samples;
+  }
+  element_.motion = element_.slope = element_.motion_doubt = element_.motion_doubt_before = speed_;
+  element_.torque = element_.torque_doubt = output_zero;
+  element_.functions.resize(functions_.size());
+}
+
+void ElementFilter::restart() {
+  samples_ = 0;
+  instants_ = 0;
+  after_loss_ = false;
+  corrector_.restart();
+}
+
+void ElementFilter::read(double t, std::span<const double> sample) {
+  newest_ = newest_ + 1 < ring_.size() ? newest_ + 1 : 0;
+  ++samples_;
+  Sample& now = ring_[newest_];
+  now.t = t;
+  for (Eigen::Index j = 0; j < now.joint.size(); ++j) {
+    const double value = sample[static_cast<std::size_t>(j)];
+    now.joint[j] = measurement_.count > 0.0 ? std::round(value / measurement_.count) * measurement_.count : value;
+  }
+  now.heading = measurement_.heading_column.empty() ? 0.0 : sample.back();
+  read_effort(now, sample);
+}
+
+void ElementFilter::read_effort(Sample& now, std::span<const double> sample) {
+  const auto joints = static_cast<std::size_t>(now.joint.size());
+  const Sample& before = ring_[(newest_ + ring_.size() - 1) % ring_.size()];
+  for (std::size_t j = 0; j < joints; ++j) {
+    const auto i = static_cast<Eigen::Index>(j);
+    const double value = sample[joints + j];
+    if (measurement_.effort_unsigned) {
+      const bool angle = measurement_.motion == MotionKind::angle;
+      const double moved = !angle ? now.joint[i] : samples_ > 1 ? now.joint[i] - before.joint[i] : 0.0;
+      now.effort[i] = std::abs(value) * sign(moved);
+    } else {
+      now.effort[i] = value;
+    }
+  }
+  if (corrector_.empty()) {
+    now.over = before.effort;
+    return;
+  }
+  corrector_.step(now.t, now.effort.data());
+  for (std::size_t j = 0; j < joints; ++j) {
+    const auto i = static_cast<Eigen::Index>(j);
+    now.over[i] = corrector_.mean(j);  // what acted since the last sample is known now
+    now.effort[i] = corrector_.now(j);
+  }
+}
+
+void ElementFilter::measure_motion(const Sample& now, const Sample& before) {
+  StepMotion& step = step_;
+  switch (measurement_.motion) {
+    case MotionKind::angle:
+      for (Eigen::Index j = 0; j < now.joint.size(); ++j) {
+        step.joint_speed[j] = (now.joint[j] - before.joint[j]) / step.length;
+      }
+      break;
+    case MotionKind::mean_speed: step.joint_speed = now.joint; break;
+    case MotionKind::speed:
+      for (Eigen::Index j = 0; j < now.joint.size(); ++j) {
+        step.joint_speed[j] = 0.5 * (before.joint[j] + now.joint[j]);
+      }
+      break;
+  }
+  multiply(model_.motion, step.joint_speed, step.speed);
+  const double error = angles_ && errors_.joint_sample > 0.0 ? measurement_.nominal_step / step.length : 1.0;
+  step.joint_error.setConstant(error * errors_.joint_sample);
+  for (Eigen::Index c = 0; c < step.speed.size(); ++c) {
+    step.speed_error[c] = error * errors_.speed_sample[c];
+  }
+}
+
+// All values that may act between `begin` and `end` where logged efforts are late by anything in the declared range.
+void ElementFilter::effort_of_range(double begin, double end) {
+  const double from = begin + measurement_.delay.lower, to = end + measurement_.delay.upper;
+  low_.setConstant(core::kInfinity);
+  high_.setConstant(-core::kInfinity);
+  // From the last stamp before the range to the first behind it: a value may change right after its stamp, or before
+  // it.
+  const std::size_t held = std::min(samples_, ring_.size());
+  for (std::size_t k = 0; k < held; ++k) {
+    const bool behind = sample(k).t > to && k + 1 < held && sample(k + 1).t >= to;
+    const bool gone = k > 0 && sample(k - 1).t <= from;
+    if (behind || gone) {
+      continue;
+    }
+    for (Eigen::Index j = 0; j < low_.size(); ++j) {
+      low_[j] = std::min(low_[j], sample(k).effort[j]);
+      high_[j] = std::max(high_[j], sample(k).effort[j]);
+    }
+  }
+}
+
+bool ElementFilter::effort_is_covered(double end) const {
+  return !ranged_ || sample(0).t >= end + measurement_.delay.upper;
+}
+
+// Effort in the step whose motion ends with the sample of `age`.
+bool ElementFilter::measure_effort(std::size_t age) {
+  const Sample& now = sample(age);
+  const Sample& before = sample(age + 1);
+  const bool held = measurement_.hold == Hold::zero_order;
+  const bool mean = measurement_.motion == MotionKind::mean_speed;
+  const bool between = measurement_.changes == model::EffortChanges::between;
+  // Without bounds the nominal hold is taken: the middle of what is possible would be half a step late.
+  const bool hull = ranged_ || (held && between && errors_.between_samples);
+  StepEffort& e = effort_;
+  e.doubt.setZero();
+  if (hull) {
+    if (ranged_) {
+      const double shift = mean ? 0.5 * step_.length : 0.0;
+      effort_of_range(before.t + shift, now.t + shift);
+    } else {
+      low_ = before.effort.cwiseMin(now.effort);
+      high_ = before.effort.cwiseMax(now.effort);
+      if (mean) {
+        low_ = low_.cwiseMin(sample(age - 1).effort);
+        high_ = high_.cwiseMax(sample(age - 1).effort);
+      }
+    }
+    for (Eigen::Index j = 0; j < low_.size(); ++j) {
+      scratch_[j] = 0.25 * (low_[j] + high_[j]);
+    }
+    multiply(model_.input, scratch_, e.falling);
+    e.rising = e.falling;
+  } else if (!mean) {
+    if (held) {
+      low_ = high_ = now.over;
+      scratch_ = 0.5 * now.over;
+      multiply(model_.input, scratch_, e.falling);
+      e.rising = e.falling;
+    } else {
+      low_ = before.effort.cwiseMin(now.effort);
+      high_ = before.effort.cwiseMax(now.effort);
+      scratch_ = (2.0 * before.effort + now.effort) / 6.0;
+      multiply(model_.input, scratch_, e.falling);
+      scratch_ = (before.effort + 2.0 * now.effort) / 6.0;
+      multiply(model_.input, scratch_, e.rising);
+    }
+  } else {  // the stamp is in the middle of the step
+    const Sample& next = sample(age - 1);
+    if (held) {
+      low_ = now.over.cwiseMin(next.over);
+      high_ = now.over.cwiseMax(next.over);
+      scratch_ = (3.0 * now.over + next.over) / 8.0;
+      multiply(model_.input, scratch_, e.falling);
+      scratch_ = (now.over + 3.0 * next.over) / 8.0;
+      multiply(model_.input, scratch_, e.rising);
+    } else {
+      low_ = before.effort.cwiseMin(now.effort).cwiseMin(next.effort);
+      high_ = before.effort.cwiseMax(now.effort).cwiseMax(next.effort);
+      if (between) {
+        scratch_ = 0.5 * now.effort;
+        multiply(model_.input, scratch_, e.falling);
+        e.rising = e.falling;
+      } else {
+        scratch_ = (5.0 * before.effort + 18.0 * now.effort + next.effort) / 48.0;
+        multiply(model_.input, scratch_, e.falling);
+        scratch_ = (before.effort + 18.0 * now.effort + 5.0 * next.effort) / 48.0;
+        multiply(model_.input, scratch_, e.rising);
+      }
+    }
+  }
+  scratch_ = 0.5 * (high_ - low_);
+  multiply_sizes(model_.input, scratch_, effort_change_);
+  if (hull) {
+    e.doubt = effort_change_;
+  }
+  for (Eigen::Index i = 0; i < e.doubt.size(); ++i) {
+    step_.effort[i] = std::abs(e.falling[i] + e.rising[i]) + effort_change_[i] + errors_.motion.effort[i];
+  }
+  return effort_is_covered(mean ? now.t + 0.5 * step_.length : now.t);
+}
+
+bool ElementFilter::describe(std::size_t age) {
+  const Sample& now = sample(age);
+  const Sample& before = sample(age + 1);
+  std::swap(step_, step_before_);
+  std::swap(effort_, effort_before_);
+  length_before_ = length_;
+  const bool mean = measurement_.motion == MotionKind::mean_speed;
+  length_ = mean && measurement_.nominal_step > 0.0 ? measurement_.nominal_step : now.t - before.t;
+  step_.length = length_;
+  measure_motion(now, before);
+  if (measurement_.heading_column.empty()) {
+    const bool first = instants_ == (angles_ ? 0U : 1U);
+    const auto c = static_cast<Eigen::Index>(std::max(model_.heading_coordinate, 0));
+    step_.heading =
+        first || model_.heading_coordinate < 0
+            ? 0.0
+            : step_before_.heading + 0.5 * (length_before_ * step_before_.speed[c] + length_ * step_.speed[c]);
+  } else {
+    step_.heading = 0.5 * (before.heading + now.heading);
+  }
+  step_.heading_error = errors_.heading;
+  return measure_effort(age) && enclosure_.enclose(model_, step_);
+}
+
+// q − `corrected`, with `covered` in doubt, both times the curvature of a parabola through three efforts, `a` and `b`
+// apart.
+void ElementFilter::curve_effort(double a, double b, const Eigen::VectorXd& first, const Eigen::VectorXd& middle,
+                                   const Eigen::VectorXd& last, double corrected, double covered) {
+  for (Eigen::Index j = 0; j < scratch_.size(); ++j) {
+    scratch_[j] = 2.0 * ((last[j] - middle[j]) / b - (middle[j] - first[j]) / a) / (a + b);
+  }
+  multiply(model_.input, scratch_, curve_);
+  for (Eigen::Index i = 0; i < curve_.size(); ++i) {
+    curve_[i] *= corrected;
+  }
+  scratch_ = scratch_.cwiseAbs();
+  multiply_sizes(model_.input, scratch_, curve_doubt_);
+  for (Eigen::Index i = 0; i < curve_doubt_.size(); ++i) {
+    curve_doubt_[i] *= covered;
+  }
+}
+
+void ElementFilter::begin() {
+  began_ = true;
+  at_rest_ = speed_.isZero(0.0) && (corrector_.empty() || effort_.falling.isZero(0.0));
+  first_length_ = length_;
+  element_.number = 0;
+}
+
+// The node between the last two steps, and the way to the end of the last.
+void ElementFilter::make_hat() {
+  const double h = length_, before = length_before_;
+  const bool linear = measurement_.hold == Hold::first_order && measurement_.changes == model::EffortChanges::between;
+  curve_.setZero();
+  curve_doubt_.setZero();
+  if (linear && !ranged_) {
+    const Sample &first = sample(ahead_ + 2), &middle = sample(ahead_ + 1), &last = sample(ahead_);
+    if (measurement_.motion == MotionKind::angle) {
+      const double least = 2.0 * cube(std::min(h, before)) / 24.0, most = (cube(h) + cube(before)) / 24.0;
+      curve_effort(before, h, first.effort, middle.effort, last.effort, least, std::max(least, most - least));
+    } else {
+      const Sample& next = sample(ahead_ - 1);
+      scratch_ = (first.effort - middle.effort - last.effort + next.effort).cwiseAbs() / 48.0;
+      multiply_sizes(model_.input, scratch_, curve_doubt_);
+      curve_doubt_ *= h;
+    }
+  }
+  element_.t = t_ - h;
+  element_.length = 0.5 * (before + h);
+  element_.before = before;
+  element_.step = h;
+  for (Eigen::Index c = 0; c < element_.motion.size(); ++c) {
+    element_.motion[c] = 0.5 * (before * step_before_.speed[c] + h * step_.speed[c]);
+    element_.slope[c] = step_.speed[c] - step_before_.speed[c];
+    element_.motion_doubt[c] = step_.acceleration[c] * cube(h) / 12.0;
+    element_.motion_doubt_before[c] = step_before_.acceleration[c] * cube(before) / 12.0;
+  }
+  for (Eigen::Index i = 0; i < element_.torque.size(); ++i) {
+    element_.torque[i] = before * effort_before_.rising[i] + h * effort_.falling[i] - curve_[i];
+    element_.torque_doubt[i] = 0.5 * (before * effort_before_.doubt[i] + h * effort_.doubt[i]) + curve_doubt_[i];
+  }
+  for (std::size_t k = 0; k < functions_.size(); ++k) {
+    const model::TermValue &first = step_before_.values[k], &second = step_.values[k];
+    element_.functions[k] = {0.5 * (before * first.value + h * second.value),
+                             0.5 * (before * first.error + h * second.error)};
+  }
+}
+
+// The step between the last two samples.
+void ElementFilter::make_step() {
+  const double h = length_;
+  const bool linear = measurement_.hold == Hold::first_order && measurement_.changes == model::EffortChanges::between;
+  curve_.setZero();
+  curve_doubt_.setZero();
+  if (linear && !ranged_) {
+    if (instants_ > 2) {
+      const bool even = std::abs(h - length_before_) <= kAlike * h;
+      curve_effort(length_before_, h, sample(2).effort, sample(1).effort, sample(0).effort, even ? cube(h) / 12.0 : 0.0,
+                   cube(h) / 12.0);
+    } else {
+      curve_doubt_ = h * effort_change_;
+    }
+  }
+  const bool exact = measurement_.hold == Hold::zero_order && measurement_.changes == model::EffortChanges::at_samples;
+  for (Eigen::Index i = 0; i < effort_change_.size(); ++i) {
+    effort_change_[i] = exact && !ranged_ ? 0.0 : 2.0 * (effort_change_[i] + errors_.motion.effort[i]);
+  }
+  element_.t = t_;
+  element_.length = element_.before = element_.step = h;
+  for (std::size_t c = 0; c < static_cast<std::size_t>(element_.motion.size()); ++c) {
+    const auto i = static_cast<Eigen::Index>(c);
+    element_.motion[i] = h * step_.speed[i];
+    element_.slope[i] = speed_[i] - speed_before_[i];
+    element_.motion_doubt[i] = 0.0;
+    if (step_.acceleration[i] > 0.0) {
+      const double change = enclosure_.change(c, model_, step_, effort_change_);
+      element_.motion_doubt[i] = std::min(0.25 * step_.acceleration[i], 0.125 * change) * h * h;
+    }
+  }
+  for (Eigen::Index i = 0; i < element_.torque.size(); ++i) {
+    element_.torque[i] = h * (effort_.falling[i] + effort_.rising[i]) - curve_[i];
+    element_.torque_doubt[i] = h * effort_.doubt[i] + curve_doubt_[i];
+  }
+  for (std::size_t k = 0; k < functions_.size(); ++k) {
+    element_.functions[k] = {h * step_.values[k].value, h * step_.values[k].error};
+  }
+}
+
+// Held, linear, stamps at samples or in the middle of the steps: as measure_effort() and curve_effort() have them.
+ElementFilter::EffortWeights ElementFilter::effort_weights() const {
+  const bool held = measurement_.hold == Hold::zero_order;
+  const bool mean = measurement_.motion == MotionKind::mean_speed;
+  const bool between = measurement_.changes == model::EffortChanges::between;
+  if (ranged_ || !corrector_.empty() || measurement_.effort_unsigned || (held && between)) {
+    return {};
+  }
+  const double a = element_.before, b = element_.step;
+  if (!angles_) {
+    if (held) {
+      return {true, {0.0, 0.0, b, 0.0}};
+    }
+    EffortWeights w{true, {0.0, 0.0, 0.5 * b, 0.5 * b}};
+    if (between && instants_ > 2 && std::abs(b - length_before_) <= kAlike * b) {
+      const double first = 2.0 * cube(b) / 12.0 / (length_before_ + b);
+      w.weight[1] -= first / length_before_;
+      w.weight[2] += first / length_before_ + first / b;
+      w.weight[3] -= first / b;
+    }
+    return w;
+  }
+  if (mean) {
+    return held      ? EffortWeights{true, {a / 8.0, 3.0 * (a + b) / 8.0, b / 8.0, 0.0}}
+           : between ? EffortWeights{true, {0.0, 0.5 * a, 0.5 * b, 0.0}}
+                     : EffortWeights{
+                           true, {a / 48.0, (18.0 * a + 5.0 * b) / 48.0, (5.0 * a + 18.0 * b) / 48.0, b / 48.0}};
+  }
+  if (held) {
+    return {true, {0.5 * a, 0.5 * b, 0.0, 0.0}};
+  }
+  EffortWeights w{true, {a / 6.0, (a + b) / 3.0, b / 6.0, 0.0}};
+  if (between) {
+    const double by = 2.0 * (2.0 * cube(std::min(a, b)) / 24.0) / (a + b);
+    w.weight[0] -= by / a;
+    w.weight[1] += by / a + by / b;
+    w.weight[2] -= by / b;
+  }
+  return w;
+}
+
+bool ElementFilter::take() {
+  const std::size_t age = ahead_;
+  const std::size_t needed = angles_ ? ring_.size() - 1 : 1 + (ring_.size() - 3);
+  if (samples_ < std::min(needed, ring_.size())) {
+    return false;
+  }
+  speed_.swap(speed_before_);
+  if (!angles_ && instants_ == 0) {
+    const Sample& now = sample(age);
+    joint_speed_ = now.joint;
+    multiply(model_.motion, joint_speed_, speed_);
+    instants_ = 1;
+    t0_ = t_ = now.t;
+    heading_ = now.heading;
+    return false;
+  }
+  if (!describe(age)) {
+    const bool lost = after_loss_;
+    restart();
+    after_loss_ = lost;
+    return false;
+  }
+  const Sample& now = sample(age);
+  const double h = length_;
+  t_ = measurement_.motion == MotionKind::mean_speed ? now.t + 0.5 * h : now.t;
+  if (angles_) {
+    joint_speed_ = step_.joint_speed;
+    speed_ = step_.speed;
+    heading_ = step_.heading;
+  } else {
+    joint_speed_ = now.joint;
+    multiply(model_.motion, joint_speed_, speed_);
+    heading_ = measurement_.heading_column.empty()
+                   ? (model_.heading_coordinate >= 0
+                          ? heading_ + h * step_.speed[static_cast<Eigen::Index>(model_.heading_coordinate)]
+                          : 0.0)
+                   : now.heading;
+  }
+  ++instants_;
+  if (angles_ ? instants_ == 1 : instants_ == 2) {
+    begin();
+    if (angles_) {
+      t0_ = t_;
+      return false;
+    }
+  }
+  if (angles_) {
+    make_hat();
+  } else {
+    make_step();
+  }
+  ++element_.number;
+  return true;
+}
+
+bool ElementFilter::step(double t, std::span<const double> sample) {
+  const double longest = measurement_.longest_step();
+  if (samples_ > 0 && longest > 0.0 && t - ring_[newest_].t > longest) {
+    restart();
+    after_loss_ = true;
+  }
+  read(t, sample);
+  began_ = false;
+  return take();
+}
+
+}  // namespace wheelwright::filter

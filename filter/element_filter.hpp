@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Elements of the weak form: the equation of motion times a short weight, integrated, sample by sample.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include <wheelwright/filter/effort_correction.hpp>
+#include <wheelwright/filter/measurement.hpp>
+#include <wheelwright/filter/motion_bound.hpp>
+#include <wheelwright/filter/noise.hpp>
+#include <wheelwright/model/model.hpp>
+
+namespace wheelwright::filter {
+
+/// The equation (20) multiplied by a weight ω and integrated. For angles and mean speeds ω is a hat: 1 at a sample, 0
+/// at those before and after it, linear between; with s_k the mean speed of the step before t_k, h_k its length,
+///
+///     ∫ ω φ̈ dt = s_k+1 − s_k          ∫ ω φ̇ dt = (h_k s_k + h_k+1 s_k+1)/2 + what the slope of ω makes of φ̈
+///
+/// For speeds ω is 1 in a step and 0 outside. Any weight that is linear between samples (constant in each step) is a
+/// sum of these, so that every regression on this equation is made of elements: Σ g_k (element k).
+struct WeakElement {
+  std::size_t number = 0;     ///< from 1 on in a segment
+  double t = 0.0;             ///< s, its sample (angles), the end of its step (speeds)
+  double length = 0.0;        ///< s, ∫ ω
+  double before = 0.0;        ///< s, from the sample before to its sample (angles); its step (speeds)
+  double step = 0.0;          ///< s, from its sample to the next one (angles); its step (speeds)
+  Eigen::VectorXd motion;     ///< per coordinate: ∫ ω φ̇
+  Eigen::VectorXd slope;      ///< per coordinate: ∫ ω φ̈, exactly
+  Eigen::VectorXd torque;     ///< per output: ∫ ω u
+  Eigen::VectorXd torque_doubt;  ///< per output: what efforts may do between samples
+  /// Per coordinate; speeds: what the trapezoidal rule may miss. Angles: the most that ∫ (s − middle)(φ̇ − s_k) ds is in
+  /// the step after the sample, by which the *slope* of a sum's weights is to be multiplied.
+  Eigen::VectorXd motion_doubt;
+  Eigen::VectorXd motion_doubt_before;  ///< angles: the same of the step before the sample
+  std::vector<model::TermValue> functions;  ///< ∫ ω f of each function term, in their order
+};
+
+/// Makes elements of samples: reads them as a Measurement says, bounds what may happen between them. Everything that
+/// RegressorFilter promises of its signals before they are filtered. step() does not allocate.
+class ElementFilter {
+ public:
+  ElementFilter() = default;
+  /// `errors` as for RegressorFilter. Throws InvalidArgument when `model` or `measurement` is not valid.
+  ElementFilter(Model model, Measurement measurement, SignalErrors errors = {});
+
+  /// Forgets all samples: the next one starts a segment.
+  void restart();
+
+  /// Takes the sample at time `t` (RegressorFilter::step). Returns whether element() is a new one.
+  bool step(double t, std::span<const double> sample);
+
+  /// The newest.
+  [[nodiscard]] const WeakElement& element() const { return element_; }
+  /// True if the last sample was the one with which a segment's first step is known: what was summed up before belongs
+  /// to another segment.
+  [[nodiscard]] bool began() const { return began_; }
+
+  [[nodiscard]] const Model& model() const { return model_; }
+  [[nodiscard]] const Measurement& measurement() const { return measurement_; }
+  [[nodiscard]] const SignalErrors& errors() const { return errors_; }
+  /// Numbers of the terms of the model that are functions.
+  [[nodiscard]] const std::vector<std::size_t>& functions() const { return functions_; }
+  /// True if elements are hats at samples.
+  [[nodiscard]] bool angles() const { return angles_; }
+
+  /// RegressorFilter says what these are.
+  [[nodiscard]] std::size_t instants() const { return instants_; }
+  [[nodiscard]] double instant() const { return t_; }
+  [[nodiscard]] double first_instant() const { return t0_; }
+  [[nodiscard]] const Eigen::VectorXd& speed() const { return speed_; }
+  [[nodiscard]] const Eigen::VectorXd& joint_speed() const { return joint_speed_; }
+  [[nodiscard]] double heading() const { return heading_; }
+  [[nodiscard]] double step_length() const { return length_; }
+  /// The last step.
+  [[nodiscard]] const StepMotion& last_step() const { return step_; }
+  /// True if the segment begins at standstill without effort.
+  [[nodiscard]] bool at_rest() const { return at_rest_; }
+  /// True if the segment begins after lost rows.
+  [[nodiscard]] bool after_loss() const { return after_loss_; }
+  /// Length of the segment's first step, s.
+  [[nodiscard]] double first_length() const { return first_length_; }
+  /// Efforts' correction.
+  [[nodiscard]] const EffortCorrector& corrector() const { return corrector_; }
+
+  /// Weights with which logged efforts stand in the torque of the newest element, of four consecutive samples: from the
+  /// one before its own sample on (angles), up to the end of its step (speeds). Not `exact` where torque is no fixed sum
+  /// of logged efforts: late by an unknown time, changing at an unknown moment, or corrected.
+  struct EffortWeights {
+    bool exact = false;
+    std::array<double, 4> weight{};  ///< s, oldest first
+  };
+  [[nodiscard]] EffortWeights effort_weights() const;
+
+ private:
+  // What a sample brings: motion and effort of the joints.
+  struct Sample {
+    double t = 0.0;
+    Eigen::VectorXd joint;
+    Eigen::VectorXd effort;  // at the stamp
+    Eigen::VectorXd over;    // held efforts: what acts in the step that ends at the stamp
+    double heading = 0.0;
+  };
+  // Integrals of a step's effort with weights that fall from 1 to 0 and rise from 0 to 1, over its length; doubt alike.
+  struct StepEffort {
+    Eigen::VectorXd falling, rising, doubt;
+  };
+
+  [[nodiscard]] const Sample& sample(std::size_t age) const {
+    return ring_[(newest_ + ring_.size() - age) % ring_.size()];
+  }
+  void read(double t, std::span<const double> sample);
+  void read_effort(Sample& now, std::span<const double> sample);
+  [[nodiscard]] bool take();
+  bool describe(std::size_t age);
+  void measure_motion(const Sample& now, const Sample& before);
+  bool measure_effort(std::size_t age);
+  void effort_of_range(double begin, double end);
+  [[nodiscard]] bool effort_is_covered(double end) const;
+  void begin();
+  void make_hat();
+  void make_step();
+  void curve_effort(double a, double b, const Eigen::VectorXd& first, const Eigen::VectorXd& middle,
+                    const Eigen::VectorXd& last, double corrected, double covered);
+
+  Model model_;
+  Measurement measurement_;
+  SignalErrors errors_;
+  StepEnclosure enclosure_;
+  EffortCorrector corrector_;
+  bool angles_ = false;    // steps between angles, measured or those behind mean speeds
+  std::size_t ahead_ = 0;  // samples that efforts are known ahead of the motion that is filtered
+  bool ranged_ = false;    // efforts are late by an unknown time
+  std::vector<std::size_t> functions_;
+
+  std::vector<Sample> ring_;
+  std::size_t newest_ = 0;
+  std::size_t samples_ = 0;  // of this segment
+  std::size_t instants_ = 0;
+  bool after_loss_ = false;
+  bool at_rest_ = false;
+  bool began_ = false;
+
+  double t0_ = 0.0;  // first instant
+  double t_ = 0.0;   // last instant
+  double length_ = 0.0, length_before_ = 0.0;
+  double first_length_ = 0.0;
+  double heading_ = 0.0;
+  Eigen::VectorXd speed_, speed_before_, joint_speed_;
+  StepMotion step_, step_before_;
+  StepEffort effort_, effort_before_;
+  Eigen::VectorXd curve_, curve_doubt_;  // of the efforts about the node
+  Eigen::VectorXd low_, high_, scratch_, effort_change_;
+  WeakElement element_;
+};
+
+}  // namespace wheelwright::filter
