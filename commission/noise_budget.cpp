@@ -85,6 +85,29 @@ NoiseBudget noise_budget(const Robot& robot, const Measurement& measurement) {
   return budget;
 }
 
+std::optional<filter::ErrorClasses> error_classes(const Robot& robot, const Measurement& measurement) {
+  const NoiseBudget budget = noise_budget(robot, measurement);
+  if (!budget.complete || !robot.noise.effort.bias) {
+    return std::nullopt;
+  }
+  filter::ErrorClasses classes;
+  classes.shortest_step = measurement.shortest_step > 0.0 ? measurement.shortest_step : measurement.nominal_step;
+  classes.effort = {budget.sensors.effort, *robot.noise.effort.bias, robot.noise.effort.correlation};
+  const model::NoiseBound& angle =
+      model::on_two_wheels(robot) ? robot.noise.wheel_angle : robot.noise.position;
+  const bool speed = measurement.motion == MotionKind::speed;
+  const model::NoiseBound& motion = speed ? robot.noise.wheel_speed : angle;
+  const bool declared = speed || (measurement.motion == MotionKind::angle && angle.value);
+  classes.motion.bound = budget.sensors.motion;
+  if (declared) {
+    classes.motion.bias = motion.bias.value_or(classes.motion.bound);
+    classes.motion.correlation = motion.correlation;
+  } else {
+    classes.count = 2.0 * classes.motion.bound;
+  }
+  return classes;
+}
+
 Eigen::VectorXd coordinate_limit(const Model& model, const std::vector<double>& joint_limit) {
   return model.motion.cwiseAbs() *
          Eigen::Map<const Eigen::VectorXd>(joint_limit.data(), static_cast<Eigen::Index>(joint_limit.size()));

@@ -13,6 +13,7 @@
 #include <wheelwright/bounds/minimax.hpp>
 #include <wheelwright/core/regression.hpp>
 #include <wheelwright/core/warrant.hpp>
+#include <wheelwright/filter/error_class.hpp>
 #include <wheelwright/filter/measurement.hpp>
 #include <wheelwright/filter/noise.hpp>
 #include <wheelwright/identify/least_squares.hpp>
@@ -62,6 +63,10 @@ struct NoiseBudget {
 /// Otherwise the equation error as a whole is estimated from the residuals: it then holds the noise of all sensors, and
 /// adding propagated bounds to it would count them twice.
 [[nodiscard]] NoiseBudget noise_budget(const Robot& robot, const Measurement& measurement);
+
+/// What the robot file says of errors that average out; nothing where it declares no bias, or not all bounds. Rounding of
+/// an encoder has no bias while its wheel moves by several counts a sample (error_class.hpp).
+[[nodiscard]] std::optional<filter::ErrorClasses> error_classes(const Robot& robot, const Measurement& measurement);
 
 /// `limit` of each joint (acceleration_limit) as one of each coordinate of `model`.
 [[nodiscard]] Eigen::VectorXd coordinate_limit(const Model& model, const std::vector<double>& joint_limit);

@@ -60,7 +60,7 @@ void walk(LogSource& log, ElementFilter& filter, Begin&& begin, Each&& each, End
   }
 }
 
-// Weights rise from 0 over a time after a segment's first element and fall to 0 before its last.
+// Weights rise from 0 over a time from `from` on, and fall to 0 before a segment's last element.
 double taper(const Stretch& stretch, double from, double t) {
   constexpr double kOver = 1.0;  // s
   return std::clamp(std::min(t - from, stretch.last - t) / kOver, 0.0, 1.0);
@@ -71,6 +71,7 @@ struct Ellipsoid {
   double delay = 0.0;
   std::vector<Eigen::Index> block;
   Eigen::MatrixXd M, V, V0;
+  Eigen::VectorXd straight;  // per instrument: ErrorShare::straight
   double squared_radius = 0.0, log_volume = 0.0;
   bool usable = false;
 };
@@ -94,6 +95,52 @@ std::vector<std::vector<Eigen::Index>> blocks_of(const Model& model) {
 constexpr double kSpread = 0.01;      // η of (a + b)(a + b)ᵀ <= (1 + η) aaᵀ + (1 + 1/η) bbᵀ
 constexpr double kExpected = 0.1;     // V0 is this share of the V that the log's beginning makes expect
 constexpr double kRounding = 1e-10;   // relative, of all sums
+
+// What becomes of a block's elements: first V0 is learnt from those in which the foreseen torque stands above the
+// efforts' errors, then sums begin; between both is a pause, in which no weights stand.
+class Phase {
+ public:
+  Phase(const Model& model, const std::vector<Eigen::Index>& block, const Eigen::VectorXd& theta, double effort_bound,
+        std::size_t to_learn)
+      : to_learn_(to_learn) {
+    for (std::size_t i = 0; i < model.n(); ++i) {
+      const bool has = std::ranges::any_of(model.terms, [&](const Term& term) {
+        return term.output == i && static_cast<Eigen::Index>(term.parameter) == block.front();
+      });
+      if (has) {
+        const auto at = static_cast<Eigen::Index>(i);
+        outputs_.push_back({at, effort_bound * model.input.row(at).cwiseAbs().sum()});
+      }
+    }
+    theta_ = Eigen::VectorXd::Zero(theta.size());
+    theta_(block) = theta(block);
+  }
+  void begin_segment(double first) { from_ = first; }
+  // The next element, at time `t` with the foreseen regressor `foreseen`.
+  void step(const RowMatrix& foreseen, double t) {
+    if (!learnt_) {
+      const bool shows = std::ranges::any_of(
+          outputs_, [&](const auto& o) { return std::abs(foreseen.row(o.first).dot(theta_)) > o.second; });
+      seen_ += shows ? 1 : 0;
+      learnt_ = seen_ > to_learn_;
+    } else if (since_ < kPause && ++since_ == kPause) {
+      from_ = t;
+    }
+  }
+  [[nodiscard]] bool learning() const { return !learnt_; }
+  [[nodiscard]] bool in_use() const { return since_ == kPause; }
+  // Whether errors that are handed out now belong to V0.
+  [[nodiscard]] bool of_prior() const { return since_ < kPause / 2; }
+  [[nodiscard]] double from() const { return from_; }
+
+ private:
+  static constexpr std::size_t kPause = 16;  // twice what SampleWeights holds
+  std::size_t to_learn_, seen_ = 0, since_ = 0;
+  bool learnt_ = false;
+  double from_ = 0.0;
+  std::vector<std::pair<Eigen::Index, double>> outputs_;
+  Eigen::VectorXd theta_;
+};
 
 class Learner {
  public:
@@ -124,6 +171,7 @@ class Learner {
     const auto p = box_.middle.size();
     const Eigen::MatrixXd none = Eigen::MatrixXd::Zero(p, p);
     std::vector<Eigen::MatrixXd> V(count, none), V0 = V, spread = V, spread0 = V;
+    std::vector<Eigen::VectorXd> straight(count, Eigen::VectorXd::Zero(p));
     std::vector<PredictableRegressor> foreseen;
     std::vector<SampleWeights> weights;
     std::vector<WeakSummation> sums;
@@ -132,19 +180,25 @@ class Learner {
       weights.emplace_back(filter_, box_, p);
       sums.emplace_back(filter_, p);
     }
-    std::size_t taken = 0, stretch = 0;
-    bool learning = learning_ > 0;
-    double from = 0.0;
+    std::vector<Phase> phases = phases_of(blocks);
+    std::size_t stretch = 0;
     std::size_t b = 0;
     const auto sink = [&](const SampleWeight& s) {
       const filter::SampleClass c = sample_class(classes_, s);
+      straight[b] += (c.averages ? c.bias : c.bound) * (s.middle.cwiseAbs() + s.spread);
       if (!c.averages) {
         return;
       }
       const double square = c.multiplicity * c.bound * c.bound;
-      (learning ? V0 : V)[b].noalias() += square * s.middle * s.middle.transpose();
-      if (s.sensor == SampleWeight::Sensor::motion) {
-        (learning ? spread0 : spread)[b].diagonal() += (square * static_cast<double>(p)) * s.spread.cwiseAbs2();
+      for (std::size_t k = 0; k < blocks.size(); ++k) {
+        Eigen::MatrixXd& to = (phases[k].of_prior() ? V0 : V)[b];
+        Eigen::MatrixXd& wide = (phases[k].of_prior() ? spread0 : spread)[b];
+        for (const Eigen::Index i : blocks[k]) {
+          for (const Eigen::Index j : blocks[k]) {
+            to(i, j) += square * s.middle[i] * s.middle[j];
+          }
+          wide(i, i) += square * static_cast<double>(blocks[k].size()) * s.spread[i] * s.spread[i];
+        }
       }
     };
     RowMatrix g;
@@ -156,26 +210,24 @@ class Learner {
             weights[b].begin();
             sums[b].begin();
           }
-          from = stretches_[stretch].first;
+          for (Phase& phase : phases) {
+            phase.begin_segment(stretches_[stretch].first);
+          }
         },
         [&] {
           const double t = filter_.element().t;
-          if (learning && ++taken > learning_) {
-            for (b = 0; b < count; ++b) {
-              weights[b].end(sink);
-              weights[b].begin();
-            }
-            learning = false;
-            from = t;
+          for (PredictableRegressor& f : foreseen) {
+            f.take(filter_);
           }
-          const double share = taper(stretches_[stretch], from, t);
+          for (Phase& phase : phases) {
+            phase.step(foreseen.front().value(), t);
+          }
           for (b = 0; b < count; ++b) {
-            foreseen[b].take(filter_);
-            g = foreseen[b].value() * share;
+            g = foreseen[b].value();
+            weigh(g, blocks, phases, stretches_[stretch], t, true);
             weights[b].take(filter_, g, sink);
-            if (!learning) {
-              sums[b].take(filter_, g);
-            }
+            weigh(g, blocks, phases, stretches_[stretch], t, false);
+            sums[b].take(filter_, g);
           }
         },
         [&] {
@@ -189,7 +241,7 @@ class Learner {
     const double risk = options_.risk / static_cast<double>(count * blocks.size());
     for (b = 0; b < count; ++b) {
       for (const std::vector<Eigen::Index>& block : blocks) {
-        Ellipsoid e{options_.delays[b], block, sums[b].sums().Y(block, block), {}, {}};
+        Ellipsoid e{options_.delays[b], block, sums[b].sums().Y(block, block), {}, {}, straight[b](block)};
         e.V = (1.0 + kSpread) * V[b](block, block);
         e.V += (1.0 + 1.0 / kSpread) * spread[b](block, block);
         e.V0 = kExpected * expected_ * (V0[b](block, block) + spread0[b](block, block));
@@ -200,8 +252,9 @@ class Learner {
     return result;
   }
 
-  // Sums for columns of `directions`, each with the bandwidth of `of`.
+  // Sums with the weights `directions`, each of the delay and block of the ellipsoid `of`.
   [[nodiscard]] std::vector<RiskFacet> facets(const std::vector<Ellipsoid>& ellipsoids,
+                                              const std::vector<std::vector<Eigen::Index>>& blocks,
                                               const std::vector<Eigen::VectorXd>& directions,
                                               const std::vector<std::size_t>& of) {
     const auto count = static_cast<Eigen::Index>(directions.size());
@@ -219,9 +272,12 @@ class Learner {
         add(shares[d], c, std::abs(s.middle[i]) + s.spread[i]);
       }
     };
-    std::size_t taken = 0, stretch = 0;
-    bool learning = learning_ > 0;
-    double from = 0.0;
+    std::vector<Phase> phases = phases_of(blocks);
+    std::vector<std::size_t> block(directions.size());
+    for (std::size_t d = 0; d < block.size(); ++d) {
+      block[d] = static_cast<std::size_t>(std::ranges::find(blocks, ellipsoids[of[d]].block) - blocks.begin());
+    }
+    std::size_t stretch = 0;
     RowMatrix g(static_cast<Eigen::Index>(filter_.model().n()), count);
     walk(
         log_, filter_,
@@ -231,25 +287,24 @@ class Learner {
           }
           weights.begin();
           sums.begin();
-          from = stretches_[stretch].first;
+          for (Phase& phase : phases) {
+            phase.begin_segment(stretches_[stretch].first);
+          }
         },
         [&] {
           const double t = filter_.element().t;
-          if (learning && ++taken > learning_) {
-            learning = false;
-            from = t;
-          }
           for (PredictableRegressor& f : foreseen) {
             f.take(filter_);
           }
-          if (learning) {
-            return;
+          for (Phase& phase : phases) {
+            phase.step(foreseen.front().value(), t);
           }
           for (Eigen::Index d = 0; d < count; ++d) {
-            const std::size_t b = of[static_cast<std::size_t>(d)];
-            g.col(d).noalias() = foreseen[b].value() * directions[static_cast<std::size_t>(d)];
+            const Phase& phase = phases[block[static_cast<std::size_t>(d)]];
+            const double share = phase.in_use() ? taper(stretches_[stretch], phase.from(), t) : 0.0;
+            g.col(d).noalias() =
+                foreseen[of[static_cast<std::size_t>(d)]].value() * (share * directions[static_cast<std::size_t>(d)]);
           }
-          g *= taper(stretches_[stretch], from, t);
           weights.take(filter_, g, sink);
           sums.take(filter_, g);
         },
@@ -279,6 +334,26 @@ class Learner {
   }
 
  private:
+  [[nodiscard]] std::vector<Phase> phases_of(const std::vector<std::vector<Eigen::Index>>& blocks) const {
+    std::vector<Phase> result;
+    for (const std::vector<Eigen::Index>& block : blocks) {
+      result.emplace_back(filter_.model(), block, box_.middle, classes_.effort.bound, learning_);
+    }
+    return result;
+  }
+
+  // Columns of `g` as their block's phase wants them: those of sums, and with `all` those that V0 is learnt from.
+  static void weigh(RowMatrix& g, const std::vector<std::vector<Eigen::Index>>& blocks,
+                    const std::vector<Phase>& phases, const Stretch& stretch, double t, bool all) {
+    for (std::size_t k = 0; k < blocks.size(); ++k) {
+      const bool learns = all && phases[k].learning();
+      const double share = learns || (all && phases[k].in_use()) ? taper(stretch, phases[k].from(), t)
+                           : phases[k].in_use()                  ? 1.0
+                                                                 : 0.0;
+      g(Eigen::all, blocks[k]) *= share;
+    }
+  }
+
   static void finish(Ellipsoid& e, double risk) {
     const double floor = 1e-6 * e.V0.diagonal().maxCoeff();
     e.V0.diagonal() += 1e-3 * e.V0.diagonal() + Eigen::VectorXd::Constant(e.V0.rows(), floor > 0.0 ? floor : 1.0);
@@ -325,11 +400,10 @@ RiskSet risk_set(LogSource& log, const Model& model, const Measurement& measurem
 
   std::vector<Eigen::VectorXd> directions;  // of instruments
   std::vector<std::size_t> of;
-  // Takes the ellipsoid that is narrowest along `w`, and returns its half width.
-  const auto consider = [&](const Eigen::VectorXd& w, const std::vector<Eigen::Index>& block) {
+  // The half width of the narrowest ellipsoid along `w`, about; takes it, or all of them.
+  const auto consider = [&](const Eigen::VectorXd& w, const std::vector<Eigen::Index>& block, bool all) {
     double best = core::kInfinity;
-    std::size_t which = 0;
-    Eigen::VectorXd at;
+    std::size_t first = directions.size();
     for (std::size_t b = 0; b < ellipsoids.size(); ++b) {
       const Ellipsoid& e = ellipsoids[b];
       if (!e.usable || e.block != block) {
@@ -340,33 +414,36 @@ RiskSet risk_set(LogSource& log, const Model& model, const Measurement& measurem
         continue;
       }
       const Eigen::VectorXd x = lu.solve(w(block));
-      const double half = std::sqrt(x.dot((e.V + e.V0) * x) * e.squared_radius);
-      if (half < best) {
-        best = half;
-        which = b;
-        at = Eigen::VectorXd::Zero(p);
-        at(block) = x;
+      const double half =
+          std::sqrt(x.dot((e.V + e.V0) * x) * e.squared_radius) + x.cwiseAbs().dot(e.straight);
+      if (all || half < best) {
+        if (!all) {
+          directions.resize(first);
+          of.resize(first);
+        }
+        directions.emplace_back(Eigen::VectorXd::Zero(p));
+        directions.back()(block) = x;
+        of.push_back(b);
+        result.log_volume = std::max(result.log_volume, e.log_volume);
       }
-    }
-    if (best < core::kInfinity) {
-      directions.push_back(at);
-      of.push_back(which);
-      result.log_volume = std::max(result.log_volume, ellipsoids[which].log_volume);
+      best = std::min(best, half);
     }
     return best;
   };
-  // Parameters, then sums and differences of any two, each in units of what is known of it.
+  // Parameters, then sums and differences of any two, each in units of what is known of it. Every
+  // ellipsoid holds, so that of a parameter's facets the sharpest may be chosen when their sums are known.
   for (const std::vector<Eigen::Index>& block : blocks) {
     Eigen::VectorXd width = box.radius;
     for (const Eigen::Index j : block) {
-      width[j] = std::min(consider(Eigen::VectorXd::Unit(p, j), block), box.radius[j]);
+      width[j] = std::min(consider(Eigen::VectorXd::Unit(p, j), block, true), box.radius[j]);
     }
     for (std::size_t a = 0; a < block.size(); ++a) {
       for (std::size_t b = a + 1; b < block.size(); ++b) {
         const Eigen::Index j = block[a], k = block[b];
         for (const double sign : {1.0, -1.0}) {
           if (width[j] > 0.0 && width[k] > 0.0) {
-            consider(Eigen::VectorXd::Unit(p, j) / width[j] + sign * Eigen::VectorXd::Unit(p, k) / width[k], block);
+            consider(Eigen::VectorXd::Unit(p, j) / width[j] + sign * Eigen::VectorXd::Unit(p, k) / width[k],
+                     block, false);
           }
         }
       }
@@ -376,7 +453,7 @@ RiskSet risk_set(LogSource& log, const Model& model, const Measurement& measurem
     result.reason = "the log does not show all parameters";
     return result;
   }
-  result.facets = learner.facets(ellipsoids, directions, of);
+  result.facets = learner.facets(ellipsoids, blocks, directions, of);
   std::vector<bounds::HalfSpace> rows = guaranteed.facets();
   const bounds::SlabRows slabs(guaranteed.hull());
   for (std::size_t d = 0; d < result.facets.size(); ++d) {

@@ -12,6 +12,7 @@
 #include <wheelwright/bounds/slab_rows.hpp>
 #include <wheelwright/core/warrant.hpp>
 #include <wheelwright/detector/detector.hpp>
+#include <wheelwright/filter/error_class.hpp>
 #include <wheelwright/filter/measurement.hpp>
 #include <wheelwright/filter/noise.hpp>
 #include <wheelwright/filter/odometry_filter.hpp>
@@ -36,6 +37,17 @@ struct KinematicModel : LearntSet {
   filter::OdometryErrors errors{};  ///< of the rows of driving to come
 };
 
+/// What a detector at a stated risk needs (scale_detector.hpp).
+struct RiskModel {
+  double risk = 1e-9;             ///< that the set lacks the true θ
+  filter::ErrorClasses errors{};  ///< what is assumed of the sensors' errors
+  std::vector<bounds::HalfSpace> facets{};
+  Box box{};
+  std::vector<double> scales{};  ///< s, of the sums
+  double delay = 0.0;            ///< s, by which their weights foresee
+  Eigen::MatrixXd usual{};       ///< weights × scales: variance of a sum's errors on the log that was learnt from
+};
+
 /// A commissioned robot as it is watched: the channel of the torque residual (the estimate is θ̂_L), and that of the
 /// kinematic residual where the log had a pose or a gyro.
 struct OnlineModel : LearntSet {
@@ -45,6 +57,7 @@ struct OnlineModel : LearntSet {
   FilterDesign filter{};
   filter::SignalErrors errors{};  ///< dY and dy of the rows, ē included
   std::optional<KinematicModel> kinematic{};
+  std::optional<RiskModel> at_risk{};  ///< where the robot file declares errors that average out
   std::vector<core::Assumption> assumptions{};  ///< behind the numbers, with the verdict of the log on each
 };
 

@@ -43,6 +43,9 @@ enum class SpeedSource {
 /// A bound |n| <= value on the noise of a sensor, or the wish that it be estimated from the log.
 struct NoiseBound {
   std::optional<double> value;  ///< unit of the column; nothing means "estimate"
+  /// Whatever happened before, the mean of an error is within ±bias; nothing: anything up to the bound, for ever.
+  std::optional<double> bias{};
+  double correlation = 0.0;  ///< s, from which on errors know nothing of each other; read where there is a bias
 };
 
 /// Declared noise of the sensors. A bound that is not declared is estimated.

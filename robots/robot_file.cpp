@@ -216,9 +216,27 @@ struct RobotReader {
                                  : name == "effort"      ? robot.noise.effort
                                  : name == "position"    ? robot.noise.position
                                                          : robot.noise.heading;
-      if (!(value.is_scalar() && value.text() == "estimate")) {
+      if (value.is_mapping() && (name == "wheel_speed" || name == "wheel_angle" || name == "effort")) {
+        read_error_class(value, bound);
+      } else if (!(value.is_scalar() && value.text() == "estimate")) {
         bound.value = value.number("a bound >= 0, or estimate", [](double number) { return number >= 0.0; });
       }
+    }
+  }
+
+  static void read_error_class(const YamlPlace& place, model::NoiseBound& bound) {
+    const auto not_negative = [](double number) { return number >= 0.0; };
+    for (const auto& [name, value] : place.members({"bound", "bias", "correlation"})) {
+      if (name == "bound") {
+        bound.value = value.number("a bound >= 0", not_negative);
+      } else if (name == "bias") {
+        bound.bias = value.number("a bias >= 0", not_negative);
+      } else {
+        bound.correlation = value.number("a time >= 0 in s", not_negative);
+      }
+    }
+    if (!bound.value || !bound.bias || *bound.bias > *bound.value) {
+      place.fail("{bound: B, bias: b, correlation: seconds} with 0 <= b <= B (correlation may be left out)");
     }
   }
 
@@ -272,7 +290,16 @@ Robot robot_from_json(const Json& object, const std::string& where) {
 
 namespace {
 
-Json noise_bound(const model::NoiseBound& bound) { return bound.value ? Json(*bound.value) : Json("estimate"); }
+Json noise_bound(const model::NoiseBound& bound) {
+  if (!bound.value || !bound.bias) {
+    return bound.value ? Json(*bound.value) : Json("estimate");
+  }
+  Json out = {{"bound", *bound.value}, {"bias", *bound.bias}};
+  if (bound.correlation > 0.0) {
+    out["correlation"] = bound.correlation;
+  }
+  return out;
+}
 
 Json noise_of(const model::SensorNoise& noise) {
   return {{"wheel_speed", noise_bound(noise.wheel_speed)},

@@ -1,0 +1,346 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/detector/scale_detector.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include <wheelwright/core/check.hpp>
+
+namespace wheelwright::detector {
+namespace {
+
+constexpr double kRoundings = 1e-10;  // of all that is added up, relative
+constexpr double kOfUsual = 0.2;      // V0 is this share of a usual drive's V
+
+const RiskModel& demand(const OnlineModel& model) {
+  check::that(model.at_risk.has_value(), "model", "one that was learnt at a stated risk");
+  const RiskModel& risk = *model.at_risk;
+  check::that(!risk.scales.empty() && risk.delay > 0.0, "model at a stated risk", "scales, and a delay > 0");
+  for (const double scale : risk.scales) {
+    check::positive(scale, "scale");
+  }
+  return risk;
+}
+
+// Sizes of a matrix whose square bounds MᵀM for all M within middle ± radius: (1 + η) mid'mid + (1 + 1/η) |radius|².
+Eigen::MatrixXd largest_root(const Eigen::MatrixXd& middle, const Eigen::MatrixXd& radius) {
+  const double size = middle.norm(), spread = radius.norm();
+  const double eta = size > 0.0 ? std::max(spread / size, 1e-6) : 1.0;
+  Eigen::MatrixXd square = (1.0 + eta) * middle.transpose() * middle;
+  square.diagonal().array() += (1.0 + 1.0 / eta) * spread * spread + 1e-12 * (size * size + spread * spread) + 1e-300;
+  return Eigen::LLT<Eigen::MatrixXd>(square).matrixU();
+}
+
+}  // namespace
+
+std::vector<SumWeight> sum_weights(const Model& model) {
+  std::vector<SumWeight> result;
+  const auto joint = [&](std::size_t j) {
+    return model.joints.size() > 1 ? fmt::format(" {}", model.joints[j].torque) : std::string();
+  };
+  for (std::size_t j = 0; j < model.joints.size(); ++j) {
+    result.push_back({SumWeight::Shape::constant, j, "constant" + joint(j)});
+    result.push_back({SumWeight::Shape::effort, j, "effort" + joint(j)});
+  }
+  for (std::size_t q = 0; q < model.p(); ++q) {
+    result.push_back({SumWeight::Shape::parameter, q, model.parameters[q].physical});
+  }
+  return result;
+}
+
+ScaleDetector::ScaleDetector(const OnlineModel& model, ScaleDetectorOptions options)
+    : elements_(model.model, model.measurement, model.errors),
+      foreseen_(elements_, demand(model).delay,
+                std::max(model.at_risk->errors.effort.correlation, model.at_risk->errors.motion.correlation)),
+      risk_(*model.at_risk),
+      options_(options),
+      rule_(Polytope(risk_.facets, risk_.box), model.estimate),
+      weights_(sum_weights(model.model)) {
+  check::positive(options_.false_alarms, "rate of false alarms");
+  check::positive(options_.checks, "checks of a sum in its scale");
+  const Model& m = elements_.model();
+  const auto n = static_cast<Eigen::Index>(m.n()), p = static_cast<Eigen::Index>(m.p());
+  const auto joints = static_cast<Eigen::Index>(m.joints.size()), W = static_cast<Eigen::Index>(weights_.size());
+  check::that(risk_.usual.rows() == W && risk_.usual.cols() == static_cast<Eigen::Index>(risk_.scales.size()),
+              "usual variances", "one for each weight and scale");
+  inverse_ = (m.input * m.input.transpose()).inverse();
+  to_joints_ = m.input.transpose() * inverse_;
+  largest_ = Eigen::VectorXd(p);
+  Eigen::MatrixXd middle = Eigen::MatrixXd::Zero(joints, n), radius = middle;
+  speed_gain_ = Eigen::VectorXd::Zero(n);
+  for (Eigen::Index q = 0; q < p; ++q) {
+    const Interval& side = risk_.box.sides[static_cast<std::size_t>(q)];
+    largest_[q] = std::max(std::abs(side.lower), std::abs(side.upper));
+  }
+  for (const Term& term : m.terms) {
+    if (term.kind == Term::Kind::function) {
+      continue;
+    }
+    const Interval& side = risk_.box.sides[term.parameter];
+    const auto i = static_cast<Eigen::Index>(term.output);
+    for (Eigen::Index j = 0; j < joints; ++j) {
+      const double by = term.scale * m.motion(static_cast<Eigen::Index>(term.coordinate), j);
+      if (term.kind == Term::Kind::acceleration) {
+        middle(j, i) += 0.5 * (side.lower + side.upper) * by;
+        radius(j, i) += 0.5 * (side.upper - side.lower) * std::abs(by);
+      } else {
+        speed_gain_[i] += largest_[static_cast<Eigen::Index>(term.parameter)] * std::abs(by);
+      }
+    }
+  }
+  slope_gain_ = largest_root(middle, radius);
+  averages_ = elements_.effort_weights().exact && risk_.errors.effort.bias < risk_.errors.effort.bound;
+  const double correlation = risk_.errors.effort.correlation;
+  const double together = correlation > 0.0 ? std::floor(correlation / risk_.errors.shortest_step) + 1.0 : 1.0;
+  square_ = averages_ ? risk_.errors.effort.bound * risk_.errors.effort.bound * together : 0.0;
+  g_ = g1_ = g2_ = c_ = c1_ = c2_ = Eigen::MatrixXd::Zero(n, W);
+  joint_g_ = Eigen::MatrixXd::Zero(joints, W);
+  torque_ = Eigen::VectorXd::Zero(n);
+  Y_ = core::RowMatrix::Zero(n, p);
+  residual_ = straight_ = turning_ = efforts_ = efforts1_ = Eigen::ArrayXd::Zero(W);
+  rows_ = Eigen::ArrayXXd::Zero(W, p);
+  direction_.resize(static_cast<std::size_t>(p));
+  const double share = options_.false_alarms / static_cast<double>(weights_.size() * risk_.scales.size());
+  for (const double T : risk_.scales) {
+    Scale s;
+    s.T = T;
+    s.risk = std::log(options_.checks / (share * T));
+    for (Eigen::ArrayXd* state : {&s.y0, &s.y1, &s.v0, &s.v1, &s.v2, &s.l0, &s.l1, &s.u0, &s.u1, &s.u2}) {
+      *state = Eigen::ArrayXd::Zero(W);
+    }
+    s.Y0 = s.Y1 = rows_;
+    states_.push_back(std::move(s));
+  }
+  looks_.resize(weights_.size() * states_.size());
+}
+
+void ScaleDetector::restart() { elements_.restart(); }
+
+void ScaleDetector::begin() {
+  foreseen_.begin();
+  taken_ = 0;
+  for (Eigen::MatrixXd* weights : {&g_, &g1_, &g2_, &c_, &c1_, &c2_}) {
+    weights->setZero();
+  }
+  efforts_.setZero();
+  efforts1_.setZero();
+  steps_.fill(elements_.step_length());
+  for (Scale& s : states_) {
+    for (Eigen::ArrayXd* state : {&s.y0, &s.y1, &s.v0, &s.v1, &s.v2, &s.l0, &s.l1, &s.u0, &s.u1, &s.u2}) {
+      state->setZero();
+    }
+    s.Y0.setZero();
+    s.Y1.setZero();
+    s.samples = s.since = 0.0;
+  }
+}
+
+// Weights of the newest element.
+void ScaleDetector::weigh() {
+  g2_.swap(g1_);
+  g1_.swap(g_);
+  c2_.swap(c1_);
+  c1_.swap(c_);
+  const Model& m = elements_.model();
+  const core::RowMatrix& foreseen = foreseen_.value();
+  const Eigen::VectorXd& theta = rule_.estimate();
+  torque_.noalias() = foreseen * theta;
+  for (std::size_t w = 0; w < weights_.size(); ++w) {
+    const auto i = static_cast<Eigen::Index>(w), which = static_cast<Eigen::Index>(weights_[w].which);
+    switch (weights_[w].shape) {
+      case SumWeight::Shape::constant: g_.col(i).noalias() = inverse_ * m.input.col(which); break;
+      case SumWeight::Shape::effort:
+        g_.col(i).noalias() = inverse_ * m.input.col(which);
+        g_.col(i) *= to_joints_.row(which).dot(torque_);
+        break;
+      case SumWeight::Shape::parameter: g_.col(i).noalias() = inverse_ * foreseen.col(which) * theta[which]; break;
+    }
+  }
+  c_.noalias() = slope_gain_ * g_;
+}
+
+void ScaleDetector::take() {
+  const Model& m = elements_.model();
+  const filter::WeakElement& e = elements_.element();
+  const bool angles = elements_.angles();
+  filter::element_regressor(elements_, e, Y_);
+  rows_.matrix().noalias() = g_.transpose() * Y_;
+  residual_.matrix().noalias() = g_.transpose() * e.torque;
+  joint_g_.noalias() = m.input.transpose() * g_;
+
+  // At worst: what stands beside the sum for certain, in units of K.
+  straight_ = kRoundings * residual_.abs();
+  for (Eigen::Index q = 0; q < rows_.cols(); ++q) {
+    straight_ += (kRoundings * largest_[q]) * rows_.col(q).abs();
+  }
+  const double effort = averages_ ? risk_.errors.effort.bias : risk_.errors.effort.bound;
+  efforts_.setZero();
+  for (Eigen::Index j = 0; j < joint_g_.rows(); ++j) {
+    straight_ += (effort * e.length) * joint_g_.row(j).transpose().array().abs();
+    efforts_ += joint_g_.row(j).transpose().array().square();
+  }
+  for (Eigen::Index i = 0; i < e.torque_doubt.size(); ++i) {
+    double doubt = e.torque_doubt[i];
+    if (!angles) {
+      doubt += speed_gain_[i] * e.length * risk_.errors.motion.bound;
+    }
+    straight_ += doubt * g_.row(i).transpose().array().abs();
+  }
+  std::size_t function = 0;
+  turning_.setZero();
+  for (const Term& term : m.terms) {
+    const auto i = static_cast<Eigen::Index>(term.output), c = static_cast<Eigen::Index>(term.coordinate);
+    const double theta = largest_[static_cast<Eigen::Index>(term.parameter)];
+    if (term.kind == Term::Kind::function) {
+      straight_ += (theta * e.functions[function++].error) * g_.row(i).transpose().array().abs();
+    } else if (term.kind == Term::Kind::speed && !angles) {
+      straight_ += (theta * std::abs(term.scale) * e.motion_doubt[c]) * g_.row(i).transpose().array().abs();
+    } else if (term.kind == Term::Kind::speed) {
+      const double by = theta * std::abs(term.scale) * e.motion_doubt_before[c] / e.before;
+      straight_ += by * (g_.row(i) - g1_.row(i)).transpose().array().abs();
+      turning_ += by * g1_.row(i).transpose().array().abs();
+    }
+  }
+  if (angles) {
+    for (Eigen::Index i = 0; i < g_.rows(); ++i) {
+      const double by = speed_gain_[i] * risk_.errors.motion.bound;
+      straight_ += by * (g_.row(i) - g1_.row(i)).transpose().array().abs();
+      turning_ += by * g1_.row(i).transpose().array().abs();
+    }
+  }
+
+  steps_ = {steps_[1], steps_[2], steps_[3], e.step};
+  const double longest = *std::max_element(steps_.begin(), steps_.end());
+  const double h = angles ? e.before : e.step;       // from the element before
+  const double length1 = angles ? 0.5 * (steps_[1] + steps_[2]) : steps_[2];
+  const double effort_square = square_ * length1 * longest;
+  for (Scale& s : states_) {
+    const double x = h / s.T;
+    if (x != s.delta) {
+      s.delta = x;
+      s.decay = std::exp(-x);
+    }
+    const double d = s.decay, dd = d * d;
+    s.y0 = d * (s.y0 + x * s.y1);
+    s.y1 = d * s.y1 + residual_;
+    s.Y0 = d * (s.Y0 + x * s.Y1);
+    s.Y1 = d * s.Y1 + rows_;
+    s.l0 = d * (s.l0 + x * s.l1) + x * turning_;
+    s.l1 = d * s.l1 + straight_ + x * turning_;
+    // Efforts of the element before, which is as old as the step.
+    s.v0 = dd * (s.v0 + x * s.v1 + (x * x) * s.v2 + (x * x * effort_square) * efforts1_);
+    s.v1 = dd * (s.v1 + (2.0 * x) * s.v2 + (2.0 * x * effort_square) * efforts1_);
+    s.v2 = dd * (s.v2 + effort_square * efforts1_);
+    // The sample before the newest element's, which no later element holds: it stands in the sum with (a0 + a1 x)e^−x.
+    s.u0 = d * (s.u0 + x * s.u1 + (x * x) * s.u2);
+    s.u1 = d * (s.u1 + (2.0 * x) * s.u2);
+    s.u2 = d * s.u2;
+    const double x2 = (h + steps_[1]) / s.T, d2 = std::exp(-steps_[1] / s.T) * d;
+    for (Eigen::Index i = 0; i < c_.rows(); ++i) {
+      if (angles) {
+        const double before = 1.0 / steps_[1], after = 1.0 / h;
+        const auto a1 = (before * d2) * c2_.row(i) - ((before + after) * d) * c1_.row(i) + after * c_.row(i);
+        const auto a0 = (before * d2 * x2) * c2_.row(i) - ((before + after) * d * x) * c1_.row(i);
+        s.u0 += a0.transpose().array().square();
+        s.u1 += 2.0 * a0.transpose().array() * a1.transpose().array();
+        s.u2 += a1.transpose().array().square();
+      } else {
+        const auto a1 = d * c1_.row(i) - c_.row(i);
+        const auto a0 = (d * x) * c1_.row(i);
+        s.u0 += a0.transpose().array().square();
+        s.u1 += 2.0 * a0.transpose().array() * a1.transpose().array();
+        s.u2 += a1.transpose().array().square();
+      }
+    }
+    s.samples = d * s.samples + 1.0;
+    s.since += h;
+  }
+  efforts1_ = efforts_;
+  ++taken_;
+}
+
+void ScaleDetector::look(Scale& s, std::size_t which) {
+  const std::size_t p = direction_.size();
+  const double joints = static_cast<double>(elements_.model().joints.size());
+  const double last = elements_.angles() ? s.delta * s.decay / elements_.element().before : 0.0;
+  for (std::size_t w = 0; w < weights_.size(); ++w) {
+    const auto i = static_cast<Eigen::Index>(w);
+    double predicted = 0.0;
+    for (std::size_t q = 0; q < p; ++q) {
+      direction_[q] = s.Y0(i, static_cast<Eigen::Index>(q));
+      predicted += direction_[q] * rule_.estimate()[static_cast<Eigen::Index>(q)];
+    }
+    const Interval range = rule_.prediction(direction_, w);
+    const double newest = last * last * c1_.col(i).squaredNorm();
+    const double angles = risk_.errors.motion.bound * std::sqrt(joints * (s.samples + 2.0) * (std::max(s.u0[i], 0.0) + newest));
+    const double usual = risk_.usual(i, static_cast<Eigen::Index>(which)), V = std::max(s.v0[i], 0.0);
+    const double averaged =
+        usual > 0.0 ? std::sqrt((V + usual) * (2.0 * s.risk + std::log1p(V / usual))) : V > 0.0 ? HUGE_VAL : 0.0;
+    const double radius = (s.l0[i] + angles + averaged) * (1.0 + kRoundings);
+    const double value = s.y0[i] - predicted;
+    const double up = range.upper - predicted + radius, down = predicted - range.lower + radius;
+    SumState& state = looks_[looked_++];
+    state = {w, which, value, value >= 0.0 ? up : down, std::max(value - up, -value - down)};
+    alarm_ = alarm_ || state.excess > 0.0;
+  }
+}
+
+bool ScaleDetector::step(double t, std::span<const double> sample) {
+  looked_ = 0;
+  alarm_ = false;
+  const bool element = elements_.step(t, sample);
+  if (elements_.began()) {
+    begin();
+  }
+  if (!element) {
+    return false;
+  }
+  foreseen_.take(elements_);
+  weigh();
+  take();
+  for (std::size_t k = 0; k < states_.size(); ++k) {
+    Scale& s = states_[k];
+    if (s.since * options_.checks >= s.T) {
+      s.since = 0.0;
+      look(s, k);
+    }
+  }
+  return looked_ > 0;
+}
+
+Eigen::MatrixXd ScaleDetector::variances() const {
+  Eigen::MatrixXd result(static_cast<Eigen::Index>(weights_.size()), static_cast<Eigen::Index>(states_.size()));
+  for (std::size_t k = 0; k < states_.size(); ++k) {
+    result.col(static_cast<Eigen::Index>(k)) = states_[k].v0.matrix();
+  }
+  return result;
+}
+
+Eigen::MatrixXd usual_variances(LogSource& log, const OnlineModel& model) {
+  OnlineModel any = model;
+  const auto W = static_cast<Eigen::Index>(sum_weights(model.model).size());
+  any.at_risk->usual = Eigen::MatrixXd::Ones(W, static_cast<Eigen::Index>(any.at_risk->scales.size()));
+  ScaleDetector detector(any);
+  const std::vector<std::size_t> pick = core::positions_of(log, model.measurement.columns());
+  std::vector<double> sample(pick.size());
+  Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(any.at_risk->usual.rows(), any.at_risk->usual.cols());
+  double count = 0.0;
+  core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
+    if (starts) {
+      detector.restart();
+    }
+    for (std::size_t c = 0; c < pick.size(); ++c) {
+      sample[c] = block.columns[pick[c]][k];
+    }
+    if (detector.step(block.t[k], sample)) {
+      sum += detector.variances();
+      count += 1.0;
+    }
+  });
+  return count > 0.0 ? Eigen::MatrixXd(kOfUsual / count * sum) : sum;
+}
+
+}  // namespace wheelwright::detector

@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// The detector at a stated risk: weighted sums over many time scales, sharper than a filter since errors average out.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include <wheelwright/core/log.hpp>
+#include <wheelwright/detector/online_model.hpp>
+#include <wheelwright/detector/threshold.hpp>
+#include <wheelwright/filter/element_filter.hpp>
+#include <wheelwright/filter/predictable_regressor.hpp>
+
+namespace wheelwright::detector {
+
+/// What the weights of a sum are like: the shape of what a fault adds to the torque, as it is foreseen.
+struct SumWeight {
+  /// Shape.
+  enum class Shape {
+    constant,   ///< of the joint's effort: a bias; a jump of the speed, over short scales
+    effort,     ///< the joint's effort: a share of it is lost
+    parameter,  ///< the torque of one parameter: it has changed
+  };
+  Shape shape = Shape::constant;
+  std::size_t which = 0;  ///< joint or parameter
+  std::string name{};     ///< "effort_right", "constant_left", "mass"
+};
+
+/// The weights of a model's sums: constant and effort of each joint, torque of each parameter.
+[[nodiscard]] std::vector<SumWeight> sum_weights(const Model& model);
+
+/// Options of a ScaleDetector.
+struct ScaleDetectorOptions {
+  /// Expected number of false alarms in a second of driving, if errors are as assumed and θ is in the set. Once in ten
+  /// years.
+  double false_alarms = 1.0 / (10.0 * 365.25 * 86400.0);
+  double checks = 8.0;  ///< of a sum, in the time of its scale
+};
+
+/// A sum that stands where no healthy robot's could, or how near it comes.
+struct SumState {
+  std::size_t weight = 0, scale = 0;
+  double value = 0.0;      ///< Σ g (torque − Yθ̂)
+  double threshold = 0.0;  ///< the most that a healthy robot's may be above the θ̂ of its best explanation
+  double excess = 0.0;     ///< by which it stands outside, > 0: an alarm; unit of `threshold`
+};
+
+/// Sums over scales T, with weights w(t) = K((now − t)/T) g(t), K(x) = x e^{−x}, g foreseen (PredictableRegressor), of
+/// what the model does not explain:
+///
+///     S = Σ w_k (torque_k − Y_k θ)
+///
+/// A healthy robot's S is made of its sensors' errors alone. Those of efforts average out: with V = Σ (weight · bound)²
+/// and V0 fixed beforehand, |S − bias| <= sqrt((V + V0)(2L + ln(1 + V/V0))) but for the probability e^{−L} (method of
+/// mixtures: Robbins 1970; de la Peña, Klass, Lai 2004). All else counts at its worst: bias, the angles' errors, what
+/// happens between samples, and any θ of the set. A sum is looked at `checks` times in its scale, and the risks of all
+/// looks at all sums add up to ScaleDetectorOptions::false_alarms. No assumption on the drive, the noise's law, or
+/// when a fault comes.
+///
+/// step() does not allocate but in linear programs where the set has more vertices than a table takes. Memory and work
+/// per sample do not depend on time.
+class ScaleDetector {
+ public:
+  /// Throws InvalidArgument where `model.at_risk` is missing or makes no sense.
+  explicit ScaleDetector(const OnlineModel& model, ScaleDetectorOptions options = {});
+
+  /// Forgets all samples.
+  void restart();
+  /// Takes a sample (RegressorFilter::step). Returns whether a sum was looked at; looks() are those then.
+  bool step(double t, std::span<const double> sample);
+  /// The sums that were looked at with the last sample.
+  [[nodiscard]] std::span<const SumState> looks() const { return {looks_.data(), looked_}; }
+  /// True if one of them is outside.
+  [[nodiscard]] bool alarm() const { return alarm_; }
+
+  [[nodiscard]] const std::vector<SumWeight>& weights() const { return weights_; }
+  /// s.
+  [[nodiscard]] const std::vector<double>& scales() const { return risk_.scales; }
+  [[nodiscard]] const filter::ElementFilter& elements() const { return elements_; }
+  /// V of every sum now (weights × scales).
+  [[nodiscard]] Eigen::MatrixXd variances() const;
+
+ private:
+  // c0 + c1 x (+ c2 x²) of every weight, x = age/T.
+  struct Scale {
+    double T = 0.0, decay = 1.0, delta = 0.0, since = 0.0, risk = 0.0, samples = 0.0;
+    Eigen::ArrayXd y0, y1, v0, v1, v2, l0, l1, u0, u1, u2;
+    Eigen::ArrayXXd Y0, Y1;  // weights × p
+  };
+
+  void begin();
+  void weigh();
+  void take();
+  void look(Scale& scale, std::size_t which);
+
+  filter::ElementFilter elements_;
+  filter::PredictableRegressor foreseen_;
+  RiskModel risk_;
+  ScaleDetectorOptions options_;
+  ThresholdRule rule_;
+  std::vector<SumWeight> weights_;
+  std::vector<Scale> states_;
+  Eigen::VectorXd largest_;      // |θ|
+  Eigen::MatrixXd inverse_;      // (N Nᵀ)⁻¹, N the model's input
+  Eigen::MatrixXd to_joints_;    // joints × outputs: N⁺
+  Eigen::MatrixXd slope_gain_;   // outputs × outputs: |·|² bounds that of what θ makes of errors of slopes in the joints
+  Eigen::VectorXd speed_gain_;   // outputs: the most that θ makes of errors of all joints' speeds
+  bool averages_ = false;        // errors of efforts
+  double square_ = 0.0;          // their bound squared, times the samples that are correlated
+  Eigen::MatrixXd g_, g1_, g2_;  // outputs × weights: of the newest element and those before
+  Eigen::MatrixXd c_, c1_, c2_;  // slope_gain_ times these
+  Eigen::MatrixXd joint_g_;      // joints × weights: what errors of efforts are multiplied with
+  Eigen::VectorXd torque_;
+  core::RowMatrix Y_;
+  Eigen::ArrayXd residual_, straight_, turning_, efforts_, efforts1_;
+  Eigen::ArrayXXd rows_;          // weights × p
+  std::array<double, 4> steps_{};  // the newest last
+  std::size_t taken_ = 0;
+  std::vector<SumState> looks_;
+  std::size_t looked_ = 0;
+  bool alarm_ = false;
+  std::vector<double> direction_;
+};
+
+/// V0 of every sum for RiskModel::usual: a share of the mean V on a log of usual driving.
+[[nodiscard]] Eigen::MatrixXd usual_variances(LogSource& log, const OnlineModel& model);
+
+}  // namespace wheelwright::detector
+
+namespace wheelwright {
+using detector::ScaleDetector;
+}  // namespace wheelwright
