@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include <wheelwright/bounds/outliers.hpp>
+#include <wheelwright/commission/at_risk.hpp>
 #include <wheelwright/commission/contradictions.hpp>
 #include <wheelwright/commission/fit.hpp>
 #include <wheelwright/commission/setting.hpp>
@@ -517,6 +518,7 @@ Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionO
 Commissioning commission_robot(LogSource& log, const Robot& robot, const CommissionOptions& options) {
   Commissioning result = commissioned(log, robot, options);
   settle_warrants(result);
+  learn_at_risk(log, result);
   return result;
 }
 

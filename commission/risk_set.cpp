@@ -3,11 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 #include <variant>
 
 #include <wheelwright/bounds/slab_rows.hpp>
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/core/limits.hpp>
 #include <wheelwright/filter/element_filter.hpp>
 #include <wheelwright/filter/predictable_regressor.hpp>
@@ -359,9 +361,7 @@ class Learner {
     e.V0.diagonal() += 1e-3 * e.V0.diagonal() + Eigen::VectorXd::Constant(e.V0.rows(), floor > 0.0 ? floor : 1.0);
     const Eigen::VectorXd scale = e.V0.diagonal().cwiseSqrt().cwiseInverse();
     const auto log_det = [&](const Eigen::MatrixXd& A) {
-      const Eigen::LLT<Eigen::MatrixXd> llt(scale.asDiagonal() * A * scale.asDiagonal());
-      return llt.info() == Eigen::Success ? 2.0 * llt.matrixLLT().diagonal().array().log().sum()
-                                          : std::numeric_limits<double>::quiet_NaN();
+      return core::symmetric_eigen(scale.asDiagonal() * A * scale.asDiagonal()).values.array().log().sum();
     };
     e.log_volume = log_det(e.V + e.V0) - log_det(e.V0);
     e.squared_radius = 2.0 * std::log(1.0 / risk) + e.log_volume;
@@ -387,6 +387,7 @@ RiskSet risk_set(LogSource& log, const Model& model, const Measurement& measurem
   check::that(!options.delays.empty(), "delays of the weights", "at least one");
   validate(classes);
   RiskSet result;
+  result.risk = options.risk;
   const auto p = static_cast<Eigen::Index>(model.p());
   filter::ParameterBox box{Eigen::VectorXd(p), Eigen::VectorXd(p)};
   for (Eigen::Index j = 0; j < p; ++j) {
@@ -409,11 +410,13 @@ RiskSet risk_set(LogSource& log, const Model& model, const Measurement& measurem
       if (!e.usable || e.block != block) {
         continue;
       }
-      const Eigen::FullPivLU<Eigen::MatrixXd> lu(e.M.transpose());
-      if (!lu.isInvertible()) {
+      const Eigen::VectorXd from = (e.V + e.V0).diagonal().cwiseSqrt().cwiseInverse();
+      const Eigen::VectorXd to = box.radius(block).cwiseMax(std::numeric_limits<double>::min());
+      const core::RankRevealingLu lu(to.asDiagonal() * e.M.transpose() * from.asDiagonal());
+      if (!lu.invertible()) {
         continue;
       }
-      const Eigen::VectorXd x = lu.solve(w(block));
+      const Eigen::VectorXd x = from.cwiseProduct(lu.solve(to.cwiseProduct(w(block))));
       const double half =
           std::sqrt(x.dot((e.V + e.V0) * x) * e.squared_radius) + x.cwiseAbs().dot(e.straight);
       if (all || half < best) {

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/linear_algebra.hpp>
 
 namespace wheelwright::detector {
 namespace {
@@ -31,7 +32,8 @@ Eigen::MatrixXd largest_root(const Eigen::MatrixXd& middle, const Eigen::MatrixX
   const double eta = size > 0.0 ? std::max(spread / size, 1e-6) : 1.0;
   Eigen::MatrixXd square = (1.0 + eta) * middle.transpose() * middle;
   square.diagonal().array() += (1.0 + 1.0 / eta) * spread * spread + 1e-12 * (size * size + spread * spread) + 1e-300;
-  return Eigen::LLT<Eigen::MatrixXd>(square).matrixU();
+  const core::EigenPairs pairs = core::symmetric_eigen(square);
+  return pairs.values.cwiseMax(0.0).cwiseSqrt().asDiagonal() * pairs.vectors.transpose();
 }
 
 }  // namespace
@@ -66,7 +68,7 @@ ScaleDetector::ScaleDetector(const OnlineModel& model, ScaleDetectorOptions opti
   const auto joints = static_cast<Eigen::Index>(m.joints.size()), W = static_cast<Eigen::Index>(weights_.size());
   check::that(risk_.usual.rows() == W && risk_.usual.cols() == static_cast<Eigen::Index>(risk_.scales.size()),
               "usual variances", "one for each weight and scale");
-  inverse_ = (m.input * m.input.transpose()).inverse();
+  inverse_ = core::inverse(m.input * m.input.transpose());
   to_joints_ = m.input.transpose() * inverse_;
   largest_ = Eigen::VectorXd(p);
   Eigen::MatrixXd middle = Eigen::MatrixXd::Zero(joints, n), radius = middle;

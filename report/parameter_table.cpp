@@ -130,9 +130,14 @@ std::string interval_cells(const ParameterView& v, bool with_nominal) {
           ? fmt::format("{} to {}", beside(*v.estimate - *v.spread, *v.estimate - *v.spread, *v.estimate + *v.spread),
                         beside(*v.estimate + *v.spread, *v.estimate - *v.spread, *v.estimate + *v.spread))
           : "–";
+  std::string at_risk;
+  if (v.at_risk) {
+    const auto [lower, upper] = outward(v.at_risk->lower, v.at_risk->upper);
+    at_risk = fmt::format("<td class=\"n\">{} to {}</td>", lower, upper);
+  }
   std::string out =
-      fmt::format("<td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td>",
-                  estimate_text(v), bounds, statistical, centre_text(v));
+      fmt::format("<td class=\"n\">{}</td><td class=\"n\">{}</td>{}<td class=\"n\">{}</td><td class=\"n\">{}</td>",
+                  estimate_text(v), bounds, at_risk, statistical, centre_text(v));
   if (with_nominal) {
     out += fmt::format("<td class=\"n\">{}</td>", v.nominal ? number(*v.nominal, 4) : "–");
   }
@@ -191,19 +196,24 @@ std::string parameter_table(const Commissioning& result, const TimeAxis& axis) {
   const std::vector<ParameterViews> views = parameter_views(result);
   const bool with_nominal =
       std::any_of(views.begin(), views.end(), [](const ParameterViews& v) { return v.theta.nominal.has_value(); });
+  const bool at_risk = result.at_risk && result.at_risk->set;
   std::string out = fmt::format(
       "<div class=\"wide\"><table class=\"parameters\"><thead><tr><th scope=\"col\">Parameter</th><th "
       "scope=\"col\">unit"
-      "</th><th scope=\"col\" class=\"n\">estimate</th><th scope=\"col\" class=\"n\">{}</th>"
+      "</th><th scope=\"col\" class=\"n\">estimate</th><th scope=\"col\" class=\"n\">{}</th>{}"
       "<th scope=\"col\" class=\"n\">95 % statistical</th><th scope=\"col\" class=\"n\">centre</th>{}"
       "<th scope=\"col\">intervals</th><th scope=\"col\">bound set by</th></tr></thead><tbody>\n",
       warrant_badge(commission::interval_warrant(result)),
+      at_risk ? "<th scope=\"col\" class=\"n\">at a stated risk</th>" : "",
       with_nominal ? "<th scope=\"col\" class=\"n\">nominal</th>" : "");
   for (std::size_t j = 0; j < views.size(); ++j) {
     out += rows_of(views[j], result.parameters[j], with_nominal, result, axis);
   }
   out += "</tbody></table></div>\n";
   out += "<p class=\"note\">" + escape(core::statistical_remark()) + "</p>\n";
+  if (at_risk) {
+    out += "<p class=\"note\">" + escape(words::risk_remark(*result.at_risk)) + "</p>\n";
+  }
   out +=
       "<p class=\"note\">Box: interval of the bounds (dashed: a side is the prior’s; arrow: it goes on beyond the "
       "drawing). Black dot and whiskers: estimate with its 95 % interval. Ring: Chebyshev centre of the "

@@ -130,7 +130,7 @@ Json parameter_json(const Commissioning& r, std::size_t j, const Robot& robot, c
   const auto proof = [&](const std::vector<bounds::CertifiedBound>& bounds) {
     return j < bounds.size() ? proof_json(bounds[j].binding, model) : Json::array();
   };
-  return {{"name", p.parameter.name},
+  Json json{{"name", p.parameter.name},
           {"unit", commission::parameter_unit(robot, p.parameter)},
           {"estimate", files::or_null(p.estimate)},
           {"lower", p.lower},
@@ -144,6 +144,11 @@ Json parameter_json(const Commissioning& r, std::size_t j, const Robot& robot, c
           {"upper_is_prior", p.upper_is_prior},
           {"estimate_inside", p.estimate_inside},
           {"binding_samples", {{"lower", proof(r.feasible.lower)}, {"upper", proof(r.feasible.upper)}}}};
+  if (r.at_risk && r.at_risk->set) {
+    const Interval& side = r.at_risk->set->hull().sides[j];
+    json["at_risk"] = {side.lower, side.upper};
+  }
+  return json;
 }
 
 Json physical_json(const Commissioning& r, const Robot& robot, const Model& model) {
@@ -163,6 +168,10 @@ Json physical_json(const Commissioning& r, const Robot& robot, const Model& mode
                   {"upper", scaled.upper},
                   {"warrant", core::warrant_word(p.warrant)},
                   {"standard_error", p.standard_error ? Json(s.scale * *p.standard_error) : Json(nullptr)}};
+    if (r.at_risk && r.at_risk->set) {
+      const Interval at_risk = Interval{s.scale, s.scale} * r.at_risk->set->hull().sides[j] - Interval{s.offset, s.offset};
+      entry["at_risk"] = {at_risk.lower, at_risk.upper};
+    }
     if (const auto nominal = robot.nominal.find(p.parameter.physical); nominal != robot.nominal.end()) {
       entry["nominal"] = nominal->second;
     }
@@ -224,6 +233,34 @@ Json set_json(const Commissioning& r, const Model& model) {
       }
       json["blocks"].push_back({{"parameters", block.parameters}, {"vertices", vertices}});
     }
+  }
+  return json;
+}
+
+Json error_class_json(const filter::ErrorClass& c) {
+  return {{"bound", c.bound}, {"bias", c.bias}, {"correlation", c.correlation}};
+}
+
+Json risk_json(const detector::RiskModel& risk) {
+  Json json = {{"risk", risk.risk},
+               {"errors",
+                {{"motion", error_class_json(risk.errors.motion)},
+                 {"effort", error_class_json(risk.errors.effort)},
+                 {"count", risk.errors.count},
+                 {"shortest_step", risk.errors.shortest_step}}},
+               {"feasible_set", {{"A", Json::array()}, {"b", Json::array()}, {"hull", Json::array()}}},
+               {"scales", risk.scales},
+               {"delay", risk.delay},
+               {"usual", Json::array()}};
+  for (const bounds::HalfSpace& facet : risk.facets) {
+    json["feasible_set"]["A"].push_back(numbers(facet.a));
+    json["feasible_set"]["b"].push_back(facet.b);
+  }
+  for (const Interval& side : risk.box.sides) {
+    json["feasible_set"]["hull"].push_back({side.lower, side.upper});
+  }
+  for (Eigen::Index w = 0; w < risk.usual.rows(); ++w) {
+    json["usual"].push_back(numbers(risk.usual.row(w)));
   }
   return json;
 }
@@ -308,6 +345,9 @@ Json to_json(const Commissioning& r, const logs::LogReport& data, const std::str
     json["detector"] = {{"estimate", numbers(m.estimate)},
                         {"error_bounds", std::move(bounds)},
                         {"persistence", {{"k", m.persistence.k}, {"n", m.persistence.n}}}};
+  }
+  if (m.at_risk) {
+    json["at_risk"] = risk_json(*m.at_risk);
   }
   json["validation"] = validation_json(r, m.model);
   if (auto kinematic = kinematic_json(r.kinematic, r.folds)) {

@@ -47,7 +47,11 @@ ParameterView theta_view(const Commissioning& result, const commission::Paramete
                      .lower_is_prior = r.lower_is_prior,
                      .upper_is_prior = r.upper_is_prior,
                      .has_set = result.status != Commissioning::Status::empty,
-                     .warrant = r.warrant};
+                     .warrant = r.warrant,
+                     .at_risk = {}};
+  if (result.at_risk && result.at_risk->set) {
+    view.at_risk = result.at_risk->set->hull().sides[static_cast<std::size_t>(&r - result.parameters.data())];
+  }
   if (r.estimate && r.standard_error) {
     view.spread = core::student_quantile(0.95, std::max(result.residuals.freedom, 1.0)) * *r.standard_error;
   }
@@ -68,6 +72,9 @@ ParameterView physical_view(ParameterView view, const commission::PhysicalScale&
   if (view.spread) {
     view.spread = std::abs(scale.scale) * *view.spread;
   }
+  if (view.at_risk) {
+    view.at_risk = Interval{scale.scale, scale.scale} * *view.at_risk - Interval{scale.offset, scale.offset};
+  }
   if (scale.scale < 0.0) {
     std::swap(view.lower, view.upper);
     std::swap(view.lower_is_prior, view.upper_is_prior);
@@ -76,6 +83,12 @@ ParameterView physical_view(ParameterView view, const commission::PhysicalScale&
 }
 
 }  // namespace
+
+std::string risk_remark(const commission::RiskSet& set) {
+  return fmt::format("At a stated risk: the true values lie inside all of these intervals, unless a chance of {:g} came "
+                     "true; for errors within their bounds that have no more than the declared bias, whatever their law.",
+                     set.risk);
+}
 
 std::string estimate_text(const ParameterView& view) {
   const auto [low, high] = uncertainty(view);

@@ -26,6 +26,7 @@ struct ParameterView {
   bool upper_is_prior = false;
   bool has_set = true;                                  ///< false: the feasible set is empty, and nothing is bounded
   core::Warrant warrant = core::Warrant::extrapolated;  ///< of lower and upper
+  std::optional<Interval> at_risk{};                    ///< bounds at a stated risk (RiskSet)
 };
 
 /// A parameter as θ_L,j, and as a physical quantity where the robot file tells the scale and the two differ.
@@ -44,6 +45,9 @@ struct ParameterViews {
 
 /// Views of all parameters, in their order.
 [[nodiscard]] std::vector<ParameterViews> parameter_views(const Commissioning& result);
+
+/// What the bounds at a stated risk mean, in one sentence.
+[[nodiscard]] std::string risk_remark(const commission::RiskSet& set);
 
 /// True if the effort is not torque and the robot file lacks the motor's constants.
 [[nodiscard]] bool physical_values_unknown(const Commissioning& result);

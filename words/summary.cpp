@@ -12,6 +12,7 @@
 #include <wheelwright/core/statistics.hpp>
 #include <wheelwright/identify/noise_level.hpp>
 #include <wheelwright/words/margin_words.hpp>
+#include <wheelwright/words/parameter_view.hpp>
 
 namespace wheelwright::words {
 namespace {
@@ -42,6 +43,11 @@ std::string parameter_table(const Commissioning& r) {
     text += line(scales ? p.parameter.physical : p.parameter.name, estimate, value(p.lower), value(p.upper), half,
                  scales ? p.parameter.physical_unit : commission::parameter_unit(robot, p.parameter), p.lower_is_prior,
                  p.upper_is_prior);
+    if (r.at_risk && r.at_risk->set) {
+      const Interval& side = r.at_risk->set->hull().sides[j];
+      text += fmt::format("  {:<20} {:>11}   [{:.5g}, {:.5g}]   at a risk of {:g}\n", "", "", value(side.lower),
+                          value(side.upper), r.at_risk->risk);
+    }
     if (!p.reason.empty()) {
       text += fmt::format("  {:<20} {}\n", "", p.reason);
     }
@@ -52,6 +58,9 @@ std::string parameter_table(const Commissioning& r) {
   }
   text +=
       fmt::format("  {}\n  {}\n", core::warrant_meaning(commission::interval_warrant(r)), core::statistical_remark());
+  if (r.at_risk && r.at_risk->set) {
+    text += fmt::format("  {}\n", risk_remark(*r.at_risk));
+  }
   return text;
 }
 

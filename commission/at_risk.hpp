@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// What a commissioning says at a stated risk: set, detector, and the log's own word on the assumptions behind both.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include <wheelwright/commission/commission.hpp>
+#include <wheelwright/detector/scale_detector.hpp>
+
+namespace wheelwright::commission {
+
+/// Options of learn_at_risk().
+struct AtRiskOptions {
+  RiskSetOptions set{};
+  std::vector<double> scales{0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0};  ///< s, of the detector's sums
+  double test_risk = 1e-3;  ///< probability that a log which keeps to its assumptions is said to contradict them
+};
+
+/// Adds Commissioning::at_risk and OnlineModel::at_risk to a guaranteed result whose robot file declares errors that
+/// average out (error_classes()), and an assumption with the log's verdict on them. The log contradicts them where it
+/// leaves no set, or where a sum over any scale stands outside what such errors can do at AtRiskOptions::test_risk:
+/// then nothing is said at a risk, and the worst case stands alone. Walks the log six times.
+void learn_at_risk(LogSource& log, Commissioning& result, const AtRiskOptions& options = {});
+
+}  // namespace wheelwright::commission
