@@ -14,6 +14,7 @@ namespace wheelwright::detector {
 namespace {
 
 constexpr double kRoundings = 1e-10;  // of all that is added up, relative
+constexpr double kRise = 1.0;         // s, in which constant weights rise at a segment's start
 constexpr double kOfUsual = 0.2;      // V0 is this share of a usual drive's V
 
 const RiskModel& demand(const OnlineModel& model) {
@@ -150,10 +151,15 @@ void ScaleDetector::weigh() {
   const core::RowMatrix& foreseen = foreseen_.value();
   const Eigen::VectorXd& theta = rule_.estimate();
   torque_.noalias() = foreseen * theta;
+  const double share = std::min((elements_.element().t - elements_.first_instant()) / kRise, 1.0);
+  const double rise = share * share * (3.0 - 2.0 * share);
   for (std::size_t w = 0; w < weights_.size(); ++w) {
     const auto i = static_cast<Eigen::Index>(w), which = static_cast<Eigen::Index>(weights_[w].which);
     switch (weights_[w].shape) {
-      case SumWeight::Shape::constant: g_.col(i).noalias() = inverse_ * m.input.col(which); break;
+      case SumWeight::Shape::constant:
+        g_.col(i).noalias() = inverse_ * m.input.col(which);
+        g_.col(i) *= rise;
+        break;
       case SumWeight::Shape::effort:
         g_.col(i).noalias() = inverse_ * m.input.col(which);
         g_.col(i) *= to_joints_.row(which).dot(torque_);
