@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/commission/detector_walk.hpp>
+#include <wheelwright/commission/risk_watch.hpp>
 #include <wheelwright/report/chart.hpp>
 #include <wheelwright/report/detect_report.hpp>
 #include <wheelwright/results/model_file.hpp>
@@ -76,23 +77,27 @@ int run(const Arguments& a) {
     return detect(log, std::move(detector), watch);
   });
   const commission::KinematicWatch kinematic = commission::watch_kinematics(log, model, a.detector, watch);
+  const commission::RiskWatch at_risk = commission::watch_at_risk(log, model);
   commission::EventIsolationOptions isolation;
   isolation.isolation.threads = static_cast<std::size_t>(std::max(a.common.threads, 1));
   const std::vector<detector::Isolation> isolations = commission::isolate_events(log, model, detection, isolation);
-  const bool fault = !detection.events.empty() || (kinematic.detection && !kinematic.detection->events.empty());
+  const bool fault = !detection.events.empty() || !at_risk.events.empty() ||
+                     (kinematic.detection && !kinematic.detection->events.empty());
   const std::string undecided =
       detection.instants == 0 ? why_undecided(model, log.report().rows, log.median_step()) : std::string();
   if (!a.common.out.empty() || a.common.json) {
     Json json = results::to_json(detection, model, a.model.string(), a.log.string(), results::software());
     results::add_isolation(json, isolations);
     results::add_kinematic(json, kinematic, model);
+    results::add_at_risk(json, at_risk, model);
     if (!undecided.empty()) {
       json["undecided"] = undecided;
     }
     std::string page;
     if (!a.common.out.empty()) {
       page = report::detect_report(detection, model, context,
-                                   {.detection = kinematic.detection, .message = kinematic.message}, isolations);
+                                   {.detection = kinematic.detection, .message = kinematic.message}, isolations,
+                                   at_risk);
     }
     publish(a.common, json, "detection.json", page);
   }
@@ -101,7 +106,8 @@ int run(const Arguments& a) {
   }
   if (!a.common.quiet && !a.common.json) {
     print_log(logs::sentences(log.report()));
-    fmt::print("{}{}{}", summary(detection, model), summary(isolations, detection), summary(kinematic, model));
+    fmt::print("{}{}{}{}", summary(detection, model), summary(at_risk, model), summary(isolations, detection),
+               summary(kinematic, model));
     if (!a.common.out.empty()) {
       fmt::print("wrote {} and {}\n", (a.common.out / "detection.json").string(),
                  (a.common.out / "report.html").string());

@@ -118,10 +118,31 @@ std::string isolation_section(const std::vector<detector::Isolation>& isolations
          table({"", "Still possible", "other faults"}, rows);
 }
 
+// Sums over scales: how near they came to what a healthy robot's can be, and where they went beyond.
+std::string at_risk_section(const commission::RiskWatch& watch, const OnlineModel& model, const TimeAxis& axis) {
+  constexpr double kYear = 365.25 * 86400.0;
+  std::string out = paragraph(fmt::format(
+      "Weighted sums over {} to {} s of what the model leaves, matched to faults, were compared {} times with what the "
+      "errors of a healthy robot can make of them; in {} years of driving at most one false alarm is to be expected, as "
+      "long as the errors are as the robot file declares them. The largest reached {} of its threshold.",
+      number(model.at_risk->scales.front()), number(model.at_risk->scales.back()), count(watch.looks),
+      number(1.0 / (watch.false_alarms * kYear), 2), percent(watch.utilisation)));
+  std::vector<std::vector<Cell>> rows;
+  for (const commission::RiskEvent& e : watch.events) {
+    rows.push_back({escape(axis.text(e.alarm)), escape(axis.text(e.end)),
+                    escape(commission::sum_words(e.weight, model.model)), numeric(number(e.scale)),
+                    numeric(number(e.ratio, 3))});
+  }
+  return rows.empty() ? out
+                      : out + table({"alarm", "until", "matched to", numeric("over, s"), numeric("times the threshold")},
+                                    rows);
+}
+
 }  // namespace
 
 std::string detect_report(const Detection& detection, const OnlineModel& model, const ReportContext& context,
-                          const KinematicFindings& kinematic, const std::vector<detector::Isolation>& isolations) {
+                          const KinematicFindings& kinematic, const std::vector<detector::Isolation>& isolations,
+                          const commission::RiskWatch& at_risk) {
   const TimeAxis axis = axis_for(detection, context);
   std::vector<std::vector<ChartMark>> marks(detection.trace.outputs.size());
   std::vector<ChartMark> all_marks;
@@ -137,10 +158,14 @@ std::string detect_report(const Detection& detection, const OnlineModel& model, 
   PageContent content;
   content.title = context.title.empty() ? "Detection on " + model.robot.name : context.title;
   const std::size_t kinematic_events = kinematic.detection ? kinematic.detection->events.size() : 0;
-  const bool fault = !detection.events.empty() || kinematic_events > 0;
+  const bool fault = !detection.events.empty() || kinematic_events > 0 || !at_risk.events.empty();
   content.status = fault ? "bad" : detection.instants == 0 ? "caution" : "good";
-  content.verdict = detect_verdict(detection, kinematic_events);
+  content.verdict = detect_verdict(detection, kinematic_events + at_risk.events.size());
   content.sentences = detect_words(detection, model, isolations, axis);
+  if (!at_risk.events.empty()) {
+    content.sentences.insert(content.sentences.begin(),
+                             core::capital(commission::sentence(at_risk.events.front(), model.model)) + ".");
+  }
   if (kinematic_events > 0) {
     const detector::Event& first = kinematic.detection->events.front();
     content.sentences.push_back(fmt::format(
@@ -150,6 +175,9 @@ std::string detect_report(const Detection& detection, const OnlineModel& model, 
   content.software = context.software;
   content.warrant = model.warrant;
   content.sections.push_back({"events", "Events", event_table(detection, model, axis)});
+  if (at_risk.watched) {
+    content.sections.push_back({"at_risk", "At a stated risk", at_risk_section(at_risk, model, axis)});
+  }
   if (!isolations.empty()) {
     content.sections.push_back({"isolation", "What it can be", isolation_section(isolations, detection, axis)});
   }

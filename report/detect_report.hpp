@@ -9,6 +9,7 @@
 
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/commission/detector_walk.hpp>
+#include <wheelwright/commission/risk_watch.hpp>
 #include <wheelwright/report/context.hpp>
 
 namespace wheelwright::report {
@@ -21,10 +22,11 @@ struct KinematicFindings {
 
 /// One self-contained HTML page: what the detector says in words, its events (a click zooms all charts to one), the
 /// residual inside [l, u] with the events shaded, prediction, raw signals, data, and the same of
-/// the kinematic residual. `isolations` belong to the first events, in their order. It loads nothing when opened; every
+/// the kinematic residual. `at_risk` is the same log under the detector at a stated risk. `isolations` belong to the first events, in their order. It loads nothing when opened; every
 /// name is escaped, every number is finite. `context.own_log` is not used.
 [[nodiscard]] std::string detect_report(const Detection& detection, const OnlineModel& model,
                                         const ReportContext& context, const KinematicFindings& kinematic = {},
-                                        const std::vector<detector::Isolation>& isolations = {});
+                                        const std::vector<detector::Isolation>& isolations = {},
+                                        const commission::RiskWatch& at_risk = {});
 
 }  // namespace wheelwright::report

@@ -73,6 +73,28 @@ void add_isolation(Json& json, const std::vector<detector::Isolation>& isolation
   }
 }
 
+void add_at_risk(Json& json, const commission::RiskWatch& watch, const OnlineModel& model) {
+  if (!watch.watched) {
+    return;
+  }
+  Json events = Json::array();
+  for (const commission::RiskEvent& e : watch.events) {
+    events.push_back({{"alarm", e.alarm},
+                      {"end", e.end},
+                      {"weight", e.weight.name},
+                      {"scale", e.scale},
+                      {"ratio", e.ratio},
+                      {"peak_time", e.peak_time},
+                      {"sentence", commission::sentence(e, model.model)}});
+  }
+  json["at_risk"] = {{"false_alarms_per_year", watch.false_alarms * 365.25 * 86400.0},
+                     {"risk_of_the_set", model.at_risk->risk},
+                     {"looks", watch.looks},
+                     {"utilisation", watch.utilisation},
+                     {"events", std::move(events)}};
+  json["fault"] = json["fault"].get<bool>() || !watch.events.empty();
+}
+
 void add_kinematic(Json& json, const commission::KinematicWatch& watch, const OnlineModel& model) {
   const Detection none;
   const Detection& d = watch.detection ? *watch.detection : none;
@@ -85,7 +107,7 @@ void add_kinematic(Json& json, const commission::KinematicWatch& watch, const On
   events.insert(events.end(), own.at("events").begin(), own.at("events").end());
   std::ranges::stable_sort(events, {}, [](const Json& event) { return event.at("alarm").get<double>(); });
   json["events"] = events;
-  json["fault"] = !events.empty();
+  json["fault"] = json["fault"].get<bool>() || !events.empty();
   json["kinematic"] = {{"warrant", core::warrant_word(view.warrant)},
                        {"watched", watch.detection.has_value()},
                        {"message", watch.message},

@@ -232,6 +232,26 @@ std::string summary(const std::vector<detector::Isolation>& isolations, const De
   return text;
 }
 
+std::string summary(const commission::RiskWatch& watch, const OnlineModel& model) {
+  if (!watch.watched) {
+    return {};
+  }
+  constexpr double kYear = 365.25 * 86400.0;
+  std::string text = fmt::format(
+      "at a stated risk (at most one false alarm in {:.2g} years of driving): {}\n", 1.0 / (watch.false_alarms * kYear),
+      watch.events.empty()
+          ? fmt::format("no fault; at most {:.0f} % of a threshold used", 100.0 * watch.utilisation)
+          : fmt::format("{} event{}", watch.events.size(), watch.events.size() == 1 ? "" : "s"));
+  constexpr std::size_t most = 20;
+  for (std::size_t k = 0; k < std::min(watch.events.size(), most); ++k) {
+    text += "  " + commission::sentence(watch.events[k], model.model) + "\n";
+  }
+  if (watch.events.size() > most) {
+    text += fmt::format("  … and {} more (--json lists them all)\n", watch.events.size() - most);
+  }
+  return text;
+}
+
 std::string summary(const commission::KinematicWatch& watch, const OnlineModel& model) {
   if (!watch.detection) {
     return "kinematic residual: not watched, " + watch.message + "\n";

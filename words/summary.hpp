@@ -8,6 +8,7 @@
 
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/commission/detector_walk.hpp>
+#include <wheelwright/commission/risk_watch.hpp>
 
 namespace wheelwright::words {
 
@@ -19,6 +20,9 @@ namespace wheelwright::words {
 
 /// Summary of the kinematic residual for a terminal.
 [[nodiscard]] std::string summary(const commission::KinematicWatch& watch, const OnlineModel& model);
+
+/// Summary of the detector at a stated risk for a terminal; empty where the model says nothing at a risk.
+[[nodiscard]] std::string summary(const commission::RiskWatch& watch, const OnlineModel& model);
 
 /// Summary of the isolation of the first events for a terminal.
 [[nodiscard]] std::string summary(const std::vector<detector::Isolation>& isolations, const Detection& detection);

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/commission/risk_watch.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+namespace wheelwright::commission {
+
+RiskWatch watch_at_risk(LogSource& log, const OnlineModel& model, double merge) {
+  RiskWatch watch;
+  if (!model.at_risk) {
+    return watch;
+  }
+  watch.watched = true;
+  const detector::ScaleDetectorOptions options;
+  watch.false_alarms = options.false_alarms;
+  detector::ScaleDetector detector(model, options);
+  const std::vector<std::size_t> pick = core::positions_of(log, model.measurement.columns());
+  std::vector<double> sample(pick.size());
+  double pause = merge;
+  core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
+    if (starts) {
+      detector.restart();
+    }
+    for (std::size_t c = 0; c < pick.size(); ++c) {
+      sample[c] = block.columns[pick[c]][k];
+    }
+    const double t = block.t[k];
+    detector.step(t, sample);
+    for (const detector::SumState& state : detector.looks()) {
+      const double ratio = state.threshold > 0.0 ? std::abs(state.value) / state.threshold : 0.0;
+      ++watch.looks;
+      watch.utilisation = std::max(watch.utilisation, ratio);
+      if (!(state.excess > 0.0)) {
+        continue;
+      }
+      const double scale = detector.scales()[state.scale];
+      if (watch.events.empty() || t > watch.events.back().end + pause) {
+        watch.events.push_back({t, t, detector.weights()[state.weight], scale, 0.0, t});
+        pause = merge;
+      }
+      RiskEvent& event = watch.events.back();
+      event.end = t;
+      pause = std::max(pause, 0.25 * scale);
+      if (ratio > event.ratio) {
+        event.ratio = ratio;
+        event.peak_time = t;
+      }
+    }
+  });
+  return watch;
+}
+
+std::string sum_words(const detector::SumWeight& weight, const Model& model) {
+  using Shape = detector::SumWeight::Shape;
+  const auto of_joint = [&] {
+    return model.joints.size() > 1 ? fmt::format(" ({})", model.joints[weight.which].torque) : std::string();
+  };
+  switch (weight.shape) {
+    case Shape::constant: return "bias of the effort, or a jump" + of_joint();
+    case Shape::effort: return "share of the effort" + of_joint();
+    case Shape::parameter: return "torque of " + model.parameters[weight.which].physical;
+  }
+  return {};
+}
+
+std::string sentence(const RiskEvent& event, const Model& model) {
+  return fmt::format("since {:.2f} s: {}, seen over {:g} s, up to {:.2g} times what a healthy robot's errors can do",
+                     event.alarm, sum_words(event.weight, model), event.scale, event.ratio);
+}
+
+}  // namespace wheelwright::commission

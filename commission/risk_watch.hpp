@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// A whole log under the detector at a stated risk.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include <wheelwright/core/log.hpp>
+#include <wheelwright/detector/scale_detector.hpp>
+
+namespace wheelwright::commission {
+
+/// Sums outside what a healthy robot's can be, without a longer pause.
+struct RiskEvent {
+  double alarm = 0.0;            ///< s, when the first one was seen
+  double end = 0.0;              ///< s, when the last one was
+  detector::SumWeight weight{};  ///< of the first one
+  double scale = 0.0;            ///< s, of the first one: over about this time it has come together
+  double ratio = 0.0;            ///< largest |value|/threshold of all
+  double peak_time = 0.0;        ///< s
+};
+
+/// Result of watch_at_risk().
+struct RiskWatch {
+  bool watched = false;          ///< false: the model says nothing at a stated risk
+  double false_alarms = 0.0;     ///< at most as many are to be expected in a second
+  std::size_t looks = 0;         ///< at sums
+  double utilisation = 0.0;      ///< largest |value|/threshold
+  std::vector<RiskEvent> events;
+};
+
+/// Walks `log` through the ScaleDetector of `model`; events are apart by more than `merge` s, and than a quarter of
+/// the scale that shows them.
+[[nodiscard]] RiskWatch watch_at_risk(LogSource& log, const OnlineModel& model, double merge = 0.5);
+
+/// "bias or jump (tau_r)", "share of the effort (tau_r)", "mass": what the sum of an event looks for.
+[[nodiscard]] std::string sum_words(const detector::SumWeight& weight, const Model& model);
+
+/// "since 60.2 s: share of the effort (tau_r), seen over 3 s, up to 1.8 times what a healthy robot's errors can do".
+[[nodiscard]] std::string sentence(const RiskEvent& event, const Model& model);
+
+}  // namespace wheelwright::commission
