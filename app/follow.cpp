@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include <wheelwright/commission/risk_watch.hpp>
 #include <wheelwright/logs/csv.hpp>
 
 #include <wheelwright/results/detection_json.hpp>
@@ -105,6 +106,12 @@ ExitCode follow(std::istream& in, std::ostream& out, TorqueDetector detector, co
       fmt::print(stderr, "wheelwright detect: no column '{}': the kinematic residual is not watched\n", missing);
     }
   }
+  std::optional<detector::ScaleDetector> scales;
+  commission::RiskRecorder at_risk(kMerge);
+  std::vector<double> sample(pick->size());
+  if (model.at_risk) {
+    scales.emplace(model);
+  }
   LogBlock row;
   std::size_t number = 0;
   std::vector<double> times;  // of the first rows
@@ -124,9 +131,24 @@ ExitCode follow(std::istream& in, std::ostream& out, TorqueDetector detector, co
     if (kinematic) {
       kinematic->take(row, number, out, json);
     }
+    if (scales) {
+      if (!row.segment_starts.empty()) {
+        scales->restart();
+      }
+      for (std::size_t c = 0; c < sample.size(); ++c) {
+        sample[c] = row.columns[(*pick)[c]][0];
+      }
+      scales->step(row.t[0], sample);
+      if (at_risk.add(*scales, row.t[0])) {
+        const commission::RiskEvent& event = at_risk.watch().events.back();
+        out << (json ? files::json_text({{"at_risk", results::to_json(event, model)}}, -1)
+                     : "at a stated risk, " + commission::sentence(event, model.model))
+            << std::endl;
+      }
+    }
     ++number;
   }
-  if (torque.any() || (kinematic && kinematic->any())) {
+  if (torque.any() || (kinematic && kinematic->any()) || !at_risk.watch().events.empty()) {
     return kNo;
   }
   if (torque.decisions() > 0) {

@@ -92,7 +92,8 @@ std::optional<filter::ErrorClasses> error_classes(const Robot& robot, const Meas
   }
   filter::ErrorClasses classes;
   classes.shortest_step = measurement.shortest_step > 0.0 ? measurement.shortest_step : measurement.nominal_step;
-  classes.effort = {budget.sensors.effort, *robot.noise.effort.bias, robot.noise.effort.correlation};
+  classes.effort = {budget.sensors.effort, std::min(*robot.noise.effort.bias, budget.sensors.effort),
+                    robot.noise.effort.correlation};
   const model::NoiseBound& angle =
       model::on_two_wheels(robot) ? robot.noise.wheel_angle : robot.noise.position;
   const bool speed = measurement.motion == MotionKind::speed;
@@ -100,7 +101,7 @@ std::optional<filter::ErrorClasses> error_classes(const Robot& robot, const Meas
   const bool declared = speed || (measurement.motion == MotionKind::angle && angle.value);
   classes.motion.bound = budget.sensors.motion;
   if (declared) {
-    classes.motion.bias = motion.bias.value_or(classes.motion.bound);
+    classes.motion.bias = std::min(motion.bias.value_or(classes.motion.bound), classes.motion.bound);
     classes.motion.correlation = motion.correlation;
   } else {
     classes.count = 2.0 * classes.motion.bound;

@@ -3,23 +3,47 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <fmt/format.h>
 
 namespace wheelwright::commission {
 
-RiskWatch watch_at_risk(LogSource& log, const OnlineModel& model, double merge) {
-  RiskWatch watch;
-  if (!model.at_risk) {
-    return watch;
+bool RiskRecorder::add(const detector::ScaleDetector& detector, double t) {
+  bool begins = false;
+  for (const detector::SumState& state : detector.looks()) {
+    const double ratio = state.threshold > 0.0 ? std::abs(state.value) / state.threshold : 0.0;
+    ++watch_.looks;
+    watch_.utilisation = std::max(watch_.utilisation, ratio);
+    if (!(state.excess > 0.0)) {
+      continue;
+    }
+    const double scale = detector.scales()[state.scale];
+    if (watch_.events.empty() || t > watch_.events.back().end + pause_) {
+      watch_.events.push_back({t, t, detector.weights()[state.weight], scale, 0.0, t});
+      pause_ = merge_;
+      begins = true;
+    }
+    RiskEvent& event = watch_.events.back();
+    event.end = t;
+    pause_ = std::max(pause_, 0.25 * scale);
+    if (ratio > event.ratio) {
+      event.ratio = ratio;
+      event.peak_time = t;
+    }
   }
-  watch.watched = true;
+  return begins;
+}
+
+RiskWatch watch_at_risk(LogSource& log, const OnlineModel& model, double merge) {
+  if (!model.at_risk) {
+    return {};
+  }
   const detector::ScaleDetectorOptions options;
-  watch.false_alarms = options.false_alarms;
   detector::ScaleDetector detector(model, options);
+  RiskRecorder recorder(merge);
   const std::vector<std::size_t> pick = core::positions_of(log, model.measurement.columns());
   std::vector<double> sample(pick.size());
-  double pause = merge;
   core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
     if (starts) {
       detector.restart();
@@ -27,30 +51,12 @@ RiskWatch watch_at_risk(LogSource& log, const OnlineModel& model, double merge) 
     for (std::size_t c = 0; c < pick.size(); ++c) {
       sample[c] = block.columns[pick[c]][k];
     }
-    const double t = block.t[k];
-    detector.step(t, sample);
-    for (const detector::SumState& state : detector.looks()) {
-      const double ratio = state.threshold > 0.0 ? std::abs(state.value) / state.threshold : 0.0;
-      ++watch.looks;
-      watch.utilisation = std::max(watch.utilisation, ratio);
-      if (!(state.excess > 0.0)) {
-        continue;
-      }
-      const double scale = detector.scales()[state.scale];
-      if (watch.events.empty() || t > watch.events.back().end + pause) {
-        watch.events.push_back({t, t, detector.weights()[state.weight], scale, 0.0, t});
-        pause = merge;
-      }
-      RiskEvent& event = watch.events.back();
-      event.end = t;
-      pause = std::max(pause, 0.25 * scale);
-      if (ratio > event.ratio) {
-        event.ratio = ratio;
-        event.peak_time = t;
-      }
-    }
+    detector.step(block.t[k], sample);
+    recorder.add(detector, block.t[k]);
   });
-  return watch;
+  recorder.watch().watched = true;
+  recorder.watch().false_alarms = options.false_alarms;
+  return std::move(recorder.watch());
 }
 
 std::string sum_words(const detector::SumWeight& weight, const Model& model) {
@@ -67,7 +73,7 @@ std::string sum_words(const detector::SumWeight& weight, const Model& model) {
 }
 
 std::string sentence(const RiskEvent& event, const Model& model) {
-  return fmt::format("since {:.2f} s: {}, seen over {:g} s, up to {:.2g} times what a healthy robot's errors can do",
+  return fmt::format("since {:.2f} s: {}, seen over {:g} s, up to {:.3g} times what a healthy robot's errors can do",
                      event.alarm, sum_words(event.weight, model), event.scale, event.ratio);
 }
 

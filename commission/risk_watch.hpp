@@ -31,8 +31,21 @@ struct RiskWatch {
   std::vector<RiskEvent> events;
 };
 
-/// Walks `log` through the ScaleDetector of `model`; events are apart by more than `merge` s, and than a quarter of
-/// the scale that shows them.
+/// Makes events of what a ScaleDetector sees.
+class RiskRecorder {
+ public:
+  /// Events are apart by more than `merge` s, and than a quarter of the scale that shows them.
+  explicit RiskRecorder(double merge = 0.5) : merge_(merge), pause_(merge) {}
+  /// Takes the looks of the detector's last step, at the time `t` (s). Returns whether a new event begins.
+  bool add(const detector::ScaleDetector& detector, double t);
+  [[nodiscard]] RiskWatch& watch() { return watch_; }
+
+ private:
+  RiskWatch watch_;
+  double merge_, pause_;
+};
+
+/// Walks `log` through the ScaleDetector of `model`.
 [[nodiscard]] RiskWatch watch_at_risk(LogSource& log, const OnlineModel& model, double merge = 0.5);
 
 /// "bias or jump (tau_r)", "share of the effort (tau_r)", "mass": what the sum of an event looks for.

@@ -5,8 +5,6 @@
 #include <cmath>
 #include <utility>
 
-#include <fmt/format.h>
-
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/linear_algebra.hpp>
 
@@ -14,6 +12,7 @@ namespace wheelwright::detector {
 namespace {
 
 constexpr double kRoundings = 1e-10;  // of all that is added up, relative
+constexpr double kAlike = 1e-12;      // relative: steps whose decays need not be computed anew
 constexpr double kRise = 1.0;         // s, in which constant weights rise at a segment's start
 constexpr double kOfUsual = 0.2;      // V0 is this share of a usual drive's V
 
@@ -42,7 +41,7 @@ Eigen::MatrixXd largest_root(const Eigen::MatrixXd& middle, const Eigen::MatrixX
 std::vector<SumWeight> sum_weights(const Model& model) {
   std::vector<SumWeight> result;
   const auto joint = [&](std::size_t j) {
-    return model.joints.size() > 1 ? fmt::format(" {}", model.joints[j].torque) : std::string();
+    return model.joints.size() > 1 ? " " + model.joints[j].torque : std::string();
   };
   for (std::size_t j = 0; j < model.joints.size(); ++j) {
     result.push_back({SumWeight::Shape::constant, j, "constant" + joint(j)});
@@ -71,12 +70,13 @@ ScaleDetector::ScaleDetector(const OnlineModel& model, ScaleDetectorOptions opti
               "usual variances", "one for each weight and scale");
   inverse_ = core::inverse(m.input * m.input.transpose());
   to_joints_ = m.input.transpose() * inverse_;
-  largest_ = Eigen::VectorXd(p);
+  largest_ = half_ = Eigen::VectorXd(p);
   Eigen::MatrixXd middle = Eigen::MatrixXd::Zero(joints, n), radius = middle;
   speed_gain_ = Eigen::VectorXd::Zero(n);
   for (Eigen::Index q = 0; q < p; ++q) {
     const Interval& side = risk_.box.sides[static_cast<std::size_t>(q)];
     largest_[q] = std::max(std::abs(side.lower), std::abs(side.upper));
+    half_[q] = std::max(side.upper - model.estimate[q], model.estimate[q] - side.lower);
   }
   for (const Term& term : m.terms) {
     if (term.kind == Term::Kind::function) {
@@ -99,11 +99,11 @@ ScaleDetector::ScaleDetector(const OnlineModel& model, ScaleDetectorOptions opti
   const double correlation = risk_.errors.effort.correlation;
   const double together = correlation > 0.0 ? std::floor(correlation / risk_.errors.shortest_step) + 1.0 : 1.0;
   square_ = averages_ ? risk_.errors.effort.bound * risk_.errors.effort.bound * together : 0.0;
-  g_ = g1_ = g2_ = c_ = c1_ = c2_ = Eigen::MatrixXd::Zero(n, W);
-  joint_g_ = Eigen::MatrixXd::Zero(joints, W);
+  g_ = g1_ = c_ = c1_ = c2_ = Eigen::ArrayXXd::Zero(W, n);
+  joint_g_ = Eigen::ArrayXXd::Zero(W, joints);
   torque_ = Eigen::VectorXd::Zero(n);
   Y_ = core::RowMatrix::Zero(n, p);
-  residual_ = straight_ = turning_ = efforts_ = efforts1_ = Eigen::ArrayXd::Zero(W);
+  residual_ = straight_ = turning_ = efforts_ = efforts1_ = a0_ = a1_ = Eigen::ArrayXd::Zero(W);
   rows_ = Eigen::ArrayXXd::Zero(W, p);
   direction_.resize(static_cast<std::size_t>(p));
   const double share = options_.false_alarms / static_cast<double>(weights_.size() * risk_.scales.size());
@@ -125,7 +125,7 @@ void ScaleDetector::restart() { elements_.restart(); }
 void ScaleDetector::begin() {
   foreseen_.begin();
   taken_ = 0;
-  for (Eigen::MatrixXd* weights : {&g_, &g1_, &g2_, &c_, &c1_, &c2_}) {
+  for (Eigen::ArrayXXd* weights : {&g_, &g1_, &c_, &c1_, &c2_}) {
     weights->setZero();
   }
   efforts_.setZero();
@@ -143,11 +143,9 @@ void ScaleDetector::begin() {
 
 // Weights of the newest element.
 void ScaleDetector::weigh() {
-  g2_.swap(g1_);
   g1_.swap(g_);
   c2_.swap(c1_);
   c1_.swap(c_);
-  const Model& m = elements_.model();
   const core::RowMatrix& foreseen = foreseen_.value();
   const Eigen::VectorXd& theta = rule_.estimate();
   torque_.noalias() = foreseen * theta;
@@ -156,18 +154,18 @@ void ScaleDetector::weigh() {
   for (std::size_t w = 0; w < weights_.size(); ++w) {
     const auto i = static_cast<Eigen::Index>(w), which = static_cast<Eigen::Index>(weights_[w].which);
     switch (weights_[w].shape) {
-      case SumWeight::Shape::constant:
-        g_.col(i).noalias() = inverse_ * m.input.col(which);
-        g_.col(i) *= rise;
-        break;
+      case SumWeight::Shape::constant: g_.row(i) = rise * to_joints_.row(which).array(); break;
       case SumWeight::Shape::effort:
-        g_.col(i).noalias() = inverse_ * m.input.col(which);
-        g_.col(i) *= to_joints_.row(which).dot(torque_);
+        g_.row(i) = to_joints_.row(which).dot(torque_) * to_joints_.row(which).array();
         break;
-      case SumWeight::Shape::parameter: g_.col(i).noalias() = inverse_ * foreseen.col(which) * theta[which]; break;
+      case SumWeight::Shape::parameter:
+        for (Eigen::Index o = 0; o < g_.cols(); ++o) {
+          g_(i, o) = theta[which] * inverse_.row(o).dot(foreseen.col(which));
+        }
+        break;
     }
   }
-  c_.noalias() = slope_gain_ * g_;
+  c_.matrix().noalias() = g_.matrix() * slope_gain_.transpose();
 }
 
 void ScaleDetector::take() {
@@ -175,9 +173,9 @@ void ScaleDetector::take() {
   const filter::WeakElement& e = elements_.element();
   const bool angles = elements_.angles();
   filter::element_regressor(elements_, e, Y_);
-  rows_.matrix().noalias() = g_.transpose() * Y_;
-  residual_.matrix().noalias() = g_.transpose() * e.torque;
-  joint_g_.noalias() = m.input.transpose() * g_;
+  rows_.matrix().noalias() = g_.matrix() * Y_;
+  residual_.matrix().noalias() = g_.matrix() * e.torque;
+  joint_g_.matrix().noalias() = g_.matrix() * m.input;
 
   // At worst: what stands beside the sum for certain, in units of K.
   straight_ = kRoundings * residual_.abs();
@@ -186,16 +184,16 @@ void ScaleDetector::take() {
   }
   const double effort = averages_ ? risk_.errors.effort.bias : risk_.errors.effort.bound;
   efforts_.setZero();
-  for (Eigen::Index j = 0; j < joint_g_.rows(); ++j) {
-    straight_ += (effort * e.length) * joint_g_.row(j).transpose().array().abs();
-    efforts_ += joint_g_.row(j).transpose().array().square();
+  for (Eigen::Index j = 0; j < joint_g_.cols(); ++j) {
+    straight_ += (effort * e.length) * joint_g_.col(j).abs();
+    efforts_ += joint_g_.col(j).square();
   }
   for (Eigen::Index i = 0; i < e.torque_doubt.size(); ++i) {
     double doubt = e.torque_doubt[i];
     if (!angles) {
       doubt += speed_gain_[i] * e.length * risk_.errors.motion.bound;
     }
-    straight_ += doubt * g_.row(i).transpose().array().abs();
+    straight_ += doubt * g_.col(i).abs();
   }
   std::size_t function = 0;
   turning_.setZero();
@@ -203,20 +201,20 @@ void ScaleDetector::take() {
     const auto i = static_cast<Eigen::Index>(term.output), c = static_cast<Eigen::Index>(term.coordinate);
     const double theta = largest_[static_cast<Eigen::Index>(term.parameter)];
     if (term.kind == Term::Kind::function) {
-      straight_ += (theta * e.functions[function++].error) * g_.row(i).transpose().array().abs();
+      straight_ += (theta * e.functions[function++].error) * g_.col(i).abs();
     } else if (term.kind == Term::Kind::speed && !angles) {
-      straight_ += (theta * std::abs(term.scale) * e.motion_doubt[c]) * g_.row(i).transpose().array().abs();
+      straight_ += (theta * std::abs(term.scale) * e.motion_doubt[c]) * g_.col(i).abs();
     } else if (term.kind == Term::Kind::speed) {
       const double by = theta * std::abs(term.scale) * e.motion_doubt_before[c] / e.before;
-      straight_ += by * (g_.row(i) - g1_.row(i)).transpose().array().abs();
-      turning_ += by * g1_.row(i).transpose().array().abs();
+      straight_ += by * (g_.col(i) - g1_.col(i)).abs();
+      turning_ += by * g1_.col(i).abs();
     }
   }
   if (angles) {
-    for (Eigen::Index i = 0; i < g_.rows(); ++i) {
+    for (Eigen::Index i = 0; i < g_.cols(); ++i) {
       const double by = speed_gain_[i] * risk_.errors.motion.bound;
-      straight_ += by * (g_.row(i) - g1_.row(i)).transpose().array().abs();
-      turning_ += by * g1_.row(i).transpose().array().abs();
+      straight_ += by * (g_.col(i) - g1_.col(i)).abs();
+      turning_ += by * g1_.col(i).abs();
     }
   }
 
@@ -226,8 +224,8 @@ void ScaleDetector::take() {
   const double length1 = angles ? 0.5 * (steps_[1] + steps_[2]) : steps_[2];
   const double effort_square = square_ * length1 * longest;
   for (Scale& s : states_) {
-    const double x = h / s.T;
-    if (x != s.delta) {
+    const double x = h / s.T, d_before = s.decay;
+    if (std::abs(x - s.delta) > kAlike * x) {
       s.delta = x;
       s.decay = std::exp(-x);
     }
@@ -246,22 +244,15 @@ void ScaleDetector::take() {
     s.u0 = d * (s.u0 + x * s.u1 + (x * x) * s.u2);
     s.u1 = d * (s.u1 + (2.0 * x) * s.u2);
     s.u2 = d * s.u2;
-    const double x2 = (h + steps_[1]) / s.T, d2 = std::exp(-steps_[1] / s.T) * d;
-    for (Eigen::Index i = 0; i < c_.rows(); ++i) {
-      if (angles) {
-        const double before = 1.0 / steps_[1], after = 1.0 / h;
-        const auto a1 = (before * d2) * c2_.row(i) - ((before + after) * d) * c1_.row(i) + after * c_.row(i);
-        const auto a0 = (before * d2 * x2) * c2_.row(i) - ((before + after) * d * x) * c1_.row(i);
-        s.u0 += a0.transpose().array().square();
-        s.u1 += 2.0 * a0.transpose().array() * a1.transpose().array();
-        s.u2 += a1.transpose().array().square();
-      } else {
-        const auto a1 = d * c1_.row(i) - c_.row(i);
-        const auto a0 = (d * x) * c1_.row(i);
-        s.u0 += a0.transpose().array().square();
-        s.u1 += 2.0 * a0.transpose().array() * a1.transpose().array();
-        s.u2 += a1.transpose().array().square();
-      }
+    const double d2 = d_before * d, x2 = angles ? (h + steps_[1]) / s.T : 0.0;
+    const double before = angles ? 1.0 / steps_[1] : 0.0, after = angles ? 1.0 / h : -1.0;
+    const double middle = angles ? -(before + after) : 1.0;
+    for (Eigen::Index i = 0; i < c_.cols(); ++i) {
+      a1_ = (before * d2) * c2_.col(i) + (middle * d) * c1_.col(i) + after * c_.col(i);
+      a0_ = (before * d2 * x2) * c2_.col(i) + (middle * d * x) * c1_.col(i);
+      s.u0 += a0_.square();
+      s.u1 += 2.0 * a0_ * a1_;
+      s.u2 += a1_.square();
     }
     s.samples = d * s.samples + 1.0;
     s.since += h;
@@ -281,16 +272,25 @@ void ScaleDetector::look(Scale& s, std::size_t which) {
       direction_[q] = s.Y0(i, static_cast<Eigen::Index>(q));
       predicted += direction_[q] * rule_.estimate()[static_cast<Eigen::Index>(q)];
     }
-    const Interval range = rule_.prediction(direction_, w);
-    const double newest = last * last * c1_.col(i).squaredNorm();
-    const double angles = risk_.errors.motion.bound * std::sqrt(joints * (s.samples + 2.0) * (std::max(s.u0[i], 0.0) + newest));
+    const double newest = last * last * c1_.row(i).square().sum();
+    const double angles =
+        risk_.errors.motion.bound * std::sqrt(joints * (s.samples + 2.0) * (std::max(s.u0[i], 0.0) + newest));
     const double usual = risk_.usual(i, static_cast<Eigen::Index>(which)), V = std::max(s.v0[i], 0.0);
     const double averaged =
         usual > 0.0 ? std::sqrt((V + usual) * (2.0 * s.risk + std::log1p(V / usual))) : V > 0.0 ? HUGE_VAL : 0.0;
     const double radius = (s.l0[i] + angles + averaged) * (1.0 + kRoundings);
     const double value = s.y0[i] - predicted;
-    const double up = range.upper - predicted + radius, down = predicted - range.lower + radius;
     SumState& state = looks_[looked_++];
+    if (std::abs(value) <= radius) {  // inside, whatever the set: its box will do
+      double box = 0.0;
+      for (std::size_t q = 0; q < p; ++q) {
+        box += std::abs(direction_[q]) * half_[static_cast<Eigen::Index>(q)];
+      }
+      state = {w, which, value, radius + box, std::abs(value) - radius - box};
+      continue;
+    }
+    const Interval range = rule_.prediction(direction_, w);
+    const double up = range.upper - predicted + radius, down = predicted - range.lower + radius;
     state = {w, which, value, value >= 0.0 ? up : down, std::max(value - up, -value - down)};
     alarm_ = alarm_ || state.excess > 0.0;
   }

@@ -47,7 +47,7 @@ struct ScaleDetectorOptions {
 struct SumState {
   std::size_t weight = 0, scale = 0;
   double value = 0.0;      ///< Σ g (torque − Yθ̂)
-  double threshold = 0.0;  ///< the most that a healthy robot's may be above the θ̂ of its best explanation
+  double threshold = 0.0;  ///< |value| of a healthy robot is below; of a sum that is far inside, by the set's box
   double excess = 0.0;     ///< by which it stands outside, > 0: an alarm; unit of `threshold`
 };
 
@@ -107,18 +107,19 @@ class ScaleDetector {
   std::vector<SumWeight> weights_;
   std::vector<Scale> states_;
   Eigen::VectorXd largest_;      // |θ|
+  Eigen::VectorXd half_;         // sides of the set's hull from θ̂ on
   Eigen::MatrixXd inverse_;      // (N Nᵀ)⁻¹, N the model's input
   Eigen::MatrixXd to_joints_;    // joints × outputs: N⁺
   Eigen::MatrixXd slope_gain_;   // outputs × outputs: |·|² bounds that of what θ makes of errors of slopes in the joints
   Eigen::VectorXd speed_gain_;   // outputs: the most that θ makes of errors of all joints' speeds
   bool averages_ = false;        // errors of efforts
   double square_ = 0.0;          // their bound squared, times the samples that are correlated
-  Eigen::MatrixXd g_, g1_, g2_;  // outputs × weights: of the newest element and those before
-  Eigen::MatrixXd c_, c1_, c2_;  // slope_gain_ times these
-  Eigen::MatrixXd joint_g_;      // joints × weights: what errors of efforts are multiplied with
+  Eigen::ArrayXXd g_, g1_;       // weights × outputs: of the newest element and the one before
+  Eigen::ArrayXXd c_, c1_, c2_;  // slope_gain_ times these
+  Eigen::ArrayXXd joint_g_;      // weights × joints: what errors of efforts are multiplied with
   Eigen::VectorXd torque_;
   core::RowMatrix Y_;
-  Eigen::ArrayXd residual_, straight_, turning_, efforts_, efforts1_;
+  Eigen::ArrayXd residual_, straight_, turning_, efforts_, efforts1_, a0_, a1_;
   Eigen::ArrayXXd rows_;          // weights × p
   std::array<double, 4> steps_{};  // the newest last
   std::size_t taken_ = 0;

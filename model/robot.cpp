@@ -191,8 +191,11 @@ Robot with_column_errors(Robot robot, const std::vector<core::ColumnError>& erro
   for (const core::ColumnError& of : errors) {
     const auto widen = [&](NoiseBound SensorNoise::*kind) {
       if (const std::optional<double> bound = (declared.*kind).value) {
-        double& widened = *(robot.noise.*kind).value;
-        widened = std::max(widened, *bound + of.bound);
+        NoiseBound& widened = robot.noise.*kind;
+        widened.value = std::max(*widened.value, *bound + of.bound);
+        if (const std::optional<double> bias = (declared.*kind).bias) {  // interpolation does not average out
+          widened.bias = std::max(*widened.bias, *bias + of.bound);
+        }
       }
     };
     const std::string& name = of.column;

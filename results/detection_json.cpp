@@ -73,19 +73,23 @@ void add_isolation(Json& json, const std::vector<detector::Isolation>& isolation
   }
 }
 
+Json to_json(const commission::RiskEvent& e, const OnlineModel& model) {
+  return {{"alarm", e.alarm},
+          {"end", e.end},
+          {"weight", e.weight.name},
+          {"scale", e.scale},
+          {"ratio", e.ratio},
+          {"peak_time", e.peak_time},
+          {"sentence", commission::sentence(e, model.model)}};
+}
+
 void add_at_risk(Json& json, const commission::RiskWatch& watch, const OnlineModel& model) {
   if (!watch.watched) {
     return;
   }
   Json events = Json::array();
   for (const commission::RiskEvent& e : watch.events) {
-    events.push_back({{"alarm", e.alarm},
-                      {"end", e.end},
-                      {"weight", e.weight.name},
-                      {"scale", e.scale},
-                      {"ratio", e.ratio},
-                      {"peak_time", e.peak_time},
-                      {"sentence", commission::sentence(e, model.model)}});
+    events.push_back(to_json(e, model));
   }
   json["at_risk"] = {{"false_alarms_per_year", watch.false_alarms * 365.25 * 86400.0},
                      {"risk_of_the_set", model.at_risk->risk},

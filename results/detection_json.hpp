@@ -24,6 +24,7 @@ namespace wheelwright::results {
 void add_isolation(Json& detection, const std::vector<detector::Isolation>& isolations);
 
 /// Adds outputs and events of the kinematic residual to a detection as JSON; events stay in the order of their alarms.
+[[nodiscard]] Json to_json(const commission::RiskEvent& event, const OnlineModel& model);
 void add_at_risk(Json& json, const commission::RiskWatch& watch, const OnlineModel& model);
 void add_kinematic(Json& detection, const commission::KinematicWatch& watch, const OnlineModel& model);
 
