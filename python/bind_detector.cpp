@@ -109,19 +109,22 @@ struct DetectionObject {
   Detection detection;
   commission::KinematicWatch kinematic;
   std::vector<detector::Isolation> isolations;
+  commission::RiskWatch at_risk;
 
   [[nodiscard]] bool fault() const {
-    return !detection.events.empty() || (kinematic.detection && !kinematic.detection->events.empty());
+    return !detection.events.empty() || !at_risk.events.empty() ||
+           (kinematic.detection && !kinematic.detection->events.empty());
   }
   [[nodiscard]] Json json() const {
     Json json = results::to_json(detection, *model.model, model.path, log, results::software());
     results::add_isolation(json, isolations);
     results::add_kinematic(json, kinematic, *model.model);
+    results::add_at_risk(json, at_risk, *model.model);
     return json;
   }
   [[nodiscard]] std::string summary() const {
-    return words::summary(detection, *model.model) + words::summary(isolations, detection) +
-           words::summary(kinematic, *model.model);
+    return words::summary(detection, *model.model) + words::summary(at_risk, *model.model) +
+           words::summary(isolations, detection) + words::summary(kinematic, *model.model);
   }
 };
 
@@ -140,12 +143,14 @@ DetectionObject detect_in(LogObject& log, const ModelObject& given, const std::s
     const LogWalk walk(log);
     logs::require_columns(*log.source, model->measurement.columns());
     WatchedLog source(*log.source, work);
-    DetectionObject out{{model, given.path}, log.name(), {}, {}, {}};
+    DetectionObject out{{model, given.path}, log.name(), {}, {}, {}, {}};
     const auto tell = work.teller();
     tell("the torque residual", 0.0);
     out.detection = detect(source, make_detector(*model, own));
     tell("the kinematic residual", 0.4);
     out.kinematic = commission::watch_kinematics(source, *model, own);
+    tell("sums at a stated risk", 0.6);
+    out.at_risk = commission::watch_at_risk(source, *model);
     tell("what the events can be", 0.8);
     commission::EventIsolationOptions isolation;
     isolation.isolation.threads = threads;

@@ -19,6 +19,26 @@ class Results : public testing::ProgramTest {
   std::string shipped() const { return fmt::format("'{}'", (examples() / "healthy.csv.gz").string()); }
 
   /// What two detections of one log must agree on, event by event: only a finished event has an end and a peak.
+  // Events of a stream, a line each, and the times and sums of those at a stated risk.
+  static std::pair<Json, Json> streamed(const std::string& lines) {
+    Json events = Json::array(), at_risk = Json::array();
+    for (const std::string& line : testing::lines_of(lines)) {
+      const Json event = Json::parse(line);
+      if (event.contains("at_risk")) {
+        at_risk.push_back(event.at("at_risk"));
+      } else {
+        events.push_back(event);
+      }
+    }
+    return {events, sums_of(at_risk)};
+  }
+  static Json sums_of(const Json& events) {
+    Json sums = Json::array();
+    for (const Json& e : events) {
+      sums.push_back({e.at("alarm"), e.at("weight"), e.at("scale")});
+    }
+    return sums;
+  }
   static Json alarms_of(const Json& events) {
     Json alarms = Json::array();
     for (const Json& e : events) {
@@ -83,12 +103,11 @@ TEST_F(Results, FollowTellsWhatBatchTells) {
     const Outcome stream = run("detect --follow --model model/model.json --json" + options, path("fault.csv"));
     EXPECT_EQ(batch.code, 1);
     EXPECT_EQ(stream.code, 1);
-    Json events = Json::array();
-    for (const std::string& line : testing::lines_of(stream.out)) {
-      events.push_back(Json::parse(line));
-    }
+    const auto [events, at_risk] = streamed(stream.out);
     EXPECT_FALSE(events.empty());
+    EXPECT_FALSE(at_risk.empty());
     EXPECT_EQ(alarms_of(events), alarms_of(Json::parse(batch.out).at("events"))) << options;
+    EXPECT_EQ(at_risk, sums_of(Json::parse(batch.out).at("at_risk").at("events"))) << options;
   }
 }
 
@@ -103,13 +122,11 @@ TEST_F(Results, FollowTellsWhatBatchTellsOfADamagedLog) {
   put("fault.csv", bytes(path("fault.csv")) + lines.back().substr(0, lines.back().rfind(',')));  // a last line cut off
   const Outcome batch = run("detect fault.csv --model model/model.json --json");
   const Outcome stream = run("detect --follow --model model/model.json --json", path("fault.csv"));
-  Json events = Json::array();
-  for (const std::string& line : testing::lines_of(stream.out)) {
-    events.push_back(Json::parse(line));
-  }
+  const auto [events, at_risk] = streamed(stream.out);
   EXPECT_EQ(batch.code, 1);
   EXPECT_EQ(stream.code, 1);
   EXPECT_EQ(alarms_of(events), alarms_of(Json::parse(batch.out).at("events")));
+  EXPECT_EQ(at_risk, sums_of(Json::parse(batch.out).at("at_risk").at("events")));
 }
 
 TEST_F(Results, PersistenceOnTheCommandLineGoesBeforeTheModels) {
