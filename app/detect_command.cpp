@@ -95,9 +95,9 @@ int run(const Arguments& a) {
     }
     std::string page;
     if (!a.common.out.empty()) {
-      page = report::detect_report(detection, model, context,
-                                   {.detection = kinematic.detection, .message = kinematic.message}, isolations,
-                                   at_risk);
+      page =
+          report::detect_report(detection, model, context,
+                                {.detection = kinematic.detection, .message = kinematic.message}, isolations, at_risk);
     }
     publish(a.common, json, "detection.json", page);
   }

@@ -66,12 +66,13 @@ void learn_at_risk(LogSource& log, Commissioning& result, const AtRiskOptions& o
     assumption.detail = std::move(detail);
     result.notes.push_back(fmt::format(
         "nothing is said at a stated risk, the worst case stands alone: {}; a larger `bias` or `correlation` of "
-        "`noise: effort` in the robot file would allow for it", assumption.detail));
+        "`noise: effort` in the robot file would allow for it",
+        assumption.detail));
     result.at_risk->set.reset();
     model.at_risk.reset();
   };
-  result.at_risk = risk_set(log, model.model, model.measurement, result.row_errors, *classes,
-                            *result.feasible.polytope, options.set);
+  result.at_risk = risk_set(log, model.model, model.measurement, result.row_errors, *classes, *result.feasible.polytope,
+                            options.set);
   if (!result.at_risk->set) {
     if (!result.at_risk->facets.empty()) {
       contradicted(result.at_risk->reason);
@@ -93,6 +94,9 @@ void learn_at_risk(LogSource& log, Commissioning& result, const AtRiskOptions& o
                                model.at_risk->scales[worst->scale], 1.0 + worst->excess / worst->threshold,
                                weight.name));
     }
+  }
+  if (model.at_risk) {
+    result.reach = risk_reach(log, model);
   }
   result.assumptions.push_back(assumption);
   model.assumptions = result.assumptions;

@@ -21,7 +21,7 @@ struct AtRiskOptions {
 /// Adds Commissioning::at_risk and OnlineModel::at_risk to a guaranteed result whose robot file declares errors that
 /// average out (error_classes()), and an assumption with the log's verdict on them. The log contradicts them where it
 /// leaves no set, or where a sum over any scale stands outside what such errors can do at AtRiskOptions::test_risk:
-/// then nothing is said at a risk, and the worst case stands alone. Walks the log six times.
+/// then nothing is said at a risk, and the worst case stands alone. Walks the log seven times.
 void learn_at_risk(LogSource& log, Commissioning& result, const AtRiskOptions& options = {});
 
 }  // namespace wheelwright::commission

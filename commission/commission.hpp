@@ -16,6 +16,7 @@
 #include <wheelwright/commission/filter_choice.hpp>
 #include <wheelwright/commission/kinematic.hpp>
 #include <wheelwright/commission/noise_budget.hpp>
+#include <wheelwright/commission/risk_reach.hpp>
 #include <wheelwright/commission/risk_set.hpp>
 #include <wheelwright/commission/survey.hpp>
 #include <wheelwright/commission/validation.hpp>
@@ -90,10 +91,11 @@ struct Commissioning {
   std::vector<EarlierSet>
       earlier;  ///< sets of the earlier passes, from which it was refined: the first one rests on the
                 ///< limit of the accelerations alone; none where nothing bounds the motion by the model
-  std::optional<RiskSet> at_risk;  ///< where the robot file declares errors that average out, and a model came out
-  KinematicCommissioning kinematic;           ///< of the kinematic residual; its model is also OnlineModel::kinematic
-  double polytope_over_box = 1.0;             ///< median width of [l, u]: polytope over box, held out, worst output
-  std::vector<std::string> notes;             ///< what was repaired or chosen, for people
+  std::optional<RiskSet> at_risk;    ///< where the robot file declares errors that average out, and a model came out
+  std::vector<RiskReach> reach;      ///< what the detector at that risk will see on drives like this log
+  KinematicCommissioning kinematic;  ///< of the kinematic residual; its model is also OnlineModel::kinematic
+  double polytope_over_box = 1.0;    ///< median width of [l, u]: polytope over box, held out, worst output
+  std::vector<std::string> notes;    ///< what was repaired or chosen, for people
   std::vector<core::Assumption> assumptions;  ///< all assumptions, with the verdict of the log on each
 };
 

@@ -94,8 +94,7 @@ std::optional<filter::ErrorClasses> error_classes(const Robot& robot, const Meas
   classes.shortest_step = measurement.shortest_step > 0.0 ? measurement.shortest_step : measurement.nominal_step;
   classes.effort = {budget.sensors.effort, std::min(*robot.noise.effort.bias, budget.sensors.effort),
                     robot.noise.effort.correlation};
-  const model::NoiseBound& angle =
-      model::on_two_wheels(robot) ? robot.noise.wheel_angle : robot.noise.position;
+  const model::NoiseBound& angle = model::on_two_wheels(robot) ? robot.noise.wheel_angle : robot.noise.position;
   const bool speed = measurement.motion == MotionKind::speed;
   const model::NoiseBound& motion = speed ? robot.noise.wheel_speed : angle;
   const bool declared = speed || (measurement.motion == MotionKind::angle && angle.value);

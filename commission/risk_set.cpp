@@ -9,8 +9,8 @@
 
 #include <wheelwright/bounds/slab_rows.hpp>
 #include <wheelwright/core/check.hpp>
-#include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/core/limits.hpp>
+#include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/filter/element_filter.hpp>
 #include <wheelwright/filter/predictable_regressor.hpp>
 #include <wheelwright/filter/sample_weights.hpp>
@@ -94,9 +94,9 @@ std::vector<std::vector<Eigen::Index>> blocks_of(const Model& model) {
   return result;
 }
 
-constexpr double kSpread = 0.01;      // η of (a + b)(a + b)ᵀ <= (1 + η) aaᵀ + (1 + 1/η) bbᵀ
-constexpr double kExpected = 0.1;     // V0 is this share of the V that the log's beginning makes expect
-constexpr double kRounding = 1e-10;   // relative, of all sums
+constexpr double kSpread = 0.01;     // η of (a + b)(a + b)ᵀ <= (1 + η) aaᵀ + (1 + 1/η) bbᵀ
+constexpr double kExpected = 0.1;    // V0 is this share of the V that the log's beginning makes expect
+constexpr double kRounding = 1e-10;  // relative, of all sums
 
 // What becomes of a block's elements: first V0 is learnt from those in which the foreseen torque stands above the
 // efforts' errors, then sums begin; between both is a pause, in which no weights stand.
@@ -146,8 +146,8 @@ class Phase {
 
 class Learner {
  public:
-  Learner(LogSource& log, const ElementFilter& filter, const filter::ErrorClasses& classes,
-          filter::ParameterBox box, const RiskSetOptions& options)
+  Learner(LogSource& log, const ElementFilter& filter, const filter::ErrorClasses& classes, filter::ParameterBox box,
+          const RiskSetOptions& options)
       : log_(log), filter_(filter), classes_(classes), box_(std::move(box)), options_(options) {
     walk(
         log_, filter_, [&] { stretches_.push_back({}); },
@@ -380,9 +380,9 @@ class Learner {
 
 }  // namespace
 
-RiskSet risk_set(LogSource& log, const Model& model, const Measurement& measurement,
-                 const filter::SignalErrors& errors, const filter::ErrorClasses& classes,
-                 const bounds::Polytope& guaranteed, const RiskSetOptions& options) {
+RiskSet risk_set(LogSource& log, const Model& model, const Measurement& measurement, const filter::SignalErrors& errors,
+                 const filter::ErrorClasses& classes, const bounds::Polytope& guaranteed,
+                 const RiskSetOptions& options) {
   check::that(options.risk > 0.0 && options.risk < 1.0, "risk", "between 0 and 1");
   check::that(!options.delays.empty(), "delays of the weights", "at least one");
   validate(classes);
@@ -417,8 +417,7 @@ RiskSet risk_set(LogSource& log, const Model& model, const Measurement& measurem
         continue;
       }
       const Eigen::VectorXd x = from.cwiseProduct(lu.solve(to.cwiseProduct(w(block))));
-      const double half =
-          std::sqrt(x.dot((e.V + e.V0) * x) * e.squared_radius) + x.cwiseAbs().dot(e.straight);
+      const double half = std::sqrt(x.dot((e.V + e.V0) * x) * e.squared_radius) + x.cwiseAbs().dot(e.straight);
       if (all || half < best) {
         if (!all) {
           directions.resize(first);
@@ -445,8 +444,8 @@ RiskSet risk_set(LogSource& log, const Model& model, const Measurement& measurem
         const Eigen::Index j = block[a], k = block[b];
         for (const double sign : {1.0, -1.0}) {
           if (width[j] > 0.0 && width[k] > 0.0) {
-            consider(Eigen::VectorXd::Unit(p, j) / width[j] + sign * Eigen::VectorXd::Unit(p, k) / width[k],
-                     block, false);
+            consider(Eigen::VectorXd::Unit(p, j) / width[j] + sign * Eigen::VectorXd::Unit(p, k) / width[k], block,
+                     false);
           }
         }
       }

@@ -20,14 +20,14 @@ namespace wheelwright::commission {
 
 /// Options of risk_set().
 struct RiskSetOptions {
-  double risk = 1e-9;                                     ///< probability that the set lacks the true θ
+  double risk = 1e-9;                              ///< probability that the set lacks the true θ
   std::vector<double> delays{0.2, 0.4, 0.8, 1.6};  ///< s, by which the weights that are tried foresee
-  double learning = 0.05;                                 ///< share of the log on which the ellipsoid's scale is learnt
+  double learning = 0.05;                          ///< share of the log on which the ellipsoid's scale is learnt
 };
 
 /// One facet: but for the set's risk, |y − Yθ| <= dy with Y known up to dY.
 struct RiskFacet {
-  Eigen::VectorXd Y, dY;     ///< p
+  Eigen::VectorXd Y, dY;  ///< p
   double y = 0.0, dy = 0.0;
   double delay = 0.0;        ///< s, of the weights
   Eigen::VectorXd weights;   ///< p: the sum's weights are the foreseen regressor times this
@@ -39,8 +39,8 @@ struct RiskFacet {
 struct RiskSet {
   std::optional<bounds::Polytope> set;  ///< nothing where the log leaves none: it contradicts what is assumed
   std::vector<RiskFacet> facets;
-  double risk = 0.0;                    ///< probability that the set lacks the true θ
-  double log_volume = 0.0;              ///< largest of the ellipsoids' ln det(I + V0⁻¹V)
+  double risk = 0.0;        ///< probability that the set lacks the true θ
+  double log_volume = 0.0;  ///< largest of the ellipsoids' ln det(I + V0⁻¹V)
   std::string reason;       ///< where there is no set
 };
 

@@ -24,10 +24,10 @@ struct RiskEvent {
 
 /// Result of watch_at_risk().
 struct RiskWatch {
-  bool watched = false;          ///< false: the model says nothing at a stated risk
-  double false_alarms = 0.0;     ///< at most as many are to be expected in a second
-  std::size_t looks = 0;         ///< at sums
-  double utilisation = 0.0;      ///< largest |value|/threshold
+  bool watched = false;       ///< false: the model says nothing at a stated risk
+  double false_alarms = 0.0;  ///< at most as many are to be expected in a second
+  std::size_t looks = 0;      ///< at sums
+  double utilisation = 0.0;   ///< largest |value|/threshold
   std::vector<RiskEvent> events;
 };
 

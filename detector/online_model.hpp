@@ -57,7 +57,7 @@ struct OnlineModel : LearntSet {
   FilterDesign filter{};
   filter::SignalErrors errors{};  ///< dY and dy of the rows, ē included
   std::optional<KinematicModel> kinematic{};
-  std::optional<RiskModel> at_risk{};  ///< where the robot file declares errors that average out
+  std::optional<RiskModel> at_risk{};           ///< where the robot file declares errors that average out
   std::vector<core::Assumption> assumptions{};  ///< behind the numbers, with the verdict of the log on each
 };
 

@@ -103,7 +103,7 @@ ScaleDetector::ScaleDetector(const OnlineModel& model, ScaleDetectorOptions opti
   joint_g_ = Eigen::ArrayXXd::Zero(W, joints);
   torque_ = Eigen::VectorXd::Zero(n);
   Y_ = core::RowMatrix::Zero(n, p);
-  residual_ = straight_ = turning_ = efforts_ = efforts1_ = a0_ = a1_ = Eigen::ArrayXd::Zero(W);
+  residual_ = straight_ = turning_ = efforts_ = efforts1_ = response_ = a0_ = a1_ = Eigen::ArrayXd::Zero(W);
   rows_ = Eigen::ArrayXXd::Zero(W, p);
   direction_.resize(static_cast<std::size_t>(p));
   const double share = options_.false_alarms / static_cast<double>(weights_.size() * risk_.scales.size());
@@ -111,7 +111,7 @@ ScaleDetector::ScaleDetector(const OnlineModel& model, ScaleDetectorOptions opti
     Scale s;
     s.T = T;
     s.risk = std::log(options_.checks / (share * T));
-    for (Eigen::ArrayXd* state : {&s.y0, &s.y1, &s.v0, &s.v1, &s.v2, &s.l0, &s.l1, &s.u0, &s.u1, &s.u2}) {
+    for (Eigen::ArrayXd* state : {&s.y0, &s.y1, &s.v0, &s.v1, &s.v2, &s.l0, &s.l1, &s.u0, &s.u1, &s.u2, &s.r0, &s.r1}) {
       *state = Eigen::ArrayXd::Zero(W);
     }
     s.Y0 = s.Y1 = rows_;
@@ -132,7 +132,7 @@ void ScaleDetector::begin() {
   efforts1_.setZero();
   steps_.fill(elements_.step_length());
   for (Scale& s : states_) {
-    for (Eigen::ArrayXd* state : {&s.y0, &s.y1, &s.v0, &s.v1, &s.v2, &s.l0, &s.l1, &s.u0, &s.u1, &s.u2}) {
+    for (Eigen::ArrayXd* state : {&s.y0, &s.y1, &s.v0, &s.v1, &s.v2, &s.l0, &s.l1, &s.u0, &s.u1, &s.u2, &s.r0, &s.r1}) {
       state->setZero();
     }
     s.Y0.setZero();
@@ -218,9 +218,18 @@ void ScaleDetector::take() {
     }
   }
 
+  for (std::size_t w = 0; w < weights_.size(); ++w) {
+    const auto i = static_cast<Eigen::Index>(w), which = static_cast<Eigen::Index>(weights_[w].which);
+    switch (weights_[w].shape) {
+      case SumWeight::Shape::constant: response_[i] = joint_g_(i, which) * e.length; break;
+      case SumWeight::Shape::effort: response_[i] = joint_g_(i, which) * to_joints_.row(which).dot(e.torque); break;
+      case SumWeight::Shape::parameter: response_[i] = rows_(i, which) * rule_.estimate()[which]; break;
+    }
+  }
+
   steps_ = {steps_[1], steps_[2], steps_[3], e.step};
   const double longest = *std::max_element(steps_.begin(), steps_.end());
-  const double h = angles ? e.before : e.step;       // from the element before
+  const double h = angles ? e.before : e.step;  // from the element before
   const double length1 = angles ? 0.5 * (steps_[1] + steps_[2]) : steps_[2];
   const double effort_square = square_ * length1 * longest;
   for (Scale& s : states_) {
@@ -232,6 +241,8 @@ void ScaleDetector::take() {
     const double d = s.decay, dd = d * d;
     s.y0 = d * (s.y0 + x * s.y1);
     s.y1 = d * s.y1 + residual_;
+    s.r0 = d * (s.r0 + x * s.r1);
+    s.r1 = d * s.r1 + response_;
     s.Y0 = d * (s.Y0 + x * s.Y1);
     s.Y1 = d * s.Y1 + rows_;
     s.l0 = d * (s.l0 + x * s.l1) + x * turning_;
@@ -276,22 +287,23 @@ void ScaleDetector::look(Scale& s, std::size_t which) {
     const double angles =
         risk_.errors.motion.bound * std::sqrt(joints * (s.samples + 2.0) * (std::max(s.u0[i], 0.0) + newest));
     const double usual = risk_.usual(i, static_cast<Eigen::Index>(which)), V = std::max(s.v0[i], 0.0);
-    const double averaged =
-        usual > 0.0 ? std::sqrt((V + usual) * (2.0 * s.risk + std::log1p(V / usual))) : V > 0.0 ? HUGE_VAL : 0.0;
+    const double averaged = usual > 0.0 ? std::sqrt((V + usual) * (2.0 * s.risk + std::log1p(V / usual)))
+                            : V > 0.0   ? HUGE_VAL
+                                        : 0.0;
     const double radius = (s.l0[i] + angles + averaged) * (1.0 + kRoundings);
     const double value = s.y0[i] - predicted;
     SumState& state = looks_[looked_++];
-    if (std::abs(value) <= radius) {  // inside, whatever the set: its box will do
+    if (!options_.exact_thresholds && std::abs(value) <= radius) {  // inside, whatever the set: its box will do
       double box = 0.0;
       for (std::size_t q = 0; q < p; ++q) {
         box += std::abs(direction_[q]) * half_[static_cast<Eigen::Index>(q)];
       }
-      state = {w, which, value, radius + box, std::abs(value) - radius - box};
+      state = {w, which, value, radius + box, std::abs(value) - radius - box, s.r0[i], s.r1[i]};
       continue;
     }
     const Interval range = rule_.prediction(direction_, w);
     const double up = range.upper - predicted + radius, down = predicted - range.lower + radius;
-    state = {w, which, value, value >= 0.0 ? up : down, std::max(value - up, -value - down)};
+    state = {w, which, value, value >= 0.0 ? up : down, std::max(value - up, -value - down), s.r0[i], s.r1[i]};
     alarm_ = alarm_ || state.excess > 0.0;
   }
 }

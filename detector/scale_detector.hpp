@@ -40,7 +40,8 @@ struct ScaleDetectorOptions {
   /// Expected number of false alarms in a second of driving, if errors are as assumed and θ is in the set. Once in ten
   /// years.
   double false_alarms = 1.0 / (10.0 * 365.25 * 86400.0);
-  double checks = 8.0;  ///< of a sum, in the time of its scale
+  double checks = 8.0;            ///< of a sum, in the time of its scale
+  bool exact_thresholds = false;  ///< those of sums that are far inside, too, by the set instead of its box
 };
 
 /// A sum that stands where no healthy robot's could, or how near it comes.
@@ -49,6 +50,10 @@ struct SumState {
   double value = 0.0;      ///< Σ g (torque − Yθ̂)
   double threshold = 0.0;  ///< |value| of a healthy robot is below; of a sum that is far inside, by the set's box
   double excess = 0.0;     ///< by which it stands outside, > 0: an alarm; unit of `threshold`
+  /// What the sum would be by a fault of size 1 that its weight is like, if it had always been there: c0; and that times
+  /// a further age x of the scale is (c0 + c1 x)e^{−x}. Size 1: the unit of the effort, all of the effort, all of the
+  /// parameter.
+  double c0 = 0.0, c1 = 0.0;
 };
 
 /// Sums over scales T, with weights w(t) = K((now − t)/T) g(t), K(x) = x e^{−x}, g foreseen (PredictableRegressor), of
@@ -90,7 +95,7 @@ class ScaleDetector {
   // c0 + c1 x (+ c2 x²) of every weight, x = age/T.
   struct Scale {
     double T = 0.0, decay = 1.0, delta = 0.0, since = 0.0, risk = 0.0, samples = 0.0;
-    Eigen::ArrayXd y0, y1, v0, v1, v2, l0, l1, u0, u1, u2;
+    Eigen::ArrayXd y0, y1, v0, v1, v2, l0, l1, u0, u1, u2, r0, r1;
     Eigen::ArrayXXd Y0, Y1;  // weights × p
   };
 
@@ -106,11 +111,11 @@ class ScaleDetector {
   ThresholdRule rule_;
   std::vector<SumWeight> weights_;
   std::vector<Scale> states_;
-  Eigen::VectorXd largest_;      // |θ|
-  Eigen::VectorXd half_;         // sides of the set's hull from θ̂ on
-  Eigen::MatrixXd inverse_;      // (N Nᵀ)⁻¹, N the model's input
-  Eigen::MatrixXd to_joints_;    // joints × outputs: N⁺
-  Eigen::MatrixXd slope_gain_;   // outputs × outputs: |·|² bounds that of what θ makes of errors of slopes in the joints
+  Eigen::VectorXd largest_;    // |θ|
+  Eigen::VectorXd half_;       // sides of the set's hull from θ̂ on
+  Eigen::MatrixXd inverse_;    // (N Nᵀ)⁻¹, N the model's input
+  Eigen::MatrixXd to_joints_;  // joints × outputs: N⁺
+  Eigen::MatrixXd slope_gain_;  // outputs × outputs: |·|² bounds that of what θ makes of errors of slopes in the joints
   Eigen::VectorXd speed_gain_;   // outputs: the most that θ makes of errors of all joints' speeds
   bool averages_ = false;        // errors of efforts
   double square_ = 0.0;          // their bound squared, times the samples that are correlated
@@ -119,8 +124,8 @@ class ScaleDetector {
   Eigen::ArrayXXd joint_g_;      // weights × joints: what errors of efforts are multiplied with
   Eigen::VectorXd torque_;
   core::RowMatrix Y_;
-  Eigen::ArrayXd residual_, straight_, turning_, efforts_, efforts1_, a0_, a1_;
-  Eigen::ArrayXXd rows_;          // weights × p
+  Eigen::ArrayXd residual_, straight_, turning_, efforts_, efforts1_, response_, a0_, a1_;
+  Eigen::ArrayXXd rows_;           // weights × p
   std::array<double, 4> steps_{};  // the newest last
   std::size_t taken_ = 0;
   std::vector<SumState> looks_;

@@ -298,7 +298,7 @@ bool ElementFilter::describe(std::size_t age) {
 // q − `corrected`, with `covered` in doubt, both times the curvature of a parabola through three efforts, `a` and `b`
 // apart.
 void ElementFilter::curve_effort(double a, double b, const Eigen::VectorXd& first, const Eigen::VectorXd& middle,
-                                   const Eigen::VectorXd& last, double corrected, double covered) {
+                                 const Eigen::VectorXd& last, double corrected, double covered) {
   for (Eigen::Index j = 0; j < scratch_.size(); ++j) {
     scratch_[j] = 2.0 * ((last[j] - middle[j]) / b - (middle[j] - first[j]) / a) / (a + b);
   }
@@ -422,10 +422,10 @@ ElementFilter::EffortWeights ElementFilter::effort_weights() const {
     return w;
   }
   if (mean) {
-    return held      ? EffortWeights{true, {a / 8.0, 3.0 * (a + b) / 8.0, b / 8.0, 0.0}}
-           : between ? EffortWeights{true, {0.0, 0.5 * a, 0.5 * b, 0.0}}
-                     : EffortWeights{
-                           true, {a / 48.0, (18.0 * a + 5.0 * b) / 48.0, (5.0 * a + 18.0 * b) / 48.0, b / 48.0}};
+    return held ? EffortWeights{true, {a / 8.0, 3.0 * (a + b) / 8.0, b / 8.0, 0.0}}
+           : between
+               ? EffortWeights{true, {0.0, 0.5 * a, 0.5 * b, 0.0}}
+               : EffortWeights{true, {a / 48.0, (18.0 * a + 5.0 * b) / 48.0, (5.0 * a + 18.0 * b) / 48.0, b / 48.0}};
   }
   if (held) {
     return {true, {0.5 * a, 0.5 * b, 0.0, 0.0}};

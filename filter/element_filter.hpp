@@ -26,19 +26,19 @@ namespace wheelwright::filter {
 /// For speeds ω is 1 in a step and 0 outside. Any weight that is linear between samples (constant in each step) is a
 /// sum of these, so that every regression on this equation is made of elements: Σ g_k (element k).
 struct WeakElement {
-  std::size_t number = 0;     ///< from 1 on in a segment
-  double t = 0.0;             ///< s, its sample (angles), the end of its step (speeds)
-  double length = 0.0;        ///< s, ∫ ω
-  double before = 0.0;        ///< s, from the sample before to its sample (angles); its step (speeds)
-  double step = 0.0;          ///< s, from its sample to the next one (angles); its step (speeds)
-  Eigen::VectorXd motion;     ///< per coordinate: ∫ ω φ̇
-  Eigen::VectorXd slope;      ///< per coordinate: ∫ ω φ̈, exactly
-  Eigen::VectorXd torque;     ///< per output: ∫ ω u
+  std::size_t number = 0;        ///< from 1 on in a segment
+  double t = 0.0;                ///< s, its sample (angles), the end of its step (speeds)
+  double length = 0.0;           ///< s, ∫ ω
+  double before = 0.0;           ///< s, from the sample before to its sample (angles); its step (speeds)
+  double step = 0.0;             ///< s, from its sample to the next one (angles); its step (speeds)
+  Eigen::VectorXd motion;        ///< per coordinate: ∫ ω φ̇
+  Eigen::VectorXd slope;         ///< per coordinate: ∫ ω φ̈, exactly
+  Eigen::VectorXd torque;        ///< per output: ∫ ω u
   Eigen::VectorXd torque_doubt;  ///< per output: what efforts may do between samples
   /// Per coordinate; speeds: what the trapezoidal rule may miss. Angles: the most that ∫ (s − middle)(φ̇ − s_k) ds is in
   /// the step after the sample, by which the *slope* of a sum's weights is to be multiplied.
   Eigen::VectorXd motion_doubt;
-  Eigen::VectorXd motion_doubt_before;  ///< angles: the same of the step before the sample
+  Eigen::VectorXd motion_doubt_before;      ///< angles: the same of the step before the sample
   std::vector<model::TermValue> functions;  ///< ∫ ω f of each function term, in their order
 };
 

@@ -23,8 +23,7 @@ SampleClass sample_class(const ErrorClasses& classes, const SampleWeight& sample
   SampleClass result;
   result.bound = c.bound;
   result.bias = c.bias;
-  result.averages =
-      sample.exact && c.bias < c.bound && (!motion || sample.moved >= kCountsThatAverage * classes.count);
+  result.averages = sample.exact && c.bias < c.bound && (!motion || sample.moved >= kCountsThatAverage * classes.count);
   result.multiplicity = c.correlation > 0.0 ? std::floor(c.correlation / classes.shortest_step) + 1.0 : 1.0;
   return result;
 }

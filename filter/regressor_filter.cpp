@@ -33,8 +33,7 @@ RegressorFilter::RegressorFilter(Model model, FilterDesign design, Measurement m
 }
 
 void RegressorFilter::begin() {
-  for (auto* states :
-       {&motion_, &slope_, &torque_, &torque_doubt_, &motion_doubt_, &functions_, &function_doubt_}) {
+  for (auto* states : {&motion_, &slope_, &torque_, &torque_doubt_, &motion_doubt_, &functions_, &function_doubt_}) {
     std::fill(states->begin(), states->end(), KernelState{});
   }
   std::fill(slope_doubt_.begin(), slope_doubt_.end(), SlopeMajorant{});
@@ -124,8 +123,8 @@ void RegressorFilter::write_row() {
       error = errors.speed[c];
       if (bounded) {
         error += angles ? kernel_.gain() * kernel_.majorant_gain() * slope_doubt_[term.coordinate].value() +
-                               start * first_doubt_[term.coordinate]
-                         : kernel_.value(motion_doubt_[term.coordinate]);
+                              start * first_doubt_[term.coordinate]
+                        : kernel_.value(motion_doubt_[term.coordinate]);
       }
     } else {
       value = kernel_.value(slope_[term.coordinate]);

@@ -43,8 +43,8 @@ void SampleWeights::add(const ElementFilter& elements, const core::RowMatrix& g)
   moved_[(angles ? k + 1 : k) % kSlots] = (elements.last_step().joint_speed * e.step).cwiseAbs();
 
   // Samples k − 1, k, k + 1 (angles), or k − 1 and k (speeds), in ∫ ω φ̈ and ∫ ω φ̇.
-  const std::array<double, 3> slope = angles ? std::array{1.0 / e.before, -1.0 / e.before - 1.0 / e.step, 1.0 / e.step}
-                                             : std::array{-1.0, 1.0, 0.0};
+  const std::array<double, 3> slope =
+      angles ? std::array{1.0 / e.before, -1.0 / e.before - 1.0 / e.step, 1.0 / e.step} : std::array{-1.0, 1.0, 0.0};
   const std::array<double, 3> motion =
       angles ? std::array{-0.5, 0.0, 0.5} : std::array{0.5 * e.step, 0.5 * e.step, 0.0};
   for (const Term& term : model.terms) {
@@ -55,8 +55,8 @@ void SampleWeights::add(const ElementFilter& elements, const core::RowMatrix& g)
     const auto par = static_cast<Eigen::Index>(term.parameter);
     const auto& stencil = term.kind == Term::Kind::acceleration ? slope : motion;
     for (std::size_t j = 0; j < joints_; ++j) {
-      const double by = -term.scale * model.motion(static_cast<Eigen::Index>(term.coordinate),
-                                                   static_cast<Eigen::Index>(j));
+      const double by =
+          -term.scale * model.motion(static_cast<Eigen::Index>(term.coordinate), static_cast<Eigen::Index>(j));
       if (by == 0.0) {
         continue;
       }

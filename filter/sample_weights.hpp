@@ -120,10 +120,10 @@ class SampleWeights {
 
 /// Σ_k g_kᵀ (torque_k − Y_k θ) for several sums, apart from its sensors' errors.
 struct WeakSums {
-  core::RowMatrix Y;      ///< sums × p
-  Eigen::VectorXd y;      ///< sums
-  core::RowMatrix dY;     ///< sums × p: bound on what Y lacks, >= 0
-  Eigen::VectorXd dy;     ///< sums: bound on what y lacks, >= 0
+  core::RowMatrix Y;   ///< sums × p
+  Eigen::VectorXd y;   ///< sums
+  core::RowMatrix dY;  ///< sums × p: bound on what Y lacks, >= 0
+  Eigen::VectorXd dy;  ///< sums: bound on what y lacks, >= 0
 
   /// Zeros.
   WeakSums(Eigen::Index sums, Eigen::Index p);

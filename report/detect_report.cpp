@@ -123,7 +123,8 @@ std::string at_risk_section(const commission::RiskWatch& watch, const OnlineMode
   constexpr double kYear = 365.25 * 86400.0;
   std::string out = paragraph(fmt::format(
       "Weighted sums over {} to {} s of what the model leaves, matched to faults, were compared {} times with what the "
-      "errors of a healthy robot can make of them; in {} years of driving at most one false alarm is to be expected, as "
+      "errors of a healthy robot can make of them; in {} years of driving at most one false alarm is to be expected, "
+      "as "
       "long as the errors are as the robot file declares them. The largest reached {} of its threshold.",
       number(model.at_risk->scales.front()), number(model.at_risk->scales.back()), count(watch.looks),
       number(1.0 / (watch.false_alarms * kYear), 2), percent(watch.utilisation)));
@@ -133,9 +134,9 @@ std::string at_risk_section(const commission::RiskWatch& watch, const OnlineMode
                     escape(commission::sum_words(e.weight, model.model)), numeric(number(e.scale)),
                     numeric(number(e.ratio, 3))});
   }
-  return rows.empty() ? out
-                      : out + table({"alarm", "until", "matched to", numeric("over, s"), numeric("times the threshold")},
-                                    rows);
+  return rows.empty()
+             ? out
+             : out + table({"alarm", "until", "matched to", numeric("over, s"), numeric("times the threshold")}, rows);
 }
 
 }  // namespace

@@ -131,19 +131,19 @@ Json parameter_json(const Commissioning& r, std::size_t j, const Robot& robot, c
     return j < bounds.size() ? proof_json(bounds[j].binding, model) : Json::array();
   };
   Json json{{"name", p.parameter.name},
-          {"unit", commission::parameter_unit(robot, p.parameter)},
-          {"estimate", files::or_null(p.estimate)},
-          {"lower", p.lower},
-          {"upper", p.upper},
-          {"warrant", core::warrant_word(p.warrant)},
-          {"standard_error", files::or_null(p.standard_error)},
-          {"chebyshev_centre", p.chebyshev},
-          {"excitation", word_of(kExcitationWords, p.excitation)},
-          {"reason", p.reason},
-          {"lower_is_prior", p.lower_is_prior},
-          {"upper_is_prior", p.upper_is_prior},
-          {"estimate_inside", p.estimate_inside},
-          {"binding_samples", {{"lower", proof(r.feasible.lower)}, {"upper", proof(r.feasible.upper)}}}};
+            {"unit", commission::parameter_unit(robot, p.parameter)},
+            {"estimate", files::or_null(p.estimate)},
+            {"lower", p.lower},
+            {"upper", p.upper},
+            {"warrant", core::warrant_word(p.warrant)},
+            {"standard_error", files::or_null(p.standard_error)},
+            {"chebyshev_centre", p.chebyshev},
+            {"excitation", word_of(kExcitationWords, p.excitation)},
+            {"reason", p.reason},
+            {"lower_is_prior", p.lower_is_prior},
+            {"upper_is_prior", p.upper_is_prior},
+            {"estimate_inside", p.estimate_inside},
+            {"binding_samples", {{"lower", proof(r.feasible.lower)}, {"upper", proof(r.feasible.upper)}}}};
   if (r.at_risk && r.at_risk->set) {
     const Interval& side = r.at_risk->set->hull().sides[j];
     json["at_risk"] = {side.lower, side.upper};
@@ -169,7 +169,8 @@ Json physical_json(const Commissioning& r, const Robot& robot, const Model& mode
                   {"warrant", core::warrant_word(p.warrant)},
                   {"standard_error", p.standard_error ? Json(s.scale * *p.standard_error) : Json(nullptr)}};
     if (r.at_risk && r.at_risk->set) {
-      const Interval at_risk = Interval{s.scale, s.scale} * r.at_risk->set->hull().sides[j] - Interval{s.offset, s.offset};
+      const Interval at_risk =
+          Interval{s.scale, s.scale} * r.at_risk->set->hull().sides[j] - Interval{s.offset, s.offset};
       entry["at_risk"] = {at_risk.lower, at_risk.upper};
     }
     if (const auto nominal = robot.nominal.find(p.parameter.physical); nominal != robot.nominal.end()) {
@@ -348,6 +349,14 @@ Json to_json(const Commissioning& r, const logs::LogReport& data, const std::str
   }
   if (m.at_risk) {
     json["at_risk"] = risk_json(*m.at_risk);
+    for (const commission::RiskReach& reach : r.reach) {
+      Json sizes = Json::array();
+      for (const double size : reach.size) {
+        sizes.push_back(files::or_null(size));
+      }
+      json["at_risk"]["reach"].push_back(
+          {{"weight", reach.weight.name}, {"unit", reach.unit}, {"within", reach.within}, {"size", std::move(sizes)}});
+    }
   }
   json["validation"] = validation_json(r, m.model);
   if (auto kinematic = kinematic_json(r.kinematic, r.folds)) {

@@ -85,9 +85,10 @@ ParameterView physical_view(ParameterView view, const commission::PhysicalScale&
 }  // namespace
 
 std::string risk_remark(const commission::RiskSet& set) {
-  return fmt::format("At a stated risk: the true values lie inside all of these intervals, unless a chance of {:g} came "
-                     "true; for errors within their bounds that have no more than the declared bias, whatever their law.",
-                     set.risk);
+  return fmt::format(
+      "At a stated risk: the true values lie inside all of these intervals, unless a chance of {:g} came "
+      "true; for errors within their bounds that have no more than the declared bias, whatever their law.",
+      set.risk);
 }
 
 std::string estimate_text(const ParameterView& view) {

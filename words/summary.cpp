@@ -130,6 +130,20 @@ std::string contradiction_notes(const Commissioning& r) {
   return text;
 }
 
+// What is certain to be seen at the stated risk.
+std::string reach_lines(const Commissioning& r) {
+  if (r.reach.empty()) {
+    return {};
+  }
+  std::string text =
+      "  certainly seen at the stated risk (one false alarm in ten years) within 1 s, 5 s, 20 s, from half of all "
+      "moments of such a drive:\n";
+  for (const commission::RiskReach& reach : r.reach) {
+    text += "    " + commission::sentence(reach, r.model.model) + "\n";
+  }
+  return text;
+}
+
 }  // namespace
 
 std::string summary(const Commissioning& r) {
@@ -160,6 +174,7 @@ std::string summary(const Commissioning& r) {
   if (!r.validation.empty() && r.model.warrant != core::Warrant::guaranteed) {
     text += fmt::format("  {}\n", certain_meaning(r.model.warrant));
   }
+  text += reach_lines(r);
   text += kinematic_table(r.kinematic);
   text += assumption_lines(r.assumptions);
   for (const std::string& note : r.notes) {
@@ -239,9 +254,8 @@ std::string summary(const commission::RiskWatch& watch, const OnlineModel& model
   constexpr double kYear = 365.25 * 86400.0;
   std::string text = fmt::format(
       "at a stated risk (at most one false alarm in {:.2g} years of driving): {}\n", 1.0 / (watch.false_alarms * kYear),
-      watch.events.empty()
-          ? fmt::format("no fault; at most {:.0f} % of a threshold used", 100.0 * watch.utilisation)
-          : fmt::format("{} event{}", watch.events.size(), watch.events.size() == 1 ? "" : "s"));
+      watch.events.empty() ? fmt::format("no fault; at most {:.0f} % of a threshold used", 100.0 * watch.utilisation)
+                           : fmt::format("{} event{}", watch.events.size(), watch.events.size() == 1 ? "" : "s"));
   constexpr std::size_t most = 20;
   for (std::size_t k = 0; k < std::min(watch.events.size(), most); ++k) {
     text += "  " + commission::sentence(watch.events[k], model.model) + "\n";

@@ -140,7 +140,8 @@ TEST_P(AtRisk, TheDetectorRaisesNoMoreFalseAlarmsThanItSays) {
   EXPECT_LE(runs_with_alarm(GetParam().axis, model.model, kRuns, 1e-2), most_failures(kRuns, 1e-2));
 }
 
-INSTANTIATE_TEST_SUITE_P(Worlds, AtRisk, ::testing::ValuesIn(worlds()), [](const auto& each) { return each.param.name; });
+INSTANTIATE_TEST_SUITE_P(Worlds, AtRisk, ::testing::ValuesIn(worlds()),
+                         [](const auto& each) { return each.param.name; });
 
 // With as many runs as the promise is stated for.
 class SlowAtRisk : public AtRisk {};
@@ -201,6 +202,39 @@ TEST(RiskSet, ABiasOfTheEffortIsSeenThatTheDeadZoneDoesNotSee) {
   EXPECT_GT(first, 20.0);
   EXPECT_LT(first, 35.0);
   EXPECT_FALSE(seen);
+}
+
+// What is called certain is seen: from more than half of all moments, within the time, on another drive of that kind.
+TEST(RiskReach, AFaultOfThatSizeIsSeen) {
+  ExactAxis axis;
+  axis.seconds = 60.0;
+  const Commissioning c = learn(axis, 1);
+  ASSERT_FALSE(c.reach.empty());
+  const RiskReach& bias = c.reach.front();
+  ASSERT_EQ(bias.weight.shape, detector::SumWeight::Shape::constant);
+  for (std::size_t k = 0; k < bias.within.size(); ++k) {
+    ASSERT_TRUE(std::isfinite(bias.size[k]));
+    EXPECT_TRUE(k == 0 || bias.size[k] <= bias.size[k - 1]);
+    std::size_t seen = 0, runs = 0;
+    for (double onset = 7.0; onset + bias.within[k] < axis.seconds; onset += 6.0) {
+      ExactAxis faulty = axis;
+      faulty.fault_at = onset;
+      faulty.fault_bias = bias.size[k];
+      const LogTable log = drive(faulty, 50 + runs);
+      detector::ScaleDetector detector(c.model);
+      double first = 1e300;
+      for (std::size_t i = 0; i < log.rows(); ++i) {
+        const double sample[2] = {log.columns[0][i], log.columns[1][i]};
+        if (detector.step(log.t[i], sample) && detector.alarm()) {
+          first = std::min(first, log.t[i]);
+        }
+      }
+      EXPECT_GE(first, onset);
+      seen += first <= onset + bias.within[k] ? 1 : 0;
+      ++runs;
+    }
+    EXPECT_GE(2 * seen, runs) << bias.within[k] << " s: " << seen << " of " << runs;
+  }
 }
 
 // Errors that are more biased, or correlated for longer, than declared: the log says so, and the worst case stands

@@ -113,8 +113,8 @@ TEST_P(SampleWeight, IsByHowMuchASumMovesWithItsSample) {
   const std::size_t joints = model.joints.size();
   const Log log = any_log(c, 2 * joints, 7);
   Random random(3);
-  const Eigen::VectorXd theta = Eigen::VectorXd::NullaryExpr(static_cast<Eigen::Index>(model.p()),
-                                                             [&] { return 1.0 + random.unit(); });
+  const Eigen::VectorXd theta =
+      Eigen::VectorXd::NullaryExpr(static_cast<Eigen::Index>(model.p()), [&] { return 1.0 + random.unit(); });
   std::map<std::pair<int, std::size_t>, std::vector<Eigen::VectorXd>> handed;
   const Eigen::VectorXd base = sum_of(c, log, theta, [&](const filter::SampleWeight& s) {
     EXPECT_TRUE(s.exact);
@@ -145,20 +145,19 @@ TEST_P(SampleWeight, IsByHowMuchASumMovesWithItsSample) {
 using enum model::EffortChanges;
 INSTANTIATE_TEST_SUITE_P(
     AllKinds, SampleWeight,
-    ::testing::Values(
-        Case{"axis_held", true, MotionKind::angle, Hold::zero_order, at_samples, 0.0},
-        Case{"axis_held_uneven", true, MotionKind::angle, Hold::zero_order, at_samples, 0.2},
-        Case{"axis_linear", true, MotionKind::angle, Hold::first_order, at_samples, 0.0},
-        Case{"axis_linear_uneven", true, MotionKind::angle, Hold::first_order, at_samples, 0.2},
-        Case{"axis_smooth", true, MotionKind::angle, Hold::first_order, between, 0.0},
-        Case{"axis_smooth_uneven", true, MotionKind::angle, Hold::first_order, between, 0.2},
-        Case{"axis_speed_held", true, MotionKind::speed, Hold::zero_order, at_samples, 0.2},
-        Case{"axis_speed_linear", true, MotionKind::speed, Hold::first_order, at_samples, 0.0},
-        Case{"axis_speed_smooth", true, MotionKind::speed, Hold::first_order, between, 0.0},
-        Case{"axis_speed_smooth_uneven", true, MotionKind::speed, Hold::first_order, between, 0.2},
-        Case{"wheels_held", false, MotionKind::angle, Hold::zero_order, at_samples, 0.0},
-        Case{"wheels_held_uneven", false, MotionKind::angle, Hold::zero_order, at_samples, 0.2},
-        Case{"wheels_speed", false, MotionKind::speed, Hold::first_order, between, 0.0}),
+    ::testing::Values(Case{"axis_held", true, MotionKind::angle, Hold::zero_order, at_samples, 0.0},
+                      Case{"axis_held_uneven", true, MotionKind::angle, Hold::zero_order, at_samples, 0.2},
+                      Case{"axis_linear", true, MotionKind::angle, Hold::first_order, at_samples, 0.0},
+                      Case{"axis_linear_uneven", true, MotionKind::angle, Hold::first_order, at_samples, 0.2},
+                      Case{"axis_smooth", true, MotionKind::angle, Hold::first_order, between, 0.0},
+                      Case{"axis_smooth_uneven", true, MotionKind::angle, Hold::first_order, between, 0.2},
+                      Case{"axis_speed_held", true, MotionKind::speed, Hold::zero_order, at_samples, 0.2},
+                      Case{"axis_speed_linear", true, MotionKind::speed, Hold::first_order, at_samples, 0.0},
+                      Case{"axis_speed_smooth", true, MotionKind::speed, Hold::first_order, between, 0.0},
+                      Case{"axis_speed_smooth_uneven", true, MotionKind::speed, Hold::first_order, between, 0.2},
+                      Case{"wheels_held", false, MotionKind::angle, Hold::zero_order, at_samples, 0.0},
+                      Case{"wheels_held_uneven", false, MotionKind::angle, Hold::zero_order, at_samples, 0.2},
+                      Case{"wheels_speed", false, MotionKind::speed, Hold::first_order, between, 0.0}),
     [](const auto& each) { return each.param.name; });
 
 // Weights of efforts under mean speeds, whose stamps lie in the middle of the steps.

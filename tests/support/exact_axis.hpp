@@ -17,11 +17,11 @@ namespace wheelwright::testing_support {
 
 /// Laws of the efforts' errors, all within the bound and of the stated bias and correlation.
 enum class ErrorLaw {
-  two_point,      ///< ± bound, and the bias on one side
-  uniform,        ///<
-  by_speed,       ///< ± bound while the axis moves fast, next to nothing else
-  gambler,        ///< ± bound while the errors' sum is behind, next to nothing once it is ahead
-  together,       ///< ± bound, the same within a correlation time
+  two_point,  ///< ± bound, and the bias on one side
+  uniform,    ///<
+  by_speed,   ///< ± bound while the axis moves fast, next to nothing else
+  gambler,    ///< ± bound while the errors' sum is behind, next to nothing once it is ahead
+  together,   ///< ± bound, the same within a correlation time
 };
 
 /// An axis m v̇ = u − f v, its drive and its sensors.

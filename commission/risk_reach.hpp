@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// What the detector at a stated risk will see: the smallest certain fault of each kind that its weights are like.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include <wheelwright/core/log.hpp>
+#include <wheelwright/detector/scale_detector.hpp>
+
+namespace wheelwright::commission {
+
+/// Smallest certain size of one kind of fault, on a drive like a log.
+struct RiskReach {
+  detector::SumWeight weight{};
+  std::string unit{};  ///< of the sizes; "1" for a share
+  /// Sizes that are seen within RiskReachOptions::within from half of all moments at which they may set in; infinite
+  /// where there is none.
+  std::vector<double> size{};
+  std::vector<double> within{};  ///< s
+};
+
+/// Options of risk_reach().
+struct RiskReachOptions {
+  std::vector<double> within{1.0, 5.0, 20.0};  ///< s
+  double every = 2.0;                          ///< s, between the moments that are looked at
+  double most = 600.0;                         ///< s of the log that are looked at
+};
+
+/// A fault of size κ moves a sum by κ times what a fault of size 1 does, from its onset on. Where that is more than
+/// twice what a healthy robot's sum can be (threshold, of either sign), the sum is outside: certainly, but for the
+/// chance that the threshold itself allows. For effort readings that are off by a constant, or by a share of the effort,
+/// and parameters that change by a share. Of the first segment of the log, which
+/// is walked once.
+[[nodiscard]] std::vector<RiskReach> risk_reach(LogSource& log, const OnlineModel& model,
+                                                const RiskReachOptions& options = {});
+
+/// "a bias of the effort (tau_r): 0.06, 0.024, 0.011 N·m".
+[[nodiscard]] std::string sentence(const RiskReach& reach, const Model& model);
+
+}  // namespace wheelwright::commission
