@@ -64,8 +64,8 @@ struct NoiseBudget {
 /// adding propagated bounds to it would count them twice.
 [[nodiscard]] NoiseBudget noise_budget(const Robot& robot, const Measurement& measurement);
 
-/// What the robot file says of errors that average out; nothing where it declares no bias, or not all bounds. Rounding of
-/// an encoder has no bias while its wheel moves by several counts a sample (error_class.hpp).
+/// What the robot file says of errors that average out; nothing where it declares no bias, or not all bounds. Rounding
+/// of an encoder has no bias while its wheel moves by several counts a sample (error_class.hpp).
 [[nodiscard]] std::optional<filter::ErrorClasses> error_classes(const Robot& robot, const Measurement& measurement);
 
 /// `limit` of each joint (acceleration_limit) as one of each coordinate of `model`.

@@ -31,9 +31,8 @@ struct RiskReachOptions {
 
 /// A fault of size κ moves a sum by κ times what a fault of size 1 does, from its onset on. Where that is more than
 /// twice what a healthy robot's sum can be (threshold, of either sign), the sum is outside: certainly, but for the
-/// chance that the threshold itself allows. For effort readings that are off by a constant, or by a share of the effort,
-/// and parameters that change by a share. Of the first segment of the log, which
-/// is walked once.
+/// chance that the threshold itself allows. For effort readings that are off by a constant, or by a share of the
+/// effort, and parameters that change by a share. Of the first segment of the log, which is walked once.
 [[nodiscard]] std::vector<RiskReach> risk_reach(LogSource& log, const OnlineModel& model,
                                                 const RiskReachOptions& options = {});
 

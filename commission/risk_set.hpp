@@ -47,7 +47,7 @@ struct RiskSet {
 /// Learns the set of the parameters that explain `log` at the risk `options.risk`, as a part of `guaranteed`.
 ///
 /// Sums of elements, weighted by the regressor as it was foreseen (instruments G), leave b − Mθ = Σ c_s e_s of all
-/// samples' errors. For errors as `classes` says this is a vector martingale beside its bias, and with V = Σ n̄² c_s c_sᵀ
+/// samples' errors. For errors as `classes` says this is a vector martingale beside its bias; V = Σ n̄² c_s c_sᵀ, and
 ///
 ///     (b − Mθ)ᵀ (V + V0)⁻¹ (b − Mθ) <= 2 ln(1/δ) + ln det(V + V0)/det V0
 ///

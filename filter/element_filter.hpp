@@ -35,8 +35,8 @@ struct WeakElement {
   Eigen::VectorXd slope;         ///< per coordinate: ∫ ω φ̈, exactly
   Eigen::VectorXd torque;        ///< per output: ∫ ω u
   Eigen::VectorXd torque_doubt;  ///< per output: what efforts may do between samples
-  /// Per coordinate; speeds: what the trapezoidal rule may miss. Angles: the most that ∫ (s − middle)(φ̇ − s_k) ds is in
-  /// the step after the sample, by which the *slope* of a sum's weights is to be multiplied.
+  /// Per coordinate; speeds: what the trapezoidal rule may miss. Angles: the most that ∫ (s − middle)(φ̇ − s_k) ds is
+  /// in the step after the sample, by which the *slope* of a sum's weights is to be multiplied.
   Eigen::VectorXd motion_doubt;
   Eigen::VectorXd motion_doubt_before;      ///< angles: the same of the step before the sample
   std::vector<model::TermValue> functions;  ///< ∫ ω f of each function term, in their order
@@ -89,9 +89,9 @@ class ElementFilter {
   /// Efforts' correction.
   [[nodiscard]] const EffortCorrector& corrector() const { return corrector_; }
 
-  /// Weights with which logged efforts stand in the torque of the newest element, of four consecutive samples: from the
-  /// one before its own sample on (angles), up to the end of its step (speeds). Not `exact` where torque is no fixed sum
-  /// of logged efforts: late by an unknown time, changing at an unknown moment, or corrected.
+  /// Weights with which logged efforts stand in the torque of the newest element, of four consecutive samples: from
+  /// the one before its own sample on (angles), up to the end of its step (speeds). Not `exact` where torque is no
+  /// fixed sum of logged efforts: late by an unknown time, changing at an unknown moment, or corrected.
   struct EffortWeights {
     bool exact = false;
     std::array<double, 4> weight{};  ///< s, oldest first

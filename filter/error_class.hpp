@@ -30,8 +30,8 @@ struct ErrorClasses {
 /// Throws InvalidArgument, naming the field, unless numbers are as ErrorClass says.
 void validate(const ErrorClasses& classes);
 
-/// Bound on the errors' share of a sum: |share| <= straight + sqrt(2 · squares · ln(2/δ)) but for the probability δ, and
-/// |share| <= worst always.
+/// Bound on the errors' share of a sum: |share| <= straight + sqrt(2 · squares · ln(2/δ)) but for the probability δ,
+/// and |share| <= worst always.
 struct ErrorShare {
   double squares = 0.0;   ///< Σ (weight · bound)², times the number of samples within a correlation time
   double straight = 0.0;  ///< Σ |weight| · bias; of errors that do not average out, · bound

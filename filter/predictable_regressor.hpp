@@ -12,8 +12,8 @@
 
 namespace wheelwright::filter {
 
-/// Foresees the regressor of the next element from old ones: a low-pass filter of order kOrder, led by its own delay, of
-/// all elements but the newest. The order makes weights smooth: errors of angles stand in a sum with the second
+/// Foresees the regressor of the next element from old ones: a low-pass filter of order kOrder, led by its own delay,
+/// of all elements but the newest. The order makes weights smooth: errors of angles stand in a sum with the second
 /// difference of its weights, which of a low order's would be mostly these errors themselves.
 ///
 /// A sum Σ g_k (torque_k − Y_k θ) is a martingale in the sensors' errors only where g_k is known before any error that

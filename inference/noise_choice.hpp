@@ -79,8 +79,8 @@ struct NoiseChoice {
 
 /// Differences where they look white, because they are of the sensor in motion; unless standstill is larger by three
 /// standard errors, since differences do not see correlated noise. Then standstill, as a lower limit; then rough
-/// differences, as an upper limit. Smooth differences are never used: they may be wrong either way. The bound is made for `options`; where standstill is used, it is no less than the one
-/// extrapolated there.
+/// differences, as an upper limit. Smooth differences are never used: they may be wrong either way. The bound is made
+/// for `options`; where standstill is used, it is no less than the one extrapolated there.
 [[nodiscard]] NoiseChoice choose_noise(const NoiseEvidence& evidence, const ErrorBoundOptions& options = {});
 
 }  // namespace wheelwright::inference
