@@ -42,7 +42,7 @@ core::Assumption assumption_of(const filter::ErrorClasses& classes, const std::s
   const std::string since = effort.correlation > 0.0
                                 ? fmt::format("Whatever happened up to {:g} s before a sample", effort.correlation)
                                 : "Whatever happened before a sample";
-  return {.id = "noise_averages",
+  return {.id = kNoiseAverages,
           .statement = fmt::format("{}, the mean error of its effort is {}.", since,
                                    effort.bias > 0.0 ? fmt::format("at most {:g} {}", effort.bias, unit) : "zero"),
           .declared_by = "noise.effort.bias",

@@ -11,6 +11,9 @@
 
 namespace wheelwright::commission {
 
+/// Id of the assumption (core::Assumption) behind what is said at a risk. The guaranteed bounds do not stand on it.
+inline constexpr const char* kNoiseAverages = "noise_averages";
+
 /// Options of learn_at_risk().
 struct AtRiskOptions {
   RiskSetOptions set{};

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include <wheelwright/commission/at_risk.hpp>
 #include <wheelwright/words/margin_words.hpp>
 #include <wheelwright/words/parameter_view.hpp>
 #include <wheelwright/words/text.hpp>
@@ -83,7 +84,7 @@ std::string footing(const Commissioning& result) {
         .push_back(output_name(result.model.model, i));
   }
   for (const core::Assumption& a : result.assumptions) {
-    if (a.verdict == core::AssumptionVerdict::fails) {
+    if (a.verdict == core::AssumptionVerdict::fails && a.id != commission::kNoiseAverages) {
       broken.push_back(a.statement);
     }
   }
@@ -187,6 +188,44 @@ std::string contradiction(const Commissioning& result) {
                      t.size() == 1 ? "itself" : "themselves", t.size() == 1 ? "it" : "them");
 }
 
+// What holds at the stated risk, or why nothing is said; empty where the robot file does not ask for it.
+std::string at_risk(const Commissioning& result) {
+  const auto assumption = std::ranges::find(result.assumptions, commission::kNoiseAverages, &core::Assumption::id);
+  if (assumption == result.assumptions.end()) {
+    return {};
+  }
+  if (!result.at_risk || !result.at_risk->set) {
+    return fmt::format("Nothing is said at a stated risk, the guaranteed answer stands alone: {}.", assumption->detail);
+  }
+  std::vector<std::string> items;
+  for (const ParameterViews& views : parameter_views(result)) {
+    const ParameterView& v = views.best();
+    if (v.at_risk) {
+      const auto [lower, upper] = outward(v.at_risk->lower, v.at_risk->upper);
+      items.push_back(with_unit(v.name + " " + lower + " to " + upper, v.unit));
+    }
+  }
+  std::string text = fmt::format("At a risk of {:g}: {}.", result.at_risk->risk, core::enumerated(items));
+  std::vector<std::string> seen;
+  for (const commission::RiskReach& reach : result.reach) {
+    const bool share = reach.unit == "1";
+    if (reach.weight.shape == detector::SumWeight::Shape::parameter || reach.size.size() < 2 ||
+        !std::isfinite(reach.size[1]) || (share && reach.size[1] >= 1.0)) {
+      continue;
+    }
+    const std::string& joint = result.model.model.joints[reach.weight.which].torque;
+    seen.push_back(share ? fmt::format("a loss of {} of {}", percent(reach.size[1], 2), joint)
+                         : fmt::format("a bias of {} in {}", with_unit(number(reach.size[1], 2), reach.unit), joint));
+  }
+  if (!seen.empty()) {
+    text += fmt::format(
+        " With at most one false alarm in ten years, {} are certain to be seen within {} from half of "
+        "all moments of such a drive.",
+        core::enumerated(seen), with_unit(fmt::format("{:g}", result.reach.front().within[1]), "s"));
+  }
+  return text;
+}
+
 // Each contradiction that withdraws a model (or does not) with what to do about it.
 void tell_contradictions(const Commissioning& result, bool withdraws, std::vector<std::string>& out) {
   for (const commission::LogContradiction& c : result.contradictions) {
@@ -207,6 +246,9 @@ std::vector<std::string> words_with_model(const Commissioning& result) {
   out.push_back(sees(result) + (smallest_certain_kappa(result) && result.model.warrant != core::Warrant::guaranteed
                                     ? " " + certain_meaning(result.model.warrant)
                                     : ""));
+  if (std::string text = at_risk(result); !text.empty()) {
+    out.push_back(std::move(text));
+  }
   if (false_alarms(result) > 0) {
     out.emplace_back(
         "What to do: look at those moments in the log; where they are no fault, commission on longer and more "
