@@ -86,7 +86,11 @@ Warrant kinematic_warrant(const JsonPlace& place) {
 }
 
 filter::ErrorClass error_class_at(const JsonPlace& place) {
-  return {bound_at(place.at("bound")), bound_at(place.at("bias")), bound_at(place.at("correlation"))};
+  filter::ErrorClass c{bound_at(place.at("bound")), bound_at(place.at("bias")), bound_at(place.at("correlation"))};
+  if (place.has("deviation")) {
+    c.deviation = bound_at(place.at("deviation"));
+  }
+  return c;
 }
 
 detector::RiskModel risk_at(const JsonPlace& place, const Model& model) {
