@@ -40,6 +40,7 @@ struct RiskSet {
   std::optional<bounds::Polytope> set;  ///< nothing where the log leaves none: it contradicts what is assumed
   std::vector<RiskFacet> facets;
   double risk = 0.0;        ///< probability that the set lacks the true θ
+  core::Warrant warrant = core::Warrant::guaranteed;  ///< extrapolated where the errors were estimated from the log
   double log_volume = 0.0;  ///< largest of the ellipsoids' ln det(I + V0⁻¹V)
   std::string reason;       ///< where there is no set
 };
