@@ -75,7 +75,7 @@ struct Ellipsoid {
   std::vector<Eigen::Index> block;
   Eigen::MatrixXd M, V, V0;  // V of the smaller proxies, or of Hoeffding's: as squared_radius is
   Eigen::VectorXd straight;  // per instrument: ErrorShare::straight
-  double squared_radius = 0.0, log_volume = 0.0;
+  double risk = 0.0, squared_radius = 0.0, log_volume = 0.0;
   bool usable = false;
 };
 
@@ -93,6 +93,13 @@ std::vector<std::vector<Eigen::Index>> blocks_of(const Model& model) {
     result.emplace_back(block.begin(), block.end());
   }
   return result;
+}
+
+// The largest of `count` equal parts that do not add up to more than `risk`.
+double part_of(double risk, std::size_t count) {
+  const auto parts = static_cast<double>(count);
+  const double part = risk / parts;
+  return std::fma(part, parts, -risk) > 0.0 ? std::nextafter(part, 0.0) : part;
 }
 
 constexpr double kSpread = 0.01;     // η of (a + b)(a + b)ᵀ <= (1 + η) aaᵀ + (1 + 1/η) bbᵀ
@@ -153,6 +160,7 @@ class SelfNormalised {
   // V, V0 and the squared radius at `risk`.
   void finish(Ellipsoid& e, double risk) {
     fix();
+    e.risk = risk;
     e.V0 = V0_;
     const bool varied = this->varied();
     // Mixture of exp(λᵀS − λᵀVλ/2) over a Gaussian that is cut off where λᵀV0λ = reach²: half of it or more is left
@@ -268,7 +276,7 @@ class Learner {
   [[nodiscard]] std::vector<Ellipsoid> ellipsoids(const std::vector<std::vector<Eigen::Index>>& blocks) {
     const std::size_t count = options_.delays.size();
     const auto p = box_.middle.size();
-    const double risk = options_.risk / static_cast<double>(count * blocks.size() * kExpected.size());
+    const double risk = part_of(options_.risk, count * blocks.size() * kExpected.size());
     std::vector<std::vector<SelfNormalised>> variances(count);  // of blocks, and of kExpected
     std::vector<Eigen::VectorXd> straight(count, Eigen::VectorXd::Zero(p));
     std::vector<PredictableRegressor> foreseen;
@@ -424,13 +432,14 @@ class Learner {
       f.Y = sums.sums().Y.row(i);
       f.dY = sums.sums().dY.row(i);
       f.y = sums.sums().y[i];
-      f.delay = e.delay;
+      f.ellipsoid = of[d];
       f.weights = directions[d];
       f.share = shares[d];
       const Eigen::VectorXd x = f.weights(e.block);
       f.radius = std::min(std::sqrt(x.dot((e.V + e.V0) * x) * e.squared_radius), f.share.worst - f.share.straight);
       const double size = std::abs(f.y) + f.Y.cwiseAbs().dot(box_.middle.cwiseAbs() + box_.radius);
-      f.dy = f.radius + f.share.straight + sums.sums().dy[i] + kRounding * (size + f.share.worst);
+      f.rounding = kRounding * (size + f.share.worst);
+      f.dy = f.radius + f.share.straight + sums.sums().dy[i] + f.rounding;
     }
     return result;
   }
@@ -466,26 +475,49 @@ class Learner {
   double grown_ = 0.0, correlation_ = 0.0;
 };
 
+void validate(const RiskSetOptions& options, const filter::ErrorClasses& classes) {
+  check::that(options.risk > 0.0 && options.risk < 1.0, "risk", "between 0 and 1");
+  check::that(!options.delays.empty(), "delays of the weights", "at least one");
+  check::that(options.learning >= 0.0 && options.learning < 1.0, "share of the log to learn a scale on", "below 1");
+  filter::validate(classes);
+}
+
+filter::ParameterBox middle_and_radius(const Box& box) {
+  const auto p = static_cast<Eigen::Index>(box.dimension());
+  filter::ParameterBox result{Eigen::VectorXd(p), Eigen::VectorXd(p)};
+  for (Eigen::Index j = 0; j < p; ++j) {
+    const Interval& side = box.sides[static_cast<std::size_t>(j)];
+    const double middle = 0.5 * (side.lower + side.upper);
+    result.middle[j] = middle;
+    result.radius[j] = std::nextafter(std::max(side.upper - middle, middle - side.lower), core::kInfinity);
+  }
+  return result;
+}
+
+std::vector<RiskEllipsoid> published(const std::vector<Ellipsoid>& ellipsoids) {
+  std::vector<RiskEllipsoid> result;
+  for (const Ellipsoid& e : ellipsoids) {
+    result.push_back({e.delay, {e.block.begin(), e.block.end()}, e.risk, e.log_volume, e.squared_radius});
+  }
+  return result;
+}
+
 }  // namespace
 
 RiskSet risk_set(LogSource& log, const Model& model, const Measurement& measurement, const filter::SignalErrors& errors,
                  const filter::ErrorClasses& classes, const bounds::Polytope& guaranteed,
                  const RiskSetOptions& options) {
-  check::that(options.risk > 0.0 && options.risk < 1.0, "risk", "between 0 and 1");
-  check::that(!options.delays.empty(), "delays of the weights", "at least one");
-  validate(classes);
+  validate(options, classes);
   RiskSet result;
   result.risk = options.risk;
+  result.learning = options.learning;
+  result.box = guaranteed.hull();
   const auto p = static_cast<Eigen::Index>(model.p());
-  filter::ParameterBox box{Eigen::VectorXd(p), Eigen::VectorXd(p)};
-  for (Eigen::Index j = 0; j < p; ++j) {
-    const Interval& side = guaranteed.hull().sides[static_cast<std::size_t>(j)];
-    box.middle[j] = 0.5 * (side.lower + side.upper);
-    box.radius[j] = std::nextafter(std::max(side.upper - box.middle[j], box.middle[j] - side.lower), core::kInfinity);
-  }
+  const filter::ParameterBox box = middle_and_radius(result.box);
   Learner learner(log, ElementFilter(model, measurement, errors), classes, box, options);
   const std::vector<std::vector<Eigen::Index>> blocks = blocks_of(model);
   const std::vector<Ellipsoid> ellipsoids = learner.ellipsoids(blocks);
+  result.ellipsoids = published(ellipsoids);
 
   std::vector<Eigen::VectorXd> directions;  // of instruments
   std::vector<std::size_t> of;
@@ -547,7 +579,12 @@ RiskSet risk_set(LogSource& log, const Model& model, const Measurement& measurem
     return result;
   }
   result.facets = learner.facets(ellipsoids, blocks, directions, of);
+  // Half-spaces are named by their numbers: sums, then guaranteed facets (risk_origin()).
   std::vector<bounds::HalfSpace> rows = guaranteed.facets();
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    rows[k].origin = {};
+    rows[k].origin.sample = result.facets.size() + k;
+  }
   const bounds::SlabRows slabs(guaranteed.hull());
   for (std::size_t d = 0; d < result.facets.size(); ++d) {
     const RiskFacet& f = result.facets[d];
@@ -566,6 +603,34 @@ RiskSet risk_set(LogSource& log, const Model& model, const Measurement& measurem
     result.reason = "the log contradicts what is assumed of its errors";
   }
   return result;
+}
+
+RiskOrigin risk_origin(const RiskSet& set, const bounds::RowOrigin& origin) {
+  const std::size_t sums = set.facets.size();
+  return origin.is_prior        ? RiskOrigin{RiskOrigin::Kind::box, origin.parameter, origin.side}
+         : origin.sample < sums ? RiskOrigin{RiskOrigin::Kind::sum, origin.sample, origin.side}
+                                : RiskOrigin{RiskOrigin::Kind::guaranteed, origin.sample - sums, origin.side};
+}
+
+RiskSums risk_sums(LogSource& log, const Model& model, const Measurement& measurement,
+                   const filter::SignalErrors& errors, const filter::ErrorClasses& classes, const Box& box,
+                   const RiskSetOptions& options, const std::vector<RiskDirection>& directions) {
+  validate(options, classes);
+  Learner learner(log, ElementFilter(model, measurement, errors), classes, middle_and_radius(box), options);
+  const std::vector<std::vector<Eigen::Index>> blocks = blocks_of(model);
+  const std::vector<Ellipsoid> ellipsoids = learner.ellipsoids(blocks);
+  std::vector<Eigen::VectorXd> weights;
+  std::vector<std::size_t> of;
+  for (const RiskDirection& direction : directions) {
+    check::that(direction.ellipsoid < ellipsoids.size(), "ellipsoid of a direction", "one of every delay and block");
+    Eigen::VectorXd rest = direction.weights;
+    check::that(rest.size() == static_cast<Eigen::Index>(model.p()), "weights of a direction", "one per parameter");
+    rest(ellipsoids[direction.ellipsoid].block).setZero();
+    check::that(rest.isZero(0.0), "weights of a direction", "0 outside of the ellipsoid's block");
+    weights.push_back(direction.weights);
+    of.push_back(direction.ellipsoid);
+  }
+  return {published(ellipsoids), learner.facets(ellipsoids, blocks, weights, of)};
 }
 
 }  // namespace wheelwright::commission
