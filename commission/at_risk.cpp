@@ -64,25 +64,40 @@ Attempt attempt_with(LogSource& log, const Commissioning& result, const filter::
 }
 
 // The least bias, in steps of √2 of the deviation, with which the log's sums use no more than half of what such errors
-// could make of them; nothing where even a bias as large as the deviation is not enough.
-std::optional<Attempt> least_bias(LogSource& log, const Commissioning& result, const AtRiskOptions& options) {
+// could make of them; with a `reason` and no model where even a bias as large as the deviation is not enough.
+struct Estimate {
+  Attempt attempt;
+  std::string reason;
+};
+Estimate least_bias(LogSource& log, const Commissioning& result, const AtRiskOptions& options) {
   constexpr double kHalf = 0.5;
   constexpr int kSteps = 20;
   std::optional<filter::ErrorClasses> classes = estimated_classes(log, result.model);
+  Estimate best;
   if (!classes) {
-    return std::nullopt;
+    best.reason =
+        motion_error(result.model.robot, result.model.measurement)
+            ? "the log is too short to show how its errors average out"
+            : "the error of the motion column is not known: `noise: {wheel_speed: ...}` or `encoder_counts_per_turn` "
+              "in the robot file would tell it";
+    return best;
   }
-  std::optional<Attempt> best;
   int none = -1, enough = kSteps + 1;  // the number of a bias that is too small, and of one that is not
   while (enough - none > 1) {
-    const int step = none < 0 && enough > kSteps ? kSteps / 2 : (none + enough) / 2;
+    const int step = (none + enough) / 2;
     classes->effort.bias = classes->effort.deviation * std::exp2(0.5 * (step - kSteps));
     Attempt attempt = attempt_with(log, result, *classes, options);
     if (attempt.model && attempt.utilisation <= kHalf) {
       enough = step;
-      best = std::move(attempt);
+      best.attempt = std::move(attempt);
     } else {
       none = step;
+      if (enough > kSteps) {
+        best.reason = attempt.model ? fmt::format("over {:g} s the model leaves more than errors with a bias of {:.2g} "
+                                                  "would, as where it lacks an effect (`gap` looks for it)",
+                                                  options.scales[attempt.worst.scale], classes->effort.bias)
+                                    : attempt.set.reason;
+      }
     }
   }
   return best;
@@ -94,8 +109,12 @@ core::Assumption assumption_of(const filter::ErrorClasses& classes, const std::s
                                 ? fmt::format("Whatever happened up to {:g} s before a sample", effort.correlation)
                                 : "Whatever happened before a sample";
   return {.id = kNoiseAverages,
-          .statement = fmt::format("{}, the mean error of its effort is {}.", since,
-                                   effort.bias > 0.0 ? fmt::format("at most {:g} {}", effort.bias, unit) : "zero"),
+          .statement = fmt::format("{}, the mean error of its effort is {}{}.", since,
+                                   effort.bias > 0.0 ? fmt::format("at most {:.3g} {}", effort.bias, unit) : "zero",
+                                   effort.deviation < effort.bound
+                                       ? fmt::format(", the root of its mean square about it at most {:.3g} {}",
+                                                     effort.deviation, unit)
+                                       : ""),
           .declared_by = "noise.effort.bias",
           .test = "sums of what the model leaves, over all scales, are as small as such errors make them",
           .verdict = core::AssumptionVerdict::holds,
@@ -146,16 +165,19 @@ void learn_at_risk(LogSource& log, Commissioning& result, const AtRiskOptions& o
     if (!options.estimate || model.robot.noise.effort.value) {
       return;
     }
-    std::optional<Attempt> attempt = least_bias(log, result, options);
-    if (!attempt) {
-      return;
+    Estimate estimate = least_bias(log, result, options);
+    Attempt& attempt = estimate.attempt;
+    assumption = assumption_of(attempt.model ? attempt.model->errors : filter::ErrorClasses{}, unit);
+    if (attempt.model) {
+      assumption.declared_by = "estimated from this log";
+      attempt.model->warrant = core::Warrant::extrapolated;
+      attempt.set.warrant = core::Warrant::extrapolated;
+      result.at_risk = std::move(attempt.set);
+      model.at_risk = std::move(attempt.model);
+    } else {
+      assumption.verdict = core::AssumptionVerdict::not_tested;
+      assumption.detail = estimate.reason;
     }
-    assumption = assumption_of(attempt->model->errors, unit);
-    assumption.declared_by = "estimated from this log";
-    attempt->model->warrant = core::Warrant::extrapolated;
-    attempt->set.warrant = core::Warrant::extrapolated;
-    result.at_risk = std::move(attempt->set);
-    model.at_risk = std::move(attempt->model);
   }
   if (model.at_risk) {
     result.reach = risk_reach(log, model);

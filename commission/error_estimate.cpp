@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kWindows = 20.0;  // of a scale that the log must hold for it to count
 constexpr double kAbove = 1.1;     // deviation that is assumed, in units of the estimated one
-constexpr double kBound = 5.0;     // bound, in deviations
+constexpr double kBound = 3.0;     // bound, in deviations
 
 }  // namespace
 

@@ -18,7 +18,7 @@ namespace wheelwright::commission {
 [[nodiscard]] std::optional<double> effort_deviation(LogSource& log, const OnlineModel& model, double motion);
 
 /// Classes of errors that average out, up to the bias: the motion column's error as declared or as its encoder makes it,
-/// the efforts' deviation a tenth above effort_deviation(), their bound five of these. Nothing where either is not known.
+/// the efforts' deviation a tenth above effort_deviation(), their bound three of these. Nothing where either is not known.
 [[nodiscard]] std::optional<filter::ErrorClasses> estimated_classes(LogSource& log, const OnlineModel& model);
 
 }  // namespace wheelwright::commission

@@ -248,6 +248,7 @@ Json error_class_json(const filter::ErrorClass& c) {
 
 Json risk_json(const detector::RiskModel& risk) {
   Json json = {{"risk", risk.risk},
+               {"warrant", core::warrant_word(risk.warrant)},
                {"errors",
                 {{"motion", error_class_json(risk.errors.motion)},
                  {"effort", error_class_json(risk.errors.effort)},

@@ -99,6 +99,7 @@ detector::RiskModel risk_at(const JsonPlace& place, const Model& model) {
   if (!(risk.risk > 0.0 && risk.risk < 1.0)) {
     place.at("risk").fail("a number between 0 and 1");
   }
+  risk.warrant = warrant_at(place, core::Warrant::guaranteed);
   const JsonPlace errors = place.at("errors"), set = place.at("feasible_set"), usual = place.at("usual");
   risk.errors.motion = error_class_at(errors.at("motion"));
   risk.errors.effort = error_class_at(errors.at("effort"));
