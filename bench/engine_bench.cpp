@@ -4,7 +4,6 @@
 // tolerance.
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <string>
 #include <vector>
 
