@@ -3,12 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include <wheelwright/commission/assumptions.hpp>
 #include <wheelwright/commission/error_estimate.hpp>
+#include <wheelwright/commission/noise_budget.hpp>
 #include <wheelwright/commission/physical.hpp>
 
 namespace wheelwright::commission {
@@ -20,10 +22,48 @@ struct Attempt {
   std::optional<detector::RiskModel> model;  // where there is a set
   detector::SumState worst;                  // the sum that stands farthest out at the test's risk
   double utilisation = 0.0;                  // its |value|/threshold
+  double spread = 0.0;                       // of sums over a scale, in units of what errors can do: see Spread
+  std::size_t widest = 0;                    // that scale
 };
 
-void look_at_sums(LogSource& log, const OnlineModel& model, double false_alarms, Attempt& attempt) {
-  detector::ScaleDetector detector(model, {.false_alarms = false_alarms});
+// Mean squares of a sum's S. For errors as assumed E √(V0/(V + V0)) exp(S²/(2(V + V0))) <= 1 in each window, given what
+// was before, so that over windows that are apart Σ (S²/(V + V0) − ln(1 + V/V0)) exceeds 2L with the probability e^−L at
+// most; so does the mean of that over groups of such windows (Jensen's inequality), here all looks. What bias, angles and
+// the set may add is taken away from S first. Windows count as apart after eight scales, when 1 % of a sum is left.
+class Spread {
+ public:
+  Spread(const detector::ScaleDetector& detector, Eigen::MatrixXd usual, double checks, double risk)
+      : usual_(std::move(usual)),
+        limit_(2.0 * kApart * checks * std::log(static_cast<double>(usual_.size()) / risk)),
+        sum_(Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(detector.weights().size()),
+                                   static_cast<Eigen::Index>(detector.scales().size()))) {}
+  void add(const detector::SumState& look, const Eigen::MatrixXd& variances) {
+    const auto w = static_cast<Eigen::Index>(look.weight), s = static_cast<Eigen::Index>(look.scale);
+    const double V = variances(w, s), V0 = usual_(w, s);
+    if (V0 > 0.0) {
+      const double left = std::max(0.0, std::abs(look.value) - (look.threshold - look.averaged));
+      sum_(w, s) += left * left / (V + V0) - std::log1p(V / V0);
+    }
+  }
+  // Largest sum, in units of its limit, and its scale.
+  [[nodiscard]] std::pair<double, std::size_t> largest() const {
+    Eigen::Index w = 0, s = 0;
+    const double most = sum_.maxCoeff(&w, &s);
+    return {most / limit_, static_cast<std::size_t>(s)};
+  }
+
+ private:
+  static constexpr double kApart = 8.0;
+  Eigen::MatrixXd usual_;
+  double limit_;
+  Eigen::MatrixXd sum_;
+};
+
+// Half of the test's risk each: a sum too large, and too many large ones.
+void look_at_sums(LogSource& log, const OnlineModel& model, double risk, double seconds, Attempt& attempt) {
+  const detector::ScaleDetectorOptions options{.false_alarms = 0.5 * risk / std::max(seconds, 1.0)};
+  detector::ScaleDetector detector(model, options);
+  Spread spread(detector, model.at_risk->usual, options.checks, 0.5 * risk);
   const std::vector<std::size_t> pick = core::positions_of(log, model.measurement.columns());
   std::vector<double> sample(pick.size());
   core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
@@ -33,14 +73,19 @@ void look_at_sums(LogSource& log, const OnlineModel& model, double false_alarms,
     for (std::size_t c = 0; c < pick.size(); ++c) {
       sample[c] = block.columns[pick[c]][k];
     }
-    detector.step(block.t[k], sample);
+    if (!detector.step(block.t[k], sample)) {
+      return;
+    }
+    const Eigen::MatrixXd variances = detector.variances();
     for (const detector::SumState& state : detector.looks()) {
+      spread.add(state, variances);
       if (std::abs(state.value) > attempt.utilisation * state.threshold) {
         attempt.utilisation = std::abs(state.value) / state.threshold;
         attempt.worst = state;
       }
     }
   });
+  std::tie(attempt.spread, attempt.widest) = spread.largest();
 }
 
 Attempt attempt_with(LogSource& log, const Commissioning& result, const filter::ErrorClasses& classes,
@@ -58,7 +103,7 @@ Attempt attempt_with(LogSource& log, const Commissioning& result, const filter::
   risk.delay = options.set.delays[std::min<std::size_t>(1, options.set.delays.size() - 1)];
   model.at_risk = std::move(risk);
   model.at_risk->usual = detector::usual_variances(log, model);
-  look_at_sums(log, model, options.test_risk / std::max(result.survey.seconds, 1.0), attempt);
+  look_at_sums(log, model, options.test_risk, result.survey.seconds, attempt);
   attempt.model = std::move(model.at_risk);
   return attempt;
 }
@@ -87,7 +132,7 @@ Estimate least_bias(LogSource& log, const Commissioning& result, const AtRiskOpt
     const int step = (none + enough) / 2;
     classes->effort.bias = classes->effort.deviation * std::exp2(0.5 * (step - kSteps));
     Attempt attempt = attempt_with(log, result, *classes, options);
-    if (attempt.model && attempt.utilisation <= kHalf) {
+    if (attempt.model && attempt.utilisation <= kHalf && attempt.spread <= 1.0) {
       enough = step;
       best.attempt = std::move(attempt);
     } else {
@@ -157,6 +202,9 @@ void learn_at_risk(LogSource& log, Commissioning& result, const AtRiskOptions& o
       contradicted(fmt::format("over {:g} s the model leaves {:.2g} times as much ({}) as such errors can",
                                attempt.model->scales[attempt.worst.scale], attempt.utilisation,
                                detector::sum_weights(model.model)[attempt.worst.weight].name));
+    } else if (attempt.spread > 1.0) {
+      contradicted(fmt::format("over {:g} s what the model leaves spreads wider, time and again, than such errors can",
+                               attempt.model->scales[attempt.widest]));
     } else {
       model.at_risk = std::move(attempt.model);
     }

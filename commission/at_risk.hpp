@@ -24,7 +24,8 @@ struct AtRiskOptions {
 
 /// Adds Commissioning::at_risk and OnlineModel::at_risk to a guaranteed result whose robot file declares errors that
 /// average out (error_classes()), and an assumption with the log's verdict on them. The log contradicts them where it
-/// leaves no set, or where a sum over any scale stands outside what such errors can do at AtRiskOptions::test_risk:
+/// leaves no set, where a sum over any scale stands outside what such errors can do at AtRiskOptions::test_risk, or where
+/// the sums' mean square over many windows does, which shows errors that are alike for longer than is declared:
 /// then nothing is said at a risk, and the worst case stands alone.
 ///
 /// Where the robot file leaves the efforts' noise to be estimated, so are the classes (error_estimate.hpp), with the least

@@ -54,6 +54,8 @@ struct SumState {
   /// time of x scales (c0 + c1 x)e^{−x} of it remain. Size 1: the effort's unit, all of the effort, all of the
   /// parameter.
   double c0 = 0.0, c1 = 0.0;
+  double radius = 0.0;    ///< what errors alone can do: the threshold's part that does not depend on the set
+  double averaged = 0.0;  ///< the part of `radius` that errors have which average out
 };
 
 /// Sums over scales T, with weights w(t) = K((now − t)/T) g(t), K(x) = x e^{−x}, g foreseen (PredictableRegressor), of

@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <iostream>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -211,6 +212,106 @@ TEST_P(SlowAtRisk, OfAKnownRobotThereAreAsManyFalseAlarmsAsTheSumsAllow) {
 
 INSTANTIATE_TEST_SUITE_P(Worlds, SlowAtRisk, ::testing::ValuesIn(worlds()),
                          [](const auto& each) { return each.param.name; });
+
+// Random axes, laws and rates from 10 to 500 Hz, watched for half a million samples each at one false alarm in ten years.
+TEST(SlowAtRiskRobots, RaiseNoFalseAlarm) {
+  constexpr std::uint64_t kSeed = 1;
+  constexpr std::size_t kRobots = 2000;
+  constexpr double kRows = 5e5;
+  std::mt19937_64 random(kSeed);
+  const auto between = [&](double a, double b) { return a * std::pow(b / a, std::ldexp(random() >> 11, -53)); };
+  std::size_t robots = 0, silent = 0, alarms = 0, contradicted = 0;
+  double rows = 0.0, years = 0.0;
+  for (std::size_t k = 0; k < kRobots; ++k) {
+    ExactAxis axis;
+    axis.mass = between(2.0, 100.0);
+    axis.viscous = between(0.5, 30.0);
+    axis.rate = between(10.0, 500.0);
+    axis.seconds = 60.0;
+    axis.bound = between(0.05, 4.0);
+    axis.bias = random() % 2 == 0 ? 0.0 : between(0.001, 0.2) * axis.bound;
+    axis.count = between(1e-5, 1e-3);
+    axis.jitter = random() % 2 == 0 ? 0.0 : between(0.01, 0.4);
+    axis.feedback = random() % 3 == 0 ? between(1.0, 30.0) : 0.0;
+    axis.law = static_cast<ErrorLaw>(random() % 7);
+    if (axis.law == ErrorLaw::together) {
+      axis.correlation = between(1.0, 8.0) / axis.rate;
+    }
+    if (axis.law == ErrorLaw::spikes || axis.law == ErrorLaw::skewed) {
+      axis.deviation = between(0.03, 0.9) * (axis.bound - axis.bias);
+    }
+    const Commissioning model = learn(axis, 2 * k + 1);
+    if (!model.model.at_risk) {
+      ++silent;
+      const auto said = std::ranges::find(model.assumptions, kNoiseAverages, &core::Assumption::id);
+      contradicted += said != model.assumptions.end() && said->verdict == core::AssumptionVerdict::fails ? 1 : 0;
+      continue;
+    }
+    ++robots;
+    axis.seconds = kRows / axis.rate;
+    const LogTable log = drive(axis, 2 * k + 2);
+    detector::ScaleDetector detector(model.model);
+    bool alarm = false;
+    for (std::size_t i = 0; i < log.rows(); ++i) {
+      const double sample[2] = {log.columns[0][i], log.columns[1][i]};
+      alarm = (detector.step(log.t[i], sample) && detector.alarm()) || alarm;
+    }
+    alarms += alarm ? 1 : 0;
+    rows += static_cast<double>(log.rows());
+    years += axis.seconds / (365.25 * 86400.0);
+  }
+  std::cout << "seed " << kSeed << ": " << robots << " robots, " << rows << " samples, " << years << " years, robots with a "
+            << "false alarm " << alarms << "; nothing said at a risk: " << silent << ", contradicted: " << contradicted
+            << '\n';
+  EXPECT_EQ(alarms, 0u);
+  EXPECT_LE(contradicted, kRobots / 200);
+  EXPECT_GT(robots, kRobots / 2);
+}
+
+// Assumptions that are broken: where a later drive would raise a false alarm, the log that the robot was commissioned on
+// had said so.
+TEST(SlowBrokenAssumption, IsToldBeforeFalseAlarmsCome) {
+  struct Broken {
+    std::string name;
+    double bias, correlation;    // what errors have, in bounds and s
+    double declared, together;  // what the robot file says
+  };
+  for (const Broken& b : {Broken{"bias twice as large", 0.2, 0.0, 0.1, 0.0},
+                          Broken{"bias five times as large", 0.5, 0.0, 0.1, 0.0},
+                          Broken{"bias ten times as large", 0.5, 0.0, 0.05, 0.0},
+                          Broken{"correlation ten times as long", 0.0, 0.5, 0.0, 0.05},
+                          Broken{"correlation where there is said to be none", 0.0, 0.1, 0.0, 0.0}}) {
+    constexpr std::size_t kRuns = 300;
+    std::size_t told = 0, alarms = 0;
+    for (std::size_t k = 0; k < kRuns; ++k) {
+      ExactAxis axis;
+      axis.bias = b.bias * axis.bound;
+      axis.correlation = b.correlation;
+      axis.law = b.correlation > 0.0 ? ErrorLaw::together : ErrorLaw::two_point;
+      const LogTable learnt = drive(axis, 2 * k + 1);
+      Robot robot = robot_of(axis);
+      robot.noise.effort.bias = b.declared * axis.bound;
+      robot.noise.effort.correlation = b.together;
+      robot.parameters = {"inertia", "viscous"};  // an offset as a parameter would learn the bias
+      TableSource source(learnt);
+      const Commissioning c = commission_robot(source, robot);
+      if (!c.model.at_risk) {
+        ++told;
+        continue;
+      }
+      const LogTable log = drive(axis, 2 * k + 2);
+      detector::ScaleDetector detector(c.model);
+      bool alarm = false;
+      for (std::size_t i = 0; i < log.rows(); ++i) {
+        const double sample[2] = {log.columns[0][i], log.columns[1][i]};
+        alarm = (detector.step(log.t[i], sample) && detector.alarm()) || alarm;
+      }
+      alarms += alarm ? 1 : 0;
+    }
+    std::cout << b.name << ": told by " << told << " of " << kRuns << " logs, false alarms after the other " << alarms << '\n';
+    EXPECT_LE(20 * alarms, told + alarms) << b.name;
+  }
+}
 
 TEST(RiskSet, IsSharperThanTheWorstCase) {
   ExactAxis axis;
