@@ -8,7 +8,7 @@
 
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/commission/detector_walk.hpp>
-#include <wheelwright/files/atomic_file.hpp>
+#include <wheelwright/files/bytes.hpp>
 #include <wheelwright/report/chart.hpp>
 #include <wheelwright/report/commission_report.hpp>
 #include <wheelwright/results/model_file.hpp>

@@ -7,9 +7,9 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/files/atomic_file.hpp>
+#include <wheelwright/files/bytes.hpp>
 #include <wheelwright/files/words.hpp>
-#include <wheelwright/logs/log_columns.hpp>
+#include <wheelwright/logs/recorded_log.hpp>
 #include <wheelwright/model/robot.hpp>
 #include <wheelwright/report/signals.hpp>
 

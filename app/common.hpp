@@ -15,7 +15,7 @@
 #include <wheelwright/logs/log_file.hpp>
 #include <wheelwright/report/context.hpp>
 #include <wheelwright/results/software.hpp>
-#include <wheelwright/robots/robot_columns.hpp>
+#include <wheelwright/robots/robot_file.hpp>
 
 #include "commands.hpp"
 

@@ -10,7 +10,7 @@
 #include <wheelwright/design/detection.hpp>
 #include <wheelwright/design/manoeuvre.hpp>
 #include <wheelwright/design/stages.hpp>
-#include <wheelwright/files/number.hpp>
+#include <wheelwright/files/words.hpp>
 #include <wheelwright/gap/discrimination_design.hpp>
 #include <wheelwright/gap/effect.hpp>
 #include <wheelwright/gap/further_drive.hpp>

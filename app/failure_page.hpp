@@ -4,7 +4,7 @@
 #pragma once
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/files/atomic_file.hpp>
+#include <wheelwright/files/bytes.hpp>
 #include <wheelwright/report/commission_report.hpp>
 
 #include "common.hpp"

@@ -13,8 +13,8 @@
 
 #include <fmt/format.h>
 
+#include <wheelwright/files/bytes.hpp>
 #include <wheelwright/files/words.hpp>
-#include <wheelwright/files/xxh64.hpp>
 
 #include "ranks.hpp"
 

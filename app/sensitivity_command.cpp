@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/commission/commission.hpp>
-#include <wheelwright/files/xxh64.hpp>
+#include <wheelwright/files/bytes.hpp>
 #include <wheelwright/report/sensitivity_report.hpp>
 #include <wheelwright/results/study_json.hpp>
 #include <wheelwright/robots/robot_file.hpp>

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include <wheelwright/files/xxh64.hpp>
+#include <wheelwright/files/bytes.hpp>
 #include <wheelwright/logs/row_log.hpp>
 
 #include "arrays.hpp"

@@ -15,7 +15,6 @@
 
 #include <wheelwright/results/detection_json.hpp>
 #include <wheelwright/results/software.hpp>
-#include <wheelwright/robots/robot_columns.hpp>
 #include <wheelwright/words/summary.hpp>
 #include "arrays.hpp"
 #include "long_work.hpp"

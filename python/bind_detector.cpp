@@ -11,7 +11,7 @@
 
 #include <wheelwright/results/detection_json.hpp>
 #include <wheelwright/results/software.hpp>
-#include <wheelwright/robots/robot_columns.hpp>
+#include <wheelwright/robots/robot_file.hpp>
 #include <wheelwright/words/summary.hpp>
 #include "arrays.hpp"
 #include "detector_run.hpp"

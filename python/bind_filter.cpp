@@ -15,7 +15,6 @@
 #include <wheelwright/robots/robot_file.hpp>
 
 #include <wheelwright/results/software.hpp>
-#include <wheelwright/robots/robot_columns.hpp>
 #include <wheelwright/words/identify_summary.hpp>
 #include "arrays.hpp"
 #include "long_work.hpp"

@@ -18,7 +18,6 @@
 #include <wheelwright/gap/next_drive.hpp>
 #include <wheelwright/results/rival_json.hpp>
 #include <wheelwright/results/software.hpp>
-#include <wheelwright/robots/robot_columns.hpp>
 #include "arrays.hpp"
 #include "effect_object.hpp"
 #include "long_work.hpp"

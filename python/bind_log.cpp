@@ -9,11 +9,11 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/files/words.hpp>
 #include <wheelwright/logs/csv.hpp>
-#include <wheelwright/logs/log_columns.hpp>
 #include <wheelwright/logs/log_file.hpp>
+#include <wheelwright/logs/recorded_log.hpp>
 
 #include <wheelwright/results/software.hpp>
-#include <wheelwright/robots/robot_columns.hpp>
+#include <wheelwright/robots/robot_file.hpp>
 #include "array_log.hpp"
 #include "arrays.hpp"
 #include "long_work.hpp"

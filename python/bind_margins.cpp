@@ -13,7 +13,7 @@
 #include <wheelwright/words/margin_words.hpp>
 
 #include <wheelwright/results/software.hpp>
-#include <wheelwright/robots/robot_columns.hpp>
+#include <wheelwright/robots/robot_file.hpp>
 #include "arrays.hpp"
 #include "long_work.hpp"
 #include "module.hpp"

@@ -17,7 +17,7 @@
 
 #include <wheelwright/results/design_json.hpp>
 #include <wheelwright/results/software.hpp>
-#include <wheelwright/robots/robot_columns.hpp>
+#include <wheelwright/robots/robot_file.hpp>
 #include <wheelwright/words/design_summary.hpp>
 #include "array_log.hpp"
 #include "arrays.hpp"

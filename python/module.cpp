@@ -9,7 +9,7 @@
 #include <wheelwright/core/check.hpp>
 
 #include <wheelwright/results/software.hpp>
-#include <wheelwright/robots/robot_columns.hpp>
+#include <wheelwright/robots/robot_file.hpp>
 
 namespace wheelwright::python {
 

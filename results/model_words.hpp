@@ -5,7 +5,7 @@
 
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/files/words.hpp>
-#include <wheelwright/robots/model_words.hpp>
+#include <wheelwright/robots/robot_keys.hpp>
 
 namespace wheelwright::results {
 

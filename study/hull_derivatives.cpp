@@ -7,7 +7,6 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/bounds/block_parts.hpp>
 #include <wheelwright/bounds/linear_program.hpp>
 #include <wheelwright/bounds/slab_rows.hpp>
 #include <wheelwright/core/check.hpp>

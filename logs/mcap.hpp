@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// MCAP files, message by message in bounded memory; damaged and cut-off files as far as they can be read, and a report
-/// of what was lost.
+/// of what was lost; written with chunks, indexes and statistics, as Foxglove, PlotJuggler and rosbag2 read them.
 ///
 /// Integrity: a chunk is unpacked whole and compared with its checksum before a message of it is handed out, and left
 /// out when it does not match. A recording that was cut off is read to its last whole message. Where the length of a
@@ -13,13 +13,66 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <wheelwright/logs/mcap_format.hpp>
+
+namespace wheelwright::logs::mcap {
+
+/// Summary at the end of a file.
+struct Summary {
+  bool has_footer = false;  ///< footer and trailing magic are there
+  bool usable = false;      ///< and a summary which is whole: its checksum is right, or it has none and can be parsed
+  std::uint64_t data_end = 0;  ///< where the data section ends; the size of the file where that is not known
+  bool chunked = false;        ///< the summary has an index of chunks
+  std::uint32_t data_crc = 0;  ///< CRC-32 of the file up to the data end record; 0 where there is none
+  std::map<std::uint16_t, McapSchema> schemas;
+  std::map<std::uint16_t, McapChannel> channels;
+  std::optional<std::uint64_t> messages;  ///< of the statistics
+  std::uint64_t defect_offset = 0;        ///< where the defect is
+  std::uint64_t defect_bytes = 0;         ///< how many bytes are not used for it
+  std::string defect;                     ///< why the summary that is there is not usable; empty otherwise
+};
+
+/// Reads the end of `file`. A summary of more than `limit` bytes is not read.
+[[nodiscard]] Summary read_summary(WindowedFile& file, std::size_t limit);
+
+/// The data section of a file.
+struct DataSection {
+  std::uint64_t end = 0;      ///< where it ends, or the file
+  bool cut_off = false;       ///< the file has no footer: records may go beyond the end
+  std::size_t max_bytes = 0;  ///< longest record that is looked for
+};
+
+/// True if a record of a data section may begin at `offset`: the end of the section, or an opcode with a length that
+/// fits (in a file that is cut off also a known opcode with a length within max_bytes). Bytes at random look like that
+/// in one case of 10⁹ or less, but for the last eight bytes of a file that is cut off.
+[[nodiscard]] bool begins_record(WindowedFile& file, const DataSection& section, std::uint64_t offset);
+
+/// True if a record whose own length is damaged may begin at `offset`: a message on a channel for which `messages`
+/// holds, or the data end record at the end of the section. Bytes at random look like that in one case of 10⁵ or less.
+[[nodiscard]] bool begins_damaged_record(WindowedFile& file, const DataSection& section, std::uint64_t offset,
+                                         const std::function<bool(std::uint16_t)>& messages);
+
+/// End of the record at `offset` whose head says that its content has `length` bytes, and whose content says that it
+/// has `known` (more where fields were added that this reader does not know). When the two differ, the one behind which
+/// a record begins is right, the content's before the head's; nothing when neither is.
+[[nodiscard]] std::optional<std::uint64_t> settled_end(WindowedFile& file, const DataSection& section,
+                                                       std::uint64_t offset, std::uint64_t length, std::uint64_t known);
+
+/// The first offset >= `from` at which reading can go on, or the end of the section: a chunk record whose two lengths
+/// agree and whose compression is known; where `messages` is given, also a message record of at most max_bytes on a
+/// channel for which it holds, with two more records behind it. Leaves behind what it has searched.
+[[nodiscard]] std::uint64_t find_record(WindowedFile& file, const DataSection& section, std::uint64_t from,
+                                        const std::function<bool(std::uint16_t)>& messages);
+
+}  // namespace wheelwright::logs::mcap
 
 namespace wheelwright::logs {
 
@@ -104,6 +157,42 @@ class McapReader {
 
   /// Back to the first message, with a fresh report.
   void rewind();
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// Options for writing an MCAP file.
+struct McapWriterOptions {
+  McapCompression compression = McapCompression::zstd;
+  /// A chunk is closed when its unpacked records reach this; 0 writes messages outside of chunks, unpacked and without
+  /// an index.
+  std::size_t chunk_bytes = std::size_t{1} << 20;
+  std::string profile;                  ///< e.g. "ros2"
+  std::string library = "wheelwright";  ///< what writes
+};
+
+/// A writer of one file, which appears whole at commit() or not at all. Memory holds one chunk and the index of those
+/// before.
+class McapWriter {
+ public:
+  /// Begins the file. Throws InputError as AtomicFile does.
+  explicit McapWriter(const std::filesystem::path& path, McapWriterOptions options = {});
+  ~McapWriter();
+  McapWriter(McapWriter&&) noexcept;
+  McapWriter& operator=(McapWriter&&) noexcept;
+
+  /// Adds a schema and returns its id (1, 2, …). Throws InvalidArgument from the 65 536th on.
+  std::uint16_t add_schema(std::string name, std::string encoding, std::string text);
+  /// Adds a channel and returns its id (1, 2, …). Throws InvalidArgument unless `schema_id` is 0 or that of a schema,
+  /// and from the 65 536th on.
+  std::uint16_t add_channel(std::uint16_t schema_id, std::string topic, std::string message_encoding,
+                            std::map<std::string, std::string> metadata = {});
+  /// Appends a message. Throws InvalidArgument unless its channel has been added; InputError when the disk is full.
+  void write(const McapMessage& message);
+  /// Writes index, statistics and footer, and puts the file in its place. To be called once, last.
+  void commit();
 
  private:
   struct Impl;
