@@ -11,8 +11,8 @@
 #include <wheelwright/files/words.hpp>
 #include <wheelwright/gap/diagnose.hpp>
 #include <wheelwright/gap/effect.hpp>
-#include <wheelwright/gap/naive.hpp>
 #include <wheelwright/gap/prepared.hpp>
+#include <wheelwright/gap/selection.hpp>
 #include <wheelwright/logs/csv.hpp>
 #include <wheelwright/report/commission_report.hpp>
 #include <wheelwright/report/gap_report.hpp>
@@ -20,7 +20,7 @@
 #include <wheelwright/robots/robot_file.hpp>
 #include <wheelwright/words/gap_words.hpp>
 
-#include <wheelwright/gap/next_drive.hpp>
+#include <wheelwright/gap/further_drive.hpp>
 #include <wheelwright/results/rival_json.hpp>
 #include <wheelwright/words/gap_summary.hpp>
 #include "commands.hpp"

@@ -11,7 +11,7 @@
 #include <wheelwright/report/sensitivity_report.hpp>
 #include <wheelwright/results/study_json.hpp>
 #include <wheelwright/robots/robot_file.hpp>
-#include <wheelwright/study/local_derivatives.hpp>
+#include <wheelwright/study/bound_derivatives.hpp>
 #include <wheelwright/study/study.hpp>
 
 #include <wheelwright/words/study_summary.hpp>

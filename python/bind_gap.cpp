@@ -15,7 +15,7 @@
 #include <wheelwright/robots/robot_file.hpp>
 #include <wheelwright/words/gap_words.hpp>
 
-#include <wheelwright/gap/next_drive.hpp>
+#include <wheelwright/gap/further_drive.hpp>
 #include <wheelwright/results/rival_json.hpp>
 #include <wheelwright/results/software.hpp>
 #include "arrays.hpp"

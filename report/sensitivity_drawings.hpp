@@ -9,8 +9,7 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/study/screening.hpp>
-#include <wheelwright/study/sobol_indices.hpp>
+#include <wheelwright/study/global_sensitivity.hpp>
 
 namespace wheelwright::report {
 

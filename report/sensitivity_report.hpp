@@ -8,7 +8,7 @@
 #include <vector>
 
 #include <wheelwright/report/context.hpp>
-#include <wheelwright/study/local_derivatives.hpp>
+#include <wheelwright/study/bound_derivatives.hpp>
 #include <wheelwright/study/study.hpp>
 
 namespace wheelwright::report {

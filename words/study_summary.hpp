@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include <wheelwright/study/local_derivatives.hpp>
+#include <wheelwright/study/bound_derivatives.hpp>
 #include <wheelwright/study/study.hpp>
 
 namespace wheelwright::words {
