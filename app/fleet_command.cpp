@@ -20,7 +20,6 @@
 #include "commands.hpp"
 #include "common.hpp"
 #include "options.hpp"
-#include "progress.hpp"
 #include "run_items.hpp"
 
 namespace wheelwright::app {

@@ -21,12 +21,10 @@
 #include <wheelwright/words/gap_words.hpp>
 
 #include <wheelwright/gap/further_drive.hpp>
-#include <wheelwright/results/rival_json.hpp>
-#include <wheelwright/words/gap_summary.hpp>
+#include <wheelwright/words/summary.hpp>
 #include "commands.hpp"
 #include "common.hpp"
 #include "options.hpp"
-#include "progress.hpp"
 
 namespace wheelwright::app {
 using namespace words;

@@ -14,11 +14,10 @@
 #include <wheelwright/study/bound_derivatives.hpp>
 #include <wheelwright/study/study.hpp>
 
-#include <wheelwright/words/study_summary.hpp>
+#include <wheelwright/words/summary.hpp>
 #include "commands.hpp"
 #include "common.hpp"
 #include "options.hpp"
-#include "progress.hpp"
 #include "run_items.hpp"
 
 namespace wheelwright::app {

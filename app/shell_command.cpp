@@ -11,7 +11,6 @@
 #include "command_tree.hpp"
 #include "commands.hpp"
 #include "common.hpp"
-#include "completion.hpp"
 #include "manual.hpp"
 #include "options.hpp"
 

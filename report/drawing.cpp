@@ -14,7 +14,7 @@
 #include <fmt/format.h>
 
 #include <wheelwright/report/page.hpp>
-#include <wheelwright/report/parameter_table.hpp>
+#include <wheelwright/report/sections.hpp>
 #include <wheelwright/words/text.hpp>
 
 namespace wheelwright::report {

@@ -8,7 +8,7 @@
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/commission/filter_choice.hpp>
 #include <wheelwright/core/log.hpp>
-#include <wheelwright/report/parameter_table.hpp>
+#include <wheelwright/report/sections.hpp>
 
 namespace wheelwright::report {
 

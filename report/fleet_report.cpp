@@ -9,9 +9,8 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/report/chart.hpp>
-#include <wheelwright/report/data_sections.hpp>
 #include <wheelwright/report/page.hpp>
+#include <wheelwright/report/sections.hpp>
 #include <wheelwright/words/text.hpp>
 
 namespace wheelwright::report {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/report/gap_drawings.hpp>
+#include <wheelwright/report/gap_report.hpp>
 
 #include <algorithm>
 #include <array>

@@ -1,18 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Sections of a commissioning report: tables below the charts, assumptions and their warrant. All functions return
-/// HTML.
+/// Sections of a commissioning report: tables of parameters and estimators, tables below the charts, assumptions and
+/// their warrant. All functions return HTML.
 #pragma once
 
+#include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include <wheelwright/commission/assumptions.hpp>
 #include <wheelwright/commission/commission.hpp>
-#include <wheelwright/report/chart.hpp>
-#include <wheelwright/report/context.hpp>
+#include <wheelwright/report/page.hpp>
+#include <wheelwright/words/commission_words.hpp>
+#include <wheelwright/words/text.hpp>
 
 namespace wheelwright::report {
+
+/// Reason, Durbin-Wu-Hausman test and a table of all candidates with their 95 % intervals, as HTML; empty where nothing
+/// was estimated.
+[[nodiscard]] std::string estimator_table(const Commissioning& result);
+
+/// The table (HTML), its legend and remarks; empty where there is no parameter. Two rows for each parameter: the
+/// physical quantity, where the robot file tells the scale, and θ_L. Bounds are printed rounded outward.
+[[nodiscard]] std::string parameter_table(const Commissioning& result, const words::TimeAxis& axis);
 
 /// Validation on held-out blocks, one row for each output, with the meaning of the numbers.
 [[nodiscard]] std::string validation_section(const Commissioning& result);
