@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include <wheelwright/core/limits.hpp>
+#include <wheelwright/report/drawing.hpp>
 #include <wheelwright/report/page.hpp>
 #include <wheelwright/report/sections.hpp>
 #include <wheelwright/report/signals.hpp>
@@ -227,19 +228,6 @@ struct MarginAxis {
   }
 };
 
-// 1, 2 and 5 times powers of ten inside the axis.
-std::vector<double> ticks(const MarginAxis& axis) {
-  std::vector<double> out;
-  for (double power = std::pow(10.0, std::floor(std::log10(axis.low))); power <= axis.high; power *= 10.0) {
-    for (const double m : {1.0, 2.0, 5.0}) {
-      if (m * power >= axis.low * (1.0 - 1e-9) && m * power <= axis.high * (1.0 + 1e-9)) {
-        out.push_back(m * power);
-      }
-    }
-  }
-  return out;
-}
-
 constexpr std::array kDashes = {"", "7 4", "2 3", "9 3 2 3", "4 3"};
 constexpr std::array kColours = {"--first", "--second", "--third", "--ink", "--caution"};
 
@@ -291,13 +279,13 @@ std::string delay_curves(const detector::FaultMargins& margins, const commission
       "<svg viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\" role=\"img\" aria-label=\"smallest certain size over "
       "delay\">",
       width, height);
-  for (const double tick : ticks(x)) {
+  for (const double tick : logarithmic_ticks(x.low, x.high, true)) {
     out += fmt::format(
         "<line class=\"axis\" x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1}\" y2=\"{2}\"/><text x=\"{0:.1f}\" y=\"{3}\" "
         "text-anchor=\"middle\">{4:g}</text>",
         x(tick), top, height - bottom, height - bottom + 14.0, tick);
   }
-  for (const double tick : ticks(y)) {
+  for (const double tick : logarithmic_ticks(y.low, y.high, true)) {
     out += fmt::format(
         "<line class=\"axis\" x1=\"{0}\" x2=\"{1}\" y1=\"{2:.1f}\" y2=\"{2:.1f}\"/><text x=\"{3}\" y=\"{4:.1f}\" "
         "text-anchor=\"end\">{5:g}</text>",

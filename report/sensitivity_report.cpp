@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 #include <utility>
 
@@ -45,18 +44,11 @@ std::string label_words(const AxisLabel& label) {
 }
 
 // An axis from pixel `from` to pixel `to` over the numbers that it has taken.
-struct Scale {
-  double from = 0.0, to = 1.0;
-  bool logarithmic = false;
-  double low = std::numeric_limits<double>::infinity();
-  double high = -std::numeric_limits<double>::infinity();
+struct Scale : Range {
+  double from, to;
+  bool logarithmic;
 
-  void take(double x) {
-    if (std::isfinite(x)) {
-      low = std::min(low, x);
-      high = std::max(high, x);
-    }
-  }
+  Scale(double first, double last, bool logarithms = false) : from(first), to(last), logarithmic(logarithms) {}
   [[nodiscard]] bool empty() const { return !(low <= high); }
   void pad() {
     const double margin = high > low ? 0.05 * (high - low) : (high != 0.0 ? 0.1 * std::abs(high) : 1.0);
@@ -69,18 +61,10 @@ struct Scale {
   }
   // Round numbers, about five of them.
   [[nodiscard]] std::vector<double> ticks() const {
-    std::vector<double> out;
     if (logarithmic) {
-      const bool fine = high / low < 300.0;
-      for (double power = std::pow(10.0, std::floor(std::log10(low))); power <= high; power *= 10.0) {
-        for (const double m : {1.0, 2.0, 5.0}) {
-          if ((fine || m == 1.0) && m * power >= low * (1.0 - 1e-9) && m * power <= high * (1.0 + 1e-9)) {
-            out.push_back(m * power);
-          }
-        }
-      }
-      return out;
+      return logarithmic_ticks(low, high, high / low < 300.0);
     }
+    std::vector<double> out;
     const double rough = (high - low) / 5.0, power = std::pow(10.0, std::floor(std::log10(rough)));
     const double step = power * (rough < 1.5 * power   ? 1.0
                                  : rough < 3.5 * power ? 2.0
