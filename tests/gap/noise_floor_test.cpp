@@ -9,8 +9,6 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/gap/prepared.hpp>
-
 #include "gap/simulated_gap.hpp"
 
 namespace wheelwright::gap::noise_floor_test {
