@@ -6,10 +6,9 @@
 #include <fmt/format.h>
 
 #include <wheelwright/commission/physical.hpp>
-#include <wheelwright/report/data_sections.hpp>
 #include <wheelwright/report/page.hpp>
+#include <wheelwright/report/sections.hpp>
 #include <wheelwright/results/model_json.hpp>
-#include <wheelwright/results/model_words.hpp>
 #include <wheelwright/words/text.hpp>
 
 namespace wheelwright::app {

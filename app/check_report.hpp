@@ -5,7 +5,7 @@
 
 #include <string>
 
-#include <wheelwright/results/check_json.hpp>
+#include <wheelwright/results/model_check.hpp>
 
 namespace wheelwright::app {
 

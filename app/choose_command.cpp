@@ -10,14 +10,13 @@
 #include <wheelwright/commission/detector_choice.hpp>
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/report/commission_report.hpp>
-#include <wheelwright/results/margins_json.hpp>
+#include <wheelwright/results/detection_json.hpp>
 #include <wheelwright/results/model_file.hpp>
 #include <wheelwright/robots/robot_file.hpp>
 
 #include "commands.hpp"
 #include "common.hpp"
 #include "options.hpp"
-#include "progress.hpp"
 
 namespace wheelwright::app {
 namespace choose_command {

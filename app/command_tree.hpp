@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The program's commands and options as plain data: what completions, manual pages and suggestions are made of.
+/// The program's commands and options as plain data: what completions, manual pages and suggestions are made of; and
+/// the scripts by which a shell completes them.
 #pragma once
 
 #include <string>
 #include <vector>
 
 namespace CLI {
+
 class App;
+
 }
 
 namespace wheelwright::app {
@@ -58,5 +61,9 @@ struct ProgramWords {
 /// Suggestion for misspelt `words` (without the program's name): "did you mean '--model' instead of '--modle'?"; empty
 /// where every word that begins with -- is an option and the first other one a command.
 [[nodiscard]] std::string suggestion(const ProgramWords& program, const std::vector<std::string>& words);
+
+/// A script for bash, zsh or fish (`shell`) that completes what `program` takes: commands, options, choices, files and
+/// directories. Throws InputError for another shell.
+[[nodiscard]] std::string completion(const ProgramWords& program, const std::string& shell);
 
 }  // namespace wheelwright::app

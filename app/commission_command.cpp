@@ -8,9 +8,9 @@
 
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/commission/detector_walk.hpp>
-#include <wheelwright/files/atomic_file.hpp>
-#include <wheelwright/report/chart.hpp>
+#include <wheelwright/files/bytes.hpp>
 #include <wheelwright/report/commission_report.hpp>
+#include <wheelwright/report/page.hpp>
 #include <wheelwright/results/model_file.hpp>
 #include <wheelwright/robots/robot_file.hpp>
 
@@ -19,7 +19,6 @@
 #include "commands.hpp"
 #include "common.hpp"
 #include "options.hpp"
-#include "progress.hpp"
 
 namespace wheelwright::app {
 using namespace words;

@@ -1,21 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Parts that all commands share: exit codes, output directory.
+/// Parts that all commands share: exit codes, output directory, progress on standard error, a report where a step
+/// fails.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include <wheelwright/core/error.hpp>
 #include <wheelwright/detector/detector.hpp>
+#include <wheelwright/files/bytes.hpp>
 #include <wheelwright/files/json.hpp>
 #include <wheelwright/logs/log_file.hpp>
-#include <wheelwright/report/context.hpp>
+#include <wheelwright/report/commission_report.hpp>
+#include <wheelwright/report/page.hpp>
 #include <wheelwright/results/software.hpp>
-#include <wheelwright/robots/robot_columns.hpp>
+#include <wheelwright/robots/robot_file.hpp>
 
 #include "commands.hpp"
 
@@ -61,5 +67,42 @@ void print_log(const std::vector<std::string>& sentences);
 /// The context of a report: files, repairs, software, command line, raw signals of `log` (which is walked once).
 [[nodiscard]] report::ReportContext report_context(const CommonOptions& options, const logs::LogReport& data,
                                                    LogSource& log);
+
+/// Runs `work` and returns what it returns. Where it throws an Error and results are wanted, out/report.html shows the
+/// message and the raw signals of `context`; the error is thrown on.
+template <typename Work>
+auto or_failure_page(const CommonOptions& options, const report::ReportContext& context, const Work& work) {
+  try {
+    return work();
+  } catch (const Error& error) {
+    if (!options.out.empty()) {
+      files::atomic_write(options.out / "report.html", report::failure_report(error.what(), context));
+    }
+    throw;
+  }
+}
+
+/// "  40 %  identifying (12 s, about 18 s left)": `seconds` have passed at the share [0, 1] of the work. What is left
+/// is told from a twentieth of the work and 2 s on: seconds·(1 − share)/share.
+[[nodiscard]] std::string progress_line(std::string_view stage, double share, double seconds);
+
+/// One line that is rewritten, without colours; nothing where standard error is no terminal that can rewrite a line
+/// (TERM=dumb), or `quiet` is set. The first line appears after half a second: short work stays silent.
+class Progress {
+ public:
+  explicit Progress(bool quiet);
+  ~Progress();
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+  /// Tells that `stage` began, at the share [0, 1] of the work. At most ten lines a second are written.
+  void tell(std::string_view stage, double share);
+
+ private:
+  bool shown_ = false;
+  bool active_;
+  std::string stage_;
+  double last_ = 0.0;  // s
+  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+};
 
 }  // namespace wheelwright::app

@@ -12,7 +12,6 @@
 #include "commands.hpp"
 #include "common.hpp"
 #include "options.hpp"
-#include "progress.hpp"
 
 namespace wheelwright::app {
 namespace convert_command {

@@ -10,22 +10,21 @@
 #include <wheelwright/design/detection.hpp>
 #include <wheelwright/design/manoeuvre.hpp>
 #include <wheelwright/design/stages.hpp>
-#include <wheelwright/files/number.hpp>
+#include <wheelwright/files/words.hpp>
 #include <wheelwright/gap/discrimination_design.hpp>
 #include <wheelwright/gap/effect.hpp>
 #include <wheelwright/gap/further_drive.hpp>
 #include <wheelwright/logs/csv.hpp>
 #include <wheelwright/report/design_report.hpp>
+#include <wheelwright/results/gap_json.hpp>
 #include <wheelwright/results/model_file.hpp>
-#include <wheelwright/results/rival_json.hpp>
 #include <wheelwright/robots/robot_file.hpp>
 
 #include <wheelwright/results/design_json.hpp>
-#include <wheelwright/words/design_summary.hpp>
+#include <wheelwright/words/summary.hpp>
 #include "commands.hpp"
 #include "common.hpp"
 #include "options.hpp"
-#include "progress.hpp"
 #include "rivals.hpp"
 #include "units.hpp"
 

@@ -9,15 +9,14 @@
 
 #include <wheelwright/commission/detector_walk.hpp>
 #include <wheelwright/commission/risk_watch.hpp>
-#include <wheelwright/report/chart.hpp>
 #include <wheelwright/report/detect_report.hpp>
+#include <wheelwright/report/page.hpp>
 #include <wheelwright/results/model_file.hpp>
 
 #include <wheelwright/results/detection_json.hpp>
 #include <wheelwright/words/summary.hpp>
 #include "commands.hpp"
 #include "common.hpp"
-#include "failure_page.hpp"
 #include "follow.hpp"
 #include "options.hpp"
 #include "series.hpp"

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/export/export_c.hpp>
-#include <wheelwright/files/atomic_file.hpp>
+#include <wheelwright/files/bytes.hpp>
 #include <wheelwright/results/model_file.hpp>
 #include <wheelwright/results/model_json.hpp>
 

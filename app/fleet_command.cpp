@@ -9,7 +9,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/files/atomic_file.hpp>
+#include <wheelwright/files/bytes.hpp>
 #include <wheelwright/report/fleet_report.hpp>
 #include <wheelwright/results/fleet_json.hpp>
 #include <wheelwright/robots/fleet_list.hpp>
@@ -20,7 +20,6 @@
 #include "commands.hpp"
 #include "common.hpp"
 #include "options.hpp"
-#include "progress.hpp"
 #include "run_items.hpp"
 
 namespace wheelwright::app {

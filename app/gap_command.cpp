@@ -7,12 +7,12 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/files/atomic_file.hpp>
+#include <wheelwright/files/bytes.hpp>
 #include <wheelwright/files/words.hpp>
 #include <wheelwright/gap/diagnose.hpp>
 #include <wheelwright/gap/effect.hpp>
-#include <wheelwright/gap/naive.hpp>
 #include <wheelwright/gap/prepared.hpp>
+#include <wheelwright/gap/selection.hpp>
 #include <wheelwright/logs/csv.hpp>
 #include <wheelwright/report/commission_report.hpp>
 #include <wheelwright/report/gap_report.hpp>
@@ -20,13 +20,11 @@
 #include <wheelwright/robots/robot_file.hpp>
 #include <wheelwright/words/gap_words.hpp>
 
-#include <wheelwright/gap/next_drive.hpp>
-#include <wheelwright/results/rival_json.hpp>
-#include <wheelwright/words/gap_summary.hpp>
+#include <wheelwright/gap/further_drive.hpp>
+#include <wheelwright/words/summary.hpp>
 #include "commands.hpp"
 #include "common.hpp"
 #include "options.hpp"
-#include "progress.hpp"
 
 namespace wheelwright::app {
 using namespace words;

@@ -13,12 +13,10 @@
 #include <wheelwright/robots/robot_file.hpp>
 #include <wheelwright/words/identification_words.hpp>
 
-#include <wheelwright/words/identify_summary.hpp>
+#include <wheelwright/words/summary.hpp>
 #include "commands.hpp"
 #include "common.hpp"
-#include "failure_page.hpp"
 #include "options.hpp"
-#include "progress.hpp"
 
 namespace wheelwright::app {
 using namespace words;

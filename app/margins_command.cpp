@@ -9,17 +9,15 @@
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/commission/margin_survey.hpp>
-#include <wheelwright/report/margins_report.hpp>
-#include <wheelwright/results/margins_json.hpp>
+#include <wheelwright/report/detect_report.hpp>
+#include <wheelwright/results/detection_json.hpp>
 #include <wheelwright/results/model_file.hpp>
-#include <wheelwright/words/margin_words.hpp>
+#include <wheelwright/words/detect_words.hpp>
 
-#include <wheelwright/words/columns.hpp>
+#include <wheelwright/words/text.hpp>
 #include "commands.hpp"
 #include "common.hpp"
-#include "failure_page.hpp"
 #include "options.hpp"
-#include "progress.hpp"
 
 namespace wheelwright::app {
 using namespace words;

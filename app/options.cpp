@@ -7,7 +7,7 @@
 #include <CLI/CLI.hpp>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/files/number.hpp>
+#include <wheelwright/files/words.hpp>
 
 #include "units.hpp"
 

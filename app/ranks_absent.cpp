@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/core/error.hpp>
 
-#include "ranks.hpp"
+#include "run_items.hpp"
 
 namespace wheelwright::app {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/study/work_on_ranks.hpp>
 
-#include "ranks.hpp"
+#include "run_items.hpp"
 
 namespace wheelwright::app {
 

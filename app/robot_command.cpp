@@ -6,7 +6,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/files/atomic_file.hpp>
+#include <wheelwright/files/bytes.hpp>
 #include <wheelwright/robots/controller_file.hpp>
 #include <wheelwright/robots/robot_description.hpp>
 #include <wheelwright/robots/robot_file.hpp>

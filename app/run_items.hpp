@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The many items of a command: on threads, as one shard of several, or on the ranks of MPI, with results that outlive
-/// the process.
+/// The many items of a command: on threads, as one shard of several, or on the processes that mpirun or srun started
+/// together, with results that outlive the process.
 #pragma once
 
 #include <cstddef>
@@ -55,5 +55,16 @@ struct ItemsRun {
 /// leaves items missing: the message names them and the shards that evaluate them.
 [[nodiscard]] ItemsRun run_items(const ItemsToRun& items, const CommonOptions& common, const ScaleOptions& scale,
                                  const std::function<void(std::size_t done, std::size_t items)>& progress = {});
+
+/// True if this process is one of several that mpirun or srun started together, by the environment they set; MPI itself
+/// is not asked, so that a plain run never starts it. False where that says that there is one alone.
+[[nodiscard]] bool launched_by_mpi();
+
+/// Evaluates `work` on all these processes (run_work_on_ranks()); each has to call it, once. `fingerprint` is what all
+/// have to agree on; `open` is called on rank 0, and what it opens has the results there. Returns what was done on rank
+/// 0, nothing on the others, whose part is over. Throws InputError where the program was built without MPI.
+[[nodiscard]] std::optional<study::RunCount> run_on_ranks(const study::Work& work, const std::string& fingerprint,
+                                                          const std::function<study::ResultStore&()>& open,
+                                                          const study::RunOptions& options);
 
 }  // namespace wheelwright::app

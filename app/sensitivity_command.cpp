@@ -7,18 +7,17 @@
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/commission/commission.hpp>
-#include <wheelwright/files/xxh64.hpp>
+#include <wheelwright/files/bytes.hpp>
 #include <wheelwright/report/sensitivity_report.hpp>
 #include <wheelwright/results/study_json.hpp>
 #include <wheelwright/robots/robot_file.hpp>
-#include <wheelwright/study/local_derivatives.hpp>
+#include <wheelwright/study/bound_derivatives.hpp>
 #include <wheelwright/study/study.hpp>
 
-#include <wheelwright/words/study_summary.hpp>
+#include <wheelwright/words/summary.hpp>
 #include "commands.hpp"
 #include "common.hpp"
 #include "options.hpp"
-#include "progress.hpp"
 #include "run_items.hpp"
 
 namespace wheelwright::app {

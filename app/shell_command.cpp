@@ -5,13 +5,12 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include <wheelwright/files/atomic_file.hpp>
+#include <wheelwright/files/bytes.hpp>
 #include <wheelwright/files/words.hpp>
 
 #include "command_tree.hpp"
 #include "commands.hpp"
 #include "common.hpp"
-#include "completion.hpp"
 #include "manual.hpp"
 #include "options.hpp"
 

@@ -10,7 +10,6 @@
 #include <fmt/format.h>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/files/number.hpp>
 #include <wheelwright/files/words.hpp>
 
 namespace wheelwright::app {

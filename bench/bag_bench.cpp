@@ -12,8 +12,7 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/logs/bag.hpp>
 #include <wheelwright/logs/bag_write.hpp>
-#include <wheelwright/logs/ros_extractor.hpp>
-#include <wheelwright/logs/ros_write.hpp>
+#include <wheelwright/logs/ros_messages.hpp>
 
 #include "bench.hpp"
 #include "temporary_file.hpp"

@@ -12,8 +12,7 @@
 #include <fmt/format.h>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/logs/mcap_reader.hpp>
-#include <wheelwright/logs/mcap_writer.hpp>
+#include <wheelwright/logs/mcap.hpp>
 
 #include "bench.hpp"
 #include "temporary_file.hpp"

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Certificates: rigorous bounds from the approximate multipliers of a linear program.
+/// Certificates: rigorous bounds from the approximate multipliers of a linear program, and proofs that a set of
+/// parameters is empty.
 ///
 /// Neumaier and Shcherbina 2004, "Safe bounds in linear and mixed-integer linear programming", Math. Program. 99: for
 /// any λ >= 0 and any θ in the box with Aθ <= b,
@@ -11,6 +12,7 @@
 /// included: nothing depends on how λ was found.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -34,5 +36,17 @@ namespace wheelwright::bounds {
 /// True if the multipliers prove that { θ in box : row·θ <= row.b for every row } is empty: that 0·θ has a certified
 /// upper bound below zero (Farkas).
 [[nodiscard]] bool proves_empty(std::span<const WeightedRow> rows, const Box& box);
+
+/// The 2p half-spaces of a box, lower before upper side, with their origin marked as prior. Where `parameters` is
+/// given, side j belongs to parameter parameters[j].
+[[nodiscard]] std::vector<HalfSpace> sides_as_rows(const Box& box, std::span<const std::size_t> parameters = {});
+
+/// Looks for a Farkas certificate that { θ in box : row·θ <= row.b for every row } is empty: at most p + 1 of the rows,
+/// with multipliers > 0 that proves_empty() accepts, and none of which can be left out (without it no such proof is
+/// found). Nothing where no certificate passes the rigorous check, so the set may be non-empty. `coordinates` scale the
+/// linear programs only.
+[[nodiscard]] std::optional<std::vector<WeightedRow>> find_contradiction(std::span<const HalfSpace> rows,
+                                                                         const Box& box,
+                                                                         const Coordinates& coordinates);
 
 }  // namespace wheelwright::bounds

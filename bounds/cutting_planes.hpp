@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include <wheelwright/bounds/infeasibility.hpp>
+#include <wheelwright/bounds/certificate.hpp>
 #include <wheelwright/bounds/linear_program.hpp>
 #include <wheelwright/bounds/slab_rows.hpp>
 

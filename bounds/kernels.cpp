@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/bounds/kernels.hpp>
 
+#include <wheelwright/bounds/kernels_impl.hpp>
 #include <wheelwright/core/vector_units.hpp>
 
 namespace wheelwright::bounds::kernels {
@@ -23,5 +24,8 @@ std::span<const Table* const> available() {
 }
 
 const Table& best() { return *available().back(); }
+
+extern const Table k_baseline;
+const Table k_baseline = Loops<2>::table("baseline");
 
 }  // namespace wheelwright::bounds::kernels

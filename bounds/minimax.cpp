@@ -9,7 +9,6 @@
 #include <span>
 
 #include <wheelwright/bounds/certificate.hpp>
-#include <wheelwright/bounds/infeasibility.hpp>
 #include <wheelwright/bounds/linear_program.hpp>
 #include <wheelwright/bounds/slab_rows.hpp>
 #include <wheelwright/bounds/survey.hpp>

@@ -11,8 +11,8 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/bounds/block_parts.hpp>
 #include <wheelwright/bounds/certificate.hpp>
+#include <wheelwright/bounds/slab_rows.hpp>
 #include <wheelwright/core/interval.hpp>
 #include <wheelwright/core/limits.hpp>
 #include <wheelwright/core/linear_algebra.hpp>

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include <wheelwright/bounds/box.hpp>
+#include <wheelwright/bounds/certificate.hpp>
 #include <wheelwright/bounds/cutting_planes.hpp>
-#include <wheelwright/bounds/infeasibility.hpp>
 
 namespace wheelwright::bounds {
 

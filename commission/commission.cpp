@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/bounds/outliers.hpp>
+#include <wheelwright/bounds/feasible_set.hpp>
 #include <wheelwright/commission/at_risk.hpp>
 #include <wheelwright/commission/contradictions.hpp>
 #include <wheelwright/commission/fit.hpp>

@@ -22,7 +22,7 @@
 #include <wheelwright/commission/validation.hpp>
 #include <wheelwright/core/log.hpp>
 #include <wheelwright/detector/online_model.hpp>
-#include <wheelwright/identify/estimator_choice.hpp>
+#include <wheelwright/identify/estimate.hpp>
 #include <wheelwright/identify/least_squares.hpp>
 #include <wheelwright/model/robot.hpp>
 

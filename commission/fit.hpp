@@ -10,7 +10,7 @@
 #include <wheelwright/bounds/polytope.hpp>
 #include <wheelwright/commission/setting.hpp>
 #include <wheelwright/commission/validation.hpp>
-#include <wheelwright/identify/estimator_choice.hpp>
+#include <wheelwright/identify/estimate.hpp>
 #include <wheelwright/identify/least_squares.hpp>
 
 namespace wheelwright::commission {

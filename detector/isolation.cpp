@@ -8,7 +8,6 @@
 #include <utility>
 
 #include <wheelwright/bounds/certificate.hpp>
-#include <wheelwright/bounds/infeasibility.hpp>
 #include <wheelwright/bounds/linear_program.hpp>
 #include <wheelwright/bounds/slab_rows.hpp>
 #include <wheelwright/core/check.hpp>

@@ -11,7 +11,6 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/core/statistics.hpp>
 #include <wheelwright/doctor/log_health.hpp>
-#include <wheelwright/inference/direction_words.hpp>
 #include <wheelwright/inference/identifiability.hpp>
 
 namespace wheelwright::doctor {

@@ -12,7 +12,7 @@
 #include <wheelwright/doctor/log_health.hpp>
 #include <wheelwright/filter/encoder.hpp>
 #include <wheelwright/identify/noise_level.hpp>
-#include <wheelwright/inference/standstill_noise.hpp>
+#include <wheelwright/inference/noise_levels.hpp>
 
 namespace wheelwright::doctor {
 namespace {

@@ -10,8 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/files/atomic_file.hpp>
-#include <wheelwright/files/byte_source.hpp>
+#include <wheelwright/files/bytes.hpp>
 #include <wheelwright/files/words.hpp>
 
 namespace wheelwright::files {

@@ -2,9 +2,131 @@
 #include <wheelwright/files/words.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cctype>
+#include <charconv>
+#include <cstdint>
+#include <limits>
 
 namespace wheelwright::files {
+namespace {
+
+constexpr std::array<double, 23> powers_of_ten = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
+                                                  1e8,  1e9,  1e10, 1e11, 1e12, 1e13, 1e14, 1e15,
+                                                  1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
+
+bool is_digit(char c) { return static_cast<unsigned char>(c - '0') < 10; }
+
+/// Whether the decimal number in [first, last), known to be out of range, is too large and not too small: its leading
+/// non-zero digit stands at 10^k with k > 0.
+bool is_too_large(const char* first, const char* last) {
+  const char* const mantissa_end = std::find_if(first, last, [](char c) { return c == 'e' || c == 'E'; });
+  const char* const point = std::find(first, mantissa_end, '.');
+  const char* const leading = std::find_if(first, mantissa_end, [](char c) { return c != '0' && c != '.'; });
+  long exponent = 0;
+  if (mantissa_end != last) {
+    const char* digits = mantissa_end + 1;
+    const bool below = *digits == '-';
+    digits += below || *digits == '+' ? 1 : 0;
+    if (std::from_chars(digits, last, exponent).ec == std::errc::result_out_of_range) {
+      return !below;
+    }
+    exponent = below ? -exponent : exponent;
+  }
+  return (point - leading) + exponent > 0;
+}
+
+const char* parse_general(const char* start, const char* digits, const char* last, bool negative, double& value) {
+  const auto [end, error] = std::from_chars(digits, last, value);
+  if (error == std::errc::invalid_argument || end == digits || (start != digits && *digits == '-')) {
+    return nullptr;
+  }
+  if (error == std::errc::result_out_of_range) {
+    value = is_too_large(digits, end) ? std::numeric_limits<double>::infinity() : 0.0;
+  }
+  if (negative) {
+    value = -value;
+  }
+  return end;
+}
+
+}  // namespace
+
+const char* parse_number(const char* first, const char* last, double& value) {
+  const char* p = first;
+  if (p == last) {
+    return nullptr;
+  }
+  const bool negative = *p == '-';
+  if (negative || *p == '+') {
+    ++p;
+  }
+  const char* const digits = p;
+  std::uint64_t mantissa = 0;
+  for (; p != last && is_digit(*p); ++p) {
+    mantissa = 10 * mantissa + static_cast<std::uint64_t>(*p - '0');
+  }
+  std::ptrdiff_t count = p - digits;
+  std::ptrdiff_t exponent = 0;
+  if (p != last && *p == '.') {
+    const char* const fraction = ++p;
+    for (; p != last && is_digit(*p); ++p) {
+      mantissa = 10 * mantissa + static_cast<std::uint64_t>(*p - '0');
+    }
+    exponent = fraction - p;
+    count -= exponent;
+  }
+  if (count == 0 || count > 18) {
+    return parse_general(first, digits, last, negative, value);
+  }
+  if (p != last && (*p == 'e' || *p == 'E')) {
+    const char* q = p + 1;
+    const bool below = q != last && *q == '-';
+    if (q != last && (*q == '-' || *q == '+')) {
+      ++q;
+    }
+    const char* const power = q;
+    int shift = 0;
+    for (; q != last && is_digit(*q) && q - power < 4; ++q) {
+      shift = 10 * shift + (*q - '0');
+    }
+    if (q == power || q - power == 4) {
+      return parse_general(first, digits, last, negative, value);
+    }
+    exponent += below ? -shift : shift;
+    p = q;
+  }
+  // An integer up to 2^53 and a power of ten up to 10^22 are exact: one operation rounds correctly (Clinger 1990).
+  constexpr std::uint64_t exact = std::uint64_t{1} << 53;
+  if (mantissa > exact || exponent < -22 || exponent > 22) {
+    return parse_general(first, digits, last, negative, value);
+  }
+  const double magnitude = static_cast<double>(mantissa);
+  const double result = exponent < 0 ? magnitude / powers_of_ten[static_cast<std::size_t>(-exponent)]
+                                     : magnitude * powers_of_ten[static_cast<std::size_t>(exponent)];
+  value = negative ? -result : result;
+  return p;
+}
+
+std::optional<double> to_number(std::string_view text) {
+  const std::size_t begin = text.find_first_not_of(" \t\r\n");
+  if (begin == std::string_view::npos) {
+    return std::nullopt;
+  }
+  text = text.substr(begin, text.find_last_not_of(" \t\r\n") - begin + 1);
+  double value = 0.0;
+  if (parse_number(text.data(), text.data() + text.size(), value) != text.data() + text.size()) {
+    return std::nullopt;
+  }
+  return value;
+}
+
+std::string number_text(double value) {
+  std::array<char, 32> buffer;
+  const auto [end, error] = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value);
+  return std::string(buffer.data(), end);
+}
+
 namespace {
 
 std::size_t edit_distance(std::string_view a, std::string_view b) {

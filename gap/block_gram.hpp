@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Cross-validated least squares on any subset of many columns, over blocks of time, from Gram matrices alone.
+/// Least squares from Gram matrices alone: small ones with coefficients of a given sign, and cross-validated ones on
+/// any subset of many columns, over blocks of time.
 #pragma once
 
 #include <cstddef>
@@ -10,6 +11,21 @@
 #include <Eigen/Core>
 
 namespace wheelwright::gap {
+
+/// The minimiser of ½ xᵀA x − bᵀx.
+struct SignedSolution {
+  Eigen::VectorXd x;
+  std::vector<bool> zero;  ///< held at 0: by its sign, or since A does not determine it
+};
+
+/// argmin ½ xᵀA x − bᵀx over sign_i x_i >= 0 (sign 0: free; `sign` may be empty), A symmetric positive semidefinite, by
+/// active sets (Lawson and Hanson 1974, chapter 23). Unknowns that A determines to fewer than ten digits, given those
+/// before them, are held at 0.
+[[nodiscard]] SignedSolution signed_least_squares(const Eigen::MatrixXd& A, const Eigen::VectorXd& b,
+                                                  const std::vector<int>& sign);
+
+/// (A restricted to the unknowns that are not `zero`)⁻¹ in its place, zeros elsewhere.
+[[nodiscard]] Eigen::MatrixXd restricted_inverse(const Eigen::MatrixXd& A, const std::vector<bool>& zero);
 
 /// The rows of one output of one residual space, over all candidate columns.
 struct RowSpace {

@@ -2,10 +2,14 @@
 #include <wheelwright/gap/candidate.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <map>
+#include <numeric>
+#include <random>
 #include <utility>
 
+#include <wheelwright/core/check.hpp>
 #include <wheelwright/core/for_all.hpp>
 
 namespace wheelwright::gap {
@@ -190,6 +194,184 @@ std::vector<std::string> names_of(const CandidateTable& table, const CauseSet& s
 
 std::vector<std::vector<CauseSet>> search_causes(const CandidateTable& table, const CauseSearchOptions& options) {
   return Search(table, options).run();
+}
+
+namespace {
+
+// Standardised sums over a regime for any arrangement of the blocks of values over those of the regime.
+struct Arrangement {
+  Eigen::MatrixXd product;  // (block of the regime, block of values)
+  double mean = 0.0, deviation = 0.0;
+
+  [[nodiscard]] double score(const std::vector<Eigen::Index>& order) const {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < order.size(); ++i) {
+      sum += product(order[i], static_cast<Eigen::Index>(i));
+    }
+    return (sum - mean) / deviation;
+  }
+};
+
+// Mean and deviation over all arrangements (Hoeffding 1951).
+Arrangement arrangement(const Mask& regime, const Eigen::MatrixXd& blocks) {
+  const Eigen::Index length = blocks.rows(), n = blocks.cols();
+  const Eigen::MatrixXd in = regime.head(length * n).cast<double>().matrix().reshaped(length, n);
+  Arrangement a;
+  a.product.noalias() = in.transpose() * blocks;
+  a.mean = a.product.sum() / static_cast<double>(n);
+  Eigen::MatrixXd rest = a.product;
+  rest.colwise() -= a.product.rowwise().mean();
+  rest.rowwise() -= a.product.colwise().mean();
+  rest.array() += a.product.mean();
+  a.deviation = std::sqrt(rest.squaredNorm() / static_cast<double>(n - 1));
+  return a;
+}
+
+}  // namespace
+
+double memory_of_squares(const Eigen::VectorXd& series) {
+  const Eigen::VectorXd centred = series.array() - series.mean();
+  const double variance = centred.squaredNorm();
+  double sum = 1.0;
+  const Eigen::Index n = series.size();
+  for (Eigen::Index lag = 1; lag < n / 4 && variance > 0.0; ++lag) {
+    const double rho = centred.head(n - lag).dot(centred.tail(n - lag)) / variance;
+    if (std::abs(rho) <= 0.2) {
+      break;
+    }
+    sum += 2.0 * rho * rho;
+  }
+  return sum;
+}
+
+std::vector<double> block_permutation_p_values(const Eigen::VectorXd& values, const std::vector<Mask>& regimes,
+                                               double memory, std::size_t permutations, std::uint64_t seed) {
+  std::vector<double> p(regimes.size(), 1.0);
+  if (values.size() < 64) {
+    return p;
+  }
+  const auto blocks =
+      std::clamp<Eigen::Index>(static_cast<Eigen::Index>(static_cast<double>(values.size()) / (10.0 * memory)), 12, 48);
+  const Eigen::Index length = values.size() / blocks;
+  const Eigen::MatrixXd cut =
+      (values.head(length * blocks).array() - values.head(length * blocks).mean()).matrix().reshaped(length, blocks);
+  std::vector<Eigen::Index> order(static_cast<std::size_t>(blocks));
+  std::iota(order.begin(), order.end(), Eigen::Index{0});
+
+  std::vector<Arrangement> tested;
+  std::vector<std::size_t> index;
+  const double scale = std::sqrt(cut.squaredNorm());
+  for (std::size_t r = 0; r < regimes.size(); ++r) {
+    Arrangement a = arrangement(regimes[r], cut);
+    if (a.deviation > 1e-9 * scale) {
+      tested.push_back(std::move(a));
+      index.push_back(r);
+    }
+  }
+  std::vector<double> observed;
+  for (const Arrangement& a : tested) {
+    observed.push_back(a.score(order));
+  }
+  std::vector<std::size_t> rank(tested.size());
+  std::iota(rank.begin(), rank.end(), std::size_t{0});
+  std::sort(rank.begin(), rank.end(), [&](std::size_t a, std::size_t b) { return observed[a] > observed[b]; });
+
+  std::vector<std::size_t> above(tested.size(), 1);
+  std::mt19937_64 generator(seed);
+  for (std::size_t k = 0; k < permutations; ++k) {
+    std::shuffle(order.begin(), order.end(), generator);
+    double largest = -1e300;
+    for (std::size_t i = rank.size(); i-- > 0;) {
+      largest = std::max(largest, tested[rank[i]].score(order));
+      above[i] += largest >= observed[rank[i]] ? 1 : 0;
+    }
+  }
+  double running = 0.0;
+  for (std::size_t i = 0; i < rank.size(); ++i) {
+    running = std::max(running, static_cast<double>(above[i]) / static_cast<double>(permutations + 1));
+    p[index[rank[i]]] = running;
+  }
+  return p;
+}
+
+namespace {
+
+// Standard error of the mean of `d`; the smallest positive number where it does not vary.
+double standard_error(const Eigen::VectorXd& d) {
+  const auto n = static_cast<double>(d.size());
+  const double variance = (d.array() - d.mean()).square().sum() / (n - 1.0);
+  return std::max(std::sqrt(variance / n), std::numeric_limits<double>::min());
+}
+
+}  // namespace
+
+std::vector<double> model_confidence_set(const std::vector<Eigen::VectorXd>& losses,
+                                         const ConfidenceSetOptions& options) {
+  check::that(!losses.empty() && losses.front().size() >= 4, "losses", "at least one model and four blocks");
+  check::that(options.resamples > 0, "ConfidenceSetOptions::resamples", "> 0");
+  const Eigen::Index blocks = losses.front().size();
+  for (const Eigen::VectorXd& loss : losses) {
+    check::that(loss.size() == blocks && loss.allFinite(), "losses", "one finite value per block");
+  }
+  std::size_t best = 0;
+  for (std::size_t i = 1; i < losses.size(); ++i) {
+    if (losses[i].sum() < losses[best].sum()) {
+      best = i;
+    }
+  }
+  std::vector<double> t(losses.size());
+  std::vector<std::size_t> order{best};  // the best, then the others, the one to be dropped last first
+  for (std::size_t i = 0; i < losses.size(); ++i) {
+    if (i != best) {
+      t[i] = ((losses[i] - losses[best]).mean() - options.margin) / standard_error(losses[i] - losses[best]);
+      order.push_back(i);
+    }
+  }
+  std::stable_sort(order.begin() + 1, order.end(), [&t](std::size_t a, std::size_t b) { return t[a] < t[b]; });
+  const auto models = static_cast<Eigen::Index>(order.size());
+  Eigen::MatrixXd centred(blocks, models), error(models, models);
+  for (Eigen::Index i = 0; i < models; ++i) {
+    const Eigen::VectorXd& loss = losses[order[static_cast<std::size_t>(i)]];
+    centred.col(i) = loss.array() - loss.mean();
+    for (Eigen::Index j = 0; j < i; ++j) {
+      error(i, j) = error(j, i) = standard_error(centred.col(i) - centred.col(j));
+    }
+  }
+
+  // How often the largest studentised mean among the first k + 1 models, beyond that of the best of them, is at least
+  // t_k where all are equally good: which one comes out best is left to chance too.
+  std::vector<std::size_t> beyond(order.size(), 0);
+  std::mt19937_64 generator(options.seed);
+  std::uniform_int_distribution<Eigen::Index> any(0, blocks - 1);
+  Eigen::VectorXd weight(blocks);
+  for (std::size_t r = 0; r < options.resamples; ++r) {
+    weight.setZero();
+    for (Eigen::Index b = 0; b < blocks; ++b) {
+      weight[any(generator)] += 1.0;
+    }
+    const Eigen::VectorXd mean = centred.transpose() * weight / static_cast<double>(blocks);
+    Eigen::Index lowest = 0;
+    double largest = 0.0;
+    for (Eigen::Index k = 1; k < models; ++k) {
+      if (mean[k] < mean[lowest]) {
+        lowest = k;
+        largest = 0.0;
+        for (Eigen::Index i = 0; i < k; ++i) {
+          largest = std::max(largest, (mean[i] - mean[k]) / error(i, k));
+        }
+      } else {
+        largest = std::max(largest, (mean[k] - mean[lowest]) / error(k, lowest));
+      }
+      beyond[static_cast<std::size_t>(k)] += largest >= t[order[static_cast<std::size_t>(k)]] ? 1 : 0;
+    }
+  }
+  std::vector<double> p(losses.size(), 1.0);
+  double so_far = 0.0;
+  for (std::size_t k = order.size() - 1; k > 0; --k) {
+    so_far = std::max(so_far, (1.0 + static_cast<double>(beyond[k])) / (1.0 + static_cast<double>(options.resamples)));
+    p[order[k]] = so_far;
+  }
+  return p;
 }
 
 }  // namespace wheelwright::gap

@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include <wheelwright/gap/effect.hpp>
-#include <wheelwright/gap/kinematic_rows.hpp>
+#include <wheelwright/gap/gap_rows.hpp>
 
 namespace wheelwright::gap {
 namespace {

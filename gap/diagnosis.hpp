@@ -11,10 +11,11 @@
 #include <string_view>
 #include <vector>
 
+#include <Eigen/Core>
+
 #include <wheelwright/core/log.hpp>
 #include <wheelwright/gap/effect.hpp>
 #include <wheelwright/gap/gap_rows.hpp>
-#include <wheelwright/gap/residual_series.hpp>
 #include <wheelwright/model/robot.hpp>
 
 namespace wheelwright::gap {

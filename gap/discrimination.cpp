@@ -13,8 +13,8 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/filter/noise.hpp>
+#include <wheelwright/gap/block_gram.hpp>
 #include <wheelwright/gap/drive.hpp>
-#include <wheelwright/gap/signed_least_squares.hpp>
 
 namespace wheelwright::gap {
 namespace {

@@ -33,7 +33,7 @@
 #include <wheelwright/design/subject.hpp>
 #include <wheelwright/gap/drive.hpp>
 #include <wheelwright/gap/effect.hpp>
-#include <wheelwright/gap/kinematic_rows.hpp>
+#include <wheelwright/gap/gap_rows.hpp>
 
 namespace wheelwright::gap {
 

@@ -6,13 +6,18 @@
 #include <optional>
 #include <random>
 
+#include <fmt/format.h>
+
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/core/random.hpp>
+#include <wheelwright/core/words.hpp>
 #include <wheelwright/design/stages.hpp>
 #include <wheelwright/filter/measurement.hpp>
 #include <wheelwright/gap/discrimination_design.hpp>
+#include <wheelwright/gap/estimates.hpp>
+#include <wheelwright/gap/prepared.hpp>
 
 namespace wheelwright::gap {
 namespace {
@@ -241,6 +246,130 @@ void judge_pairs(std::vector<ConfusablePair>& pairs, const CandidateTable& table
     const Effect& second = prepared.catalogue[effect_index(table, pairs[k].second)];
     pairs[k].reason = reason_for(judged[k], first, second, prepared.catalogue);
     pairs[k].inseparable = !judged[k].separable && !judged[k].first_is_special && !judged[k].second_is_special;
+  }
+}
+
+namespace {
+
+constexpr std::size_t kMostRivals = 4;  // pairs grow with the square
+
+// The best fit of a set of effects at any of their shapes.
+CauseSet best_set(const CandidateTable& table, const std::vector<std::string>& effects, BaseModel base) {
+  CauseSearchOptions search;
+  search.base = base;
+  for (const std::string& name : table.names) {
+    search.allowed.push_back(std::ranges::find(effects, name) != effects.end());
+  }
+  for (const std::vector<CauseSet>& level : search_causes(table, search)) {
+    if (!level.empty() && level.front().members.size() == effects.size()) {
+      return level.front();
+    }
+  }
+  throw InvalidArgument("these causes are in no table: " + fmt::format("{}", fmt::join(effects, ", ")));
+}
+
+Rival rival_of(const FittedCauses& fitted, const std::vector<Effect>& catalogue, const Drive& drive) {
+  Rival rival;
+  for (const FittedEffect& effect : fitted.effects) {
+    const Eigen::VectorXd& c = effect.coefficients;
+    RivalCause cause{effect.effect.name, {c.data(), c.data() + c.size()}, effect.shape};
+    if (c.size() > 0 && c.isZero()) {
+      cause = typical_rival({cause.effect}, catalogue, drive).causes.front();
+    }
+    rival.causes.push_back(std::move(cause));
+  }
+  return rival;
+}
+
+// Each member of the credible set fitted to the drive; θ beside the first of them goes to `theta`.
+std::vector<Rival> fitted_rivals(const PreparedGap& prepared, const Diagnosis& diagnosis,
+                                 const DiagnoseOptions& options, Eigen::VectorXd& theta) {
+  const bool trusted = std::ranges::find(prepared.trusted, true) != prepared.trusted.end();
+  std::vector<Rival> rivals;
+  for (const CredibleCauses& member : diagnosis.credible) {
+    if (member.effects.empty() || rivals.size() == kMostRivals) {
+      continue;
+    }
+    ShapeGrids shapes = all_shapes(prepared.catalogue, prepared.drive);
+    bool parametric = false;
+    for (std::size_t e = 0; e < prepared.catalogue.size(); ++e) {
+      const bool here = std::ranges::find(member.effects, prepared.catalogue[e].name) != member.effects.end();
+      parametric = parametric || (here && prepared.catalogue[e].parametric);
+      if (!here) {
+        shapes[e].clear();
+      }
+    }
+    GapProblem problem = make_problem(prepared.drive, prepared.floor, prepared.healthy, prepared.trusted,
+                                      prepared.catalogue, shapes, prepared.row_options);
+    BlockOptions blocks = options.blocks;
+    blocks.threads = options.threads;
+    const BlockGram gram(problem.rows.spaces, blocks);
+    problem.table.gram = &gram;
+    const BaseModel base = parametric && trusted ? BaseModel::nominal : BaseModel::refitted;
+    const FittedCauses fitted =
+        fit_causes(prepared, problem, best_set(problem.table, member.effects, base), base, blocks);
+    if (rivals.empty()) {
+      theta = fitted.theta;
+    }
+    rivals.push_back(rival_of(fitted, prepared.catalogue, prepared.drive));
+  }
+  return rivals;
+}
+
+}  // namespace
+
+NextDrive next_drive(LogSource& log, LogSource* baseline, const Robot& robot, const Diagnosis& diagnosis,
+                     const DiagnoseOptions& options) {
+  const PreparedGap prepared = prepare_gap(log, baseline, robot, options);
+  NextDrive next;
+  Eigen::VectorXd theta = prepared.theta;
+  next.rivals = fitted_rivals(prepared, diagnosis, options, theta);
+  if (next.rivals.size() < 2) {
+    return next;
+  }
+  const design::DesignSubject subject = subject_of(prepared, robot, theta);
+  PlannedNoise noise;
+  noise.beta = prepared.row_options.beta;
+  noise.output = {prepared.floor.efforts.data(), prepared.floor.efforts.data() + prepared.floor.efforts.size()};
+  noise.pose = prepared.floor.increments;
+  noise.window = prepared.row_options.window;
+  design::DesignOptions search;
+  search.samples = 60;
+  search.descents = 2;
+  search.steps = 120;
+  search.seed = options.seed;
+  search.threads = options.threads;
+  search.progress = [&](std::string_view, double share) {
+    if (options.progress) {
+      options.progress("designing the next manoeuvre", share);
+    }
+  };
+  const design::MotionLimits limits = limits_within(prepared, robot);
+  const DiscriminationDesign design =
+      design_for_discrimination(subject, limits, next.rivals, prepared.catalogue, noise, search, &prepared.drive);
+  next.sentence = core::listed(design.sentences, " ");
+  if (design.worst()) {
+    next.commands = design::command_table(design.manoeuvre.plan, subject.model);
+    next.sentence = fmt::format("A drive of {:.0f} s within {:.2g} m of its start. {}", limits.duration,
+                                design.manoeuvre.plan.reach(), next.sentence);
+  }
+  return next;
+}
+
+NextDrive what_next(LogSource& log, LogSource* baseline, const Robot& robot, Diagnosis& d,
+                    const DiagnoseOptions& options) {
+  if (d.verdict != GapVerdict::ambiguous) {
+    return {};
+  }
+  try {
+    NextDrive next = next_drive(log, baseline, robot, d, options);
+    if (!next.commands && !next.sentence.empty()) {
+      d.notes.push_back(next.sentence);
+    }
+    return next;
+  } catch (const InvalidArgument& error) {
+    d.notes.push_back(std::string("no manoeuvre was designed to tell the causes apart: ") + error.what());
+    return {};
   }
 }
 

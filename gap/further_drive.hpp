@@ -1,19 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Planned drives of a robot whose log was analysed: within what limits, and what they would tell.
+/// Planned drives of a robot whose log was analysed: within what limits, what they would tell, and the one that
+/// discriminates between the causes that the log leaves possible.
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include <wheelwright/core/log.hpp>
 #include <wheelwright/design/plan.hpp>
 #include <wheelwright/design/subject.hpp>
 #include <wheelwright/gap/block_gram.hpp>
 #include <wheelwright/gap/candidate.hpp>
 #include <wheelwright/gap/confusion.hpp>
+#include <wheelwright/gap/diagnose.hpp>
 #include <wheelwright/gap/diagnosis.hpp>
+#include <wheelwright/gap/discrimination_design.hpp>
 #include <wheelwright/gap/drive.hpp>
 #include <wheelwright/gap/prepared.hpp>
 #include <wheelwright/model/robot.hpp>
@@ -43,5 +48,23 @@ namespace wheelwright::gap {
 void judge_pairs(std::vector<ConfusablePair>& pairs, const CandidateTable& table,
                  const std::vector<std::optional<Signature>>& on_log, BaseModel base, const PreparedGap& prepared,
                  const Robot& robot, const BlockOptions& blocks);
+
+/// The next drive to record.
+struct NextDrive {
+  std::vector<Rival> rivals;         ///< members of the credible set as fitted to the log, in its order
+  std::optional<LogTable> commands;  ///< of the wheels; nothing where no drive tells any two of the rivals apart
+  std::string sentence;              ///< what the drive promises, and what no drive can
+};
+
+/// Designs the drive for the credible set of `diagnosis`, the first few members of it: each fitted to the log again, of
+/// the robot and options that diagnosed it. Limits are those of the robot file; where it has none, what the log itself
+/// drove: speeds, accelerations, and with a pose the distance from the start. Four fifths of the effort are planned
+/// with, for the controller to have the rest. It lasts a third of the log, between 20 and 60 s.
+[[nodiscard]] NextDrive next_drive(LogSource& log, LogSource* baseline, const Robot& robot, const Diagnosis& diagnosis,
+                                   const DiagnoseOptions& options);
+
+/// next_drive() where `diagnosis` is ambiguous; what hinders it, or what no drive can tell, becomes a note of it.
+[[nodiscard]] NextDrive what_next(LogSource& log, LogSource* baseline, const Robot& robot, Diagnosis& diagnosis,
+                                  const DiagnoseOptions& options);
 
 }  // namespace wheelwright::gap

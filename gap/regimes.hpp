@@ -52,7 +52,7 @@ struct Contradictions {
 
 /// Tests if any θ in `prior` keeps |f₂*τ − (f₂*Y)θ| within k times the floor on all `rows` of the drive at once; if
 /// none does, the result has a Farkas certificate: a few rows that, with the prior, contradict each other, checked in
-/// outward arithmetic (bounds/infeasibility.hpp). k is such that independent Gaussian noise of the floor's standard
+/// outward arithmetic (bounds/certificate.hpp). k is such that independent Gaussian noise of the floor's standard
 /// deviation `floors` (one per output, > 0) stays within it on all N rows of all outputs with the confidence: Φ(k) = 1
 /// − (1 − confidence)/(2N), a union bound that holds for dependent rows too.
 ///

@@ -11,6 +11,8 @@
 /// has the limits), and more than chance explains, over blocks of time and the number of effects that were tried. At
 /// the noise floor no further cause is sought. Columns are not exact (a smoothed sign, a neglected second order), so
 /// the misfit of the best set is the reference by which other sets count as equally good.
+///
+/// Naive selection rule for comparison with selection.hpp (docs/gap.md has its results).
 #pragma once
 
 #include <cstddef>
@@ -90,5 +92,20 @@ struct EffectKind {
 /// 0 where b contains a.
 [[nodiscard]] double unexplained_by(const CandidateTable& table, const std::vector<std::size_t>& a,
                                     const std::vector<std::size_t>& b, BaseModel base);
+
+/// A set of causes that the naive rule chose.
+struct NaiveChoice {
+  std::vector<std::size_t> members;  ///< indices of candidates, in the order in which they were taken
+  double criterion = 0.0;            ///< the smallest n ln s² + k ln n that was reached
+};
+
+/// Forward selection of single effects by the Bayesian information criterion (Schwarz 1978), θ fitted again beside
+/// them, in sample: at each step the candidate that lowers n ln s² + k ln n most, until none does or there are
+/// `largest`. s² is the mean square over all n rows of the table, k counts the coefficients of θ and of the causes and
+/// their shapes.
+///
+/// The criterion takes rows for independent. Filtered rows are not, so that chance pays for its columns: without any
+/// effect about two logs in three are given one. A forward search never takes back what it took.
+[[nodiscard]] NaiveChoice naive_selection(const CandidateTable& table, std::size_t largest = 3);
 
 }  // namespace wheelwright::gap

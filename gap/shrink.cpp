@@ -11,10 +11,10 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/core/for_all.hpp>
 #include <wheelwright/core/statistics.hpp>
+#include <wheelwright/gap/block_gram.hpp>
+#include <wheelwright/gap/gap_rows.hpp>
 #include <wheelwright/gap/improved_robot.hpp>
-#include <wheelwright/gap/kinematic_rows.hpp>
-#include <wheelwright/gap/noise_floor.hpp>
-#include <wheelwright/gap/signed_least_squares.hpp>
+#include <wheelwright/gap/prepared.hpp>
 #include <wheelwright/identify/noise_level.hpp>
 #include <wheelwright/sim/plant.hpp>
 

@@ -18,7 +18,7 @@
 #include <wheelwright/core/limits.hpp>
 #include <wheelwright/core/log.hpp>
 #include <wheelwright/core/statistics.hpp>
-#include <wheelwright/gap/confidence_set.hpp>
+#include <wheelwright/gap/candidate.hpp>
 #include <wheelwright/gap/drive.hpp>
 #include <wheelwright/identify/moments.hpp>
 

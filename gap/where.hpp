@@ -12,7 +12,6 @@
 #include <wheelwright/gap/diagnosis.hpp>
 #include <wheelwright/gap/drive.hpp>
 #include <wheelwright/gap/regimes.hpp>
-#include <wheelwright/gap/residual_series.hpp>
 
 namespace wheelwright::gap {
 

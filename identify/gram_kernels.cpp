@@ -2,6 +2,7 @@
 #include <wheelwright/identify/gram_kernels.hpp>
 
 #include <wheelwright/core/vector_units.hpp>
+#include <wheelwright/identify/gram_kernels_impl.hpp>
 
 namespace wheelwright::identify::gram_kernels {
 
@@ -23,5 +24,12 @@ std::span<const GramKernels* const> available() {
 }
 
 const GramKernels& best() { return *available().back(); }
+
+namespace {
+struct Variant {};
+}  // namespace
+
+extern const GramKernels k_baseline;
+const GramKernels k_baseline{"baseline", GramLoops<2, Variant>::products, GramLoops<2, Variant>::gradient};
 
 }  // namespace wheelwright::identify::gram_kernels

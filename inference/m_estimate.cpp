@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/inference/m_estimate.hpp>
+#include <wheelwright/inference/robust.hpp>
 
 #include <algorithm>
 #include <cmath>

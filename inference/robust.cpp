@@ -10,7 +10,6 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/identify/moments.hpp>
-#include <wheelwright/inference/m_estimate.hpp>
 
 namespace wheelwright::inference {
 namespace {

@@ -15,11 +15,11 @@
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/files/byte_source.hpp>
+#include <wheelwright/files/bytes.hpp>
 #include <wheelwright/files/words.hpp>
 #include <wheelwright/logs/bag_files.hpp>
 #include <wheelwright/logs/mcap_format.hpp>
-#include <wheelwright/logs/ros_extractor.hpp>
+#include <wheelwright/logs/ros_messages.hpp>
 
 namespace wheelwright::logs {
 namespace {

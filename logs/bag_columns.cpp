@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/logs/bag_columns.hpp>
+#include <wheelwright/logs/bag_log.hpp>
 
 #include <algorithm>
 #include <array>
@@ -13,8 +13,8 @@
 
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/files/words.hpp>
-#include <wheelwright/logs/log_columns.hpp>
-#include <wheelwright/logs/ros_extractor.hpp>
+#include <wheelwright/logs/recorded_log.hpp>
+#include <wheelwright/logs/ros_messages.hpp>
 
 namespace wheelwright::logs {
 namespace {

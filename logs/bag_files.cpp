@@ -18,7 +18,7 @@
 
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/core/words.hpp>
-#include <wheelwright/files/byte_source.hpp>
+#include <wheelwright/files/bytes.hpp>
 #include <wheelwright/files/words.hpp>
 
 namespace wheelwright::logs::bag {

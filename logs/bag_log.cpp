@@ -13,10 +13,9 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/files/words.hpp>
 #include <wheelwright/logs/bag.hpp>
-#include <wheelwright/logs/bag_columns.hpp>
-#include <wheelwright/logs/log_columns.hpp>
-#include <wheelwright/logs/ros_extractor.hpp>
-#include <wheelwright/logs/stream_aligner.hpp>
+#include <wheelwright/logs/recorded_log.hpp>
+#include <wheelwright/logs/ros_messages.hpp>
+#include <wheelwright/logs/row_log.hpp>
 
 namespace wheelwright::logs {
 namespace {

@@ -1,17 +1,98 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// A bag as a file of a log: rows at the times of one topic, other topics brought to them.
+/// A bag as a file of a log: columns from fields of topics, rows at the times of one topic, other topics brought to
+/// them.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
+#include <string>
+#include <vector>
 
+#include <wheelwright/logs/bag.hpp>
+#include <wheelwright/logs/csv_format.hpp>
 #include <wheelwright/logs/log_file.hpp>
 #include <wheelwright/logs/row_log.hpp>
 
 namespace wheelwright::logs {
+
+/// Clock of a topic, from its first messages.
+struct TopicTimes {
+  std::string topic;
+  std::vector<std::int64_t> log_times;              ///< ns, when each was recorded
+  std::vector<std::optional<std::int64_t>> stamps;  ///< ns, of its header; nothing where it has none
+};
+
+/// The time of a topic's messages: its stamp or the time it was recorded, plus `shift`.
+struct TopicClock {
+  bool stamped = false;          ///< whether the header's stamp is used: where every message has one
+  bool zero_is_time = false;     ///< whether a stamp of zero is one (of a clock that begins there), not a missing one
+  std::int64_t shift = 0;        ///< ns, to the clock of the first topic
+  std::int64_t median_step = 0;  ///< ns
+  std::int64_t jitter = 0;       ///< ns; of a time of recording: 99 % of its steps are as close to the median step
+};
+
+/// The clocks of `topics`, of which the first gives the rows their times, and what was decided, in words:
+/// - the header's stamp goes before the time of recording; zero counts as a stamp in the first message of a topic whose
+///   second stamp is within a minute of it;
+/// - stamps of a topic that lie, in the median and against their times of recording, within 1 s of those of the first
+///   topic are taken as the same clock; others are shifted by the difference of these medians;
+/// - a topic without stamps has its times of recording, shifted by that median of the first topic where it has stamps.
+struct BagClocks {
+  std::vector<TopicClock> clocks;
+  std::vector<std::string> notes;
+};
+[[nodiscard]] BagClocks bag_clocks(const std::vector<TopicTimes>& topics);
+
+/// One column of a log and where a message has it.
+struct BagColumn {
+  std::string name;                 ///< of the contract
+  std::vector<std::string> fields;  ///< paths for RosExtractor: one, or the quaternion x, y, z, w that it is the yaw of
+  [[nodiscard]] bool is_yaw() const { return fields.size() == 4; }
+  bool operator==(const BagColumn&) const = default;
+};
+
+/// Columns that are read from one topic.
+struct BagSource {
+  std::size_t topic = 0;  ///< index in BagReader::topics()
+  std::vector<BagColumn> columns;
+};
+
+/// The columns of a bag.
+struct BagChoice {
+  std::vector<BagSource> sources;   ///< the first gives the rows their times; empty where nothing is known
+  std::vector<std::string> header;  ///< all numeric fields there are, "topic.path"
+  std::vector<std::string> notes;   ///< what was taken or left although one might have thought otherwise
+};
+
+/// A topic and, of a type that names its elements (JointState), the names in its first message.
+struct BagTopicView {
+  const BagTopic* topic = nullptr;
+  bool silent = false;  ///< has no messages: nothing is taken from it unasked
+  std::vector<std::string> names;
+  std::vector<std::string> filled;  ///< arrays beside `names` that had elements in that message
+};
+
+/// Chooses columns. What `options.map` says goes first: NAME=TOPIC.PATH, e.g.
+/// omega_r=/joint_states.velocity[right_wheel], the PATH as RosExtractor takes it, or ending in `.yaw` behind a
+/// quaternion. Else:
+/// - sensor_msgs/JointState: the joints that alone are named right and left (of those named wheel, where there are any)
+///   give phi, omega and tau; a topic with one joint gives position, velocity and effort;
+/// - geometry_msgs/PoseStamped and PoseWithCovarianceStamped, else nav_msgs/Odometry, give x, y and theta; an Odometry
+///   topic whose name says that it comes from the wheels is left out, since that is no independent measurement;
+/// - sensor_msgs/Imu gives gyro_z and accel_x;
+/// - types of other packages than ROS's own give the columns that fields of theirs are named after.
+/// Where two topics could give a column it is left out and reported. The rows' times are those of the topic with the
+/// efforts. Throws InputError for entries of the map that name no topic, and as RosExtractor for their fields.
+[[nodiscard]] BagChoice choose_bag_columns(const std::vector<BagTopicView>& topics, const CsvOptions& options,
+                                           const std::string& path);
+
+/// The sides that `name` of a joint tells: "r", "l" or nothing.
+[[nodiscard]] std::string side_of_joint(const std::string& name);
 
 /// Origin of the times of all bags of a log, ns: set by the first that is opened.
 using TimeOrigin = std::shared_ptr<std::optional<std::int64_t>>;

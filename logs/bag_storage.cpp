@@ -15,8 +15,8 @@
 #include <wheelwright/files/words.hpp>
 #include <wheelwright/logs/bag.hpp>
 #include <wheelwright/logs/database.hpp>
+#include <wheelwright/logs/mcap.hpp>
 #include <wheelwright/logs/mcap_format.hpp>
-#include <wheelwright/logs/mcap_reader.hpp>
 
 namespace wheelwright::logs::bag {
 namespace {

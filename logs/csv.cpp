@@ -12,11 +12,10 @@
 #include <fmt/format.h>
 
 #include <wheelwright/core/check.hpp>
-#include <wheelwright/files/byte_source.hpp>
+#include <wheelwright/files/bytes.hpp>
 #include <wheelwright/logs/csv_format.hpp>
-#include <wheelwright/logs/log_columns.hpp>
+#include <wheelwright/logs/recorded_log.hpp>
 #include <wheelwright/logs/row_log.hpp>
-#include <wheelwright/logs/stream_aligner.hpp>
 
 namespace wheelwright::logs {
 namespace {

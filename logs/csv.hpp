@@ -2,7 +2,7 @@
 /// \file
 /// CSV logs: read in bounded memory and cleaned on the way, or row by row from a live stream; written.
 ///
-/// A file has a header line with the names of its columns in any order (see log_columns.hpp for the spellings that are
+/// A file has a header line with the names of its columns in any order (see recorded_log.hpp for the spellings that are
 /// known), then one row a line. Separators , ; or tab; LF or CRLF; blank lines and lines that begin with # are skipped;
 /// plain text, gzip or zstd, told apart by the first bytes. Fields that are not used may hold anything.
 #pragma once
@@ -29,7 +29,7 @@ class CsvLog final : public RowLog {
   /// What is repaired and counted, and what is not:
   /// - a row with an empty, NaN or infinite used field, or with the time of the row before, is dropped;
   /// - columns that more than a fifth of a file's first rows lack were sampled apart (csv.hpp): they are brought to
-  ///   the times of the other rows as topics of a bag are (stream_aligner.hpp), and the report says so;
+  ///   the times of the other rows as topics of a bag are (row_log.hpp), and the report says so;
   /// - time that goes backwards, and a step of more than 5 × the median step, begin a new segment;
   /// - `theta` is unwrapped inside a segment, so that no step exceeds π;
   /// - a last line without line end that is cut off is dropped;

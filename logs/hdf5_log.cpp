@@ -15,11 +15,11 @@
 #include <fmt/format.h>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/files/atomic_file.hpp>
+#include <wheelwright/files/bytes.hpp>
 #include <wheelwright/files/words.hpp>
-#include <wheelwright/logs/log_columns.hpp>
 #include <wheelwright/logs/log_file.hpp>
 #include <wheelwright/logs/mcap_format.hpp>
+#include <wheelwright/logs/recorded_log.hpp>
 
 namespace wheelwright::logs {
 namespace {

@@ -3,9 +3,9 @@
 /// HDF5 files as files of a log.
 ///
 /// A log is a group with one-dimensional numeric datasets of the same length, one for each column (any names that
-/// log_columns.hpp knows; other datasets are ignored), or one dataset of a compound type whose members are the columns,
-/// as h5py writes structured arrays. A text attribute `units` (or `unit`) that is not the contract's keeps a dataset
-/// from being taken.
+/// recorded_log.hpp knows; other datasets are ignored), or one dataset of a compound type whose members are the
+/// columns, as h5py writes structured arrays. A text attribute `units` (or `unit`) that is not the contract's keeps a
+/// dataset from being taken.
 #pragma once
 
 #include <filesystem>

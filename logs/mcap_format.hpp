@@ -18,7 +18,7 @@
 #include <string_view>
 #include <vector>
 
-#include <wheelwright/files/xxh64.hpp>
+#include <wheelwright/files/bytes.hpp>
 
 namespace wheelwright::logs {
 

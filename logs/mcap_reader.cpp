@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/logs/mcap_reader.hpp>
+#include <wheelwright/logs/mcap.hpp>
 
 #include <algorithm>
 #include <functional>
@@ -13,7 +13,6 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/files/words.hpp>
 #include <wheelwright/logs/mcap_format.hpp>
-#include <wheelwright/logs/mcap_recovery.hpp>
 
 namespace wheelwright::logs {
 namespace {

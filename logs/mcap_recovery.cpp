@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/logs/mcap_recovery.hpp>
+#include <wheelwright/logs/mcap.hpp>
 
 #include <algorithm>
 #include <string_view>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/logs/mcap_writer.hpp>
+#include <wheelwright/logs/mcap.hpp>
 
 #include <algorithm>
 #include <functional>
@@ -8,7 +8,7 @@
 #include <vector>
 
 #include <wheelwright/core/check.hpp>
-#include <wheelwright/files/atomic_file.hpp>
+#include <wheelwright/files/bytes.hpp>
 #include <wheelwright/logs/mcap_format.hpp>
 
 namespace wheelwright::logs {

@@ -2,14 +2,196 @@
 #include <wheelwright/logs/recorded_log.hpp>
 
 #include <algorithm>
+#include <cctype>
+#include <initializer_list>
+#include <map>
+#include <vector>
 
 #include <fmt/format.h>
 
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/files/words.hpp>
-#include <wheelwright/logs/log_columns.hpp>
 
 namespace wheelwright::logs {
+namespace {
+
+struct Row {
+  std::string_view name, meaning, unit;
+  double limit;
+  std::string_view spellings;
+};
+
+/// A name that ends in '@' is two columns, _r and _l.
+constexpr Row table[] = {
+    {"t", "time", "s", 1e11,
+     "time stamp timestamp time_stamp sec secs seconds time_s time_sec t_s t_sec elapsed elapsed_s elapsed_time "
+     "header_stamp"},
+    {"omega_@", "speed of the @ wheel", "rad/s", 1e4,
+     "@_omega w_@ w@ omega@ omega_wheel_@ wheel_@_omega wheel_omega_@ wheel_@_vel wheel_@_velocity wheel_@_speed "
+     "@_wheel_vel @_wheel_velocity @_wheel_speed wheel_vel_@ wheel_velocity_@ wheel_speed_@ @_wheel_angular_velocity"},
+    {"phi_@", "angle of the @ wheel", "rad", 1e9,
+     "@_phi phi@ angle_@ @_angle wheel_@_angle @_wheel_angle wheel_angle_@ wheel_@_pos wheel_@_position @_wheel_pos "
+     "@_wheel_position wheel_pos_@ wheel_position_@"},
+    {"tau_@", "torque at the @ wheel", "N·m", 1e6,
+     "@_tau tau@ torque_@ @_torque wheel_@_torque @_wheel_torque wheel_torque_@ effort_@ @_effort wheel_@_effort "
+     "@_wheel_effort wheel_effort_@"},
+    {"current_@", "current of the @ motor", "A", 1e5,
+     "@_current i_@ abs_current_@ current_abs_@ motor_current_@ @_motor_current motor_@_current wheel_@_current "
+     "@_wheel_current"},
+    {"voltage_@", "voltage of the @ motor", "V", 1e5,
+     "@_voltage u_@ volt_@ motor_voltage_@ @_motor_voltage motor_@_voltage wheel_@_voltage @_wheel_voltage"},
+    {"x", "pose, first coordinate", "m", 1e7, "pos_x position_x pose_x x_m pose_position_x pose_pose_position_x"},
+    {"y", "pose, second coordinate", "m", 1e7, "pos_y position_y pose_y y_m pose_position_y pose_pose_position_y"},
+    {"theta", "heading", "rad", 1e6, "yaw heading pose_theta pose_yaw orientation_yaw psi"},
+    {"gyro_z", "measured yaw rate", "rad/s", 1e4,
+     "gz yaw_rate angular_velocity_z imu_gyro_z imu_angular_velocity_z imu_wz"},
+    {"accel_x", "measured forward acceleration", "m/s²", 1e5,
+     "ax acc_x acceleration_x linear_acceleration_x imu_accel_x imu_acc_x imu_linear_acceleration_x"},
+    {"position", "position of the axis", "m or rad", 1e9, "pos q joint_position axis_position"},
+    {"velocity", "speed of the axis", "m/s or rad/s", 1e5, "vel dq qd joint_velocity axis_velocity"},
+    {"effort", "force or torque of the axis", "N or N·m", 1e8, "force tau torque joint_effort axis_effort"},
+    {"command_@", "commanded speed of the @ wheel", "rad/s", 1e4,
+     "@_command cmd_@ @_cmd command_omega_@ omega_command_@ cmd_omega_@ omega_cmd_@ omega_ref_@ omega_@_cmd "
+     "omega_@_ref wheel_@_command wheel_@_cmd @_wheel_command @_wheel_cmd wheel_command_@ wheel_cmd_@"},
+};
+
+std::string replace_side(std::string_view text, std::string_view side) {
+  std::string out;
+  for (const char c : text) {
+    out += c == '@' ? std::string(side) : std::string(1, c);
+  }
+  return out;
+}
+
+struct Columns {
+  std::vector<LogColumn> columns;
+  std::vector<std::string> meanings;         ///< storage of the meanings that name a side
+  std::map<std::string, std::size_t> known;  ///< plain spelling -> column
+
+  Columns() {
+    meanings.reserve(2 * std::size(table));
+    for (const Row& row : table) {
+      if (row.name.back() == '@') {
+        add(row, "r", "right");
+        add(row, "l", "left");
+      } else {
+        add(row, "", "");
+      }
+    }
+  }
+
+  void add(const Row& row, std::string_view letter, std::string_view word) {
+    meanings.push_back(replace_side(row.meaning, word));
+    columns.push_back({replace_side(row.name, letter), meanings.back(), row.unit, row.limit, row.spellings});
+    const std::size_t index = columns.size() - 1;
+    known[columns.back().name] = index;
+    std::size_t begin = 0;
+    while (begin < row.spellings.size()) {
+      const std::size_t end = std::min(row.spellings.find(' ', begin), row.spellings.size());
+      const std::string_view spelling = row.spellings.substr(begin, end - begin);
+      known.emplace(replace_side(spelling, letter), index);
+      known.emplace(replace_side(spelling, word), index);
+      begin = end + 1;
+    }
+    if (!letter.empty()) {
+      known.emplace(replace_side(row.name, word), index);
+    }
+  }
+};
+
+const Columns& all() {
+  static const Columns columns;
+  return columns;
+}
+
+/// Drops "[unit]" or "(unit)" at the end of `text` and returns the unit; empty where there is none.
+std::string_view take_unit(std::string_view& text) {
+  while (!text.empty() && text.back() == ' ') {
+    text.remove_suffix(1);
+  }
+  if (text.empty() || (text.back() != ']' && text.back() != ')')) {
+    return {};
+  }
+  const std::size_t open = text.find_last_of(text.back() == ']' ? '[' : '(');
+  if (open == std::string_view::npos) {
+    return {};
+  }
+  const std::string_view unit = text.substr(open + 1, text.size() - open - 2);
+  text = text.substr(0, open);
+  return unit;
+}
+
+bool same_unit(std::string_view written, std::string_view expected) {
+  const auto plain = [](std::string_view unit) {
+    std::string out;
+    for (const char c : unit) {
+      if (c != ' ' && c != '*' && c != '.' && c != '^') {
+        out += c;
+      }
+    }
+    for (const auto& [from, to] : {std::pair<std::string, std::string>{"·", ""}, {"²", "2"}}) {
+      for (std::size_t at = out.find(from); at != std::string::npos; at = out.find(from)) {
+        out.replace(at, from.size(), to);
+      }
+    }
+    return out;
+  };
+  const std::string unit = plain(written);
+  std::size_t begin = 0;
+  while (begin <= expected.size()) {
+    const std::size_t end = std::min(expected.find(" or ", begin), expected.size());
+    if (unit == plain(expected.substr(begin, end - begin))) {
+      return true;
+    }
+    begin = end + 4;
+  }
+  return false;
+}
+
+}  // namespace
+
+std::span<const LogColumn> log_columns() { return all().columns; }
+
+const LogColumn* find_log_column(std::string_view name) {
+  const auto columns = log_columns();
+  const auto it = std::find_if(columns.begin(), columns.end(), [&](const LogColumn& c) { return c.name == name; });
+  return it == columns.end() ? nullptr : &*it;
+}
+
+const LogColumn* recognise_log_column(std::string_view text) {
+  const std::string_view unit = take_unit(text);
+  const auto it = all().known.find(plain_name(text));
+  if (it == all().known.end()) {
+    return nullptr;
+  }
+  const LogColumn& column = all().columns[it->second];
+  return unit.empty() || same_unit(unit, column.unit) ? &column : nullptr;
+}
+
+int row_weight(std::string_view name) {
+  const auto begins = [&](std::initializer_list<std::string_view> words) {
+    return std::ranges::any_of(words, [&](std::string_view word) { return name.starts_with(word); });
+  };
+  return begins({"tau", "current", "voltage", "effort"})    ? 10000
+         : begins({"omega", "phi", "position", "velocity"}) ? 100
+                                                            : 1;
+}
+
+std::string plain_name(std::string_view text) {
+  std::string out;
+  for (const char c : text) {
+    const bool gap = c == ' ' || c == '-' || c == '.' || c == '/' || c == '_';
+    if (!gap) {
+      out += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    } else if (!out.empty() && out.back() != '_') {
+      out += '_';
+    }
+  }
+  if (!out.empty() && out.back() == '_') {
+    out.pop_back();
+  }
+  return out;
+}
 
 std::vector<core::ColumnError> interpolation_errors(const LogReport& report) {
   std::vector<core::ColumnError> errors;

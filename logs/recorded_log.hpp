@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// A log recorded in files of whatever format, and the report of what reading it found and repaired.
+/// A log recorded in files of whatever format: the columns of the log contract with their units and aliases, and the
+/// report of what reading it found and repaired.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -12,6 +15,33 @@
 #include <wheelwright/core/log.hpp>
 
 namespace wheelwright::logs {
+
+/// One column of the contract.
+struct LogColumn {
+  std::string name;            ///< e.g. "omega_r"
+  std::string_view meaning;    ///< e.g. "speed of the right wheel"
+  std::string_view unit;       ///< SI
+  double limit;                ///< |value| above this cannot be meant in `unit`
+  std::string_view spellings;  ///< other names, separated by blanks; '@' stands for r|right (l|left)
+};
+
+/// All columns of the contract, time first.
+[[nodiscard]] std::span<const LogColumn> log_columns();
+
+/// The column of the contract called exactly `name`; nullptr where there is none.
+[[nodiscard]] const LogColumn* find_log_column(std::string_view name);
+
+/// The column of the contract that a header's `text` means: its own name or another spelling, letter case ignored,
+/// blanks, '-', '.' and '/' read as '_', and a unit in brackets at the end dropped when it is the contract's own
+/// ("Time [s]" is `t`; "Time [ms]" is nothing). nullptr where it means none.
+[[nodiscard]] const LogColumn* recognise_log_column(std::string_view text);
+
+/// Weight of a column in the choice of the stream whose samples become the rows of a log: the stream with the largest
+/// sum. Efforts go before motion, motion before the rest.
+[[nodiscard]] int row_weight(std::string_view name);
+
+/// `text` in lower case, blanks, '-', '.' and '/' as single '_', none at the ends.
+[[nodiscard]] std::string plain_name(std::string_view text);
 
 /// Count of a defect, and the place of the first one.
 struct Occurrences {

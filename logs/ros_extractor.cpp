@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/logs/ros_extractor.hpp>
+#include <wheelwright/logs/ros_messages.hpp>
 
 #include <algorithm>
 #include <array>
@@ -13,7 +13,6 @@
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/limits.hpp>
-#include <wheelwright/logs/ros_plan.hpp>
 
 namespace wheelwright::logs::ros {
 namespace {

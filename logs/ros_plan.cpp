@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/logs/ros_plan.hpp>
+#include <wheelwright/logs/ros_messages.hpp>
 
 #include <algorithm>
 #include <array>
@@ -12,7 +12,6 @@
 
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/files/words.hpp>
-#include <wheelwright/logs/ros_extractor.hpp>
 
 namespace wheelwright::logs {
 namespace {

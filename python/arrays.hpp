@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// numpy arrays ↔ Eigen and std::vector: read-only views of what lives in C++, arguments without copies where they fit.
+/// numpy arrays ↔ Eigen and std::vector: read-only views of what lives in C++, arguments without copies where they fit;
+/// numpy columns as a log, read where they lie.
 #pragma once
 
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -13,6 +15,8 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/log.hpp>
 #include <wheelwright/core/regression.hpp>
+#include <wheelwright/logs/csv_format.hpp>
+#include <wheelwright/logs/recorded_log.hpp>
 
 namespace wheelwright::python {
 
@@ -81,5 +85,13 @@ inline void check_shape(const py::array& array, const std::vector<py::ssize_t>& 
   check_shape(array, {size}, what);
   return {array.data(), static_cast<std::size_t>(array.size())};
 }
+
+/// The log that `columns` (name → one-dimensional array, one of them the time) is, cleaned as a file's rows are: rows
+/// with NaN are dropped and counted, gaps and resets begin segments. The arrays are kept and read block by block; those
+/// that are not float64 and contiguous are converted first. Names are understood as in a CSV header. Needs the
+/// interpreter's lock, which it gives up while it looks at the rows; reading does not need it. Throws InputError as
+/// CsvLog does, InvalidArgument for shapes.
+[[nodiscard]] std::unique_ptr<logs::RecordedLog> array_log(const pybind11::dict& columns,
+                                                           const logs::CsvOptions& options);
 
 }  // namespace wheelwright::python

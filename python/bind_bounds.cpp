@@ -8,7 +8,6 @@
 #include <wheelwright/detector/threshold.hpp>
 
 #include "arrays.hpp"
-#include "long_work.hpp"
 #include "module.hpp"
 
 namespace wheelwright::python {

@@ -10,15 +10,12 @@
 #include <wheelwright/logs/log_file.hpp>
 #include <wheelwright/results/model_file.hpp>
 #include <wheelwright/results/model_json.hpp>
-#include <wheelwright/results/model_words.hpp>
 #include <wheelwright/robots/robot_file.hpp>
 
 #include <wheelwright/results/detection_json.hpp>
 #include <wheelwright/results/software.hpp>
-#include <wheelwright/robots/robot_columns.hpp>
 #include <wheelwright/words/summary.hpp>
 #include "arrays.hpp"
-#include "long_work.hpp"
 #include "module.hpp"
 
 namespace wheelwright::python {

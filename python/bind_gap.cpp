@@ -10,25 +10,312 @@
 #include <wheelwright/files/words.hpp>
 #include <wheelwright/gap/diagnose.hpp>
 #include <wheelwright/gap/effect.hpp>
+#include <wheelwright/gap/further_drive.hpp>
 #include <wheelwright/logs/log_file.hpp>
 #include <wheelwright/results/gap_json.hpp>
+#include <wheelwright/results/software.hpp>
 #include <wheelwright/robots/robot_file.hpp>
 #include <wheelwright/words/gap_words.hpp>
 
-#include <wheelwright/gap/next_drive.hpp>
-#include <wheelwright/results/rival_json.hpp>
-#include <wheelwright/results/software.hpp>
-#include <wheelwright/robots/robot_columns.hpp>
 #include "arrays.hpp"
-#include "effect_object.hpp"
-#include "long_work.hpp"
 #include "module.hpp"
 
 namespace wheelwright::python {
 
-using gap::GapEstimate;
+using gap::Drive;
+using gap::JointSignals;
+using gap::ShapeParameter;
 
 namespace {
+
+// A drive as an effect's function sees it: good for the time of the call. Needs the interpreter's lock.
+class DriveObject {
+ public:
+  explicit DriveObject(const gap::Drive& drive) : drive_(&drive) {}
+  // The call is over.
+  void close() { drive_ = nullptr; }
+  // Throws InvalidArgument after the call.
+  [[nodiscard]] const gap::Drive& drive() const {
+    check::that(drive_ != nullptr, "drive", "to be used during the call that it was given to: keep its arrays instead");
+    return *drive_;
+  }
+
+ private:
+  const gap::Drive* drive_;
+};
+
+// A function that may be copied and dropped without the interpreter's lock.
+std::shared_ptr<py::function> kept(const py::function& function) {
+  return {new py::function(function), [](py::function* held) {
+            const py::gil_scoped_acquire lock;
+            delete held;
+          }};
+}
+
+// Closes the drive whatever happens.
+class OpenDrive {
+ public:
+  explicit OpenDrive(const Drive& drive) : object_(std::make_shared<DriveObject>(drive)) {}
+  ~OpenDrive() { object_->close(); }
+  OpenDrive(const OpenDrive&) = delete;
+  OpenDrive& operator=(const OpenDrive&) = delete;
+  [[nodiscard]] const std::shared_ptr<DriveObject>& object() const { return object_; }
+
+ private:
+  std::shared_ptr<DriveObject> object_;
+};
+
+// What an effect adds, as Python makes it: arrays, or None for zeros.
+struct ColumnObject {
+  std::vector<std::optional<Doubles>> effort, effort_rate;
+  std::optional<Doubles> forward, lateral, yaw;
+};
+
+Eigen::VectorXd signal(const std::optional<Doubles>& array, Eigen::Index rows, const std::string& what) {
+  if (!array) {
+    return {};
+  }
+  const auto v = values(*array, what, rows);
+  for (const double each : v) {
+    check::finite(each, what);
+  }
+  return Eigen::Map<const Eigen::VectorXd>(v.data(), rows);
+}
+
+std::vector<Eigen::VectorXd> signals(const std::vector<std::optional<Doubles>>& arrays, const Drive& drive,
+                                     const std::string& what) {
+  check::that(arrays.size() <= drive.model.n(), what, "one signal for each output, " + std::to_string(drive.model.n()));
+  std::vector<Eigen::VectorXd> out;
+  for (std::size_t i = 0; i < arrays.size(); ++i) {
+    out.push_back(signal(arrays[i], drive.rows(), what + "[" + std::to_string(i) + "]"));
+  }
+  return out;
+}
+
+// `columns(drive, shape)` as Effect::columns: called with the interpreter's lock, from whatever thread. What it returns
+// is checked: as many columns as `count`, signals of one value per instant, finite.
+std::function<std::vector<gap::Column>(const Drive&, std::span<const double>)> columns_in_python(
+    const std::string& name, const py::function& columns, std::size_t count) {
+  return [name, count, function = kept(columns)](const Drive& drive, std::span<const double> shape) {
+    const py::gil_scoped_acquire lock;
+    const OpenDrive open(drive);
+    const py::object made = (*function)(open.object(), copy(std::vector<double>(shape.begin(), shape.end())));
+    std::vector<gap::Column> out;
+    for (const py::handle each : made) {
+      if (!py::isinstance<ColumnObject>(each)) {
+        throw InvalidArgument("effect " + name + " returned " + py::repr(each).cast<std::string>() +
+                              ": expected a sequence of Column");
+      }
+      const auto& column = each.cast<const ColumnObject&>();
+      const std::string what = "effect " + name + ", column " + std::to_string(out.size()) + ", ";
+      out.push_back(
+          {signals(column.effort, drive, what + "effort"), signals(column.effort_rate, drive, what + "effort_rate"),
+           signal(column.forward, drive.rows(), what + "forward"),
+           signal(column.lateral, drive.rows(), what + "lateral"), signal(column.yaw, drive.rows(), what + "yaw")});
+    }
+    check::that(out.size() == count, "effect " + name + " returned " + std::to_string(out.size()) + " columns",
+                "one for each parameter, " + std::to_string(count));
+    return out;
+  };
+}
+
+// `applies(drive)` as Effect::applies: it returns None, or the reason why not.
+std::function<gap::Applicability(const Drive&)> applies_in_python(const py::function& applies) {
+  return [function = kept(applies)](const Drive& drive) -> gap::Applicability {
+    const py::gil_scoped_acquire lock;
+    const OpenDrive open(drive);
+    const py::object reason = (*function)(open.object());
+    return reason.is_none() ? gap::Applicability{} : gap::Applicability{false, reason.cast<std::string>()};
+  };
+}
+
+Effect make_effect(const std::string& name, const py::function& columns, std::vector<gap::EffectParameter> parameters,
+                   std::vector<ShapeParameter> shapes, const std::string& sentence, const std::string& family,
+                   bool parametric, bool unit_coefficient, const std::string& excite,
+                   const std::optional<py::function>& applies) {
+  Effect effect;
+  effect.name = name;
+  effect.sentence = sentence;
+  effect.family = family;
+  effect.parametric = parametric;
+  effect.unit_coefficient = unit_coefficient;
+  effect.excite = excite;
+  check::that(unit_coefficient || !parameters.empty(), "effect " + name, "at least one parameter");
+  effect.columns = columns_in_python(name, columns, unit_coefficient ? 1 : parameters.size());
+  effect.parameters = std::move(parameters);
+  effect.shapes = std::move(shapes);
+  if (applies) {
+    effect.applies = applies_in_python(*applies);
+  }
+  gap::validate(effect);
+  return effect;
+}
+
+// A part of a drive, which knows whether the drive is still there.
+template <int kind>
+struct Part {
+  std::shared_ptr<DriveObject> owner;
+  std::size_t index = 0;
+};
+using JointObject = Part<0>;
+using CoordinateObject = Part<1>;
+
+py::array rests(const gap::Mask& mask) {
+  py::array_t<bool> out(mask.size());
+  std::copy(mask.data(), mask.data() + mask.size(), out.mutable_data());
+  return out;
+}
+
+void bind_drive(py::module_& m) {
+  py::class_<JointObject> joint(m, "JointSignals", "One wheel of a drive; arrays are copies of shape (rows,).");
+  const auto of_joint = [&joint](const char* name, Eigen::VectorXd JointSignals::*member, const char* doc) {
+    joint.def_property_readonly(
+        name, [member](const JointObject& j) { return copy(j.owner->drive().joints[j.index].*member); }, doc);
+  };
+  of_joint("speed", &JointSignals::speed, "as measured, rad/s");
+  of_joint("smooth_speed", &JointSignals::smooth_speed, "rad/s");
+  of_joint("smooth_acceleration", &JointSignals::smooth_acceleration, "rad/s^2");
+  of_joint("angle", &JointSignals::angle, "rad");
+  of_joint("effort", &JointSignals::effort, "unit of the log's efforts");
+  of_joint("smooth_effort", &JointSignals::smooth_effort, "unit of the log's efforts");
+  of_joint("predicted_effort", &JointSignals::predicted_effort, "of the base model on the smooth motion");
+  of_joint("expected_effort", &JointSignals::expected_effort, "predicted_effort, or with what causes add to it");
+  joint.def_property_readonly(
+      "resting", [](const JointObject& j) { return rests(j.owner->drive().joints[j.index].resting); },
+      "whether it stands still, bool");
+  py::class_<CoordinateObject> coordinate(m, "CoordinateSignals",
+                                          "One motion coordinate (v1 in m/s, v2 in rad/s); arrays are copies.");
+  const auto of_coordinate = [&coordinate](const char* name, Eigen::VectorXd gap::CoordinateSignals::*member,
+                                           const char* doc) {
+    coordinate.def_property_readonly(
+        name, [member](const CoordinateObject& c) { return copy(c.owner->drive().coordinates[c.index].*member); }, doc);
+  };
+  of_coordinate("speed", &gap::CoordinateSignals::speed, "as measured");
+  of_coordinate("smooth_speed", &gap::CoordinateSignals::smooth_speed, "smoothed");
+  of_coordinate("smooth_acceleration", &gap::CoordinateSignals::smooth_acceleration, "smoothed, per s");
+
+  py::class_<DriveObject, std::shared_ptr<DriveObject>> drive(
+      m, "Drive",
+      "A log as effects see it: evenly sampled, `rows` instants. Good during the call that it was given to; arrays are "
+      "copies of shape (rows,) that may be kept.");
+  const auto number = [&drive](const char* name, double Drive::*member, const char* doc) {
+    drive.def_property_readonly(
+        name, [member](const DriveObject& d) { return d.drive().*member; }, doc);
+  };
+  const auto array = [&drive](const char* name, Eigen::VectorXd Drive::*member, const char* doc) {
+    drive.def_property_readonly(
+        name, [member](const DriveObject& d) { return copy(d.drive().*member); }, doc);
+  };
+  number("wheel_radius", &Drive::wheel_radius, "m (0 for other than wheeled robots)");
+  number("track_width", &Drive::track_width, "m");
+  number("lever_arm", &Drive::lever_arm, "of the difference channel, m");
+  number("step", &Drive::step, "s");
+  array("t", &Drive::t, "s");
+  array("x", &Drive::x, "m; empty where the log has no pose");
+  array("y", &Drive::y, "m; empty where the log has no pose");
+  array("heading", &Drive::heading, "rad, unwrapped; empty where the log has none");
+  array("gyro", &Drive::gyro, "yaw rate, rad/s; empty where the log has none");
+  drive.def_property_readonly("rows", [](const DriveObject& d) { return d.drive().rows(); })
+      .def_property_readonly("has_pose", [](const DriveObject& d) { return d.drive().has_pose(); })
+      .def_property_readonly("outputs", [](const DriveObject& d) { return d.drive().model.outputs; })
+      .def_property_readonly(
+          "segment_starts",
+          [](const DriveObject& d) {
+            const auto& starts = d.drive().segment_starts;
+            return copy(std::vector<std::int64_t>(starts.begin(), starts.end()));
+          },
+          "rows at which segments begin")
+      .def_property_readonly("joints",
+                             [](const std::shared_ptr<DriveObject>& d) {
+                               std::vector<JointObject> out;
+                               for (std::size_t i = 0; i < d->drive().joints.size(); ++i) {
+                                 out.push_back({d, i});
+                               }
+                               return out;
+                             })
+      .def_property_readonly("coordinates",
+                             [](const std::shared_ptr<DriveObject>& d) {
+                               std::vector<CoordinateObject> out;
+                               for (std::size_t i = 0; i < d->drive().coordinates.size(); ++i) {
+                                 out.push_back({d, i});
+                               }
+                               return out;
+                             })
+      .def(
+          "physical", [](const DriveObject& d, const std::string& name) { return d.drive().physical(name); },
+          py::arg("name"), "The physical parameter of the base model, e.g. 'mass' (kg); 0 where there is none.");
+}
+
+void bind_effect(py::module_& m) {
+  bind_drive(m);
+  using Signals = std::vector<std::optional<Doubles>>;
+  using Signal = std::optional<Doubles>;
+  py::class_<ColumnObject>(m, "Column",
+                           "What an effect adds per unit of one of its parameters: one value per instant of the drive, "
+                           "not filtered (the toolkit filters it). None stands for zeros.")
+      .def(py::init([](Signals effort, Signals effort_rate, Signal forward, Signal lateral, Signal yaw) {
+             return ColumnObject{std::move(effort), std::move(effort_rate), std::move(forward), std::move(lateral),
+                                 std::move(yaw)};
+           }),
+           py::arg("effort") = Signals{}, py::arg("effort_rate") = Signals{}, py::kw_only(),
+           py::arg("forward") = std::nullopt, py::arg("lateral") = std::nullopt, py::arg("yaw") = std::nullopt,
+           "effort: for each output (sum, difference) the effort that is asked for in addition (15), shape (rows,). "
+           "effort_rate: signals whose time derivative is such an effort. forward, lateral (m/s), yaw (rad/s): body "
+           "velocity that the wheels do not show.");
+  py::class_<gap::EffectParameter>(m, "EffectParameter",
+                                   "A coefficient of an effect: what multiplies one of its columns.")
+      .def(py::init([](std::string name, std::string unit, int sign) {
+             return gap::EffectParameter{std::move(name), std::move(unit), sign};
+           }),
+           py::arg("name"), py::arg("unit"), py::arg("sign") = 0,
+           "sign: 1 where physics wants it >= 0, -1 for <= 0, 0 for either.")
+      .def_readonly("name", &gap::EffectParameter::name)
+      .def_readonly("unit", &gap::EffectParameter::unit)
+      .def_readonly("sign", &gap::EffectParameter::sign);
+  py::class_<ShapeParameter>(m, "ShapeParameter", "A parameter on which an effect's columns depend nonlinearly.")
+      .def(py::init(
+               [](std::string name, std::string unit, double lower, double upper, std::size_t scan, bool logarithmic) {
+                 ShapeParameter shape;
+                 shape.name = std::move(name);
+                 shape.unit = std::move(unit);
+                 shape.lower = lower;
+                 shape.upper = upper;
+                 shape.scan = scan;
+                 shape.logarithmic = logarithmic;
+                 return shape;
+               }),
+           py::arg("name"), py::arg("unit"), py::arg("lower"), py::arg("upper"), py::arg("scan") = 5,
+           py::arg("logarithmic") = false, "scan: points of the grid, between the bounds, on which a search begins.")
+      .def_readonly("name", &ShapeParameter::name)
+      .def_readonly("unit", &ShapeParameter::unit)
+      .def_readonly("lower", &ShapeParameter::lower)
+      .def_readonly("upper", &ShapeParameter::upper);
+  py::class_<Effect>(m, "Effect", "An unmodelled effect: of the catalogue, or a user's own.")
+      .def(py::init(&make_effect), py::arg("name"), py::arg("columns"),
+           py::arg("parameters") = std::vector<gap::EffectParameter>{},
+           py::arg("shapes") = std::vector<ShapeParameter>{}, py::kw_only(), py::arg("sentence") = "",
+           py::arg("family") = "", py::arg("parametric") = false, py::arg("unit_coefficient") = false,
+           py::arg("excite") = "", py::arg("applies") = std::nullopt,
+           "columns(drive, shape) returns a Column for each of `parameters`, at the values `shape` of `shapes`; it is "
+           "called often, from any thread, with the interpreter's lock. applies(drive) returns None, or why the effect "
+           "cannot be looked for. family: of effects that are the same cause. unit_coefficient: one column whose "
+           "coefficient is 1; only the shapes are estimated.")
+      .def_readonly("name", &Effect::name)
+      .def_readonly("sentence", &Effect::sentence)
+      .def_readonly("family", &Effect::family)
+      .def_readonly("parametric", &Effect::parametric)
+      .def_readonly("parameters", &Effect::parameters)
+      .def_readonly("shapes", &Effect::shapes)
+      .def("__repr__", [](const Effect& e) { return "<wheelwright.Effect " + e.name + ">"; });
+  m.def(
+      "effect_catalogue",
+      [](const RobotObject* robot) {
+        return robot != nullptr ? gap::effect_catalogue(model::make_model(robot->robot)) : gap::effect_catalogue();
+      },
+      py::arg("robot") = nullptr, "The effects that gap() looks for, for a robot (by default on two driven wheels).");
+}
+
+using gap::GapEstimate;
 
 struct DiagnosisObject {
   Diagnosis diagnosis;

@@ -3,15 +3,40 @@
 
 #include <cmath>
 #include <exception>
+#include <string>
 
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/core/check.hpp>
-
 #include <wheelwright/results/software.hpp>
-#include <wheelwright/robots/robot_columns.hpp>
+#include <wheelwright/robots/robot_file.hpp>
 
 namespace wheelwright::python {
+
+void LongWork::breathe() {
+  using namespace std::chrono_literals;
+  {
+    const std::lock_guard hold(watch_);
+    const auto now = std::chrono::steady_clock::now();
+    if (now - last_ < 100ms) {
+      return;
+    }
+    last_ = now;
+  }
+  ask([] {
+    if (PyErr_CheckSignals() != 0) {
+      throw py::error_already_set();
+    }
+  });
+}
+
+void LongWork::tell(std::string_view text, double share) {
+  breathe();
+  if (progress_.is_none()) {
+    return;
+  }
+  ask([&] { progress_(share, std::string(text)); });
+}
 
 py::object to_python(const Json& value) {
   switch (value.type()) {
@@ -67,6 +92,7 @@ py::object mirror(py::module_& m, const char* name, const py::tuple& bases, cons
 }
 
 }  // namespace
+
 }  // namespace wheelwright::python
 
 PYBIND11_MODULE(_core, m) {

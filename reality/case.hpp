@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/reality/catalogue.hpp>
+#include <wheelwright/reality/effect.hpp>
 #include <wheelwright/reality/oracle.hpp>
 
 namespace wheelwright::reality {

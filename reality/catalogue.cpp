@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/reality/catalogue.hpp>
+#include <wheelwright/reality/effect.hpp>
 
 namespace wheelwright::reality {
 

@@ -14,7 +14,7 @@
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/files/atomic_file.hpp>
+#include <wheelwright/files/bytes.hpp>
 #include <wheelwright/files/json.hpp>
 #include <wheelwright/logs/csv.hpp>
 #include <wheelwright/reality/case.hpp>

@@ -7,10 +7,9 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/report/data_sections.hpp>
 #include <wheelwright/report/drawing.hpp>
 #include <wheelwright/report/page.hpp>
-#include <wheelwright/report/parameter_table.hpp>
+#include <wheelwright/report/sections.hpp>
 #include <wheelwright/report/signals.hpp>
 #include <wheelwright/words/commission_words.hpp>
 #include <wheelwright/words/text.hpp>

@@ -6,7 +6,7 @@
 #include <string>
 
 #include <wheelwright/commission/commission.hpp>
-#include <wheelwright/report/context.hpp>
+#include <wheelwright/report/page.hpp>
 
 namespace wheelwright::report {
 

@@ -9,10 +9,9 @@
 #include <fmt/format.h>
 
 #include <wheelwright/commission/physical.hpp>
-#include <wheelwright/report/chart.hpp>
 #include <wheelwright/report/drawing.hpp>
 #include <wheelwright/report/page.hpp>
-#include <wheelwright/words/margin_words.hpp>
+#include <wheelwright/words/detect_words.hpp>
 #include <wheelwright/words/text.hpp>
 
 namespace wheelwright::report {

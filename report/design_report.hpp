@@ -8,7 +8,7 @@
 #include <wheelwright/design/detection.hpp>
 #include <wheelwright/design/manoeuvre.hpp>
 #include <wheelwright/gap/discrimination_design.hpp>
-#include <wheelwright/report/context.hpp>
+#include <wheelwright/report/page.hpp>
 
 namespace wheelwright::report {
 

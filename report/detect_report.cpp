@@ -1,19 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/report/detect_report.hpp>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 
-#include <wheelwright/report/data_sections.hpp>
+#include <wheelwright/core/limits.hpp>
+#include <wheelwright/report/drawing.hpp>
 #include <wheelwright/report/page.hpp>
-#include <wheelwright/report/parameter_table.hpp>
+#include <wheelwright/report/sections.hpp>
 #include <wheelwright/report/signals.hpp>
 #include <wheelwright/words/detect_words.hpp>
 #include <wheelwright/words/text.hpp>
 
 namespace wheelwright::report {
+
 using namespace words;
 
 namespace {
@@ -212,6 +217,282 @@ std::string detect_report(const Detection& detection, const OnlineModel& model, 
     content.sections.push_back({"assumptions", "Assumptions", std::move(given)});
   }
   content.sections.push_back({"data", "Data", std::move(data)});
+  return page(content);
+}
+
+namespace {
+
+// A logarithmic axis.
+struct MarginAxis {
+  double low, high, from, to;
+  [[nodiscard]] double operator()(double x) const {
+    return from + (to - from) * std::log(x / low) / std::log(high / low);
+  }
+};
+
+constexpr std::array kDashes = {"", "7 4", "2 3", "9 3 2 3", "4 3"};
+constexpr std::array kColours = {"--first", "--second", "--third", "--ink", "--caution"};
+
+struct Curve {
+  std::string label;
+  std::vector<std::pair<double, double>> median, worst;
+};
+
+std::string path(const std::vector<std::pair<double, double>>& points, const MarginAxis& x, const MarginAxis& y,
+                 std::size_t style, double width) {
+  std::string d;
+  for (const auto& [at, size] : points) {
+    d += fmt::format("{}{:.1f} {:.1f}", d.empty() ? "M" : " L", x(at), y(size));
+  }
+  return fmt::format("<path d=\"{}\" style=\"fill:none;stroke:var({});stroke-width:{};stroke-dasharray:{}\"/>", d,
+                     kColours[style], width, *kDashes[style] != '\0' ? kDashes[style] : "none");
+}
+
+}  // namespace
+
+std::string delay_curves(const detector::FaultMargins& margins, const commission::MarginSurvey& survey) {
+  std::vector<Curve> curves;
+  double low = core::kInfinity, high = 0.0;
+  for (const auto& [kind, count] : survey.manoeuvres) {
+    Curve curve{std::string(detector::manoeuvre_words(kind)), {}, {}};
+    for (std::size_t w = 0; w < survey.windows.size(); ++w) {
+      const detector::MarginSummary summary = detector::summarise(margins, w, kind);
+      const auto add = [&](std::vector<std::pair<double, double>>& to, double size) {
+        if (summary.onsets > 0 && std::isfinite(size) && size > 0.0) {
+          to.emplace_back(survey.windows[w], size);
+          low = std::min(low, size);
+          high = std::max(high, size);
+        }
+      };
+      add(curve.median, summary.median);
+      add(curve.worst, summary.worst);
+    }
+    curves.push_back(std::move(curve));
+  }
+  const bool drawn = std::any_of(curves.begin(), curves.end(), [](const Curve& c) { return c.median.size() > 1; });
+  if (!drawn) {
+    return {};
+  }
+  constexpr double width = 520.0, height = 260.0, left = 70.0, right = 170.0, top = 10.0, bottom = 40.0;
+  const double scale = margins.fault.unit == "1" ? 100.0 : 1.0;
+  const MarginAxis x{survey.windows.front(), survey.windows.back(), left, width - right};
+  const MarginAxis y{scale * low / 1.1, scale * high * 1.1, height - bottom, top};
+  std::string out = fmt::format(
+      "<svg viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\" role=\"img\" aria-label=\"smallest certain size over "
+      "delay\">",
+      width, height);
+  for (const double tick : logarithmic_ticks(x.low, x.high, true)) {
+    out += fmt::format(
+        "<line class=\"axis\" x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1}\" y2=\"{2}\"/><text x=\"{0:.1f}\" y=\"{3}\" "
+        "text-anchor=\"middle\">{4:g}</text>",
+        x(tick), top, height - bottom, height - bottom + 14.0, tick);
+  }
+  for (const double tick : logarithmic_ticks(y.low, y.high, true)) {
+    out += fmt::format(
+        "<line class=\"axis\" x1=\"{0}\" x2=\"{1}\" y1=\"{2:.1f}\" y2=\"{2:.1f}\"/><text x=\"{3}\" y=\"{4:.1f}\" "
+        "text-anchor=\"end\">{5:g}</text>",
+        left, width - right, y(tick), left - 6.0, y(tick) + 4.0, tick);
+  }
+  out += fmt::format("<text x=\"{}\" y=\"{}\" text-anchor=\"middle\">delay, s</text>", 0.5 * (left + width - right),
+                     height - 6.0);
+  out +=
+      fmt::format("<text x=\"14\" y=\"{0}\" transform=\"rotate(-90 14 {0})\" text-anchor=\"middle\">size, {1}</text>",
+                  0.5 * (top + height - bottom), escape(margins.fault.unit == "1" ? "%" : margins.fault.unit));
+  double at = top + 10.0;
+  for (std::size_t k = 0; k < curves.size(); ++k) {
+    const std::size_t style = k % kDashes.size();
+    const auto scaled = [&](std::vector<std::pair<double, double>> points) {
+      for (auto& point : points) {
+        point.second *= scale;
+      }
+      return points;
+    };
+    if (curves[k].median.empty()) {
+      continue;
+    }
+    out += path(scaled(curves[k].median), x, y, style, 2.0);
+    out += path(scaled(curves[k].worst), x, y, style, 0.8);
+    out += fmt::format(
+        "<line x1=\"{0}\" x2=\"{1}\" y1=\"{2}\" y2=\"{2}\" "
+        "style=\"stroke:var({3});stroke-width:2;stroke-dasharray:{4}\"/><text class=\"ink\" x=\"{5}\" "
+        "y=\"{6}\">{7}</text>",
+        width - right + 8.0, width - right + 36.0, at, kColours[style],
+        *kDashes[style] != '\0' ? kDashes[style] : "none", width - right + 42.0, at + 4.0, escape(curves[k].label));
+    at += 18.0;
+  }
+  return out + "</svg>";
+}
+
+std::string margin_map(const detector::OperatingMap& map, const detector::FaultType& fault, const std::string& x_label,
+                       const std::string& y_label) {
+  double low = core::kInfinity, high = 0.0;
+  for (const double size : map.smallest.reshaped()) {
+    if (std::isfinite(size) && size > 0.0) {
+      low = std::min(low, size);
+      high = std::max(high, size);
+    }
+  }
+  if (!(high > 0.0)) {
+    return {};
+  }
+  high = std::max(high, low * 1.01);
+  const std::size_t nx = map.plane.x.size(), ny = map.plane.y.size();
+  constexpr double side = 230.0, left = 60.0, top = 10.0;
+  const double cell_x = side / static_cast<double>(nx), height = ny > 1 ? side : 40.0,
+               cell_y = height / static_cast<double>(ny);
+  std::string out = fmt::format(
+      "<svg viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\" role=\"img\" aria-label=\"smallest certain size over "
+      "the "
+      "operating space\">",
+      left + side + 20.0, top + height + 60.0);
+  for (std::size_t a = 0; a < nx; ++a) {
+    for (std::size_t b = 0; b < ny; ++b) {
+      const double size = map.smallest(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b));
+      const double share =
+          std::isfinite(size) ? 1.0 - std::log(std::max(size, low) / low) / std::log(high / low) : -1.0;
+      out += fmt::format(
+          "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.2f}\" height=\"{:.2f}\" "
+          "style=\"fill:var({});fill-opacity:{:.3f}\">"
+          "<title>{:.3g}, {:.3g}: {}</title></rect>",
+          left + cell_x * static_cast<double>(a), top + height - cell_y * static_cast<double>(b + 1), cell_x, cell_y,
+          share >= 0.0 ? "--first" : "--pale", share >= 0.0 ? 0.12 + 0.88 * share : 1.0, map.plane.x[a], map.plane.y[b],
+          escape(magnitude_words(fault, size)));
+    }
+  }
+  const auto text = [&](double x, double y, const char* anchor, const std::string& what) {
+    out += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\">{}</text>", x, y, anchor, escape(what));
+  };
+  text(left, top + height + 14.0, "start", number(map.plane.x.front(), 2));
+  text(left + side, top + height + 14.0, "end", number(map.plane.x.back(), 2));
+  text(left + 0.5 * side, top + height + 14.0, "middle", x_label);
+  if (ny > 1) {
+    text(left - 5.0, top + height, "end", number(map.plane.y.front(), 2));
+    text(left - 5.0, top + 10.0, "end", number(map.plane.y.back(), 2));
+    out += fmt::format("<text x=\"14\" y=\"{0}\" transform=\"rotate(-90 14 {0})\" text-anchor=\"middle\">{1}</text>",
+                       top + 0.5 * height, escape(y_label));
+  }
+  text(left, top + height + 34.0, "start",
+       fmt::format("dark {}, pale {}, empty: none", magnitude_words(fault, low), magnitude_words(fault, high)));
+  return out + "</svg>";
+}
+
+namespace {
+
+std::string name_of(const detector::FaultMargins& margins) {
+  const bool sides = !margins.fault.whole && margins.fault.range.lower < 0.0;
+  return spaced(margins.fault.name) + (sides ? margins.side > 0.0 ? ", growing" : ", shrinking" : "");
+}
+
+std::string margins_table(const commission::MarginSurvey& survey, const commission::ResidualMargins& residual) {
+  const std::size_t window = shown_window(survey);
+  std::vector<Cell> header = {"Fault"};
+  for (const auto& [kind, count] : survey.manoeuvres) {
+    header.push_back(numeric(core::capital(std::string(detector::manoeuvre_words(kind))) +
+                             fmt::format("<small>{}</small>", plural(count, "onset"))));
+  }
+  std::vector<std::vector<Cell>> rows;
+  for (const detector::FaultMargins& margins : residual.margins) {
+    std::vector<Cell> row = {escape(core::capital(name_of(margins))) + "<small>" + escape(margins.fault.sentence) +
+                             "</small>"};
+    for (const auto& [kind, count] : survey.manoeuvres) {
+      row.push_back(numeric(escape(certain_words(margins, window, kind))));
+    }
+    rows.push_back(std::move(row));
+  }
+  std::string out = warrant_note(residual.warrant) + table(header, rows);
+  if (!residual.blind.empty()) {
+    std::vector<std::string> names;
+    for (const std::string& name : residual.blind) {
+      names.push_back(spaced(name));
+    }
+    out += paragraph("Leaves no trace in this residual, whatever its size: " + escape(core::enumerated(names)) + ".");
+  }
+  return out +
+         paragraph(fmt::format(
+             "<span class=\"note\">Size from which on the fault raises an alarm within {:g} s, for every θ of the "
+             "feasible set and all noise within its bounds, whenever it sets in during such driving, or at so many "
+             "of the moments that were tried; –: at none. The rule is {} of {} instants.</span>",
+             survey.windows[window], survey.persistence.k, survey.persistence.n));
+}
+
+std::string curves(const commission::MarginSurvey& survey, const commission::ResidualMargins& residual) {
+  std::string out;
+  for (const detector::FaultMargins& margins : residual.margins) {
+    const std::string drawing = margins.fault.whole ? "" : delay_curves(margins, survey);
+    if (!drawing.empty()) {
+      out += "<div><h3>" + escape(core::capital(name_of(margins))) + "</h3>" + drawing + "</div>";
+    }
+  }
+  return "<div class=\"pairs\">" + out + "</div>" +
+         paragraph(
+             "<span class=\"note\">Thick: certain at half of the onsets of the manoeuvre; thin: at every one. A "
+             "size reads the other way round, too: how long a fault of that size can go unseen.</span>");
+}
+
+std::string maps(const commission::ResidualMargins& residual, const OnlineModel& model) {
+  std::string out;
+  const auto& names = model.model.coordinates;
+  const std::string first = names.front(), second = names.size() > 1 ? names[1] : "";
+  for (const commission::FaultMaps& each : residual.maps) {
+    const auto margins = std::find_if(
+        residual.margins.begin(), residual.margins.end(),
+        [&](const detector::FaultMargins& m) { return m.fault.name == each.fault && m.side == each.side; });
+    if (margins == residual.margins.end() || margins->fault.whole) {
+      continue;
+    }
+    const std::string speeds = margin_map(each.speeds, margins->fault, first, second);
+    const std::string accelerations =
+        margin_map(each.accelerations, margins->fault, "d" + first + "/dt", second.empty() ? "" : "d" + second + "/dt");
+    if (!speeds.empty() || !accelerations.empty()) {
+      out += "<div><h3>" + escape(core::capital(name_of(*margins))) + "</h3>" + speeds + accelerations + "</div>";
+    }
+  }
+  return "<div class=\"pairs\">" + out + "</div>" +
+         paragraph(
+             "<span class=\"note\">Smallest certain size where the robot keeps its speed (left), and where it "
+             "keeps accelerating at the drive's typical speeds (right), m/s and rad/s, over the range of the "
+             "drive: drive there to check the robot.</span>");
+}
+
+}  // namespace
+
+std::string margins_report(const commission::MarginSurvey& survey, const OnlineModel& model,
+                           const ReportContext& context) {
+  const TimeAxis axis(context.signals ? context.signals->t : std::vector<double>{});
+  PageContent content;
+  content.title = context.title.empty() ? "What is certainly seen: " + model.robot.name : context.title;
+  content.status = "good";
+  content.verdict = "Faults that this robot's detector is certain to see in this drive.";
+  content.warrant = model.warrant;
+  content.sentences.push_back(certain_meaning(model.warrant));
+  content.sentences.push_back(
+      fmt::format("Every size below is about {} of driving.", with_unit(number(survey.seconds), "s")));
+  if (!survey.without_kinematic.empty()) {
+    content.sentences.push_back("There is no kinematic residual: " + survey.without_kinematic +
+                                ". Slip across the heading cannot be promised while driving straight.");
+  }
+  content.software = context.software;
+  const std::vector<std::string> sentences = margin_sentences(survey);
+  if (!sentences.empty()) {
+    content.sentences.push_back("For one: " + sentences.front());
+  }
+  for (const commission::ResidualMargins& residual : survey.residuals) {
+    content.sections.push_back(
+        {residual.name, core::capital(residual.name) + " residual", margins_table(survey, residual)});
+    content.sections.push_back(
+        {residual.name + "-delay", "How soon: " + residual.name + " residual", curves(survey, residual)});
+    if (!residual.maps.empty()) {
+      content.sections.push_back({residual.name + "-map", "Where it shows best", maps(residual, model)});
+    }
+  }
+  content.sections.push_back({"words", "In words", bullets(sentences)});
+  if (context.signals) {
+    content.sections.push_back({"signals", "Raw signals", signal_charts(*context.signals, {}, axis, context.rows)});
+  }
+  if (std::string given = assumptions_section(survey.assumptions); !given.empty()) {
+    content.sections.push_back({"assumptions", "Assumptions", std::move(given)});
+  }
+  content.sections.push_back({"data", "Data", provenance(context, axis)});
   return page(content);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The page of a detection.
+/// The pages of a detection and of margins, and their drawings as SVG.
 #pragma once
 
 #include <optional>
@@ -9,8 +9,9 @@
 
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/commission/detector_walk.hpp>
+#include <wheelwright/commission/margin_survey.hpp>
 #include <wheelwright/commission/risk_watch.hpp>
-#include <wheelwright/report/context.hpp>
+#include <wheelwright/report/page.hpp>
 
 namespace wheelwright::report {
 
@@ -29,5 +30,19 @@ struct KinematicFindings {
                                         const ReportContext& context, const KinematicFindings& kinematic = {},
                                         const std::vector<detector::Isolation>& isolations = {},
                                         const commission::RiskWatch& at_risk = {});
+
+/// Smallest certain size over the delay, both logarithmic: for each manoeuvre the median over its onsets, and the size
+/// that is certain at every one of them (thin). Empty where nothing is certain.
+[[nodiscard]] std::string delay_curves(const detector::FaultMargins& margins, const commission::MarginSurvey& survey);
+
+/// A map over the operating space: the darker a point, the smaller the certain size, on a logarithmic scale whose ends
+/// are written out; empty points show no certain size. Empty where no point has one.
+[[nodiscard]] std::string margin_map(const detector::OperatingMap& map, const detector::FaultType& fault,
+                                     const std::string& x_label, const std::string& y_label);
+
+/// One self-contained page: what is certainly seen, in words, as a table by manoeuvre, as curves of size over delay,
+/// and as maps over the operating space.
+[[nodiscard]] std::string margins_report(const commission::MarginSurvey& survey, const OnlineModel& model,
+                                         const ReportContext& context);
 
 }  // namespace wheelwright::report

@@ -14,7 +14,7 @@
 #include <fmt/format.h>
 
 #include <wheelwright/report/page.hpp>
-#include <wheelwright/report/parameter_table.hpp>
+#include <wheelwright/report/sections.hpp>
 #include <wheelwright/words/text.hpp>
 
 namespace wheelwright::report {
@@ -31,29 +31,36 @@ std::string svg_text(double x, double y, const char* anchor, const std::string& 
                      y, anchor, escape(what));
 }
 
+void Range::take(double x) {
+  if (std::isfinite(x)) {
+    low = std::min(low, x);
+    high = std::max(high, x);
+  }
+}
+
+std::vector<double> logarithmic_ticks(double low, double high, bool fine) {
+  std::vector<double> out;
+  for (double power = std::pow(10.0, std::floor(std::log10(low))); power <= high; power *= 10.0) {
+    for (const double m : {1.0, 2.0, 5.0}) {
+      if ((fine || m == 1.0) && m * power >= low * (1.0 - 1e-9) && m * power <= high * (1.0 + 1e-9)) {
+        out.push_back(m * power);
+      }
+    }
+  }
+  return out;
+}
+
 namespace {
 
-// Range of numbers that have to be seen.
-struct Range {
-  double low = std::numeric_limits<double>::infinity();
-  double high = -std::numeric_limits<double>::infinity();
-
-  void take(double x) {
-    if (std::isfinite(x)) {
-      low = std::min(low, x);
-      high = std::max(high, x);
-    }
+void pad(Range& range, double share) {
+  if (!(range.low <= range.high)) {
+    range = {0.0, 1.0};
   }
-  void pad(double share) {
-    if (!(low <= high)) {
-      low = 0.0;
-      high = 1.0;
-    }
-    const double margin = high > low ? share * (high - low) : (high != 0.0 ? 0.1 * std::abs(high) : 1.0);
-    low -= margin;
-    high += margin;
-  }
-};
+  const double margin = range.high > range.low ? share * (range.high - range.low)
+                                               : (range.high != 0.0 ? 0.1 * std::abs(range.high) : 1.0);
+  range.low -= margin;
+  range.high += margin;
+}
 
 // Linear map of a range to pixels.
 struct Scale {
@@ -95,7 +102,7 @@ std::string interval_bar(const ParameterView& v) {
       range.take(bound);
     }
   }
-  range.pad(0.12);
+  pad(range, 0.12);
   const Scale scale{range, left, right};
   const bool beyond_left = v.lower<range.low, beyond_right = v.upper> range.high;
   const double x0 = scale(std::clamp(v.lower, range.low, range.high));
@@ -145,8 +152,8 @@ std::string filter_curve(const commission::FilterChoice& choice) {
     x.range.take(b);
     y.range.take(c);
   }
-  x.range.pad(0.05);
-  y.range.pad(0.1);
+  pad(x.range, 0.05);
+  pad(y.range, 0.1);
   std::string out = fmt::format(
       "<svg viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\" role=\"img\" "
       "aria-label=\"residual over torque for each candidate filter\">",

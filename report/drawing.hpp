@@ -4,13 +4,27 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/commission/filter_choice.hpp>
+#include <wheelwright/core/limits.hpp>
 #include <wheelwright/core/log.hpp>
-#include <wheelwright/report/parameter_table.hpp>
+#include <wheelwright/report/sections.hpp>
 
 namespace wheelwright::report {
+
+/// Range of numbers that a drawing shows.
+struct Range {
+  double low = core::kInfinity;  ///< > high: none was taken
+  double high = -core::kInfinity;
+
+  /// Widens it for `x`, where that is finite.
+  void take(double x);
+};
+
+/// The powers of ten in [low, high] and, where `fine`, 2 and 5 times these; low > 0.
+[[nodiscard]] std::vector<double> logarithmic_ticks(double low, double high, bool fine);
 
 /// The beginning of a drawing of that size, with `label` (text) for those who cannot see it.
 [[nodiscard]] std::string open_svg(double width, double height, const std::string& label);

@@ -3,15 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <set>
 #include <vector>
 
 #include <fmt/format.h>
 
-#include <wheelwright/report/chart.hpp>
-#include <wheelwright/report/data_sections.hpp>
+#include <wheelwright/report/drawing.hpp>
 #include <wheelwright/report/page.hpp>
+#include <wheelwright/report/sections.hpp>
 #include <wheelwright/words/text.hpp>
 
 namespace wheelwright::report {
@@ -25,16 +24,7 @@ constexpr double kFleetWidth = 860.0, kHeight = 240.0, kFleetLeft = 74.0, kFleet
                  kFleetBottom = 30.0;
 constexpr std::size_t kColumns = 400;
 
-struct Axis {
-  double low = std::numeric_limits<double>::infinity();
-  double high = -std::numeric_limits<double>::infinity();
-
-  void take(double x) {
-    if (std::isfinite(x)) {
-      low = std::min(low, x);
-      high = std::max(high, x);
-    }
-  }
+struct Axis : Range {
   void pad(double share) {
     const double more = high > low ? share * (high - low) : std::max(1e-9, 0.1 * std::abs(high));
     low -= more;

@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <string>
 
-#include <wheelwright/report/context.hpp>
+#include <wheelwright/report/page.hpp>
 #include <wheelwright/study/fleet_result.hpp>
 
 namespace wheelwright::report {

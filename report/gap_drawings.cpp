@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/report/gap_drawings.hpp>
+#include <wheelwright/report/gap_report.hpp>
 
 #include <algorithm>
 #include <array>
@@ -34,18 +34,7 @@ struct LogAxis {
     return from + (to - from) * std::log(std::clamp(x, low, high) / low) / std::log(high / low);
   }
   // The decades inside it, with 2 and 5 between where these are few.
-  [[nodiscard]] std::vector<double> ticks() const {
-    std::vector<double> out;
-    const bool fine = high / low < 300.0;
-    for (double power = std::pow(10.0, std::floor(std::log10(low))); power <= high; power *= 10.0) {
-      for (const double m : {1.0, 2.0, 5.0}) {
-        if ((fine || m == 1.0) && m * power >= low * (1.0 - 1e-9) && m * power <= high * (1.0 + 1e-9)) {
-          out.push_back(m * power);
-        }
-      }
-    }
-    return out;
-  }
+  [[nodiscard]] std::vector<double> ticks() const { return logarithmic_ticks(low, high, high / low < 300.0); }
 };
 
 struct Look {

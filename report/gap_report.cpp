@@ -11,8 +11,6 @@
 
 #include <wheelwright/core/statistics.hpp>
 #include <wheelwright/gap/where.hpp>
-#include <wheelwright/report/chart.hpp>
-#include <wheelwright/report/gap_drawings.hpp>
 #include <wheelwright/report/page.hpp>
 #include <wheelwright/report/signals.hpp>
 #include <wheelwright/words/gap_words.hpp>

@@ -6,7 +6,7 @@
 #include <string>
 
 #include <wheelwright/doctor/log_health.hpp>
-#include <wheelwright/report/context.hpp>
+#include <wheelwright/report/page.hpp>
 
 namespace wheelwright::report {
 

@@ -8,8 +8,7 @@
 #include <vector>
 
 #include <wheelwright/inference/identification.hpp>
-#include <wheelwright/report/chart.hpp>
-#include <wheelwright/report/context.hpp>
+#include <wheelwright/report/page.hpp>
 
 namespace wheelwright::report {
 

@@ -10,7 +10,7 @@
 
 #include <wheelwright/report/drawing.hpp>
 #include <wheelwright/report/page.hpp>
-#include <wheelwright/report/parameter_table.hpp>
+#include <wheelwright/report/sections.hpp>
 #include <wheelwright/words/text.hpp>
 
 namespace wheelwright::report {

@@ -10,7 +10,7 @@
 #include <wheelwright/commission/detector_walk.hpp>
 #include <wheelwright/core/log.hpp>
 #include <wheelwright/model/robot.hpp>
-#include <wheelwright/report/chart.hpp>
+#include <wheelwright/report/page.hpp>
 
 namespace wheelwright::report {
 

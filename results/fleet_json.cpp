@@ -9,7 +9,6 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/files/number.hpp>
 #include <wheelwright/files/words.hpp>
 #include <wheelwright/results/model_json.hpp>
 #include <wheelwright/robots/online_model_file.hpp>

@@ -8,7 +8,7 @@
 
 #include <wheelwright/files/json.hpp>
 #include <wheelwright/study/fleet_result.hpp>
-#include <wheelwright/study/robot_record.hpp>
+#include <wheelwright/study/population.hpp>
 
 namespace wheelwright::results {
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// gap.json: the result of `wheelwright gap`; and the residuals behind it as a table.
+/// gap.json: the result of `wheelwright gap`, with rival causes; and the residuals behind it as a table.
 #pragma once
 
 #include <filesystem>
@@ -10,6 +10,7 @@
 
 #include <wheelwright/files/json.hpp>
 #include <wheelwright/gap/diagnosis.hpp>
+#include <wheelwright/gap/discrimination.hpp>
 
 namespace wheelwright::results {
 
@@ -43,5 +44,16 @@ struct GapFiles {
 /// and channel, seven significant digits (time: microseconds); a signal that a series lacks is empty. The file appears
 /// whole or not at all. Throws InputError when it cannot be written.
 void write_residuals(const std::filesystem::path& path, const std::vector<gap::ResidualSeries>& series);
+
+/// Members of the credible set of a gap.json. Parameters are those of credible_set[].parameters, keyed
+/// "effect.parameter", else of `causes` where the effects are the same; a member without any is as large as
+/// typical_rival() makes it. Noise and filter of the analysed log, where the file has them, take the place of those in
+/// `noise`. Throws InputError where fewer than two members are left that the catalogue knows.
+[[nodiscard]] std::vector<gap::Rival> rivals_of_gap(const std::filesystem::path& file,
+                                                    const std::vector<Effect>& catalogue, const gap::Drive& drive,
+                                                    gap::PlannedNoise& noise);
+
+/// Adds the parameters of `rivals` to the members of the credible set of a gap.json: `design --gap` begins from them.
+void add_rivals(Json& result, const std::vector<gap::Rival>& rivals, const std::vector<Effect>& catalogue);
 
 }  // namespace wheelwright::results

@@ -8,7 +8,7 @@
 
 #include <wheelwright/commission/physical.hpp>
 #include <wheelwright/files/words.hpp>
-#include <wheelwright/results/model_words.hpp>
+#include <wheelwright/results/model_json.hpp>
 #include <wheelwright/robots/robot_file.hpp>
 #include <wheelwright/words/identification_words.hpp>
 

@@ -7,7 +7,7 @@
 #include <string>
 
 #include <wheelwright/files/json.hpp>
-#include <wheelwright/identify/estimator_choice.hpp>
+#include <wheelwright/identify/estimate.hpp>
 #include <wheelwright/inference/identification.hpp>
 #include <wheelwright/logs/recorded_log.hpp>
 

@@ -3,16 +3,147 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <utility>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
+#include <wheelwright/bounds/slab_rows.hpp>
 #include <wheelwright/commission/physical.hpp>
-
-#include <wheelwright/results/rebuilt_rows.hpp>
+#include <wheelwright/filter/row_stream.hpp>
+#include <wheelwright/results/model_json.hpp>
 
 namespace wheelwright::results {
 namespace {
+
+/// The instants of the log's regression that the claims name.
+RegressionBlock named_instants(const ModelClaims& claims, LogSource& log) {
+  std::set<std::size_t> wanted;
+  const auto want = [&](const bounds::RowOrigin& origin) {
+    if (!origin.is_prior) {
+      wanted.insert(origin.sample);
+    }
+  };
+  for (const auto* bounds : {&claims.lower, &claims.upper}) {
+    for (const PublishedBound& bound : *bounds) {
+      std::ranges::for_each(bound.proof, [&](const NamedRow& row) { want(row.origin); });
+    }
+  }
+  std::ranges::for_each(claims.contradiction, [&](const NamedRow& row) { want(row.origin); });
+  std::ranges::for_each(claims.facets, [&](const bounds::HalfSpace& facet) { want(facet.origin); });
+
+  RegressionBlock kept, block;
+  kept.resize(wanted.size(), claims.model.n(), claims.model.p());
+  const auto n = static_cast<Eigen::Index>(claims.model.n());
+  std::size_t count = 0;
+  TorqueRows rows(log, RegressorFilter(claims.model, claims.filter, claims.measurement, claims.errors));
+  while (rows.next(block)) {
+    for (std::size_t k = 0; k < block.instants(); ++k) {
+      if (wanted.contains(block.sample[k])) {
+        const auto to = static_cast<Eigen::Index>(count) * n, from = static_cast<Eigen::Index>(k) * n;
+        kept.sample[count] = block.sample[k];
+        kept.t[count++] = block.t[k];
+        kept.Y.middleRows(to, n) = block.Y.middleRows(from, n);
+        kept.dY.middleRows(to, n) = block.dY.middleRows(from, n);
+        kept.y.segment(to, n) = block.y.segment(from, n);
+        kept.dy.segment(to, n) = block.dy.segment(from, n);
+      }
+    }
+  }
+  kept.sample.resize(count);  // fewer than the storage holds where a name is no instant of this log
+  kept.t.resize(count);
+  return kept;
+}
+
+/// A side of the prior box.
+bounds::HalfSpace side_of(const Box& prior, const bounds::RowOrigin& origin) {
+  const Interval& side = prior.sides[origin.parameter];
+  const bool is_upper = origin.side == bounds::Side::upper;
+  bounds::HalfSpace row{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(prior.dimension())),
+                        is_upper ? side.upper : -side.lower, origin};
+  row.a[static_cast<Eigen::Index>(origin.parameter)] = is_upper ? 1.0 : -1.0;
+  return row;
+}
+
+/// The rows of the log's regression that the claims of a model name, filtered again with the claimed filter and errors.
+class RebuiltRows {
+ public:
+  /// Walks `log` once; keeps the named instants only. `claims` must outlive it. Throws InvalidArgument when the log
+  /// lacks a column.
+  RebuiltRows(const ModelClaims& claims, LogSource& log);
+
+  /// True if a column is noisy and `box` leaves the sign of its parameter open: the rows then depend on the box.
+  [[nodiscard]] bool depends_on(const Box& box) const;
+
+  /// The half-space that holds for every admissible θ of `box` (SlabRows; sides are those of the prior). Nothing where
+  /// this log has no such row, or one at another time, or where it was left out: `why` says which.
+  [[nodiscard]] std::optional<bounds::HalfSpace> row(const bounds::RowOrigin& origin, const Box& box,
+                                                     std::string& why) const;
+
+  /// The rows of a proof, in their order. One that cannot be built takes no part (a multiplier of 0); the first of them
+  /// is told in `why`.
+  [[nodiscard]] std::vector<bounds::WeightedRow> proof(const std::vector<NamedRow>& named, const Box& box,
+                                                       std::string& why) const;
+
+ private:
+  const ModelClaims& claims_;
+  RegressionBlock instants_;
+};
+
+RebuiltRows::RebuiltRows(const ModelClaims& claims, LogSource& log)
+    : claims_(claims), instants_(named_instants(claims, log)) {}
+
+bool RebuiltRows::depends_on(const Box& box) const {
+  const bounds::SlabRows slabs(box);
+  for (std::size_t j = 0; j < box.dimension(); ++j) {
+    const auto column = instants_.dY.col(static_cast<Eigen::Index>(j)).head(instants_.rows());
+    if (slabs.sign_is_open(j) && (column.array() > 0.0).any()) {
+      return true;
+    }
+  }
+  return false;
+}
+
+std::optional<bounds::HalfSpace> RebuiltRows::row(const bounds::RowOrigin& origin, const Box& box,
+                                                  std::string& why) const {
+  if (origin.is_prior) {
+    return side_of(claims_.prior, origin);
+  }
+  if (std::ranges::find(claims_.dropped, origin.sample) != claims_.dropped.end()) {
+    why = fmt::format("row {} is one of those that were left out as outliers", origin.sample);
+    return std::nullopt;
+  }
+  const auto it = std::ranges::lower_bound(instants_.sample, origin.sample);
+  if (it == instants_.sample.end() || *it != origin.sample) {
+    why = fmt::format("row {} is no instant of the regression of this log", origin.sample);
+    return std::nullopt;
+  }
+  const auto k = static_cast<std::size_t>(it - instants_.sample.begin());
+  if (instants_.t[k] != origin.t) {
+    why = fmt::format("row {} is at t = {} s in this log, not at {} s", origin.sample, instants_.t[k], origin.t);
+    return std::nullopt;
+  }
+  bounds::HalfSpace upper, lower;
+  const auto row = static_cast<Eigen::Index>(k * instants_.outputs + origin.output);
+  bounds::SlabRows(box).half_spaces(instants_, row, upper, lower);
+  return origin.side == bounds::Side::upper ? upper : lower;
+}
+
+std::vector<bounds::WeightedRow> RebuiltRows::proof(const std::vector<NamedRow>& named, const Box& box,
+                                                    std::string& why) const {
+  std::vector<bounds::WeightedRow> rows;
+  for (const NamedRow& name : named) {
+    std::string missing;
+    if (auto half_space = row(name.origin, box, missing)) {
+      rows.push_back({*std::move(half_space), name.multiplier});
+    } else {
+      rows.push_back({{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(box.dimension())), 0.0, {}}, 0.0});
+      why = why.empty() ? missing : why;
+    }
+  }
+  return rows;
+}
 
 /// The bounds proved, the boxes over which rows were built, and what could not be built.
 struct Proof {
@@ -258,6 +389,79 @@ ModelCheck check_model(const ModelClaims& claims, LogSource& log, const logs::Lo
   }
   tell_premises(claims, result);
   return result;
+}
+
+std::string proof_scope(const ModelClaims& claims) {
+  const auto tested =
+      std::ranges::count(claims.assumptions, core::AssumptionVerdict::holds, &core::Assumption::verdict);
+  return fmt::format(
+      "What is proved is arithmetic: the bounds follow from the rows of the log within the stated noise. "
+      "That the assumptions hold is not proved{}. The bounds are {}.",
+      claims.assumptions.empty() ? ", and the model does not list them"
+                                 : fmt::format(": commissioning took {}, of which {} were tested on the log and held",
+                                               claims.assumptions.size(), tested),
+      core::warrant_word(claims.warrant));
+}
+
+std::string verdict(const ModelCheck& check, const ModelClaims& claims) {
+  if (!check.proved()) {
+    return fmt::format("not proved: {} statement{} of the model {} not follow from the log", check.failures.size(),
+                       check.failures.size() == 1 ? "" : "s", check.failures.size() == 1 ? "does" : "do");
+  }
+  if (check.emptiness) {
+    return fmt::format("proved: no parameters explain {} rows of the log within the stated noise",
+                       claims.contradiction.size());
+  }
+  return fmt::format("proved: all {} bounds and {} facets follow from the rows of the log that they name",
+                     check.bounds.size(), claims.facets.size());
+}
+
+Json to_json(const ModelCheck& check, const ModelClaims& claims, const logs::LogReport& data, const CheckedFiles& files,
+             const std::string& software) {
+  Json log_files = Json::array(), bounds = Json::array();
+  for (const logs::LogFileReport& file : data.files) {
+    log_files.push_back({{"path", file.path}, {"hash", file.hash}, {"bytes", file.bytes}, {"rows", file.rows}});
+  }
+  for (const BoundVerdict& each : check.bounds) {
+    const model::Parameter& parameter = claims.model.parameters[each.parameter];
+    bounds.push_back(
+        {{"parameter", parameter.name},
+         {"unit", commission::parameter_unit(claims.robot, parameter)},
+         {"side", files::word_of(kSideWords, each.side)},
+         {"stated", each.stated},
+         {"shown", files::or_null(each.shown)},
+         {"proved", each.proved},
+         {"shortfall", files::or_null(each.shortfall)},
+         {"rows", (each.side == bounds::Side::upper ? claims.upper : claims.lower)[each.parameter].proof.size()},
+         {"reason", each.reason}});
+  }
+  const FacetVerdicts& facets = check.facets;
+  Json json = {
+      {"schema", "wheelwright/check/1"},
+      {"software", software},
+      {"model", files.model},
+      {"proved", check.proved()},
+      {"message", verdict(check, claims)},
+      {"warrant", core::warrant_word(claims.warrant)},
+      {"scope", proof_scope(claims)},
+      {"data", {{"same", check.same_log}, {"rows", data.rows}, {"segments", data.segments}, {"files", log_files}}},
+      {"bounds", bounds},
+      {"facets",
+       {{"stated", claims.facets.size()},
+        {"rows", facets.rows},
+        {"sides", facets.sides},
+        {"implied", facets.implied},
+        {"wrong", facets.wrong.size()}}},
+      {"failures", check.failures},
+      {"warnings", check.warnings},
+      {"premises", check.premises},
+      {"assumptions", assumptions_json(claims.assumptions)}};
+  if (check.emptiness) {
+    json["contradiction"] = {{"rows", claims.contradiction.size()},
+                             {"proved", check.emptiness->proved},
+                             {"shortfall", files::or_null(check.emptiness->shortfall)}};
+  }
+  return json;
 }
 
 }  // namespace wheelwright::results

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Verification of a model.json against its log: rows are filtered again, and the proofs of all bounds are checked in
-/// exact arithmetic.
+/// exact arithmetic; check.json has the verdict and its scope.
 #pragma once
 
 #include <optional>
@@ -10,6 +10,7 @@
 
 #include <wheelwright/bounds/check_certificate.hpp>
 #include <wheelwright/core/log.hpp>
+#include <wheelwright/files/json.hpp>
 #include <wheelwright/results/model_file.hpp>
 
 namespace wheelwright::results {
@@ -56,5 +57,21 @@ struct ModelCheck {
 
 /// "row 5017 (t = 50.17 s, sum, upper)", or "the prior's lower bound of r_mass".
 [[nodiscard]] std::string name_of(const bounds::RowOrigin& origin, const Model& model);
+
+/// The files of a check, as they were named.
+struct CheckedFiles {
+  std::string model;
+  std::vector<std::string> logs;
+};
+
+/// Scope of the proof and its limits, one sentence or two.
+[[nodiscard]] std::string proof_scope(const ModelClaims& claims);
+
+/// The answer in one sentence.
+[[nodiscard]] std::string verdict(const ModelCheck& check, const ModelClaims& claims);
+
+/// The answer as JSON (results/check.schema.json); `software` is name and version.
+[[nodiscard]] Json to_json(const ModelCheck& check, const ModelClaims& claims, const logs::LogReport& data,
+                           const CheckedFiles& files, const std::string& software);
 
 }  // namespace wheelwright::results

@@ -4,9 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/files/json.hpp>
-#include <wheelwright/results/kinematic_json.hpp>
 #include <wheelwright/results/model_json.hpp>
-#include <wheelwright/results/model_words.hpp>
 #include <wheelwright/robots/robot_file.hpp>
 
 namespace wheelwright::results {

@@ -1,16 +1,39 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Warrants and assumptions in JSON files.
+/// The words and parts of model.json that other results have too: warrants, assumptions, the section `kinematic`.
 #pragma once
 
+#include <optional>
 #include <vector>
 
+#include <wheelwright/commission/commission.hpp>
+#include <wheelwright/commission/kinematic.hpp>
 #include <wheelwright/core/warrant.hpp>
 #include <wheelwright/files/json.hpp>
+#include <wheelwright/files/words.hpp>
+#include <wheelwright/robots/robot_keys.hpp>
 
 namespace wheelwright::results {
 
+inline constexpr files::Words<Commissioning::Status, 5> kStatusWords{
+    {{Commissioning::Status::done, "done"},
+     {Commissioning::Status::partial, "partial"},
+     {Commissioning::Status::empty, "empty"},
+     {Commissioning::Status::nothing, "nothing"},
+     {Commissioning::Status::contradicted, "contradicted"}}};
+inline constexpr files::Words<identify::Excitation, 3> kExcitationWords{
+    {{identify::Excitation::identified, "identified"},
+     {identify::Excitation::indistinct, "indistinct"},
+     {identify::Excitation::not_excited, "not_excited"}}};
+inline constexpr files::Words<bounds::Side, 2> kSideWords{
+    {{bounds::Side::upper, "upper"}, {bounds::Side::lower, "lower"}}};
+
 /// The list as results have it under `assumptions`.
 [[nodiscard]] Json assumptions_json(const std::vector<core::Assumption>& assumptions);
+
+/// The section as JSON (results/model.schema.json, definition `kinematic`); nothing where the log had neither pose nor
+/// gyro.
+[[nodiscard]] std::optional<Json> kinematic_json(const commission::KinematicCommissioning& result,
+                                                 const commission::FoldOptions& folds);
 
 }  // namespace wheelwright::results

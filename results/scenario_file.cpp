@@ -11,8 +11,8 @@
 #include <yaml-cpp/yaml.h>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/files/byte_source.hpp>
-#include <wheelwright/files/yaml_place.hpp>
+#include <wheelwright/files/bytes.hpp>
+#include <wheelwright/files/place.hpp>
 #include <wheelwright/logs/csv.hpp>
 #include <wheelwright/robots/robot_file.hpp>
 #include <wheelwright/robots/robot_keys.hpp>

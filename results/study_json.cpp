@@ -9,9 +9,9 @@
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/files/byte_source.hpp>
+#include <wheelwright/files/bytes.hpp>
 #include <wheelwright/files/json.hpp>
-#include <wheelwright/files/yaml_place.hpp>
+#include <wheelwright/files/place.hpp>
 #include <wheelwright/logs/log_file.hpp>
 #include <wheelwright/results/model_json.hpp>
 #include <wheelwright/results/scenario_file.hpp>

@@ -14,7 +14,7 @@
 #include <wheelwright/core/log.hpp>
 #include <wheelwright/files/json.hpp>
 #include <wheelwright/model/robot.hpp>
-#include <wheelwright/study/local_derivatives.hpp>
+#include <wheelwright/study/bound_derivatives.hpp>
 #include <wheelwright/study/study.hpp>
 
 namespace wheelwright::results {

@@ -8,9 +8,9 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/files/byte_source.hpp>
+#include <wheelwright/files/bytes.hpp>
+#include <wheelwright/files/place.hpp>
 #include <wheelwright/files/words.hpp>
-#include <wheelwright/files/yaml_place.hpp>
 
 namespace wheelwright::robots {
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <string_view>
 
-#include <wheelwright/files/xml_place.hpp>
+#include <wheelwright/files/place.hpp>
 #include <wheelwright/robots/robot_description.hpp>
 
 namespace wheelwright::robots {

@@ -14,8 +14,7 @@
 
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/core/words.hpp>
-#include <wheelwright/files/byte_source.hpp>
-#include <wheelwright/files/number.hpp>
+#include <wheelwright/files/bytes.hpp>
 #include <wheelwright/files/words.hpp>
 
 namespace wheelwright::robots {

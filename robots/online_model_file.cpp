@@ -10,8 +10,8 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/detector/scale_detector.hpp>
 #include <wheelwright/model/robot.hpp>
-#include <wheelwright/robots/model_words.hpp>
 #include <wheelwright/robots/robot_file.hpp>
+#include <wheelwright/robots/robot_keys.hpp>
 
 namespace wheelwright::robots {
 

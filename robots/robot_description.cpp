@@ -7,9 +7,9 @@
 #include <fmt/format.h>
 #include <Eigen/Eigenvalues>
 
-#include <wheelwright/files/byte_source.hpp>
+#include <wheelwright/files/bytes.hpp>
+#include <wheelwright/files/place.hpp>
 #include <wheelwright/files/words.hpp>
-#include <wheelwright/files/xml_place.hpp>
 #include <wheelwright/robots/controller_file.hpp>
 
 namespace wheelwright::robots {

@@ -12,8 +12,7 @@
 
 #include <Eigen/Geometry>
 
-#include <wheelwright/files/xml_place.hpp>
-#include <wheelwright/files/yaml_place.hpp>
+#include <wheelwright/files/place.hpp>
 
 namespace wheelwright::robots {
 

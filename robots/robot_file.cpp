@@ -7,13 +7,37 @@
 
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/files/atomic_file.hpp>
-#include <wheelwright/files/byte_source.hpp>
+#include <wheelwright/files/bytes.hpp>
+#include <wheelwright/files/place.hpp>
 #include <wheelwright/files/words.hpp>
-#include <wheelwright/files/yaml_place.hpp>
 #include <wheelwright/robots/robot_keys.hpp>
 
 namespace wheelwright::robots {
+namespace {
+
+const std::string& effort_column(const Robot& robot, const model::Joint& joint) {
+  return robot.effort == model::EffortKind::torque    ? joint.torque
+         : robot.effort == model::EffortKind::current ? joint.current
+                                                      : joint.voltage;
+}
+
+}  // namespace
+
+std::vector<std::string> useful_columns(const Robot& robot) {
+  std::vector<std::string> names = {"t", "x", "y", "theta", "gyro_z", "command_r", "command_l"};
+  for (const model::Joint& joint : model::make_model(robot).joints) {
+    names.insert(names.end(), {joint.angle, joint.speed, effort_column(robot, joint)});
+  }
+  return names;
+}
+
+std::vector<std::string> needed_columns(const Robot& robot) {
+  std::vector<std::string> names;
+  for (const model::Joint& joint : model::make_model(robot).joints) {
+    names.insert(names.end(), {joint.speed + "|" + joint.angle, effort_column(robot, joint)});
+  }
+  return names;
+}
 
 using files::YamlPlace;
 

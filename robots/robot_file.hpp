@@ -1,16 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Robot files (YAML) ↔ Robot ↔ JSON.
+/// Robot files (YAML) ↔ Robot ↔ JSON, and the columns of a log that a robot's model asks for.
 #pragma once
 
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <wheelwright/files/json.hpp>
 #include <wheelwright/model/robot.hpp>
 
 namespace wheelwright::robots {
+
+/// Columns that a robot of this model can use, so that a defect elsewhere in a file does no harm.
+[[nodiscard]] std::vector<std::string> useful_columns(const Robot& robot);
+
+/// Columns that commissioning needs, as require_columns() takes them: each joint's effort, and its speed or angle.
+[[nodiscard]] std::vector<std::string> needed_columns(const Robot& robot);
 
 /// Reads a robot file. Its keys, all optional but those that the model needs (wheel_radius and track_width for
 /// differential_drive):

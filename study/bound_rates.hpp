@@ -23,8 +23,7 @@
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/core/log.hpp>
 #include <wheelwright/filter/row_stream.hpp>
-#include <wheelwright/study/hull_derivatives.hpp>
-#include <wheelwright/study/local_derivatives.hpp>
+#include <wheelwright/study/bound_derivatives.hpp>
 
 namespace wheelwright::study {
 

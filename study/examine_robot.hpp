@@ -10,7 +10,7 @@
 
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/core/log.hpp>
-#include <wheelwright/study/robot_record.hpp>
+#include <wheelwright/study/population.hpp>
 
 namespace wheelwright::study {
 

@@ -1,17 +1,136 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Population of a fleet: random effects, robots outside at a family-wise level (Holm).
+/// A fleet as a population: records of single robots (numbers and sentences, no logs and no sets) and their table by
+/// parameter; random effects, robots outside at a family-wise level (Holm); a prior box for the next robot, with a
+/// coverage that holds whatever the distribution.
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include <wheelwright/core/interval.hpp>
-#include <wheelwright/study/robot_record.hpp>
+#include <wheelwright/core/warrant.hpp>
 
 namespace wheelwright::study {
+
+/// Status of a robot's commissioning.
+enum class RobotStatus {
+  commissioned,  ///< every parameter shows
+  partial,       ///< a model came out; the bounds of some parameters are the prior's
+  contradicted,  ///< no parameters explain the log within the declared noise
+  nothing,       ///< no parameter shows: no model
+  unreadable,    ///< the log or the robot file cannot be used: the message says why
+};
+
+/// One parameter of one log. Where the effort's constants are known it is the physical quantity as a robot file's
+/// `prior` counts it, θ_L,j / per_physical (under voltage, viscous terms with the braking of the back-EMF in them);
+/// else θ_L,j itself. Bounds are rounded outward.
+struct RecordedParameter {
+  std::string name;  ///< physical name, name of θ_L,j, or "kinematic." and the name of a kinematic parameter
+  std::string unit;
+  bool is_prior_key = false;               ///< `name` is a key of a robot file's `prior`
+  std::optional<double> estimate{};        ///< nothing where the log does not show the parameter
+  std::optional<double> standard_error{};  ///< of the estimate, where it is finite
+  std::optional<double> freedom{};  ///< degrees of freedom of the standard error; nothing where it is taken as exact
+  double lower = 0.0;               ///< of the bounds, in the sense of `warrant`
+  double upper = 0.0;
+  bool lower_is_prior = false;  ///< the log does not tighten this side
+  bool upper_is_prior = false;
+  Interval prior{};  ///< in which the bounds were sought; [lower, upper] where that is not known
+  core::Warrant warrant = core::Warrant::extrapolated;  ///< of lower and upper
+
+  friend bool operator==(const RecordedParameter&, const RecordedParameter&) = default;
+};
+
+/// The threshold of one output, on driving that was held out.
+struct RecordedOutput {
+  std::string name;
+  std::string unit;
+  double median_width = 0.0;     ///< of u − l, unit of the output
+  std::size_t instants = 0;      ///< held out
+  std::size_t false_alarms = 0;  ///< of these, outside
+
+  friend bool operator==(const RecordedOutput&, const RecordedOutput&) = default;
+};
+
+/// A log, or several taken together, commissioned by itself.
+struct LogRecord {
+  std::string log;    ///< as the list names it
+  double when = 0.0;  ///< days; a plain order where RobotRecord::dated is false
+  RobotStatus status = RobotStatus::unreadable;
+  std::string message;  ///< one sentence for people
+  double seconds = 0.0;
+  std::size_t rows = 0;
+  std::vector<RecordedParameter> parameters{};
+
+  friend bool operator==(const LogRecord&, const LogRecord&) = default;
+};
+
+/// A later log: looked at by the detector of the commissioned model, and commissioned anew to see what moved.
+struct CheckRecord {
+  LogRecord log;
+  bool checked = false;           ///< there was a model, and the detector could walk the log
+  std::string not_checked;        ///< why it was not; else empty
+  std::size_t events = 0;         ///< alarms of both residuals
+  std::optional<double> first{};  ///< time of the first alarm, s of the log
+  std::size_t instants = 0;       ///< decisions of the torque residual
+  double outside_share = 0.0;     ///< largest share of instants outside over its outputs
+
+  friend bool operator==(const CheckRecord&, const CheckRecord&) = default;
+};
+
+/// A robot's entry in the fleet.
+struct RobotRecord {
+  std::string robot;
+  bool dated = false;  ///< `when` of its logs are dates (days since 1970-01-01) or days; else their order
+  LogRecord commissioning;
+  std::vector<RecordedOutput> outputs{};
+  std::optional<double> smallest_radius_change{};  ///< share of the wheel radius certainly seen held out; nothing where
+                                                   ///< none up to 41 % (an effort scaled by 2) is, or for no wheels
+  std::vector<CheckRecord> checks{};               ///< in order of time
+  std::vector<std::string> notes{};
+  std::vector<std::string> findings{};  ///< what is wrong with the robot's entry (a duplicate, a missing file)
+
+  friend bool operator==(const RobotRecord&, const RobotRecord&) = default;
+};
+
+/// One robot's value of a parameter.
+struct FleetEntry {
+  std::size_t robot = 0;        ///< index into FleetTable::robots
+  double estimate = 0.0;        ///< NaN where the log does not show it
+  double standard_error = 0.0;  ///< NaN where there is none
+  double freedom = 0.0;         ///< of the standard error; infinite where it is taken as exact
+  double lower = 0.0;           ///< bounds
+  double upper = 0.0;
+  Interval prior{};  ///< in which they were sought
+};
+
+/// One parameter over the fleet.
+struct FleetColumn {
+  std::string name;
+  std::string unit;
+  bool is_prior_key = false;
+  std::vector<FleetEntry> entries{};  ///< ascending robots
+  core::Warrant warrant =
+      core::Warrant::extrapolated;  ///< the weakest of all logs' bounds of it, those of checks included
+};
+
+/// Robots in the order in which they were added.
+struct FleetTable {
+  std::vector<std::string> robots{};
+  std::vector<RobotStatus> status{};
+  std::vector<FleetColumn> columns{};
+};
+
+/// Index of the column `name` with `unit`; a new one where there is none.
+[[nodiscard]] std::size_t column_of(FleetTable& table, const RecordedParameter& parameter);
+
+/// Appends the robot of `record` with the parameters of its commissioning.
+void add(FleetTable& table, const RobotRecord& record);
 
 /// Result of fit_random_effects().
 struct RandomEffects {
@@ -90,5 +209,61 @@ struct Population {
 /// certain statement needs no distribution, only the noise bounds. Throws InvalidArgument for a level or share outside
 /// (0, 1) or fewest < 4.
 [[nodiscard]] Population describe_population(const FleetTable& table, const PopulationOptions& options = {});
+
+/// Options of pooled_prior().
+struct PooledPriorOptions {
+  double coverage = 0.95;    ///< least probability that the box holds the next robot's θ
+  std::uint64_t seed = 1;    ///< of the split
+  double most_hidden = 0.1;  ///< a parameter that more of the learning robots than this share do not show is left out
+};
+
+/// One parameter of the box.
+struct PooledParameter {
+  std::size_t column = 0;  ///< of the table
+  bool included = false;
+  std::string reason{};      ///< why it is left out; else empty
+  double hidden = 0.0;       ///< share of the learning robots whose log does not show it
+  double centre = 0.0;       ///< median of the learning robots' mid-points
+  double scale_below = 0.0;  ///< median of how far their intervals reach below the centre
+  double scale_above = 0.0;  ///< median of how far their intervals reach above the centre
+  Interval before{};         ///< hull of the priors with which the fleet was commissioned
+  Interval box{};            ///< rounded outward; `before` where it is not included or there is no box
+};
+
+/// The result of pooled_prior().
+struct PooledPrior {
+  bool exists = false;                        ///< there is a box with at least one parameter
+  std::string message{};                      ///< one sentence for people: the statement, or why there is none
+  double asked = 0.0;                         ///< coverage that was asked for
+  double coverage = 0.0;                      ///< coverage that is stated: k/(m + 1); 0 where there is no box
+  std::size_t learning = 0;                   ///< robots that gave centres and scales
+  std::size_t scored = 0;                     ///< m, the others
+  std::size_t rank = 0;                       ///< k
+  std::size_t boundless = 0;                  ///< of the scored, robots without bounds: their scores are infinite
+  std::size_t needed = 0;                     ///< fewest robots of a fleet for a box at the coverage asked for
+  double radius = 0.0;                        ///< k-th smallest score
+  std::vector<PooledParameter> parameters{};  ///< of the columns that are keys of a prior
+};
+
+/// Split-conformal prediction (`vovk2005`, `lei2018`) of a box. The robots whose logs could be read are split in halves
+/// by a seeded hash of their names. One half gives each parameter a centre and a scale to each side, and says which
+/// parameters are left out. Each of the m robots of the other half gets the score
+///
+///     S_i = max over parameters of max((c − l_i)/s_below, (u_i − c)/s_above)
+///
+/// of the farthest corner of its bounds: at least the score of its true θ, which is unknown. The box is all points with
+/// a score of at most the k-th smallest, k = ⌈(m + 1)(1 − a)⌉, cut to the hull of the robots' own priors.
+///
+/// Where the robots and the next one are exchangeable and their noise keeps to its bounds, P(θ of the next robot in the
+/// box) >= k/(m + 1) >= 1 − a, over fleets and next robots together, for any distribution of θ: the true θ's of the
+/// scored robots and the next one's are exchangeable given the learning half, and larger scores only enlarge the box.
+/// No robot is left out as an outlier. A robot that was read but gave no bounds (contradicted, nothing shown) has an
+/// infinite score, so the statement is about such robots too; where they are more than the coverage allows, there is no
+/// box. A parameter that a scored robot's log does not show has the bounds of its prior, which are wide and true. Which
+/// parameters are included depends on the learning half only, and so costs no coverage. Robots whose logs could not be
+/// read take no part: that has to have nothing to do with their θ.
+///
+/// Throws InvalidArgument for a coverage outside (0, 1) or a share outside [0, 1].
+[[nodiscard]] PooledPrior pooled_prior(const FleetTable& table, const PooledPriorOptions& options = {});
 
 }  // namespace wheelwright::study

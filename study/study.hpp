@@ -11,8 +11,7 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/study/screening.hpp>
-#include <wheelwright/study/sobol_indices.hpp>
+#include <wheelwright/study/global_sensitivity.hpp>
 #include <wheelwright/study/study_case.hpp>
 #include <wheelwright/study/study_quantity.hpp>
 
@@ -20,7 +19,7 @@ namespace wheelwright::study {
 
 /// Methods of a study.
 struct StudyMethods {
-  bool local = false;                           ///< derivatives of the bounds (local_derivatives.hpp)
+  bool local = false;                           ///< derivatives of the bounds (bound_derivatives.hpp)
   std::optional<Eigen::Index> one_at_a_time{};  ///< levels
   std::optional<MorrisOptions> morris{};
   std::optional<SobolOptions> sobol{};

@@ -17,8 +17,7 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/logs/bag.hpp>
 #include <wheelwright/logs/bag_write.hpp>
-#include <wheelwright/logs/ros_extractor.hpp>
-#include <wheelwright/logs/ros_write.hpp>
+#include <wheelwright/logs/ros_messages.hpp>
 
 namespace {
 

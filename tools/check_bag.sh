@@ -12,10 +12,9 @@ command -v npm >/dev/null || { echo "bag: npm is missing" >&2; exit 2; }
 
 mkdir "$scratch/include"
 ln -s "$PWD" "$scratch/include/wheelwright"
-"${CXX:-g++}" -std=c++20 -O1 -I "$scratch/include" -o "$scratch/check_bag" tools/check_bag.cpp logs/ros_*.cpp logs/mcap_*.cpp \
-  logs/bag.cpp logs/database.cpp logs/database.cpp logs/bag_mcap.cpp logs/bag_files.cpp logs/bag_files.cpp \
-  logs/bag.cpp logs/bag_sqlite.cpp logs/bag_files.cpp logs/bag_files.cpp logs/bag_write.cpp files/atomic_file.cpp \
-  files/byte_source.cpp files/words.cpp files/xxh64.cpp -lfmt -lz -lzstd -llz4 -lxxhash -lsqlite3 -lfastcdr -lyaml-cpp
+"${CXX:-g++}" -std=c++20 -O1 -I "$scratch/include" $(pkg-config --cflags eigen3) -o "$scratch/check_bag" \
+  tools/check_bag.cpp logs/ros_*.cpp logs/mcap_*.cpp logs/bag.cpp logs/bag_files.cpp logs/bag_storage.cpp logs/bag_write.cpp \
+  logs/database.cpp files/bytes.cpp files/words.cpp core/words.cpp -lfmt -lz -lzstd -llz4 -lxxhash -lsqlite3 -lfastcdr -lyaml-cpp
 cp tools/check_bag.mjs "$scratch"
 cd "$scratch"
 npm install --silent --no-audit --no-fund --ignore-scripts @mcap/core@2.2.2 @foxglove/wasm-zstd@1.0.1 \

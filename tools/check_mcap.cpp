@@ -11,8 +11,7 @@
 #include <fmt/format.h>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/logs/mcap_reader.hpp>
-#include <wheelwright/logs/mcap_writer.hpp>
+#include <wheelwright/logs/mcap.hpp>
 
 namespace {
 

@@ -12,7 +12,7 @@ command -v npm >/dev/null || { echo "mcap: npm is missing" >&2; exit 2; }
 mkdir "$scratch/include"
 ln -s "$PWD" "$scratch/include/wheelwright"
 "${CXX:-g++}" -std=c++20 -O1 -I "$scratch/include" -o "$scratch/check_mcap" tools/check_mcap.cpp logs/mcap_*.cpp \
-  files/atomic_file.cpp files/xxh64.cpp files/words.cpp -lfmt -lz -lzstd -llz4 -lxxhash
+  files/bytes.cpp files/words.cpp -lfmt -lz -lzstd -llz4 -lxxhash
 cp tools/check_mcap.mjs "$scratch"
 cd "$scratch"
 npm install --silent --no-audit --no-fund --ignore-scripts @mcap/core@2.2.2 @foxglove/wasm-lz4@1.0.2 \

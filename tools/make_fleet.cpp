@@ -20,7 +20,7 @@
 
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/core/log.hpp>
-#include <wheelwright/files/atomic_file.hpp>
+#include <wheelwright/files/bytes.hpp>
 #include <wheelwright/logs/log_file.hpp>
 #include <wheelwright/robots/robot_file.hpp>
 #include <wheelwright/sim/simulation.hpp>

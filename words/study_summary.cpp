@@ -1,17 +1,367 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/words/study_summary.hpp>
+#include <wheelwright/words/summary.hpp>
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 
+#include <wheelwright/commission/physical.hpp>
+#include <wheelwright/core/words.hpp>
+#include <wheelwright/gap/where.hpp>
+#include <wheelwright/identify/noise_level.hpp>
+#include <wheelwright/words/detect_words.hpp>
+#include <wheelwright/words/gap_words.hpp>
+#include <wheelwright/words/identification_words.hpp>
 #include <wheelwright/words/text.hpp>
 
-#include <wheelwright/words/columns.hpp>
-
 namespace wheelwright::words {
+namespace {
+
+constexpr std::size_t kWidth = 110;  // of a line of words
+
+// Columns that a terminal shows: bytes that begin a character.
+std::size_t columns(std::string_view text) {
+  return static_cast<std::size_t>(
+      std::ranges::count_if(text, [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));
+}
+
+// `text` in lines, the first one after `first` and the others as deep.
+std::string wrapped(std::string_view text, const std::string& first) {
+  const std::string indent(columns(first), ' ');
+  std::string out = first, line;
+  const auto flush = [&] {
+    out += line + "\n";
+    line.clear();
+  };
+  std::size_t at = 0;
+  while (at < text.size()) {
+    const std::size_t end = std::min(text.find(' ', at), text.size());
+    const std::string_view word = text.substr(at, end - at);
+    if (!line.empty() && columns(line) + columns(word) + 1 + indent.size() > kWidth) {
+      flush();
+      out += indent;
+    }
+    line += line.empty() ? "" : " ";
+    line += word;
+    at = end + 1;
+  }
+  flush();
+  return out;
+}
+
+// A table as rows of cells, the first column set to the left and the others to the right.
+std::string aligned(const std::vector<std::vector<std::string>>& rows) {
+  std::vector<std::size_t> width;
+  for (const auto& row : rows) {
+    width.resize(std::max(width.size(), row.size()), 0);
+    for (std::size_t c = 0; c < row.size(); ++c) {
+      width[c] = std::max(width[c], columns(row[c]));
+    }
+  }
+  std::string out;
+  for (const auto& row : rows) {
+    std::string line = " ";
+    for (std::size_t c = 0; c < row.size(); ++c) {
+      const std::string blanks(width[c] - columns(row[c]), ' ');
+      line += c == 0 ? " " + row[c] + blanks : "  " + blanks + row[c];
+    }
+    out += line.substr(0, line.find_last_not_of(' ') + 1) + "\n";
+  }
+  return out;
+}
+
+// How many digits after the point show `spread` with two digits.
+int decimals(double spread) {
+  return spread > 0.0 && std::isfinite(spread) ? std::clamp(1 - static_cast<int>(std::floor(std::log10(spread))), 0, 12)
+                                               : 4;
+}
+
+std::string fixed_number(double x, int digits) { return std::isfinite(x) ? fmt::format("{:.{}f}", x, digits) : "-"; }
+
+// Estimators and intervals by method are the lines; one block for each parameter keeps lines short.
+std::string comparison(const inference::Identification& r) {
+  const auto shown = shown_parameters(r);
+  const identify::EstimatorChoice& choice = r.fit.choice;
+  std::vector<std::vector<std::string>> rows;
+  std::vector<std::string> header = {""}, units = {""};
+  std::vector<int> digits;
+  for (std::size_t j = 0; j < shown.size(); ++j) {
+    header.push_back(words::spaced(shown[j].name));
+    units.push_back(shown[j].unit);
+    const auto at = static_cast<Eigen::Index>(j);
+    const Eigen::VectorXd& error = r.fit.residuals.standard_error;
+    digits.push_back(decimals(at < error.size() ? std::abs(shown[j].scale.scale) * error[at] : 0.0));
+  }
+  rows.push_back(header);
+  rows.push_back(units);
+  const auto excluded = [&](std::size_t j) { return r.fit.excitation[j].state == identify::Excitation::not_excited; };
+  const auto line = [&](std::string name, const Eigen::VectorXd& theta) {
+    std::vector<std::string> row = {std::move(name)};
+    for (std::size_t j = 0; j < shown.size(); ++j) {
+      const auto at = static_cast<Eigen::Index>(j);
+      row.push_back(excluded(j) || at >= theta.size() ? "-" : fixed_number(shown[j].value(theta[at]), digits[j]));
+    }
+    rows.push_back(row);
+  };
+  for (std::size_t c = 0; c < choice.candidates.size(); ++c) {
+    const identify::Estimate& e = choice.candidates[c].estimate;
+    if (e.usable) {
+      line(words::spaced(identify::to_string(e.estimator)) + (c == choice.chosen ? " (taken)" : ""), e.theta);
+    }
+  }
+  line("robust", r.robust.estimate);
+  if (!binding(r.constrained).empty()) {
+    line("physically consistent", r.constrained.estimate);
+  }
+  for (const inference::RegionRow& region : r.regions.rows) {
+    if (!region.available) {
+      continue;
+    }
+    for (const bool upper : {false, true}) {
+      line(upper ? "  to"
+                 : fmt::format("{} {:g} %{}", words::spaced(inference::to_string(region.method)),
+                               100.0 * region.confidence, region.all_at_once ? ", all at once" : ""),
+           upper ? region.upper : region.lower);
+    }
+  }
+  return aligned(rows);
+}
+
+std::string promises(const inference::Identification& r) {
+  std::string out;
+  for (const inference::RegionRow& row : r.regions.rows) {
+    const std::string name = "  " + words::spaced(inference::to_string(row.method)) + ": ";
+    out += wrapped(
+        row.available ? row.promise + (row.remark.empty() ? "" : "; " + row.remark) : "not available: " + row.remark,
+        name);
+  }
+  return out;
+}
+
+std::string noise_lines(const inference::Identification& r) {
+  std::string out;
+  for (const inference::ColumnNoise& n : r.noise) {
+    const bool of_angles = n.known && (n.known->unit != n.unit || n.known->origin == "half an encoder count" ||
+                                       r.setting.measurement.motion == MotionKind::angle);
+    std::string text = n.known ? fmt::format("{}: ± {:.2g} {}", n.known->origin, n.known->bound, n.known->unit) : "";
+    const bool effort =
+        std::ranges::find(r.setting.measurement.effort_columns, n.column) != r.setting.measurement.effort_columns.end();
+    if (!n.known || effort || !of_angles) {
+      text += text.empty() ? "" : "; ";
+      text += n.choice.method == inference::NoiseMethod::none
+                  ? "not found: " + n.choice.reason
+                  : fmt::format("standard deviation {:.2g} {} by {} ({})", n.choice.sd, n.unit,
+                                inference::to_string(n.choice.method), n.choice.assumption);
+    }
+    out += wrapped(text, "  " + n.column + ": ");
+  }
+  return out;
+}
+
+}  // namespace
+
+std::string summary(const inference::Identification& r) {
+  std::string text = wrapped(r.setting.robot.name + ": " + verdict(r), "");
+  for (const std::string& finding : findings(r)) {
+    text += wrapped(finding, "  ");
+  }
+  if (r.effort && !r.fit.choice.candidates.empty()) {
+    text.append("\n").append(comparison(r)).append("\nwhat the intervals promise\n").append(promises(r));
+  }
+  if (!r.noise.empty()) {
+    text.append("\nnoise\n").append(noise_lines(r));
+  }
+  if (!r.shapes.empty()) {
+    text += "\nlooked for beside the model\n";
+    for (const inference::ShapeFinding& shape : r.shapes) {
+      text += wrapped(in_words(shape), "  ");
+    }
+  }
+  text += "\nnext\n";
+  for (const std::string& step : next_steps(r)) {
+    text += wrapped(step, "  - ");
+  }
+  for (const std::string& note : r.notes) {
+    text += wrapped(note, "  note: ");
+  }
+  return text;
+}
+
+namespace {
+
+std::string causes_words(const Diagnosis& d) {
+  std::string out;
+  for (const gap::GapCause& cause : d.causes) {
+    out += fmt::format("  {}: {}\n", core::capital(words::effect_noun(cause.effect)), cause.sentence);
+    for (const gap::GapEstimate& p : cause.parameters) {
+      out += fmt::format("      {} {}\n", words::parameter_words(p.name), words::estimate_words(p));
+    }
+  }
+  return out;
+}
+
+std::string figures_words(const std::vector<gap::ShrinkFigure>& figures, const std::string& what) {
+  std::string out;
+  for (const gap::ShrinkFigure& f : figures) {
+    if (!std::isfinite(f.before) || !std::isfinite(f.after)) {
+      continue;
+    }
+    out += fmt::format("  {:<38} {:>9} → {:>9} {}{}\n", what + ", " + words::spaced(f.name), words::number(f.before),
+                       words::number(f.after), f.unit == "1" ? "" : f.unit,
+                       f.floor > 0.0 ? ", floor " + words::number(f.floor) : "");
+  }
+  return out;
+}
+
+std::string shifts_words(const Diagnosis& d) {
+  std::string out;
+  for (const gap::ParameterShift& p : d.parametric) {
+    const auto [low, high] = words::outward(p.lower, p.upper);
+    out += fmt::format("  {:<20} {:>9} {}{}, {} [{}, {}] with the causes\n", words::spaced(p.parameter),
+                       words::number(p.without_causes), p.unit,
+                       p.nominal ? " (nominal " + words::number(*p.nominal) + ")" : "", words::number(p.estimate), low,
+                       high);
+  }
+  return out;
+}
+
+std::string titled(const std::string& title, const std::string& body) {
+  return body.empty() ? body : title + ":\n" + body;
+}
+
+// The regimes in which most of what is left lies.
+std::string places(const Diagnosis& d) {
+  std::vector<std::string> names;
+  for (const gap::GapShare& s : d.where) {
+    if (s.kind != "channel" && s.kind != "time" && gap::is_finding(s) && names.size() < 3) {
+      names.push_back(s.regime);
+    }
+  }
+  return core::enumerated(names);
+}
+
+std::string next_step(const Diagnosis& d, const GapResults& r) {
+  const auto file = [&r](const char* name) { return r.out + name; };
+  const std::string improved =
+      r.improved ? fmt::format("wheelwright commission LOG --robot {}", file("robot_improved.yaml")) : std::string();
+  switch (d.verdict) {
+    case gap::GapVerdict::no_gap:
+      return fmt::format("wheelwright commission LOG --robot {}; nothing is to be added to it.", r.robot);
+    case gap::GapVerdict::explained:
+      return !improved.empty() ? improved + ", for thresholds that are not widened by what the model lacked."
+             : r.out.empty()   ? "run this with --out DIR, which writes the robot file with the causes in it."
+                               : "the robot file cannot carry these causes (see the notes): mend them, or model them.";
+    case gap::GapVerdict::ambiguous:
+      return r.commands ? fmt::format("drive {}, then wheelwright gap on that log.", file("next_manoeuvre.csv"))
+                        : std::string("a measurement that tells the causes apart; until then any of them is a guess.");
+    case gap::GapVerdict::unexplained: {
+      const std::string where = places(d);
+      return "add a term to the model: what is left lies in " +
+             (where.empty() ? std::string("no regime more than in others") : where) + ".";
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+std::string summary(const Diagnosis& d, const GapResults& r) {
+  std::string out = words::gap_verdict(d) + "\n";
+  for (const std::string& sentence : words::gap_sentences(d, {})) {
+    out += sentence + "\n";
+  }
+  out += titled("causes, 95 % intervals", causes_words(d));
+  out += titled("held out, before → after the causes are in the model",
+                figures_words(d.shrink.torque_rms, "torque residual") +
+                    figures_words(d.shrink.fresh_torque_rms, "torque residual, fresh log") +
+                    figures_words(d.shrink.rollout, "rollout") +
+                    figures_words(d.shrink.threshold_width, "width of the threshold") +
+                    figures_words(d.shrink.smallest_fault, "smallest radius fault"));
+  out += titled("parameters fitted to this log without the causes", shifts_words(d));
+  for (const std::string& note : d.notes) {
+    out += "note: " + note + "\n";
+  }
+  if (!r.next_manoeuvre.empty()) {
+    out += r.next_manoeuvre + "\n";
+  }
+  if (r.naive) {
+    out += fmt::format("the naive rule (forward selection by BIC over samples) says: {}\n",
+                       words::effect_nouns(r.naive_effects));
+  }
+  return out + "next: " + next_step(d, r) + "\n";
+}
+
+std::string summary(const design::BoundsDesign& design, const design::DesignSubject& subject) {
+  const auto scales = commission::physical_scales(subject.robot, subject.model);
+  std::string out = fmt::format("{:.1f} s, within {:.2f} m of the start; {} manoeuvres were looked at\n",
+                                design.manoeuvre.plan.t(design.manoeuvre.plan.samples() - 1),
+                                design.manoeuvre.plan.reach(), design.manoeuvre.evaluations);
+  out += fmt::format("  {:<20} {:>12}{}{}\n", "half widths", "promised",
+                     subject.known ? fmt::format(" {:>12}", "model now") : "",
+                     design.figure_eight ? fmt::format(" {:>14}", "figure eight") : "");
+  for (std::size_t j = 0; j < subject.model.p(); ++j) {
+    const model::Parameter& parameter = subject.model.parameters[j];
+    const double scale = scales ? std::abs((*scales)[j].scale) : 1.0;
+    const auto half = [&](const Box& box) { return 0.5 * scale * (box.sides[j].upper - box.sides[j].lower); };
+    out += fmt::format("  {:<20} {:>12.4g}", scales ? parameter.physical : parameter.name, half(design.promised));
+    if (subject.known) {
+      out += fmt::format(" {:>12.4g}", half(*subject.known));
+    }
+    if (design.figure_eight) {
+      out += fmt::format(" {:>14.4g}", half(design.promised_eight));
+    }
+    out += "  " + (scales ? parameter.physical_unit : commission::parameter_unit(subject.robot, parameter)) + "\n";
+  }
+  return out;
+}
+
+std::string summary(const design::DetectionDesign& design) {
+  const design::Plan& plan = design.manoeuvre.plan;
+  std::string out = fmt::format("{:.1f} s, within {:.2f} m of the start; {} manoeuvres were looked at\n",
+                                plan.t(plan.samples() - 1), plan.reach(), design.manoeuvre.evaluations);
+  out += fmt::format("  {:<26} {:>10} {:>12} {:>8}{}\n", "certainly found from", "asked", "promised", "after",
+                     design.figure_eight ? fmt::format(" {:>14}", "figure eight") : "");
+  for (std::size_t k = 0; k < design.promised.size(); ++k) {
+    const design::PromisedFault& p = design.promised[k];
+    out += fmt::format("  {:<26} {:>10} {:>12} {:>8}", p.fault.name + (p.side > 0.0 ? " +" : " -"),
+                       magnitude_words(p.fault, p.asked),
+                       std::isfinite(p.smallest) ? magnitude_words(p.fault, p.smallest) : "none",
+                       std::isfinite(p.smallest) ? fmt::format("{:.2f} s", p.t) : "");
+    if (design.figure_eight) {
+      const double eight = design.promised_eight[k].smallest;
+      out += fmt::format(" {:>14}", std::isfinite(eight) ? magnitude_words(p.fault, eight) : "none");
+    }
+    out += "\n";
+  }
+  return out;
+}
+
+std::string summary(const gap::DiscriminationDesign& design) {
+  const design::Plan& plan = design.manoeuvre.plan;
+  std::string out = fmt::format("{:.1f} s, within {:.2f} m of the start; {} manoeuvres were looked at\n",
+                                plan.t(plan.samples() - 1), plan.reach(), design.manoeuvre.evaluations);
+  for (const std::string& stage : design.stages) {
+    out += "  " + stage + "\n";
+  }
+  out += fmt::format("  {:<52} {:>12}{}\n", "standard deviations from going wrong", "promised",
+                     design.figure_eight ? fmt::format(" {:>14}", "figure eight") : "");
+  for (std::size_t k = 0; k < design.promised.size(); ++k) {
+    const gap::RivalSeparation& pair = design.promised[k];
+    out +=
+        fmt::format("  {:<52} {:>12.2f}",
+                    design.rivals[pair.truth].name() + ", not " + design.rivals[pair.other].name(), pair.deviations());
+    out += design.figure_eight ? fmt::format(" {:>14.2f}\n", design.promised_eight[k].deviations()) : "\n";
+  }
+  for (const std::string& sentence : design.sentences) {
+    out += sentence + "\n";
+  }
+  return out;
+}
+
 namespace {
 
 constexpr std::size_t kFindings = 5;

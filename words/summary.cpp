@@ -11,8 +11,8 @@
 #include <wheelwright/commission/physical.hpp>
 #include <wheelwright/core/statistics.hpp>
 #include <wheelwright/identify/noise_level.hpp>
-#include <wheelwright/words/margin_words.hpp>
-#include <wheelwright/words/parameter_view.hpp>
+#include <wheelwright/words/commission_words.hpp>
+#include <wheelwright/words/detect_words.hpp>
 
 namespace wheelwright::words {
 namespace {

@@ -1,14 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Results in a few lines for a terminal.
+/// Results in a few lines or tables for a terminal.
 #pragma once
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/commission/detector_walk.hpp>
 #include <wheelwright/commission/risk_watch.hpp>
+#include <wheelwright/design/detection.hpp>
+#include <wheelwright/design/manoeuvre.hpp>
+#include <wheelwright/gap/diagnosis.hpp>
+#include <wheelwright/gap/discrimination_design.hpp>
+#include <wheelwright/inference/identification.hpp>
+#include <wheelwright/study/bound_derivatives.hpp>
+#include <wheelwright/study/study.hpp>
 
 namespace wheelwright::words {
 
@@ -33,5 +41,37 @@ namespace wheelwright::words {
 
 /// One event in a line.
 [[nodiscard]] std::string event_line(const detector::Event& event, const OnlineModel& model);
+
+/// Words first, then one table of estimates and intervals by every method, then what to do next.
+[[nodiscard]] std::string summary(const inference::Identification& result);
+
+/// Files that the summary refers to.
+struct GapResults {
+  std::string out;                         ///< what stands before names of results; empty: none was written
+  std::string robot;                       ///< robot file
+  bool improved = false;                   ///< whether robot_improved.yaml was written
+  std::string next_manoeuvre;              ///< what the next drive promises; empty: none was designed
+  bool commands = false;                   ///< whether next_manoeuvre.csv was written
+  bool naive = false;                      ///< whether the naive rule was asked
+  std::vector<std::string> naive_effects;  ///< what it said
+};
+
+/// Verdict, causes with their intervals, what the healthy log had already, how far the gap shrinks, and what to do
+/// next.
+[[nodiscard]] std::string summary(const Diagnosis& diagnosis, const GapResults& results);
+
+/// The result for a terminal.
+[[nodiscard]] std::string summary(const design::BoundsDesign& design, const design::DesignSubject& subject);
+
+/// The result for a terminal.
+[[nodiscard]] std::string summary(const design::DetectionDesign& design);
+
+/// The result for a terminal.
+[[nodiscard]] std::string summary(const gap::DiscriminationDesign& design);
+
+/// One table for each quantity: what each input does to it, by every method that the study asks for; the widths'
+/// elasticities; and what could not be evaluated.
+[[nodiscard]] std::string summary(const study::Study& study, const study::StudyResult& result,
+                                  const std::optional<study::LocalSensitivity>& local);
 
 }  // namespace wheelwright::words

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Numbers and names as a reader wants them. Everything returns UTF-8 text that is not yet escaped, escape() apart.
+/// Numbers, names and times of a log as a reader wants them. Everything returns UTF-8 text that is not yet escaped,
+/// escape() apart.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <string>
 #include <string_view>
@@ -51,5 +53,39 @@ namespace wheelwright::words {
 /// `x` with as many decimals as outward(lower, upper) shows, three significant digits at least; as number() where that
 /// interval has no width.
 [[nodiscard]] std::string beside(double x, double lower, double upper);
+
+/// UTF-8 `text` filled with blanks to `width` columns, one blank at least where it is longer. Columns count what is
+/// seen: a dash is one column and three bytes.
+[[nodiscard]] inline std::string padded(std::string text, std::size_t width) {
+  const auto columns = static_cast<std::size_t>(
+      std::count_if(text.begin(), text.end(), [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));
+  text.append(columns < width ? width - columns : 1, ' ');
+  return text;
+}
+
+/// Times of a page. They count from an origin where the log's clock is an epoch, so that digits are left for the
+/// driving. Where the log's time goes back (several runs in one log), its runs are laid end to end: a moment then no
+/// longer has one place on the axis.
+class TimeAxis {
+ public:
+  /// The axis for the times `t` (s) of a whole log, or of what is known of it: origin 0 unless the first one is beyond
+  /// ±10⁶ s.
+  explicit TimeAxis(const std::vector<double>& t = {});
+
+  /// s, subtracted from every time that is shown.
+  [[nodiscard]] double origin() const { return origin_; }
+  /// True if the log's time goes back somewhere.
+  [[nodiscard]] bool repeats() const { return offsets_.size() > 1; }
+  /// Seconds since the origin.
+  [[nodiscard]] double shown(double t) const { return t - origin_; }
+  /// "12.345 s".
+  [[nodiscard]] std::string text(double t) const;
+  /// Places on the axis of the times `t` of one walk over the log; never decreasing.
+  [[nodiscard]] std::vector<double> lay(const std::vector<double>& t) const;
+
+ private:
+  double origin_ = 0.0;
+  std::vector<double> offsets_;  // of each run, s
+};
 
 }  // namespace wheelwright::words

@@ -3,8 +3,8 @@
 #include <regex>
 #include <set>
 
+#include "app/common.hpp"
 #include "app/program.hpp"
-#include "app/progress.hpp"
 #include "app/units.hpp"
 
 namespace wheelwright::app::manners_test {

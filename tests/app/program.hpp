@@ -16,7 +16,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/files/byte_source.hpp>
+#include <wheelwright/files/bytes.hpp>
 #include <wheelwright/files/json.hpp>
 
 #include "support/scratch.hpp"

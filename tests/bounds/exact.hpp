@@ -10,7 +10,7 @@
 
 #include <boost/multiprecision/cpp_int.hpp>
 
-#include <wheelwright/bounds/infeasibility.hpp>
+#include <wheelwright/bounds/certificate.hpp>
 #include <wheelwright/bounds/slab_rows.hpp>
 
 namespace wheelwright::bounds::exact {

@@ -6,7 +6,6 @@
 
 #include <wheelwright/bounds/feasible_set.hpp>
 #include <wheelwright/bounds/minimax.hpp>
-#include <wheelwright/bounds/outliers.hpp>
 
 #include "bounds/exact.hpp"
 #include "bounds/rows.hpp"

@@ -8,7 +8,7 @@
 
 #include <wheelwright/commission/assumptions.hpp>
 #include <wheelwright/commission/commission.hpp>
-#include <wheelwright/files/byte_source.hpp>
+#include <wheelwright/files/bytes.hpp>
 
 #include "support/drives.hpp"
 

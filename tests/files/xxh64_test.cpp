@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/files/xxh64.hpp>
+#include <wheelwright/files/bytes.hpp>
 
 #include <algorithm>
 #include <cstdint>

@@ -10,7 +10,6 @@
 #include <Eigen/QR>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/gap/signed_least_squares.hpp>
 
 namespace wheelwright::gap::block_gram_test {
 namespace {

@@ -14,7 +14,7 @@
 
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/gap/drive.hpp>
-#include <wheelwright/gap/kinematic_rows.hpp>
+#include <wheelwright/gap/gap_rows.hpp>
 
 namespace wheelwright::gap::catalogue_test {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/core/statistics.hpp>
-#include <wheelwright/identify/estimator_choice.hpp>
+#include <wheelwright/identify/estimate.hpp>
 
 #include <cmath>
 

@@ -8,7 +8,7 @@
 
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/identify/time_shift.hpp>
-#include <wheelwright/inference/stribeck.hpp>
+#include <wheelwright/inference/identification.hpp>
 
 #include "support/drives.hpp"
 #include "support/random.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/inference/noise_choice.hpp>
+#include <wheelwright/inference/noise_levels.hpp>
 
 #include <algorithm>
 #include <cmath>

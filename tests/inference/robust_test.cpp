@@ -11,7 +11,6 @@
 
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/inference/constrained.hpp>
-#include <wheelwright/inference/m_estimate.hpp>
 #include <wheelwright/inference/robust.hpp>
 
 #include "support/random.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/inference/standstill_noise.hpp>
+#include <wheelwright/inference/noise_levels.hpp>
 
 #include <algorithm>
 #include <cmath>

@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/logs/bag_columns.hpp>
+#include <wheelwright/logs/bag_log.hpp>
 
 namespace wheelwright::logs::bag_columns_test {
 namespace {

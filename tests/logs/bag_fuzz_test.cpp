@@ -9,7 +9,7 @@
 #include "logs/bag_samples.hpp"
 #include "support/scratch.hpp"
 
-#include <wheelwright/logs/ros_extractor.hpp>
+#include <wheelwright/logs/ros_messages.hpp>
 
 namespace wheelwright::logs::bag_fuzz_test {
 namespace {

@@ -8,12 +8,11 @@
 #include "logs/bag_samples.hpp"
 #include "support/scratch.hpp"
 
-#include <wheelwright/files/xxh64.hpp>
+#include <wheelwright/files/bytes.hpp>
 #include <wheelwright/logs/bag.hpp>
 #include <wheelwright/logs/bag_write.hpp>
-#include <wheelwright/logs/mcap_reader.hpp>
-#include <wheelwright/logs/ros_extractor.hpp>
-#include <wheelwright/logs/ros_write.hpp>
+#include <wheelwright/logs/mcap.hpp>
+#include <wheelwright/logs/ros_messages.hpp>
 
 namespace wheelwright::logs::bag_test {
 namespace {

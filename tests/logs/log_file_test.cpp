@@ -12,8 +12,7 @@
 
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/logs/bag_write.hpp>
-#include <wheelwright/logs/ros_definition.hpp>
-#include <wheelwright/logs/ros_write.hpp>
+#include <wheelwright/logs/ros_messages.hpp>
 
 #include <hdf5.h>
 

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include <wheelwright/files/xxh64.hpp>
+#include <wheelwright/files/bytes.hpp>
 
 #include "logs/mcap_samples.hpp"
 #include "support/scratch.hpp"

@@ -9,8 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/logs/mcap_reader.hpp>
-#include <wheelwright/logs/mcap_writer.hpp>
+#include <wheelwright/logs/mcap.hpp>
 
 namespace wheelwright::testing {
 

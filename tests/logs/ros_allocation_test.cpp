@@ -9,7 +9,7 @@
 
 #include "logs/ros_cdr.hpp"
 
-#include <wheelwright/logs/ros_extractor.hpp>
+#include <wheelwright/logs/ros_messages.hpp>
 
 namespace wheelwright::logs::ros_allocation_test {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "support/scratch.hpp"
 
-#include <wheelwright/logs/ros_definition.hpp>
+#include <wheelwright/logs/ros_messages.hpp>
 
 namespace wheelwright::logs::ros_definition_test {
 namespace {

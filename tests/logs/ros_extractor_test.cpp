@@ -11,8 +11,8 @@
 #include "logs/ros_cdr.hpp"
 #include "support/scratch.hpp"
 
-#include <wheelwright/logs/ros_extractor.hpp>
-#include <wheelwright/logs/ros_write.hpp>
+#include <wheelwright/logs/bag_write.hpp>
+#include <wheelwright/logs/ros_messages.hpp>
 
 namespace wheelwright::logs::ros_extractor_test {
 namespace {

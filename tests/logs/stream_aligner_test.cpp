@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/logs/stream_aligner.hpp>
+#include <wheelwright/logs/row_log.hpp>
 
 namespace wheelwright::logs::stream_aligner_test {
 namespace {

@@ -12,7 +12,7 @@
 
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/model/differential_drive.hpp>
-#include <wheelwright/report/context.hpp>
+#include <wheelwright/report/page.hpp>
 
 namespace wheelwright::report::report_example {
 

@@ -4,7 +4,6 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/report/gap_drawings.hpp>
 #include <wheelwright/report/gap_report.hpp>
 #include <wheelwright/words/gap_words.hpp>
 

@@ -11,12 +11,12 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/report/chart.hpp>
 #include <wheelwright/report/commission_report.hpp>
 #include <wheelwright/report/design_report.hpp>
 #include <wheelwright/report/detect_report.hpp>
 #include <wheelwright/report/gap_report.hpp>
 #include <wheelwright/report/identify_report.hpp>
+#include <wheelwright/report/page.hpp>
 #include <wheelwright/report/signals.hpp>
 #include <wheelwright/words/identification_words.hpp>
 

@@ -10,7 +10,7 @@
 
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/core/limits.hpp>
-#include <wheelwright/report/sensitivity_drawings.hpp>
+#include <wheelwright/report/sensitivity_report.hpp>
 
 namespace wheelwright::report::sensitivity_drawings_test {
 

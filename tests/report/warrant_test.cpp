@@ -8,9 +8,8 @@
 #include <gtest/gtest.h>
 
 #include <wheelwright/report/commission_report.hpp>
-#include <wheelwright/report/data_sections.hpp>
 #include <wheelwright/report/detect_report.hpp>
-#include <wheelwright/report/margins_report.hpp>
+#include <wheelwright/report/sections.hpp>
 
 #include "report/example.hpp"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The kinematic section of model.json gives back the detector that was commissioned, bit for bit.
-#include <wheelwright/results/kinematic_json.hpp>
+#include <wheelwright/results/model_json.hpp>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

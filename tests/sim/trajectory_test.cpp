@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/sim/trajectory.hpp>
+#include <wheelwright/sim/simulation.hpp>
 
 namespace wheelwright::sim::trajectory_test {
 namespace {

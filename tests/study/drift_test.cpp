@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Drift: what is certain, what is a trend, and how often chance is taken for one.
-#include <wheelwright/study/drift.hpp>
+#include <wheelwright/study/fleet_result.hpp>
 
 #include <cmath>
 #include <limits>

@@ -6,8 +6,8 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/study/drift.hpp>
-#include <wheelwright/study/pooled_prior.hpp>
+#include <wheelwright/study/fleet_result.hpp>
+#include <wheelwright/study/population.hpp>
 
 #include "study/simulated.hpp"
 #include "support/random.hpp"

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/study/robot_record.hpp>
+#include <wheelwright/study/population.hpp>
 
 #include "support/random.hpp"
 

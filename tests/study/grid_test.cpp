@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/study/screening.hpp>
+#include <wheelwright/study/global_sensitivity.hpp>
 
 namespace wheelwright::study::grid_test {
 namespace {

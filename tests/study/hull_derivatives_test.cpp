@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <wheelwright/bounds/feasible_set.hpp>
-#include <wheelwright/study/hull_derivatives.hpp>
+#include <wheelwright/study/bound_derivatives.hpp>
 
 #include "support/random.hpp"
 

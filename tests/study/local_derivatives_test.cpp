@@ -6,7 +6,7 @@
 
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/study/local_derivatives.hpp>
+#include <wheelwright/study/bound_derivatives.hpp>
 
 #include "support/drives.hpp"
 

@@ -8,7 +8,7 @@
 
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/core/limits.hpp>
-#include <wheelwright/study/screening.hpp>
+#include <wheelwright/study/global_sensitivity.hpp>
 
 #include "study/test_functions.hpp"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The pooled prior covers what it says, whatever the fleet is like, and says so where it cannot.
-#include <wheelwright/study/pooled_prior.hpp>
+#include <wheelwright/study/population.hpp>
 
 #include <algorithm>
 #include <cmath>

@@ -10,7 +10,7 @@
 #include <gtest/gtest.h>
 #include <boost/math/distributions/binomial.hpp>
 
-#include <wheelwright/study/sobol_indices.hpp>
+#include <wheelwright/study/global_sensitivity.hpp>
 
 #include "study/test_functions.hpp"
 

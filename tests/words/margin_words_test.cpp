@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/words/margin_words.hpp>
+#include <wheelwright/words/detect_words.hpp>
 
 namespace wheelwright::words::margin_words_test {
 namespace {

@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/report/chart.hpp>
+#include <wheelwright/report/page.hpp>
 
 namespace wheelwright::words {
 namespace {
