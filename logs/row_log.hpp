@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Cleaning of the rows of a log, for all formats: defects dropped and counted, segments split, heading and wheel angles
-/// unwrapped.
+/// Cleaning of the rows of a log, for all formats: defects dropped and counted, segments split, heading and wheel
+/// angles unwrapped.
 #pragma once
 
 #include <cstddef>
