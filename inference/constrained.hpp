@@ -71,9 +71,9 @@ struct ConstrainedFit {
 
 /// Physical quantity of one entry of θ_L: θ_j = per_physical · quantity (model/model.hpp's Parameter).
 struct PhysicalQuantity {
-  std::string name;           ///< e.g. "mass", "yaw_inertia", "viscous_linear"
-  double per_physical = 1.0;  ///< other than 0
-  std::string unit;           ///< of the quantity, for the words, e.g. "kg"
+  std::string name;             ///< e.g. "mass", "yaw_inertia", "viscous_linear"
+  double per_physical = 1.0;    ///< other than 0
+  std::string unit;             ///< of the quantity, for the words, e.g. "kg"
   bool never_negative = false;  ///< >= 0 in every robot
 };
 
