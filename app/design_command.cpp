@@ -99,12 +99,11 @@ design::MotionLimits limits_from(const Arguments& a, const Robot& robot) {
 std::vector<design::InspectedFault> inspected(const Arguments& a, const OnlineModel& model) {
   std::vector<design::InspectedFault> faults;
   const std::vector<design::InspectedFault> usual = design::usual_inspection(model);
-  const std::vector<detector::FaultType> catalogue =
-      detector::fault_catalogue(model.model, model.estimate, model.robot.effort);
+  const std::vector<FaultType> catalogue = model::fault_catalogue(model.model, model.estimate, model.robot.effort);
   for (const std::string& text : a.faults) {
     const std::size_t equals = text.find('=');
     const std::string name = text.substr(0, equals);
-    design::InspectedFault fault{detector::find_fault(catalogue, name), 0.05};
+    design::InspectedFault fault{model::find_fault(catalogue, name), 0.05};
     for (const design::InspectedFault& each : usual) {
       fault.asked = each.fault.name == name ? each.asked : fault.asked;
     }

@@ -139,8 +139,8 @@ void compare(const OnlineModel& m, const Drive& drive, const LogTable& second, c
   const detector::ReferenceMotion filtered =
       detector::read_reference(log, RegressorFilter(m.model, m.filter, m.measurement, m.errors));
   const detector::ThresholdRule rule(Polytope(m.facets, m.box), m.estimate);
-  detector::FaultType radius;
-  for (const detector::FaultType& fault : detector::fault_catalogue(m.model, m.estimate)) {
+  FaultType radius;
+  for (const FaultType& fault : model::fault_catalogue(m.model, m.estimate)) {
     if (fault.name == "wheel_radius") {
       radius = fault;
     }
@@ -148,7 +148,7 @@ void compare(const OnlineModel& m, const Drive& drive, const LogTable& second, c
   radius.range.upper = 0.0;
   const auto margins =
       detector::margins_along(filtered, {radius}, rule,
-                              [&](const detector::FaultType& fault) {
+                              [&](const FaultType& fault) {
                                 return std::make_unique<detector::FaultFilter>(fault, m.model, m.filter, filtered);
                               },
                               {.windows = kWindows, .most_onsets = options.onsets});

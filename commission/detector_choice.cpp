@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 #include <utility>
 
 #include <fmt/format.h>
@@ -14,6 +15,7 @@
 #include <wheelwright/core/limits.hpp>
 #include <wheelwright/filter/measurement.hpp>
 #include <wheelwright/identify/minimise_scalar.hpp>
+#include <wheelwright/model/fault_type.hpp>
 
 namespace wheelwright::commission {
 
@@ -38,10 +40,11 @@ std::vector<StatedFault> faults_for(const Robot& robot, const std::vector<Stated
   if (!stated.empty()) {
     return stated;
   }
+  const auto named = [](model::FaultKind kind) { return StatedFault{std::string(to_string(kind))}; };
   if (!model::on_two_wheels(robot)) {
-    return {{"effort_loss"}};
+    return {named(model::FaultKind::effort_loss)};
   }
-  return {{"wheel_radius"}, {"wheel_radius_right"}};
+  return {named(model::FaultKind::wheel_radius), named(model::FaultKind::wheel_radius_right)};
 }
 
 // The β worth trying for one order, slowest first.

@@ -24,7 +24,7 @@ constexpr double kLeastOnsetStep = 1e-9;  // s: onsets are where `settled` says
 
 double rows_of_an_hour(double step) { return kHour / check::positive(step, "sampling step"); }
 
-double stated_size(const StatedFault& stated, const detector::FaultType& fault) {
+double stated_size(const StatedFault& stated, const FaultType& fault) {
   const double most = std::max(fault.range.upper, -fault.range.lower);
   if (fault.whole) {
     return most;
@@ -93,7 +93,7 @@ class Margins {
   Margins(const LogTable& log, const OnlineModel& model, const TrialOptions& options)
       : model_(&model),
         options_(&options),
-        catalogue_(detector::fault_catalogue(model.model, model.estimate, model.robot.effort)),
+        catalogue_(model::fault_catalogue(model.model, model.estimate, model.robot.effort)),
         rule_(Polytope(model.facets, model.box), model.estimate) {
     TableSource source(log);
     motion_ =
@@ -105,14 +105,14 @@ class Margins {
   }
 
   [[nodiscard]] std::vector<StatedMargin> operator()(detector::Persistence persistence) const {
-    std::vector<detector::FaultType> faults;
+    std::vector<FaultType> faults;
     std::vector<double> asked;
     for (const StatedFault& stated : options_->faults) {
-      faults.push_back(detector::find_fault(catalogue_, stated.name));
+      faults.push_back(model::find_fault(catalogue_, stated.name));
       asked.push_back(stated_size(stated, faults.back()));
     }
     const auto all = detector::margins_along(motion_, faults, rule_,
-                                             [this](const detector::FaultType& fault) {
+                                             [this](const FaultType& fault) {
                                                return std::make_unique<detector::FaultFilter>(fault, model_->model,
                                                                                               model_->filter, motion_);
                                              },
@@ -137,7 +137,7 @@ class Margins {
  private:
   const OnlineModel* model_;
   const TrialOptions* options_;
-  std::vector<detector::FaultType> catalogue_;
+  std::vector<FaultType> catalogue_;
   detector::ThresholdRule rule_;
   detector::ReferenceMotion motion_;
   std::vector<double> windows_;
@@ -173,9 +173,9 @@ void validate(const TrialOptions& options, const Robot& robot) {
   for (std::size_t j = 0; j < model.p(); ++j) {
     middle[static_cast<Eigen::Index>(j)] = 0.5 * (prior.bounds[j].lower + prior.bounds[j].upper);
   }
-  const auto catalogue = detector::fault_catalogue(model, middle, robot.effort);
+  const auto catalogue = model::fault_catalogue(model, middle, robot.effort);
   for (const StatedFault& stated : options.faults) {
-    const detector::FaultType& fault = detector::find_fault(catalogue, stated.name);
+    const FaultType& fault = model::find_fault(catalogue, stated.name);
     if (fault.theta.size() == 0) {  // the range of a lost mass depends on the robot that is found
       static_cast<void>(stated_size(stated, fault));
     }

@@ -231,8 +231,7 @@ std::vector<detector::Isolation> isolate_events(LogSource& log, const OnlineMode
   }
   gather(log, pieces);
   const Polytope set(model.facets, model.box);
-  const std::vector<detector::FaultType> faults =
-      detector::fault_catalogue(model.model, model.estimate, model.robot.effort);
+  const std::vector<FaultType> faults = model::fault_catalogue(model.model, model.estimate, model.robot.effort);
   std::vector<detector::Isolation> out;
   for (std::size_t k = 0; k < pieces.size(); ++k) {
     TableSource source(pieces[k].table);
@@ -244,7 +243,7 @@ std::vector<detector::Isolation> isolate_events(LogSource& log, const OnlineMode
 }
 
 std::string sentence(const detector::FaultFinding& finding) {
-  const detector::FaultType& fault = finding.fault;
+  const FaultType& fault = finding.fault;
   std::string text = fault.sentence.empty() ? fault.name : fault.sentence;
   if (finding.magnitude && finding.magnitude->lower <= fault.range.lower &&
       finding.magnitude->upper >= fault.range.upper) {

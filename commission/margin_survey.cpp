@@ -11,9 +11,6 @@
 #include <wheelwright/detector/odometry_faults.hpp>
 
 namespace wheelwright::commission {
-
-using detector::FaultType;
-
 namespace {
 
 constexpr std::array kKinds = {detector::ManoeuvreKind::standstill, detector::ManoeuvreKind::cruising,
@@ -26,7 +23,7 @@ std::vector<FaultType> chosen(const std::vector<FaultType>& catalogue, const std
   }
   std::vector<FaultType> faults;
   for (const std::string& name : names) {
-    faults.push_back(detector::find_fault(catalogue, name));
+    faults.push_back(model::find_fault(catalogue, name));
   }
   return faults;
 }
@@ -93,7 +90,7 @@ MarginSurvey survey_margins(LogSource& log, const OnlineModel& model, const Marg
   survey.noise_share = margins.noise_share;
   survey.assumptions = model.assumptions;
   const std::vector<FaultType> faults =
-      chosen(detector::fault_catalogue(model.model, model.estimate, model.robot.effort), options.faults);
+      chosen(model::fault_catalogue(model.model, model.estimate, model.robot.effort), options.faults);
 
   const detector::ReferenceMotion motion =
       detector::read_reference(log, RegressorFilter(model.model, model.filter, model.measurement, model.errors));

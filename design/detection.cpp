@@ -28,9 +28,8 @@ struct Judged {
 void check_inspected(const std::vector<InspectedFault>& faults) {
   check::that(!faults.empty(), "faults", "one or more");
   for (const InspectedFault& each : faults) {
-    const detector::FaultType& fault = each.fault;
-    check::that(fault.profile.kind == detector::FaultProfile::Kind::step && !fault.held_effort,
-                "fault '" + fault.name + "'",
+    const FaultType& fault = each.fault;
+    check::that(fault.profile.kind == FaultProfile::Kind::step && !fault.held_effort, "fault '" + fault.name + "'",
                 "one that is there in full from the beginning on (a step, no reading that stays at its value)");
   }
 }
@@ -42,7 +41,7 @@ std::vector<Judged> judge(const Plan& plan, const DesignSubject& subject, const 
   detector::FaultMargin margin(rule);
   std::vector<Judged> all;
   for (const InspectedFault& inspected : faults) {
-    const detector::FaultType& fault = inspected.fault;
+    const FaultType& fault = inspected.fault;
     const std::size_t first = all.size();
     for (const double side : {1.0, -1.0}) {
       if ((side > 0.0 ? fault.range.upper : -fault.range.lower) > 0.0) {
@@ -143,7 +142,7 @@ DetectionDesign design_for_detection(const OnlineModel& model, const DesignSubje
 
 std::vector<InspectedFault> usual_inspection(const OnlineModel& model) {
   std::vector<InspectedFault> faults;
-  for (const detector::FaultType& fault : detector::fault_catalogue(model.model, model.estimate, model.robot.effort)) {
+  for (const FaultType& fault : model::fault_catalogue(model.model, model.estimate, model.robot.effort)) {
     if (fault.inspected > 0.0) {
       faults.push_back({fault, fault.inspected});
     }

@@ -14,19 +14,19 @@
 
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/design/manoeuvre.hpp>
-#include <wheelwright/detector/fault_type.hpp>
+#include <wheelwright/model/fault_type.hpp>
 
 namespace wheelwright::design {
 
 /// A fault that an inspection is to find, with the size that would be good.
 struct InspectedFault {
-  detector::FaultType fault;
+  FaultType fault;
   double asked = 0.05;  ///< magnitude, > 0; both sides where the fault's range has two
 };
 
 /// A fault that a plan is certain to detect.
 struct PromisedFault {
-  detector::FaultType fault;
+  FaultType fault;
   double side = 1.0;
   double asked = 0.0;
   double smallest = 0.0;   ///< every size from here up to the range's end is seen for certain; infinite where none is

@@ -255,7 +255,7 @@ SignatureErrors::SignatureErrors(const FaultType& fault, const Model& model, con
   }
   sample_ = shorter(shortest) * errors.speed_sample;
   slope_ = Eigen::VectorXd::Zero(errors.speed.size());
-  if (fault.profile.kind == FaultProfile::Kind::drift) {
+  if (fault.profile.kind == FaultProfile::Kind::ramp) {
     slope_ = errors.speed / fault.profile.rise;
   } else if (fault.profile.kind == FaultProfile::Kind::bump && motion.joint_speed.size() > 0) {
     const double fastest = motion.joint_speed.row(static_cast<Eigen::Index>(fault.profile.joint)).cwiseAbs().maxCoeff();

@@ -31,8 +31,8 @@
 
 #include <wheelwright/bounds/polytope.hpp>
 #include <wheelwright/core/interval.hpp>
-#include <wheelwright/detector/fault_type.hpp>
 #include <wheelwright/detector/reference_motion.hpp>
+#include <wheelwright/model/fault_type.hpp>
 
 namespace wheelwright::detector {
 

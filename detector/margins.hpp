@@ -16,9 +16,9 @@
 #include <wheelwright/detector/events.hpp>
 #include <wheelwright/detector/fault_margin.hpp>
 #include <wheelwright/detector/fault_rows.hpp>
-#include <wheelwright/detector/fault_type.hpp>
 #include <wheelwright/detector/reference_motion.hpp>
 #include <wheelwright/filter/noise.hpp>
+#include <wheelwright/model/fault_type.hpp>
 
 namespace wheelwright::detector {
 

@@ -36,7 +36,7 @@ FaultType of_motion(const FaultType& fault) {
   return out;
 }
 
-bool drifts(const FaultType& fault) { return fault.profile.kind == FaultProfile::Kind::drift; }
+bool drifts(const FaultType& fault) { return fault.profile.kind == FaultProfile::Kind::ramp; }
 
 }  // namespace
 

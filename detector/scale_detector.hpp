@@ -50,8 +50,8 @@ struct SumState {
   double value = 0.0;      ///< Σ g (torque − Yθ̂)
   double threshold = 0.0;  ///< |value| of a healthy robot is below; of a sum that is far inside, by the set's box
   double excess = 0.0;     ///< by which it stands outside, > 0: an alarm; unit of `threshold`
-  /// By c0 a fault of size 1 that the weight is like would have moved the sum, had it always been there; after a further
-  /// time of x scales (c0 + c1 x)e^{−x} of it remain. Size 1: the effort's unit, all of the effort, all of the
+  /// By c0 a fault of size 1 that the weight is like would have moved the sum, had it always been there; after a
+  /// further time of x scales (c0 + c1 x)e^{−x} of it remain. Size 1: the effort's unit, all of the effort, all of the
   /// parameter.
   double c0 = 0.0, c1 = 0.0;
   double radius = 0.0;    ///< what errors alone can do: the threshold's part that does not depend on the set

@@ -175,7 +175,7 @@ void check_effort_scale(const HealthView& view, const commission::Setting& s, co
   for (std::size_t j = 0; view.robot_given && scales && j < s.model.p(); ++j) {
     const std::string& name = s.model.parameters[j].physical;
     const auto nominal = s.robot.nominal.find(name);
-    if ((name != "mass" && name != "inertia") || nominal == s.robot.nominal.end() || !(nominal->second > 0.0) ||
+    if (!s.model.parameters[j].moved_mass || nominal == s.robot.nominal.end() || !(nominal->second > 0.0) ||
         fit.excitation[j].state != identify::Excitation::identified) {
       continue;
     }

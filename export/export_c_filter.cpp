@@ -14,10 +14,11 @@
 #include <wheelwright/core/limits.hpp>
 #include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/export/export_c_text.hpp>
-#include <wheelwright/model/differential_drive.hpp>
-#include <wheelwright/model/single_axis.hpp>
 
 namespace wheelwright::exporter::c_text {
+
+using model::TermShape;
+
 namespace {
 
 constexpr double kOutward = 1.0 + 64.0 * core::kEpsilon;  // kUp of filter/motion_bound.cpp
@@ -26,6 +27,17 @@ constexpr double kAlikeSteps = 0.05;                      // kAlike of filter/re
 
 bool any_kind(const Model& model, Term::Kind kind) {
   return std::ranges::any_of(model.terms, [&](const Term& term) { return term.kind == kind; });
+}
+
+// The shape, which FilterWriter::evaluate writes.
+TermShape c_form(const Model& model, const Term& term) {
+  if (term.function.shape() == TermShape::own) {
+    throw InputError("export: the term of parameter " + model.parameters[term.parameter].name + " of the model " +
+                     model.name +
+                     " is a function of its own, which has no C form; expected accelerations, speeds, and the "
+                     "functions of differential_drive and single_axis");
+  }
+  return term.function.shape();
 }
 
 bool any_not_zero(const Eigen::VectorXd& x) { return (x.array() != 0.0).any(); }
@@ -105,7 +117,7 @@ FilterWriter::FilterWriter(const RegressorFilter& filter, bool bounds)
   }
   for (std::size_t k = 0; k < model_.terms.size(); ++k) {
     if (model_.terms[k].kind == Term::Kind::function) {
-      functions_.push_back({k, function_of(model_, model_.terms[k])});
+      functions_.push_back({k, c_form(model_, model_.terms[k])});
     }
   }
   const filter::MotionBound& motion = errors_.motion;
@@ -119,9 +131,9 @@ FilterWriter::FilterWriter(const RegressorFilter& filter, bool bounds)
   mobile_ = bounded_ && motion.mobility.size() > 0;
   limited_ = bounded_ && motion.limit.size() > 0;
   moved_ = mobile_ || limited_;
-  heading_ = uses({Function::along_x, Function::along_y});
+  heading_ = uses({TermShape::along_x, TermShape::along_y});
   measured_heading_ = heading_ && !measurement_.heading_column.empty();
-  joints_ = uses({Function::signs_sum, Function::signs_difference});
+  joints_ = uses({TermShape::sum_of_signs, TermShape::difference_of_signs});
   viscous_ = any_kind(model_, Term::Kind::speed);
   inertial_ = any_kind(model_, Term::Kind::acceleration);
   linear_ = !held_ && between_;
@@ -137,7 +149,7 @@ FilterWriter::FilterWriter(const RegressorFilter& filter, bool bounds)
   start_ = nodes_ && (first_error_ || interpolated_ || lost_);
   area_ = bounds_ && bounded_ && any_not_zero(errors_.output);
   joint_error_ = joints_;
-  speed_error_ = (mobile_ && viscous_) || heading_ || uses({Function::sign_of_speed});
+  speed_error_ = (mobile_ && viscous_) || heading_ || uses({TermShape::sign_of_speed});
   ahead_ = mean_ ? 1 : 0;
   samples_ = ahead_ + (linear_ && (!mean_ || doubt_) ? 3 : 2);
   if (mobile_) {
@@ -148,32 +160,9 @@ FilterWriter::FilterWriter(const RegressorFilter& filter, bool bounds)
   }
 }
 
-// Functions are known by their addresses in the models that have them.
-FilterWriter::Function FilterWriter::function_of(const Model& model, const Term& term) {
-  const auto is = [&](const Model& of, const char* physical, std::size_t output) {
-    return std::any_of(of.terms.begin(), of.terms.end(), [&](const Term& other) {
-      return other.kind == Term::Kind::function && other.function == term.function && other.output == output &&
-             of.parameters[other.parameter].physical == physical;
-    });
-  };
-  const Model drive = DifferentialDrive{1.0, 1.0, false, true, true}.model();
-  const Model axis = model::SingleAxis{.coulomb = true, .offset = true}.model();
-  const bool two_joints = model.joints.size() >= 2;
-  if (is(drive, "viscous_x", 0)) return Function::along_x;
-  if (is(drive, "viscous_y", 0)) return Function::along_y;
-  if (is(drive, "coulomb", 0) && two_joints) return Function::signs_sum;
-  if (is(drive, "coulomb", 1) && two_joints) return Function::signs_difference;
-  if (is(axis, "coulomb", 0)) return Function::sign_of_speed;
-  if (is(axis, "offset", 0)) return Function::one;
-  throw InputError("export: the term of parameter " + model.parameters[term.parameter].name + " of the model " +
-                   model.name +
-                   " is a function of its own, which has no C form; expected accelerations, speeds, and the functions "
-                   "of differential_drive and single_axis");
-}
-
-bool FilterWriter::uses(std::initializer_list<Function> any) const {
+bool FilterWriter::uses(std::initializer_list<TermShape> any) const {
   return std::any_of(functions_.begin(), functions_.end(),
-                     [&](const FunctionTerm& f) { return std::find(any.begin(), any.end(), f.function) != any.end(); });
+                     [&](const FunctionTerm& f) { return std::find(any.begin(), any.end(), f.shape) != any.end(); });
 }
 
 std::string FilterWriter::effort_words() const {
@@ -246,8 +235,8 @@ std::string FilterWriter::types() const {
   out.line_if(speed_error_, "  double speed_error[PFX_COORDINATES]; /* what the samples are wrong by */");
   out.line_if(joints_, "  double joint_speed[PFX_JOINTS], joint_error;");
   out.line_if(heading_, "  double heading; /* rad, in its middle */");
-  out.line_if(uses({Function::along_x}), "  double along_x; /* square of its cosine */");
-  out.line_if(uses({Function::along_y}), "  double along_y; /* square of its sine */");
+  out.line_if(uses({TermShape::along_x}), "  double along_x; /* square of its cosine */");
+  out.line_if(uses({TermShape::along_y}), "  double along_y; /* square of its sine */");
   out.line_if(moved_, "  double acceleration[PFX_COORDINATES]; /* its size is at most this in the step */");
   out.line_if(!functions_.empty(),
               "  double term[{0}], term_error[{0}]; /* functions of the motion, at every instant */",
@@ -299,7 +288,7 @@ std::string FilterWriter::state() const {
 }
 
 void FilterWriter::conversions(Text& out) const {
-  if (uses({Function::signs_sum, Function::signs_difference}) || measurement_.effort_unsigned) {
+  if (uses({TermShape::sum_of_signs, TermShape::difference_of_signs}) || measurement_.effort_unsigned) {
     out.put("\nstatic inline double pfx_signum(double x)\n{\n  return (double)(x > 0.0) - (double)(x < 0.0);\n}\n");
   }
   if (change_ || hull_) {
@@ -358,7 +347,7 @@ void FilterWriter::evaluate(Text& out) const {
   if (functions_.empty()) {
     return;
   }
-  const bool first_speed = uses({Function::along_x, Function::along_y, Function::sign_of_speed});
+  const bool first_speed = uses({TermShape::along_x, TermShape::along_y, TermShape::sign_of_speed});
   const int turning = heading_ && moved_ ? model_.heading_coordinate : -1;
   const bool joints_in_doubt = joints_ && (moved_ || errors_.joint_sample > 0.0);
   const auto widened = [&](int c) {
@@ -404,37 +393,38 @@ void FilterWriter::evaluate(Text& out) const {
     const Term& term = model_.terms[functions_[k].term];
     const std::string scale = times(term.scale), size = times(std::abs(term.scale));
     out.line("  /* {} in {} */", plain(model_.parameters[term.parameter].name), plain(model_.outputs[term.output]));
-    switch (functions_[k].function) {
-      case Function::along_x:
-      case Function::along_y: {
-        const std::string share = functions_[k].function == Function::along_x ? "p->along_x" : "p->along_y";
+    switch (functions_[k].shape) {
+      case TermShape::along_x:
+      case TermShape::along_y: {
+        const std::string share = functions_[k].shape == TermShape::along_x ? "p->along_x" : "p->along_y";
         out.line("  p->term[{}] = {}({} * p->speed[0]);", k, scale, share);
         out.line("  p->term_error[{0}] = {1}(({2} + share_error < 1.0 ? {2} + share_error : 1.0) * speed_error +", k,
                  size, share);
         out.line("      share_error * fabs(p->speed[0]));");
         break;
       }
-      case Function::signs_sum:
-      case Function::signs_difference:
+      case TermShape::sum_of_signs:
+      case TermShape::difference_of_signs:
         out.line("  p->term[{}] = {}(sign[0] {} sign[1]);", k, scale,
-                 functions_[k].function == Function::signs_sum ? "+" : "-");
+                 functions_[k].shape == TermShape::sum_of_signs ? "+" : "-");
         if (joints_in_doubt) {
           out.line("  p->term_error[{}] = {}(doubt[0] + doubt[1]);", k, size);
         } else {
           out.line("  p->term_error[{}] = 0.0;", k);
         }
         break;
-      case Function::sign_of_speed:
+      case TermShape::sign_of_speed:
         out.line("  {{");
         out.line("    const int doubt = fabs(p->speed[0]) <= speed_error;");
         out.line("    p->term[{}] = doubt ? 0.0 : p->speed[0] > 0.0 ? {} : {};", k, hex(term.scale), hex(-term.scale));
         out.line("    p->term_error[{}] = doubt ? {} : 0.0;", k, hex(std::abs(term.scale)));
         out.line("  }}");
         break;
-      case Function::one:
+      case TermShape::constant:
         out.line("  p->term[{}] = {};", k, hex(term.scale));
         out.line("  p->term_error[{}] = 0.0;", k);
         break;
+      case TermShape::own: break;  // refused by c_form
     }
   }
   out.put("}\n");
@@ -674,7 +664,7 @@ void FilterWriter::describe(Text& out) const {
       out.line("  p->heading = 0.0;");
     }
     for (const bool x : {true, false}) {
-      if (uses({x ? Function::along_x : Function::along_y})) {
+      if (uses({x ? TermShape::along_x : TermShape::along_y})) {
         out.line("  {{");
         out.line("    const double c = {}(p->heading);", x ? "cos" : "sin");
         out.line("    p->{} = c * c;", x ? "along_x" : "along_y");

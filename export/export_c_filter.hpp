@@ -37,15 +37,13 @@ class FilterWriter {
   [[nodiscard]] std::string libm_words() const;
 
  private:
-  enum class Function { along_x, along_y, signs_sum, signs_difference, sign_of_speed, one };
   struct FunctionTerm {
     std::size_t term;
-    Function function;
+    model::TermShape shape;
   };
   class Text;
 
-  [[nodiscard]] static Function function_of(const Model& model, const Term& term);
-  [[nodiscard]] bool uses(std::initializer_list<Function> any) const;
+  [[nodiscard]] bool uses(std::initializer_list<model::TermShape> any) const;
   void conversions(Text& out) const;
   void read(Text& out) const;
   void evaluate(Text& out) const;

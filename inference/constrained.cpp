@@ -279,11 +279,6 @@ std::string with_blanks(std::string name) {
   return name;
 }
 
-bool never_negative(const std::string& name) {
-  return name == "mass" || name == "yaw_inertia" || name == "inertia" || name == "coulomb" ||
-         name.starts_with("viscous");
-}
-
 /// sign · quantity_j <= bound.
 LinearConstraint one_sided(const std::vector<PhysicalQuantity>& parameters, std::size_t j, double sign, double bound) {
   const auto at = static_cast<Eigen::Index>(j);
@@ -311,7 +306,7 @@ std::vector<LinearConstraint> physical_consistency(const std::vector<PhysicalQua
   std::optional<std::size_t> mass, inertia;
   for (std::size_t j = 0; j < parameters.size(); ++j) {
     const std::string& name = parameters[j].name;
-    if (never_negative(name)) {
+    if (parameters[j].never_negative) {
       constraints.push_back(one_sided(parameters, j, -1.0, 0.0));
       constraints.back().name = name + " = 0";
       constraints.back().asks = "a negative " + with_blanks(name);

@@ -173,7 +173,7 @@ std::vector<ColumnNoise> find_noise(LogSource& log, const commission::Setting& s
 std::vector<PhysicalQuantity> quantities(const Model& model) {
   std::vector<PhysicalQuantity> list;
   for (const model::Parameter& p : model.parameters) {
-    list.push_back({p.physical, p.per_physical, p.physical_unit});
+    list.push_back({p.physical, p.per_physical, p.physical_unit, p.never_negative});
   }
   return list;
 }

@@ -1,47 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/model/differential_drive.hpp>
 
-#include <algorithm>
-#include <cmath>
+#include <string>
+#include <utility>
 
 #include <wheelwright/core/check.hpp>
 
 namespace wheelwright::model {
 namespace {
-
-// |cos²a − cos²b| = |sin(a + b) sin(a − b)| <= min(1, |a − b|), and the same for sin².
-TermValue share_of_speed(double share, const MotionState& state) {
-  const double share_error = std::min(1.0, state.heading_error);
-  const double speed = state.speed[0];
-  return {share * speed, std::min(1.0, share + share_error) * state.speed_error[0] + share_error * std::abs(speed)};
-}
-
-TermValue along_x(const MotionState& state) {
-  const double c = std::cos(state.heading);
-  return share_of_speed(c * c, state);
-}
-
-TermValue along_y(const MotionState& state) {
-  const double s = std::sin(state.heading);
-  return share_of_speed(s * s, state);
-}
-
-// sgn ω_R ± sgn ω_L; where a sign is in doubt its friction is any number in [−1, 1].
-TermValue signs(const MotionState& state, double of_left) {
-  TermValue sum;
-  for (std::size_t j = 0; j < 2; ++j) {
-    const double w = state.joint_speed[j];
-    if (state.joint_error[j] > 0.0 && std::abs(w) <= state.joint_error[j]) {
-      sum.error += 1.0;
-    } else {
-      sum.value += (j == 0 ? 1.0 : of_left) * (static_cast<double>(w > 0.0) - static_cast<double>(w < 0.0));
-    }
-  }
-  return sum;
-}
-
-TermValue signs_sum(const MotionState& state) { return signs(state, 1.0); }
-TermValue signs_difference(const MotionState& state) { return signs(state, -1.0); }
 
 Parameter viscous(const char* axis, double r) {
   return {.name = std::string("r_viscous_") + axis,
@@ -51,7 +17,8 @@ Parameter viscous(const char* axis, double r) {
           .per_physical = r,
           .prior = {0.0, 1e7},
           .excite = std::string(axis) == "linear" ? "drive straight at different speeds"
-                                                  : "drive straight at different speeds, heading along x and along y"};
+                                                  : "drive straight at different speeds, heading along x and along y",
+          .never_negative = true};
 }
 
 }  // namespace
@@ -98,7 +65,9 @@ Model DifferentialDrive::model() const {
        .physical_unit = "kg",
        .per_physical = r,
        .prior = {0.0, 1e6},
-       .excite = "accelerate and brake"},
+       .excite = "accelerate and brake",
+       .never_negative = true,
+       .moved_mass = true},
       {.output = 0, .kind = Term::Kind::acceleration, .coordinate = 0});
   add({.name = "r_yaw_inertia",
        .unit = "kg·m³",
@@ -106,11 +75,12 @@ Model DifferentialDrive::model() const {
        .physical_unit = "kg·m²",
        .per_physical = r,
        .prior = {0.0, 1e8},
-       .excite = "turn with changing yaw rate"},
+       .excite = "turn with changing yaw rate",
+       .never_negative = true},
       {.output = 1, .kind = Term::Kind::acceleration, .coordinate = 1});
   if (anisotropic_friction) {
-    add(viscous("x", r), {.output = 0, .kind = Term::Kind::function, .function = along_x});
-    add(viscous("y", r), {.output = 0, .kind = Term::Kind::function, .function = along_y});
+    add(viscous("x", r), {.output = 0, .kind = Term::Kind::function, .function = TermShape::along_x});
+    add(viscous("y", r), {.output = 0, .kind = Term::Kind::function, .function = TermShape::along_y});
     m.heading_used = true;
   } else {
     add(viscous("linear", r), {.output = 0, .kind = Term::Kind::speed, .coordinate = 0});
@@ -121,7 +91,8 @@ Model DifferentialDrive::model() const {
        .physical_unit = "N·m·s/rad",
        .per_physical = r,
        .prior = {0.0, 1e8},
-       .excite = "drive in curves"},
+       .excite = "drive in curves",
+       .never_negative = true},
       {.output = 1, .kind = Term::Kind::speed, .coordinate = 1});
   if (coulomb) {
     add({.name = "coulomb",
@@ -132,13 +103,14 @@ Model DifferentialDrive::model() const {
          .prior = {0.0, 1e6},
          .excite = "drive in both directions",
          .on_request = true,
-         .dry_friction = true},
-        {.output = 0, .kind = Term::Kind::function, .function = signs_sum});
+         .dry_friction = true,
+         .never_negative = true},
+        {.output = 0, .kind = Term::Kind::function, .function = TermShape::sum_of_signs});
     m.terms.push_back({.output = 1,
                        .parameter = m.terms.back().parameter,
                        .kind = Term::Kind::function,
                        .scale = l,
-                       .function = signs_difference});
+                       .function = TermShape::difference_of_signs});
   }
   return m;
 }

@@ -68,8 +68,6 @@ TermValue stribeck(const MotionState& s, const Constants& constants) {
   return in_doubt(w, error) ? TermValue{0.0, 1.0} : TermValue{value, smooth};
 }
 
-TermValue one(const MotionState&, const Constants&) { return {1.0, 0.0}; }
-
 // constants: coordinate. v|v|
 TermValue signed_square(const MotionState& s, const Constants& constants) {
   const auto c = static_cast<std::size_t>(constants[0]);
@@ -179,7 +177,9 @@ class EffectTerms {
       return false;
     }
     const auto& known = effect_law(effect.name).parameters_of(robot);
-    p.physical = std::ranges::find(known, name, &EffectParameterLaw::name)->physical;
+    const auto law = std::ranges::find(known, name, &EffectParameterLaw::name);
+    p.physical = law->physical;
+    p.never_negative = law->lower >= 0.0;
     p.name = (p.per_physical == 1.0 ? "" : "r_") + p.physical;
     p.prior = *effect_prior(robot, p.physical);
     model.parameters.push_back(std::move(p));
@@ -220,7 +220,7 @@ void coulomb_asymmetric(EffectTerms& add, const RobotEffect& effect) {
 void torque_bias(EffectTerms& add, const RobotEffect& effect) {
   for (std::size_t j = 0; j < 2; ++j) {
     if (add.parameter(effect, j == 0 ? "b_R" : "b_L", wheel_torque())) {
-      add.at_joint(j, {one, {}});
+      add.at_joint(j, TermShape::constant);
     }
   }
 }

@@ -2,7 +2,6 @@
 #include <wheelwright/model/faults.hpp>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 #include <string>
@@ -13,27 +12,63 @@ namespace wheelwright::model {
 namespace {
 
 using std::numbers::pi;
+using Shape = TimeProfile::Shape;
 
-double rise(TimeProfile::Shape shape, double since, double rise_time) {
-  if (since < 0.0) {
-    return 0.0;
-  }
-  if (shape == TimeProfile::Shape::step || since >= rise_time) {
-    return 1.0;
-  }
-  const double s = since / rise_time;
-  return shape == TimeProfile::Shape::ramp ? s : 0.5 * (1.0 - std::cos(pi * s));
+double rise(Shape shape, double since, double rise_time) {
+  return since < 0.0 ? 0.0 : FaultProfile{.kind = shape, .rise = rise_time}.at(since, 0.0, 0.0);
 }
 
-double rise_rate(TimeProfile::Shape shape, double since, double rise_time) {
-  if (shape == TimeProfile::Shape::step || since < 0.0 || since >= rise_time) {
+double rise_rate(Shape shape, double since, double rise_time) {
+  if (since < 0.0 || since >= rise_time) {
     return 0.0;
   }
-  return (shape == TimeProfile::Shape::ramp ? 1.0 : 0.5 * pi * std::sin(pi * since / rise_time)) / rise_time;
+  switch (shape) {
+    case Shape::ramp: return 1.0 / rise_time;
+    case Shape::smooth: return 0.5 * pi * std::sin(pi * since / rise_time) / rise_time;
+    case Shape::step:
+    case Shape::pulse:
+    case Shape::bump: break;
+  }
+  return 0.0;
 }
 
-constexpr std::array<std::string_view, 8> kind_names = {
-    "wheel_radius", "wheel_radius_right", "wheel_radius_left", "slip_x", "slip_y", "slip_yaw", "matched", "unmatched"};
+// Adds a fault of this size; whether a simulator has its kind.
+bool add(FaultKind kind, double value, double rate, FaultState& state) {
+  const auto slip = [&](Eigen::Index axis) {
+    state.slip[axis] += value;
+    state.slip_rate[axis] += rate;
+    return true;
+  };
+  const auto radius = [&](Eigen::Index wheel) {
+    state.radius[wheel] += value;
+    state.radius_rate[wheel] += rate;
+    return true;
+  };
+  switch (kind) {
+    case FaultKind::wheel_radius: return radius(0) && radius(1);
+    case FaultKind::wheel_radius_right: return radius(0);
+    case FaultKind::wheel_radius_left: return radius(1);
+    case FaultKind::slip_x: return slip(0);
+    case FaultKind::slip_y: return slip(1);
+    case FaultKind::slip_yaw: return slip(2);
+    case FaultKind::matched: state.matched += value, state.matched_rate += rate; return true;
+    case FaultKind::unmatched: state.unmatched += value, state.unmatched_rate += rate; return true;
+    case FaultKind::wheel_radius_drift:
+    case FaultKind::wheel_radius_bump_right:
+    case FaultKind::wheel_radius_bump_left:
+    case FaultKind::wheel_slip_right:
+    case FaultKind::wheel_slip_left:
+    case FaultKind::effort_loss:
+    case FaultKind::effort_bias:
+    case FaultKind::effort_stuck:
+    case FaultKind::effort_dead:
+    case FaultKind::encoder_scale:
+    case FaultKind::encoder_frozen:
+    case FaultKind::encoder_dropout:
+    case FaultKind::payload_lost: break;
+  }
+  return false;
+}
 
 }  // namespace
 
@@ -53,8 +88,6 @@ double TimeProfile::rate(double t) const {
   return rise_rate(shape, t - onset, rise_time) - rise_rate(shape, t - end, rise_time);
 }
 
-std::string_view to_string(Fault::Kind kind) { return kind_names.at(static_cast<std::size_t>(kind)); }
-
 void validate(std::span<const Fault> faults, const DifferentialDrive& drive) {
   check::positive(drive.wheel_radius, "wheel_radius");
   check::positive(drive.track_width, "track_width");
@@ -62,46 +95,42 @@ void validate(std::span<const Fault> faults, const DifferentialDrive& drive) {
   for (std::size_t k = 0; k < faults.size(); ++k) {
     const Fault& fault = faults[k];
     const std::string name = "faults[" + std::to_string(k) + "] (" + std::string(to_string(fault.kind)) + ")";
+    FaultState none;
+    check::that(add(fault.kind, 0.0, 0.0, none), name, "a fault that a simulator has");
     check::finite(fault.magnitude, name + ".magnitude");
     check::finite(fault.profile.onset, name + ".onset");
     check::non_negative(fault.profile.rise_time, name + ".rise_time");
-    check::that(fault.profile.shape == TimeProfile::Shape::step || fault.profile.rise_time > 0.0, name + ".rise_time",
+    check::that(fault.profile.shape != Shape::pulse && fault.profile.shape != Shape::bump, name + ".shape",
+                "step, ramp or smooth");
+    check::that(fault.profile.shape == Shape::step || fault.profile.rise_time > 0.0, name + ".rise_time",
                 "a number > 0 for a fault that is not a step");
     check::that(fault.profile.end >= fault.profile.onset + fault.profile.rise_time, name + ".end",
                 "a time not before the fault is fully there");
-    if (fault.kind == Fault::Kind::wheel_radius || fault.kind == Fault::Kind::wheel_radius_right) {
+    if (fault.kind == FaultKind::wheel_radius || fault.kind == FaultKind::wheel_radius_right) {
       right += std::min(0.0, fault.magnitude);
     }
-    if (fault.kind == Fault::Kind::wheel_radius || fault.kind == Fault::Kind::wheel_radius_left) {
+    if (fault.kind == FaultKind::wheel_radius || fault.kind == FaultKind::wheel_radius_left) {
       left += std::min(0.0, fault.magnitude);
     }
   }
   check::that(right > 0.0 && left > 0.0, "faults", "wheel radii that stay positive, r + δ1 > 0 (12)");
 }
 
+std::vector<FaultKind> simulated_faults() {
+  std::vector<FaultKind> kinds;
+  for (std::size_t k = 0; k < fault_kinds; ++k) {
+    FaultState none;
+    if (const auto kind = static_cast<FaultKind>(k); add(kind, 0.0, 0.0, none)) {
+      kinds.push_back(kind);
+    }
+  }
+  return kinds;
+}
+
 FaultState fault_state(std::span<const Fault> faults, double t) {
   FaultState state;
   for (const Fault& fault : faults) {
-    const double value = fault.magnitude * fault.profile.value(t);
-    const double rate = fault.magnitude * fault.profile.rate(t);
-    const auto slip = [&](Eigen::Index axis) {
-      state.slip[axis] += value;
-      state.slip_rate[axis] += rate;
-    };
-    const auto radius = [&](Eigen::Index wheel) {
-      state.radius[wheel] += value;
-      state.radius_rate[wheel] += rate;
-    };
-    switch (fault.kind) {
-      case Fault::Kind::wheel_radius: radius(0), radius(1); break;
-      case Fault::Kind::wheel_radius_right: radius(0); break;
-      case Fault::Kind::wheel_radius_left: radius(1); break;
-      case Fault::Kind::slip_x: slip(0); break;
-      case Fault::Kind::slip_y: slip(1); break;
-      case Fault::Kind::slip_yaw: slip(2); break;
-      case Fault::Kind::matched: state.matched += value, state.matched_rate += rate; break;
-      case Fault::Kind::unmatched: state.unmatched += value, state.unmatched_rate += rate; break;
-    }
+    add(fault.kind, fault.magnitude * fault.profile.value(t), fault.magnitude * fault.profile.rate(t), state);
   }
   return state;
 }

@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Every fault of Dixon, Walker and Dawson (2001) as data, and what it does to the kinematics, δ(t) of (6), and to the
-/// torque equation, ζ(t) of (16).
+/// Faults of a simulation: which sets in when, and what all of them together do to wheels and body, as Dixon, Walker
+/// and Dawson (2001) have them.
 #pragma once
 
 #include <limits>
 #include <span>
-#include <string_view>
+#include <vector>
 
 #include <Eigen/Core>
 
 #include <wheelwright/model/differential_drive.hpp>
+#include <wheelwright/model/fault_type.hpp>
 
 namespace wheelwright::model {
 
@@ -27,50 +28,34 @@ struct DriveParameters {
 /// Throws InvalidArgument, naming the field, unless mass and yaw inertia are > 0 and the friction is >= 0.
 void validate(const DriveParameters& parameters);
 
-/// Time profile of a fault: 0 before `onset`, 1 from `onset` + `rise_time` on, and the same way back from `end`. (8)
-/// asks for a differentiable fault: `smooth` is, `ramp` is but for its two corners, `step` is not (its rate is 0
-/// wherever it exists).
+/// Time profile of a simulated fault: that of its shape from `onset` on, and the same way back from `end`.
 struct TimeProfile {
-  /// The way from 0 to 1 over the rise time.
-  enum class Shape {
-    step,    ///< at once; the rise time is not used
-    ramp,    ///< linear
-    smooth,  ///< half a cosine, (1 − cos πs)/2
-  };
-  Shape shape = Shape::step;
+  using Shape = FaultProfile::Kind;
+  Shape shape = Shape::step;                             ///< step, ramp or smooth
   double onset = 0.0;                                    ///< T of (7), s
   double rise_time = 0.0;                                ///< s, > 0 for ramp and smooth
   double end = std::numeric_limits<double>::infinity();  ///< s, >= onset + rise time
 
   /// Share of the magnitude at time `t` (s), in [0, 1].
   [[nodiscard]] double value(double t) const;
-  /// Its time derivative, 1/s (at a corner, that of the later side).
+  /// Its time derivative, 1/s (at a corner, that of the later side; 0 for a step).
   [[nodiscard]] double rate(double t) const;
 };
 
-/// One fault.
+/// One simulated fault.
 struct Fault {
-  /// What changes.
-  enum class Kind {
-    wheel_radius,        ///< δ1 of (1): both wheel radii, m
-    wheel_radius_right,  ///< δ1R of Remark 1: the right wheel's radius, m
-    wheel_radius_left,   ///< δ1L of Remark 1: the left wheel's radius, m
-    slip_x,              ///< δ2 of (1): slip or skid along the world x axis, m/s
-    slip_y,              ///< δ3 of (1): along the world y axis, m/s
-    slip_yaw,            ///< δ4 of (1): about the vertical, rad/s
-    matched,             ///< ρ_M of (10): along the heading, m/s
-    unmatched,           ///< ρ_U of (11): across the heading, to the right, m/s
-  };
-  Kind kind = Kind::wheel_radius;
-  double magnitude = 0.0;  ///< at full size, unit of the kind
+  using Kind = FaultKind;
+  Kind kind = Kind::wheel_radius;  ///< one of simulated_faults()
+  double magnitude = 0.0;          ///< at full size, m for a wheel radius, else unit of the kind
   TimeProfile profile;
 };
 
-/// Name of a kind as scenario files write it, e.g. "wheel_radius_right".
-[[nodiscard]] std::string_view to_string(Fault::Kind kind);
+/// The kinds that a simulator has.
+[[nodiscard]] std::vector<FaultKind> simulated_faults();
 
-/// Throws InvalidArgument, naming the fault, unless magnitudes and times are finite (`end` may be infinite), profiles
-/// are as TimeProfile says, and the radii stay positive at all times whatever falls together, r + δ1 > 0 (12).
+/// Throws InvalidArgument, naming the fault, unless kinds are simulated, magnitudes and times are finite (`end` may be
+/// infinite), profiles are as TimeProfile says, and the radii stay positive at all times whatever falls together,
+/// r + δ1 > 0 (12).
 void validate(std::span<const Fault> faults, const DifferentialDrive& drive);
 
 /// The sum of all faults at one instant, and its rate.

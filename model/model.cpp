@@ -22,7 +22,11 @@ void validate_term(const Model& model, std::size_t k) {
   check::that(term.parameter < model.p(), entry("terms", k) + ".parameter", "the index of a parameter");
   check::finite(term.scale, entry("terms", k) + ".scale");
   if (term.kind == Term::Kind::function) {
+    const TermShape shape = term.function.shape();
     check::that(term.function != nullptr, entry("terms", k) + ".function", "a function");
+    check::that(
+        (shape != TermShape::sum_of_signs && shape != TermShape::difference_of_signs) || model.joints.size() >= 2,
+        entry("terms", k) + ".function", "a function of the joints that there are");
   } else {
     check::that(term.coordinate < model.coordinates.size(), entry("terms", k) + ".coordinate",
                 "the index of a coordinate");

@@ -34,6 +34,8 @@ struct Parameter {
   std::string excite;  ///< what to do when a log does not show it, e.g. "drive in curves"
   bool on_request = false;    ///< in a robot's model only where it is asked for
   bool dry_friction = false;  ///< equal at all joints, of the signs of their speeds: at rest it is any number up to it
+  bool never_negative = false;  ///< the quantity is >= 0 in every robot: a mass, an inertia, friction
+  bool moved_mass = false;      ///< inertia of the first coordinate: a robot's mass, an axis's inertia
 };
 
 /// A measured joint: which columns of the log hold its angle, speed and effort.
@@ -62,6 +64,18 @@ struct TermValue {
   double error = 0.0;  ///< >= 0: the exact value is within `error` of `value`
 };
 
+/// Instantaneous functions that models have in common. Where a sign is in doubt by the error of its speed, it is any
+/// number in [−1, 1].
+enum class TermShape {
+  own,                  ///< none of these: a function that a model or an effect brings with it
+  along_x,              ///< v1 cos²θ
+  along_y,              ///< v1 sin²θ
+  sum_of_signs,         ///< sgn ω1 + sgn ω2, of the first two joints
+  difference_of_signs,  ///< sgn ω1 − sgn ω2
+  sign_of_speed,        ///< sgn v1, in doubt at rest, too
+  constant,             ///< 1
+};
+
 /// An instantaneous function of the motion, with up to two constants of its own (a joint's number, a shape parameter).
 /// Two are equal when they are the same function with the same constants.
 class TermFunction {
@@ -75,6 +89,8 @@ class TermFunction {
   requires(std::convertible_to<F, Plain> && !std::same_as<std::remove_cvref_t<F>, TermFunction>)
       TermFunction(F&& function)
       : plain_(static_cast<Plain>(function)) {}
+  /// The function of `shape`; none for TermShape::own.
+  TermFunction(TermShape shape);
   /// `function` with `constants`.
   TermFunction(Shaped function, const std::array<double, 2>& constants) : shaped_(function), constants_(constants) {}
 
@@ -82,17 +98,20 @@ class TermFunction {
   TermValue operator()(const MotionState& state) const {
     return shaped_ != nullptr ? shaped_(state, constants_) : plain_(state);
   }
+  /// What it is, for those who write the function down instead of calling it.
+  [[nodiscard]] TermShape shape() const { return shape_; }
   friend bool operator==(const TermFunction&, const TermFunction&) = default;
 
  private:
+  TermShape shape_ = TermShape::own;
   Plain plain_ = nullptr;
   Shaped shaped_ = nullptr;
   std::array<double, 2> constants_{};
 };
 
-/// Mean of `function` over the errors of `state`: eight points on the way of all its speeds from −error to +error. Where
-/// it jumps with the sign of a speed, as dry friction does, it goes over from one value to the other, which simulators
-/// and fits of measured speeds need.
+/// Mean of `function` over the errors of `state`: eight points on the way of all its speeds from −error to +error.
+/// Where it jumps with the sign of a speed, as dry friction does, it goes over from one value to the other, which
+/// simulators and fits of measured speeds need.
 [[nodiscard]] double softened(const TermFunction& function, const MotionState& state);
 
 /// One non-zero entry of Y: what stands at (output, parameter).

@@ -136,11 +136,10 @@ std::vector<design::InspectedFault> inspected(const std::map<std::string, double
   if (faults.empty()) {
     return design::usual_inspection(model);
   }
-  const std::vector<detector::FaultType> catalogue =
-      detector::fault_catalogue(model.model, model.estimate, model.robot.effort);
+  const std::vector<FaultType> catalogue = model::fault_catalogue(model.model, model.estimate, model.robot.effort);
   std::vector<design::InspectedFault> out;
   for (const auto& [name, size] : faults) {
-    out.push_back({detector::find_fault(catalogue, name), check::positive(size, "faults['" + name + "']")});
+    out.push_back({model::find_fault(catalogue, name), check::positive(size, "faults['" + name + "']")});
   }
   return out;
 }

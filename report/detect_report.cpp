@@ -323,7 +323,7 @@ std::string delay_curves(const detector::FaultMargins& margins, const commission
   return out + "</svg>";
 }
 
-std::string margin_map(const detector::OperatingMap& map, const detector::FaultType& fault, const std::string& x_label,
+std::string margin_map(const detector::OperatingMap& map, const model::FaultType& fault, const std::string& x_label,
                        const std::string& y_label) {
   double low = core::kInfinity, high = 0.0;
   for (const double size : map.smallest.reshaped()) {

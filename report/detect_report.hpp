@@ -37,7 +37,7 @@ struct KinematicFindings {
 
 /// A map over the operating space: the darker a point, the smaller the certain size, on a logarithmic scale whose ends
 /// are written out; empty points show no certain size. Empty where no point has one.
-[[nodiscard]] std::string margin_map(const detector::OperatingMap& map, const detector::FaultType& fault,
+[[nodiscard]] std::string margin_map(const detector::OperatingMap& map, const model::FaultType& fault,
                                      const std::string& x_label, const std::string& y_label);
 
 /// One self-contained page: what is certainly seen, in words, as a table by manoeuvre, as curves of size over delay,

@@ -15,8 +15,8 @@
 
 namespace wheelwright::results {
 
-/// A detection as JSON (results/detection.schema.json). `model_file` and `log` say what was used, `software` is name and
-/// version.
+/// A detection as JSON (results/detection.schema.json). `model_file` and `log` say what was used, `software` is name
+/// and version.
 [[nodiscard]] Json to_json(const Detection& detection, const OnlineModel& model, const std::string& model_file,
                            const std::string& log, const std::string& software);
 

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/results/scenario_file.hpp>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <optional>
 #include <set>
 #include <utility>
@@ -267,16 +269,19 @@ struct ScenarioReader {
     for (const auto& [name, value] : place.members({"kind", "magnitude", "onset", "shape", "rise_time", "end"})) {
       if (name == "kind") {
         kind = true;
-        fault.kind =
-            static_cast<model::Fault::Kind>(value.choice({"wheel_radius", "wheel_radius_right", "wheel_radius_left",
-                                                          "slip_x", "slip_y", "slip_yaw", "matched", "unmatched"}));
+        const std::vector<model::FaultKind> kinds = model::simulated_faults();
+        Names names;
+        std::ranges::transform(kinds, std::back_inserter(names),
+                               [](model::FaultKind k) { return std::string(to_string(k)); });
+        fault.kind = kinds.at(value.choice(names));
       } else if (name == "magnitude") {
         magnitude = true;
         fault.magnitude = any_number(value);
       } else if (name == "onset") {
         fault.profile.onset = any_number(value);
       } else if (name == "shape") {
-        fault.profile.shape = static_cast<model::TimeProfile::Shape>(value.choice({"step", "ramp", "smooth"}));
+        constexpr std::array shapes = {FaultProfile::Kind::step, FaultProfile::Kind::ramp, FaultProfile::Kind::smooth};
+        fault.profile.shape = shapes.at(value.choice({"step", "ramp", "smooth"}));
       } else if (name == "rise_time") {
         fault.profile.rise_time = not_negative(value);
       } else {

@@ -15,8 +15,8 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/core/limits.hpp>
 #include <wheelwright/core/words.hpp>
-#include <wheelwright/detector/fault_type.hpp>
 #include <wheelwright/gap/diagnose.hpp>
+#include <wheelwright/model/fault_type.hpp>
 
 namespace wheelwright::study {
 namespace {
@@ -133,8 +133,8 @@ struct Reader {
     const std::size_t equals = member.find('=');
     q.subject = member.substr(0, equals);
     const Eigen::VectorXd theta = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(model.p()));
-    const std::vector<detector::FaultType> faults = detector::fault_catalogue(model, theta, robot.effort);
-    q.unit = q.kind == Kind::delay ? "s" : detector::find_fault(faults, q.subject).unit;
+    const std::vector<FaultType> faults = model::fault_catalogue(model, theta, robot.effort);
+    q.unit = q.kind == Kind::delay ? "s" : model::find_fault(faults, q.subject).unit;
     if (q.kind == Kind::delay) {
       const std::string text = equals == std::string::npos ? "" : member.substr(equals + 1);
       char* end = nullptr;

@@ -185,7 +185,7 @@ std::string sentence(const commission::MarginSurvey& survey, const detector::Fau
 
 }  // namespace
 
-std::string magnitude_words(const detector::FaultType& fault, double magnitude) {
+std::string magnitude_words(const model::FaultType& fault, double magnitude) {
   if (!std::isfinite(magnitude)) {
     return "–";
   }

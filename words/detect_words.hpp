@@ -24,7 +24,7 @@ namespace wheelwright::words {
                                                     const TimeAxis& axis);
 
 /// A magnitude of a fault: a share as a percentage ("4.1 %"), else with its unit; "–" where it is infinite.
-[[nodiscard]] std::string magnitude_words(const detector::FaultType& fault, double magnitude);
+[[nodiscard]] std::string magnitude_words(const model::FaultType& fault, double magnitude);
 
 /// Smallest certain size in one manoeuvre within window number `window`, in words: "4.1 %" at every onset of it in the
 /// drive, "4.1 % at 5 of 7" onsets, "–" at none; of a fault without a size "yes", "at 3 of 7" or "–". Empty where the

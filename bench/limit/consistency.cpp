@@ -199,9 +199,8 @@ Consistency ConsistencyTest::consistent(const detector::ReferenceMotion& motion,
   return result;
 }
 
-DetectableSize ConsistencyTest::smallest_detectable(const detector::ReferenceMotion& motion,
-                                                    const detector::FaultType& fault, double side, std::size_t onset,
-                                                    double window) {
+DetectableSize ConsistencyTest::smallest_detectable(const detector::ReferenceMotion& motion, const FaultType& fault,
+                                                    double side, std::size_t onset, double window) {
   check::that(side == 1.0 || side == -1.0, "side", "1 or −1");
   check::that(onset < motion.instants(), "onset", "an instant of the motion");
   const auto next = std::upper_bound(motion.segment_starts.begin(), motion.segment_starts.end(), onset);

@@ -51,8 +51,8 @@
 #include <Eigen/Core>
 
 #include <wheelwright/bounds/polytope.hpp>
-#include <wheelwright/detector/fault_type.hpp>
 #include <wheelwright/detector/reference_motion.hpp>
+#include <wheelwright/model/fault_type.hpp>
 #include "limit/raw_equations.hpp"
 #include "limit/separation.hpp"
 
@@ -99,9 +99,8 @@ class ConsistencyTest {
   /// The smallest size of `fault` (`side` 1: positive, −1: negative magnitudes) that any test could see for certain
   /// within `window` s of its onset at an instant of `motion`. A fault that is there or not is asked for at its one
   /// size.
-  [[nodiscard]] DetectableSize smallest_detectable(const detector::ReferenceMotion& motion,
-                                                   const detector::FaultType& fault, double side, std::size_t onset,
-                                                   double window);
+  [[nodiscard]] DetectableSize smallest_detectable(const detector::ReferenceMotion& motion, const FaultType& fault,
+                                                   double side, std::size_t onset, double window);
 
   [[nodiscard]] const Polytope& set() const { return set_; }
 

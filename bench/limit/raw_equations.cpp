@@ -201,8 +201,8 @@ Eigen::MatrixXd read_efforts(LogSource& log, const filter::Measurement& measurem
   return Eigen::Map<const Eigen::MatrixXd>(values.data(), joints, static_cast<Eigen::Index>(values.size()) / joints);
 }
 
-detector::FaultSignals raw_signature(const RawEquations& equations, const detector::FaultType& fault,
-                                     const Model& model, const detector::ReferenceMotion& motion, std::size_t onset) {
+detector::FaultSignals raw_signature(const RawEquations& equations, const FaultType& fault, const Model& model,
+                                     const detector::ReferenceMotion& motion, std::size_t onset) {
   check::that(!fault.held_effort, "fault '" + fault.name + "'", "one whose signature needs no filter");
   const std::size_t last = equations.first + equations.count();
   check::that(onset >= equations.first && onset < last, "onset", "an instant inside the stretch");

@@ -28,10 +28,10 @@
 
 #include <wheelwright/core/log.hpp>
 #include <wheelwright/detector/fault_rows.hpp>
-#include <wheelwright/detector/fault_type.hpp>
 #include <wheelwright/detector/reference_motion.hpp>
 #include <wheelwright/filter/measurement.hpp>
 #include <wheelwright/filter/noise.hpp>
+#include <wheelwright/model/fault_type.hpp>
 #include <wheelwright/model/model.hpp>
 
 namespace wheelwright::bench {
@@ -86,7 +86,7 @@ struct RawEquations {
 /// before. Means of FaultFilter's signature over the intervals; what jumps at the onset is in the equation that ends
 /// there. Throws InvalidArgument for a fault that needs a filtered value (FaultType::held_effort), or an onset that is
 /// not inside the stretch.
-[[nodiscard]] detector::FaultSignals raw_signature(const RawEquations& equations, const detector::FaultType& fault,
+[[nodiscard]] detector::FaultSignals raw_signature(const RawEquations& equations, const FaultType& fault,
                                                    const Model& model, const detector::ReferenceMotion& motion,
                                                    std::size_t onset);
 

@@ -139,12 +139,12 @@ Scenario make_drive(const Subject& subject, Driving driving, std::uint64_t seed,
 
 std::vector<TriedFault> tried_faults(const Subject& subject, Driving driving, std::uint64_t seed) {
   const OnlineModel& m = subject.model;
-  const std::vector<detector::FaultType> catalogue = detector::fault_catalogue(m.model, m.estimate);
+  const std::vector<FaultType> catalogue = model::fault_catalogue(m.model, m.estimate);
   std::vector<TriedFault> tried;
-  std::vector<detector::FaultType> types;
+  std::vector<FaultType> types;
   for (const char* name : {"wheel_radius", "wheel_radius_right", "matched", "unmatched", "slip_yaw",
                            "effort_loss_right", "effort_bias_left", "encoder_scale_right"}) {
-    for (const detector::FaultType& type : catalogue) {
+    for (const FaultType& type : catalogue) {
       if (type.name == name) {
         types.push_back(type);
       }
@@ -169,7 +169,7 @@ std::vector<TriedFault> tried_faults(const Subject& subject, Driving driving, st
     }
     std::vector<detector::FaultMargins> each =
         detector::margins_along(motion, types, subject.rule(),
-                                [&](const detector::FaultType& fault) {
+                                [&](const FaultType& fault) {
                                   return std::make_unique<detector::FaultFilter>(fault, m.model, m.filter, motion);
                                 },
                                 {.windows = {1.0}, .onset_step = 1.0});

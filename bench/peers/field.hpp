@@ -10,8 +10,8 @@
 #include <vector>
 
 #include <wheelwright/commission/commission.hpp>
-#include <wheelwright/detector/fault_type.hpp>
 #include <wheelwright/detector/threshold.hpp>
+#include <wheelwright/model/fault_type.hpp>
 
 #include "detector/detectability.hpp"
 #include "peers/statistic.hpp"
@@ -56,7 +56,7 @@ struct Subject {
 
 /// A fault that is tried: with its simulated counterpart.
 struct TriedFault {
-  detector::FaultType type;
+  FaultType type;
   std::optional<model::Fault::Kind> simulated;
   std::array<double, 2> certain{};  ///< median over onsets of the smallest size certain within 1 s: growing, shrinking;
                                     ///< infinite where none is in half of them

@@ -54,14 +54,14 @@ struct Viscous {
     return b;
   }
 
-  [[nodiscard]] DetectableSize limit(const detector::FaultType& fault, double side, filter::SensorErrors errors) const {
+  [[nodiscard]] DetectableSize limit(const FaultType& fault, double side, filter::SensorErrors errors) const {
     return ConsistencyTest(model, measurement, errors, set, {.before = 0.02})
         .smallest_detectable(motion, fault, side, 5, 0.1);
   }
 };
 
-const detector::FaultType kBias{.name = "bias", .range = {-10.0, 10.0}, .offset = Eigen::VectorXd::Ones(1)};
-const detector::FaultType kGain{.name = "gain", .range = {-0.9, 10.0}, .effort = Eigen::MatrixXd::Ones(1, 1)};
+const FaultType kBias{.name = "bias", .range = {-10.0, 10.0}, .offset = Eigen::VectorXd::Ones(1)};
+const FaultType kGain{.name = "gain", .range = {-0.9, 10.0}, .effort = Eigen::MatrixXd::Ones(1, 1)};
 
 // Without healthy samples before the onset, θ° may be anywhere.
 TEST(Consistency, LimitOfOneParameterIsTheClosedForm) {

@@ -160,12 +160,12 @@ TEST(Detection, PersistenceCosts) {
 TEST(Detection, OnlyFaultsThatAreThereInFullAreInspected) {
   const Prepared p = prepared();
   const Plan plan = plan_of(FigureEight{0.2, 4.0}, subject_of(p.model), 6.0, 0.02);
-  const auto catalogue = detector::fault_catalogue(p.model.model, p.model.estimate);
+  const auto catalogue = model::fault_catalogue(p.model.model, p.model.estimate);
   for (const char* name :
        {"wheel_radius_bump_right", "wheel_radius_drift", "encoder_dropout_left", "effort_stuck_left"}) {
-    EXPECT_THROW(promised(p, plan, {}, {detector::find_fault(catalogue, name), 0.05}), InvalidArgument) << name;
+    EXPECT_THROW(promised(p, plan, {}, {model::find_fault(catalogue, name), 0.05}), InvalidArgument) << name;
   }
-  EXPECT_LT(promised(p, plan, {}, {detector::find_fault(catalogue, "encoder_frozen_left"), 1.0}), core::kInfinity);
+  EXPECT_LT(promised(p, plan, {}, {model::find_fault(catalogue, "encoder_frozen_left"), 1.0}), core::kInfinity);
 }
 
 // Slip that was there before the drive adds its friction, and no impulse of the mass: the sum over the samples of the
@@ -175,9 +175,8 @@ TEST(Detection, AFaultThatWasThereBeforeDoesNotJump) {
   const DesignSubject subject = subject_of(p.model);
   const FilterDesign& f = subject.filter;
   const detector::ReferenceMotion motion = planned_motion(plan_of(FigureEight{0.2, 4.0}, subject, 6.0, 0.02), subject);
-  detector::FaultFilter rows(
-      detector::find_fault(detector::fault_catalogue(p.model.model, p.model.estimate), "matched"), subject.model, f,
-      motion);
+  detector::FaultFilter rows(model::find_fault(model::fault_catalogue(p.model.model, p.model.estimate), "matched"),
+                             subject.model, f, motion);
   rows.begin_broken(0);
   ASSERT_EQ(f.order, 2);
   ASSERT_NE(motion.kind, MotionKind::speed);
@@ -196,8 +195,8 @@ TEST(Detection, AFaultThatWasThereBeforeDoesNotJump) {
 
 TEST(Detection, SaysWhichFaultCannotBeInspected) {
   const Prepared p = prepared();
-  const detector::FaultType stuck =
-      detector::find_fault(detector::fault_catalogue(p.model.model, p.model.estimate), "effort_stuck_left");
+  const FaultType stuck =
+      model::find_fault(model::fault_catalogue(p.model.model, p.model.estimate), "effort_stuck_left");
   try {
     static_cast<void>(design_for_detection(p.model, subject_of(p.model), limits(p.scenario.robot), {{stuck, 1.0}}));
     FAIL();

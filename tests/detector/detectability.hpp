@@ -81,7 +81,7 @@ inline const std::vector<Breakage>& breakages() {
 struct FaultyRun {
   const Commissioned* robot;
   Scenario drive;  ///< without the fault
-  detector::FaultType fault;
+  FaultType fault;
   std::optional<model::Fault::Kind> simulated;
   double onset = 0.0;  ///< s, between two samples of the log
   double side = 1.0;
@@ -145,12 +145,10 @@ inline Promise promise(const FaultyRun& run, double magnitude, double window, do
     motion.settled[k] = k == onset;
   }
   const detector::ThresholdRule rule(Polytope(m.facets, m.box), m.estimate);
-  const auto margins =
-      detector::margins_along(motion, {run.fault}, rule,
-                              [&](const detector::FaultType& fault) {
-                                return std::make_unique<detector::FaultFilter>(fault, m.model, m.filter, motion);
-                              },
-                              {.windows = {window}, .noise_share = share});
+  const auto margins = detector::margins_along(
+      motion, {run.fault}, rule,
+      [&](const FaultType& fault) { return std::make_unique<detector::FaultFilter>(fault, m.model, m.filter, motion); },
+      {.windows = {window}, .noise_share = share});
   for (const detector::FaultMargins& each : margins) {
     if (each.side == run.side && each.onsets.size() == 1 && each.onsets[0].certain.size() == 1) {
       return {each.onsets[0].certain[0], each.onsets[0].hidden};
@@ -204,7 +202,7 @@ inline FaultyRun random_run(const Commissioned& robot, std::uint64_t seed, const
   run.drive.trajectory.yaw_rate = 0.6 + 1.0 * random.unit();
   run.drive.duration = 10.0;
   run.onset = (std::floor((4.0 + 3.0 * random.unit()) * run.drive.rate) + 0.01) / run.drive.rate;
-  for (const detector::FaultType& fault : detector::fault_catalogue(robot.model.model, robot.model.estimate)) {
+  for (const FaultType& fault : model::fault_catalogue(robot.model.model, robot.model.estimate)) {
     if (fault.name == breakage.fault) {
       run.fault = fault;
     }

@@ -115,7 +115,7 @@ double simulated_error(const Simulated& each, Shown shown, double rate, bool dri
   FaultType fault = find_fault(s.model, each.name);
   Fault simulated{.kind = each.kind, .magnitude = each.magnitude, .profile = {.onset = kOnset}};
   if (drift) {
-    fault.profile = {.kind = FaultProfile::Kind::drift, .rise = 1.0};
+    fault.profile = {.kind = FaultProfile::Kind::ramp, .rise = 1.0};
     simulated.profile.shape = model::TimeProfile::Shape::ramp;
     simulated.profile.rise_time = 1.0;
   }

@@ -69,7 +69,7 @@ double error(const Simulated& each, double rate, bool drift) {
   FaultType fault = find_fault(model, each.name);
   Fault simulated{.kind = each.kind, .magnitude = each.magnitude, .profile = {.onset = kOnset}};
   if (drift) {
-    fault.profile = {.kind = FaultProfile::Kind::drift, .rise = 1.0};
+    fault.profile = {.kind = FaultProfile::Kind::ramp, .rise = 1.0};
     simulated.profile.shape = model::TimeProfile::Shape::ramp;
     simulated.profile.rise_time = 1.0;
   }

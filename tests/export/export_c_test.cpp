@@ -10,6 +10,7 @@
 #include <wheelwright/export/export_c.hpp>
 #include <wheelwright/filter/motion_bound.hpp>
 #include <wheelwright/model/differential_drive.hpp>
+#include <wheelwright/model/robot.hpp>
 #include <wheelwright/model/single_axis.hpp>
 
 #include "support/c_detector.hpp"
@@ -74,6 +75,15 @@ Model coupled() {
   m.terms.push_back({.output = 0, .parameter = j, .kind = Term::Kind::speed, .coordinate = 1, .scale = 0.03});
   m.terms.push_back({.output = 1, .parameter = j, .kind = Term::Kind::speed, .coordinate = 0, .scale = -0.3});
   return m;
+}
+
+/// A drive with an effect of the robot file.
+Model with_effect(const model::RobotEffect& effect) {
+  model::Robot robot;
+  robot.wheel_radius = 0.1;
+  robot.track_width = 0.4;
+  robot.effects = {effect};
+  return make_model(robot);
 }
 
 /// Three axes, each for itself.
@@ -292,6 +302,7 @@ TEST_F(ExportC, DecidesAsTheLibraryWithEveryFunctionTerm) {
   expect_same({.model = drive(true, true), .motion = MotionKind::mean_speed, .heading = true, .options = of_set(kBox)},
               "measured heading");
   expect_same({.model = drive(true, false), .heading = true}, "angles with a measured heading");
+  expect_same({.model = with_effect({"torque_bias", {{"b_R", {-1.0, 1.0}}}})}, "an offset at one wheel");
   expect_same({.model = model::SingleAxis{.coulomb = true, .offset = true}.model(), .hold = Hold::zero_order},
               "single axis");
   expect_same(
@@ -488,6 +499,10 @@ TEST_F(ExportC, SaysWhatItCannotWrite) {
   };
   const Detector other = detector_of(own);
   EXPECT_THAT(testing::input_error([&] { static_cast<void>(c_header(other)); }), HasSubstr("offset"));
+  const Detector drag = detector_of({.model = with_effect({"quadratic_drag", {{"c", {-1.0, 1.0}}}})});
+  EXPECT_THAT(
+      testing::input_error([&] { static_cast<void>(c_header(drag)); }),
+      HasSubstr("the term of parameter quadratic_drag_c of the model differential_drive is a function of its own"));
   // Too many vertices for a table: the box still goes.
   Case many{.model = drive(true, true), .half_spaces = 80};
   EXPECT_THAT(testing::input_error([&] { static_cast<void>(c_header(detector_of(many))); }), HasSubstr("--set box"));

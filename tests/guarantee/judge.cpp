@@ -149,7 +149,7 @@ bool sees(const OnlineModel& model, const LogTable& log, double onset, double en
 }
 
 // Whether what is said of the first alarm leaves the fault possible, of its size and at its time.
-bool isolated(const OnlineModel& model, const LogTable& log, const detector::FaultType& fault, const Breakdown& truth) {
+bool isolated(const OnlineModel& model, const LogTable& log, const FaultType& fault, const Breakdown& truth) {
   TableSource source(log);
   const Detection detection = detect(source, make_detector(model));
   if (detection.events.empty() || detection.events.front().start < truth.onset) {

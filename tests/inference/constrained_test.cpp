@@ -190,8 +190,10 @@ TEST(PhysicalConsistency, TheFootprintBindsAndSaysSo) {
   // A robot of 20 kg whose log looks like I = 5 kg·m² in a footprint of R = 0.4 m: I <= 20·0.16 = 3.2.
   Random random(9);
   const double r = 0.1, R = 0.4;
-  const std::vector<PhysicalQuantity> parameters = {
-      {"mass", r, "kg"}, {"yaw_inertia", r, "kg·m²"}, {"viscous_linear", r, "N·s/m"}, {"offset", 1.0, "N·m"}};
+  const std::vector<PhysicalQuantity> parameters = {{"mass", r, "kg", true},
+                                                    {"yaw_inertia", r, "kg·m²", true},
+                                                    {"viscous_linear", r, "N·s/m", true},
+                                                    {"offset", 1.0, "N·m"}};
   const auto constraints = physical_consistency(parameters, R);
   ASSERT_EQ(constraints.size(), 4u);
   const Eigen::MatrixXd Y = random.matrix(500, 4);
@@ -212,7 +214,8 @@ TEST(PhysicalConsistency, TheFootprintBindsAndSaysSo) {
 }
 
 TEST(PhysicalConsistency, KnowsWhatIsNeverNegative) {
-  const auto constraints = physical_consistency({{"inertia", 2.0, ""}, {"coulomb", 1.0, ""}, {"offset", 1.0, ""}}, 1.0);
+  const auto constraints =
+      physical_consistency({{"inertia", 2.0, "", true}, {"coulomb", 1.0, "", true}, {"offset", 1.0, ""}}, 1.0);
   ASSERT_EQ(constraints.size(), 2u);
   EXPECT_EQ(constraints[0].asks, "a negative inertia");
   EXPECT_EQ(constraints[0].a, Eigen::Vector3d(-0.5, 0.0, 0.0));

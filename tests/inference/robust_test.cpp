@@ -329,7 +329,8 @@ TEST(RobustFit, ThinnedLogsAreFinishedOnAllRows) {
 // are a box in other coordinates, those of a fan are not.
 TEST(RobustFit, FulfilsTheOptimalityConditionsUnderConstraints) {
   const Problem a = contaminated(9, 800);
-  const auto footprint = physical_consistency({{"mass", 1.0, ""}, {"yaw_inertia", 0.01, ""}, {"offset", 1.0, ""}}, 1.2);
+  const auto footprint =
+      physical_consistency({{"mass", 1.0, "", true}, {"yaw_inertia", 0.01, "", true}, {"offset", 1.0, ""}}, 1.2);
   std::vector<LinearConstraint> fan;
   for (const double slope : {-1.0, 0.0, 1.0}) {
     fan.push_back({Eigen::Vector3d(slope, 100.0, 0.5), 3.0 + slope, "fan", ""});

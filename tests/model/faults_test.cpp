@@ -3,6 +3,8 @@
 #include <limits>
 #include <numbers>
 #include <random>
+#include <set>
+#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -35,6 +37,32 @@ Eigen::Vector2d healthy_torque(const DriveParameters& p, const DriveMotion& m) {
   const double f = p.viscous_x * c * c + p.viscous_y * s * s;
   return drive.wheel_radius * Eigen::Vector2d(p.mass * m.acceleration[0] + f * m.speed[0],
                                               p.yaw_inertia * m.acceleration[1] + p.viscous_yaw * m.speed[1]);
+}
+
+TEST(FaultKind, EachHasANameOfItsOwn) {
+  std::set<std::string_view> names;
+  for (std::size_t k = 0; k < fault_kinds; ++k) {
+    names.insert(to_string(static_cast<FaultKind>(k)));
+  }
+  EXPECT_EQ(names.size(), fault_kinds);
+  EXPECT_FALSE(names.contains(""));
+  EXPECT_THROW(static_cast<void>(to_string(static_cast<FaultKind>(fault_kinds))), InvalidArgument);
+}
+
+TEST(FaultKind, IsSimulatedOrHasASignatureOrBoth) {
+  const Model model = drive.model();
+  std::set<std::string> without_signature;
+  for (std::size_t k = 0; k < fault_kinds; ++k) {
+    without_signature.insert(std::string(to_string(static_cast<FaultKind>(k))));
+  }
+  for (const FaultType& fault : fault_catalogue(model, Eigen::VectorXd::Ones(static_cast<Eigen::Index>(model.p())))) {
+    EXPECT_NO_THROW(validate(fault, model)) << fault.name;
+    EXPECT_FALSE(fault.sentence.empty() || fault.unit.empty()) << fault.name;
+    without_signature.erase(fault.name);
+    without_signature.erase(fault.name.substr(0, fault.name.rfind('_')));  // of each joint
+  }
+  EXPECT_EQ(without_signature, (std::set<std::string>{"slip_x", "slip_y"}));  // they turn with the heading
+  EXPECT_EQ(simulated_faults(), std::vector(all_kinds.begin(), all_kinds.end()));
 }
 
 TEST(TimeProfile, IsNothingBeforeItsOnsetAndAllAfterItsRise) {
@@ -172,6 +200,8 @@ TEST(ValidateFaults, RadiiStayPositive) {
 TEST(ValidateFaults, RefusesWhatIsNoProfile) {
   const double nan = std::nan("");
   const auto check = [](Fault fault) { validate(std::vector<Fault>{fault}, drive); };
+  EXPECT_THROW(check({Kind::effort_loss, 0.1, {}}), InvalidArgument);
+  EXPECT_THROW(check({Kind::slip_x, 0.1, {Shape::pulse, 1.0, 2.0}}), InvalidArgument);
   EXPECT_THROW(check({Kind::slip_x, nan, {}}), InvalidArgument);
   EXPECT_THROW(check({Kind::slip_x, 0.1, {Shape::step, nan}}), InvalidArgument);
   EXPECT_THROW(check({Kind::slip_x, 0.1, {Shape::ramp, 1.0, 0.0}}), InvalidArgument);

@@ -158,6 +158,51 @@ TEST(SingleAxis, SignOfASpeedThatMayBeEitherIsBoundedSo) {
   }
 }
 
+// What reads terms as data goes by their shape.
+TEST(TermShape, SaysWhatAFunctionIs) {
+  const auto shapes = [](const Model& model) {
+    std::vector<TermShape> list;
+    for (const Term& term : model.terms) {
+      if (term.kind == Term::Kind::function) {
+        list.push_back(term.function.shape());
+      }
+    }
+    return list;
+  };
+  DifferentialDrive all = drive;
+  all.anisotropic_friction = all.coulomb = true;
+  EXPECT_THAT(shapes(all.model()), ElementsAre(TermShape::along_x, TermShape::along_y, TermShape::sum_of_signs,
+                                               TermShape::difference_of_signs));
+  EXPECT_THAT(shapes(SingleAxis{.coulomb = true, .offset = true}.model()),
+              ElementsAre(TermShape::sign_of_speed, TermShape::constant));
+  EXPECT_EQ(TermFunction([](const MotionState&) { return TermValue{1.0, 0.0}; }).shape(), TermShape::own);
+  EXPECT_EQ(TermFunction(TermShape::own), TermFunction());
+  EXPECT_NE(TermFunction(TermShape::sum_of_signs), TermFunction(TermShape::difference_of_signs));
+}
+
+TEST(Parameter, KnowsWhatIsNeverNegativeAndWhatIsTheMovedMass) {
+  Robot robot = two_wheels(0.1, 0.4);
+  robot.parameters = {"mass", "yaw_inertia", "viscous_linear", "viscous_yaw", "coulomb"};
+  robot.effects = {{"viscous_asymmetric", {{"b", {-1.0, 1.0}}}},
+                   {"caster_drag", {{"c", {0.1, 0.2}}, {"p", {0.3, 0.3}}}}};
+  Robot axis;
+  axis.model = "single_axis";
+  axis.parameters = {"inertia", "viscous", "coulomb", "offset"};
+  std::vector<std::string> of_any_sign, moved;
+  for (const Robot& each : {robot, axis}) {
+    for (const Parameter& parameter : make_model(each).parameters) {
+      if (!parameter.never_negative) {
+        of_any_sign.push_back(parameter.physical);
+      }
+      if (parameter.moved_mass) {
+        moved.push_back(parameter.physical);
+      }
+    }
+  }
+  EXPECT_THAT(of_any_sign, ElementsAre("viscous_asymmetric_b", "offset"));
+  EXPECT_THAT(moved, ElementsAre("mass", "inertia"));
+}
+
 TEST(MakeModel, TakesTheParametersThatAreRequestedInTheModelsOrder) {
   Robot robot;
   robot.model = "single_axis";
@@ -229,6 +274,9 @@ TEST(Validate, NamesTheFieldThatIsWrong) {
   bad = good;
   bad.terms[0].kind = Term::Kind::function;
   EXPECT_THAT([&] { validate(bad); }, ThrowsMessage<InvalidArgument>(HasSubstr("function")));
+  bad = SingleAxis{}.model();
+  bad.terms[0] = {.kind = Term::Kind::function, .function = TermShape::sum_of_signs};
+  EXPECT_THAT([&] { validate(bad); }, ThrowsMessage<InvalidArgument>(HasSubstr("terms[0].function")));
 }
 
 // Closed forms: the mean of an odd or linear function over a symmetric interval; the share of it above zero.

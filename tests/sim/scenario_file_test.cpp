@@ -89,11 +89,18 @@ seed: 77
 }
 
 TEST(ScenarioFile, FaultKindsAreCalledAsInTheLibrary) {
-  for (int kind = 0; kind < 8; ++kind) {
-    const auto expected = static_cast<model::Fault::Kind>(kind);
+  ASSERT_EQ(model::simulated_faults().size(), 8U);
+  for (const model::FaultKind expected : model::simulated_faults()) {
     const Scenario s = results::parse_scenario(
         head + "faults: [{kind: " + std::string(model::to_string(expected)) + ", magnitude: 0.01}]", "s.yaml");
     EXPECT_EQ(s.faults.at(0).kind, expected);
+  }
+  const std::array shapes{FaultProfile::Kind::step, FaultProfile::Kind::ramp, FaultProfile::Kind::smooth};
+  for (std::size_t k = 0; k < shapes.size(); ++k) {
+    const std::string name = std::array{"step", "ramp", "smooth"}.at(k);
+    const Scenario s = results::parse_scenario(
+        head + "faults: [{kind: slip_x, magnitude: 0.01, rise_time: 1, shape: " + name + "}]", "s.yaml");
+    EXPECT_EQ(s.faults.at(0).profile.shape, shapes.at(k)) << name;
   }
   int kind = 0;
   for (const char* name : {"straight", "circle", "figure_eight", "multi_sine", "spin", "stops", "commissioning"}) {

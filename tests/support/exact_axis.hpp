@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// A linear axis, driven by held efforts and solved in closed form, with sensors whose errors obey an error class in its
-/// worst ways. Shares no code with the library's filters and simulators.
+/// A linear axis, driven by held efforts and solved in closed form, with sensors whose errors obey an error class in
+/// its worst ways. Shares no code with the library's filters and simulators.
 #pragma once
 
 #include <cmath>

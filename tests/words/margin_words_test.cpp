@@ -10,7 +10,7 @@ namespace wheelwright::words::margin_words_test {
 namespace {
 
 TEST(MarginWords, AreTwoDigitsUpwards) {
-  const detector::FaultType share{.name = "share", .unit = "1"}, mass{.name = "mass", .unit = "kg"};
+  const FaultType share{.name = "share", .unit = "1"}, mass{.name = "mass", .unit = "kg"};
   EXPECT_EQ(magnitude_words(share, 0.0461), "4.7 %");
   EXPECT_EQ(magnitude_words(share, 0.05), "5 %");
   EXPECT_EQ(magnitude_words(share, 0.991), "100 %");

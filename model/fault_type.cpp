@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/detector/fault_type.hpp>
+#include <wheelwright/model/fault_type.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 
 #include <wheelwright/core/check.hpp>
 
-namespace wheelwright::detector {
+namespace wheelwright::model {
 namespace {
 
 using std::numbers::pi;
@@ -24,7 +24,8 @@ void check_shape(const M& matrix, std::size_t rows, std::size_t columns, const s
 double FaultProfile::at(double since, double angle, double speed) const {
   switch (kind) {
     case Kind::step: return 1.0;
-    case Kind::drift: return std::min(since / rise, 1.0);
+    case Kind::ramp: return std::min(since / rise, 1.0);
+    case Kind::smooth: return since < rise ? 0.5 * (1.0 - std::cos(pi * (since / rise))) : 1.0;
     case Kind::pulse: return since < rise ? 1.0 : 0.0;
     case Kind::bump: {
       const double psi = std::remainder(angle - std::copysign(0.5 * arc, speed), 2.0 * pi);
@@ -60,6 +61,7 @@ void validate(const FaultType& fault, const Model& model) {
   check::finite(fault.range.upper, name + "range");
   check::that(fault.lateral == 0.0 || c >= 2, name + "lateral", "0 for a model without a heading");
   const FaultProfile& profile = fault.profile;
+  check::that(profile.kind != FaultProfile::Kind::smooth, name + "profile.kind", "step, ramp, pulse or bump");
   check::that(
       profile.rise > 0.0 || profile.kind == FaultProfile::Kind::step || profile.kind == FaultProfile::Kind::bump,
       name + "profile.rise", "a number > 0");
@@ -72,4 +74,4 @@ void validate(const FaultType& fault, const Model& model) {
               "nothing where the fault changes motion and efforts at once");
 }
 
-}  // namespace wheelwright::detector
+}  // namespace wheelwright::model

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Fault models as data: the signature of a fault in robot and sensors, with one unknown size.
+/// Faults as data: their kinds, their time profiles, and the signature of each in robot and sensors, with one unknown
+/// size. What a simulator does with them is in faults.hpp.
 ///
 /// A fault has a size κ, 0 without it. With the profile s(t) in [0, 1] of its coming, v the coordinate speeds that the
 /// encoders of a healthy robot would show, and Y the model's regressor, a faulty robot
@@ -14,7 +15,9 @@
 /// ζ = ((1 + κ)² − 1) Yθ. Motion across the heading adds −w2 κ d to the forward acceleration.
 #pragma once
 
+#include <cstddef>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <Eigen/Core>
@@ -23,20 +26,53 @@
 #include <wheelwright/model/model.hpp>
 #include <wheelwright/model/robot.hpp>
 
-namespace wheelwright::detector {
+namespace wheelwright::model {
+
+/// Kinds of fault: what changes. Each is one entry of model/fault_catalogue.cpp, with its name, sentence, unit, range
+/// and signature. Those from effort_loss to encoder_dropout are of each joint.
+enum class FaultKind {
+  wheel_radius,             ///< both wheel radii, δ1 of (1)
+  wheel_radius_right,       ///< the right wheel's, δ1R of Remark 1
+  wheel_radius_left,        ///< the left wheel's, δ1L of Remark 1
+  slip_x,                   ///< slip or skid along the world x axis, δ2 of (1)
+  slip_y,                   ///< along the world y axis, δ3 of (1)
+  slip_yaw,                 ///< about the vertical, δ4 of (1)
+  matched,                  ///< along the heading, ρ_M of (10)
+  unmatched,                ///< across the heading, to the right, ρ_U of (11)
+  wheel_radius_drift,       ///< both wheel radii, slowly
+  wheel_radius_bump_right,  ///< the right wheel's, over a part of its turn
+  wheel_radius_bump_left,   ///< the left wheel's
+  wheel_slip_right,         ///< a share of the right wheel's way is lost
+  wheel_slip_left,          ///< of the left wheel's
+  effort_loss,              ///< a share of the effort is not delivered
+  effort_bias,              ///< the effort's reading is off
+  effort_stuck,             ///< it stays at its value
+  effort_dead,              ///< it is zero
+  encoder_scale,            ///< the encoder counts too much or too little
+  encoder_frozen,           ///< it stands still
+  encoder_dropout,          ///< it stands still for a moment
+  payload_lost,             ///< mass in line with the axle is lost or gained
+};
+/// How many there are.
+inline constexpr std::size_t fault_kinds = static_cast<std::size_t>(FaultKind::payload_lost) + 1;
+
+/// Name of a kind as results and scenario files write it, e.g. "wheel_radius_right"; where it is of each joint, the
+/// part before the joint's: "effort_loss" of "effort_loss_right".
+[[nodiscard]] std::string_view to_string(FaultKind kind);
 
 /// Time profile of a fault: s(t) of its signature.
 struct FaultProfile {
   /// Shape.
   enum class Kind {
-    step,   ///< 0, then 1 from the onset on
-    drift,  ///< linear from 0 to 1 over `rise`
-    pulse,  ///< 1 for the time `rise` after the onset, then 0 again
+    step,    ///< 0, then 1 from the onset on
+    ramp,    ///< linear from 0 to 1 over `rise`
+    smooth,  ///< half a cosine over `rise`, (1 − cos πs)/2: differentiable, as (8) asks for; simulators only
+    pulse,   ///< 1 for the time `rise` after the onset, then 0 again
     bump,  ///< once per turn of joint `joint`: (1 + cos(2π ψ/arc))/2 where |ψ| <= arc/2, ψ the joint's angle from the
            ///< middle of the bump, which lies half an arc ahead at the onset
   };
   Kind kind = Kind::step;
-  double rise = 0.0;      ///< s, > 0 for drift and pulse
+  double rise = 0.0;      ///< s, > 0 for ramp, smooth and pulse
   double arc = 0.0;       ///< rad, in (0, 2π], for a bump
   std::size_t joint = 0;  ///< for a bump
 
@@ -46,9 +82,9 @@ struct FaultProfile {
   [[nodiscard]] bool jumps() const { return kind == Kind::step || kind == Kind::pulse; }
 };
 
-/// A kind of fault. Matrices and vectors may be left empty where they are zero.
+/// A fault of a robot. Matrices and vectors may be left empty where they are zero.
 struct FaultType {
-  std::string name;          ///< as in results, e.g. "wheel_radius_right"
+  std::string name{};        ///< as in results, e.g. "wheel_radius_right"
   std::string sentence{};    ///< for people, e.g. "the right wheel's radius changes"
   std::string unit{};        ///< of the magnitude; "1" for a share
   Interval range{};          ///< magnitudes that are looked at, in it 0: one side or both
@@ -93,9 +129,14 @@ void validate(const FaultType& fault, const Model& model);
 /// `theta` (p), a best guess of θ_L, bounds the mass that can be lost or gained; `effort` names the unit of a bias. The
 /// mass is in kg where efforts are torques, else a share of what `theta` says.
 [[nodiscard]] std::vector<FaultType> fault_catalogue(const Model& model, const Eigen::VectorXd& theta,
-                                                     model::EffortKind effort = model::EffortKind::torque);
+                                                     EffortKind effort = EffortKind::torque);
 
 /// The fault called `name`. Throws InvalidArgument, naming those that there are, where there is none.
 [[nodiscard]] const FaultType& find_fault(const std::vector<FaultType>& catalogue, const std::string& name);
 
-}  // namespace wheelwright::detector
+}  // namespace wheelwright::model
+
+namespace wheelwright {
+using model::FaultProfile;
+using model::FaultType;
+}  // namespace wheelwright
