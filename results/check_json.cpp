@@ -37,6 +37,53 @@ std::string verdict(const ModelCheck& check, const ModelClaims& claims) {
                      check.bounds.size(), claims.facets.size());
 }
 
+std::string risk_verdict(const RiskCheck& check, const RiskClaims& claims) {
+  if (!check.failures.empty()) {
+    return fmt::format("at a risk of {:g}: not proved, {} statement{} not follow from the log", claims.model.risk,
+                       check.failures.size(), check.failures.size() == 1 ? " does" : "s do");
+  }
+  return fmt::format(
+      "at a risk of {:g}: all {} bounds and {} facets follow from the guaranteed set and from {} sums over the log, "
+      "and "
+      "the risks of all {} ellipsoids add up to {:g}",
+      claims.model.risk, check.bounds.size(), claims.model.facets.size(), claims.sums.size(), claims.ellipsoids.size(),
+      check.spent);
+}
+
+namespace {
+
+Json bound_json(const BoundVerdict& verdict, const ModelClaims& claims, std::size_t rows) {
+  const model::Parameter& parameter = claims.model.parameters[verdict.parameter];
+  return {{"parameter", parameter.name},
+          {"unit", commission::parameter_unit(claims.robot, parameter)},
+          {"side", files::word_of(kSideWords, verdict.side)},
+          {"stated", verdict.stated},
+          {"shown", files::or_null(verdict.shown)},
+          {"proved", verdict.proved},
+          {"shortfall", files::or_null(verdict.shortfall)},
+          {"rows", rows},
+          {"reason", verdict.reason}};
+}
+
+Json risk_json(const RiskCheck& check, const ModelClaims& claims) {
+  const RiskClaims& risk = *claims.at_risk;
+  Json bounds = Json::array();
+  for (const BoundVerdict& each : check.bounds) {
+    const auto& proofs = each.side == bounds::Side::upper ? risk.upper : risk.lower;
+    bounds.push_back(bound_json(each, claims, proofs[each.parameter].size()));
+  }
+  return {{"risk", risk.model.risk},
+          {"proved", check.failures.empty()},
+          {"message", risk_verdict(check, risk)},
+          {"spent", files::or_null(check.spent)},
+          {"ellipsoids", risk.ellipsoids.size()},
+          {"sums", {{"stated", risk.sums.size()}, {"proved", check.sums}}},
+          {"facets", {{"stated", risk.model.facets.size()}, {"proved", check.facets}}},
+          {"bounds", std::move(bounds)}};
+}
+
+}  // namespace
+
 Json to_json(const ModelCheck& check, const ModelClaims& claims, const logs::LogReport& data, const CheckedFiles& files,
              const std::string& software) {
   Json log_files = Json::array(), bounds = Json::array();
@@ -44,17 +91,8 @@ Json to_json(const ModelCheck& check, const ModelClaims& claims, const logs::Log
     log_files.push_back({{"path", file.path}, {"hash", file.hash}, {"bytes", file.bytes}, {"rows", file.rows}});
   }
   for (const BoundVerdict& each : check.bounds) {
-    const model::Parameter& parameter = claims.model.parameters[each.parameter];
-    bounds.push_back(
-        {{"parameter", parameter.name},
-         {"unit", commission::parameter_unit(claims.robot, parameter)},
-         {"side", files::word_of(kSideWords, each.side)},
-         {"stated", each.stated},
-         {"shown", files::or_null(each.shown)},
-         {"proved", each.proved},
-         {"shortfall", files::or_null(each.shortfall)},
-         {"rows", (each.side == bounds::Side::upper ? claims.upper : claims.lower)[each.parameter].proof.size()},
-         {"reason", each.reason}});
+    const auto& stated = each.side == bounds::Side::upper ? claims.upper : claims.lower;
+    bounds.push_back(bound_json(each, claims, stated[each.parameter].proof.size()));
   }
   const FacetVerdicts& facets = check.facets;
   Json json = {
@@ -77,6 +115,9 @@ Json to_json(const ModelCheck& check, const ModelClaims& claims, const logs::Log
       {"warnings", check.warnings},
       {"premises", check.premises},
       {"assumptions", assumptions_json(claims.assumptions)}};
+  if (check.at_risk) {
+    json["at_risk"] = risk_json(*check.at_risk, claims);
+  }
   if (check.emptiness) {
     json["contradiction"] = {{"rows", claims.contradiction.size()},
                              {"proved", check.emptiness->proved},

@@ -23,6 +23,9 @@ struct CheckedFiles {
 /// The answer in one sentence.
 [[nodiscard]] std::string verdict(const ModelCheck& check, const ModelClaims& claims);
 
+/// What is proved at a stated risk, in one sentence.
+[[nodiscard]] std::string risk_verdict(const RiskCheck& check, const RiskClaims& claims);
+
 /// The answer as JSON (results/check.schema.json); `software` is name and version.
 [[nodiscard]] Json to_json(const ModelCheck& check, const ModelClaims& claims, const logs::LogReport& data,
                            const CheckedFiles& files, const std::string& software);

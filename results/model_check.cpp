@@ -10,6 +10,7 @@
 #include <wheelwright/commission/physical.hpp>
 
 #include <wheelwright/results/rebuilt_rows.hpp>
+#include <wheelwright/results/risk_check.hpp>
 
 namespace wheelwright::results {
 namespace {
@@ -58,22 +59,8 @@ std::string explain(const bounds::CertificateCheck& check, const std::string& mi
   if (!missing.empty()) {
     return missing;
   }
-  std::string text;
-  if (std::isfinite(check.shortfall)) {
-    text = fmt::format("what the certificate proves falls short of it by {:.3g}", check.shortfall);
-    if (check.row) {
-      text += "; it proves more without " + name_of(proof[*check.row].origin, claims.model);
-    }
-    if (check.parameter) {
-      text += fmt::format("; most is left over in {}", claims.model.parameters[*check.parameter].name);
-    }
-  } else {
-    text = check.reason;
-    if (check.row) {
-      text += fmt::format(" ({})", name_of(proof[*check.row].origin, claims.model));
-    }
-  }
-  return text + sign_parts_remark(claims);
+  const auto name = [&](std::size_t row) { return name_of(proof[row].origin, claims.model); };
+  return shortcoming(check, name, claims.model) + sign_parts_remark(claims);
 }
 
 void judge_bounds(const ModelClaims& claims, const Proof& proof, ModelCheck& result) {
@@ -157,13 +144,18 @@ std::string judge_facet(const bounds::HalfSpace& facet, const RebuiltRows& rebui
   return why + sign_parts_remark(claims);
 }
 
-void judge_facets(const ModelClaims& claims, const RebuiltRows& rebuilt, const Proof& proof, ModelCheck& result) {
+/// Says of each facet whether it is proved.
+std::vector<bool> judge_facets(const ModelClaims& claims, const RebuiltRows& rebuilt, const Proof& proof,
+                               ModelCheck& result) {
+  std::vector<bool> proved(claims.facets.size(), true);
   for (std::size_t k = 0; k < claims.facets.size(); ++k) {
     if (const std::string why = judge_facet(claims.facets[k], rebuilt, proof, claims, result.facets); !why.empty()) {
       result.facets.wrong.push_back(fmt::format("row {} of feasible_set.A is not proved: {}", k, why));
+      proved[k] = false;
     }
   }
   result.failures.insert(result.failures.end(), result.facets.wrong.begin(), result.facets.wrong.end());
+  return proved;
 }
 
 void judge_emptiness(const ModelClaims& claims, const RebuiltRows& rebuilt, ModelCheck& result) {
@@ -225,6 +217,14 @@ void tell_premises(const ModelClaims& claims, ModelCheck& result) {
                     claims.origin[i] == core::NoiseOrigin::declared ? "from the declared bounds of the sensors"
                                                                     : "estimated from the residuals of this log"));
   }
+  if (claims.at_risk) {
+    result.premises.push_back(fmt::format(
+        "at a risk of {:g}: that errors are as the robot file says and of no larger mean, independent from joint to "
+        "joint; the inequality for their sums (docs/risk.md); that delays, shares of the risk, and the part of the log "
+        "on which a scale is learnt, were chosen without this log; and how elements and sample weights are computed, "
+        "which commissioning and this check have in common",
+        claims.at_risk->model.risk));
+  }
   if (!claims.dropped.empty()) {
     result.premises.push_back(
         fmt::format("that the instants left out as outliers (rows {}) are the wrong ones: this cannot be checked",
@@ -241,6 +241,21 @@ std::string name_of(const bounds::RowOrigin& origin, const Model& model) {
              : fmt::format("row {} (t = {} s, {}, {})", origin.sample, origin.t, model.outputs[origin.output], side);
 }
 
+std::string shortcoming(const bounds::CertificateCheck& check, const std::function<std::string(std::size_t)>& row_name,
+                        const Model& model) {
+  if (!std::isfinite(check.shortfall)) {
+    return check.row ? fmt::format("{} ({})", check.reason, row_name(*check.row)) : check.reason;
+  }
+  std::string text = fmt::format("what the certificate proves falls short of it by {:.3g}", check.shortfall);
+  if (check.row) {
+    text += "; it proves more without " + row_name(*check.row);
+  }
+  if (check.parameter) {
+    text += fmt::format("; most is left over in {}", model.parameters[*check.parameter].name);
+  }
+  return text;
+}
+
 ModelCheck check_model(const ModelClaims& claims, LogSource& log, const logs::LogReport& data) {
   ModelCheck result;
   judge_log(claims, data, result);
@@ -250,11 +265,18 @@ ModelCheck check_model(const ModelClaims& claims, LogSource& log, const logs::Lo
   judge_bounds(claims, proof, result);
   if (claims.set == FeasibleSet::Status::empty) {
     judge_emptiness(claims, rebuilt, result);
+    if (claims.at_risk) {
+      result.failures.emplace_back("a set at a stated risk is a part of the guaranteed one, which is said to be empty");
+    }
   } else {
     if (!proof.hull.contradiction) {
       judge_hull(claims, proof, result);
     }
-    judge_facets(claims, rebuilt, proof, result);
+    const std::vector<bool> facets = judge_facets(claims, rebuilt, proof, result);
+    if (claims.at_risk && !proof.hull.contradiction) {
+      result.at_risk = check_at_risk(claims, *claims.at_risk, log, proof.hull.proved, facets);
+      result.failures.insert(result.failures.end(), result.at_risk->failures.begin(), result.at_risk->failures.end());
+    }
   }
   tell_premises(claims, result);
   return result;
