@@ -312,6 +312,27 @@ TEST_F(CheckAtRisk, SaysWhatIsProvedAndWhatIsTakenOnTrust) {
   EXPECT_EQ(json.at("at_risk").at("ellipsoids"), 4);
 }
 
+// Equal parts, as doubles: seven of the double next to a seventh may be more than the whole.
+TEST_F(CheckAtRisk, PartsOfARiskDoNotAddUpToMore) {
+  const ModelClaims claims = claims_from_json(made_->model, "model.json");
+  TableSource source(made_->log);
+  for (const double risk : {1e-9, 0.3, 1e-2}) {
+    for (const std::size_t count : {1u, 3u, 7u, 11u}) {
+      commission::RiskSetOptions options{.risk = risk, .delays = std::vector<double>(count, 0.4)};
+      std::vector<double> parts;
+      for (const commission::RiskEllipsoid& e :
+           risk_sums(source, claims.model, claims.measurement, claims.errors, claims.at_risk->model.errors,
+                     claims.at_risk->box, options, {})
+               .ellipsoids) {
+        parts.push_back(e.risk);
+      }
+      ASSERT_EQ(parts.size(), count);
+      EXPECT_LE(bounds::exact_sum(parts), risk) << count;
+      EXPECT_GT(bounds::exact_sum(parts), risk * (1.0 - 1e-15)) << count;
+    }
+  }
+}
+
 TEST_F(CheckAtRisk, WithoutItsProofIsBadInput) {
   const auto message = [](const std::function<void(Json&)>& change) {
     Json model = made_->model;
