@@ -29,7 +29,8 @@ constexpr const char* kHelp =
     "bound names, and verifies their multipliers in exact rational arithmetic. No solver takes part.\n\n"
     "Checked are the bounds of every parameter (also in physical words), every facet of the feasible set, or, where "
     "the "
-    "model says that nothing explains the log, that claim. What is proved is "
+    "model says that nothing explains the log, that claim. So is what it says at a stated risk: sums over the log are "
+    "taken again, facets and bounds are proved from them, and the parts of the risk are added up. What is proved is "
     "arithmetic. Not checked: estimates, standard errors, validation, and whether the noise, the prior and the other "
     "assumptions that the model states are true; they are listed as given, with what commissioning's tests said.";
 

@@ -2,6 +2,7 @@
 #include "check_report.hpp"
 
 #include <algorithm>
+#include <set>
 
 #include <fmt/format.h>
 
@@ -33,6 +34,25 @@ std::string stands_on(const results::BoundVerdict& verdict, const results::Model
     return "the prior";
   }
   return fmt::format("row{} {}{}", rows.size() == 1 ? "" : "s", fmt::join(rows, ", "), prior ? " and the prior" : "");
+}
+
+/// "sums 0, 3 and the guaranteed set".
+std::string stands_on_at_risk(const results::BoundVerdict& verdict, const results::RiskClaims& risk) {
+  using Kind = commission::RiskOrigin::Kind;
+  std::set<std::size_t> sums;
+  bool guaranteed = false;
+  for (const results::NamedRiskRow& row :
+       (verdict.side == bounds::Side::upper ? risk.upper : risk.lower)[verdict.parameter]) {
+    guaranteed = guaranteed || row.origin.kind != Kind::sum;
+    if (row.origin.kind == Kind::sum) {
+      sums.insert(row.origin.number);
+    }
+  }
+  if (sums.empty()) {
+    return "the guaranteed set";
+  }
+  return fmt::format("sum{} {}{}", sums.size() == 1 ? "" : "s", fmt::join(sums, ", "),
+                     guaranteed ? " and the guaranteed set" : "");
 }
 
 std::string statement(const results::BoundVerdict& verdict, const results::ModelClaims& claims) {
@@ -68,6 +88,13 @@ std::string check_summary(const results::ModelCheck& check, const results::Model
                           each.proved ? "proved" : "NOT PROVED", stands_on(each, claims));
     }
     text += "  " + facet_sentence(check.facets) + "\n";
+    if (check.at_risk) {
+      text += "  " + results::risk_verdict(*check.at_risk, *claims.at_risk) + "\n";
+      for (const results::BoundVerdict& each : check.at_risk->bounds) {
+        text += fmt::format("  {:<{}} {:<10}   {}\n", statement(each, claims), width,
+                            each.proved ? "proved" : "NOT PROVED", stands_on_at_risk(each, *claims.at_risk));
+      }
+    }
   }
   for (std::size_t k = 0; k < std::min(check.failures.size(), most); ++k) {
     text += "  failure: " + check.failures[k] + "\n";
@@ -91,15 +118,17 @@ std::string check_summary(const results::ModelCheck& check, const results::Model
 std::string check_report(const results::ModelCheck& check, const results::ModelClaims& claims,
                          const results::CheckedFiles& files, const std::string& software) {
   using namespace report;
-  std::vector<std::vector<Cell>> rows;
-  for (const results::BoundVerdict& each : check.bounds) {
-    rows.push_back(
-        {escape(spaced(claims.model.parameters[each.parameter].name)),
-         each.side == bounds::Side::upper ? "at most" : "at least",
-         numeric(escape(with_unit(fmt::format("{:.7g}", each.stated),
-                                  commission::parameter_unit(claims.robot, claims.model.parameters[each.parameter])))),
-         each.proved ? "proved" : "not proved", escape(stands_on(each, claims))});
-  }
+  const auto bounds_table = [&](const std::vector<results::BoundVerdict>& verdicts, const auto& origin) {
+    std::vector<std::vector<Cell>> rows;
+    for (const results::BoundVerdict& each : verdicts) {
+      const model::Parameter& parameter = claims.model.parameters[each.parameter];
+      rows.push_back({escape(spaced(parameter.name)), each.side == bounds::Side::upper ? "at most" : "at least",
+                      numeric(escape(with_unit(fmt::format("{:.7g}", each.stated),
+                                               commission::parameter_unit(claims.robot, parameter)))),
+                      each.proved ? "proved" : "not proved", escape(origin(each))});
+    }
+    return table({"parameter", "", "bound", "", "stands on"}, rows);
+  };
   PageContent content;
   content.title = "Check of the model of " + claims.robot.name;
   content.status = check.proved() ? (check.warnings.empty() ? "good" : "caution") : "bad";
@@ -110,10 +139,19 @@ std::string check_report(const results::ModelCheck& check, const results::ModelC
       "solver that found them.",
       results::proof_scope(claims)};
   content.warrant = claims.warrant;
-  content.sections = {{"bounds", "Bounds", table({"parameter", "", "bound", "", "stands on"}, rows)}};
+  content.sections = {{"bounds", "Bounds", bounds_table(check.bounds, [&](const results::BoundVerdict& each) {
+                         return stands_on(each, claims);
+                       })}};
   if (!check.emptiness) {
     content.sections.push_back(
         {"facets", "Feasible set", paragraph(escape(core::capital(facet_sentence(check.facets)) + "."))});
+  }
+  if (check.at_risk) {
+    const results::RiskClaims& risk = *claims.at_risk;
+    const auto origin = [&](const results::BoundVerdict& each) { return stands_on_at_risk(each, risk); };
+    content.sections.push_back({"at_risk", "At a stated risk",
+                                paragraph(escape(core::capital(results::risk_verdict(*check.at_risk, risk)) + ".")) +
+                                    bounds_table(check.at_risk->bounds, origin)});
   }
   if (!check.failures.empty()) {
     content.sections.push_back({"failures", "Not proved", bullets(check.failures)});

@@ -224,6 +224,17 @@ CertificateCheck check_emptiness(std::span<const WeightedRow> rows, const Box& b
   return compare(zero, rows, box, 0.0, true);
 }
 
+double exact_sum(std::span<const double> parts) {
+  Rational sum;
+  for (const double part : parts) {
+    if (!std::isfinite(part)) {
+      return core::kInfinity;
+    }
+    sum += rational(part);
+  }
+  return double_above(sum);
+}
+
 bool HullCheck::all_proved() const {
   return std::ranges::all_of(lower, &CertificateCheck::proved) && std::ranges::all_of(upper, &CertificateCheck::proved);
 }

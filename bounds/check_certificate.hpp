@@ -46,6 +46,9 @@ struct CertificateCheck {
 /// strictly, so that a `shortfall` of zero is not proved).
 [[nodiscard]] CertificateCheck check_emptiness(std::span<const WeightedRow> rows, const Box& box);
 
+/// The smallest double that is not below the sum of `parts`, which is evaluated exactly; +∞ unless all are finite.
+[[nodiscard]] double exact_sum(std::span<const double> parts);
+
 /// A claimed bound of one parameter, and the rows that are to prove it.
 struct BoundClaim {
   double value = 0.0;             ///< θ_j >= value, or θ_j <= value

@@ -13,6 +13,7 @@
 #include <wheelwright/commission/physical.hpp>
 #include <wheelwright/filter/row_stream.hpp>
 #include <wheelwright/results/model_json.hpp>
+#include <wheelwright/results/risk_check.hpp>
 
 namespace wheelwright::results {
 namespace {
@@ -189,22 +190,8 @@ std::string explain(const bounds::CertificateCheck& check, const std::string& mi
   if (!missing.empty()) {
     return missing;
   }
-  std::string text;
-  if (std::isfinite(check.shortfall)) {
-    text = fmt::format("what the certificate proves falls short of it by {:.3g}", check.shortfall);
-    if (check.row) {
-      text += "; it proves more without " + name_of(proof[*check.row].origin, claims.model);
-    }
-    if (check.parameter) {
-      text += fmt::format("; most is left over in {}", claims.model.parameters[*check.parameter].name);
-    }
-  } else {
-    text = check.reason;
-    if (check.row) {
-      text += fmt::format(" ({})", name_of(proof[*check.row].origin, claims.model));
-    }
-  }
-  return text + sign_parts_remark(claims);
+  const auto name = [&](std::size_t row) { return name_of(proof[row].origin, claims.model); };
+  return shortcoming(check, name, claims.model) + sign_parts_remark(claims);
 }
 
 void judge_bounds(const ModelClaims& claims, const Proof& proof, ModelCheck& result) {
@@ -288,13 +275,18 @@ std::string judge_facet(const bounds::HalfSpace& facet, const RebuiltRows& rebui
   return why + sign_parts_remark(claims);
 }
 
-void judge_facets(const ModelClaims& claims, const RebuiltRows& rebuilt, const Proof& proof, ModelCheck& result) {
+/// Says of each facet whether it is proved.
+std::vector<bool> judge_facets(const ModelClaims& claims, const RebuiltRows& rebuilt, const Proof& proof,
+                               ModelCheck& result) {
+  std::vector<bool> proved(claims.facets.size(), true);
   for (std::size_t k = 0; k < claims.facets.size(); ++k) {
     if (const std::string why = judge_facet(claims.facets[k], rebuilt, proof, claims, result.facets); !why.empty()) {
       result.facets.wrong.push_back(fmt::format("row {} of feasible_set.A is not proved: {}", k, why));
+      proved[k] = false;
     }
   }
   result.failures.insert(result.failures.end(), result.facets.wrong.begin(), result.facets.wrong.end());
+  return proved;
 }
 
 void judge_emptiness(const ModelClaims& claims, const RebuiltRows& rebuilt, ModelCheck& result) {
@@ -356,6 +348,16 @@ void tell_premises(const ModelClaims& claims, ModelCheck& result) {
                     claims.origin[i] == core::NoiseOrigin::declared ? "from the declared bounds of the sensors"
                                                                     : "estimated from the residuals of this log"));
   }
+  if (claims.at_risk) {
+    const bool estimated = claims.at_risk->model.warrant == core::Warrant::extrapolated;
+    result.premises.push_back(fmt::format(
+        "at a risk of {:g}: that errors are as {} and of no larger mean, independent from joint to "
+        "joint; the inequality for their sums (docs/risk.md); that delays, shares of the risk, and the part of the log "
+        "on which a scale is learnt, were chosen without this log; and how elements and sample weights are computed, "
+        "which commissioning and this check have in common",
+        claims.at_risk->model.risk,
+        estimated ? "they were estimated from the log, in all driving to come," : "the robot file says"));
+  }
   if (!claims.dropped.empty()) {
     result.premises.push_back(
         fmt::format("that the instants left out as outliers (rows {}) are the wrong ones: this cannot be checked",
@@ -372,6 +374,21 @@ std::string name_of(const bounds::RowOrigin& origin, const Model& model) {
              : fmt::format("row {} (t = {} s, {}, {})", origin.sample, origin.t, model.outputs[origin.output], side);
 }
 
+std::string shortcoming(const bounds::CertificateCheck& check, const std::function<std::string(std::size_t)>& row_name,
+                        const Model& model) {
+  if (!std::isfinite(check.shortfall)) {
+    return check.row ? fmt::format("{} ({})", check.reason, row_name(*check.row)) : check.reason;
+  }
+  std::string text = fmt::format("what the certificate proves falls short of it by {:.3g}", check.shortfall);
+  if (check.row) {
+    text += "; it proves more without " + row_name(*check.row);
+  }
+  if (check.parameter) {
+    text += fmt::format("; most is left over in {}", model.parameters[*check.parameter].name);
+  }
+  return text;
+}
+
 ModelCheck check_model(const ModelClaims& claims, LogSource& log, const logs::LogReport& data) {
   ModelCheck result;
   judge_log(claims, data, result);
@@ -381,11 +398,18 @@ ModelCheck check_model(const ModelClaims& claims, LogSource& log, const logs::Lo
   judge_bounds(claims, proof, result);
   if (claims.set == FeasibleSet::Status::empty) {
     judge_emptiness(claims, rebuilt, result);
+    if (claims.at_risk) {
+      result.failures.emplace_back("a set at a stated risk is a part of the guaranteed one, which is said to be empty");
+    }
   } else {
     if (!proof.hull.contradiction) {
       judge_hull(claims, proof, result);
     }
-    judge_facets(claims, rebuilt, proof, result);
+    const std::vector<bool> facets = judge_facets(claims, rebuilt, proof, result);
+    if (claims.at_risk && !proof.hull.contradiction) {
+      result.at_risk = check_at_risk(claims, *claims.at_risk, log, proof.hull.proved, facets);
+      result.failures.insert(result.failures.end(), result.at_risk->failures.begin(), result.at_risk->failures.end());
+    }
   }
   tell_premises(claims, result);
   return result;
@@ -416,6 +440,53 @@ std::string verdict(const ModelCheck& check, const ModelClaims& claims) {
                      check.bounds.size(), claims.facets.size());
 }
 
+std::string risk_verdict(const RiskCheck& check, const RiskClaims& claims) {
+  if (!check.failures.empty()) {
+    return fmt::format("at a risk of {:g}: not proved, {} statement{} not follow from the log", claims.model.risk,
+                       check.failures.size(), check.failures.size() == 1 ? " does" : "s do");
+  }
+  return fmt::format(
+      "at a risk of {:g}: all {} bounds and {} facets follow from the guaranteed set and from {} sums over the log, "
+      "and "
+      "the risks of all {} ellipsoids add up to {:g}",
+      claims.model.risk, check.bounds.size(), claims.model.facets.size(), claims.sums.size(), claims.ellipsoids.size(),
+      check.spent);
+}
+
+namespace {
+
+Json bound_json(const BoundVerdict& verdict, const ModelClaims& claims, std::size_t rows) {
+  const model::Parameter& parameter = claims.model.parameters[verdict.parameter];
+  return {{"parameter", parameter.name},
+          {"unit", commission::parameter_unit(claims.robot, parameter)},
+          {"side", files::word_of(kSideWords, verdict.side)},
+          {"stated", verdict.stated},
+          {"shown", files::or_null(verdict.shown)},
+          {"proved", verdict.proved},
+          {"shortfall", files::or_null(verdict.shortfall)},
+          {"rows", rows},
+          {"reason", verdict.reason}};
+}
+
+Json risk_json(const RiskCheck& check, const ModelClaims& claims) {
+  const RiskClaims& risk = *claims.at_risk;
+  Json bounds = Json::array();
+  for (const BoundVerdict& each : check.bounds) {
+    const auto& proofs = each.side == bounds::Side::upper ? risk.upper : risk.lower;
+    bounds.push_back(bound_json(each, claims, proofs[each.parameter].size()));
+  }
+  return {{"risk", risk.model.risk},
+          {"proved", check.failures.empty()},
+          {"message", risk_verdict(check, risk)},
+          {"spent", files::or_null(check.spent)},
+          {"ellipsoids", risk.ellipsoids.size()},
+          {"sums", {{"stated", risk.sums.size()}, {"proved", check.sums}}},
+          {"facets", {{"stated", risk.model.facets.size()}, {"proved", check.facets}}},
+          {"bounds", std::move(bounds)}};
+}
+
+}  // namespace
+
 Json to_json(const ModelCheck& check, const ModelClaims& claims, const logs::LogReport& data, const CheckedFiles& files,
              const std::string& software) {
   Json log_files = Json::array(), bounds = Json::array();
@@ -423,17 +494,8 @@ Json to_json(const ModelCheck& check, const ModelClaims& claims, const logs::Log
     log_files.push_back({{"path", file.path}, {"hash", file.hash}, {"bytes", file.bytes}, {"rows", file.rows}});
   }
   for (const BoundVerdict& each : check.bounds) {
-    const model::Parameter& parameter = claims.model.parameters[each.parameter];
-    bounds.push_back(
-        {{"parameter", parameter.name},
-         {"unit", commission::parameter_unit(claims.robot, parameter)},
-         {"side", files::word_of(kSideWords, each.side)},
-         {"stated", each.stated},
-         {"shown", files::or_null(each.shown)},
-         {"proved", each.proved},
-         {"shortfall", files::or_null(each.shortfall)},
-         {"rows", (each.side == bounds::Side::upper ? claims.upper : claims.lower)[each.parameter].proof.size()},
-         {"reason", each.reason}});
+    const auto& stated = each.side == bounds::Side::upper ? claims.upper : claims.lower;
+    bounds.push_back(bound_json(each, claims, stated[each.parameter].proof.size()));
   }
   const FacetVerdicts& facets = check.facets;
   Json json = {
@@ -456,6 +518,9 @@ Json to_json(const ModelCheck& check, const ModelClaims& claims, const logs::Log
       {"warnings", check.warnings},
       {"premises", check.premises},
       {"assumptions", assumptions_json(claims.assumptions)}};
+  if (check.at_risk) {
+    json["at_risk"] = risk_json(*check.at_risk, claims);
+  }
   if (check.emptiness) {
     json["contradiction"] = {{"rows", claims.contradiction.size()},
                              {"proved", check.emptiness->proved},

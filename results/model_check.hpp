@@ -4,6 +4,7 @@
 /// exact arithmetic; check.json has the verdict and its scope.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -34,11 +35,21 @@ struct FacetVerdicts {
   std::vector<std::string> wrong;  ///< the others, a sentence each
 };
 
+/// What became of the claims at a stated risk (RiskClaims).
+struct RiskCheck {
+  std::vector<BoundVerdict> bounds;   ///< both ends of each side of the set's hull
+  std::size_t sums = 0;               ///< sums that are no sharper than the log makes them
+  std::size_t facets = 0;             ///< half-spaces of the set that are what they name, or follow from it
+  double spent = 0.0;                 ///< the ellipsoids' risks, added exactly, rounded up
+  std::vector<std::string> failures;  ///< everything that is not proved, a sentence each
+};
+
 /// Result of check_model().
 struct ModelCheck {
   std::vector<BoundVerdict> bounds;                   ///< lower and upper bound of each parameter
   std::optional<bounds::CertificateCheck> emptiness;  ///< where the model says that no θ explains the log
   FacetVerdicts facets;
+  std::optional<RiskCheck> at_risk;   ///< where the model says something at a stated risk and has bounds
   bool same_log = false;              ///< same bytes, file by file
   std::vector<std::string> failures;  ///< everything that is not proved, a sentence each
   std::vector<std::string> warnings;  ///< what is worth knowing and contradicts no proof
@@ -52,11 +63,16 @@ struct ModelCheck {
 /// row that it names, or follows from it; that each published bound is proved by the rows that it names; that the hull
 /// and the physical intervals contain the proved bounds; or, where the set is said to be empty, that it is. `data` says
 /// which files the log is. Rows of columns with noise whose sign the prior leaves open are rebuilt over the box that
-/// they prove. Throws InvalidArgument when the log lacks a column.
+/// they prove. What it says at a stated risk is left to check_at_risk(). Throws InvalidArgument when the log lacks a
+/// column.
 [[nodiscard]] ModelCheck check_model(const ModelClaims& claims, LogSource& log, const logs::LogReport& data);
 
 /// "row 5017 (t = 50.17 s, sum, upper)", or "the prior's lower bound of r_mass".
 [[nodiscard]] std::string name_of(const bounds::RowOrigin& origin, const Model& model);
+
+/// Why `check` does not prove its bound, in words; `row_name` names the rows of the certificate.
+[[nodiscard]] std::string shortcoming(const bounds::CertificateCheck& check,
+                                      const std::function<std::string(std::size_t)>& row_name, const Model& model);
 
 /// The files of a check, as they were named.
 struct CheckedFiles {
@@ -69,6 +85,9 @@ struct CheckedFiles {
 
 /// The answer in one sentence.
 [[nodiscard]] std::string verdict(const ModelCheck& check, const ModelClaims& claims);
+
+/// What is proved at a stated risk, in one sentence.
+[[nodiscard]] std::string risk_verdict(const RiskCheck& check, const RiskClaims& claims);
 
 /// The answer as JSON (results/check.schema.json); `software` is name and version.
 [[nodiscard]] Json to_json(const ModelCheck& check, const ModelClaims& claims, const logs::LogReport& data,

@@ -3,6 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include <wheelwright/core/limits.hpp>
 #include <wheelwright/files/json.hpp>
 #include <wheelwright/results/model_json.hpp>
 #include <wheelwright/robots/robot_file.hpp>
@@ -25,13 +26,17 @@ std::size_t position(const List& list, NameOf name_of, const JsonPlace& place) {
   place.fail("a name of the robot's model");
 }
 
+std::size_t parameter_at(const JsonPlace& place, const Model& model) {
+  return position(
+      model.parameters, [](const model::Parameter& p) { return p.name; }, place);
+}
+
 bounds::RowOrigin read_origin(const JsonPlace& place, const Model& model) {
   bounds::RowOrigin origin;
   origin.side = files::value_of(kSideWords, place.at("side"));
   origin.is_prior = place.has("prior");
   if (origin.is_prior) {
-    origin.parameter = position(
-        model.parameters, [](const model::Parameter& p) { return p.name; }, place.at("prior"));
+    origin.parameter = parameter_at(place.at("prior"), model);
   } else {
     origin.sample = place.at("row").count();
     origin.t = place.at("t").number();
@@ -120,6 +125,131 @@ void read_set(const JsonPlace& place, ModelClaims& claims) {
   }
 }
 
+// A number below `size`.
+std::size_t number_at(const JsonPlace& place, std::size_t size, const std::string& of) {
+  const std::size_t number = place.count();
+  if (number >= size) {
+    place.fail("the number of one of the " + std::to_string(size) + " " + of);
+  }
+  return number;
+}
+
+commission::RiskOrigin read_risk_origin(const JsonPlace& place, const ModelClaims& claims) {
+  using Kind = commission::RiskOrigin::Kind;
+  if (place.has("facet")) {
+    return {.kind = Kind::guaranteed,
+            .number = number_at(place.at("facet"), claims.facets.size(), "rows of feasible_set.A")};
+  }
+  const bounds::Side side = files::value_of(kSideWords, place.at("side"));
+  if (place.has("box")) {
+    return {Kind::box, parameter_at(place.at("box"), claims.model), side};
+  }
+  return {Kind::sum, number_at(place.at("sum"), claims.at_risk->sums.size(), "at_risk.sums"), side};
+}
+
+std::vector<NamedRiskRow> read_risk_proof(const JsonPlace& place, const ModelClaims& claims) {
+  std::vector<NamedRiskRow> rows;
+  for (std::size_t k = 0; k < place.size(); ++k) {
+    rows.push_back({read_risk_origin(place.at(k), claims), place.at(k).at("multiplier").number()});
+  }
+  return rows;
+}
+
+commission::RiskEllipsoid read_ellipsoid(const JsonPlace& place, const Model& model) {
+  // A radius that is not finite bounds nothing.
+  const auto number = [&](const char* key) { return place.has(key) ? place.at(key).number() : core::kInfinity; };
+  commission::RiskEllipsoid ellipsoid{.delay = place.at("delay").number(),
+                                      .parameters = {},
+                                      .risk = place.at("risk").number(),
+                                      .log_volume = number("log_volume"),
+                                      .squared_radius = number("squared_radius")};
+  const JsonPlace names = place.at("parameters");
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    ellipsoid.parameters.push_back(parameter_at(names.at(k), model));
+  }
+  return ellipsoid;
+}
+
+commission::RiskFacet read_sum(const JsonPlace& place, const ModelClaims& claims) {
+  const std::vector<commission::RiskEllipsoid>& ellipsoids = claims.at_risk->ellipsoids;
+  commission::RiskFacet sum;
+  sum.ellipsoid = number_at(place.at("ellipsoid"), ellipsoids.size(), "at_risk.ellipsoids");
+  const std::vector<std::size_t>& block = ellipsoids[sum.ellipsoid].parameters;
+  const auto of_block = [&](const char* key) {
+    Eigen::VectorXd all = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(claims.model.p()));
+    all(block) = files::vector_at(place.at(key), block.size());
+    return all;
+  };
+  sum.weights = of_block("weights");
+  sum.Y = of_block("Y");
+  sum.dY = of_block("dY");
+  sum.y = place.at("y").number();
+  sum.dy = place.at("dy").number();
+  sum.radius = place.at("radius").number();
+  sum.share = {.straight = place.at("straight").number(), .worst = place.at("worst").number()};
+  return sum;
+}
+
+void read_risk(const JsonPlace& place, ModelClaims& claims) {
+  const std::size_t p = claims.model.p();
+  if (!place.has("sums")) {
+    throw InputError(place.where() +
+                     ": no member 'sums': this model was written before the set at a stated risk carried "
+                     "certificates; commission again to have one that can be checked");
+  }
+  RiskClaims& risk = claims.at_risk.emplace();
+  risk.model = robots::risk_at(place, claims.model);
+  const JsonPlace set = place.at("feasible_set"), ellipsoids = place.at("ellipsoids"), sums = place.at("sums"),
+                  origin = set.at("origin"), binding = place.at("binding");
+  risk.box = robots::box_at(set.at("box"), p);
+  risk.learning = place.at("learning").number();
+  for (std::size_t k = 0; k < ellipsoids.size(); ++k) {
+    risk.ellipsoids.push_back(read_ellipsoid(ellipsoids.at(k), claims.model));
+  }
+  for (std::size_t k = 0; k < sums.size(); ++k) {
+    risk.sums.push_back(read_sum(sums.at(k), claims));
+  }
+  if (origin.size() != risk.model.facets.size()) {
+    origin.fail("one entry for each of the " + std::to_string(risk.model.facets.size()) + " rows of A");
+  }
+  for (std::size_t k = 0; k < origin.size(); ++k) {
+    risk.origin.push_back(read_risk_origin(origin.at(k), claims));
+  }
+  if (binding.size() != p) {
+    binding.fail("one entry for each of the " + std::to_string(p) + " parameters");
+  }
+  for (std::size_t j = 0; j < p; ++j) {
+    risk.lower.push_back(read_risk_proof(binding.at(j).at("lower"), claims));
+    risk.upper.push_back(read_risk_proof(binding.at(j).at("upper"), claims));
+  }
+}
+
+// The interval that `place` publishes at a stated risk, where it does.
+void read_published(const JsonPlace& place, const std::string& name, std::map<std::string, Interval>& to) {
+  if (place.has("at_risk")) {
+    const Eigen::VectorXd ends = files::vector_at(place.at("at_risk"), 2);
+    to[name] = {ends[0], ends[1]};
+  }
+}
+
+void read_published_at_risk(const JsonPlace& root, ModelClaims& claims) {
+  RiskClaims none;
+  RiskClaims& risk = claims.at_risk ? *claims.at_risk : none;
+  const JsonPlace parameters = root.at("parameters");
+  for (std::size_t j = 0; j < parameters.size(); ++j) {
+    read_published(parameters.at(j), claims.model.parameters[j].name, risk.parameters);
+  }
+  if (root.has("physical")) {
+    const JsonPlace physical = root.at("physical");
+    for (const std::string& name : physical.keys()) {
+      read_published(physical.at(name), name, risk.physical);
+    }
+  }
+  if (!none.parameters.empty() || !none.physical.empty()) {
+    throw InputError(root.where() + ": no member 'at_risk', on which the intervals at a stated risk stand");
+  }
+}
+
 void read_data(const JsonPlace& place, ModelClaims& claims) {
   const JsonPlace files = place.at("files");
   for (std::size_t k = 0; k < files.size(); ++k) {
@@ -154,6 +284,10 @@ ModelClaims claims_from_json(const Json& json, const std::string& file) {
       claims.physical[name] = {physical.at(name).at("lower").number(), physical.at(name).at("upper").number()};
     }
   }
+  if (root.has("at_risk")) {
+    read_risk(root.at("at_risk"), claims);
+  }
+  read_published_at_risk(root, claims);
   read_data(root.at("data"), claims);
   return claims;
 }

@@ -5,6 +5,7 @@
 
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -31,6 +32,24 @@ struct PublishedBound {
   std::vector<NamedRow> proof;
 };
 
+/// A half-space of the set at a stated risk, and its multiplier in a proof.
+struct NamedRiskRow {
+  commission::RiskOrigin origin;  ///< a sum's number is that in RiskClaims::sums
+  double multiplier = 0.0;
+};
+
+/// What a model.json claims at a stated risk, and what is needed to prove it again from the log.
+struct RiskClaims {
+  detector::RiskModel model;                            ///< its set, risk and errors are what is proved
+  std::vector<commission::RiskOrigin> origin;           ///< of model.facets
+  std::vector<std::vector<NamedRiskRow>> lower, upper;  ///< proof of model.box, side by side
+  Box box;                                              ///< over which the sums hold
+  double learning = 0.0;                                ///< commission::RiskSetOptions::learning
+  std::vector<commission::RiskEllipsoid> ellipsoids;
+  std::vector<commission::RiskFacet> sums;               ///< apart from their rounding
+  std::map<std::string, Interval> parameters, physical;  ///< intervals as they are published, by name
+};
+
 /// Claims of a model.json about θ, and all that is needed to prove them again from the log; `wheelwright check`
 /// verifies them.
 struct ModelClaims {
@@ -54,6 +73,7 @@ struct ModelClaims {
   std::size_t segments = 0;                             ///< of the log
   core::Warrant warrant = core::Warrant::extrapolated;  ///< of the bounds, as the model states it
   std::vector<core::Assumption> assumptions;            ///< that it took; none of a model from before it listed them
+  std::optional<RiskClaims> at_risk;                    ///< what it says at a stated risk
 };
 
 /// Reads the claims of a model.json, also of one that holds no model. Throws InputError, naming file and key, when it

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/results/model_json.hpp>
 
+#include <algorithm>
 #include <cmath>
+#include <map>
 #include <string>
 #include <utility>
 #include <vector>
@@ -143,6 +145,25 @@ Json assumptions_json(const std::vector<core::Assumption>& assumptions) {
                     {"detail", a.detail}});
   }
   return list;
+}
+
+namespace {
+
+Json error_class_json(const filter::ErrorClass& c) {
+  Json json = {{"bound", c.bound}, {"bias", c.bias}, {"correlation", c.correlation}};
+  if (c.deviation < c.bound) {
+    json["deviation"] = c.deviation;
+  }
+  return json;
+}
+
+}  // namespace
+
+Json error_classes_json(const filter::ErrorClasses& classes) {
+  return {{"motion", error_class_json(classes.motion)},
+          {"effort", error_class_json(classes.effort)},
+          {"count", classes.count},
+          {"shortest_step", classes.shortest_step}};
 }
 
 namespace {
@@ -352,33 +373,127 @@ Json set_json(const Commissioning& r, const Model& model) {
   return json;
 }
 
-Json error_class_json(const filter::ErrorClass& c) {
-  Json json = {{"bound", c.bound}, {"bias", c.bias}, {"correlation", c.correlation}};
-  if (c.deviation < c.bound) {
-    json["deviation"] = c.deviation;
+Json sides_json(const Box& box) {
+  Json json = Json::array();
+  for (const Interval& side : box.sides) {
+    json.push_back({side.lower, side.upper});
   }
   return json;
 }
 
-Json risk_json(const detector::RiskModel& risk) {
+// The proof of a set at a stated risk: the sums that it needs, and what names them.
+class RiskProof {
+ public:
+  RiskProof(const commission::RiskSet& risk, const Model& model) : risk_(risk), model_(model) {
+    const auto need = [&](const bounds::RowOrigin& name) {
+      const commission::RiskOrigin origin = commission::risk_origin(risk, name);
+      if (origin.kind == commission::RiskOrigin::Kind::sum) {
+        numbers_.emplace(origin.number, 0);
+      }
+    };
+    for (const bounds::HalfSpace& facet : risk.set->facets()) {
+      need(facet.origin);
+    }
+    for (const auto* ends : {&risk.set->lower(), &risk.set->upper()}) {
+      for (const bounds::CertifiedBound& bound : *ends) {
+        std::ranges::for_each(bound.binding, [&](const bounds::WeightedRow& row) { need(row.row.origin); });
+      }
+    }
+    std::size_t next = 0;
+    for (auto& [sum, number] : numbers_) {
+      number = next++;
+    }
+  }
+
+  [[nodiscard]] Json origin(const bounds::RowOrigin& name) const {
+    using Kind = commission::RiskOrigin::Kind;
+    const commission::RiskOrigin origin = commission::risk_origin(risk_, name);
+    switch (origin.kind) {
+      case Kind::guaranteed: return {{"facet", origin.number}};
+      case Kind::sum: return {{"sum", numbers_.at(origin.number)}, {"side", word_of(kSideWords, origin.side)}};
+      case Kind::box: break;
+    }
+    return {{"box", model_.parameters[origin.number].name}, {"side", word_of(kSideWords, origin.side)}};
+  }
+
+  [[nodiscard]] Json of(const bounds::CertifiedBound& bound) const {
+    Json list = Json::array();
+    for (const bounds::WeightedRow& weighted : bound.binding) {
+      if (weighted.multiplier > 0.0) {
+        list.push_back(origin(weighted.row.origin));
+        list.back()["multiplier"] = weighted.multiplier;
+      }
+    }
+    return list;
+  }
+
+  [[nodiscard]] Json ellipsoids() const {
+    Json list = Json::array();
+    for (const commission::RiskEllipsoid& e : risk_.ellipsoids) {
+      Json names = Json::array();
+      for (const std::size_t j : e.parameters) {
+        names.push_back(model_.parameters[j].name);
+      }
+      list.push_back({{"delay", e.delay},
+                      {"parameters", std::move(names)},
+                      {"risk", e.risk},
+                      {"log_volume", files::or_null(e.log_volume)},
+                      {"squared_radius", files::or_null(e.squared_radius)}});
+    }
+    return list;
+  }
+
+  [[nodiscard]] Json sums() const {
+    Json list = Json::array();
+    for (const auto& [sum, number] : numbers_) {
+      const commission::RiskFacet& f = risk_.facets[sum];
+      const std::vector<std::size_t>& block = risk_.ellipsoids[f.ellipsoid].parameters;
+      list.push_back({{"ellipsoid", f.ellipsoid},
+                      {"weights", numbers(f.weights(block))},
+                      {"Y", numbers(f.Y(block))},
+                      {"dY", numbers(f.dY(block))},
+                      {"y", f.y},
+                      {"dy", f.dy},
+                      {"radius", f.radius},
+                      {"straight", f.share.straight},
+                      {"worst", f.share.worst}});
+    }
+    return list;
+  }
+
+ private:
+  const commission::RiskSet& risk_;
+  const Model& model_;
+  std::map<std::size_t, std::size_t> numbers_;  // of the sums that are written, by those that they have in the set
+};
+
+Json risk_json(const detector::RiskModel& risk, const commission::RiskSet& set, const Model& model) {
+  const RiskProof proof(set, model);
+  Json a = Json::array(), b = Json::array(), origin = Json::array(), binding = Json::array();
+  for (const bounds::HalfSpace& facet : set.set->facets()) {
+    a.push_back(numbers(facet.a));
+    b.push_back(facet.b);
+    origin.push_back(proof.origin(facet.origin));
+  }
+  for (std::size_t j = 0; j < model.p(); ++j) {
+    binding.push_back({{"lower", proof.of(set.set->lower()[j])}, {"upper", proof.of(set.set->upper()[j])}});
+  }
   Json json = {{"risk", risk.risk},
                {"warrant", core::warrant_word(risk.warrant)},
-               {"errors",
-                {{"motion", error_class_json(risk.errors.motion)},
-                 {"effort", error_class_json(risk.errors.effort)},
-                 {"count", risk.errors.count},
-                 {"shortest_step", risk.errors.shortest_step}}},
-               {"feasible_set", {{"A", Json::array()}, {"b", Json::array()}, {"hull", Json::array()}}},
+               {"errors", error_classes_json(risk.errors)},
+               {"feasible_set",
+                {{"A", std::move(a)},
+                 {"b", std::move(b)},
+                 {"origin", std::move(origin)},
+                 {"hull", sides_json(risk.box)},
+                 {"box", sides_json(set.box)}}},
+               {"binding", std::move(binding)},
+               {"learning", set.learning},
+               {"ellipsoids", proof.ellipsoids()},
+               {"sums", proof.sums()},
                {"scales", risk.scales},
                {"delay", risk.delay},
                {"usual", Json::array()}};
-  for (const bounds::HalfSpace& facet : risk.facets) {
-    json["feasible_set"]["A"].push_back(numbers(facet.a));
-    json["feasible_set"]["b"].push_back(facet.b);
-  }
-  for (const Interval& side : risk.box.sides) {
-    json["feasible_set"]["hull"].push_back({side.lower, side.upper});
-  }
   for (Eigen::Index w = 0; w < risk.usual.rows(); ++w) {
     json["usual"].push_back(numbers(risk.usual.row(w)));
   }
@@ -467,7 +582,7 @@ Json to_json(const Commissioning& r, const logs::LogReport& data, const std::str
                         {"persistence", {{"k", m.persistence.k}, {"n", m.persistence.n}}}};
   }
   if (m.at_risk) {
-    json["at_risk"] = risk_json(*m.at_risk);
+    json["at_risk"] = risk_json(*m.at_risk, *r.at_risk, m.model);
     for (const commission::RiskReach& reach : r.reach) {
       Json sizes = Json::array();
       for (const double size : reach.size) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The words and parts of model.json that other results have too: warrants, assumptions, the section `kinematic`.
+/// The words and parts of model.json that other results have too: warrants, assumptions, error classes, the section
+/// `kinematic`.
 #pragma once
 
 #include <optional>
@@ -11,6 +12,7 @@
 #include <wheelwright/core/warrant.hpp>
 #include <wheelwright/files/json.hpp>
 #include <wheelwright/files/words.hpp>
+#include <wheelwright/filter/error_class.hpp>
 #include <wheelwright/robots/robot_keys.hpp>
 
 namespace wheelwright::results {
@@ -30,6 +32,9 @@ inline constexpr files::Words<bounds::Side, 2> kSideWords{
 
 /// The list as results have it under `assumptions`.
 [[nodiscard]] Json assumptions_json(const std::vector<core::Assumption>& assumptions);
+
+/// Error classes as model.json has them under `at_risk/errors`.
+[[nodiscard]] Json error_classes_json(const filter::ErrorClasses& classes);
 
 /// The section as JSON (results/model.schema.json, definition `kinematic`); nothing where the log had neither pose nor
 /// gyro.

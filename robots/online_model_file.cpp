@@ -93,40 +93,6 @@ filter::ErrorClass error_class_at(const JsonPlace& place) {
   return c;
 }
 
-detector::RiskModel risk_at(const JsonPlace& place, const Model& model) {
-  detector::RiskModel risk;
-  risk.risk = place.at("risk").number();
-  if (!(risk.risk > 0.0 && risk.risk < 1.0)) {
-    place.at("risk").fail("a number between 0 and 1");
-  }
-  risk.warrant = warrant_at(place, core::Warrant::guaranteed);
-  const JsonPlace errors = place.at("errors"), set = place.at("feasible_set"), usual = place.at("usual");
-  risk.errors.motion = error_class_at(errors.at("motion"));
-  risk.errors.effort = error_class_at(errors.at("effort"));
-  risk.errors.count = bound_at(errors.at("count"));
-  risk.errors.shortest_step = bound_at(errors.at("shortest_step"));
-  risk.facets = facets_at(set, model.p());
-  risk.box = box_at(set.at("hull"), model.p());
-  const Eigen::VectorXd scales = vector_at(place.at("scales"));
-  if (scales.size() == 0 || !(scales.array() > 0.0).all()) {
-    place.at("scales").fail("times > 0 in s");
-  }
-  risk.scales.assign(scales.begin(), scales.end());
-  risk.delay = bound_at(place.at("delay"));
-  const std::size_t weights = detector::sum_weights(model).size();
-  if (usual.size() != weights) {
-    usual.fail("one row for each of the " + std::to_string(weights) + " weights");
-  }
-  risk.usual.resize(static_cast<Eigen::Index>(weights), scales.size());
-  for (std::size_t w = 0; w < weights; ++w) {
-    risk.usual.row(static_cast<Eigen::Index>(w)) = vector_at(usual.at(w), risk.scales.size());
-  }
-  if (!(risk.usual.array() >= 0.0).all()) {
-    usual.fail("variances >= 0");
-  }
-  return risk;
-}
-
 }  // namespace
 
 Warrant warrant_at(const JsonPlace& place, Warrant absent) {
@@ -222,6 +188,40 @@ Box box_at(const JsonPlace& place, std::size_t p) {
     box.sides.push_back({side[0], side[1]});
   }
   return box;
+}
+
+detector::RiskModel risk_at(const JsonPlace& place, const Model& model) {
+  detector::RiskModel risk;
+  risk.risk = place.at("risk").number();
+  if (!(risk.risk > 0.0 && risk.risk < 1.0)) {
+    place.at("risk").fail("a number between 0 and 1");
+  }
+  risk.warrant = warrant_at(place, core::Warrant::guaranteed);
+  const JsonPlace errors = place.at("errors"), set = place.at("feasible_set"), usual = place.at("usual");
+  risk.errors.motion = error_class_at(errors.at("motion"));
+  risk.errors.effort = error_class_at(errors.at("effort"));
+  risk.errors.count = bound_at(errors.at("count"));
+  risk.errors.shortest_step = bound_at(errors.at("shortest_step"));
+  risk.facets = facets_at(set, model.p());
+  risk.box = box_at(set.at("hull"), model.p());
+  const Eigen::VectorXd scales = vector_at(place.at("scales"));
+  if (scales.size() == 0 || !(scales.array() > 0.0).all()) {
+    place.at("scales").fail("times > 0 in s");
+  }
+  risk.scales.assign(scales.begin(), scales.end());
+  risk.delay = bound_at(place.at("delay"));
+  const std::size_t weights = detector::sum_weights(model).size();
+  if (usual.size() != weights) {
+    usual.fail("one row for each of the " + std::to_string(weights) + " weights");
+  }
+  risk.usual.resize(static_cast<Eigen::Index>(weights), scales.size());
+  for (std::size_t w = 0; w < weights; ++w) {
+    risk.usual.row(static_cast<Eigen::Index>(w)) = vector_at(usual.at(w), risk.scales.size());
+  }
+  if (!(risk.usual.array() >= 0.0).all()) {
+    usual.fail("variances >= 0");
+  }
+  return risk;
 }
 
 bool all_declared(const JsonPlace& noise) {

@@ -43,6 +43,8 @@ inline constexpr const char* kModelSchema = "wheelwright/model/1";
 [[nodiscard]] Box box_at(const files::JsonPlace& place, std::size_t p);
 /// The channel in the section `kinematic`; nothing where it holds no model.
 [[nodiscard]] std::optional<detector::KinematicModel> kinematic_from_json(const files::JsonPlace& place);
+/// What a detector at a stated risk needs, from the section `at_risk`.
+[[nodiscard]] detector::RiskModel risk_at(const files::JsonPlace& place, const Model& model);
 /// True if each of the `outputs` of an object `noise` has the origin "declared", and there is one.
 [[nodiscard]] bool all_declared(const files::JsonPlace& noise);
 

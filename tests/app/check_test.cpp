@@ -64,6 +64,10 @@ TEST_F(Check, WhatWasCommissionedIsProved) {
     EXPECT_LE(bound.at("rows").get<int>(), 5) << "p + 1";
     EXPECT_LE(bound.at("shortfall").get<double>(), 0.0);
   }
+  EXPECT_THAT(outcome.out, HasSubstr("at a risk of 1e-09: all 8 bounds and "));
+  EXPECT_THAT(bytes(path("result/report.html")), HasSubstr("At a risk of 1e-09: all 8 bounds and "));
+  EXPECT_TRUE(result.at("at_risk").at("proved").get<bool>());
+  EXPECT_LE(result.at("at_risk").at("spent").get<double>(), result.at("at_risk").at("risk").get<double>());
   EXPECT_EQ(run("check model/model.json " + shipped() + " --json").out, bytes(path("result/check.json")));
   const Outcome quiet = run("check model/model.json " + shipped() + " --quiet");
   EXPECT_EQ(quiet.code, 0);
@@ -172,6 +176,31 @@ TEST_F(Check, PremisesMayNotBeNarrowed) {
                 m["feasible_set"]["prior"][0] = {1.0, 3.0};
               }),
               HasSubstr("the prior of r_mass, [1, 3], is narrower than the robot's"));
+}
+
+// tests/results/risk_check_test.cpp tries every kind of change.
+TEST_F(Check, WhatIsSaidAtARiskIsProvedOrRefused) {
+  commission_shipped();
+  EXPECT_THAT(failures([](Json& m) { m["at_risk"]["risk"] = 1e-10; }), HasSubstr("ellipsoids add up to 1e-09"));
+  for (int j = 0; j < 4; ++j) {
+    const std::string name = read_json(path("model/model.json"))["parameters"][j]["name"].get<std::string>();
+    EXPECT_THAT(failures([&](Json& m) {
+                  Json& upper = m["at_risk"]["feasible_set"]["hull"][j][1];
+                  upper = upper.get<double>() * (1.0 - 1e-6);
+                }),
+                HasSubstr("at a risk of 1e-09: " + name + " <= "));
+  }
+  // The log of another drive makes other sums.
+  simulate("healthy.yaml", "other.csv");
+  EXPECT_THAT(run("check model/model.json other.csv --json").out, HasSubstr("is sharper than the log makes it"));
+  std::string bare = bytes(path("robot.yaml"));
+  const std::string with = "{bound: 0.02, bias: 0.0001}";
+  ASSERT_NE(bare.find(with), std::string::npos);
+  put("bare.yaml", bare.replace(bare.find(with), with.size(), "0.02"));
+  ASSERT_EQ(run("commission " + shipped() + " --robot bare.yaml --out bare --quiet").code, 0);
+  const Outcome silent = run("check bare/model.json " + shipped());
+  EXPECT_EQ(silent.code, 0) << silent.out;
+  EXPECT_THAT(silent.out, Not(HasSubstr("risk")));
 }
 
 // A prior that leaves the sign of a noisy column open makes weaker rows; what they prove decides the sign again.

@@ -77,6 +77,20 @@ TEST_F(Schemas, Design) {
   EXPECT_TRUE(refused("design.schema.json", apart, "/sentences", nullptr));
 }
 
+TEST_F(Schemas, Check) {
+  commission_shipped();
+  const Json said = fitting("check.schema.json", "check model/model.json " + shipped() + " --json");
+  EXPECT_TRUE(refused("check.schema.json", said, "/at_risk/spent", "all"));
+  EXPECT_TRUE(refused("check.schema.json", said, "/at_risk/sums/proved", -1));
+  EXPECT_TRUE(refused("check.schema.json", said, "/at_risk/bounds/0/side", "left"));
+  const Json model = files::read_json(path("model/model.json"));
+  EXPECT_EQ(misfit("model.schema.json", "model/model.json"), "");
+  EXPECT_TRUE(refused("model.schema.json", model, "/at_risk/sums", nullptr));
+  EXPECT_TRUE(refused("model.schema.json", model, "/at_risk/feasible_set/origin/0", Json::object())) << "names nothing";
+  EXPECT_TRUE(refused("model.schema.json", model, "/at_risk/binding/0/lower/0/multiplier", nullptr));
+  EXPECT_TRUE(refused("model.schema.json", model, "/at_risk/ellipsoids/0/risk", 2.0));
+}
+
 TEST_F(Schemas, Robot) {
   const testing::SampleRobot sample;
   put("robot.urdf", sample_urdf(sample, usual_frames(sample)));

@@ -34,6 +34,16 @@ WeightedRow weighted(const std::vector<double>& a, double b, double multiplier) 
   return {{Eigen::Map<const Eigen::VectorXd>(a.data(), static_cast<Eigen::Index>(a.size())), b, {}}, multiplier};
 }
 
+TEST(ExactSum, IsTheSmallestDoubleThatIsNotBelow) {
+  EXPECT_EQ(exact_sum({}), 0.0);
+  // The double 0.1 is above a tenth: ten of them are above 1, though rounding to nearest makes less of them.
+  const std::vector<double> tenths(10, 0.1);
+  EXPECT_EQ(exact_sum(tenths), std::nextafter(1.0, 2.0));
+  EXPECT_EQ(exact_sum(std::array{1e300, 1e-9, -1e300}), 1e-9);
+  EXPECT_EQ(exact_sum(std::array{1.0, kTiny}), std::nextafter(1.0, 2.0));
+  EXPECT_EQ(exact_sum(std::array{1.0, kInfinity}), kInfinity);
+}
+
 TEST(CheckBound, TheBoxAloneProvesItsSupport) {
   const Box box{{{-1.0, 2.0}, {-3.0, 5.0}}};
   const std::array a{2.0, -1.0};
