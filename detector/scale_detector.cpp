@@ -298,12 +298,12 @@ void ScaleDetector::look(Scale& s, std::size_t which) {
       for (std::size_t q = 0; q < p; ++q) {
         box += std::abs(direction_[q]) * half_[static_cast<Eigen::Index>(q)];
       }
-      state = {w, which, value, radius + box, std::abs(value) - radius - box, s.r0[i], s.r1[i]};
+      state = {w, which, value, radius + box, std::abs(value) - radius - box, s.r0[i], s.r1[i], radius};
       continue;
     }
     const Interval range = rule_.prediction(direction_, w);
     const double up = range.upper - predicted + radius, down = predicted - range.lower + radius;
-    state = {w, which, value, value >= 0.0 ? up : down, std::max(value - up, -value - down), s.r0[i], s.r1[i]};
+    state = {w, which, value, value >= 0.0 ? up : down, std::max(value - up, -value - down), s.r0[i], s.r1[i], radius};
     alarm_ = alarm_ || state.excess > 0.0;
   }
 }

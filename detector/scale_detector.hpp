@@ -54,6 +54,7 @@ struct SumState {
   /// time of x scales (c0 + c1 x)e^{−x} of it remain. Size 1: the effort's unit, all of the effort, all of the
   /// parameter.
   double c0 = 0.0, c1 = 0.0;
+  double radius = 0.0;  ///< what errors alone can do: the threshold's part that does not depend on the set
 };
 
 /// Sums over scales T, with weights w(t) = K((now − t)/T) g(t), K(x) = x e^{−x}, g foreseen (PredictableRegressor), of
@@ -88,6 +89,8 @@ class ScaleDetector {
   /// s.
   [[nodiscard]] const std::vector<double>& scales() const { return risk_.scales; }
   [[nodiscard]] const filter::ElementFilter& elements() const { return elements_; }
+  /// g of the newest element (weights × outputs).
+  [[nodiscard]] const Eigen::ArrayXXd& element_weights() const { return g_; }
   /// V of every sum now (weights × scales).
   [[nodiscard]] Eigen::MatrixXd variances() const;
 
