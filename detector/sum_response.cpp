@@ -138,18 +138,18 @@ class ReadingErrors {
   core::RowMatrix Y_;
 };
 
-// Walks the log; calls element(instant) for each element and look(state) for each look. False where the elements are
-// not those of the motion.
-template <typename Element, typename Look>
-bool walk_sums(LogSource& log, ScaleDetector& detector, const ReferenceMotion& motion, double most, Element&& element,
-               Look&& look) {
+// Walks the log; calls element(instant, whether there is one) for each instant of the motion, earlier() for each
+// element before it, and look(instant, time, state) for each look. False where the instants are not those of the motion.
+template <typename Earlier, typename Element, typename Look>
+bool walk_sums(LogSource& log, ScaleDetector& detector, const ReferenceMotion& motion, const SumDriveOptions& options,
+               Earlier&& earlier, Element&& element, Look&& look) {
   const std::vector<std::size_t> pick = core::positions_of(log, detector.elements().measurement().columns());
   std::vector<double> sample(pick.size());
   std::size_t seen = 0, count = 0;
   double begun = 0.0;
   bool any = false, fits = true, over = false;
   core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
-    over = over || (any && block.t[k] - begun > most);
+    over = over || count == motion.instants() || (any && !options.piece && block.t[k] - begun > options.most);
     if (over || !fits) {
       return;
     }
@@ -169,6 +169,13 @@ bool walk_sums(LogSource& log, ScaleDetector& detector, const ReferenceMotion& m
       return;
     }
     seen = instants;
+    if (options.piece && count == 0 &&
+        (block.first_row + k < *options.piece || detector.elements().instant() < motion.instant.front())) {
+      if (instants > 1) {
+        earlier();
+      }
+      return;
+    }
     fits = count < motion.instants() && motion.instant[count] == detector.elements().instant();
     if (!fits) {
       return;
@@ -224,7 +231,7 @@ std::optional<SumDrive> read_sum_drive(LogSource& log, const OnlineModel& model,
   Eigen::RowVectorXd y(p), doubt(reading.errors());
   std::vector<double> direction(static_cast<std::size_t>(p)), opposite = direction;
   const bool fits = walk_sums(
-      log, detector, motion, options.most,
+      log, detector, motion, options, [&] { reading.take(detector); },
       [&](std::size_t k, bool element) {
         drive.instants = k + 1;
         if (!element) {
@@ -265,7 +272,7 @@ std::optional<SumDrive> read_sum_drive(LogSource& log, const OnlineModel& model,
   ScaleDetector wider(wide, usual);
   std::size_t look = 0;
   const bool known = walk_sums(
-      log, wider, motion, options.most, [](std::size_t, bool) {},
+      log, wider, motion, options, [] {}, [](std::size_t, bool) {},
       [&](std::size_t k, double, const SumState& state) {
         if (look < drive.looks.size() && drive.looks[look].instant == k) {
           const double more = std::max(0.0, state.radius - drive.looks[look].radius);

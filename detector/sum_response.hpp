@@ -79,6 +79,8 @@ struct SumDriveOptions {
   /// True: looks allow for any log that the sensors may write of that drive, and for a fault's efforts. False: they are
   /// those of the log itself.
   bool any_log = true;
+  /// First row of the piece of the log that `motion` is of: the sums begin with the log, what is held with the piece.
+  std::optional<std::size_t> piece{};
 };
 
 /// Walks `log`, whose motion is `motion` as read for `model` (read_reference()), through the ScaleDetector of `model`;

@@ -21,23 +21,11 @@ using core::kInfinity;
 using testing_support::Breakage;
 using testing_support::breakages;
 using testing_support::Commissioned;
+using testing_support::commissioned_at_risk;
 using testing_support::FaultyRun;
 using testing_support::log_of;
 using testing_support::Random;
 using testing_support::random_run;
-
-// A robot whose efforts' errors average out, learnt from half a minute.
-Commissioned robot_at_risk(std::uint64_t seed) {
-  Commissioned c{testing_support::random_robot(seed), {}};
-  c.scenario.duration = 30.0;
-  c.scenario.robot.effort_changes = model::EffortChanges::at_samples;
-  c.scenario.robot.noise.effort.bias = 0.0;
-  Simulation log(c.scenario);
-  const Commissioning result = commission_robot(log, c.scenario.robot);
-  EXPECT_TRUE(result.model.at_risk) << result.message << testing::PrintToString(result.notes);
-  c.model = result.model;
-  return c;
-}
 
 FaultyRun run_of(const Commissioned& robot, std::uint64_t seed, const Breakage& breakage) {
   FaultyRun run = random_run(robot, seed, breakage);
@@ -128,7 +116,7 @@ double size_of(const FaultyRun& run) {
 // The oracle: robots that break in the simulator, logs that a broken sensor writes.
 TEST(SumResponse, IsWhatFaultsDoToTheSums) {
   for (const std::uint64_t seed : {1, 2}) {
-    const Commissioned robot = robot_at_risk(seed);
+    const Commissioned robot = commissioned_at_risk(seed);
     for (const Breakage& breakage : breakages()) {
       const FaultyRun run = run_of(robot, 100 + seed, breakage);
       for (const auto& [sum, agreement] : compare(run, run.side * size_of(run))) {
@@ -142,7 +130,7 @@ TEST(SumResponse, IsWhatFaultsDoToTheSums) {
 
 // Rows of a rounded reading and of the motion itself: they are apart by what is allowed for.
 TEST(SumResponse, AllowsForAMeasuredMotionsErrors) {
-  const Commissioned robot = robot_at_risk(3);
+  const Commissioned robot = commissioned_at_risk(3);
   const OnlineModel& model = robot.model;
   double nearest = 0.0;
   for (const Breakage& breakage : breakages()) {
@@ -215,7 +203,7 @@ std::optional<double> certain_on_its_own_motion(const FaultyRun& run, double win
 
 // How many of `runs` had a certain size; it was seen in all of them.
 int seen_in_time(std::uint64_t robot_seed, int runs) {
-  const Commissioned robot = robot_at_risk(robot_seed);
+  const Commissioned robot = commissioned_at_risk(robot_seed);
   int certain = 0;
   for (int k = 0; k < runs; ++k) {
     const std::uint64_t seed = 1000 * robot_seed + static_cast<std::uint64_t>(k);
@@ -264,7 +252,7 @@ TEST(SlowMarginsAtRisk, AreKept) {
 }
 
 TEST(MarginsAtRisk, LongerWindowsPromiseSmallerSizes) {
-  const Commissioned robot = robot_at_risk(1);
+  const Commissioned robot = commissioned_at_risk(1);
   const LogTable table = log_of(run_of(robot, 7, breakages().front()), 0.0, true);
   const ReferenceMotion motion = motion_of(table, robot.model);
   TableSource log(table);
