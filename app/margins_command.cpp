@@ -72,6 +72,28 @@ std::string table(const commission::MarginSurvey& survey, const commission::Resi
   return out;
 }
 
+// Both guarantees side by side.
+std::string risk_table(const commission::MarginSurvey& survey) {
+  constexpr std::size_t name_width = 28, width = 13;
+  std::string out = "seen for certain from half of all moments\n" + padded("  within", name_width);
+  for (const double within : kRiskWindows) {
+    out += padded(fmt::format("{:g} s", within), 2 * width);
+  }
+  out += "\n" + padded("", name_width);
+  for (std::size_t w = 0; w < kRiskWindows.size(); ++w) {
+    out += padded("every noise", width) + padded("at risk", width);
+  }
+  out += "\n";
+  for (const RiskSizes& sizes : risk_sizes(survey)) {
+    out += padded("  " + sizes.fault, name_width);
+    for (std::size_t w = 0; w < kRiskWindows.size(); ++w) {
+      out += padded(sizes.worst_case[w], width) + padded(sizes.at_risk[w], width);
+    }
+    out += "\n";
+  }
+  return out;
+}
+
 int run(const Arguments& a) {
   const OnlineModel model = read_model(a.model);
   make_directory(a.common);
@@ -100,6 +122,9 @@ int run(const Arguments& a) {
     print_log(logs::sentences(log.report()));
     for (const commission::ResidualMargins& residual : survey.residuals) {
       fmt::print("{}{}\n", table(survey, residual), certain_meaning(residual.warrant));
+    }
+    if (survey.at_risk) {
+      fmt::print("{}{}\n", risk_table(survey), risk_meaning(*survey.at_risk));
     }
     if (!survey.without_kinematic.empty()) {
       fmt::print("no kinematic residual: {}\n", survey.without_kinematic);

@@ -167,6 +167,7 @@ constexpr double kMemory = 16.0;  // of the filter before the window, in units o
 struct Piece {
   std::size_t row = 0;
   double from = 0.0, to = 0.0;
+  std::size_t first = 0;  // row
   LogTable table{};
   bool closed = false;
 };
@@ -192,6 +193,7 @@ void gather(LogSource& log, std::vector<Piece>& pieces) {
           }
         }
         if (!piece.closed && block.t[k] >= piece.from && block.t[k] <= piece.to) {
+          piece.first = table.t.empty() ? block.first_row + k : piece.first;
           table.t.push_back(block.t[k]);
           for (std::size_t c = 0; c < table.columns.size(); ++c) {
             table.columns[c].push_back(block.columns[c][k]);
@@ -229,6 +231,14 @@ std::vector<detector::Isolation> isolate_events(LogSource& log, const OnlineMode
   if (pieces.empty()) {
     return {};
   }
+  std::vector<Piece> longer;
+  if (model.at_risk) {
+    longer = pieces;
+    for (Piece& piece : longer) {
+      piece.to += std::max(0.0, options.sums.after - options.isolation.after);
+    }
+    gather(log, longer);
+  }
   gather(log, pieces);
   const Polytope set(model.facets, model.box);
   const std::vector<FaultType> faults = model::fault_catalogue(model.model, model.estimate, model.robot.effort);
@@ -238,6 +248,16 @@ std::vector<detector::Isolation> isolate_events(LogSource& log, const OnlineMode
     const detector::ReferenceMotion motion = detector::read_reference(source, filter);
     out.push_back(detector::isolate(motion, filter, set, faults, detection.events[k].start, detection.events[k].alarm,
                                     options.isolation));
+    if (!model.at_risk) {
+      continue;
+    }
+    TableSource around(longer[k].table);
+    const detector::ReferenceMotion seen = detector::read_reference(around, filter);
+    if (const auto drive = detector::read_sum_drive(log, model, seen, {.any_log = false, .piece = longer[k].first})) {
+      detector::SumIsolationOptions sums = options.sums;
+      sums.threads = options.isolation.threads;
+      detector::narrow_by_sums(out.back(), *drive, model, seen, detection.events[k].alarm, sums);
+    }
   }
   return out;
 }

@@ -13,6 +13,7 @@
 #include <wheelwright/core/log.hpp>
 #include <wheelwright/detector/detector.hpp>
 #include <wheelwright/detector/isolation.hpp>
+#include <wheelwright/detector/sum_isolation.hpp>
 
 namespace wheelwright::commission {
 
@@ -112,11 +113,14 @@ struct KinematicWatch {
 /// Options of isolate_events().
 struct EventIsolationOptions {
   detector::IsolationOptions isolation{};
-  std::size_t most_events = 8;  ///< the first ones; the others are left alone
+  detector::SumIsolationOptions sums{};  ///< where the model says something at a stated risk
+  std::size_t most_events = 8;           ///< the first ones; the others are left alone
 };
 
 /// Isolates the first events of `detection`, which came of walking `log` with the torque residual of `model`, against
 /// the catalogue of its robot. Walks the log once and holds the rows around these events. One result for each of them.
+/// Where the model says something at a stated risk, sums over all scales narrow what is left (narrow_by_sums()): the log
+/// is walked once more for each event, and exclusions stand on that risk.
 [[nodiscard]] std::vector<detector::Isolation> isolate_events(LogSource& log, const OnlineModel& model,
                                                               const Detection& detection,
                                                               const EventIsolationOptions& options = {});

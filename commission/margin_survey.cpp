@@ -79,6 +79,50 @@ std::vector<FaultMaps> maps_of(const std::vector<detector::FaultMargins>& margin
   return maps;
 }
 
+// Margins at the stated risk, from some of the onsets of `worst_case`.
+void add_at_risk(MarginSurvey& survey, LogSource& log, const OnlineModel& model,
+                 const detector::ReferenceMotion& motion, const std::vector<FaultType>& faults,
+                 const std::vector<detector::OnsetMargin>& worst_case, const MarginSurveyOptions& options) {
+  if (!model.at_risk) {
+    survey.without_risk = "the model says nothing at a stated risk (docs/risk.md)";
+    return;
+  }
+  if (options.risk_onsets == 0) {
+    survey.without_risk = "it was not asked for";
+    return;
+  }
+  const std::optional<detector::SumDrive> drive = detector::read_sum_drive(log, model, motion);
+  if (!drive) {
+    survey.without_risk = "what the sensors may write of this drive leaves no bound on the motion between samples";
+    return;
+  }
+  std::vector<std::size_t> onsets;
+  std::vector<detector::ManoeuvreKind> kinds;
+  const std::size_t stride = (worst_case.size() + options.risk_onsets - 1) / options.risk_onsets;
+  for (std::size_t k = 0; k < worst_case.size(); k += stride) {
+    onsets.push_back(worst_case[k].instant);
+    kinds.push_back(worst_case[k].kind);
+  }
+  detector::SumMarginOptions sums;
+  sums.windows = options.margins.windows;
+  for (const double window : {1.0, 5.0, 10.0, 20.0}) {
+    const auto at = std::ranges::lower_bound(sums.windows, window);
+    if (at == sums.windows.end() || *at != window) {
+      sums.windows.insert(at, window);
+    }
+  }
+  sums.threads = options.margins.threads;
+  sums.progress = options.margins.progress;
+  RiskMargins result{model.at_risk->risk, drive->miss, detector::ScaleDetectorOptions{}.false_alarms, sums.windows, {}};
+  result.margins = detector::margins_at_risk(*drive, model, motion, faults, onsets, sums);
+  for (detector::FaultMargins& margins : result.margins) {
+    for (std::size_t k = 0; k < kinds.size(); ++k) {
+      margins.onsets[k].kind = kinds[k];
+    }
+  }
+  survey.at_risk = std::move(result);
+}
+
 }  // namespace
 
 MarginSurvey survey_margins(LogSource& log, const OnlineModel& model, const MarginSurveyOptions& options) {
@@ -123,6 +167,7 @@ MarginSurvey survey_margins(LogSource& log, const OnlineModel& model, const Marg
       survey.manoeuvres.emplace_back(kind, static_cast<std::size_t>(count));
     }
   }
+  add_at_risk(survey, log, model, motion, faults, torque.margins.front().onsets, options);
   survey.residuals.push_back(std::move(torque));
 
   if (!model.kinematic) {

@@ -12,6 +12,7 @@
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/core/log.hpp>
 #include <wheelwright/detector/margins.hpp>
+#include <wheelwright/detector/sum_margins.hpp>
 
 namespace wheelwright::commission {
 
@@ -22,6 +23,7 @@ struct MarginSurveyOptions {
   detector::ParameterSetKind set = detector::ParameterSetKind::polytope;
   std::vector<std::string> faults{};  ///< names; empty: the whole catalogue
   std::size_t map_points = 15;        ///< on each axis of the maps; 0: none
+  std::size_t risk_onsets = 60;       ///< at most as many of the onsets are asked at the stated risk; 0: none
 };
 
 /// Maps of one fault on one side.
@@ -42,6 +44,16 @@ struct ResidualMargins {
   core::Warrant warrant = core::Warrant::extrapolated;  ///< of the thresholds: in which sense a size is certain
 };
 
+/// Margins in the sums over scales: certain but for a stated chance.
+struct RiskMargins {
+  double risk = 0.0;            ///< that the set lacks the true parameters
+  double miss = 0.0;            ///< a fault of a certain size is missed with at most this probability
+  double false_alarms = 0.0;    ///< at most as many are to be expected in a second
+  std::vector<double> windows;  ///< s: those of the survey, and 1, 5, 10 and 20 s
+  std::vector<detector::FaultMargins>
+      margins;  ///< of the whole catalogue; of its onsets at most MarginSurveyOptions::risk_onsets
+};
+
 /// Everything that `wheelwright margins` says.
 struct MarginSurvey {
   std::vector<double> windows;  ///< s
@@ -52,6 +64,8 @@ struct MarginSurvey {
   std::vector<ResidualMargins> residuals;     ///< torque; kinematic where model and log have it
   std::vector<core::Assumption> assumptions;  ///< of the model
   std::string without_kinematic;              ///< why there is no kinematic residual; empty where there is one
+  std::optional<RiskMargins> at_risk;         ///< where the model says something at a stated risk
+  std::string without_risk;                   ///< why there is nothing at a stated risk; empty where there is
 };
 
 /// Walks `log`, a drive whose motion is taken as a reference, and asks of every fault of the catalogue what is certain

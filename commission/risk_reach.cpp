@@ -9,77 +9,95 @@
 
 #include <wheelwright/commission/physical.hpp>
 #include <wheelwright/core/limits.hpp>
+#include <wheelwright/detector/sum_margins.hpp>
 
 namespace wheelwright::commission {
 namespace {
 
-struct Look {
-  double t = 0.0, threshold = 0.0, c0 = 0.0, c1 = 0.0;
-};
+constexpr std::size_t kMostRows = 60000;  // of the log that are held
 
-// Smallest size that a sum certainly shows between `from` and `to`, after an onset at its first look in that time.
-double smallest(const std::vector<Look>& looks, double scale, double from, double to) {
-  const auto first = std::ranges::lower_bound(looks, from, {}, &Look::t);
-  double best = core::kInfinity;
-  for (auto look = first; look != looks.end() && look->t <= to; ++look) {
-    const double x = (look->t - first->t) / scale;
-    const double since = look->c0 - std::exp(-x) * (first->c0 + first->c1 * x);
-    if (std::abs(since) > 0.0) {
-      best = std::min(best, 2.0 * look->threshold / std::abs(since));
+// The beginning of the first segment, with the columns of `model` alone.
+LogTable beginning(LogSource& log, const OnlineModel& model, double most) {
+  LogTable table{model.measurement.columns(), {}, {}, {}};
+  const std::vector<std::size_t> pick = core::positions_of(log, table.names);
+  table.columns.resize(pick.size());
+  LogBlock block;
+  log.rewind();
+  bool done = false;
+  while (!done && log.next(block)) {
+    for (std::size_t k = 0; k < block.rows() && !done; ++k) {
+      const bool starts = std::ranges::binary_search(block.segment_starts, k);
+      done = table.rows() == kMostRows || (table.rows() > 0 && (starts || block.t[k] - table.t.front() > most));
+      if (done) {
+        break;
+      }
+      table.t.push_back(block.t[k]);
+      for (std::size_t c = 0; c < pick.size(); ++c) {
+        table.columns[c].push_back(block.columns[pick[c]][k]);
+      }
     }
   }
-  return best;
+  log.rewind();
+  return table;
+}
+
+// The fault that a sum's weights are like.
+model::FaultType fault_like(const detector::SumWeight& weight, const OnlineModel& model,
+                               const std::vector<model::FaultType>& catalogue) {
+  using Shape = detector::SumWeight::Shape;
+  if (weight.shape == Shape::parameter) {
+    Eigen::VectorXd theta = Eigen::VectorXd::Zero(model.estimate.size());
+    theta[static_cast<Eigen::Index>(weight.which)] = model.estimate[static_cast<Eigen::Index>(weight.which)];
+    return {.name = weight.name, .unit = "1", .range = {0.0, 100.0}, .theta = theta};
+  }
+  const std::string name = weight.shape == Shape::constant ? "effort_bias" : "effort_loss";
+  std::size_t joint = 0;
+  for (const model::FaultType& fault : catalogue) {
+    if (fault.name.starts_with(name) && joint++ == weight.which) {
+      return fault;
+    }
+  }
+  return model::find_fault(catalogue, name);
 }
 
 }  // namespace
 
 std::vector<RiskReach> risk_reach(LogSource& log, const OnlineModel& model, const RiskReachOptions& options) {
-  detector::ScaleDetector detector(model, {.exact_thresholds = true});
-  const std::size_t weights = detector.weights().size(), scales = detector.scales().size();
-  std::vector<std::vector<Look>> looks(weights * scales);
-  const std::vector<std::size_t> pick = core::positions_of(log, model.measurement.columns());
-  std::vector<double> sample(pick.size());
-  // Of the first segment.
-  double first = 0.0, last = 0.0;
-  bool any = false, done = false;
-  core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
-    done = done || (starts && any) || (any && block.t[k] - first > options.most);
-    if (done) {
-      return;
+  const LogTable table = beginning(log, model, options.most);
+  TableSource source(table);
+  const detector::ReferenceMotion motion =
+      detector::read_reference(source, RegressorFilter(model.model, model.filter, model.measurement, model.errors));
+  const std::optional<detector::SumDrive> drive = detector::read_sum_drive(source, model, motion);
+  if (!drive) {
+    return {};
+  }
+  std::vector<std::size_t> onsets;
+  double next = table.rows() > 0 ? table.t.front() + options.every : 0.0;
+  for (std::size_t k = 0; k + 1 < motion.instants(); ++k) {
+    if (motion.instant[k] >= next) {
+      onsets.push_back(k);
+      next = motion.instant[k] + options.every;
     }
-    if (starts) {
-      detector.restart();
-    }
-    for (std::size_t c = 0; c < pick.size(); ++c) {
-      sample[c] = block.columns[pick[c]][k];
-    }
-    first = any ? first : block.t[k];
-    last = block.t[k];
-    any = true;
-    detector.step(block.t[k], sample);
-    for (const detector::SumState& state : detector.looks()) {
-      looks[state.weight * scales + state.scale].push_back({block.t[k], state.threshold, state.c0, state.c1});
-    }
-  });
+  }
+  const std::vector<model::FaultType> catalogue =
+      model::fault_catalogue(model.model, model.estimate, model.robot.effort);
+  std::vector<model::FaultType> faults;
+  for (const detector::SumWeight& weight : drive->weights) {
+    faults.push_back(fault_like(weight, model, catalogue));
+  }
+  detector::SumMarginOptions margins;
+  margins.windows = options.within;
   std::vector<RiskReach> result;
-  for (std::size_t w = 0; w < weights; ++w) {
-    RiskReach reach;
-    reach.within = options.within;
-    reach.weight = detector.weights()[w];
+  for (const detector::FaultMargins& each : detector::margins_at_risk(*drive, model, motion, faults, onsets, margins)) {
+    if (each.side < 0.0) {
+      continue;
+    }
+    RiskReach reach{drive->weights[result.size()], {}, {}, options.within};
     reach.unit = reach.weight.shape == detector::SumWeight::Shape::constant
                      ? output_unit(model.robot, model.model.output_units.front())
                      : "1";
-    for (const double within : options.within) {
-      std::vector<double> sizes;
-      for (double onset = first + options.every; onset + within <= last; onset += options.every) {
-        double best = core::kInfinity;
-        for (std::size_t s = 0; s < scales; ++s) {
-          best = std::min(best, smallest(looks[w * scales + s], detector.scales()[s], onset, onset + within));
-        }
-        sizes.push_back(best);
-      }
-      std::ranges::sort(sizes);
-      reach.size.push_back(sizes.empty() ? core::kInfinity : sizes[sizes.size() / 2]);
+    for (std::size_t w = 0; w < options.within.size(); ++w) {
+      reach.size.push_back(detector::summarise(each, w).median);
     }
     result.push_back(std::move(reach));
   }

@@ -29,10 +29,9 @@ struct RiskReachOptions {
   double most = 600.0;                         ///< s of the log that are looked at
 };
 
-/// A fault of size κ moves a sum by κ times what a fault of size 1 does, from its onset on. Where that is more than
-/// twice what a healthy robot's sum can be (threshold, of either sign), the sum is outside: certainly, but for the
-/// chance that the threshold itself allows. For effort readings that are off by a constant, or by a share of the
-/// effort, and parameters that change by a share. Of the first segment of the log, which is walked once.
+/// Of what the weights are like: effort readings that are off by a constant, or by a share of the effort that is lost,
+/// and parameters that grow by a share. Certain as margins_at_risk() has it. Of the beginning of the log's first
+/// segment, 60,000 rows at most.
 [[nodiscard]] std::vector<RiskReach> risk_reach(LogSource& log, const OnlineModel& model,
                                                 const RiskReachOptions& options = {});
 

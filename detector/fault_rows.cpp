@@ -339,16 +339,95 @@ SignatureErrors::Row SignatureErrors::row(std::size_t k, std::size_t i, double s
   return out;
 }
 
+FaultElements::FaultElements(FaultType fault, const Model& model, double static_gain, const ReferenceMotion& motion)
+    : fault_(std::move(fault)),
+      model_(&model),
+      static_gain_(static_gain),
+      motion_(&motion),
+      held_(core::RowMatrix::Zero(static_cast<Eigen::Index>(model.n()), static_cast<Eigen::Index>(model.p()))),
+      from_motion_(inverse_of(model)),
+      jump_(FaultSignals::none(model)),
+      begin_(jump_),
+      end_signals_(jump_) {
+  validate(fault_, model);
+}
+
+FaultElements::Point FaultElements::point(std::size_t k) const {
+  const auto i = static_cast<Eigen::Index>(k), joint = static_cast<Eigen::Index>(fault_.profile.joint);
+  const double s =
+      fault_.profile.at(motion_->instant[k] - motion_->instant[onset_],
+                        motion_->joint_angle(joint, i) - motion_->joint_angle(joint, static_cast<Eigen::Index>(onset_)),
+                        motion_->joint_speed(joint, i));
+  return {s, extra_motion(fault_, from_motion_, motion_->speed.col(i), motion_->joint_speed.col(i), s)};
+}
+
+void FaultElements::begin(std::size_t onset) {
+  begin_broken(onset);
+  fresh_ = fault_.profile.jumps() && motion_->kind != MotionKind::speed;
+  if (fault_.profile.jumps()) {
+    // Motion beyond v, and what is seen, are there at once: their derivatives have an impulse.
+    for (const Term& term : model_->terms) {
+      if (term.kind == Term::Kind::acceleration) {
+        const auto o = static_cast<Eigen::Index>(term.output), j = static_cast<Eigen::Index>(term.parameter),
+                   c = static_cast<Eigen::Index>(term.coordinate);
+        jump_.g1(o, j) += term.scale * before_.extra.moved[c];
+        jump_.s(o, j) += term.scale * before_.extra.seen[c];
+      }
+    }
+  }
+}
+
+void FaultElements::begin_broken(std::size_t first) {
+  check::that(first < motion_->instants(), "onset", "an instant of the motion");
+  const auto next = std::upper_bound(motion_->segment_starts.begin(), motion_->segment_starts.end(), first);
+  last_ = next == motion_->segment_starts.end() ? motion_->instants() : *next;
+  onset_ = k_ = first;
+  fresh_ = false;
+  jump_ = begin_ = end_signals_ = FaultSignals::none(*model_);
+  before_ = point(first);
+  if (fault_.held_effort) {
+    const auto n = static_cast<Eigen::Index>(model_->n());
+    held_ = motion_->rows.Y.middleRows(static_cast<Eigen::Index>(first) * n, n) / static_gain_;
+  }
+}
+
+bool FaultElements::next() {
+  if (k_ + 1 >= last_) {
+    return false;
+  }
+  const auto a = static_cast<Eigen::Index>(k_), b = a + 1;
+  shares_ = motion_->shares(k_);
+  const double h = shares_[0] + shares_[1];
+  const Point after = point(k_ + 1);
+  const Eigen::VectorXd v0 = motion_->speed.col(a), v1 = motion_->speed.col(b);
+  const Eigen::VectorXd joints0 = motion_->joint_speed.col(a), joints1 = motion_->joint_speed.col(b);
+  const Eigen::VectorXd acceleration = (v1 - v0) / h, moved_rate = (after.extra.moved - before_.extra.moved) / h,
+                        seen_rate = (after.extra.seen - before_.extra.seen) / h;
+  // The step that ends at the onset of a jump is still healthy.
+  const bool healthy = sets_in_ = fresh_ && k_ == onset_;
+  begin_ =
+      signature(fault_, *model_,
+                {before_.profile, v0, joints0, motion_->heading[k_], acceleration, before_.extra.moved, moved_rate,
+                 before_.extra.joint_moved, before_.extra.seen, seen_rate, before_.extra.joint_seen, healthy, healthy},
+                held_);
+  end_signals_ =
+      signature(fault_, *model_,
+                {after.profile, v1, joints1, motion_->heading[k_ + 1], acceleration, after.extra.moved, moved_rate,
+                 after.extra.joint_moved, after.extra.seen, seen_rate, after.extra.joint_seen, healthy},
+                held_);
+  before_ = after;
+  ++k_;
+  return true;
+}
+
 FaultFilter::FaultFilter(FaultType fault, const Model& model, const FilterDesign& design, const ReferenceMotion& motion)
     : fault_(std::move(fault)),
       model_(&model),
-      design_(design),
       motion_(&motion),
-      held_(core::RowMatrix::Zero(static_cast<Eigen::Index>(model.n()), static_cast<Eigen::Index>(model.p()))),
+      elements_(fault_, model, design.static_gain(), motion),
       filtered_(FaultSignals::none(model)) {
-  validate(fault_, model);
-  filter::validate(design_);
-  kernel_ = filter::FilterKernel(design_, motion.kind, motion.nominal_step);
+  filter::validate(design);
+  kernel_ = filter::FilterKernel(design, motion.kind, motion.nominal_step);
   cascades_.resize(model.n() * (3 * model.p() + 1));
   const auto n = static_cast<Eigen::Index>(model.n());
   from_motion_ = inverse_of(model);
@@ -381,7 +460,7 @@ FaultFilter::FaultFilter(FaultType fault, const Model& model, const FilterDesign
       norm(from_motion_, fault_.motion, model.motion) + norm(from_motion_, fault_.seen, model.motion);
   growth_ = gains + motions + most_kappa_ * gains * motions;
   if (motion.measured) {
-    read_errors_.emplace(fault_, model, design_, motion);
+    read_errors_.emplace(fault_, model, design, motion);
   }
   last_ = FaultSignals::none(model);
   widened_.resize(model.n() * (model.p() + 1));
@@ -389,19 +468,23 @@ FaultFilter::FaultFilter(FaultType fault, const Model& model, const FilterDesign
   widened_c_ = last_.c;
 }
 
-FaultFilter::Point FaultFilter::point(std::size_t k) const {
-  const auto i = static_cast<Eigen::Index>(k), joint = static_cast<Eigen::Index>(fault_.profile.joint);
-  const double s =
-      fault_.profile.at(motion_->instant[k] - motion_->instant[onset_],
-                        motion_->joint_angle(joint, i) - motion_->joint_angle(joint, static_cast<Eigen::Index>(onset_)),
-                        motion_->joint_speed(joint, i));
-  return {s, extra_motion(fault_, from_motion_, motion_->speed.col(i), motion_->joint_speed.col(i), s)};
+void FaultFilter::begin(std::size_t onset) {
+  begin_filter(onset);
+  elements_.begin(onset);
+  const FaultSignals& jumps = elements_.jump();
+  const std::size_t size = static_cast<std::size_t>(jumps.g1.size());
+  for (std::size_t e = 0; e < size; ++e) {
+    const auto jump = [](filter::KernelState& state, double by) {
+      state.z1 += by;
+      state.fast += by;
+    };
+    jump(cascades_[e], jumps.g1.data()[e]);
+    jump(cascades_[2 * size + e], jumps.s.data()[e]);
+  }
 }
 
-void FaultFilter::begin(std::size_t onset) {
+void FaultFilter::begin_filter(std::size_t onset) {
   check::that(onset < motion_->instants(), "onset", "an instant of the motion");
-  const auto next = std::upper_bound(motion_->segment_starts.begin(), motion_->segment_starts.end(), onset);
-  end_ = next == motion_->segment_starts.end() ? motion_->instants() : *next;
   onset_ = k_ = onset;
   if (read_errors_) {
     read_errors_->begin(onset);
@@ -413,34 +496,11 @@ void FaultFilter::begin(std::size_t onset) {
   widened_c_.setZero();
   added_ = since_ = 0.0;
   row_range_ = row_dY_ = range_;
-  before_ = point(onset);
-  const auto n = static_cast<Eigen::Index>(model_->n());
-  if (fault_.held_effort) {
-    held_ = motion_->rows.Y.middleRows(static_cast<Eigen::Index>(onset) * n, n) / design_.static_gain();
-  }
-  fresh_ = fault_.profile.jumps() && kernel_.nodes();
-  if (fault_.profile.jumps()) {
-    // Motion beyond v, and what is seen, are there at once: their derivatives have an impulse.
-    const std::size_t p = model_->p(), size = model_->n() * p;
-    const auto jump = [](filter::KernelState& state, double by) {
-      state.z1 += by;
-      state.fast += by;
-    };
-    for (const Term& term : model_->terms) {
-      if (term.kind == Term::Kind::acceleration) {
-        const std::size_t at = term.output * p + term.parameter;
-        const auto c = static_cast<Eigen::Index>(term.coordinate);
-        jump(cascades_[at], term.scale * before_.extra.moved[c]);
-        jump(cascades_[2 * size + at], term.scale * before_.extra.seen[c]);
-      }
-    }
-  }
 }
 
 void FaultFilter::begin_broken(std::size_t first) {
-  begin(first);
-  fresh_ = false;
-  std::fill(cascades_.begin(), cascades_.end(), filter::KernelState{});
+  begin_filter(first);
+  elements_.begin_broken(first);
 }
 
 void FaultFilter::filter(const FaultSignals& begin, const FaultSignals& end, const std::array<double, 2>& shares,
@@ -522,32 +582,13 @@ FaultSignals FaultFilter::state(double filter::KernelState::*part) const {
 }
 
 bool FaultFilter::next() {
-  if (k_ + 1 >= end_) {
+  if (!elements_.next()) {
     return false;
   }
-  const auto a = static_cast<Eigen::Index>(k_), b = a + 1;
-  const std::array<double, 2> shares = motion_->shares(k_);
-  const double h = shares[0] + shares[1];
-  const Point after = point(k_ + 1);
-  const Eigen::VectorXd v0 = motion_->speed.col(a), v1 = motion_->speed.col(b);
-  const Eigen::VectorXd joints0 = motion_->joint_speed.col(a), joints1 = motion_->joint_speed.col(b);
-  const Eigen::VectorXd acceleration = (v1 - v0) / h, moved_rate = (after.extra.moved - before_.extra.moved) / h,
-                        seen_rate = (after.extra.seen - before_.extra.seen) / h;
-  // The step that ends at the onset of a jump is still healthy.
-  const bool healthy = fresh_ && k_ == onset_;
-  const FaultSignals begin =
-      signature(fault_, *model_,
-                {before_.profile, v0, joints0, motion_->heading[k_], acceleration, before_.extra.moved, moved_rate,
-                 before_.extra.joint_moved, before_.extra.seen, seen_rate, before_.extra.joint_seen, healthy, healthy},
-                held_);
-  const FaultSignals end =
-      signature(fault_, *model_,
-                {after.profile, v1, joints1, motion_->heading[k_ + 1], acceleration, after.extra.moved, moved_rate,
-                 after.extra.joint_moved, after.extra.seen, seen_rate, after.extra.joint_seen, healthy},
-                held_);
+  const std::array<double, 2>& shares = elements_.shares();
+  const FaultSignals &begin = elements_.at_begin(), &end = elements_.at_end();
   filter(begin, end, shares, motion_->step[k_ + 1]);
-  widen(begin, end, k_ == onset_ || healthy, std::max(h, motion_->step[k_ + 1]));
-  before_ = after;
+  widen(begin, end, k_ == onset_ || elements_.sets_in(), std::max(shares[0] + shares[1], motion_->step[k_ + 1]));
   ++k_;
   const auto n = static_cast<Eigen::Index>(model_->n());
   const Eigen::Index first = static_cast<Eigen::Index>(k_) * n;

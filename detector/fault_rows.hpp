@@ -123,11 +123,61 @@ class SignatureErrors {
   bool moves_ = false, whole_ = false;
 };
 
+/// A fault's signature along a reference motion, element by element of the weak form (filter/element_filter.hpp): what
+/// it adds between one instant and the next is shares()[0] at_begin() + shares()[1] at_end(), and in the first element
+/// after an onset jump(), whatever weights the elements are summed with.
+///
+/// Products with the fault's profile need no derivative of noise. At the onset of a step the robot's own speed goes on
+/// (its mass sees to that) and what the encoders show jumps; the reading of an effort changes with no more than its
+/// gain.
+class FaultElements {
+ public:
+  /// Throws InvalidArgument where `fault` does not fit `model`. `model` and `motion` are kept by reference.
+  /// `static_gain`: of the filter that `motion` was read with.
+  FaultElements(FaultType fault, const Model& model, double static_gain, const ReferenceMotion& motion);
+
+  /// Sets the fault in at instant `onset` of the motion.
+  void begin(std::size_t onset);
+  /// The same for a fault that was there before instant `first`: nothing jumps.
+  void begin_broken(std::size_t first);
+  /// Goes on to the next element, which ends at the next instant; false at the end of the segment.
+  bool next();
+  /// The instant at which the element ends.
+  [[nodiscard]] std::size_t instant() const { return k_; }
+
+  /// s, by which the signature at the beginning and at the end of the element count.
+  [[nodiscard]] const std::array<double, 2>& shares() const { return shares_; }
+  [[nodiscard]] const FaultSignals& at_begin() const { return begin_; }
+  [[nodiscard]] const FaultSignals& at_end() const { return end_signals_; }
+  /// Integral of what jumps at the onset (g1 and s).
+  [[nodiscard]] const FaultSignals& jump() const { return jump_; }
+  /// True if a fault that jumps sets in at the beginning of the element.
+  [[nodiscard]] bool sets_in() const { return sets_in_; }
+
+ private:
+  // The fault and the motion at one instant: s(t), what moves (s u) and what is seen (s S v) beyond v.
+  struct Point {
+    double profile = 0.0;
+    ExtraMotion extra;
+  };
+  [[nodiscard]] Point point(std::size_t k) const;
+
+  FaultType fault_;
+  const Model* model_;
+  double static_gain_;
+  const ReferenceMotion* motion_;
+  core::RowMatrix held_;  // filtered rows at the onset over the static gain
+  Eigen::MatrixXd from_motion_;
+  Point before_;
+  FaultSignals jump_, begin_, end_signals_;
+  std::array<double, 2> shares_{};
+  std::size_t onset_ = 0, k_ = 0, last_ = 0;
+  bool fresh_ = false;  // the fault jumps at the onset, between two steps
+  bool sets_in_ = false;
+};
+
 /// Rows of the torque residual: filters a fault's signature along a reference motion, with the filter's own kernel:
-/// what happens between two instants counts as RegressorFilter counts it. Products with the fault's profile need no
-/// derivative of noise. At
-/// the onset of a step the robot's own speed goes on (its mass sees to that) and what the encoders show jumps; the
-/// reading of an effort changes with no more than its gain.
+/// what happens between two instants counts as RegressorFilter counts it.
 ///
 /// FaultRow::range and FaultRow::doubt bound the widening of the rows by the efforts that a fault adds. The hull of
 /// efforts that change between samples: an effort's gain widens it by as much as the efforts do, any other fault by
@@ -154,23 +204,16 @@ class FaultFilter final : public FaultRows {
   [[nodiscard]] FaultSignals state(double filter::KernelState::*part) const;
 
  private:
-  // The fault and the motion at one instant: s(t), what moves (s u) and what is seen (s S v) beyond v.
-  struct Point {
-    double profile = 0.0;
-    ExtraMotion extra;
-  };
-  [[nodiscard]] Point point(std::size_t k) const;
+  void begin_filter(std::size_t onset);
   void filter(const FaultSignals& begin, const FaultSignals& end, const std::array<double, 2>& shares, double h);
   [[nodiscard]] double most_added(const FaultSignals& signals) const;
   void widen(const FaultSignals& begin, const FaultSignals& end, bool sets_in, double h);
 
   FaultType fault_;
   const Model* model_;
-  FilterDesign design_;
   const ReferenceMotion* motion_;
-  core::RowMatrix held_;  // filtered rows at the onset over the static gain
+  FaultElements elements_;
   filter::FilterKernel kernel_;
-  Point before_;
   std::vector<filter::KernelState> cascades_;  // g1, g2, s, c one after the other
   FaultSignals filtered_;
   bool gain_only_ = false;       // a fault of an effort's gain, and nothing else
@@ -190,8 +233,7 @@ class FaultFilter final : public FaultRows {
   double since_ = 0.0;         // steps since the onset, s
   core::RowMatrix row_range_;  // range_, what grows in dY and the signature's errors
   core::RowMatrix row_dY_;     // with functions in doubt
-  std::size_t onset_ = 0, k_ = 0, end_ = 0;
-  bool fresh_ = false;  // the fault jumps at the onset, between two steps
+  std::size_t onset_ = 0, k_ = 0;
 };
 
 /// The same at an operating point: coordinate speeds `v` and accelerations `a` that stay for as long as the filter

@@ -20,8 +20,11 @@ void raise(FaultSignals& to, const FaultSignals& from) {
   to.c = to.c.cwiseMax(from.c.cwiseAbs());
 }
 
-// What is seen, as a fault of motion in κ' = κ/(1 + κ); its range is in κ' too.
-FaultType of_motion(const FaultType& fault) {
+bool drifts(const FaultType& fault) { return fault.profile.kind == FaultProfile::Kind::ramp; }
+
+}  // namespace
+
+FaultType as_motion_of_reading(const FaultType& fault) {
   FaultType out = fault;
   out.motion = -fault.seen;
   out.seen.resize(0, 0);
@@ -36,10 +39,6 @@ FaultType of_motion(const FaultType& fault) {
   return out;
 }
 
-bool drifts(const FaultType& fault) { return fault.profile.kind == FaultProfile::Kind::ramp; }
-
-}  // namespace
-
 bool OnsetRows::knows(const FaultType& fault, const Model& model) {
   if (fault.profile.kind != FaultProfile::Kind::step && !drifts(fault)) {
     return false;
@@ -52,13 +51,13 @@ bool OnsetRows::knows(const FaultType& fault, const Model& model) {
   const bool alone = fault.motion.size() == 0 && fault.slip.size() == 0 && fault.lateral == 0.0 &&
                      fault.effort.size() == 0 && fault.ground.size() == 0 && fault.offset.size() == 0 &&
                      fault.theta.size() == 0 && !fault.whole && !drifts(fault);
-  return alone && polynomial(of_motion(fault), model) &&
+  return alone && polynomial(as_motion_of_reading(fault), model) &&
          (fault.seen * fault.seen - fault.seen).cwiseAbs().maxCoeff() <= 1e-12 * fault.seen.cwiseAbs().maxCoeff();
 }
 
 OnsetRows::OnsetRows(const FaultType& fault, const Model& model, const FilterDesign& design,
                      const ReferenceMotion& motion, std::size_t first, std::size_t end)
-    : fault_(fault.seen.size() > 0 ? of_motion(fault) : fault),
+    : fault_(fault.seen.size() > 0 ? as_motion_of_reading(fault) : fault),
       model_(&model),
       design_(design),
       kernel_(design, motion.kind, motion.nominal_step),

@@ -40,6 +40,9 @@ struct OnsetRow {
   std::array<double, 3> left{};  ///< weights of A, B and C
 };
 
+/// A fault of the encoders alone as a fault of motion, in κ' = κ/(1 + κ), of what they show; its range is in κ' too.
+[[nodiscard]] FaultType as_motion_of_reading(const FaultType& fault);
+
 /// Rows of one fault for one onset interval after the other.
 class OnsetRows {
  public:

@@ -92,6 +92,8 @@ class ScaleDetector {
   /// s.
   [[nodiscard]] const std::vector<double>& scales() const { return risk_.scales; }
   [[nodiscard]] const filter::ElementFilter& elements() const { return elements_; }
+  /// g of the newest element (weights × outputs).
+  [[nodiscard]] const Eigen::ArrayXXd& element_weights() const { return g_; }
   /// V of every sum now (weights × scales).
   [[nodiscard]] Eigen::MatrixXd variances() const;
 

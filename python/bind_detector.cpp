@@ -476,12 +476,23 @@ void bind_margins(py::module_& m) {
       .def_readonly("faults", &commission::ResidualMargins::margins, "each fault and side that this residual can see")
       .def_readonly("blind", &commission::ResidualMargins::blind,
                     "faults that leave no trace in it, whatever their size");
+  py::class_<commission::RiskMargins>(m, "RiskMargins", "Margins in sums over scales: certain but for a stated chance.")
+      .def_readonly("risk", &commission::RiskMargins::risk, "probability that the set lacks the true parameters")
+      .def_readonly("miss", &commission::RiskMargins::miss,
+                    "a fault of a certain size is missed with at most this probability")
+      .def_readonly("false_alarms", &commission::RiskMargins::false_alarms, "expected number in a second, at most")
+      .def_property_readonly(
+          "windows", [](const commission::RiskMargins& r) { return copy(r.windows); }, "s, shape (windows,)")
+      .def_readonly("faults", &commission::RiskMargins::margins, "each fault and side");
   py::class_<MarginsObject>(m, "Margins", "Detectability along a drive: which faults are certain to be seen.")
       .def_property_readonly(
           "windows", [](const MarginsObject& o) { return copy(o.survey.windows); }, "s, shape (windows,)")
       .def_property_readonly(
           "seconds", [](const MarginsObject& o) { return o.survey.seconds; }, "of driving")
       .def_property_readonly("residuals", [](const MarginsObject& o) { return o.survey.residuals; })
+      .def_property_readonly(
+          "at_risk", [](const MarginsObject& o) { return o.survey.at_risk; },
+          "what is certain at a stated risk; None where the model says nothing at one")
       .def_property_readonly(
           "sentences", [](const MarginsObject& o) { return words::margin_sentences(o.survey); }, "for people")
       .def(

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -250,32 +251,42 @@ std::string path(const std::vector<std::pair<double, double>>& points, const Mar
 
 }  // namespace
 
-std::string delay_curves(const detector::FaultMargins& margins, const commission::MarginSurvey& survey) {
-  std::vector<Curve> curves;
+namespace {
+
+// Smallest certain sizes over the delay, of some onsets.
+Curve curve_of(const std::string& label, const detector::FaultMargins& margins, const std::vector<double>& windows,
+               std::optional<detector::ManoeuvreKind> kind) {
+  Curve curve{label, {}, {}};
+  for (std::size_t w = 0; w < windows.size(); ++w) {
+    const detector::MarginSummary summary = detector::summarise(margins, w, kind);
+    const auto add = [&](std::vector<std::pair<double, double>>& to, double size) {
+      if (summary.onsets > 0 && std::isfinite(size) && size > 0.0) {
+        to.emplace_back(windows[w], size);
+      }
+    };
+    add(curve.median, summary.median);
+    add(curve.worst, summary.worst);
+  }
+  return curve;
+}
+
+std::string chart_of(const std::vector<Curve>& curves, const model::FaultType& fault, double from, double to) {
   double low = core::kInfinity, high = 0.0;
-  for (const auto& [kind, count] : survey.manoeuvres) {
-    Curve curve{std::string(detector::manoeuvre_words(kind)), {}, {}};
-    for (std::size_t w = 0; w < survey.windows.size(); ++w) {
-      const detector::MarginSummary summary = detector::summarise(margins, w, kind);
-      const auto add = [&](std::vector<std::pair<double, double>>& to, double size) {
-        if (summary.onsets > 0 && std::isfinite(size) && size > 0.0) {
-          to.emplace_back(survey.windows[w], size);
-          low = std::min(low, size);
-          high = std::max(high, size);
-        }
-      };
-      add(curve.median, summary.median);
-      add(curve.worst, summary.worst);
+  for (const Curve& curve : curves) {
+    for (const auto* points : {&curve.median, &curve.worst}) {
+      for (const auto& [at, size] : *points) {
+        low = std::min(low, size);
+        high = std::max(high, size);
+      }
     }
-    curves.push_back(std::move(curve));
   }
   const bool drawn = std::any_of(curves.begin(), curves.end(), [](const Curve& c) { return c.median.size() > 1; });
   if (!drawn) {
     return {};
   }
   constexpr double width = 520.0, height = 260.0, left = 70.0, right = 170.0, top = 10.0, bottom = 40.0;
-  const double scale = margins.fault.unit == "1" ? 100.0 : 1.0;
-  const MarginAxis x{survey.windows.front(), survey.windows.back(), left, width - right};
+  const double scale = fault.unit == "1" ? 100.0 : 1.0;
+  const MarginAxis x{from, to, left, width - right};
   const MarginAxis y{scale * low / 1.1, scale * high * 1.1, height - bottom, top};
   std::string out = fmt::format(
       "<svg viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\" role=\"img\" aria-label=\"smallest certain size over "
@@ -297,7 +308,7 @@ std::string delay_curves(const detector::FaultMargins& margins, const commission
                      height - 6.0);
   out +=
       fmt::format("<text x=\"14\" y=\"{0}\" transform=\"rotate(-90 14 {0})\" text-anchor=\"middle\">size, {1}</text>",
-                  0.5 * (top + height - bottom), escape(margins.fault.unit == "1" ? "%" : margins.fault.unit));
+                  0.5 * (top + height - bottom), escape(fault.unit == "1" ? "%" : fault.unit));
   double at = top + 10.0;
   for (std::size_t k = 0; k < curves.size(); ++k) {
     const std::size_t style = k % kDashes.size();
@@ -321,6 +332,35 @@ std::string delay_curves(const detector::FaultMargins& margins, const commission
     at += 18.0;
   }
   return out + "</svg>";
+}
+
+}  // namespace
+
+std::string delay_curves(const detector::FaultMargins& margins, const commission::MarginSurvey& survey) {
+  std::vector<Curve> curves;
+  for (const auto& [kind, count] : survey.manoeuvres) {
+    curves.push_back(curve_of(std::string(detector::manoeuvre_words(kind)), margins, survey.windows, kind));
+  }
+  return chart_of(curves, margins.fault, survey.windows.front(), survey.windows.back());
+}
+
+std::string risk_curves(const detector::FaultMargins& margins, const commission::MarginSurvey& survey) {
+  if (!survey.at_risk) {
+    return {};
+  }
+  std::vector<Curve> curves;
+  for (const commission::ResidualMargins& residual : survey.residuals) {
+    for (const detector::FaultMargins& each : residual.margins) {
+      if (each.fault.name == margins.fault.name && each.side == margins.side) {
+        curves.push_back(curve_of("every noise, " + residual.name, each, survey.windows, std::nullopt));
+        curves.back().worst.clear();
+      }
+    }
+  }
+  const std::vector<double>& windows = survey.at_risk->windows;
+  curves.push_back(curve_of("at the stated risk", margins, windows, std::nullopt));
+  curves.back().worst.clear();
+  return chart_of(curves, margins.fault, std::min(windows.front(), survey.windows.front()), windows.back());
 }
 
 std::string margin_map(const detector::OperatingMap& map, const model::FaultType& fault, const std::string& x_label,
@@ -454,6 +494,38 @@ std::string maps(const commission::ResidualMargins& residual, const OnlineModel&
              "drive: drive there to check the robot.</span>");
 }
 
+std::string at_risk_section(const commission::MarginSurvey& survey) {
+  const commission::RiskMargins& at_risk = *survey.at_risk;
+  std::vector<Cell> header = {"Fault"};
+  for (const char* guarantee : {"every noise", "at the stated risk"}) {
+    for (const double within : kRiskWindows) {
+      header.push_back(numeric(fmt::format("{}<small>within {:g} s</small>", guarantee, within)));
+    }
+  }
+  std::vector<std::vector<Cell>> rows;
+  for (const RiskSizes& sizes : risk_sizes(survey)) {
+    std::vector<Cell> row = {escape(core::capital(sizes.fault))};
+    for (const auto* words : {&sizes.worst_case, &sizes.at_risk}) {
+      for (const std::string& size : *words) {
+        row.push_back(numeric(escape(size)));
+      }
+    }
+    rows.push_back(std::move(row));
+  }
+  std::string out = paragraph(escape(risk_meaning(at_risk))) + table(header, rows), charts;
+  for (const detector::FaultMargins& margins : at_risk.margins) {
+    const std::string drawing = margins.fault.whole ? "" : risk_curves(margins, survey);
+    if (!drawing.empty()) {
+      charts += "<div><h3>" + escape(core::capital(name_of(margins))) + "</h3>" + drawing + "</div>";
+    }
+  }
+  return out + "<div class=\"pairs\">" + charts + "</div>" +
+         paragraph(fmt::format(
+             "<span class=\"note\">Smallest size that is certain to raise an alarm over the time since it set in, from "
+             "half of the onsets. Sums over scales from 0.1 to 100 s raise at most {:.2g} false alarms an hour.</span>",
+             3600.0 * at_risk.false_alarms));
+}
+
 }  // namespace
 
 std::string margins_report(const commission::MarginSurvey& survey, const OnlineModel& model,
@@ -475,6 +547,9 @@ std::string margins_report(const commission::MarginSurvey& survey, const OnlineM
   const std::vector<std::string> sentences = margin_sentences(survey);
   if (!sentences.empty()) {
     content.sentences.push_back("For one: " + sentences.front());
+  }
+  if (survey.at_risk) {
+    content.sections.push_back({"at-risk", "Both guarantees", at_risk_section(survey)});
   }
   for (const commission::ResidualMargins& residual : survey.residuals) {
     content.sections.push_back(

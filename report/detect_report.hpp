@@ -35,6 +35,10 @@ struct KinematicFindings {
 /// that is certain at every one of them (thin). Empty where nothing is certain.
 [[nodiscard]] std::string delay_curves(const detector::FaultMargins& margins, const commission::MarginSurvey& survey);
 
+/// The same for both guarantees: medians over all onsets of the drive, for every noise within its bounds, and at the
+/// stated risk. `margins` are MarginSurvey::at_risk's.
+[[nodiscard]] std::string risk_curves(const detector::FaultMargins& margins, const commission::MarginSurvey& survey);
+
 /// A map over the operating space: the darker a point, the smaller the certain size, on a logarithmic scale whose ends
 /// are written out; empty points show no certain size. Empty where no point has one.
 [[nodiscard]] std::string margin_map(const detector::OperatingMap& map, const model::FaultType& fault,

@@ -214,6 +214,39 @@ Json fault_json(const detector::FaultMargins& margins, const commission::MarginS
   return json;
 }
 
+Json risk_json(const commission::RiskMargins& at_risk) {
+  Json faults = Json::array();
+  for (const detector::FaultMargins& margins : at_risk.margins) {
+    Json summary = Json::array(), onsets = Json::array();
+    for (std::size_t w = 0; w < at_risk.windows.size(); ++w) {
+      const detector::MarginSummary all = detector::summarise(margins, w);
+      if (all.onsets > 0) {
+        summary.push_back({{"window", at_risk.windows[w]},
+                           {"onsets", all.onsets},
+                           {"certain_at", all.certain},
+                           {"best", or_null(all.best)},
+                           {"median", or_null(all.median)},
+                           {"worst", or_null(all.worst)}});
+      }
+    }
+    for (const detector::OnsetMargin& onset : margins.onsets) {
+      onsets.push_back({{"t", onset.t}, {"manoeuvre", name_of(onset.kind)}, {"certain", sizes_json(onset.certain)}});
+    }
+    faults.push_back({{"fault", margins.fault.name},
+                      {"unit", margins.fault.unit},
+                      {"side", margins.side > 0.0 ? "positive" : "negative"},
+                      {"whole", margins.fault.whole},
+                      {"largest", margins.largest()},
+                      {"summary", std::move(summary)},
+                      {"onsets", std::move(onsets)}});
+  }
+  return {{"risk", at_risk.risk},
+          {"miss", at_risk.miss},
+          {"false_alarms", at_risk.false_alarms},
+          {"windows", at_risk.windows},
+          {"faults", std::move(faults)}};
+}
+
 }  // namespace
 
 Json to_json(const commission::MarginSurvey& survey, const std::string& model, const std::string& log,
@@ -244,6 +277,8 @@ Json to_json(const commission::MarginSurvey& survey, const std::string& model, c
                                  {"blind", residual.blind},
                                  {"faults", std::move(faults)}});
   }
+  json["at_risk"] = survey.at_risk ? risk_json(*survey.at_risk) : Json(nullptr);
+  json["without_risk"] = survey.without_risk;
   json["assumptions"] = assumptions_json(survey.assumptions);
   return json;
 }

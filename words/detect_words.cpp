@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include <wheelwright/core/limits.hpp>
 #include <wheelwright/core/words.hpp>
 #include <wheelwright/words/commission_words.hpp>
 #include <wheelwright/words/text.hpp>
@@ -144,6 +145,16 @@ double delay_of(const commission::MarginSurvey& survey, const detector::FaultMar
   return survey.windows.back();
 }
 
+// "wheel radius (+)".
+std::string name_of(const detector::FaultMargins& of) {
+  std::string name = of.fault.name;
+  std::replace(name.begin(), name.end(), '_', ' ');
+  if (!of.fault.whole && of.fault.range.lower < 0.0) {
+    name += of.side > 0.0 ? " (+)" : " (−)";
+  }
+  return name;
+}
+
 std::string sentence(const commission::MarginSurvey& survey, const detector::FaultMargins& of) {
   const std::size_t window = shown_window(survey);
   std::vector<std::string> seen, at_best, unseen;
@@ -166,12 +177,7 @@ std::string sentence(const commission::MarginSurvey& survey, const detector::Fau
       unseen.push_back(where);
     }
   }
-  std::string name = of.fault.name;
-  std::replace(name.begin(), name.end(), '_', ' ');
-  if (!of.fault.whole && of.fault.range.lower < 0.0) {
-    name += of.side > 0.0 ? " (+)" : " (−)";
-  }
-  std::string out = name + ": ";
+  std::string out = name_of(of) + ": ";
   out += seen.empty() ? "not certain to be seen at every moment of any manoeuvre"
                       : "certainly seen " + core::enumerated(seen);
   if (!at_best.empty()) {
@@ -232,6 +238,54 @@ std::string certain_meaning(core::Warrant warrant) {
              : "“Certain” is extrapolated: it takes the noise bounds that were learnt "
                "from the commissioning log for true "
                "and holds as far as noise and driving stay like that log.";
+}
+
+std::vector<RiskSizes> risk_sizes(const commission::MarginSurvey& survey) {
+  std::vector<RiskSizes> all;
+  if (!survey.at_risk) {
+    return all;
+  }
+  // The median within the longest window up to `within`.
+  const auto median = [](const detector::FaultMargins& margins, const std::vector<double>& windows, double within) {
+    const auto end = std::ranges::upper_bound(windows, within);
+    return end == windows.begin()
+               ? core::kInfinity
+               : detector::summarise(margins, static_cast<std::size_t>(end - windows.begin()) - 1).median;
+  };
+  const auto words = [](const detector::FaultMargins& margins, double size) {
+    return margins.fault.whole && std::isfinite(size) ? std::string("yes") : magnitude_words(margins.fault, size);
+  };
+  for (const detector::FaultMargins& margins : survey.at_risk->margins) {
+    RiskSizes sizes{name_of(margins), {}, {}};
+    bool any = false;
+    for (const double within : kRiskWindows) {
+      double worst_case = core::kInfinity;
+      for (const commission::ResidualMargins& residual : survey.residuals) {
+        for (const detector::FaultMargins& each : residual.margins) {
+          if (each.fault.name == margins.fault.name && each.side == margins.side) {
+            worst_case = std::min(worst_case, median(each, survey.windows, within));
+          }
+        }
+      }
+      const double size = median(margins, survey.at_risk->windows, within);
+      sizes.worst_case.push_back(words(margins, worst_case));
+      sizes.at_risk.push_back(words(margins, size));
+      any = any || std::isfinite(size);
+    }
+    if (any) {
+      all.push_back(std::move(sizes));
+    }
+  }
+  return all;
+}
+
+std::string risk_meaning(const commission::RiskMargins& margins) {
+  return fmt::format(
+      "“At the stated risk” is meant for all parameters that the set at a risk of {:g} allows, while the errors "
+      "average "
+      "out as the robot file declares: a fault of that size, in a drive whose encoders read like this one, is missed "
+      "with a probability of at most {:.2g}.",
+      margins.risk, margins.miss);
 }
 
 std::vector<std::string> margin_sentences(const commission::MarginSurvey& survey) {

@@ -3,6 +3,7 @@
 /// Detections and margins in plain sentences.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <string>
 #include <vector>
@@ -37,6 +38,23 @@ namespace wheelwright::words {
 
 /// In which sense a size is called certain, one sentence.
 [[nodiscard]] std::string certain_meaning(core::Warrant warrant);
+
+/// One fault on one side under both guarantees: the smallest certain size within each of kRiskWindows, median over
+/// onsets.
+struct RiskSizes {
+  std::string fault;                    ///< "wheel radius (+)"
+  std::vector<std::string> worst_case;  ///< for every noise within its bounds, the better of the residuals
+  std::vector<std::string> at_risk;     ///< at the stated risk, by sums over scales
+};
+
+/// s, of RiskSizes.
+inline constexpr std::array<double, 3> kRiskWindows = {1.0, 5.0, 20.0};
+
+/// Of every fault that has a certain size at the stated risk; nothing where the survey says nothing at a risk.
+[[nodiscard]] std::vector<RiskSizes> risk_sizes(const commission::MarginSurvey& survey);
+
+/// In which sense a size is called certain at the stated risk, one sentence.
+[[nodiscard]] std::string risk_meaning(const commission::RiskMargins& margins);
 
 /// A sentence or two for each fault and side: in which manoeuvres it is certainly seen, from what size on, how soon, by
 /// which residual, and in which it is not certain.

@@ -57,6 +57,21 @@ inline Commissioned commissioned_robot(std::uint64_t seed) {
   return c;
 }
 
+/// The same where efforts' errors average out, learnt from half a minute: its model has something at a stated risk.
+inline Commissioned commissioned_at_risk(std::uint64_t seed) {
+  Commissioned c{random_robot(seed), {}};
+  c.scenario.duration = 30.0;
+  c.scenario.robot.effort_changes = model::EffortChanges::at_samples;
+  c.scenario.robot.noise.effort.bias = 0.0;
+  Simulation log(c.scenario);
+  const Commissioning result = commission_robot(log, c.scenario.robot);
+  if (!result.model.at_risk) {
+    throw InvalidArgument("seed " + std::to_string(seed) + ": nothing at a stated risk");
+  }
+  c.model = result.model;
+  return c;
+}
+
 /// Realisation of a catalogue fault in a run.
 struct Breakage {
   std::string fault;                            ///< of the catalogue

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a model says at a stated risk is proved from its log; what is sharper than the log makes it is found and named.
-#include <wheelwright/results/check_json.hpp>
+#include <wheelwright/results/model_check.hpp>
 
 #include <cmath>
 #include <functional>
