@@ -19,7 +19,9 @@ struct AtRiskOptions {
   RiskSetOptions set{};
   std::vector<double> scales{0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0};  ///< s, of the detector's sums
   bool estimate = true;     ///< where the robot file leaves the efforts' noise to be estimated: see learn_at_risk()
-  double test_risk = 1e-3;  ///< probability that a log which keeps to its assumptions is said to contradict them
+  /// Probability that a log which keeps to its assumptions is said to contradict them: by one sum, or by the mean square
+  /// of many, half each.
+  double test_risk = 2e-3;
 };
 
 /// Adds Commissioning::at_risk and OnlineModel::at_risk to a guaranteed result whose robot file declares errors that

@@ -203,12 +203,11 @@ class SelfNormalised {
   Eigen::MatrixXd V0_, root_;  // root V0 rootᵀ = I
 };
 
-// What becomes of a block's elements: first V0 is learnt from those in which the foreseen torque stands above the
+// What becomes of a block's elements: first V0 is learnt from those in which the logged torque stands above the
 // efforts' errors, then sums begin; between both is a pause, in which no weights stand.
 class Phase {
  public:
-  Phase(const Model& model, const std::vector<Eigen::Index>& block, const Eigen::VectorXd& theta, double effort_bound,
-        std::size_t to_learn)
+  Phase(const Model& model, const std::vector<Eigen::Index>& block, double effort_bound, std::size_t to_learn)
       : to_learn_(to_learn) {
     for (std::size_t i = 0; i < model.n(); ++i) {
       const bool has = std::ranges::any_of(model.terms, [&](const Term& term) {
@@ -219,19 +218,17 @@ class Phase {
         outputs_.push_back({at, effort_bound * model.input.row(at).cwiseAbs().sum()});
       }
     }
-    theta_ = Eigen::VectorXd::Zero(theta.size());
-    theta_(block) = theta(block);
   }
   void begin_segment(double first) { from_ = first; }
-  // The next element, at time `t` with the foreseen regressor `foreseen`.
-  void step(const RowMatrix& foreseen, double t) {
+  // The next element. What ends the learning must not depend on what comes later, as anything that a fit knows does.
+  void step(const filter::WeakElement& element) {
     if (!learnt_) {
       const bool shows = std::ranges::any_of(
-          outputs_, [&](const auto& o) { return std::abs(foreseen.row(o.first).dot(theta_)) > o.second; });
+          outputs_, [&](const auto& o) { return std::abs(element.torque[o.first]) > o.second * element.length; });
       seen_ += shows ? 1 : 0;
       learnt_ = seen_ > to_learn_;
     } else if (since_ < kPause && ++since_ == kPause) {
-      from_ = t;
+      from_ = element.t;
     }
   }
   [[nodiscard]] bool learning() const { return !learnt_; }
@@ -246,7 +243,6 @@ class Phase {
   bool learnt_ = false;
   double from_ = 0.0;
   std::vector<std::pair<Eigen::Index, double>> outputs_;
-  Eigen::VectorXd theta_;
 };
 
 class Learner {
@@ -305,10 +301,10 @@ class Learner {
         const Eigen::VectorXd middle = s.middle(blocks[k]), spread = s.spread(blocks[k]);
         for (std::size_t i = 0; i < kExpected.size(); ++i) {
           SelfNormalised& of = variances[b][k * kExpected.size() + i];
-          if (phases[k].of_prior()) {
-            of.learn(c, middle, spread);
-          } else {
+          if (!phases[k].of_prior()) {
             of.add(c, middle, spread);
+          } else if (s.sensor == SampleWeight::Sensor::effort) {  // weights of the motion's errors depend on the box
+            of.learn(c, middle, spread);
           }
         }
       }
@@ -332,7 +328,7 @@ class Learner {
             f.take(filter_);
           }
           for (Phase& phase : phases) {
-            phase.step(foreseen.front().value(), t);
+            phase.step(filter_.element());
           }
           for (b = 0; b < count; ++b) {
             g = foreseen[b].value();
@@ -408,7 +404,7 @@ class Learner {
             f.take(filter_);
           }
           for (Phase& phase : phases) {
-            phase.step(foreseen.front().value(), t);
+            phase.step(filter_.element());
           }
           for (Eigen::Index d = 0; d < count; ++d) {
             const Phase& phase = phases[block[static_cast<std::size_t>(d)]];
@@ -448,7 +444,7 @@ class Learner {
   [[nodiscard]] std::vector<Phase> phases_of(const std::vector<std::vector<Eigen::Index>>& blocks) const {
     std::vector<Phase> result;
     for (const std::vector<Eigen::Index>& block : blocks) {
-      result.emplace_back(filter_.model(), block, box_.middle, classes_.effort.bound, learning_);
+      result.emplace_back(filter_.model(), block, classes_.effort.bound, learning_);
     }
     return result;
   }
