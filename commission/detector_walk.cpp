@@ -205,6 +205,18 @@ void gather(LogSource& log, std::vector<Piece>& pieces) {
   log.rewind();
 }
 
+// " by 3.1 to 5.2 %": outward, to three digits of the larger end.
+std::string size_words(const Interval& magnitude, const detector::FaultType& fault) {
+  const bool share = fault.unit == "1";
+  const double factor = share ? 100.0 : 1.0;
+  const double low = factor * magnitude.lower, high = factor * magnitude.upper;
+  const double size = std::max({std::abs(low), std::abs(high), 1e-12});
+  const int decimals = std::clamp(2 - static_cast<int>(std::floor(std::log10(size))), 0, 9);
+  const double unit = std::pow(10.0, -decimals);
+  return fmt::format(" by {:.{}f} to {:.{}f} {}", std::floor(low / unit) * unit, decimals,
+                     std::ceil(high / unit) * unit, decimals, share ? "%" : fault.unit);
+}
+
 std::string names(const detector::Isolation& isolation, Verdict verdict) {
   std::string out;
   for (const detector::FaultFinding& f : isolation.findings) {
@@ -269,19 +281,17 @@ std::string sentence(const detector::FaultFinding& finding) {
       finding.magnitude->upper >= fault.range.upper) {
     text += " by any amount";
   } else if (finding.magnitude) {
-    const bool share = fault.unit == "1";
-    const double factor = share ? 100.0 : 1.0;
-    // Outward, to three digits of the larger end.
-    const double low = factor * finding.magnitude->lower, high = factor * finding.magnitude->upper;
-    const double size = std::max({std::abs(low), std::abs(high), 1e-12});
-    const int decimals = std::clamp(2 - static_cast<int>(std::floor(std::log10(size))), 0, 9);
-    const double unit = std::pow(10.0, -decimals);
-    text += fmt::format(" by {:.{}f} to {:.{}f} {}", std::floor(low / unit) * unit, decimals,
-                        std::ceil(high / unit) * unit, decimals, share ? "%" : fault.unit);
+    text += size_words(*finding.magnitude, fault);
   }
   text += fmt::format(", since {}{:.2f} to {:.2f} s", finding.earlier ? "before " : "",
                       std::floor(100.0 * finding.onset.lower) / 100.0, std::ceil(100.0 * finding.onset.upper) / 100.0);
-  return text + (finding.complete ? "" : " (not narrowed down further)");
+  text += finding.complete ? "" : " (not narrowed down further)";
+  if (finding.at_risk && finding.at_risk->excluded) {
+    text += ", excluded at the stated risk";
+  } else if (finding.at_risk && finding.at_risk->magnitude) {
+    text += ", at the stated risk" + size_words(*finding.at_risk->magnitude, fault);
+  }
+  return text;
 }
 
 std::string sentence(const detector::Isolation& isolation) {

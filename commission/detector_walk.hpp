@@ -119,8 +119,8 @@ struct EventIsolationOptions {
 
 /// Isolates the first events of `detection`, which came of walking `log` with the torque residual of `model`, against
 /// the catalogue of its robot. Walks the log once and holds the rows around these events. One result for each of them.
-/// Where the model says something at a stated risk, sums over all scales narrow what is left (narrow_by_sums()): the log
-/// is walked once more for each event, and exclusions stand on that risk.
+/// Where the model says something at a stated risk, sums over all scales are asked, too (narrow_by_sums()): the log is
+/// walked once more for each event.
 [[nodiscard]] std::vector<detector::Isolation> isolate_events(LogSource& log, const OnlineModel& model,
                                                               const Detection& detection,
                                                               const EventIsolationOptions& options = {});

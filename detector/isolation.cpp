@@ -491,6 +491,12 @@ std::size_t Isolation::count(FaultFinding::Verdict verdict) const {
       std::count_if(findings.begin(), findings.end(), [&](const FaultFinding& f) { return f.verdict == verdict; }));
 }
 
+std::size_t Isolation::count_at_risk() const {
+  return static_cast<std::size_t>(std::count_if(findings.begin(), findings.end(), [](const FaultFinding& f) {
+    return f.verdict == FaultFinding::Verdict::consistent && !(f.at_risk && f.at_risk->excluded);
+  }));
+}
+
 Isolation isolate(const ReferenceMotion& motion, const RegressorFilter& filter, const Polytope& set,
                   const std::vector<FaultType>& faults, double outside, double alarm, const IsolationOptions& options) {
   check::positive(options.before, "before");

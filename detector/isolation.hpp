@@ -47,6 +47,13 @@ struct IsolationOptions {
   std::size_t threads = 1;         ///< the result does not depend on it
 };
 
+/// What sums over all scales leave of a fault that is not excluded otherwise, at the stated risk (sum_isolation.hpp).
+struct SumFinding {
+  bool excluded = false;              ///< no size and onset explains the looks at the sums, but for the risk
+  std::optional<Interval> magnitude;  ///< where it is not excluded and has a size: holds the true one, but for the risk
+  Interval onset{};                   ///< where it is not excluded: holds the true one, but for the risk, s
+};
+
 /// Finding on one fault.
 struct FaultFinding {
   /// Kinds of answers.
@@ -62,6 +69,7 @@ struct FaultFinding {
   bool earlier = false;               ///< the onset may also lie before the window (then onset.lower is its beginning)
   bool complete = true;               ///< the budget sufficed
   std::size_t programs = 0;           ///< linear programs that were solved
+  std::optional<SumFinding> at_risk{};  ///< where sums over scales were asked
 };
 
 /// Findings on all faults.
@@ -71,6 +79,8 @@ struct Isolation {
 
   /// Number of findings with that verdict.
   [[nodiscard]] std::size_t count(FaultFinding::Verdict verdict) const;
+  /// Number of findings that are consistent, and not excluded at the stated risk either.
+  [[nodiscard]] std::size_t count_at_risk() const;
 };
 
 /// Tells `faults` apart after an alarm at `alarm` whose first instant outside is `outside` (both times of rows of the

@@ -167,17 +167,18 @@ class Narrowing {
       sizes = sizes ? hull(*sizes, left) : left;
       when = when ? hull(*when, time) : time;
     }
-    if (!sizes) {
-      finding_.verdict = FaultFinding::Verdict::excluded;
-      finding_.magnitude.reset();
-      return;
+    SumFinding found{!sizes, finding_.magnitude, finding_.onset};
+    if (sizes) {
+      found.onset = {std::max(found.onset.lower, when->lower), std::min(found.onset.upper, when->upper)};
+    } else {
+      found.magnitude.reset();
     }
-    finding_.onset = {std::max(finding_.onset.lower, when->lower), std::min(finding_.onset.upper, when->upper)};
-    if (finding_.magnitude) {
+    if (found.magnitude) {
       const auto size = [&](double x) { return finding_.fault.magnitude(encoder ? x / (1.0 - x) : x); };
-      finding_.magnitude = Interval{std::max(finding_.magnitude->lower, size(sizes->lower)),
-                                    std::min(finding_.magnitude->upper, size(sizes->upper))};
+      found.magnitude = Interval{std::max(found.magnitude->lower, size(sizes->lower)),
+                                 std::min(found.magnitude->upper, size(sizes->upper))};
     }
+    finding_.at_risk = found;
   }
 
  private:

@@ -139,7 +139,8 @@ class ReadingErrors {
 };
 
 // Walks the log; calls element(instant, whether there is one) for each instant of the motion, earlier() for each
-// element before it, and look(instant, time, state) for each look. False where the instants are not those of the motion.
+// element before it, and look(instant, time, state) for each look. False where the instants are not those of the
+// motion.
 template <typename Earlier, typename Element, typename Look>
 bool walk_sums(LogSource& log, ScaleDetector& detector, const ReferenceMotion& motion, const SumDriveOptions& options,
                Earlier&& earlier, Element&& element, Look&& look) {

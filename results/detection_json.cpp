@@ -66,6 +66,16 @@ void add_isolation(Json& json, const std::vector<detector::Isolation>& isolation
         if (f.magnitude) {
           entry["magnitude"] = {f.magnitude->lower, f.magnitude->upper};
         }
+        if (f.at_risk) {
+          Json& at_risk = entry["at_risk"];
+          at_risk = {{"excluded", f.at_risk->excluded}, {"magnitude", nullptr}, {"onset", nullptr}};
+          if (f.at_risk->magnitude) {
+            at_risk["magnitude"] = {f.at_risk->magnitude->lower, f.at_risk->magnitude->upper};
+          }
+          if (!f.at_risk->excluded) {
+            at_risk["onset"] = {f.at_risk->onset.lower, f.at_risk->onset.upper};
+          }
+        }
         consistent.push_back(std::move(entry));
       }
     }

@@ -48,8 +48,12 @@ std::string first_isolation(const std::vector<detector::Isolation>& isolations) 
   if (possible.empty()) {
     return fmt::format("No fault of the catalogue explains the first event: {} are excluded by proof.", excluded);
   }
-  return fmt::format("{} faults of the catalogue are excluded by proof for the first event; possible {}: {}.", excluded,
-                     possible.size() == 1 ? "remains" : "remain", fmt::join(possible, "; or "));
+  const std::size_t left = isolations.front().count_at_risk();
+  const std::string fewer =
+      left < possible.size() ? fmt::format(" At the stated risk {} of these {} left.", left, left == 1 ? "is" : "are")
+                             : std::string();
+  return fmt::format("{} faults of the catalogue are excluded by proof for the first event; possible {}: {}.{}",
+                     excluded, possible.size() == 1 ? "remains" : "remain", fmt::join(possible, "; or "), fewer);
 }
 
 }  // namespace
