@@ -67,33 +67,30 @@ void read_messages(const std::filesystem::path& path, bool decoded) {
     sum += values[1];
     ++count;
   }
-  keep(sum);
+  DoNotOptimize(sum);
   if (count != messages || !bag->reports().at(0).losses.empty()) {
     throw Error(path.string() + ": not everything was read");
   }
 }
 
-Measurement measure(const char* word, const char* ending, logs::McapCompression compression) {
+void measure(Form form, const char* name, const char* ending, logs::McapCompression compression) {
   const TemporaryFile file(ending);
   write_log(file.path, compression);
-  const auto [seconds, peer_seconds] = interleaved_medians([&] { read_messages(file.path, true); },
-                                                           [&] { read_messages(file.path, false); }, repetitions);
   const auto size = static_cast<double>(std::filesystem::file_size(file.path));
-  return {fmt::format("logs/bag {}", word),
-          messages,
-          0,
-          1,
-          seconds,
-          "not decoded",
-          peer_seconds,
-          fmt::format("{:.0f} MB/s of a file of {:.0f} MB, {:.0f} ns a message", 1e-6 * size / seconds, 1e-6 * size,
-                      1e9 * seconds / static_cast<double>(messages))};
+  const auto note = [&](double seconds) {
+    return fmt::format("{:.0f} MB/s of a file of {:.0f} MB, {:.0f} ns a message", 1e-6 * size / seconds, 1e-6 * size,
+                       1e9 * seconds / static_cast<double>(messages));
+  };
+  compare(
+      form, {name, messages, 0, 1, "not decoded", note}, [&] { read_messages(file.path, true); },
+      [&] { read_messages(file.path, false); }, repetitions);
 }
 
-std::vector<Measurement> bag_against_undecoded() {
-  return {measure("mcap none", "mcap", logs::McapCompression::none),
-          measure("mcap zstd", "mcap", logs::McapCompression::zstd),
-          measure("mcap lz4", "mcap", logs::McapCompression::lz4), measure("db3", "db3", logs::McapCompression::none)};
+void bag_against_undecoded(Form form) {
+  measure(form, "logs/bag mcap none", "mcap", logs::McapCompression::none);
+  measure(form, "logs/bag mcap zstd", "mcap", logs::McapCompression::zstd);
+  measure(form, "logs/bag mcap lz4", "mcap", logs::McapCompression::lz4);
+  measure(form, "logs/bag db3", "db3", logs::McapCompression::none);
 }
 
 const bool registered = register_bench("logs/bag", bag_against_undecoded);

@@ -2,48 +2,92 @@
 #include "bench.hpp"
 
 #include <algorithm>
-#include <chrono>
+#include <cstdio>
+#include <optional>
 
-#include <wheelwright/core/check.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 namespace wheelwright::bench {
 namespace {
 
-double seconds_of(const std::function<void()>& work) {
-  const auto start = std::chrono::steady_clock::now();
-  work();
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
+/// Prints one subject's line when both medians are there.
+class Line : public benchmark::BenchmarkReporter {
+ public:
+  Line(Form form, const Subject& subject) : form_(form), subject_(subject) {}
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+  bool ReportContext(const Context& /*context*/) override { return true; }
+
+  void ReportRuns(const std::vector<Run>& runs) override {
+    const auto found = std::ranges::find(runs, "median", &Run::aggregate_name);
+    const Run& median = found == runs.end() ? runs.front() : *found;  // of one run there are no aggregates
+    (median.run_name.function_name == subject_.name ? ours_ : peer_) =
+        median.GetAdjustedRealTime() / benchmark::GetTimeUnitMultiplier(median.time_unit);
+  }
+
+  void Finalize() override {
+    if (!ours_ || !peer_) {
+      return;  // --benchmark_filter
+    }
+    const Subject& s = subject_;
+    const std::string note = s.note ? s.note(*ours_) : "";
+    if (form_ == Form::json) {
+      nlohmann::ordered_json line = {{"name", s.name},         {"rows", s.rows},          {"p", s.p},
+                                     {"threads", s.threads},   {"seconds", *ours_},       {"peer", s.peer},
+                                     {"peer_seconds", *peer_}, {"ratio", *peer_ / *ours_}};
+      if (!note.empty()) {
+        line["note"] = note;
+      }
+      fmt::print("{}\n", line.dump());
+    } else {
+      fmt::print("{:<28} {:>10} rows  p {:>2}  {:>2} thr  {:>11.6f} s  {:<28} {:>11.6f} s  ratio {:>9.3g}  {}\n",
+                 s.name, s.rows, s.p, s.threads, *ours_, s.peer, *peer_, *peer_ / *ours_, note);
+    }
+    std::fflush(stdout);
+  }
+
+ private:
+  Form form_;
+  const Subject& subject_;
+  std::optional<double> ours_, peer_;
+};
+
+void add(const std::string& name, const Work& work, int repetitions) {
+  auto* const one = benchmark::RegisterBenchmark(name.c_str(), work.run)->Repetitions(repetitions);
+  if (work.own_clock) {
+    one->UseManualTime()->Iterations(1);
+  } else {
+    one->UseRealTime();
+  }
 }
 
 }  // namespace
 
-std::vector<Benchmark>& benchmarks() {
-  static std::vector<Benchmark> all;
+bool take_options(std::vector<char*> options, void (*help)()) {
+  char interleaved[] = "--benchmark_enable_random_interleaving=true", least[] = "--benchmark_min_time=0.1",
+       warm_up[] = "--benchmark_min_warmup_time=1e-9";  // one call
+  options.insert(options.begin() + 1, {interleaved, least, warm_up});
+  int left = static_cast<int>(options.size());
+  benchmark::Initialize(&left, options.data(), help);
+  return left == 1;
+}
+
+void compare(Form form, const Subject& subject, const Work& ours, const Work& peer, int repetitions) {
+  benchmark::ClearRegisteredBenchmarks();
+  add(subject.name, ours, repetitions);
+  add(subject.name + " | " + subject.peer, peer, repetitions);
+  Line line(form, subject);
+  benchmark::RunSpecifiedBenchmarks(&line);
+}
+
+std::multimap<std::string, std::function<void(Form)>>& benchmarks() {
+  static std::multimap<std::string, std::function<void(Form)>> all;
   return all;
 }
 
-bool register_bench(std::string name, std::function<std::vector<Measurement>()> run) {
-  benchmarks().push_back({std::move(name), std::move(run)});
+bool register_bench(std::string name, std::function<void(Form)> run) {
+  benchmarks().emplace(std::move(name), std::move(run));
   return true;
-}
-
-std::pair<double, double> interleaved_medians(const std::function<void()>& ours, const std::function<void()>& peer,
-                                              int repetitions) {
-  check::that(repetitions >= 1, "repetitions", "at least 1");
-  ours();
-  peer();
-  std::vector<double> our_times, peer_times;
-  for (int k = 0; k < repetitions; ++k) {
-    our_times.push_back(seconds_of(ours));
-    peer_times.push_back(seconds_of(peer));
-  }
-  return {median(our_times), median(peer_times)};
 }
 
 }  // namespace wheelwright::bench

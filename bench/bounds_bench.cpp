@@ -51,29 +51,21 @@ Box positive(std::size_t p) {
 
 void read_bare(core::RegressionTable& table) {
   const RegressionBlock& block = table.block();
-  keep(block.Y.sum() + block.dY.sum() + block.y.sum() + block.dy.sum());
+  DoNotOptimize(block.Y.sum() + block.dY.sum() + block.y.sum() + block.dy.sum());
 }
 
-std::vector<Measurement> sets() {
-  std::vector<Measurement> result;
-  const auto measure = [&](const char* name, core::RegressionTable& table, const char* peer, const auto& ours,
-                           const auto& theirs, int repetitions) {
-    const auto [seconds, peer_seconds] = interleaved_medians(ours, theirs, repetitions);
-    const auto rows = static_cast<std::size_t>(table.block().rows());
-    result.push_back({name, rows, static_cast<int>(table.parameters()), 1, seconds, peer, peer_seconds,
-                      fmt::format("{:.0f} ns a row", 1e9 * seconds / static_cast<double>(rows))});
+void sets(Form form) {
+  core::RegressionTable table = rows_of(1000000, 2, 4, true);
+  const auto rows = static_cast<std::size_t>(table.block().rows());
+  const auto measure = [&](const char* name, const Work& ours) {
+    const auto note = [&](double seconds) {
+      return fmt::format("{:.0f} ns a row", 1e9 * seconds / static_cast<double>(rows));
+    };
+    compare(
+        form, {name, rows, 4, 1, "bare read", note}, ours, [&] { read_bare(table); }, 3);
   };
-  {
-    core::RegressionTable table = rows_of(1000000, 2, 4, true);
-    const auto bare = [&] { read_bare(table); };
-    measure(
-        "bounds/source/feasible set", table, "bare read", [&] { keep(feasible_set(table, positive(4)).hull); }, bare,
-        3);
-    measure(
-        "bounds/source/minimax", table, "bare read", [&] { keep(bounds::minimax_fit(table, positive(4)).upper); }, bare,
-        3);
-  }
-  return result;
+  measure("bounds/source/feasible set", [&] { DoNotOptimize(feasible_set(table, positive(4)).hull); });
+  measure("bounds/source/minimax", [&] { DoNotOptimize(bounds::minimax_fit(table, positive(4)).upper); });
 }
 
 const bool registered = register_bench("bounds/source", sets);

@@ -48,7 +48,7 @@ void read_bare(const std::filesystem::path& path) {
   std::setvbuf(file.get(), nullptr, _IONBF, 0);
   std::vector<char> buffer(std::size_t{1} << 18);
   while (std::fread(buffer.data(), 1, buffer.size(), file.get()) > 0) {
-    keep(buffer);
+    DoNotOptimize(buffer);
   }
 }
 
@@ -59,24 +59,24 @@ void walk(LogSource& log) {
   while (log.next(block)) {
     sum += block.columns.front().front();
   }
-  keep(sum);
+  DoNotOptimize(sum);
 }
 
-Measurement measure(const std::string& name, const std::filesystem::path& path, const std::function<void()>& ours) {
-  const auto [seconds, peer_seconds] = interleaved_medians(
-      ours, [&] { read_bare(path); }, repetitions);
-  const double megabytes = 1e-6 * static_cast<double>(std::filesystem::file_size(path));
-  return {name, rows, 0, 1, seconds, "bare read", peer_seconds, fmt::format("{:.0f} MB/s", megabytes / seconds)};
-}
-
-std::vector<Measurement> csv_against_bare_read() {
+void csv_against_bare_read(Form form) {
   const TemporaryFile file("csv");
   write_log(file.path);
+  const double megabytes = 1e-6 * static_cast<double>(std::filesystem::file_size(file.path));
+  const auto measure = [&](const char* name, const Work& ours) {
+    const auto note = [&](double seconds) { return fmt::format("{:.0f} MB/s", megabytes / seconds); };
+    compare(
+        form, {name, rows, 0, 1, "bare read", note}, ours, [&] { read_bare(file.path); }, repetitions);
+  };
   CsvLog log({file.path});
-  return {measure("logs/csv walk", file.path, [&] { walk(log); }), measure("logs/csv open and walk", file.path, [&] {
-            CsvLog fresh({file.path});
-            walk(fresh);
-          })};
+  measure("logs/csv walk", [&] { walk(log); });
+  measure("logs/csv open and walk", [&] {
+    CsvLog fresh({file.path});
+    walk(fresh);
+  });
 }
 
 const bool registered = register_bench("logs/csv", csv_against_bare_read);

@@ -92,7 +92,7 @@ struct World {
   void run(TorqueDetector& detector) const {
     detector.restart();
     for (std::size_t k = 0; k < rows; ++k) {
-      keep(detector.step(t[k], {samples.data() + k * inputs, inputs}).fault);
+      DoNotOptimize(detector.step(t[k], {samples.data() + k * inputs, inputs}).fault);
     }
   }
 };
@@ -133,15 +133,14 @@ class Exported {
   Exported(const Exported&) = delete;
   Exported& operator=(const Exported&) = delete;
   explicit operator bool() const { return run_ != nullptr; }
-  void run(const World& w) const { keep(run_(static_cast<long>(World::rows), w.t.data(), w.samples.data())); }
+  void run(const World& w) const { DoNotOptimize(run_(static_cast<long>(World::rows), w.t.data(), w.samples.data())); }
 
  private:
   void* library_ = nullptr;
   int (*run_)(long, const double*, const double*) = nullptr;
 };
 
-std::vector<Measurement> steps() {
-  std::vector<Measurement> result;
+void steps(Form form) {
   for (const bool dry_friction : {false, true}) {
     const World w(dry_friction);
     const int p = static_cast<int>(w.estimate.size());
@@ -149,16 +148,15 @@ std::vector<Measurement> steps() {
     for (const ParameterSetKind kind : {ParameterSetKind::box, ParameterSetKind::polytope}) {
       const std::string name = kind == ParameterSetKind::box ? "box" : "polytope";
       Detector detector = w.detector({.set = kind});
-      const auto measure = [&](const std::string& what, const std::function<void()>& ours) {
-        const auto [seconds, peer_seconds] = interleaved_medians(
-            ours, [&] { w.run(constant); }, kRepetitions);
-        result.push_back({"detector/step " + what + name, World::rows, p, 1, seconds, "constant thresholds",
-                          peer_seconds,
-                          each(seconds, World::rows,
-                               kind == ParameterSetKind::polytope
+      const std::string more = kind == ParameterSetKind::polytope
                                    ? fmt::format(", {} facets{}", w.set->facets().size(),
                                                  detector.threshold().table() ? "" : ", walked without a table")
-                                   : "")});
+                                   : "";
+      const auto note = [&](double seconds) { return each(seconds, World::rows, more); };
+      const auto measure = [&](const std::string& what, const Work& ours) {
+        compare(
+            form, {"detector/step " + what + name, World::rows, p, 1, "constant thresholds", note}, ours,
+            [&] { w.run(constant); }, kRepetitions);
       };
       measure("", [&] { w.run(detector); });
       if (kind == ParameterSetKind::box || detector.threshold().table()) {
@@ -168,12 +166,10 @@ std::vector<Measurement> steps() {
       }
     }
   }
-  return result;
 }
 
 /// Thresholds of both channels of slowly turning rows, next to constant ones.
-std::vector<Measurement> thresholds() {
-  std::vector<Measurement> result;
+void thresholds(Form form) {
   const std::size_t n = 100000;
   for (const std::size_t p : {4, 6, 8}) {
     const DriveRows rows = drive_rows(n, p, RowNoise::uniform);
@@ -185,7 +181,7 @@ std::vector<Measurement> thresholds() {
       const detector::ThresholdRule rule(set, estimate, kind);
       const auto ours = [&] {
         for (std::size_t k = 0; k < n; ++k) {
-          keep(rule.at({along.data() + k * p, p}, none, 0.01, k < n / 2 ? 0 : 1));
+          DoNotOptimize(rule.at({along.data() + k * p, p}, none, 0.01, k < n / 2 ? 0 : 1));
         }
       };
       const auto constant = [&] {
@@ -194,24 +190,23 @@ std::vector<Measurement> thresholds() {
           for (std::size_t j = 0; j < p; ++j) {
             predicted += along[k * p + j] * estimate[static_cast<Eigen::Index>(j)];
           }
-          keep(predicted);
+          DoNotOptimize(predicted);
         }
       };
-      const auto [seconds, peer_seconds] = interleaved_medians(ours, constant, kRepetitions);
-      result.push_back({std::string("detector/threshold ") + (kind == ParameterSetKind::box ? "box" : "polytope"), n,
-                        static_cast<int>(p), 1, seconds, "prediction alone", peer_seconds,
-                        each(seconds, n,
-                             kind == ParameterSetKind::box ? ""
-                             : rule.table()                ? ", table"
-                                                           : ", walk")});
+      const bool box = kind == ParameterSetKind::box;
+      const auto note = [&](double seconds) {
+        return each(seconds, n, box ? "" : rule.table() ? ", table" : ", walk");
+      };
+      compare(form,
+              {box ? "detector/threshold box" : "detector/threshold polytope", n, static_cast<int>(p), 1,
+               "prediction alone", note},
+              ours, constant, kRepetitions);
     }
   }
-  return result;
 }
 
 /// The support function from the table, next to the walk that finds its vertices as it goes.
-std::vector<Measurement> supports() {
-  std::vector<Measurement> result;
+void supports(Form form) {
   const std::size_t n = 100000;
   for (const std::size_t p : {4, 6, 8}) {
     const DriveRows rows = drive_rows(n, p, RowNoise::uniform);
@@ -227,18 +222,19 @@ std::vector<Measurement> supports() {
     }
     bounds::SupportWalk walk(set);
     const std::vector<double> along = directions(rows, n);
-    const auto [seconds, peer_seconds] = interleaved_medians(
+    const auto note = [&](double seconds) {
+      return each(seconds, n, fmt::format(", {} facets, {} vertices", set.facets().size(), vertices));
+    };
+    compare(
+        form, {"detector/support table", n, static_cast<int>(p), 1, "walk, warm", note},
         [&] {
-          for (std::size_t k = 0; k < n; ++k) keep(table->support({along.data() + k * p, p}, 2 * k / n));
+          for (std::size_t k = 0; k < n; ++k) DoNotOptimize(table->support({along.data() + k * p, p}, 2 * k / n));
         },
         [&] {
-          for (std::size_t k = 0; k < n; ++k) keep(walk.support({along.data() + k * p, p}, 2 * k / n));
+          for (std::size_t k = 0; k < n; ++k) DoNotOptimize(walk.support({along.data() + k * p, p}, 2 * k / n));
         },
         kRepetitions);
-    result.push_back({"detector/support table", n, static_cast<int>(p), 1, seconds, "walk, warm", peer_seconds,
-                      each(seconds, n, fmt::format(", {} facets, {} vertices", set.facets().size(), vertices))});
   }
-  return result;
 }
 
 const bool registered = register_bench("detector/step", steps) && register_bench("detector/threshold", thresholds) &&

@@ -4,7 +4,6 @@
 // tolerance.
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <string>
 #include <vector>
 
@@ -80,21 +79,21 @@ void require_contains(const Box& certified, const Box& peer) {
   }
 }
 
-std::vector<Measurement> hulls() {
-  std::vector<Measurement> result;
+void hulls(Form form) {
   for (const std::size_t n : {100000, 1000000}) {
     for (const Kind& kind : kinds) {
       const DriveRows rows = drive_rows(n, 8, kind.noise);
       const bounds::SlabColumns columns = columns_of(rows);
       bounds::IntervalHull hull;
       Box peer;
-      const auto take = [&](const char* name, const std::function<void()>& solve) {
-        const auto [seconds, peer_seconds] =
-            interleaved_medians([&] { hull = bounds::interval_hull(columns, rows.prior); }, solve, n < 1000000 ? 3 : 1);
+      const auto note = [&](double) {
         require_contains(hull.hull, peer);
-        result.push_back(
-            {"bounds/hull", n, 8, 1, seconds, name, peer_seconds,
-             fmt::format("{}, {} passes, {} rows looked at twice", kind.letter, hull.passes, hull.candidates)});
+        return fmt::format("{}, {} passes, {} rows looked at twice", kind.letter, hull.passes, hull.candidates);
+      };
+      const auto take = [&](const char* name, const Work& solve) {
+        compare(
+            form, {"bounds/hull", n, 8, 1, name, note}, [&] { hull = bounds::interval_hull(columns, rows.prior); },
+            solve, n < 1000000 ? 3 : 1);
       };
       const auto loop = clp_loop(rows);
       take("clp cutting-plane loop", [&] { peer = loop().hull; });
@@ -104,26 +103,26 @@ std::vector<Measurement> hulls() {
       }
     }
   }
-  return result;
 }
 
-std::vector<Measurement> minimax() {
-  std::vector<Measurement> result;
+void minimax(Form form) {
   for (const std::size_t n : {100000, 1000000}) {
     for (const Kind& kind : {kinds[0], kinds[1]}) {
       const DriveRows rows = drive_rows(n, 8, kind.noise);
       const ScaledColumns scaled(rows);
       bounds::MinimaxFit fit;
       double peer = 0.0;
-      const auto take = [&](const char* name, const MinimaxPeer& solve) {
-        const auto [seconds, peer_seconds] = interleaved_medians(
-            [&] { fit = bounds::minimax_fit(scaled.view, rows.prior); }, [&] { peer = solve(); }, n < 1000000 ? 3 : 1);
+      const auto note = [&](double) {
         if (!(fit.lower <= peer * (1.0 + 1e-6) && fit.upper >= peer * (1.0 - 1e-6))) {
           throw Error(fmt::format("minimax: [{:.17g}, {:.17g}], peer {:.17g}", fit.lower, fit.upper, peer));
         }
-        result.push_back({"bounds/minimax", n, 8, 1, seconds, name, peer_seconds,
-                          fmt::format("{}, {} passes, bracket {:.1g}", kind.letter, fit.passes,
-                                      (fit.upper - fit.lower) / fit.upper)});
+        return fmt::format("{}, {} passes, bracket {:.1g}", kind.letter, fit.passes,
+                           (fit.upper - fit.lower) / fit.upper);
+      };
+      const auto take = [&](const char* name, const MinimaxPeer& solve) {
+        compare(
+            form, {"bounds/minimax", n, 8, 1, name, note}, [&] { fit = bounds::minimax_fit(scaled.view, rows.prior); },
+            [&] { peer = solve(); }, n < 1000000 ? 3 : 1);
       };
       take("clp", clp_minimax(rows));
       if (has_glpk()) {
@@ -131,11 +130,9 @@ std::vector<Measurement> minimax() {
       }
     }
   }
-  return result;
 }
 
-std::vector<Measurement> walks() {
-  std::vector<Measurement> result;
+void walks(Form form) {
   for (const std::size_t p : {4, 6, 8, 12}) {
     const std::size_t n = 100000;
     for (const Kind& kind : {kinds[0], kinds[1]}) {
@@ -162,10 +159,8 @@ std::vector<Measurement> walks() {
         }
         cost = h.count();
       };
-      const auto take = [&](const char* name, const SupportPeer& peer) {
+      const auto note = [&](double seconds) {
         double wrong = 0.0;
-        const auto [seconds, peer_seconds] = interleaved_medians(
-            walk, [&] { theirs = peer(along); }, 3);
         for (std::size_t k = 0; k < 2 * n; ++k) {
           const double width = theirs[k] + theirs[(k + n) % (2 * n)];
           // Ours is a proved upper bound: it may be above a peer's value by rounding, and below by what the peer is
@@ -176,12 +171,14 @@ std::vector<Measurement> walks() {
           }
           wrong = std::max(wrong, (theirs[k] - ours[k]) / width);
         }
-        result.push_back(
-            {"bounds/walk", 2 * n, static_cast<int>(p), 1, seconds, name, peer_seconds,
-             fmt::format("{}, {} facets, {:.0f} ns each, {:.3f} edges each; peer too large by up to {:.0e} "
-                         "of the width",
-                         kind.letter, facets.m, 1e9 * seconds / static_cast<double>(2 * n),
-                         static_cast<double>(cost.edges) / static_cast<double>(2 * n), wrong)});
+        return fmt::format(
+            "{}, {} facets, {:.0f} ns each, {:.3f} edges each; peer too large by up to {:.0e} of the width",
+            kind.letter, facets.m, 1e9 * seconds / static_cast<double>(2 * n),
+            static_cast<double>(cost.edges) / static_cast<double>(2 * n), wrong);
+      };
+      const auto take = [&](const char* name, const SupportPeer& peer) {
+        compare(
+            form, {"bounds/walk", 2 * n, static_cast<int>(p), 1, name, note}, walk, [&] { theirs = peer(along); }, 3);
       };
       take("clp", clp_support(facets));
       if (has_glpk()) {
@@ -189,38 +186,37 @@ std::vector<Measurement> walks() {
       }
     }
   }
-  return result;
 }
 
-std::vector<Measurement> facets() {
-  std::vector<Measurement> result;
+void facets(Form form) {
   for (const Kind& kind : kinds) {
     const DriveRows rows = drive_rows(1000000, 8, kind.noise);
     core::RegressionTable table(as_block(rows));
     FeasibleSet set;
-    const auto [seconds, read] = interleaved_medians([&] { set = feasible_set(table, rows.prior, without_vertices()); },
-                                                     [&] { keep(table.block().Y.sum() + table.block().y.sum()); }, 3);
-    result.push_back({"bounds/facets", rows.n, 8, 1, seconds, "bare read", read,
-                      fmt::format("{}, {} facets, {:.2f} s", kind.letter, set.polytope->facets().size(), seconds)});
+    const auto note = [&](double seconds) {
+      return fmt::format("{}, {} facets, {:.2f} s", kind.letter, set.polytope->facets().size(), seconds);
+    };
+    compare(
+        form, {"bounds/facets", rows.n, 8, 1, "bare read", note},
+        [&] { set = feasible_set(table, rows.prior, without_vertices()); },
+        [&] { DoNotOptimize(table.block().Y.sum() + table.block().y.sum()); }, 3);
   }
-  return result;
 }
 
 /// One thread against two on rows of which most are only looked at.
-std::vector<Measurement> threads() {
-  std::vector<Measurement> result;
+void threads(Form form) {
   for (const Kind& kind : {kinds[0], kinds[1]}) {
     const DriveRows rows = drive_rows(4000000, 8, kind.noise);
     const bounds::SlabColumns columns = columns_of(rows);
     const auto run = [&](std::size_t count) {
       bounds::IntervalHullOptions options;
       options.threads = count;
-      keep(bounds::interval_hull(columns, rows.prior, options).hull);
+      DoNotOptimize(bounds::interval_hull(columns, rows.prior, options).hull);
     };
-    const auto [two, one] = interleaved_medians([&] { run(2); }, [&] { run(1); }, 5);
-    result.push_back({"bounds/threads", rows.n, 8, 2, two, "one thread", one, kind.letter});
+    const auto note = [&](double) { return std::string(kind.letter); };
+    compare(
+        form, {"bounds/threads", rows.n, 8, 2, "one thread", note}, [&] { run(2); }, [&] { run(1); }, 5);
   }
-  return result;
 }
 
 const bool registered = register_bench("bounds/hull", hulls) && register_bench("bounds/minimax", minimax) &&

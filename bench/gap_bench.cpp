@@ -6,7 +6,6 @@
 #include <chrono>
 #include <cmath>
 #include <cstdint>
-#include <functional>
 #include <limits>
 #include <numeric>
 #include <random>
@@ -55,12 +54,6 @@ LogTable drive(double duration, double ahead, std::uint64_t seed) {
   s.seed = seed;
   Simulation simulation(s);
   return read_all(simulation);
-}
-
-double seconds_of(const std::function<void()>& work) {
-  const auto start = std::chrono::steady_clock::now();
-  work();
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
 /// All rows of all spaces, whitened, with the columns of `members` beside θ; the last column is the response.
@@ -137,49 +130,51 @@ std::vector<std::size_t> plain_search(const gap::GapProblem& problem) {
   return chosen;
 }
 
+/// Seconds that the plain search takes.
 double plain_seconds(TableSource& log, TableSource& baseline) {
   gap::PreparedGap prepared = gap::prepare_gap(log, &baseline, plain_robot(), {});
   prepared.row_options.row_step = 1e-9;
   const gap::GapProblem problem =
       gap::make_problem(prepared.drive, prepared.floor, prepared.healthy, prepared.trusted, prepared.catalogue,
                         gap::all_shapes(prepared.catalogue, prepared.drive), prepared.row_options);
-  return seconds_of([&] { keep(plain_search(problem)); });
+  const auto start = std::chrono::steady_clock::now();
+  DoNotOptimize(plain_search(problem));
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-std::vector<Measurement> catalogue() {
-  std::vector<Measurement> result;
-  double of_plain = 0.0;
+/// A drive with a healthy baseline.
+struct Logs {
+  LogTable real, base;
+  TableSource log{real}, baseline{base};
+  explicit Logs(double duration) : real(drive(duration, 0.03, 2)), base(drive(duration, 0.0, 1)) {}
+};
+
+void catalogue(Form form) {
+  Logs shorter(120.0), longer(240.0);
+  const double of_plain = plain_seconds(shorter.log, shorter.baseline);  // a quarter of a minute: once is enough
   for (const bool shrink : {false, true}) {
-    for (const std::size_t threads : {1, 2}) {
-      double shorter = 0.0;
-      for (const double duration : {120.0, 240.0}) {
-        const LogTable real = drive(duration, 0.03, 2), base = drive(duration, 0.0, 1);
-        TableSource log(real), baseline(base);
-        if (of_plain == 0.0) {
-          of_plain = plain_seconds(log, baseline);
-        }
+    for (const int threads : {1, 2}) {
+      const auto first_cause = [&](Logs& logs) {
         gap::DiagnoseOptions options;
         options.shrink = shrink;
-        options.threads = threads;
-        std::vector<double> times;
+        options.threads = static_cast<std::size_t>(threads);
+        const Diagnosis diagnosis = diagnose(logs.log, &logs.baseline, plain_robot(), options);
+        return diagnosis.causes.empty() ? std::string("nothing") : diagnosis.causes.front().effect;
+      };
+      const auto take = [&](Logs& logs, const char* peer, const Work& theirs) {
         std::string found;
-        for (int k = 0; k < 3; ++k) {
-          times.push_back(seconds_of([&] {
-            const Diagnosis diagnosis = diagnose(log, &baseline, plain_robot(), options);
-            found = diagnosis.causes.empty() ? "nothing" : diagnosis.causes.front().effect;
-          }));
-        }
-        std::sort(times.begin(), times.end());
-        const std::string name = shrink ? "gap/catalogue and shrink" : "gap/catalogue";
-        const bool first = duration < 200.0;
-        result.push_back({name, real.rows(), 4, static_cast<int>(threads), times[1],
-                          first ? "eigen qr, random 10-fold" : "the same at 120 s", first ? of_plain : shorter,
-                          fmt::format("{:.0f} s at {:.0f} Hz, finds {}", duration, kRate, found)});
-        shorter = times[1];
-      }
+        const auto note = [&](double) {
+          return fmt::format("{:.0f} s at {:.0f} Hz, finds {}", static_cast<double>(logs.real.rows()) / kRate, kRate,
+                             found);
+        };
+        compare(
+            form, {shrink ? "gap/catalogue and shrink" : "gap/catalogue", logs.real.rows(), 4, threads, peer, note},
+            [&] { found = first_cause(logs); }, theirs, 3);
+      };
+      take(shorter, "eigen qr, random 10-fold", [&] { return of_plain; });
+      take(longer, "the same at 120 s", [&] { DoNotOptimize(first_cause(shorter)); });
     }
   }
-  return result;
 }
 
 const bool registered = register_bench("gap/catalogue", catalogue);

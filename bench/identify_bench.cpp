@@ -69,39 +69,37 @@ Eigen::VectorXd by_moments(const RegressionBlock& block) {
   return identify::ordinary_least_squares(sums).theta;
 }
 
-std::vector<Measurement> moments() {
+void moments(Form form) {
   const RegressionBlock block = rows(kParameters);
-  const auto ours = [&] { keep(by_moments(block)); };
-  std::vector<Measurement> result;
-  const auto against = [&](const std::string& peer, const std::function<void()>& theirs, std::string remark) {
-    const auto [seconds, peer_seconds] = interleaved_medians(ours, theirs, kRepetitions);
-    result.push_back({"identify/moments", kRows, kParameters, 1, seconds, peer, peer_seconds, std::move(remark)});
+  const auto ours = [&] { DoNotOptimize(by_moments(block)); };
+  const auto against = [&](const char* peer, const Work& theirs, const std::string& remark) {
+    compare(form, {"identify/moments", kRows, kParameters, 1, peer, [&](double) { return remark; }}, ours, theirs,
+            kRepetitions);
   };
   against(
-      "bare read", [&] { keep(block.Y.sum() + block.y.sum()); }, "Y and y, 72 MB");
+      "bare read", [&] { DoNotOptimize(block.Y.sum() + block.y.sum()); }, "Y and y, 72 MB");
 #ifdef WHEELWRIGHT_LAPACK
   const Eigen::MatrixXd Y = block.Y;
   const Eigen::VectorXd theirs = dgels(Y, block.y);
   const Eigen::VectorXd difference = by_moments(block) - theirs;
   against(
-      "lapack dgels", [&] { keep(dgels(Y, block.y)); },
+      "lapack dgels", [&] { DoNotOptimize(dgels(Y, block.y)); },
       fmt::format("largest relative difference {:.1e}", (difference.array() / theirs.array()).abs().maxCoeff()));
 #endif
-  return result;
 }
 
-std::vector<Measurement> instruments() {
+void instruments(Form form) {
   const RegressionBlock both = rows(2 * kParameters);
   const RegressionBlock block = rows(kParameters);
   const auto ours = [&] {
     identify::RegressionMoments sums(1, kParameters, true);
     sums.add(both);
-    keep(identify::instrumental_variables(sums).theta);
+    DoNotOptimize(identify::instrumental_variables(sums).theta);
   };
-  const auto [seconds, peer_seconds] = interleaved_medians(
-      ours, [&] { keep(by_moments(block)); }, kRepetitions);
-  return {{"identify/instrumental_variables", kRows, kParameters, 1, seconds, "identify/moments", peer_seconds,
-           "covariance under autocorrelation included"}};
+  const auto note = [](double) { return std::string("covariance under autocorrelation included"); };
+  compare(
+      form, {"identify/instrumental_variables", kRows, kParameters, 1, "identify/moments", note}, ours,
+      [&] { DoNotOptimize(by_moments(block)); }, kRepetitions);
 }
 
 const bool registered_moments = register_bench("identify/moments", moments);

@@ -125,27 +125,29 @@ void read_bare(const DriveRows& rows) {
   const auto sum = [](const std::vector<double>& x) {
     return Eigen::Map<const Eigen::VectorXd>(x.data(), static_cast<Eigen::Index>(x.size())).sum();
   };
-  keep(sum(rows.columns) + sum(rows.y));
+  DoNotOptimize(sum(rows.columns) + sum(rows.y));
 }
 
-std::vector<Measurement> peers() {
+void peers(Form form) {
   check_peers();
-  std::vector<Measurement> result;
   for (const std::size_t p : {4, 8}) {
     for (const std::size_t n : {10000, 100000}) {
       for (const Kind& kind : {kinds[0], kinds[1]}) {
         const DriveRows rows = drive_rows(n, p, kind.noise);
-        const auto take = [&](const char* peer, const std::string& subject, const std::function<void()>& solve,
+        const auto take = [&](const char* peer, const std::string& subject, const Work& solve,
                               const std::function<std::string()>& more) {
-          const auto [bare, seconds] = interleaved_medians([&] { read_bare(rows); }, solve, n < 100000 ? 3 : 1);
-          result.push_back({"bounds/peers", n, static_cast<int>(p), 1, bare, peer, seconds,
-                            fmt::format("{} {}{}; beside a bare read", subject, kind.letter, more())});
+          const auto note = [&](double) {
+            return fmt::format("{} {}{}; beside a bare read", subject, kind.letter, more());
+          };
+          compare(
+              form, {"bounds/peers", n, static_cast<int>(p), 1, peer, note}, [&] { read_bare(rows); }, solve,
+              n < 100000 ? 3 : 1);
         };
         const auto nothing = [] { return std::string(); };
         {
           const HullPeer solve = clp_hull(rows);
           take(
-              "clp", "hull", [&] { keep(solve()); }, nothing);
+              "clp", "hull", [&] { DoNotOptimize(solve()); }, nothing);
         }
         {
           const auto solve = clp_loop(rows);
@@ -157,18 +159,18 @@ std::vector<Measurement> peers() {
         {
           const MinimaxPeer solve = clp_minimax(rows);
           take(
-              "clp", "minimax", [&] { keep(solve()); }, nothing);
+              "clp", "minimax", [&] { DoNotOptimize(solve()); }, nothing);
         }
         if (has_glpk()) {
-          for (const GlpkForm form : {GlpkForm::dual, GlpkForm::ranged}) {
-            const HullPeer hull = glpk_hull(rows, form);
-            const char* subject = form == GlpkForm::dual ? "hull, dual form," : "hull, ranged rows,";
+          for (const GlpkForm program : {GlpkForm::dual, GlpkForm::ranged}) {
+            const HullPeer hull = glpk_hull(rows, program);
+            const char* subject = program == GlpkForm::dual ? "hull, dual form," : "hull, ranged rows,";
             take(
-                "glpk", subject, [&] { keep(hull()); }, nothing);
+                "glpk", subject, [&] { DoNotOptimize(hull()); }, nothing);
           }
           const MinimaxPeer minimax = glpk_minimax(rows);
           take(
-              "glpk", "minimax", [&] { keep(minimax()); }, nothing);
+              "glpk", "minimax", [&] { DoNotOptimize(minimax()); }, nothing);
         }
         if (n == 10000) {
           core::RegressionTable table(as_block(rows));
@@ -178,17 +180,16 @@ std::vector<Measurement> peers() {
           const auto each = fmt::format("support along the rows, {} facets", facets.m);
           const SupportPeer clp = clp_support(facets);
           take(
-              "clp", each, [&] { keep(clp(along)); }, nothing);
+              "clp", each, [&] { DoNotOptimize(clp(along)); }, nothing);
           if (has_glpk()) {
             const SupportPeer glpk = glpk_support(facets);
             take(
-                "glpk", each, [&] { keep(glpk(along)); }, nothing);
+                "glpk", each, [&] { DoNotOptimize(glpk(along)); }, nothing);
           }
         }
       }
     }
   }
-  return result;
 }
 
 const bool registered = register_bench("bounds/peers", peers);

@@ -1,91 +1,59 @@
 // SPDX-License-Identifier: Apache-2.0
-// wheelwright-bench [--filter WORDS] [--json]: every benchmark whose name has one of the words, one measurement a line.
+// wheelwright-bench [--filter WORDS] [--json] [--benchmark_…]: every benchmark whose name has one of the words, one
+// measurement a line.
 #include <algorithm>
-#include <cstdio>
 #include <exception>
+#include <iterator>
+#include <sstream>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
 #include "bench.hpp"
 
 namespace {
 
-using wheelwright::bench::Measurement;
-
-std::vector<std::string> words_of(std::string_view text) {
-  std::vector<std::string> words(1);
-  for (const char c : text) {
-    if (c == ' ' || c == ',') {
-      words.emplace_back();
-    } else {
-      words.back() += c;
-    }
-  }
-  std::erase(words, "");
-  return words;
-}
-
-std::string json_line(const Measurement& m) {
-  nlohmann::ordered_json line = {{"name", m.name},
-                                 {"rows", m.rows},
-                                 {"p", m.p},
-                                 {"threads", m.threads},
-                                 {"seconds", m.seconds},
-                                 {"peer", m.peer},
-                                 {"peer_seconds", m.peer_seconds},
-                                 {"ratio", m.peer_seconds / m.seconds}};
-  if (!m.note.empty()) {
-    line["note"] = m.note;
-  }
-  return line.dump();
-}
-
-std::string table_line(const Measurement& m) {
-  return fmt::format("{:<28} {:>10} rows  p {:>2}  {:>2} thr  {:>11.6f} s  {:<28} {:>11.6f} s  ratio {:>9.3g}  {}",
-                     m.name, m.rows, m.p, m.threads, m.seconds, m.peer, m.peer_seconds, m.peer_seconds / m.seconds,
-                     m.note);
-}
-
-int usage() {
-  fmt::print(stderr,
-             "usage: wheelwright-bench [--filter WORDS] [--json]\n"
-             "  --filter WORDS  only benchmarks whose name has one of the words (separated by blanks or commas)\n"
-             "  --json          one JSON object a line\n");
-  return 2;
+void usage() {
+  fmt::print(
+      stderr,
+      "usage: wheelwright-bench [--filter WORDS] [--json] [--benchmark_...]\n"
+      "  --filter WORDS   only benchmarks whose name has one of the words (separated by blanks or commas)\n"
+      "  --json           one JSON object a line\n"
+      "  --benchmark_...  options of Google Benchmark; not --benchmark_out, since every line is a run of its own\n");
 }
 
 }  // namespace
 
 int main(int count, char** arguments) try {
   std::vector<std::string> words;
-  bool json = false;
+  auto form = wheelwright::bench::Form::table;
+  std::vector<char*> others = {arguments[0]};
   for (int k = 1; k < count; ++k) {
     const std::string_view argument = arguments[k];
     if (argument == "--json") {
-      json = true;
+      form = wheelwright::bench::Form::json;
     } else if (argument == "--filter" && k + 1 < count) {
-      const auto more = words_of(arguments[++k]);
-      words.insert(words.end(), more.begin(), more.end());
+      std::string text = arguments[++k];
+      std::ranges::replace(text, ',', ' ');
+      std::istringstream in(text);
+      words.insert(words.end(), std::istream_iterator<std::string>(in), {});
+    } else if (argument.starts_with("--benchmark_out")) {
+      usage();
+      return 2;
     } else {
-      return usage();
+      others.push_back(arguments[k]);
     }
   }
-  auto& all = wheelwright::bench::benchmarks();
-  std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.name < b.name; });
-  for (const auto& benchmark : all) {
-    const bool wanted = words.empty() || std::any_of(words.begin(), words.end(), [&](const std::string& word) {
-                          return benchmark.name.find(word) != std::string::npos;
-                        });
-    if (!wanted) {
-      continue;
-    }
-    for (const Measurement& measurement : benchmark.run()) {
-      fmt::print("{}\n", json ? json_line(measurement) : table_line(measurement));
-      std::fflush(stdout);
+  if (!wheelwright::bench::take_options(others, usage)) {
+    usage();
+    return 2;
+  }
+  for (const auto& [name, run] : wheelwright::bench::benchmarks()) {
+    const auto wanted = [&](const std::string& word) { return name.find(word) != std::string::npos; };
+    if (words.empty() || std::ranges::any_of(words, wanted)) {
+      run(form);
     }
   }
   return 0;

@@ -59,7 +59,7 @@ void read_bare(const std::filesystem::path& path) {
   std::setvbuf(file.get(), nullptr, _IONBF, 0);
   std::vector<char> buffer(std::size_t{1} << 20);
   while (std::fread(buffer.data(), 1, buffer.size(), file.get()) > 0) {
-    keep(buffer);
+    DoNotOptimize(buffer);
   }
 }
 
@@ -72,32 +72,29 @@ void read_messages(const std::filesystem::path& path) {
     std::memcpy(&first, message.data.data(), sizeof first);
     sum += first;
   }
-  keep(sum);
+  DoNotOptimize(sum);
   if (reader.report().messages != messages || !reader.report().clean()) {
     throw Error(path.string() + ": not everything was read");
   }
 }
 
-Measurement measure(const char* word, logs::McapCompression compression) {
+void measure(Form form, const char* name, logs::McapCompression compression) {
   const TemporaryFile file("mcap");
-  const std::size_t unpacked = write_log(file.path, compression);
-  const auto [seconds, peer_seconds] =
-      interleaved_medians([&] { read_messages(file.path); }, [&] { read_bare(file.path); }, repetitions);
+  const auto unpacked = static_cast<double>(write_log(file.path, compression));
   const auto size = static_cast<double>(std::filesystem::file_size(file.path));
-  return {fmt::format("logs/mcap {}", word),
-          messages,
-          0,
-          1,
-          seconds,
-          "bare read",
-          peer_seconds,
-          fmt::format("{:.0f} MB/s of a file of {:.0f} MB, {:.0f} MB/s unpacked", 1e-6 * size / seconds, 1e-6 * size,
-                      1e-6 * static_cast<double>(unpacked) / seconds)};
+  const auto note = [&](double seconds) {
+    return fmt::format("{:.0f} MB/s of a file of {:.0f} MB, {:.0f} MB/s unpacked", 1e-6 * size / seconds, 1e-6 * size,
+                       1e-6 * unpacked / seconds);
+  };
+  compare(
+      form, {name, messages, 0, 1, "bare read", note}, [&] { read_messages(file.path); }, [&] { read_bare(file.path); },
+      repetitions);
 }
 
-std::vector<Measurement> mcap_against_bare_read() {
-  return {measure("none", logs::McapCompression::none), measure("zstd", logs::McapCompression::zstd),
-          measure("lz4", logs::McapCompression::lz4)};
+void mcap_against_bare_read(Form form) {
+  measure(form, "logs/mcap none", logs::McapCompression::none);
+  measure(form, "logs/mcap zstd", logs::McapCompression::zstd);
+  measure(form, "logs/mcap lz4", logs::McapCompression::lz4);
 }
 
 const bool registered = register_bench("logs/mcap", mcap_against_bare_read);

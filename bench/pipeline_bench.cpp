@@ -73,30 +73,26 @@ void read_bare(const LogTable& table) {
   for (const auto& column : table.columns) {
     for (const double value : column) sum += value;
   }
-  keep(sum);
+  DoNotOptimize(sum);
 }
 
-void read_bare(const RegressionBlock& block) { keep(block.Y.sum() + block.dY.sum() + block.y.sum() + block.dy.sum()); }
+void read_bare(const RegressionBlock& block) {
+  DoNotOptimize(block.Y.sum() + block.dY.sum() + block.y.sum() + block.dy.sum());
+}
 
 template <typename Source, typename Block>
 void walk(Source& source, Block& block) {
   source.rewind();
   while (source.next(block)) {
-    keep(block.t);
+    DoNotOptimize(block.t);
   }
 }
 
-Measurement against(std::string name, std::size_t rows, int p, const std::function<void()>& ours, std::string peer,
-                    const std::function<void()>& theirs) {
-  const auto [seconds, peer_seconds] = interleaved_medians(ours, theirs, repetitions);
-  return {std::move(name),
-          rows,
-          p,
-          1,
-          seconds,
-          std::move(peer),
-          peer_seconds,
-          fmt::format("{:.0f} ns a row", 1e9 * seconds / static_cast<double>(rows))};
+void against(Form form, const char* name, std::size_t rows, const Work& ours, const char* peer, const Work& theirs) {
+  const auto note = [&](double seconds) {
+    return fmt::format("{:.0f} ns a row", 1e9 * seconds / static_cast<double>(rows));
+  };
+  compare(form, {name, rows, 4, 1, peer, note}, ours, theirs, repetitions);
 }
 
 /// What the stages share: a log in memory, the model commissioned on it, and its filtered rows.
@@ -116,45 +112,46 @@ struct World {
   }
 };
 
-std::vector<Measurement> filter_rows() {
+void filter_rows(Form form) {
   const World w;
   TableSource log(w.table);
   TorqueRows stream(log, w.filter());
   RegressionBlock block;
-  return {against(
-      "filter/rows", World::rows, 4, [&] { walk(stream, block); }, "bare read", [&] { read_bare(w.table); })};
+  against(
+      form, "filter/rows", World::rows, [&] { walk(stream, block); }, "bare read", [&] { read_bare(w.table); });
 }
 
-/// Seconds that numpy.linalg.lstsq takes on `rows`, median of `repetitions`; nothing where there is no numpy.
-std::optional<double> numpy_seconds(const RegressionBlock& rows) {
-  const Temporary data(".raw");
-  {
-    const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(data.path.c_str(), "wb"), &std::fclose);
-    if (!file) {
-      throw Error(data.path.string() + ": cannot be written");
-    }
-    const auto write = [&](const double* from, Eigen::Index count) {
-      const auto n = static_cast<std::size_t>(count);
-      if (std::fwrite(from, sizeof(double), n, file.get()) != n) {
-        throw Error(data.path.string() + ": cannot be written");
-      }
-    };
-    write(rows.Y.data(), rows.Y.size());
-    write(rows.y.data(), rows.y.size());
+/// The numbers of Y, row by row, and those of y.
+void write_raw(const std::filesystem::path& path, const RegressionBlock& rows) {
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "wb"), &std::fclose);
+  if (!file) {
+    throw Error(path.string() + ": cannot be written");
   }
+  const auto write = [&](const double* from, Eigen::Index count) {
+    const auto n = static_cast<std::size_t>(count);
+    if (std::fwrite(from, sizeof(double), n, file.get()) != n) {
+      throw Error(path.string() + ": cannot be written");
+    }
+  };
+  write(rows.Y.data(), rows.Y.size());
+  write(rows.y.data(), rows.y.size());
+}
+
+/// Seconds that numpy.linalg.lstsq takes, called a second time, on `rows` as write_raw() wrote them into `data`;
+/// nothing where there is no numpy.
+std::optional<double> numpy_seconds(const std::filesystem::path& data, const RegressionBlock& rows) {
   const std::string command = fmt::format(
       "OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 /usr/bin/python3 -c '"
       "import numpy, time\n"
       "data = numpy.fromfile(\"{0}\")\n"
       "Y = data[:{1} * {2}].reshape({1}, {2})\n"
       "y = data[{1} * {2}:]\n"
-      "seconds = []\n"
-      "for _ in range({3} + 1):\n"
+      "for _ in range(2):\n"
       "    start = time.perf_counter()\n"
       "    numpy.linalg.lstsq(Y, y, rcond=None)\n"
-      "    seconds.append(time.perf_counter() - start)\n"
-      "print(sorted(seconds[1:])[{3} // 2])' 2>/dev/null",
-      data.path.string(), rows.Y.rows(), rows.Y.cols(), repetitions);
+      "    seconds = time.perf_counter() - start\n"
+      "print(seconds)' 2>/dev/null",
+      data.string(), rows.Y.rows(), rows.Y.cols());
   const std::unique_ptr<std::FILE, int (*)(std::FILE*)> python(popen(command.c_str(), "r"), &pclose);
   double seconds = 0.0;
   if (!python || std::fscanf(python.get(), "%lf", &seconds) != 1) {
@@ -163,44 +160,44 @@ std::optional<double> numpy_seconds(const RegressionBlock& rows) {
   return seconds;
 }
 
-std::vector<Measurement> least_squares_peers() {
+void least_squares_peers(Form form) {
   const World w;
   TableSource log(w.table);
   TorqueRows stream(log, w.filter());
   core::RegressionTable rows(read_all(stream));
   const auto instants = rows.block().instants();
-  const auto ours = [&] { keep(least_squares(rows).estimate); };
-  std::vector<Measurement> result;
-  result.push_back(against("identify/least_squares", instants, 4, ours, "bare read", [&] { read_bare(rows.block()); }));
+  const auto ours = [&] { DoNotOptimize(least_squares(rows).estimate); };
+  const auto measure = [&](const char* peer, const Work& theirs) {
+    against(form, "identify/least_squares", instants, ours, peer, theirs);
+  };
+  measure("bare read", [&] { read_bare(rows.block()); });
   const Eigen::MatrixXd Y = rows.block().Y;
-  result.push_back(against("identify/least_squares", instants, 4, ours, "eigen qr", [&] {
-    keep(Eigen::VectorXd(Eigen::HouseholderQR<Eigen::MatrixXd>(Y).solve(rows.block().y)));
-  }));
-  if (const auto seconds = numpy_seconds(rows.block())) {
-    result.push_back(result.back());
-    result.back().peer = "numpy lstsq";
-    result.back().peer_seconds = *seconds;
+  measure("eigen qr",
+          [&] { DoNotOptimize(Eigen::VectorXd(Eigen::HouseholderQR<Eigen::MatrixXd>(Y).solve(rows.block().y))); });
+  const Temporary data(".raw");
+  write_raw(data.path, rows.block());
+  const auto numpy = [&] { return numpy_seconds(data.path, rows.block()); };
+  if (numpy()) {
+    measure("numpy lstsq", [&] { return numpy().value(); });
   } else {
     fmt::print(stderr, "identify/least_squares: /usr/bin/python3 has no numpy, which is left out\n");
   }
-  return result;
 }
 
-std::vector<Measurement> bounds_set() {
+void bounds_set(Form form) {
   const World w;
   TableSource log(w.table);
   TorqueRows stream(log, w.filter());
   core::RegressionTable rows(read_all(stream));
   Box prior;
   prior.sides = model::prior_box(w.scenario.robot, w.result.model.model).bounds;
-  return {against(
-      "bounds/feasible_set", rows.block().instants(), 4, [&] { keep(feasible_set(rows, prior).hull); }, "bare read",
-      [&] { read_bare(rows.block()); })};
+  against(
+      form, "bounds/feasible_set", rows.block().instants(), [&] { DoNotOptimize(feasible_set(rows, prior).hull); },
+      "bare read", [&] { read_bare(rows.block()); });
 }
 
-std::vector<Measurement> detector_step() {
+void detector_step(Form form) {
   const World w;
-  std::vector<Measurement> result;
   const auto measure = [&](const char* name, detector::DetectorOptions options) {
     Detector detector = make_detector(w.result.model, std::move(options));
     std::vector<const double*> columns;
@@ -212,22 +209,21 @@ std::vector<Measurement> detector_step() {
       detector.restart();
       for (std::size_t k = 0; k < World::rows; ++k) {
         for (std::size_t c = 0; c < columns.size(); ++c) sample[c] = columns[c][k];
-        keep(detector.step(w.table.t[k], sample).fault);
+        DoNotOptimize(detector.step(w.table.t[k], sample).fault);
       }
     };
-    result.push_back(against(name, World::rows, 4, ours, "bare read", [&] { read_bare(w.table); }));
+    against(form, name, World::rows, ours, "bare read", [&] { read_bare(w.table); });
   };
   measure("detector/step", {});
   measure("detector/step box", {.set = detector::ParameterSetKind::box});
-  return result;
 }
 
-std::vector<Measurement> commission_all() {
+void commission_all(Form form) {
   const World w;
   TableSource log(w.table);
-  return {against(
-      "commission/all", World::rows, 4, [&] { keep(commission_robot(log, w.scenario.robot).parameters); }, "bare read",
-      [&] { read_bare(w.table); })};
+  against(
+      form, "commission/all", World::rows, [&] { DoNotOptimize(commission_robot(log, w.scenario.robot).parameters); },
+      "bare read", [&] { read_bare(w.table); });
 }
 
 /// What a child process used.
@@ -302,27 +298,32 @@ void read_file(const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary);
   std::vector<char> buffer(std::size_t{1} << 18);
   while (file.read(buffer.data(), static_cast<std::streamsize>(buffer.size())) || file.gcount() > 0) {
-    keep(buffer);
+    DoNotOptimize(buffer);
   }
 }
 
 /// From a file, and from one four times as long: what commissioning holds must not grow with it.
-std::vector<Measurement> commission_file() {
-  std::vector<Measurement> result;
+void commission_file(Form form) {
   for (const std::size_t rows : {1000000, 4000000}) {
     const Temporary file(".csv");
     const Scenario scenario = drive(rows);
     write_log(file.path, scenario);
-    const Usage ours = usage_of([&] {
-      CsvLog source({file.path});
-      keep(commission_robot(source, scenario.robot).parameters);
-    });
-    const Usage bare = usage_of([&] { read_file(file.path); });
-    result.push_back({"commission/file", rows, 4, 1, ours.seconds, "bare read of the file", bare.seconds,
-                      fmt::format("{:.1f} MB at the peak, {:.0f} ns a row", ours.megabytes,
-                                  1e9 * ours.seconds / static_cast<double>(rows))});
+    Usage usage;
+    const auto ours = [&] {
+      usage = usage_of([&] {
+        CsvLog source({file.path});
+        DoNotOptimize(commission_robot(source, scenario.robot).parameters);
+      });
+      return usage.seconds;
+    };
+    const auto note = [&](double seconds) {
+      return fmt::format("{:.1f} MB at the peak, {:.0f} ns a row", usage.megabytes,
+                         1e9 * seconds / static_cast<double>(rows));
+    };
+    compare(
+        form, {"commission/file", rows, 4, 1, "bare read of the file", note}, ours,
+        [&] { return usage_of([&] { read_file(file.path); }).seconds; }, 1);
   }
-  return result;
 }
 
 const bool registered =

@@ -31,31 +31,28 @@ class Counter : public study::ResultStore {
   std::size_t bytes = 0;
 };
 
-std::vector<Measurement> sharing() {
-  std::vector<Measurement> measurements;
+void sharing(Form form) {
   const study::Work work{shared_items, [](std::size_t item) { return std::string(item % 8, 'x'); }};
   for (const std::size_t threads : {1U, 2U}) {
     const auto shared = [&] {
       Counter counter;
       study::run_work(work, counter, {threads, {}, {}});
-      keep(counter.bytes);
+      DoNotOptimize(counter.bytes);
     };
     const auto bare = [&] {
       Counter counter;
       for (std::size_t item = 0; item < shared_items; ++item) {
         counter.put(item, work.evaluate(item));
       }
-      keep(counter.bytes);
+      DoNotOptimize(counter.bytes);
     };
-    const auto [ours, peer] = interleaved_medians(shared, bare, repetitions);
-    measurements.push_back({"study/work", shared_items, 0, static_cast<int>(threads), ours, "a loop", peer,
-                            fmt::format("{:.0f} ns/item", 1e9 * ours / shared_items)});
+    const auto note = [](double seconds) { return fmt::format("{:.0f} ns/item", 1e9 * seconds / shared_items); };
+    compare(form, {"study/work", shared_items, 0, static_cast<int>(threads), "a loop", note}, shared, bare,
+            repetitions);
   }
-  return measurements;
 }
 
-std::vector<Measurement> keeping() {
-  std::vector<Measurement> measurements;
+void keeping(Form form) {
   for (const std::size_t size : {300U, 5000U}) {
     const std::string result(size, 'x');
     const auto store = [&] {
@@ -77,11 +74,11 @@ std::vector<Measurement> keeping() {
         std::fflush(out.get());
       }
     };
-    const auto [ours, peer] = interleaved_medians(store, flushed, repetitions);
-    measurements.push_back({"results/store", kept_items, 0, 1, ours, "flushed file", peer,
-                            fmt::format("{} bytes, {:.1f} us/put", size, 1e6 * ours / kept_items)});
+    const auto note = [&](double seconds) {
+      return fmt::format("{} bytes, {:.1f} us/put", size, 1e6 * seconds / kept_items);
+    };
+    compare(form, {"results/store", kept_items, 0, 1, "flushed file", note}, store, flushed, repetitions);
   }
-  return measurements;
 }
 
 const bool registered_sharing = register_bench("study/work", sharing);

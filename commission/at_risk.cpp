@@ -2,23 +2,30 @@
 #include <wheelwright/commission/at_risk.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include <wheelwright/commission/assumptions.hpp>
+#include <wheelwright/commission/error_estimate.hpp>
 #include <wheelwright/commission/physical.hpp>
 
 namespace wheelwright::commission {
 namespace {
 
-// The sum that stands farthest outside, in units of its threshold.
-std::optional<detector::SumState> farthest_outside(LogSource& log, const OnlineModel& model, double false_alarms) {
+// What a log makes of one assumption on its errors.
+struct Attempt {
+  RiskSet set;
+  std::optional<detector::RiskModel> model;  // where there is a set
+  detector::SumState worst;                  // the sum that stands farthest out at the test's risk
+  double utilisation = 0.0;                  // its |value|/threshold
+};
+
+void look_at_sums(LogSource& log, const OnlineModel& model, double false_alarms, Attempt& attempt) {
   detector::ScaleDetector detector(model, {.false_alarms = false_alarms});
   const std::vector<std::size_t> pick = core::positions_of(log, model.measurement.columns());
   std::vector<double> sample(pick.size());
-  std::optional<detector::SumState> worst;
-  double most = 0.0;
   core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
     if (starts) {
       detector.restart();
@@ -28,13 +35,72 @@ std::optional<detector::SumState> farthest_outside(LogSource& log, const OnlineM
     }
     detector.step(block.t[k], sample);
     for (const detector::SumState& state : detector.looks()) {
-      if (state.excess > most * state.threshold) {
-        most = state.excess / state.threshold;
-        worst = state;
+      if (std::abs(state.value) > attempt.utilisation * state.threshold) {
+        attempt.utilisation = std::abs(state.value) / state.threshold;
+        attempt.worst = state;
       }
     }
   });
-  return worst;
+}
+
+Attempt attempt_with(LogSource& log, const Commissioning& result, const filter::ErrorClasses& classes,
+                     const AtRiskOptions& options) {
+  Attempt attempt;
+  OnlineModel model = result.model;
+  attempt.set = risk_set(log, model.model, model.measurement, result.row_errors, classes, *result.feasible.polytope,
+                         options.set);
+  if (!attempt.set.set) {
+    return attempt;
+  }
+  const bounds::Polytope& set = *attempt.set.set;
+  detector::RiskModel risk{.risk = options.set.risk, .errors = classes, .facets = set.facets(), .box = set.hull()};
+  risk.scales = options.scales;
+  risk.delay = options.set.delays[std::min<std::size_t>(1, options.set.delays.size() - 1)];
+  model.at_risk = std::move(risk);
+  model.at_risk->usual = detector::usual_variances(log, model);
+  look_at_sums(log, model, options.test_risk / std::max(result.survey.seconds, 1.0), attempt);
+  attempt.model = std::move(model.at_risk);
+  return attempt;
+}
+
+// The least bias, in steps of √2 of the deviation, with which the log's sums use no more than half of what such errors
+// could make of them; with a `reason` and no model where even a bias as large as the deviation is not enough.
+struct Estimate {
+  Attempt attempt;
+  std::string reason;
+};
+Estimate least_bias(LogSource& log, const Commissioning& result, const AtRiskOptions& options) {
+  constexpr double kHalf = 0.5;
+  constexpr int kSteps = 20;
+  std::optional<filter::ErrorClasses> classes = estimated_classes(log, result.model);
+  Estimate best;
+  if (!classes) {
+    best.reason =
+        motion_error(result.model.robot, result.model.measurement)
+            ? "the log is too short to show how its errors average out"
+            : "the error of the motion column is not known: `noise: {wheel_speed: ...}` or `encoder_counts_per_turn` "
+              "in the robot file would tell it";
+    return best;
+  }
+  int none = -1, enough = kSteps + 1;  // the number of a bias that is too small, and of one that is not
+  while (enough - none > 1) {
+    const int step = (none + enough) / 2;
+    classes->effort.bias = classes->effort.deviation * std::exp2(0.5 * (step - kSteps));
+    Attempt attempt = attempt_with(log, result, *classes, options);
+    if (attempt.model && attempt.utilisation <= kHalf) {
+      enough = step;
+      best.attempt = std::move(attempt);
+    } else {
+      none = step;
+      if (enough > kSteps) {
+        best.reason = attempt.model ? fmt::format("over {:g} s the model leaves more than errors with a bias of {:.2g} "
+                                                  "would, as where it lacks an effect (`gap` looks for it)",
+                                                  options.scales[attempt.worst.scale], classes->effort.bias)
+                                    : attempt.set.reason;
+      }
+    }
+  }
+  return best;
 }
 
 core::Assumption assumption_of(const filter::ErrorClasses& classes, const std::string& unit) {
@@ -43,8 +109,12 @@ core::Assumption assumption_of(const filter::ErrorClasses& classes, const std::s
                                 ? fmt::format("Whatever happened up to {:g} s before a sample", effort.correlation)
                                 : "Whatever happened before a sample";
   return {.id = kNoiseAverages,
-          .statement = fmt::format("{}, the mean error of its effort is {}.", since,
-                                   effort.bias > 0.0 ? fmt::format("at most {:g} {}", effort.bias, unit) : "zero"),
+          .statement = fmt::format("{}, the mean error of its effort is {}{}.", since,
+                                   effort.bias > 0.0 ? fmt::format("at most {:.3g} {}", effort.bias, unit) : "zero",
+                                   effort.deviation < effort.bound
+                                       ? fmt::format(", the root of its mean square about it at most {:.3g} {}",
+                                                     effort.deviation, unit)
+                                       : ""),
           .declared_by = "noise.effort.bias",
           .test = "sums of what the model leaves, over all scales, are as small as such errors make them",
           .verdict = core::AssumptionVerdict::holds,
@@ -55,44 +125,58 @@ core::Assumption assumption_of(const filter::ErrorClasses& classes, const std::s
 
 void learn_at_risk(LogSource& log, Commissioning& result, const AtRiskOptions& options) {
   OnlineModel& model = result.model;
-  const std::optional<filter::ErrorClasses> classes = error_classes(model.robot, model.measurement);
-  if (!classes || !result.has_model() || !result.feasible.polytope || !classes->average() ||
-      interval_warrant(result) != core::Warrant::guaranteed) {
+  if (!result.has_model() || !result.feasible.polytope) {
     return;
   }
-  core::Assumption assumption = assumption_of(*classes, output_unit(model.robot, model.model.output_units.front()));
-  const auto contradicted = [&](std::string detail) {
-    assumption.verdict = core::AssumptionVerdict::fails;
-    assumption.detail = std::move(detail);
-    result.notes.push_back(fmt::format(
-        "nothing is said at a stated risk, the worst case stands alone: {}; a larger `bias` or `correlation` of "
-        "`noise: effort` in the robot file would allow for it",
-        assumption.detail));
-    result.at_risk->set.reset();
-    model.at_risk.reset();
-  };
-  result.at_risk = risk_set(log, model.model, model.measurement, result.row_errors, *classes, *result.feasible.polytope,
-                            options.set);
-  if (!result.at_risk->set) {
-    if (!result.at_risk->facets.empty()) {
-      contradicted(result.at_risk->reason);
+  const std::string unit = output_unit(model.robot, model.model.output_units.front());
+  std::optional<filter::ErrorClasses> classes = error_classes(model.robot, model.measurement);
+  core::Assumption assumption;
+  if (classes) {
+    if (!classes->average() || interval_warrant(result) != core::Warrant::guaranteed) {
+      return;
+    }
+    assumption = assumption_of(*classes, unit);
+    Attempt attempt = attempt_with(log, result, *classes, options);
+    const auto contradicted = [&](std::string detail) {
+      assumption.verdict = core::AssumptionVerdict::fails;
+      assumption.detail = std::move(detail);
+      result.notes.push_back(fmt::format(
+          "nothing is said at a stated risk, the worst case stands alone: {}; a larger `bias` or `correlation` of "
+          "`noise: effort` in the robot file would allow for it",
+          assumption.detail));
+      attempt.set.set.reset();
+    };
+    if (!attempt.model) {
+      if (!attempt.set.facets.empty()) {
+        contradicted(attempt.set.reason);
+      } else {
+        assumption.verdict = core::AssumptionVerdict::not_tested;
+        assumption.detail = attempt.set.reason;
+      }
+    } else if (attempt.utilisation > 1.0) {
+      contradicted(fmt::format("over {:g} s the model leaves {:.2g} times as much ({}) as such errors can",
+                               attempt.model->scales[attempt.worst.scale], attempt.utilisation,
+                               detector::sum_weights(model.model)[attempt.worst.weight].name));
+    } else {
+      model.at_risk = std::move(attempt.model);
+    }
+    result.at_risk = std::move(attempt.set);
+  } else {
+    if (!options.estimate || model.robot.noise.effort.value) {
+      return;
+    }
+    Estimate estimate = least_bias(log, result, options);
+    Attempt& attempt = estimate.attempt;
+    assumption = assumption_of(attempt.model ? attempt.model->errors : filter::ErrorClasses{}, unit);
+    if (attempt.model) {
+      assumption.declared_by = "estimated from this log";
+      attempt.model->warrant = core::Warrant::extrapolated;
+      attempt.set.warrant = core::Warrant::extrapolated;
+      result.at_risk = std::move(attempt.set);
+      model.at_risk = std::move(attempt.model);
     } else {
       assumption.verdict = core::AssumptionVerdict::not_tested;
-      assumption.detail = result.at_risk->reason;
-    }
-  } else {
-    const bounds::Polytope& set = *result.at_risk->set;
-    detector::RiskModel risk{.risk = options.set.risk, .errors = *classes, .facets = set.facets(), .box = set.hull()};
-    risk.scales = options.scales;
-    risk.delay = options.set.delays[std::min<std::size_t>(1, options.set.delays.size() - 1)];
-    model.at_risk = std::move(risk);
-    model.at_risk->usual = detector::usual_variances(log, model);
-    const double seconds = std::max(result.survey.seconds, 1.0);
-    if (const auto worst = farthest_outside(log, model, options.test_risk / seconds)) {
-      const detector::SumWeight weight = detector::sum_weights(model.model)[worst->weight];
-      contradicted(fmt::format("over {:g} s the model leaves {:.2g} times as much ({}) as such errors can",
-                               model.at_risk->scales[worst->scale], 1.0 + worst->excess / worst->threshold,
-                               weight.name));
+      assumption.detail = estimate.reason;
     }
   }
   if (model.at_risk) {

@@ -85,27 +85,34 @@ NoiseBudget noise_budget(const Robot& robot, const Measurement& measurement) {
   return budget;
 }
 
-std::optional<filter::ErrorClasses> error_classes(const Robot& robot, const Measurement& measurement) {
-  const NoiseBudget budget = noise_budget(robot, measurement);
-  if (!budget.complete || !robot.noise.effort.bias) {
-    return std::nullopt;
-  }
+filter::ErrorClasses classes_with(const Robot& robot, const Measurement& measurement, double motion,
+                                  const filter::ErrorClass& effort) {
   filter::ErrorClasses classes;
   classes.shortest_step = measurement.shortest_step > 0.0 ? measurement.shortest_step : measurement.nominal_step;
-  classes.effort = {budget.sensors.effort, std::min(*robot.noise.effort.bias, budget.sensors.effort),
-                    robot.noise.effort.correlation};
+  classes.effort = effort;
   const model::NoiseBound& angle = model::on_two_wheels(robot) ? robot.noise.wheel_angle : robot.noise.position;
   const bool speed = measurement.motion == MotionKind::speed;
-  const model::NoiseBound& motion = speed ? robot.noise.wheel_speed : angle;
-  const bool declared = speed || (measurement.motion == MotionKind::angle && angle.value);
-  classes.motion.bound = budget.sensors.motion;
-  if (declared) {
-    classes.motion.bias = std::min(motion.bias.value_or(classes.motion.bound), classes.motion.bound);
-    classes.motion.correlation = motion.correlation;
+  const model::NoiseBound& declared = speed ? robot.noise.wheel_speed : angle;
+  classes.motion.bound = motion;
+  if (speed || (measurement.motion == MotionKind::angle && angle.value)) {
+    classes.motion.bias = std::min(declared.bias.value_or(motion), motion);
+    classes.motion.correlation = declared.correlation;
+    classes.motion.deviation = declared.deviation.value_or(core::kInfinity);
   } else {
-    classes.count = 2.0 * classes.motion.bound;
+    classes.count = 2.0 * motion;
   }
   return classes;
+}
+
+std::optional<filter::ErrorClasses> error_classes(const Robot& robot, const Measurement& measurement) {
+  const NoiseBudget budget = noise_budget(robot, measurement);
+  const model::NoiseBound& effort = robot.noise.effort;
+  if (!budget.complete || !effort.bias) {
+    return std::nullopt;
+  }
+  return classes_with(robot, measurement, budget.sensors.motion,
+                      {budget.sensors.effort, std::min(*effort.bias, budget.sensors.effort), effort.correlation,
+                       effort.deviation.value_or(core::kInfinity)});
 }
 
 Eigen::VectorXd coordinate_limit(const Model& model, const std::vector<double>& joint_limit) {

@@ -68,6 +68,10 @@ struct NoiseBudget {
 /// of an encoder has no bias while its wheel moves by several counts a sample (error_class.hpp).
 [[nodiscard]] std::optional<filter::ErrorClasses> error_classes(const Robot& robot, const Measurement& measurement);
 
+/// The same with the efforts' errors as `effort` says, and the motion column's at most `motion`.
+[[nodiscard]] filter::ErrorClasses classes_with(const Robot& robot, const Measurement& measurement, double motion,
+                                                const filter::ErrorClass& effort);
+
 /// `limit` of each joint (acceleration_limit) as one of each coordinate of `model`.
 [[nodiscard]] Eigen::VectorXd coordinate_limit(const Model& model, const std::vector<double>& joint_limit);
 

@@ -2,6 +2,7 @@
 #include <wheelwright/commission/risk_set.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -72,9 +73,9 @@ double taper(const Stretch& stretch, double from, double t) {
 struct Ellipsoid {
   double delay = 0.0;
   std::vector<Eigen::Index> block;
-  Eigen::MatrixXd M, V, V0;
+  Eigen::MatrixXd M, V, V0;  // V of the smaller proxies, or of Hoeffding's: as squared_radius is
   Eigen::VectorXd straight;  // per instrument: ErrorShare::straight
-  double squared_radius = 0.0, log_volume = 0.0;
+  double risk = 0.0, squared_radius = 0.0, log_volume = 0.0;
   bool usable = false;
 };
 
@@ -94,9 +95,113 @@ std::vector<std::vector<Eigen::Index>> blocks_of(const Model& model) {
   return result;
 }
 
+// The largest of `count` equal parts that do not add up to more than `risk`.
+double part_of(double risk, std::size_t count) {
+  const auto parts = static_cast<double>(count);
+  const double part = risk / parts;
+  return std::fma(part, parts, -risk) > 0.0 ? std::nextafter(part, 0.0) : part;
+}
+
 constexpr double kSpread = 0.01;     // η of (a + b)(a + b)ᵀ <= (1 + η) aaᵀ + (1 + 1/η) bbᵀ
-constexpr double kExpected = 0.1;    // V0 is this share of the V that the log's beginning makes expect
+// V0 is this share of the V that the log's beginning makes expect: each of these at its part of the risk, since the
+// beginning may be driven harder than the rest, or in one direction only.
+constexpr std::array<double, 3> kExpected = {0.1, 0.01, 0.001};
 constexpr double kRounding = 1e-10;  // relative, of all sums
+constexpr double kReach = 1.1;       // for λᵀV0λ, in units of what an ellipsoid asks for if V is as V0 makes expect
+constexpr double kHoeffding = 0.1;   // part of the risk that is kept for Hoeffding's proxies, where others are smaller
+
+// The sum of cᵀc over samples times their variance proxy, each c within middle ± spread.
+class Variances {
+ public:
+  explicit Variances(Eigen::Index size) : sum_(Eigen::MatrixXd::Zero(size, size)), wide_(Eigen::VectorXd::Zero(size)) {}
+  void add(const Eigen::VectorXd& middle, const Eigen::VectorXd& spread, double proxy) {
+    sum_.noalias() += proxy * middle * middle.transpose();
+    wide_ += (proxy * static_cast<double>(spread.size())) * spread.cwiseAbs2();
+  }
+  [[nodiscard]] Eigen::MatrixXd total() const {
+    Eigen::MatrixXd result = (1.0 + kSpread) * sum_;
+    result.diagonal() += (1.0 + 1.0 / kSpread) * wide_;
+    return result;
+  }
+  [[nodiscard]] Eigen::MatrixXd plain() const { return sum_ + Eigen::MatrixXd(wide_.asDiagonal()); }
+
+ private:
+  Eigen::MatrixXd sum_;
+  Eigen::VectorXd wide_;
+};
+
+// Variances of one delay and block. V0 is that of the log's beginning and is fixed when the first sample of the sums
+// comes: the reach of a sample, for which its proxy has to hold, is the largest |λᵀc| with λᵀV0λ <= reach².
+class SelfNormalised {
+ public:
+  // `grown`: what the log's beginning is to be multiplied by to be like the whole.
+  SelfNormalised(Eigen::Index size, double expected, double grown, double log_risk)
+      : scale_(expected * grown), prior_(size), small_(size), hoeffding_(size), V0_(size, size) {
+    const double p = static_cast<double>(size);
+    const double radius = std::sqrt(2.0 * log_risk + p * std::log1p(1.0 / expected) + 2.0 * std::log(2.0));
+    reach_ = kReach * (radius + std::sqrt(p));
+  }
+
+  void learn(const filter::SampleClass& sample, const Eigen::VectorXd& middle, const Eigen::VectorXd& spread) {
+    prior_.add(middle, spread, sample.multiplicity * sample.deviation * sample.deviation);
+  }
+  void add(const filter::SampleClass& sample, const Eigen::VectorXd& middle, const Eigen::VectorXd& spread) {
+    fix();
+    small_.add(middle, spread,
+               sample.deviation < sample.bound
+                   ? filter::variance_proxy(sample, reach_ * ((root_ * middle).norm() + gain_ * spread.norm()))
+                   : sample.multiplicity * sample.bound * sample.bound);
+    hoeffding_.add(middle, spread, sample.multiplicity * sample.bound * sample.bound);
+  }
+
+  // Whether errors have deviations below their bounds.
+  [[nodiscard]] bool varied() const { return small_.plain() != hoeffding_.plain(); }
+
+  // V, V0 and the squared radius at `risk`.
+  void finish(Ellipsoid& e, double risk) {
+    fix();
+    e.risk = risk;
+    e.V0 = V0_;
+    const bool varied = this->varied();
+    // Mixture of exp(λᵀS − λᵀVλ/2) over a Gaussian that is cut off where λᵀV0λ = reach²: half of it or more is left
+    // around every λ that the ellipsoid asks for, if those are inside by √p standard deviations.
+    if (varied) {
+      e.V = small_.total();
+      const core::EigenPairs pairs = core::symmetric_eigen(root_ * (e.V + e.V0) * root_.transpose());
+      e.log_volume = pairs.values.array().log().sum();
+      e.squared_radius = 2.0 * std::log(1.0 / ((1.0 - kHoeffding) * risk)) + e.log_volume + 2.0 * std::log(2.0);
+      const double p = static_cast<double>(e.V0.rows());
+      if (std::sqrt(e.squared_radius) + std::sqrt(p) <= reach_ * std::sqrt(pairs.values.minCoeff())) {
+        e.usable = std::isfinite(e.squared_radius);
+        return;
+      }
+    }
+    e.V = hoeffding_.total();
+    e.log_volume = core::symmetric_eigen(root_ * (e.V + e.V0) * root_.transpose()).values.array().log().sum();
+    e.squared_radius = 2.0 * std::log(1.0 / (varied ? kHoeffding * risk : risk)) + e.log_volume;
+    e.usable = std::isfinite(e.squared_radius);
+  }
+
+ private:
+  void fix() {
+    if (fixed_) {
+      return;
+    }
+    fixed_ = true;
+    V0_ = scale_ * prior_.plain();
+    const double floor = 1e-6 * V0_.diagonal().maxCoeff();
+    V0_.diagonal() += 1e-3 * V0_.diagonal() + Eigen::VectorXd::Constant(V0_.rows(), floor > 0.0 ? floor : 1.0);
+    const Eigen::VectorXd scale = V0_.diagonal().cwiseSqrt().cwiseInverse();
+    const core::EigenPairs pairs = core::symmetric_eigen(scale.asDiagonal() * V0_ * scale.asDiagonal());
+    root_ = pairs.values.cwiseSqrt().cwiseInverse().asDiagonal() * pairs.vectors.transpose() * scale.asDiagonal();
+    gain_ = root_.norm();
+  }
+
+  double scale_, reach_ = 0.0, gain_ = 0.0;
+  bool fixed_ = false;
+  Variances prior_, small_, hoeffding_;
+  Eigen::MatrixXd V0_, root_;  // root V0 rootᵀ = I
+};
 
 // What becomes of a block's elements: first V0 is learnt from those in which the foreseen torque stands above the
 // efforts' errors, then sums begin; between both is a pause, in which no weights stand.
@@ -164,23 +269,28 @@ class Learner {
       elements += s.elements;
     }
     learning_ = static_cast<std::size_t>(options.learning * static_cast<double>(elements));
-    expected_ = learning_ > 0 ? static_cast<double>(elements) / static_cast<double>(learning_) : 0.0;
+    grown_ = learning_ > 0 ? static_cast<double>(elements) / static_cast<double>(learning_) : 0.0;
   }
 
   // Of every delay and block.
   [[nodiscard]] std::vector<Ellipsoid> ellipsoids(const std::vector<std::vector<Eigen::Index>>& blocks) {
     const std::size_t count = options_.delays.size();
     const auto p = box_.middle.size();
-    const Eigen::MatrixXd none = Eigen::MatrixXd::Zero(p, p);
-    std::vector<Eigen::MatrixXd> V(count, none), V0 = V, spread = V, spread0 = V;
+    const double risk = part_of(options_.risk, count * blocks.size() * kExpected.size());
+    std::vector<std::vector<SelfNormalised>> variances(count);  // of blocks, and of kExpected
     std::vector<Eigen::VectorXd> straight(count, Eigen::VectorXd::Zero(p));
     std::vector<PredictableRegressor> foreseen;
     std::vector<SampleWeights> weights;
     std::vector<WeakSummation> sums;
-    for (const double delay : options_.delays) {
-      foreseen.emplace_back(filter_, delay, correlation_);
+    for (std::size_t d = 0; d < count; ++d) {
+      foreseen.emplace_back(filter_, options_.delays[d], correlation_);
       weights.emplace_back(filter_, box_, p);
       sums.emplace_back(filter_, p);
+      for (const std::vector<Eigen::Index>& block : blocks) {
+        for (const double expected : kExpected) {
+          variances[d].emplace_back(static_cast<Eigen::Index>(block.size()), expected, grown_, std::log(1.0 / risk));
+        }
+      }
     }
     std::vector<Phase> phases = phases_of(blocks);
     std::size_t stretch = 0;
@@ -191,15 +301,15 @@ class Learner {
       if (!c.averages) {
         return;
       }
-      const double square = c.multiplicity * c.bound * c.bound;
       for (std::size_t k = 0; k < blocks.size(); ++k) {
-        Eigen::MatrixXd& to = (phases[k].of_prior() ? V0 : V)[b];
-        Eigen::MatrixXd& wide = (phases[k].of_prior() ? spread0 : spread)[b];
-        for (const Eigen::Index i : blocks[k]) {
-          for (const Eigen::Index j : blocks[k]) {
-            to(i, j) += square * s.middle[i] * s.middle[j];
+        const Eigen::VectorXd middle = s.middle(blocks[k]), spread = s.spread(blocks[k]);
+        for (std::size_t i = 0; i < kExpected.size(); ++i) {
+          SelfNormalised& of = variances[b][k * kExpected.size() + i];
+          if (phases[k].of_prior()) {
+            of.learn(c, middle, spread);
+          } else {
+            of.add(c, middle, spread);
           }
-          wide(i, i) += square * static_cast<double>(blocks[k].size()) * s.spread[i] * s.spread[i];
         }
       }
     };
@@ -240,15 +350,14 @@ class Learner {
           ++stretch;
         });
     std::vector<Ellipsoid> result;
-    const double risk = options_.risk / static_cast<double>(count * blocks.size());
     for (b = 0; b < count; ++b) {
-      for (const std::vector<Eigen::Index>& block : blocks) {
-        Ellipsoid e{options_.delays[b], block, sums[b].sums().Y(block, block), {}, {}, straight[b](block)};
-        e.V = (1.0 + kSpread) * V[b](block, block);
-        e.V += (1.0 + 1.0 / kSpread) * spread[b](block, block);
-        e.V0 = kExpected * expected_ * (V0[b](block, block) + spread0[b](block, block));
-        finish(e, risk);
-        result.push_back(std::move(e));
+      for (std::size_t k = 0; k < blocks.size(); ++k) {
+        const std::vector<Eigen::Index>& block = blocks[k];
+        for (std::size_t i = 0; i < kExpected.size(); ++i) {
+          Ellipsoid e{options_.delays[b], block, sums[b].sums().Y(block, block), {}, {}, straight[b](block)};
+          variances[b][k * kExpected.size() + i].finish(e, risk);
+          result.push_back(std::move(e));
+        }
       }
     }
     return result;
@@ -323,14 +432,14 @@ class Learner {
       f.Y = sums.sums().Y.row(i);
       f.dY = sums.sums().dY.row(i);
       f.y = sums.sums().y[i];
-      f.delay = e.delay;
+      f.ellipsoid = of[d];
       f.weights = directions[d];
       f.share = shares[d];
       const Eigen::VectorXd x = f.weights(e.block);
-      const double prior = x.dot(e.V0 * x);
-      f.radius = std::min(std::sqrt((f.share.squares + prior) * e.squared_radius), f.share.worst - f.share.straight);
+      f.radius = std::min(std::sqrt(x.dot((e.V + e.V0) * x) * e.squared_radius), f.share.worst - f.share.straight);
       const double size = std::abs(f.y) + f.Y.cwiseAbs().dot(box_.middle.cwiseAbs() + box_.radius);
-      f.dy = f.radius + f.share.straight + sums.sums().dy[i] + kRounding * (size + f.share.worst);
+      f.rounding = kRounding * (size + f.share.worst);
+      f.dy = f.radius + f.share.straight + sums.sums().dy[i] + f.rounding;
     }
     return result;
   }
@@ -356,18 +465,6 @@ class Learner {
     }
   }
 
-  static void finish(Ellipsoid& e, double risk) {
-    const double floor = 1e-6 * e.V0.diagonal().maxCoeff();
-    e.V0.diagonal() += 1e-3 * e.V0.diagonal() + Eigen::VectorXd::Constant(e.V0.rows(), floor > 0.0 ? floor : 1.0);
-    const Eigen::VectorXd scale = e.V0.diagonal().cwiseSqrt().cwiseInverse();
-    const auto log_det = [&](const Eigen::MatrixXd& A) {
-      return core::symmetric_eigen(scale.asDiagonal() * A * scale.asDiagonal()).values.array().log().sum();
-    };
-    e.log_volume = log_det(e.V + e.V0) - log_det(e.V0);
-    e.squared_radius = 2.0 * std::log(1.0 / risk) + e.log_volume;
-    e.usable = std::isfinite(e.squared_radius);
-  }
-
   LogSource& log_;
   ElementFilter filter_;
   const filter::ErrorClasses& classes_;
@@ -375,35 +472,58 @@ class Learner {
   const RiskSetOptions& options_;
   std::vector<Stretch> stretches_;
   std::size_t learning_ = 0;
-  double expected_ = 0.0, correlation_ = 0.0;
+  double grown_ = 0.0, correlation_ = 0.0;
 };
+
+void validate(const RiskSetOptions& options, const filter::ErrorClasses& classes) {
+  check::that(options.risk > 0.0 && options.risk < 1.0, "risk", "between 0 and 1");
+  check::that(!options.delays.empty(), "delays of the weights", "at least one");
+  check::that(options.learning >= 0.0 && options.learning < 1.0, "share of the log to learn a scale on", "below 1");
+  filter::validate(classes);
+}
+
+filter::ParameterBox middle_and_radius(const Box& box) {
+  const auto p = static_cast<Eigen::Index>(box.dimension());
+  filter::ParameterBox result{Eigen::VectorXd(p), Eigen::VectorXd(p)};
+  for (Eigen::Index j = 0; j < p; ++j) {
+    const Interval& side = box.sides[static_cast<std::size_t>(j)];
+    const double middle = 0.5 * (side.lower + side.upper);
+    result.middle[j] = middle;
+    result.radius[j] = std::nextafter(std::max(side.upper - middle, middle - side.lower), core::kInfinity);
+  }
+  return result;
+}
+
+std::vector<RiskEllipsoid> published(const std::vector<Ellipsoid>& ellipsoids) {
+  std::vector<RiskEllipsoid> result;
+  for (const Ellipsoid& e : ellipsoids) {
+    result.push_back({e.delay, {e.block.begin(), e.block.end()}, e.risk, e.log_volume, e.squared_radius});
+  }
+  return result;
+}
 
 }  // namespace
 
 RiskSet risk_set(LogSource& log, const Model& model, const Measurement& measurement, const filter::SignalErrors& errors,
                  const filter::ErrorClasses& classes, const bounds::Polytope& guaranteed,
                  const RiskSetOptions& options) {
-  check::that(options.risk > 0.0 && options.risk < 1.0, "risk", "between 0 and 1");
-  check::that(!options.delays.empty(), "delays of the weights", "at least one");
-  validate(classes);
+  validate(options, classes);
   RiskSet result;
   result.risk = options.risk;
+  result.learning = options.learning;
+  result.box = guaranteed.hull();
   const auto p = static_cast<Eigen::Index>(model.p());
-  filter::ParameterBox box{Eigen::VectorXd(p), Eigen::VectorXd(p)};
-  for (Eigen::Index j = 0; j < p; ++j) {
-    const Interval& side = guaranteed.hull().sides[static_cast<std::size_t>(j)];
-    box.middle[j] = 0.5 * (side.lower + side.upper);
-    box.radius[j] = std::nextafter(std::max(side.upper - box.middle[j], box.middle[j] - side.lower), core::kInfinity);
-  }
+  const filter::ParameterBox box = middle_and_radius(result.box);
   Learner learner(log, ElementFilter(model, measurement, errors), classes, box, options);
   const std::vector<std::vector<Eigen::Index>> blocks = blocks_of(model);
   const std::vector<Ellipsoid> ellipsoids = learner.ellipsoids(blocks);
+  result.ellipsoids = published(ellipsoids);
 
   std::vector<Eigen::VectorXd> directions;  // of instruments
   std::vector<std::size_t> of;
-  // The half width of the narrowest ellipsoid along `w`, about; takes it, or all of them.
+  // The half width of the narrowest ellipsoid along `w`, about; takes it, or the narrowest of each delay.
   const auto consider = [&](const Eigen::VectorXd& w, const std::vector<Eigen::Index>& block, bool all) {
-    double best = core::kInfinity;
+    double best = core::kInfinity, narrowest = core::kInfinity;
     std::size_t first = directions.size();
     for (std::size_t b = 0; b < ellipsoids.size(); ++b) {
       const Ellipsoid& e = ellipsoids[b];
@@ -418,19 +538,22 @@ RiskSet risk_set(LogSource& log, const Model& model, const Measurement& measurem
       }
       const Eigen::VectorXd x = from.cwiseProduct(lu.solve(to.cwiseProduct(w(block))));
       const double half = std::sqrt(x.dot((e.V + e.V0) * x) * e.squared_radius) + x.cwiseAbs().dot(e.straight);
-      if (all || half < best) {
-        if (!all) {
-          directions.resize(first);
-          of.resize(first);
-        }
+      if (all && first < directions.size() && ellipsoids[of.back()].delay != e.delay) {
+        first = directions.size();
+        best = core::kInfinity;
+      }
+      if (half < best) {
+        directions.resize(first);
+        of.resize(first);
         directions.emplace_back(Eigen::VectorXd::Zero(p));
         directions.back()(block) = x;
         of.push_back(b);
         result.log_volume = std::max(result.log_volume, e.log_volume);
       }
       best = std::min(best, half);
+      narrowest = std::min(narrowest, half);
     }
-    return best;
+    return narrowest;
   };
   // Parameters, then sums and differences of any two, each in units of what is known of it. Every
   // ellipsoid holds, so that of a parameter's facets the sharpest may be chosen when their sums are known.
@@ -456,7 +579,12 @@ RiskSet risk_set(LogSource& log, const Model& model, const Measurement& measurem
     return result;
   }
   result.facets = learner.facets(ellipsoids, blocks, directions, of);
+  // Half-spaces are named by their numbers: sums, then guaranteed facets (risk_origin()).
   std::vector<bounds::HalfSpace> rows = guaranteed.facets();
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    rows[k].origin = {};
+    rows[k].origin.sample = result.facets.size() + k;
+  }
   const bounds::SlabRows slabs(guaranteed.hull());
   for (std::size_t d = 0; d < result.facets.size(); ++d) {
     const RiskFacet& f = result.facets[d];
@@ -475,6 +603,34 @@ RiskSet risk_set(LogSource& log, const Model& model, const Measurement& measurem
     result.reason = "the log contradicts what is assumed of its errors";
   }
   return result;
+}
+
+RiskOrigin risk_origin(const RiskSet& set, const bounds::RowOrigin& origin) {
+  const std::size_t sums = set.facets.size();
+  return origin.is_prior        ? RiskOrigin{RiskOrigin::Kind::box, origin.parameter, origin.side}
+         : origin.sample < sums ? RiskOrigin{RiskOrigin::Kind::sum, origin.sample, origin.side}
+                                : RiskOrigin{RiskOrigin::Kind::guaranteed, origin.sample - sums, origin.side};
+}
+
+RiskSums risk_sums(LogSource& log, const Model& model, const Measurement& measurement,
+                   const filter::SignalErrors& errors, const filter::ErrorClasses& classes, const Box& box,
+                   const RiskSetOptions& options, const std::vector<RiskDirection>& directions) {
+  validate(options, classes);
+  Learner learner(log, ElementFilter(model, measurement, errors), classes, middle_and_radius(box), options);
+  const std::vector<std::vector<Eigen::Index>> blocks = blocks_of(model);
+  const std::vector<Ellipsoid> ellipsoids = learner.ellipsoids(blocks);
+  std::vector<Eigen::VectorXd> weights;
+  std::vector<std::size_t> of;
+  for (const RiskDirection& direction : directions) {
+    check::that(direction.ellipsoid < ellipsoids.size(), "ellipsoid of a direction", "one of every delay and block");
+    Eigen::VectorXd rest = direction.weights;
+    check::that(rest.size() == static_cast<Eigen::Index>(model.p()), "weights of a direction", "one per parameter");
+    rest(ellipsoids[direction.ellipsoid].block).setZero();
+    check::that(rest.isZero(0.0), "weights of a direction", "0 outside of the ellipsoid's block");
+    weights.push_back(direction.weights);
+    of.push_back(direction.ellipsoid);
+  }
+  return {published(ellipsoids), learner.facets(ellipsoids, blocks, weights, of)};
 }
 
 }  // namespace wheelwright::commission

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/limits.hpp>
 #include <wheelwright/core/linear_algebra.hpp>
 
 namespace wheelwright::detector {
@@ -15,6 +16,8 @@ constexpr double kRoundings = 1e-10;  // of all that is added up, relative
 constexpr double kAlike = 1e-12;      // relative: steps whose decays need not be computed anew
 constexpr double kRise = 1.0;         // s, in which constant weights rise at a segment's start
 constexpr double kOfUsual = 0.2;      // V0 is this share of a usual drive's V
+constexpr double kKernel = 0.36787944117144233;  // 1/e, the most that x e^{−x} is
+const double kHalves = 2.0 * std::log(2.0);      // what a mixture costs of which half, and half of that, counts
 
 const RiskModel& demand(const OnlineModel& model) {
   check::that(model.at_risk.has_value(), "model", "one that was learnt at a stated risk");
@@ -24,6 +27,12 @@ const RiskModel& demand(const OnlineModel& model) {
     check::positive(scale, "scale");
   }
   return risk;
+}
+
+// Λ √V0 for sums whose risk is e^{−L}: what a usual drive's ellipsoid asks for, and a quarter more.
+double reach_of(double L) {
+  const double radius = std::sqrt(2.0 * (L + kHalves) + std::log1p(1.0 / kOfUsual));
+  return 1.25 * std::sqrt(kOfUsual / (1.0 + kOfUsual)) * (radius + 1.0);
 }
 
 // Sizes of a matrix whose square bounds MᵀM for all M within middle ± radius: (1 + η) mid'mid + (1 + 1/η) |radius|².
@@ -37,6 +46,17 @@ Eigen::MatrixXd largest_root(const Eigen::MatrixXd& middle, const Eigen::MatrixX
 }
 
 }  // namespace
+
+double averaged_radius(double V, double V0, double L, double reach) {
+  const double volume = std::log1p(V / V0);
+  if (reach == core::kInfinity) {
+    return std::sqrt((V + V0) * (2.0 * L + volume));
+  }
+  const double at_reach = std::sqrt(V0) / reach * (L + kHalves) + 0.5 * reach * V / std::sqrt(V0);
+  const double squared = 2.0 * (L + kHalves) + volume;
+  const bool inside = std::sqrt(squared) + 1.0 <= reach * std::sqrt(1.0 + V / V0);
+  return inside ? std::min(at_reach, std::sqrt((V + V0) * squared)) : at_reach;
+}
 
 std::vector<SumWeight> sum_weights(const Model& model) {
   std::vector<SumWeight> result;
@@ -95,15 +115,16 @@ ScaleDetector::ScaleDetector(const OnlineModel& model, ScaleDetectorOptions opti
     }
   }
   slope_gain_ = largest_root(middle, radius);
-  averages_ = elements_.effort_weights().exact && risk_.errors.effort.bias < risk_.errors.effort.bound;
-  const double correlation = risk_.errors.effort.correlation;
-  const double together = correlation > 0.0 ? std::floor(correlation / risk_.errors.shortest_step) + 1.0 : 1.0;
-  square_ = averages_ ? risk_.errors.effort.bound * risk_.errors.effort.bound * together : 0.0;
+  const Eigen::VectorXd none;
+  effort_ = filter::sample_class(risk_.errors, {filter::SampleWeight::Sensor::effort, 0,
+                                                elements_.effort_weights().exact, 0.0, none, none});
+  averages_ = effort_.averages;
+  square_ = averages_ ? filter::variance_proxy(effort_, core::kInfinity) : 0.0;
   g_ = g1_ = c_ = c1_ = c2_ = Eigen::ArrayXXd::Zero(W, n);
   joint_g_ = Eigen::ArrayXXd::Zero(W, joints);
   torque_ = Eigen::VectorXd::Zero(n);
   Y_ = core::RowMatrix::Zero(n, p);
-  residual_ = straight_ = turning_ = efforts_ = efforts1_ = response_ = a0_ = a1_ = Eigen::ArrayXd::Zero(W);
+  residual_ = straight_ = turning_ = efforts_ = efforts1_ = spread_ = squares_ = response_ = a0_ = a1_ = Eigen::ArrayXd::Zero(W);
   rows_ = Eigen::ArrayXXd::Zero(W, p);
   direction_.resize(static_cast<std::size_t>(p));
   const double share = options_.false_alarms / static_cast<double>(weights_.size() * risk_.scales.size());
@@ -111,6 +132,11 @@ ScaleDetector::ScaleDetector(const OnlineModel& model, ScaleDetectorOptions opti
     Scale s;
     s.T = T;
     s.risk = std::log(options_.checks / (share * T));
+    s.reach = Eigen::ArrayXd::Zero(W);
+    for (Eigen::Index w = 0; w < W; ++w) {
+      const double usual = risk_.usual(w, static_cast<Eigen::Index>(states_.size()));
+      s.reach[w] = usual > 0.0 ? kKernel * reach_of(s.risk) / std::sqrt(usual) : 1e100;
+    }
     for (Eigen::ArrayXd* state : {&s.y0, &s.y1, &s.v0, &s.v1, &s.v2, &s.l0, &s.l1, &s.u0, &s.u1, &s.u2, &s.r0, &s.r1}) {
       *state = Eigen::ArrayXd::Zero(W);
     }
@@ -231,7 +257,11 @@ void ScaleDetector::take() {
   const double longest = *std::max_element(steps_.begin(), steps_.end());
   const double h = angles ? e.before : e.step;  // from the element before
   const double length1 = angles ? 0.5 * (steps_[1] + steps_[2]) : steps_[2];
-  const double effort_square = square_ * length1 * longest;
+  const double length = length1 * longest;
+  const bool varied = averages_ && effort_.deviation < effort_.bound;
+  const double least = varied ? effort_.multiplicity * effort_.deviation * effort_.deviation : square_;
+  const double third = effort_.multiplicity * (effort_.bound + effort_.bias) / 3.0;
+  spread_ = (third * longest) * efforts1_.sqrt();
   for (Scale& s : states_) {
     const double x = h / s.T, d_before = s.decay;
     if (std::abs(x - s.delta) > kAlike * x) {
@@ -247,10 +277,16 @@ void ScaleDetector::take() {
     s.Y1 = d * s.Y1 + rows_;
     s.l0 = d * (s.l0 + x * s.l1) + x * turning_;
     s.l1 = d * s.l1 + straight_ + x * turning_;
-    // Efforts of the element before, which is as old as the step.
-    s.v0 = dd * (s.v0 + x * s.v1 + (x * x) * s.v2 + (x * x * effort_square) * efforts1_);
-    s.v1 = dd * (s.v1 + (2.0 * x) * s.v2 + (2.0 * x * effort_square) * efforts1_);
-    s.v2 = dd * (s.v2 + effort_square * efforts1_);
+    // Efforts of the element before, which is as old as the step, with filter::variance_proxy(): a sample's weight is an
+    // average of its elements' (the logarithm of a generating function is convex), none larger than 1/e of theirs.
+    if (varied) {
+      squares_ = (length * least) * efforts1_ / (1.0 - s.reach * spread_).max(least / square_);
+    } else {
+      squares_ = (length * square_) * efforts1_;
+    }
+    s.v0 = dd * (s.v0 + x * s.v1 + (x * x) * (s.v2 + squares_));
+    s.v1 = dd * (s.v1 + (2.0 * x) * (s.v2 + squares_));
+    s.v2 = dd * (s.v2 + squares_);
     // The sample before the newest element's, which no later element holds: it stands in the sum with (a0 + a1 x)e^−x.
     s.u0 = d * (s.u0 + x * s.u1 + (x * x) * s.u2);
     s.u1 = d * (s.u1 + (2.0 * x) * s.u2);
@@ -287,7 +323,8 @@ void ScaleDetector::look(Scale& s, std::size_t which) {
     const double angles =
         risk_.errors.motion.bound * std::sqrt(joints * (s.samples + 2.0) * (std::max(s.u0[i], 0.0) + newest));
     const double usual = risk_.usual(i, static_cast<Eigen::Index>(which)), V = std::max(s.v0[i], 0.0);
-    const double averaged = usual > 0.0 ? std::sqrt((V + usual) * (2.0 * s.risk + std::log1p(V / usual)))
+    const bool varied = averages_ && effort_.deviation < effort_.bound;
+    const double averaged = usual > 0.0 ? averaged_radius(V, usual, s.risk, varied ? reach_of(s.risk) : core::kInfinity)
                             : V > 0.0   ? HUGE_VAL
                                         : 0.0;
     const double radius = (s.l0[i] + angles + averaged) * (1.0 + kRoundings);
@@ -343,6 +380,10 @@ Eigen::MatrixXd usual_variances(LogSource& log, const OnlineModel& model) {
   OnlineModel any = model;
   const auto W = static_cast<Eigen::Index>(sum_weights(model.model).size());
   any.at_risk->usual = Eigen::MatrixXd::Ones(W, static_cast<Eigen::Index>(any.at_risk->scales.size()));
+  filter::ErrorClass& effort = any.at_risk->errors.effort;
+  if (effort.bias < effort.bound && effort.deviation < effort.bound) {
+    effort = {.bound = effort.deviation, .bias = 0.0, .correlation = effort.correlation};  // what reach adds depends on V0
+  }
   ScaleDetector detector(any);
   const std::vector<std::size_t> pick = core::positions_of(log, model.measurement.columns());
   std::vector<double> sample(pick.size());

@@ -61,10 +61,12 @@ struct SumState {
 ///
 ///     S = Σ w_k (torque_k − Y_k θ)
 ///
-/// A healthy robot's S is made of its sensors' errors alone. Those of efforts average out: with V = Σ (weight · bound)²
-/// and V0 fixed beforehand, |S − bias| <= sqrt((V + V0)(2L + ln(1 + V/V0))) but for the probability e^{−L} (method of
-/// mixtures: Robbins 1970; de la Peña, Klass, Lai 2004). All else counts at its worst: bias, the angles' errors, what
-/// happens between samples, and any θ of the set. A sum is looked at `checks` times in its scale, and the risks of all
+/// A healthy robot's S is made of its sensors' errors alone. Those of efforts average out: with V = Σ weight² · s², s²
+/// their variance proxy (error_class.hpp), and V0 fixed beforehand, |S − bias| <= sqrt((V + V0)(2L + ln(1 + V/V0))) but
+/// for the probability e^{−L} (method of mixtures: Robbins 1970; de la Peña, Klass, Lai 2004). Where a deviation below
+/// the bound is declared, s² holds for |λ| <= Λ only: half of the mixture is cut off there, the other half stands at ±Λ,
+/// and the smaller bound of both counts (averaged_radius()). All else counts at its worst: bias, the angles' errors,
+/// what happens between samples, and any θ of the set. A sum is looked at `checks` times in its scale, and the risks of all
 /// looks at all sums add up to ScaleDetectorOptions::false_alarms. No assumption on the drive, the noise's law, or
 /// when a fault comes.
 ///
@@ -95,6 +97,7 @@ class ScaleDetector {
   // c0 + c1 x (+ c2 x²) of every weight, x = age/T.
   struct Scale {
     double T = 0.0, decay = 1.0, delta = 0.0, since = 0.0, risk = 0.0, samples = 0.0;
+    Eigen::ArrayXd reach;  // Λ times the most that a kernel is
     Eigen::ArrayXd y0, y1, v0, v1, v2, l0, l1, u0, u1, u2, r0, r1;
     Eigen::ArrayXXd Y0, Y1;  // weights × p
   };
@@ -118,13 +121,14 @@ class ScaleDetector {
   Eigen::MatrixXd slope_gain_;  // outputs × outputs: |·|² bounds that of what θ makes of errors of slopes in the joints
   Eigen::VectorXd speed_gain_;   // outputs: the most that θ makes of errors of all joints' speeds
   bool averages_ = false;        // errors of efforts
-  double square_ = 0.0;          // their bound squared, times the samples that are correlated
+  filter::SampleClass effort_{};  // of one effort
+  double square_ = 0.0;           // its Hoeffding proxy
   Eigen::ArrayXXd g_, g1_;       // weights × outputs: of the newest element and the one before
   Eigen::ArrayXXd c_, c1_, c2_;  // slope_gain_ times these
   Eigen::ArrayXXd joint_g_;      // weights × joints: what errors of efforts are multiplied with
   Eigen::VectorXd torque_;
   core::RowMatrix Y_;
-  Eigen::ArrayXd residual_, straight_, turning_, efforts_, efforts1_, response_, a0_, a1_;
+  Eigen::ArrayXd residual_, straight_, turning_, efforts_, efforts1_, spread_, squares_, response_, a0_, a1_;
   Eigen::ArrayXXd rows_;           // weights × p
   std::array<double, 4> steps_{};  // the newest last
   std::size_t taken_ = 0;
@@ -133,6 +137,10 @@ class ScaleDetector {
   bool alarm_ = false;
   std::vector<double> direction_;
 };
+
+/// Bound on the share that errors with the summed variance proxies `V` have in a sum, but for the probability e^{−L}:
+/// V0 > 0 fixed beforehand, the proxies good for |λ| <= `reach`/√V0 (infinite: for all λ).
+[[nodiscard]] double averaged_radius(double V, double V0, double L, double reach);
 
 /// V0 of every sum for RiskModel::usual: a share of the mean V on a log of usual driving.
 [[nodiscard]] Eigen::MatrixXd usual_variances(LogSource& log, const OnlineModel& model);

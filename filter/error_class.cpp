@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/filter/error_class.hpp>
 
+#include <algorithm>
 #include <cmath>
 
 #include <wheelwright/core/check.hpp>
@@ -11,6 +12,7 @@ void validate(const ErrorClasses& classes) {
   for (const ErrorClass* c : {&classes.motion, &classes.effort}) {
     check::that(c->bound >= 0.0 && std::isfinite(c->bound), "noise bound", ">= 0");
     check::that(c->bias >= 0.0 && c->bias <= c->bound, "noise bias", "from 0 to the bound");
+    check::that(c->deviation > 0.0, "noise deviation", "> 0");
     check::that(c->correlation >= 0.0 && std::isfinite(c->correlation), "correlation time of the noise", ">= 0");
     check::that(c->correlation == 0.0 || classes.shortest_step > 0.0, "correlation time of the noise",
                 "a log with a shortest step");
@@ -23,6 +25,7 @@ SampleClass sample_class(const ErrorClasses& classes, const SampleWeight& sample
   SampleClass result;
   result.bound = c.bound;
   result.bias = c.bias;
+  result.deviation = std::min(c.deviation, c.bound);
   result.averages = sample.exact && c.bias < c.bound && (!motion || sample.moved >= kCountsThatAverage * classes.count);
   result.multiplicity = c.correlation > 0.0 ? std::floor(c.correlation / classes.shortest_step) + 1.0 : 1.0;
   return result;

@@ -5,16 +5,19 @@
 
 #include <cstddef>
 
+#include <wheelwright/core/limits.hpp>
 #include <wheelwright/filter/sample_weights.hpp>
 
 namespace wheelwright::filter {
 
 /// Errors e of one sensor: |e| <= bound always, and whatever happened up to `correlation` (s) before a sample, the mean
-/// of its error is within ±bias. Nothing is said of their law. With bias = bound that is all bounded errors.
+/// of its error is within ±bias, and the root of its mean square about that mean is at most `deviation`. Nothing else is
+/// said of their law. With bias = bound that is all bounded errors.
 struct ErrorClass {
-  double bound = 0.0;        ///< unit of the column
-  double bias = 0.0;         ///< the same unit, 0 <= bias <= bound
-  double correlation = 0.0;  ///< s
+  double bound = 0.0;                  ///< unit of the column
+  double bias = 0.0;                   ///< the same unit, 0 <= bias <= bound
+  double correlation = 0.0;            ///< s
+  double deviation = core::kInfinity;  ///< the same unit, > 0; from the bound on it says nothing
 };
 
 /// Those of a log's columns, independent from joint to joint.
@@ -30,10 +33,8 @@ struct ErrorClasses {
 /// Throws InvalidArgument, naming the field, unless numbers are as ErrorClass says.
 void validate(const ErrorClasses& classes);
 
-/// Bound on the errors' share of a sum: |share| <= straight + sqrt(2 · squares · ln(2/δ)) but for the probability δ,
-/// and |share| <= worst always.
+/// Bound on the errors' share of a sum: what averages out may add to `straight`, and |share| <= worst always.
 struct ErrorShare {
-  double squares = 0.0;   ///< Σ (weight · bound)², times the number of samples within a correlation time
   double straight = 0.0;  ///< Σ |weight| · bias; of errors that do not average out, · bound
   double worst = 0.0;     ///< Σ |weight| · bound
 };
@@ -43,6 +44,7 @@ struct ErrorShare {
 struct SampleClass {
   bool averages = false;
   double bound = 0.0, bias = 0.0;
+  double deviation = 0.0;     ///< <= bound
   double multiplicity = 1.0;  ///< samples within a correlation time
 };
 [[nodiscard]] SampleClass sample_class(const ErrorClasses& classes, const SampleWeight& sample);
@@ -50,12 +52,22 @@ struct SampleClass {
 /// Counts from sample to sample from which on rounding averages out.
 inline constexpr double kCountsThatAverage = 4.0;
 
+/// Variance proxy s² of an error e that averages out: E exp(λ (e − mean)) <= exp(λ² s²/2), whatever happened before, for
+/// all |λ| <= `reach` (1/unit). The smaller of Hoeffding's, bound², for every λ, and Bernstein's, deviation²/(1 − u/3) with
+/// u = reach · (bound + bias) [boucheron2013]; for errors that are alike within a correlation time both hold with
+/// its number of samples (Hölder's inequality).
+[[nodiscard]] inline double variance_proxy(const SampleClass& sample, double reach) {
+  const double m = sample.multiplicity, square = sample.bound * sample.bound;
+  const double deviation = sample.deviation * sample.deviation;
+  const double u = m * reach * (sample.bound + sample.bias);
+  return m * (deviation < square * (1.0 - u / 3.0) ? deviation / (1.0 - u / 3.0) : square);
+}
+
 /// Adds a sample that stands in a sum with a weight of the size `weight` >= 0.
 inline void add(ErrorShare& share, const SampleClass& sample, double weight) {
   const double size = weight * sample.bound;
   share.worst += size;
   share.straight += sample.averages ? weight * sample.bias : size;
-  share.squares += sample.averages ? sample.multiplicity * size * size : 0.0;
 }
 
 }  // namespace wheelwright::filter

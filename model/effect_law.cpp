@@ -9,6 +9,7 @@
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/limits.hpp>
+#include <wheelwright/core/words.hpp>
 
 namespace wheelwright::model {
 
@@ -479,14 +480,6 @@ std::vector<EffectLaw> make_laws() {
   };
 }
 
-std::string joined(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) {
-    text += (text.empty() ? "" : ", ") + name;
-  }
-  return text;
-}
-
 std::string limits_of(const EffectParameterLaw& law) {
   if (law.positive) {
     return std::isfinite(law.upper) ? "a number > 0 and at most " + std::to_string(law.upper) : "a number > 0";
@@ -502,7 +495,7 @@ void validate_effect(const RobotEffect& effect, const Robot& robot) {
   const EffectLaw& law = effect_law(effect.name);
   const Parameters& known = law.parameters_of(robot);
   check::that(!known.empty(), "effects." + effect.name,
-              "an effect of the model " + robot.model + ", one of " + joined(effect_names(robot)));
+              "an effect of the model " + robot.model + ", one of " + core::listed(effect_names(robot)));
   for (const auto& [name, interval] : effect.parameters) {
     const std::string where = "effects." + effect.name + "." + name;
     const auto found = std::ranges::find(known, name, &EffectParameterLaw::name);

@@ -46,6 +46,8 @@ struct NoiseBound {
   /// Whatever happened before, the mean of an error is within ±bias; nothing: anything up to the bound, for ever.
   std::optional<double> bias{};
   double correlation = 0.0;  ///< s, from which on errors know nothing of each other; read where there is a bias
+  /// Root of an error's mean square about its mean, whatever happened before; read where there is a bias.
+  std::optional<double> deviation{};
 };
 
 /// Declared noise of the sensors. A bound that is not declared is estimated.

@@ -124,10 +124,12 @@ std::string at_risk_section(const commission::RiskWatch& watch, const OnlineMode
   std::string out = paragraph(fmt::format(
       "Weighted sums over {} to {} s of what the model leaves, matched to faults, were compared {} times with what the "
       "errors of a healthy robot can make of them; in {} years of driving at most one false alarm is to be expected, "
-      "as "
-      "long as the errors are as the robot file declares them. The largest reached {} of its threshold.",
+      "as long as the errors are as {}. The largest reached {} of its threshold.",
       number(model.at_risk->scales.front()), number(model.at_risk->scales.back()), count(watch.looks),
-      number(1.0 / (watch.false_alarms * kYear), 2), percent(watch.utilisation)));
+      number(1.0 / (watch.false_alarms * kYear), 2),
+      model.at_risk->warrant == core::Warrant::guaranteed ? "the robot file declares them"
+                                                          : "they were in the log that the model was learnt from",
+      percent(watch.utilisation)));
   std::vector<std::vector<Cell>> rows;
   for (const commission::RiskEvent& e : watch.events) {
     rows.push_back({escape(axis.text(e.alarm)), escape(axis.text(e.end)),

@@ -239,11 +239,16 @@ Json set_json(const Commissioning& r, const Model& model) {
 }
 
 Json error_class_json(const filter::ErrorClass& c) {
-  return {{"bound", c.bound}, {"bias", c.bias}, {"correlation", c.correlation}};
+  Json json = {{"bound", c.bound}, {"bias", c.bias}, {"correlation", c.correlation}};
+  if (c.deviation < c.bound) {
+    json["deviation"] = c.deviation;
+  }
+  return json;
 }
 
 Json risk_json(const detector::RiskModel& risk) {
   Json json = {{"risk", risk.risk},
+               {"warrant", core::warrant_word(risk.warrant)},
                {"errors",
                 {{"motion", error_class_json(risk.errors.motion)},
                  {"effort", error_class_json(risk.errors.effort)},

@@ -86,7 +86,11 @@ Warrant kinematic_warrant(const JsonPlace& place) {
 }
 
 filter::ErrorClass error_class_at(const JsonPlace& place) {
-  return {bound_at(place.at("bound")), bound_at(place.at("bias")), bound_at(place.at("correlation"))};
+  filter::ErrorClass c{bound_at(place.at("bound")), bound_at(place.at("bias")), bound_at(place.at("correlation"))};
+  if (place.has("deviation")) {
+    c.deviation = bound_at(place.at("deviation"));
+  }
+  return c;
 }
 
 detector::RiskModel risk_at(const JsonPlace& place, const Model& model) {
@@ -95,6 +99,7 @@ detector::RiskModel risk_at(const JsonPlace& place, const Model& model) {
   if (!(risk.risk > 0.0 && risk.risk < 1.0)) {
     place.at("risk").fail("a number between 0 and 1");
   }
+  risk.warrant = warrant_at(place, core::Warrant::guaranteed);
   const JsonPlace errors = place.at("errors"), set = place.at("feasible_set"), usual = place.at("usual");
   risk.errors.motion = error_class_at(errors.at("motion"));
   risk.errors.effort = error_class_at(errors.at("effort"));

@@ -226,17 +226,21 @@ struct RobotReader {
 
   static void read_error_class(const YamlPlace& place, model::NoiseBound& bound) {
     const auto not_negative = [](double number) { return number >= 0.0; };
-    for (const auto& [name, value] : place.members({"bound", "bias", "correlation"})) {
+    for (const auto& [name, value] : place.members({"bound", "bias", "correlation", "deviation"})) {
       if (name == "bound") {
         bound.value = value.number("a bound >= 0", not_negative);
       } else if (name == "bias") {
         bound.bias = value.number("a bias >= 0", not_negative);
+      } else if (name == "deviation") {
+        bound.deviation = value.number("a root mean square > 0", [](double number) { return number > 0.0; });
       } else {
         bound.correlation = value.number("a time >= 0 in s", not_negative);
       }
     }
-    if (!bound.value || !bound.bias || *bound.bias > *bound.value) {
-      place.fail("{bound: B, bias: b, correlation: seconds} with 0 <= b <= B (correlation may be left out)");
+    if (!bound.value || !bound.bias || *bound.bias > *bound.value || bound.deviation.value_or(0.0) > *bound.value) {
+      place.fail(
+          "{bound: B, bias: b, deviation: s, correlation: seconds} with 0 <= b <= B and 0 < s <= B (deviation and "
+          "correlation may be left out)");
     }
   }
 
@@ -297,6 +301,9 @@ Json noise_bound(const model::NoiseBound& bound) {
   Json out = {{"bound", *bound.value}, {"bias", *bound.bias}};
   if (bound.correlation > 0.0) {
     out["correlation"] = bound.correlation;
+  }
+  if (bound.deviation) {
+    out["deviation"] = *bound.deviation;
   }
   return out;
 }

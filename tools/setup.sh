@@ -20,7 +20,7 @@ packages="g++ cmake ninja-build pkg-config
   libcli11-dev"
 everything="libopenmpi-dev openmpi-bin
   libgtest-dev libgmock-dev python3-jsonschema
-  coinor-libclp-dev libglpk-dev liblapack-dev libqsopt-ex-dev libmujoco-dev
+  libbenchmark-dev coinor-libclp-dev libglpk-dev liblapack-dev libqsopt-ex-dev libmujoco-dev
   pybind11-dev python3 python3-dev python3-numpy"
 case "${1:-}" in
   program) everything= ;;

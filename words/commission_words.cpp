@@ -195,7 +195,7 @@ std::string at_risk(const Commissioning& result) {
     return {};
   }
   if (!result.at_risk || !result.at_risk->set) {
-    return fmt::format("Nothing is said at a stated risk, the guaranteed answer stands alone: {}.", assumption->detail);
+    return fmt::format("Nothing is said at a stated risk, the other answer stands alone: {}.", assumption->detail);
   }
   std::vector<std::string> items;
   for (const ParameterViews& views : parameter_views(result)) {
@@ -205,7 +205,10 @@ std::string at_risk(const Commissioning& result) {
       items.push_back(with_unit(v.name + " " + lower + " to " + upper, v.unit));
     }
   }
-  std::string text = fmt::format("At a risk of {:g}: {}.", result.at_risk->risk, core::enumerated(items));
+  std::string text =
+      fmt::format("At a risk of {:g}{}: {}.", result.at_risk->risk,
+                  result.at_risk->warrant == core::Warrant::guaranteed ? "" : ", while errors stay as this log shows them",
+                  core::enumerated(items));
   std::vector<std::string> seen;
   for (const commission::RiskReach& reach : result.reach) {
     const bool share = reach.unit == "1";

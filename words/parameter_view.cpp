@@ -87,8 +87,9 @@ ParameterView physical_view(ParameterView view, const commission::PhysicalScale&
 std::string risk_remark(const commission::RiskSet& set) {
   return fmt::format(
       "At a stated risk: the true values lie inside all of these intervals, unless a chance of {:g} came "
-      "true; for errors within their bounds that have no more than the declared bias, whatever their law.",
-      set.risk);
+      "true; for errors that have no more than the {}, whatever their law.",
+      set.risk,
+      set.warrant == core::Warrant::guaranteed ? "declared bias" : "bias and deviation that were estimated from this log");
 }
 
 std::string estimate_text(const ParameterView& view) {

@@ -135,9 +135,11 @@ std::string reach_lines(const Commissioning& r) {
   if (r.reach.empty()) {
     return {};
   }
-  std::string text =
-      "  certainly seen at the stated risk (one false alarm in ten years) within 1 s, 5 s, 20 s, from half of all "
-      "moments of such a drive:\n";
+  const bool estimated = r.model.at_risk && r.model.at_risk->warrant == core::Warrant::extrapolated;
+  std::string text = fmt::format(
+      "  certainly seen at the stated risk (one false alarm in ten years{}) within 1 s, 5 s, 20 s, from half of all "
+      "moments of such a drive:\n",
+      estimated ? " while the errors stay as this log shows them" : "");
   for (const commission::RiskReach& reach : r.reach) {
     text += "    " + commission::sentence(reach, r.model.model) + "\n";
   }

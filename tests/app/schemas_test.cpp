@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What convert, export, design and robot write fits its schema, and the schemas refuse what is not there.
+// What convert, export, design, robot and simulate write fits its schema, and the schemas refuse what is not there.
 #include "app/program.hpp"
 #include "robots/robot_samples.hpp"
 
@@ -84,6 +84,17 @@ TEST_F(Schemas, Robot) {
   EXPECT_TRUE(refused("robot-file.schema.json", said, "/robot/wheel_radius", -1));
   EXPECT_TRUE(refused("robot-file.schema.json", said, "/origins/wheel_radius", ""));
   EXPECT_TRUE(refused("robot-file.schema.json", said, "/unheard_of", 1));
+}
+
+TEST_F(Schemas, Simulate) {
+  const std::string scenario = (examples() / "scenarios/healthy.yaml").string();
+  const Json said =
+      fitting("simulation.schema.json", fmt::format("simulate '{}' --out drive.csv --seed 7 --json", scenario));
+  EXPECT_EQ(said.at("seed"), 7);
+  EXPECT_TRUE(refused("simulation.schema.json", said, "/schema", "wheelwright/simulation/2"));
+  EXPECT_TRUE(refused("simulation.schema.json", said, "/rows", -1));
+  EXPECT_TRUE(refused("simulation.schema.json", said, "/log", nullptr));
+  EXPECT_TRUE(refused("simulation.schema.json", said, "/unheard_of", 1));
 }
 
 }  // namespace

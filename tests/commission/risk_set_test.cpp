@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The set and the detector at a stated risk, on an axis solved in closed form under the worst laws of errors that the
 // assumptions allow. Risks are large here, so that a few hundred runs would show a promise that is broken; the campaign
-// (SlowRisk) has the runs that the promise is stated for.
+// (SlowAtRisk) has the runs that the promise is stated for.
 #include <wheelwright/commission/at_risk.hpp>
 
 #include <cmath>
@@ -90,6 +90,22 @@ std::vector<Named> worlds() {
   };
   add("two_point", [](ExactAxis&) {});
   add("uniform", [](ExactAxis& a) { a.law = ErrorLaw::uniform; });
+  add("uniform_declared", [](ExactAxis& a) {
+    a.law = ErrorLaw::uniform;
+    a.deviation = a.bound / std::sqrt(3.0);
+  });
+  add("spikes", [](ExactAxis& a) {
+    a.law = ErrorLaw::spikes;
+    a.deviation = 0.3 * a.bound;
+  });
+  add("skewed", [](ExactAxis& a) {
+    a.law = ErrorLaw::skewed;
+    a.deviation = 0.3 * a.bound;
+  });
+  add("skewed_rarely", [](ExactAxis& a) {
+    a.law = ErrorLaw::skewed;
+    a.deviation = 0.05 * a.bound;
+  });
   add("biased", [](ExactAxis& a) { a.bias = 0.1 * a.bound; });
   add("by_speed", [](ExactAxis& a) { a.law = ErrorLaw::by_speed; });
   add("gambler", [](ExactAxis& a) { a.law = ErrorLaw::gambler; });
@@ -175,6 +191,29 @@ TEST(RiskSet, IsSharperThanTheWorstCase) {
   for (std::size_t j = 0; j < 2; ++j) {
     const Interval wide = c.feasible.hull.sides[j], narrow = c.at_risk->set->hull().sides[j];
     EXPECT_LT(narrow.upper - narrow.lower, 0.3 * (wide.upper - wide.lower)) << j;
+  }
+}
+
+// A declared deviation brings nearly as much as its share of the bound.
+TEST(RiskSet, IsSharperWhereADeviationIsDeclared) {
+  ExactAxis axis;
+  axis.seconds = 120.0;
+  axis.law = ErrorLaw::spikes;
+  axis.deviation = 0.3 * axis.bound;
+  const LogTable log = drive(axis, 1);
+  Robot robot = robot_of(axis);
+  TableSource source(log);
+  const Commissioning with = commission_robot(source, robot);
+  robot.noise.effort.deviation.reset();
+  source.rewind();
+  const Commissioning without = commission_robot(source, robot);
+  ASSERT_TRUE(with.at_risk && with.at_risk->set && without.at_risk && without.at_risk->set);
+  for (std::size_t j = 0; j < 2; ++j) {
+    const auto width = [&](const Commissioning& c) {
+      const Interval side = c.at_risk->set->hull().sides[j];
+      return side.upper - side.lower;
+    };
+    EXPECT_LT(width(with), 0.6 * width(without)) << j;
   }
 }
 

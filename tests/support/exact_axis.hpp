@@ -22,6 +22,8 @@ enum class ErrorLaw {
   by_speed,   ///< ± bound while the axis moves fast, next to nothing else
   gambler,    ///< ± bound while the errors' sum is behind, next to nothing once it is ahead
   together,   ///< ± bound, the same within a correlation time
+  spikes,     ///< ± bound now and then, so that the deviation is as stated, and nothing between
+  skewed,     ///< the bound now and then, a little to the other side between: mean 0, the deviation as stated
 };
 
 /// An axis m v̇ = u − f v, its drive and its sensors.
@@ -30,6 +32,7 @@ struct ExactAxis {
   double rate = 100.0, seconds = 60.0;  ///< Hz, s
   double bound = 2.0, bias = 0.0;       ///< of the effort, N
   double correlation = 0.0;             ///< s
+  double deviation = 0.0;               ///< N, of spikes and skewed; declared where it is > 0
   double count = 1e-4;                  ///< m, resolution of the position
   double jitter = 0.0;                  ///< of the steps, relative
   double feedback = 0.0;                ///< N s/m, on the measured speed: errors act on the motion
@@ -71,6 +74,12 @@ inline LogTable drive(const ExactAxis& a, std::uint64_t seed) {
       case ErrorLaw::uniform: error = free * (2.0 * uniform() - 1.0); break;
       case ErrorLaw::by_speed: error = (std::abs(v) > 0.5 ? free : 0.01 * free) * sign; break;
       case ErrorLaw::gambler: error = (side * sum < 3.0 * free * std::sqrt(a.rate) ? free : 0.01 * free) * sign; break;
+      case ErrorLaw::spikes: error = uniform() < std::pow(a.deviation / free, 2) ? free * sign : 0.0; break;
+      case ErrorLaw::skewed: {
+        const double often = a.deviation * a.deviation / (free * free + a.deviation * a.deviation);
+        error = side * (uniform() < often ? free : -free * often / (1.0 - often));
+        break;
+      }
       case ErrorLaw::together:
         if (t >= until) {
           held = sign;
@@ -99,6 +108,9 @@ inline Robot robot_of(const ExactAxis& a) {
   robot.hold = Hold::zero_order;
   robot.effort_changes = model::EffortChanges::at_samples;
   robot.noise.effort = {.value = a.bound, .bias = a.bias, .correlation = a.correlation};
+  if (a.deviation > 0.0) {
+    robot.noise.effort.deviation = a.deviation;
+  }
   robot.noise.position = {.value = 0.5 * a.count, .bias = 0.5 * a.count};
   return robot;
 }
