@@ -81,9 +81,9 @@ Subject make_subject(std::uint64_t seed, Regime regime) {
   s.scenario = testing_support::random_robot(seed);
   s.scenario.sensors.encoder_counts_per_turn = s.scenario.robot.encoder_counts_per_turn;
   s.scenario.sensors.effort = *s.scenario.robot.noise.effort.value;
-  s.scenario.robot.noise.effort.bias = kBias * s.scenario.sensors.effort;
   s.torque_sd = s.scenario.sensors.effort * deviation(s.scenario.sensors.noise);
-  s.declared_torque_sd = s.scenario.sensors.effort;
+  s.scenario.robot.noise.effort.bias = kBias * s.scenario.sensors.effort;
+  s.scenario.robot.noise.effort.deviation = s.torque_sd;
   s.angle_sd = 2.0 * std::numbers::pi / *s.scenario.sensors.encoder_counts_per_turn / std::sqrt(12.0);
 
   Scenario learning = s.scenario;

@@ -30,15 +30,14 @@ inline constexpr std::array kDriving = {Driving::gentle, Driving::varied, Drivin
 
 /// A robot as its detectors know it.
 struct Subject {
-  Scenario scenario;        ///< sensors and θ°; noise is as large as declared
+  Scenario scenario;        ///< sensors and θ°; noise is as large as declared, without the bias that is
   Scenario learning;        ///< the drive of 60 s that it was commissioned on
   OnlineModel model;        ///< facets, box and estimate are those of the regime
   OnlineModel statistical;  ///< the same with NoiseMode::statistical
   Regime regime = Regime::identified;
   Eigen::MatrixXd covariance;               ///< of θ̂; of a uniform θ in the box where it is uncertain
   std::array<double, kOutputs> variance{};  ///< of the residual of a least-squares fit to the learning log
-  double torque_sd = 0.0;                   ///< of the noise of an effort, N·m
-  double declared_torque_sd = 0.0;          ///< the largest that the robot file allows, N·m
+  double torque_sd = 0.0;                   ///< of the noise of an effort, as declared, N·m
   double angle_sd = 0.0;                    ///< of the noise of an angle, rad
 
   [[nodiscard]] detector::ThresholdRule rule(
