@@ -6,7 +6,7 @@
 #include "peers/confidence_threshold.hpp"
 #include "peers/constant_threshold.hpp"
 #include "peers/cusum.hpp"
-#include "peers/innovations.hpp"
+#include "peers/scale_sums.hpp"
 #include "peers/tight_threshold.hpp"
 
 namespace wheelwright::peers {
@@ -14,6 +14,8 @@ namespace {
 
 constexpr double kChiWindow = 0.5;  // s
 constexpr std::size_t kUnsettled = 50;
+constexpr std::size_t kMostFitted = 20'000;                // rows that the Kalman filters' noise is fitted to: enough
+constexpr std::size_t kLeastSquares = 6, kCalibrated = 7;  // statistics; four for each calibration from there on
 
 // Rows of the calibration as the Kalman filter of one coordinate sees them.
 struct AxisLog {
@@ -48,65 +50,90 @@ AxisModel most_likely(const AxisModel& start, Hold hold, const std::vector<AxisL
 }  // namespace
 
 const std::vector<Column>& columns() {
-  using enum Column::Limit;
-  static const std::vector<Column> all = {{"tight, polytope", 0, given, 0.5},
-                                          {"tight, box", 1, given, 0.5},
-                                          {"tight, ρ", 2, given, 0.5},
-                                          {"tight, statistical noise", 3, given, 0.5},
-                                          {"constant", kConstant, own_driving},
-                                          {"constant, all driving", kConstant, every_driving},
-                                          {"CUSUM 0.5", 5, own_driving},
-                                          {"CUSUM 2", 6, own_driving},
-                                          {"χ²", 7, own_driving},
-                                          {"χ², 0.5 s", 8, own_driving},
-                                          {"LS, tuned", 9, own_driving},
-                                          {"LS, z = 4", 9, given, 4.0}};
+  static const std::vector<Column> all = [] {
+    using enum Tuning;
+    std::vector<Column> list = {{"tight, polytope", 0, given, 0.5},
+                                {"tight, box", 1, given, 0.5},
+                                {"tight, ρ", 2, given, 0.5},
+                                {"tight, statistical noise", 3, given, 0.5},
+                                {"sums (one false alarm in ten years)", kSums, given, 0.5},
+                                {"dead zone or sums", 0, given, 0.5, kSums},
+                                {"constant", kConstant, own_driving},
+                                {"constant, all driving", kConstant, every_driving}};
+    const std::array<std::string, 4> calibrated = {"CUSUM 0.5", "CUSUM 2", "χ²", "χ², 0.5 s"};
+    const auto add_calibrated = [&](std::size_t calibration, Tuning tuning) {
+      for (std::size_t i = 0; i < calibrated.size(); ++i) {
+        list.push_back({calibrated[i], kCalibrated + calibration * calibrated.size() + i, tuning});
+      }
+    };
+    add_calibrated(0, own_driving);
+    list.push_back({"LS, tuned", kLeastSquares, own_driving});
+    list.push_back({"LS, z = 4", kLeastSquares, given, 4.0});
+    for (const Tuning tuning : {minute, usual, usual_margin}) {
+      list.push_back({"constant", kConstant, tuning});
+      add_calibrated(tuning == minute ? 1 : 2, tuning);
+      list.push_back({"LS", kLeastSquares, tuning});
+    }
+    return list;
+  }();
   return all;
 }
 
-Bank::Bank(const Subject& subject, const std::vector<LogTable>& calibration)
-    : subject_(&subject),
-      filter_(subject.model.model, subject.model.filter, subject.model.measurement, subject.model.errors),
-      statistical_filter_(subject.model.model, subject.model.filter, subject.model.measurement,
-                          subject.statistical.errors) {
-  std::array<double, kOutputs> mean{}, square{}, sd{};
-  std::array<std::vector<AxisLog>, kOutputs> logs;
+Calibration calibrate(const Subject& subject, const std::vector<LogTable>& logs) {
+  Bank bank(subject);
+  Calibration result;
+  std::array<double, kOutputs> square{};
+  std::array<std::vector<AxisLog>, kOutputs> axes;
   double count = 0.0;
-  for (const LogTable& table : calibration) {
+  std::size_t rows = 0;
+  for (const LogTable& table : logs) {
     TableSource log(table);
-    restart();
-    pick(log);
-    for (auto& each : logs) {
+    bank.restart();
+    bank.pick(log);
+    for (auto& each : axes) {
       each.emplace_back();
     }
     LogBlock block;
     while (log.next(block)) {
-      for (std::size_t k = 0; k < block.rows(); ++k) {
-        const bool valid = observe(block, k);
+      for (std::size_t k = 0; k < block.rows(); ++k, ++rows) {
+        const bool valid = bank.observe(block, k);
+        const Observation& now = bank.now_;
         count += valid ? 1.0 : 0.0;
         for (std::size_t i = 0; i < kOutputs; ++i) {
-          mean[i] += valid ? now_.residual[i] : 0.0;
-          square[i] += valid ? now_.residual[i] * now_.residual[i] : 0.0;
-          AxisLog& axis = logs[i].back();
-          axis.t.push_back(now_.t);
-          axis.position.push_back(now_.position[i]);
-          axis.effort.push_back(now_.effort[i]);
+          result.mean[i] += valid ? now.residual[i] : 0.0;
+          square[i] += valid ? now.residual[i] * now.residual[i] : 0.0;
+          if (rows < kMostFitted) {
+            AxisLog& axis = axes[i].back();
+            axis.t.push_back(now.t);
+            axis.position.push_back(now.position[i]);
+            axis.effort.push_back(now.effort[i]);
+          }
         }
       }
     }
   }
   const OnlineModel& m = subject.model;
-  std::array<AxisModel, kOutputs> axes;
   for (std::size_t i = 0; i < kOutputs; ++i) {
-    mean[i] /= count;
-    sd[i] = std::sqrt(square[i] / count - mean[i] * mean[i]);
+    result.mean[i] /= count;
+    result.sd[i] = std::sqrt(square[i] / count - result.mean[i] * result.mean[i]);
     const auto row = static_cast<Eigen::Index>(i);
     // θ_L = r·[m, I, f1, f3].
-    axes[i] = {m.estimate[row], m.estimate[row + 2],
-               m.model.input.row(row).squaredNorm() * subject.torque_sd * subject.torque_sd,
-               m.model.motion.row(row).squaredNorm() * subject.angle_sd * subject.angle_sd};
-    axes[i] = most_likely(axes[i], m.measurement.hold, logs[i]);
+    const AxisModel start = {m.estimate[row], m.estimate[row + 2],
+                             m.model.input.row(row).squaredNorm() * subject.torque_sd * subject.torque_sd,
+                             m.model.motion.row(row).squaredNorm() * subject.angle_sd * subject.angle_sd};
+    result.axes[i] = most_likely(start, m.measurement.hold, axes[i]);
   }
+  return result;
+}
+
+Bank::Bank(const Subject& subject)
+    : subject_(&subject),
+      filter_(subject.model.model, subject.model.filter, subject.model.measurement, subject.model.errors),
+      statistical_filter_(subject.model.model, subject.model.filter, subject.model.measurement,
+                          subject.statistical.errors) {}
+
+Bank::Bank(const Subject& subject, const std::array<Calibration, 3>& calibrations) : Bank(subject) {
+  const OnlineModel& m = subject.model;
   const auto window = static_cast<std::size_t>(std::lround(kChiWindow * subject.scenario.rate));
   using Kind = TightThreshold::Kind;
   statistics_.push_back(std::make_unique<TightThreshold>(subject.rule(), Kind::two_sided));
@@ -114,12 +141,15 @@ Bank::Bank(const Subject& subject, const std::vector<LogTable>& calibration)
       std::make_unique<TightThreshold>(subject.rule(detector::ParameterSetKind::box), Kind::two_sided));
   statistics_.push_back(std::make_unique<TightThreshold>(subject.rule(), Kind::symmetric));
   statistics_.push_back(std::make_unique<TightThreshold>(subject.statistical_rule(), Kind::statistical));
+  statistics_.push_back(std::make_unique<ScaleSums>(m));
   statistics_.push_back(std::make_unique<ConstantThreshold>());
-  statistics_.push_back(std::make_unique<Cusum>(mean, sd, 0.5));
-  statistics_.push_back(std::make_unique<Cusum>(mean, sd, 2.0));
-  statistics_.push_back(std::make_unique<Innovations>(axes, m.measurement.hold, 1));
-  statistics_.push_back(std::make_unique<Innovations>(axes, m.measurement.hold, window));
   statistics_.push_back(std::make_unique<ConfidenceThreshold>(subject.covariance, subject.variance));
+  for (const Calibration& each : calibrations) {
+    statistics_.push_back(std::make_unique<Cusum>(each.mean, each.sd, 0.5));
+    statistics_.push_back(std::make_unique<Cusum>(each.mean, each.sd, 2.0));
+    statistics_.push_back(std::make_unique<Innovations>(each.axes, m.measurement.hold, 1));
+    statistics_.push_back(std::make_unique<Innovations>(each.axes, m.measurement.hold, window));
+  }
   std::size_t total = 0;
   for (const auto& statistic : statistics_) {
     first_.push_back(total);
@@ -127,6 +157,16 @@ Bank::Bank(const Subject& subject, const std::vector<LogTable>& calibration)
   }
   first_.push_back(total);
   values_.resize(total);
+}
+
+std::vector<double> Bank::with_margin(const std::vector<double>& largest, double margin) const {
+  std::vector<double> limits(largest.size());
+  for (std::size_t s = 0; s < statistics_.size(); ++s) {
+    for (std::size_t v = first_[s]; v < first_[s + 1]; ++v) {
+      limits[v] = statistics_[s]->with_margin(largest[v], margin);
+    }
+  }
+  return limits;
 }
 
 void Bank::restart() {
@@ -151,6 +191,7 @@ bool Bank::observe(const LogBlock& block, std::size_t k) {
   }
   const OnlineModel& m = subject_->model;
   now_.t = block.t[k];
+  now_.sample = sample_;
   now_.valid = filter_.step(now_.t, sample_);
   statistical_filter_.step(now_.t, sample_);
   now_.row = &filter_.row();

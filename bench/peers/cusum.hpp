@@ -28,6 +28,8 @@ class Cusum final : public Statistic {
       values[i] = std::max(up_[i], down_[i]);
     }
   }
+  /// Tails of S are exponential where those of z are Gaussian.
+  [[nodiscard]] double with_margin(double largest, double margin) const override { return margin * margin * largest; }
 
  private:
   std::array<double, kOutputs> mean_, sd_, up_{}, down_{};

@@ -15,6 +15,7 @@ namespace {
 using testing_support::Random;
 
 constexpr double kUncertainty = 0.2;  // of θ, as in the paper
+constexpr double kBias = 0.01;        // of the efforts' noise, declared, as a share of its bound
 constexpr double kFirstOnset = 3.0;   // s
 constexpr double kLastOnset = 1.5;    // s before the end of a drive
 
@@ -41,6 +42,16 @@ sim::Trajectory trajectory(Driving driving, Random& random) {
       break;
   }
   return r;
+}
+
+// Standard deviation of noise of the bound 1.
+double deviation(sim::NoiseShape shape) {
+  switch (shape) {
+    case sim::NoiseShape::uniform: return 1.0 / std::numbers::sqrt3;
+    case sim::NoiseShape::truncated_gaussian: return 1.0 / 3.0;  // before it is cut
+    case sim::NoiseShape::two_point: break;
+  }
+  return 1.0;
 }
 
 // Variance of what a least-squares fit leaves of each output of `log`.
@@ -70,8 +81,9 @@ Subject make_subject(std::uint64_t seed, Regime regime) {
   s.scenario = testing_support::random_robot(seed);
   s.scenario.sensors.encoder_counts_per_turn = s.scenario.robot.encoder_counts_per_turn;
   s.scenario.sensors.effort = *s.scenario.robot.noise.effort.value;
-  const bool uniform = s.scenario.sensors.noise == sim::NoiseShape::uniform;
-  s.torque_sd = s.scenario.sensors.effort / (uniform ? std::numbers::sqrt3 : 3.0);
+  s.torque_sd = s.scenario.sensors.effort * deviation(s.scenario.sensors.noise);
+  s.scenario.robot.noise.effort.bias = kBias * s.scenario.sensors.effort;
+  s.scenario.robot.noise.effort.deviation = s.torque_sd;
   s.angle_sd = 2.0 * std::numbers::pi / *s.scenario.sensors.encoder_counts_per_turn / std::sqrt(12.0);
 
   Scenario learning = s.scenario;
@@ -83,6 +95,10 @@ Subject make_subject(std::uint64_t seed, Regime regime) {
   if (result.status != Commissioning::Status::done) {
     throw InvalidArgument("robot " + std::to_string(seed) + ": " + result.message);
   }
+  if (!result.model.at_risk) {
+    throw InvalidArgument("robot " + std::to_string(seed) + ": nothing is said at a stated risk");
+  }
+  s.learning = learning;
   s.model = result.model;
   commission::CommissionOptions options;
   options.noise_mode = filter::NoiseMode::statistical;
@@ -116,6 +132,8 @@ Subject make_subject(std::uint64_t seed, Regime regime) {
   }
   s.statistical.facets.clear();
   s.statistical.box = s.model.box;
+  s.model.at_risk->facets.clear();
+  s.model.at_risk->box = s.model.box;
   return s;
 }
 
@@ -135,6 +153,37 @@ Scenario make_drive(const Subject& subject, Driving driving, std::uint64_t seed,
     change(s.parameters.viscous_yaw);
   }
   return s;
+}
+
+std::uint64_t drive_seed(std::uint64_t robot, Driving driving, std::uint64_t number) {
+  return robot * 100'000 + static_cast<std::uint64_t>(driving) * 10'000 + number;
+}
+
+std::array<std::vector<testing_support::FaultyRun>, kDriving.size()> make_runs(const Subject& subject,
+                                                                               std::uint64_t robot, std::size_t count) {
+  Random random(robot + 3'000'000);
+  std::array<std::vector<testing_support::FaultyRun>, kDriving.size()> runs;
+  for (const Driving driving : kDriving) {
+    for (std::size_t k = 0; k < count; ++k) {
+      testing_support::FaultyRun run{.robot = nullptr, .drive = {}, .fault = {}, .simulated = std::nullopt};
+      const double onset = kFirstOnset + 9.0 * random.unit();
+      run.drive = make_drive(subject, driving, drive_seed(robot, driving, 5'000 + k), onset + kPatience + 0.2);
+      run.onset = (std::floor(onset * run.drive.rate) + 0.01) / run.drive.rate;
+      run.side = random.unit() < 0.5 ? -1.0 : 1.0;
+      runs[static_cast<std::size_t>(driving)].push_back(run);
+    }
+  }
+  return runs;
+}
+
+std::vector<LogTable> usual_logs(const Subject& subject, std::uint64_t robot, double samples) {
+  constexpr std::uint64_t drives = 12;
+  std::vector<LogTable> logs;
+  for (std::uint64_t k = 0; k < drives; ++k) {
+    logs.push_back(sim::simulate(make_drive(subject, Driving::varied, drive_seed(robot, Driving::varied, 7'000 + k),
+                                            samples / static_cast<double>(drives) / subject.scenario.rate)));
+  }
+  return logs;
 }
 
 std::vector<TriedFault> tried_faults(const Subject& subject, Driving driving, std::uint64_t seed) {

@@ -30,13 +30,14 @@ inline constexpr std::array kDriving = {Driving::gentle, Driving::varied, Drivin
 
 /// A robot as its detectors know it.
 struct Subject {
-  Scenario scenario;        ///< sensors and θ°; noise is as large as declared
+  Scenario scenario;        ///< sensors and θ°; noise is as large as declared, without the bias that is
+  Scenario learning;        ///< the drive of 60 s that it was commissioned on
   OnlineModel model;        ///< facets, box and estimate are those of the regime
   OnlineModel statistical;  ///< the same with NoiseMode::statistical
   Regime regime = Regime::identified;
   Eigen::MatrixXd covariance;               ///< of θ̂; of a uniform θ in the box where it is uncertain
   std::array<double, kOutputs> variance{};  ///< of the residual of a least-squares fit to the learning log
-  double torque_sd = 0.0;                   ///< of the noise of an effort, N·m
+  double torque_sd = 0.0;                   ///< of the noise of an effort, as declared, N·m
   double angle_sd = 0.0;                    ///< of the noise of an angle, rad
 
   [[nodiscard]] detector::ThresholdRule rule(
@@ -53,6 +54,20 @@ struct Subject {
 
 /// A fault-free drive: trajectory and, where they are uncertain, parameters are those of the seed.
 [[nodiscard]] Scenario make_drive(const Subject& subject, Driving driving, std::uint64_t seed, double duration);
+
+/// Drives in which a robot breaks, still without a fault: `count` for each class of driving, one class after the other.
+[[nodiscard]] std::array<std::vector<testing_support::FaultyRun>, kDriving.size()> make_runs(const Subject& subject,
+                                                                                             std::uint64_t robot,
+                                                                                             std::size_t count);
+
+/// Fault-free logs of about `samples` samples in all: varied driving, other drives than those that are judged.
+[[nodiscard]] std::vector<LogTable> usual_logs(const Subject& subject, std::uint64_t robot, double samples);
+
+/// Seed of a drive of a robot.
+[[nodiscard]] std::uint64_t drive_seed(std::uint64_t robot, Driving driving, std::uint64_t number);
+
+/// s after the onset in which a fault counts as seen.
+inline constexpr double kPatience = 5.0;
 
 /// A fault that is tried: with its simulated counterpart.
 struct TriedFault {

@@ -126,6 +126,11 @@ class Innovations final : public Statistic {
     }
     values[0] = sum_;
   }
+  /// √(χ²) is nearly Gaussian about the root of its mean.
+  [[nodiscard]] double with_margin(double largest, double margin) const override {
+    const double mean = std::sqrt(static_cast<double>(kOutputs * last_.size())), root = std::sqrt(largest);
+    return root > mean ? std::pow(mean + margin * (root - mean), 2) : margin * largest;
+  }
 
  private:
   std::array<AxisFilter, kOutputs> axes_;

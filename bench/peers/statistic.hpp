@@ -17,6 +17,7 @@ inline constexpr std::size_t kOutputs = 2;
 /// One row of the log and what the filter made of it: all detectors see the same.
 struct Observation {
   double t = 0.0;                                    ///< s
+  std::span<const double> sample{};                  ///< the row as logged, in the order of the measurement's columns
   std::array<double, kOutputs> position{};           ///< of the coordinates, from the wheel angles as logged, m, rad
   std::array<double, kOutputs> effort{};             ///< left side of (15) as logged, N·m, N·m²
   bool valid = false;                                ///< whether there is a filtered row
@@ -35,6 +36,8 @@ class Statistic {
   virtual void restart() = 0;
   /// Takes the next row of the log and writes size() values >= 0; zeros while there is nothing to say.
   virtual void step(const Observation& now, std::span<double> values) = 0;
+  /// The limit that is `margin` (>= 1) times as far out as `largest`, in standard deviations of a Gaussian residual.
+  [[nodiscard]] virtual double with_margin(double largest, double margin) const { return margin * largest; }
 };
 
 }  // namespace wheelwright::peers
