@@ -206,7 +206,7 @@ void gather(LogSource& log, std::vector<Piece>& pieces) {
 }
 
 // " by 3.1 to 5.2 %": outward, to three digits of the larger end.
-std::string size_words(const Interval& magnitude, const detector::FaultType& fault) {
+std::string size_words(const Interval& magnitude, const model::FaultType& fault) {
   const bool share = fault.unit == "1";
   const double factor = share ? 100.0 : 1.0;
   const double low = factor * magnitude.lower, high = factor * magnitude.upper;

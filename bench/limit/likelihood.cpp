@@ -52,7 +52,7 @@ double upper_quantile(double risk) {
 
 double likelihood_limit(const Model& model, const filter::Measurement& measurement,
                         const filter::SensorErrors& deviations, const Eigen::VectorXd& theta,
-                        const detector::ReferenceMotion& motion, const detector::FaultType& fault, double side,
+                        const detector::ReferenceMotion& motion, const model::FaultType& fault, double side,
                         std::size_t onset, const LikelihoodQuestion& question) {
   check::that(side == 1.0 || side == -1.0, "side", "1 or −1");
   check::that(onset < motion.instants(), "onset", "an instant of the motion");

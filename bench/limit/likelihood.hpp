@@ -20,7 +20,7 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/detector/fault_type.hpp>
+#include <wheelwright/model/fault_type.hpp>
 #include <wheelwright/detector/reference_motion.hpp>
 #include <wheelwright/filter/measurement.hpp>
 #include <wheelwright/filter/noise.hpp>
@@ -43,7 +43,7 @@ struct LikelihoodQuestion {
 /// deviations: of angles also where the log has mean speeds. Throws InvalidArgument as raw_equations() does.
 [[nodiscard]] double likelihood_limit(const Model& model, const filter::Measurement& measurement,
                                       const filter::SensorErrors& deviations, const Eigen::VectorXd& theta,
-                                      const detector::ReferenceMotion& motion, const detector::FaultType& fault,
+                                      const detector::ReferenceMotion& motion, const model::FaultType& fault,
                                       double side, std::size_t onset, const LikelihoodQuestion& question = {});
 
 }  // namespace wheelwright::bench

@@ -46,14 +46,14 @@ struct Viscous {
     motion = detector::read_reference(log, RegressorFilter(model, {}, measurement));
   }
 
-  [[nodiscard]] double limit(const detector::FaultType& fault, double side, double speed, double effort) const {
+  [[nodiscard]] double limit(const model::FaultType& fault, double side, double speed, double effort) const {
     return likelihood_limit(model, measurement, {.motion = speed, .effort = effort},
                             Eigen::VectorXd::Constant(1, kTheta), motion, fault, side, 10, kQuestion);
   }
 };
 
-const detector::FaultType kBias{.name = "bias", .range = {-10.0, 10.0}, .offset = Eigen::VectorXd::Ones(1)};
-const detector::FaultType kGain{.name = "gain", .range = {-0.9, 10.0}, .effort = Eigen::MatrixXd::Ones(1, 1)};
+const model::FaultType kBias{.name = "bias", .range = {-10.0, 10.0}, .offset = Eigen::VectorXd::Ones(1)};
+const model::FaultType kGain{.name = "gain", .range = {-0.9, 10.0}, .effort = Eigen::MatrixXd::Ones(1, 1)};
 
 TEST(Likelihood, QuantileIsThatOfANormalVariable) {
   EXPECT_NEAR(upper_quantile(0.15865525393145707), 1.0, 1e-12);
@@ -90,7 +90,7 @@ TEST(Likelihood, ErrorsOfTheMotionHideMoreAndAllScaleTogether) {
 
 TEST(Likelihood, NothingIsSeenBeyondTheRange) {
   const Viscous drive;
-  detector::FaultType small = kBias;
+  model::FaultType small = kBias;
   small.range = {-1e-3, 1e-3};
   EXPECT_TRUE(std::isinf(drive.limit(small, 1.0, 0.0, kEffort)));
 }
