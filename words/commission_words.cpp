@@ -323,7 +323,8 @@ std::string at_risk(const Commissioning& result) {
     return {};
   }
   if (!result.at_risk || !result.at_risk->set) {
-    return fmt::format("Nothing is said at a stated risk, the other answer stands alone: {}.", assumption->detail);
+    return fmt::format("Nothing is said at a stated risk, the {} answer stands alone: {}.",
+                       core::warrant_word(commission::interval_warrant(result)), assumption->detail);
   }
   std::vector<std::string> items;
   for (const ParameterViews& views : parameter_views(result)) {

@@ -175,7 +175,7 @@ std::vector<Tampering> tamperings() {
   });
   add("smaller_part", "ellipsoid 1 takes 1e-11 of the risk",
       [](Json&, Json& r) { r["ellipsoids"][1]["risk"] = 1e-11; });
-  add("larger_part", "the risks of its 4 ellipsoids add up to", [](Json&, Json& r) {
+  add("larger_part", "the risks of its 12 ellipsoids add up to", [](Json&, Json& r) {
     Json& risk = r["ellipsoids"][2]["risk"];
     risk = risk.get<double>() * (1.0 + 1e-9);
   });
@@ -300,7 +300,7 @@ TEST_F(CheckAtRisk, SaysWhatIsProvedAndWhatIsTakenOnTrust) {
   const ModelClaims claims = claims_from_json(made_->model, "model.json");
   EXPECT_THAT(risk_verdict(*result.at_risk, *claims.at_risk),
               AllOf(HasSubstr("at a risk of 1e-09: all 4 bounds and "), HasSubstr(" sums over the log"),
-                    HasSubstr("the risks of all 4 ellipsoids add up to 1e-09")));
+                    HasSubstr("the risks of all 12 ellipsoids add up to 1e-09")));
   EXPECT_THAT(result.premises,
               ::testing::Contains(AllOf(HasSubstr("at a risk of 1e-09: that errors are as the robot "
                                                   "file says"),
@@ -308,7 +308,7 @@ TEST_F(CheckAtRisk, SaysWhatIsProvedAndWhatIsTakenOnTrust) {
   const Json json = to_json(result, claims, logs::LogReport{}, {"model.json", {"log.csv"}}, "test");
   EXPECT_TRUE(json.at("at_risk").at("proved").get<bool>());
   EXPECT_EQ(json.at("at_risk").at("spent"), 1e-9);
-  EXPECT_EQ(json.at("at_risk").at("ellipsoids"), 4);
+  EXPECT_EQ(json.at("at_risk").at("ellipsoids"), 12);
 }
 
 // Equal parts, as doubles: seven of the double next to a seventh may be more than the whole.
@@ -325,7 +325,7 @@ TEST_F(CheckAtRisk, PartsOfARiskDoNotAddUpToMore) {
                .ellipsoids) {
         parts.push_back(e.risk);
       }
-      ASSERT_EQ(parts.size(), count);
+      ASSERT_EQ(parts.size(), 3 * count);  // an ellipsoid at each of three scales of V0
       EXPECT_LE(bounds::exact_sum(parts), risk) << count;
       EXPECT_GT(bounds::exact_sum(parts), risk * (1.0 - 1e-15)) << count;
     }
@@ -352,7 +352,7 @@ TEST_F(CheckAtRisk, WithoutItsProofIsBadInput) {
                 m["at_risk"]["feasible_set"]["origin"][0] = {{"facet", 999}};
               }),
               HasSubstr("rows of feasible_set.A"));
-  EXPECT_THAT(message([](Json& m) { m["at_risk"]["sums"][0]["ellipsoid"] = 4; }), HasSubstr("at_risk.ellipsoids"));
+  EXPECT_THAT(message([](Json& m) { m["at_risk"]["sums"][0]["ellipsoid"] = 12; }), HasSubstr("at_risk.ellipsoids"));
   EXPECT_THAT(message([](Json& m) { m["at_risk"]["sums"][0]["weights"] = {1.0}; }), HasSubstr("an array of 2 numbers"));
   EXPECT_THAT(message([](Json& m) { m["at_risk"]["binding"].erase(0); }), HasSubstr("/at_risk/binding"));
 }
