@@ -346,13 +346,13 @@ class Writer {
           "\n/* Group {} of parameters: the {} vertices of its feasible set, and where their edges lead (pfx_follow). "
           "*/",
           g, graph.vertices());
-      line("static const unsigned char pfx_index{}{}[{}] = {};", name, g, q,
+      line("static const unsigned char pfx_{}index{}[{}] = {};", name, g, q,
            list(q, [&](std::size_t k) { return std::to_string(graph.parameters[k]); }));
-      line("static const double pfx_half{}{}[{}] = {};", name, g, q,
+      line("static const double pfx_{}half{}[{}] = {};", name, g, q,
            list(q, [&](std::size_t k) { return hex(graph.half[k]); }));
-      line("static const unsigned short pfx_next{}{}[{}] = {};", name, g, graph.neighbours.size(),
+      line("static const unsigned short pfx_{}next{}[{}] = {};", name, g, graph.neighbours.size(),
            list(graph.neighbours.size(), [&](std::size_t k) { return std::to_string(graph.neighbours[k]); }));
-      line("static const double pfx_vertices{}{}[{}] = {{", name, g, graph.numbers.size());
+      line("static const double pfx_{}vertices{}[{}] = {{", name, g, graph.numbers.size());
       for (std::size_t v = 0; v < graph.vertices(); ++v) {
         std::string row = list(stride, [&](std::size_t k) { return hex(graph.numbers[v * stride + k]); });
         line(" {},", std::string_view(row).substr(1, row.size() - 2));
