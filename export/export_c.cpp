@@ -230,7 +230,8 @@ class Writer {
     line(
         " * C99, or C++17 for its hexadecimal numbers. No heap, no mutable static data, no recursion, bounded work; a "
         "state");
-    line(" * belongs to one thread at a time. Of libm: {}{}.", written_.libm_words(), sums_ ? "; expm1, log1p, sqrt" : "");
+    line(" * belongs to one thread at a time. Of libm: {}{}.", written_.libm_words(),
+         sums_ ? "; expm1, log1p, sqrt" : "");
     line(
         " * Every operation is that of the C++ library, in the same order: compiled with -ffp-contract=off (gcc "
         "otherwise");

@@ -259,8 +259,7 @@ std::string FilterWriter::types() const {
            split_ ? ", rising[PFX_CHANNELS]" : "", split_ ? ", rise from 0 to 1" : " (and rise)");
   out.line_if(mobile_, "  double effort[PFX_CHANNELS]; /* its largest size */");
   out.line_if(change_, "  double change[PFX_CHANNELS]; /* half the range of efforts in the step */");
-  out.put(
-      "} pfx_span;\n\n/* What samples were so far. */\ntypedef struct pfx_elements {\n");
+  out.put("} pfx_span;\n\n/* What samples were so far. */\ntypedef struct pfx_elements {\n");
   out.line("  int samples, instants; /* samples, and instants of the recursion, in this segment: counted up to 3 */");
   out.line("  int began; /* with the last sample a segment's first step is known */");
   if (nodes_) {
@@ -274,7 +273,7 @@ std::string FilterWriter::types() const {
   out.line("  pfx_span span[2];               /* the last two steps; which of them is the last */");
   out.line("  int newest;");
   out.put(
-      "} pfx_elements;\n\n/* The equation of motion times a weight, integrated: a hat at a sample, or the mean of a step. "
+      "} pfx_elements;\n\n/* The equation of motion times a weight, integrated: a hat at a sample, or a whole step. "
       "*/\ntypedef struct pfx_element {\n");
   out.line("  double t, length, before, step; /* s: its instant, integral of the weight, steps around it */");
   out.line_if(viscous_, "  double motion[PFX_COORDINATES]; /* of the speeds */");
@@ -284,8 +283,9 @@ std::string FilterWriter::types() const {
               sums_ && nodes_ ? ", motion_doubt_before[PFX_COORDINATES]" : "");
   out.line_if(!functions_.empty(), "  double term[{0}], term_error[{0}]; /* functions of the motion */",
               functions_.size());
-  out.put("} pfx_element;\n\n/* What the recursion remembers: zeros at the start of a segment. */\ntypedef struct "
-          "pfx_memory {\n");
+  out.put(
+      "} pfx_element;\n\n/* What the recursion remembers: zeros at the start of a segment. */\ntypedef struct "
+      "pfx_memory {\n");
   out.line_if(viscous_, "  pfx_cascade motion[PFX_COORDINATES]; /* driven by the speeds */");
   out.line_if(inertial_, "  pfx_cascade slope[PFX_COORDINATES]; /* driven by their derivatives */");
   out.line("  pfx_cascade torque[PFX_CHANNELS];");
@@ -820,8 +820,7 @@ void FilterWriter::make_hat(Text& out) const {
   out.line("  }}");
   out.line("  for (i = 0; i < PFX_CHANNELS; ++i) {{");
   out.line("    e->torque[i] = before * last->{}[i] + h * p->falling[i]{};", rising, curved ? " - curve[i]" : "");
-  out.line_if(doubted_ && !linear_,
-              "    e->torque_doubt[i] = 0.5 * (before * last->change[i] + h * p->change[i]);");
+  out.line_if(doubted_ && !linear_, "    e->torque_doubt[i] = 0.5 * (before * last->change[i] + h * p->change[i]);");
   out.line("  }}");
   if (!functions_.empty()) {
     out.line("  for (i = 0; i < {}; ++i) {{", functions_.size());
@@ -1110,7 +1109,7 @@ std::string FilterWriter::regressor() const {
   for (const Term& term : model_.terms) {
     const bool own = term.kind == Term::Kind::function;
     out.line("  y[{}][{}] += {}e->{}[{}]; /* {} */", term.output, term.parameter, own ? "" : times(term.scale),
-             own                                    ? "term"
+             own                                     ? "term"
              : term.kind == Term::Kind::acceleration ? "slope"
                                                      : "motion",
              own ? function++ : term.coordinate, plain(model_.parameters[term.parameter].name));

@@ -193,10 +193,12 @@ SumsWriter::SumsWriter(const detector::ScaleDetector& sums, const FilterWriter& 
 
 std::string SumsWriter::words() const {
   std::string text;
-  text += line(" * The detector at a stated risk stands beside that one: sums of what the model leaves, over {} scales of {:g} to",
-               risk_.scales.size(), risk_.scales.front());
-  text += line(" * {:g} s, where errors of the efforts average out. Expected number of false alarms in a second: {:.3g}.",
-               risk_.scales.back(), sums_.options().false_alarms);
+  text += line(
+      " * Beside that one there is the detector at a stated risk: sums of what the model leaves, over {} scales of",
+      risk_.scales.size());
+  text += line(
+      " * {:g} to {:g} s, where errors of efforts average out. It is expected to raise {:.3g} false alarms a second.",
+      risk_.scales.front(), risk_.scales.back(), sums_.options().false_alarms);
   text += line(" * It asks for a state of its own, and is used alike, with the same samples:");
   text += line(" *");
   text += line(" *   pfx_sums sums;");
@@ -283,7 +285,7 @@ typedef struct pfx_sums {
   pfx_waiting waiting[PFX_WAITING];
   double stage[PFX_STAGES][PFX_CHANNELS][PFX_PARAMETERS], foreseen[PFX_CHANNELS][PFX_PARAMETERS];
   double g[PFX_CHANNELS][PFX_SUMS], g1[PFX_CHANNELS][PFX_SUMS]; /* weights of the last two elements */
-  double c[PFX_CHANNELS][PFX_SUMS], c1[PFX_CHANNELS][PFX_SUMS], c2[PFX_CHANNELS][PFX_SUMS]; /* and of errors of slopes */
+  double c[PFX_CHANNELS][PFX_SUMS], c1[PFX_CHANNELS][PFX_SUMS], c2[PFX_CHANNELS][PFX_SUMS]; /* and of slopes */
   double efforts1[PFX_SUMS];                /* squares of the weights of efforts, of the element before */
   double steps[4];                          /* the newest last, s */
   pfx_scale scale[PFX_SCALES];
@@ -300,7 +302,8 @@ typedef struct pfx_sums {
 
 std::string SumsWriter::tables() const {
   const Eigen::VectorXd& theta = sums_.rule().estimate();
-  std::string text = "\n/* Numbers of the sums: scales (s), risk of each look, parameters, and what errors are multiplied by. */\n";
+  std::string text =
+      "\n/* Numbers of the sums: scales (s), risk of a look, parameters, what errors are multiplied by. */\n";
   text += line("static const double pfx_scale_time[PFX_SCALES] = {};", numbers_of(risk_.scales));
   text += line("static const double pfx_log_risk[PFX_SCALES] = {};", numbers_of(constants_.risk));
   if (varied_) {
@@ -360,9 +363,7 @@ std::string SumsWriter::worst() const {
   const bool nodes = elements_.nodes();
   const double effort = constants_.averages ? risk_.errors.effort.bias : risk_.errors.effort.bound;
   std::string text;
-  const auto each = [&](const std::string& body) {
-    text += "  for (w = 0; w < PFX_SUMS; ++w) {\n" + body + "  }\n";
-  };
+  const auto each = [&](const std::string& body) { text += "  for (w = 0; w < PFX_SUMS; ++w) {\n" + body + "  }\n"; };
   each(fmt::format("    straight[w] = {} * fabs(residual[w]);\n    turning[w] = efforts[w] = 0.0;\n", hex(kRoundings)));
   text += "  for (j = 0; j < PFX_PARAMETERS; ++j) {\n    for (w = 0; w < PFX_SUMS; ++w) {\n";
   text += "      straight[w] += pfx_rounded[j] * fabs(rows[j][w]);\n    }\n  }\n";
@@ -383,9 +384,10 @@ std::string SumsWriter::worst() const {
     }
   }
   const auto bent = [&](std::size_t i) {
-    each(fmt::format("    straight[w] += by * fabs(s->g[{0}][w] - s->g1[{0}][w]);\n"
-                     "    turning[w] += by * fabs(s->g1[{0}][w]);\n",
-                     i));
+    each(
+        fmt::format("    straight[w] += by * fabs(s->g[{0}][w] - s->g1[{0}][w]);\n"
+                    "    turning[w] += by * fabs(s->g1[{0}][w]);\n",
+                    i));
   };
   std::size_t function = 0;
   for (const Term& term : model_.terms) {
@@ -404,8 +406,7 @@ std::string SumsWriter::worst() const {
   }
   if (nodes) {
     for (std::size_t i = 0; i < model_.n(); ++i) {
-      text += line("  by = {};",
-                   hex(constants_.speed_gain[static_cast<Eigen::Index>(i)] * risk_.errors.motion.bound));
+      text += line("  by = {};", hex(constants_.speed_gain[static_cast<Eigen::Index>(i)] * risk_.errors.motion.bound));
       bent(i);
     }
   }
@@ -415,8 +416,7 @@ std::string SumsWriter::worst() const {
 std::string SumsWriter::take() const {
   const bool nodes = elements_.nodes();
   const filter::SampleClass& effort = constants_.effort;
-  const double least =
-      varied_ ? effort.multiplicity * effort.deviation * effort.deviation : constants_.square;
+  const double least = varied_ ? effort.multiplicity * effort.deviation * effort.deviation : constants_.square;
   std::string text = R"(
 /* Adds the newest element to all sums. */
 static inline void pfx_sums_take(pfx_sums *s, const pfx_element *e)

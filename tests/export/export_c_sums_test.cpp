@@ -115,9 +115,9 @@ int sums_step(double t, const double *sample, double *out) {
   return s.looks;
 }
 )");
-    const std::string command = fmt::format("cc {} -O2 -shared -fPIC -o '{}' '{}' -lm 2> '{}'", testing_support::kStrictC,
-                                            (folder / "robot.so").string(), (folder / "robot.c").string(),
-                                            (folder / "words").string());
+    const std::string command =
+        fmt::format("cc {} -O2 -shared -fPIC -o '{}' '{}' -lm 2> '{}'", testing_support::kStrictC,
+                    (folder / "robot.so").string(), (folder / "robot.c").string(), (folder / "words").string());
     if (std::system(command.c_str()) != 0) {
       std::ifstream words(folder / "words");
       ADD_FAILURE() << command << '\n' << std::string(std::istreambuf_iterator<char>(words), {});
@@ -152,8 +152,8 @@ int sums_step(double t, const double *sample, double *out) {
     last_ = t;
     const bool looked = ours_.step(t, sample);
     const auto count = static_cast<std::size_t>(step_(t, sample.data(), out_.data()));
-    bool equal = count == ours_.looks().size() && out_[0] == (looked ? 1.0 : 0.0) &&
-                 out_[1] == (ours_.alarm() ? 1.0 : 0.0);
+    bool equal =
+        count == ours_.looks().size() && out_[0] == (looked ? 1.0 : 0.0) && out_[1] == (ours_.alarm() ? 1.0 : 0.0);
     for (std::size_t k = 0; equal && k < count; ++k) {
       const detector::SumState& a = ours_.looks()[k];
       const double mine[7] = {double(a.weight), double(a.scale), a.value, a.threshold, a.excess, a.c0, a.c1};
