@@ -75,12 +75,15 @@ int run(const Arguments& a) {
   OnlineModel model = read_model(a.model);
   model.persistence = a.persistence.value_or(model.persistence);
   const Detector detector = make_detector(model, a.detector);
-  const std::string text = exporter::c_header(
-      detector,
-      {.name = a.name,
-       .robot = model.robot.name,
-       .source = fmt::format("{}, thresholds {}", a.model.filename().string(), core::warrant_word(model.warrant)),
-       .software = results::software()});
+  const exporter::CExportOptions options{
+      .name = a.name,
+      .robot = model.robot.name,
+      .source = fmt::format("{}, thresholds {}", a.model.filename().string(), core::warrant_word(model.warrant)),
+      .software = results::software()};
+  const std::string text =
+      model.at_risk
+          ? exporter::c_header(detector, exporter::scale_detector_for_c(model, {.set = a.detector.set}), options)
+          : exporter::c_header(detector, options);
   std::string file;
   if (!a.common.out.empty()) {
     make_directory(a.common);

@@ -45,6 +45,27 @@ Eigen::MatrixXd largest_root(const Eigen::MatrixXd& middle, const Eigen::MatrixX
   return pairs.values.cwiseMax(0.0).cwiseSqrt().asDiagonal() * pairs.vectors.transpose();
 }
 
+// a · b, from the first element to the last: the same digits in every language and build (export/export_c_sums.hpp).
+template <typename A, typename B>
+double dot_in_order(const A& a, const B& b) {
+  double sum = a[0] * b[0];
+  for (Eigen::Index k = 1; k < a.size(); ++k) {
+    sum += a[k] * b[k];
+  }
+  return sum;
+}
+
+// left · right, each sum in that order.
+template <typename Right, typename Result>
+void multiply_in_order(const Eigen::ArrayXXd& left, const Right& right, Result& result) {
+  for (Eigen::Index j = 0; j < right.cols(); ++j) {
+    result.col(j) = right(0, j) * left.col(0);
+    for (Eigen::Index k = 1; k < left.cols(); ++k) {
+      result.col(j) += right(k, j) * left.col(k);
+    }
+  }
+}
+
 }  // namespace
 
 double averaged_radius(double V, double V0, double L, double reach) {
@@ -79,7 +100,7 @@ ScaleDetector::ScaleDetector(const OnlineModel& model, ScaleDetectorOptions opti
                 std::max(model.at_risk->errors.effort.correlation, model.at_risk->errors.motion.correlation)),
       risk_(*model.at_risk),
       options_(options),
-      rule_(Polytope(risk_.facets, risk_.box), model.estimate),
+      rule_(Polytope(risk_.facets, risk_.box), model.estimate, options.set),
       weights_(sum_weights(model.model)) {
   check::positive(options_.false_alarms, "rate of false alarms");
   check::positive(options_.checks, "checks of a sum in its scale");
@@ -174,7 +195,9 @@ void ScaleDetector::weigh() {
   c1_.swap(c_);
   const core::RowMatrix& foreseen = foreseen_.value();
   const Eigen::VectorXd& theta = rule_.estimate();
-  torque_.noalias() = foreseen * theta;
+  for (Eigen::Index o = 0; o < torque_.size(); ++o) {
+    torque_[o] = dot_in_order(foreseen.row(o), theta);
+  }
   const double share = std::min((elements_.element().t - elements_.first_instant()) / kRise, 1.0);
   const double rise = share * share * (3.0 - 2.0 * share);
   for (std::size_t w = 0; w < weights_.size(); ++w) {
@@ -182,16 +205,16 @@ void ScaleDetector::weigh() {
     switch (weights_[w].shape) {
       case SumWeight::Shape::constant: g_.row(i) = rise * to_joints_.row(which).array(); break;
       case SumWeight::Shape::effort:
-        g_.row(i) = to_joints_.row(which).dot(torque_) * to_joints_.row(which).array();
+        g_.row(i) = dot_in_order(to_joints_.row(which), torque_) * to_joints_.row(which).array();
         break;
       case SumWeight::Shape::parameter:
         for (Eigen::Index o = 0; o < g_.cols(); ++o) {
-          g_(i, o) = theta[which] * inverse_.row(o).dot(foreseen.col(which));
+          g_(i, o) = theta[which] * dot_in_order(inverse_.row(o), foreseen.col(which));
         }
         break;
     }
   }
-  c_.matrix().noalias() = g_.matrix() * slope_gain_.transpose();
+  multiply_in_order(g_, slope_gain_.transpose(), c_);
 }
 
 void ScaleDetector::take() {
@@ -199,9 +222,9 @@ void ScaleDetector::take() {
   const filter::WeakElement& e = elements_.element();
   const bool angles = elements_.angles();
   filter::element_regressor(elements_, e, Y_);
-  rows_.matrix().noalias() = g_.matrix() * Y_;
-  residual_.matrix().noalias() = g_.matrix() * e.torque;
-  joint_g_.matrix().noalias() = g_.matrix() * m.input;
+  multiply_in_order(g_, Y_, rows_);
+  multiply_in_order(g_, e.torque, residual_);
+  multiply_in_order(g_, m.input, joint_g_);
 
   // At worst: what stands beside the sum for certain, in units of K.
   straight_ = kRoundings * residual_.abs();
@@ -248,7 +271,7 @@ void ScaleDetector::take() {
     const auto i = static_cast<Eigen::Index>(w), which = static_cast<Eigen::Index>(weights_[w].which);
     switch (weights_[w].shape) {
       case SumWeight::Shape::constant: response_[i] = joint_g_(i, which) * e.length; break;
-      case SumWeight::Shape::effort: response_[i] = joint_g_(i, which) * to_joints_.row(which).dot(e.torque); break;
+      case SumWeight::Shape::effort: response_[i] = joint_g_(i, which) * dot_in_order(to_joints_.row(which), e.torque); break;
       case SumWeight::Shape::parameter: response_[i] = rows_(i, which) * rule_.estimate()[which]; break;
     }
   }
@@ -319,7 +342,7 @@ void ScaleDetector::look(Scale& s, std::size_t which) {
       direction_[q] = s.Y0(i, static_cast<Eigen::Index>(q));
       predicted += direction_[q] * rule_.estimate()[static_cast<Eigen::Index>(q)];
     }
-    const double newest = last * last * c1_.row(i).square().sum();
+    const double newest = last * last * dot_in_order(c1_.row(i), c1_.row(i));
     const double angles =
         risk_.errors.motion.bound * std::sqrt(joints * (s.samples + 2.0) * (std::max(s.u0[i], 0.0) + newest));
     const double usual = risk_.usual(i, static_cast<Eigen::Index>(which)), V = std::max(s.v0[i], 0.0);
@@ -366,6 +389,17 @@ bool ScaleDetector::step(double t, std::span<const double> sample) {
     }
   }
   return looked_ > 0;
+}
+
+SumConstants ScaleDetector::constants() const {
+  SumConstants c{largest_, half_, inverse_, to_joints_, slope_gain_, speed_gain_, effort_, averages_, square_};
+  c.kernel_reach.resize(static_cast<Eigen::Index>(weights_.size()), static_cast<Eigen::Index>(states_.size()));
+  for (std::size_t k = 0; k < states_.size(); ++k) {
+    c.risk.push_back(states_[k].risk);
+    c.reach.push_back(reach_of(states_[k].risk));
+    c.kernel_reach.col(static_cast<Eigen::Index>(k)) = states_[k].reach.matrix();
+  }
+  return c;
 }
 
 Eigen::MatrixXd ScaleDetector::variances() const {

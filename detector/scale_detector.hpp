@@ -42,6 +42,7 @@ struct ScaleDetectorOptions {
   double false_alarms = 1.0 / (10.0 * 365.25 * 86400.0);
   double checks = 8.0;            ///< of a sum, in the time of its scale
   bool exact_thresholds = false;  ///< those of sums that are far inside, too, by the set instead of its box
+  ParameterSetKind set = ParameterSetKind::polytope;  ///< which θ explain a sum
 };
 
 /// A sum that stands where no healthy robot's could, or how near it comes.
@@ -56,6 +57,21 @@ struct SumState {
   double c0 = 0.0, c1 = 0.0;
   double radius = 0.0;    ///< what errors alone can do: the threshold's part that does not depend on the set
   double averaged = 0.0;  ///< the part of `radius` that errors have which average out
+};
+
+/// Numbers of a ScaleDetector that do not change from sample to sample, for its form in C (export/export_c.hpp).
+struct SumConstants {
+  Eigen::VectorXd largest, half;   ///< p: |θ| at most, sides of the set's box from θ̂ on
+  Eigen::MatrixXd inverse;         ///< n × n: (N Nᵀ)⁻¹, N the model's input
+  Eigen::MatrixXd to_joints;       ///< joints × n: N⁺
+  Eigen::MatrixXd slope_gain;      ///< n × n: what θ makes of errors of the joints' slopes, as a bound on its square
+  Eigen::VectorXd speed_gain;      ///< n: the most that θ makes of errors of all joints' speeds
+  filter::SampleClass effort{};    ///< one effort
+  bool averages = false;           ///< whether its errors do
+  double square = 0.0;             ///< its variance proxy for every λ
+  std::vector<double> risk{};      ///< L of each scale
+  std::vector<double> reach{};     ///< of averaged_radius(), for each scale
+  Eigen::MatrixXd kernel_reach{};  ///< weights × scales: Λ times the most that a kernel is
 };
 
 /// Sums over scales T, with weights w(t) = K((now − t)/T) g(t), K(x) = x e^{−x}, g foreseen (PredictableRegressor), of
@@ -94,6 +110,12 @@ class ScaleDetector {
   [[nodiscard]] const filter::ElementFilter& elements() const { return elements_; }
   /// g of the newest element (weights × outputs).
   [[nodiscard]] const Eigen::ArrayXXd& element_weights() const { return g_; }
+  [[nodiscard]] const filter::PredictableRegressor& foreseen() const { return foreseen_; }
+  /// The set at a stated risk, and θ̂.
+  [[nodiscard]] const ThresholdRule& rule() const { return rule_; }
+  [[nodiscard]] const RiskModel& risk() const { return risk_; }
+  [[nodiscard]] const ScaleDetectorOptions& options() const { return options_; }
+  [[nodiscard]] SumConstants constants() const;
   /// V of every sum now (weights × scales).
   [[nodiscard]] Eigen::MatrixXd variances() const;
 

@@ -6,8 +6,10 @@
 #include <cctype>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -15,6 +17,7 @@
 #include <wheelwright/core/limits.hpp>
 #include <wheelwright/core/words.hpp>
 #include <wheelwright/export/export_c_filter.hpp>
+#include <wheelwright/export/export_c_sums.hpp>
 #include <wheelwright/export/export_c_text.hpp>
 
 namespace wheelwright::exporter {
@@ -53,20 +56,27 @@ std::string unit_of(const std::string& column) {
 /// Writes one header.
 class Writer {
  public:
-  Writer(const TorqueDetector& detector, const CExportOptions& options)
+  Writer(const TorqueDetector& detector, const detector::ScaleDetector* sums, const CExportOptions& options)
       : detector_(detector),
         options_(options),
         filter_(detector.filter()),
         model_(filter_.model()),
         measurement_(filter_.measurement()),
         rule_(detector.threshold()),
-        written_(filter_, thresholds()) {
+        written_(filter_, thresholds(), sums != nullptr),
+        risk_rule_(sums == nullptr ? nullptr : &sums->rule()) {
     check_name(options.name);
     if (thresholds() && rule_.kind() == detector::ParameterSetKind::polytope && !rule_.table()) {
       throw InputError(
           fmt::format("export: the feasible set has too many vertices for a table (more than {} in one group of "
                       "parameters, or it is too flat); export its box instead (--set box)",
                       bounds::SupportTableOptions{}.vertices));
+    }
+    if (risk_rule_ != nullptr && of_polytope(*risk_rule_) && !risk_rule_->table()) {
+      throw InputError("export: the set at a stated risk has too many vertices for a table; export its box instead");
+    }
+    if (sums != nullptr) {
+      sums_.emplace(*sums, written_);
     }
   }
 
@@ -81,26 +91,40 @@ class Writer {
     put("\n");
     put(written_.types());
     state();
+    if (sums_) {
+      put(sums_->types());
+    }
     if (thresholds()) {
       tables();
     }
+    if (sums_) {
+      put("\n/* Interval hull of the set at a stated risk. */\n");
+      hull("risk_", *risk_rule_);
+      graphs("risk_", *risk_rule_);
+      put(sums_->tables());
+    }
     put(written_.functions());
-    if (thresholds()) {
+    if (thresholds() || sums_) {
       put("\n");
       put(c_text::kHull);
-      if (polytope()) {
-        if (!rule_.table()->graphs().empty()) {
-          put("\n");
-          put(c_text::kFollow);
-        }
-      }
-      support();
+    }
+    if (followed()) {
+      put("\n");
+      put(c_text::kFollow);
+    }
+    if (thresholds()) {
+      support("", "state", rule_);
       put("\n");
       put(c_text::kThreshold);
     }
     put("\n");
     put(c_text::kPersistence);
     interface();
+    if (sums_) {
+      put("\n/* ---- The detector at a stated risk ---- */\n");
+      support("risk_", "sums", *risk_rule_);
+      put(sums_->functions());
+    }
     put("\n#ifdef __cplusplus\n}\n#endif\n\n#endif\n");
     std::string upper = options_.name;
     for (char& c : upper) {
@@ -119,7 +143,28 @@ class Writer {
   }
 
   [[nodiscard]] bool thresholds() const { return !detector_.options().mu; }
-  [[nodiscard]] bool polytope() const { return rule_.kind() == detector::ParameterSetKind::polytope; }
+  [[nodiscard]] static bool of_polytope(const detector::ThresholdRule& rule) {
+    return rule.kind() == detector::ParameterSetKind::polytope;
+  }
+  [[nodiscard]] static bool has_graphs(const detector::ThresholdRule& rule) {
+    return of_polytope(rule) && !rule.table()->graphs().empty();
+  }
+  [[nodiscard]] bool polytope() const { return of_polytope(rule_); }
+  /// The sets that are looked at; whether one of them has a table.
+  [[nodiscard]] std::vector<const detector::ThresholdRule*> rules() const {
+    std::vector<const detector::ThresholdRule*> result;
+    if (thresholds()) {
+      result.push_back(&rule_);
+    }
+    if (sums_) {
+      result.push_back(risk_rule_);
+    }
+    return result;
+  }
+  [[nodiscard]] bool followed() const {
+    const auto all = rules();
+    return std::any_of(all.begin(), all.end(), [](const auto* rule) { return has_graphs(*rule); });
+  }
   [[nodiscard]] std::size_t slots() const { return std::min(2 * model_.n(), detector::ThresholdRule::kSlots); }
   [[nodiscard]] bool two_sided() const { return detector_.options().test == detector::Test::two_sided; }
   void comment() {
@@ -177,11 +222,16 @@ class Writer {
     if (measurement_.motion == MotionKind::mean_speed) {
       line(" * A decision is about the interval of the sample before, whose effort the last one has made known.");
     }
+    if (sums_) {
+      line(" *");
+      put(sums_->words());
+    }
     line(" *");
     line(
         " * C99, or C++17 for its hexadecimal numbers. No heap, no mutable static data, no recursion, bounded work; a "
         "state");
-    line(" * belongs to one thread at a time. Of libm: {}.", written_.libm_words());
+    line(" * belongs to one thread at a time. Of libm: {}{}.", written_.libm_words(),
+         sums_ ? "; expm1, log1p, sqrt" : "");
     line(
         " * Every operation is that of the C++ library, in the same order: compiled with -ffp-contract=off (gcc "
         "otherwise");
@@ -203,30 +253,50 @@ class Writer {
     line("#define PFX_PERSISTENCE_K {}", persistence.k);
     line("#define PFX_PERSISTENCE_N {}", persistence.n);
     line("#define PFX_PERSISTENCE_MASK 0x{:x}ULL", persistence.n == 64 ? ~0ULL : (1ULL << persistence.n) - 1);
-    if (!thresholds()) {
+    if (sums_) {
+      put(sums_->constants());
+      line("#define PFX_RISK_SLOTS {}", detector::ThresholdRule::kSlots);
+    }
+    if (thresholds()) {
+      line("#define PFX_SLOTS {}        /* directions that are followed from one sample to the next */", slots());
+      line("#define PFX_ROUNDING {} /* relative, of residual and threshold */",
+           hex(4.0 * (static_cast<double>(model_.p()) + 4.0) * core::kEpsilon));
+    }
+    set_constants();
+  }
+
+  /// Of all sets that are looked at.
+  void set_constants() {
+    const auto p = static_cast<double>(model_.p());
+    std::size_t groups = 0, largest = 1;
+    bool polytopes = false;
+    for (const detector::ThresholdRule* rule : rules()) {
+      polytopes = polytopes || of_polytope(*rule);
+      if (has_graphs(*rule)) {
+        for (const bounds::VertexGraph& graph : rule->table()->graphs()) {
+          largest = std::max(largest, graph.parameters.size());
+          ++groups;
+        }
+      }
+    }
+    if (rules().empty()) {
       return;
     }
-    const auto p = static_cast<double>(model_.p());
-    line("#define PFX_SLOTS {}        /* directions that are followed from one sample to the next */", slots());
-    line("#define PFX_ROUNDING {} /* relative, of residual and threshold */", hex(4.0 * (p + 4.0) * core::kEpsilon));
     line("#define PFX_HULL_ROUNDING {}", hex(4.0 * (p + 1.0) * core::kEpsilon));
     line("#define PFX_HULL_UNDERFLOW {}", hex(2.0 * p * std::numeric_limits<double>::min()));
-    if (polytope()) {
-      const auto& graphs = rule_.table()->graphs();
-      std::size_t largest = 1;
-      for (const bounds::VertexGraph& graph : graphs) {
-        largest = std::max(largest, graph.parameters.size());
-      }
+    if (polytopes) {
       line("#define PFX_SLACK {}", hex(1.0 + (p + 6.0) * core::kEpsilon));
       line("#define PFX_SUM {}", hex((p + 2.0) * core::kEpsilon));
       line("#define PFX_TINY {}", hex(std::numeric_limits<double>::min()));
-      if (!graphs.empty()) {
-        line("#define PFX_GROUPS {}       /* of parameters that bound each other */", graphs.size());
-        line("#define PFX_LARGEST_GROUP {}", largest);
-        line("#define PFX_EDGES {}       /* most edges walked for one direction and group */",
-             rule_.table()->options().budget);
-        line("#define PFX_TIGHT {}", hex(bounds::SupportTable::kTight));
+    }
+    if (groups > 0) {
+      if (thresholds() && has_graphs(rule_)) {
+        line("#define PFX_GROUPS {}       /* of parameters that bound each other */", rule_.table()->graphs().size());
       }
+      line("#define PFX_LARGEST_GROUP {}", largest);
+      line("#define PFX_EDGES {}       /* most edges walked for one direction and group */",
+           bounds::SupportTableOptions{}.budget);
+      line("#define PFX_TIGHT {}", hex(bounds::SupportTable::kTight));
     }
   }
 
@@ -235,7 +305,7 @@ class Writer {
     line("  int started; /* a sample was seen */");
     put(written_.state());
     line("  unsigned long long window[PFX_CHANNELS]; /* of the persistence */");
-    if (thresholds() && polytope() && !rule_.table()->graphs().empty()) {
+    if (thresholds() && has_graphs(rule_)) {
       line("  unsigned short place[PFX_GROUPS][PFX_SLOTS]; /* the vertex that was best last time */");
     }
     put("} pfx_state;\n");
@@ -247,19 +317,29 @@ class Writer {
     put("\n/* Parameters: estimate, and the interval hull of the feasible set. */\n");
     line("static const double pfx_estimate[PFX_PARAMETERS] = {};",
          list(p, [&](std::size_t j) { return hex(rule_.estimate()[static_cast<Eigen::Index>(j)]); }));
-    line("static const double pfx_lower[PFX_PARAMETERS] = {};",
-         list(p, [&](std::size_t j) { return hex(sides[j].lower); }));
-    line("static const double pfx_upper[PFX_PARAMETERS] = {};",
-         list(p, [&](std::size_t j) { return hex(sides[j].upper); }));
+    hull("", rule_);
     line("static const double pfx_largest[PFX_PARAMETERS] = {};",
          list(p, [&](std::size_t j) { return hex(std::max(std::abs(sides[j].lower), std::abs(sides[j].upper))); }));
     line("static const double pfx_sign[PFX_PARAMETERS] = {}; /* 0 where it is open */", list(p, [&](std::size_t j) {
            return std::string(sides[j].lower >= 0.0 ? "1.0" : sides[j].upper <= 0.0 ? "-1.0" : "0.0");
          }));
-    if (!polytope()) {
+    graphs("", rule_);
+  }
+
+  /// pfx_NAMElower and pfx_NAMEupper.
+  void hull(std::string_view name, const detector::ThresholdRule& rule) {
+    const auto& sides = rule.set().hull().sides;
+    line("static const double pfx_{}lower[PFX_PARAMETERS] = {};", name,
+         list(sides.size(), [&](std::size_t j) { return hex(sides[j].lower); }));
+    line("static const double pfx_{}upper[PFX_PARAMETERS] = {};", name,
+         list(sides.size(), [&](std::size_t j) { return hex(sides[j].upper); }));
+  }
+
+  void graphs(std::string_view name, const detector::ThresholdRule& rule) {
+    if (!of_polytope(rule)) {
       return;
     }
-    const auto& graphs = rule_.table()->graphs();
+    const auto& graphs = rule.table()->graphs();
     for (std::size_t g = 0; g < graphs.size(); ++g) {
       const bounds::VertexGraph& graph = graphs[g];
       const std::size_t q = graph.parameters.size(), stride = q * q + 4 * q;
@@ -267,13 +347,13 @@ class Writer {
           "\n/* Group {} of parameters: the {} vertices of its feasible set, and where their edges lead (pfx_follow). "
           "*/",
           g, graph.vertices());
-      line("static const unsigned char pfx_index{}[{}] = {};", g, q,
+      line("static const unsigned char pfx_{}index{}[{}] = {};", name, g, q,
            list(q, [&](std::size_t k) { return std::to_string(graph.parameters[k]); }));
-      line("static const double pfx_half{}[{}] = {};", g, q,
+      line("static const double pfx_{}half{}[{}] = {};", name, g, q,
            list(q, [&](std::size_t k) { return hex(graph.half[k]); }));
-      line("static const unsigned short pfx_next{}[{}] = {};", g, graph.neighbours.size(),
+      line("static const unsigned short pfx_{}next{}[{}] = {};", name, g, graph.neighbours.size(),
            list(graph.neighbours.size(), [&](std::size_t k) { return std::to_string(graph.neighbours[k]); }));
-      line("static const double pfx_vertices{}[{}] = {{", g, graph.numbers.size());
+      line("static const double pfx_{}vertices{}[{}] = {{", name, g, graph.numbers.size());
       for (std::size_t v = 0; v < graph.vertices(); ++v) {
         std::string row = list(stride, [&](std::size_t k) { return hex(graph.numbers[v * stride + k]); });
         line(" {},", std::string_view(row).substr(1, row.size() - 2));
@@ -282,35 +362,36 @@ class Writer {
     }
   }
 
-  void support() {
-    put("\n/* Largest a.theta over the feasible set, rounded outward; slot: which direction is followed. */\n"
-        "static inline double pfx_support(pfx_state *s, const double *a, int slot)\n{\n");
-    if (!polytope()) {
+  /// pfx_NAMEsupport, for the state pfx_STATE.
+  void support(std::string_view name, std::string_view state, const detector::ThresholdRule& rule) {
+    put("\n/* Largest a.theta over the set, rounded outward; slot: which direction is followed. */\n");
+    line("static inline double pfx_{}support(pfx_{} *s, const double *a, int slot)\n{{", name, state);
+    const std::string hull = fmt::format("pfx_support_of_hull(pfx_{0}lower, pfx_{0}upper, a)", name);
+    if (!of_polytope(rule)) {
       line("  (void)s;");
       line("  (void)slot;");
-      line("  return pfx_support_of_hull(a);");
+      line("  return {};", hull);
       put("}\n");
       return;
     }
-    const auto& graphs = rule_.table()->graphs();
-    line("  const double hull = pfx_support_of_hull(a);");
+    const auto& graphs = rule.table()->graphs();
+    line("  const double hull = {};", hull);
     line("  double value = 0.0, magnitude = 0.0, slack = 0.0, bound;");
     if (graphs.empty()) {
       line("  (void)s;");
       line("  (void)slot;");
     }
-    for (const std::size_t j : rule_.table()->singles()) {
+    for (const std::size_t j : rule.table()->singles()) {
       line("  {{");
-      line("    const double product = a[{0}] * (a[{0}] > 0.0 ? pfx_upper[{0}] : pfx_lower[{0}]);", j);
+      line("    const double product = a[{0}] * (a[{0}] > 0.0 ? pfx_{1}upper[{0}] : pfx_{1}lower[{0}]);", j, name);
       line("    value += product;");
       line("    magnitude += fabs(product);");
       line("  }}");
     }
     for (std::size_t g = 0; g < graphs.size(); ++g) {
-      line(
-          "  pfx_follow(pfx_vertices{0}, pfx_next{0}, pfx_index{0}, pfx_half{0}, {1}, a, &s->place[{0}][slot], &value,",
-          g, graphs[g].parameters.size());
-      line("             &magnitude, &slack);");
+      line("  pfx_follow(pfx_{1}vertices{0}, pfx_{1}next{0}, pfx_{1}index{0}, pfx_{1}half{0}, {2}, a,", g, name,
+           graphs[g].parameters.size());
+      line("             &s->place[{}][slot], &value, &magnitude, &slack);", g);
     }
     line("  bound = value + (slack * PFX_SLACK + (PFX_SUM * magnitude + PFX_TINY));");
     line("  return hull < bound ? hull : bound;");
@@ -323,7 +404,7 @@ class Writer {
         "static inline void pfx_restart(pfx_state *s)\n{\n");
     line("  int i;");
     line("  s->started = 0;");
-    line("  pfx_forget(s);");
+    line("  pfx_forget(&s->elements);");
     line("  for (i = 0; i < PFX_CHANNELS; ++i) {{");
     line("    s->window[i] = 0;");
     line("  }}");
@@ -338,8 +419,8 @@ class Writer {
       line("  double dy[PFX_CHANNELS][PFX_PARAMETERS], torque_error[PFX_CHANNELS];");
     }
     line("  int valid, i, j;");
-    line("  if (s->started && (!(t > s->sample[0].t){})) {{",
-         measurement_.nominal_step > 0.0 ? " || t - s->sample[0].t > PFX_GAP" : "");
+    line("  if (s->started && (!(t > s->elements.sample[0].t){})) {{",
+         measurement_.nominal_step > 0.0 ? " || t - s->elements.sample[0].t > PFX_GAP" : "");
     line("    pfx_restart(s);");
     line("  }}");
     line("  s->started = 1;");
@@ -396,13 +477,29 @@ class Writer {
   const Measurement& measurement_;
   const detector::ThresholdRule& rule_;
   const c_text::FilterWriter written_;
+  const detector::ThresholdRule* risk_rule_;
+  std::optional<c_text::SumsWriter> sums_{};
   std::string text_;
 };
 
 }  // namespace
 
 std::string c_header(const TorqueDetector& detector, const CExportOptions& options) {
-  return Writer(detector, options).text();
+  return Writer(detector, nullptr, options).text();
+}
+
+std::string c_header(const TorqueDetector& detector, const detector::ScaleDetector& sums,
+                     const CExportOptions& options) {
+  return Writer(detector, &sums, options).text();
+}
+
+detector::ScaleDetector scale_detector_for_c(const OnlineModel& model, detector::ScaleDetectorOptions options) {
+  detector::ScaleDetector result(model, options);
+  if (options.set == detector::ParameterSetKind::polytope && !result.rule().table()) {
+    options.set = detector::ParameterSetKind::box;
+    return detector::ScaleDetector(model, options);
+  }
+  return result;
 }
 
 }  // namespace wheelwright::exporter

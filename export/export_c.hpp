@@ -6,6 +6,7 @@
 #include <string>
 
 #include <wheelwright/detector/detector.hpp>
+#include <wheelwright/detector/scale_detector.hpp>
 
 namespace wheelwright::exporter {
 
@@ -27,5 +28,19 @@ struct CExportOptions {
 /// where effects correct the efforts, or efforts are late by a stated time; where a term of the model is a function
 /// that this file does not know as C; and where the set has more vertices than a table takes (SupportTable).
 [[nodiscard]] std::string c_header(const TorqueDetector& detector, const CExportOptions& options = {});
+
+/// The same with the detector at a stated risk beside it, as a state of its own (pfx_sums) with init, restart and step:
+/// each operation of ElementFilter and ScaleDetector, so that value, threshold and excess of all looks have the same
+/// bits as those of a ScaleDetector that is restarted where the C restarts itself (a time that does not increase, a gap
+/// of more than five steps). Of libm it calls expm1, log1p and sqrt, too. `sums` is of the same model, and counts as
+/// new. Throws as c_header() does, and InputError where the set has more vertices than a table takes:
+/// scale_detector_for_c() makes one whose set has not.
+[[nodiscard]] std::string c_header(const TorqueDetector& detector, const detector::ScaleDetector& sums,
+                                   const CExportOptions& options = {});
+
+/// The detector at a stated risk of `model`, with the box of its set where `options` say so, or the set has more
+/// vertices than a table takes. Throws as ScaleDetector.
+[[nodiscard]] detector::ScaleDetector scale_detector_for_c(const OnlineModel& model,
+                                                           detector::ScaleDetectorOptions options = {});
 
 }  // namespace wheelwright::exporter

@@ -99,7 +99,7 @@ class FilterWriter::Text {
   std::string text_;
 };
 
-FilterWriter::FilterWriter(const RegressorFilter& filter, bool bounds)
+FilterWriter::FilterWriter(const RegressorFilter& filter, bool bounds, bool sums)
     : filter_(filter),
       model_(filter.model()),
       measurement_(filter.measurement()),
@@ -127,6 +127,7 @@ FilterWriter::FilterWriter(const RegressorFilter& filter, bool bounds)
   held_ = measurement_.hold == Hold::zero_order;
   between_ = measurement_.changes == model::EffortChanges::between;
   bounds_ = bounds;
+  sums_ = sums;
   bounded_ = errors_.between_samples;
   mobile_ = bounded_ && motion.mobility.size() > 0;
   limited_ = bounded_ && motion.limit.size() > 0;
@@ -141,8 +142,10 @@ FilterWriter::FilterWriter(const RegressorFilter& filter, bool bounds)
   split_ = !hull_ && (mean_ ? held_ || !between_ : !held_);
   ranging_ = hull_ || !held_ || mean_;
   doubt_ = bounds_ && bounded_ && (hull_ || linear_);
-  change_ = ranging_ && (mobile_ || (doubt_ && (hull_ || !nodes_)));
+  doubted_ = doubt_ || (sums_ && (hull_ || linear_));
+  change_ = ranging_ && (mobile_ || (doubted_ && (hull_ || !nodes_)));
   interpolated_ = bounds_ && moved_ && viscous_;
+  moving_ = (bounds_ || sums_) && moved_ && viscous_;
   lost_ = measurement_.longest_step() > 0.0;
   first_error_ =
       bounds_ && nodes_ && errors_.joint_sample > 0.0 && lost_ && inertial_ && any_not_zero(errors_.speed_sample);
@@ -151,7 +154,7 @@ FilterWriter::FilterWriter(const RegressorFilter& filter, bool bounds)
   joint_error_ = joints_;
   speed_error_ = (mobile_ && viscous_) || heading_ || uses({TermShape::sign_of_speed});
   ahead_ = mean_ ? 1 : 0;
-  samples_ = ahead_ + (linear_ && (!mean_ || doubt_) ? 3 : 2);
+  samples_ = ahead_ + (linear_ && (!mean_ || doubted_) ? 3 : 2);
   if (mobile_) {
     rate_ = friction_rate(model_, motion);
   }
@@ -245,9 +248,33 @@ std::string FilterWriter::types() const {
            split_ ? ", rising[PFX_CHANNELS]" : "", split_ ? ", rise from 0 to 1" : " (and rise)");
   out.line_if(mobile_, "  double effort[PFX_CHANNELS]; /* its largest size */");
   out.line_if(change_, "  double change[PFX_CHANNELS]; /* half the range of efforts in the step */");
+  out.put("} pfx_span;\n\n/* What samples were so far. */\ntypedef struct pfx_elements {\n");
+  out.line("  int samples, instants; /* samples, and instants of the recursion, in this segment: counted up to 3 */");
+  out.line("  int began; /* with the last sample a segment's first step is known */");
+  if (nodes_) {
+    out.line("  int at_rest{}; /* the segment began at standstill{} */", lost_ ? ", after_loss" : "",
+             lost_ ? ", after lost rows" : "");
+  } else {
+    out.line("  double speed[PFX_COORDINATES], speed_before[PFX_COORDINATES]; /* at the last two samples */");
+  }
+  out.line("  double t0, t; /* first and last instant of the recursion, s */");
+  out.line("  pfx_sample sample[PFX_SAMPLES]; /* newest first */");
+  out.line("  pfx_span span[2];               /* the last two steps; which of them is the last */");
+  out.line("  int newest;");
   out.put(
-      "} pfx_span;\n\n/* What the recursion remembers: zeros at the start of a segment. */\ntypedef struct pfx_memory "
-      "{\n");
+      "} pfx_elements;\n\n/* The equation of motion times a weight, integrated: a hat at a sample, or a whole step. "
+      "*/\ntypedef struct pfx_element {\n");
+  out.line("  double t, length, before, step; /* s: its instant, integral of the weight, steps around it */");
+  out.line_if(viscous_, "  double motion[PFX_COORDINATES]; /* of the speeds */");
+  out.line_if(inertial_, "  double slope[PFX_COORDINATES]; /* of their derivatives */");
+  out.line("  double torque[PFX_CHANNELS]{};", doubted_ ? ", torque_doubt[PFX_CHANNELS]" : "");
+  out.line_if(moving_, "  double motion_doubt[PFX_COORDINATES]{}; /* speeds between samples */",
+              sums_ && nodes_ ? ", motion_doubt_before[PFX_COORDINATES]" : "");
+  out.line_if(!functions_.empty(), "  double term[{0}], term_error[{0}]; /* functions of the motion */",
+              functions_.size());
+  out.put(
+      "} pfx_element;\n\n/* What the recursion remembers: zeros at the start of a segment. */\ntypedef struct "
+      "pfx_memory {\n");
   out.line_if(viscous_, "  pfx_cascade motion[PFX_COORDINATES]; /* driven by the speeds */");
   out.line_if(inertial_, "  pfx_cascade slope[PFX_COORDINATES]; /* driven by their derivatives */");
   out.line("  pfx_cascade torque[PFX_CHANNELS];");
@@ -271,17 +298,7 @@ std::string FilterWriter::types() const {
 
 std::string FilterWriter::state() const {
   Text out;
-  out.line("  int samples, instants; /* samples, and instants of the recursion, in this segment: counted up to 3 */");
-  if (nodes_) {
-    out.line("  int at_rest{}; /* the segment began at standstill{} */", lost_ ? ", after_loss" : "",
-             lost_ ? ", after lost rows" : "");
-    out.line("  double t0, t; /* first and last instant of the recursion, s */");
-  } else {
-    out.line("  double speed[PFX_COORDINATES], speed_before[PFX_COORDINATES]; /* at the last two samples */");
-  }
-  out.line("  pfx_sample sample[PFX_SAMPLES]; /* newest first */");
-  out.line("  pfx_span span[2];               /* the last two steps; which of them is the last */");
-  out.line("  int newest;");
+  out.line("  pfx_elements elements;");
   out.line("  pfx_weights weights;");
   out.line("  pfx_memory memory;");
   return out.take();
@@ -309,7 +326,7 @@ void FilterWriter::conversions(Text& out) const {
     out.line("  channel[{}] = {}; /* {} */", i, combination(model_.input, i, "joint"), plain(model_.outputs[i]));
   }
   out.put("}\n");
-  if (change_ || (doubt_ && linear_)) {
+  if (change_ || (doubted_ && linear_)) {
     out.put("\n/* The same for sizes. */\nstatic inline void pfx_sizes(const double *joint, double *channel)\n{\n");
     for (std::size_t i = 0; i < model_.n(); ++i) {
       out.line("  channel[{}] = {};", i, combination(model_.input.cwiseAbs(), i, "joint"));
@@ -319,7 +336,7 @@ void FilterWriter::conversions(Text& out) const {
 }
 
 void FilterWriter::read(Text& out) const {
-  out.put("\nstatic inline void pfx_read(pfx_state *s, double t, const double *input)\n{\n");
+  out.put("\nstatic inline void pfx_read(pfx_elements *s, double t, const double *input)\n{\n");
   out.line("  pfx_sample *now = &s->sample[0];");
   out.line("  int i;");
   out.line("  for (i = PFX_SAMPLES - 1; i > 0; --i) {{");
@@ -624,7 +641,7 @@ void FilterWriter::describe(Text& out) const {
   const bool before = !mean_ || !lost_ || measured_heading_ || held_ || change_ || split_;
   out.put(
       "\n/* The step between two samples, as far as they tell; 0 where no bounds on its motion can be given. */\n"
-      "static inline int pfx_describe(pfx_state *s)\n{\n");
+      "static inline int pfx_describe(pfx_elements *s)\n{\n");
   out.line(
       "  const pfx_sample *now = &s->sample[{}]{};", ahead_,
       (before ? fmt::format(", *before = &s->sample[{}]", ahead_ + 1) : "") + (next ? ", *next = &s->sample[0]" : ""));
@@ -684,7 +701,7 @@ void FilterWriter::describe(Text& out) const {
 
 // By how much an acceleration can change within a step between speeds.
 void FilterWriter::change(Text& out) const {
-  if (nodes_ || !interpolated_ || !mobile_) {
+  if (nodes_ || !moving_ || !mobile_) {
     return;
   }
   const bool exact = held_ && !between_;
@@ -713,13 +730,13 @@ void FilterWriter::change(Text& out) const {
 
 // Linear efforts that may change between samples: as a parabola through three.
 void FilterWriter::curve(Text& out) const {
-  if (!linear_ || (mean_ && !doubt_)) {
+  if (!linear_ || (mean_ && !doubted_)) {
     return;
   }
   if (mean_) {
     out.put(
         "\n/* What makes the efforts around the last node differ from a line, h seconds long. */\n"
-        "static inline void pfx_curve(const pfx_state *s, double h, double *doubt)\n{\n");
+        "static inline void pfx_curve(const pfx_elements *s, double h, double *doubt)\n{\n");
     out.line("  double bend[PFX_JOINTS];");
     out.line("  int i;");
     out.line("  for (i = 0; i < PFX_JOINTS; ++i) {{");
@@ -734,10 +751,10 @@ void FilterWriter::curve(Text& out) const {
     return;
   }
   out.put("\n/* Curvature of a parabola through the last three efforts, a and b seconds apart, times what it corrects");
-  out.put(doubt_ ? ",\n * and its size times what is in doubt. */\n" : ". */\n");
+  out.put(doubted_ ? ",\n * and its size times what is in doubt. */\n" : ". */\n");
   out.line(
-      "static inline void pfx_curve(const pfx_state *s, double a, double b, double corrected, double *curve{})\n{{",
-      doubt_ ? ",\n                             double covered, double *doubt" : "");
+      "static inline void pfx_curve(const pfx_elements *s, double a, double b, double corrected, double *curve{})\n{{",
+      doubted_ ? ",\n                             double covered, double *doubt" : "");
   out.line("  double bend[PFX_JOINTS];");
   out.line("  int i;");
   out.line("  for (i = 0; i < PFX_JOINTS; ++i) {{");
@@ -749,7 +766,7 @@ void FilterWriter::curve(Text& out) const {
   out.line("  for (i = 0; i < PFX_CHANNELS; ++i) {{");
   out.line("    curve[i] *= corrected;");
   out.line("  }}");
-  if (doubt_) {
+  if (doubted_) {
     out.line("  for (i = 0; i < PFX_JOINTS; ++i) {{");
     out.line("    bend[i] = fabs(bend[i]);");
     out.line("  }}");
@@ -761,131 +778,149 @@ void FilterWriter::curve(Text& out) const {
   out.put("}\n");
 }
 
-void FilterWriter::advance_angles(Text& out) const {
+void FilterWriter::make_hat(Text& out) const {
   const char* rising = split_ ? "rising" : "falling";
   out.put(
       "\n/* The node between the last two steps, and the way to the end of the last. */\n"
-      "static inline void pfx_advance(pfx_state *s)\n{\n");
+      "static inline void pfx_make(const pfx_elements *s, pfx_element *e)\n{\n");
   out.line("  const pfx_span *p = &s->span[s->newest], *last = &s->span[!s->newest];");
-  out.line("  const pfx_weights *w = &s->weights;");
   out.line("  const double h = p->length, before = last->length;");
-  out.line("  pfx_memory *m = &s->memory;");
-  const bool curved = linear_ && angle_, bent = linear_ && doubt_;
+  const bool curved = linear_ && angle_;
   if (curved) {
     out.line("  const double least = 2.0 * pfx_cube(before < h ? before : h) / 24.0;");
-    out.line_if(doubt_, "  const double rest = (pfx_cube(h) + pfx_cube(before)) / 24.0 - least;");
-  }
-  if (curved || bent) {
-    out.line("  double {}{}{};", curved ? "curve[PFX_CHANNELS]" : "", curved && bent ? ", " : "",
-             bent ? "doubt[PFX_CHANNELS]" : "");
+    out.line_if(doubted_, "  const double rest = (pfx_cube(h) + pfx_cube(before)) / 24.0 - least;");
+    out.line("  double curve[PFX_CHANNELS];");
   }
   out.line("  int i;");
   if (curved) {
-    out.line("  pfx_curve(s, before, h, least, curve{});", doubt_ ? ", least < rest ? rest : least, doubt" : "");
-  } else if (bent) {
-    out.line("  pfx_curve(s, h, doubt);");
+    out.line("  pfx_curve(s, before, h, least, curve{});",
+             doubted_ ? ", least < rest ? rest : least, e->torque_doubt" : "");
+  } else if (linear_ && doubted_) {
+    out.line("  pfx_curve(s, h, e->torque_doubt);");
   }
+  out.line("  e->t = s->t - h;");
+  out.line("  e->length = 0.5 * (before + h);");
+  out.line("  e->before = before;");
+  out.line("  e->step = h;");
   out.line("  for (i = 0; i < PFX_COORDINATES; ++i) {{");
-  out.line_if(viscous_, "    pfx_take(&m->motion[i], w, 0.5 * (before * last->speed[i] + h * p->speed[i]));");
-  out.line_if(inertial_, "    pfx_take(&m->slope[i], w, p->speed[i] - last->speed[i]);");
-  out.line_if(
-      interpolated_,
-      "    pfx_majorant_take(&m->motion_doubt[i], w->decay, PFX_BETA * h, p->acceleration[i] * pfx_cube(h) / 12.0);");
+  out.line_if(viscous_, "    e->motion[i] = 0.5 * (before * last->speed[i] + h * p->speed[i]);");
+  out.line_if(inertial_, "    e->slope[i] = p->speed[i] - last->speed[i];");
+  out.line_if(moving_, "    e->motion_doubt[i] = p->acceleration[i] * pfx_cube(h) / 12.0;");
+  out.line_if(moving_ && sums_, "    e->motion_doubt_before[i] = last->acceleration[i] * pfx_cube(before) / 12.0;");
   out.line("  }}");
   out.line("  for (i = 0; i < PFX_CHANNELS; ++i) {{");
-  out.line("    pfx_take(&m->torque[i], w, before * last->{}[i] + h * p->falling[i]{});", rising,
-           curved ? " - curve[i]" : "");
-  if (bent) {
-    out.line("    pfx_take(&m->torque_doubt[i], w, doubt[i]);");
-  } else if (doubt_) {
-    out.line("    pfx_take(&m->torque_doubt[i], w, 0.5 * (before * last->change[i] + h * p->change[i]));");
-  }
+  out.line("    e->torque[i] = before * last->{}[i] + h * p->falling[i]{};", rising, curved ? " - curve[i]" : "");
+  out.line_if(doubted_ && !linear_, "    e->torque_doubt[i] = 0.5 * (before * last->change[i] + h * p->change[i]);");
   out.line("  }}");
   if (!functions_.empty()) {
     out.line("  for (i = 0; i < {}; ++i) {{", functions_.size());
-    out.line("    pfx_take(&m->term[i], w, 0.5 * (before * last->term[i] + h * p->term[i]));");
-    out.line_if(bounds_,
-                "    pfx_take(&m->term_error[i], w, 0.5 * (before * last->term_error[i] + h * p->term_error[i]));");
+    out.line("    e->term[i] = 0.5 * (before * last->term[i] + h * p->term[i]);");
+    out.line("    e->term_error[i] = 0.5 * (before * last->term_error[i] + h * p->term_error[i]);");
     out.line("  }}");
   }
-  out.line_if(area_, "  pfx_take(&m->area, w, 0.5 * (before + h));");
-  out.line_if(start_, "  pfx_take(&m->start, w, s->instants == 2 ? 1.0 : 0.0);");
   out.put("}\n");
 }
 
-void FilterWriter::advance_speeds(Text& out) const {
-  out.put("\n/* The step between the last two samples. */\nstatic inline void pfx_advance(pfx_state *s)\n{\n");
+void FilterWriter::make_step(Text& out) const {
+  out.put(
+      "\n/* The step between the last two samples. */\n"
+      "static inline void pfx_make(const pfx_elements *s, pfx_element *e)\n{\n");
   out.line("  const pfx_span *p = &s->span[s->newest]{};", linear_ ? ", *last = &s->span[!s->newest]" : "");
-  out.line("  const pfx_weights *w = &s->weights;");
   out.line("  const double h = p->length;");
-  out.line("  pfx_memory *m = &s->memory;");
-  out.line_if(linear_, "  double curve[PFX_CHANNELS]{};", doubt_ ? ", doubt[PFX_CHANNELS]" : "");
+  out.line_if(linear_, "  double curve[PFX_CHANNELS];");
   out.line("  int i;");
   if (linear_) {
     out.line("  if (s->instants > 2) {{");
     out.line("    const int even = fabs(h - last->length) <= {} * h;", hex(kAlikeSteps));
     out.line("    pfx_curve(s, last->length, h, even ? pfx_cube(h) / 12.0 : 0.0, curve{});",
-             doubt_ ? ", pfx_cube(h) / 12.0, doubt" : "");
+             doubted_ ? ", pfx_cube(h) / 12.0, e->torque_doubt" : "");
     out.line("  }} else {{");
     out.line("    for (i = 0; i < PFX_CHANNELS; ++i) {{");
     out.line("      curve[i] = 0.0;");
-    out.line_if(doubt_, "      doubt[i] = h * p->change[i];");
+    out.line_if(doubted_, "      e->torque_doubt[i] = h * p->change[i];");
     out.line("    }}");
     out.line("  }}");
   }
+  out.line("  e->t = s->t;");
+  out.line("  e->length = e->before = e->step = h;");
   out.line("  for (i = 0; i < PFX_COORDINATES; ++i) {{");
-  out.line_if(viscous_, "    pfx_take(&m->motion[i], w, h * p->speed[i]);");
-  out.line_if(inertial_, "    pfx_take(&m->slope[i], w, s->speed[i] - s->speed_before[i]);");
-  if (interpolated_) {
-    out.line("    {{");
-    out.line("      double error = 0.0;");
-    out.line("      if (p->acceleration[i] > 0.0) {{");
-    out.line("        const double most = 0.25 * p->acceleration[i], change = 0.125 * {};",
+  out.line_if(viscous_, "    e->motion[i] = h * p->speed[i];");
+  out.line_if(inertial_, "    e->slope[i] = s->speed[i] - s->speed_before[i];");
+  if (moving_) {
+    out.line("    e->motion_doubt[i] = 0.0;");
+    out.line("    if (p->acceleration[i] > 0.0) {{");
+    out.line("      const double most = 0.25 * p->acceleration[i], change = 0.125 * {};",
              mobile_ ? "pfx_change(p, i)" : "(2.0 * p->acceleration[i])");
-    out.line("        error = (change < most ? change : most) * h * h;");
-    out.line("      }}");
-    out.line("      pfx_take(&m->motion_doubt[i], w, error);");
+    out.line("      e->motion_doubt[i] = (change < most ? change : most) * h * h;");
     out.line("    }}");
   }
   out.line("  }}");
   out.line("  for (i = 0; i < PFX_CHANNELS; ++i) {{");
-  out.line("    pfx_take(&m->torque[i], w, h * (p->falling[i] + p->{}[i]){});", split_ ? "rising" : "falling",
+  out.line("    e->torque[i] = h * (p->falling[i] + p->{}[i]){};", split_ ? "rising" : "falling",
            linear_ ? " - curve[i]" : "");
-  out.line_if(doubt_, "    pfx_take(&m->torque_doubt[i], w, {});", linear_ ? "doubt[i]" : "h * p->change[i]");
+  out.line_if(doubted_ && !linear_, "    e->torque_doubt[i] = h * p->change[i];");
   out.line("  }}");
   if (!functions_.empty()) {
     out.line("  for (i = 0; i < {}; ++i) {{", functions_.size());
-    out.line("    pfx_take(&m->term[i], w, h * p->term[i]);");
-    out.line_if(bounds_, "    pfx_take(&m->term_error[i], w, h * p->term_error[i]);");
+    out.line("    e->term[i] = h * p->term[i];");
+    out.line("    e->term_error[i] = h * p->term_error[i];");
     out.line("  }}");
   }
-  out.line_if(area_, "  pfx_take(&m->area, w, h);");
   out.put("}\n");
 }
 
-void FilterWriter::advance(Text& out) const {
-  if ((linear_ && !mean_) || (interpolated_ && nodes_)) {
+void FilterWriter::make(Text& out) const {
+  if ((linear_ && !mean_) || (moving_ && nodes_)) {
     out.put("\nstatic inline double pfx_cube(double x)\n{\n  return x * x * x;\n}\n");
   }
   curve(out);
   if (nodes_) {
-    advance_angles(out);
+    make_hat(out);
   } else {
     change(out);
-    advance_speeds(out);
+    make_step(out);
   }
 }
 
-void FilterWriter::filter(Text& out) const {
-  out.put("\n/* The next sample starts a segment. */\nstatic inline void pfx_forget(pfx_state *s)\n{\n");
+void FilterWriter::advance(Text& out) const {
+  out.put(
+      "\n/* An element goes through the filter. */\n"
+      "static inline void pfx_advance(pfx_state *s, const pfx_element *e)\n{\n");
+  out.line("  const pfx_weights *w = &s->weights;");
+  out.line("  pfx_memory *m = &s->memory;");
+  out.line("  int i;");
+  out.line("  for (i = 0; i < PFX_COORDINATES; ++i) {{");
+  out.line_if(viscous_, "    pfx_take(&m->motion[i], w, e->motion[i]);");
+  out.line_if(inertial_, "    pfx_take(&m->slope[i], w, e->slope[i]);");
+  out.line_if(interpolated_ && nodes_,
+              "    pfx_majorant_take(&m->motion_doubt[i], w->decay, PFX_BETA * e->step, e->motion_doubt[i]);");
+  out.line_if(interpolated_ && !nodes_, "    pfx_take(&m->motion_doubt[i], w, e->motion_doubt[i]);");
+  out.line("  }}");
+  out.line("  for (i = 0; i < PFX_CHANNELS; ++i) {{");
+  out.line("    pfx_take(&m->torque[i], w, e->torque[i]);");
+  out.line_if(doubt_, "    pfx_take(&m->torque_doubt[i], w, e->torque_doubt[i]);");
+  out.line("  }}");
+  if (!functions_.empty()) {
+    out.line("  for (i = 0; i < {}; ++i) {{", functions_.size());
+    out.line("    pfx_take(&m->term[i], w, e->term[i]);");
+    out.line_if(bounds_, "    pfx_take(&m->term_error[i], w, e->term_error[i]);");
+    out.line("  }}");
+  }
+  out.line_if(area_, "  pfx_take(&m->area, w, e->length);");
+  out.line_if(start_, "  pfx_take(&m->start, w, s->elements.instants == 2 ? 1.0 : 0.0);");
+  out.put("}\n");
+}
+
+void FilterWriter::take_sample(Text& out) const {
+  out.put("\n/* The next sample starts a segment. */\nstatic inline void pfx_forget(pfx_elements *s)\n{\n");
   out.line("  s->samples = s->instants = 0;");
   out.line_if(nodes_ && lost_, "  s->after_loss = 0;");
   out.put(
-      "}\n\n/* Takes one sample; whether there is a row. */\n"
-      "static inline int pfx_filter(pfx_state *s, double t, const double *input)\n{\n");
-  out.line("  const pfx_span *p;");
-  out.line_if(nodes_, "  double since;");
+      "}\n\n/* Takes one sample; whether there is an element. */\n"
+      "static inline int pfx_take_sample(pfx_elements *s, double t, const double *input)\n{\n");
+  out.line_if(nodes_, "  const pfx_span *p;");
   out.line("  int i;");
+  out.line("  s->began = 0;");
   if (lost_) {
     out.line("  if (s->samples > 0 && t - s->sample[0].t > PFX_LONGEST) {{ /* nothing is known of the effort in it */");
     out.line("    pfx_forget(s);");
@@ -904,6 +939,7 @@ void FilterWriter::filter(Text& out) const {
     out.line("  pfx_coordinates(s->sample[0].joint, s->speed);");
     out.line("  if (s->instants == 0) {{");
     out.line("    s->instants = 1;");
+    out.line("    s->t0 = s->t = t;");
     out.line("    return 0;");
     out.line("  }}");
   }
@@ -912,28 +948,54 @@ void FilterWriter::filter(Text& out) const {
   out.line("    s->samples = s->instants = 0;");
   out.line("    return 0;");
   out.line("  }}");
-  out.line("  p = &s->span[s->newest];");
-  out.line("  pfx_prepare(&s->weights, p->length);");
+  out.line_if(nodes_, "  p = &s->span[s->newest];");
   out.line("  s->instants += s->instants < 3;");
-  out.line_if(nodes_, "  s->t = s->sample[{}].t{};", ahead_, mean_ ? " + 0.5 * p->length" : "");
+  out.line("  s->t = s->sample[{}].t{};", ahead_, mean_ ? " + 0.5 * p->length" : "");
   out.line("  if (s->instants == {}) {{", nodes_ ? 1 : 2);
-  out.line("    memset(&s->memory, 0, sizeof s->memory);");
-  out.line_if(start_, "    s->memory.first_length = p->length;");
+  out.line("    s->began = 1;");
   if (nodes_) {
     out.line("    s->at_rest = 1;");
     out.line("    for (i = 0; i < PFX_COORDINATES; ++i) {{");
     out.line("      s->at_rest = s->at_rest && fabs(p->speed[i]) <= 0.0;");
-    out.line_if(interpolated_, "      s->memory.first_doubt[i] = p->acceleration[i] * p->length * p->length / 12.0;");
     out.line("    }}");
     out.line("    s->t0 = s->t;");
     out.line("    return 0;");
   }
   out.line("  }}");
-  out.line("  pfx_advance(s);");
+  out.line("  return 1;");
+  out.put("}\n");
+}
+
+void FilterWriter::filter(Text& out) const {
+  out.put(
+      "\n/* Takes one sample; whether there is a row. */\n"
+      "static inline int pfx_filter(pfx_state *s, double t, const double *input)\n{\n");
+  const bool first_doubt = interpolated_ && nodes_;
+  out.line("  pfx_elements *all = &s->elements;");
+  out.line("  pfx_element element;");
+  out.line_if(nodes_, "  double since;");
+  out.line("  const int any = pfx_take_sample(all, t, input);");
+  out.line("  const pfx_span *p = &all->span[all->newest];");
+  out.line("  if (all->began) {{");
+  out.line_if(first_doubt, "    int i;");
+  out.line("    memset(&s->memory, 0, sizeof s->memory);");
+  out.line_if(start_, "    s->memory.first_length = p->length;");
+  if (first_doubt) {
+    out.line("    for (i = 0; i < PFX_COORDINATES; ++i) {{");
+    out.line("      s->memory.first_doubt[i] = p->acceleration[i] * p->length * p->length / 12.0;");
+    out.line("    }}");
+  }
+  out.line("  }}");
+  out.line("  if (!any) {{");
+  out.line("    return 0;");
+  out.line("  }}");
+  out.line("  pfx_prepare(&s->weights, p->length);");
+  out.line("  pfx_make(all, &element);");
+  out.line("  pfx_advance(s, &element);");
   if (nodes_) {
-    out.line("  since = s->t - s->t0;");
-    out.line("  return s->at_rest || since * PFX_BETA >= PFX_SETTLE{};",
-             lost_ ? " ||\n         (s->after_loss && since * PFX_BETA >= 1.0 &&\n"
+    out.line("  since = all->t - all->t0;");
+    out.line("  return all->at_rest || since * PFX_BETA >= PFX_SETTLE{};",
+             lost_ ? " ||\n         (all->after_loss && since * PFX_BETA >= 1.0 &&\n"
                      "          pfx_value(&s->memory.start) / (PFX_GAIN * s->memory.first_length) <= PFX_SETTLED_START)"
                    : "");
   } else {
@@ -1014,9 +1076,35 @@ std::string FilterWriter::functions() const {
   evaluate(out);
   enclose(out);
   describe(out);
+  make(out);
+  take_sample(out);
   advance(out);
   filter(out);
   row(out);
+  return out.take();
+}
+
+std::string FilterWriter::regressor() const {
+  Text out;
+  out.put(
+      "\n/* The regressor of an element, times its length. */\n"
+      "static inline void pfx_regressor(const pfx_element *e, double y[PFX_CHANNELS][PFX_PARAMETERS])\n{\n");
+  out.line("  int i, j;");
+  out.line("  for (i = 0; i < PFX_CHANNELS; ++i) {{");
+  out.line("    for (j = 0; j < PFX_PARAMETERS; ++j) {{");
+  out.line("      y[i][j] = 0.0;");
+  out.line("    }}");
+  out.line("  }}");
+  std::size_t function = 0;
+  for (const Term& term : model_.terms) {
+    const bool own = term.kind == Term::Kind::function;
+    out.line("  y[{}][{}] += {}e->{}[{}]; /* {} */", term.output, term.parameter, own ? "" : times(term.scale),
+             own                                     ? "term"
+             : term.kind == Term::Kind::acceleration ? "slope"
+                                                     : "motion",
+             own ? function++ : term.coordinate, plain(model_.parameters[term.parameter].name));
+  }
+  out.put("}\n");
   return out.take();
 }
 

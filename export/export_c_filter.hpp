@@ -12,29 +12,38 @@
 
 namespace wheelwright::exporter::c_text {
 
-/// Writes the parts of a header that stand for a filter. Each gives text with `pfx` for the prefix (export_c_text.hpp).
+/// Writes the parts of a header that stand for a filter, and for the elements that it is driven by. Each gives text with
+/// `pfx` for the prefix (export_c_text.hpp).
 ///
 /// The C has the library's operations in the library's order. Left out is what adds an exact zero, multiplies by one,
 /// or is never looked at; sums of constants alone are done here.
 class FilterWriter {
  public:
-  /// `bounds`: whether dY and dy are wanted. Throws InputError where the filter has no C form.
-  FilterWriter(const RegressorFilter& filter, bool bounds);
+  /// `bounds`: whether dY and dy are wanted; `sums`: whether elements are for a ScaleDetector, too. Throws InputError
+  /// where the filter has no C form.
+  FilterWriter(const RegressorFilter& filter, bool bounds, bool sums);
 
   /// The numbers of the filter, as macros.
   [[nodiscard]] std::string constants() const;
-  /// The kernel; types of a sample, a step, and of what the recursion remembers.
+  /// The kernel; types of a sample, a step, an element, and of what elements and the recursion remember.
   [[nodiscard]] std::string types() const;
   /// Members of the state.
   [[nodiscard]] std::string state() const;
-  /// Functions up to pfx_filter, which takes a sample and says whether there is a row, pfx_row, which gives it, and
-  /// pfx_forget, after which the next sample starts a segment.
+  /// Functions: pfx_take_sample and pfx_make, which make elements (ElementFilter); pfx_filter, which takes a sample and
+  /// says whether there is a row, and pfx_row, which gives it; pfx_forget, after which the next sample starts a segment.
   [[nodiscard]] std::string functions() const;
+  /// Function pfx_regressor: element_regressor() of filter/sample_weights.hpp.
+  [[nodiscard]] std::string regressor() const;
 
   /// Lines of the header's comment: how efforts are taken, when a segment ends, what of libm is called.
   [[nodiscard]] std::string effort_words() const;
   [[nodiscard]] std::string segment_words() const;
   [[nodiscard]] std::string libm_words() const;
+  /// True if elements are hats at samples.
+  [[nodiscard]] bool nodes() const { return nodes_; }
+  /// Which members an element has beside motion, slope, torque: torque_doubt, motion_doubt.
+  [[nodiscard]] bool doubted() const { return doubted_; }
+  [[nodiscard]] bool moving() const { return moving_; }
 
  private:
   struct FunctionTerm {
@@ -53,9 +62,11 @@ class FilterWriter {
   void measure_effort(Text& out) const;
   void change(Text& out) const;
   void curve(Text& out) const;
-  void advance_angles(Text& out) const;
-  void advance_speeds(Text& out) const;
+  void make_hat(Text& out) const;
+  void make_step(Text& out) const;
+  void make(Text& out) const;
   void advance(Text& out) const;
+  void take_sample(Text& out) const;
   void filter(Text& out) const;
   void row(Text& out) const;
 
@@ -72,6 +83,8 @@ class FilterWriter {
   bool held_ = false, between_ = false;
   // dY and dy are wanted; they hold what happens between samples
   bool bounds_ = false, bounded_ = false;
+  // elements are for sums, too
+  bool sums_ = false;
   // which bounds on accelerations there are; whether any
   bool mobile_ = false, limited_ = false, moved_ = false;
   // a function looks at it; it has a column
@@ -86,6 +99,8 @@ class FilterWriter {
   bool ranging_ = false, change_ = false, doubt_ = false;
   // the error of interpolated motion goes into dY
   bool interpolated_ = false;
+  // elements have these
+  bool doubted_ = false, moving_ = false;
   // error of a segment's first slope; weight of its first node; area of the kernel
   bool first_error_ = false, start_ = false, area_ = false;
   // lost rows are known from the length of a step

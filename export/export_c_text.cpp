@@ -269,13 +269,13 @@ static inline double pfx_majorant_value(const pfx_majorant *m)
 }
 )";
 
-const std::string_view kHull = R"(/* Largest a.theta over the interval hull of the feasible set, rounded outward. */
-static inline double pfx_support_of_hull(const double *a)
+const std::string_view kHull = R"(/* Largest a.theta over the interval hull of a set, rounded outward. */
+static inline double pfx_support_of_hull(const double *lower, const double *upper, const double *a)
 {
   double sum = 0.0, magnitude = 0.0;
   int j, zero = 1;
   for (j = 0; j < PFX_PARAMETERS; ++j) {
-    const double low = a[j] * pfx_lower[j], high = a[j] * pfx_upper[j];
+    const double low = a[j] * lower[j], high = a[j] * upper[j];
     const double term = low < high ? high : low;
     sum += term;
     magnitude += fabs(term);

@@ -33,6 +33,13 @@ class PredictableRegressor {
   /// n × p.
   [[nodiscard]] const core::RowMatrix& value() const { return value_; }
 
+  /// Of each of its stages, 1/s; by how much it leads, and the errors' correlation time, s.
+  [[nodiscard]] double beta() const { return beta_; }
+  [[nodiscard]] double lead() const { return lead_; }
+  [[nodiscard]] double correlation() const { return correlation_; }
+  /// Elements that it has room for until they are old enough.
+  [[nodiscard]] std::size_t room() const { return ring_.size(); }
+
   /// Elements that stand between the newest and the newest that value() depends on.
   static constexpr std::size_t kLag = 4;
   /// Order of the filter.
