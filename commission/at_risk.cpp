@@ -27,9 +27,10 @@ struct Attempt {
 };
 
 // Mean squares of a sum's S. For errors as assumed E √(V0/(V + V0)) exp(S²/(2(V + V0))) <= 1 in each window, given what
-// was before, so that over windows that are apart Σ (S²/(V + V0) − ln(1 + V/V0)) exceeds 2L with the probability e^−L at
-// most; so does the mean of that over groups of such windows (Jensen's inequality), here all looks. What bias, angles and
-// the set may add is taken away from S first. Windows count as apart after eight scales, when 1 % of a sum is left.
+// was before, so that over windows that are apart Σ (S²/(V + V0) − ln(1 + V/V0)) exceeds 2L with the probability e^−L
+// at most; so does the mean of that over groups of such windows (Jensen's inequality), here all looks. What bias,
+// angles and the set may add is taken away from S first. Windows count as apart after eight scales, when 1 % of a sum
+// is left.
 class Spread {
  public:
   Spread(const detector::ScaleDetector& detector, Eigen::MatrixXd usual, double checks, double risk)
@@ -92,8 +93,8 @@ Attempt attempt_with(LogSource& log, const Commissioning& result, const filter::
                      const AtRiskOptions& options) {
   Attempt attempt;
   OnlineModel model = result.model;
-  attempt.set = risk_set(log, model.model, model.measurement, result.row_errors, classes, *result.feasible.polytope,
-                         options.set);
+  attempt.set =
+      risk_set(log, model.model, model.measurement, result.row_errors, classes, *result.feasible.polytope, options.set);
   if (!attempt.set.set) {
     return attempt;
   }
@@ -138,9 +139,10 @@ Estimate least_bias(LogSource& log, const Commissioning& result, const AtRiskOpt
     } else {
       none = step;
       if (enough > kSteps) {
-        best.reason = attempt.model ? fmt::format("over {:g} s the model leaves more than errors with a bias of {:.2g} "
-                                                  "would, as where it lacks an effect (`gap` looks for it)",
-                                                  options.scales[attempt.worst.scale], classes->effort.bias)
+        best.reason = attempt.model ? fmt::format(
+                                          "over {:g} s the model leaves more than errors with a bias of {:.2g} "
+                                          "would, as where it lacks an effect (`gap` looks for it)",
+                                          options.scales[attempt.worst.scale], classes->effort.bias)
                                     : attempt.set.reason;
       }
     }
@@ -154,12 +156,12 @@ core::Assumption assumption_of(const filter::ErrorClasses& classes, const std::s
                                 ? fmt::format("Whatever happened up to {:g} s before a sample", effort.correlation)
                                 : "Whatever happened before a sample";
   return {.id = kNoiseAverages,
-          .statement = fmt::format("{}, the mean error of its effort is {}{}.", since,
-                                   effort.bias > 0.0 ? fmt::format("at most {:.3g} {}", effort.bias, unit) : "zero",
-                                   effort.deviation < effort.bound
-                                       ? fmt::format(", the root of its mean square about it at most {:.3g} {}",
-                                                     effort.deviation, unit)
-                                       : ""),
+          .statement = fmt::format(
+              "{}, the mean error of its effort is {}{}.", since,
+              effort.bias > 0.0 ? fmt::format("at most {:.3g} {}", effort.bias, unit) : "zero",
+              effort.deviation < effort.bound
+                  ? fmt::format(", the root of its mean square about it at most {:.3g} {}", effort.deviation, unit)
+                  : ""),
           .declared_by = "noise.effort.bias",
           .test = "sums of what the model leaves, over all scales, are as small as such errors make them",
           .verdict = core::AssumptionVerdict::holds,

@@ -43,7 +43,7 @@ LogTable beginning(LogSource& log, const OnlineModel& model, double most) {
 
 // The fault that a sum's weights are like.
 model::FaultType fault_like(const detector::SumWeight& weight, const OnlineModel& model,
-                               const std::vector<model::FaultType>& catalogue) {
+                            const std::vector<model::FaultType>& catalogue) {
   using Shape = detector::SumWeight::Shape;
   if (weight.shape == Shape::parameter) {
     Eigen::VectorXd theta = Eigen::VectorXd::Zero(model.estimate.size());

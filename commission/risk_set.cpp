@@ -102,7 +102,7 @@ double part_of(double risk, std::size_t count) {
   return std::fma(part, parts, -risk) > 0.0 ? std::nextafter(part, 0.0) : part;
 }
 
-constexpr double kSpread = 0.01;     // η of (a + b)(a + b)ᵀ <= (1 + η) aaᵀ + (1 + 1/η) bbᵀ
+constexpr double kSpread = 0.01;  // η of (a + b)(a + b)ᵀ <= (1 + η) aaᵀ + (1 + 1/η) bbᵀ
 // V0 is this share of the V that the log's beginning makes expect: each of these at its part of the risk, since the
 // beginning may be driven harder than the rest, or in one direction only.
 constexpr std::array<double, 3> kExpected = {0.1, 0.01, 0.001};

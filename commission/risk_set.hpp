@@ -49,20 +49,21 @@ struct RiskFacet {
 struct RiskSet {
   std::optional<bounds::Polytope> set;  ///< nothing where the log leaves none: it contradicts what is assumed
   std::vector<RiskFacet> facets;
-  std::vector<RiskEllipsoid> ellipsoids;  ///< of every delay, block and scale: their risks add up to no more than `risk`
-  Box box;                                ///< that of the guaranteed set, over which the facets hold
-  double learning = 0.0;                  ///< RiskSetOptions::learning
-  double risk = 0.0;                      ///< probability that the set lacks the true θ
+  std::vector<RiskEllipsoid>
+      ellipsoids;         ///< of every delay, block and scale: their risks add up to no more than `risk`
+  Box box;                ///< that of the guaranteed set, over which the facets hold
+  double learning = 0.0;  ///< RiskSetOptions::learning
+  double risk = 0.0;      ///< probability that the set lacks the true θ
   core::Warrant warrant = core::Warrant::guaranteed;  ///< extrapolated where the errors were estimated from the log
-  double log_volume = 0.0;                ///< largest of the ellipsoids' ln det(I + V0⁻¹V)
-  std::string reason;                     ///< where there is no set
+  double log_volume = 0.0;                            ///< largest of the ellipsoids' ln det(I + V0⁻¹V)
+  std::string reason;                                 ///< where there is no set
 };
 
 /// Learns the set of the parameters that explain `log` at the risk `options.risk`, as a part of `guaranteed`.
 ///
 /// Sums of elements, weighted by the regressor as it was foreseen (instruments G), leave b − Mθ = Σ c_s e_s of all
-/// samples' errors. For errors as `classes` says this is a vector martingale beside its bias; with V = Σ s² c_s c_sᵀ and
-/// s² their variance proxies (error_class.hpp),
+/// samples' errors. For errors as `classes` says this is a vector martingale beside its bias; with V = Σ s² c_s c_sᵀ
+/// and s² their variance proxies (error_class.hpp),
 ///
 ///     (b − Mθ)ᵀ (V + V0)⁻¹ (b − Mθ) <= 2 ln(1/δ) + ln det(V + V0)/det V0
 ///
@@ -71,8 +72,8 @@ struct RiskSet {
 /// parameters and of their pairs are taken. To each is added what bias, the motion between samples, and errors that do
 /// not average may do at worst. V0 is learnt from the log's beginning, which the sums leave out, and taken at several
 /// scales. Where a deviation below the bound is declared, proxies hold for λᵀV0λ <= reach² only: the mixture behind the
-/// inequality is cut off there, at the price of 2 ln 2, and where that is not enough Hoeffding's proxies stand in, with a
-/// tenth of the risk. Weights fall to zero towards the ends of segments.
+/// inequality is cut off there, at the price of 2 ln 2, and where that is not enough Hoeffding's proxies stand in, with
+/// a tenth of the risk. Weights fall to zero towards the ends of segments.
 ///
 /// The log is walked three times. Throws InvalidArgument where options or classes make no sense.
 [[nodiscard]] RiskSet risk_set(LogSource& log, const Model& model, const Measurement& measurement,

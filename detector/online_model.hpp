@@ -39,9 +39,9 @@ struct KinematicModel : LearntSet {
 
 /// What a detector at a stated risk needs (scale_detector.hpp).
 struct RiskModel {
-  double risk = 1e-9;             ///< that the set lacks the true θ
+  double risk = 1e-9;                                 ///< that the set lacks the true θ
   core::Warrant warrant = core::Warrant::guaranteed;  ///< extrapolated where the errors were estimated from the log
-  filter::ErrorClasses errors{};  ///< what is assumed of the sensors' errors
+  filter::ErrorClasses errors{};                      ///< what is assumed of the sensors' errors
   std::vector<bounds::HalfSpace> facets{};
   Box box{};
   std::vector<double> scales{};  ///< s, of the sums

@@ -12,10 +12,10 @@
 namespace wheelwright::detector {
 namespace {
 
-constexpr double kRoundings = 1e-10;  // of all that is added up, relative
-constexpr double kAlike = 1e-12;      // relative: steps whose decays need not be computed anew
-constexpr double kRise = 1.0;         // s, in which constant weights rise at a segment's start
-constexpr double kOfUsual = 0.2;      // V0 is this share of a usual drive's V
+constexpr double kRoundings = 1e-10;             // of all that is added up, relative
+constexpr double kAlike = 1e-12;                 // relative: steps whose decays need not be computed anew
+constexpr double kRise = 1.0;                    // s, in which constant weights rise at a segment's start
+constexpr double kOfUsual = 0.2;                 // V0 is this share of a usual drive's V
 constexpr double kKernel = 0.36787944117144233;  // 1/e, the most that x e^{−x} is
 const double kHalves = 2.0 * std::log(2.0);      // what a mixture costs of which half, and half of that, counts
 
@@ -137,15 +137,16 @@ ScaleDetector::ScaleDetector(const OnlineModel& model, ScaleDetectorOptions opti
   }
   slope_gain_ = largest_root(middle, radius);
   const Eigen::VectorXd none;
-  effort_ = filter::sample_class(risk_.errors, {filter::SampleWeight::Sensor::effort, 0,
-                                                elements_.effort_weights().exact, 0.0, none, none});
+  effort_ = filter::sample_class(
+      risk_.errors, {filter::SampleWeight::Sensor::effort, 0, elements_.effort_weights().exact, 0.0, none, none});
   averages_ = effort_.averages;
   square_ = averages_ ? filter::variance_proxy(effort_, core::kInfinity) : 0.0;
   g_ = g1_ = c_ = c1_ = c2_ = Eigen::ArrayXXd::Zero(W, n);
   joint_g_ = Eigen::ArrayXXd::Zero(W, joints);
   torque_ = Eigen::VectorXd::Zero(n);
   Y_ = core::RowMatrix::Zero(n, p);
-  residual_ = straight_ = turning_ = efforts_ = efforts1_ = spread_ = squares_ = response_ = a0_ = a1_ = Eigen::ArrayXd::Zero(W);
+  residual_ = straight_ = turning_ = efforts_ = efforts1_ = spread_ = squares_ = response_ = a0_ = a1_ =
+      Eigen::ArrayXd::Zero(W);
   rows_ = Eigen::ArrayXXd::Zero(W, p);
   direction_.resize(static_cast<std::size_t>(p));
   const double share = options_.false_alarms / static_cast<double>(weights_.size() * risk_.scales.size());
@@ -271,7 +272,9 @@ void ScaleDetector::take() {
     const auto i = static_cast<Eigen::Index>(w), which = static_cast<Eigen::Index>(weights_[w].which);
     switch (weights_[w].shape) {
       case SumWeight::Shape::constant: response_[i] = joint_g_(i, which) * e.length; break;
-      case SumWeight::Shape::effort: response_[i] = joint_g_(i, which) * dot_in_order(to_joints_.row(which), e.torque); break;
+      case SumWeight::Shape::effort:
+        response_[i] = joint_g_(i, which) * dot_in_order(to_joints_.row(which), e.torque);
+        break;
       case SumWeight::Shape::parameter: response_[i] = rows_(i, which) * rule_.estimate()[which]; break;
     }
   }
@@ -300,8 +303,8 @@ void ScaleDetector::take() {
     s.Y1 = d * s.Y1 + rows_;
     s.l0 = d * (s.l0 + x * s.l1) + x * turning_;
     s.l1 = d * s.l1 + straight_ + x * turning_;
-    // Efforts of the element before, which is as old as the step, with filter::variance_proxy(): a sample's weight is an
-    // average of its elements' (the logarithm of a generating function is convex), none larger than 1/e of theirs.
+    // Efforts of the element before, which is as old as the step, with filter::variance_proxy(): a sample's weight is
+    // an average of its elements' (the logarithm of a generating function is convex), none larger than 1/e of theirs.
     if (varied) {
       squares_ = (length * least) * efforts1_ / (1.0 - s.reach * spread_).max(least / square_);
     } else {
@@ -363,7 +366,8 @@ void ScaleDetector::look(Scale& s, std::size_t which) {
     }
     const Interval range = rule_.prediction(direction_, w);
     const double up = range.upper - predicted + radius, down = predicted - range.lower + radius;
-    state = {w, which, value, value >= 0.0 ? up : down, std::max(value - up, -value - down), s.r0[i], s.r1[i], radius, averaged};
+    state = {w,       which,  value,   value >= 0.0 ? up : down, std::max(value - up, -value - down), s.r0[i],
+             s.r1[i], radius, averaged};
     alarm_ = alarm_ || state.excess > 0.0;
   }
 }
@@ -416,7 +420,8 @@ Eigen::MatrixXd usual_variances(LogSource& log, const OnlineModel& model) {
   any.at_risk->usual = Eigen::MatrixXd::Ones(W, static_cast<Eigen::Index>(any.at_risk->scales.size()));
   filter::ErrorClass& effort = any.at_risk->errors.effort;
   if (effort.bias < effort.bound && effort.deviation < effort.bound) {
-    effort = {.bound = effort.deviation, .bias = 0.0, .correlation = effort.correlation};  // what reach adds depends on V0
+    effort = {
+        .bound = effort.deviation, .bias = 0.0, .correlation = effort.correlation};  // what reach adds depends on V0
   }
   ScaleDetector detector(any);
   const std::vector<std::size_t> pick = core::positions_of(log, model.measurement.columns());

@@ -82,11 +82,11 @@ struct SumConstants {
 /// A healthy robot's S is made of its sensors' errors alone. Those of efforts average out: with V = Σ weight² · s², s²
 /// their variance proxy (error_class.hpp), and V0 fixed beforehand, |S − bias| <= sqrt((V + V0)(2L + ln(1 + V/V0))) but
 /// for the probability e^{−L} (method of mixtures: Robbins 1970; de la Peña, Klass, Lai 2004). Where a deviation below
-/// the bound is declared, s² holds for |λ| <= Λ only: half of the mixture is cut off there, the other half stands at ±Λ,
-/// and the smaller bound of both counts (averaged_radius()). All else counts at its worst: bias, the angles' errors,
-/// what happens between samples, and any θ of the set. A sum is looked at `checks` times in its scale, and the risks of all
-/// looks at all sums add up to ScaleDetectorOptions::false_alarms. No assumption on the drive, the noise's law, or
-/// when a fault comes.
+/// the bound is declared, s² holds for |λ| <= Λ only: half of the mixture is cut off there, the other half stands at
+/// ±Λ, and the smaller bound of both counts (averaged_radius()). All else counts at its worst: bias, the angles'
+/// errors, what happens between samples, and any θ of the set. A sum is looked at `checks` times in its scale, and the
+/// risks of all looks at all sums add up to ScaleDetectorOptions::false_alarms. No assumption on the drive, the noise's
+/// law, or when a fault comes.
 ///
 /// step() does not allocate but in linear programs where the set has more vertices than a table takes. Memory and work
 /// per sample do not depend on time.
@@ -145,13 +145,13 @@ class ScaleDetector {
   Eigen::MatrixXd inverse_;    // (N Nᵀ)⁻¹, N the model's input
   Eigen::MatrixXd to_joints_;  // joints × outputs: N⁺
   Eigen::MatrixXd slope_gain_;  // outputs × outputs: |·|² bounds that of what θ makes of errors of slopes in the joints
-  Eigen::VectorXd speed_gain_;   // outputs: the most that θ makes of errors of all joints' speeds
-  bool averages_ = false;        // errors of efforts
+  Eigen::VectorXd speed_gain_;    // outputs: the most that θ makes of errors of all joints' speeds
+  bool averages_ = false;         // errors of efforts
   filter::SampleClass effort_{};  // of one effort
   double square_ = 0.0;           // its Hoeffding proxy
-  Eigen::ArrayXXd g_, g1_;       // weights × outputs: of the newest element and the one before
-  Eigen::ArrayXXd c_, c1_, c2_;  // slope_gain_ times these
-  Eigen::ArrayXXd joint_g_;      // weights × joints: what errors of efforts are multiplied with
+  Eigen::ArrayXXd g_, g1_;        // weights × outputs: of the newest element and the one before
+  Eigen::ArrayXXd c_, c1_, c2_;   // slope_gain_ times these
+  Eigen::ArrayXXd joint_g_;       // weights × joints: what errors of efforts are multiplied with
   Eigen::VectorXd torque_;
   core::RowMatrix Y_;
   Eigen::ArrayXd residual_, straight_, turning_, efforts_, efforts1_, spread_, squares_, response_, a0_, a1_;

@@ -26,8 +26,8 @@ struct SumIsolationOptions {
 ///
 /// (sum_response.hpp). Sizes and onsets that leave a look without such a θ are excluded; a fault of which nothing is
 /// left is. Each look may have a θ of its own, so that more may be left than the data allow, never less. **The true
-/// fault is excluded with no more probability than the looks' own:** ScaleDetectorOptions::false_alarms for all looks at
-/// all sums in a second, and RiskModel::risk for the set. What a sum does for an onset between two that are tried is
+/// fault is excluded with no more probability than the looks' own:** ScaleDetectorOptions::false_alarms for all looks
+/// at all sums in a second, and RiskModel::risk for the set. What a sum does for an onset between two that are tried is
 /// bounded by twice their difference: argued, and held in every run, but not proved. Faults whose onset may lie before
 /// the window, bumps, and readings that stand still are not asked.
 ///

@@ -12,8 +12,8 @@
 
 namespace wheelwright::exporter::c_text {
 
-/// Writes the parts of a header that stand for a filter, and for the elements that it is driven by. Each gives text with
-/// `pfx` for the prefix (export_c_text.hpp).
+/// Writes the parts of a header that stand for a filter, and for the elements that it is driven by. Each gives text
+/// with `pfx` for the prefix (export_c_text.hpp).
 ///
 /// The C has the library's operations in the library's order. Left out is what adds an exact zero, multiplies by one,
 /// or is never looked at; sums of constants alone are done here.
@@ -30,7 +30,8 @@ class FilterWriter {
   /// Members of the state.
   [[nodiscard]] std::string state() const;
   /// Functions: pfx_take_sample and pfx_make, which make elements (ElementFilter); pfx_filter, which takes a sample and
-  /// says whether there is a row, and pfx_row, which gives it; pfx_forget, after which the next sample starts a segment.
+  /// says whether there is a row, and pfx_row, which gives it; pfx_forget, after which the next sample starts a
+  /// segment.
   [[nodiscard]] std::string functions() const;
   /// Function pfx_regressor: element_regressor() of filter/sample_weights.hpp.
   [[nodiscard]] std::string regressor() const;

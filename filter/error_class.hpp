@@ -11,8 +11,8 @@
 namespace wheelwright::filter {
 
 /// Errors e of one sensor: |e| <= bound always, and whatever happened up to `correlation` (s) before a sample, the mean
-/// of its error is within ±bias, and the root of its mean square about that mean is at most `deviation`. Nothing else is
-/// said of their law. With bias = bound that is all bounded errors.
+/// of its error is within ±bias, and the root of its mean square about that mean is at most `deviation`. Nothing else
+/// is said of their law. With bias = bound that is all bounded errors.
 struct ErrorClass {
   double bound = 0.0;                  ///< unit of the column
   double bias = 0.0;                   ///< the same unit, 0 <= bias <= bound
@@ -52,10 +52,10 @@ struct SampleClass {
 /// Counts from sample to sample from which on rounding averages out.
 inline constexpr double kCountsThatAverage = 4.0;
 
-/// Variance proxy s² of an error e that averages out: E exp(λ (e − mean)) <= exp(λ² s²/2), whatever happened before, for
-/// all |λ| <= `reach` (1/unit). The smaller of Hoeffding's, bound², for every λ, and Bernstein's, deviation²/(1 − u/3) with
-/// u = reach · (bound + bias) [boucheron2013]; for errors that are alike within a correlation time both hold with
-/// its number of samples (Hölder's inequality).
+/// Variance proxy s² of an error e that averages out: E exp(λ (e − mean)) <= exp(λ² s²/2), whatever happened before,
+/// for all |λ| <= `reach` (1/unit). The smaller of Hoeffding's, bound², for every λ, and Bernstein's, deviation²/(1 −
+/// u/3) with u = reach · (bound + bias) [boucheron2013]; for errors that are alike within a correlation time both hold
+/// with its number of samples (Hölder's inequality).
 [[nodiscard]] inline double variance_proxy(const SampleClass& sample, double reach) {
   const double m = sample.multiplicity, square = sample.bound * sample.bound;
   const double deviation = sample.deviation * sample.deviation;

@@ -92,7 +92,8 @@ std::string risk_remark(const commission::RiskSet& set) {
       "At a stated risk: the true values lie inside all of these intervals, unless a chance of {:g} came "
       "true; for errors that have no more than the {}, whatever their law.",
       set.risk,
-      set.warrant == core::Warrant::guaranteed ? "declared bias" : "bias and deviation that were estimated from this log");
+      set.warrant == core::Warrant::guaranteed ? "declared bias"
+                                               : "bias and deviation that were estimated from this log");
 }
 
 std::string estimate_text(const ParameterView& view) {
@@ -334,10 +335,10 @@ std::string at_risk(const Commissioning& result) {
       items.push_back(with_unit(v.name + " " + lower + " to " + upper, v.unit));
     }
   }
-  std::string text =
-      fmt::format("At a risk of {:g}{}: {}.", result.at_risk->risk,
-                  result.at_risk->warrant == core::Warrant::guaranteed ? "" : ", while errors stay as this log shows them",
-                  core::enumerated(items));
+  std::string text = fmt::format(
+      "At a risk of {:g}{}: {}.", result.at_risk->risk,
+      result.at_risk->warrant == core::Warrant::guaranteed ? "" : ", while errors stay as this log shows them",
+      core::enumerated(items));
   std::vector<std::string> seen;
   for (const commission::RiskReach& reach : result.reach) {
     const bool share = reach.unit == "1";

@@ -20,10 +20,10 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/model/fault_type.hpp>
 #include <wheelwright/detector/reference_motion.hpp>
 #include <wheelwright/filter/measurement.hpp>
 #include <wheelwright/filter/noise.hpp>
+#include <wheelwright/model/fault_type.hpp>
 #include <wheelwright/model/model.hpp>
 
 namespace wheelwright::bench {

@@ -210,8 +210,8 @@ TEST_P(SlowAtRisk, OfAKnownRobotThereAreAsManyFalseAlarmsAsTheSumsAllow) {
 INSTANTIATE_TEST_SUITE_P(Worlds, SlowAtRisk, ::testing::ValuesIn(worlds()),
                          [](const auto& each) { return each.param.name; });
 
-// Random axes, laws and rates from 10 to 500 Hz, watched for half a million samples each at one false alarm in ten years:
-// 10⁸ samples a seed.
+// Random axes, laws and rates from 10 to 500 Hz, watched for half a million samples each at one false alarm in ten
+// years: 10⁸ samples a seed.
 class SlowAtRiskRobots : public ::testing::TestWithParam<std::uint64_t> {};
 
 TEST_P(SlowAtRiskRobots, RaiseNoFalseAlarm) {
@@ -265,7 +265,8 @@ TEST_P(SlowAtRiskRobots, RaiseNoFalseAlarm) {
     rows += static_cast<double>(log.rows());
     years += axis.seconds / (365.25 * 86400.0);
   }
-  std::cout << "seed " << GetParam() << ": " << robots << " robots, " << rows << " samples, " << years << " years, robots with a "
+  std::cout << "seed " << GetParam() << ": " << robots << " robots, " << rows << " samples, " << years
+            << " years, robots with a "
             << "false alarm " << alarms << "; nothing said at a risk: " << silent << ", contradicted: " << contradicted
             << ", refused: " << refused << '\n';
   EXPECT_EQ(alarms, 0u);
@@ -275,19 +276,19 @@ TEST_P(SlowAtRiskRobots, RaiseNoFalseAlarm) {
 
 INSTANTIATE_TEST_SUITE_P(Seeds, SlowAtRiskRobots, ::testing::Range<std::uint64_t>(1, 11));
 
-// Assumptions that are broken: where a later drive would raise a false alarm, the log that the robot was commissioned on
-// had said so.
+// Assumptions that are broken: where a later drive would raise a false alarm, the log that the robot was commissioned
+// on had said so.
 TEST(SlowBrokenAssumption, IsToldBeforeFalseAlarmsCome) {
   struct Broken {
     std::string name;
-    double bias, correlation;    // what errors have, in bounds and s
+    double bias, correlation;   // what errors have, in bounds and s
     double declared, together;  // what the robot file says
   };
-  for (const Broken& b : {Broken{"bias twice as large", 0.2, 0.0, 0.1, 0.0},
-                          Broken{"bias five times as large", 0.5, 0.0, 0.1, 0.0},
-                          Broken{"bias ten times as large", 0.5, 0.0, 0.05, 0.0},
-                          Broken{"correlation ten times as long", 0.0, 0.5, 0.0, 0.05},
-                          Broken{"correlation where there is said to be none", 0.0, 0.1, 0.0, 0.0}}) {
+  for (const Broken& b :
+       {Broken{"bias twice as large", 0.2, 0.0, 0.1, 0.0}, Broken{"bias five times as large", 0.5, 0.0, 0.1, 0.0},
+        Broken{"bias ten times as large", 0.5, 0.0, 0.05, 0.0},
+        Broken{"correlation ten times as long", 0.0, 0.5, 0.0, 0.05},
+        Broken{"correlation where there is said to be none", 0.0, 0.1, 0.0, 0.0}}) {
     constexpr std::size_t kRuns = 300;
     std::size_t told = 0, alarms = 0;
     for (std::size_t k = 0; k < kRuns; ++k) {
@@ -315,7 +316,8 @@ TEST(SlowBrokenAssumption, IsToldBeforeFalseAlarmsCome) {
       }
       alarms += alarm ? 1 : 0;
     }
-    std::cout << b.name << ": told by " << told << " of " << kRuns << " logs, false alarms after the other " << alarms << '\n';
+    std::cout << b.name << ": told by " << told << " of " << kRuns << " logs, false alarms after the other " << alarms
+              << '\n';
     EXPECT_LE(20 * alarms, told + alarms) << b.name;
   }
 }
