@@ -11,6 +11,7 @@
 
 #include <wheelwright/bounds/polytope.hpp>
 #include <wheelwright/core/log.hpp>
+#include <wheelwright/core/warrant.hpp>
 #include <wheelwright/filter/error_class.hpp>
 #include <wheelwright/filter/measurement.hpp>
 #include <wheelwright/filter/noise.hpp>
