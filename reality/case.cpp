@@ -13,7 +13,16 @@ namespace wheelwright::reality {
 namespace {
 
 /// Streams of draws of a case.
-enum Stream : std::uint64_t { of_robot = 1, of_baseline, of_real, of_fresh, of_kind, of_noise = 10, of_effect = 100 };
+enum Stream : std::uint64_t {
+  of_robot = 1,
+  of_baseline,
+  of_real,
+  of_fresh,
+  of_kind,
+  of_noise = 10,
+  of_effect = 100,
+  of_law = 1000
+};
 
 constexpr double short_drive = 45.0;  // s, to find severities
 
@@ -60,37 +69,44 @@ struct Source {
   std::uint64_t index;
   const RobotDesign& robot;
 
-  [[nodiscard]] Effect make(const Entry& entry, std::uint64_t stream, double severity) const {
-    return entry.make(robot, Random(request.seed, index, stream), severity);
+  [[nodiscard]] Effect make(const Subject& subject, std::uint64_t stream, double severity) const {
+    return subject.make(robot, Random(request.seed, index, stream), severity);
   }
 };
 
-double gap_of(const Source& source, const Entry& entry, std::uint64_t stream, double severity, const Drive& drive,
-              double beta) {
+/// A severity and the gap that it makes.
+struct Size {
+  double severity = 0.0;
+  Gap gap;
+};
+
+Gap gap_of(const Source& source, const Subject& subject, std::uint64_t stream, double severity, const Drive& drive,
+           double beta) {
   std::vector<Effect> effects;
-  effects.push_back(source.make(entry, stream, severity));
+  effects.push_back(source.make(subject, stream, severity));
   const Record record = run_world(source.robot, effects, drive);
-  const Gap gap = measure_gap(source.robot, signals_of(source.robot, record), beta);
-  return entry.kind == Class::parametric ? gap.before : gap.after;
+  return measure_gap(source.robot, signals_of(source.robot, record), beta);
 }
 
 /// The severity at which the gap is `target` per cent, within a tenth; none where the effect cannot reach `least`.
-std::optional<double> find_severity(const Source& source, const Entry& entry, std::uint64_t stream, const Drive& drive,
-                                    double beta, double target, double least) {
+std::optional<Size> find_severity(const Source& source, const Subject& subject, std::uint64_t stream,
+                                  const Drive& drive, double beta, double target, double least) {
+  const Entry& entry = *subject.entry;
   const Drive part = entry.slow ? drive : first_part(drive, short_drive);
   double severity = std::min(target / 15.0, entry.largest);
   double low = 0.0;
   double high = entry.largest;
-  double best = 0.0;
+  Size best;
   double nearest = std::numeric_limits<double>::infinity();
   for (int k = 0; k < 7; ++k) {
     double factor = 0.2;
     try {
-      const double gap = gap_of(source, entry, stream, severity, part, beta);
+      const Gap made = gap_of(source, subject, stream, severity, part, beta);
+      const double gap = entry.kind == Class::parametric ? made.before : made.after;
       factor = target / std::max(gap, 1e-3);
       if (gap >= least && std::abs(std::log(factor)) < nearest) {
         nearest = std::abs(std::log(factor));
-        best = severity;
+        best = {severity, made};
       }
     } catch (const Error&) {
       // Beyond what the robot stands.
@@ -104,7 +120,7 @@ std::optional<double> find_severity(const Source& source, const Entry& entry, st
     severity = next > low && next < high ? next : low > 0.0 ? std::sqrt(low * high) : 0.3 * high;
     severity = std::min(severity, entry.largest);
   }
-  return best > 0.0 ? std::optional(best) : std::nullopt;
+  return best.severity > 0.0 ? std::optional(best) : std::nullopt;
 }
 
 /// Chooses the filter that the gap is measured with, and better sensors where noise would hide everything.
@@ -128,8 +144,36 @@ double settle_sensors(RobotDesign& robot, const Record& record, Random random, d
 
 }  // namespace
 
-Case make_case(const Request& request, std::uint64_t index) {
-  const auto stream = [&](std::uint64_t number) { return Random(request.seed, index, number); };
+std::vector<Subject> subjects(std::string_view effect) {
+  std::vector<Subject> all;
+  for (const Entry& entry : catalogue()) {
+    if (entry.kind == Class::outside || (!effect.empty() && effect != entry.name)) {
+      continue;
+    }
+    const std::size_t before = all.size();
+    for (const Law& law : laws()) {
+      if (law.effect == entry.name) {
+        all.push_back({&entry, &law});
+      }
+    }
+    if (all.size() == before) {
+      all.push_back({&entry, nullptr});
+    }
+  }
+  return all;
+}
+
+namespace {
+
+/// No severity makes a gap that stands out of the noise.
+class TooSmall : public Error {
+ public:
+  using Error::Error;
+};
+
+/// `item` separates the draws of this case, and `subject` is what is withheld where every law is taken in turn.
+Case draw_case(const Request& request, std::uint64_t item, const Subject* fixed) {
+  const auto stream = [&](std::uint64_t number) { return Random(request.seed, item, number); };
   Case result;
   Random robot_draws = stream(of_robot);
   result.robot = draw_robot(robot_draws, request.hard);
@@ -149,37 +193,50 @@ Case make_case(const Request& request, std::uint64_t index) {
   Random draws = stream(of_kind);
   const Kind drawn = draw_kind(draws);
   Kind kind = request.kind == Kind::mixed ? drawn : request.kind;
-  if (!request.effect.empty()) {
+  if (!request.effect.empty() || fixed != nullptr) {
     kind = Kind::single;
   }
   const std::size_t wanted = kind == Kind::none ? 0 : kind == Kind::pair ? 2 : 1;
-  const Source source{request, index, robot};
+  const Source source{request, item, robot};
   std::vector<std::uint64_t> streams;
   for (std::uint64_t attempt = 0; result.causes.size() < wanted; ++attempt) {
-    if (attempt == 40) {
-      throw Error(fmt::format("reality: no effect is large enough in case {}", index));
+    if (attempt == (fixed != nullptr ? 4U : 40U)) {
+      throw TooSmall(fmt::format("reality: no effect is large enough in case {}", item));
     }
-    const Entry& entry = request.effect.empty() ? draw_entry(draws, kind) : find_entry(request.effect);
+    Subject subject;
+    if (fixed != nullptr) {
+      subject = *fixed;
+    } else {
+      subject.entry = request.effect.empty() ? &draw_entry(draws, kind) : &find_entry(request.effect);
+      subject.law = request.laws.draw(subject.entry->name, stream(of_law + attempt));
+    }
+    const Entry& entry = *subject.entry;
     const double share = request.hard ? 1.0 / 3.0 : 1.0;
-    const double least = std::max(3.0 * floor, 5.0 * share);
-    const double target = draws.log_uniform(least, std::max(35.0 * share, 1.2 * least));
+    const double least = std::max(3.0 * floor, request.low * share);
+    const double target = draws.log_uniform(least, std::max(request.high * share, 1.2 * least));
     const double free = draws.log_uniform(0.4, 1.6) * share;
-    if (!result.causes.empty() && alike(result.causes[0].entry->name, entry.name)) {
+    if (!result.causes.empty() && alike(result.causes[0].of.entry->name, entry.name)) {
       continue;
     }
-    const auto severity =
-        entry.kinematic ? std::optional(std::min(free, entry.largest))
-                        : find_severity(source, entry, of_effect + attempt, real_drive, beta, target, 0.9 * least);
-    if (severity) {
-      result.causes.push_back({&entry, *severity, source.make(entry, of_effect + attempt, *severity).parameters});
-      streams.push_back(of_effect + attempt);
+    const std::uint64_t draw = of_effect + attempt;
+    std::optional<Size> size;
+    if (entry.kinematic) {
+      const double severity = std::min(free, entry.largest);
+      size = Size{severity, gap_of(source, subject, draw, severity, first_part(real_drive, short_drive), beta)};
+    } else {
+      size = find_severity(source, subject, draw, real_drive, beta, target, 0.9 * least);
+    }
+    if (size) {
+      result.causes.push_back({subject, size->severity, size->gap.before, size->gap.after,
+                               source.make(subject, draw, size->severity).parameters});
+      streams.push_back(draw);
     }
   }
 
   const auto run = [&](const Drive& drive) {
     std::vector<Effect> effects;
     for (std::size_t k = 0; k < wanted; ++k) {
-      effects.push_back(source.make(*result.causes[k].entry, streams[k], result.causes[k].severity));
+      effects.push_back(source.make(result.causes[k].of, streams[k], result.causes[k].severity));
     }
     return run_world(robot, effects, drive);
   };
@@ -194,12 +251,32 @@ Case make_case(const Request& request, std::uint64_t index) {
   std::vector<std::string> truth;
   bool parametric = wanted > 0;
   for (const Cause& cause : result.causes) {
-    truth.emplace_back(cause.entry->name);
-    parametric = parametric && cause.entry->kind == Class::parametric;
+    truth.emplace_back(cause.of.entry->name);
+    parametric = parametric && cause.of.entry->kind == Class::parametric;
   }
   const double real_floor = noise_floor(robot, clean, signals_of(robot, result.real), beta);
   result.oracle = ask_oracle(robot, clean, truth, parametric, std::max(real_floor, 0.05), beta);
   return result;
+}
+
+}  // namespace
+
+Case make_case(const Request& request, std::uint64_t index) {
+  if (!request.each) {
+    return draw_case(request, index, nullptr);
+  }
+  const std::vector<Subject> all = subjects(request.effect);
+  // Some robots cannot show some effects: a light rotor its play. Another robot is drawn then.
+  constexpr std::uint64_t robots = 8;
+  for (std::uint64_t k = 0;; ++k) {
+    try {
+      return draw_case(request, index + (k << 32), &all[index % all.size()]);
+    } catch (const TooSmall&) {
+      if (k + 1 == robots) {
+        throw;
+      }
+    }
+  }
 }
 
 std::string robot_yaml(const RobotDesign& robot, const std::string& name) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <wheelwright/reality/effect.hpp>
+#include <wheelwright/reality/law.hpp>
 #include <wheelwright/reality/oracle.hpp>
 
 namespace wheelwright::reality {
@@ -20,15 +21,35 @@ enum class Kind { mixed, single, pair, none, outside };
 struct Request {
   std::uint64_t seed = 1;
   Kind kind = Kind::mixed;
-  bool hard = false;        ///< a third of the severity, three times the noise, imperfect robots
+  bool hard = false;   ///< a third of the severity, three times the noise, imperfect robots
+  double low = 5.0;    ///< least gap that one effect makes, per cent of the torque's RMS; the noise may ask for more
+  double high = 35.0;  ///< largest, likewise
   double duration = 120.0;  ///< s
   std::string effect;       ///< this effect alone, where it is given
+  LawChoice laws;           ///< what effects follow; it changes no other draw
+  bool each = false;        ///< every effect and law in turn, one to a case
 };
+
+/// An effect under a law.
+struct Subject {
+  const Entry* entry = nullptr;
+  const Law* law = nullptr;  ///< null: the one law that the effect has
+
+  [[nodiscard]] Effect make(const RobotDesign& robot, Random random, double severity) const {
+    return law != nullptr ? law->make(robot, random, severity) : entry->make(robot, random, severity);
+  }
+};
+
+/// Every law of every effect that is not outside, and the effects that have one law only; of `effect` alone where it
+/// is not empty.
+[[nodiscard]] std::vector<Subject> subjects(std::string_view effect = {});
 
 /// An effect that was drawn.
 struct Cause {
-  const Entry* entry = nullptr;
+  Subject of;
   double severity = 1.0;
+  double before = 0.0;  ///< gap that it alone makes with the healthy robot's parameters, per cent of the torque's RMS
+  double after = 0.0;   ///< likewise with parameters by least squares; both on the part of the drive that was tried
   std::vector<std::pair<std::string, double>> parameters;
 };
 

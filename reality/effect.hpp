@@ -83,6 +83,9 @@ struct Entry {
 [[nodiscard]] std::vector<Entry> outside_effects();
 /// @}
 
+/// Width of the smooth sign of a wheel's speed, rad/s; smaller than any speed that is driven.
+inline constexpr double creep = 0.02;
+
 /// sgn x, smooth within `width`.
 [[nodiscard]] double soft_sign(double x, double width);
 

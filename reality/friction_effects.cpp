@@ -187,9 +187,6 @@ std::vector<Entry> actuator_effects() {
 
 namespace {
 
-/// Width of the smooth sign of a wheel's speed, rad/s; smaller than any speed that is driven.
-constexpr double creep = 0.02;
-
 Effect coulomb(const RobotDesign& robot, Random random, double severity) {
   const double c = 0.25 * severity * robot.typical_torque();
   Effect effect{"coulomb", {{"c", c}}, {}, {}, {}, {}, 0.0};

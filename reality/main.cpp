@@ -35,9 +35,13 @@ Json answer(const Case& c) {
     for (const auto& [name, value] : cause.parameters) {
       parameters[name] = digits(value);
     }
-    effects.push_back(
-        {{"effect", cause.entry->name}, {"severity", digits(cause.severity)}, {"parameters", parameters}});
-    known = known && cause.entry->kind != Class::outside;
+    effects.push_back({{"effect", cause.of.entry->name},
+                       {"law", cause.of.law != nullptr ? cause.of.law->name : "given"},
+                       {"severity", digits(cause.severity)},
+                       {"alone_gap_percent", digits(cause.before)},
+                       {"alone_gap_percent_after_refit", digits(cause.after)},
+                       {"parameters", parameters}});
+    known = known && cause.of.entry->kind != Class::outside;
   }
   const Oracle& o = c.oracle;
   Json oracle{{"floor_percent", digits(o.floor_percent)}, {"beta", o.beta}};
@@ -106,6 +110,25 @@ int generate(const Request& request, std::uint64_t first, std::uint64_t cases, u
   return 0;
 }
 
+int list_laws() {
+  for (const Subject& subject : subjects()) {
+    const Law* law = subject.law;
+    fmt::print("{:<24} {:<14} {}{}\n", subject.entry->name, law != nullptr ? law->name : "given",
+               law == nullptr                  ? "one law only"
+               : law->origin == Origin::engine ? "engine: "
+                                               : "",
+               law != nullptr ? law->says : "");
+  }
+  return 0;
+}
+
+/// Least and largest gap of one effect, per cent; `hard` takes a third of its own.
+struct Severities {
+  double low, high;
+};
+const std::map<std::string, Severities> severities{
+    {"standard", {5.0, 35.0}}, {"plain", {3.0, 60.0}}, {"hard", {5.0, 35.0}}};
+
 }  // namespace
 
 int main(int count, char** arguments) try {
@@ -114,11 +137,13 @@ int main(int count, char** arguments) try {
   CLI::App& make = *app.add_subcommand("generate",
                                        "A set of cases: logs and robot files in DIR/logs, a second drive of "
                                        "each in DIR/fresh, answers in DIR/answers.json");
+  CLI::App& list = *app.add_subcommand("laws", "Effects and the laws that they may follow");
   Request request;
-  std::uint64_t cases = 10;
+  std::uint64_t cases = 0;
   std::uint64_t first = 0;
   unsigned threads = 2;
   std::string profile = "standard";
+  std::string chosen = "all";
   std::string out;
   const std::map<std::string, Kind> kinds{{"mixed", Kind::mixed},
                                           {"single", Kind::single},
@@ -126,13 +151,20 @@ int main(int count, char** arguments) try {
                                           {"none", Kind::none},
                                           {"outside", Kind::outside}};
   make.add_option("--seed", request.seed, "of all draws")->capture_default_str();
-  make.add_option("--cases", cases, "how many")->capture_default_str();
+  make.add_option("--cases", cases, "how many; 10 where nothing is said, with --laws each one of each");
   make.add_option("--first", first, "number of the first")->capture_default_str();
-  make.add_option("--profile", profile, "hard: a third of the severity, three times the noise, imperfect robots")
-      ->check(CLI::IsMember({"standard", "hard"}))
+  make.add_option("--profile", profile,
+                  "gap of one effect, per cent of the torque: standard 5 to 35, plain 3 to 60; hard: a "
+                  "third of standard, three times the noise, imperfect robots")
+      ->check(CLI::IsMember(severities))
       ->capture_default_str();
   make.add_option("--kind", request.kind, "what is withheld")->transform(CLI::CheckedTransformer(kinds));
   make.add_option("--effect", request.effect, "this effect in every case");
+  make.add_option(
+          "--laws", chosen,
+          "what effects follow: all laws that `laws` lists, other (without the common formulas), given (the law "
+          "of each effect before there were several), laws by comma, or each: every law in turn")
+      ->capture_default_str();
   make.add_option("--duration", request.duration, "of each drive, s")
       ->check(CLI::Range(50.0, 3600.0))
       ->capture_default_str();
@@ -143,9 +175,19 @@ int main(int count, char** arguments) try {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
   }
+  if (list.parsed()) {
+    return list_laws();
+  }
   request.hard = profile == "hard";
+  request.low = severities.at(profile).low;
+  request.high = severities.at(profile).high;
+  request.each = chosen == "each";
+  request.laws = LawChoice(request.each ? "all" : chosen);
   if (!request.effect.empty()) {
     static_cast<void>(find_entry(request.effect));
+  }
+  if (cases == 0) {
+    cases = request.each ? subjects(request.effect).size() : 10;
   }
   // The engine writes its warnings into a file of its own in the working directory: the world looks at them itself.
   mju_user_warning = [](const char*) {};

@@ -84,32 +84,35 @@ std::string engine_xml(const Body& b, double step) {
   const double spin = wheel_spin(b);
   std::string wheels;
   for (const auto& [name, side, y] : {std::tuple{"right", right, -b.half_track}, {"left", left, b.half_track}}) {
-    wheels +=
-        fmt::format(R"(<body name="{0}" pos="0 {1} {2}"><joint name="{0}" type="hinge" axis="0 1 0" armature="{3}" )"
-                    R"(damping="{4}" frictionloss="{5}"/>
+    wheels += fmt::format(
+        R"(<body name="{0}" pos="0 {1} {2}"><joint name="{0}" type="hinge" axis="0 1 0" armature="{3}" )"
+        R"(damping="{4}" frictionloss="{5}"/>
 <inertial pos="0 0 0" mass="{6}" diaginertia="{7} {8} {7}"/>
-<geom type="ellipsoid" size="{9} {10} {9}" condim="3" friction="1.5 0 0"/></body>
+<geom type="ellipsoid" size="{9} {10} {9}" pos="{11} 0 {12}" condim="3" priority="1" friction="{13} 0 0"/></body>
 )",
-                    name, y, b.radius[side] - height, b.armature[side], b.damping[side], b.friction[side], b.wheel_mass,
-                    0.5 * spin, spin, b.radius[side], b.wheel_width);
+        name, y, b.radius[side] - height, b.armature[side], b.damping[side], b.friction[side], b.wheel_mass, 0.5 * spin,
+        spin, b.radius[side], b.wheel_width, b.off_centre[side][0], b.off_centre[side][1], b.grip);
   }
   const double ball = 0.3 * height;
   std::string casters;
   for (const double x : {-b.caster, b.caster}) {
     casters +=
-        fmt::format("<geom type=\"sphere\" size=\"{0}\" pos=\"{1} 0 {2}\" condim=\"1\"/>\n", ball, x, ball - height);
+        fmt::format(R"(<geom type="sphere" size="{0}" pos="{1} 0 {2}" condim="{3}" priority="1" friction="{4} 0 0"/>
+)",
+                    ball, x, ball - height, b.caster_grip > 0.0 ? 3 : 1, b.caster_grip);
   }
   return fmt::format(
       R"(<mujoco><compiler boundmass="1e-9" boundinertia="1e-12"/>
 <option timestep="{0}" cone="elliptic" impratio="100" solver="Newton" iterations="30" )"
-      R"(tolerance="1e-12" gravity="{1} {2} {3}"/>
+      R"(tolerance="1e-12" gravity="{1} {2} {3}" density="{16}"/>
 <default><geom solref="{4} 1" solimp="0.99 0.99 0.001"/></default>
 <worldbody><geom type="plane" size="0 0 1" condim="1" friction="1.5 0 0"/>
 <body name="chassis" pos="0 0 {5}"><freejoint/>
 <inertial pos="{6} {7} {8}" mass="{9}" diaginertia="{10} {11} {12}"/>
-{13}{14}{15}</body></worldbody></mujoco>)",
+{13}{14}{15}</body></worldbody>{17}</mujoco>)",
       step, b.gravity.x(), b.gravity.y(), b.gravity.z(), 2.0 * step, height, b.centre.x(), b.centre.y(), b.centre.z(),
-      b.chassis_mass, b.chassis_inertia.x(), b.chassis_inertia.y(), b.chassis_inertia.z(), casters, wheels, b.attached);
+      b.chassis_mass, b.chassis_inertia.x(), b.chassis_inertia.y(), b.chassis_inertia.z(), casters, wheels, b.attached,
+      b.fluid_density, b.beside);
 }
 
 }  // namespace wheelwright::reality

@@ -71,7 +71,12 @@ struct Body {
   Pair friction{0, 0};                       ///< dry, N m
   double caster = 0.2;                       ///< distance of the balls from the axle, m
   Eigen::Vector3d gravity{0, 0, -9.81};      ///< m/s²
+  double grip = 1.5;                         ///< friction of wheels on the ground
+  double caster_grip = 0.0;                  ///< likewise of the balls
+  double fluid_density = 0.0;                ///< of what the robot moves in, kg/m³
+  std::array<Pair, 2> off_centre{};          ///< tyre's centre from the axle, forward and up at angle 0, m
   std::string attached;                      ///< bodies hung into the chassis, in the engine's XML
+  std::string beside;  ///< elements beside the bodies; actuators named right and left take the wheels' torques
 };
 
 /// A robot, its sensors and its controller.

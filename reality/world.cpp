@@ -265,11 +265,12 @@ Record run_world(const RobotDesign& robot, std::vector<Effect>& effects, const D
   }
   const Model model = compile(engine_xml(body, step));
   const Data data(mj_makeData(model.get()));
-  std::array<int, 2> dof{}, joint{};
+  std::array<int, 2> dof{}, joint{}, motor{};
   for (std::size_t i = 0; i < 2; ++i) {
     const int id = mj_name2id(model.get(), mjOBJ_JOINT, i == right ? "right" : "left");
     dof[i] = model->jnt_dofadr[id];
     joint[i] = model->jnt_qposadr[id];
+    motor[i] = mj_name2id(model.get(), mjOBJ_ACTUATOR, i == right ? "right" : "left");
   }
   double late = 0.0;
   for (const Effect& effect : effects) {
@@ -332,7 +333,10 @@ Record run_world(const RobotDesign& robot, std::vector<Effect>& effects, const D
       history.angle[i].push_back(encoder[i]);
       history.speed[i].push_back(seen[i]);
       history.torque[i].push_back(command[i]);
-      data->qfrc_applied[dof[i]] = torque[i] + push.wheel[i];
+      data->qfrc_applied[dof[i]] = push.wheel[i] + (motor[i] < 0 ? torque[i] : 0.0);
+      if (motor[i] >= 0) {
+        data->ctrl[motor[i]] = torque[i];
+      }
     }
     history.x.push_back(q[0]);
     history.y.push_back(q[1]);

@@ -106,6 +106,40 @@ def figures_of(gap, kind):
             if f.get("after") is not None and f.get("before") is not None}
 
 
+class Laws:
+    """What was said of single effects, by effect and law."""
+
+    def __init__(self):
+        self.of = defaultdict(Counter)
+
+    def add(self, answer, inside, right, verdict, causes):
+        effect = answer["effects"][0]
+        count = self.of[effect["effect"], effect.get("law", "given")]
+        count["cases"] += 1
+        count["in the answer"] += inside
+        count["single and right"] += right
+        count["no_gap"] += verdict == "no_gap"
+        count["one wrong cause"] += verdict == "explained" and len(causes) == 1 and not right
+        count["unexplained"] += verdict == "unexplained"
+
+    def __bool__(self):
+        return any(law != "given" for _, law in self.of)
+
+    COLUMNS = ["cases", "in the answer", "single and right", "no_gap", "one wrong cause", "unexplained"]
+
+    def report(self, out):
+        print("\n| effect | law | " + " | ".join(self.COLUMNS) + " |\n|" + "---|" * 8, file=out)
+        total = Counter()
+        several = Counter()
+        for (effect, law), count in sorted(self.of.items()):
+            print(f"| {effect} | {law} | " + " | ".join(str(count[c]) for c in self.COLUMNS) + " |", file=out)
+            total.update(count)
+            if law != "given":
+                several.update(count)
+        for name, count in (("all", total), ("of several laws", several)):
+            print(f"| {name} | | " + " | ".join(str(count[c]) for c in self.COLUMNS) + " |", file=out)
+
+
 class Promise:
     """What was promised of the shrinking, and what came of it."""
 
@@ -172,11 +206,13 @@ def score(answers, results, naive=False):
     coverage = defaultdict(Count)
     missed = []
     promise = Promise()
+    laws = Laws()
     for case, answer in sorted(answers.items()):
         kind = class_of(answer)
         truth = [e["effect"] for e in answer["effects"]]
         label = " + ".join(sorted(truth)) if kind != "outside" else f"({' + '.join(sorted(truth))})"
         label = label or "no effect"
+        law = "/".join(e["law"] for e in answer["effects"] if e.get("law", "given") != "given")
         gap = load(results, case)
         rows["results that are there"].add(gap is not None)
         if gap is None:
@@ -200,6 +236,7 @@ def score(answers, results, naive=False):
 
         good = True
         if kind in ("single", "parametric"):
+            laws.add(answer, right or inside, right, verdict, causes)
             rows[f"{kind}: verdict or credible set has it"].add(right or inside)
             rows[f"{kind}: the single verdict"].add(right)
             if "separable" in oracle:
@@ -228,7 +265,7 @@ def score(answers, results, naive=False):
             rows["outside the catalogue: explained by one wrong cause"].add(verdict == "explained" and len(causes) == 1)
             good = verdict == "unexplained"
         if not good:
-            missed.append(f"{case}: {label}: {answered}; credible set {kept}; closest rival "
+            missed.append(f"{case}: {label}{law and f' ({law})'}: {answered}; credible set {kept}; closest rival "
                           f"{oracle.get('closest_rival', '–')}, gap {answer.get('gap_percent_after_refit')} %")
 
         if right and truth:
@@ -239,14 +276,14 @@ def score(answers, results, naive=False):
                 value = true.get((cause["effect"], name))
                 if value is not None and interval.get("lower") is not None and interval.get("upper") is not None:
                     coverage[f"{cause['effect']}.{name}"].add(interval["lower"] <= value <= interval["upper"])
-    return rows, sizes, confusion, coverage, missed, promise
+    return rows, sizes, confusion, coverage, missed, promise, laws
 
 
 ORDER = ["results", "single", "parametric", "two", "no effect", "outside"]
 
 
 def report(answers, results, naive=False, out=sys.stdout):
-    rows, sizes, confusion, coverage, missed, promise = score(answers, results, naive)
+    rows, sizes, confusion, coverage, missed, promise, laws = score(answers, results, naive)
     print("| measure | cases |\n|---|---|", file=out)
     for name in sorted(rows, key=lambda n: next(k for k, word in enumerate(ORDER) if n.startswith(word))):
         print(f"| {name} | {rows[name]} |", file=out)
@@ -263,6 +300,8 @@ def report(answers, results, naive=False, out=sys.stdout):
     print("\n| hidden | said (cases) |\n|---|---|", file=out)
     for truth in sorted(confusion):
         print(f"| {truth} | {', '.join(f'{said} {n}' for said, n in confusion[truth].most_common())} |", file=out)
+    if laws:
+        laws.report(out)
     if coverage:
         print("\n| parameter | within its interval |\n|---|---|", file=out)
         for name in sorted(coverage):

@@ -3,11 +3,13 @@
 #
 # Withheld effects: has `wheelwright gap` name what another physics engine hid in logs, and scores the answers.
 #
-#   tools/withheld.sh [--seed S] [--cases N] [--profile standard|hard] [--kind KIND] [--out DIR] [--only naive|removed] [SET]
+#   tools/withheld.sh [--seed S] [--cases N] [--profile standard|plain|hard] [--kind KIND] [--laws LAWS] [--duration S]
+#                     [--out DIR] [--only naive|removed] [SET]
 #
 # SET is a directory of cases that is there already: case_*/ (or logs/case_*/) beside answers.json. Without it a set is
 # made in DIR/set. The tool sees logs and robot file of a case and nothing else; its results are in DIR/results, without
 # the drive that would split ambiguous causes, which takes longer than all the rest.
+#   --laws LAWS     what effects follow (`wheelwright-reality generate --help`); each: a case for every effect and law
 #   --only naive    scores what the naive rule said; results in DIR/results-naive
 #   --only removed  takes the hidden effect (and those that contain it) out of the tool's catalogue, for cases of one effect
 #                   of the catalogue; results in DIR/results-removed
@@ -17,16 +19,18 @@ set -eu
 root=$(cd "$(dirname "$0")/.." && pwd)
 bin=${BUILD:-$root/build}/bin
 jobs=${JOBS:-2}
-seed=1 cases=60 profile=standard kind=mixed out=out/withheld only='' set=''
+seed=1 cases='' profile=standard kind=mixed laws=all duration=120 out=out/withheld only='' set=''
 while [ $# -gt 0 ]; do
   case $1 in
-    --seed | --cases | --profile | --kind | --out | --only)
+    --seed | --cases | --profile | --kind | --laws | --duration | --out | --only)
       [ $# -ge 2 ] || { echo "withheld: $1 wants a value" >&2; exit 2; }
       case $1 in
         --seed) seed=$2 ;;
         --cases) cases=$2 ;;
         --profile) profile=$2 ;;
         --kind) kind=$2 ;;
+        --laws) laws=$2 ;;
+        --duration) duration=$2 ;;
         --out) out=$2 ;;
         --only) only=$2 ;;
       esac
@@ -39,8 +43,9 @@ done
 mkdir -p "$out"
 if [ -z "$set" ]; then
   set=$out/set
-  "$bin/wheelwright-reality" generate --seed "$seed" --cases "$cases" --profile "$profile" --kind "$kind" \
-    --out "$set" --threads "$jobs"
+  [ -n "$cases" ] || [ "$laws" = each ] || cases=60
+  "$bin/wheelwright-reality" generate --seed "$seed" ${cases:+--cases "$cases"} --profile "$profile" --kind "$kind" \
+    --laws "$laws" --duration "$duration" --out "$set" --threads "$jobs"
 fi
 logs=$set
 [ ! -d "$set/logs" ] || logs=$set/logs
