@@ -52,11 +52,15 @@ const Entry& draw_entry(Random& random, Kind kind) {
   return *able[random.below(able.size())];
 }
 
-/// Pairs of which one would hide the other.
-bool alike(std::string_view a, std::string_view b) {
-  const auto family = [](std::string_view name) {
+/// Pairs of which one would hide the other, or that both have the rotor to themselves.
+bool alike(const Subject& a, const Subject& b) {
+  const auto family = [](const Subject& subject) {
+    const std::string_view name = subject.entry->name;
     if (name == "delay" || name == "sensor_time_offset") {
       return std::string_view("actuator_lag");
+    }
+    if (name == "longitudinal_slip" && subject.law != nullptr) {
+      return std::string_view("backlash");
     }
     return name == "coulomb_asymmetric" ? std::string_view("coulomb") : name;
   };
@@ -215,7 +219,7 @@ Case draw_case(const Request& request, std::uint64_t item, const Subject* fixed)
     const double least = std::max(3.0 * floor, request.low * share);
     const double target = draws.log_uniform(least, std::max(request.high * share, 1.2 * least));
     const double free = draws.log_uniform(0.4, 1.6) * share;
-    if (!result.causes.empty() && alike(result.causes[0].of.entry->name, entry.name)) {
+    if (!result.causes.empty() && alike(result.causes[0].of, subject)) {
       continue;
     }
     const std::uint64_t draw = of_effect + attempt;

@@ -33,11 +33,7 @@ Effect on_torque(Parameters parameters, OneWheel law) {
 Effect engine_motor(Parameters parameters, const std::string& attributes) {
   Effect effect;
   effect.parameters = std::move(parameters);
-  effect.build = [attributes](Body& body) {
-    body.beside += fmt::format(
-        R"(<actuator><general name="right" joint="right" {0}/><general name="left" joint="left" {0}/></actuator>)",
-        attributes);
-  };
+  effect.build = [attributes](Body& body) { body.motor += " " + attributes; };
   return effect;
 }
 
@@ -266,7 +262,6 @@ Effect joint_limits(const RobotDesign& robot, Random, double severity) {
   effect.parameters = {{"play_rad", gap}};
   effect.build = [=, inertia = robot.body.armature](Body& body) {
     std::string tendons;
-    std::string motors;
     for (const auto& [name, side] : {std::pair{"right", right}, {"left", left}}) {
       body.attached += fmt::format(R"(<body><joint name="rotor_{0}" type="hinge" axis="0 1 0" armature="{1}"/>)"
                                    R"(<inertial pos="0 0 0" mass="1e-6" diaginertia="1e-9 1e-9 1e-9"/></body>
@@ -276,9 +271,9 @@ Effect joint_limits(const RobotDesign& robot, Random, double severity) {
           fmt::format(R"(<fixed limited="true" range="{0} {1}" solreflimit="0.004 1" solimplimit="0.95 0.99 1e-4">)"
                       R"(<joint joint="rotor_{2}" coef="1"/><joint joint="{2}" coef="-1"/></fixed>)",
                       -0.5 * gap, 0.5 * gap, name);
-      motors += fmt::format(R"(<motor name="{0}" joint="rotor_{0}"/>)", name);
     }
-    body.beside += "<tendon>" + tendons + "</tendon><actuator>" + motors + "</actuator>";
+    body.beside += "<tendon>" + tendons + "</tendon>";
+    body.motor_at = "rotor_";
     take_rotor(body);
   };
   return effect;

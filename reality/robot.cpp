@@ -101,6 +101,12 @@ std::string engine_xml(const Body& b, double step) {
 )",
                     ball, x, ball - height, b.caster_grip > 0.0 ? 3 : 1, b.caster_grip);
   }
+  std::string motors;
+  if (!b.motor.empty() || !b.motor_at.empty()) {
+    motors = fmt::format(R"(<actuator><general name="right" joint="{0}right" {1}/>)"
+                         R"(<general name="left" joint="{0}left" {1}/></actuator>)",
+                         b.motor_at, b.motor);
+  }
   return fmt::format(
       R"(<mujoco><compiler boundmass="1e-9" boundinertia="1e-12"/>
 <option timestep="{0}" cone="elliptic" impratio="100" solver="Newton" iterations="30" )"
@@ -112,7 +118,7 @@ std::string engine_xml(const Body& b, double step) {
 {13}{14}{15}</body></worldbody>{17}</mujoco>)",
       step, b.gravity.x(), b.gravity.y(), b.gravity.z(), 2.0 * step, height, b.centre.x(), b.centre.y(), b.centre.z(),
       b.chassis_mass, b.chassis_inertia.x(), b.chassis_inertia.y(), b.chassis_inertia.z(), casters, wheels, b.attached,
-      b.fluid_density, b.beside);
+      b.fluid_density, b.beside + motors);
 }
 
 }  // namespace wheelwright::reality

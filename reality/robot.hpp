@@ -76,7 +76,9 @@ struct Body {
   double fluid_density = 0.0;                ///< of what the robot moves in, kg/m³
   std::array<Pair, 2> off_centre{};          ///< tyre's centre from the axle, forward and up at angle 0, m
   std::string attached;                      ///< bodies hung into the chassis, in the engine's XML
-  std::string beside;  ///< elements beside the bodies; actuators named right and left take the wheels' torques
+  std::string beside;                        ///< elements beside the bodies
+  std::string motor;                         ///< attributes of the engine's actuators; none: torques act on the joints
+  std::string motor_at;                      ///< what the names of their joints begin with
 };
 
 /// A robot, its sensors and its controller.
