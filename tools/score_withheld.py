@@ -118,6 +118,7 @@ class Laws:
         count["cases"] += 1
         count["in the answer"] += inside
         count["single and right"] += right
+        count["beside others"] += not inside and family(effect["effect"]) in families(causes)
         count["no_gap"] += verdict == "no_gap"
         count["one wrong cause"] += verdict == "explained" and len(causes) == 1 and not right
         count["unexplained"] += verdict == "unexplained"
@@ -125,10 +126,10 @@ class Laws:
     def __bool__(self):
         return any(law != "given" for _, law in self.of)
 
-    COLUMNS = ["cases", "in the answer", "single and right", "no_gap", "one wrong cause", "unexplained"]
+    COLUMNS = ["cases", "in the answer", "single and right", "beside others", "no_gap", "one wrong cause", "unexplained"]
 
     def report(self, out):
-        print("\n| effect | law | " + " | ".join(self.COLUMNS) + " |\n|" + "---|" * 8, file=out)
+        print("\n| effect | law | " + " | ".join(self.COLUMNS) + " |\n|" + "---|" * (2 + len(self.COLUMNS)), file=out)
         total = Counter()
         several = Counter()
         for (effect, law), count in sorted(self.of.items()):
