@@ -22,6 +22,7 @@ namespace wheelwright::app {
 logs::LogOptions reader_options(const CommonOptions& options) {
   logs::LogOptions reader;
   reader.msg_path = options.msg_path;
+  reader.trust = options.trust;
   for (const std::string& entry : options.map) {
     const std::size_t at = entry.find('=');
     if (at == std::string::npos || at == 0 || at + 1 == entry.size()) {

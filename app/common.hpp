@@ -44,6 +44,7 @@ struct CommonOptions {
   std::uint64_t seed = 1;                       ///< of everything random
   std::vector<std::string> map;                 ///< name=column
   std::vector<std::filesystem::path> msg_path;  ///< directories with definitions of messages
+  bool trust = false;                           ///< a log may reach for files beside it
   std::string command_line;                     ///< as the user gave it
 };
 
