@@ -30,8 +30,7 @@ namespace fs = std::filesystem;
 /// Files one behind the other.
 class Bag final : public BagReader {
  public:
-  Bag(const std::vector<fs::path>& paths, const BagOptions& options)
-      : hashed_(options.hashed), trust_(options.trust) {
+  Bag(const std::vector<fs::path>& paths, const BagOptions& options) : hashed_(options.hashed), trust_(options.trust) {
     for (const fs::path& directory : options.msg_path) {
       definitions_.push_back(ros_definitions_from(directory));
     }
@@ -409,8 +408,8 @@ class PackedSource final : public Source {
                           from->file_bytes(), unpacked);
     }
     if (limit) {
-      throw InputError(fmt::format("{}: more than {} bytes come out of it: expected a smaller recording, or --trust", shown_,
-                                   largest_unpacked));
+      throw InputError(fmt::format("{}: more than {} bytes come out of it: expected a smaller recording, or --trust",
+                                   shown_, largest_unpacked));
     }
     check(std::fflush(to.get()) == 0);
     bytes_ = std::filesystem::file_size(path);

@@ -47,9 +47,10 @@ void stays_in(const fs::path& directory, const fs::path& file) {
     return;
   }
   if (std::mismatch(home.begin(), home.end(), real.begin(), real.end()).first != home.end()) {
-    throw InputError(fmt::format("{}: is a link to {}, outside of the recording's directory: expected a file in it, or "
-                                 "--trust",
-                                 file.string(), real.string()));
+    throw InputError(
+        fmt::format("{}: is a link to {}, outside of the recording's directory: expected a file in it, or "
+                    "--trust",
+                    file.string(), real.string()));
   }
 }
 

@@ -236,9 +236,10 @@ class SqliteSource final : public Source {
       Statement columns = database_.prepare(fmt::format("PRAGMA main.table_xinfo('{}')", table));
       while (columns.ok() && columns.step() == Statement::Result::row) {
         if (columns.integer(6) != 0) {
-          throw InputError(fmt::format("{}: column {} of table {} is generated: expected plain columns, as rosbag2 "
-                                       "writes them",
-                                       shown_, files::shown(std::string(columns.text(1))), table));
+          throw InputError(
+              fmt::format("{}: column {} of table {} is generated: expected plain columns, as rosbag2 "
+                          "writes them",
+                          shown_, files::shown(std::string(columns.text(1))), table));
         }
       }
     }

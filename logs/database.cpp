@@ -203,8 +203,8 @@ void DatabaseFile::find_journals(const fs::path& original, bool trust) {
     const auto size = fs::file_size(beside, error);
     if (!error && size > 0) {
       if (!trust && !fs::is_regular_file(fs::symlink_status(beside, error))) {
-        throw InputError(fmt::format("{}: is a link: expected a journal beside its database, or --trust",
-                                     beside.string()));
+        throw InputError(
+            fmt::format("{}: is a link: expected a journal beside its database, or --trust", beside.string()));
       }
       if (!trust && size > largest_journal) {
         throw InputError(fmt::format("{}: has {} bytes, and would be copied: expected at most {}, or --trust",

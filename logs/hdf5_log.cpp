@@ -148,8 +148,8 @@ void list_dataset(hid_t file, const std::string& path, bool trust, std::vector<S
       const Handle member(H5Tget_member_type(type.get(), index), H5Tclose);
       char* name = H5Tget_member_name(type.get(), index);
       // The library takes a member's place for granted.
-      const bool inside = member && H5Tget_member_offset(type.get(), index) + H5Tget_size(member.get()) <=
-                                        H5Tget_size(type.get());
+      const bool inside =
+          member && H5Tget_member_offset(type.get(), index) + H5Tget_size(member.get()) <= H5Tget_size(type.get());
       if (inside && name != nullptr && is_number(member.get())) {
         sources.push_back({path, name, "", rows, refused});
       }

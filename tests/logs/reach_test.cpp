@@ -221,7 +221,7 @@ TEST_F(Reach, Hdf5StaysInItsFile) {
   LogOptions speed;
   speed.map = {{"omega", "omega"}};
   expect_refusal([&] { (void)open_log({path("external.h5")}, speed); },
-                     {"external.h5", "omega", "another file", "--trust"});
+                 {"external.h5", "omega", "another file", "--trust"});
 
   write_hdf5(path("other.h5"), [](hid_t file, hid_t space, hid_t how) {
     const hid_t dataset = H5Dcreate2(file, "omega", H5T_IEEE_F64LE, space, H5P_DEFAULT, how, H5P_DEFAULT);
@@ -233,8 +233,7 @@ TEST_F(Reach, Hdf5StaysInItsFile) {
     H5Pset_virtual(how, space, path("other.h5").c_str(), "/omega", space);
     H5Dclose(H5Dcreate2(file, "omega", H5T_IEEE_F64LE, space, H5P_DEFAULT, how, H5P_DEFAULT));
   });
-  expect_refusal([&] { (void)open_log({path("virtual.h5")}, speed); },
-                     {"virtual.h5", "omega", "virtual", "--trust"});
+  expect_refusal([&] { (void)open_log({path("virtual.h5")}, speed); }, {"virtual.h5", "omega", "virtual", "--trust"});
   LogOptions trusting = speed;
   trusting.trust = true;
   const auto log = open_log({path("virtual.h5")}, trusting);
