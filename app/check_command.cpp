@@ -56,9 +56,9 @@ int run(const Arguments& a) {
             check_report(check, claims, files, results::software()));
   }
   if (!a.common.quiet && !a.common.json) {
-    fmt::print("{}", check_summary(check, claims));
+    say("{}", check_summary(check, claims));
     if (!a.common.out.empty()) {
-      fmt::print("wrote {} and {}\n", (a.common.out / "check.json").string(), (a.common.out / "report.html").string());
+      say("wrote {} and {}\n", (a.common.out / "check.json").string(), (a.common.out / "report.html").string());
     }
   }
   return check.proved() ? kDone : kNo;

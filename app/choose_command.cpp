@@ -148,18 +148,18 @@ int run(const Arguments& a) {
     files::write_json(a.common.out / "choice.json", json);
   }
   if (a.common.json) {
-    fmt::print("{}\n", files::json_text(json));
+    say_json(json);
   } else if (!a.common.quiet) {
-    fmt::print("{}", table(choice));
-    fmt::print("{}", faults(choice));
+    say("{}", table(choice));
+    say("{}", faults(choice));
     for (const std::string& name : choice.hopeless) {
-      fmt::print("does not count: no candidate is certain to see {} at half of the onsets\n", name);
+      say("does not count: no candidate is certain to see {} at half of the onsets\n", name);
     }
     for (const std::string& note : choice.notes) {
-      fmt::print("{}\n", note);
+      say("{}\n", note);
     }
     if (choice.chosen) {
-      fmt::print("for the robot file:\n{}\n", results::robot_file_line(choice.candidates.front().filter));
+      say("for the robot file:\n{}\n", results::robot_file_line(choice.candidates.front().filter));
     }
   }
   return choice.chosen ? kDone : kNo;

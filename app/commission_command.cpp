@@ -78,9 +78,9 @@ int run(const Arguments& a) {
           report::commission_report(result, context));
   if (!a.common.quiet && !a.common.json) {
     print_log(context.warnings);
-    fmt::print("{}", summary(result));
+    say("{}", summary(result));
     if (!a.common.out.empty()) {
-      fmt::print("wrote {} and {}\n", (a.common.out / "model.json").string(), (a.common.out / "report.html").string());
+      say("wrote {} and {}\n", (a.common.out / "model.json").string(), (a.common.out / "report.html").string());
     }
   }
   return result.model.facets.empty() ? kNo : kDone;

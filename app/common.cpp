@@ -2,9 +2,12 @@
 #include "common.hpp"
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
+#include <iostream>
 #include <system_error>
 
 #include <fmt/format.h>
@@ -19,9 +22,30 @@
 
 namespace wheelwright::app {
 
+void write_text(std::FILE* stream, std::string_view text) {
+  const std::string fit = files::printable(text);
+  std::fwrite(fit.data(), 1, fit.size(), stream);
+}
+
+void say_json(const Json& result) {
+  const std::string text = files::json_text(result) + "\n";
+  std::fwrite(text.data(), 1, text.size(), stdout);
+}
+
+int finished(int code) {
+  std::cout.flush();
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0 && std::cout.good()) {
+    return code;
+  }
+  tell("wheelwright: standard output: cannot be written ({}): what stands there is not whole; expected room there\n",
+       std::strerror(errno));
+  return kBadInput;
+}
+
 logs::LogOptions reader_options(const CommonOptions& options) {
   logs::LogOptions reader;
   reader.msg_path = options.msg_path;
+  reader.trust = options.trust;
   for (const std::string& entry : options.map) {
     const std::size_t at = entry.find('=');
     if (at == std::string::npos || at == 0 || at + 1 == entry.size()) {
@@ -66,15 +90,13 @@ void publish(const CommonOptions& options, const Json& result, const std::string
     files::write_json(options.out / name, result);
   }
   if (options.json) {
-    const std::string text = files::json_text(result);
-    std::fwrite(text.data(), 1, text.size(), stdout);
-    std::fputc('\n', stdout);
+    say_json(result);
   }
 }
 
 void print_log(const std::vector<std::string>& sentences) {
   for (const std::string& sentence : sentences) {
-    fmt::print("log: {}\n", sentence);
+    say("log: {}\n", sentence);
   }
 }
 

@@ -6,12 +6,16 @@
 
 #include <chrono>
 #include <cstdint>
+#include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
+
+#include <fmt/format.h>
 
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/detector/detector.hpp>
@@ -44,8 +48,27 @@ struct CommonOptions {
   std::uint64_t seed = 1;                       ///< of everything random
   std::vector<std::string> map;                 ///< name=column
   std::vector<std::filesystem::path> msg_path;  ///< directories with definitions of messages
+  bool trust = false;                           ///< a log may reach for files beside it
   std::string command_line;                     ///< as the user gave it
 };
+
+/// Writes a text on a stream, fit for a terminal (files::printable). What goes wrong is found by finished().
+void write_text(std::FILE* stream, std::string_view text);
+/// Prints on standard output with write_text().
+template <typename... Values>
+void say(fmt::format_string<Values...> text, Values&&... values) {
+  write_text(stdout, fmt::format(text, std::forward<Values>(values)...));
+}
+/// Prints a result and a line end on standard output.
+void say_json(const Json& result);
+/// Prints on standard error with write_text().
+template <typename... Values>
+void tell(fmt::format_string<Values...> text, Values&&... values) {
+  write_text(stderr, fmt::format(text, std::forward<Values>(values)...));
+}
+/// Ends a run that would have exited with `code`: that, or kBadInput, and a word why, where standard output could not
+/// take all of the result.
+[[nodiscard]] int finished(int code);
 
 /// --map as reader options. Throws InputError where an entry is not name=column, or its name none of the log contract.
 [[nodiscard]] logs::LogOptions reader_options(const CommonOptions& options);

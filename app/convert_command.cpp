@@ -68,15 +68,15 @@ int run(const Arguments& a) {
                        {"seconds", report.seconds},
                        {"columns", log->columns()},
                        {"notes", said}};
-    fmt::print("{}\n", files::json_text(json));
+    say_json(json);
   } else if (!a.common.quiet) {
     print_log(said);
-    fmt::print("wrote {}: {} rows, {:.6g} s in {} segment{}, columns t", to.string(), report.rows, report.seconds,
-               report.segments, report.segments == 1 ? "" : "s");
+    say("wrote {}: {} rows, {:.6g} s in {} segment{}, columns t", to.string(), report.rows, report.seconds,
+        report.segments, report.segments == 1 ? "" : "s");
     for (const std::string& name : log->columns()) {
-      fmt::print(", {}", name);
+      say(", {}", name);
     }
-    fmt::print("\n");
+    say("\n");
   }
   return kDone;
 }

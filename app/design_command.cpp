@@ -130,10 +130,10 @@ void write_plans(const Arguments& a, const Model& model, const design::Plan& pla
 
 void tell(const Arguments& a, const std::string& summary) {
   if (!a.common.quiet && !a.common.json) {
-    fmt::print("{}", summary);
+    say("{}", summary);
     if (!a.common.out.empty()) {
-      fmt::print("wrote {} (commands to drive), design.json and report.html beside it\n",
-                 (a.common.out / "manoeuvre.csv").string());
+      say("wrote {} (commands to drive), design.json and report.html beside it\n",
+          (a.common.out / "manoeuvre.csv").string());
     }
   }
 }

@@ -105,18 +105,17 @@ int run(const Arguments& a) {
   }
   if (!a.common.quiet && !a.common.json) {
     print_log(logs::sentences(log.report()));
-    fmt::print("{}{}{}{}", summary(detection, model), summary(at_risk, model), summary(isolations, detection),
-               summary(kinematic, model));
+    say("{}{}{}{}", summary(detection, model), summary(at_risk, model), summary(isolations, detection),
+        summary(kinematic, model));
     if (!a.common.out.empty()) {
-      fmt::print("wrote {} and {}\n", (a.common.out / "detection.json").string(),
-                 (a.common.out / "report.html").string());
+      say("wrote {} and {}\n", (a.common.out / "detection.json").string(), (a.common.out / "report.html").string());
     }
     if (!a.series.empty()) {
-      fmt::print("wrote {}\n", a.series.string());
+      say("wrote {}\n", a.series.string());
     }
   }
   if (!undecided.empty()) {
-    fmt::print(stderr, "wheelwright detect: {}: {}\n", a.log.string(), undecided);
+    tell("wheelwright detect: {}: {}\n", a.log.string(), undecided);
   }
   return fault ? kNo : undecided.empty() ? kDone : kBadInput;
 }

@@ -100,22 +100,22 @@ void tell(const doctor::LogHealth& health, bool all) {
     if (finding.severity == doctor::FindingSeverity::fine && !all) {
       continue;
     }
-    fmt::print("{}: {}\n{}", doctor::to_string(finding.severity), finding.id, wrapped(finding.sentence, "  "));
+    say("{}: {}\n{}", doctor::to_string(finding.severity), finding.id, wrapped(finding.sentence, "  "));
     if (const std::string when = stretches(finding); !when.empty()) {
-      fmt::print("{}", wrapped(when, "  "));
+      say("{}", wrapped(when, "  "));
     }
     if (!finding.next.empty()) {
-      fmt::print("{}", wrapped(finding.next, "  → "));
+      say("{}", wrapped(finding.next, "  → "));
     }
   }
   const std::size_t fine = health.count(doctor::FindingSeverity::fine);
   if (!all && fine > 0) {
-    fmt::print("{} check{} found nothing to mention (--all shows them)\n", fine, fine == 1 ? "" : "s");
+    say("{} check{} found nothing to mention (--all shows them)\n", fine, fine == 1 ? "" : "s");
   }
   if (!health.assumed.empty()) {
-    fmt::print("{}\n", health.assumed);
+    say("{}\n", health.assumed);
   }
-  fmt::print("{}\n", health.sentence);
+  say("{}\n", health.sentence);
 }
 
 int run(const Arguments& a) {
@@ -149,7 +149,7 @@ int run(const Arguments& a) {
     print_log(logs::sentences(log.report()));
     tell(health, a.all);
     if (!a.common.out.empty()) {
-      fmt::print("wrote {} and {}\n", (a.common.out / "doctor.json").string(), (a.common.out / "report.html").string());
+      say("wrote {} and {}\n", (a.common.out / "doctor.json").string(), (a.common.out / "report.html").string());
     }
   }
   return health.verdict == doctor::LogVerdict::commission ? kDone : kNo;

@@ -91,11 +91,11 @@ int run(const Arguments& a) {
     files::atomic_write(file, text);
   }
   if (a.common.json) {
-    fmt::print("{}\n", files::json_text(to_json(a, model, detector, file, text)));
+    say_json(to_json(a, model, detector, file, text));
   } else if (file.empty()) {
-    fmt::print("{}", text);
+    say("{}", text);
   } else if (!a.common.quiet) {
-    fmt::print("wrote {} ({:.0f} kB)\n", file, static_cast<double>(text.size()) / 1000.0);
+    say("wrote {} ({:.0f} kB)\n", file, static_cast<double>(text.size()) / 1000.0);
   }
   return kDone;
 }

@@ -170,11 +170,11 @@ void tell_failures(const study::FleetResult& fleet) {
   for (std::size_t i = 0; i < std::min(reasons.size(), kMostReasons); ++i) {
     const auto& [first, count] = reasons[i];
     const std::string& robot = fleet.table.robots[first->robot];
-    fmt::print("  {}{}{}: {}\n", robot, first->log.empty() ? "" : ", " + first->log,
-               count > 1 ? fmt::format(" and {} more", count - 1) : "", first->text);
+    say("  {}{}{}: {}\n", robot, first->log.empty() ? "" : ", " + first->log,
+        count > 1 ? fmt::format(" and {} more", count - 1) : "", first->text);
   }
   if (reasons.size() > kMostReasons) {
-    fmt::print("  and {} other reasons: see fleet.json or report.html in --out\n", reasons.size() - kMostReasons);
+    say("  and {} other reasons: see fleet.json or report.html in --out\n", reasons.size() - kMostReasons);
   }
 }
 
@@ -213,11 +213,11 @@ int run(const Arguments& a) {
           a.common.out.empty() ? std::string() : report::fleet_report(fleet, context));
   if (!a.common.quiet && !a.common.json) {
     for (const std::string& sentence : study::sentences(fleet)) {
-      fmt::print("{}\n", sentence);
+      say("{}\n", sentence);
     }
     tell_failures(fleet);
     if (!a.common.out.empty()) {
-      fmt::print("wrote fleet.json, fleet.csv, pooled_prior.yaml and report.html to {}\n", a.common.out.string());
+      say("wrote fleet.json, fleet.csv, pooled_prior.yaml and report.html to {}\n", a.common.out.string());
     }
   }
   return fleet.well() ? kDone : kNo;

@@ -103,7 +103,7 @@ ExitCode follow(std::istream& in, std::ostream& out, TorqueDetector detector, co
     if (const auto pose = pick_columns(parser, model.kinematic->measurement.columns(), missing)) {
       kinematic.emplace(make_detector(*model.kinematic, options), *pose, commission::with_kinematic_outputs(model));
     } else {
-      fmt::print(stderr, "wheelwright detect: no column '{}': the kinematic residual is not watched\n", missing);
+      tell("wheelwright detect: no column '{}': the kinematic residual is not watched\n", missing);
     }
   }
   std::optional<detector::ScaleDetector> scales;
@@ -121,7 +121,7 @@ ExitCode follow(std::istream& in, std::ostream& out, TorqueDetector detector, co
         continue;
       }
     } catch (const InputError& error) {
-      fmt::print(stderr, "wheelwright detect: {} (row left out)\n", error.what());
+      tell("wheelwright detect: {} (row left out)\n", error.what());
       continue;
     }
     torque.take(row, number, out, json);
@@ -154,7 +154,7 @@ ExitCode follow(std::istream& in, std::ostream& out, TorqueDetector detector, co
   if (torque.decisions() > 0) {
     return kDone;
   }
-  fmt::print(stderr, "wheelwright detect: {}\n", why_undecided(model, number, core::median_step(times)));
+  tell("wheelwright detect: {}\n", why_undecided(model, number, core::median_step(times)));
   return kBadInput;
 }
 

@@ -210,11 +210,10 @@ int run(const Arguments& a) {
           files ? report::gap_report(diagnosis, robot.name, context, promise) : std::string());
   if (!a.common.quiet && !a.common.json) {
     print_log(context.warnings);
-    fmt::print("{}",
-               summary(diagnosis, {files ? (a.common.out / "").string() : "", a.robot.string(),
-                                   files && diagnosis.improved, promise, files && next.commands, a.naive, naive}));
+    say("{}", summary(diagnosis, {files ? (a.common.out / "").string() : "", a.robot.string(),
+                                  files && diagnosis.improved, promise, files && next.commands, a.naive, naive}));
     if (files) {
-      fmt::print("wrote {} and {}\n", (a.common.out / "gap.json").string(), (a.common.out / "report.html").string());
+      say("wrote {} and {}\n", (a.common.out / "gap.json").string(), (a.common.out / "report.html").string());
     }
   }
   return kDone;

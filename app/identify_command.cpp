@@ -81,10 +81,10 @@ int run(const Arguments& a) {
           report::identify_report(result, context));
   if (!a.common.quiet && !a.common.json) {
     print_log(context.warnings);
-    fmt::print("{}", summary(result));
+    say("{}", summary(result));
     if (!a.common.out.empty()) {
-      fmt::print("wrote {} and {}\n", (a.common.out / "identification.json").string(),
-                 (a.common.out / "report.html").string());
+      say("wrote {} and {}\n", (a.common.out / "identification.json").string(),
+          (a.common.out / "report.html").string());
     }
   }
   return standing(result) == IdentificationStanding::bad ? kNo : kDone;

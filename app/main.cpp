@@ -35,9 +35,7 @@ std::string joined(int count, char** words) {
   return line;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int run(int argc, char** argv) {
   CLI::App program(
       "Model-based fault detection for wheeled robots, with thresholds that are derived, not tuned.\n"
       "A robot and a log of fault-free driving go in; a model with thresholds that no healthy robot exceeds, while the "
@@ -82,11 +80,14 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return program.exit(error) == 0 ? kDone : kBadInput;
   } catch (const wheelwright::Error& error) {
-    fmt::print(stderr, "wheelwright: {}\n", error.what());
+    tell("wheelwright: {}\n", error.what());
     return kBadInput;
   } catch (const std::exception& error) {
-    fmt::print(stderr, "wheelwright: internal failure: {}\nThis is a bug; please report it with the input.\n",
-               error.what());
+    tell("wheelwright: internal failure: {}\nThis is a bug; please report it with the input.\n", error.what());
     return kInternal;
   }
 }
+
+}  // namespace
+
+int main(int argc, char** argv) { return finished(run(argc, argv)); }

@@ -121,17 +121,16 @@ int run(const Arguments& a) {
   if (!a.common.quiet && !a.common.json) {
     print_log(logs::sentences(log.report()));
     for (const commission::ResidualMargins& residual : survey.residuals) {
-      fmt::print("{}{}\n", table(survey, residual), certain_meaning(residual.warrant));
+      say("{}{}\n", table(survey, residual), certain_meaning(residual.warrant));
     }
     if (survey.at_risk) {
-      fmt::print("{}{}\n", risk_table(survey), risk_meaning(*survey.at_risk));
+      say("{}{}\n", risk_table(survey), risk_meaning(*survey.at_risk));
     }
     if (!survey.without_kinematic.empty()) {
-      fmt::print("no kinematic residual: {}\n", survey.without_kinematic);
+      say("no kinematic residual: {}\n", survey.without_kinematic);
     }
     if (!a.common.out.empty()) {
-      fmt::print("wrote {} and {}\n", (a.common.out / "margins.json").string(),
-                 (a.common.out / "report.html").string());
+      say("wrote {} and {}\n", (a.common.out / "margins.json").string(), (a.common.out / "report.html").string());
     }
   }
   return kDone;

@@ -44,6 +44,9 @@ void add_map(CLI::App& command, CommonOptions& options) {
       ->expected(1)
       ->allow_extra_args(false)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  command.add_flag("--trust", options.trust,
+                   "Read also what a log reaches for outside of itself and its directory: links, HDF5's external and "
+                   "virtual datasets, very large journals and packed files");
 }
 
 void add_persistence(CLI::App& command, std::optional<detector::Persistence>& persistence,

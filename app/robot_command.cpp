@@ -79,13 +79,13 @@ int run(const Arguments& a) {
     result["robot"] = robots::to_json(robot.robot);
     result["origins"] = robot.origins;
     result["remarks"] = robot.remarks;
-    fmt::print("{}\n", files::json_text(result));
+    say_json(result);
   } else if (target.empty()) {
-    fmt::print("{}", text);
+    say("{}", text);
   } else if (!a.common.quiet) {
-    fmt::print("wrote {}\n", target.string());
+    say("wrote {}\n", target.string());
     for (const std::string& remark : robot.remarks) {
-      fmt::print("  {}\n", remark);
+      say("  {}\n", remark);
     }
   }
   return kDone;

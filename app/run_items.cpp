@@ -155,8 +155,8 @@ ItemsRun run_items(const ItemsToRun& items, const CommonOptions& common, const S
     options.shard = shard;
     run.count = study::run_work(items.work, *results, options);
     if (!common.quiet && !common.json) {
-      fmt::print("shard {} of {}: {} items evaluated, {} were there; {}\nwhen all are done: the same with --merge\n",
-                 shard.index + 1, shard.count, run.count.evaluated, run.count.found, results->file().string());
+      say("shard {} of {}: {} items evaluated, {} were there; {}\nwhen all are done: the same with --merge\n",
+          shard.index + 1, shard.count, run.count.evaluated, run.count.found, results->file().string());
     }
     return run;
   }

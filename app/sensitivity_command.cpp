@@ -153,10 +153,9 @@ int run(const Arguments& a) {
           a.common.out.empty() ? std::string() : report::sensitivity_report(study, result, local, file.notes, context));
   if (!a.common.quiet && !a.common.json) {
     print_log(file.notes);
-    fmt::print("{}", summary(study, result, local));
+    say("{}", summary(study, result, local));
     if (!a.common.out.empty()) {
-      fmt::print("wrote {} and {}\n", (a.common.out / "sensitivity.json").string(),
-                 (a.common.out / "report.html").string());
+      say("wrote {} and {}\n", (a.common.out / "sensitivity.json").string(), (a.common.out / "report.html").string());
     }
   }
   return kDone;

@@ -61,7 +61,7 @@ Run add_completion(CLI::App& program) {
   command.add_option("SHELL", *shell, "The shell")->required()->check(CLI::IsMember({"bash", "zsh", "fish"}));
   add_footer(command, kCompletionExamples);
   return [shell, &program](const std::string&) {
-    fmt::print("{}", completion(words_of(program), *shell));
+    say("{}", completion(words_of(program), *shell));
     return kDone;
   };
 }
@@ -86,7 +86,7 @@ Run add_man(CLI::App& program) {
       throw InputError(fmt::format("man: there is no command {}: expected one of {}{}", files::shown(a->command),
                                    core::listed(names), files::did_you_mean(a->command, names)));
     }
-    fmt::print("{}", one == nullptr ? manual_page(words, results::software()) : manual_page(*one, results::software()));
+    say("{}", one == nullptr ? manual_page(words, results::software()) : manual_page(*one, results::software()));
     return static_cast<int>(kDone);
   };
 }

@@ -44,14 +44,14 @@ int run(const Arguments& a) {
   const LogTable log = read_all(simulation);
   logs::write_csv(a.out, log);
   if (a.json) {
-    fmt::print("{}\n", files::json_text({{"schema", "wheelwright/simulation/1"},
-                                         {"software", results::software()},
-                                         {"scenario", a.scenario.string()},
-                                         {"log", a.out.string()},
-                                         {"rows", log.rows()},
-                                         {"seed", scenario.seed}}));
+    say_json({{"schema", "wheelwright/simulation/1"},
+              {"software", results::software()},
+              {"scenario", a.scenario.string()},
+              {"log", a.out.string()},
+              {"rows", log.rows()},
+              {"seed", scenario.seed}});
   } else if (!a.quiet) {
-    fmt::print("wrote {}: {} rows, {:.1f} s, seed {}\n", a.out.string(), log.rows(), scenario.duration, scenario.seed);
+    say("wrote {}: {} rows, {:.1f} s, seed {}\n", a.out.string(), log.rows(), scenario.duration, scenario.seed);
   }
   return kDone;
 }

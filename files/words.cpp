@@ -7,6 +7,9 @@
 #include <charconv>
 #include <cstdint>
 #include <limits>
+#include <utility>
+
+#include <fmt/format.h>
 
 namespace wheelwright::files {
 namespace {
@@ -183,6 +186,62 @@ std::string shown(std::string_view text) {
     out += c >= ' ' && c <= '~' ? c : '?';
   }
   return out + (text.size() > longest ? "...'" : "'");
+}
+
+namespace {
+
+/// Bytes of the character at the beginning of `text`, and its number; 0 bytes where it is no UTF-8 (Unicode 15, table
+/// 3-7).
+std::pair<std::size_t, std::uint32_t> first_character(std::string_view text) {
+  const auto byte = [&](std::size_t k) { return static_cast<unsigned char>(text[k]); };
+  const unsigned char head = byte(0);
+  if (head < 0x80) {
+    return {1, head};
+  }
+  const std::size_t size = head >= 0xC2 && head < 0xE0   ? 2
+                           : head >= 0xE0 && head < 0xF0 ? 3
+                           : head >= 0xF0 && head < 0xF5 ? 4
+                                                         : 0;
+  if (size == 0 || text.size() < size) {
+    return {0, 0};
+  }
+  std::uint32_t number = head & (0xFFU >> (size + 1));
+  for (std::size_t k = 1; k < size; ++k) {
+    if ((byte(k) & 0xC0) != 0x80) {
+      return {0, 0};
+    }
+    number = number << 6 | (byte(k) & 0x3FU);
+  }
+  constexpr std::array<std::uint32_t, 5> least = {0, 0, 0x80, 0x800, 0x10000};
+  const bool surrogate = number >= 0xD800 && number < 0xE000;
+  return number < least[size] || number > 0x10FFFF || surrogate ? std::pair<std::size_t, std::uint32_t>{0, 0}
+                                                                : std::pair{size, number};
+}
+
+/// True for a character that a terminal obeys instead of showing it.
+bool is_command(std::uint32_t c) {
+  return (c < 0x20 && c != '\n' && c != '\t') || (c >= 0x7F && c < 0xA0) || (c >= 0x202A && c <= 0x202E) ||
+         (c >= 0x2066 && c <= 0x2069);
+}
+
+}  // namespace
+
+std::string printable(std::string_view text) {
+  std::string out;
+  out.reserve(text.size());
+  while (!text.empty()) {
+    const auto [size, number] = first_character(text);
+    const std::size_t taken = std::max<std::size_t>(size, 1);
+    if (size == 0 || is_command(number)) {
+      for (const char c : text.substr(0, taken)) {
+        out += fmt::format("\\x{:02X}", static_cast<unsigned char>(c));
+      }
+    } else {
+      out += text.substr(0, size);
+    }
+    text.remove_prefix(taken);
+  }
+  return out;
 }
 
 }  // namespace wheelwright::files

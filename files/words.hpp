@@ -67,4 +67,8 @@ template <typename Value, std::size_t n>
 /// characters.
 [[nodiscard]] std::string shown(std::string_view text);
 
+/// `text` fit for a terminal, whatever files, names and arguments are in it: control characters but line ends and tabs,
+/// those that turn the direction of writing, and bytes that are no UTF-8 are "\\x1B". The rest is as it was.
+[[nodiscard]] std::string printable(std::string_view text);
+
 }  // namespace wheelwright::files

@@ -2,6 +2,7 @@
 #include <wheelwright/logs/bag.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cerrno>
 #include <cstdio>
@@ -29,7 +30,7 @@ namespace fs = std::filesystem;
 /// Files one behind the other.
 class Bag final : public BagReader {
  public:
-  Bag(const std::vector<fs::path>& paths, const BagOptions& options) : hashed_(options.hashed) {
+  Bag(const std::vector<fs::path>& paths, const BagOptions& options) : hashed_(options.hashed), trust_(options.trust) {
     for (const fs::path& directory : options.msg_path) {
       definitions_.push_back(ros_definitions_from(directory));
     }
@@ -88,7 +89,7 @@ class Bag final : public BagReader {
 
   /// Adds the files of one argument, and looks into each.
   void add(const fs::path& path) {
-    const bag::Parts parts = bag::parts_of(path);
+    const bag::Parts parts = bag::parts_of(path, trust_);
     const std::size_t first = files_.size();
     std::vector<std::string> losses = parts.losses;
     for (const bag::Part& part : parts.files) {
@@ -124,7 +125,7 @@ class Bag final : public BagReader {
                          {}});
       return;
     }
-    auto source = bag::open_source(part.path, hashed_ && files_.empty());
+    auto source = bag::open_source(part.path, {.hashed = hashed_ && files_.empty(), .trust = trust_});
     BagReport report = source->report();
     report.losses.clear();
     files_.push_back({part.path, {}, {}, 0});
@@ -146,7 +147,7 @@ class Bag final : public BagReader {
       return;
     }
     places_.clear();
-    source_ = bag::open_source(files_[file].path, hashed_);
+    source_ = bag::open_source(files_[file].path, {.hashed = hashed_, .trust = trust_});
     open_ = file;
     topics_known();
   }
@@ -194,14 +195,10 @@ class Bag final : public BagReader {
     const auto& own = source_->topics();
     while (places_.size() < own.size()) {
       const bag::SourceTopic& topic = own[places_.size()];
-      const auto same = std::find_if(topics_.begin(), topics_.end(), [&](const BagTopic& other) {
-        return other.name == topic.name && other.type == topic.type && other.encoding == topic.encoding;
-      });
-      if (same == topics_.end()) {
-        places_.push_back(topics_.size());
+      const auto [same, added] = topic_places_.try_emplace({topic.name, topic.type, topic.encoding}, topics_.size());
+      places_.push_back(same->second);
+      if (added) {
         topics_.push_back(described(topic, places_.size() - 1));
-      } else {
-        places_.push_back(static_cast<std::size_t>(same - topics_.begin()));
       }
     }
   }
@@ -280,6 +277,7 @@ class Bag final : public BagReader {
   }
 
   bool hashed_;
+  bool trust_;
   std::vector<RosDefinitions> definitions_;
   std::vector<File> files_;
   std::vector<BagReport> opened_;  ///< as they were before reading
@@ -289,6 +287,7 @@ class Bag final : public BagReader {
   std::vector<std::size_t> places_;  ///< of its topics in topics_
   std::size_t at_ = 0;               ///< the file that is being read
   std::vector<BagTopic> topics_;
+  std::map<std::array<std::string, 3>, std::size_t> topic_places_;  ///< by name, type and encoding
   mutable std::vector<BagReport> reports_;
   bag::MessageUnpacker unpacker_;
   std::uint64_t unpacked_wrong_ = 0;
@@ -314,8 +313,14 @@ bool is_bag(const fs::path& path) {
       case bag::Content::zstd: break;
       default: return false;
     }
+    // A packed stream may give its first bytes one by one.
     std::string head(16, '\0');
-    head.resize(files::open_bytes(path)->read(head.data(), head.size()));
+    const auto bytes = files::open_bytes(path);
+    std::size_t size = 0;
+    while (const std::size_t got = size < head.size() ? bytes->read(head.data() + size, head.size() - size) : 0) {
+      size += got;
+    }
+    head.resize(size);
     return head.starts_with("\x89MCAP") || head.starts_with("SQLite format 3");
   } catch (const InputError&) {
     return false;
@@ -337,13 +342,13 @@ constexpr std::size_t bag_piece = std::size_t{1} << 18;
 /// A file that was packed with zstd as a whole, read from its unpacked copy.
 class PackedSource final : public Source {
  public:
-  PackedSource(const std::filesystem::path& path, bool hashed)
+  PackedSource(const std::filesystem::path& path, const SourceOptions& options)
       : shown_(path.string()), file_(directory_.path() / "unpacked") {
-    unpack(path, hashed);
+    unpack(path, options);
     const std::string name = shown_ + " (unpacked)";
     switch (content_of(file_)) {
-      case Content::mcap: source_ = open_mcap(file_, name, false); break;
-      case Content::sqlite: source_ = open_sqlite(file_, name, false); break;
+      case Content::mcap: source_ = open_mcap(file_, name, {}); break;
+      case Content::sqlite: source_ = open_sqlite(file_, name, {.trust = options.trust}); break;
       default:
         throw InputError(
             fmt::format("{}: is no recording: {}expected an MCAP file or an SQLite database inside the zstd "
@@ -371,7 +376,7 @@ class PackedSource final : public Source {
   }
 
  private:
-  void unpack(const std::filesystem::path& path, bool hashed) {
+  void unpack(const std::filesystem::path& path, const SourceOptions& options) {
     const std::unique_ptr<std::FILE, int (*)(std::FILE*)> to(std::fopen(file_.c_str(), "wb"), &std::fclose);
     const auto check = [&](bool written) {
       if (!written) {
@@ -382,13 +387,18 @@ class PackedSource final : public Source {
       }
     };
     check(to != nullptr);
-    const auto from = files::open_bytes(path, hashed);
+    const auto from = files::open_bytes(path, options.hashed);
     std::vector<char> buffer(bag_piece);
     std::uint64_t unpacked = 0;
+    bool limit = false;
     try {
       while (const std::size_t got = from->read(buffer.data(), buffer.size())) {
         check(std::fwrite(buffer.data(), 1, got, to.get()) == got);
         unpacked += got;
+        if (unpacked > largest_unpacked && !options.trust) {
+          limit = true;
+          break;
+        }
       }
     } catch (const InputError& error) {
       if (unpacked == 0 || std::ferror(to.get()) != 0) {
@@ -397,9 +407,13 @@ class PackedSource final : public Source {
       loss_ = fmt::format("{}; unpacked up to byte {} of the file, {} bytes of its content", error.what(),
                           from->file_bytes(), unpacked);
     }
+    if (limit) {
+      throw InputError(fmt::format("{}: more than {} bytes come out of it: expected a smaller recording, or --trust",
+                                   shown_, largest_unpacked));
+    }
     check(std::fflush(to.get()) == 0);
     bytes_ = std::filesystem::file_size(path);
-    if (hashed) {
+    if (options.hashed) {
       mcap::WindowedFile file(path, true);
       file.leave(file.size());
       hash_ = file.hash();
@@ -430,12 +444,12 @@ Content content_of(const std::filesystem::path& path) {
                                                                         : Content::other;
 }
 
-std::unique_ptr<Source> open_source(const std::filesystem::path& path, bool hashed) {
+std::unique_ptr<Source> open_source(const std::filesystem::path& path, const SourceOptions& options) {
   const std::string name = path.string();
   switch (content_of(path)) {
-    case Content::mcap: return open_mcap(path, name, hashed);
-    case Content::sqlite: return open_sqlite(path, name, hashed);
-    case Content::zstd: return std::make_unique<PackedSource>(path, hashed);
+    case Content::mcap: return open_mcap(path, name, options);
+    case Content::sqlite: return open_sqlite(path, name, options);
+    case Content::zstd: return std::make_unique<PackedSource>(path, options);
     case Content::empty: throw InputError(name + ": is empty: nothing was recorded, or nothing of it reached the disk");
     case Content::other: break;
   }

@@ -47,6 +47,7 @@ struct BagReport {
 struct BagOptions {
   std::vector<std::filesystem::path> msg_path = {};  ///< directories with definitions: see ros_definitions_from()
   bool hashed = false;                               ///< whether BagReport::hash is wanted
+  bool trust = false;                                ///< see LogOptions::trust
 };
 
 /// Reads files one behind the other. Nothing is written beside them.
@@ -76,7 +77,8 @@ class BagReader {
 ///
 /// Files packed with zstd, and a database with a journal beside it (a recording that was not closed), are read from a
 /// copy in the system's directory for temporary files, which is gone afterwards. Messages packed with zstd one by one
-/// are unpacked. A file of a directory that is missing or of no use is a loss while others can be read.
+/// are unpacked. A file of a directory that is missing or of no use is a loss while others can be read. Without
+/// BagOptions::trust metadata and links reach no file outside the directory.
 ///
 /// Throws InputError, naming the file, when it is missing or no recording, when a directory has none, and for a
 /// BagOptions::msg_path as ros_definitions_from() does; InvalidArgument when `paths` is empty.
@@ -118,14 +120,22 @@ enum class Content { empty, mcap, sqlite, zstd, other };
 /// Looks at the first bytes. Throws InputError, naming the file, when it is missing, no regular file or unreadable.
 [[nodiscard]] Content content_of(const std::filesystem::path& path);
 
+/// How to open a file.
+struct SourceOptions {
+  bool hashed = false;  ///< whether BagReport::hash is wanted
+  bool trust = false;   ///< see LogOptions::trust
+};
+
 /// Opens an MCAP file. `shown` is its name in sentences.
 [[nodiscard]] std::unique_ptr<Source> open_mcap(const std::filesystem::path& path, const std::string& shown,
-                                                bool hashed);
-/// Opens a database of rosbag2. Throws InputError, naming `shown`, when it is none.
+                                                const SourceOptions& options);
+/// Opens a database of rosbag2. Throws InputError, naming `shown`, when it is none, and for one that would run what it
+/// says: tables with generated columns, virtual tables.
 [[nodiscard]] std::unique_ptr<Source> open_sqlite(const std::filesystem::path& path, const std::string& shown,
-                                                  bool hashed);
-/// Opens a file, unpacking it where it is packed with zstd. Throws InputError as they do.
-[[nodiscard]] std::unique_ptr<Source> open_source(const std::filesystem::path& path, bool hashed);
+                                                  const SourceOptions& options);
+/// Opens a file, unpacking it where it is packed with zstd. Throws InputError as they do, and without trust where more
+/// than `largest_unpacked` bytes come out.
+[[nodiscard]] std::unique_ptr<Source> open_source(const std::filesystem::path& path, const SourceOptions& options);
 
 /// "1700000000.123456789 s" of a time in ns.
 [[nodiscard]] std::string shown_time(std::int64_t time);

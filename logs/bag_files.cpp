@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <functional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -36,7 +37,34 @@ std::string storage_ending(const fs::path& given) {
   return name.extension() == ".mcap" ? "mcap" : name.extension() == ".db3" ? "db3" : "";
 }
 
-Parts parts_of(const fs::path& path) {
+namespace {
+
+/// Throws unless `file` is below `directory` when all links are followed. One that is missing is told later.
+void stays_in(const fs::path& directory, const fs::path& file) {
+  std::error_code error;
+  const fs::path home = fs::canonical(directory, error), real = error ? fs::path() : fs::canonical(file, error);
+  if (error) {
+    return;
+  }
+  if (std::mismatch(home.begin(), home.end(), real.begin(), real.end()).first != home.end()) {
+    throw InputError(
+        fmt::format("{}: is a link to {}, outside of the recording's directory: expected a file in it, or "
+                    "--trust",
+                    file.string(), real.string()));
+  }
+}
+
+/// The file that metadata mean by `name`: below the directory, or, where it is not there, by its last part.
+fs::path named_part(const fs::path& directory, const std::string& name) {
+  std::error_code error;
+  const fs::path inside = fs::path(name).relative_path().lexically_normal();
+  const bool leaves = !inside.empty() && *inside.begin() == "..";
+  return !leaves && fs::exists(directory / inside, error) ? directory / inside : directory / fs::path(name).filename();
+}
+
+}  // namespace
+
+Parts parts_of(const fs::path& path, bool trust) {
   Parts parts;
   std::error_code error;
   if (!fs::is_directory(path, error)) {
@@ -44,19 +72,40 @@ Parts parts_of(const fs::path& path) {
     return parts;
   }
   const fs::path metadata = path / "metadata.yaml";
+  const auto check_links = [&] {
+    for (const Part& part : parts.files) {
+      if (!trust) {
+        stays_in(path, part.path);
+      }
+    }
+  };
   if (fs::exists(metadata, error)) {
     parts.metadata = metadata.string();
+    if (!trust) {
+      stays_in(path, metadata);
+    }
+    std::optional<Metadata> found;
     try {
-      const Metadata read = read_metadata(metadata);
-      for (const std::string& name : read.files) {
-        const fs::path inside = path / fs::path(name).relative_path();
-        const fs::path beside = path / fs::path(name).filename();
-        parts.files.push_back({fs::exists(inside, error) ? inside : beside, read.files.size() == 1});
-      }
-      parts.promised = read.messages;
-      return parts;
+      found = read_metadata(metadata);
     } catch (const InputError& problem) {
       parts.losses.push_back(fmt::format("{}; all files beside it are read", problem.what()));
+    }
+    if (found) {
+      std::set<fs::path> met;
+      for (const std::string& name : found->files) {
+        const fs::path part = named_part(path, name);
+        if (met.insert(part).second) {
+          parts.files.push_back({part, false});
+        }
+      }
+      if (met.size() < found->files.size()) {
+        parts.losses.push_back(fmt::format("{}: names {} files, {} of them again: each is read once", metadata.string(),
+                                           found->files.size(), found->files.size() - met.size()));
+      }
+      parts.files.front().demanded = parts.files.size() == 1;
+      parts.promised = found->messages;
+      check_links();
+      return parts;
     }
   }
   std::vector<std::string> names, kinds;
@@ -84,6 +133,7 @@ Parts parts_of(const fs::path& path) {
   for (const std::string& name : names) {
     parts.files.push_back({path / name, names.size() == 1});
   }
+  check_links();
   return parts;
 }
 

@@ -13,6 +13,11 @@
 
 namespace wheelwright::logs::bag {
 
+/// Bytes of the largest journal of a database that is copied without LogOptions::trust.
+inline constexpr std::uintmax_t largest_journal = std::uintmax_t{4} << 30;
+/// Bytes that a packed recording may have unpacked without LogOptions::trust.
+inline constexpr std::uintmax_t largest_unpacked = std::uintmax_t{16} << 30;
+
 /// A file to be read.
 struct Part {
   std::filesystem::path path;
@@ -31,8 +36,10 @@ struct Parts {
 [[nodiscard]] std::string storage_ending(const std::filesystem::path& name);
 
 /// The file itself, or those of a directory: as its metadata.yaml lists them, else all, "_2" before "_10". Throws
-/// InputError, naming it, for a directory without any, and for one with files of both storages and no metadata.
-[[nodiscard]] Parts parts_of(const std::filesystem::path& path);
+/// InputError, naming it, for a directory without any, and for one with files of both storages and no metadata. Of a
+/// name in the metadata that leads out of the directory only the last part counts; a file that is named twice is read
+/// once; without `trust`, a link that leads out of the directory is an InputError.
+[[nodiscard]] Parts parts_of(const std::filesystem::path& path, bool trust = false);
 
 /// Metadata that reading needs.
 struct Metadata {

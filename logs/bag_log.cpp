@@ -316,7 +316,7 @@ class BagFile final : public RowFile {
  public:
   BagFile(const std::filesystem::path& path, const LogOptions& options, TimeOrigin origin)
       : plan_{.path = path,
-              .options = {.msg_path = options.msg_path, .hashed = false},
+              .options = {.msg_path = options.msg_path, .hashed = false, .trust = options.trust},
               .choice = {},
               .topics = {},
               .definitions = {},

@@ -23,8 +23,8 @@ namespace {
 
 class McapSource final : public Source {
  public:
-  McapSource(const std::filesystem::path& path, std::string shown, bool hashed)
-      : reader_(path, {.hashed = hashed}), shown_(std::move(shown)) {
+  McapSource(const std::filesystem::path& path, std::string shown, const SourceOptions& options)
+      : reader_(path, {.hashed = options.hashed}), shown_(std::move(shown)) {
     for (const auto& [id, channel] : reader_.channels()) {
       topic_of(id);
     }
@@ -84,8 +84,9 @@ class McapSource final : public Source {
 
 }  // namespace
 
-std::unique_ptr<Source> open_mcap(const std::filesystem::path& path, const std::string& shown, bool hashed) {
-  return std::make_unique<McapSource>(path, shown, hashed);
+std::unique_ptr<Source> open_mcap(const std::filesystem::path& path, const std::string& shown,
+                                  const SourceOptions& options) {
+  return std::make_unique<McapSource>(path, shown, options);
 }
 
 namespace {
@@ -108,12 +109,12 @@ std::uint64_t mixed(std::int64_t row, std::int64_t time) {
 
 class SqliteSource final : public Source {
  public:
-  SqliteSource(const fs::path& path, std::string shown, bool hashed)
+  SqliteSource(const fs::path& path, std::string shown, const SourceOptions& options)
       : shown_(std::move(shown)),
-        file_(path, shown_),
+        file_(path, shown_, options.trust),
         database_(file_.path(), shown_, file_.has_journal() ? Database::Mode::recovering : Database::Mode::unchanging) {
     bytes_ = fs::file_size(path);
-    if (hashed) {
+    if (options.hashed) {
       mcap::WindowedFile file(path, true);
       file.leave(file.size());
       hash_ = file.hash();
@@ -122,6 +123,7 @@ class SqliteSource final : public Source {
       lose(file_.defect());
     }
     check_tables();
+    check_columns();
     read_topics();
     read_definitions();
     found_ = losses_;
@@ -219,6 +221,28 @@ class SqliteSource final : public Source {
         fmt::format("{}: is an SQLite database but no recording: it has {}: expected the tables topics and "
                     "messages, as rosbag2 writes them",
                     shown_, names.empty() ? "no tables" : "the tables " + core::listed(names)));
+  }
+
+  /// Reading a table must not compute what its file says.
+  void check_columns() {
+    for (const char* const table : {"topics", "messages", "message_definitions"}) {
+      Statement kind = database_.prepare(fmt::format("PRAGMA main.table_list('{}')", table));
+      while (kind.ok() && kind.step() == Statement::Result::row) {
+        if (kind.text(2) == "virtual" || kind.text(2) == "view") {
+          throw InputError(fmt::format("{}: table {} is a {}: expected a plain table, as rosbag2 writes it", shown_,
+                                       table, kind.text(2) == "view" ? "view" : "virtual table"));
+        }
+      }
+      Statement columns = database_.prepare(fmt::format("PRAGMA main.table_xinfo('{}')", table));
+      while (columns.ok() && columns.step() == Statement::Result::row) {
+        if (columns.integer(6) != 0) {
+          throw InputError(
+              fmt::format("{}: column {} of table {} is generated: expected plain columns, as rosbag2 "
+                          "writes them",
+                          shown_, files::shown(std::string(columns.text(1))), table));
+        }
+      }
+    }
   }
 
   void read_topics() {
@@ -402,8 +426,8 @@ class SqliteSource final : public Source {
 
 }  // namespace
 
-std::unique_ptr<Source> open_sqlite(const fs::path& path, const std::string& shown, bool hashed) {
-  return std::make_unique<SqliteSource>(path, shown, hashed);
+std::unique_ptr<Source> open_sqlite(const fs::path& path, const std::string& shown, const SourceOptions& options) {
+  return std::make_unique<SqliteSource>(path, shown, options);
 }
 
 }  // namespace wheelwright::logs::bag

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cstdint>
+#include <fstream>
 #include <system_error>
 
 #include <fmt/format.h>
@@ -137,11 +138,32 @@ std::uint64_t number_at(const std::string& header, std::size_t at, std::size_t s
   return value;
 }
 
+/// What ends a rollback journal that names a super-journal (SQLite, "Database File Format", section 3).
+constexpr std::string_view journal_magic("\xd9\xd5\x05\xf9\x20\xa1\x63\xd7", 8);
+
+/// Takes the name of a super-journal off a copy of a journal: without its magic number it is none. What the journal
+/// holds is played back as if the transaction had not been finished, which leaves the database whole.
+void forget_super_journal(const fs::path& journal) {
+  std::fstream file(journal, std::ios::in | std::ios::out | std::ios::binary);
+  std::string end(journal_magic.size(), '\0');
+  const auto at = -static_cast<std::streamoff>(end.size());
+  if (file.seekg(at, std::ios::end) && file.read(end.data(), static_cast<std::streamsize>(end.size())) &&
+      end == journal_magic) {
+    end.assign(end.size(), '\0');
+    file.seekp(at, std::ios::end);
+    file.write(end.data(), static_cast<std::streamsize>(end.size()));
+    file.flush();
+    if (!file) {
+      throw InputError(fmt::format("{}: cannot be written: expected room there", journal.string()));
+    }
+  }
+}
+
 }  // namespace
 
-DatabaseFile::DatabaseFile(const fs::path& path, const std::string& shown) : path_(path) {
+DatabaseFile::DatabaseFile(const fs::path& path, const std::string& shown, bool trust) : path_(path) {
   find_end(path, shown);
-  find_journals(path);
+  find_journals(path, trust);
 }
 
 void DatabaseFile::find_end(const fs::path& original, const std::string& shown) {
@@ -173,18 +195,29 @@ void DatabaseFile::find_end(const fs::path& original, const std::string& shown) 
   }
 }
 
-void DatabaseFile::find_journals(const fs::path& original) {
+void DatabaseFile::find_journals(const fs::path& original, bool trust) {
   for (const char* const ending : {"-wal", "-journal"}) {
     fs::path beside = original;
     beside += ending;
     std::error_code error;
     const auto size = fs::file_size(beside, error);
     if (!error && size > 0) {
+      if (!trust && !fs::is_regular_file(fs::symlink_status(beside, error))) {
+        throw InputError(
+            fmt::format("{}: is a link: expected a journal beside its database, or --trust", beside.string()));
+      }
+      if (!trust && size > largest_journal) {
+        throw InputError(fmt::format("{}: has {} bytes, and would be copied: expected at most {}, or --trust",
+                                     beside.string(), size, largest_journal));
+      }
       if (!directory_) {
         copy(original, "bag.db3");
       }
       const fs::path database = path_;
       copy(beside, (std::string("bag.db3") + ending).c_str());
+      if (std::string_view(ending) == "-journal") {
+        forget_super_journal(path_);
+      }
       path_ = database;
       journal_ = true;
       defect_.clear();  // what is missing may be in the journal

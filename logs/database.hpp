@@ -86,9 +86,11 @@ class Database {
 /// copy lives as long as this.
 class DatabaseFile {
  public:
-  /// Looks at `path`; `shown` is its name in sentences. Throws InputError when it cannot be read or copied, or ends
-  /// inside its header.
-  DatabaseFile(const std::filesystem::path& path, const std::string& shown);
+  /// Looks at `path`; `shown` is its name in sentences. Throws InputError when it cannot be read or copied, ends inside
+  /// its header, or, without `trust`, where a journal is a link or larger than `largest_journal`. A rollback journal
+  /// names the super-journal of its transaction, which SQLite deletes when it has played the journal back: the copy
+  /// names none.
+  DatabaseFile(const std::filesystem::path& path, const std::string& shown, bool trust = false);
 
   /// What to open.
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
@@ -98,7 +100,7 @@ class DatabaseFile {
   [[nodiscard]] const std::string& defect() const { return defect_; }
 
  private:
-  void find_journals(const std::filesystem::path& original);
+  void find_journals(const std::filesystem::path& original, bool trust);
   void find_end(const std::filesystem::path& original, const std::string& shown);
   void copy(const std::filesystem::path& from, const char* name);
 

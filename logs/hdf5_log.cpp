@@ -28,7 +28,10 @@ using hdf5::Handle;
 
 constexpr std::string_view signature("\x89HDF\r\n\x1a\n", 8);
 constexpr std::size_t rows_at_once = 8192;
-constexpr std::size_t most_datasets = 100000;
+constexpr std::size_t most_objects = 100000;
+constexpr std::ptrdiff_t deepest_group = 64;
+constexpr hsize_t most_rows = hsize_t{1} << 32;
+constexpr hsize_t largest_chunk = hsize_t{1} << 28;  // bytes; the library holds a chunk of each column
 
 /// One column that a file has: a dataset, or a member of one of a compound type.
 struct Source {
@@ -36,6 +39,7 @@ struct Source {
   std::string member;  ///< empty for a plain dataset
   std::string unit;
   hsize_t rows = 0;
+  std::string refused{};  ///< why it is not read, without a subject; empty where it is
 
   [[nodiscard]] std::string name() const { return member.empty() ? path.substr(path.rfind('/') + 1) : member; }
   [[nodiscard]] std::string shown() const { return member.empty() ? path : path + "." + member; }
@@ -43,8 +47,14 @@ struct Source {
   [[nodiscard]] std::string home() const { return member.empty() ? path.substr(0, path.rfind('/') + 1) : path; }
 };
 
-Handle open_file(const std::filesystem::path& path) {
+/// Before the first call: the library closes at exit what a failed write left open, and crashes there.
+void begin_library() {
+  H5dont_atexit();
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+}
+
+Handle open_file(const std::filesystem::path& path) {
+  begin_library();
   Handle file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
   if (!file) {
     throw InputError(path.string() +
@@ -91,8 +101,35 @@ std::string unit_of(hid_t dataset) {
   return {};
 }
 
+/// Why a dataset is not read: what it says of its place is followed with trust only, and its size must be one that a log
+/// has.
+std::string refusal(hid_t dataset, hid_t type, hsize_t rows, bool trust) {
+  const Handle how(H5Dget_create_plist(dataset), H5Pclose);
+  const H5D_layout_t layout = how ? H5Pget_layout(how.get()) : H5D_LAYOUT_ERROR;
+  if (!how || layout == H5D_LAYOUT_ERROR) {
+    return "does not say how it is stored: expected a whole HDF5 file";
+  }
+  if (!trust && layout == H5D_VIRTUAL) {
+    return "is a virtual dataset, whose values stand in other files: expected them in this file, or --trust";
+  }
+  if (!trust && H5Pget_external_count(how.get()) > 0) {
+    return "has its values in another file: expected them in this file, or --trust";
+  }
+  hsize_t chunk = 0;
+  if (layout == H5D_CHUNKED && (H5Pget_chunk(how.get(), 1, &chunk) != 1 || chunk > largest_chunk / H5Tget_size(type))) {
+    return fmt::format("is stored in pieces of {} values: expected at most {} bytes in one", chunk, largest_chunk);
+  }
+  if (rows > most_rows) {
+    return fmt::format("has {} values: expected at most {}", rows, most_rows);
+  }
+  if (rows > 0 && layout != H5D_VIRTUAL && H5Pget_external_count(how.get()) == 0 && H5Dget_storage_size(dataset) == 0) {
+    return fmt::format("has {} values, none of which was written", rows);
+  }
+  return {};
+}
+
 /// Lists what a dataset offers.
-void list_dataset(hid_t file, const std::string& path, std::vector<Source>& sources) {
+void list_dataset(hid_t file, const std::string& path, bool trust, std::vector<Source>& sources) {
   const Handle dataset(H5Dopen2(file, path.c_str(), H5P_DEFAULT), H5Dclose);
   const Handle space(dataset ? H5Dget_space(dataset.get()) : -1, H5Sclose);
   const Handle type(dataset ? H5Dget_type(dataset.get()) : -1, H5Tclose);
@@ -101,16 +138,20 @@ void list_dataset(hid_t file, const std::string& path, std::vector<Source>& sour
   }
   hsize_t rows = 0;
   H5Sget_simple_extent_dims(space.get(), &rows, nullptr);
+  const std::string refused = refusal(dataset.get(), type.get(), rows, trust);
   if (is_number(type.get())) {
-    sources.push_back({path, "", unit_of(dataset.get()), rows});
+    sources.push_back({path, "", unit_of(dataset.get()), rows, refused});
   } else if (H5Tget_class(type.get()) == H5T_COMPOUND) {
     const int members = H5Tget_nmembers(type.get());
     for (int k = 0; k < members; ++k) {
       const auto index = static_cast<unsigned>(k);
       const Handle member(H5Tget_member_type(type.get(), index), H5Tclose);
       char* name = H5Tget_member_name(type.get(), index);
-      if (member && name != nullptr && is_number(member.get())) {
-        sources.push_back({path, name, "", rows});
+      // The library takes a member's place for granted.
+      const bool inside =
+          member && H5Tget_member_offset(type.get(), index) + H5Tget_size(member.get()) <= H5Tget_size(type.get());
+      if (inside && name != nullptr && is_number(member.get())) {
+        sources.push_back({path, name, "", rows, refused});
       }
       H5free_memory(name);
     }
@@ -118,19 +159,30 @@ void list_dataset(hid_t file, const std::string& path, std::vector<Source>& sour
 }
 
 /// All columns of a file, in the order of their paths.
-std::vector<Source> list_sources(hid_t file) {
-  std::vector<std::string> paths;
+std::vector<Source> list_sources(hid_t file, const std::string& shown, bool trust) {
+  struct Found {
+    std::vector<std::string> paths;
+    std::size_t objects = 0;
+    bool too_deep = false;
+  } found;
   const auto visit = [](hid_t, const char* name, const H5O_info_t* info, void* to) -> herr_t {
-    auto& found = *static_cast<std::vector<std::string>*>(to);
+    auto& all = *static_cast<Found*>(to);
+    const std::string_view path(name);
+    all.too_deep = std::ranges::count(path, '/') >= deepest_group;
     if (info->type == H5O_TYPE_DATASET) {
-      found.push_back(std::string("/") + name);
+      all.paths.push_back(fmt::format("/{}", path));
     }
-    return found.size() < most_datasets ? 0 : 1;
+    return ++all.objects <= most_objects && !all.too_deep ? 0 : 1;
   };
-  H5Ovisit2(file, H5_INDEX_NAME, H5_ITER_INC, visit, &paths, H5O_INFO_BASIC);
+  H5Ovisit2(file, H5_INDEX_NAME, H5_ITER_INC, visit, &found, H5O_INFO_BASIC);
+  if (found.too_deep || found.objects > most_objects) {
+    throw InputError(fmt::format("{}: {}: expected a log, with at most {} objects in groups at most {} deep", shown,
+                                 found.too_deep ? "its groups lie too deep in each other" : "has too many objects",
+                                 most_objects, deepest_group));
+  }
   std::vector<Source> sources;
-  for (const std::string& path : paths) {
-    list_dataset(file, path, sources);
+  for (const std::string& path : found.paths) {
+    list_dataset(file, path, trust, sources);
   }
   return sources;
 }
@@ -260,7 +312,12 @@ class DatasetChooser {
                                  core::listed(choice_.header), files::did_you_mean(place, choice_.header)));
   }
 
-  void take(const std::string& name, Source source) { choice_.found.insert_or_assign(name, std::move(source)); }
+  void take(const std::string& name, Source source) {
+    if (!source.refused.empty()) {
+      throw InputError(fmt::format("{}: {} {}", path_, source.shown(), source.refused));
+    }
+    choice_.found.insert_or_assign(name, std::move(source));
+  }
 
   void recognise(const Source& source) {
     const LogColumn* column = meaning_of(source);
@@ -374,7 +431,7 @@ class Hdf5File final : public RowFile {
  public:
   Hdf5File(std::filesystem::path path, const LogOptions& options) : path_(std::move(path)) {
     const Handle file = open_file(path_);
-    choice_ = DatasetChooser(path_.string(), options, list_sources(file.get())).choose();
+    choice_ = DatasetChooser(path_.string(), options, list_sources(file.get(), path_.string(), options.trust)).choose();
     for (const auto& [name, source] : choice_.found) {
       if (name != "t") {
         names_.push_back(name);
@@ -418,7 +475,7 @@ constexpr unsigned packing_level = 4;
 class Hdf5Writer final : public LogWriter {
  public:
   Hdf5Writer(std::filesystem::path path, std::vector<std::string> names) : beside_(std::move(path)) {
-    H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+    begin_library();
     file_ = Handle(H5Fcreate(beside_.path().c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT), H5Fclose);
     const Handle group(file_ ? H5Gcreate2(file_.get(), "log", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT) : -1, H5Gclose);
     if (!group) {

@@ -202,9 +202,11 @@ logs::LogOptions reader_options(const RobotObject* robot, const std::map<std::st
 
 std::unique_ptr<LogObject> read_recorded(const Paths& paths, const RobotObject* robot,
                                          const std::map<std::string, std::string>& map,
-                                         const std::vector<std::string>& extra, const std::vector<Path>& msg_path) {
+                                         const std::vector<std::string>& extra, const std::vector<Path>& msg_path,
+                                         bool trust) {
   logs::LogOptions options = reader_options(robot, map, extra);
   options.msg_path = msg_path;
+  options.trust = trust;
   const auto files = std::holds_alternative<Path>(paths) ? std::vector<Path>{std::get<Path>(paths)}
                                                          : std::get<std::vector<Path>>(paths);
   const py::gil_scoped_release unlocked;
@@ -280,13 +282,14 @@ void bind_log(py::module_& m) {
       });
   m.def("read_log", &read_recorded, py::arg("paths"), py::arg("robot") = nullptr,
         py::arg("map") = std::map<std::string, std::string>{}, py::arg("extra") = std::vector<std::string>{},
-        py::arg("msg_path") = std::vector<Path>{},
+        py::arg("msg_path") = std::vector<Path>{}, py::arg("trust") = false,
         "Reads one log (CSV, also .gz and .zst; rosbag2 in MCAP or SQLite; HDF5), or several as one (each begins a "
         "segment), in bounded memory.\n\n"
         "With `robot` only the columns that it can use are read, as the command line does. `map` gives column names "
         "that no spelling covers, e.g. {'omega_r': 'wheel_2'}, or fields of bags (TOPIC.FIELD). `extra` names further "
         "columns to keep. `msg_path`: directories with definitions of messages, for bags that do not bring their "
-        "own.\n\n"
+        "own. `trust`: whether the log may reach for files outside of itself and its directory (links, HDF5's external "
+        "and virtual datasets, very large journals and packed files).\n\n"
         "Raises InputError, naming file, place, value and what was expected.");
 }
 

@@ -97,6 +97,7 @@ def read_log(
     map: Mapping[str, str] = {},
     extra: Sequence[str] = [],
     msg_path: Sequence[_Path] = [],
+    trust: bool = False,
 ) -> Log: ...
 
 class FeasibleSet:

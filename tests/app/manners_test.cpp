@@ -7,6 +7,8 @@
 #include "app/program.hpp"
 #include "app/units.hpp"
 
+#include <wheelwright/files/words.hpp>
+
 namespace wheelwright::app::manners_test {
 namespace {
 
@@ -183,6 +185,37 @@ TEST_F(Manners, NoEscapesWhereNobodyWatches) {
   const Outcome outcome = run("commission '" + log + "' --robot robot.yaml --out model");
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_EQ((outcome.out + outcome.err).find('\033'), std::string::npos);
+}
+
+// A result that did not arrive is no success, and a message that nobody can read ends no program.
+TEST_F(Manners, AFullOutputIsAnExitCode) {
+  const std::filesystem::path program = WHEELWRIGHT_PROGRAM;
+  const auto code = [&](const std::string& arguments) {
+    const int status =
+        std::system(fmt::format("cd '{}' && '{}' {}", directory_.string(), program.string(), arguments).c_str());
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  };
+  put_lines("log.csv", healthy_lines());
+  for (const char* const command : {"doctor log.csv --robot robot.yaml --json", "doctor log.csv --robot robot.yaml",
+                                    "completion bash", "simulate --scenario none.yaml"}) {
+    EXPECT_EQ(code(std::string(command) + " > /dev/full 2> '" + path("err").string() + "'"), 2) << command;
+    EXPECT_THAT(bytes(path("err")), HasSubstr("wheelwright")) << command;
+    EXPECT_EQ(code(std::string(command) + " >&- 2> /dev/null"), 2) << command;
+  }
+  EXPECT_EQ(code("doctor none.csv --robot robot.yaml > /dev/null 2> /dev/full"), 2);
+  EXPECT_EQ(code("doctor none.csv --robot robot.yaml > /dev/null 2>&-"), 2);
+}
+
+TEST_F(Manners, WhatFilesSayIsNoCommandToTheTerminal) {
+  put("esc.yaml", "\"\\e[31mred\": 1\n");
+  for (const std::string& arguments : {std::string("doctor '\x1B]0;title\x07\xFF.csv' --robot robot.yaml"),
+                                       std::string("doctor log.csv --robot esc.yaml"),
+                                       std::string("doctor log.csv --robot robot.yaml --map 'x\x1B[2J=\x9B'")}) {
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.code, 2);
+    EXPECT_EQ(outcome.err.find_first_of("\x1B\x07\x9B\xFF"), std::string::npos) << outcome.err;
+    EXPECT_EQ(files::printable(outcome.err), outcome.err);
+  }
 }
 
 TEST(Units, AreThoseOfTheQuantity) {

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+// Texts for a terminal: what it would obey is shown, and all else is left alone.
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include <wheelwright/files/words.hpp>
+
+namespace wheelwright::files::printable_test {
+namespace {
+
+TEST(Printable, TextIsLeftAlone) {
+  for (const std::string text :
+       {"", "mass 21 kg\n\tand more", "θ̂ ≤ 3 · 10⁻⁹, naïve → 🤖", "back\\slash \"quoted\""}) {
+    EXPECT_EQ(printable(text), text);
+  }
+}
+
+TEST(Printable, CommandsAreShown) {
+  EXPECT_EQ(printable("\x1B[2J"), "\\x1B[2J");
+  EXPECT_EQ(printable("a\rb\x07\x7F"), "a\\x0Db\\x07\\x7F");
+  EXPECT_EQ(printable(std::string("\0", 1)), "\\x00");
+  EXPECT_EQ(printable("\xC2\x9B"
+                      "31m"),
+            "\\xC2\\x9B"
+            "31m");  // CSI of ISO 6429 in UTF-8
+  EXPECT_EQ(printable("\xE2\x80\xAE"
+                      "fdp"),
+            "\\xE2\\x80\\xAE"
+            "fdp");  // right-to-left override
+}
+
+// The byte sequences that Unicode 15, section 3.9 calls ill-formed.
+TEST(Printable, BytesThatAreNoUtf8AreShown) {
+  EXPECT_EQ(printable("\xFF"), "\\xFF");
+  EXPECT_EQ(printable("\xC0\xAF"), "\\xC0\\xAF");
+  EXPECT_EQ(printable("\xE0\x80\xAF"), "\\xE0\\x80\\xAF");
+  EXPECT_EQ(printable("\xED\xA0\x80"), "\\xED\\xA0\\x80");
+  EXPECT_EQ(printable("\xF4\x91\x92\x93"), "\\xF4\\x91\\x92\\x93");
+  EXPECT_EQ(printable("\xE1\x80\xE2"
+                      "A"),
+            "\\xE1\\x80\\xE2"
+            "A");
+  EXPECT_EQ(printable("\xF0\x9F\xA4"), "\\xF0\\x9F\\xA4");
+}
+
+}  // namespace
+}  // namespace wheelwright::files::printable_test
