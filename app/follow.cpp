@@ -144,15 +144,15 @@ ExitCode follow(std::istream& in, std::ostream& out, TorqueDetector detector, co
     if (kinematic) {
       kinematic->take(row, number, out, json);
     }
-    const auto sum = [&](auto& detector, const std::vector<std::size_t>& columns, std::vector<double>& values) {
+    const auto sum = [&](auto& sums, const std::vector<std::size_t>& columns, std::vector<double>& values) {
       if (!row.segment_starts.empty()) {
-        detector.restart();
+        sums.restart();
       }
       for (std::size_t c = 0; c < values.size(); ++c) {
         values[c] = row.columns[columns[c]][0];
       }
-      detector.step(row.t[0], values);
-      if (at_risk.add(detector, row.t[0])) {
+      sums.step(row.t[0], values);
+      if (at_risk.add(sums, row.t[0])) {
         tell();
       }
     };
