@@ -107,7 +107,7 @@ ExitCode follow(std::istream& in, std::ostream& out, TorqueDetector detector, co
     }
   }
   std::optional<detector::ScaleDetector> scales;
-  commission::RiskRecorder at_risk(kMerge);
+  commission::RiskRecorder at_risk(kMerge), pose_at_risk(kMerge);
   std::vector<double> sample(pick->size()), pose_sample;
   if (model.at_risk) {
     scales.emplace(model, detector::ScaleDetectorOptions{.false_alarms = commission::torque_false_alarms(model)});
@@ -119,8 +119,7 @@ ExitCode follow(std::istream& in, std::ostream& out, TorqueDetector detector, co
     pose_sample.resize(pose_pick.size());
     pose_sums.emplace(*model.kinematic, detector::PoseSumOptions{.false_alarms = commission::pose_false_alarms(model)});
   }
-  const auto tell = [&] {
-    const commission::RiskEvent& event = at_risk.watch().events.back();
+  const auto tell = [&](const commission::RiskEvent& event) {
     out << (json ? files::json_text({{"at_risk", results::to_json(event, model)}}, -1)
                  : "at a stated risk, " + commission::sentence(event, model.model))
         << std::endl;
@@ -144,7 +143,7 @@ ExitCode follow(std::istream& in, std::ostream& out, TorqueDetector detector, co
     if (kinematic) {
       kinematic->take(row, number, out, json);
     }
-    const auto sum = [&](auto& sums, const std::vector<std::size_t>& columns, std::vector<double>& values) {
+    const auto sum = [&](auto& sums, const auto& columns, std::vector<double>& values, auto& recorder) {
       if (!row.segment_starts.empty()) {
         sums.restart();
       }
@@ -152,19 +151,20 @@ ExitCode follow(std::istream& in, std::ostream& out, TorqueDetector detector, co
         values[c] = row.columns[columns[c]][0];
       }
       sums.step(row.t[0], values);
-      if (at_risk.add(sums, row.t[0])) {
-        tell();
+      if (recorder.add(sums, row.t[0])) {
+        tell(recorder.watch().events.back());
       }
     };
     if (scales) {
-      sum(*scales, *pick, sample);
+      sum(*scales, *pick, sample, at_risk);
     }
     if (pose_sums) {
-      sum(*pose_sums, pose_pick, pose_sample);
+      sum(*pose_sums, pose_pick, pose_sample, pose_at_risk);
     }
     ++number;
   }
-  if (torque.any() || (kinematic && kinematic->any()) || !at_risk.watch().events.empty()) {
+  if (torque.any() || (kinematic && kinematic->any()) || !at_risk.watch().events.empty() ||
+      !pose_at_risk.watch().events.empty()) {
     return kNo;
   }
   if (torque.decisions() > 0) {

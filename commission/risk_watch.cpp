@@ -87,8 +87,8 @@ struct Watched {
 }  // namespace
 
 RiskWatch watch_at_risk(LogSource& log, const OnlineModel& model, double merge) {
-  RiskRecorder recorder(merge);
-  RiskWatch& watch = recorder.watch();
+  RiskRecorder of_torque(merge), of_pose(merge);  // an event of one residual is not to hide one of the other
+  RiskWatch& watch = of_torque.watch();
   std::optional<Watched<detector::ScaleDetector>> torque;
   std::optional<Watched<detector::PoseSumDetector>> pose;
   if (model.at_risk) {
@@ -111,13 +111,18 @@ RiskWatch watch_at_risk(LogSource& log, const OnlineModel& model, double merge) 
   core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
     if (torque) {
       torque->take(block, k, starts);
-      recorder.add(torque->detector, block.t[k]);
+      of_torque.add(torque->detector, block.t[k]);
     }
     if (pose) {
       pose->take(block, k, starts);
-      recorder.add(pose->detector, block.t[k]);
+      of_pose.add(pose->detector, block.t[k]);
     }
   });
+  const RiskWatch& other = of_pose.watch();
+  watch.looks += other.looks;
+  watch.utilisation = std::max(watch.utilisation, other.utilisation);
+  watch.events.insert(watch.events.end(), other.events.begin(), other.events.end());
+  std::ranges::stable_sort(watch.events, {}, &RiskEvent::alarm);
   return std::move(watch);
 }
 
