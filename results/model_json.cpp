@@ -154,9 +154,8 @@ std::optional<Json> kinematic_json(const commission::KinematicCommissioning& r, 
   json["measurement"] = measurement_json(m.measurement);
   json["noise"] = noise_json(r, m.measurement);
   json["parameters"] = parameters_json(r);
-  json["feasible_set"] = half_spaces_json(m.facets, m.box);
-  json["feasible_set"]["rows"] = r.rows;
-  json["feasible_set"]["prior"] = box_json(r.prior);
+  json["feasible_set"] = {{"rows", r.rows}, {"prior", box_json(r.prior)}};
+  json["feasible_set"].update(half_spaces_json(m.facets, m.box));
   json["detector"] = {{"estimate", numbers(m.estimate)},
                       {"error_bounds",
                        {{"motion", m.errors.motion},
