@@ -111,7 +111,7 @@ TEST(Allocation, NorHasAStepOfSumsOfThePose) {
   std::size_t looks = 0;
   bool alarm = false;
   const std::size_t before = allocations;
-  walk(log, detector, [&](std::size_t) {
+  testing_support::walk(log, detector, [&](std::size_t) {
     looks += detector.looks().size();
     alarm = alarm || detector.alarm();
   });
