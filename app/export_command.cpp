@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include <wheelwright/commission/risk_watch.hpp>
 #include <wheelwright/export/export_c.hpp>
 #include <wheelwright/files/bytes.hpp>
 #include <wheelwright/results/model_file.hpp>
@@ -81,9 +82,12 @@ int run(const Arguments& a) {
       .source = fmt::format("{}, thresholds {}", a.model.filename().string(), core::warrant_word(model.warrant)),
       .software = results::software()};
   const std::string text =
-      model.at_risk
-          ? exporter::c_header(detector, exporter::scale_detector_for_c(model, {.set = a.detector.set}), options)
-          : exporter::c_header(detector, options);
+      model.at_risk ? exporter::c_header(
+                          detector,
+                          exporter::scale_detector_for_c(
+                              model, {.false_alarms = commission::torque_false_alarms(model), .set = a.detector.set}),
+                          options)
+                    : exporter::c_header(detector, options);
   std::string file;
   if (!a.common.out.empty()) {
     make_directory(a.common);

@@ -107,11 +107,23 @@ ExitCode follow(std::istream& in, std::ostream& out, TorqueDetector detector, co
     }
   }
   std::optional<detector::ScaleDetector> scales;
-  commission::RiskRecorder at_risk(kMerge);
-  std::vector<double> sample(pick->size());
+  commission::RiskRecorder at_risk(kMerge), pose_at_risk(kMerge);
+  std::vector<double> sample(pick->size()), pose_sample;
   if (model.at_risk) {
-    scales.emplace(model);
+    scales.emplace(model, detector::ScaleDetectorOptions{.false_alarms = commission::torque_false_alarms(model)});
   }
+  std::optional<detector::PoseSumDetector> pose_sums;
+  std::vector<std::size_t> pose_pick;
+  if (kinematic && model.kinematic->at_risk) {
+    pose_pick = *pick_columns(parser, model.kinematic->measurement.columns(), missing);
+    pose_sample.resize(pose_pick.size());
+    pose_sums.emplace(*model.kinematic, detector::PoseSumOptions{.false_alarms = commission::pose_false_alarms(model)});
+  }
+  const auto tell = [&](const commission::RiskEvent& event) {
+    out << (json ? files::json_text({{"at_risk", results::to_json(event, model)}}, -1)
+                 : "at a stated risk, " + commission::sentence(event, model.model))
+        << std::endl;
+  };
   LogBlock row;
   std::size_t number = 0;
   std::vector<double> times;  // of the first rows
@@ -131,24 +143,28 @@ ExitCode follow(std::istream& in, std::ostream& out, TorqueDetector detector, co
     if (kinematic) {
       kinematic->take(row, number, out, json);
     }
-    if (scales) {
+    const auto sum = [&](auto& sums, const auto& columns, std::vector<double>& values, auto& recorder) {
       if (!row.segment_starts.empty()) {
-        scales->restart();
+        sums.restart();
       }
-      for (std::size_t c = 0; c < sample.size(); ++c) {
-        sample[c] = row.columns[(*pick)[c]][0];
+      for (std::size_t c = 0; c < values.size(); ++c) {
+        values[c] = row.columns[columns[c]][0];
       }
-      scales->step(row.t[0], sample);
-      if (at_risk.add(*scales, row.t[0])) {
-        const commission::RiskEvent& event = at_risk.watch().events.back();
-        out << (json ? files::json_text({{"at_risk", results::to_json(event, model)}}, -1)
-                     : "at a stated risk, " + commission::sentence(event, model.model))
-            << std::endl;
+      sums.step(row.t[0], values);
+      if (recorder.add(sums, row.t[0])) {
+        tell(recorder.watch().events.back());
       }
+    };
+    if (scales) {
+      sum(*scales, *pick, sample, at_risk);
+    }
+    if (pose_sums) {
+      sum(*pose_sums, pose_pick, pose_sample, pose_at_risk);
     }
     ++number;
   }
-  if (torque.any() || (kinematic && kinematic->any()) || !at_risk.watch().events.empty()) {
+  if (torque.any() || (kinematic && kinematic->any()) || !at_risk.watch().events.empty() ||
+      !pose_at_risk.watch().events.empty()) {
     return kNo;
   }
   if (torque.decisions() > 0) {

@@ -12,6 +12,7 @@
 #include <wheelwright/commission/error_estimate.hpp>
 #include <wheelwright/commission/noise_budget.hpp>
 #include <wheelwright/commission/physical.hpp>
+#include <wheelwright/commission/sum_spread.hpp>
 
 namespace wheelwright::commission {
 namespace {
@@ -22,49 +23,15 @@ struct Attempt {
   std::optional<detector::RiskModel> model;  // where there is a set
   detector::SumState worst;                  // the sum that stands farthest out at the test's risk
   double utilisation = 0.0;                  // its |value|/threshold
-  double spread = 0.0;                       // of sums over a scale, in units of what errors can do: see Spread
+  double spread = 0.0;                       // of sums over a scale, in units of what errors can do: see SumSpread
   std::size_t widest = 0;                    // that scale
-};
-
-// Mean squares of a sum's S. For errors as assumed E √(V0/(V + V0)) exp(S²/(2(V + V0))) <= 1 in each window, given what
-// was before, so that over windows that are apart Σ (S²/(V + V0) − ln(1 + V/V0)) exceeds 2L with the probability e^−L
-// at most; so does the mean of that over groups of such windows (Jensen's inequality), here all looks. What bias,
-// angles and the set may add is taken away from S first. Windows count as apart after eight scales, when 1 % of a sum
-// is left.
-class Spread {
- public:
-  Spread(const detector::ScaleDetector& detector, Eigen::MatrixXd usual, double checks, double risk)
-      : usual_(std::move(usual)),
-        limit_(2.0 * kApart * checks * std::log(static_cast<double>(usual_.size()) / risk)),
-        sum_(Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(detector.weights().size()),
-                                   static_cast<Eigen::Index>(detector.scales().size()))) {}
-  void add(const detector::SumState& look, const Eigen::MatrixXd& variances) {
-    const auto w = static_cast<Eigen::Index>(look.weight), s = static_cast<Eigen::Index>(look.scale);
-    const double V = variances(w, s), V0 = usual_(w, s);
-    if (V0 > 0.0) {
-      const double left = std::max(0.0, std::abs(look.value) - (look.threshold - look.averaged));
-      sum_(w, s) += left * left / (V + V0) - std::log1p(V / V0);
-    }
-  }
-  // Largest sum, in units of its limit, and its scale.
-  [[nodiscard]] std::pair<double, std::size_t> largest() const {
-    Eigen::Index w = 0, s = 0;
-    const double most = sum_.maxCoeff(&w, &s);
-    return {most / limit_, static_cast<std::size_t>(s)};
-  }
-
- private:
-  static constexpr double kApart = 8.0;
-  Eigen::MatrixXd usual_;
-  double limit_;
-  Eigen::MatrixXd sum_;
 };
 
 // Half of the test's risk each: a sum too large, and too many large ones.
 void look_at_sums(LogSource& log, const OnlineModel& model, double risk, double seconds, Attempt& attempt) {
   const detector::ScaleDetectorOptions options{.false_alarms = 0.5 * risk / std::max(seconds, 1.0)};
   detector::ScaleDetector detector(model, options);
-  Spread spread(detector, model.at_risk->usual, options.checks, 0.5 * risk);
+  SumSpread spread(model.at_risk->usual, options.checks, 0.5 * risk);
   const std::vector<std::size_t> pick = core::positions_of(log, model.measurement.columns());
   std::vector<double> sample(pick.size());
   core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {

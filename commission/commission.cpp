@@ -12,6 +12,7 @@
 #include <wheelwright/commission/at_risk.hpp>
 #include <wheelwright/commission/contradictions.hpp>
 #include <wheelwright/commission/fit.hpp>
+#include <wheelwright/commission/pose_at_risk.hpp>
 #include <wheelwright/commission/setting.hpp>
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/filter/row_stream.hpp>
@@ -518,6 +519,7 @@ Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionO
 Commissioning commission_robot(LogSource& log, const Robot& robot, const CommissionOptions& options) {
   Commissioning result = commissioned(log, robot, options);
   settle_warrants(result);
+  learn_pose_at_risk(log, result);
   learn_at_risk(log, result);
   return result;
 }

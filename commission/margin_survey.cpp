@@ -6,6 +6,7 @@
 #include <cmath>
 #include <memory>
 
+#include <wheelwright/commission/risk_watch.hpp>
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/for_all.hpp>
 #include <wheelwright/detector/odometry_faults.hpp>
@@ -113,7 +114,7 @@ void add_at_risk(MarginSurvey& survey, LogSource& log, const OnlineModel& model,
   }
   sums.threads = options.margins.threads;
   sums.progress = options.margins.progress;
-  RiskMargins result{model.at_risk->risk, drive->miss, detector::ScaleDetectorOptions{}.false_alarms, sums.windows, {}};
+  RiskMargins result{model.at_risk->risk, drive->miss, torque_false_alarms(model), sums.windows, {}};
   result.margins = detector::margins_at_risk(*drive, model, motion, faults, onsets, sums);
   for (detector::FaultMargins& margins : result.margins) {
     for (std::size_t k = 0; k < kinds.size(); ++k) {

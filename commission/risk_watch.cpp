@@ -9,42 +9,71 @@
 
 namespace wheelwright::commission {
 
+RiskEvent* RiskRecorder::take(const detector::SumState& state, double scale, double t) {
+  const double ratio = state.threshold > 0.0 ? std::abs(state.value) / state.threshold : 0.0;
+  ++watch_.looks;
+  watch_.utilisation = std::max(watch_.utilisation, ratio);
+  if (!(state.excess > 0.0)) {
+    return nullptr;
+  }
+  const bool begins = watch_.events.empty() || t > watch_.events.back().end + pause_;
+  if (begins) {
+    watch_.events.push_back({.alarm = t, .end = t, .scale = scale, .peak_time = t, .pose = {}});
+    pause_ = merge_;
+  }
+  RiskEvent& event = watch_.events.back();
+  event.end = t;
+  pause_ = std::max(pause_, 0.25 * scale);
+  if (ratio > event.ratio) {
+    event.ratio = ratio;
+    event.peak_time = t;
+  }
+  return begins ? &event : nullptr;
+}
+
 bool RiskRecorder::add(const detector::ScaleDetector& detector, double t) {
   bool begins = false;
   for (const detector::SumState& state : detector.looks()) {
-    const double ratio = state.threshold > 0.0 ? std::abs(state.value) / state.threshold : 0.0;
-    ++watch_.looks;
-    watch_.utilisation = std::max(watch_.utilisation, ratio);
-    if (!(state.excess > 0.0)) {
-      continue;
-    }
-    const double scale = detector.scales()[state.scale];
-    if (watch_.events.empty() || t > watch_.events.back().end + pause_) {
-      watch_.events.push_back({t, t, detector.weights()[state.weight], scale, 0.0, t});
-      pause_ = merge_;
+    if (RiskEvent* event = take(state, detector.scales()[state.scale], t)) {
+      event->weight = detector.weights()[state.weight];
       begins = true;
-    }
-    RiskEvent& event = watch_.events.back();
-    event.end = t;
-    pause_ = std::max(pause_, 0.25 * scale);
-    if (ratio > event.ratio) {
-      event.ratio = ratio;
-      event.peak_time = t;
     }
   }
   return begins;
 }
 
-RiskWatch watch_at_risk(LogSource& log, const OnlineModel& model, double merge) {
-  if (!model.at_risk) {
-    return {};
+bool RiskRecorder::add(const detector::PoseSumDetector& detector, double t) {
+  bool begins = false;
+  for (const detector::SumState& state : detector.looks()) {
+    if (RiskEvent* event = take(state, detector.scales()[state.scale], t)) {
+      event->pose = detector.weights()[state.weight];
+      begins = true;
+    }
   }
-  const detector::ScaleDetectorOptions options;
-  detector::ScaleDetector detector(model, options);
-  RiskRecorder recorder(merge);
-  const std::vector<std::size_t> pick = core::positions_of(log, model.measurement.columns());
-  std::vector<double> sample(pick.size());
-  core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
+  return begins;
+}
+
+double torque_false_alarms(const OnlineModel& model) {
+  return detector::torque_share(model) * detector::ScaleDetectorOptions{}.false_alarms;
+}
+
+double pose_false_alarms(const OnlineModel& model) {
+  return (model.at_risk ? 0.5 : 1.0) * detector::PoseSumOptions{}.false_alarms;
+}
+
+namespace {
+
+// A detector and where its columns are.
+template <typename AnyDetector>
+struct Watched {
+  AnyDetector detector;
+  std::vector<std::size_t> pick;
+  std::vector<double> sample;
+
+  Watched(LogSource& log, const std::vector<std::string>& columns, AnyDetector watching)
+      : detector(std::move(watching)), pick(core::positions_of(log, columns)), sample(pick.size()) {}
+
+  void take(const LogBlock& block, std::size_t k, bool starts) {
     if (starts) {
       detector.restart();
     }
@@ -52,11 +81,49 @@ RiskWatch watch_at_risk(LogSource& log, const OnlineModel& model, double merge) 
       sample[c] = block.columns[pick[c]][k];
     }
     detector.step(block.t[k], sample);
-    recorder.add(detector, block.t[k]);
+  }
+};
+
+}  // namespace
+
+RiskWatch watch_at_risk(LogSource& log, const OnlineModel& model, double merge) {
+  RiskRecorder of_torque(merge), of_pose(merge);  // an event of one residual is not to hide one of the other
+  RiskWatch& watch = of_torque.watch();
+  std::optional<Watched<detector::ScaleDetector>> torque;
+  std::optional<Watched<detector::PoseSumDetector>> pose;
+  if (model.at_risk) {
+    torque.emplace(log, model.measurement.columns(),
+                   detector::ScaleDetector(model, {.false_alarms = torque_false_alarms(model)}));
+    watch.false_alarms += torque_false_alarms(model);
+  }
+  if (model.kinematic && model.kinematic->at_risk &&
+      std::ranges::all_of(model.kinematic->measurement.columns(),
+                          [&](const std::string& name) { return log.find(name).has_value(); })) {
+    pose.emplace(log, model.kinematic->measurement.columns(),
+                 detector::PoseSumDetector(*model.kinematic, {.false_alarms = pose_false_alarms(model)}));
+    watch.false_alarms += pose_false_alarms(model);
+    watch.pose = true;
+  }
+  watch.watched = torque || pose;
+  if (!watch.watched) {
+    return {};
+  }
+  core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
+    if (torque) {
+      torque->take(block, k, starts);
+      of_torque.add(torque->detector, block.t[k]);
+    }
+    if (pose) {
+      pose->take(block, k, starts);
+      of_pose.add(pose->detector, block.t[k]);
+    }
   });
-  recorder.watch().watched = true;
-  recorder.watch().false_alarms = options.false_alarms;
-  return std::move(recorder.watch());
+  const RiskWatch& other = of_pose.watch();
+  watch.looks += other.looks;
+  watch.utilisation = std::max(watch.utilisation, other.utilisation);
+  watch.events.insert(watch.events.end(), other.events.begin(), other.events.end());
+  std::ranges::stable_sort(watch.events, {}, &RiskEvent::alarm);
+  return std::move(watch);
 }
 
 std::string sum_words(const detector::SumWeight& weight, const Model& model) {
@@ -72,9 +139,26 @@ std::string sum_words(const detector::SumWeight& weight, const Model& model) {
   return {};
 }
 
+std::string sum_words(const detector::PoseWeight& weight) {
+  using Shape = detector::PoseWeight::Shape;
+  const char* side = weight.wheel == 0 ? "right" : "left";
+  switch (weight.shape) {
+    case Shape::along: return "slip along the heading";
+    case Shape::across: return "slip across the heading";
+    case Shape::turn: return "turning beside the wheels";
+    case Shape::radius: return fmt::format("way of the {} wheel", side);
+    case Shape::yaw_gain: return fmt::format("turn by the {} wheel", side);
+  }
+  return {};
+}
+
+std::string sum_words(const RiskEvent& event, const Model& model) {
+  return event.pose ? sum_words(*event.pose) + " (pose against wheels)" : sum_words(event.weight, model);
+}
+
 std::string sentence(const RiskEvent& event, const Model& model) {
   return fmt::format("since {:.2f} s: {}, seen over {:g} s, up to {:.3g} times what a healthy robot's errors can do",
-                     event.alarm, sum_words(event.weight, model), event.scale, event.ratio);
+                     event.alarm, sum_words(event, model), event.scale, event.ratio);
 }
 
 }  // namespace wheelwright::commission

@@ -31,6 +31,8 @@ KinematicDetector make_detector(const KinematicModel& model, DetectorOptions opt
   return detector_of(model, std::move(options));
 }
 
+double torque_share(const OnlineModel& model) { return model.kinematic && model.kinematic->at_risk ? 0.5 : 1.0; }
+
 Model kinematic_outputs(const KinematicModel& model) {
   Model names;
   names.outputs = model.measurement.outputs();

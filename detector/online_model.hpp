@@ -30,11 +30,35 @@ struct LearntSet {
   core::Warrant warrant = core::Warrant::extrapolated;  ///< of set, hull and thresholds
 };
 
+/// What is assumed of a pose's errors. Those of x, y and heading at one instant may depend on each other in any way.
+struct PoseErrors {
+  filter::ErrorClass position{};  ///< of x and of y, m
+  filter::ErrorClass heading{};   ///< rad
+  double shortest_step = 0.0;     ///< s, between poses
+
+  /// True if some of them average out.
+  [[nodiscard]] bool average() const { return position.bias < position.bound || heading.bias < heading.bound; }
+};
+
+/// What a detector of the kinematic residual at a stated risk needs (pose_sums.hpp).
+struct PoseRiskModel {
+  double risk = 1e-9;                                 ///< that the set lacks the true parameters
+  core::Warrant warrant = core::Warrant::guaranteed;  ///< of set and thresholds, the risk aside
+  PoseErrors errors{};
+  std::vector<bounds::HalfSpace> facets{};
+  Box box{};
+  std::vector<double> scales{};      ///< s, of the sums
+  double delay = 0.0;                ///< s, by which their weights foresee
+  Eigen::MatrixXd usual_position{};  ///< weights × scales: variance of a sum's errors of position on the learnt log
+  Eigen::MatrixXd usual_heading{};   ///< the same of errors of heading
+};
+
 /// The channel of the kinematic residual. The estimate is one of OdometryMeasurement::parameters().
 struct KinematicModel : LearntSet {
   filter::OdometryMeasurement measurement{};
-  double window = 1.0;              ///< W, s
-  filter::OdometryErrors errors{};  ///< of the rows of driving to come
+  double window = 1.0;                     ///< W, s
+  filter::OdometryErrors errors{};         ///< of the rows of driving to come
+  std::optional<PoseRiskModel> at_risk{};  ///< where the robot file declares errors of the pose that average out
 };
 
 /// What a detector at a stated risk needs (scale_detector.hpp).
@@ -70,6 +94,10 @@ struct OnlineModel : LearntSet {
 /// that make no sense.
 [[nodiscard]] TorqueDetector make_detector(const OnlineModel& model, DetectorOptions options = {});
 [[nodiscard]] KinematicDetector make_detector(const KinematicModel& model, DetectorOptions options = {});
+
+/// The share of the stated rate of false alarms that sums of the torque residual may use: half of it where sums of the
+/// kinematic residual are watched beside them, else all.
+[[nodiscard]] double torque_share(const OnlineModel& model);
 
 /// Names and units of the outputs as a Model that has nothing else, for tables and charts.
 [[nodiscard]] Model kinematic_outputs(const KinematicModel& model);

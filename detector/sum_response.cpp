@@ -211,7 +211,8 @@ std::optional<SumDrive> read_sum_drive(LogSource& log, const OnlineModel& model,
     errors.output *= motion.effort_reach > 0 ? 3.0 : 1.0;
   }
   const OnlineModel any = with_errors(model, errors);
-  const ScaleDetectorOptions usual;
+  ScaleDetectorOptions usual;
+  usual.false_alarms *= torque_share(model);
   ScaleDetector detector(any, usual);
   ReadingErrors reading(detector);
   const RiskModel& risk = *model.at_risk;

@@ -28,6 +28,16 @@ double chord_over_arc(double x) { return std::abs(x) < 1e-4 ? 1.0 - x * x / 6.0 
 
 }  // namespace
 
+std::array<double, 2> mean_direction(double from, double to) {
+  const double turn = to - from, middle = from + 0.5 * turn, length = chord_over_arc(0.5 * turn);
+  return {length * std::cos(middle), length * std::sin(middle)};
+}
+
+double motion_within_step(double h, double size, double turn, const OdometryErrors& errors) {
+  const double a = errors.acceleration, yaw = 2.0 * errors.yaw_gain * a;
+  return h * h * ((size + 0.5 * a * h * h) * yaw / 12.0 + (std::abs(turn) + 2.0 * errors.heading) * a / 8.0);
+}
+
 std::vector<std::string> OdometryMeasurement::columns() const {
   std::vector<std::string> all = motion_columns;
   if (position) {
@@ -163,13 +173,10 @@ bool OdometryFilter::read(double t, std::span<const double> sample) {
 void OdometryFilter::follow_pose(const Sample& before) {
   const double h = now_.t - before.t;
   const double turn = now_.heading - before.heading;
-  const double middle = before.heading + 0.5 * turn;
-  const double length = chord_over_arc(0.5 * turn);
-  now_.mean = {length * std::cos(middle), length * std::sin(middle)};
+  now_.mean = mean_direction(before.heading, now_.heading);
   const bool any = before.steps > 0;
   now_.variation.add(any ? std::hypot(now_.mean[0] - before.mean[0], now_.mean[1] - before.mean[1]) : 0.0);
   now_.steps = before.steps + 1;
-  const double a = errors_.acceleration, yaw = 2.0 * errors_.yaw_gain * a;
   const double slack = measurement_.motion == MotionKind::speed ? h * errors_.motion : 2.0 * errors_.motion;
   for (std::size_t w = 0; w < 2; ++w) {
     Wheel& wheel = now_.wheels[w];
@@ -177,8 +184,7 @@ void OdometryFilter::follow_pose(const Sample& before) {
     wheel.along[0].add(now_.mean[0] * by);
     wheel.along[1].add(now_.mean[1] * by);
     wheel.size.add(size + slack);
-    wheel.within.add(
-        h * h * ((size + slack + 0.5 * a * h * h) * yaw / 12.0 + (std::abs(turn) + 2.0 * errors_.heading) * a / 8.0));
+    wheel.within.add(motion_within_step(h, size + slack, turn, errors_));
   }
 }
 

@@ -52,6 +52,13 @@ struct OdometryErrors {
   Eigen::VectorXd estimated{};
 };
 
+/// Mean of the unit vector whose direction goes from `from` to `to` (rad) at a constant rate: E_j below.
+[[nodiscard]] std::array<double, 2> mean_direction(double from, double to);
+
+/// Bound on what a motion that is not constant within a step of `h` s adds to E Δφ of a wheel that moved by `size` >= 0
+/// rad (its errors included), while the measured heading turned by `turn` rad: the third sum below.
+[[nodiscard]] double motion_within_step(double h, double size, double turn, const OdometryErrors& errors);
+
 /// A window of wheel odometry against what a pose or a gyro saw of it, for every sample k; k0 is the sample of the same
 /// segment with t_k − t_k0 nearest to the window W. With p and θ the measured pose, φ the wheel angles (speeds are
 /// integrated by the trapezoidal rule) and ϑ = [r_R, r_L, c_R, c_L, b]: effective rolling radii, yaw gains c = r/D,

@@ -129,20 +129,23 @@ std::string isolation_section(const std::vector<detector::Isolation>& isolations
 // Sums over scales: how near they came to what a healthy robot's can be, and where they went beyond.
 std::string at_risk_section(const commission::RiskWatch& watch, const OnlineModel& model, const TimeAxis& axis) {
   constexpr double kYear = 365.25 * 86400.0;
+  const std::vector<double>& scales = model.at_risk ? model.at_risk->scales : model.kinematic->at_risk->scales;
+  const bool declared = !model.at_risk || model.at_risk->warrant == core::Warrant::guaranteed;
   std::string out = paragraph(fmt::format(
-      "Weighted sums over {} to {} s of what the model leaves, matched to faults, were compared {} times with what the "
+      "Weighted sums over {} to {} s of {}, matched to faults, were compared {} times with what the "
       "errors of a healthy robot can make of them; in {} years of driving at most one false alarm is to be expected, "
       "as long as the errors are as {}. The largest reached {} of its threshold.",
-      number(model.at_risk->scales.front()), number(model.at_risk->scales.back()), count(watch.looks),
-      number(1.0 / (watch.false_alarms * kYear), 2),
-      model.at_risk->warrant == core::Warrant::guaranteed ? "the robot file declares them"
-                                                          : "they were in the log that the model was learnt from",
+      number(scales.front()), number(scales.back()),
+      !watch.pose     ? "what the model leaves"
+      : model.at_risk ? "what the model leaves of the torque, and wheel odometry of the pose"
+                      : "what wheel odometry leaves of the pose",
+      count(watch.looks), number(1.0 / (watch.false_alarms * kYear), 2),
+      declared ? "the robot file declares them" : "they were in the log that the model was learnt from",
       percent(watch.utilisation)));
   std::vector<std::vector<Cell>> rows;
   for (const commission::RiskEvent& e : watch.events) {
-    rows.push_back({escape(axis.text(e.alarm)), escape(axis.text(e.end)),
-                    escape(commission::sum_words(e.weight, model.model)), numeric(number(e.scale)),
-                    numeric(number(e.ratio, 3))});
+    rows.push_back({escape(axis.text(e.alarm)), escape(axis.text(e.end)), escape(commission::sum_words(e, model.model)),
+                    numeric(number(e.scale)), numeric(number(e.ratio, 3))});
   }
   return rows.empty()
              ? out

@@ -89,7 +89,8 @@ void add_isolation(Json& json, const std::vector<detector::Isolation>& isolation
 Json to_json(const commission::RiskEvent& e, const OnlineModel& model) {
   return {{"alarm", e.alarm},
           {"end", e.end},
-          {"weight", e.weight.name},
+          {"weight", e.pose ? e.pose->name : e.weight.name},
+          {"residual", e.pose ? "kinematic" : "torque"},
           {"scale", e.scale},
           {"ratio", e.ratio},
           {"peak_time", e.peak_time},
@@ -105,7 +106,8 @@ void add_at_risk(Json& json, const commission::RiskWatch& watch, const OnlineMod
     events.push_back(to_json(e, model));
   }
   json["at_risk"] = {{"false_alarms_per_year", watch.false_alarms * 365.25 * 86400.0},
-                     {"risk_of_the_set", model.at_risk->risk},
+                     {"risk_of_the_set", (model.at_risk ? model.at_risk->risk : 0.0) +
+                                             (watch.pose ? model.kinematic->at_risk->risk : 0.0)},
                      {"looks", watch.looks},
                      {"utilisation", watch.utilisation},
                      {"events", std::move(events)}};

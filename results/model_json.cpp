@@ -97,6 +97,48 @@ Json validation_json(const commission::KinematicCommissioning& r, const filter::
 
 }  // namespace
 
+namespace {
+
+Json error_class_json(const filter::ErrorClass& c) {
+  Json json = {{"bound", c.bound}, {"bias", c.bias}, {"correlation", c.correlation}};
+  if (c.deviation < c.bound) {
+    json["deviation"] = c.deviation;
+  }
+  return json;
+}
+
+// Facets and hull of a set.
+Json half_spaces_json(const std::vector<bounds::HalfSpace>& facets, const Box& hull) {
+  Json a = Json::array(), b = Json::array();
+  for (const bounds::HalfSpace& facet : facets) {
+    a.push_back(numbers(facet.a));
+    b.push_back(facet.b);
+  }
+  return {{"A", std::move(a)}, {"b", std::move(b)}, {"hull", box_json(hull)}};
+}
+
+Json pose_risk_json(const detector::PoseRiskModel& risk) {
+  const auto table = [](const Eigen::MatrixXd& values) {
+    Json rows = Json::array();
+    for (Eigen::Index w = 0; w < values.rows(); ++w) {
+      rows.push_back(numbers(values.row(w)));
+    }
+    return rows;
+  };
+  return {{"risk", risk.risk},
+          {"warrant", core::warrant_word(risk.warrant)},
+          {"errors",
+           {{"position", error_class_json(risk.errors.position)},
+            {"heading", error_class_json(risk.errors.heading)},
+            {"shortest_step", risk.errors.shortest_step}}},
+          {"feasible_set", half_spaces_json(risk.facets, risk.box)},
+          {"scales", risk.scales},
+          {"delay", risk.delay},
+          {"usual", {{"position", table(risk.usual_position)}, {"heading", table(risk.usual_heading)}}}};
+}
+
+}  // namespace
+
 std::optional<Json> kinematic_json(const commission::KinematicCommissioning& r, const commission::FoldOptions& folds) {
   if (r.status == Status::absent) {
     return std::nullopt;
@@ -106,19 +148,14 @@ std::optional<Json> kinematic_json(const commission::KinematicCommissioning& r, 
     return json;
   }
   const detector::KinematicModel& m = *r.model;
-  Json a = Json::array(), b = Json::array();
-  for (const bounds::HalfSpace& facet : m.facets) {
-    a.push_back(numbers(facet.a));
-    b.push_back(facet.b);
-  }
   json["warrant"] = core::warrant_word(m.warrant);
   json["window"] = m.window;
   json["outputs"] = m.measurement.outputs();
   json["measurement"] = measurement_json(m.measurement);
   json["noise"] = noise_json(r, m.measurement);
   json["parameters"] = parameters_json(r);
-  json["feasible_set"] = {
-      {"rows", r.rows}, {"prior", box_json(r.prior)}, {"A", a}, {"b", b}, {"hull", box_json(m.box)}};
+  json["feasible_set"] = {{"rows", r.rows}, {"prior", box_json(r.prior)}};
+  json["feasible_set"].update(half_spaces_json(m.facets, m.box));
   json["detector"] = {{"estimate", numbers(m.estimate)},
                       {"error_bounds",
                        {{"motion", m.errors.motion},
@@ -129,6 +166,9 @@ std::optional<Json> kinematic_json(const commission::KinematicCommissioning& r, 
                         {"estimated", numbers(m.errors.estimated)}}},
                       {"persistence", {{"k", m.persistence.k}, {"n", m.persistence.n}}}};
   json["validation"] = validation_json(r, m.measurement, folds, m.window);
+  if (m.at_risk) {
+    json["at_risk"] = pose_risk_json(*m.at_risk);
+  }
   return json;
 }
 
@@ -146,18 +186,6 @@ Json assumptions_json(const std::vector<core::Assumption>& assumptions) {
   }
   return list;
 }
-
-namespace {
-
-Json error_class_json(const filter::ErrorClass& c) {
-  Json json = {{"bound", c.bound}, {"bias", c.bias}, {"correlation", c.correlation}};
-  if (c.deviation < c.bound) {
-    json["deviation"] = c.deviation;
-  }
-  return json;
-}
-
-}  // namespace
 
 Json error_classes_json(const filter::ErrorClasses& classes) {
   return {{"motion", error_class_json(classes.motion)},

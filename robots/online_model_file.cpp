@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/core/error.hpp>
+#include <wheelwright/detector/pose_sums.hpp>
 #include <wheelwright/detector/scale_detector.hpp>
 #include <wheelwright/model/robot.hpp>
 #include <wheelwright/robots/robot_file.hpp>
@@ -91,6 +92,42 @@ filter::ErrorClass error_class_at(const JsonPlace& place) {
     c.deviation = bound_at(place.at("deviation"));
   }
   return c;
+}
+
+detector::PoseRiskModel pose_risk_at(const JsonPlace& place, const filter::OdometryMeasurement& measurement) {
+  detector::PoseRiskModel risk;
+  risk.risk = place.at("risk").number();
+  if (!(risk.risk > 0.0 && risk.risk < 1.0)) {
+    place.at("risk").fail("a number between 0 and 1");
+  }
+  risk.warrant = warrant_at(place, core::Warrant::guaranteed);
+  const JsonPlace errors = place.at("errors"), set = place.at("feasible_set"), usual = place.at("usual");
+  risk.errors.position = error_class_at(errors.at("position"));
+  risk.errors.heading = error_class_at(errors.at("heading"));
+  risk.errors.shortest_step = bound_at(errors.at("shortest_step"));
+  const std::size_t p = measurement.parameters().size();
+  risk.facets = facets_at(set, p);
+  risk.box = box_at(set.at("hull"), p);
+  const Eigen::VectorXd scales = vector_at(place.at("scales"));
+  risk.scales.assign(scales.begin(), scales.end());
+  risk.delay = bound_at(place.at("delay"));
+  const std::size_t weights = detector::pose_weights(measurement).size();
+  const auto table = [&](const JsonPlace& rows) {
+    if (rows.size() != weights) {
+      rows.fail("one row for each of the " + std::to_string(weights) + " weights");
+    }
+    Eigen::MatrixXd values(static_cast<Eigen::Index>(weights), scales.size());
+    for (std::size_t w = 0; w < weights; ++w) {
+      values.row(static_cast<Eigen::Index>(w)) = vector_at(rows.at(w), risk.scales.size());
+    }
+    if (!(values.array() >= 0.0).all()) {
+      rows.fail("variances >= 0");
+    }
+    return values;
+  };
+  risk.usual_position = table(usual.at("position"));
+  risk.usual_heading = table(usual.at("heading"));
+  return risk;
 }
 
 }  // namespace
@@ -276,6 +313,10 @@ std::optional<detector::KinematicModel> kinematic_from_json(const JsonPlace& pla
   model.box = box_at(set.at("hull"), p);
   try {
     static_cast<void>(detector::make_filter(model));
+    if (place.has("at_risk")) {
+      model.at_risk = pose_risk_at(place.at("at_risk"), model.measurement);
+      static_cast<void>(detector::PoseSumDetector(model));
+    }
   } catch (const InvalidArgument& error) {
     throw InputError(place.where() + ": " + error.what());
   }

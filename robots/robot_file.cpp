@@ -240,7 +240,7 @@ struct RobotReader {
                                  : name == "effort"      ? robot.noise.effort
                                  : name == "position"    ? robot.noise.position
                                                          : robot.noise.heading;
-      if (value.is_mapping() && (name == "wheel_speed" || name == "wheel_angle" || name == "effort")) {
+      if (value.is_mapping()) {
         read_error_class(value, bound);
       } else if (!(value.is_scalar() && value.text() == "estimate")) {
         bound.value = value.number("a bound >= 0, or estimate", [](double number) { return number >= 0.0; });

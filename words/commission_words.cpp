@@ -10,6 +10,7 @@
 
 #include <wheelwright/commission/at_risk.hpp>
 #include <wheelwright/commission/physical.hpp>
+#include <wheelwright/commission/pose_at_risk.hpp>
 #include <wheelwright/core/statistics.hpp>
 #include <wheelwright/words/detect_words.hpp>
 #include <wheelwright/words/text.hpp>
@@ -213,7 +214,8 @@ std::string footing(const Commissioning& result) {
         .push_back(output_name(result.model.model, i));
   }
   for (const core::Assumption& a : result.assumptions) {
-    if (a.verdict == core::AssumptionVerdict::fails && a.id != commission::kNoiseAverages) {
+    if (a.verdict == core::AssumptionVerdict::fails && a.id != commission::kNoiseAverages &&
+        a.id != commission::kPoseNoiseAverages) {
       broken.push_back(a.statement);
     }
   }
@@ -359,6 +361,28 @@ std::string at_risk(const Commissioning& result) {
   return text;
 }
 
+// The same of the kinematic residual.
+std::string pose_at_risk(const Commissioning& result) {
+  const auto assumption = std::ranges::find(result.assumptions, commission::kPoseNoiseAverages, &core::Assumption::id);
+  if (assumption == result.assumptions.end() || !result.kinematic.model) {
+    return {};
+  }
+  const detector::KinematicModel& model = *result.kinematic.model;
+  if (!model.at_risk) {
+    return fmt::format("Nothing is said of the pose at a stated risk, the {} answer stands alone: {}.",
+                       core::warrant_word(model.warrant), assumption->detail);
+  }
+  std::vector<std::string> items;
+  const auto names = model.measurement.parameters(), units = model.measurement.parameter_units();
+  for (std::size_t j = 0; j < names.size(); ++j) {
+    const Interval side = model.at_risk->box.sides[j];
+    const auto [lower, upper] = outward(side.lower, side.upper);
+    items.push_back(with_unit(names[j] + " " + lower + " to " + upper, units[j] == "1" ? "" : units[j]));
+  }
+  std::ranges::for_each(items, [](std::string& item) { std::ranges::replace(item, '_', ' '); });
+  return fmt::format("Of the pose, at a risk of {:g}: {}.", model.at_risk->risk, core::enumerated(items));
+}
+
 // Each contradiction that withdraws a model (or does not) with what to do about it.
 void tell_contradictions(const Commissioning& result, bool withdraws, std::vector<std::string>& out) {
   for (const commission::LogContradiction& c : result.contradictions) {
@@ -379,8 +403,10 @@ std::vector<std::string> words_with_model(const Commissioning& result) {
   out.push_back(sees(result) + (smallest_certain_kappa(result) && result.model.warrant != core::Warrant::guaranteed
                                     ? " " + certain_meaning(result.model.warrant)
                                     : ""));
-  if (std::string text = at_risk(result); !text.empty()) {
-    out.push_back(std::move(text));
+  for (std::string text : {at_risk(result), pose_at_risk(result)}) {
+    if (!text.empty()) {
+      out.push_back(std::move(text));
+    }
   }
   if (false_alarms(result) > 0) {
     out.emplace_back(

@@ -8,6 +8,7 @@
 
 #include "support/drives.hpp"
 #include "support/kinematic_drives.hpp"
+#include "support/known_unicycle.hpp"
 #include "support/skip.hpp"
 
 namespace wheelwright::detector::allocation_test {
@@ -98,6 +99,25 @@ TEST(Allocation, NorHasAStepOfTheKinematicDetector) {
   }
   EXPECT_EQ(allocations, before);
   EXPECT_GT(valid, table.rows() / 2);
+}
+
+TEST(Allocation, NorHasAStepOfSumsOfThePose) {
+  testing_support::ExactUnicycle robot;
+  robot.slip_across = 0.5;
+  robot.fault_at = 20.0;  // both sides of a threshold
+  const KinematicModel model = testing_support::known_kinematics(robot, 0.01);
+  PoseSumDetector detector(model);
+  const LogTable log = drive(robot, 1);
+  std::size_t looks = 0;
+  bool alarm = false;
+  const std::size_t before = allocations;
+  testing_support::walk(log, detector, [&](std::size_t) {
+    looks += detector.looks().size();
+    alarm = alarm || detector.alarm();
+  });
+  EXPECT_EQ(allocations, before);
+  EXPECT_GT(looks, 1000U);
+  EXPECT_TRUE(alarm);
 }
 
 #elif !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // their malloc is not ours to replace

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/core/error.hpp>
+#include <wheelwright/detector/pose_sums.hpp>
 #include <wheelwright/results/model_file.hpp>
 #include <wheelwright/robots/robot_file.hpp>
 
@@ -48,6 +49,35 @@ void expect_same_decisions(const detector::KinematicModel& a, const detector::Ki
     valid += d.valid ? 1 : 0;
   }
   EXPECT_GT(valid, 100u);
+}
+
+TEST(KinematicJson, GivesTheDetectorAtAStatedRiskBackBitForBit) {
+  Scenario s = posed_drive(3, 20.0);
+  s.robot.noise.position = {.value = 0.002, .bias = 1e-4, .correlation = 0.02, .deviation = 0.0015};
+  s.robot.noise.heading.bias = 1e-4;
+  const Commissioning result = commissioned(s);
+  ASSERT_TRUE(result.model.kinematic && result.model.kinematic->at_risk) << testing::PrintToString(result.notes);
+  const OnlineModel back = there_and_back(result);
+  ASSERT_TRUE(back.kinematic && back.kinematic->at_risk);
+  EXPECT_EQ(back.robot.noise.position.bias, 1e-4);
+  EXPECT_EQ(back.robot.noise.position.deviation, 0.0015);
+  EXPECT_EQ(back.robot.noise.heading.bias, 1e-4);
+  detector::PoseSumDetector one(*result.model.kinematic), other(*back.kinematic);
+  const LogTable log = sim::simulate(s);
+  std::size_t looks = 0;
+  for (std::size_t k = 0; k < log.rows(); ++k) {
+    std::vector<double> sample;
+    for (const std::string& name : back.kinematic->measurement.columns()) {
+      sample.push_back(log.column(name)[k]);
+    }
+    ASSERT_EQ(one.step(log.t[k], sample), other.step(log.t[k], sample));
+    for (std::size_t i = 0; i < one.looks().size(); ++i) {
+      ++looks;
+      ASSERT_EQ(one.looks()[i].value, other.looks()[i].value);
+      ASSERT_EQ(one.looks()[i].threshold, other.looks()[i].threshold);
+    }
+  }
+  EXPECT_GT(looks, 100U);
 }
 
 TEST(KinematicJson, GivesTheDetectorBackBitForBit) {

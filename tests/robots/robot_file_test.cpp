@@ -66,6 +66,22 @@ TEST(RobotFile, ReadsEveryKey) {
   EXPECT_EQ(robot.parameters.value(), (std::vector<std::string>{"mass", "yaw_inertia"}));
 }
 
+TEST(RobotFile, ErrorsOfAPoseThatAverageOutComeBack) {
+  const Robot robot = parse_robot(least +
+                                      "noise: {position: {bound: 0.01, bias: 0.001, deviation: 0.004, correlation: "
+                                      "0.2}, heading: {bound: 0.02, bias: 0}}\n",
+                                  "f");
+  EXPECT_EQ(robot.noise.position.value, 0.01);
+  EXPECT_EQ(robot.noise.position.bias, 0.001);
+  EXPECT_EQ(robot.noise.position.deviation, 0.004);
+  EXPECT_EQ(robot.noise.position.correlation, 0.2);
+  EXPECT_EQ(robot.noise.heading.bias, 0.0);
+  EXPECT_EQ(to_json(robot_from_json(to_json(robot), "model.json: /robot")), to_json(robot));
+  EXPECT_EQ(to_json(parse_robot(robot_yaml(robot), "f")), to_json(robot));
+  EXPECT_THROW((void)parse_robot(least + "noise: {position: {bound: 0.01, bias: 0.02}}\n", "f"), InputError);
+  EXPECT_THROW((void)parse_robot(least + "noise: {heading: {bias: 0.02}}\n", "f"), InputError);
+}
+
 TEST(RobotFile, DefaultsAreThoseOfRobot) {
   Robot expected;
   expected.wheel_radius = 0.1;

@@ -10,6 +10,7 @@
 #include <wheelwright/words/summary.hpp>
 
 #include "support/exact_axis.hpp"
+#include "support/kinematic_drives.hpp"
 
 namespace wheelwright::words::at_risk_words_test {
 namespace {
@@ -46,6 +47,23 @@ TEST(AtRiskWords, AContradictedBiasLeavesTheGuaranteeAlone) {
   EXPECT_THAT(page, HasSubstr("Nothing is said at a stated risk, the guaranteed answer stands alone: over "));
   EXPECT_THAT(page, HasSubstr("The guarantee stands on the sensors’ declared noise bounds"));
   EXPECT_THAT(page, Not(HasSubstr("of which the log contradicts")));
+}
+
+TEST(AtRiskWords, TellWhatIsSaidOfThePose) {
+  Scenario s = testing_support::posed_drive(3, 40.0);
+  s.robot.noise.position.bias = s.robot.noise.heading.bias = 1e-4;
+  const auto page = [&] {
+    Simulation log(s);
+    std::string text;
+    for (const std::string& sentence : commission_words(commission_robot(log, s.robot))) {
+      text += sentence + "\n";
+    }
+    return text;
+  };
+  EXPECT_THAT(page(), HasSubstr("Of the pose, at a risk of 1e-09: radius right "));
+  s.robot.noise.heading.bias.reset();
+  s.robot.noise.position.bias.reset();
+  EXPECT_THAT(page(), Not(HasSubstr("at a risk of")));
 }
 
 }  // namespace
