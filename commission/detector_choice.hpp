@@ -52,8 +52,8 @@ struct DetectorChoice {
   double false_alarms = 0.0;
   bool either = false;  ///< DetectorChoiceOptions::either
   double tie = 0.0;
-  /// Largest relative difference of the sizes at the stated risk between candidates that say something at a risk; nothing
-  /// where fewer than two do, infinite where one has a size and another has none.
+  /// Largest relative difference of the sizes at the stated risk between candidates that say something at a risk;
+  /// nothing where fewer than two do, infinite where one has a size and another has none.
   std::optional<double> risk_spread;
   std::vector<std::string> notes;  ///< what was left out, and what the guarantee assumes, for people
 };
@@ -77,8 +77,8 @@ struct DetectorChoice {
 [[nodiscard]] DetectorChoice choose_detector(LogSource& log, const Robot& robot,
                                              const DetectorChoiceOptions& options = {});
 
-/// The delay from which on, up to the window, the size at the stated risk is the smaller one; nothing where it is not at
-/// the window, or nothing is said at a risk. In fortieths of the window `window`, s.
+/// The delay from which on, up to the window, the size at the stated risk is the smaller one; nothing where it is not
+/// at the window, or nothing is said at a risk. In fortieths of the window `window`, s.
 [[nodiscard]] std::optional<double> risk_decides_from(const StatedMargin& margin, double window);
 
 /// True if `a` is to be taken rather than `b`, given the least size among all candidates.

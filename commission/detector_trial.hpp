@@ -56,8 +56,8 @@ struct StatedSizes {
   std::vector<double> medians{};  ///< `median` within each fortieth of the window
 };
 
-/// One stated fault on one side: for every noise within its bounds, and where the model says something at a stated risk,
-/// by sums over scales (detector/sum_margins.hpp).
+/// One stated fault on one side: for every noise within its bounds, and where the model says something at a stated
+/// risk, by sums over scales (detector/sum_margins.hpp).
 struct StatedMargin : StatedSizes {
   std::string fault;
   std::string unit;

@@ -75,12 +75,12 @@ struct MarginSurvey {
 [[nodiscard]] MarginSurvey survey_margins(LogSource& log, const OnlineModel& model,
                                           const MarginSurveyOptions& options = {});
 
-/// Names of the faults that a first look asks for, as far as the robot can have them: both wheels' radii, and the effort
-/// of the first joint that is lost in part or biased.
+/// Names of the faults that a first look asks for, as far as the robot can have them: both wheels' radii, and the
+/// effort of the first joint that is lost in part or biased.
 [[nodiscard]] std::vector<std::string> telling_faults(const OnlineModel& model);
 
-/// survey_margins() of these faults, from at most 30 onsets in the log's beginning (beginning_of(), 600 s), within 0.1 to
-/// 20 s, without maps: for the first screen of a page. Nothing where that has no stretch in which the filter has
+/// survey_margins() of these faults, from at most 30 onsets in the log's beginning (beginning_of(), 600 s), within 0.1
+/// to 20 s, without maps: for the first screen of a page. Nothing where that has no stretch in which the filter has
 /// settled.
 [[nodiscard]] std::optional<MarginSurvey> first_look(LogSource& log, const OnlineModel& model);
 

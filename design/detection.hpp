@@ -78,8 +78,8 @@ struct DetectionDesign {
 };
 
 /// design_manoeuvre() for certain detection of `faults` with the detector of `model` (its errors and its persistence)
-/// under DesignOptions::guarantee, and the best figure eight beside it. Throws InvalidArgument where that is at_risk and
-/// the model says nothing at a risk.
+/// under DesignOptions::guarantee, and the best figure eight beside it. Throws InvalidArgument where that is at_risk
+/// and the model says nothing at a risk.
 [[nodiscard]] DetectionDesign design_for_detection(const OnlineModel& model, const DesignSubject& subject,
                                                    const MotionLimits& limits,
                                                    const std::vector<InspectedFault>& faults,

@@ -87,8 +87,8 @@ struct BoundsDesign {
   core::Warrant at_risk_warrant = core::Warrant::guaranteed;
 };
 
-/// design_manoeuvre() for narrow bounds under DesignOptions::guarantee, and the best figure eight within the same limits
-/// beside it. Throws InvalidArgument where that is at_risk and DesignSubject::averaging is empty.
+/// design_manoeuvre() for narrow bounds under DesignOptions::guarantee, and the best figure eight within the same
+/// limits beside it. Throws InvalidArgument where that is at_risk and DesignSubject::averaging is empty.
 [[nodiscard]] BoundsDesign design_for_bounds(const DesignSubject& subject, const MotionLimits& limits,
                                              WidthCriterion criterion = WidthCriterion::geometric_mean,
                                              const DesignOptions& options = {});

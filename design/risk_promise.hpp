@@ -5,8 +5,8 @@
 /// **Bounds.** A log along the plan gives the guaranteed set P(e), and tangent slabs |y_f − Y_f θ| <= dy_f of an
 /// ellipsoid (commission/risk_set.hpp). Y_f, the summed variances V and dy_f are made of the motion and of the efforts
 /// that it takes, up to terms of second order in the errors; only y_f depends on the errors that came true. Two members
-/// of one such set differ by a d with |Y_f d| <= 2 dy_f, whatever y_f is. So the set of the log without noise is as wide
-/// as any, and it is what is promised: as for the guaranteed bounds (plan.hpp), and by the code of commissioning.
+/// of one such set differ by a d with |Y_f d| <= 2 dy_f, whatever y_f is. So the set of the log without noise is as
+/// wide as any, and it is what is promised: as for the guaranteed bounds (plan.hpp), and by the code of commissioning.
 ///
 /// **Faults.** The sums of the detector at a stated risk along the planned log, with weights, V, radii and what the set
 /// leaves open as on a drive (detector/sum_response.hpp); looks allow for any log that the sensors may write of it. The
@@ -35,8 +35,8 @@ struct RiskPromises {
 };
 
 /// Promises of `plan` by the sums of `model`'s detector at a stated risk. Of each scale the look that promises most is
-/// solved exactly, so that another might allow for a slightly smaller size. Throws InvalidArgument as promised_faults(),
-/// and where the model says nothing at a risk.
+/// solved exactly, so that another might allow for a slightly smaller size. Throws InvalidArgument as
+/// promised_faults(), and where the model says nothing at a risk.
 [[nodiscard]] RiskPromises promised_faults_at_risk(const Plan& plan, const DesignSubject& subject,
                                                    const OnlineModel& model, const std::vector<InspectedFault>& faults);
 

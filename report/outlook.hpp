@@ -10,8 +10,8 @@
 
 namespace wheelwright::report {
 
-/// Sizes of telling_faults() over the time to detection, one line for each guarantee, as pictures and as a table, and what
-/// each guarantee is worth. HTML; empty where no size is certain.
+/// Sizes of telling_faults() over the time to detection, one line for each guarantee, as pictures and as a table, and
+/// what each guarantee is worth. HTML; empty where no size is certain.
 [[nodiscard]] std::string outlook(const commission::MarginSurvey& survey, const OnlineModel& model);
 
 }  // namespace wheelwright::report

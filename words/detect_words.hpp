@@ -73,12 +73,13 @@ struct DetectionCurve {
 /// "one in 590 million": a chance of no more than `probability`.
 [[nodiscard]] std::string odds_words(double probability);
 
-/// Which guarantee decides for which of the stated faults, and from which delay on, for the chosen detector: one sentence
-/// for each fault and side, and before them what the filter has to do with it. Empty where nothing is said at a risk.
+/// Which guarantee decides for which of the stated faults, and from which delay on, for the chosen detector: one
+/// sentence for each fault and side, and before them what the filter has to do with it. Empty where nothing is said at
+/// a risk.
 [[nodiscard]] std::vector<std::string> choice_sentences(const commission::DetectorChoice& choice);
 
-/// What each guarantee is worth, a sentence for each: how sure it is that a fault is seen, and that an alarm is one. The
-/// second says why there is none where there is none.
+/// What each guarantee is worth, a sentence for each: how sure it is that a fault is seen, and that an alarm is one.
+/// The second says why there is none where there is none.
 [[nodiscard]] std::array<std::string, 2> how_sure(const commission::MarginSurvey& survey);
 
 /// In which sense a size is called certain at the stated risk, one sentence.

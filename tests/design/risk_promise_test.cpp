@@ -149,8 +149,8 @@ TEST(RiskPromise, FaultsAreSeenAndMarginsOnTheDriveAgree) {
   EXPECT_LT(promised.miss, 1e-8);
   EXPECT_EQ(first_alarm(robot, learnt.model, plan, {}), core::kInfinity);
 
-  // The margins of a log driven along the plan, of a fault that sets in while the robot still stands. They allow for the
-  // errors of the log that was read, which a plan has none of.
+  // The margins of a log driven along the plan, of a fault that sets in while the robot still stands. They allow for
+  // the errors of the log that was read, which a plan has none of.
   Simulation healthy(driven(robot, plan, 5));
   const LogTable table = read_all(healthy);
   TableSource log(table);

@@ -128,8 +128,8 @@ TEST(SumResponse, IsWhatFaultsDoToTheSums) {
   }
 }
 
-// A robot that was broken before it begins to move differs from one that breaks while it stands in no sum; where a fault
-// moves the wheels at once (slip), the onset has an impulse that the other has not.
+// A robot that was broken before it begins to move differs from one that breaks while it stands in no sum; where a
+// fault moves the wheels at once (slip), the onset has an impulse that the other has not.
 TEST(SumResponse, WhatWasBrokenBeforeHasNoOnset) {
   const Commissioned robot = commissioned_at_risk(1);
   const FaultyRun run = run_of(robot, 101, breakages().front());
