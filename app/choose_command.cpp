@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <charconv>
 #include <cmath>
+#include <map>
 #include <memory>
 
 #include <fmt/format.h>
@@ -13,6 +14,7 @@
 #include <wheelwright/results/detection_json.hpp>
 #include <wheelwright/results/model_file.hpp>
 #include <wheelwright/robots/robot_file.hpp>
+#include <wheelwright/words/detect_words.hpp>
 
 #include "commands.hpp"
 #include "common.hpp"
@@ -86,10 +88,14 @@ std::string cost(const commission::DetectorCandidate& candidate, const commissio
 
 std::string table(const commission::DetectorChoice& choice) {
   std::string out = fmt::format(
-      "smallest certain size over the stated one, within {:g} s, and delay of the stated size: medians, worst fault\n"
-      "{:>5} {:>8} {:>10} {:>7} {:>8} {:>8}  {}\n",
-      choice.window, "order", "beta", "alarms", "k of n", "size", "delay", "against the chosen one");
+      "smallest certain size over the stated one{}, within {:g} s, and delay of the stated size: medians, worst fault\n"
+      "{:>5} {:>8} {:>10} {:>7} {:>8} {:>8}{}  {}\n",
+      choice.either ? ", by whichever guarantee sees a fault first" : "", choice.window, "order", "beta", "alarms",
+      "k of n", "size", "delay", choice.risk_spread.value_or(0.0) > choice.tie ? "  at risk" : "",
+      "against the chosen one");
   const commission::DetectorCandidate& chosen = choice.candidates.front();
+  // Once is enough where it is the same for all.
+  const bool differs = choice.risk_spread.value_or(0.0) > choice.tie;
   for (const commission::DetectorCandidate& candidate : choice.candidates) {
     out +=
         fmt::format("{:>5} {:>8.4g} {:>10} {:>7} ", candidate.filter.order, candidate.filter.beta,
@@ -100,8 +106,10 @@ std::string table(const commission::DetectorChoice& choice) {
     }
     const std::string note =
         candidate.origin == "grid" || candidate.origin == "refined" ? "" : " (" + candidate.origin + ")";
-    out += fmt::format("{:>8} {:>8}  {}{}\n", shown(candidate.size, "{:.3f}"), shown(candidate.delay, "{:.3f}"),
-                       &candidate == &chosen && choice.chosen ? "chosen" : cost(candidate, chosen), note);
+    out += fmt::format(
+        "{:>8} {:>8}{}  {}{}\n", shown(candidate.size, "{:.3f}"), shown(candidate.delay, "{:.3f}"),
+        differs ? fmt::format(" {:>8}", candidate.size_at_risk ? shown(*candidate.size_at_risk, "{:.3f}") : "") : "",
+        &candidate == &chosen && choice.chosen ? "chosen" : cost(candidate, chosen), note);
   }
   return out;
 }
@@ -142,8 +150,10 @@ int run(const Arguments& a) {
     if (choice.chosen) {
       CommonOptions files = a.common;
       files.json = false;
+      report::ReportContext context = report_context(a.common, log.report(), log);
+      context.seen = commission::first_look(log, choice.chosen->model);
       publish(files, results::to_json(*choice.chosen, log.report(), results::software()), "model.json",
-              report::commission_report(*choice.chosen, report_context(a.common, log.report(), log)));
+              report::commission_report(*choice.chosen, context));
     }
     files::write_json(a.common.out / "choice.json", json);
   }
@@ -152,6 +162,9 @@ int run(const Arguments& a) {
   } else if (!a.common.quiet) {
     say("{}", table(choice));
     say("{}", faults(choice));
+    for (const std::string& sentence : words::choice_sentences(choice)) {
+      say("{}\n", sentence);
+    }
     for (const std::string& name : choice.hopeless) {
       say("does not count: no candidate is certain to see {} at half of the onsets\n", name);
     }
@@ -193,6 +206,15 @@ Run add_choose(CLI::App& program) {
       ->type_name("P")
       ->check(CLI::Range(0.0, 0.5))
       ->capture_default_str();
+  command
+      .add_option(
+          "--guarantee", a->choice.either,
+          "Which certain sizes candidates are compared by: those for every-noise within its bounds, or either, by "
+          "whichever guarantee sees a fault first (docs/risk.md); both are told")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, bool>{{"every-noise", false}, {"either", true}})
+                      .description("{every-noise,either}"))
+      ->default_str("every-noise")
+      ->type_name("WHICH");
   add_map(command, a->common);
   return finish(command, a, kExamples, run);
 }

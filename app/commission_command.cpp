@@ -67,6 +67,7 @@ int run(const Arguments& a) {
     result = commission_robot(log, robot, options);
     if (!result.model.facets.empty() && !a.common.out.empty()) {
       context.own_log = detect(log, make_detector(result.model), {.most_points = report::most_chart_points});
+      context.seen = commission::first_look(log, result.model);
     }
   } catch (const Error& error) {
     if (!a.common.out.empty()) {

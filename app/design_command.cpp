@@ -41,6 +41,7 @@ struct Arguments {
   std::vector<double> box;
   double rate = 100.0;
   design::WidthCriterion criterion = design::WidthCriterion::geometric_mean;
+  design::Promise guarantee = design::Promise::every_noise;
   std::vector<std::string> faults;
   std::filesystem::path gap;
   std::vector<std::string> between, sizes;
@@ -64,6 +65,8 @@ constexpr const char* kExamples =
     "  wheelwright design --robot robot.yaml --for bounds --duration 30 --box -1 3 -1 1 --out plan\n"
     "  wheelwright design --model result/model.json --for detection --fault wheel_radius=0.03 --speed 8 --acceleration "
     "20\n"
+    "  wheelwright design --robot robot.yaml --for bounds --guarantee at-risk --speed 8 --acceleration 20 --duration "
+    "60\n"
     "  wheelwright design --robot robot.yaml --for discrimination --gap gap/gap.json --out plan\n"
     "  wheelwright design --robot robot.yaml --for discrimination --between coulomb --between caster_drag --size "
     "coulomb=0.2\n"
@@ -182,14 +185,23 @@ int run(const Arguments& a) {
   if (!detection && !a.faults.empty()) {
     throw InputError("--fault: expected --for detection");
   }
+  if (a.aim == "discrimination" && a.guarantee == design::Promise::at_risk) {
+    throw InputError("--guarantee at-risk: expected --for bounds or detection; telling causes apart is statistical");
+  }
   check_rivals(a);
   make_directory(a.common);
   const std::optional<OnlineModel> model = a.model.empty() ? std::nullopt : std::optional(read_model(a.model));
   const design::DesignSubject subject =
       model ? design::subject_of(*model) : design::subject_of(read_robot(a.robot), 1.0 / a.rate);
+  if (a.guarantee == design::Promise::at_risk && !subject.averaging) {
+    throw InputError(
+        "--guarantee at-risk: no errors are known to average out: expected noise: {effort: {bound: …, bias: …}} in the "
+        "robot file, or a model that says something at a stated risk (docs/risk.md)");
+  }
   const design::MotionLimits limits = limits_from(a, subject.robot);
   Progress progress(a.common.quiet);
   design::DesignOptions options;
+  options.guarantee = a.guarantee;
   options.stages = a.stages;
   options.seed = a.common.seed;
   options.threads = static_cast<std::size_t>(a.common.threads);
@@ -221,6 +233,11 @@ int run(const Arguments& a) {
     const gap::DiscriminationDesign design = discriminate(a, subject, limits, options);
     finish(results::to_json(design, limits), design, summary(design));
   } else {
+    if (a.guarantee == design::Promise::at_risk) {  // an evaluation walks the plan five times
+      options.samples = 120;
+      options.descents = 2;
+      options.steps = 150;
+    }
     const design::BoundsDesign design = design::design_for_bounds(subject, limits, a.criterion, options);
     finish(results::to_json(design, subject, limits), design, summary(design, subject));
   }
@@ -282,6 +299,15 @@ Run add_design(CLI::App& program) {
                                               {"largest", design::WidthCriterion::largest}})
                       .description("{geometric_mean,mean,largest}"))
       ->default_str("geometric_mean");
+  command
+      .add_option("--guarantee", a->guarantee,
+                  "The promise that is to be good: for every-noise within its bounds, or at-risk, where errors average "
+                  "out (docs/risk.md); both are told")
+      ->transform(
+          CLI::CheckedTransformer(std::map<std::string, design::Promise>{{"every-noise", design::Promise::every_noise},
+                                                                         {"at-risk", design::Promise::at_risk}})
+              .description("{every-noise,at-risk}"))
+      ->default_str("every-noise");
   command
       .add_option("--fault", a->faults,
                   "With --for detection: a fault of the catalogue and the size asked for (may be repeated); without it "

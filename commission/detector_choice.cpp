@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <string>
 #include <utility>
 
@@ -104,21 +105,54 @@ std::vector<Wish> wishes(const LogTable& log, const Robot& robot, const Detector
 
 std::string named(const StatedMargin& margin) { return margin.fault + (margin.side > 0.0 ? " +" : " −"); }
 
-void rate(DetectorCandidate& candidate, const std::vector<std::string>& hopeless) {
+// The sizes that count.
+const StatedSizes& counted(const StatedMargin& margin, bool either) {
+  return either && margin.either ? *margin.either : static_cast<const StatedSizes&>(margin);
+}
+
+void rate(DetectorCandidate& candidate, const std::vector<std::string>& hopeless, bool either) {
   candidate.size = candidate.delay = candidate.faults.size() > hopeless.size() ? 0.0 : kInfinity;
+  candidate.size_at_risk.reset();
   for (const StatedMargin& margin : candidate.faults) {
     if (std::ranges::find(hopeless, named(margin)) == hopeless.end()) {
-      candidate.size = std::max(candidate.size, margin.median / margin.asked);
-      candidate.delay = std::max(candidate.delay, margin.delay);
+      const StatedSizes& sizes = counted(margin, either);
+      candidate.size = std::max(candidate.size, sizes.median / margin.asked);
+      candidate.delay = std::max(candidate.delay, sizes.delay);
+    }
+    if (margin.at_risk) {
+      candidate.size_at_risk = std::max(candidate.size_at_risk.value_or(0.0), margin.at_risk->median / margin.asked);
     }
   }
 }
 
-std::vector<std::string> hopeless_among(const std::vector<DetectorCandidate>& candidates) {
+std::optional<double> risk_spread(const std::vector<DetectorCandidate>& candidates) {
+  std::map<std::string, Interval> sizes;
+  std::size_t told = 0;
+  for (const DetectorCandidate& candidate : candidates) {
+    told += candidate.size_at_risk ? 1 : 0;
+    for (const StatedMargin& margin : candidate.faults) {
+      if (margin.at_risk) {
+        const double size = margin.at_risk->median;
+        Interval& range = sizes.try_emplace(named(margin), Interval{size, size}).first->second;
+        range = {std::min(range.lower, size), std::max(range.upper, size)};
+      }
+    }
+  }
+  if (told < 2) {
+    return std::nullopt;
+  }
+  double spread = 0.0;
+  for (const auto& [name, range] : sizes) {
+    spread = range.lower < kInfinity ? std::max(spread, range.upper / range.lower - 1.0) : spread;
+  }
+  return spread;
+}
+
+std::vector<std::string> hopeless_among(const std::vector<DetectorCandidate>& candidates, bool either) {
   std::vector<std::string> seen, hopeless;
   for (const DetectorCandidate& candidate : candidates) {
     for (const StatedMargin& margin : candidate.faults) {
-      if (margin.median < kInfinity) {
+      if (counted(margin, either).median < kInfinity) {
         seen.push_back(named(margin));
       }
     }
@@ -184,6 +218,8 @@ class Search {
     choice_.faults = options_.trial.faults;
     choice_.window = options.trial.window;
     choice_.false_alarms = options.trial.false_alarms;
+    choice_.either = options.either;
+    choice_.tie = options.tie;
   }
 
   [[nodiscard]] DetectorChoice operator()() {
@@ -196,6 +232,7 @@ class Search {
     }
     vary();
     put_in_order(choice_.candidates, options_.tie);
+    choice_.risk_spread = risk_spread(choice_.candidates);
     const FilterDesign filter = choice_.candidates.front().filter;
     const Guarantee guarantee = choice_.candidates.front().guarantee;
     TrialOptions trial = options_.trial;
@@ -229,9 +266,9 @@ class Search {
         [&](std::size_t begun) {
           tell("trying filters", 0.7 * static_cast<double>(begun) / static_cast<double>(all.size()));
         });
-    choice_.hopeless = hopeless_among(choice_.candidates);
+    choice_.hopeless = hopeless_among(choice_.candidates, options_.either);
     for (DetectorCandidate& candidate : choice_.candidates) {
-      rate(candidate, choice_.hopeless);
+      rate(candidate, choice_.hopeless, options_.either);
     }
   }
 
@@ -296,7 +333,7 @@ class Search {
     }
     double least = kInfinity;
     for (DetectorCandidate& candidate : try_detector(log_, *robot_, filter, persistences, origin, trial).candidates) {
-      rate(candidate, choice_.hopeless);
+      rate(candidate, choice_.hopeless, options_.either);
       least = std::min(least, candidate.size);
       choice_.candidates.push_back(std::move(candidate));
     }
@@ -310,6 +347,20 @@ class Search {
 };
 
 }  // namespace
+
+std::optional<double> risk_decides_from(const StatedMargin& margin, double window) {
+  if (!margin.at_risk) {
+    return std::nullopt;
+  }
+  const std::vector<double>&every_noise = margin.medians, &at_risk = margin.at_risk->medians;
+  std::size_t from = at_risk.size();
+  while (from > 0 && at_risk[from - 1] < every_noise[from - 1]) {
+    --from;
+  }
+  return from < at_risk.size()
+             ? std::optional(window * static_cast<double>(from + 1) / static_cast<double>(at_risk.size()))
+             : std::nullopt;
+}
 
 bool better(const DetectorCandidate& a, const DetectorCandidate& b, double least, double tie) {
   const auto key = [&](const DetectorCandidate& candidate) {

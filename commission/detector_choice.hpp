@@ -32,6 +32,9 @@ struct DetectorChoiceOptions {
   double beta_factor = 1.5;          ///< between neighbours of the grid over β
   std::size_t most_refinements = 6;  ///< candidates between the best one's neighbours
   double tie = 0.01;                 ///< relative difference of sizes below which the delay decides
+  /// Sizes and delays that count: false, those for every noise within its bounds; true, those of either guarantee, by
+  /// whichever sees a fault first.
+  bool either = false;
   std::vector<detector::Persistence> persistences = {{2, 3}, {3, 5}};       ///< shown beside 1/1 for the chosen filter
   std::function<void(std::string_view stage, double share)> progress = {};  ///< may be empty
 };
@@ -47,6 +50,11 @@ struct DetectorChoice {
                                       ///< onsets: they do not count
   double window = 0.0;                ///< s
   double false_alarms = 0.0;
+  bool either = false;  ///< DetectorChoiceOptions::either
+  double tie = 0.0;
+  /// Largest relative difference of the sizes at the stated risk between candidates that say something at a risk;
+  /// nothing where fewer than two do, infinite where one has a size and another has none.
+  std::optional<double> risk_spread;
   std::vector<std::string> notes;  ///< what was left out, and what the guarantee assumes, for people
 };
 
@@ -57,6 +65,10 @@ struct DetectorChoice {
 /// is refined between the best one's neighbours. β spans from order/β = window, as far as the log's length allows, to
 /// βh = 0.5.
 ///
+/// Sums at a stated risk (detector/scale_detector.hpp) do not pass through the filter. A candidate changes them by what
+/// its order reads, speeds or angles, and through the guaranteed set, of which the set at the risk is a part. Sizes are
+/// compared for every noise, unless `either` is asked for; what holds at the risk is told beside them.
+///
 /// It looks at the torque residual only. All candidates learn from the log that they are judged on: margins are proofs
 /// for each of them, whichever is chosen, and an hourly guarantee counts all of them in (hourly_confidence; trial.tried
 /// is set to their number).
@@ -64,6 +76,10 @@ struct DetectorChoice {
 /// Deterministic, whatever the number of threads. Throws as try_detector, and InputError as find_measurement.
 [[nodiscard]] DetectorChoice choose_detector(LogSource& log, const Robot& robot,
                                              const DetectorChoiceOptions& options = {});
+
+/// The delay from which on, up to the window, the size at the stated risk is the smaller one; nothing where it is not
+/// at the window, or nothing is said at a risk. In fortieths of the window `window`, s.
+[[nodiscard]] std::optional<double> risk_decides_from(const StatedMargin& margin, double window);
 
 /// True if `a` is to be taken rather than `b`, given the least size among all candidates.
 [[nodiscard]] bool better(const DetectorCandidate& a, const DetectorCandidate& b, double least, double tie);

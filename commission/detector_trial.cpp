@@ -13,6 +13,7 @@
 #include <wheelwright/core/limits.hpp>
 #include <wheelwright/core/statistics.hpp>
 #include <wheelwright/detector/margins.hpp>
+#include <wheelwright/detector/sum_margins.hpp>
 
 namespace wheelwright::commission {
 namespace {
@@ -68,24 +69,45 @@ void set_onsets(detector::ReferenceMotion& motion, const LogTable& log, const Tr
   motion.settled = std::move(onsets);
 }
 
-StatedMargin margin_of(const detector::FaultMargins& margins, double asked, const std::vector<double>& windows) {
-  StatedMargin result{.fault = margins.fault.name, .unit = margins.fault.unit, .side = margins.side, .asked = asked};
+// Of the onsets while the robot moves whose window fits; `count`: how many there are.
+StatedSizes sizes_of(const detector::FaultMargins& margins, double asked, const std::vector<double>& windows,
+                     std::size_t& count) {
   std::vector<double> sizes, delays;
+  std::vector<std::vector<double>> within(windows.size());
   for (const detector::OnsetMargin& onset : margins.onsets) {
     if (onset.kind == detector::ManoeuvreKind::standstill || onset.certain.size() < windows.size()) {
       continue;
     }
     sizes.push_back(onset.certain.back());
+    for (std::size_t w = 0; w < windows.size(); ++w) {
+      within[w].push_back(onset.certain[w]);
+    }
     const auto seen = std::find_if(onset.certain.begin(), onset.certain.end(), [&](double x) { return x <= asked; });
     delays.push_back(seen == onset.certain.end() ? core::kInfinity
                                                  : windows[static_cast<std::size_t>(seen - onset.certain.begin())]);
   }
   check::that(!sizes.empty(), "log", "driving that is longer than the window, after the filter has settled");
-  result.onsets = sizes.size();
+  count = sizes.size();
+  StatedSizes result;
   result.worst = *std::max_element(sizes.begin(), sizes.end());
   result.median = core::median(std::move(sizes));
   result.delay = core::median(std::move(delays));
+  for (std::vector<double>& each : within) {
+    result.medians.push_back(core::median(std::move(each)));
+  }
   return result;
+}
+
+// The smaller of the certain sizes, onset by onset.
+detector::FaultMargins smaller_of(detector::FaultMargins a, const detector::FaultMargins& b) {
+  for (std::size_t k = 0; k < a.onsets.size(); ++k) {
+    std::vector<double>& certain = a.onsets[k].certain;
+    const std::vector<double>& other = b.onsets[k].certain;
+    for (std::size_t w = 0; w < std::min(certain.size(), other.size()); ++w) {
+      certain[w] = std::min(certain[w], other[w]);
+    }
+  }
+  return a;
 }
 
 class Margins {
@@ -98,6 +120,9 @@ class Margins {
     TableSource source(log);
     motion_ =
         detector::read_reference(source, RegressorFilter(model.model, model.filter, model.measurement, model.errors));
+    if (model.at_risk) {
+      drive_ = detector::read_sum_drive(source, model, motion_);
+    }
     set_onsets(motion_, log, options);
     for (std::size_t k = 1; k <= kDelaySteps; ++k) {
       windows_.push_back(options.window * static_cast<double>(k) / static_cast<double>(kDelaySteps));
@@ -121,25 +146,63 @@ class Margins {
                                               .most_onsets = motion_.instants(),
                                               .persistence = persistence,
                                               .threads = options_->threads});
+    const std::vector<detector::FaultMargins> sums = by_sums(faults, all.front().onsets);
     std::vector<StatedMargin> result;
     std::size_t of = 0;
-    for (const detector::FaultMargins& margins : all) {
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      const detector::FaultMargins& margins = all[i];
       while (faults[of].name != margins.fault.name) {
         ++of;
       }
       if (margins.largest() >= asked[of]) {
-        result.push_back(margin_of(margins, asked[of], windows_));
+        StatedMargin stated;
+        static_cast<StatedSizes&>(stated) = sizes_of(margins, asked[of], windows_, stated.onsets);
+        stated.fault = margins.fault.name;
+        stated.unit = margins.fault.unit;
+        stated.side = margins.side;
+        stated.asked = asked[of];
+        if (!sums.empty()) {
+          std::size_t count = 0;
+          stated.at_risk = sizes_of(sums[i], asked[of], windows_, count);
+          stated.either = sizes_of(smaller_of(margins, sums[i]), asked[of], windows_, count);
+        }
+        result.push_back(std::move(stated));
       }
     }
     return result;
   }
 
+  // SumDrive::miss; nothing where nothing is said at a risk.
+  [[nodiscard]] std::optional<double> miss() const { return drive_ ? std::optional(drive_->miss) : std::nullopt; }
+
  private:
+  // In the order of margins_along(); empty where nothing is said at a risk.
+  [[nodiscard]] std::vector<detector::FaultMargins> by_sums(const std::vector<FaultType>& faults,
+                                                            const std::vector<detector::OnsetMargin>& onsets) const {
+    if (!drive_) {
+      return {};
+    }
+    std::vector<std::size_t> instants;
+    for (const detector::OnsetMargin& onset : onsets) {
+      instants.push_back(onset.instant);
+    }
+    std::vector<detector::FaultMargins> sums = detector::margins_at_risk(
+        *drive_, *model_, motion_, faults, instants, {.windows = windows_, .threads = options_->threads});
+    for (detector::FaultMargins& margins : sums) {
+      for (std::size_t k = 0; k < onsets.size(); ++k) {
+        margins.onsets[k].kind = onsets[k].kind;
+        margins.onsets[k].certain.resize(onsets[k].certain.size(), core::kInfinity);
+      }
+    }
+    return sums;
+  }
+
   const OnlineModel* model_;
   const TrialOptions* options_;
   std::vector<FaultType> catalogue_;
   detector::ThresholdRule rule_;
   detector::ReferenceMotion motion_;
+  std::optional<detector::SumDrive> drive_;  // at a stated risk
   std::vector<double> windows_;
 };
 
@@ -204,6 +267,10 @@ Trial try_detector(const LogTable& log, const Robot& robot, const FilterDesign& 
         trial.candidates.push_back(candidate);
         trial.candidates.back().persistence = persistence;
         trial.candidates.back().faults = margins(persistence);
+        trial.candidates.back().miss = margins.miss();
+        if (const auto& at_risk = trial.commissioning->model.at_risk) {
+          trial.candidates.back().risk_warrant = at_risk->warrant;
+        }
       }
       return trial;
     }

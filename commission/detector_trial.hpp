@@ -47,17 +47,25 @@ struct TrialOptions {
   std::size_t threads = 1;
 };
 
-/// One stated fault on one side. Order statistics are over the onsets while the robot moves whose window fits.
-struct StatedMargin {
+/// What is certain of a stated fault: order statistics over the onsets while the robot moves whose window fits.
+struct StatedSizes {
+  double median = 0.0;  ///< smallest size that is certain within the window; infinite where fewer than half have one
+  double worst = 0.0;   ///< the same, at every onset
+  double delay = 0.0;   ///< s until a fault of the stated size is certain to be seen, median, a fortieth of the window
+                        ///< too long at most; infinite where it is not, at half of the onsets
+  std::vector<double> medians{};  ///< `median` within each fortieth of the window
+};
+
+/// One stated fault on one side: for every noise within its bounds, and where the model says something at a stated
+/// risk, by sums over scales (detector/sum_margins.hpp).
+struct StatedMargin : StatedSizes {
   std::string fault;
   std::string unit;
   double side = 1.0;   ///< 1: positive magnitudes, −1: negative ones
   double asked = 0.0;  ///< its stated size
   std::size_t onsets = 0;
-  double median = 0.0;  ///< smallest size that is certain within the window; infinite where fewer than half have one
-  double worst = 0.0;   ///< the same, at every onset
-  double delay = 0.0;   ///< s until a fault of the stated size is certain to be seen, median, a fortieth of the window
-                        ///< too long at most; infinite where it is not, at half of the onsets
+  std::optional<StatedSizes> at_risk{};
+  std::optional<StatedSizes> either{};  ///< by whichever is certain of the smaller size, onset by onset
 };
 
 /// A detector and what it is worth.
@@ -71,6 +79,9 @@ struct DetectorCandidate {
   /// Largest of median/asked, and of the delays, over the faults that count (choose_detector).
   double size = std::numeric_limits<double>::infinity();
   double delay = std::numeric_limits<double>::infinity();
+  std::optional<double> size_at_risk{};  ///< the same of StatedMargin::at_risk; nothing where there is none
+  std::optional<double> miss{};          ///< at the stated risk: a certain fault is missed with no more probability
+  core::Warrant risk_warrant = core::Warrant::guaranteed;  ///< of what is said at the stated risk
 };
 
 /// Confidence at which noise is propagated (PropagationOptions::confidence, for the log's `rows`) so that, with

@@ -6,8 +6,10 @@
 #include <cmath>
 #include <memory>
 
+#include <wheelwright/commission/risk_reach.hpp>
 #include <wheelwright/commission/risk_watch.hpp>
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/error.hpp>
 #include <wheelwright/core/for_all.hpp>
 #include <wheelwright/detector/odometry_faults.hpp>
 
@@ -114,7 +116,8 @@ void add_at_risk(MarginSurvey& survey, LogSource& log, const OnlineModel& model,
   }
   sums.threads = options.margins.threads;
   sums.progress = options.margins.progress;
-  RiskMargins result{model.at_risk->risk, drive->miss, torque_false_alarms(model), sums.windows, {}};
+  RiskMargins result{
+      model.at_risk->risk, drive->miss, torque_false_alarms(model), sums.windows, {}, model.at_risk->warrant};
   result.margins = detector::margins_at_risk(*drive, model, motion, faults, onsets, sums);
   for (detector::FaultMargins& margins : result.margins) {
     for (std::size_t k = 0; k < kinds.size(); ++k) {
@@ -215,6 +218,45 @@ MarginSurvey survey_margins(LogSource& log, const OnlineModel& model, const Marg
       margins);
   survey.residuals.push_back(std::move(kinematic));
   return survey;
+}
+
+std::vector<std::string> telling_faults(const OnlineModel& model) {
+  const std::vector<FaultType> catalogue = model::fault_catalogue(model.model, model.estimate, model.robot.effort);
+  std::vector<std::string> names;
+  for (const model::FaultKind kind :
+       {model::FaultKind::wheel_radius, model::FaultKind::effort_loss, model::FaultKind::effort_bias}) {
+    const auto first = std::ranges::find_if(
+        catalogue, [&](const FaultType& fault) { return fault.name.starts_with(to_string(kind)); });
+    if (first != catalogue.end()) {
+      names.push_back(first->name);
+    }
+  }
+  return names;
+}
+
+std::optional<MarginSurvey> first_look(LogSource& log, const OnlineModel& model) {
+  constexpr double kMost = 600.0;      // s of the log
+  constexpr std::size_t kOnsets = 30;  // a glance, not the survey
+  MarginSurveyOptions options;
+  options.faults = telling_faults(model);
+  options.map_points = 0;
+  options.margins.windows = {0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0};
+  options.margins.most_onsets = options.risk_onsets = kOnsets;
+  std::vector<std::string> columns = model.measurement.columns();
+  if (model.kinematic) {
+    for (const std::string& column : model.kinematic->measurement.columns()) {
+      if (log.find(column) && std::ranges::find(columns, column) == columns.end()) {
+        columns.push_back(column);
+      }
+    }
+  }
+  const LogTable beginning = beginning_of(log, columns, kMost);
+  TableSource source(beginning);
+  try {
+    return survey_margins(source, model, options);
+  } catch (const InvalidArgument&) {
+    return std::nullopt;
+  }
 }
 
 }  // namespace wheelwright::commission

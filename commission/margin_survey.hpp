@@ -52,6 +52,7 @@ struct RiskMargins {
   std::vector<double> windows;  ///< s: those of the survey, and 1, 5, 10 and 20 s
   std::vector<detector::FaultMargins>
       margins;  ///< of the whole catalogue; of its onsets at most MarginSurveyOptions::risk_onsets
+  core::Warrant warrant = core::Warrant::guaranteed;  ///< extrapolated where the errors were estimated from a log
 };
 
 /// Everything that `wheelwright margins` says.
@@ -73,5 +74,14 @@ struct MarginSurvey {
 /// or a name is none of the catalogue's.
 [[nodiscard]] MarginSurvey survey_margins(LogSource& log, const OnlineModel& model,
                                           const MarginSurveyOptions& options = {});
+
+/// Names of the faults that a first look asks for, as far as the robot can have them: both wheels' radii, and the
+/// effort of the first joint that is lost in part or biased.
+[[nodiscard]] std::vector<std::string> telling_faults(const OnlineModel& model);
+
+/// survey_margins() of these faults, from at most 30 onsets in the log's beginning (beginning_of(), 600 s), within 0.1
+/// to 20 s, without maps: for the first screen of a page. Nothing where that has no stretch in which the filter has
+/// settled.
+[[nodiscard]] std::optional<MarginSurvey> first_look(LogSource& log, const OnlineModel& model);
 
 }  // namespace wheelwright::commission

@@ -16,9 +16,29 @@ namespace {
 
 constexpr std::size_t kMostRows = 60000;  // of the log that are held
 
-// The beginning of the first segment, with the columns of `model` alone.
-LogTable beginning(LogSource& log, const OnlineModel& model, double most) {
-  LogTable table{model.measurement.columns(), {}, {}, {}};
+// The fault that a sum's weights are like.
+model::FaultType fault_like(const detector::SumWeight& weight, const OnlineModel& model,
+                            const std::vector<model::FaultType>& catalogue) {
+  using Shape = detector::SumWeight::Shape;
+  if (weight.shape == Shape::parameter) {
+    Eigen::VectorXd theta = Eigen::VectorXd::Zero(model.estimate.size());
+    theta[static_cast<Eigen::Index>(weight.which)] = model.estimate[static_cast<Eigen::Index>(weight.which)];
+    return {.name = weight.name, .unit = "1", .range = {0.0, 100.0}, .theta = theta};
+  }
+  const std::string name = weight.shape == Shape::constant ? "effort_bias" : "effort_loss";
+  std::size_t joint = 0;
+  for (const model::FaultType& fault : catalogue) {
+    if (fault.name.starts_with(name) && joint++ == weight.which) {
+      return fault;
+    }
+  }
+  return model::find_fault(catalogue, name);
+}
+
+}  // namespace
+
+LogTable beginning_of(LogSource& log, const std::vector<std::string>& columns, double most) {
+  LogTable table{columns, {}, {}, {}};
   const std::vector<std::size_t> pick = core::positions_of(log, table.names);
   table.columns.resize(pick.size());
   LogBlock block;
@@ -41,29 +61,8 @@ LogTable beginning(LogSource& log, const OnlineModel& model, double most) {
   return table;
 }
 
-// The fault that a sum's weights are like.
-model::FaultType fault_like(const detector::SumWeight& weight, const OnlineModel& model,
-                            const std::vector<model::FaultType>& catalogue) {
-  using Shape = detector::SumWeight::Shape;
-  if (weight.shape == Shape::parameter) {
-    Eigen::VectorXd theta = Eigen::VectorXd::Zero(model.estimate.size());
-    theta[static_cast<Eigen::Index>(weight.which)] = model.estimate[static_cast<Eigen::Index>(weight.which)];
-    return {.name = weight.name, .unit = "1", .range = {0.0, 100.0}, .theta = theta};
-  }
-  const std::string name = weight.shape == Shape::constant ? "effort_bias" : "effort_loss";
-  std::size_t joint = 0;
-  for (const model::FaultType& fault : catalogue) {
-    if (fault.name.starts_with(name) && joint++ == weight.which) {
-      return fault;
-    }
-  }
-  return model::find_fault(catalogue, name);
-}
-
-}  // namespace
-
 std::vector<RiskReach> risk_reach(LogSource& log, const OnlineModel& model, const RiskReachOptions& options) {
-  const LogTable table = beginning(log, model, options.most);
+  const LogTable table = beginning_of(log, model.measurement.columns(), options.most);
   TableSource source(table);
   const detector::ReferenceMotion motion =
       detector::read_reference(source, RegressorFilter(model.model, model.filter, model.measurement, model.errors));

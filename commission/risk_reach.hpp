@@ -35,6 +35,10 @@ struct RiskReachOptions {
 [[nodiscard]] std::vector<RiskReach> risk_reach(LogSource& log, const OnlineModel& model,
                                                 const RiskReachOptions& options = {});
 
+/// The beginning of the first segment of `log`: `most` s, 60,000 rows at most, with these columns alone. Rewinds the
+/// log. Throws InvalidArgument where it lacks one.
+[[nodiscard]] LogTable beginning_of(LogSource& log, const std::vector<std::string>& columns, double most);
+
 /// "a bias of the effort (tau_r): 0.06, 0.024, 0.011 N·m".
 [[nodiscard]] std::string sentence(const RiskReach& reach, const Model& model);
 

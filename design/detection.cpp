@@ -8,6 +8,7 @@
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/limits.hpp>
+#include <wheelwright/design/risk_promise.hpp>
 #include <wheelwright/detector/events.hpp>
 #include <wheelwright/detector/fault_margin.hpp>
 
@@ -19,27 +20,12 @@ namespace {
 
 constexpr double kNever = 1e6;  // objective where a fault is never certain, times how far it is from it
 
-// A promise, and where there is none by how much the largest size misses the threshold, as a share of its width.
-struct Judged {
-  PromisedFault promise;
-  double missing = kInfinity;
-};
-
-void check_inspected(const std::vector<InspectedFault>& faults) {
-  check::that(!faults.empty(), "faults", "one or more");
-  for (const InspectedFault& each : faults) {
-    const FaultType& fault = each.fault;
-    check::that(fault.profile.kind == FaultProfile::Kind::step && !fault.held_effort, "fault '" + fault.name + "'",
-                "one that is there in full from the beginning on (a step, no reading that stays at its value)");
-  }
-}
-
-std::vector<Judged> judge(const Plan& plan, const DesignSubject& subject, const detector::ThresholdRule& rule,
-                          const std::vector<InspectedFault>& faults, detector::Persistence persistence) {
+std::vector<JudgedFault> judge(const Plan& plan, const DesignSubject& subject, const detector::ThresholdRule& rule,
+                               const std::vector<InspectedFault>& faults, detector::Persistence persistence) {
   check_inspected(faults);
   const detector::ReferenceMotion motion = planned_motion(plan, subject);
   detector::FaultMargin margin(rule);
-  std::vector<Judged> all;
+  std::vector<JudgedFault> all;
   for (const InspectedFault& inspected : faults) {
     const FaultType& fault = inspected.fault;
     const std::size_t first = all.size();
@@ -92,12 +78,31 @@ std::vector<Judged> judge(const Plan& plan, const DesignSubject& subject, const 
 
 }  // namespace
 
+void check_inspected(const std::vector<InspectedFault>& faults) {
+  check::that(!faults.empty(), "faults", "one or more");
+  for (const InspectedFault& each : faults) {
+    const FaultType& fault = each.fault;
+    check::that(fault.profile.kind == FaultProfile::Kind::step && !fault.held_effort, "fault '" + fault.name + "'",
+                "one that is there in full from the beginning on (a step, no reading that stays at its value)");
+  }
+}
+
+double worst_ratio(const std::vector<JudgedFault>& faults) {
+  double worst = 0.0;
+  for (const JudgedFault& judged : faults) {
+    const PromisedFault& p = judged.promise;
+    worst =
+        std::max(worst, p.smallest < kInfinity ? p.smallest / p.asked : kNever * (1.0 + std::min(judged.missing, 1e6)));
+  }
+  return worst;
+}
+
 std::vector<PromisedFault> promised_faults(const Plan& plan, const DesignSubject& subject,
                                            const detector::ThresholdRule& rule,
                                            const std::vector<InspectedFault>& faults,
                                            detector::Persistence persistence) {
   std::vector<PromisedFault> promises;
-  for (Judged& judged : judge(plan, subject, rule, faults, persistence)) {
+  for (JudgedFault& judged : judge(plan, subject, rule, faults, persistence)) {
     promises.push_back(std::move(judged.promise));
   }
   return promises;
@@ -106,13 +111,7 @@ std::vector<PromisedFault> promised_faults(const Plan& plan, const DesignSubject
 PlanObjective certain_detection(const DesignSubject& subject, const detector::ThresholdRule& rule,
                                 const std::vector<InspectedFault>& faults, detector::Persistence persistence) {
   return [&subject, rule, faults, persistence](const Plan& plan) {
-    double worst = 0.0;
-    for (const Judged& judged : judge(plan, subject, rule, faults, persistence)) {
-      const PromisedFault& p = judged.promise;
-      worst = std::max(worst,
-                       p.smallest < kInfinity ? p.smallest / p.asked : kNever * (1.0 + std::min(judged.missing, 1e6)));
-    }
-    return worst;
+    return worst_ratio(judge(plan, subject, rule, faults, persistence));
   };
 }
 
@@ -123,19 +122,31 @@ DetectionDesign design_for_detection(const OnlineModel& model, const DesignSubje
   // What decides is the detector as it was commissioned: its thresholds allow for the errors of the model.
   DesignSubject watched = subject;
   watched.errors = model.errors;
-  const PlanObjective objective = certain_detection(watched, rule, faults, model.persistence);
+  const PlanObjective objective = options.guarantee == Promise::at_risk
+                                      ? certain_detection_at_risk(watched, model, faults)
+                                      : certain_detection(watched, rule, faults, model.persistence);
   const auto promises = [&](const Plan& plan) {
     return promised_faults(plan, watched, rule, faults, model.persistence);
   };
   DetectionDesign design;
+  design.guarantee = options.guarantee;
   design.manoeuvre = design_manoeuvre(watched, limits, objective, options);
   design.promised = promises(design.manoeuvre.plan);
+  if (model.at_risk) {
+    RiskPromises sums = promised_faults_at_risk(design.manoeuvre.plan, watched, model, faults);
+    design.miss = sums.miss;
+    design.at_risk_warrant = model.at_risk->warrant;
+    design.at_risk = std::move(sums.faults);
+  }
   if (watched.model.on_two_wheels) {
     design.figure_eight = find_figure_eight(watched, limits, objective);
   }
   if (design.figure_eight) {
     design.figure_eight_plan = plan_of(*design.figure_eight, watched, limits.duration, watched.step);
     design.promised_eight = promises(*design.figure_eight_plan);
+    if (model.at_risk) {
+      design.at_risk_eight = promised_faults_at_risk(*design.figure_eight_plan, watched, model, faults).faults;
+    }
   }
   return design;
 }

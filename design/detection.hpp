@@ -9,6 +9,7 @@
 #pragma once
 
 #include <cstddef>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -31,7 +32,8 @@ struct PromisedFault {
   double asked = 0.0;
   double smallest = 0.0;   ///< every size from here up to the range's end is seen for certain; infinite where none is
   double t = 0.0;          ///< time from the plan's start at which it is, s
-  std::size_t output = 0;  ///< and the channel
+  std::size_t output = 0;  ///< and the channel; at a stated risk the sum's weight (sum_weights())
+  double scale = 0.0;      ///< at a stated risk: of the sum, s
 };
 
 /// Promises of `plan`, fault by fault, side by side, for a detector with this persistence. Throws InvalidArgument where
@@ -48,6 +50,18 @@ struct PromisedFault {
                                               const std::vector<InspectedFault>& faults,
                                               detector::Persistence persistence = {});
 
+/// Throws InvalidArgument unless each of `faults`, of which there is one, is there in full from the beginning on.
+void check_inspected(const std::vector<InspectedFault>& faults);
+
+/// A promise, and where there is none by how much the largest size misses what it takes, as a share of that.
+struct JudgedFault {
+  PromisedFault promise;
+  double missing = std::numeric_limits<double>::infinity();
+};
+
+/// The objective of certain_detection() for promises of either kind.
+[[nodiscard]] double worst_ratio(const std::vector<JudgedFault>& faults);
+
 /// A manoeuvre for certain detection, and what it promises.
 struct DetectionDesign {
   Manoeuvre manoeuvre;
@@ -55,10 +69,17 @@ struct DetectionDesign {
   std::optional<FigureEight> figure_eight;  ///< the best one within the same limits (differential drive)
   std::optional<Plan> figure_eight_plan;
   std::vector<PromisedFault> promised_eight;
+  Promise guarantee = Promise::every_noise;  ///< the one that was planned for
+  double miss = 0.0;  ///< a fault promised `at_risk` is missed with no more probability (SumDrive::miss)
+  std::vector<PromisedFault>
+      at_risk;  ///< promised by sums, as `promised`; empty where the model says nothing at a risk
+  std::vector<PromisedFault> at_risk_eight;
+  core::Warrant at_risk_warrant = core::Warrant::guaranteed;
 };
 
-/// design_manoeuvre() for certain detection of `faults` with the detector of `model` (its errors and its persistence),
-/// and the best figure eight beside it.
+/// design_manoeuvre() for certain detection of `faults` with the detector of `model` (its errors and its persistence)
+/// under DesignOptions::guarantee, and the best figure eight beside it. Throws InvalidArgument where that is at_risk
+/// and the model says nothing at a risk.
 [[nodiscard]] DetectionDesign design_for_detection(const OnlineModel& model, const DesignSubject& subject,
                                                    const MotionLimits& limits,
                                                    const std::vector<InspectedFault>& faults,

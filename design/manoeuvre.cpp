@@ -10,6 +10,7 @@
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/error.hpp>
+#include <wheelwright/design/risk_promise.hpp>
 #include <wheelwright/design/stages.hpp>
 
 namespace wheelwright::design {
@@ -157,15 +158,25 @@ BoundsDesign design_for_bounds(const DesignSubject& subject, const MotionLimits&
                                const DesignOptions& options) {
   BoundsDesign design;
   design.criterion = criterion;
-  const RowObjective objective = narrow_bounds(subject, criterion);
+  design.guarantee = options.guarantee;
+  const PlanObjective objective = options.guarantee == Promise::at_risk
+                                      ? narrow_bounds_at_risk(subject, criterion)
+                                      : of_rows(narrow_bounds(subject, criterion), subject);
+  const auto at_risk = [&](const Plan& plan) {
+    return subject.averaging ? std::optional(promised_bounds_at_risk(plan, subject)) : std::nullopt;
+  };
   design.manoeuvre = design_manoeuvre(subject, limits, objective, options);
   design.promised = promised_bounds(planned_rows(design.manoeuvre.plan, subject), subject);
+  design.risk = commission::RiskSetOptions{}.risk;
+  design.at_risk = at_risk(design.manoeuvre.plan);
+  design.at_risk_warrant = subject.averaging_warrant;
   if (subject.model.on_two_wheels) {
-    design.figure_eight = find_figure_eight(subject, limits, of_rows(objective, subject));
+    design.figure_eight = find_figure_eight(subject, limits, objective);
   }
   if (design.figure_eight) {
     design.figure_eight_plan = plan_of(*design.figure_eight, subject, limits.duration, subject.step);
     design.promised_eight = promised_bounds(planned_rows(*design.figure_eight_plan, subject), subject);
+    design.at_risk_eight = at_risk(*design.figure_eight_plan);
   }
   return design;
 }

@@ -36,13 +36,20 @@ struct FigureEight {
 [[nodiscard]] std::optional<FigureEight> find_figure_eight(const DesignSubject& subject, const MotionLimits& limits,
                                                            const PlanObjective& objective);
 
+/// In which sense a plan's promises hold.
+enum class Promise {
+  every_noise,  ///< whatever the noise does within its bounds
+  at_risk,      ///< but for a stated chance, where errors average out (docs/risk.md)
+};
+
 /// Options of design_manoeuvre().
 struct DesignOptions {
-  std::size_t stages = 4;     ///< of constant speed in each half (stages.hpp)
-  std::size_t samples = 400;  ///< random manoeuvres looked at
-  std::size_t descents = 6;   ///< improved by local search
-  std::size_t steps = 500;    ///< evaluations each
-  double coarse_step = 0.02;  ///< s: sampling while searching, unless the log's own step is larger
+  Promise guarantee = Promise::every_noise;  ///< the promise that is to be good; both are told
+  std::size_t stages = 4;                    ///< of constant speed in each half (stages.hpp)
+  std::size_t samples = 400;                 ///< random manoeuvres looked at
+  std::size_t descents = 6;                  ///< improved by local search
+  std::size_t steps = 500;                   ///< evaluations each
+  double coarse_step = 0.02;                 ///< s: sampling while searching, unless the log's own step is larger
   std::uint64_t seed = 1;
   std::size_t threads = 1;                                                  ///< the result does not depend on it
   std::function<void(std::string_view stage, double share)> progress = {};  ///< may be empty
@@ -69,13 +76,19 @@ struct Manoeuvre {
 struct BoundsDesign {
   Manoeuvre manoeuvre;
   WidthCriterion criterion = WidthCriterion::geometric_mean;
-  Box promised;                             ///< by the manoeuvre
-  std::optional<FigureEight> figure_eight;  ///< the best one within the same limits (differential drive)
-  std::optional<Plan> figure_eight_plan;    ///< its motion
-  Box promised_eight;                       ///< by the figure eight; meaningful where there is one
+  Box promised;                              ///< by the manoeuvre
+  std::optional<FigureEight> figure_eight;   ///< the best one within the same limits (differential drive)
+  std::optional<Plan> figure_eight_plan;     ///< its motion
+  Box promised_eight;                        ///< by the figure eight; meaningful where there is one
+  Promise guarantee = Promise::every_noise;  ///< the one that was planned for
+  double risk = 0.0;                         ///< of `at_risk`: that the bounds will not hold the true parameters
+  std::optional<Box> at_risk;  ///< promised at that risk; nothing where no errors are known to average out
+  std::optional<Box> at_risk_eight;
+  core::Warrant at_risk_warrant = core::Warrant::guaranteed;
 };
 
-/// design_manoeuvre() for narrow bounds, and the best figure eight within the same limits beside it.
+/// design_manoeuvre() for narrow bounds under DesignOptions::guarantee, and the best figure eight within the same
+/// limits beside it. Throws InvalidArgument where that is at_risk and DesignSubject::averaging is empty.
 [[nodiscard]] BoundsDesign design_for_bounds(const DesignSubject& subject, const MotionLimits& limits,
                                              WidthCriterion criterion = WidthCriterion::geometric_mean,
                                              const DesignOptions& options = {});

@@ -38,7 +38,113 @@ filter::SignalErrors worst_case_errors(const DesignSubject& subject, const Measu
   return filter::propagate(subject.model, subject.filter, measurement, budget.sensors);
 }
 
-// The planned log: motion as the sensors see it without noise, efforts as the robot that is believed in needs them.
+// How the planned log is read: its own steps, speeds that need not be whole counts.
+Measurement planned_measurement(const Plan& plan, const DesignSubject& subject) {
+  Measurement m = subject.measurement;
+  m.shortest_step *= m.nominal_step > 0.0 ? plan.step / m.nominal_step : 0.0;
+  m.nominal_step = plan.step;
+  m.count = 0.0;
+  return m;
+}
+
+// `errors` of logs with the subject's steps as those of logs with the plan's.
+filter::SignalErrors with_steps_of(const Plan& plan, const DesignSubject& subject, filter::SignalErrors errors) {
+  if (subject.measurement.motion != MotionKind::speed && subject.measurement.nominal_step > 0.0) {
+    const double longer = plan.step / subject.measurement.nominal_step;
+    errors.joint_sample /= longer;
+    errors.speed_sample /= longer;
+  }
+  return errors;
+}
+
+}  // namespace
+
+DesignSubject subject_of(const OnlineModel& model) {
+  DesignSubject subject;
+  subject.robot = model.robot;
+  subject.model = model.model;
+  subject.measurement = model.measurement;
+  subject.filter = model.filter;
+  subject.theta = model.estimate;
+  subject.effort_box = model.box;
+  subject.known = model.box;
+  subject.step = check::positive(model.measurement.nominal_step, "model: measurement.nominal_step");
+  subject.prior.sides = model::prior_box(model.robot, model.model).bounds;
+  for (std::size_t j = 0; j < model.model.p(); ++j) {
+    const Interval &side = model.box.sides[j], &prior = subject.prior.sides[j];
+    if (side.upper - side.lower > 0.5 * (prior.upper - prior.lower)) {
+      const auto nominal = nominal_parameter(model.robot, model.model, j);
+      if (!nominal) {
+        nothing_known(model.model.parameters[j]);
+      }
+      subject.theta[static_cast<Eigen::Index>(j)] = *nominal;
+      subject.effort_box.sides[j] = {*nominal, *nominal};
+    }
+  }
+  // A model from the statistical mode has smaller bounds than the worst case.
+  const commission::NoiseBudget budget = commission::noise_budget(subject.robot, subject.measurement);
+  const bool worst_case = budget.complete && (worst_case_errors(subject, subject.measurement, budget).output.array() <=
+                                              model.errors.output.array() * (1.0 + 1e-9))
+                                                 .all();
+  if (!worst_case) {
+    subject.errors = model.errors;
+  }
+  subject.warrant = model.warrant;
+  if (model.at_risk) {
+    subject.averaging = model.at_risk->errors;
+    subject.averaging_warrant = model.at_risk->warrant;
+  }
+  return subject;
+}
+
+DesignSubject subject_of(const Robot& robot, double step, const FilterDesign& filter) {
+  DesignSubject subject;
+  subject.robot = robot;
+  subject.model = model::make_model(robot);
+  subject.step = check::positive(step, "step");
+  subject.filter = filter;
+  subject.filter.order = robot.filter.order.value_or(filter.order);
+  if (robot.filter.beta) {
+    subject.filter.beta = subject.filter.alpha = *robot.filter.beta;
+  }
+  subject.filter.alpha = robot.filter.alpha.value_or(subject.filter.alpha);
+  filter::validate(subject.filter);
+  subject.prior.sides = model::prior_box(robot, subject.model).bounds;
+  subject.theta.resize(static_cast<Eigen::Index>(subject.model.p()));
+  for (std::size_t j = 0; j < subject.model.p(); ++j) {
+    const auto nominal = nominal_parameter(robot, subject.model, j);
+    if (!nominal) {
+      nothing_known(subject.model.parameters[j]);
+    }
+    subject.theta[static_cast<Eigen::Index>(j)] = *nominal;
+    subject.effort_box.sides.push_back({*nominal, *nominal});
+  }
+
+  Measurement& m = subject.measurement;
+  m.hold = robot.hold;
+  m.changes = robot.effort_changes;
+  m.delay = robot.effort_delay;
+  m.nominal_step = step;
+  const model::NoiseBound& angle_noise = !model::on_two_wheels(robot) ? robot.noise.position : robot.noise.wheel_angle;
+  const bool angles = subject.filter.order == 2 && robot.speed_source != model::SpeedSource::measured &&
+                      (angle_noise.value || robot.encoder_counts_per_turn);
+  m.motion = angles ? MotionKind::angle : MotionKind::speed;
+  for (const model::Joint& joint : subject.model.joints) {
+    m.motion_columns.push_back(angles ? joint.angle : joint.speed);
+    m.effort_columns.push_back("effort of " + joint.speed);
+  }
+  if (!commission::noise_budget(robot, m).complete) {
+    throw InvalidArgument(
+        "the noise is not declared: expected noise: {wheel_speed: …, effort: …} in the robot file (bounds, rad/s and "
+        "the unit of the effort), or a commissioned model, which has found it");
+  }
+  subject.averaging = commission::error_classes(robot, m);
+  if (subject.averaging && !subject.averaging->average()) {
+    subject.averaging.reset();
+  }
+  return subject;
+}
+
 LogTable planned_log(const Plan& plan, const DesignSubject& subject) {
   const Measurement& m = subject.measurement;
   const Eigen::MatrixXd joint = joint_speeds(plan, subject.model);
@@ -89,26 +195,6 @@ LogTable planned_log(const Plan& plan, const DesignSubject& subject) {
   return log;
 }
 
-// How the planned log is read: its own steps, speeds that need not be whole counts.
-Measurement planned_measurement(const Plan& plan, const DesignSubject& subject) {
-  Measurement m = subject.measurement;
-  m.shortest_step *= m.nominal_step > 0.0 ? plan.step / m.nominal_step : 0.0;
-  m.nominal_step = plan.step;
-  m.count = 0.0;
-  return m;
-}
-
-// `errors` of logs with the subject's steps as those of logs with the plan's.
-filter::SignalErrors with_steps_of(const Plan& plan, const DesignSubject& subject, filter::SignalErrors errors) {
-  if (subject.measurement.motion != MotionKind::speed && subject.measurement.nominal_step > 0.0) {
-    const double longer = plan.step / subject.measurement.nominal_step;
-    errors.joint_sample /= longer;
-    errors.speed_sample /= longer;
-  }
-  return errors;
-}
-
-// The filter of a planned log, with the errors that its sensors will make.
 RegressorFilter planned_filter(LogSource& log, const Plan& plan, const DesignSubject& subject) {
   const Measurement measurement = planned_measurement(plan, subject);
   filter::SignalErrors errors;
@@ -124,84 +210,13 @@ RegressorFilter planned_filter(LogSource& log, const Plan& plan, const DesignSub
   return RegressorFilter(subject.model, subject.filter, measurement, errors);
 }
 
-}  // namespace
-
-DesignSubject subject_of(const OnlineModel& model) {
-  DesignSubject subject;
-  subject.robot = model.robot;
-  subject.model = model.model;
-  subject.measurement = model.measurement;
-  subject.filter = model.filter;
-  subject.theta = model.estimate;
-  subject.effort_box = model.box;
-  subject.known = model.box;
-  subject.step = check::positive(model.measurement.nominal_step, "model: measurement.nominal_step");
-  subject.prior.sides = model::prior_box(model.robot, model.model).bounds;
-  for (std::size_t j = 0; j < model.model.p(); ++j) {
-    const Interval &side = model.box.sides[j], &prior = subject.prior.sides[j];
-    if (side.upper - side.lower > 0.5 * (prior.upper - prior.lower)) {
-      const auto nominal = nominal_parameter(model.robot, model.model, j);
-      if (!nominal) {
-        nothing_known(model.model.parameters[j]);
-      }
-      subject.theta[static_cast<Eigen::Index>(j)] = *nominal;
-      subject.effort_box.sides[j] = {*nominal, *nominal};
-    }
-  }
-  // A model from the statistical mode has smaller bounds than the worst case.
-  const commission::NoiseBudget budget = commission::noise_budget(subject.robot, subject.measurement);
-  const bool worst_case = budget.complete && (worst_case_errors(subject, subject.measurement, budget).output.array() <=
-                                              model.errors.output.array() * (1.0 + 1e-9))
-                                                 .all();
-  if (!worst_case) {
-    subject.errors = model.errors;
-  }
-  subject.warrant = model.warrant;
-  return subject;
-}
-
-DesignSubject subject_of(const Robot& robot, double step, const FilterDesign& filter) {
-  DesignSubject subject;
-  subject.robot = robot;
-  subject.model = model::make_model(robot);
-  subject.step = check::positive(step, "step");
-  subject.filter = filter;
-  subject.filter.order = robot.filter.order.value_or(filter.order);
-  if (robot.filter.beta) {
-    subject.filter.beta = subject.filter.alpha = *robot.filter.beta;
-  }
-  subject.filter.alpha = robot.filter.alpha.value_or(subject.filter.alpha);
-  filter::validate(subject.filter);
-  subject.prior.sides = model::prior_box(robot, subject.model).bounds;
-  subject.theta.resize(static_cast<Eigen::Index>(subject.model.p()));
-  for (std::size_t j = 0; j < subject.model.p(); ++j) {
-    const auto nominal = nominal_parameter(robot, subject.model, j);
-    if (!nominal) {
-      nothing_known(subject.model.parameters[j]);
-    }
-    subject.theta[static_cast<Eigen::Index>(j)] = *nominal;
-    subject.effort_box.sides.push_back({*nominal, *nominal});
-  }
-
-  Measurement& m = subject.measurement;
-  m.hold = robot.hold;
-  m.changes = robot.effort_changes;
-  m.delay = robot.effort_delay;
-  m.nominal_step = step;
-  const model::NoiseBound& angle_noise = !model::on_two_wheels(robot) ? robot.noise.position : robot.noise.wheel_angle;
-  const bool angles = subject.filter.order == 2 && robot.speed_source != model::SpeedSource::measured &&
-                      (angle_noise.value || robot.encoder_counts_per_turn);
-  m.motion = angles ? MotionKind::angle : MotionKind::speed;
-  for (const model::Joint& joint : subject.model.joints) {
-    m.motion_columns.push_back(angles ? joint.angle : joint.speed);
-    m.effort_columns.push_back("effort of " + joint.speed);
-  }
-  if (!commission::noise_budget(robot, m).complete) {
-    throw InvalidArgument(
-        "the noise is not declared: expected noise: {wheel_speed: …, effort: …} in the robot file (bounds, rad/s and "
-        "the unit of the effort), or a commissioned model, which has found it");
-  }
-  return subject;
+filter::ErrorClasses planned_classes(const Plan& plan, const DesignSubject& subject) {
+  check::that(subject.averaging.has_value(), "promises at a stated risk: noise",
+              "effort: {bound: …, bias: …} in the robot file, or a model that says something at a risk (docs/risk.md)");
+  filter::ErrorClasses classes = *subject.averaging;
+  const double nominal = subject.measurement.nominal_step;
+  classes.shortest_step = nominal > 0.0 ? classes.shortest_step * (plan.step / nominal) : plan.step;
+  return classes;
 }
 
 RegressionBlock planned_rows(const Plan& plan, const DesignSubject& subject) {

@@ -12,6 +12,7 @@
 #include <wheelwright/core/regression.hpp>
 #include <wheelwright/core/warrant.hpp>
 #include <wheelwright/detector/reference_motion.hpp>
+#include <wheelwright/filter/error_class.hpp>
 #include <wheelwright/model/robot.hpp>
 
 namespace wheelwright::design {
@@ -32,6 +33,9 @@ struct DesignSubject {
       errors;          ///< of the rows; nothing: from the declared noise and the planned acceleration
   double step = 0.01;  ///< sampling step of the log to come, s
   core::Warrant warrant = core::Warrant::guaranteed;  ///< of the promises: that of the model, or of the declared noise
+  std::optional<filter::ErrorClasses>
+      averaging;  ///< errors that average out, as declared or as the model has learnt them: promises at a stated risk
+  core::Warrant averaging_warrant = core::Warrant::guaranteed;  ///< extrapolated where a log was what they came from
 
   /// The commissioned bounds, where there are any: what the manoeuvre is to improve on.
   std::optional<Box> known;
@@ -49,6 +53,15 @@ struct DesignSubject {
 /// Throws InvalidArgument, naming what the robot file lacks, unless every parameter has a nominal value and the noise
 /// of motion and effort is declared.
 [[nodiscard]] DesignSubject subject_of(const Robot& robot, double step, const FilterDesign& filter = {2, 10.0, 10.0});
+
+/// The log along `plan` without noise: motion as the sensors see it, efforts as θ° needs them.
+[[nodiscard]] LogTable planned_log(const Plan& plan, const DesignSubject& subject);
+
+/// The filter of a planned log, which knows its steps, with the errors that its sensors will make.
+[[nodiscard]] RegressorFilter planned_filter(LogSource& log, const Plan& plan, const DesignSubject& subject);
+
+/// DesignSubject::averaging for the steps of `plan`. Throws InvalidArgument where there is none.
+[[nodiscard]] filter::ErrorClasses planned_classes(const Plan& plan, const DesignSubject& subject);
 
 /// The rows that commissioning would make of a log driven exactly along `plan`, without noise: Y_f of the planned
 /// motion, y = Y_f θ°, and the error bounds dY, dy that the sensors' noise gives, and what θ° needs of efforts may do

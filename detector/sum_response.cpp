@@ -301,7 +301,29 @@ FaultRow SumRow::row() const {
           .range = span(range)};
 }
 
-// A fault that has set in: what the shared sums held before, or sums of its own.
+namespace {
+
+// What a step makes of the kernels of all scales.
+struct Decays {
+  std::vector<double> x, decay;  // of each scale
+  double h = 0.0;
+
+  void step_to(double next, const std::vector<double>& scales) {
+    if (std::abs(next - h) > kSameStep * h) {
+      h = next;
+      x.resize(scales.size());
+      decay.resize(scales.size());
+      for (std::size_t j = 0; j < scales.size(); ++j) {
+        x[j] = h / scales[j];
+        decay[j] = std::exp(-x[j]);
+      }
+    }
+  }
+};
+
+}  // namespace
+
+// A fault that has set in: what the shared sums held before, or sums of its own. Neither where it was always there.
 struct SumResponse::Active {
   std::size_t which = 0, first = 0;  // number of the onset; instant at which its first element ends
   double t = 0.0;
@@ -420,12 +442,9 @@ void SumResponse::walk(std::span<const std::size_t> onsets, double within,
   const std::vector<double>& scales = drive_->scales;
   std::vector<Active> active;
   std::size_t next_onset = 0, next_look = 0;
-  std::vector<double> x(scales.size()), decay(scales.size());
-  double h = 0.0;
+  Decays decays;
   for (std::size_t s = 0; s < motion_->segment_starts.size(); ++s) {
-    const std::size_t start = motion_->segment_starts[s];
-    const std::size_t end = std::min(
-        drive_->instants, s + 1 < motion_->segment_starts.size() ? motion_->segment_starts[s + 1] : drive_->instants);
+    const std::size_t start = motion_->segment_starts[s], end = end_of(s);
     if (start >= end) {
       break;
     }
@@ -438,16 +457,10 @@ void SumResponse::walk(std::span<const std::size_t> onsets, double within,
     double added = 0.0;
     broken.begin_broken(start);
     for (std::size_t k = start + 1; k < end && broken.next(); ++k) {
-      if (std::abs(drive_->step[k] - h) > kSameStep * h) {
-        h = drive_->step[k];
-        for (std::size_t j = 0; j < scales.size(); ++j) {
-          x[j] = h / scales[j];
-          decay[j] = std::exp(-x[j]);
-        }
-      }
+      decays.step_to(drive_->step[k], scales);
       const auto add = [&](std::vector<KernelSums>& sums) {
         for (std::size_t j = 0; j < scales.size(); ++j) {
-          sums[j].advance(x[j], decay[j]);
+          sums[j].advance(decays.x[j], decays.decay[j]);
           sums[j].add(q_);
         }
       };
@@ -495,34 +508,78 @@ void SumResponse::walk(std::span<const std::size_t> onsets, double within,
         ++next_look;
       }
       for (; next_look < drive_->looks.size() && drive_->looks[next_look].instant == k; ++next_look) {
-        const SumLook& look = drive_->looks[next_look];
-        if (constant_only_ && drive_->weights[look.weight].shape != SumWeight::Shape::constant) {
-          continue;
-        }
         for (Active& each : active) {
           if (stationary_) {
             each.added = std::max(each.added, added);
           }
-          At at;
-          at.onset = each.which;
-          at.look = next_look;
-          at.of_ = this;
-          at.active_ = &each;
-          const auto w = static_cast<Eigen::Index>(look.weight);
-          at.once = value(at, w, 0);
-          at.twice = g2_ >= 0 ? value(at, w, 1) : 0.0;
-          visit(at);
+          visit_look(next_look, each, visit);
         }
       }
     }
   }
 }
 
+void SumResponse::walk_broken(const std::function<void(const At&)>& visit) {
+  check::that(stationary_, "fault '" + fault_.name + "'", "one that is there in full from its onset on (a step)");
+  if (!exact_) {
+    return;
+  }
+  const std::vector<double>& scales = drive_->scales;
+  std::size_t next_look = 0;
+  Decays decays;
+  for (std::size_t s = 0; s < motion_->segment_starts.size() && motion_->segment_starts[s] < end_of(s); ++s) {
+    const std::size_t start = motion_->segment_starts[s], end = end_of(s);
+    for (KernelSums& sums : shared_) {
+      sums.reset();
+    }
+    FaultElements broken(fault_, model_->model, model_->filter.static_gain(), *motion_);
+    broken.begin_broken(start);
+    Active always{s, start + 1, motion_->instant[start], {}, {}, Eigen::MatrixXd::Zero(n_, 2 * p_ + 1), 0.0};
+    for (std::size_t k = start + 1; k < end && broken.next(); ++k) {
+      decays.step_to(drive_->step[k], scales);
+      take(broken, false, always.last);
+      always.added = std::max(always.added, added_);
+      weigh(k);
+      for (std::size_t j = 0; j < scales.size(); ++j) {
+        shared_[j].advance(decays.x[j], decays.decay[j]);
+        shared_[j].add(q_);
+      }
+      for (; next_look < drive_->looks.size() && drive_->looks[next_look].instant <= k; ++next_look) {
+        if (drive_->looks[next_look].instant == k) {
+          visit_look(next_look, always, visit);
+        }
+      }
+    }
+  }
+}
+
+std::size_t SumResponse::end_of(std::size_t segment) const {
+  const std::vector<std::size_t>& starts = motion_->segment_starts;
+  return std::min(drive_->instants, segment + 1 < starts.size() ? starts[segment + 1] : drive_->instants);
+}
+
+void SumResponse::visit_look(std::size_t which, const Active& active,
+                             const std::function<void(const At&)>& visit) const {
+  const SumLook& look = drive_->looks[which];
+  if (constant_only_ && drive_->weights[look.weight].shape != SumWeight::Shape::constant) {
+    return;
+  }
+  At at;
+  at.onset = active.which;
+  at.look = which;
+  at.of_ = this;
+  at.active_ = &active;
+  const auto w = static_cast<Eigen::Index>(look.weight);
+  at.once = value(at, w, 0);
+  at.twice = g2_ >= 0 ? value(at, w, 1) : 0.0;
+  visit(at);
+}
+
 double SumResponse::value(const At& at, Eigen::Index weight, Eigen::Index column) const {
   const Active& active = *static_cast<const Active*>(at.active_);
   const SumLook& look = drive_->looks[at.look];
   const KernelSums& sums = (stationary_ ? shared_ : active.sums)[look.scale];
-  if (!stationary_) {
+  if (!stationary_ || active.sums.empty()) {
     return sums.value(weight, column, SumKernel::kShape);
   }
   const double x = (drive_->way[look.instant] - drive_->way[active.first]) / drive_->scales[look.scale];

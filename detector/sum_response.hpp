@@ -128,9 +128,15 @@ class SumResponse {
   /// every look up to `within` s after each, in the order of time.
   void walk(std::span<const std::size_t> onsets, double within, const std::function<void(const At&)>& visit);
 
+  /// Visits every look of a drive in which the fault was there from before each segment on, At::onset the segment's
+  /// number. Throws InvalidArgument for a fault that is not there in full from its onset on.
+  void walk_broken(const std::function<void(const At&)>& visit);
+
  private:
   struct Active;
   [[nodiscard]] SumRow row(const At& at) const;
+  [[nodiscard]] std::size_t end_of(std::size_t segment) const;
+  void visit_look(std::size_t which, const Active& active, const std::function<void(const At&)>& visit) const;
   void take(const FaultElements& elements, bool first, Eigen::Ref<Eigen::MatrixXd> last);
   void weigh(std::size_t instant);
   [[nodiscard]] double value(const At& at, Eigen::Index weight, Eigen::Index column) const;

@@ -132,6 +132,11 @@ design::WidthCriterion criterion_called(const std::string& name) {
                              : design::WidthCriterion::geometric_mean;
 }
 
+design::Promise guarantee_called(const std::string& name) {
+  check::that(name == "every_noise" || name == "at_risk", "guarantee '" + name + "'", "every_noise or at_risk");
+  return name == "at_risk" ? design::Promise::at_risk : design::Promise::every_noise;
+}
+
 std::vector<design::InspectedFault> inspected(const std::map<std::string, double>& faults, const OnlineModel& model) {
   if (faults.empty()) {
     return design::usual_inspection(model);
@@ -150,7 +155,8 @@ std::unique_ptr<DesignObject> design(const std::variant<const ModelObject*, cons
                                      const std::optional<double>& radius,
                                      const std::optional<std::array<double, 4>>& box, double rate,
                                      const std::string& criterion, const std::map<std::string, double>& faults,
-                                     std::size_t stages, std::uint64_t seed, std::size_t threads, py::object progress) {
+                                     std::size_t stages, const std::string& guarantee, std::uint64_t seed,
+                                     std::size_t threads, py::object progress) {
   check::that(aim == "bounds" || aim == "detection", "aim '" + aim + "'", "bounds or detection");
   const bool from_model = std::holds_alternative<const ModelObject*>(of);
   check::that(aim == "bounds" || from_model, "aim 'detection'", "a commissioned Model, not a Robot");
@@ -161,6 +167,7 @@ std::unique_ptr<DesignObject> design(const std::variant<const ModelObject*, cons
   LongWork work(std::move(progress));
   design::DesignOptions options;
   options.stages = stages;
+  options.guarantee = guarantee_called(guarantee);
   options.seed = seed;
   options.threads = threads;
   options.progress = work.teller();
@@ -189,6 +196,11 @@ std::unique_ptr<DesignObject> design(const std::variant<const ModelObject*, cons
       out->summary = words::summary(made);
       finish(made);
     } else {
+      if (options.guarantee == design::Promise::at_risk) {  // as the command line
+        options.samples = 120;
+        options.descents = 2;
+        options.steps = 150;
+      }
       const design::BoundsDesign made = design::design_for_bounds(subject, limits, wanted, options);
       out->json = results::to_json(made, subject, limits);
       out->summary = words::summary(made, subject);
@@ -226,14 +238,16 @@ void bind_sim(py::module_& m) {
         py::arg("speed") = std::nullopt, py::arg("acceleration") = std::nullopt, py::arg("effort") = std::nullopt,
         py::arg("radius") = std::nullopt, py::arg("box") = std::nullopt, py::arg("rate") = 100.0,
         py::arg("criterion") = "geometric_mean", py::arg("faults") = std::map<std::string, double>{},
-        py::arg("stages") = design::DesignOptions{}.stages, py::arg("seed") = 1, py::arg("threads") = 1,
-        py::arg("progress") = py::none(),
+        py::arg("stages") = design::DesignOptions{}.stages, py::arg("guarantee") = "every_noise", py::arg("seed") = 1,
+        py::arg("threads") = 1, py::arg("progress") = py::none(),
         "Designs a drive for a Model (or, for bounds, a Robot with nominal values and declared noise), as "
         "`wheelwright design` does.\n\n"
         "aim: bounds (narrow bounds on theta) or detection (certain to find faults that are small). duration: s. speed "
         "(rad/s), acceleration (rad/s^2), effort (N m): of a wheel; those of the robot file where they are not given. "
         "radius: m about the start; box: (xmin, xmax, ymin, ymax), m. rate: of the log to come, Hz, for a Robot. "
-        "criterion: geometric_mean, mean or largest. faults: name -> size asked for. The result does not depend on "
+        "criterion: geometric_mean, mean or largest. guarantee: every_noise, or at_risk where errors average out "
+        "(docs/risk.md), is the promise that is to be good; both are told. faults: name -> size asked for. The result "
+        "does not depend on "
         "`threads`. The interpreter's lock is released; Ctrl-C ends the work.");
 }
 

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include <wheelwright/report/drawing.hpp>
+#include <wheelwright/report/outlook.hpp>
 #include <wheelwright/report/page.hpp>
 #include <wheelwright/report/sections.hpp>
 #include <wheelwright/report/signals.hpp>
@@ -118,6 +119,7 @@ std::string commission_report(const Commissioning& result, const ReportContext& 
   content.status = status_class(standing(result));
   content.verdict = verdict(result);
   content.sentences = commission_words(result);
+  content.first = context.seen ? outlook(*context.seen, result.model) : std::string();
   content.software = context.software;
   if (result.status != Commissioning::Status::empty) {
     content.warrant = result.model.warrant;

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include <wheelwright/commission/physical.hpp>
+#include <wheelwright/commission/risk_watch.hpp>
 #include <wheelwright/report/drawing.hpp>
 #include <wheelwright/report/page.hpp>
 #include <wheelwright/words/detect_words.hpp>
@@ -31,6 +32,10 @@ const char* criterion_words(design::WidthCriterion criterion) {
   return "the largest relative width of the bounds";
 }
 
+std::string planned_for(design::Promise guarantee) {
+  return guarantee == design::Promise::at_risk ? ", by what holds at the stated risk" : "";
+}
+
 std::string half_width(const Interval& side, double scale, double centre) {
   const double half = 0.5 * (side.upper - side.lower) * scale;
   std::string text = "± " + number(half);
@@ -41,6 +46,9 @@ std::string half_width(const Interval& side, double scale, double centre) {
 std::string bounds_table(const design::BoundsDesign& design, const DesignSubject& subject) {
   const auto scales = commission::physical_scales(subject.robot, subject.model);
   std::vector<Cell> header = {"Parameter", "unit", numeric("believed"), numeric("promised")};
+  if (design.at_risk) {
+    header.push_back(numeric(fmt::format("at a risk of {:g}", design.risk)));
+  }
   if (subject.known) {
     header.push_back(numeric("model now"));
   }
@@ -57,6 +65,9 @@ std::string bounds_table(const design::BoundsDesign& design, const DesignSubject
         escape(spaced(scales ? parameter.physical : parameter.name)),
         escape(scales ? parameter.physical_unit : commission::parameter_unit(subject.robot, parameter)),
         numeric(number(centre)), numeric(half_width(design.promised.sides[j], scale, centre))};
+    if (design.at_risk) {
+      row.push_back(numeric(half_width(design.at_risk->sides[j], scale, centre)));
+    }
     if (subject.known) {
       row.push_back(numeric(half_width(subject.known->sides[j], scale, centre)));
     }
@@ -74,6 +85,14 @@ std::string bounds_table(const design::BoundsDesign& design, const DesignSubject
              "noise within its declared bounds, as far as the robot follows its commands: the widest bounds come from "
              "a "
              "log without noise, and those are what is computed.") +
+         (design.at_risk
+              ? paragraph(fmt::format(
+                    "At a risk of {:g}: the same for errors that average out as {}; but for that chance "
+                    "all of these bounds will hold.",
+                    design.risk,
+                    design.at_risk_warrant == core::Warrant::guaranteed ? "the robot file declares"
+                                                                        : "the commissioning log shows them"))
+              : "") +
          (design.figure_eight
               ? paragraph(fmt::format("Figure eight: the best one for the same aim within the same limits, {} with a "
                                       "period of {}, promised in the same way.",
@@ -140,8 +159,9 @@ std::vector<std::string> design_words(const design::BoundsDesign& design, const 
                   "the start and ends where it began.",
                   with_unit(number(limits.duration), "s"),
                   with_unit(number(std::sqrt(plan.pose.topRows<2>().colwise().squaredNorm().maxCoeff())), "m")));
-  sentences.push_back(fmt::format("It was chosen to minimise {}, out of {} manoeuvres within the limits.",
-                                  criterion_words(design.criterion), count(design.manoeuvre.evaluations)));
+  sentences.push_back(fmt::format("It was chosen to minimise {}, out of {} manoeuvres within the limits{}.",
+                                  criterion_words(design.criterion), count(design.manoeuvre.evaluations),
+                                  planned_for(design.guarantee)));
   sentences.push_back(
       "Record the log, then commission with it; the second half of the drive repeats the first backwards, "
       "which tells inertia from friction.");
@@ -153,9 +173,15 @@ std::vector<std::string> design_words(const design::BoundsDesign& design, const 
 
 std::string faults_table(const design::DetectionDesign& design, const DesignSubject& subject) {
   std::vector<Cell> header = {"Fault", numeric("asked"), numeric("certain from"), numeric("after"), "channel"};
+  if (!design.at_risk.empty()) {
+    header.push_back(numeric("at the stated risk"));
+    header.push_back(numeric("after"));
+    header.push_back("by sums of");
+  }
   if (design.figure_eight) {
     header.push_back(numeric("figure eight"));
   }
+  const std::vector<detector::SumWeight> weights = detector::sum_weights(subject.model);
   std::vector<std::vector<Cell>> rows;
   for (std::size_t k = 0; k < design.promised.size(); ++k) {
     const design::PromisedFault& p = design.promised[k];
@@ -166,6 +192,15 @@ std::string faults_table(const design::DetectionDesign& design, const DesignSubj
         numeric(escape(magnitude_words(p.fault, p.asked))), numeric(escape(magnitude_words(p.fault, p.smallest))),
         numeric(found ? with_unit(number(p.t), "s") : "–"),
         found ? escape(spaced(subject.model.outputs[p.output])) : "–"};
+    if (!design.at_risk.empty()) {
+      const design::PromisedFault& q = design.at_risk[k];
+      const bool seen = std::isfinite(q.smallest);
+      row.push_back(numeric(escape(magnitude_words(q.fault, q.smallest))));
+      row.push_back(numeric(seen ? with_unit(number(q.t), "s") : "–"));
+      row.push_back(
+          seen ? escape(fmt::format("{}, {:g} s", commission::sum_words(weights[q.output], subject.model), q.scale))
+               : "–");
+    }
     if (design.figure_eight) {
       row.push_back(numeric(escape(magnitude_words(p.fault, design.promised_eight[k].smallest))));
     }
@@ -176,7 +211,15 @@ std::string faults_table(const design::DetectionDesign& design, const DesignSubj
              "<span class=\"note\">A robot that is broken by that much before the drive begins raises an alarm within "
              "the time given, whatever its parameters within the model's bounds and the noise within its own, as far "
              "as "
-             "its wheels follow the commands.</span>");
+             "its wheels follow the commands.</span>") +
+         (design.at_risk.empty()
+              ? ""
+              : note(fmt::format("At the stated risk: where errors average out as {}, such a fault is missed with a "
+                                 "probability of at most {:.2g}.",
+                                 design.at_risk_warrant == core::Warrant::guaranteed
+                                     ? "the robot file declares"
+                                     : "the commissioning log shows them",
+                                 design.miss)));
 }
 
 std::string separations_table(const gap::DiscriminationDesign& design) {
@@ -240,8 +283,8 @@ std::string design_report(const design::DetectionDesign& design, const DesignSub
       "that no fault below is there in the size given.",
       fmt::format(
           "It was chosen to make the largest of these sizes small, each relative to the one asked for, out of {} "
-          "manoeuvres within the limits.",
-          count(design.manoeuvre.evaluations))};
+          "manoeuvres within the limits{}.",
+          count(design.manoeuvre.evaluations), planned_for(design.guarantee))};
   content.software = context.software;
   content.warrant = subject.warrant;
   content.sections.push_back({"faults", "What is certainly found", faults_table(design, subject)});

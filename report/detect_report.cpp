@@ -12,6 +12,7 @@
 
 #include <wheelwright/core/limits.hpp>
 #include <wheelwright/report/drawing.hpp>
+#include <wheelwright/report/outlook.hpp>
 #include <wheelwright/report/page.hpp>
 #include <wheelwright/report/sections.hpp>
 #include <wheelwright/report/signals.hpp>
@@ -540,6 +541,7 @@ std::string margins_report(const commission::MarginSurvey& survey, const OnlineM
   content.title = context.title.empty() ? "What is certainly seen: " + model.robot.name : context.title;
   content.status = "good";
   content.verdict = "Faults that this robot's detector is certain to see in this drive.";
+  content.first = outlook(survey, model);
   content.warrant = model.warrant;
   content.sentences.push_back(certain_meaning(model.warrant));
   content.sentences.push_back(

@@ -307,6 +307,7 @@ std::string page(const PageContent& content) {
   if (content.warrant) {
     out += warrant_note(*content.warrant);
   }
+  out += content.first;
   for (const std::string& sentence : content.sentences) {
     out += paragraph(escape_with_code(sentence));
   }

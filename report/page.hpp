@@ -15,6 +15,7 @@
 #include <vector>
 
 #include <wheelwright/commission/detector_walk.hpp>
+#include <wheelwright/commission/margin_survey.hpp>
 #include <wheelwright/core/log.hpp>
 #include <wheelwright/core/warrant.hpp>
 #include <wheelwright/words/text.hpp>
@@ -38,6 +39,7 @@ struct ReportContext {
   std::optional<LogTable> signals;    ///< raw signals; more than 2·10⁶ rows are thinned on the page, peaks kept
   std::size_t rows = 0;               ///< of the log, where it has more of them than `signals`
   std::optional<Detection> own_log;   ///< commission_report: the model's detector on the log it was made from
+  std::optional<commission::MarginSurvey> seen;  ///< commission_report: what is certain to be seen (first_look())
 };
 
 using words::TimeAxis;
@@ -136,7 +138,7 @@ struct Section {
 };
 
 /// A whole page. It loads nothing: its content security policy forbids every request. `status` (one of "good",
-/// "caution", "bad") and `verdict` (text) head it, followed by `sentences` (text).
+/// "caution", "bad") and `verdict` (text) head it, followed by `first` (HTML) and `sentences` (text).
 struct PageContent {
   std::string title;
   std::string status;
@@ -145,6 +147,7 @@ struct PageContent {
   std::vector<Section> sections;
   std::string software;                    ///< for the footer
   std::optional<core::Warrant> warrant{};  ///< of the page's numbers, told beneath the verdict
+  std::string first{};                     ///< what everybody wants to know, before all else is said
 };
 
 /// The page as HTML.

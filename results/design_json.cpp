@@ -20,6 +20,10 @@ const char* name(design::WidthCriterion criterion) {
   return "largest";
 }
 
+const char* name(design::Promise guarantee) {
+  return guarantee == design::Promise::at_risk ? "at_risk" : "every_noise";
+}
+
 Json optional(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
 
 // What all designs have.
@@ -56,6 +60,9 @@ Json to_json(const design::BoundsDesign& design, const design::DesignSubject& su
   Json out = frame(design.manoeuvre, design.figure_eight, limits);
   out["for"] = "bounds";
   out["criterion"] = name(design.criterion);
+  out["guarantee"] = name(design.guarantee);
+  out["at_risk"] = design.at_risk ? Json{{"risk", design.risk}, {"warrant", core::warrant_word(design.at_risk_warrant)}}
+                                  : Json(nullptr);
   out["parameters"] = Json::array();
   for (std::size_t j = 0; j < subject.model.p(); ++j) {
     const model::Parameter& parameter = subject.model.parameters[j];
@@ -74,7 +81,11 @@ Json to_json(const design::BoundsDesign& design, const design::DesignSubject& su
          {"believed", subject.theta[static_cast<Eigen::Index>(j)]},
          {"promised", bounds(design.promised)},
          {"model", subject.known ? bounds(*subject.known) : Json(nullptr)},
-         {"figure_eight", design.figure_eight ? bounds(design.promised_eight) : Json(nullptr)}});
+         {"figure_eight", design.figure_eight ? bounds(design.promised_eight) : Json(nullptr)},
+         {"at_risk", design.at_risk
+                         ? Json{{"promised", bounds(*design.at_risk)},
+                                {"figure_eight", design.at_risk_eight ? bounds(*design.at_risk_eight) : Json(nullptr)}}
+                         : Json(nullptr)}});
   }
   return out;
 }
@@ -82,18 +93,28 @@ Json to_json(const design::BoundsDesign& design, const design::DesignSubject& su
 Json to_json(const design::DetectionDesign& design, const design::MotionLimits& limits) {
   Json out = frame(design.manoeuvre, design.figure_eight, limits);
   out["for"] = "detection";
+  out["guarantee"] = name(design.guarantee);
+  out["at_risk"] = design.at_risk.empty()
+                       ? Json(nullptr)
+                       : Json{{"miss", design.miss}, {"warrant", core::warrant_word(design.at_risk_warrant)}};
   out["faults"] = Json::array();
   for (std::size_t k = 0; k < design.promised.size(); ++k) {
     const design::PromisedFault& p = design.promised[k];
     const auto size = [](const design::PromisedFault& of) {
       return std::isfinite(of.smallest) ? Json{{"smallest", of.smallest}, {"t", of.t}} : Json(nullptr);
     };
-    out["faults"].push_back({{"fault", p.fault.name},
-                             {"side", p.side > 0.0 ? "positive" : "negative"},
-                             {"unit", p.fault.unit},
-                             {"asked", p.asked},
-                             {"promised", size(p)},
-                             {"figure_eight", design.figure_eight ? size(design.promised_eight[k]) : Json(nullptr)}});
+    out["faults"].push_back(
+        {{"fault", p.fault.name},
+         {"side", p.side > 0.0 ? "positive" : "negative"},
+         {"unit", p.fault.unit},
+         {"asked", p.asked},
+         {"promised", size(p)},
+         {"figure_eight", design.figure_eight ? size(design.promised_eight[k]) : Json(nullptr)},
+         {"at_risk",
+          design.at_risk.empty()
+              ? Json(nullptr)
+              : Json{{"promised", size(design.at_risk[k])},
+                     {"figure_eight", design.at_risk_eight.empty() ? Json(nullptr) : size(design.at_risk_eight[k])}}}});
   }
   return out;
 }

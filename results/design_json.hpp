@@ -14,7 +14,7 @@ namespace wheelwright::results {
 
 /// The result as JSON, schema "wheelwright/design/1": limits and their use, θ as believed, and bounds in the units of
 /// θ_L (promised; of the model, where there is one; of the figure eight, where there is one), with the physical half
-/// widths.
+/// widths; and what is promised at a stated risk, where errors average out.
 [[nodiscard]] Json to_json(const design::BoundsDesign& design, const design::DesignSubject& subject,
                            const design::MotionLimits& limits);
 

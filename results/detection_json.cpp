@@ -319,6 +319,13 @@ Json filter_json(const FilterDesign& filter) {
   return {{"order", filter.order}, {"alpha", filter.alpha}, {"beta", filter.beta}};
 }
 
+Json sizes_json(const std::optional<commission::StatedSizes>& sizes) {
+  return sizes ? Json{{"median", or_null(sizes->median)},
+                      {"worst", or_null(sizes->worst)},
+                      {"delay", or_null(sizes->delay)}}
+               : Json(nullptr);
+}
+
 Json candidate_json(const commission::DetectorCandidate& candidate) {
   Json faults = Json::array();
   for (const commission::StatedMargin& margin : candidate.faults) {
@@ -329,7 +336,9 @@ Json candidate_json(const commission::DetectorCandidate& candidate) {
                       {"onsets", margin.onsets},
                       {"median", or_null(margin.median)},
                       {"worst", or_null(margin.worst)},
-                      {"delay", or_null(margin.delay)}});
+                      {"delay", or_null(margin.delay)},
+                      {"at_risk", sizes_json(margin.at_risk)},
+                      {"either", sizes_json(margin.either)}});
   }
   return {{"filter", filter_json(candidate.filter)},
           {"guarantee", name_of(candidate.guarantee)},
@@ -339,6 +348,7 @@ Json candidate_json(const commission::DetectorCandidate& candidate) {
           {"failure", candidate.failure},
           {"size", or_null(candidate.size)},
           {"delay", or_null(candidate.delay)},
+          {"size_at_risk", candidate.size_at_risk ? or_null(*candidate.size_at_risk) : Json(nullptr)},
           {"faults", std::move(faults)}};
 }
 
@@ -355,6 +365,19 @@ Json to_json(const commission::DetectorChoice& choice, const std::string& robot,
     candidates.push_back(candidate_json(candidate));
   }
   const bool chosen = choice.chosen.has_value();
+  Json at_risk, decides = Json::array();
+  if (chosen && choice.candidates.front().miss) {
+    const commission::DetectorCandidate& first = choice.candidates.front();
+    at_risk = {{"miss", *first.miss},
+               {"warrant", core::warrant_word(first.risk_warrant)},
+               {"spread", choice.risk_spread ? or_null(*choice.risk_spread) : Json(nullptr)}};
+    for (const commission::StatedMargin& margin : first.faults) {
+      const std::optional<double> from = commission::risk_decides_from(margin, choice.window);
+      decides.push_back({{"fault", margin.fault},
+                         {"side", margin.side > 0.0 ? "positive" : "negative"},
+                         {"at_risk_from", from ? Json(*from) : Json(nullptr)}});
+    }
+  }
   return {{"schema", kChoiceSchema},
           {"software", software},
           {"robot", robot},
@@ -364,6 +387,10 @@ Json to_json(const commission::DetectorChoice& choice, const std::string& robot,
           {"chosen", chosen ? filter_json(choice.candidates.front().filter) : Json(nullptr)},
           {"robot_file", chosen ? robot_file_line(choice.candidates.front().filter) : ""},
           {"hopeless", choice.hopeless},
+          {"guarantee", choice.either ? "either" : "every_noise"},
+          {"at_risk", std::move(at_risk)},
+          {"decides", std::move(decides)},
+          {"recommendation", choice_sentences(choice)},
           {"notes", choice.notes},
           {"candidates", std::move(candidates)}};
 }

@@ -283,6 +283,171 @@ std::vector<RiskSizes> risk_sizes(const commission::MarginSurvey& survey) {
   return all;
 }
 
+double DetectionCurve::size_within(const std::vector<std::pair<double, double>>& curve, double within) {
+  double size = core::kInfinity;
+  for (const auto& [delay, at] : curve) {
+    size = delay <= within ? std::min(size, at) : size;
+  }
+  return size;
+}
+
+std::vector<DetectionCurve> detection_curves(const commission::MarginSurvey& survey,
+                                             const std::vector<std::string>& names) {
+  constexpr std::size_t kMost = 3;
+  const auto wanted = [&](const detector::FaultMargins& margins) {
+    return std::ranges::find(names, margins.fault.name) != names.end();
+  };
+  const std::vector<detector::FaultMargins>& all = survey.residuals.front().margins;
+  const bool any = std::ranges::any_of(all, wanted);
+  std::vector<DetectionCurve> curves;
+  for (const detector::FaultMargins& margins : all) {
+    const bool known = !curves.empty() && curves.back().fault.name == margins.fault.name;
+    if (!known && !margins.fault.whole && (any ? wanted(margins) : curves.size() < kMost)) {
+      curves.push_back({margins.fault, {}, {}});
+    }
+  }
+  // The larger of the sides, of each side the smallest of several residuals.
+  const auto largest = [](const DetectionCurve& curve,
+                          const std::vector<const std::vector<detector::FaultMargins>*>& of, std::size_t window) {
+    double size = 0.0;
+    for (const double side : {1.0, -1.0}) {
+      double best = core::kInfinity;
+      bool there = false;
+      for (const std::vector<detector::FaultMargins>* list : of) {
+        for (const detector::FaultMargins& margins : *list) {
+          if (margins.fault.name == curve.fault.name && margins.side == side) {
+            best = std::min(best, detector::summarise(margins, window).median);
+            there = true;
+          }
+        }
+      }
+      size = there ? std::max(size, best) : size;
+    }
+    return size;
+  };
+  const auto fill = [&](const DetectionCurve& curve, const std::vector<double>& windows,
+                        const std::vector<const std::vector<detector::FaultMargins>*>& of) {
+    std::vector<std::pair<double, double>> points;
+    for (std::size_t w = 0; w < windows.size(); ++w) {
+      const double size = largest(curve, of, w);
+      if (std::isfinite(size) && size > 0.0) {
+        points.emplace_back(windows[w], size);
+      }
+    }
+    return points;
+  };
+  std::vector<const std::vector<detector::FaultMargins>*> residuals;
+  for (const commission::ResidualMargins& residual : survey.residuals) {
+    residuals.push_back(&residual.margins);
+  }
+  for (DetectionCurve& curve : curves) {
+    curve.every_noise = fill(curve, survey.windows, residuals);
+    if (survey.at_risk) {
+      curve.at_risk = fill(curve, survey.at_risk->windows, {&survey.at_risk->margins});
+    }
+  }
+  return curves;
+}
+
+std::string odds_words(double probability) {
+  if (!(probability > 0.0)) {
+    return "none";
+  }
+  const double odds = 1.0 / probability;
+  const double power = std::pow(10.0, std::floor(std::log10(odds)) - 1.0);
+  const double rounded = std::floor(odds / power) * power;
+  return rounded >= 1e6   ? fmt::format("one in {:.10g} million", rounded / 1e6)
+         : rounded >= 100 ? "one in " + count(static_cast<std::size_t>(rounded))
+                          : fmt::format("one in {:g}", rounded);
+}
+
+std::vector<std::string> choice_sentences(const commission::DetectorChoice& choice) {
+  std::vector<std::string> sentences;
+  if (!choice.chosen || !choice.candidates.front().miss) {
+    return sentences;
+  }
+  const commission::DetectorCandidate& chosen = choice.candidates.front();
+  const auto size = [](const commission::StatedMargin& margin, double of) {
+    return !std::isfinite(of)   ? std::string("no size")
+           : margin.unit == "1" ? percent(of, 2)
+                                : with_unit(number(of, 2), margin.unit);
+  };
+  const auto after = [](double delay) {
+    return std::isfinite(delay) ? fmt::format("after {:.3g} s", delay) : std::string("not certain");
+  };
+  // The candidate that is best at the risk, where it is another.
+  const commission::DetectorCandidate* best = &chosen;
+  for (const commission::DetectorCandidate& each : choice.candidates) {
+    best = each.size_at_risk && *each.size_at_risk < *best->size_at_risk * (1.0 - choice.tie) ? &each : best;
+  }
+  const double spread = choice.risk_spread.value_or(0.0);
+  if (spread <= choice.tie) {
+    sentences.emplace_back(
+        "At the stated risk all candidates are certain of the same sizes: the sums do not pass through the filter, "
+        "which "
+        "decides for every noise alone.");
+  } else {
+    sentences.push_back(
+        fmt::format("At the stated risk {}: the sums do not pass through the filter, but its order says whether they "
+                    "read speeds or "
+                    "angles, and their set is a part of its guaranteed one.",
+                    std::isfinite(spread) ? "the candidates’ sizes differ by up to " + percent(spread, 2)
+                                          : std::string("some candidates are certain of faults that others are not")));
+  }
+  if (best != &chosen) {
+    sentences.push_back(fmt::format(
+        "Best at the risk is order {}, β = {}, with {} of the stated size where the chosen one has {}{}.",
+        best->filter.order, number(best->filter.beta), number(*best->size_at_risk), number(*chosen.size_at_risk),
+        choice.either ? "" : "; `--guarantee either` chooses by whichever guarantee sees a fault first"));
+  }
+  for (const commission::StatedMargin& margin : chosen.faults) {
+    const std::optional<double> from = commission::risk_decides_from(margin, choice.window);
+    const double step = choice.window / static_cast<double>(margin.medians.size());
+    const std::string who = !from                 ? "the guarantee for every noise decides at every delay"
+                            : *from <= step * 1.5 ? "the stated risk decides at every delay"
+                                                  : fmt::format(
+                                                        "the guarantee for every noise decides up to {:.3g} s, the "
+                                                        "stated risk from there on",
+                                                        *from - step);
+    sentences.push_back(fmt::format(
+        "{} {}: {}; within {:g} s {} for every noise, {} at the risk; one of {} is seen {} for every noise, {} at the "
+        "risk.",
+        spaced(margin.fault), margin.side > 0.0 ? "growing" : "shrinking", who, choice.window,
+        size(margin, margin.median), size(margin, margin.at_risk ? margin.at_risk->median : core::kInfinity),
+        size(margin, margin.asked), after(margin.delay),
+        after(margin.at_risk ? margin.at_risk->delay : core::kInfinity)));
+  }
+  sentences.push_back(
+      fmt::format("At the risk{}: such a fault is missed with a probability of at most {:.2g} ({}).",
+                  chosen.risk_warrant == core::Warrant::guaranteed ? "" : ", while errors stay as this log shows them",
+                  *chosen.miss, odds_words(*chosen.miss)));
+  return sentences;
+}
+
+std::array<std::string, 2> how_sure(const commission::MarginSurvey& survey) {
+  constexpr double kYear = 365.25 * 86400.0;
+  const core::Warrant warrant = survey.residuals.front().warrant;
+  std::array<std::string, 2> sure;
+  sure[0] = warrant == core::Warrant::guaranteed
+                ? "For every noise within its bounds: such a fault is never missed, and there is never a false alarm, "
+                  "whatever the noise does within the declared bounds."
+            : warrant == core::Warrant::statistical
+                ? "For every noise within its bounds, as they hold at the confidence at which the declared noise was "
+                  "taken through the filter."
+                : "For every noise within its bounds, as they were extrapolated from the commissioning log.";
+  if (!survey.at_risk) {
+    sure[1] = "Nothing is said at a stated risk: " + survey.without_risk + ".";
+    return sure;
+  }
+  const commission::RiskMargins& risk = *survey.at_risk;
+  sure[1] = fmt::format(
+      "At the stated risk, while errors average out as {}: such a fault is missed with a probability of at most {:.2g} "
+      "({}), and at most one false alarm is to be expected in {:.2g} years of driving.",
+      risk.warrant == core::Warrant::guaranteed ? "the robot file declares" : "the commissioning log shows them",
+      risk.miss, odds_words(risk.miss), 1.0 / (risk.false_alarms * kYear));
+  return sure;
+}
+
 std::string risk_meaning(const commission::RiskMargins& margins) {
   return fmt::format(
       "“At the stated risk” is meant for all parameters that the set at a risk of {:g} allows, while the errors "

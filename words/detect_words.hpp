@@ -6,8 +6,10 @@
 #include <array>
 #include <cstddef>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include <wheelwright/commission/detector_choice.hpp>
 #include <wheelwright/commission/detector_walk.hpp>
 #include <wheelwright/commission/margin_survey.hpp>
 #include <wheelwright/words/text.hpp>
@@ -52,6 +54,33 @@ inline constexpr std::array<double, 3> kRiskWindows = {1.0, 5.0, 20.0};
 
 /// Of every fault that has a certain size at the stated risk; nothing where the survey says nothing at a risk.
 [[nodiscard]] std::vector<RiskSizes> risk_sizes(const commission::MarginSurvey& survey);
+
+/// Smallest certain sizes of one fault over the time to detection, the larger of its sides, median over onsets: (s,
+/// size), ascending, as far as there is one.
+struct DetectionCurve {
+  model::FaultType fault;
+  std::vector<std::pair<double, double>> every_noise;  ///< for every noise within its bounds, the better residual's
+  std::vector<std::pair<double, double>> at_risk;      ///< at the stated risk
+
+  /// The size that is certain within `within` s; infinite where there is none.
+  [[nodiscard]] static double size_within(const std::vector<std::pair<double, double>>& curve, double within);
+};
+
+/// Those of the faults `names`, as far as the survey has them; of its first faults where it has none of these.
+[[nodiscard]] std::vector<DetectionCurve> detection_curves(const commission::MarginSurvey& survey,
+                                                           const std::vector<std::string>& names);
+
+/// "one in 590 million": a chance of no more than `probability`.
+[[nodiscard]] std::string odds_words(double probability);
+
+/// Which guarantee decides for which of the stated faults, and from which delay on, for the chosen detector: one
+/// sentence for each fault and side, and before them what the filter has to do with it. Empty where nothing is said at
+/// a risk.
+[[nodiscard]] std::vector<std::string> choice_sentences(const commission::DetectorChoice& choice);
+
+/// What each guarantee is worth, a sentence for each: how sure it is that a fault is seen, and that an alarm is one.
+/// The second says why there is none where there is none.
+[[nodiscard]] std::array<std::string, 2> how_sure(const commission::MarginSurvey& survey);
 
 /// In which sense a size is called certain at the stated risk, one sentence.
 [[nodiscard]] std::string risk_meaning(const commission::RiskMargins& margins);

@@ -750,6 +750,7 @@ def design(
     criterion: Literal["geometric_mean", "mean", "largest"] = "geometric_mean",
     faults: Mapping[str, float] = {},
     stages: int = 4,
+    guarantee: Literal["every_noise", "at_risk"] = "every_noise",
     seed: int = 1,
     threads: int = 1,
     progress: _Progress = None,

@@ -43,6 +43,26 @@ TEST_F(Choose, GivesADetectorAndWhatTheOthersCost) {
   EXPECT_EQ(files::read_json(path("again/model.json")).at("parameters"), model.at("parameters"));
 }
 
+// The robot file declares errors that average out: the answer at the risk stands beside the one for every noise, and
+// either can be asked for.
+TEST_F(Choose, SaysWhichGuaranteeDecides) {
+  prepare();
+  const std::string choose = "choose learn.csv --robot robot.yaml --fault effort_bias_right=0.2 --window 2 ";
+  const Outcome told = run(choose + "--guarantee either --json --quiet");
+  ASSERT_EQ(told.code, 0) << told.err;
+  const Json json = Json::parse(told.out);
+  EXPECT_EQ(json.at("guarantee"), "either");
+  ASSERT_FALSE(json.at("at_risk").is_null());
+  EXPECT_LT(json.at("at_risk").at("miss").get<double>(), 1e-8);
+  ASSERT_EQ(json.at("decides").size(), 2U);
+  for (const Json& fault : json.at("candidates").at(0).at("faults")) {
+    const double either = fault.at("either").at("median").get<double>();
+    EXPECT_LE(either, fault.at("at_risk").at("median").get<double>());
+  }
+  EXPECT_GE(json.at("recommendation").size(), 4U);  // what the filter has to do with it, two sides, and the chance
+  EXPECT_EQ(run(choose + "--guarantee both").code, 2);
+}
+
 TEST_F(Choose, TellsWhatIsWrongWithAQuestion) {
   prepare();
   const std::string choose = "choose learn.csv --robot robot.yaml ";

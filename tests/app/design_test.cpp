@@ -71,6 +71,26 @@ TEST_F(SlowDesign, DesignSimulateCommissionInARow) {
   }
 }
 
+TEST_F(Design, TellsBothPromises) {
+  const std::string design = "design --robot robot.yaml --json --duration 10 --stages 1 --rate 50";
+  const Outcome told = run(design + kLimits);
+  ASSERT_EQ(told.code, 0) << told.err;
+  const Json json = Json::parse(told.out);
+  EXPECT_EQ(json.at("guarantee"), "every_noise");
+  EXPECT_EQ(json.at("at_risk").at("warrant"), "guaranteed");
+  for (const Json& parameter : json.at("parameters")) {
+    EXPECT_LT(parameter.at("at_risk").at("promised").at("physical_half_width").get<double>(),
+              parameter.at("promised").at("physical_half_width").get<double>());
+  }
+  std::string sure = bytes(path("robot.yaml"));
+  sure.replace(sure.find("{bound: 0.02, bias: 0.0001}"), 27, "0.02");
+  put("sure.yaml", sure);
+  const Outcome refused =
+      run(std::string("design --robot sure.yaml --guarantee at-risk --duration 10 --stages 1") + kLimits);
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_THAT(refused.err, AllOf(HasSubstr("--guarantee"), HasSubstr("bias")));
+}
+
 TEST_F(Design, WhatIsMissingIsAskedFor) {
   EXPECT_EQ(run("design").code, 2);
   EXPECT_EQ(run("design --for bounds").code, 2);

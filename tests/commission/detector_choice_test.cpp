@@ -124,6 +124,71 @@ TEST(DetectorChoice, BoundsThatMayFailAreNeverWider) {
   EXPECT_TRUE(narrower);
 }
 
+Scenario averaging_drive() {
+  Scenario s = noisy_drive(8, 20.0);
+  s.robot.noise.effort.bias = 0.0;
+  s.robot.effort_changes = model::EffortChanges::at_samples;
+  return s;
+}
+
+// Sums do not pass through the filter: of two filters, whose guaranteed sizes differ, they promise nearly the same.
+TEST(DetectorChoice, TheFilterHardlyMattersAtTheRisk) {
+  const Scenario s = averaging_drive();
+  const LogTable log = log_of(s);
+  TrialOptions options = few();
+  options.faults = {{"effort_bias_right", 0.1}};
+  options.window = 5.0;
+  std::vector<StatedMargin> margins;
+  for (const double beta : {4.0, 30.0}) {
+    const DetectorCandidate candidate = try_detector(log, s.robot, design_of(2, beta), {{}}, "", options).candidates[0];
+    ASSERT_EQ(candidate.failure, "");
+    ASSERT_TRUE(candidate.miss && candidate.faults[0].at_risk && candidate.faults[0].either);
+    margins.push_back(candidate.faults[0]);
+  }
+  EXPECT_GT(std::abs(margins[0].median / margins[1].median - 1.0), 0.1);
+  EXPECT_NEAR(margins[0].at_risk->median / margins[1].at_risk->median, 1.0, 0.05);
+  for (const StatedMargin& margin : margins) {
+    EXPECT_LT(margin.at_risk->median, margin.median);
+    EXPECT_LE(margin.either->median, std::min(margin.median, margin.at_risk->median));
+    EXPECT_LE(margin.either->delay, std::min(margin.delay, margin.at_risk->delay));
+    EXPECT_EQ(margin.medians.back(), margin.median);
+    // From that delay on the sums are sharper, just before it they are not.
+    const auto from = risk_decides_from(margin, options.window);
+    ASSERT_TRUE(from);
+    const auto at = static_cast<std::size_t>(std::lround(*from / options.window * 40.0)) - 1;
+    for (std::size_t k = at; k < 40; ++k) {
+      EXPECT_LT(margin.at_risk->medians[k], margin.medians[k]);
+    }
+    if (at > 0) {
+      EXPECT_GE(margin.at_risk->medians[at - 1], margin.medians[at - 1]);
+    }
+  }
+}
+
+TEST(DetectorChoice, CanCountWhatEitherGuaranteeSees) {
+  const Scenario s = averaging_drive();
+  DetectorChoiceOptions options{.trial = few()};
+  options.trial.faults = {{"effort_loss_right", 0.3}};
+  options.trial.window = 2.0;
+  options.beta_factor = 4.0;
+  options.most_refinements = 0;
+  options.persistences.clear();
+  options.either = true;
+  const LogTable log = log_of(s);
+  TableSource source(log);
+  const DetectorChoice choice = choose_detector(source, s.robot, options);
+  ASSERT_TRUE(choice.chosen);
+  ASSERT_TRUE(choice.risk_spread);
+  for (const DetectorCandidate& each : choice.candidates) {
+    double size = 0.0;
+    for (const StatedMargin& margin : each.faults) {
+      size = std::max(size, (margin.either ? margin.either->median : margin.median) / margin.asked);
+    }
+    EXPECT_EQ(each.size, each.failure.empty() ? size : each.size);
+    EXPECT_LE(choice.candidates.front().size, each.size * (1.0 + options.tie));
+  }
+}
+
 TEST(DetectorChoice, TakesTheBestOfItsOwnTable) {
   const Scenario s = speeds_drive();
   const LogTable log = log_of(s);

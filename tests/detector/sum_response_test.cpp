@@ -128,6 +128,45 @@ TEST(SumResponse, IsWhatFaultsDoToTheSums) {
   }
 }
 
+// A robot that was broken before it begins to move differs from one that breaks while it stands in no sum; where a
+// fault moves the wheels at once (slip), the onset has an impulse that the other has not.
+TEST(SumResponse, WhatWasBrokenBeforeHasNoOnset) {
+  const Commissioned robot = commissioned_at_risk(1);
+  const FaultyRun run = run_of(robot, 101, breakages().front());
+  const OnlineModel& model = run.robot->model;
+  const LogTable healthy = log_of(run, 0.0, false);
+  const ReferenceMotion motion = motion_of(healthy, model);
+  TableSource source(healthy);
+  const auto drive = read_sum_drive(source, model, motion);
+  ASSERT_TRUE(drive);
+  const auto catalogue = model::fault_catalogue(model.model, model.estimate);
+  for (const char* name : {"effort_loss_right", "effort_bias_right", "payload_lost", "matched"}) {
+    SumResponse response(model::find_fault(catalogue, name), model, motion, *drive);
+    std::map<std::size_t, double> set_in;
+    const std::vector<std::size_t> onsets{0};
+    response.walk(onsets, kInfinity, [&](const SumResponse::At& at) { set_in[at.look] = at.once; });
+    std::size_t visited = 0;
+    double most = 0.0, apart = 0.0;
+    response.walk_broken([&](const SumResponse::At& at) {
+      EXPECT_EQ(at.onset, 0U);
+      ASSERT_TRUE(set_in.contains(at.look));
+      most = std::max(most, std::abs(at.once));
+      apart = std::max(apart, std::abs(at.once - set_in[at.look]));
+      ++visited;
+    });
+    EXPECT_EQ(visited, set_in.size()) << name;
+    ASSERT_GT(most, 0.0) << name;
+    if (std::string(name) == "matched") {
+      // Weights rise from the beginning on: what an impulse there adds is small.
+      EXPECT_LE(apart, 0.5 * most);
+    } else {
+      EXPECT_LE(apart, 1e-9 * most) << name;
+    }
+  }
+  SumResponse drifting(model::find_fault(catalogue, "wheel_radius_drift"), model, motion, *drive);
+  EXPECT_THROW(drifting.walk_broken([](const SumResponse::At&) {}), InvalidArgument);
+}
+
 // Rows of a rounded reading and of the motion itself: they are apart by what is allowed for.
 TEST(SumResponse, AllowsForAMeasuredMotionsErrors) {
   const Commissioned robot = commissioned_at_risk(3);
