@@ -3,12 +3,132 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <map>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 #include <boost/math/quadrature/gauss_kronrod.hpp>
 
+#include <wheelwright/commission/commission.hpp>
+
+#include "support/exact_axis.hpp"
+
 namespace wheelwright::detector::scale_detector_test {
 namespace {
+
+// An axis that is known exactly, and whose efforts have no bias: what stands beside its sums are errors of angles and
+// of efforts alone.
+OnlineModel known_axis(const testing_support::ExactAxis& axis) {
+  const LogTable log = drive(axis, 1);
+  TableSource source(log);
+  OnlineModel m = commission_robot(source, robot_of(axis)).model;
+  m.at_risk->errors.effort.bias = 0.0;
+  m.at_risk->facets.clear();
+  for (std::size_t q = 0; q < m.at_risk->box.sides.size(); ++q) {
+    const double theta = m.estimate[static_cast<Eigen::Index>(q)];
+    m.at_risk->box.sides[q] = {theta, theta};
+  }
+  m.errors.between_samples = false;
+  return m;
+}
+
+// The last look at every sum, by weight and scale.
+using Looks = std::map<std::pair<std::size_t, std::size_t>, SumState>;
+Looks last_looks(const LogTable& log, const OnlineModel& m) {
+  ScaleDetector detector(m);
+  Looks looks;
+  for (std::size_t k = 0; k < log.rows(); ++k) {
+    const double sample[2] = {log.columns[0][k], log.columns[1][k]};
+    detector.step(log.t[k], sample);
+    for (const SumState& look : detector.looks()) {
+      looks[{look.weight, look.scale}] = look;
+    }
+  }
+  return looks;
+}
+
+// By how much each sample of `column` moves every sum, per unit: no code of the bounds is in it. Sums are linear in
+// efforts, and those with constant weights in angles.
+std::map<std::pair<std::size_t, std::size_t>, std::vector<double>> sample_weights(LogTable log, const OnlineModel& m,
+                                                                                  std::size_t column, double by) {
+  const Looks before = last_looks(log, m);
+  std::map<std::pair<std::size_t, std::size_t>, std::vector<double>> all;
+  for (double& value : log.columns[column]) {
+    const double read = value;
+    value += by;
+    for (const auto& [which, look] : last_looks(log, m)) {
+      all[which].push_back((look.value - before.at(which).value) / by);
+    }
+    value = read;
+  }
+  return all;
+}
+
+TEST(ScaleDetector, AllowsForTheWorstErrorsOfAngles) {
+  for (const double jitter : {0.0, 0.3}) {
+    testing_support::ExactAxis axis{.seconds = 30.0, .count = 1e-3, .jitter = jitter};
+    const OnlineModel m = known_axis(axis);
+    axis.seconds = 7.0;
+    const LogTable log = drive(axis, 2);
+    const Looks looks = last_looks(log, m);
+    std::size_t seen = 0;
+    for (const auto& [which, weights] : sample_weights(log, m, 0, 1e-3)) {
+      if (sum_weights(m.model)[which.first].shape != SumWeight::Shape::constant) {
+        continue;
+      }
+      double worst = 0.0;
+      for (const double weight : weights) {
+        worst += std::abs(weight) * m.at_risk->errors.motion.bound;
+      }
+      const SumState& look = looks.at(which);
+      EXPECT_GE(look.radius - look.averaged, worst * (1.0 - 1e-6)) << which.second;
+      seen += worst > 0.0 ? 1 : 0;
+    }
+    EXPECT_GE(seen, 4U);
+  }
+}
+
+// Independent errors of the law that has the largest generating function of all with their bound and deviation (two
+// points) exceed x with a chance that Chernoff's inequality tells, and no bound for all such laws by exponential
+// supermartingales can be below that.
+TEST(ScaleDetector, AllowsForTheWorstLawOfEfforts) {
+  for (const double deviation : {0.05, 0.3, 0.577, 1.0}) {
+    testing_support::ExactAxis axis{.seconds = 30.0};
+    axis.law = deviation < 1.0 ? testing_support::ErrorLaw::spikes : axis.law;
+    axis.deviation = deviation * axis.bound;
+    const OnlineModel m = known_axis(axis);
+    axis.seconds = 5.0;
+    const LogTable log = drive(axis, 2);
+    const Looks looks = last_looks(log, m);
+    const ScaleDetectorOptions usual;
+    const double share =
+        usual.false_alarms / static_cast<double>(sum_weights(m.model).size() * m.at_risk->scales.size());
+    const double up = axis.bound, often = deviation * deviation / (1.0 + deviation * deviation);
+    const double down = -up * often / (1.0 - often);
+    std::size_t seen = 0;
+    for (const auto& [which, weights] : sample_weights(log, m, 1, 1.0)) {
+      const double L = std::log(usual.checks / (share * m.at_risk->scales[which.second]));
+      double size = 0.0, least = 1e300;
+      for (const double weight : weights) {
+        size = std::max(size, std::abs(weight));
+      }
+      for (double lambda = 1e-4 / (size * up); lambda < 1e3 / (size * up); lambda *= 1.05) {
+        double sum = L;
+        for (const double weight : weights) {
+          const double by = lambda * std::abs(weight), most = std::max(by * up, 0.0);
+          sum += most + std::log(often * std::exp(by * up - most) + (1.0 - often) * std::exp(by * down - most));
+        }
+        least = std::min(least, sum / lambda);
+      }
+      EXPECT_GE(looks.at(which).averaged, least * (1.0 - 1e-9)) << deviation << ' ' << which.first << ' '
+                                                                 << which.second;
+      ++seen;
+    }
+    EXPECT_GE(seen, 12U);
+  }
+}
 
 // ln of the mixture of exp(λS − λ²V/2): half over a Gaussian of variance 1/V0 that is cut off at ±Λ, half at ±Λ.
 double log_mixture(double S, double V, double V0, double reach) {
