@@ -42,18 +42,7 @@ RiskWatch watch_at_risk(LogSource& log, const OnlineModel& model, double merge) 
   const detector::ScaleDetectorOptions options;
   detector::ScaleDetector detector(model, options);
   RiskRecorder recorder(merge);
-  const std::vector<std::size_t> pick = core::positions_of(log, model.measurement.columns());
-  std::vector<double> sample(pick.size());
-  core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
-    if (starts) {
-      detector.restart();
-    }
-    for (std::size_t c = 0; c < pick.size(); ++c) {
-      sample[c] = block.columns[pick[c]][k];
-    }
-    detector.step(block.t[k], sample);
-    recorder.add(detector, block.t[k]);
-  });
+  detector::walk_log(log, detector, [&](double t, bool, bool) { recorder.add(detector, t); });
   recorder.watch().watched = true;
   recorder.watch().false_alarms = options.false_alarms;
   return std::move(recorder.watch());

