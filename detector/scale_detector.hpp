@@ -82,9 +82,9 @@ struct SumConstants {
 /// their variance proxy (error_class.hpp), |S − bias| <= L/λ + λV/2 for a λ that is fixed beforehand, but for the
 /// probability 2e^{−L}, and the least of that over several λ at no more than a part of that risk for each
 /// (averaged_radius(); method of mixtures: Robbins 1970; de la Peña, Klass, Lai 2004). All else counts at its worst:
-/// bias, the angles' errors, what happens between samples, and any θ of the set. A sum is looked at `checks` times in its scale, and the
-/// risks of all looks at all sums add up to ScaleDetectorOptions::false_alarms. No assumption on the drive, the noise's
-/// law, or when a fault comes.
+/// bias, the angles' errors, what happens between samples, and any θ of the set. A sum is looked at `checks` times in
+/// its scale, and the risks of all looks at all sums add up to ScaleDetectorOptions::false_alarms. No assumption on the
+/// drive, the noise's law, or when a fault comes.
 ///
 /// step() does not allocate but in linear programs where the set has more vertices than a table takes. Memory and work
 /// per sample do not depend on time.

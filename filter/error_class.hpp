@@ -55,10 +55,10 @@ struct SampleClass {
 inline constexpr double kCountsThatAverage = 4.0;
 
 /// Variance proxy s² of an error e that averages out: E exp(λ (e − mean)) <= exp(λ² s²/2), whatever happened before,
-/// for every λ: of all laws with that bound and deviation, those of two points, b = bound + bias and −deviation²/b,
-/// have the largest generating function [boucheron2013], and theirs is bounded by deviation² sinh(l)/l with
-/// l = 2 ln(b/deviation) [kearns1998]. No larger than Hoeffding's, bound². For errors that are alike within a correlation time both
-/// hold with its number of samples (Hölder's inequality).
+/// for every λ. Of all laws with that bound and deviation the one of two points, b = bound + bias and −deviation²/b,
+/// has the largest generating function [boucheron2013], and that is bounded by deviation² sinh(l)/l with l = 2
+/// ln(b/deviation) [kearns1998]. No larger than Hoeffding's, bound². For errors that are alike within a correlation
+/// time both hold with its number of samples (Hölder's inequality).
 [[nodiscard]] inline double variance_proxy(const SampleClass& sample) {
   const double most = sample.bound + sample.bias, square = sample.bound * sample.bound;
   const double deviation = sample.deviation * sample.deviation;
