@@ -83,6 +83,9 @@ TEST(ScaleDetector, AllowsForTheWorstErrorsOfAngles) {
       }
       const SumState& look = looks.at(which);
       EXPECT_GE(look.radius - look.averaged, worst * (1.0 - 1e-6)) << which.second;
+      if (5.0 * m.at_risk->scales[which.second] <= axis.seconds) {  // sharp, once weights have risen and are old
+        EXPECT_LE(look.radius - look.averaged, worst * 2.0) << which.second;
+      }
       seen += worst > 0.0 ? 1 : 0;
     }
     EXPECT_GE(seen, 4U);
