@@ -5,7 +5,8 @@
 /// The robots, drives and faults of the study of peers, well identified. For every run the smallest size that
 /// ScaleDetector sees within 5 s of the onset (in steps of 2^(1/4), noise and all), and the smallest that the most
 /// powerful test at the same rate of false alarms sees as often as not, for Gaussian errors of the deviations that the
-/// robot file declares. Prints Markdown: medians over runs.
+/// robot file declares. Prints Markdown: medians over runs, and what the thresholds of the sums that saw them are made
+/// of: errors that average out, errors at their worst (angles, bias, between samples), and the set.
 ///
 ///     wheelwright-risk-limit [--seed S] [--robots R] [--runs K]
 #include <algorithm>
@@ -15,6 +16,7 @@
 #include <cstdlib>
 #include <limits>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -41,7 +43,8 @@ struct Options {
 
 struct Cell {
   std::string unit;
-  std::vector<double> seen, limit, ratio;  // run by run
+  std::vector<double> seen, limit, ratio;    // run by run
+  std::vector<double> averaged, worst, set;  // shares of the threshold
 };
 
 double median(std::vector<double> values) {
@@ -53,22 +56,17 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-bool sees(detector::ScaleDetector& detector, const std::vector<std::string>& columns, const LogTable& table,
-          double onset) {
+// The look that raises the first alarm within kPatience of the onset.
+std::optional<detector::SumState> sees(detector::ScaleDetector& detector, const LogTable& table, double onset) {
   TableSource log(table);
-  const std::vector<std::size_t> pick = core::positions_of(log, columns);
-  std::vector<double> sample(pick.size());
+  std::optional<detector::SumState> found;
   detector.restart();
-  for (std::size_t k = 0; k < table.rows(); ++k) {
-    for (std::size_t c = 0; c < pick.size(); ++c) {
-      sample[c] = table.columns[pick[c]][k];
+  detector::walk_log(log, detector, [&](double t, bool, bool) {
+    if (!found && detector.alarm() && t >= onset && t <= onset + kPatience) {
+      found = *std::ranges::find_if(detector.looks(), [](const auto& look) { return look.excess > 0.0; });
     }
-    detector.step(table.t[k], sample);
-    if (detector.alarm() && table.t[k] >= onset && table.t[k] <= onset + kPatience) {
-      return true;
-    }
-  }
-  return false;
+  });
+  return found;
 }
 
 detector::ReferenceMotion noise_free(const Subject& subject, Scenario drive) {
@@ -105,9 +103,15 @@ void study_robot(const Options& options, std::uint64_t robot, std::array<std::ma
                                                      {.motion = subject.angle_sd, .effort = subject.torque_sd}, theta,
                                                      motion, fault.type, run.side, onset, question));
         double size = cell.limit.back();
-        while (size <= largest && !sees(detector, m.measurement.columns(),
-                                        testing_support::log_of(run, run.side * size, true), run.onset)) {
+        std::optional<detector::SumState> look;
+        while (size <= largest &&
+               !(look = sees(detector, testing_support::log_of(run, run.side * size, true), run.onset))) {
           size *= std::exp2(0.25);
+        }
+        if (look) {
+          cell.averaged.push_back(look->averaged / look->threshold);
+          cell.worst.push_back((look->radius - look->averaged) / look->threshold);
+          cell.set.push_back(1.0 - look->radius / look->threshold);
         }
         cell.seen.push_back(size <= largest ? size : kNever);
         cell.ratio.push_back(cell.seen.back() / cell.limit.back());
@@ -118,23 +122,31 @@ void study_robot(const Options& options, std::uint64_t robot, std::array<std::ma
 
 void print(const std::array<std::map<std::string, Cell>, 3>& cells) {
   fmt::print(
-      "| fault, driving | sums | limit | ratio |\n"
-      "|---|---|---|---|\n");
+      "| fault, driving | sums | limit | ratio | averaged | at worst | set |\n"
+      "|---|---|---|---|---|---|---|\n");
   const auto number = [](double x) { return x == kNever ? std::string("–") : fmt::format("{:.2g}", x); };
-  std::vector<double> all;
+  const auto shares = [](const Cell& cell) {
+    return fmt::format("{:.2f} | {:.2f} | {:.2f}", median(cell.averaged), median(cell.worst), median(cell.set));
+  };
+  Cell all;
+  const auto add = [](Cell& to, const Cell& cell) {
+    for (const auto part : {&Cell::ratio, &Cell::averaged, &Cell::worst, &Cell::set}) {
+      (to.*part).insert((to.*part).end(), (cell.*part).begin(), (cell.*part).end());
+    }
+  };
   for (const auto& [name, unused] : cells[0]) {
-    std::vector<double> of_fault;
+    Cell of_fault;
     for (const Driving driving : kDriving) {
       const Cell& cell = cells[static_cast<std::size_t>(driving)].at(name);
       const std::string unit = cell.unit == "1" ? "" : " " + cell.unit;
-      fmt::print("| {}, {} | {}{} | {}{} | {} |\n", name, to_string(driving), number(median(cell.seen)), unit,
-                 number(median(cell.limit)), unit, number(median(cell.ratio)));
-      of_fault.insert(of_fault.end(), cell.ratio.begin(), cell.ratio.end());
+      fmt::print("| {}, {} | {}{} | {}{} | {} | {} |\n", name, to_string(driving), number(median(cell.seen)), unit,
+                 number(median(cell.limit)), unit, number(median(cell.ratio)), shares(cell));
+      add(of_fault, cell);
     }
-    fmt::print("| {}, all | | | {} |\n", name, number(median(of_fault)));
-    all.insert(all.end(), of_fault.begin(), of_fault.end());
+    fmt::print("| {}, all | | | {} | {} |\n", name, number(median(of_fault.ratio)), shares(of_fault));
+    add(all, of_fault);
   }
-  fmt::print("| all ({} runs) | | | {} |\n", all.size(), number(median(all)));
+  fmt::print("| all ({} runs) | | | {} | {} |\n", all.ratio.size(), number(median(all.ratio)), shares(all));
 }
 
 }  // namespace

@@ -32,16 +32,8 @@ void look_at_sums(LogSource& log, const OnlineModel& model, double risk, double 
   const detector::ScaleDetectorOptions options{.false_alarms = 0.5 * risk / std::max(seconds, 1.0)};
   detector::ScaleDetector detector(model, options);
   SumSpread spread(model.at_risk->usual, options.checks, 0.5 * risk);
-  const std::vector<std::size_t> pick = core::positions_of(log, model.measurement.columns());
-  std::vector<double> sample(pick.size());
-  core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
-    if (starts) {
-      detector.restart();
-    }
-    for (std::size_t c = 0; c < pick.size(); ++c) {
-      sample[c] = block.columns[pick[c]][k];
-    }
-    if (!detector.step(block.t[k], sample)) {
+  detector::walk_log(log, detector, [&](double, bool, bool looked) {
+    if (!looked) {
       return;
     }
     const Eigen::MatrixXd variances = detector.variances();

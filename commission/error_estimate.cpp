@@ -33,20 +33,11 @@ std::optional<double> effort_deviation(LogSource& log, const OnlineModel& model,
   detector::ScaleDetector detector(probe);
   const std::size_t scales = detector.scales().size();
   std::vector<double> ratio(scales, 0.0), count(scales, 0.0);
-  const std::vector<std::size_t> pick = core::positions_of(log, model.measurement.columns());
-  std::vector<double> sample(pick.size());
   double seconds = 0.0, last = 0.0;
-  core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
-    if (starts) {
-      detector.restart();
-    } else {
-      seconds += block.t[k] - last;
-    }
-    last = block.t[k];
-    for (std::size_t c = 0; c < pick.size(); ++c) {
-      sample[c] = block.columns[pick[c]][k];
-    }
-    if (!detector.step(block.t[k], sample)) {
+  detector::walk_log(log, detector, [&](double t, bool starts, bool looked) {
+    seconds += starts ? 0.0 : t - last;
+    last = t;
+    if (!looked) {
       return;
     }
     const Eigen::MatrixXd variances = detector.variances();

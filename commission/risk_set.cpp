@@ -73,7 +73,7 @@ double taper(const Stretch& stretch, double from, double t) {
 struct Ellipsoid {
   double delay = 0.0;
   std::vector<Eigen::Index> block;
-  Eigen::MatrixXd M, V, V0;  // V of the smaller proxies, or of Hoeffding's: as squared_radius is
+  Eigen::MatrixXd M, V, V0;  // V of the smaller proxies, or of those for every λ: as squared_radius is
   Eigen::VectorXd straight;  // per instrument: ErrorShare::straight
   double risk = 0.0, squared_radius = 0.0, log_volume = 0.0;
   bool usable = false;
@@ -108,7 +108,7 @@ constexpr double kSpread = 0.01;  // η of (a + b)(a + b)ᵀ <= (1 + η) aaᵀ +
 constexpr std::array<double, 3> kExpected = {0.1, 0.01, 0.001};
 constexpr double kRounding = 1e-10;  // relative, of all sums
 constexpr double kReach = 1.1;       // for λᵀV0λ, in units of what an ellipsoid asks for if V is as V0 makes expect
-constexpr double kHoeffding = 0.1;   // part of the risk that is kept for Hoeffding's proxies, where others are smaller
+constexpr double kEvery = 0.1;       // part of the risk that is kept for proxies for every λ, where others are smaller
 
 // The sum of cᵀc over samples times their variance proxy, each c within middle ± spread.
 class Variances {
@@ -136,7 +136,7 @@ class SelfNormalised {
  public:
   // `grown`: what the log's beginning is to be multiplied by to be like the whole.
   SelfNormalised(Eigen::Index size, double expected, double grown, double log_risk)
-      : scale_(expected * grown), prior_(size), small_(size), hoeffding_(size), V0_(size, size) {
+      : scale_(expected * grown), prior_(size), small_(size), all_(size), V0_(size, size) {
     const double p = static_cast<double>(size);
     const double radius = std::sqrt(2.0 * log_risk + p * std::log1p(1.0 / expected) + 2.0 * std::log(2.0));
     reach_ = kReach * (radius + std::sqrt(p));
@@ -150,12 +150,12 @@ class SelfNormalised {
     small_.add(middle, spread,
                sample.deviation < sample.bound
                    ? filter::variance_proxy(sample, reach_ * ((root_ * middle).norm() + gain_ * spread.norm()))
-                   : sample.multiplicity * sample.bound * sample.bound);
-    hoeffding_.add(middle, spread, sample.multiplicity * sample.bound * sample.bound);
+                   : filter::variance_proxy(sample));
+    all_.add(middle, spread, filter::variance_proxy(sample));
   }
 
   // Whether errors have deviations below their bounds.
-  [[nodiscard]] bool varied() const { return small_.plain() != hoeffding_.plain(); }
+  [[nodiscard]] bool varied() const { return small_.plain() != all_.plain(); }
 
   // V, V0 and the squared radius at `risk`.
   void finish(Ellipsoid& e, double risk) {
@@ -169,16 +169,16 @@ class SelfNormalised {
       e.V = small_.total();
       const core::EigenPairs pairs = core::symmetric_eigen(root_ * (e.V + e.V0) * root_.transpose());
       e.log_volume = pairs.values.array().log().sum();
-      e.squared_radius = 2.0 * std::log(1.0 / ((1.0 - kHoeffding) * risk)) + e.log_volume + 2.0 * std::log(2.0);
+      e.squared_radius = 2.0 * std::log(1.0 / ((1.0 - kEvery) * risk)) + e.log_volume + 2.0 * std::log(2.0);
       const double p = static_cast<double>(e.V0.rows());
       if (std::sqrt(e.squared_radius) + std::sqrt(p) <= reach_ * std::sqrt(pairs.values.minCoeff())) {
         e.usable = std::isfinite(e.squared_radius);
         return;
       }
     }
-    e.V = hoeffding_.total();
+    e.V = all_.total();
     e.log_volume = core::symmetric_eigen(root_ * (e.V + e.V0) * root_.transpose()).values.array().log().sum();
-    e.squared_radius = 2.0 * std::log(1.0 / (varied ? kHoeffding * risk : risk)) + e.log_volume;
+    e.squared_radius = 2.0 * std::log(1.0 / (varied ? kEvery * risk : risk)) + e.log_volume;
     e.usable = std::isfinite(e.squared_radius);
   }
 
@@ -199,7 +199,7 @@ class SelfNormalised {
 
   double scale_, reach_ = 0.0, gain_ = 0.0;
   bool fixed_ = false;
-  Variances prior_, small_, hoeffding_;
+  Variances prior_, small_, all_;
   Eigen::MatrixXd V0_, root_;  // root V0 rootᵀ = I
 };
 

@@ -73,7 +73,7 @@ struct RiskSet {
 /// parameters and of their pairs are taken. To each is added what bias, the motion between samples, and errors that do
 /// not average may do at worst. V0 is learnt from the log's beginning, which the sums leave out, and taken at several
 /// scales. Where a deviation below the bound is declared, proxies hold for λᵀV0λ <= reach² only: the mixture behind the
-/// inequality is cut off there, at the price of 2 ln 2, and where that is not enough Hoeffding's proxies stand in, with
+/// inequality is cut off there, at the price of 2 ln 2, and where that is not enough proxies for every λ stand in, with
 /// a tenth of the risk. Weights fall to zero towards the ends of segments.
 ///
 /// The log is walked three times. Throws InvalidArgument where options or classes make no sense.

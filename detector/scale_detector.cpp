@@ -8,16 +8,15 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/limits.hpp>
 #include <wheelwright/core/linear_algebra.hpp>
+#include <wheelwright/detector/sum_kernel.hpp>
 
 namespace wheelwright::detector {
 namespace {
 
-constexpr double kRoundings = 1e-10;             // of all that is added up, relative
-constexpr double kAlike = 1e-12;                 // relative: steps whose decays need not be computed anew
-constexpr double kRise = 1.0;                    // s, in which constant weights rise at a segment's start
-constexpr double kOfUsual = 0.2;                 // V0 is this share of a usual drive's V
-constexpr double kKernel = 0.36787944117144233;  // 1/e, the most that x e^{−x} is
-const double kHalves = 2.0 * std::log(2.0);      // what a mixture costs of which half, and half of that, counts
+constexpr double kRoundings = 1e-10;  // of all that is added up, relative
+constexpr double kAlike = 1e-12;      // relative: steps whose decays need not be computed anew
+constexpr double kRise = 1.0;         // s, in which constant weights rise at a segment's start
+constexpr double kOfUsual = 0.2;      // V0 is this share of a usual drive's V
 
 const RiskModel& demand(const OnlineModel& model) {
   check::that(model.at_risk.has_value(), "model", "one that was learnt at a stated risk");
@@ -27,12 +26,6 @@ const RiskModel& demand(const OnlineModel& model) {
     check::positive(scale, "scale");
   }
   return risk;
-}
-
-// Λ √V0 for sums whose risk is e^{−L}: what a usual drive's ellipsoid asks for, and a quarter more.
-double reach_of(double L) {
-  const double radius = std::sqrt(2.0 * (L + kHalves) + std::log1p(1.0 / kOfUsual));
-  return 1.25 * std::sqrt(kOfUsual / (1.0 + kOfUsual)) * (radius + 1.0);
 }
 
 // Sizes of a matrix whose square bounds MᵀM for all M within middle ± radius: (1 + η) mid'mid + (1 + 1/η) |radius|².
@@ -68,15 +61,19 @@ void multiply_in_order(const Eigen::ArrayXXd& left, const Right& right, Result& 
 
 }  // namespace
 
-double averaged_radius(double V, double V0, double L, double reach) {
-  const double volume = std::log1p(V / V0);
-  if (reach == core::kInfinity) {
-    return std::sqrt((V + V0) * (2.0 * L + volume));
+double mixture_cost(double L) { return L + std::log(2.0 * kMultiples); }
+
+double usual_multiple(double V0, double cost) { return V0 > 0.0 ? std::sqrt(2.0 * kOfUsual * cost / V0) : 0.0; }
+
+double averaged_radius(double V, double all, double cost, double usual) {
+  double by_risk = cost / (usual * kFirstMultiple), by_variance = 0.5 * usual * kFirstMultiple;
+  double least = HUGE_VAL;
+  for (int k = 0; k < kMultiples; ++k) {
+    least = std::min(least, by_risk + by_variance * (k <= kUsualMultiple ? V : all));
+    by_risk *= 0.5;
+    by_variance *= 2.0;
   }
-  const double at_reach = std::sqrt(V0) / reach * (L + kHalves) + 0.5 * reach * V / std::sqrt(V0);
-  const double squared = 2.0 * (L + kHalves) + volume;
-  const bool inside = std::sqrt(squared) + 1.0 <= reach * std::sqrt(1.0 + V / V0);
-  return inside ? std::min(at_reach, std::sqrt((V + V0) * squared)) : at_reach;
+  return least;
 }
 
 std::vector<SumWeight> sum_weights(const Model& model) {
@@ -140,29 +137,33 @@ ScaleDetector::ScaleDetector(const OnlineModel& model, ScaleDetectorOptions opti
   effort_ = filter::sample_class(
       risk_.errors, {filter::SampleWeight::Sensor::effort, 0, elements_.effort_weights().exact, 0.0, none, none});
   averages_ = effort_.averages;
-  square_ = averages_ ? filter::variance_proxy(effort_, core::kInfinity) : 0.0;
+  varied_ = averages_ && effort_.deviation < effort_.bound;
+  square_ = averages_ ? filter::variance_proxy(effort_) : 0.0;
+  variance_ = varied_ ? effort_.multiplicity * effort_.deviation * effort_.deviation : square_;
+  third_ = effort_.multiplicity * (effort_.bound + effort_.bias) / 3.0;
   g_ = g1_ = c_ = c1_ = c2_ = Eigen::ArrayXXd::Zero(W, n);
   joint_g_ = Eigen::ArrayXXd::Zero(W, joints);
   torque_ = Eigen::VectorXd::Zero(n);
   Y_ = core::RowMatrix::Zero(n, p);
-  residual_ = straight_ = turning_ = efforts_ = efforts1_ = spread_ = squares_ = response_ = a0_ = a1_ =
-      Eigen::ArrayXd::Zero(W);
-  rows_ = Eigen::ArrayXXd::Zero(W, p);
+  turning_ = efforts_ = efforts1_ = spread_ = Eigen::ArrayXd::Zero(W);
+  signals_ = Eigen::ArrayXXd::Zero(W, kParameters + p);
+  squares_ = Eigen::ArrayXXd::Zero(W, varied_ ? 2 : 1);
+  a0_ = a1_ = g_;
   direction_.resize(static_cast<std::size_t>(p));
   const double share = options_.false_alarms / static_cast<double>(weights_.size() * risk_.scales.size());
   for (const double T : risk_.scales) {
     Scale s;
     s.T = T;
     s.risk = std::log(options_.checks / (share * T));
-    s.reach = Eigen::ArrayXd::Zero(W);
+    s.cost = mixture_cost(s.risk);
+    s.usual = s.reach = Eigen::ArrayXd::Zero(W);
     for (Eigen::Index w = 0; w < W; ++w) {
-      const double usual = risk_.usual(w, static_cast<Eigen::Index>(states_.size()));
-      s.reach[w] = usual > 0.0 ? kKernel * reach_of(s.risk) / std::sqrt(usual) : 1e100;
+      s.usual[w] = usual_multiple(risk_.usual(w, static_cast<Eigen::Index>(states_.size())), s.cost);
     }
-    for (Eigen::ArrayXd* state : {&s.y0, &s.y1, &s.v0, &s.v1, &s.v2, &s.l0, &s.l1, &s.u0, &s.u1, &s.u2, &s.r0, &s.r1}) {
-      *state = Eigen::ArrayXd::Zero(W);
-    }
-    s.Y0 = s.Y1 = rows_;
+    s.reach = SumKernel::kLargest * s.usual;
+    s.linear0 = s.linear1 = signals_;
+    s.v0 = s.v1 = s.v2 = squares_;
+    s.u0 = s.u1 = s.u2 = Eigen::ArrayXd::Zero(W);
     states_.push_back(std::move(s));
   }
   looks_.resize(weights_.size() * states_.size());
@@ -180,11 +181,12 @@ void ScaleDetector::begin() {
   efforts1_.setZero();
   steps_.fill(elements_.step_length());
   for (Scale& s : states_) {
-    for (Eigen::ArrayXd* state : {&s.y0, &s.y1, &s.v0, &s.v1, &s.v2, &s.l0, &s.l1, &s.u0, &s.u1, &s.u2, &s.r0, &s.r1}) {
+    for (Eigen::ArrayXXd* state : {&s.linear0, &s.linear1, &s.v0, &s.v1, &s.v2}) {
       state->setZero();
     }
-    s.Y0.setZero();
-    s.Y1.setZero();
+    for (Eigen::ArrayXd* state : {&s.u0, &s.u1, &s.u2}) {
+      state->setZero();
+    }
     s.samples = s.since = 0.0;
   }
 }
@@ -222,20 +224,22 @@ void ScaleDetector::take() {
   const Model& m = elements_.model();
   const filter::WeakElement& e = elements_.element();
   const bool angles = elements_.angles();
+  auto residual = signals_.col(kValue), response = signals_.col(kResponse), straight = signals_.col(kWorst);
+  auto rows = signals_.rightCols(Y_.cols());
   filter::element_regressor(elements_, e, Y_);
-  multiply_in_order(g_, Y_, rows_);
-  multiply_in_order(g_, e.torque, residual_);
+  multiply_in_order(g_, Y_, rows);
+  multiply_in_order(g_, e.torque, residual);
   multiply_in_order(g_, m.input, joint_g_);
 
   // At worst: what stands beside the sum for certain, in units of K.
-  straight_ = kRoundings * residual_.abs();
-  for (Eigen::Index q = 0; q < rows_.cols(); ++q) {
-    straight_ += (kRoundings * largest_[q]) * rows_.col(q).abs();
+  straight = kRoundings * residual.abs();
+  for (Eigen::Index q = 0; q < rows.cols(); ++q) {
+    straight += (kRoundings * largest_[q]) * rows.col(q).abs();
   }
   const double effort = averages_ ? risk_.errors.effort.bias : risk_.errors.effort.bound;
   efforts_.setZero();
   for (Eigen::Index j = 0; j < joint_g_.cols(); ++j) {
-    straight_ += (effort * e.length) * joint_g_.col(j).abs();
+    straight += (effort * e.length) * joint_g_.col(j).abs();
     efforts_ += joint_g_.col(j).square();
   }
   for (Eigen::Index i = 0; i < e.torque_doubt.size(); ++i) {
@@ -243,7 +247,7 @@ void ScaleDetector::take() {
     if (!angles) {
       doubt += speed_gain_[i] * e.length * risk_.errors.motion.bound;
     }
-    straight_ += doubt * g_.col(i).abs();
+    straight += doubt * g_.col(i).abs();
   }
   std::size_t function = 0;
   turning_.setZero();
@@ -251,19 +255,19 @@ void ScaleDetector::take() {
     const auto i = static_cast<Eigen::Index>(term.output), c = static_cast<Eigen::Index>(term.coordinate);
     const double theta = largest_[static_cast<Eigen::Index>(term.parameter)];
     if (term.kind == Term::Kind::function) {
-      straight_ += (theta * e.functions[function++].error) * g_.col(i).abs();
+      straight += (theta * e.functions[function++].error) * g_.col(i).abs();
     } else if (term.kind == Term::Kind::speed && !angles) {
-      straight_ += (theta * std::abs(term.scale) * e.motion_doubt[c]) * g_.col(i).abs();
+      straight += (theta * std::abs(term.scale) * e.motion_doubt[c]) * g_.col(i).abs();
     } else if (term.kind == Term::Kind::speed) {
       const double by = theta * std::abs(term.scale) * e.motion_doubt_before[c] / e.before;
-      straight_ += by * (g_.col(i) - g1_.col(i)).abs();
+      straight += by * (g_.col(i) - g1_.col(i)).abs();
       turning_ += by * g1_.col(i).abs();
     }
   }
   if (angles) {
     for (Eigen::Index i = 0; i < g_.cols(); ++i) {
       const double by = speed_gain_[i] * risk_.errors.motion.bound;
-      straight_ += by * (g_.col(i) - g1_.col(i)).abs();
+      straight += by * (g_.col(i) - g1_.col(i)).abs();
       turning_ += by * g1_.col(i).abs();
     }
   }
@@ -271,11 +275,11 @@ void ScaleDetector::take() {
   for (std::size_t w = 0; w < weights_.size(); ++w) {
     const auto i = static_cast<Eigen::Index>(w), which = static_cast<Eigen::Index>(weights_[w].which);
     switch (weights_[w].shape) {
-      case SumWeight::Shape::constant: response_[i] = joint_g_(i, which) * e.length; break;
+      case SumWeight::Shape::constant: response[i] = joint_g_(i, which) * e.length; break;
       case SumWeight::Shape::effort:
-        response_[i] = joint_g_(i, which) * dot_in_order(to_joints_.row(which), e.torque);
+        response[i] = joint_g_(i, which) * dot_in_order(to_joints_.row(which), e.torque);
         break;
-      case SumWeight::Shape::parameter: response_[i] = rows_(i, which) * rule_.estimate()[which]; break;
+      case SumWeight::Shape::parameter: response[i] = rows(i, which) * rule_.estimate()[which]; break;
     }
   }
 
@@ -284,10 +288,10 @@ void ScaleDetector::take() {
   const double h = angles ? e.before : e.step;  // from the element before
   const double length1 = angles ? 0.5 * (steps_[1] + steps_[2]) : steps_[2];
   const double length = length1 * longest;
-  const bool varied = averages_ && effort_.deviation < effort_.bound;
-  const double least = varied ? effort_.multiplicity * effort_.deviation * effort_.deviation : square_;
-  const double third = effort_.multiplicity * (effort_.bound + effort_.bias) / 3.0;
-  spread_ = (third * longest) * efforts1_.sqrt();
+  if (varied_) {
+    spread_ = (third_ * longest) * efforts1_.sqrt();
+  }
+  squares_.col(0) = (length * square_) * efforts1_;
   for (Scale& s : states_) {
     const double x = h / s.T, d_before = s.decay;
     if (std::abs(x - s.delta) > kAlike * x) {
@@ -295,20 +299,14 @@ void ScaleDetector::take() {
       s.decay = std::exp(-x);
     }
     const double d = s.decay, dd = d * d;
-    s.y0 = d * (s.y0 + x * s.y1);
-    s.y1 = d * s.y1 + residual_;
-    s.r0 = d * (s.r0 + x * s.r1);
-    s.r1 = d * s.r1 + response_;
-    s.Y0 = d * (s.Y0 + x * s.Y1);
-    s.Y1 = d * s.Y1 + rows_;
-    s.l0 = d * (s.l0 + x * s.l1) + x * turning_;
-    s.l1 = d * s.l1 + straight_ + x * turning_;
+    s.linear0 = d * (s.linear0 + x * s.linear1);
+    s.linear1 = d * s.linear1 + signals_;
+    s.linear0.col(kWorst) += x * turning_;
+    s.linear1.col(kWorst) += x * turning_;
     // Efforts of the element before, which is as old as the step, with filter::variance_proxy(): a sample's weight is
     // an average of its elements' (the logarithm of a generating function is convex), none larger than 1/e of theirs.
-    if (varied) {
-      squares_ = (length * least) * efforts1_ / (1.0 - s.reach * spread_).max(least / square_);
-    } else {
-      squares_ = (length * square_) * efforts1_;
+    if (varied_) {
+      squares_.col(1) = (length * variance_) * efforts1_ / (1.0 - s.reach * spread_).max(variance_ / square_);
     }
     s.v0 = dd * (s.v0 + x * s.v1 + (x * x) * (s.v2 + squares_));
     s.v1 = dd * (s.v1 + (2.0 * x) * (s.v2 + squares_));
@@ -320,12 +318,12 @@ void ScaleDetector::take() {
     const double d2 = d_before * d, x2 = angles ? (h + steps_[1]) / s.T : 0.0;
     const double before = angles ? 1.0 / steps_[1] : 0.0, after = angles ? 1.0 / h : -1.0;
     const double middle = angles ? -(before + after) : 1.0;
+    a1_ = (before * d2) * c2_ + (middle * d) * c1_ + after * c_;
+    a0_ = (before * d2 * x2) * c2_ + (middle * d * x) * c1_;
     for (Eigen::Index i = 0; i < c_.cols(); ++i) {
-      a1_ = (before * d2) * c2_.col(i) + (middle * d) * c1_.col(i) + after * c_.col(i);
-      a0_ = (before * d2 * x2) * c2_.col(i) + (middle * d * x) * c1_.col(i);
-      s.u0 += a0_.square();
-      s.u1 += 2.0 * a0_ * a1_;
-      s.u2 += a1_.square();
+      s.u0 += a0_.col(i).square();
+      s.u1 += 2.0 * a0_.col(i) * a1_.col(i);
+      s.u2 += a1_.col(i).square();
     }
     s.samples = d * s.samples + 1.0;
     s.since += h;
@@ -342,32 +340,46 @@ void ScaleDetector::look(Scale& s, std::size_t which) {
     const auto i = static_cast<Eigen::Index>(w);
     double predicted = 0.0;
     for (std::size_t q = 0; q < p; ++q) {
-      direction_[q] = s.Y0(i, static_cast<Eigen::Index>(q));
+      direction_[q] = s.linear0(i, kParameters + static_cast<Eigen::Index>(q));
       predicted += direction_[q] * rule_.estimate()[static_cast<Eigen::Index>(q)];
     }
-    const double newest = last * last * dot_in_order(c1_.row(i), c1_.row(i));
-    const double angles =
-        risk_.errors.motion.bound * std::sqrt(joints * (s.samples + 2.0) * (std::max(s.u0[i], 0.0) + newest));
-    const double usual = risk_.usual(i, static_cast<Eigen::Index>(which)), V = std::max(s.v0[i], 0.0);
-    const bool varied = averages_ && effort_.deviation < effort_.bound;
-    const double averaged = usual > 0.0 ? averaged_radius(V, usual, s.risk, varied ? reach_of(s.risk) : core::kInfinity)
-                            : V > 0.0   ? HUGE_VAL
-                                        : 0.0;
-    const double radius = (s.l0[i] + angles + averaged) * (1.0 + kRoundings);
-    const double value = s.y0[i] - predicted;
+    // Inequality of Cauchy and Schwarz for samples that no later element holds; the newest but one stands apart from
+    // them: it alone sees the kernel's kink.
+    const double newest = last * std::sqrt(dot_in_order(c1_.row(i), c1_.row(i)));
+    const double angles = risk_.errors.motion.bound * std::sqrt(joints) *
+                          (std::sqrt((s.samples + 2.0) * std::max(s.u0[i], 0.0)) + newest);
+    const double all = std::max(s.v0(i, 0), 0.0), V = varied_ ? std::max(s.v0(i, 1), 0.0) : all;
+    const double averaged = all > 0.0 ? averaged_radius(V, all, s.cost, s.usual[i]) : 0.0;
+    const double radius = (s.linear0(i, kWorst) + angles + averaged) * (1.0 + kRoundings);
+    const double value = s.linear0(i, kValue) - predicted;
     SumState& state = looks_[looked_++];
     if (!options_.exact_thresholds && std::abs(value) <= radius) {  // inside, whatever the set: its box will do
       double box = 0.0;
       for (std::size_t q = 0; q < p; ++q) {
         box += std::abs(direction_[q]) * half_[static_cast<Eigen::Index>(q)];
       }
-      state = {w, which, value, radius + box, std::abs(value) - radius - box, s.r0[i], s.r1[i], radius, averaged};
+      state = {w,
+               which,
+               value,
+               radius + box,
+               std::abs(value) - radius - box,
+               s.linear0(i, kResponse),
+               s.linear1(i, kResponse),
+               radius,
+               averaged};
       continue;
     }
     const Interval range = rule_.prediction(direction_, w);
     const double up = range.upper - predicted + radius, down = predicted - range.lower + radius;
-    state = {w,       which,  value,   value >= 0.0 ? up : down, std::max(value - up, -value - down), s.r0[i],
-             s.r1[i], radius, averaged};
+    state = {w,
+             which,
+             value,
+             value >= 0.0 ? up : down,
+             std::max(value - up, -value - down),
+             s.linear0(i, kResponse),
+             s.linear1(i, kResponse),
+             radius,
+             averaged};
     alarm_ = alarm_ || state.excess > 0.0;
   }
 }
@@ -397,11 +409,10 @@ bool ScaleDetector::step(double t, std::span<const double> sample) {
 
 SumConstants ScaleDetector::constants() const {
   SumConstants c{largest_, half_, inverse_, to_joints_, slope_gain_, speed_gain_, effort_, averages_, square_};
-  c.kernel_reach.resize(static_cast<Eigen::Index>(weights_.size()), static_cast<Eigen::Index>(states_.size()));
+  c.usual.resize(static_cast<Eigen::Index>(weights_.size()), static_cast<Eigen::Index>(states_.size()));
   for (std::size_t k = 0; k < states_.size(); ++k) {
-    c.risk.push_back(states_[k].risk);
-    c.reach.push_back(reach_of(states_[k].risk));
-    c.kernel_reach.col(static_cast<Eigen::Index>(k)) = states_[k].reach.matrix();
+    c.cost.push_back(states_[k].cost);
+    c.usual.col(static_cast<Eigen::Index>(k)) = states_[k].usual.matrix();
   }
   return c;
 }
@@ -409,7 +420,7 @@ SumConstants ScaleDetector::constants() const {
 Eigen::MatrixXd ScaleDetector::variances() const {
   Eigen::MatrixXd result(static_cast<Eigen::Index>(weights_.size()), static_cast<Eigen::Index>(states_.size()));
   for (std::size_t k = 0; k < states_.size(); ++k) {
-    result.col(static_cast<Eigen::Index>(k)) = states_[k].v0.matrix();
+    result.col(static_cast<Eigen::Index>(k)) = states_[k].v0.col(0).matrix();
   }
   return result;
 }
@@ -424,18 +435,10 @@ Eigen::MatrixXd usual_variances(LogSource& log, const OnlineModel& model) {
         .bound = effort.deviation, .bias = 0.0, .correlation = effort.correlation};  // what reach adds depends on V0
   }
   ScaleDetector detector(any);
-  const std::vector<std::size_t> pick = core::positions_of(log, model.measurement.columns());
-  std::vector<double> sample(pick.size());
   Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(any.at_risk->usual.rows(), any.at_risk->usual.cols());
   double count = 0.0;
-  core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
-    if (starts) {
-      detector.restart();
-    }
-    for (std::size_t c = 0; c < pick.size(); ++c) {
-      sample[c] = block.columns[pick[c]][k];
-    }
-    if (detector.step(block.t[k], sample)) {
+  walk_log(log, detector, [&](double, bool, bool looked) {
+    if (looked) {
       sum += detector.variances();
       count += 1.0;
     }

@@ -61,17 +61,16 @@ struct SumState {
 
 /// Numbers of a ScaleDetector that do not change from sample to sample, for its form in C (export/export_c.hpp).
 struct SumConstants {
-  Eigen::VectorXd largest, half;   ///< p: |θ| at most, sides of the set's box from θ̂ on
-  Eigen::MatrixXd inverse;         ///< n × n: (N Nᵀ)⁻¹, N the model's input
-  Eigen::MatrixXd to_joints;       ///< joints × n: N⁺
-  Eigen::MatrixXd slope_gain;      ///< n × n: what θ makes of errors of the joints' slopes, as a bound on its square
-  Eigen::VectorXd speed_gain;      ///< n: the most that θ makes of errors of all joints' speeds
-  filter::SampleClass effort{};    ///< one effort
-  bool averages = false;           ///< whether its errors do
-  double square = 0.0;             ///< its variance proxy for every λ
-  std::vector<double> risk{};      ///< L of each scale
-  std::vector<double> reach{};     ///< of averaged_radius(), for each scale
-  Eigen::MatrixXd kernel_reach{};  ///< weights × scales: Λ times the most that a kernel is
+  Eigen::VectorXd largest, half;  ///< p: |θ| at most, sides of the set's box from θ̂ on
+  Eigen::MatrixXd inverse;        ///< n × n: (N Nᵀ)⁻¹, N the model's input
+  Eigen::MatrixXd to_joints;      ///< joints × n: N⁺
+  Eigen::MatrixXd slope_gain;     ///< n × n: what θ makes of errors of the joints' slopes, as a bound on its square
+  Eigen::VectorXd speed_gain;     ///< n: the most that θ makes of errors of all joints' speeds
+  filter::SampleClass effort{};   ///< one effort
+  bool averages = false;          ///< whether its errors do
+  double square = 0.0;            ///< its variance proxy for every λ
+  std::vector<double> cost{};     ///< mixture_cost() of each scale
+  Eigen::MatrixXd usual{};        ///< weights × scales: usual_multiple()
 };
 
 /// Sums over scales T, with weights w(t) = K((now − t)/T) g(t), K(x) = x e^{−x}, g foreseen (PredictableRegressor), of
@@ -80,13 +79,12 @@ struct SumConstants {
 ///     S = Σ w_k (torque_k − Y_k θ)
 ///
 /// A healthy robot's S is made of its sensors' errors alone. Those of efforts average out: with V = Σ weight² · s², s²
-/// their variance proxy (error_class.hpp), and V0 fixed beforehand, |S − bias| <= sqrt((V + V0)(2L + ln(1 + V/V0))) but
-/// for the probability e^{−L} (method of mixtures: Robbins 1970; de la Peña, Klass, Lai 2004). Where a deviation below
-/// the bound is declared, s² holds for |λ| <= Λ only: half of the mixture is cut off there, the other half stands at
-/// ±Λ, and the smaller bound of both counts (averaged_radius()). All else counts at its worst: bias, the angles'
-/// errors, what happens between samples, and any θ of the set. A sum is looked at `checks` times in its scale, and the
-/// risks of all looks at all sums add up to ScaleDetectorOptions::false_alarms. No assumption on the drive, the noise's
-/// law, or when a fault comes.
+/// their variance proxy (error_class.hpp), |S − bias| <= L/λ + λV/2 for a λ that is fixed beforehand, but for the
+/// probability 2e^{−L}, and the least of that over several λ at no more than a part of that risk for each
+/// (averaged_radius(); method of mixtures: Robbins 1970; de la Peña, Klass, Lai 2004). All else counts at its worst:
+/// bias, the angles' errors, what happens between samples, and any θ of the set. A sum is looked at `checks` times in
+/// its scale, and the risks of all looks at all sums add up to ScaleDetectorOptions::false_alarms. No assumption on the
+/// drive, the noise's law, or when a fault comes.
 ///
 /// step() does not allocate but in linear programs where the set has more vertices than a table takes. Memory and work
 /// per sample do not depend on time.
@@ -116,17 +114,20 @@ class ScaleDetector {
   [[nodiscard]] const RiskModel& risk() const { return risk_; }
   [[nodiscard]] const ScaleDetectorOptions& options() const { return options_; }
   [[nodiscard]] SumConstants constants() const;
-  /// V of every sum now (weights × scales).
+  /// V of every sum now, of proxies for every λ (weights × scales).
   [[nodiscard]] Eigen::MatrixXd variances() const;
 
  private:
   // c0 + c1 x (+ c2 x²) of every weight, x = age/T.
   struct Scale {
-    double T = 0.0, decay = 1.0, delta = 0.0, since = 0.0, risk = 0.0, samples = 0.0;
-    Eigen::ArrayXd reach;  // Λ times the most that a kernel is
-    Eigen::ArrayXd y0, y1, v0, v1, v2, l0, l1, u0, u1, u2, r0, r1;
-    Eigen::ArrayXXd Y0, Y1;  // weights × p
+    double T = 0.0, decay = 1.0, delta = 0.0, since = 0.0, risk = 0.0, cost = 0.0, samples = 0.0;
+    Eigen::ArrayXd usual, reach;       // usual_multiple(), and that times the most that a kernel is
+    Eigen::ArrayXXd linear0, linear1;  // weights × Columns, parameters from kParameters on
+    Eigen::ArrayXXd v0, v1, v2;        // variance for every λ, and where errors have a deviation for small λ
+    Eigen::ArrayXd u0, u1, u2;         // squares of the weights of errors of the motion
   };
+  // What a sum has, what a fault adds to it, what errors do to it at worst, its regressor.
+  enum Columns : Eigen::Index { kValue, kResponse, kWorst, kParameters };
 
   void begin();
   void weigh();
@@ -148,14 +149,18 @@ class ScaleDetector {
   Eigen::VectorXd speed_gain_;    // outputs: the most that θ makes of errors of all joints' speeds
   bool averages_ = false;         // errors of efforts
   filter::SampleClass effort_{};  // of one effort
-  double square_ = 0.0;           // its Hoeffding proxy
+  bool varied_ = false;           // their deviation is below their bound
+  double square_ = 0.0;           // its proxy for every λ
+  double variance_ = 0.0;         // for small λ
+  double third_ = 0.0;            // of the largest error, times its multiplicity
   Eigen::ArrayXXd g_, g1_;        // weights × outputs: of the newest element and the one before
   Eigen::ArrayXXd c_, c1_, c2_;   // slope_gain_ times these
   Eigen::ArrayXXd joint_g_;       // weights × joints: what errors of efforts are multiplied with
   Eigen::VectorXd torque_;
   core::RowMatrix Y_;
-  Eigen::ArrayXd residual_, straight_, turning_, efforts_, efforts1_, spread_, squares_, response_, a0_, a1_;
-  Eigen::ArrayXXd rows_;           // weights × p
+  Eigen::ArrayXXd signals_;  // weights × Columns: of the newest element
+  Eigen::ArrayXd turning_, efforts_, efforts1_, spread_;
+  Eigen::ArrayXXd squares_, a0_, a1_;
   std::array<double, 4> steps_{};  // the newest last
   std::size_t taken_ = 0;
   std::vector<SumState> looks_;
@@ -164,9 +169,36 @@ class ScaleDetector {
   std::vector<double> direction_;
 };
 
-/// Bound on the share that errors with the summed variance proxies `V` have in a sum, but for the probability e^{−L}:
-/// V0 > 0 fixed beforehand, the proxies good for |λ| <= `reach`/√V0 (infinite: for all λ).
-[[nodiscard]] double averaged_radius(double V, double V0, double L, double reach);
+/// λ that averaged_radius() looks at: the first in units of the usual one, each twice the one before; up to the usual
+/// one small variances hold.
+inline constexpr int kMultiples = 8, kUsualMultiple = 2;
+inline constexpr double kFirstMultiple = 0.25;
+/// What each of them, to either side, may cost for all to have the risk e^{−L}.
+[[nodiscard]] double mixture_cost(double L);
+/// The λ that is best for a usual drive's variance, of which V0 is RiskModel::usual; 0 where that is 0.
+[[nodiscard]] double usual_multiple(double V0, double cost);
+/// Bound on the share in a sum of errors whose summed variance proxies are `V` for |λ| <= `usual`, and `all` >= V for
+/// every λ: min of cost/λ + λV/2 over the λ above, to be exceeded with a probability of at most e^{−L} with `cost` =
+/// mixture_cost(L) (e^{λS − λ²V/2} is a supermartingale). Infinite where `usual` is 0.
+[[nodiscard]] double averaged_radius(double V, double all, double cost, double usual);
+
+/// Walks `log` through `detector`, which forgets all samples where a segment begins. After each sample calls visit(t,
+/// whether it begins a segment, whether sums were looked at).
+template <typename Visit>
+void walk_log(LogSource& log, ScaleDetector& detector, Visit&& visit) {
+  const std::vector<std::size_t> pick = core::positions_of(log, detector.elements().measurement().columns());
+  std::vector<double> sample(pick.size());
+  core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
+    if (starts) {
+      detector.restart();
+    }
+    for (std::size_t c = 0; c < pick.size(); ++c) {
+      sample[c] = block.columns[pick[c]][k];
+    }
+    const bool looked = detector.step(block.t[k], sample);
+    visit(block.t[k], starts, looked);
+  });
+}
 
 /// V0 of every sum for RiskModel::usual: a share of the mean V on a log of usual driving.
 [[nodiscard]] Eigen::MatrixXd usual_variances(LogSource& log, const OnlineModel& model);

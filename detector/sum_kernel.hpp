@@ -16,6 +16,7 @@ struct SumKernel {
   static constexpr std::size_t kStates = 2;
   using Shape = std::array<double, kStates>;
   static constexpr Shape kShape{0.0, 1.0};
+  static constexpr double kLargest = 0.36787944117144233;  ///< 1/e, at x = 1
 
   /// |K'| is at most the kernel of this shape, and |K''| at most that of curvature().
   [[nodiscard]] static constexpr Shape slope() {

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include <wheelwright/detector/sum_kernel.hpp>
 #include <wheelwright/export/export_c_text.hpp>
 
 namespace wheelwright::exporter::c_text {
@@ -16,7 +17,6 @@ namespace {
 constexpr double kRoundings = 1e-10;
 constexpr double kAlike = 1e-12;
 constexpr double kRise = 1.0;
-const double kHalves = 2.0 * std::log(2.0);
 
 using filter::PredictableRegressor;
 
@@ -134,28 +134,21 @@ static inline void pfx_weigh(pfx_sums *s, const pfx_element *e)
 }
 )";
 
-// averaged_radius(), for proxies that are good for all λ, and for |λ| <= reach/√usual.
+// averaged_radius().
 constexpr std::string_view kRadius = R"(
-/* What errors that average out may add up to: v is the sum of their variances. */
-static inline double pfx_averaged(double v, double usual, int k)
+/* What errors that average out may add up to: v is the sum of their variances for small multiples, all for any. */
+static inline double pfx_averaged(double v, double all, double usual, int k)
 {
-  return sqrt((v + usual) * (2.0 * pfx_log_risk[k] + log1p(v / usual)));
-}
-)";
-
-constexpr std::string_view kRadiusInReach = R"(
-/* What errors that average out may add up to: v is the sum of their variances. */
-static inline double pfx_averaged(double v, double usual, int k)
-{
-  const double volume = log1p(v / usual), reach = pfx_reach[k], root = sqrt(usual);
-  const double at_reach = root / reach * (pfx_log_risk[k] + PFX_HALVES) + 0.5 * reach * v / root;
-  const double squared = 2.0 * (pfx_log_risk[k] + PFX_HALVES) + volume;
-  double within;
-  if (!(sqrt(squared) + 1.0 <= reach * sqrt(1.0 + v / usual))) {
-    return at_reach;
+  double by_risk = pfx_cost[k] / (usual * PFX_FIRST_MULTIPLE), by_variance = 0.5 * usual * PFX_FIRST_MULTIPLE;
+  double least = HUGE_VAL;
+  int i;
+  for (i = 0; i < PFX_MULTIPLES; ++i) {
+    const double bound = by_risk + by_variance * (i <= PFX_USUAL_MULTIPLE ? v : all);
+    least = bound < least ? bound : least;
+    by_risk *= 0.5;
+    by_variance *= 2.0;
   }
-  within = sqrt((v + usual) * squared);
-  return within < at_reach ? within : at_reach;
+  return least;
 }
 )";
 
@@ -234,9 +227,11 @@ std::string SumsWriter::constants() const {
   text += line("#define PFX_LEAD {}", hex(foreseen.lead() * foreseen.beta()));
   text += line("#define PFX_CORRELATION {} /* s, of the errors */", hex(foreseen.correlation()));
   text += line("#define PFX_ALIKE {} /* steps whose decays are not computed anew */", hex(kAlike));
-  if (varied_) {
-    text += line("#define PFX_HALVES {}", hex(kHalves));
-  }
+  text +=
+      line("#define PFX_MULTIPLES {}    /* at which errors that average out are bounded, each twice the one before */",
+           detector::kMultiples);
+  text += line("#define PFX_USUAL_MULTIPLE {} /* the last for which small variances hold */", detector::kUsualMultiple);
+  text += line("#define PFX_FIRST_MULTIPLE {} /* of the usual one */", hex(detector::kFirstMultiple));
   text += line("#define PFX_RISE {} /* s, in which weights rise at a segment's start */", hex(kRise));
   return text;
 }
@@ -264,7 +259,7 @@ typedef struct pfx_sum {
   double p0[PFX_PARAMETERS][PFX_SUMS], p1[PFX_PARAMETERS][PFX_SUMS]; /* regressor */
   double r0[PFX_SUMS], r1[PFX_SUMS]; /* what a fault adds */
   double l0[PFX_SUMS], l1[PFX_SUMS]; /* what errors add at worst */
-  double v0[PFX_SUMS], v1[PFX_SUMS], v2[PFX_SUMS]; /* variance of the efforts' errors */
+  VARIEDdouble q0[PFX_SUMS], q1[PFX_SUMS], q2[PFX_SUMS]; /* variance of the efforts' errors */
   double u0[PFX_SUMS], u1[PFX_SUMS], u2[PFX_SUMS]; /* squares of the weights of errors of the motion */
 } pfx_sum;
 
@@ -290,6 +285,12 @@ typedef struct pfx_sums {
   double steps[4];                          /* the newest last, s */
   pfx_scale scale[PFX_SCALES];
 )";
+  constexpr std::string_view kVaried = "VARIED";
+  text.replace(text.find(kVaried), kVaried.size(),
+               varied_
+                   ? "double v0[PFX_SUMS], v1[PFX_SUMS], v2[PFX_SUMS]; /* variance of the efforts' errors, for small "
+                     "multiples */\n  "
+                   : "");
   if (elements_.nodes()) {
     text += line("  double before; /* s, the step before the newest element */");
   }
@@ -305,14 +306,13 @@ std::string SumsWriter::tables() const {
   std::string text =
       "\n/* Numbers of the sums: scales (s), risk of a look, parameters, what errors are multiplied by. */\n";
   text += line("static const double pfx_scale_time[PFX_SCALES] = {};", numbers_of(risk_.scales));
-  text += line("static const double pfx_log_risk[PFX_SCALES] = {};", numbers_of(constants_.risk));
+  text += line("static const double pfx_cost[PFX_SCALES] = {};", numbers_of(constants_.cost));
   if (varied_) {
-    text += line("static const double pfx_reach[PFX_SCALES] = {};", numbers_of(constants_.reach));
-    text += line("static const double pfx_kernel_reach[PFX_SCALES][PFX_SUMS] = {};",
-                 numbers(Eigen::MatrixXd(constants_.kernel_reach.transpose())));
+    text += line("static const double pfx_reach[PFX_SCALES][PFX_SUMS] = {};",
+                 numbers(Eigen::MatrixXd(detector::SumKernel::kLargest * constants_.usual.transpose())));
   }
   text += line("static const double pfx_usual[PFX_SCALES][PFX_SUMS] = {};",
-               numbers(Eigen::MatrixXd(risk_.usual.transpose())));
+               numbers(Eigen::MatrixXd(constants_.usual.transpose())));
   text += line("static const double pfx_theta[PFX_PARAMETERS] = {};", numbers(theta));
   text += line("static const double pfx_rounded[PFX_PARAMETERS] = {}; /* |theta| at most, times a rounding */",
                numbers(Eigen::VectorXd(kRoundings * constants_.largest)));
@@ -464,12 +464,11 @@ static inline void pfx_sums_take(pfx_sums *s, const pfx_element *e)
     text += line("    spread[w] = {} * longest * sqrt(s->efforts1[w]);",
                  hex(effort.multiplicity * (effort.bound + effort.bias) / 3.0));
     text += "  }\n";
-    text.replace(text.find("square[PFX_SUMS];"), 17, "square[PFX_SUMS], spread[PFX_SUMS];");
-  } else {
-    text += "  for (w = 0; w < PFX_SUMS; ++w) {\n";
-    text += line("    square[w] = length * {} * s->efforts1[w];", hex(constants_.square));
-    text += "  }\n";
+    text.replace(text.find("square[PFX_SUMS];"), 17, "square[PFX_SUMS], small[PFX_SUMS], spread[PFX_SUMS];");
   }
+  text += "  for (w = 0; w < PFX_SUMS; ++w) {\n";
+  text += line("    square[w] = length * {} * s->efforts1[w];", hex(constants_.square));
+  text += "  }\n";
   text += R"(  for (k = 0; k < PFX_SCALES; ++k) {
     pfx_scale *scale = &s->scale[k];
     pfx_sum *m = &scale->sum;
@@ -500,16 +499,23 @@ static inline void pfx_sums_take(pfx_sums *s, const pfx_element *e)
 )";
   if (varied_) {
     text += "    for (w = 0; w < PFX_SUMS; ++w) {\n";
-    text += "      const double left = 1.0 - pfx_kernel_reach[k][w] * spread[w];\n";
-    text += line("      square[w] = length * {0} * s->efforts1[w] / (left < {1} ? {1} : left);", hex(least),
+    text += "      const double left = 1.0 - pfx_reach[k][w] * spread[w];\n";
+    text += line("      small[w] = length * {0} * s->efforts1[w] / (left < {1} ? {1} : left);", hex(least),
                  hex(least / constants_.square));
-    text += "    }\n";
-  }
-  text += R"(    for (w = 0; w < PFX_SUMS; ++w) {
-      const double v2 = m->v2[w] + square[w];
+    text += R"(    }
+    for (w = 0; w < PFX_SUMS; ++w) {
+      const double v2 = m->v2[w] + small[w];
       m->v0[w] = dd * (m->v0[w] + x * m->v1[w] + x * x * v2);
       m->v1[w] = dd * (m->v1[w] + 2.0 * x * v2);
       m->v2[w] = dd * v2;
+    }
+)";
+  }
+  text += R"(    for (w = 0; w < PFX_SUMS; ++w) {
+      const double q2 = m->q2[w] + square[w];
+      m->q0[w] = dd * (m->q0[w] + x * m->q1[w] + x * x * q2);
+      m->q1[w] = dd * (m->q1[w] + 2.0 * x * q2);
+      m->q2[w] = dd * q2;
       m->u0[w] = d * (m->u0[w] + x * m->u1[w] + x * x * m->u2[w]);
       m->u1[w] = d * (m->u1[w] + 2.0 * x * m->u2[w]);
       m->u2[w] = d * m->u2[w];
@@ -551,7 +557,7 @@ static inline void pfx_sums_take(pfx_sums *s, const pfx_element *e)
 }
 
 std::string SumsWriter::look() const {
-  std::string text(varied_ ? kRadiusInReach : kRadius);
+  std::string text(kRadius);
   text += R"(
 /* Looks at the sums over scale k. */
 static inline void pfx_sums_look(pfx_sums *s, int k)
@@ -566,8 +572,10 @@ static inline void pfx_sums_look(pfx_sums *s, int k)
   }
   text += R"(  for (w = 0; w < PFX_SUMS; ++w) {
     pfx_look *look = &s->look[s->looks++];
-    const double usual = pfx_usual[k][w], v = 0.0 < m->v0[w] ? m->v0[w] : 0.0, u = 0.0 < m->u0[w] ? m->u0[w] : 0.0;
-    const double averaged = usual > 0.0 ? pfx_averaged(v, usual, k) : v > 0.0 ? HUGE_VAL : 0.0;
+    const double all = 0.0 < m->q0[w] ? m->q0[w] : 0.0, u = 0.0 < m->u0[w] ? m->u0[w] : 0.0;
+)";
+  text += line("    const double v = {};", varied_ ? "0.0 < m->v0[w] ? m->v0[w] : 0.0" : "all");
+  text += R"(    const double averaged = all > 0.0 ? pfx_averaged(v, all, pfx_usual[k][w], k) : 0.0;
     double predicted = 0.0, newest, angles, radius, below, above, up, down;
     for (j = 0; j < PFX_PARAMETERS; ++j) {
       direction[j] = m->p0[j][w];
@@ -579,13 +587,13 @@ static inline void pfx_sums_look(pfx_sums *s, int k)
     for (i = 1; i < PFX_CHANNELS; ++i) {
       newest += s->c1[i][w] * s->c1[i][w];
     }
-    newest = last * last * newest;
+    newest = last * sqrt(newest);
 )";
   } else {
     text += "    newest = 0.0;\n";
   }
-  text += line("    angles = {} * sqrt({} * (scale->samples + 2.0) * (u + newest));", hex(risk_.errors.motion.bound),
-               hex(static_cast<double>(model_.joints.size())));
+  text += line("    angles = {} * {} * (sqrt((scale->samples + 2.0) * u) + newest);", hex(risk_.errors.motion.bound),
+               hex(std::sqrt(static_cast<double>(model_.joints.size()))));
   text += line("    radius = (m->l0[w] + angles + averaged) * {};", hex(1.0 + kRoundings));
   text += R"(    look->sum = w;
     look->scale = k;

@@ -3,6 +3,8 @@
 /// What is assumed of sensors' errors where a guarantee holds at a stated risk.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 
 #include <wheelwright/core/limits.hpp>
@@ -53,14 +55,25 @@ struct SampleClass {
 inline constexpr double kCountsThatAverage = 4.0;
 
 /// Variance proxy s² of an error e that averages out: E exp(λ (e − mean)) <= exp(λ² s²/2), whatever happened before,
-/// for all |λ| <= `reach` (1/unit). The smaller of Hoeffding's, bound², for every λ, and Bernstein's, deviation²/(1 −
-/// u/3) with u = reach · (bound + bias) [boucheron2013]; for errors that are alike within a correlation time both hold
-/// with its number of samples (Hölder's inequality).
-[[nodiscard]] inline double variance_proxy(const SampleClass& sample, double reach) {
-  const double m = sample.multiplicity, square = sample.bound * sample.bound;
+/// for every λ. Of all laws with that bound and deviation the one of two points, b = bound + bias and −deviation²/b,
+/// has the largest generating function [boucheron2013], and that is bounded by deviation² sinh(l)/l with l = 2
+/// ln(b/deviation) [kearns1998]. No larger than Hoeffding's, bound². For errors that are alike within a correlation
+/// time both hold with its number of samples (Hölder's inequality).
+[[nodiscard]] inline double variance_proxy(const SampleClass& sample) {
+  const double most = sample.bound + sample.bias, square = sample.bound * sample.bound;
   const double deviation = sample.deviation * sample.deviation;
+  const double above = (most - sample.deviation) * (most + sample.deviation) / deviation;  // (b/deviation)² − 1
+  const double two =
+      above > 0.0 ? 0.5 * deviation * above * (2.0 + above) / ((1.0 + above) * std::log1p(above)) : square;
+  return sample.multiplicity * std::min(square, two);
+}
+
+/// The same for all |λ| <= `reach` (1/unit): the smaller of that and Bernstein's, deviation²/(1 − u/3) with u = reach ·
+/// (bound + bias) [boucheron2013], for small λ next to the variance.
+[[nodiscard]] inline double variance_proxy(const SampleClass& sample, double reach) {
+  const double m = sample.multiplicity, deviation = sample.deviation * sample.deviation, all = variance_proxy(sample);
   const double u = m * reach * (sample.bound + sample.bias);
-  return m * (deviation < square * (1.0 - u / 3.0) ? deviation / (1.0 - u / 3.0) : square);
+  return m * deviation < all * (1.0 - u / 3.0) ? m * deviation / (1.0 - u / 3.0) : all;
 }
 
 /// Adds a sample that stands in a sum with a weight of the size `weight` >= 0.

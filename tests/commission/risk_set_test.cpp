@@ -119,6 +119,20 @@ std::vector<Named> worlds() {
   add("uneven_steps", [](ExactAxis& a) { a.jitter = 0.3; });
   add("slow_clock", [](ExactAxis& a) { a.rate = 20.0; });
   add("coarse", [](ExactAxis& a) { a.count = 2e-3; });
+  add("angles_two_point", [](ExactAxis& a) {
+    a.count = 1e-3;
+    a.position = testing_support::PositionLaw::two_point;
+  });
+  add("angles_square", [](ExactAxis& a) {
+    a.count = 1e-3;
+    a.position = testing_support::PositionLaw::square;
+  });
+  add("barely_apart", [](ExactAxis& a) {
+    a.law = ErrorLaw::together;
+    a.correlation = 0.02;
+    a.bound = 1.0;
+    a.deviation = 1.0;
+  });
   return all;
 }
 

@@ -26,6 +26,13 @@ enum class ErrorLaw {
   skewed,     ///< the bound now and then, a little to the other side between: mean 0, the deviation as stated
 };
 
+/// Laws of the position's errors, all within half a count.
+enum class PositionLaw {
+  rounded,    ///< to whole counts
+  two_point,  ///< ± half a count
+  square,     ///< half a count to one side and then to the other, a second each: against a jump, for as long as it lasts
+};
+
 /// An axis m v̇ = u − f v, its drive and its sensors.
 struct ExactAxis {
   double mass = 20.0, viscous = 4.0;
@@ -34,6 +41,7 @@ struct ExactAxis {
   double correlation = 0.0;             ///< s
   double deviation = 0.0;               ///< N, of spikes and skewed; declared where it is > 0
   double count = 1e-4;                  ///< m, resolution of the position
+  PositionLaw position = PositionLaw::rounded;
   double jitter = 0.0;                  ///< of the steps, relative
   double feedback = 0.0;                ///< N s/m, on the measured speed: errors act on the motion
   ErrorLaw law = ErrorLaw::two_point;
@@ -58,7 +66,11 @@ inline LogTable drive(const ExactAxis& a, std::uint64_t seed) {
   for (std::size_t k = 0; k < rows; ++k) {
     const double h = (1.0 + a.jitter * (2.0 * uniform() - 1.0)) / a.rate;
     before = measured;
-    measured = std::round(x / a.count) * a.count;
+    switch (a.position) {
+      case PositionLaw::rounded: measured = std::round(x / a.count) * a.count; break;
+      case PositionLaw::two_point: measured = x + (uniform() < 0.5 ? -0.5 : 0.5) * a.count; break;
+      case PositionLaw::square: measured = x + (std::fmod(t, 2.0) < 1.0 ? -0.5 : 0.5) * a.count; break;
+    }
     const double speed = k > 0 ? (measured - before) * a.rate : 0.0;
     double u = 0.0;
     const double frequencies[4] = {0.11, 0.23, 0.41, 0.83};
