@@ -49,7 +49,23 @@ filter::SampleClass class_of(const filter::ErrorClass& c, double shortest_step, 
   return sample;
 }
 
-// Λ √V0 of sums whose risk is e^{−L}, as in scale_detector.cpp; infinite where Hoeffding's proxy serves.
+constexpr double kHalves = 0.6931471805599453;  // ln 2: each half of the mixture has half of the risk
+
+// Bound on the share of errors with the summed variance proxies V > 0 in a sum, but for e^{−L}, V0 > 0 fixed beforehand:
+// √((V + V0)(2L + ln(1 + V/V0))) (method of mixtures: Robbins 1970; de la Peña, Klass, Lai 2004). Where the proxies hold
+// for |λ| <= reach/√V0 only, half of the mixture is cut off there, the other half stands at that end.
+double mixture_radius(double V, double V0, double L, double reach) {
+  const double volume = std::log1p(V / V0);
+  if (reach == core::kInfinity) {
+    return std::sqrt((V + V0) * (2.0 * L + volume));
+  }
+  const double at_reach = std::sqrt(V0) / reach * (L + kHalves) + 0.5 * reach * V / std::sqrt(V0);
+  const double squared = 2.0 * (L + kHalves) + volume;
+  const bool inside = std::sqrt(squared) + 1.0 <= reach * std::sqrt(1.0 + V / V0);
+  return inside ? std::min(at_reach, std::sqrt((V + V0) * squared)) : at_reach;
+}
+
+// Λ √V0 of sums whose risk is e^{−L}; infinite where Hoeffding's proxy serves.
 double pose_reach(const filter::SampleClass& sample, double L) {
   if (!(sample.deviation < sample.bound)) {
     return core::kInfinity;
@@ -360,7 +376,7 @@ double PoseSumDetector::averaged(double V, double usual, double L, const filter:
   if (!(V > 0.0)) {
     return 0.0;
   }
-  return usual > 0.0 ? averaged_radius(V, usual, L, pose_reach(sample, L)) : HUGE_VAL;
+  return usual > 0.0 ? mixture_radius(V, usual, L, pose_reach(sample, L)) : HUGE_VAL;
 }
 
 void PoseSumDetector::look(Scale& s, std::size_t which) {
