@@ -119,7 +119,7 @@ ExitCode follow(std::istream& in, std::ostream& out, TorqueDetector detector, co
     pose_sample.resize(pose_pick.size());
     pose_sums.emplace(*model.kinematic, detector::PoseSumOptions{.false_alarms = commission::pose_false_alarms(model)});
   }
-  const auto tell = [&](const commission::RiskEvent& event) {
+  const auto announce = [&](const commission::RiskEvent& event) {
     out << (json ? files::json_text({{"at_risk", results::to_json(event, model)}}, -1)
                  : "at a stated risk, " + commission::sentence(event, model.model))
         << std::endl;
@@ -152,7 +152,7 @@ ExitCode follow(std::istream& in, std::ostream& out, TorqueDetector detector, co
       }
       sums.step(row.t[0], values);
       if (recorder.add(sums, row.t[0])) {
-        tell(recorder.watch().events.back());
+        announce(recorder.watch().events.back());
       }
     };
     if (scales) {

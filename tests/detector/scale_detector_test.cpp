@@ -132,8 +132,8 @@ TEST(ScaleDetector, AllowsForTheWorstLawOfEfforts) {
   }
 }
 
-// A supermartingale of mean 1 exceeds e^L with probability e^−L at most: a sum at the radius makes this one exceed that,
-// e^{λS − λ²V/2} of all λ, to both sides, at equal parts.
+// A supermartingale of mean 1 exceeds e^L with probability e^−L at most: a sum at the radius makes this one exceed
+// that, e^{λS − λ²V/2} of all λ, to both sides, at equal parts.
 TEST(AveragedRadius, IsWhereTheMixtureReachesTheRisk) {
   for (const double L : {3.0, 10.0, 25.0, 40.0}) {
     for (const double ratio : {1e-5, 1e-3, 0.1, 1.0, 5.0, 50.0, 1e4}) {

@@ -30,7 +30,7 @@ enum class ErrorLaw {
 enum class PositionLaw {
   rounded,    ///< to whole counts
   two_point,  ///< ± half a count
-  square,     ///< half a count to one side and then to the other, a second each: against a jump, for as long as it lasts
+  square,     ///< half a count to one side and then to the other, a second each
 };
 
 /// An axis m v̇ = u − f v, its drive and its sensors.
@@ -42,8 +42,8 @@ struct ExactAxis {
   double deviation = 0.0;               ///< N, of spikes and skewed; declared where it is > 0
   double count = 1e-4;                  ///< m, resolution of the position
   PositionLaw position = PositionLaw::rounded;
-  double jitter = 0.0;                  ///< of the steps, relative
-  double feedback = 0.0;                ///< N s/m, on the measured speed: errors act on the motion
+  double jitter = 0.0;    ///< of the steps, relative
+  double feedback = 0.0;  ///< N s/m, on the measured speed: errors act on the motion
   ErrorLaw law = ErrorLaw::two_point;
   double fault_at = 1e300, fault_bias = 0.0;  ///< s, N: a bias of the efforts' readings
 };
