@@ -189,6 +189,17 @@ Effect torque_deadzone() {
           }};
 }
 
+// What a limit takes from an effort. A limit shows at peaks: one that most of the drive lies above, or that takes most of
+// the effort away, is none of the robot's but a way to be rid of the signal, and its column is nothing.
+Signal beyond_limit(const Signal& effort, double limit) {
+  constexpr double kMostSamples = 0.25, kMostSquare = 0.4;
+  const Signal beyond = effort - effort.cwiseMax(-limit).cwiseMin(limit);
+  const double samples = static_cast<double>((beyond.array() != 0.0).count());
+  const bool peaks = samples <= kMostSamples * static_cast<double>(effort.size()) &&
+                     beyond.squaredNorm() <= kMostSquare * effort.squaredNorm();
+  return peaks ? beyond : Signal::Zero(effort.size());
+}
+
 Effect saturation() {
   return {.name = "saturation",
           .sentence = "The actuator's torque is limited below what is commanded.",
@@ -203,8 +214,7 @@ Effect saturation() {
           .excite = "accelerate as hard as it goes",
           .columns = [](const Drive& drive, Shape shape) {
             return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
-                                           const Signal& u = drive.joints[j].effort;
-                                           return u - u.cwiseMax(-shape[0]).cwiseMin(shape[0]);
+                                           return beyond_limit(drive.joints[j].effort, shape[0]);
                                          }))};
           }};
 }

@@ -4,10 +4,15 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
+#include <string_view>
 #include <utility>
+
+#include <fmt/format.h>
 
 #include <wheelwright/gap/confusion.hpp>
 #include <wheelwright/gap/drive.hpp>
+#include <wheelwright/gap/fast_band.hpp>
 #include <wheelwright/gap/estimates.hpp>
 #include <wheelwright/gap/further_drive.hpp>
 #include <wheelwright/gap/improved_robot.hpp>
@@ -22,6 +27,7 @@ namespace wheelwright::gap {
 namespace {
 
 constexpr std::size_t kShownOfEachSize = 8;
+constexpr std::string_view kPlay = "backlash";
 constexpr double kWidePrior = 1e6;  // times the nominal value: a side of the prior that nobody gave
 
 GapVerdict verdict_of(const Selection& found, std::size_t alternatives) {
@@ -101,6 +107,49 @@ void list_causes(Diagnosis& result, const PreparedGap& prepared, const GapProble
   }
   std::stable_sort(result.causes.begin(), result.causes.end(),
                    [](const GapCause& a, const GapCause& b) { return a.share > b.share; });
+}
+
+// What the band above the filter's adds to the verdict: play, or that there is a gap.
+void add_fast_band(Diagnosis& result, const FastBand& fast, const std::vector<Effect>& catalogue) {
+  const auto play = std::ranges::find(catalogue, kPlay, &Effect::name);
+  const bool named = std::ranges::find(result.causes, kPlay, &GapCause::effect) != result.causes.end();
+  if (fast.play && play != catalogue.end() && !named) {
+    GapCause cause{play->name, play->sentence, play->parametric, {}, 0.0};
+    const double whole = result.gap + fast.effort_square;
+    for (GapCause& other : result.causes) {
+      other.share *= whole > 0.0 ? result.gap / whole : 0.0;
+    }
+    cause.share = whole > 0.0 ? fast.effort_square / whole : 0.0;
+    if (result.verdict == GapVerdict::no_gap) {
+      result.verdict = GapVerdict::explained;
+      cause.share = 1.0;
+    }
+    result.remaining *= whole > 0.0 ? result.gap / whole : 1.0;
+    result.structural += fast.effort_square;
+    result.gap = whole;
+    result.causes.push_back(std::move(cause));
+    std::stable_sort(result.causes.begin(), result.causes.end(),
+                     [](const GapCause& a, const GapCause& b) { return a.share > b.share; });
+    if (result.credible.empty()) {
+      result.credible.push_back({{}, 1.0, 1.0});
+    }
+    for (CredibleCauses& set : result.credible) {
+      if (std::ranges::find(set.effects, kPlay) == set.effects.end()) {
+        set.effects.emplace_back(kPlay);
+      }
+    }
+    result.notes.push_back(fmt::format(
+        "between {:.0f} and {:.0f} 1/s, above the filter's band, the mean square of what the model leaves is {:.2f} times "
+        "the healthy log's just after reversals of the torque and {:.2f} times elsewhere: play. How wide it is cannot be "
+        "said without the rotor's inertia",
+        result.beta, fast.beta, fast.after_reversals, fast.elsewhere));
+  } else if (fast.above && result.verdict == GapVerdict::no_gap) {
+    result.verdict = GapVerdict::unexplained;
+    result.notes.push_back(fmt::format(
+        "between {:.0f} and {:.0f} 1/s, above the filter's band, the model leaves {:.2f} times the healthy log's mean "
+        "square, and not only after reversals of the torque: something fast that no cause here explains",
+        result.beta, fast.beta, fast.left));
+  }
 }
 
 std::string unit_of(const PreparedGap& prepared, const GapRows& rows, std::size_t space) {
@@ -227,6 +276,9 @@ Diagnosis diagnose(LogSource& log, LogSource* baseline, const Robot& robot, cons
   result.series = series_of(prepared, problem, fitted);
   result.theta = fitted.theta;
   result.fitted = fitted.effects;
+  if (const std::optional<FastBand> fast = look_at_fast_band(prepared, fitted.effects, {.blocks = blocks})) {
+    add_fast_band(result, *fast, prepared.catalogue);
+  }
   tell("locating", 0.65);
   WhereOptions where_to_look;
   where_to_look.beta = prepared.row_options.beta;
@@ -238,8 +290,10 @@ Diagnosis diagnose(LogSource& log, LogSource* baseline, const Robot& robot, cons
       prepared.drive, prepared.row_options.beta,
       settled(prepared.drive, prepared.row_options.beta) && moving(prepared.drive, prepared.row_options.beta), floors,
       finite_prior(robot, prepared));
-  result.contradictions = contradictions.rows;
-  result.notes.push_back(contradictions.statement);
+  if (result.verdict != GapVerdict::no_gap) {
+    result.contradictions = contradictions.rows;
+    result.notes.push_back(contradictions.statement);
+  }
   const BaseModel alike = trusted ? BaseModel::nominal : BaseModel::refitted;
   const std::vector<std::optional<Signature>> on_log = signatures(problem.table, alike);
   result.confusable = confusable_pairs(problem.table, on_log, alike);

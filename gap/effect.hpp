@@ -74,7 +74,9 @@ enum class DirectMeasurement {
   none,
 };
 
-/// One unmodelled effect, or one parametric cause.
+/// One unmodelled effect, or one parametric cause. An effect that follows one of several laws, which have other columns
+/// (friction that bends before it slides; slip as a speed or as a share of one), is several of the same name: at most
+/// one of them is in a set of causes.
 struct Effect {
   std::string name{};                         ///< as in results
   std::string noun{};                         ///< as sentences call it; empty: as catalogue_noun(name)
@@ -82,6 +84,8 @@ struct Effect {
   std::string family{};                       ///< name shared by effects that are the same cause; empty: none
   std::string common{};                       ///< parametric cause that is a part of this effect: unequal gains have a
                                               ///< mean. Where both are found it is one cause; empty: none
+  std::vector<std::string> stands_for{};      ///< effects that this one is together: a load off the middle adds mass and
+                                              ///< shifts its centre. Where these do as well it is one cause
   bool parametric = false;                    ///< moves θ or the kinematic scale of the base model
   std::vector<EffectParameter> parameters{};  ///< one for each column
   std::vector<ShapeParameter> shapes{};       ///< on which the columns depend nonlinearly

@@ -447,7 +447,13 @@ GapProblem make_problem(const Drive& drive, const NoiseFloor& floor, const std::
     }
   }
   for (const Effect& effect : catalogue) {
-    problem.kinds.push_back({effect.inexact});
+    EffectKind kind{effect.inexact, {}};
+    for (std::size_t e = 0; e < catalogue.size(); ++e) {
+      if (std::ranges::find(effect.stands_for, catalogue[e].name) != effect.stands_for.end()) {
+        kind.stands_for.push_back(e);
+      }
+    }
+    problem.kinds.push_back(std::move(kind));
   }
   return problem;
 }

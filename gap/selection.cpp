@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <optional>
 #include <random>
 
 #include <wheelwright/core/check.hpp>
@@ -310,11 +311,17 @@ class Selector {
     return best;
   }
 
+  [[nodiscard]] const std::string& name_of(std::size_t candidate) const {
+    return table_.names[table_.candidates[candidate].effect];
+  }
+
   // Parametric causes that let `structural` do with θ nominal as well as with θ fitted: sets of one or two, best first;
   // an empty one where none is needed. Nothing where no such set does.
   [[nodiscard]] std::vector<CauseSet> explain_theta(const CauseSet& structural) const {
     const CauseSet held = with_shapes_for_nominal(structural);
-    const double tolerable = std::max(options_.theta_share * gap_ + inexact(structural), options_.smallest);
+    // What the columns miss, θ may take up.
+    const double tolerable =
+        std::max(0.02 * gap_ + inexact(structural) + 2.0 * excess(structural), options_.smallest);
     if (excess(held) - excess(structural) <= tolerable) {
       return {held};
     }
@@ -340,7 +347,7 @@ class Selector {
           continue;
         }
         for (std::size_t j = i + 1; j < movers.size(); ++j) {
-          if (table_.candidates[movers[i]].effect != table_.candidates[movers[j]].effect) {
+          if (name_of(movers[i]) != name_of(movers[j])) {
             try_set({movers[i], movers[j]});
           }
         }
@@ -352,6 +359,35 @@ class Selector {
       }
     }
     return {};
+  }
+
+  // `structural` with an effect that stands for one of its members and for what else θ did, where that takes fewer
+  // causes than the sets of `found`, or explains θ where these do not.
+  [[nodiscard]] std::optional<CauseSet> as_one(const CauseSet& structural, const std::vector<CauseSet>& found) const {
+    const std::size_t most = found.empty() ? SIZE_MAX : found.front().members.size();
+    if (most <= structural.members.size()) {
+      return std::nullopt;
+    }
+    for (std::size_t k = 0; k < structural.members.size(); ++k) {
+      for (std::size_t c = 0; c < table_.candidates.size(); ++c) {
+        const std::vector<std::size_t>& parts = kinds_[table_.candidates[c].effect].stands_for;
+        if (std::ranges::find(parts, table_.candidates[structural.members[k]].effect) == parts.end()) {
+          continue;
+        }
+        std::vector<std::size_t> members = structural.members;
+        members[k] = c;
+        std::sort(members.begin(), members.end());
+        CauseSet whole = evaluate(table_, std::move(members), BaseModel::refitted);
+        if (excess(whole) > excess(structural) + margin(structural)) {
+          continue;
+        }
+        const std::vector<CauseSet> sets = explain_theta(whole);
+        if (!sets.empty() && sets.front().members.size() < most) {
+          return whole;
+        }
+      }
+    }
+    return std::nullopt;
   }
 
   void add_parametric(Selection& result, const std::vector<CauseSet>& structural_rivals, bool nominal_trusted) const {
@@ -370,7 +406,11 @@ class Selector {
         rivals.push_back({structural[i], i});
         continue;
       }
-      const std::vector<CauseSet> found = explain_theta(structural[i]);
+      std::vector<CauseSet> found = explain_theta(structural[i]);
+      if (std::optional<CauseSet> whole = as_one(structural[i], found)) {
+        structural[i] = std::move(*whole);
+        found = explain_theta(structural[i]);
+      }
       if (found.empty()) {
         rivals.push_back({structural[i], i, true});
         continue;
@@ -489,7 +529,8 @@ double unexplained_by(const CandidateTable& table, const std::vector<std::size_t
   const Eigen::MatrixXd beside = remainder(*table.gram, of, on);
   double share = 0.0;
   for (Eigen::Index i = 0; i < alone.rows(); ++i) {
-    if (alone(i, i) > 0.0) {
+    // What θ takes up is no column beside it.
+    if (alone(i, i) > 1e-6 * table.gram->square(of[static_cast<std::size_t>(i)])) {
       share = std::max(share, std::clamp(beside(i, i) / alone(i, i), 0.0, 1.0));
     }
   }

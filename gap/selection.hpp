@@ -80,7 +80,8 @@ struct Selection {
 
 /// Properties of an effect that selection needs besides its columns.
 struct EffectKind {
-  double inexact = 0.0;  ///< Effect::inexact
+  double inexact = 0.0;                   ///< Effect::inexact
+  std::vector<std::size_t> stands_for{};  ///< Effect::stands_for, by index
 };
 
 /// Selects. `floor_error` is the mean square that noise alone leaves (1 where the floors are right); `kinds` has one
