@@ -212,6 +212,12 @@ Effect saturation() {
                       .scale = typical_effort}},
           .unit_coefficient = true,
           .excite = "accelerate as hard as it goes",
+          .applies =
+              [](const Drive& drive) {
+                return drive.efforts_flowed
+                           ? Applicability{false, "the efforts are currents that flowed, which no limit cut off"}
+                           : Applicability{};
+              },
           .columns = [](const Drive& drive, Shape shape) {
             return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
                                            return beyond_limit(drive.joints[j].effort, shape[0]);

@@ -214,6 +214,7 @@ Effect load_friction() {
 Effect friction_drift() {
   return {.name = "friction_drift",
           .sentence = "Friction, viscous and dry, that changes as the drive warms up.",
+          .common = "viscous",
           .parameters = {{"loss", "N·m·s/rad", 0}, {"loss_dry", "N·m", 0}},
           .shapes = {{.name = "T", .unit = "s", .lower = 10.0, .upper = 200.0, .scan = 8, .logarithmic = true}},
           .excite = "drive for several minutes from cold, the same manoeuvre again and again",

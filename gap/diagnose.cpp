@@ -109,11 +109,22 @@ void list_causes(Diagnosis& result, const PreparedGap& prepared, const GapProble
                    [](const GapCause& a, const GapCause& b) { return a.share > b.share; });
 }
 
+// Whether some channel of some space is above its floor, though all together are not: by the largest mean square.
+bool some_channel_above(const std::vector<ResidualSeries>& series, double tolerated) {
+  return std::ranges::any_of(series, [tolerated](const ResidualSeries& s) {
+    return s.after.size() > 0 && s.floor > 0.0 &&
+           s.after.squaredNorm() > (1.0 + tolerated) * s.floor * s.floor * static_cast<double>(s.after.size());
+  });
+}
+
 // What the band above the filter's adds to the verdict: play, or that there is a gap.
 void add_fast_band(Diagnosis& result, const FastBand& fast, const std::vector<Effect>& catalogue) {
   const auto play = std::ranges::find(catalogue, kPlay, &Effect::name);
-  const bool named = std::ranges::find(result.causes, kPlay, &GapCause::effect) != result.causes.end();
-  if (fast.play && play != catalogue.end() && !named) {
+  // A dead zone acts at the same instants, and its edges are no sharper known than its column has them.
+  const bool known = std::ranges::any_of(result.causes, [](const GapCause& cause) {
+    return cause.effect == kPlay || cause.effect == "torque_deadzone";
+  });
+  if (fast.play && play != catalogue.end() && !known) {
     GapCause cause{play->name, play->sentence, play->parametric, {}, 0.0};
     const double whole = result.gap + fast.effort_square;
     for (GapCause& other : result.causes) {
@@ -276,6 +287,10 @@ Diagnosis diagnose(LogSource& log, LogSource* baseline, const Robot& robot, cons
   result.series = series_of(prepared, problem, fitted);
   result.theta = fitted.theta;
   result.fitted = fitted.effects;
+  if (result.verdict == GapVerdict::no_gap && some_channel_above(result.series, 2.0 * selection.tolerated_floor)) {
+    result.verdict = GapVerdict::unexplained;
+    result.notes.push_back("one channel is above its noise floor, though all of them together are not");
+  }
   if (const std::optional<FastBand> fast = look_at_fast_band(prepared, fitted.effects, {.blocks = blocks})) {
     add_fast_band(result, *fast, prepared.catalogue);
   }

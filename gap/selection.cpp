@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <numeric>
 #include <optional>
@@ -77,10 +78,19 @@ class Selector {
     level_ = options.significance / (2.0 * tried);  // two tests of each
     critical_ = core::normal_upper_quantile(level_);
     moves_theta_only_.assign(kinds.size(), true);
+    does_nothing_.assign(kinds.size(), true);
     for (std::size_t c = 0; c < table.candidates.size(); ++c) {
+      const std::size_t effect = table.candidates[c].effect;
       if (beyond_theta(table, c) > options.contained) {
-        moves_theta_only_[table.candidates[c].effect] = false;
+        moves_theta_only_[effect] = false;
       }
+      does_nothing_[effect] =
+          does_nothing_[effect] && std::ranges::all_of(table.candidates[c].columns, [&](std::size_t column) {
+            return !(table.gram->square(column) > 0.0);
+          });
+    }
+    for (std::size_t e = 0; e < kinds.size(); ++e) {
+      moves_theta_only_[e] = moves_theta_only_[e] && !does_nothing_[e];
     }
   }
 
@@ -90,7 +100,7 @@ class Selector {
     search.threads = options_.threads;
     search.allowed.resize(kinds_.size());
     for (std::size_t e = 0; e < kinds_.size(); ++e) {
-      search.allowed[e] = !moves_theta_only_[e];
+      search.allowed[e] = !moves_theta_only_[e] && !does_nothing_[e];
     }
     const std::vector<std::vector<CauseSet>> levels = search_causes(table_, search);
     const CauseSet& nothing = levels[0][0];
@@ -135,8 +145,9 @@ class Selector {
   // Whether `next` is worth its further causes. Nothing is where the floor is reached already.
   [[nodiscard]] bool gains(const CauseSet& now, const CauseSet& next, double whole) const {
     const double gain = now.held_out_error - next.held_out_error;
+    constexpr double kLeastGap = 0.1;  // less is nothing, though a cause may lower the noise of a log that has less of it
     const double left = excess(now);
-    if (!(left > 0.0)) {
+    if (!(left > 0.0) || gap_ < kLeastGap) {
       return false;
     }
     const bool counts = gain > options_.share * whole && gain > options_.part * left;
@@ -205,13 +216,19 @@ class Selector {
     return std::max(options_.misfit * excess(best), 0.3 * options_.smallest);
   }
 
-  // Whether the causes of the set undo each other, or all of them what they move θ by.
+  // Whether the set needs an inertia that is none, the causes undo each other, or all of them what they move θ by.
   [[nodiscard]] bool cancels(const CauseSet& set) const {
     if (set.members.empty()) {
       return false;
     }
     const Subset subset = subset_of(table_, set.members, BaseModel::refitted);
     const Eigen::VectorXd coefficients = table_.gram->fit(subset).coefficients;
+    for (const auto& [column, nominal] : table_.inertias) {
+      const auto at = std::ranges::find(table_.base, column) - table_.base.begin();
+      if (at < std::ssize(table_.base) && !(nominal + coefficients[at] > 0.0)) {
+        return true;
+      }
+    }
     // Columns of θ, then of all members, with their weights.
     using Part = std::vector<std::pair<std::size_t, double>>;
     std::vector<Part> parts(1);
@@ -321,7 +338,7 @@ class Selector {
     const CauseSet held = with_shapes_for_nominal(structural);
     // What the columns miss, θ may take up.
     const double tolerable =
-        std::max(0.02 * gap_ + inexact(structural) + 2.0 * excess(structural), options_.smallest);
+        std::max(options_.theta_share * gap_ + inexact(structural) + 2.0 * excess(structural), options_.smallest);
     if (excess(held) - excess(structural) <= tolerable) {
       return {held};
     }
@@ -427,7 +444,8 @@ class Selector {
         }
       }
     }
-    // With θ held, the right one of causes that do as well with θ fitted again is the one that leaves least.
+    // With θ held, the right one of causes that do as well with θ fitted again is the one that leaves least, with the
+    // fewest causes.
     const std::size_t most = rivals.front().moves_theta ? SIZE_MAX : rivals.front().set.members.size();
     const auto comparable = [&](const Rival& rival) { return !rival.moves_theta && rival.set.members.size() <= most; };
     const CauseSet* least = nullptr;
@@ -439,8 +457,13 @@ class Selector {
     }
     if (least != nullptr) {
       const double as_good = excess(*least) + margin(*least);
-      const auto lead = std::ranges::find_if(
-          rivals, [&](const Rival& rival) { return comparable(rival) && excess(rival.set) <= as_good; });
+      auto lead = rivals.end();
+      for (auto rival = rivals.begin(); rival != rivals.end(); ++rival) {
+        const bool good = comparable(*rival) && excess(rival->set) <= as_good;
+        if (good && (lead == rivals.end() || rival->set.members.size() < lead->set.members.size())) {
+          lead = rival;
+        }
+      }
       std::rotate(rivals.begin(), lead, lead + 1);
     }
     result.all = rivals.front().set;
@@ -498,6 +521,7 @@ class Selector {
   double level_ = 0.0;                  // of a test
   double critical_ = 0.0;               // standard deviations, of that level
   std::vector<bool> moves_theta_only_;  // by effect: θ fitted again takes all of it
+  std::vector<bool> does_nothing_;      // by effect: all of its columns are zeros
   double gap_ = 0.0;
 };
 

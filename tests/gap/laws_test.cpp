@@ -12,6 +12,7 @@
 
 #include <gtest/gtest.h>
 
+#include <wheelwright/core/words.hpp>
 #include <wheelwright/gap/diagnose.hpp>
 
 #include "gap/noisy_log.hpp"
@@ -162,6 +163,20 @@ std::set<std::string> names_of(const Diagnosis& found) {
   return names;
 }
 
+bool is_kept(const Diagnosis& found, const std::string& effect) {
+  return std::ranges::any_of(found.credible, [&](const CredibleCauses& set) {
+    return std::ranges::find(set.effects, effect) != set.effects.end();
+  });
+}
+
+std::string kept(const Diagnosis& found) {
+  std::string all;
+  for (const CredibleCauses& set : found.credible) {
+    all += (all.empty() ? "" : " or ") + core::enumerated(set.effects);
+  }
+  return all;
+}
+
 bool says(const Diagnosis& found, const std::string& words) {
   return std::ranges::any_of(found.notes,
                              [&](const std::string& note) { return note.find(words) != std::string::npos; });
@@ -182,10 +197,12 @@ TEST(Laws, PlayIsFoundWhateverItsContact) {
   }
 }
 
+// Where these contacts slide. One that only creeps makes the ground's speed lag behind the rim's, as by clocks that
+// differ, and nothing here could tell.
 TEST(Laws, SlipIsFoundByTheFrictionOfItsContact) {
-  for (const Sliding law : {Sliding{60.0, 0.08}, Sliding{25.0, 0.02}}) {
+  for (const Sliding law : {Sliding{12.0, 0.02}, Sliding{9.0, 0.05}}) {
     const Diagnosis found = diagnosis_of(law);
-    EXPECT_TRUE(names_of(found).contains("longitudinal_slip")) << law.most;
+    EXPECT_TRUE(is_kept(found, "longitudinal_slip")) << law.most << " N: " << kept(found);
     EXPECT_NE(found.verdict, GapVerdict::no_gap);
   }
 }
@@ -209,7 +226,8 @@ TEST(Laws, ALimitBelowMostEffortsIsNone) {
   const Effect limit = gap_example::effect_called("saturation");
   const auto taken = [&](double most) {
     double square = 0.0;
-    for (const Eigen::VectorXd& effort : limit.columns(drive, std::vector{most}).front().effort) {
+    const std::vector<Column> columns = limit.columns(drive, std::vector{most});
+    for (const Eigen::VectorXd& effort : columns.front().effort) {
       square += effort.squaredNorm();
     }
     return square;
