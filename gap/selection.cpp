@@ -118,7 +118,11 @@ class Selector {
       }
       const CauseSet* next = simplest(levels[size]);
       if (next != nullptr && gains(best, *next, result.refitted_excess)) {
-        best = all_needed(*next, result.refitted_excess);
+        // What is left when no member is needed beside the others need not gain anything.
+        CauseSet needed = all_needed(*next, result.refitted_excess);
+        if (needed.members == next->members || gains(best, needed, result.refitted_excess)) {
+          best = std::move(needed);
+        }
       }
     }
     result.structural = best;
