@@ -181,6 +181,7 @@ Effect torque_deadzone() {
                       .scan = 3,
                       .logarithmic = true,
                       .scale = typical_effort}},
+          .after_reversals = true,
           .excite = "brake with the motors: torque against the motion",
           .columns = [](const Drive& drive, Shape shape) {
             return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) {
@@ -218,11 +219,12 @@ Effect saturation() {
                            ? Applicability{false, "the efforts are currents that flowed, which no limit cut off"}
                            : Applicability{};
               },
-          .columns = [](const Drive& drive, Shape shape) {
-            return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
-                                           return beyond_limit(drive.joints[j].effort, shape[0]);
-                                         }))};
-          }};
+          .columns =
+              [](const Drive& drive, Shape shape) {
+                return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
+                                               return beyond_limit(drive.joints[j].effort, shape[0]);
+                                             }))};
+              }};
 }
 
 // The inertia of a joint whose torque is all for acceleration.
@@ -302,6 +304,8 @@ Effect backlash() {
                  {.name = "contact_damping", .unit = "1", .lower = 0.15, .upper = 1.0, .scan = 2, .logarithmic = true}},
       .unit_coefficient = true,
       .inexact = 0.1,
+      .after_reversals = true,
+      .above_band = true,
       .excite = "reverse the torque often, gently and hard",
       .columns = [](const Drive& drive, Shape shape) {
         const Play play{shape[0], shape[1], shape[2], shape[3]};

@@ -45,21 +45,23 @@ Effect coulomb_of_bristles() {
           .excite = "reverse often, turn on the spot, drive at several speeds",
           .measured_by = DirectMeasurement::lifted_wheels,
           .applies = [](const Drive& drive) { return needs_no(drive, "coulomb"); },
-          .columns = [](const Drive& drive, Shape shape) {
-            return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
-                                           const Signal& speed = drive.joints[j].smooth_speed;
-                                           Signal z = Signal::Zero(speed.size());
-                                           for (std::size_t s = 0; s < drive.segment_starts.size(); ++s) {
-                                             const auto [first, last] = drive.segment(s);
-                                             for (Eigen::Index k = first + 1; k < last; ++k) {
-                                               const double turn = 0.5 * (speed[k - 1] + speed[k]) * drive.step / shape[0];
-                                               const double towards = turn > 0.0 ? 1.0 : -1.0;
-                                               z[k] = towards + (z[k - 1] - towards) * std::exp(-std::abs(turn));
-                                             }
-                                           }
-                                           return z;
-                                         }))};
-          }};
+          .columns =
+              [](const Drive& drive, Shape shape) {
+                return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
+                                               const Signal& speed = drive.joints[j].smooth_speed;
+                                               Signal z = Signal::Zero(speed.size());
+                                               for (std::size_t s = 0; s < drive.segment_starts.size(); ++s) {
+                                                 const auto [first, last] = drive.segment(s);
+                                                 for (Eigen::Index k = first + 1; k < last; ++k) {
+                                                   const double turn =
+                                                       0.5 * (speed[k - 1] + speed[k]) * drive.step / shape[0];
+                                                   const double towards = turn > 0.0 ? 1.0 : -1.0;
+                                                   z[k] = towards + (z[k - 1] - towards) * std::exp(-std::abs(turn));
+                                                 }
+                                               }
+                                               return z;
+                                             }))};
+              }};
 }
 
 // A smoothed sign, wider than that of coulomb().
@@ -78,11 +80,12 @@ Effect coulomb_smoothed() {
           .excite = "reverse often, turn on the spot, drive at several speeds",
           .measured_by = DirectMeasurement::lifted_wheels,
           .applies = [](const Drive& drive) { return needs_no(drive, "coulomb"); },
-          .columns = [](const Drive& drive, Shape shape) {
-            return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) {
-                                           return soft_sign(drive.joints[j].smooth_speed, shape[0]);
-                                         }))};
-          }};
+          .columns =
+              [](const Drive& drive, Shape shape) {
+                return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) {
+                                               return soft_sign(drive.joints[j].smooth_speed, shape[0]);
+                                             }))};
+              }};
 }
 
 Effect coulomb_asymmetric() {

@@ -344,14 +344,15 @@ Effect slip_by_force(bool share) {
                 .inexact = kLoadOfWheels,
                 .excite = "accelerate and brake as hard as it goes, with the pose logged",
                 .applies = needs_heading};
-  effect.shapes = {{.name = "force_total0_inertial1", .unit = "1", .lower = 0.0, .upper = 1.0, .scan = 2, .discrete = true}};
+  effect.shapes = {
+      {.name = "force_total0_inertial1", .unit = "1", .lower = 0.0, .upper = 1.0, .scan = 2, .discrete = true}};
   for (const char* name : {"slip_1", "slip_2", "slip_3", "slip_4"}) {
     effect.parameters.push_back({name, share ? "1/N" : "m/(s·N)", 1});
   }
   effect.columns = [share, kKnots](const Drive& drive, Shape shape) {
-    std::vector<Signal> forces = shape[0] > 0.5 ? inertial_efforts(drive) : each_joint(drive, [&](std::size_t j) {
-      return drive.joints[j].smooth_effort;
-    });
+    std::vector<Signal> forces = shape[0] > 0.5
+                                     ? inertial_efforts(drive)
+                                     : each_joint(drive, [&](std::size_t j) { return drive.joints[j].smooth_effort; });
     std::vector<double> sizes;
     for (Signal& force : forces) {
       force /= drive.wheel_radius;
@@ -362,7 +363,8 @@ Effect slip_by_force(bool share) {
     std::ranges::sort(sizes);
     std::vector<double> knots;
     for (const double quantile : kKnots) {
-      knots.push_back(quantile > 0.0 ? sizes[static_cast<std::size_t>(quantile * static_cast<double>(sizes.size()))] : 0.0);
+      knots.push_back(quantile > 0.0 ? sizes[static_cast<std::size_t>(quantile * static_cast<double>(sizes.size()))]
+                                     : 0.0);
     }
     knots.push_back(std::max(sizes.back(), knots.back()));
     std::vector<Column> columns;
@@ -418,30 +420,31 @@ Effect slip_at_the_limit() {
 
 // A load at the distance x before the axle's middle: its mass, its moment of inertia, and its own centre.
 Effect payload_offset() {
-  return {.name = "payload_offset",
-          .noun = "a payload before or behind the axle",
-          .sentence = "A load was added before or behind the axle: mass, yaw inertia and a centre of mass off the axle.",
-          .common = "payload",
-          .stands_for = {"com_longitudinal", "payload"},
-          .parameters = {{"mass_kg", "kg", 1}, {"yaw_inertia", "kg·m²", 1}, {"moment", "kg·m", 0}},
-          .excite = "accelerate and brake, and drive fast curves of changing radius",
-          .measured_by = DirectMeasurement::weight,
-          .applies = needs_two_wheels,
-          .columns =
-              [](const Drive& drive, Shape) {
-                const Signal& v1 = drive.coordinates[0].smooth_speed;
-                const Signal& v2 = drive.coordinates[1].smooth_speed;
-                Column offset;
-                offset.effort = {-drive.wheel_radius * v2.cwiseAbs2(), drive.wheel_radius * v1.cwiseProduct(v2)};
-                return std::vector{base_column(drive, "mass"), base_column(drive, "yaw_inertia"), offset};
-              },
-          .physical =
-              [](std::span<const double> c, Shape) {
-                return std::vector<PhysicalValue>{{"mass_kg", "kg", c[0]},
-                                                  {"yaw_inertia", "kg·m²", c[1]},
-                                                  {"moment", "kg·m", c[2]},
-                                                  {"x_m", "m", c[0] > 0.0 ? c[2] / c[0] : 0.0}};
-              }};
+  return {
+      .name = "payload_offset",
+      .noun = "a payload before or behind the axle",
+      .sentence = "A load was added before or behind the axle: mass, yaw inertia and a centre of mass off the axle.",
+      .common = "payload",
+      .stands_for = {"com_longitudinal", "payload"},
+      .parameters = {{"mass_kg", "kg", 1}, {"yaw_inertia", "kg·m²", 1}, {"moment", "kg·m", 0}},
+      .excite = "accelerate and brake, and drive fast curves of changing radius",
+      .measured_by = DirectMeasurement::weight,
+      .applies = needs_two_wheels,
+      .columns =
+          [](const Drive& drive, Shape) {
+            const Signal& v1 = drive.coordinates[0].smooth_speed;
+            const Signal& v2 = drive.coordinates[1].smooth_speed;
+            Column offset;
+            offset.effort = {-drive.wheel_radius * v2.cwiseAbs2(), drive.wheel_radius * v1.cwiseProduct(v2)};
+            return std::vector{base_column(drive, "mass"), base_column(drive, "yaw_inertia"), offset};
+          },
+      .physical =
+          [](std::span<const double> c, Shape) {
+            return std::vector<PhysicalValue>{{"mass_kg", "kg", c[0]},
+                                              {"yaw_inertia", "kg·m²", c[1]},
+                                              {"moment", "kg·m", c[2]},
+                                              {"x_m", "m", c[0] > 0.0 ? c[2] / c[0] : 0.0}};
+          }};
 }
 
 Effect payload(std::size_t joints) {
@@ -483,10 +486,9 @@ Effect armature() {
 std::vector<Effect> geometry_effects(std::size_t joints) {
   std::vector<Effect> effects{payload(joints)};
   if (joints == 2) {
-    for (auto* make :
-         {&com_longitudinal, &com_lateral, &slope, &wheel_out_of_round, &wheel_radius_asymmetric, &longitudinal_slip,
-          &turning_slip, &curve_slip, &wheel_radius, &track_width, &encoder_scale, &armature, &payload_offset,
-          &slip_at_the_limit}) {
+    for (auto* make : {&com_longitudinal, &com_lateral, &slope, &wheel_out_of_round, &wheel_radius_asymmetric,
+                       &longitudinal_slip, &turning_slip, &curve_slip, &wheel_radius, &track_width, &encoder_scale,
+                       &armature, &payload_offset, &slip_at_the_limit}) {
       effects.push_back(make());
     }
     effects.push_back(slip_by_force(false));

@@ -12,8 +12,8 @@
 
 #include <wheelwright/gap/confusion.hpp>
 #include <wheelwright/gap/drive.hpp>
-#include <wheelwright/gap/fast_band.hpp>
 #include <wheelwright/gap/estimates.hpp>
+#include <wheelwright/gap/fast_band.hpp>
 #include <wheelwright/gap/further_drive.hpp>
 #include <wheelwright/gap/improved_robot.hpp>
 #include <wheelwright/gap/prepared.hpp>
@@ -27,7 +27,6 @@ namespace wheelwright::gap {
 namespace {
 
 constexpr std::size_t kShownOfEachSize = 8;
-constexpr std::string_view kPlay = "backlash";
 constexpr double kWidePrior = 1e6;  // times the nominal value: a side of the prior that nobody gave
 
 GapVerdict verdict_of(const Selection& found, std::size_t alternatives) {
@@ -119,10 +118,11 @@ bool some_channel_above(const std::vector<ResidualSeries>& series, double tolera
 
 // What the band above the filter's adds to the verdict: play, or that there is a gap.
 void add_fast_band(Diagnosis& result, const FastBand& fast, const std::vector<Effect>& catalogue) {
-  const auto play = std::ranges::find(catalogue, kPlay, &Effect::name);
-  // A dead zone acts at the same instants, and its edges are no sharper known than its column has them.
-  const bool known = std::ranges::any_of(result.causes, [](const GapCause& cause) {
-    return cause.effect == kPlay || cause.effect == "torque_deadzone";
+  const auto play = std::ranges::find(catalogue, true, &Effect::above_band);
+  // What acts at the same instants is known no sharper than its column has it.
+  const bool known = std::ranges::any_of(result.causes, [&](const GapCause& cause) {
+    const auto effect = std::ranges::find(catalogue, cause.effect, &Effect::name);
+    return effect != catalogue.end() && effect->after_reversals;
   });
   if (fast.play && play != catalogue.end() && !known) {
     GapCause cause{play->name, play->sentence, play->parametric, {}, 0.0};
@@ -145,15 +145,17 @@ void add_fast_band(Diagnosis& result, const FastBand& fast, const std::vector<Ef
       result.credible.push_back({{}, 1.0, 1.0});
     }
     for (CredibleCauses& set : result.credible) {
-      if (std::ranges::find(set.effects, kPlay) == set.effects.end()) {
-        set.effects.emplace_back(kPlay);
+      if (std::ranges::find(set.effects, play->name) == set.effects.end()) {
+        set.effects.push_back(play->name);
       }
     }
-    result.notes.push_back(fmt::format(
-        "between {:.0f} and {:.0f} 1/s, above the filter's band, the mean square of what the model leaves is {:.2f} times "
-        "the healthy log's just after reversals of the torque and {:.2f} times elsewhere: play. How wide it is cannot be "
-        "said without the rotor's inertia",
-        result.beta, fast.beta, fast.after_reversals, fast.elsewhere));
+    result.notes.push_back(
+        fmt::format("between {:.0f} and {:.0f} 1/s, above the filter's band, the mean square of what the model leaves "
+                    "is {:.2f} times "
+                    "the healthy log's just after reversals of the torque and {:.2f} times elsewhere: play. How wide "
+                    "it is cannot be "
+                    "said without the rotor's inertia",
+                    result.beta, fast.beta, fast.after_reversals, fast.elsewhere));
   } else if (fast.above && result.verdict == GapVerdict::no_gap) {
     result.verdict = GapVerdict::unexplained;
     result.notes.push_back(fmt::format(

@@ -71,8 +71,8 @@ Column clock_column(const Drive& drive) {
   for (std::size_t i = 0; i < drive.model.n(); ++i) {
     column.effort_rate[i] = Signal::Zero(drive.rows());
     for (std::size_t j = 0; j < drive.joints.size(); ++j) {
-      column.effort_rate[i] +=
-          drive.model.input(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) * drive.joints[j].predicted_effort;
+      column.effort_rate[i] += drive.model.input(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) *
+                               drive.joints[j].predicted_effort;
     }
   }
   return column;
@@ -271,8 +271,7 @@ std::optional<FastBand> look_at_fast_band(const PreparedGap& prepared, const std
   const BandFit fitted = fit_band(spaces, options.blocks);
   found.left = fitted.fit.held_out_error;
 
-  const Contrast now =
-      contrast_of(spaces, fitted.left, places_of(drive, rows, options.after), kParts);
+  const Contrast now = contrast_of(spaces, fitted.left, places_of(drive, rows, options.after), kParts);
   const Contrast before =
       contrast_of(reference, healthy_fit.left, places_of(healthy, healthy_rows, options.after), kParts);
   found.after_reversals = now.after;
@@ -285,8 +284,7 @@ std::optional<FastBand> look_at_fast_band(const PreparedGap& prepared, const std
   }
   found.play = now.ratio() > options.contrast * usual && signed_rank_p(beyond) < options.significance;
   if (efforts > 0.0) {
-    found.effort_square =
-        std::max(now.after - usual * now.elsewhere, 0.0) * now.presence * floor_square / efforts;
+    found.effort_square = std::max(now.after - usual * now.elsewhere, 0.0) * now.presence * floor_square / efforts;
   }
   std::size_t more = 0, blocks = 0;
   const BlockGram counts(spaces, options.blocks);
@@ -296,7 +294,8 @@ std::optional<FastBand> look_at_fast_band(const PreparedGap& prepared, const std
       more += fitted.fit.held_out_loss[b] / counts.rows()[b] > 1.0 ? 1 : 0;
     }
   }
-  found.above = found.left > 1.0 + options.above && static_cast<double>(more) >= kNearlyAll * static_cast<double>(blocks);
+  found.above =
+      found.left > 1.0 + options.above && static_cast<double>(more) >= kNearlyAll * static_cast<double>(blocks);
   return found;
 }
 

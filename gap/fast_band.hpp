@@ -13,24 +13,25 @@ namespace wheelwright::gap {
 
 /// What the band above the filter's shows, in mean squares, in units of what the model leaves of the healthy log there.
 struct FastBand {
-  double beta = 0.0;            ///< upper corner of the band, 1/s
-  double left = 1.0;            ///< held out, with θ and the causes fitted again in this band
-  bool above = false;           ///< `left` is above the healthy log's by more than a quarter, in nearly all blocks of time
+  double beta = 0.0;   ///< upper corner of the band, 1/s
+  double left = 1.0;   ///< held out, with θ and the causes fitted again in this band
+  bool above = false;  ///< `left` is above the healthy log's by more than a quarter, in nearly all blocks of time
   double after_reversals = 0.0;  ///< just after reversals of a joint's torque
   double elsewhere = 0.0;        ///< away from them
   double presence = 0.0;         ///< share of the rows that are just after such a reversal
-  bool play = false;  ///< it is the reversals that bring it: more than on the healthy log, in more blocks than by chance
+  bool play =
+      false;  ///< it is the reversals that bring it: more than on the healthy log, in more blocks than by chance
   double effort_square = 0.0;  ///< what play adds in this band, as a share of all efforts' mean square
 };
 
 /// Options of look_at_fast_band().
 struct FastBandOptions {
-  double beta = 40.0;         ///< upper corner, 1/s; lower where the log's step is long
-  double row_step = 0.4;      ///< in 1/β
-  double after = 0.15;        ///< s, how long after a reversal its play is crossed and the impact over
-  double contrast = 1.2;      ///< least ratio after_reversals/elsewhere over that of the healthy log, for play
-  double significance = 1e-3; ///< of it, over blocks of time
-  double above = 0.25;        ///< mean square above the healthy log's that counts as a gap of its own
+  double beta = 40.0;          ///< upper corner, 1/s; lower where the log's step is long
+  double row_step = 0.4;       ///< in 1/β
+  double after = 0.15;         ///< s, how long after a reversal its play is crossed and the impact over
+  double contrast = 1.2;       ///< least ratio after_reversals/elsewhere over that of the healthy log, for play
+  double significance = 1e-3;  ///< of it, over blocks of time
+  double above = 0.25;         ///< mean square above the healthy log's that counts as a gap of its own
   BlockOptions blocks{};
 };
 

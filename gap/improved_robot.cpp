@@ -571,8 +571,9 @@ const std::map<std::string, Improvement::Way>& Improvement::ways() {
        {.convert =
             [](I& r) {
               if (!r.cause_->effect.unit_coefficient) {
-                return r.refuse("a robot file has slip as a share of the speed that ends at a largest share, and this "
-                                "is another law of it");
+                return r.refuse(
+                    "a robot file has slip as a share of the speed that ends at a largest share, and this "
+                    "is another law of it");
               }
               r.set_first(r.shape(0) / r.unit_);
               return true;

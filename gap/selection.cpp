@@ -149,7 +149,8 @@ class Selector {
   // Whether `next` is worth its further causes. Nothing is where the floor is reached already.
   [[nodiscard]] bool gains(const CauseSet& now, const CauseSet& next, double whole) const {
     const double gain = now.held_out_error - next.held_out_error;
-    constexpr double kLeastGap = 0.1;  // less is nothing, though a cause may lower the noise of a log that has less of it
+    constexpr double kLeastGap =
+        0.1;  // less is nothing, though a cause may lower the noise of a log that has less of it
     const double left = excess(now);
     if (!(left > 0.0) || gap_ < kLeastGap) {
       return false;

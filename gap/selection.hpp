@@ -50,9 +50,10 @@ struct SelectionOptions {
   double tolerated = 0.04;            ///< fraction of the structural part that an explanation may leave
   double tolerated_nominal = 0.003;   ///< fraction of the whole gap, θ's part included, that an explanation may leave
   double tolerated_floor = 0.5;       ///< remainder that an explanation may leave in any case
-  double theta_share = 0.02;  ///< fraction of the gap that a change of θ may explain without a parametric cause, besides
-                              ///< twice what the causes leave and what their columns miss (EffectKind::inexact)
-  double contained = 1e-3;    ///< one set contains another's signature if it leaves less than this fraction of it
+  double theta_share =
+      0.02;                 ///< fraction of the gap that a change of θ may explain without a parametric cause, besides
+                            ///< twice what the causes leave and what their columns miss (EffectKind::inexact)
+  double contained = 1e-3;  ///< one set contains another's signature if it leaves less than this fraction of it
   std::uint64_t seed = 1;
   std::size_t threads = 1;
 };

@@ -2,12 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scores what `wheelwright gap` said of cases with withheld effects, as Markdown.
 
-    score_withheld.py [--naive|--removed|--profiles] ANSWERS.json RESULTS   RESULTS has CASE/gap.json (or CASE.json) of every case
-    score_withheld.py --even|--odd ANSWERS.json RESULTS                     --profiles of the cases with such numbers
+    score_withheld.py [--naive|--removed|--profiles] ANSWERS.json RESULTS    RESULTS has CASE/gap.json (or CASE.json)
+    score_withheld.py --even|--odd ANSWERS.json RESULTS                      --profiles of cases with such numbers
 
 With --naive what is scored is the answer of the naive rule (`wheelwright gap --naive`), not the diagnosis. With --removed the
-hidden effect was not in the tool's catalogue: whatever is said to explain the log is wrong. --profiles is one table with a
-column for each kind of case (what stands before the _ of its name), and exact names: lag and delay count as two.
+hidden effect was not in the tool's catalogue: whatever is said to explain the log is wrong. --profiles is one table
+with a column for each kind of case (what stands before the _ of its name), and exact names: lag and delay count as two.
 """
 
 import json

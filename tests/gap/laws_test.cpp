@@ -21,11 +21,11 @@ namespace wheelwright::gap::laws_test {
 namespace {
 
 constexpr double kRadius = 0.1, kTrack = 0.4, kMass = 20.0, kFriction = 4.0;
-constexpr double kLoad = 0.5 * kMass * kRadius * kRadius;          // kg·m² that a wheel moves in all
-constexpr double kDamping = 0.5 * kFriction * kRadius * kRadius;   // N·m·s/rad of one wheel
-constexpr double kRotor = 0.02;                                    // kg·m² of it that turns with the motor
-constexpr double kStep = 0.01;                                     // s, of the log
-constexpr double kFine = 2e-5;                                     // s, of the integration
+constexpr double kLoad = 0.5 * kMass * kRadius * kRadius;         // kg·m² that a wheel moves in all
+constexpr double kDamping = 0.5 * kFriction * kRadius * kRadius;  // N·m·s/rad of one wheel
+constexpr double kRotor = 0.02;                                   // kg·m² of it that turns with the motor
+constexpr double kStep = 0.01;                                    // s, of the log
+constexpr double kFine = 2e-5;                                    // s, of the integration
 
 /// With the yaw inertia m D²/4 the wheels do not know of each other.
 Robot robot_of_two_wheels() {
@@ -113,8 +113,10 @@ LogTable log_of(const Law& law, std::uint64_t seed) {
     double torque[2];
     for (int j = 0; j < 2; ++j) {
       const double* const p = phases + 3 * j;
-      const double wanted = 4.0 * std::sin(0.9 * t + p[0]) + 2.5 * std::sin(2.3 * t + p[1]) + 1.2 * std::sin(5.1 * t + p[2]);
-      const double rate = 3.6 * std::cos(0.9 * t + p[0]) + 5.75 * std::cos(2.3 * t + p[1]) + 6.12 * std::cos(5.1 * t + p[2]);
+      const double wanted =
+          4.0 * std::sin(0.9 * t + p[0]) + 2.5 * std::sin(2.3 * t + p[1]) + 1.2 * std::sin(5.1 * t + p[2]);
+      const double rate =
+          3.6 * std::cos(0.9 * t + p[0]) + 5.75 * std::cos(2.3 * t + p[1]) + 6.12 * std::cos(5.1 * t + p[2]);
       const double error = wanted - sides[j].wheel;
       sum[j] += error * kStep;
       torque[j] = kLoad * rate + kDamping * wanted + 0.5 * error + 0.5 * sum[j];
@@ -241,6 +243,9 @@ TEST(Laws, ALimitBelowMostEffortsIsNone) {
   std::ranges::sort(sizes);
   EXPECT_GT(taken(sizes[sizes.size() * 95 / 100]), 0.0);
   EXPECT_EQ(taken(sizes[sizes.size() / 2]), 0.0);
+  EXPECT_TRUE(applicability(limit, drive).applies);
+  drive.efforts_flowed = true;
+  EXPECT_FALSE(applicability(limit, drive).applies) << "currents that flowed passed every limit";
 }
 
 }  // namespace
