@@ -118,9 +118,9 @@ class Selector {
       }
       const CauseSet* next = simplest(levels[size]);
       if (next != nullptr && gains(best, *next, result.refitted_excess)) {
-        // What is left when no member is needed beside the others need not gain anything.
+        // Where no member is needed beside the others, what is left may be one that does nothing.
         CauseSet needed = all_needed(*next, result.refitted_excess);
-        if (needed.members == next->members || gains(best, needed, result.refitted_excess)) {
+        if (best.held_out_error - needed.held_out_error > 0.5 * (best.held_out_error - next->held_out_error)) {
           best = std::move(needed);
         }
       }
