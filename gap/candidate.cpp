@@ -98,8 +98,9 @@ class Search {
     std::vector<Task> tasks;
     for (std::size_t i = 0; i < std::min(beam, level.size()); ++i) {
       for (const std::size_t e : effects_) {
-        const bool there = std::any_of(level[i].members.begin(), level[i].members.end(),
-                                       [&](std::size_t c) { return table_.candidates[c].effect == e; });
+        const bool there = std::any_of(level[i].members.begin(), level[i].members.end(), [&](std::size_t c) {
+          return table_.names[table_.candidates[c].effect] == table_.names[e];
+        });
         if (!there) {
           tasks.push_back({i, e});
         }

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -35,6 +36,8 @@ struct CandidateTable {
   std::vector<std::size_t> unknown;   ///< those of them that have no nominal value: fitted in any case
   std::vector<Candidate> candidates;  ///< of one effect side by side
   std::vector<std::string> names;     ///< of the effects, by index
+  std::vector<std::pair<std::size_t, double>>
+      inertias{};  ///< columns of θ that are inertias, with the nominal values that their coefficients add to
 };
 
 /// Treatment of θ beside the causes: fitted freely, or held at its nominal value.

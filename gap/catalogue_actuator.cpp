@@ -181,12 +181,24 @@ Effect torque_deadzone() {
                       .scan = 3,
                       .logarithmic = true,
                       .scale = typical_effort}},
+          .after_reversals = true,
           .excite = "brake with the motors: torque against the motion",
           .columns = [](const Drive& drive, Shape shape) {
             return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) {
                                            return soft_sign(drive.joints[j].smooth_effort, shape[0]);
                                          }))};
           }};
+}
+
+// What a limit takes from an effort. A limit shows at peaks: one that most of the drive lies above, or that takes most of
+// the effort away, is none of the robot's but a way to be rid of the signal, and its column is nothing.
+Signal beyond_limit(const Signal& effort, double limit) {
+  constexpr double kMostSamples = 0.25, kMostSquare = 0.4;
+  const Signal beyond = effort - effort.cwiseMax(-limit).cwiseMin(limit);
+  const double samples = static_cast<double>((beyond.array() != 0.0).count());
+  const bool peaks = samples <= kMostSamples * static_cast<double>(effort.size()) &&
+                     beyond.squaredNorm() <= kMostSquare * effort.squaredNorm();
+  return peaks ? beyond : Signal::Zero(effort.size());
 }
 
 Effect saturation() {
@@ -201,12 +213,18 @@ Effect saturation() {
                       .scale = typical_effort}},
           .unit_coefficient = true,
           .excite = "accelerate as hard as it goes",
-          .columns = [](const Drive& drive, Shape shape) {
-            return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
-                                           const Signal& u = drive.joints[j].effort;
-                                           return u - u.cwiseMax(-shape[0]).cwiseMin(shape[0]);
-                                         }))};
-          }};
+          .applies =
+              [](const Drive& drive) {
+                return drive.efforts_flowed
+                           ? Applicability{false, "the efforts are currents that flowed, which no limit cut off"}
+                           : Applicability{};
+              },
+          .columns =
+              [](const Drive& drive, Shape shape) {
+                return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
+                                               return beyond_limit(drive.joints[j].effort, shape[0]);
+                                             }))};
+              }};
 }
 
 // The inertia of a joint whose torque is all for acceleration.
@@ -286,6 +304,8 @@ Effect backlash() {
                  {.name = "contact_damping", .unit = "1", .lower = 0.15, .upper = 1.0, .scan = 2, .logarithmic = true}},
       .unit_coefficient = true,
       .inexact = 0.1,
+      .after_reversals = true,
+      .above_band = true,
       .excite = "reverse the torque often, gently and hard",
       .columns = [](const Drive& drive, Shape shape) {
         const Play play{shape[0], shape[1], shape[2], shape[3]};

@@ -11,6 +11,8 @@ using namespace catalogue;
 using Signal = Eigen::VectorXd;
 using Shape = std::span<const double>;
 
+constexpr double kSecond = 1.0;  // s, of typical speed: an angle
+
 std::vector<Signal> speed_signs(const Drive& drive) {
   return each_joint(drive, [&drive](std::size_t j) { return speed_sign(drive, j); });
 }
@@ -24,6 +26,66 @@ Effect coulomb() {
           .measured_by = DirectMeasurement::lifted_wheels,
           .applies = [](const Drive& drive) { return needs_no(drive, "coulomb"); },
           .columns = [](const Drive& drive, Shape) { return std::vector{at_joints(drive, speed_signs(drive))}; }};
+}
+
+// Bristles that bend before they slide, over an angle δ: ż = ω (1 − z sgn ω), z of δ (Dahl 1968; LuGre without its
+// fading). What the sign does at once takes them a turn of 2δ.
+Effect coulomb_of_bristles() {
+  return {.name = "coulomb",
+          .sentence = "Dry friction at every joint, whose contacts bend a little before they slide.",
+          .family = "dry_friction",
+          .parameters = {{"c", "N·m", 1}},
+          .shapes = {{.name = "bending",
+                      .unit = "rad",
+                      .lower = 0.01,
+                      .upper = 0.3,
+                      .scan = 4,
+                      .logarithmic = true,
+                      .scale = [](const Drive& drive) { return typical_speed(drive) * kSecond; }}},
+          .excite = "reverse often, turn on the spot, drive at several speeds",
+          .measured_by = DirectMeasurement::lifted_wheels,
+          .applies = [](const Drive& drive) { return needs_no(drive, "coulomb"); },
+          .columns =
+              [](const Drive& drive, Shape shape) {
+                return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
+                                               const Signal& speed = drive.joints[j].smooth_speed;
+                                               Signal z = Signal::Zero(speed.size());
+                                               for (std::size_t s = 0; s < drive.segment_starts.size(); ++s) {
+                                                 const auto [first, last] = drive.segment(s);
+                                                 for (Eigen::Index k = first + 1; k < last; ++k) {
+                                                   const double turn =
+                                                       0.5 * (speed[k - 1] + speed[k]) * drive.step / shape[0];
+                                                   const double towards = turn > 0.0 ? 1.0 : -1.0;
+                                                   z[k] = towards + (z[k - 1] - towards) * std::exp(-std::abs(turn));
+                                                 }
+                                               }
+                                               return z;
+                                             }))};
+              }};
+}
+
+// A smoothed sign, wider than that of coulomb().
+Effect coulomb_smoothed() {
+  return {.name = "coulomb",
+          .sentence = "Dry friction at every joint that grows to its full size within a small speed.",
+          .family = "dry_friction",
+          .parameters = {{"c", "N·m", 1}},
+          .shapes = {{.name = "width",
+                      .unit = "rad/s",
+                      .lower = 0.03,
+                      .upper = 0.3,
+                      .scan = 3,
+                      .logarithmic = true,
+                      .scale = typical_speed}},
+          .excite = "reverse often, turn on the spot, drive at several speeds",
+          .measured_by = DirectMeasurement::lifted_wheels,
+          .applies = [](const Drive& drive) { return needs_no(drive, "coulomb"); },
+          .columns =
+              [](const Drive& drive, Shape shape) {
+                return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) {
+                                               return soft_sign(drive.joints[j].smooth_speed, shape[0]);
+                                             }))};
+              }};
 }
 
 Effect coulomb_asymmetric() {
@@ -155,6 +217,7 @@ Effect load_friction() {
 Effect friction_drift() {
   return {.name = "friction_drift",
           .sentence = "Friction, viscous and dry, that changes as the drive warms up.",
+          .common = "viscous",
           .parameters = {{"loss", "N·m·s/rad", 0}, {"loss_dry", "N·m", 0}},
           .shapes = {{.name = "T", .unit = "s", .lower = 10.0, .upper = 200.0, .scan = 8, .logarithmic = true}},
           .excite = "drive for several minutes from cold, the same manoeuvre again and again",
@@ -229,8 +292,8 @@ Effect lateral_scrub() {
 }  // namespace
 
 std::vector<Effect> friction_effects(std::size_t joints) {
-  std::vector<Effect> effects{coulomb(),       stribeck(),      viscous(joints), quadratic_drag(joints),
-                              load_friction(), friction_drift()};
+  std::vector<Effect> effects{coulomb(),       stribeck(),       viscous(joints),       quadratic_drag(joints),
+                              load_friction(), friction_drift(), coulomb_of_bristles(), coulomb_smoothed()};
   if (joints == 2) {
     for (auto* make : {&coulomb_asymmetric, &viscous_asymmetric, &caster_drag, &lateral_scrub}) {
       effects.push_back(make());

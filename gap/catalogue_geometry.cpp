@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <wheelwright/gap/effect.hpp>
@@ -13,6 +14,9 @@ using Signal = Eigen::VectorXd;
 using Shape = std::span<const double>;
 
 constexpr double kGravity = 9.80665;  // m/s²
+
+// Slip goes by the load on each wheel too, which acceleration shifts and no log has: a share of its mean square.
+constexpr double kLoadOfWheels = 0.05;
 
 std::size_t chosen(Shape shape) { return shape[0] < 0.5 ? 0 : 1; }
 
@@ -330,6 +334,119 @@ Effect longitudinal_slip() {
           }};
 }
 
+// Slip by the force that is passed on, as any increasing function of it: polygons with knots at quantiles of the force.
+// A rubber tyre loses a share of its speed, a contact with a viscous creep a speed.
+Effect slip_by_force(bool share) {
+  constexpr std::array<double, 4> kKnots{0.0, 0.6, 0.9, 0.98};  // quantiles
+  Effect effect{.name = "longitudinal_slip",
+                .sentence = share ? "The wheels lose a share of their speed that grows with the force they pass on."
+                                  : "The wheels slide at a speed that grows with the force they pass on.",
+                .inexact = kLoadOfWheels,
+                .excite = "accelerate and brake as hard as it goes, with the pose logged",
+                .applies = needs_heading};
+  effect.shapes = {
+      {.name = "force_total0_inertial1", .unit = "1", .lower = 0.0, .upper = 1.0, .scan = 2, .discrete = true}};
+  for (const char* name : {"slip_1", "slip_2", "slip_3", "slip_4"}) {
+    effect.parameters.push_back({name, share ? "1/N" : "m/(s·N)", 1});
+  }
+  effect.columns = [share, kKnots](const Drive& drive, Shape shape) {
+    std::vector<Signal> forces = shape[0] > 0.5
+                                     ? inertial_efforts(drive)
+                                     : each_joint(drive, [&](std::size_t j) { return drive.joints[j].smooth_effort; });
+    std::vector<double> sizes;
+    for (Signal& force : forces) {
+      force /= drive.wheel_radius;
+      for (const double value : force) {
+        sizes.push_back(std::abs(value));
+      }
+    }
+    std::ranges::sort(sizes);
+    std::vector<double> knots;
+    for (const double quantile : kKnots) {
+      knots.push_back(quantile > 0.0 ? sizes[static_cast<std::size_t>(quantile * static_cast<double>(sizes.size()))]
+                                     : 0.0);
+    }
+    knots.push_back(std::max(sizes.back(), knots.back()));
+    std::vector<Column> columns;
+    for (std::size_t k = 0; k + 1 < knots.size(); ++k) {
+      const auto lost = [&](std::size_t j) -> Signal {
+        const auto force = forces[j].array();
+        const Eigen::ArrayXd part = force.abs().min(knots[k + 1]).max(knots[k]) - knots[k];
+        const Eigen::ArrayXd slip = -force.sign() * part;
+        return share ? Signal(slip * rim_speed(drive, j).array().abs()) : Signal(slip);
+      };
+      columns.push_back(unseen_rim_speeds(drive, lost(0), lost(1), false));
+    }
+    return columns;
+  };
+  return effect;
+}
+
+// A wheel whose contact passes on no more than its friction: the ground's speed follows the rim's, but never faster
+// than the largest acceleration allows.
+Effect slip_at_the_limit() {
+  return {.name = "longitudinal_slip",
+          .sentence = "The wheels spin or slide where they should pass on more force than the ground takes.",
+          .parameters = {{"slid", "1", 1}},
+          .shapes = {{.name = "largest_acceleration",
+                      .unit = "m/s²",
+                      .lower = 0.5,
+                      .upper = 6.0,
+                      .scan = 8,
+                      .logarithmic = true,
+                      .scale =
+                          [](const Drive& drive) {
+                            return std::max(drive.wheel_radius * deviation(drive.joints[0].smooth_acceleration), 1e-12);
+                          }}},
+          .inexact = kLoadOfWheels,
+          .excite = "accelerate and brake as hard as it goes, with the pose logged",
+          .applies = needs_heading,
+          .columns = [](const Drive& drive, Shape shape) {
+            const auto lost = [&](std::size_t j) -> Signal {
+              const Signal rim = rim_speed(drive, j);
+              Signal ground = rim;
+              const double most = shape[0] * drive.step;
+              for (std::size_t s = 0; s < drive.segment_starts.size(); ++s) {
+                const auto [first, last] = drive.segment(s);
+                for (Eigen::Index k = first + 1; k < last; ++k) {
+                  ground[k] = ground[k - 1] + std::clamp(rim[k] - ground[k - 1], -most, most);
+                }
+              }
+              return ground - rim;
+            };
+            return std::vector{unseen_rim_speeds(drive, lost(0), lost(1), false)};
+          }};
+}
+
+// A load at the distance x before the axle's middle: its mass, its moment of inertia, and its own centre.
+Effect payload_offset() {
+  return {
+      .name = "payload_offset",
+      .noun = "a payload before or behind the axle",
+      .sentence = "A load was added before or behind the axle: mass, yaw inertia and a centre of mass off the axle.",
+      .common = "payload",
+      .stands_for = {"com_longitudinal", "payload"},
+      .parameters = {{"mass_kg", "kg", 1}, {"yaw_inertia", "kg·m²", 1}, {"moment", "kg·m", 0}},
+      .excite = "accelerate and brake, and drive fast curves of changing radius",
+      .measured_by = DirectMeasurement::weight,
+      .applies = needs_two_wheels,
+      .columns =
+          [](const Drive& drive, Shape) {
+            const Signal& v1 = drive.coordinates[0].smooth_speed;
+            const Signal& v2 = drive.coordinates[1].smooth_speed;
+            Column offset;
+            offset.effort = {-drive.wheel_radius * v2.cwiseAbs2(), drive.wheel_radius * v1.cwiseProduct(v2)};
+            return std::vector{base_column(drive, "mass"), base_column(drive, "yaw_inertia"), offset};
+          },
+      .physical =
+          [](std::span<const double> c, Shape) {
+            return std::vector<PhysicalValue>{{"mass_kg", "kg", c[0]},
+                                              {"yaw_inertia", "kg·m²", c[1]},
+                                              {"moment", "kg·m", c[2]},
+                                              {"x_m", "m", c[0] > 0.0 ? c[2] / c[0] : 0.0}};
+          }};
+}
+
 Effect payload(std::size_t joints) {
   Effect effect{.name = "payload",
                 .noun = "a payload",
@@ -369,11 +486,13 @@ Effect armature() {
 std::vector<Effect> geometry_effects(std::size_t joints) {
   std::vector<Effect> effects{payload(joints)};
   if (joints == 2) {
-    for (auto* make :
-         {&com_longitudinal, &com_lateral, &slope, &wheel_out_of_round, &wheel_radius_asymmetric, &longitudinal_slip,
-          &turning_slip, &curve_slip, &wheel_radius, &track_width, &encoder_scale, &armature}) {
+    for (auto* make : {&com_longitudinal, &com_lateral, &slope, &wheel_out_of_round, &wheel_radius_asymmetric,
+                       &longitudinal_slip, &turning_slip, &curve_slip, &wheel_radius, &track_width, &encoder_scale,
+                       &armature, &payload_offset, &slip_at_the_limit}) {
       effects.push_back(make());
     }
+    effects.push_back(slip_by_force(false));
+    effects.push_back(slip_by_force(true));
   }
   return effects;
 }

@@ -98,7 +98,7 @@ std::vector<ConfusablePair> confusable_pairs(const CandidateTable& table,
   std::vector<ConfusablePair> pairs;
   for (std::size_t a = 0; a < of_effect.size(); ++a) {
     for (std::size_t b = a + 1; b < of_effect.size(); ++b) {
-      if (!of_effect[a] || !of_effect[b]) {
+      if (!of_effect[a] || !of_effect[b] || table.names[a] == table.names[b]) {
         continue;
       }
       const double similarity = std::max(made_up(table, *of_effect[a], *of_effect[b], base),

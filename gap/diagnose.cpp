@@ -4,11 +4,16 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
+#include <string_view>
 #include <utility>
+
+#include <fmt/format.h>
 
 #include <wheelwright/gap/confusion.hpp>
 #include <wheelwright/gap/drive.hpp>
 #include <wheelwright/gap/estimates.hpp>
+#include <wheelwright/gap/fast_band.hpp>
 #include <wheelwright/gap/further_drive.hpp>
 #include <wheelwright/gap/improved_robot.hpp>
 #include <wheelwright/gap/prepared.hpp>
@@ -101,6 +106,63 @@ void list_causes(Diagnosis& result, const PreparedGap& prepared, const GapProble
   }
   std::stable_sort(result.causes.begin(), result.causes.end(),
                    [](const GapCause& a, const GapCause& b) { return a.share > b.share; });
+}
+
+// Whether some channel of some space is above its floor, though all together are not: by the largest mean square.
+bool some_channel_above(const std::vector<ResidualSeries>& series, double tolerated) {
+  return std::ranges::any_of(series, [tolerated](const ResidualSeries& s) {
+    return s.after.size() > 0 && s.floor > 0.0 &&
+           s.after.squaredNorm() > (1.0 + tolerated) * s.floor * s.floor * static_cast<double>(s.after.size());
+  });
+}
+
+// What the band above the filter's adds to the verdict: play, or that there is a gap.
+void add_fast_band(Diagnosis& result, const FastBand& fast, const std::vector<Effect>& catalogue) {
+  const auto play = std::ranges::find(catalogue, true, &Effect::above_band);
+  // What acts at the same instants is known no sharper than its column has it.
+  const bool known = std::ranges::any_of(result.causes, [&](const GapCause& cause) {
+    const auto effect = std::ranges::find(catalogue, cause.effect, &Effect::name);
+    return effect != catalogue.end() && effect->after_reversals;
+  });
+  if (fast.play && play != catalogue.end() && !known) {
+    GapCause cause{play->name, play->sentence, play->parametric, {}, 0.0};
+    const double whole = result.gap + fast.effort_square;
+    for (GapCause& other : result.causes) {
+      other.share *= whole > 0.0 ? result.gap / whole : 0.0;
+    }
+    cause.share = whole > 0.0 ? fast.effort_square / whole : 0.0;
+    if (result.verdict == GapVerdict::no_gap) {
+      result.verdict = GapVerdict::explained;
+      cause.share = 1.0;
+    }
+    result.remaining *= whole > 0.0 ? result.gap / whole : 1.0;
+    result.structural += fast.effort_square;
+    result.gap = whole;
+    result.causes.push_back(std::move(cause));
+    std::stable_sort(result.causes.begin(), result.causes.end(),
+                     [](const GapCause& a, const GapCause& b) { return a.share > b.share; });
+    if (result.credible.empty()) {
+      result.credible.push_back({{}, 1.0, 1.0});
+    }
+    for (CredibleCauses& set : result.credible) {
+      if (std::ranges::find(set.effects, play->name) == set.effects.end()) {
+        set.effects.push_back(play->name);
+      }
+    }
+    result.notes.push_back(
+        fmt::format("between {:.0f} and {:.0f} 1/s, above the filter's band, the mean square of what the model leaves "
+                    "is {:.2f} times "
+                    "the healthy log's just after reversals of the torque and {:.2f} times elsewhere: play. How wide "
+                    "it is cannot be "
+                    "said without the rotor's inertia",
+                    result.beta, fast.beta, fast.after_reversals, fast.elsewhere));
+  } else if (fast.above && result.verdict == GapVerdict::no_gap) {
+    result.verdict = GapVerdict::unexplained;
+    result.notes.push_back(fmt::format(
+        "between {:.0f} and {:.0f} 1/s, above the filter's band, the model leaves {:.2f} times the healthy log's mean "
+        "square, and not only after reversals of the torque: something fast that no cause here explains",
+        result.beta, fast.beta, fast.left));
+  }
 }
 
 std::string unit_of(const PreparedGap& prepared, const GapRows& rows, std::size_t space) {
@@ -227,6 +289,13 @@ Diagnosis diagnose(LogSource& log, LogSource* baseline, const Robot& robot, cons
   result.series = series_of(prepared, problem, fitted);
   result.theta = fitted.theta;
   result.fitted = fitted.effects;
+  if (result.verdict == GapVerdict::no_gap && some_channel_above(result.series, 2.0 * selection.tolerated_floor)) {
+    result.verdict = GapVerdict::unexplained;
+    result.notes.push_back("one channel is above its noise floor, though all of them together are not");
+  }
+  if (const std::optional<FastBand> fast = look_at_fast_band(prepared, fitted.effects, {.blocks = blocks})) {
+    add_fast_band(result, *fast, prepared.catalogue);
+  }
   tell("locating", 0.65);
   WhereOptions where_to_look;
   where_to_look.beta = prepared.row_options.beta;
@@ -238,8 +307,10 @@ Diagnosis diagnose(LogSource& log, LogSource* baseline, const Robot& robot, cons
       prepared.drive, prepared.row_options.beta,
       settled(prepared.drive, prepared.row_options.beta) && moving(prepared.drive, prepared.row_options.beta), floors,
       finite_prior(robot, prepared));
-  result.contradictions = contradictions.rows;
-  result.notes.push_back(contradictions.statement);
+  if (result.verdict != GapVerdict::no_gap) {
+    result.contradictions = contradictions.rows;
+    result.notes.push_back(contradictions.statement);
+  }
   const BaseModel alike = trusted ? BaseModel::nominal : BaseModel::refitted;
   const std::vector<std::optional<Signature>> on_log = signatures(problem.table, alike);
   result.confusable = confusable_pairs(problem.table, on_log, alike);

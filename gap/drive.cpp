@@ -417,6 +417,7 @@ Drive make_drive(const LogTable& log, const Robot& robot, const Measurement& mea
   drive.step = check::positive(core::median_step(log.t), "the log's median step");
   drive.count = measurement.count;
   drive.efforts_unsigned = measurement.effort_unsigned;
+  drive.efforts_flowed = robot.effort == model::EffortKind::current;
   drive.angles_measured = measurement.motion == MotionKind::angle;
   const double half = 0.5 * check::positive(options.smoothing_window, "smoothing_window") / drive.step;
   drive.window = 2 * std::max<std::size_t>(2, static_cast<std::size_t>(std::lround(half))) + 1;

@@ -54,6 +54,7 @@ struct Drive {
   double count = 0.0;                       ///< quantum of the speeds, rad/s (0: none known)
   bool has_efforts = true;                  ///< else all efforts are zeros: only the pose can be compared
   bool efforts_unsigned = false;            ///< the log has their size only: they have their joint's sign of motion
+  bool efforts_flowed = false;              ///< they are currents, so what the actuators had, whatever was commanded
   bool angles_measured = false;             ///< else a joint's angle begins anew, at 0, in each segment
   std::size_t window = 0;                   ///< samples of the smoothing window, odd
   Eigen::VectorXd t;                        ///< s, the log's own, ascending

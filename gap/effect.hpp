@@ -74,22 +74,28 @@ enum class DirectMeasurement {
   none,
 };
 
-/// One unmodelled effect, or one parametric cause.
+/// One unmodelled effect, or one parametric cause. An effect that follows one of several laws, which have other columns
+/// (friction that bends before it slides; slip as a speed or as a share of one), is several of the same name: at most
+/// one of them is in a set of causes.
 struct Effect {
-  std::string name{};                         ///< as in results
-  std::string noun{};                         ///< as sentences call it; empty: as catalogue_noun(name)
-  std::string sentence{};                     ///< description for people
-  std::string family{};                       ///< name shared by effects that are the same cause; empty: none
-  std::string common{};                       ///< parametric cause that is a part of this effect: unequal gains have a
-                                              ///< mean. Where both are found it is one cause; empty: none
-  bool parametric = false;                    ///< moves θ or the kinematic scale of the base model
+  std::string name{};                     ///< as in results
+  std::string noun{};                     ///< as sentences call it; empty: as catalogue_noun(name)
+  std::string sentence{};                 ///< description for people
+  std::string family{};                   ///< name shared by effects that are the same cause; empty: none
+  std::string common{};                   ///< parametric cause that is a part of this effect: unequal gains have a
+                                          ///< mean. Where both are found it is one cause; empty: none
+  std::vector<std::string> stands_for{};  ///< effects that this one is together: a load off the middle adds mass and
+                                          ///< shifts its centre. Where these do as well it is one cause
+  bool parametric = false;                ///< moves θ or the kinematic scale of the base model
   std::vector<EffectParameter> parameters{};  ///< one for each column
   std::vector<ShapeParameter> shapes{};       ///< on which the columns depend nonlinearly
   bool unit_coefficient = false;  ///< the one column's coefficient is 1; `parameters` is empty, the shapes are
                                   ///< what is estimated
   double inexact = 0.0;  ///< share of its own contribution that its columns cannot explain (impacts shorter than a
                          ///< sampling interval); added to what an explanation with it may leave
-  std::string excite{};  ///< the manoeuvre that would show it
+  bool after_reversals = false;  ///< acts just after reversals of the torque, more sharply than its columns can
+  bool above_band = false;       ///< it is the cause where the band above the filter's shows more just after them
+  std::string excite{};          ///< the manoeuvre that would show it
   DirectMeasurement measured_by = DirectMeasurement::none;
   std::function<Applicability(const Drive&)> applies{};  ///< empty: on every drive
   /// The columns at `shape` (one value for each of `shapes`), for a drive on which the effect applies and whose efforts

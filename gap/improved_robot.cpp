@@ -55,7 +55,8 @@ class Improvement {
       return true;
     }
     const auto& laws = model::effect_laws();
-    const auto law = std::ranges::find(laws, name, &model::EffectLaw::name);
+    const std::string becomes = way != nullptr && way->becomes != nullptr ? way->becomes : name;
+    const auto law = std::ranges::find(laws, becomes, &model::EffectLaw::name);
     if (law == laws.end() || law->parameters_of(improved_).empty()) {
       return refuse("a robot file has no effect called " + name);
     }
@@ -65,7 +66,7 @@ class Improvement {
     cause_ = &cause;
     intervals_ = &intervals;
     law_ = &*law;
-    effect_ = {name, {}};
+    effect_ = {becomes, {}};
     if (way != nullptr ? !way->convert(*this) : !as_law()) {
       return false;
     }
@@ -91,6 +92,7 @@ class Improvement {
     bool (*convert)(Improvement& robot) = nullptr;  // into an effect of the robot file; nothing: it is no effect there
     bool adds_up = false;  // its parameters add up when it is there twice, to first order where they are not linear
     bool (*beside)(Improvement& robot) = nullptr;  // what comes along with the effect
+    const char* becomes = nullptr;                 // the effect of the file; nothing: that of its own name
     bool of_others = false;                        // it is a share of other effects, which have to be there
   };
   static const std::map<std::string, Way>& ways();
@@ -424,6 +426,18 @@ const std::map<std::string, Improvement::Way>& Improvement::ways() {
               r.add(r.axis() ? "inertia" : "mass", r.fitted(0));
               r.add("yaw_inertia", r.fitted(1));
             }}},
+      {"payload_offset",
+       {.change =
+            [](I& r) {
+              r.add("mass", r.fitted(0));
+              r.add("yaw_inertia", r.fitted(1));
+            },
+        .convert =
+            [](I& r) {
+              r.linear("a", 2, 1.0 / r.improved_.nominal.at("mass"));
+              return true;
+            },
+        .becomes = "com_longitudinal"}},
       {"viscous",
        {.change =
             [](I& r) {
@@ -556,6 +570,11 @@ const std::map<std::string, Improvement::Way>& Improvement::ways() {
       {"longitudinal_slip",
        {.convert =
             [](I& r) {
+              if (!r.cause_->effect.unit_coefficient) {
+                return r.refuse(
+                    "a robot file has slip as a share of the speed that ends at a largest share, and this "
+                    "is another law of it");
+              }
               r.set_first(r.shape(0) / r.unit_);
               return true;
             }}},

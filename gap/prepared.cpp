@@ -446,8 +446,21 @@ GapProblem make_problem(const Drive& drive, const NoiseFloor& floor, const std::
       problem.table.unknown.push_back(j);
     }
   }
+  for (std::size_t j = 0; j < drive.model.p(); ++j) {
+    const std::string& name = drive.model.parameters[j].physical;
+    const double nominal = drive.theta[static_cast<Eigen::Index>(j)];
+    if ((name == "mass" || name == "yaw_inertia" || name == "inertia") && nominal > 0.0) {
+      problem.table.inertias.emplace_back(j, nominal);
+    }
+  }
   for (const Effect& effect : catalogue) {
-    problem.kinds.push_back({effect.inexact});
+    EffectKind kind{effect.inexact, {}};
+    for (std::size_t e = 0; e < catalogue.size(); ++e) {
+      if (std::ranges::find(effect.stands_for, catalogue[e].name) != effect.stands_for.end()) {
+        kind.stands_for.push_back(e);
+      }
+    }
+    problem.kinds.push_back(std::move(kind));
   }
   return problem;
 }

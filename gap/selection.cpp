@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <numeric>
+#include <optional>
 #include <random>
 
 #include <wheelwright/core/check.hpp>
@@ -76,10 +78,19 @@ class Selector {
     level_ = options.significance / (2.0 * tried);  // two tests of each
     critical_ = core::normal_upper_quantile(level_);
     moves_theta_only_.assign(kinds.size(), true);
+    does_nothing_.assign(kinds.size(), true);
     for (std::size_t c = 0; c < table.candidates.size(); ++c) {
+      const std::size_t effect = table.candidates[c].effect;
       if (beyond_theta(table, c) > options.contained) {
-        moves_theta_only_[table.candidates[c].effect] = false;
+        moves_theta_only_[effect] = false;
       }
+      does_nothing_[effect] =
+          does_nothing_[effect] && std::ranges::all_of(table.candidates[c].columns, [&](std::size_t column) {
+            return !(table.gram->square(column) > 0.0);
+          });
+    }
+    for (std::size_t e = 0; e < kinds.size(); ++e) {
+      moves_theta_only_[e] = moves_theta_only_[e] && !does_nothing_[e];
     }
   }
 
@@ -89,7 +100,7 @@ class Selector {
     search.threads = options_.threads;
     search.allowed.resize(kinds_.size());
     for (std::size_t e = 0; e < kinds_.size(); ++e) {
-      search.allowed[e] = !moves_theta_only_[e];
+      search.allowed[e] = !moves_theta_only_[e] && !does_nothing_[e];
     }
     const std::vector<std::vector<CauseSet>> levels = search_causes(table_, search);
     const CauseSet& nothing = levels[0][0];
@@ -107,7 +118,11 @@ class Selector {
       }
       const CauseSet* next = simplest(levels[size]);
       if (next != nullptr && gains(best, *next, result.refitted_excess)) {
-        best = all_needed(*next, result.refitted_excess);
+        // Where no member is needed beside the others, what is left may be one that does nothing.
+        CauseSet needed = all_needed(*next, result.refitted_excess);
+        if (best.held_out_error - needed.held_out_error > 0.5 * (best.held_out_error - next->held_out_error)) {
+          best = std::move(needed);
+        }
       }
     }
     result.structural = best;
@@ -134,8 +149,10 @@ class Selector {
   // Whether `next` is worth its further causes. Nothing is where the floor is reached already.
   [[nodiscard]] bool gains(const CauseSet& now, const CauseSet& next, double whole) const {
     const double gain = now.held_out_error - next.held_out_error;
+    constexpr double kLeastGap =
+        0.1;  // less is nothing, though a cause may lower the noise of a log that has less of it
     const double left = excess(now);
-    if (!(left > 0.0)) {
+    if (!(left > 0.0) || gap_ < kLeastGap) {
       return false;
     }
     const bool counts = gain > options_.share * whole && gain > options_.part * left;
@@ -204,13 +221,19 @@ class Selector {
     return std::max(options_.misfit * excess(best), 0.3 * options_.smallest);
   }
 
-  // Whether the causes of the set undo each other, or all of them what they move θ by.
+  // Whether the set needs an inertia that is none, the causes undo each other, or all of them what they move θ by.
   [[nodiscard]] bool cancels(const CauseSet& set) const {
     if (set.members.empty()) {
       return false;
     }
     const Subset subset = subset_of(table_, set.members, BaseModel::refitted);
     const Eigen::VectorXd coefficients = table_.gram->fit(subset).coefficients;
+    for (const auto& [column, nominal] : table_.inertias) {
+      const auto at = std::ranges::find(table_.base, column) - table_.base.begin();
+      if (at < std::ssize(table_.base) && !(nominal + coefficients[at] > 0.0)) {
+        return true;
+      }
+    }
     // Columns of θ, then of all members, with their weights.
     using Part = std::vector<std::pair<std::size_t, double>>;
     std::vector<Part> parts(1);
@@ -310,11 +333,17 @@ class Selector {
     return best;
   }
 
+  [[nodiscard]] const std::string& name_of(std::size_t candidate) const {
+    return table_.names[table_.candidates[candidate].effect];
+  }
+
   // Parametric causes that let `structural` do with θ nominal as well as with θ fitted: sets of one or two, best first;
   // an empty one where none is needed. Nothing where no such set does.
   [[nodiscard]] std::vector<CauseSet> explain_theta(const CauseSet& structural) const {
     const CauseSet held = with_shapes_for_nominal(structural);
-    const double tolerable = std::max(options_.theta_share * gap_ + inexact(structural), options_.smallest);
+    // What the columns miss, θ may take up.
+    const double tolerable =
+        std::max(options_.theta_share * gap_ + inexact(structural) + 2.0 * excess(structural), options_.smallest);
     if (excess(held) - excess(structural) <= tolerable) {
       return {held};
     }
@@ -340,7 +369,7 @@ class Selector {
           continue;
         }
         for (std::size_t j = i + 1; j < movers.size(); ++j) {
-          if (table_.candidates[movers[i]].effect != table_.candidates[movers[j]].effect) {
+          if (name_of(movers[i]) != name_of(movers[j])) {
             try_set({movers[i], movers[j]});
           }
         }
@@ -352,6 +381,35 @@ class Selector {
       }
     }
     return {};
+  }
+
+  // `structural` with an effect that stands for one of its members and for what else θ did, where that takes fewer
+  // causes than the sets of `found`, or explains θ where these do not.
+  [[nodiscard]] std::optional<CauseSet> as_one(const CauseSet& structural, const std::vector<CauseSet>& found) const {
+    const std::size_t most = found.empty() ? SIZE_MAX : found.front().members.size();
+    if (most <= structural.members.size()) {
+      return std::nullopt;
+    }
+    for (std::size_t k = 0; k < structural.members.size(); ++k) {
+      for (std::size_t c = 0; c < table_.candidates.size(); ++c) {
+        const std::vector<std::size_t>& parts = kinds_[table_.candidates[c].effect].stands_for;
+        if (std::ranges::find(parts, table_.candidates[structural.members[k]].effect) == parts.end()) {
+          continue;
+        }
+        std::vector<std::size_t> members = structural.members;
+        members[k] = c;
+        std::sort(members.begin(), members.end());
+        CauseSet whole = evaluate(table_, std::move(members), BaseModel::refitted);
+        if (excess(whole) > excess(structural) + margin(structural)) {
+          continue;
+        }
+        const std::vector<CauseSet> sets = explain_theta(whole);
+        if (!sets.empty() && sets.front().members.size() < most) {
+          return whole;
+        }
+      }
+    }
+    return std::nullopt;
   }
 
   void add_parametric(Selection& result, const std::vector<CauseSet>& structural_rivals, bool nominal_trusted) const {
@@ -370,7 +428,11 @@ class Selector {
         rivals.push_back({structural[i], i});
         continue;
       }
-      const std::vector<CauseSet> found = explain_theta(structural[i]);
+      std::vector<CauseSet> found = explain_theta(structural[i]);
+      if (std::optional<CauseSet> whole = as_one(structural[i], found)) {
+        structural[i] = std::move(*whole);
+        found = explain_theta(structural[i]);
+      }
       if (found.empty()) {
         rivals.push_back({structural[i], i, true});
         continue;
@@ -387,7 +449,8 @@ class Selector {
         }
       }
     }
-    // With θ held, the right one of causes that do as well with θ fitted again is the one that leaves least.
+    // With θ held, the right one of causes that do as well with θ fitted again is the one that leaves least, with the
+    // fewest causes.
     const std::size_t most = rivals.front().moves_theta ? SIZE_MAX : rivals.front().set.members.size();
     const auto comparable = [&](const Rival& rival) { return !rival.moves_theta && rival.set.members.size() <= most; };
     const CauseSet* least = nullptr;
@@ -399,8 +462,13 @@ class Selector {
     }
     if (least != nullptr) {
       const double as_good = excess(*least) + margin(*least);
-      const auto lead = std::ranges::find_if(
-          rivals, [&](const Rival& rival) { return comparable(rival) && excess(rival.set) <= as_good; });
+      auto lead = rivals.end();
+      for (auto rival = rivals.begin(); rival != rivals.end(); ++rival) {
+        const bool good = comparable(*rival) && excess(rival->set) <= as_good;
+        if (good && (lead == rivals.end() || rival->set.members.size() < lead->set.members.size())) {
+          lead = rival;
+        }
+      }
       std::rotate(rivals.begin(), lead, lead + 1);
     }
     result.all = rivals.front().set;
@@ -458,6 +526,7 @@ class Selector {
   double level_ = 0.0;                  // of a test
   double critical_ = 0.0;               // standard deviations, of that level
   std::vector<bool> moves_theta_only_;  // by effect: θ fitted again takes all of it
+  std::vector<bool> does_nothing_;      // by effect: all of its columns are zeros
   double gap_ = 0.0;
 };
 
@@ -489,7 +558,8 @@ double unexplained_by(const CandidateTable& table, const std::vector<std::size_t
   const Eigen::MatrixXd beside = remainder(*table.gram, of, on);
   double share = 0.0;
   for (Eigen::Index i = 0; i < alone.rows(); ++i) {
-    if (alone(i, i) > 0.0) {
+    // What θ takes up is no column beside it.
+    if (alone(i, i) > 1e-6 * table.gram->square(of[static_cast<std::size_t>(i)])) {
       share = std::max(share, std::clamp(beside(i, i) / alone(i, i), 0.0, 1.0));
     }
   }

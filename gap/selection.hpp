@@ -50,8 +50,10 @@ struct SelectionOptions {
   double tolerated = 0.04;            ///< fraction of the structural part that an explanation may leave
   double tolerated_nominal = 0.003;   ///< fraction of the whole gap, θ's part included, that an explanation may leave
   double tolerated_floor = 0.5;       ///< remainder that an explanation may leave in any case
-  double theta_share = 0.06;  ///< fraction of the gap that a change of θ may explain without a parametric cause
-  double contained = 1e-3;    ///< one set contains another's signature if it leaves less than this fraction of it
+  double theta_share =
+      0.02;                 ///< fraction of the gap that a change of θ may explain without a parametric cause, besides
+                            ///< twice what the causes leave and what their columns miss (EffectKind::inexact)
+  double contained = 1e-3;  ///< one set contains another's signature if it leaves less than this fraction of it
   std::uint64_t seed = 1;
   std::size_t threads = 1;
 };
@@ -80,7 +82,8 @@ struct Selection {
 
 /// Properties of an effect that selection needs besides its columns.
 struct EffectKind {
-  double inexact = 0.0;  ///< Effect::inexact
+  double inexact = 0.0;                   ///< Effect::inexact
+  std::vector<std::size_t> stands_for{};  ///< Effect::stands_for, by index
 };
 
 /// Selects. `floor_error` is the mean square that noise alone leaves (1 where the floors are right); `kinds` has one

@@ -2,10 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scores what `wheelwright gap` said of cases with withheld effects, as Markdown.
 
-    score_withheld.py [--naive|--removed] ANSWERS.json RESULTS    RESULTS has CASE/gap.json (or CASE.json) for every case
+    score_withheld.py [--naive|--removed|--profiles] ANSWERS.json RESULTS    RESULTS has CASE/gap.json (or CASE.json)
+    score_withheld.py --even|--odd ANSWERS.json RESULTS                      --profiles of cases with such numbers
 
 With --naive what is scored is the answer of the naive rule (`wheelwright gap --naive`), not the diagnosis. With --removed the
-hidden effect was not in the tool's catalogue: whatever is said to explain the log is wrong.
+hidden effect was not in the tool's catalogue: whatever is said to explain the log is wrong. --profiles is one table
+with a column for each kind of case (what stands before the _ of its name), and exact names: lag and delay count as two.
 """
 
 import json
@@ -280,6 +282,49 @@ def score(answers, results, naive=False):
     return rows, sizes, confusion, coverage, missed, promise, laws
 
 
+def exact(effects):
+    """Names as a set; a payload and the shift of the centre that it makes are a payload off the middle."""
+    names = set(effects)
+    return frozenset(names - {"payload", "com_longitudinal"} | {"payload_offset"}
+                     if {"payload", "com_longitudinal"} <= names else names)
+
+
+def report_profiles(answers, results, rest=None, out=sys.stdout):
+    rows = defaultdict(lambda: defaultdict(Count))
+    for case, answer in sorted(answers.items()):
+        profile, _, number = case.rpartition("_")
+        if rest is not None and int(number) % 2 != rest:
+            continue
+        gap = load(results, case) or {}
+        verdict, kind = gap.get("verdict", "no result"), class_of(answer)
+        truth, causes = exact(e["effect"] for e in answer["effects"]), exact(said(gap))
+        kept = [exact(member) for member in credible(gap)] + [causes]
+        explained = verdict == "explained"
+
+        def add(row, good, profile=profile):
+            rows[row][profile].add(good)
+
+        if kind in ("single", "parametric"):
+            add("one effect: in the answer", any(truth <= member for member in kept))
+            add("one effect: alone, and explained", explained and causes == truth)
+        elif kind == "pair":
+            add("two effects: exactly these", causes == truth)
+            add("two effects: among those said", any(truth <= member for member in kept))
+        elif kind == "none":
+            add("no effect: no_gap", verdict == "no_gap")
+        else:
+            add("outside the catalogue: unexplained", verdict == "unexplained")
+        if kind != "none":
+            add("blamed on one wrong cause", explained and len(causes) == 1 and not causes <= truth)
+            add("a gap called no_gap", verdict == "no_gap")
+    profiles = sorted({p for row in rows.values() for p in row}, reverse=True)
+    print(f"| measure | {' | '.join(profiles)} |\n|---|{'---|' * len(profiles)}", file=out)
+    for row in ("one effect: in the answer", "one effect: alone, and explained", "two effects: exactly these",
+                "two effects: among those said", "no effect: no_gap", "outside the catalogue: unexplained",
+                "blamed on one wrong cause", "a gap called no_gap"):
+        print(f"| {row} | {' | '.join(str(rows[row][p]) for p in profiles)} |", file=out)
+
+
 ORDER = ["results", "single", "parametric", "two", "no effect", "outside"]
 
 
@@ -314,7 +359,8 @@ def report(answers, results, naive=False, out=sys.stdout):
 
 
 def main(arguments):
-    mode = arguments[0] if arguments[:1] in (["--naive"], ["--removed"]) else ""
+    modes = ("--naive", "--removed", "--profiles", "--even", "--odd")
+    mode = arguments[0] if arguments[:1] and arguments[0] in modes else ""
     arguments = arguments[bool(mode):]
     if len(arguments) != 2 or arguments[0].startswith("-"):
         print(__doc__, file=sys.stderr)
@@ -322,6 +368,8 @@ def main(arguments):
     answers = json.loads(Path(arguments[0]).read_text(encoding="utf-8"))
     if mode == "--removed":
         report_removed(answers, Path(arguments[1]))
+    elif mode in ("--profiles", "--even", "--odd"):
+        report_profiles(answers, Path(arguments[1]), {"--even": 0, "--odd": 1}.get(mode))
     else:
         report(answers, Path(arguments[1]), mode == "--naive")
     return 0

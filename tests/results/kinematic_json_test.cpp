@@ -56,7 +56,7 @@ TEST(KinematicJson, GivesTheDetectorAtAStatedRiskBackBitForBit) {
   s.robot.noise.position = {.value = 0.002, .bias = 1e-4, .correlation = 0.02, .deviation = 0.0015};
   s.robot.noise.heading.bias = 1e-4;
   const Commissioning result = commissioned(s);
-  ASSERT_TRUE(result.model.kinematic && result.model.kinematic->at_risk) << testing::PrintToString(result.notes);
+  ASSERT_TRUE(result.model.kinematic && result.model.kinematic->at_risk) << ::testing::PrintToString(result.notes);
   const OnlineModel back = there_and_back(result);
   ASSERT_TRUE(back.kinematic && back.kinematic->at_risk);
   EXPECT_EQ(back.robot.noise.position.bias, 1e-4);
