@@ -29,7 +29,7 @@ struct FastBandOptions {
   double beta = 40.0;          ///< upper corner, 1/s; lower where the log's step is long
   double row_step = 0.4;       ///< in 1/β
   double after = 0.15;         ///< s, how long after a reversal its play is crossed and the impact over
-  double contrast = 1.25;       ///< least ratio after_reversals/elsewhere over that of the healthy log, for play
+  double contrast = 1.25;      ///< least ratio after_reversals/elsewhere over that of the healthy log, for play
   double significance = 0.05;  ///< of it, over blocks of time
   double above = 0.25;         ///< mean square above the healthy log's that counts as a gap of its own
   BlockOptions blocks{};

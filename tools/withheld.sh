@@ -56,8 +56,9 @@ mkdir -p "$results"
 python3 - "$set/answers.json" "$only" >"$results/runs" <<'PY'
 import json, sys
 
-ALSO = {"coulomb": ["coulomb_asymmetric"], "armature": ["payload"], "wheel_radius": ["wheel_radius_asymmetric"],
-        "torque_gain": ["torque_gain_asymmetric"], "viscous": ["viscous_asymmetric"]}
+ALSO = {"coulomb": ["coulomb_asymmetric"], "armature": ["payload", "payload_offset"], "wheel_radius": ["wheel_radius_asymmetric"],
+        "torque_gain": ["torque_gain_asymmetric"], "viscous": ["viscous_asymmetric"],
+        "com_longitudinal": ["payload_offset"], "payload": ["payload_offset"]}
 answers, only = json.load(open(sys.argv[1], encoding="utf-8")), sys.argv[2]
 for case, answer in sorted(answers.items()):
     effects = [effect["effect"] for effect in answer["effects"]]
