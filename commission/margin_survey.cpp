@@ -116,8 +116,8 @@ void add_at_risk(MarginSurvey& survey, LogSource& log, const OnlineModel& model,
   }
   sums.threads = options.margins.threads;
   sums.progress = options.margins.progress;
-  RiskMargins result{
-      model.at_risk->risk, drive->miss, torque_false_alarms(model), sums.windows, {}, model.at_risk->warrant};
+  RiskMargins result{model.at_risk->risk, drive->miss, torque_false_alarms(model),
+                     sums.windows,        {},          model.at_risk->warrant};
   result.margins = detector::margins_at_risk(*drive, model, motion, faults, onsets, sums);
   for (detector::FaultMargins& margins : result.margins) {
     for (std::size_t k = 0; k < kinds.size(); ++k) {

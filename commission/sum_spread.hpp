@@ -12,9 +12,9 @@
 
 namespace wheelwright::commission {
 
-/// Mean squares of a sum's S. For errors as assumed E √(V0/(V + V0)) exp(S²/(2(V + V0))) <= 1 in each window, given what
-/// was before, so that over windows that are apart Σ (S²/(V + V0) − ln(1 + V/V0)) exceeds 2L with the probability e^−L
-/// at most; so does the mean of that over groups of such windows (Jensen's inequality), here all looks. What bias,
+/// Mean squares of a sum's S. For errors as assumed E √(V0/(V + V0)) exp(S²/(2(V + V0))) <= 1 in each window, given
+/// what was before, so that over windows that are apart Σ (S²/(V + V0) − ln(1 + V/V0)) exceeds 2L with the probability
+/// e^−L at most; so does the mean of that over groups of such windows (Jensen's inequality), here all looks. What bias,
 /// what counts at its worst and the set may add is taken away from S first. Windows count as apart after eight scales,
 /// when 1 % of a sum is left.
 class SumSpread {

@@ -49,11 +49,11 @@ filter::SampleClass class_of(const filter::ErrorClass& c, double shortest_step, 
   return sample;
 }
 
-constexpr double kHalves = 0.6931471805599453;  // ln 2: each half of the mixture has half of the risk
+const double kHalves = 2.0 * std::log(2.0);  // what a mixture costs of which half, and half of that, counts
 
-// Bound on the share of errors with the summed variance proxies V > 0 in a sum, but for e^{−L}, V0 > 0 fixed beforehand:
-// √((V + V0)(2L + ln(1 + V/V0))) (method of mixtures: Robbins 1970; de la Peña, Klass, Lai 2004). Where the proxies hold
-// for |λ| <= reach/√V0 only, half of the mixture is cut off there, the other half stands at that end.
+// Bound on the share of errors with the summed variance proxies V > 0 in a sum, but for e^{−L}, V0 > 0 fixed
+// beforehand: √((V + V0)(2L + ln(1 + V/V0))) (method of mixtures: Robbins 1970; de la Peña, Klass, Lai 2004). Where the
+// proxies hold for |λ| <= reach/√V0 only, half of the mixture is cut off there, the other half stands at that end.
 double mixture_radius(double V, double V0, double L, double reach) {
   const double volume = std::log1p(V / V0);
   if (reach == core::kInfinity) {
@@ -70,7 +70,7 @@ double pose_reach(const filter::SampleClass& sample, double L) {
   if (!(sample.deviation < sample.bound)) {
     return core::kInfinity;
   }
-  const double radius = std::sqrt(2.0 * (L + 2.0 * std::log(2.0)) + std::log1p(1.0 / kShareOfUsual));
+  const double radius = std::sqrt(2.0 * (L + kHalves) + std::log1p(1.0 / kShareOfUsual));
   return 1.25 * std::sqrt(kShareOfUsual / (1.0 + kShareOfUsual)) * (radius + 1.0);
 }
 

@@ -190,8 +190,8 @@ Effect torque_deadzone() {
           }};
 }
 
-// What a limit takes from an effort. A limit shows at peaks: one that most of the drive lies above, or that takes most of
-// the effort away, is none of the robot's but a way to be rid of the signal, and its column is nothing.
+// What a limit takes from an effort. A limit shows at peaks: one that most of the drive lies above, or that takes most
+// of the effort away, is none of the robot's but a way to be rid of the signal, and its column is nothing.
 Signal beyond_limit(const Signal& effort, double limit) {
   constexpr double kMostSamples = 0.25, kMostSquare = 0.4;
   const Signal beyond = effort - effort.cwiseMax(-limit).cwiseMin(limit);

@@ -40,9 +40,9 @@ struct FastBandOptions {
 /// θ, of an offset between the clocks and of `causes` (their shapes as they are), all fitted again.
 ///
 /// Play is crossed after each reversal of the torque, within hundredths of a second: whatever the contact is like, the
-/// torque is missing first and then an impact. Below the band nothing of it is left. Rows just after a joint's speed has
-/// changed its sign, where friction acts, do not count. Nothing for a preparation without a healthy log, without efforts
-/// or with too few rows.
+/// torque is missing first and then an impact. Below the band nothing of it is left. Rows just after a joint's speed
+/// has changed its sign, where friction acts, do not count. Nothing for a preparation without a healthy log, without
+/// efforts or with too few rows.
 [[nodiscard]] std::optional<FastBand> look_at_fast_band(const PreparedGap& prepared,
                                                         const std::vector<FittedEffect>& causes,
                                                         const FastBandOptions& options = {});

@@ -447,9 +447,11 @@ GapProblem make_problem(const Drive& drive, const NoiseFloor& floor, const std::
     }
   }
   for (std::size_t j = 0; j < drive.model.p(); ++j) {
-    const std::string& name = drive.model.parameters[j].physical;
     const double nominal = drive.theta[static_cast<Eigen::Index>(j)];
-    if ((name == "mass" || name == "yaw_inertia" || name == "inertia") && nominal > 0.0) {
+    const bool of_acceleration = std::ranges::any_of(drive.model.terms, [j](const Term& term) {
+      return term.parameter == j && term.kind == Term::Kind::acceleration;
+    });
+    if (of_acceleration && nominal > 0.0) {
       problem.table.inertias.emplace_back(j, nominal);
     }
   }

@@ -101,8 +101,8 @@ std::string unit_of(hid_t dataset) {
   return {};
 }
 
-/// Why a dataset is not read: what it says of its place is followed with trust only, and its size must be one that a log
-/// has.
+/// Why a dataset is not read: what it says of its place is followed with trust only, and its size must be one that a
+/// log has.
 std::string refusal(hid_t dataset, hid_t type, hsize_t rows, bool trust) {
   const Handle how(H5Dget_create_plist(dataset), H5Pclose);
   const H5D_layout_t layout = how ? H5Pget_layout(how.get()) : H5D_LAYOUT_ERROR;

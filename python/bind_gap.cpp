@@ -312,7 +312,10 @@ void bind_effect(py::module_& m) {
       [](const RobotObject* robot) {
         return robot != nullptr ? gap::effect_catalogue(model::make_model(robot->robot)) : gap::effect_catalogue();
       },
-      py::arg("robot") = nullptr, "The effects that gap() looks for, for a robot (by default on two driven wheels).");
+      py::arg("robot") = nullptr,
+      "The effects that gap() looks for, for a robot (by default on two driven wheels). One that may follow one of "
+      "several "
+      "laws is there once for each, with other columns.");
 }
 
 using gap::GapEstimate;
@@ -330,11 +333,15 @@ struct SeriesObject {
   [[nodiscard]] const gap::ResidualSeries& series() const { return owner->diagnosis.series[index]; }
 };
 
-void check_names(const std::vector<std::string>& without, const std::vector<Effect>& catalogue) {
+// The first `own` are the catalogue's, in which an effect of several laws stands several times.
+void check_names(const std::vector<std::string>& without, const std::vector<Effect>& catalogue, std::size_t own) {
   std::vector<std::string> names;
-  for (const Effect& effect : catalogue) {
-    check::that(std::ranges::find(names, effect.name) == names.end(), "effect " + effect.name, "each name once");
-    names.push_back(effect.name);
+  for (std::size_t k = 0; k < catalogue.size(); ++k) {
+    const bool met = std::ranges::find(names, catalogue[k].name) != names.end();
+    check::that(k < own || !met, "effect " + catalogue[k].name, "each name once");
+    if (!met) {
+      names.push_back(catalogue[k].name);
+    }
   }
   for (const std::string& name : without) {
     if (std::ranges::find(names, name) == names.end()) {
@@ -349,8 +356,9 @@ std::shared_ptr<DiagnosisObject> gap(LogObject& log, const RobotObject& robot, L
                                      const std::optional<double>& beta, bool shrink, bool manoeuvre, std::uint64_t seed,
                                      std::size_t threads, py::object progress) {
   std::vector<Effect> catalogue = gap::effect_catalogue(model::make_model(robot.robot));
+  const std::size_t own = catalogue.size();
   catalogue.insert(catalogue.end(), effects.begin(), effects.end());
-  check_names(without, catalogue);
+  check_names(without, catalogue, own);
   gap::DiagnoseOptions options;
   options.catalogue = catalogue;
   options.without = without;

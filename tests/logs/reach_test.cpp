@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a recording may reach: itself, and the files of its directory. It deletes nothing, runs nothing, follows nothing.
+// What a recording may reach: itself, and the files of its directory. It deletes nothing, runs nothing, follows
+// nothing.
 #include <algorithm>
 #include <filesystem>
 #include <fstream>

@@ -33,12 +33,14 @@ inline Commissioning done() {
   c.message = "commissioned";
   c.model.robot = robot();
   c.model.model = model::make_model(c.model.robot);
+  c.model.estimate = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(c.model.model.p()));
   c.model.filter = {.order = 2, .alpha = 20.0, .beta = 20.0};
   const double estimate[] = {21.3, 0.91, 4.2, 0.52}, half[] = {0.4, 0.02, 0.3, 0.05};
   for (std::size_t j = 0; j < 4; ++j) {
     commission::ParameterResult p;
     p.parameter = c.model.model.parameters[j];
     p.estimate = kRadius * estimate[j];
+    c.model.estimate[static_cast<Eigen::Index>(j)] = kRadius * estimate[j];
     p.standard_error = kRadius * half[j] / 8.0;
     p.lower = kRadius * (estimate[j] - half[j]);
     p.upper = kRadius * (estimate[j] + half[j]);
