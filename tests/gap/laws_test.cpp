@@ -91,7 +91,8 @@ struct Sliding {
   }
 };
 
-/// 80 s under a speed controller, as a log: encoder counts, noise of torque and pose, `t` at the middle of each interval.
+/// 80 s under a speed controller, as a log: encoder counts, noise of torque and pose, `t` at the middle of each
+/// interval.
 template <typename Law>
 LogTable log_of(const Law& law, std::uint64_t seed) {
   std::mt19937_64 generator(seed);

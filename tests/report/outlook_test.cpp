@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The first screen of a detector's page: size over time to detection, a line for each guarantee, and what each is worth.
+// The first screen of a detector's page: size over time to detection, a line for each guarantee, and what each is
+// worth.
 #include <wheelwright/report/outlook.hpp>
 
 #include <string>
