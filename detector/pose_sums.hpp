@@ -64,8 +64,8 @@ struct PoseSumOptions {
 /// - heading errors η turn E_j: to first order by J E_j q_j η, q_j the way of the step. With the foreseen way d_j in
 ///   the place of E_j q_j that averages out, the factor of η_k is that of (K_k g_kᵀJd_k + K_k+1 g_k+1ᵀJd_k+1)/2. What
 ///   is left counts at its worst: n_θ |gᵀJ(E_j q_j − d_j)|, and
-///   n_θ |g| (n_θ (3/2 + 1/3) Q + |Δθ| Q/6 + Σ_w |Δφ_w| δr_w/2 + …), Q the largest way and δr what the set leaves of the
-///   radii;
+///   n_θ |g| (n_θ (3/2 + 1/3) Q + |Δθ| Q/6 + Σ_w |Δφ_w| δr_w/2 + …), Q the largest way and δr what the set leaves of
+///   the radii;
 /// - wheel angles at their worst, by parts: n_φ Σ_k |K_k c_k − K_k+1 c_k+1|, c = gᵀE r/2 (or the yaw gain times g);
 /// - what happens within a step: motion_within_step(); any parameters of the set; rounding.
 /// Looks and their risks are those of ScaleDetector: all looks at all sums together raise
