@@ -87,15 +87,14 @@ std::string cost(const commission::DetectorCandidate& candidate, const commissio
 }
 
 std::string table(const commission::DetectorChoice& choice) {
+  // Once is enough where it is the same for all.
+  const bool differs = choice.risk_spread.value_or(0.0) > choice.tie;
   std::string out = fmt::format(
       "smallest certain size over the stated one{}, within {:g} s, and delay of the stated size: medians, worst fault\n"
       "{:>5} {:>8} {:>10} {:>7} {:>8} {:>8}{}  {}\n",
       choice.either ? ", by whichever guarantee sees a fault first" : "", choice.window, "order", "beta", "alarms",
-      "k of n", "size", "delay", choice.risk_spread.value_or(0.0) > choice.tie ? "  at risk" : "",
-      "against the chosen one");
+      "k of n", "size", "delay", differs ? "  at risk" : "", "against the chosen one");
   const commission::DetectorCandidate& chosen = choice.candidates.front();
-  // Once is enough where it is the same for all.
-  const bool differs = choice.risk_spread.value_or(0.0) > choice.tie;
   for (const commission::DetectorCandidate& candidate : choice.candidates) {
     out +=
         fmt::format("{:>5} {:>8.4g} {:>10} {:>7} ", candidate.filter.order, candidate.filter.beta,

@@ -21,27 +21,6 @@ constexpr double kLeastCuttingScale = 1.0;  // s, of sums that cut the set
 constexpr std::size_t kCutsAtOnce = 256;
 constexpr double kFewestSteps = 2.0;  // in a scale
 
-// Walks the poses of `log` from `from` s on through `detector`; calls at() after every look.
-template <typename At>
-void walk_poses(LogSource& log, detector::PoseSumDetector& detector, double from, const At& at) {
-  const std::vector<std::size_t> pick = core::positions_of(log, detector.measurement().columns());
-  std::vector<double> sample(pick.size());
-  core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
-    if (starts) {
-      detector.restart();
-    }
-    if (block.t[k] < from) {
-      return;
-    }
-    for (std::size_t c = 0; c < pick.size(); ++c) {
-      sample[c] = block.columns[pick[c]][k];
-    }
-    if (detector.step(block.t[k], sample)) {
-      at();
-    }
-  });
-}
-
 // The time at which `share` of the time from the first row of `log` to the last is over.
 double time_at(LogSource& log, double share) {
   double first = core::kInfinity, last = -core::kInfinity;
@@ -104,7 +83,7 @@ void test_on_log(LogSource& log, const detector::KinematicModel& model, double s
   SumSpread spread(2.0 * (risk.usual_position + risk.usual_heading), own.checks, 0.5 * options.test_risk);
   double utilisation = 0.0;
   detector::SumState worst;
-  walk_poses(log, detector, -core::kInfinity, [&] {
+  walk_poses(log, detector, -core::kInfinity, core::kInfinity, [&] {
     const Eigen::MatrixXd variances = 2.0 * (detector.position_variances() + detector.heading_variances());
     for (const detector::SumState& look : detector.looks()) {
       spread.add(look, variances);
@@ -224,7 +203,7 @@ PoseAtRisk pose_at_risk(LogSource& log, const detector::KinematicModel& guarante
   {
     detector::PoseSumDetector sums(model, {.false_alarms = options.risk / std::max(seconds, 1.0)});
     Cutter cutter(model);
-    walk_poses(log, sums, learnt, [&] {
+    walk_poses(log, sums, learnt, core::kInfinity, [&] {
       for (const detector::SumState& look : sums.looks()) {
         if (sums.scales()[look.scale] >= kLeastCuttingScale && std::isfinite(look.radius)) {
           const Eigen::VectorXd row = sums.regressor(look);

@@ -9,17 +9,17 @@
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/limits.hpp>
+#include <wheelwright/detector/sum_kernel.hpp>
 
 namespace wheelwright::detector {
 namespace {
 
 constexpr double kSumRounding = 1e-10;  // of all that is added up, relative
 constexpr double kCoordinateRounding =
-    16.0 * std::numeric_limits<double>::epsilon();     // of a difference of two coordinates
-constexpr double kShareOfUsual = 0.2;                  // V0 is this share of a usual drive's V
-constexpr double kMostOfKernel = 0.36787944117144233;  // 1/e, the most that x e^{−x} is
-constexpr double kLongestStep = 1.0;                   // s, from pose to pose
-constexpr double kShortestOf = 0.999;                  // of the shortest step: a pose that comes earlier is left out
+    16.0 * std::numeric_limits<double>::epsilon();  // of a difference of two coordinates
+constexpr double kShareOfUsual = 0.2;               // V0 is this share of a usual drive's V
+constexpr double kLongestStep = 1.0;                // s, from pose to pose
+constexpr double kShortestOf = 0.999;               // of the shortest step: a pose that comes earlier is left out
 // V0 is never less than this share of that of weights of size 1 on an even drive.
 constexpr double kLeastUsual = 1e-6;
 const double kHalfTheRisk = std::log(2.0);  // what it costs that position and heading share a risk
@@ -40,12 +40,10 @@ const PoseRiskModel& at_risk_of(const KinematicModel& model) {
 
 // Of errors whose size is `times` as large: those of a vector's length.
 filter::SampleClass class_of(const filter::ErrorClass& c, double shortest_step, double times) {
-  filter::SampleClass sample;
-  sample.averages = c.bias < c.bound;
-  sample.bound = times * c.bound;
-  sample.bias = times * (sample.averages ? c.bias : c.bound);
-  sample.deviation = times * std::min(c.deviation, c.bound);
-  sample.multiplicity = c.correlation > 0.0 ? std::floor(c.correlation / shortest_step) + 1.0 : 1.0;
+  filter::SampleClass sample = filter::sample_class(c, shortest_step);
+  sample.bias = times * (sample.averages ? sample.bias : sample.bound);
+  sample.bound *= times;
+  sample.deviation *= times;
   return sample;
 }
 
@@ -84,7 +82,7 @@ template <typename Factor>
 void add_variance(std::array<double, 3>& V, const filter::SampleClass& sample, double reach, double size0, double size1,
                   const Factor& product) {
   if (sample.averages) {
-    const double s = filter::variance_proxy(sample, reach * (size0 + kMostOfKernel * size1));
+    const double s = filter::variance_proxy(sample, reach * (size0 + SumKernel::kLargest * size1));
     V[0] += s * size0 * size0;
     V[1] += 2.0 * s * product;
     V[2] += s * size1 * size1;
@@ -448,25 +446,19 @@ Eigen::VectorXd PoseSumDetector::regressor(const SumState& look) const {
   return states_[look.scale].Y0.row(static_cast<Eigen::Index>(look.weight)).transpose();
 }
 
-Eigen::MatrixXd PoseSumDetector::position_variances() const {
+Eigen::MatrixXd PoseSumDetector::variances(std::array<double, 3> Sum::*part) const {
   Eigen::MatrixXd result(rows_.rows(), static_cast<Eigen::Index>(states_.size()));
   for (Eigen::Index k = 0; k < result.cols(); ++k) {
     for (Eigen::Index w = 0; w < result.rows(); ++w) {
-      result(w, k) = states_[static_cast<std::size_t>(k)].sums[static_cast<std::size_t>(w)].position[0];
+      result(w, k) = (states_[static_cast<std::size_t>(k)].sums[static_cast<std::size_t>(w)].*part)[0];
     }
   }
   return result;
 }
 
-Eigen::MatrixXd PoseSumDetector::heading_variances() const {
-  Eigen::MatrixXd result(rows_.rows(), static_cast<Eigen::Index>(states_.size()));
-  for (Eigen::Index k = 0; k < result.cols(); ++k) {
-    for (Eigen::Index w = 0; w < result.rows(); ++w) {
-      result(w, k) = states_[static_cast<std::size_t>(k)].sums[static_cast<std::size_t>(w)].heading[0];
-    }
-  }
-  return result;
-}
+Eigen::MatrixXd PoseSumDetector::position_variances() const { return variances(&Sum::position); }
+
+Eigen::MatrixXd PoseSumDetector::heading_variances() const { return variances(&Sum::heading); }
 
 UsualPoseVariances usual_pose_variances(LogSource& log, const KinematicModel& model, double from, double until) {
   KinematicModel any = model;
@@ -480,25 +472,12 @@ UsualPoseVariances usual_pose_variances(LogSource& log, const KinematicModel& mo
     }
   }
   PoseSumDetector detector(any);
-  const std::vector<std::size_t> pick = core::positions_of(log, model.measurement.columns());
-  std::vector<double> sample(pick.size());
   UsualPoseVariances sum{Eigen::MatrixXd::Zero(W, S), Eigen::MatrixXd::Zero(W, S)};
   double count = 0.0;
-  core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
-    if (starts) {
-      detector.restart();
-    }
-    if (block.t[k] < from || block.t[k] >= until) {
-      return;
-    }
-    for (std::size_t c = 0; c < pick.size(); ++c) {
-      sample[c] = block.columns[pick[c]][k];
-    }
-    if (detector.step(block.t[k], sample)) {
-      sum.position += detector.position_variances();
-      sum.heading += detector.heading_variances();
-      count += 1.0;
-    }
+  walk_poses(log, detector, from, until, [&] {
+    sum.position += detector.position_variances();
+    sum.heading += detector.heading_variances();
+    count += 1.0;
   });
   const double h = risk.errors.shortest_step, share = count > 0.0 ? kShareOfUsual / count : 0.0;
   const double p = 2.0 * risk.errors.position.bound * risk.errors.position.bound;

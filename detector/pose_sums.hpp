@@ -141,6 +141,7 @@ class PoseSumDetector {
   void take(const Step& step);
   void look(Scale& scale, std::size_t which);
   [[nodiscard]] double averaged(double V, double usual, double L, const filter::SampleClass& sample) const;
+  [[nodiscard]] Eigen::MatrixXd variances(std::array<double, 3> Sum::*part) const;
 
   filter::OdometryMeasurement measurement_;
   filter::OdometryErrors errors_;
@@ -170,6 +171,28 @@ class PoseSumDetector {
   bool alarm_ = false;
   std::vector<double> direction_;
 };
+
+/// Walks the rows of `log` from `from` s on and before `until` s through `detector`, which forgets all samples where a
+/// segment begins; calls looked() where sums were looked at.
+template <typename Looked>
+void walk_poses(LogSource& log, PoseSumDetector& detector, double from, double until, const Looked& looked) {
+  const std::vector<std::size_t> pick = core::positions_of(log, detector.measurement().columns());
+  std::vector<double> sample(pick.size());
+  core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
+    if (starts) {
+      detector.restart();
+    }
+    if (block.t[k] < from || block.t[k] >= until) {
+      return;
+    }
+    for (std::size_t c = 0; c < pick.size(); ++c) {
+      sample[c] = block.columns[pick[c]][k];
+    }
+    if (detector.step(block.t[k], sample)) {
+      looked();
+    }
+  });
+}
 
 /// PoseRiskModel::usual_position and usual_heading: a share of the mean variances on `log`, from `from` s on and before
 /// `until` s. `model.at_risk` is to have all else.

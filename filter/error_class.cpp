@@ -21,13 +21,18 @@ void validate(const ErrorClasses& classes) {
 
 SampleClass sample_class(const ErrorClasses& classes, const SampleWeight& sample) {
   const bool motion = sample.sensor == SampleWeight::Sensor::motion;
-  const ErrorClass& c = motion ? classes.motion : classes.effort;
+  SampleClass result = sample_class(motion ? classes.motion : classes.effort, classes.shortest_step);
+  result.averages = result.averages && sample.exact && (!motion || sample.moved >= kCountsThatAverage * classes.count);
+  return result;
+}
+
+SampleClass sample_class(const ErrorClass& c, double shortest_step) {
   SampleClass result;
   result.bound = c.bound;
   result.bias = c.bias;
   result.deviation = std::min(c.deviation, c.bound);
-  result.averages = sample.exact && c.bias < c.bound && (!motion || sample.moved >= kCountsThatAverage * classes.count);
-  result.multiplicity = c.correlation > 0.0 ? std::floor(c.correlation / classes.shortest_step) + 1.0 : 1.0;
+  result.averages = c.bias < c.bound;
+  result.multiplicity = c.correlation > 0.0 ? std::floor(c.correlation / shortest_step) + 1.0 : 1.0;
   return result;
 }
 

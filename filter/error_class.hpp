@@ -50,6 +50,8 @@ struct SampleClass {
   double multiplicity = 1.0;  ///< samples within a correlation time
 };
 [[nodiscard]] SampleClass sample_class(const ErrorClasses& classes, const SampleWeight& sample);
+/// Class of samples whose factors are known exactly, no two of them nearer than `shortest_step` s.
+[[nodiscard]] SampleClass sample_class(const ErrorClass& c, double shortest_step);
 
 /// Counts from sample to sample from which on rounding averages out.
 inline constexpr double kCountsThatAverage = 4.0;

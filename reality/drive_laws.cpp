@@ -422,14 +422,20 @@ Effect contact_slip(const RobotDesign& robot, Random random, double severity) {
 
 // Wheels that are not round.
 
-Effect off_centre(const RobotDesign& robot, Random random, double severity) {
-  // The engine's: the tyre's centre beside the axle.
-  const double weight = 9.81 * (robot.body.chassis_mass + 2.0 * robot.body.wheel_mass);
-  const double large = std::min(0.4 * severity * robot.typical_torque() / (0.25 * weight), 0.2 * robot.radius);
+/// One wheel, drawn, has `large`, the other up to 60 % of it.
+Pair uneven(Random& random, double large) {
   const std::size_t side = random.below(2);
   Pair size{};
   size[side] = large;
   size[1 - side] = random.uniform(0.0, 0.6) * large;
+  return size;
+}
+
+Effect off_centre(const RobotDesign& robot, Random random, double severity) {
+  // The engine's: the tyre's centre beside the axle.
+  const double weight = 9.81 * (robot.body.chassis_mass + 2.0 * robot.body.wheel_mass);
+  const double large = std::min(0.4 * severity * robot.typical_torque() / (0.25 * weight), 0.2 * robot.radius);
+  const Pair size = uneven(random, large);
   const Pair phase{random.uniform(0.0, full_turn), random.uniform(0.0, full_turn)};
   Effect effect;
   effect.parameters = {{"offset_R_m", size[right]}, {"offset_L_m", size[left]}};
@@ -444,10 +450,7 @@ Effect off_centre(const RobotDesign& robot, Random random, double severity) {
 /// Torque by the angle of each wheel; the second wheel has a share of the first's.
 Effect by_angle(const RobotDesign& robot, Random& random, double severity, Parameters parameters, const Curve& shape) {
   const double large = 0.5 * severity * robot.typical_torque();
-  const std::size_t side = random.below(2);
-  Pair size{};
-  size[side] = large;
-  size[1 - side] = random.uniform(0.0, 0.6) * large;
+  const Pair size = uneven(random, large);
   const Pair phase{random.uniform(0.0, full_turn), random.uniform(0.0, full_turn)};
   Effect effect;
   effect.parameters = std::move(parameters);

@@ -94,39 +94,51 @@ filter::ErrorClass error_class_at(const JsonPlace& place) {
   return c;
 }
 
-detector::PoseRiskModel pose_risk_at(const JsonPlace& place, const filter::OdometryMeasurement& measurement) {
-  detector::PoseRiskModel risk;
+/// What both residuals say at a stated risk: everything but their errors and usual variances.
+template <typename Risk>
+Risk risk_model_at(const JsonPlace& place, std::size_t p) {
+  Risk risk;
   risk.risk = place.at("risk").number();
   if (!(risk.risk > 0.0 && risk.risk < 1.0)) {
     place.at("risk").fail("a number between 0 and 1");
   }
   risk.warrant = warrant_at(place, core::Warrant::guaranteed);
-  const JsonPlace errors = place.at("errors"), set = place.at("feasible_set"), usual = place.at("usual");
-  risk.errors.position = error_class_at(errors.at("position"));
-  risk.errors.heading = error_class_at(errors.at("heading"));
-  risk.errors.shortest_step = bound_at(errors.at("shortest_step"));
-  const std::size_t p = measurement.parameters().size();
+  const JsonPlace set = place.at("feasible_set");
   risk.facets = facets_at(set, p);
   risk.box = box_at(set.at("hull"), p);
   const Eigen::VectorXd scales = vector_at(place.at("scales"));
+  if (scales.size() == 0 || !(scales.array() > 0.0).all()) {
+    place.at("scales").fail("times > 0 in s");
+  }
   risk.scales.assign(scales.begin(), scales.end());
   risk.delay = bound_at(place.at("delay"));
+  return risk;
+}
+
+/// weights × scales.
+Eigen::MatrixXd variances_at(const JsonPlace& rows, std::size_t weights, std::size_t scales) {
+  if (rows.size() != weights) {
+    rows.fail("one row for each of the " + std::to_string(weights) + " weights");
+  }
+  Eigen::MatrixXd values(static_cast<Eigen::Index>(weights), static_cast<Eigen::Index>(scales));
+  for (std::size_t w = 0; w < weights; ++w) {
+    values.row(static_cast<Eigen::Index>(w)) = vector_at(rows.at(w), scales);
+  }
+  if (!(values.array() >= 0.0).all()) {
+    rows.fail("variances >= 0");
+  }
+  return values;
+}
+
+detector::PoseRiskModel pose_risk_at(const JsonPlace& place, const filter::OdometryMeasurement& measurement) {
+  auto risk = risk_model_at<detector::PoseRiskModel>(place, measurement.parameters().size());
+  const JsonPlace errors = place.at("errors"), usual = place.at("usual");
+  risk.errors.position = error_class_at(errors.at("position"));
+  risk.errors.heading = error_class_at(errors.at("heading"));
+  risk.errors.shortest_step = bound_at(errors.at("shortest_step"));
   const std::size_t weights = detector::pose_weights(measurement).size();
-  const auto table = [&](const JsonPlace& rows) {
-    if (rows.size() != weights) {
-      rows.fail("one row for each of the " + std::to_string(weights) + " weights");
-    }
-    Eigen::MatrixXd values(static_cast<Eigen::Index>(weights), scales.size());
-    for (std::size_t w = 0; w < weights; ++w) {
-      values.row(static_cast<Eigen::Index>(w)) = vector_at(rows.at(w), risk.scales.size());
-    }
-    if (!(values.array() >= 0.0).all()) {
-      rows.fail("variances >= 0");
-    }
-    return values;
-  };
-  risk.usual_position = table(usual.at("position"));
-  risk.usual_heading = table(usual.at("heading"));
+  risk.usual_position = variances_at(usual.at("position"), weights, risk.scales.size());
+  risk.usual_heading = variances_at(usual.at("heading"), weights, risk.scales.size());
   return risk;
 }
 
@@ -228,36 +240,13 @@ Box box_at(const JsonPlace& place, std::size_t p) {
 }
 
 detector::RiskModel risk_at(const JsonPlace& place, const Model& model) {
-  detector::RiskModel risk;
-  risk.risk = place.at("risk").number();
-  if (!(risk.risk > 0.0 && risk.risk < 1.0)) {
-    place.at("risk").fail("a number between 0 and 1");
-  }
-  risk.warrant = warrant_at(place, core::Warrant::guaranteed);
-  const JsonPlace errors = place.at("errors"), set = place.at("feasible_set"), usual = place.at("usual");
+  auto risk = risk_model_at<detector::RiskModel>(place, model.p());
+  const JsonPlace errors = place.at("errors");
   risk.errors.motion = error_class_at(errors.at("motion"));
   risk.errors.effort = error_class_at(errors.at("effort"));
   risk.errors.count = bound_at(errors.at("count"));
   risk.errors.shortest_step = bound_at(errors.at("shortest_step"));
-  risk.facets = facets_at(set, model.p());
-  risk.box = box_at(set.at("hull"), model.p());
-  const Eigen::VectorXd scales = vector_at(place.at("scales"));
-  if (scales.size() == 0 || !(scales.array() > 0.0).all()) {
-    place.at("scales").fail("times > 0 in s");
-  }
-  risk.scales.assign(scales.begin(), scales.end());
-  risk.delay = bound_at(place.at("delay"));
-  const std::size_t weights = detector::sum_weights(model).size();
-  if (usual.size() != weights) {
-    usual.fail("one row for each of the " + std::to_string(weights) + " weights");
-  }
-  risk.usual.resize(static_cast<Eigen::Index>(weights), scales.size());
-  for (std::size_t w = 0; w < weights; ++w) {
-    risk.usual.row(static_cast<Eigen::Index>(w)) = vector_at(usual.at(w), risk.scales.size());
-  }
-  if (!(risk.usual.array() >= 0.0).all()) {
-    usual.fail("variances >= 0");
-  }
+  risk.usual = variances_at(place.at("usual"), detector::sum_weights(model).size(), risk.scales.size());
   return risk;
 }
 

@@ -15,29 +15,19 @@
 #include <wheelwright/detector/scale_detector.hpp>
 
 #include "support/exact_axis.hpp"
+#include "support/most_failures.hpp"
 
 namespace wheelwright::commission::risk_set_test {
 namespace {
 
 using testing_support::ErrorLaw;
 using testing_support::ExactAxis;
+using testing_support::most_failures;
 
 Commissioning learn(const ExactAxis& axis, std::uint64_t seed) {
   const LogTable log = drive(axis, seed);
   TableSource source(log);
   return commission_robot(source, robot_of(axis));
-}
-
-// The chance of more than this is below 1e-6 if each of `runs` fails with `risk`.
-std::size_t most_failures(std::size_t runs, double risk) {
-  double term = std::pow(1.0 - risk, static_cast<double>(runs)), sum = term;
-  std::size_t k = 0;
-  while (1.0 - sum > 1e-6) {
-    term *= static_cast<double>(runs - k) / static_cast<double>(k + 1) * risk / (1.0 - risk);
-    sum += term;
-    ++k;
-  }
-  return k;
 }
 
 // How often the true parameters are outside the set at a risk of 1e-2, and the median width relative to the guaranteed.

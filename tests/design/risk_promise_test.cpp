@@ -37,23 +37,12 @@ Plan ordinary_plan(const DesignSubject& subject, double duration) {
 
 // The believed robot drives `plan`.
 Scenario driven(const Robot& robot, const Plan& plan, std::uint64_t seed) {
-  Scenario s;
-  s.robot = robot;
+  Scenario s = testing_support::drive_of(plan, robot, seed);
   s.parameters = {.mass = robot.nominal.at("mass"),
                   .yaw_inertia = robot.nominal.at("yaw_inertia"),
                   .viscous_x = robot.nominal.at("viscous_linear"),
                   .viscous_y = robot.nominal.at("viscous_linear"),
                   .viscous_yaw = robot.nominal.at("viscous_yaw")};
-  s.trajectory.kind = sim::Trajectory::Kind::table;
-  for (Eigen::Index k = 0; k < plan.samples(); ++k) {
-    s.trajectory.table.t.push_back(plan.t(k));
-    s.trajectory.table.speed.push_back(plan.speed.col(k));
-  }
-  s.duration = plan.t(plan.samples() - 1);
-  s.sensors.encoder_counts_per_turn = robot.encoder_counts_per_turn;
-  s.sensors.effort = *robot.noise.effort.value;
-  s.sensors.speeds = s.sensors.pose = s.sensors.commands = false;
-  s.seed = seed;
   return s;
 }
 

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Two robots of different size, with noise that is declared.
+/// Two robots of different size, with noise that is declared, and drives of a plan.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
+#include <wheelwright/design/stages.hpp>
 #include <wheelwright/model/robot.hpp>
+#include <wheelwright/sim/simulation.hpp>
 
 namespace wheelwright::testing_support {
 
@@ -39,6 +42,23 @@ inline Robot large_robot() {
   r.filter.beta = 6.0;
   r.limits = {{"speed", 10.0}, {"acceleration", 8.0}, {"effort", 25.0}};
   return r;
+}
+
+/// `robot` drives `plan`, with the sensors that it declares; the truth is left to the caller.
+inline Scenario drive_of(const design::Plan& plan, const Robot& robot, std::uint64_t seed) {
+  Scenario s;
+  s.robot = robot;
+  s.trajectory.kind = sim::Trajectory::Kind::table;
+  for (Eigen::Index k = 0; k < plan.samples(); ++k) {
+    s.trajectory.table.t.push_back(plan.t(k));
+    s.trajectory.table.speed.push_back(plan.speed.col(k));
+  }
+  s.duration = plan.t(plan.samples() - 1);
+  s.sensors.encoder_counts_per_turn = robot.encoder_counts_per_turn;
+  s.sensors.effort = *robot.noise.effort.value;
+  s.sensors.speeds = s.sensors.pose = s.sensors.commands = false;
+  s.seed = seed;
+  return s;
 }
 
 }  // namespace wheelwright::testing_support

@@ -22,24 +22,13 @@ const DesignOptions kQuick{.samples = 100, .descents = 2, .steps = 150};
 
 // The robot drives `plan`; the truth is up to a fifth off what is believed.
 Scenario driven(const Robot& robot, const Plan& plan, std::uint64_t seed) {
-  Scenario s;
-  s.robot = robot;
+  Scenario s = testing_support::drive_of(plan, robot, seed);
   s.parameters = {.mass = 1.1 * robot.nominal.at("mass"),
                   .yaw_inertia = 0.9 * robot.nominal.at("yaw_inertia"),
                   .viscous_x = 1.2 * robot.nominal.at("viscous_linear"),
                   .viscous_y = 1.2 * robot.nominal.at("viscous_linear"),
                   .viscous_yaw = 1.2 * robot.nominal.at("viscous_yaw")};
-  s.trajectory.kind = sim::Trajectory::Kind::table;
-  for (Eigen::Index k = 0; k < plan.samples(); ++k) {
-    s.trajectory.table.t.push_back(plan.t(k));
-    s.trajectory.table.speed.push_back(plan.speed.col(k));
-  }
   s.torque_limit = robot.limits.at("effort");
-  s.duration = plan.t(plan.samples() - 1);
-  s.sensors.encoder_counts_per_turn = robot.encoder_counts_per_turn;
-  s.sensors.effort = *robot.noise.effort.value;
-  s.sensors.speeds = s.sensors.pose = s.sensors.commands = false;
-  s.seed = seed;
   return s;
 }
 

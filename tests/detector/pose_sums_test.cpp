@@ -14,6 +14,7 @@
 #include <wheelwright/core/error.hpp>
 
 #include "support/known_unicycle.hpp"
+#include "support/most_failures.hpp"
 
 namespace wheelwright::detector::pose_sums_test {
 namespace {
@@ -22,20 +23,9 @@ using testing_support::alarms;
 using testing_support::drive;
 using testing_support::ExactUnicycle;
 using testing_support::known_kinematics;
+using testing_support::most_failures;
 using testing_support::PoseLaw;
 using testing_support::walk;
-
-// The chance of more than this is below 1e-6 if each of `runs` fails with `risk`.
-std::size_t most_failures(std::size_t runs, double risk) {
-  double term = std::pow(1.0 - risk, static_cast<double>(runs)), sum = term;
-  std::size_t k = 0;
-  while (1.0 - sum > 1e-6) {
-    term *= static_cast<double>(runs - k) / static_cast<double>(k + 1) * risk / (1.0 - risk);
-    sum += term;
-    ++k;
-  }
-  return k;
-}
 
 struct Named {
   std::string name;
