@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/for_all.hpp>
@@ -561,6 +562,19 @@ Eigen::MatrixXd remainder(const BlockGram& gram, const std::vector<std::size_t>&
   const Eigen::MatrixXd c = unit.asDiagonal() * products(gram, on, of);
   rest -= c.transpose() * core::LdltFactors(A).solve(c);
   return rest;
+}
+
+double signed_rank(const Eigen::VectorXd& differences) {
+  std::vector<Eigen::Index> order(static_cast<std::size_t>(differences.size()));
+  std::iota(order.begin(), order.end(), Eigen::Index{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](Eigen::Index a, Eigen::Index b) { return std::abs(differences[a]) < std::abs(differences[b]); });
+  double positive = 0.0;
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    positive += differences[order[k]] > 0.0 ? static_cast<double>(k + 1) : 0.0;
+  }
+  const auto n = static_cast<double>(differences.size());
+  return (positive - n * (n + 1.0) / 4.0) / std::sqrt(n * (n + 1.0) * (2.0 * n + 1.0) / 24.0);
 }
 
 }  // namespace wheelwright::gap

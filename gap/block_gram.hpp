@@ -67,6 +67,11 @@ struct BlockFit {
   Eigen::VectorXd held_out_loss;  ///< of each block: sum of squares of its held-out rows
 };
 
+/// Wilcoxon's signed-rank statistic of `differences` (of losses over blocks), in standard deviations: large where most
+/// are > 0. An effect may show in a few blocks only, by amounts that differ a thousandfold: the mean's t would be blind
+/// to it.
+[[nodiscard]] double signed_rank(const Eigen::VectorXd& differences);
+
 /// Gram matrices of columns and response over the inner rows of each block, and over the rows near borders.
 ///
 /// Everything is in units of the floors: a residual that is nothing but noise has the mean square 1.

@@ -39,14 +39,6 @@ std::vector<Eigen::Index> band_rows(const Drive& drive, const Band& band, double
   return rows;
 }
 
-Signal picked(const Signal& signal, const std::vector<Eigen::Index>& rows) {
-  Signal values(static_cast<Eigen::Index>(rows.size()));
-  for (std::size_t k = 0; k < rows.size(); ++k) {
-    values[static_cast<Eigen::Index>(k)] = signal[rows[k]];
-  }
-  return values;
-}
-
 // Column `column` in the band, one part for each output.
 std::vector<Signal> parts_of(const Drive& drive, const Band& band, const std::vector<Eigen::Index>& rows,
                              const Column& column) {
@@ -62,20 +54,6 @@ std::vector<Signal> parts_of(const Drive& drive, const Band& band, const std::ve
     parts[i] = picked(sum, rows);
   }
   return parts;
-}
-
-// The offset between the clocks of effort and speed (prepared.cpp learns it too).
-Column clock_column(const Drive& drive) {
-  Column column;
-  column.effort_rate.resize(drive.model.n());
-  for (std::size_t i = 0; i < drive.model.n(); ++i) {
-    column.effort_rate[i] = Signal::Zero(drive.rows());
-    for (std::size_t j = 0; j < drive.joints.size(); ++j) {
-      column.effort_rate[i] += drive.model.input(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) *
-                               drive.joints[j].predicted_effort;
-    }
-  }
-  return column;
 }
 
 // Efforts in the band, with the columns of θ, the clocks and `effects`.
@@ -196,25 +174,20 @@ Contrast contrast_of(const std::vector<RowSpace>& spaces, const std::vector<Sign
   return contrast;
 }
 
-// One-sided p-value that the median of `values` is not above 0 (Wilcoxon's signed ranks, normal approximation).
-double signed_rank_p(const std::vector<double>& values) {
-  if (values.size() < 6) {
+// One-sided p-value that the median of `values` is not above 0, by the normal approximation.
+double median_above_zero_p(const std::vector<double>& values) {
+  constexpr std::size_t kFewest = 6;
+  if (values.size() < kFewest) {
     return 1.0;
   }
-  std::vector<double> sorted = values;
-  std::ranges::sort(sorted, [](double a, double b) { return std::abs(a) < std::abs(b); });
-  double positive = 0.0;
-  for (std::size_t k = 0; k < sorted.size(); ++k) {
-    positive += sorted[k] > 0.0 ? static_cast<double>(k + 1) : 0.0;
-  }
-  const auto n = static_cast<double>(sorted.size());
-  const double z = (positive - n * (n + 1.0) / 4.0) / std::sqrt(n * (n + 1.0) * (2.0 * n + 1.0) / 24.0);
-  return 0.5 * std::erfc(z / std::sqrt(2.0));
+  const Eigen::Map<const Signal> differences(values.data(), static_cast<Eigen::Index>(values.size()));
+  return 0.5 * std::erfc(signed_rank(differences) / std::sqrt(2.0));
 }
 
 // The fit of all columns, and its residuals.
 struct BandFit {
   BlockFit fit;
+  Signal counts;  // rows of each block
   std::vector<Signal> left;
 };
 
@@ -223,7 +196,8 @@ BandFit fit_band(const std::vector<RowSpace>& spaces, const BlockOptions& blocks
   for (std::size_t c = 0; c < spaces.front().columns.size(); ++c) {
     all.columns.push_back(c);
   }
-  BandFit fitted{BlockGram(spaces, blocks).fit(all), {}};
+  const BlockGram gram(spaces, blocks);
+  BandFit fitted{gram.fit(all), gram.rows(), {}};
   for (const RowSpace& space : spaces) {
     fitted.left.push_back(residual(space, all, fitted.fit.coefficients));
   }
@@ -257,6 +231,7 @@ std::optional<FastBand> look_at_fast_band(const PreparedGap& prepared, const std
   const BandFit healthy_fit = fit_band(reference, options.blocks);
   all.insert(all.end(), causes.begin(), causes.end());
   std::vector<RowSpace> spaces = band_spaces(drive, band, rows, all);
+  const std::vector<Signal> outputs = filtered_outputs(drive, band.fast);
   double efforts = 0.0, floor_square = 0.0;
   for (std::size_t i = 0; i < spaces.size(); ++i) {
     const Signal& left = healthy_fit.left[i];
@@ -266,7 +241,7 @@ std::optional<FastBand> look_at_fast_band(const PreparedGap& prepared, const std
     }
     reference[i].floor = spaces[i].floor = floor;
     floor_square += floor * floor;
-    efforts += filtered_outputs(drive, band.fast)[i].squaredNorm() / static_cast<double>(drive.rows());
+    efforts += outputs[i].squaredNorm() / static_cast<double>(drive.rows());
   }
   const BandFit fitted = fit_band(spaces, options.blocks);
   found.left = fitted.fit.held_out_error;
@@ -282,16 +257,15 @@ std::optional<FastBand> look_at_fast_band(const PreparedGap& prepared, const std
   for (std::size_t p = 0; p < now.after_of.size(); ++p) {
     beyond.push_back(now.after_of[p] - usual * now.elsewhere_of[p]);
   }
-  found.play = now.ratio() > options.contrast * usual && signed_rank_p(beyond) < options.significance;
+  found.play = now.ratio() > options.contrast * usual && median_above_zero_p(beyond) < options.significance;
   if (efforts > 0.0) {
     found.effort_square = std::max(now.after - usual * now.elsewhere, 0.0) * now.presence * floor_square / efforts;
   }
   std::size_t more = 0, blocks = 0;
-  const BlockGram counts(spaces, options.blocks);
-  for (Eigen::Index b = 0; b < counts.rows().size(); ++b) {
-    if (counts.rows()[b] > 0.0) {
+  for (Eigen::Index b = 0; b < fitted.counts.size(); ++b) {
+    if (fitted.counts[b] > 0.0) {
       ++blocks;
-      more += fitted.fit.held_out_loss[b] / counts.rows()[b] > 1.0 ? 1 : 0;
+      more += fitted.fit.held_out_loss[b] / fitted.counts[b] > 1.0 ? 1 : 0;
     }
   }
   found.above =

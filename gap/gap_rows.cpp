@@ -197,8 +197,6 @@ IncrementNoise repeatability(const Drive& drive, const Windows& windows, const I
   return {root(sum.forward), root(sum.lateral), root(sum.yaw)};
 }
 
-namespace {
-
 Eigen::VectorXd picked(const Eigen::VectorXd& signal, const std::vector<Eigen::Index>& rows) {
   Eigen::VectorXd values(static_cast<Eigen::Index>(rows.size()));
   for (std::size_t k = 0; k < rows.size(); ++k) {
@@ -206,6 +204,8 @@ Eigen::VectorXd picked(const Eigen::VectorXd& signal, const std::vector<Eigen::I
   }
   return values;
 }
+
+namespace {
 
 // Rows of efforts that are used: settled, moving, `step` apart.
 std::vector<Eigen::Index> effort_rows(const Drive& drive, const GapRowOptions& options) {

@@ -135,6 +135,9 @@ std::size_t add_column(std::vector<RowSpace>& spaces, std::vector<Eigen::VectorX
 [[nodiscard]] Eigen::VectorXd residual(const RowSpace& space, const Subset& subset,
                                        const Eigen::VectorXd& coefficients);
 
+/// The values of `signal` at `rows`.
+[[nodiscard]] Eigen::VectorXd picked(const Eigen::VectorXd& signal, const std::vector<Eigen::Index>& rows);
+
 /// The part of `column` in each space of `rows`.
 [[nodiscard]] std::vector<Eigen::VectorXd> rows_of(const Drive& drive, const GapRows& rows, const Column& column,
                                                    const GapRowOptions& options);

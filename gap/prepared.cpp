@@ -318,19 +318,7 @@ FittedEffect timing_of(const Drive& drive, const GapRows& rows, std::vector<Eige
   Effect timing;
   timing.name = kTiming;
   timing.parameters = {{"delay", "s", 0}};
-  timing.columns = [](const Drive& d, std::span<const double>) {
-    Column column;
-    column.effort_rate.resize(d.model.n());
-    for (std::size_t i = 0; i < d.model.n(); ++i) {
-      Eigen::VectorXd output = Eigen::VectorXd::Zero(d.rows());
-      for (std::size_t j = 0; j < d.joints.size(); ++j) {
-        output +=
-            d.model.input(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) * d.joints[j].predicted_effort;
-      }
-      column.effort_rate[i] = output;
-    }
-    return std::vector{column};
-  };
+  timing.columns = [](const Drive& d, std::span<const double>) { return std::vector{clock_column(d)}; };
   const std::vector<Eigen::VectorXd> column = rows_of(drive, rows, timing.columns(drive, {}).front(), options);
   double along = 0.0, square = 0.0;
   for (std::size_t s = 0; s < left.size(); ++s) {
@@ -465,6 +453,19 @@ GapProblem make_problem(const Drive& drive, const NoiseFloor& floor, const std::
     problem.kinds.push_back(std::move(kind));
   }
   return problem;
+}
+
+Column clock_column(const Drive& drive) {
+  Column column;
+  column.effort_rate.resize(drive.model.n());
+  for (std::size_t i = 0; i < drive.model.n(); ++i) {
+    column.effort_rate[i] = Eigen::VectorXd::Zero(drive.rows());
+    for (std::size_t j = 0; j < drive.joints.size(); ++j) {
+      column.effort_rate[i] += drive.model.input(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) *
+                               drive.joints[j].predicted_effort;
+    }
+  }
+  return column;
 }
 
 std::vector<FittedEffect> robots_own(const std::vector<FittedEffect>& healthy) {

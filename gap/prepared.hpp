@@ -69,6 +69,9 @@ struct PreparedGap {
 [[nodiscard]] PreparedGap prepare_gap(LogSource& log, LogSource* baseline, const Robot& robot,
                                       const DiagnoseOptions& options);
 
+/// The column of an offset between the clocks of effort and speed: the rate of the efforts that the model predicts.
+[[nodiscard]] Column clock_column(const Drive& drive);
+
 /// The effects of `healthy` that are the robot's: the offset between the clocks of effort and speed is the logger's.
 [[nodiscard]] std::vector<FittedEffect> robots_own(const std::vector<FittedEffect>& healthy);
 

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
-#include <numeric>
 #include <optional>
 #include <random>
 
@@ -16,22 +15,6 @@
 
 namespace wheelwright::gap {
 namespace {
-
-// Wilcoxon's signed-rank statistic of what `better` saves against `worse` over blocks, in standard deviations. An
-// effect may show in a few blocks only, by amounts that differ a thousandfold: the mean's t would be blind to it.
-double signed_rank(const CauseSet& worse, const CauseSet& better) {
-  const Eigen::VectorXd d = worse.loss - better.loss;
-  std::vector<Eigen::Index> order(static_cast<std::size_t>(d.size()));
-  std::iota(order.begin(), order.end(), Eigen::Index{0});
-  std::stable_sort(order.begin(), order.end(),
-                   [&](Eigen::Index a, Eigen::Index b) { return std::abs(d[a]) < std::abs(d[b]); });
-  double positive = 0.0;
-  for (std::size_t k = 0; k < order.size(); ++k) {
-    positive += d[order[k]] > 0.0 ? static_cast<double>(k + 1) : 0.0;
-  }
-  const auto n = static_cast<double>(d.size());
-  return (positive - n * (n + 1.0) / 4.0) / std::sqrt(n * (n + 1.0) * (2.0 * n + 1.0) / 24.0);
-}
 
 // Probability that the logarithms of the savings add up to so much when their signs are left to chance: for an effect
 // that shows in half of the blocks only, but there by far. By random signs. Below the floor's own mean square savings
@@ -160,7 +143,7 @@ class Selector {
     const bool last =
         gain > options_.large_part * left && gain > options_.tolerated_floor && gain > options_.small_share * whole;
     return gain > options_.smallest && (counts || large || last) &&
-           (signed_rank(now, next) > critical_ || sign_flip_p(now, next, options_.seed) < level_);
+           (signed_rank(now.loss - next.loss) > critical_ || sign_flip_p(now, next, options_.seed) < level_);
   }
 
   // The set without those of its members that it does as well without.
