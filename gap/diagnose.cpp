@@ -10,8 +10,10 @@
 
 #include <fmt/format.h>
 
+#include <wheelwright/core/words.hpp>
 #include <wheelwright/gap/confusion.hpp>
 #include <wheelwright/gap/drive.hpp>
+#include <wheelwright/gap/effort_units.hpp>
 #include <wheelwright/gap/estimates.hpp>
 #include <wheelwright/gap/fast_band.hpp>
 #include <wheelwright/gap/further_drive.hpp>
@@ -106,6 +108,68 @@ void list_causes(Diagnosis& result, const PreparedGap& prepared, const GapProble
   }
   std::stable_sort(result.causes.begin(), result.causes.end(),
                    [](const GapCause& a, const GapCause& b) { return a.share > b.share; });
+}
+
+// What cannot be negative is not told as negative.
+void leave_out_impossible(Diagnosis& result, const Model& model) {
+  std::vector<std::string> names;
+  for (std::size_t j = 0; j < result.parametric.size(); ++j) {
+    ParameterShift& shift = result.parametric[j];
+    if (model.parameters[j].prior.lower < 0.0) {
+      continue;
+    }
+    if (!(shift.without_causes > 0.0)) {
+      shift.without_causes = std::numeric_limits<double>::quiet_NaN();
+    }
+    shift.lower = std::max(shift.lower, 0.0);
+    shift.upper = std::max(shift.upper, 0.0);
+    if (!(shift.estimate > 0.0)) {
+      shift.estimate = std::numeric_limits<double>::quiet_NaN();
+      names.push_back(shift.parameter);
+    }
+  }
+  if (!names.empty()) {
+    result.notes.push_back(fmt::format(
+        "this log does not tell {} from 0: drive with more of what {} (accelerations, turns, speeds), and have "
+        "`wheelwright doctor` look at the efforts' signs, units and delay",
+        core::enumerated(names), names.size() == 1 ? "it acts on" : "they act on"));
+  }
+}
+
+// Shares of a gap that is smaller than what its causes, which act against each other, explain.
+std::vector<double> shares_of_one(std::vector<double> shares) {
+  double sum = 0.0;
+  for (double& share : shares) {
+    share = std::max(share, 0.0);
+    sum += share;
+  }
+  for (double& share : shares) {
+    share /= std::max(sum, 1.0);
+  }
+  return shares;
+}
+
+// Efforts without their sign, of which the model explains too little to say where the motors braked: nothing that was
+// fitted to them holds.
+bool braking_unknown(const Drive& drive, const std::vector<ResidualSeries>& series) {
+  constexpr double kTellsEnough = 0.1;  // of the efforts' mean square: what may be left
+  return drive.efforts_unsigned && std::ranges::any_of(series, [](const ResidualSeries& s) {
+           return s.space == GapSpace::dynamic && s.refitted.squaredNorm() > kTellsEnough * s.signal.squaredNorm();
+         });
+}
+
+void withdraw_causes(Diagnosis& result) {
+  result.verdict = GapVerdict::unexplained;
+  result.causes.clear();
+  result.credible.clear();
+  result.fitted.clear();
+  result.improved.reset();
+  result.shrink = {};
+  result.parametric.clear();
+  result.remaining = 1.0;
+  result.notes.push_back(
+      "only the size of the efforts is logged, and the model explains too little of it to say when the motors braked: "
+      "no cause can be told from a wrong sign; log the efforts with their sign, or leave them out and log a pose");
 }
 
 // Whether some channel of some space is above its floor, though all together are not: by the largest mean square.
@@ -238,6 +302,7 @@ Diagnosis diagnose(LogSource& log, LogSource* baseline, const Robot& robot, cons
   if (!prepared.healthy_drive) {
     selection.tolerated_floor = std::max(selection.tolerated_floor, options.sensor_floor);
   }
+  const Robot& seen = prepared.view.robot;
   const bool trusted = std::any_of(prepared.trusted.begin(), prepared.trusted.end(), [](bool t) { return t; });
   const auto problem_with = [&](const ShapeGrids& shapes) {
     return make_problem(prepared.drive, prepared.floor, prepared.healthy, prepared.trusted, prepared.catalogue, shapes,
@@ -285,7 +350,8 @@ Diagnosis diagnose(LogSource& log, LogSource* baseline, const Robot& robot, cons
   const BaseModel base = found.base;
   const FittedCauses fitted = fit_causes(prepared, problem, found.all, base, blocks);
   list_causes(result, prepared, problem, found.all, fitted,
-              shapley_shares(problem.table, found.all, trusted ? BaseModel::nominal : BaseModel::refitted, whole));
+              shares_of_one(
+                  shapley_shares(problem.table, found.all, trusted ? BaseModel::nominal : BaseModel::refitted, whole)));
   result.series = series_of(prepared, problem, fitted);
   result.theta = fitted.theta;
   result.fitted = fitted.effects;
@@ -306,7 +372,7 @@ Diagnosis diagnose(LogSource& log, LogSource* baseline, const Robot& robot, cons
   const Contradictions contradictions = find_contradictions(
       prepared.drive, prepared.row_options.beta,
       settled(prepared.drive, prepared.row_options.beta) && moving(prepared.drive, prepared.row_options.beta), floors,
-      finite_prior(robot, prepared));
+      finite_prior(seen, prepared));
   if (result.verdict != GapVerdict::no_gap) {
     result.contradictions = contradictions.rows;
     result.notes.push_back(contradictions.statement);
@@ -314,13 +380,13 @@ Diagnosis diagnose(LogSource& log, LogSource* baseline, const Robot& robot, cons
   const BaseModel alike = trusted ? BaseModel::nominal : BaseModel::refitted;
   const std::vector<std::optional<Signature>> on_log = signatures(problem.table, alike);
   result.confusable = confusable_pairs(problem.table, on_log, alike);
-  judge_pairs(result.confusable, problem.table, on_log, alike, prepared, robot, blocks);
+  judge_pairs(result.confusable, problem.table, on_log, alike, prepared, seen, blocks);
   result.not_excited = not_excited(problem.table, prepared.catalogue, prepared.drive);
-  result.parametric = parameter_shifts(robot, prepared.drive, problem.table, found.structural.members);
+  result.parametric = parameter_shifts(seen, prepared.drive, problem.table, found.structural.members);
 
   std::string why_not;
   if (!found.all.members.empty() && found.reaches_floor) {
-    result.improved = improved_robot(robot, prepared.drive, fitted.theta, fitted.effects, fitted.intervals, why_not);
+    result.improved = improved_robot(seen, prepared.drive, fitted.theta, fitted.effects, fitted.intervals, why_not);
     if (!result.improved) {
       result.notes.push_back(why_not);
     }
@@ -331,8 +397,13 @@ Diagnosis diagnose(LogSource& log, LogSource* baseline, const Robot& robot, cons
     how.blocks = blocks;
     how.seed = options.seed;
     how.threads = options.threads;
-    result.shrink = measure_shrink(robot, prepared, {fitted.effects, base, result.improved}, how, result.notes);
+    result.shrink = measure_shrink(seen, prepared, {fitted.effects, base, result.improved}, how, result.notes);
   }
+  if (braking_unknown(prepared.drive, result.series)) {
+    withdraw_causes(result);
+  }
+  from_torques(result, robot, prepared.view);
+  leave_out_impossible(result, prepared.drive.model);
   tell("done", 1.0);
   return result;
 }

@@ -94,7 +94,9 @@ struct GapShrink {
       fresh_torque_rms;  ///< per channel, on another log that nothing was fitted to; where there is one
 };
 
-/// A parameter of θ: nominal, estimated without the causes (biased by them), and estimated with them.
+/// A parameter of θ: nominal, estimated without the causes (biased by them), and estimated with them. An estimate of
+/// what cannot be negative (a mass, a friction) that is not above 0 is NaN: the log does not tell it from 0. Its lower
+/// end is then 0.
 struct ParameterShift {
   std::string parameter;
   std::string unit;

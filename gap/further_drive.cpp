@@ -327,7 +327,7 @@ NextDrive next_drive(LogSource& log, LogSource* baseline, const Robot& robot, co
   if (next.rivals.size() < 2) {
     return next;
   }
-  const design::DesignSubject subject = subject_of(prepared, robot, theta);
+  const design::DesignSubject subject = subject_of(prepared, prepared.view.robot, theta);
   PlannedNoise noise;
   noise.beta = prepared.row_options.beta;
   noise.output = {prepared.floor.efforts.data(), prepared.floor.efforts.data() + prepared.floor.efforts.size()};
@@ -344,7 +344,7 @@ NextDrive next_drive(LogSource& log, LogSource* baseline, const Robot& robot, co
       options.progress("designing the next manoeuvre", share);
     }
   };
-  const design::MotionLimits limits = limits_within(prepared, robot);
+  const design::MotionLimits limits = limits_within(prepared, prepared.view.robot);
   const DiscriminationDesign design =
       design_for_discrimination(subject, limits, next.rivals, prepared.catalogue, noise, search, &prepared.drive);
   next.sentence = core::listed(design.sentences, " ");

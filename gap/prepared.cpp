@@ -218,26 +218,27 @@ constexpr double kUsualBeta = 10.0;  // 1/s
 constexpr const char* kTiming = "timing";
 
 // The columns that hold the joints' efforts.
-std::vector<std::string> effort_columns(const Model& model, model::EffortKind kind) {
+std::vector<std::string> effort_columns(const Robot& robot) {
   std::vector<std::string> names;
-  for (const model::Joint& joint : model.joints) {
-    names.push_back(kind == model::EffortKind::torque    ? joint.torque
-                    : kind == model::EffortKind::current ? joint.current
-                                                         : joint.voltage);
+  for (const model::Joint& joint : model::make_model(robot).joints) {
+    names.push_back(effort_column(joint, robot.effort));
   }
   return names;
 }
 
 // A log with a heading and none of the efforts is compared by its pose alone: zeros stand for the efforts.
-Drive drive_of(const LogTable& log, const Robot& robot) {
+Drive drive_of(const LogTable& log, const TorqueView& view) {
+  const Robot& robot = view.robot;
   const Model model = model::make_model(robot);
-  const std::vector<std::string> efforts = effort_columns(model, robot.effort);
+  const std::vector<std::string> efforts = effort_columns(robot);
   const auto logged = [&log](const std::string& name) {
     return std::find(log.names.begin(), log.names.end(), name) != log.names.end();
   };
   if (std::any_of(efforts.begin(), efforts.end(), logged) || !(logged("theta") || logged("gyro_z"))) {
     TableSource source(log);
-    return make_drive(log, robot, filter::find_measurement(source, robot, model, 2));
+    Drive drive = make_drive(log, robot, filter::find_measurement(source, robot, model, 2));
+    tell_units(drive, view);
+    return drive;
   }
   LogTable padded = log;
   for (const std::string& name : efforts) {
@@ -247,6 +248,7 @@ Drive drive_of(const LogTable& log, const Robot& robot) {
   TableSource source(padded);
   Drive drive = make_drive(padded, robot, filter::find_measurement(source, robot, model, 2));
   drive.has_efforts = false;
+  tell_units(drive, view);
   return drive;
 }
 
@@ -521,22 +523,25 @@ std::vector<Eigen::VectorXd> residuals(const GapRows& rows, const Subset& subset
 
 PreparedGap prepare_gap(LogSource& log, LogSource* baseline, const Robot& robot, const DiagnoseOptions& options) {
   PreparedGap prepared;
+  prepared.view = in_torques(robot);
   prepared.log = read_all(log);
-  prepared.drive = drive_of(prepared.log, robot);
+  to_torques(prepared.log, prepared.view);
+  prepared.drive = drive_of(prepared.log, prepared.view);
   const Model& model = prepared.drive.model;
   prepared.catalogue = chosen_catalogue(model, options);
   prepared.row_options.window = options.window;
   prepared.row_options.threads = options.threads;
   if (baseline != nullptr) {
     prepared.baseline_log = read_all(*baseline);
-    prepared.healthy_drive = drive_of(*prepared.baseline_log, robot);
+    to_torques(*prepared.baseline_log, prepared.view);
+    prepared.healthy_drive = drive_of(*prepared.baseline_log, prepared.view);
   }
   if (!prepared.drive.has_efforts) {
     prepared.notes.push_back(
         "the log has no efforts: only its pose is compared with what the wheels say, and effects that change the "
         "torque "
         "alone cannot be seen; log " +
-        effort_columns(model, robot.effort).front() + " and its like to see them");
+        effort_columns(robot).front() + " and its like to see them");
     if (prepared.healthy_drive && prepared.healthy_drive->has_efforts) {
       throw InputError("the healthy log has efforts and the other one has none: log them in both, or leave them out");
     }
@@ -553,8 +558,8 @@ PreparedGap prepare_gap(LogSource& log, LogSource* baseline, const Robot& robot,
   prepared.theta = fit_base(prepared.drive, prepared.row_options.beta);
   prepared.trusted.assign(model.p(), false);
   for (std::size_t j = 0; j < model.p(); ++j) {
-    const auto nominal = robot.nominal.find(model.parameters[j].physical);
-    if (nominal != robot.nominal.end()) {
+    const auto nominal = prepared.view.robot.nominal.find(model.parameters[j].physical);
+    if (nominal != prepared.view.robot.nominal.end()) {
       prepared.theta[static_cast<Eigen::Index>(j)] = nominal->second * model.parameters[j].per_physical;
       prepared.trusted[j] = true;
     }

@@ -13,6 +13,7 @@
 #include <wheelwright/core/log.hpp>
 #include <wheelwright/gap/diagnose.hpp>
 #include <wheelwright/gap/drive.hpp>
+#include <wheelwright/gap/effort_units.hpp>
 #include <wheelwright/gap/gap_rows.hpp>
 
 namespace wheelwright::gap {
@@ -46,8 +47,9 @@ struct SignalNoise {
 
 /// A log ready for the search.
 struct PreparedGap {
+  TorqueView view;                ///< of the robot: all that follows is in its units
   std::vector<Effect> catalogue;  ///< that is looked for
-  LogTable log;                   ///< the log as it was read
+  LogTable log;                   ///< the log as it was read, with torques
   std::optional<LogTable> baseline_log;
   Drive drive;  ///< of the log, with its nominal θ
   std::optional<Drive> healthy_drive;

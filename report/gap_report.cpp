@@ -277,13 +277,16 @@ std::string parameters_section(const Diagnosis& d) {
   std::vector<std::vector<Cell>> rows;
   for (const gap::ParameterShift& p : d.parametric) {
     const auto [low, high] = outward(p.lower, p.upper);
+    const bool found = std::isfinite(p.estimate);
     const double base = p.nominal.value_or(p.estimate);
     rows.push_back({escape(core::capital(spaced(p.parameter))), escape(unit_of(p.unit)),
                     numeric(p.nominal ? number(*p.nominal, 4) : "–"), numeric(number(p.without_causes, 4)),
-                    numeric(base != 0.0 ? fmt::format("{}{}\u00a0%", p.without_causes >= base ? "+" : "−",
-                                                      number(100.0 * std::abs(p.without_causes / base - 1.0), 2))
-                                        : "–"),
-                    numeric(beside(p.estimate, p.lower, p.upper)), numeric("[" + low + ", " + high + "]")});
+                    numeric(std::isfinite(base / p.without_causes) && base != 0.0
+                                ? fmt::format("{}{}\u00a0%", p.without_causes >= base ? "+" : "−",
+                                              number(100.0 * std::abs(p.without_causes / base - 1.0), 2))
+                                : "–"),
+                    numeric(found ? beside(p.estimate, p.lower, p.upper) : "not told from 0"),
+                    numeric("[" + low + ", " + high + "]")});
   }
   return table({"Parameter", "unit", numeric("as designed"), numeric("without<br>the causes"),
                 numeric("off from the design<br>(or the estimate)"), numeric("with them"), numeric("95 % interval")},

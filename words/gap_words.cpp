@@ -152,6 +152,13 @@ std::string estimate_words(const gap::GapEstimate& e) {
   return fmt::format("{} [{}, {}]", with_unit(beside(e.estimate, e.lower, e.upper), unit), low, high);
 }
 
+std::string shift_words(const gap::ParameterShift& shift) {
+  const auto [low, high] = outward(shift.lower, shift.upper);
+  return std::isfinite(shift.estimate)
+             ? fmt::format("{} [{}, {}]", beside(shift.estimate, shift.lower, shift.upper), low, high)
+             : "not told from 0, at most " + high;
+}
+
 double signal_rms(const Diagnosis& d, std::string_view channel) {
   for (const gap::ResidualSeries& s : d.series) {
     if (s.channel == channel && s.signal.size() > 0) {

@@ -217,14 +217,12 @@ std::string figures_words(const std::vector<gap::ShrinkFigure>& figures, const s
   return out;
 }
 
-std::string shifts_words(const Diagnosis& d) {
+std::string parameters_words(const Diagnosis& d) {
   std::string out;
   for (const gap::ParameterShift& p : d.parametric) {
-    const auto [low, high] = words::outward(p.lower, p.upper);
-    out += fmt::format("  {:<20} {:>9} {}{}, {} [{}, {}] with the causes\n", words::spaced(p.parameter),
+    out += fmt::format("  {:<20} {:>9} {}{}, {} with the causes\n", words::spaced(p.parameter),
                        words::number(p.without_causes), p.unit,
-                       p.nominal ? " (nominal " + words::number(*p.nominal) + ")" : "", words::number(p.estimate), low,
-                       high);
+                       p.nominal ? " (nominal " + words::number(*p.nominal) + ")" : "", words::shift_words(p));
   }
   return out;
 }
@@ -281,7 +279,7 @@ std::string summary(const Diagnosis& d, const GapResults& r) {
                     figures_words(d.shrink.rollout, "rollout") +
                     figures_words(d.shrink.threshold_width, "width of the threshold") +
                     figures_words(d.shrink.smallest_fault, "smallest radius fault"));
-  out += titled("parameters fitted to this log without the causes", shifts_words(d));
+  out += titled("parameters fitted to this log without the causes", parameters_words(d));
   for (const std::string& note : d.notes) {
     out += "note: " + note + "\n";
   }

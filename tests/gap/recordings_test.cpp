@@ -122,6 +122,8 @@ TEST_F(GapRecordings, UnsignedEffortsAreNoLoadFriction) {
   EXPECT_THAT(effects(diagnosis), ::testing::Not(Contains("load_friction")));
   EXPECT_TRUE(std::ranges::any_of(
       diagnosis.not_excited, [](const std::string& sentence) { return sentence.rfind("load_friction: ", 0) == 0; }));
+  EXPECT_TRUE(effects(diagnosis).empty()) << "where the motors braked is not known";
+  EXPECT_FALSE(std::ranges::any_of(diagnosis.parametric, [](const ParameterShift& p) { return p.estimate < 0.0; }));
 }
 
 }  // namespace
