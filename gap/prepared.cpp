@@ -226,15 +226,18 @@ std::vector<std::string> effort_columns(const Robot& robot) {
   return names;
 }
 
-// A log with a heading and none of the efforts is compared by its pose alone: zeros stand for the efforts.
+// A log with a heading and none of the efforts is compared by its pose alone.
+bool by_pose_alone(const std::vector<std::string>& columns, const std::vector<std::string>& efforts) {
+  const auto logged = [&columns](const std::string& name) { return std::ranges::find(columns, name) != columns.end(); };
+  return std::ranges::none_of(efforts, logged) && (logged("theta") || logged("gyro_z"));
+}
+
+// Zeros stand for efforts that are not there.
 Drive drive_of(const LogTable& log, const TorqueView& view) {
   const Robot& robot = view.robot;
   const Model model = model::make_model(robot);
   const std::vector<std::string> efforts = effort_columns(robot);
-  const auto logged = [&log](const std::string& name) {
-    return std::find(log.names.begin(), log.names.end(), name) != log.names.end();
-  };
-  if (std::any_of(efforts.begin(), efforts.end(), logged) || !(logged("theta") || logged("gyro_z"))) {
+  if (!by_pose_alone(log.names, efforts)) {
     TableSource source(log);
     Drive drive = make_drive(log, robot, filter::find_measurement(source, robot, model, 2));
     tell_units(drive, view);
@@ -519,6 +522,18 @@ std::vector<Eigen::VectorXd> residuals(const GapRows& rows, const Subset& subset
     left.push_back(residual(space, subset, coefficients));
   }
   return left;
+}
+
+std::vector<std::string> required_columns(const LogSource& log, const Robot& robot) {
+  std::vector<std::string> names;
+  for (const model::Joint& joint : model::make_model(robot).joints) {
+    names.push_back(joint.speed + "|" + joint.angle);
+  }
+  const std::vector<std::string> efforts = effort_columns(robot);
+  if (!by_pose_alone(log.columns(), efforts)) {
+    names.insert(names.end(), efforts.begin(), efforts.end());
+  }
+  return names;
 }
 
 PreparedGap prepare_gap(LogSource& log, LogSource* baseline, const Robot& robot, const DiagnoseOptions& options) {

@@ -369,16 +369,15 @@ std::shared_ptr<DiagnosisObject> gap(LogObject& log, const RobotObject& robot, L
   LongWork work(std::move(progress));
   options.progress = work.teller();
   return work.run([&] {
-    const std::vector<std::string> needed = robots::needed_columns(robot.robot);
     const LogWalk walk(log);
     const Robot measured = model::with_column_errors(robot.robot, logs::interpolation_errors(log.source->report()));
-    logs::require_columns(*log.source, needed);
+    logs::require_columns(*log.source, gap::required_columns(*log.source, robot.robot));
     WatchedLog source(*log.source, work);
     std::optional<LogWalk> healthy_walk;
     std::optional<WatchedLog> healthy_source;
     if (baseline != nullptr) {
       healthy_walk.emplace(*baseline);
-      logs::require_columns(*baseline->source, needed);
+      logs::require_columns(*baseline->source, gap::required_columns(*baseline->source, robot.robot));
       healthy_source.emplace(*baseline->source, work);
     }
     LogSource* const healthy = healthy_source ? &*healthy_source : nullptr;
@@ -387,7 +386,7 @@ std::shared_ptr<DiagnosisObject> gap(LogObject& log, const RobotObject& robot, L
     d = diagnose(source, healthy, measured, options);
     if (fresh != nullptr) {
       const LogWalk fresh_walk(*fresh);
-      logs::require_columns(*fresh->source, needed);
+      logs::require_columns(*fresh->source, gap::required_columns(*fresh->source, robot.robot));
       WatchedLog fresh_source(*fresh->source, work);
       d.shrink.fresh_torque_rms = gap::torque_on(fresh_source, healthy, measured, d, options);
     }
