@@ -78,7 +78,8 @@ TEST_F(Warrants, OfBoundsThatWereLearntNothingSaysGuaranteed) {
   for (const std::string file : {"m/model.json", "d/detection.json", "c/check.json", "p/design.json"}) {
     EXPECT_EQ(files::read_json(path(file)).at("warrant"), "extrapolated") << file;
   }
-  for (const Json& residual : files::read_json(path("g/margins.json")).at("residuals")) {
+  const Json margins = files::read_json(path("g/margins.json"));
+  for (const Json& residual : margins.at("residuals")) {
     EXPECT_EQ(residual.at("warrant"), "extrapolated");
   }
 }
