@@ -12,6 +12,7 @@
 #include <wheelwright/commission/error_estimate.hpp>
 #include <wheelwright/commission/noise_budget.hpp>
 #include <wheelwright/commission/physical.hpp>
+#include <wheelwright/commission/serial_correlation.hpp>
 #include <wheelwright/commission/sum_spread.hpp>
 
 namespace wheelwright::commission {
@@ -25,13 +26,14 @@ struct Attempt {
   double utilisation = 0.0;                  // its |value|/threshold
   double spread = 0.0;                       // of sums over a scale, in units of what errors can do: see SumSpread
   std::size_t widest = 0;                    // that scale
+  SerialCorrelation serial;
 };
 
-// Half of the test's risk each: a sum too large, and too many large ones.
+// `risk` each: a sum too large, and too many large ones.
 void look_at_sums(LogSource& log, const OnlineModel& model, double risk, double seconds, Attempt& attempt) {
-  const detector::ScaleDetectorOptions options{.false_alarms = 0.5 * risk / std::max(seconds, 1.0)};
+  const detector::ScaleDetectorOptions options{.false_alarms = risk / std::max(seconds, 1.0)};
   detector::ScaleDetector detector(model, options);
-  SumSpread spread(model.at_risk->usual, options.checks, 0.5 * risk);
+  SumSpread spread(model.at_risk->usual, options.checks, risk);
   detector::walk_log(log, detector, [&](double, bool, bool looked) {
     if (!looked) {
       return;
@@ -63,7 +65,10 @@ Attempt attempt_with(LogSource& log, const Commissioning& result, const filter::
   risk.delay = options.set.delays[std::min<std::size_t>(1, options.set.delays.size() - 1)];
   model.at_risk = std::move(risk);
   model.at_risk->usual = detector::usual_variances(log, model);
-  look_at_sums(log, model, options.test_risk, result.survey.seconds, attempt);
+  const double each = options.test_risk / 3.0;
+  look_at_sums(log, model, each, result.survey.seconds, attempt);
+  attempt.serial = serial_correlation(log, {model.model, model.measurement, result.row_errors}, classes, set,
+                                      result.survey.seconds, each);
   attempt.model = std::move(model.at_risk);
   return attempt;
 }
@@ -166,6 +171,11 @@ void learn_at_risk(LogSource& log, Commissioning& result, const AtRiskOptions& o
     } else if (attempt.spread > 1.0) {
       contradicted(fmt::format("over {:g} s what the model leaves spreads wider, time and again, than such errors can",
                                attempt.model->scales[attempt.widest]));
+    } else if (attempt.serial.excess > 1.0) {
+      contradicted(fmt::format(
+          "what the model leaves{} is like what it left {:.2g} s before, {:.2g} times as much as such errors can be",
+          model.model.joints.size() > 1 ? " of " + model.model.joints[attempt.serial.joint].torque : std::string(),
+          attempt.serial.delay, attempt.serial.excess));
     } else {
       model.at_risk = std::move(attempt.model);
     }
