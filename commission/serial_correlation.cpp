@@ -24,6 +24,7 @@ constexpr double kShortestInCorrelations = 1.0 / 3.0, kShortestInSteps = 4.0;  /
 constexpr double kWindows = 20.0;          // of a delay that the log must hold for it to count
 constexpr int kMultiples = 12;             // λ, each twice the one before
 constexpr double kLargestVariance = 16.0;  // for which the first of them is the best, in units of that of q = bound
+constexpr double kRounding = 1e-10;        // relative, of eigenvalues
 constexpr double kStamps = 1e-6;           // relative, by which a correlation time is taken to be longer
 
 // Means of old elements [torque | Y], by filters of order kOrder that delay by several times each. Elements come in when
@@ -91,6 +92,14 @@ class OldElements {
   std::deque<Waiting> waiting_;
   std::vector<std::array<RowMatrix, kOrder>> stages_;
 };
+
+// The most by which uᵀMu may be below 0 while no entry of u is larger than 1.
+double most_below(const Eigen::MatrixXd& M) {
+  const Eigen::MatrixXd half = 0.5 * (M + M.transpose());
+  const double size = half.cwiseAbs().sum();
+  const double least = core::symmetric_eigen(half).values.minCoeff();
+  return std::min(size, static_cast<double>(M.rows()) * std::max(-least, 0.0) + kRounding * size);
+}
 
 // The most that errors which average out may add to S, but for the probability e^{−cost}.
 double averaged(double V, double largest, double cost) {
@@ -179,7 +188,8 @@ SerialCorrelation serial_correlation(LogSource& log, filter::ElementFilter eleme
     // S(middle + Δ) = left_0 − slope·Δ + Δᵀ curvature Δ.
     const Eigen::VectorXd slope = sums.Y.row(first).transpose() + left.tail(p);
     const double by_slope = set.support({slope.data(), static_cast<std::size_t>(p)}) - slope.dot(box.middle);
-    const double by_curvature = box.radius.dot(sums.Y.middleRows(first + 1, p).cwiseAbs() * box.radius);
+    const double by_curvature =
+        most_below(box.radius.asDiagonal() * sums.Y.middleRows(first + 1, p) * box.radius.asDiagonal());
     const double least = left[0] - by_slope - by_curvature - doubt[0] - box.radius.dot(doubt.tail(p)) - straight[k];
     const double excess = least / averaged(V[k], variance, cost);
     if (excess > result.excess) {
