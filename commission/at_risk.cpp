@@ -26,7 +26,6 @@ struct Attempt {
   double utilisation = 0.0;                  // its |value|/threshold
   double spread = 0.0;                       // of sums over a scale, in units of what errors can do: see SumSpread
   std::size_t widest = 0;                    // that scale
-  SerialCorrelation serial;
 };
 
 // `risk` each: a sum too large, and too many large ones.
@@ -65,10 +64,7 @@ Attempt attempt_with(LogSource& log, const Commissioning& result, const filter::
   risk.delay = options.set.delays[std::min<std::size_t>(1, options.set.delays.size() - 1)];
   model.at_risk = std::move(risk);
   model.at_risk->usual = detector::usual_variances(log, model);
-  const double each = options.test_risk / 3.0;
-  look_at_sums(log, model, each, result.survey.seconds, attempt);
-  attempt.serial = serial_correlation(log, {model.model, model.measurement, result.row_errors}, classes, set,
-                                      result.survey.seconds, each);
+  look_at_sums(log, model, options.test_risk / 3.0, result.survey.seconds, attempt);
   attempt.model = std::move(model.at_risk);
   return attempt;
 }
@@ -147,6 +143,7 @@ void learn_at_risk(LogSource& log, Commissioning& result, const AtRiskOptions& o
       return;
     }
     assumption = assumption_of(*classes, unit);
+    assumption.test += ", and it is not like what it left before";
     Attempt attempt = attempt_with(log, result, *classes, options);
     const auto contradicted = [&](std::string detail) {
       assumption.verdict = core::AssumptionVerdict::fails;
@@ -171,11 +168,14 @@ void learn_at_risk(LogSource& log, Commissioning& result, const AtRiskOptions& o
     } else if (attempt.spread > 1.0) {
       contradicted(fmt::format("over {:g} s what the model leaves spreads wider, time and again, than such errors can",
                                attempt.model->scales[attempt.widest]));
-    } else if (attempt.serial.excess > 1.0) {
+    } else if (const SerialCorrelation serial =
+                   serial_correlation(log, {model.model, model.measurement, result.row_errors}, *classes,
+                                      *attempt.set.set, result.survey.seconds, options.test_risk / 3.0);
+               serial.excess > 1.0) {
       contradicted(fmt::format(
           "what the model leaves{} is like what it left {:.2g} s before, {:.2g} times as much as such errors can be",
-          model.model.joints.size() > 1 ? " of " + model.model.joints[attempt.serial.joint].torque : std::string(),
-          attempt.serial.delay, attempt.serial.excess));
+          model.model.joints.size() > 1 ? " of " + model.model.joints[serial.joint].torque : std::string(),
+          serial.delay, serial.excess));
     } else {
       model.at_risk = std::move(attempt.model);
     }

@@ -33,9 +33,10 @@ struct AtRiskOptions {
 ///
 /// Where the robot file leaves the efforts' noise to be estimated, so are the classes (error_estimate.hpp), with the
 /// least bias of which this log uses no more than half: the result is extrapolated, and holds while noise and driving
-/// stay as they were. Nothing is said where even a bias as large as the deviation is not enough.
+/// stay as they were. Nothing is said where even a bias as large as the deviation is not enough. What is left may be like
+/// what was left before: an estimate takes what the log has of that into deviation and bias.
 ///
-/// Walks the log seven times; to estimate, about forty times.
+/// Walks the log eight times; to estimate, about forty times.
 void learn_at_risk(LogSource& log, Commissioning& result, const AtRiskOptions& options = {});
 
 }  // namespace wheelwright::commission

@@ -19,7 +19,7 @@ namespace {
 using core::RowMatrix;
 using filter::SampleWeight;
 
-constexpr std::array<double, 4> kDelays = {1.0, 3.0, 10.0, 30.0};              // in units of the shortest
+constexpr std::array<double, 5> kDelays = {1.0, 2.0, 4.0, 10.0, 30.0};         // in units of the shortest
 constexpr double kShortestInCorrelations = 1.0 / 3.0, kShortestInSteps = 4.0;  // the larger of both
 constexpr double kWindows = 20.0;          // of a delay that the log must hold for it to count
 constexpr int kMultiples = 12;             // λ, each twice the one before
