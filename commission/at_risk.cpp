@@ -12,6 +12,7 @@
 #include <wheelwright/commission/error_estimate.hpp>
 #include <wheelwright/commission/noise_budget.hpp>
 #include <wheelwright/commission/physical.hpp>
+#include <wheelwright/commission/serial_correlation.hpp>
 #include <wheelwright/commission/sum_spread.hpp>
 
 namespace wheelwright::commission {
@@ -27,11 +28,11 @@ struct Attempt {
   std::size_t widest = 0;                    // that scale
 };
 
-// Half of the test's risk each: a sum too large, and too many large ones.
+// `risk` each: a sum too large, and too many large ones.
 void look_at_sums(LogSource& log, const OnlineModel& model, double risk, double seconds, Attempt& attempt) {
-  const detector::ScaleDetectorOptions options{.false_alarms = 0.5 * risk / std::max(seconds, 1.0)};
+  const detector::ScaleDetectorOptions options{.false_alarms = risk / std::max(seconds, 1.0)};
   detector::ScaleDetector detector(model, options);
-  SumSpread spread(model.at_risk->usual, options.checks, 0.5 * risk);
+  SumSpread spread(model.at_risk->usual, options.checks, risk);
   detector::walk_log(log, detector, [&](double, bool, bool looked) {
     if (!looked) {
       return;
@@ -63,7 +64,7 @@ Attempt attempt_with(LogSource& log, const Commissioning& result, const filter::
   risk.delay = options.set.delays[std::min<std::size_t>(1, options.set.delays.size() - 1)];
   model.at_risk = std::move(risk);
   model.at_risk->usual = detector::usual_variances(log, model);
-  look_at_sums(log, model, options.test_risk, result.survey.seconds, attempt);
+  look_at_sums(log, model, options.test_risk / 3.0, result.survey.seconds, attempt);
   attempt.model = std::move(model.at_risk);
   return attempt;
 }
@@ -142,6 +143,7 @@ void learn_at_risk(LogSource& log, Commissioning& result, const AtRiskOptions& o
       return;
     }
     assumption = assumption_of(*classes, unit);
+    assumption.test += ", and it is not like what it left before";
     Attempt attempt = attempt_with(log, result, *classes, options);
     const auto contradicted = [&](std::string detail) {
       assumption.verdict = core::AssumptionVerdict::fails;
@@ -166,6 +168,14 @@ void learn_at_risk(LogSource& log, Commissioning& result, const AtRiskOptions& o
     } else if (attempt.spread > 1.0) {
       contradicted(fmt::format("over {:g} s what the model leaves spreads wider, time and again, than such errors can",
                                attempt.model->scales[attempt.widest]));
+    } else if (const SerialCorrelation serial =
+                   serial_correlation(log, {model.model, model.measurement, result.row_errors}, *classes,
+                                      *attempt.set.set, result.survey.seconds, options.test_risk / 3.0);
+               serial.excess > 1.0) {
+      contradicted(fmt::format(
+          "what the model leaves{} is like what it left {:.2g} s before, {:.2g} times as much as such errors can be",
+          model.model.joints.size() > 1 ? " of " + model.model.joints[serial.joint].torque : std::string(),
+          serial.delay, serial.excess));
     } else {
       model.at_risk = std::move(attempt.model);
     }

@@ -19,22 +19,24 @@ struct AtRiskOptions {
   RiskSetOptions set{};
   std::vector<double> scales{0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0};  ///< s, of the detector's sums
   bool estimate = true;  ///< where the robot file leaves the efforts' noise to be estimated: see learn_at_risk()
-  /// Probability that a log which keeps to its assumptions is said to contradict them: by one sum, or by the mean
-  /// square of many, half each.
-  double test_risk = 2e-3;
+  /// Probability that a log which keeps to its assumptions is said to contradict them: by one sum, by the mean square of
+  /// many, or by what is left being like what was left before, a third each.
+  double test_risk = 3e-3;
 };
 
 /// Adds Commissioning::at_risk and OnlineModel::at_risk to a guaranteed result whose robot file declares errors that
 /// average out (error_classes()), and an assumption with the log's verdict on them. The log contradicts them where it
-/// leaves no set, where a sum over any scale stands outside what such errors can do at AtRiskOptions::test_risk, or
-/// where the sums' mean square over many windows does, which shows errors that are alike for longer than is declared:
-/// then nothing is said at a risk, and the worst case stands alone.
+/// leaves no set, where a sum over any scale stands outside what such errors can do at AtRiskOptions::test_risk, where
+/// the sums' mean square over many windows does, or where what the model leaves is like what it left before
+/// (serial_correlation()), which both show errors that are alike for longer than is declared: then nothing is said at a
+/// risk, and the worst case stands alone.
 ///
 /// Where the robot file leaves the efforts' noise to be estimated, so are the classes (error_estimate.hpp), with the
 /// least bias of which this log uses no more than half: the result is extrapolated, and holds while noise and driving
-/// stay as they were. Nothing is said where even a bias as large as the deviation is not enough.
+/// stay as they were. Nothing is said where even a bias as large as the deviation is not enough. What is left may be like
+/// what was left before: an estimate takes what the log has of that into deviation and bias.
 ///
-/// Walks the log seven times; to estimate, about forty times.
+/// Walks the log eight times; to estimate, about forty times.
 void learn_at_risk(LogSource& log, Commissioning& result, const AtRiskOptions& options = {});
 
 }  // namespace wheelwright::commission

@@ -9,6 +9,7 @@
 #include <variant>
 
 #include <wheelwright/bounds/slab_rows.hpp>
+#include <wheelwright/commission/element_walk.hpp>
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/limits.hpp>
 #include <wheelwright/core/linear_algebra.hpp>
@@ -31,37 +32,6 @@ struct Stretch {
   double first = 0.0, last = 0.0;
   std::size_t elements = 0;
 };
-
-// begin() where a segment does, element(stretch) for each element, end() where a segment's last element was.
-template <typename Begin, typename Each, typename End>
-void walk(LogSource& log, ElementFilter& filter, Begin&& begin, Each&& each, End&& end) {
-  const std::vector<std::size_t> pick = core::positions_of(log, filter.measurement().columns());
-  std::vector<double> sample(pick.size());
-  bool open = false;
-  filter.restart();
-  core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
-    if (starts) {
-      filter.restart();
-    }
-    for (std::size_t c = 0; c < pick.size(); ++c) {
-      sample[c] = block.columns[pick[c]][k];
-    }
-    const bool element = filter.step(block.t[k], sample);
-    if (filter.began()) {
-      if (open) {
-        end();
-      }
-      begin();
-      open = true;
-    }
-    if (element) {
-      each();
-    }
-  });
-  if (open) {
-    end();
-  }
-}
 
 // Weights rise from 0 over a time from `from` on, and fall to 0 before a segment's last element.
 double taper(const Stretch& stretch, double from, double t) {
@@ -250,7 +220,7 @@ class Learner {
   Learner(LogSource& log, const ElementFilter& filter, const filter::ErrorClasses& classes, filter::ParameterBox box,
           const RiskSetOptions& options)
       : log_(log), filter_(filter), classes_(classes), box_(std::move(box)), options_(options) {
-    walk(
+    walk_elements(
         log_, filter_, [&] { stretches_.push_back({}); },
         [&] {
           Stretch& s = stretches_.back();
@@ -310,7 +280,7 @@ class Learner {
       }
     };
     RowMatrix g;
-    walk(
+    walk_elements(
         log_, filter_,
         [&] {
           for (b = 0; b < count; ++b) {
@@ -386,7 +356,7 @@ class Learner {
     }
     std::size_t stretch = 0;
     RowMatrix g(static_cast<Eigen::Index>(filter_.model().n()), count);
-    walk(
+    walk_elements(
         log_, filter_,
         [&] {
           for (PredictableRegressor& f : foreseen) {
@@ -476,18 +446,6 @@ void validate(const RiskSetOptions& options, const filter::ErrorClasses& classes
   check::that(!options.delays.empty(), "delays of the weights", "at least one");
   check::that(options.learning >= 0.0 && options.learning < 1.0, "share of the log to learn a scale on", "below 1");
   filter::validate(classes);
-}
-
-filter::ParameterBox middle_and_radius(const Box& box) {
-  const auto p = static_cast<Eigen::Index>(box.dimension());
-  filter::ParameterBox result{Eigen::VectorXd(p), Eigen::VectorXd(p)};
-  for (Eigen::Index j = 0; j < p; ++j) {
-    const Interval& side = box.sides[static_cast<std::size_t>(j)];
-    const double middle = 0.5 * (side.lower + side.upper);
-    result.middle[j] = middle;
-    result.radius[j] = std::nextafter(std::max(side.upper - middle, middle - side.lower), core::kInfinity);
-  }
-  return result;
 }
 
 std::vector<RiskEllipsoid> published(const std::vector<Ellipsoid>& ellipsoids) {

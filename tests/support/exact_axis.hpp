@@ -24,6 +24,8 @@ enum class ErrorLaw {
   together,   ///< ± bound, the same within a correlation time
   spikes,     ///< ± bound now and then, so that the deviation is as stated, and nothing between
   skewed,     ///< the bound now and then, a little to the other side between: mean 0, the deviation as stated
+  follower,   ///< ± bound, and the bias on the side to which the last errors were
+  echo,       ///< ± bound while errors have been unlike those before them, next to nothing once they have been alike
 };
 
 /// Laws of the position's errors, all within half a count.
@@ -48,6 +50,8 @@ struct ExactAxis {
   double fault_at = 1e300, fault_bias = 0.0;  ///< s, N: a bias of the efforts' readings
 };
 
+inline constexpr double kRecent = 0.1;  ///< s, memory of ErrorLaw::follower and echo
+
 /// Its log (position, effort).
 inline LogTable drive(const ExactAxis& a, std::uint64_t seed) {
   std::mt19937_64 random(seed);
@@ -57,7 +61,7 @@ inline LogTable drive(const ExactAxis& a, std::uint64_t seed) {
   log.columns.resize(2);
   const auto rows = static_cast<std::size_t>(a.rate * a.seconds);
   double x = 0.0, v = 0.0, t = 0.0, measured = 0.0, before = 0.0, sum = 0.0, held = 1.0;
-  double until = -1.0;
+  double until = -1.0, recent = 0.0, alike = 0.0;
   double phase[4];
   for (double& p : phase) {
     p = 6.283185307179586 * uniform();
@@ -79,6 +83,7 @@ inline LogTable drive(const ExactAxis& a, std::uint64_t seed) {
     }
     u -= a.feedback * speed;
     const double free = a.bound - a.bias;
+    double lean = side;
     const double sign = uniform() < 0.5 ? -1.0 : 1.0;
     double error = 0.0;
     switch (a.law) {
@@ -92,6 +97,11 @@ inline LogTable drive(const ExactAxis& a, std::uint64_t seed) {
         error = side * (uniform() < often ? free : -free * often / (1.0 - often));
         break;
       }
+      case ErrorLaw::follower:
+        error = free * sign;
+        lean = recent >= 0.0 ? 1.0 : -1.0;
+        break;
+      case ErrorLaw::echo: error = (alike < 3.0 * free * free * std::sqrt(a.rate) ? free : 0.01 * free) * sign; break;
       case ErrorLaw::together:
         if (t >= until) {
           held = sign;
@@ -101,9 +111,11 @@ inline LogTable drive(const ExactAxis& a, std::uint64_t seed) {
         break;
     }
     sum += error;
+    alike += recent * error;
+    recent += (error + lean * a.bias - recent) / (1.0 + kRecent * a.rate);
     log.t.push_back(t);
     log.columns[0].push_back(measured);
-    log.columns[1].push_back(u + error + side * a.bias + (t >= a.fault_at ? a.fault_bias : 0.0));
+    log.columns[1].push_back(u + error + lean * a.bias + (t >= a.fault_at ? a.fault_bias : 0.0));
     const double e = std::exp(-a.viscous / a.mass * h), end = u / a.viscous;
     x += end * h + (v - end) * (1.0 - e) * a.mass / a.viscous;
     v = end + (v - end) * e;
