@@ -40,9 +40,11 @@ struct SimulatorOption {
   const char* says;
 };
 constexpr std::array<SimulatorOption, 3> kSimulators = {
-    {{robots::SimulatorFormat::mjcf, "--write-mjcf", "Write this MuJoCo file (MJCF) with the causes in it into --out"},
-     {robots::SimulatorFormat::urdf, "--write-urdf", "Write this URDF file with the causes in it into --out"},
-     {robots::SimulatorFormat::sdf, "--write-sdf", "Write this Gazebo file (SDF) with the causes in it into --out"}}};
+    {{robots::SimulatorFormat::mjcf, "--write-mjcf",
+      "Write a copy of this MuJoCo file (MJCF) with the causes in it into --out"},
+     {robots::SimulatorFormat::urdf, "--write-urdf", "Write a copy of this URDF file with the causes in it into --out"},
+     {robots::SimulatorFormat::sdf, "--write-sdf",
+      "Write a copy of this Gazebo file (SDF) with the causes in it into --out"}}};
 
 struct Arguments {
   std::vector<std::filesystem::path> logs, baseline, fresh;
@@ -73,8 +75,8 @@ constexpr const char* kExamples =
     "  wheelwright gap drive.csv --robot robot.yaml --baseline healthy.csv --out gap\n"
     "  wheelwright gap monday.csv tuesday.csv --robot robot.yaml --without slope --json > gap.json\n"
     "  then wheelwright commission drive.csv --robot gap/robot_improved.yaml --out result\n"
-    "  wheelwright gap drive.csv --robot robot.yaml --write-mjcf robot.xml --out gap   # gap/robot.xml is the edited "
-    "file\n\n"
+    "  wheelwright gap drive.csv --robot robot.yaml --write-mjcf robot.xml --out gap   # writes "
+    "gap/robot_improved.xml\n\n"
     "Exit code: 0 a diagnosis was made, whatever it is; 2 bad input.";
 
 constexpr const char* kImproved = "robot_improved.yaml";
@@ -157,6 +159,11 @@ struct SimulatorSource {
   robots::SimulatorFormat format = robots::SimulatorFormat::mjcf;
   std::filesystem::path path;
   std::string text;
+
+  // Name of the edited file in the directory of results: robot_improved.xml of robot.xml.
+  [[nodiscard]] std::string edited_name() const {
+    return path.stem().string() + "_improved" + path.extension().string();
+  }
 };
 
 // Files that are to be edited; what is wrong with them is told before the work begins.
@@ -177,12 +184,13 @@ std::vector<SimulatorSource> simulator_sources(const Arguments& a, const Robot& 
     }
     SimulatorSource source{format, path, files::read_bytes(path, kLongest)};
     std::error_code none;
-    const std::filesystem::path target = a.common.out / path.filename();
+    const std::filesystem::path target = a.common.out / source.edited_name();
     if (std::filesystem::equivalent(path, target, none)) {
-      throw InputError(fmt::format("{} {}: would be written over itself: expected another --out", option, path.string()));
+      throw InputError(
+          fmt::format("{} {}: would be written over itself: expected another --out", option, path.string()));
     }
     for (const SimulatorSource& other : sources) {
-      if (other.path.filename() == path.filename()) {
+      if (other.edited_name() == source.edited_name()) {
         throw InputError(fmt::format("{} {}: {} has the same name: expected one file for each", option, path.string(),
                                      other.path.string()));
       }
@@ -217,17 +225,16 @@ std::vector<robots::EditedSimulator> write_simulators(const Arguments& a, const 
                                                       Json& result) {
   std::vector<robots::EditedSimulator> edits;
   for (const SimulatorSource& source : sources) {
-    edits.push_back(
-        robots::edit_simulator(source.format, source.text, source.path.string(), change, robot, a.wheels));
+    edits.push_back(robots::edit_simulator(source.format, source.text, source.path.string(), change, robot, a.wheels));
     const robots::EditedSimulator& edit = edits.back();
-    const std::filesystem::path name = source.path.filename();
+    const std::string name = source.edited_name();
     if (edit.changed.empty()) {
       std::filesystem::remove(a.common.out / name);
     } else {
       files::atomic_write(a.common.out / name, edit.text);
     }
     result["simulators"].push_back(
-        robots::to_json(edit, source.path.string(), edit.changed.empty() ? std::string() : name.string()));
+        robots::to_json(edit, source.path.string(), edit.changed.empty() ? std::string() : name));
   }
   return edits;
 }
@@ -239,7 +246,7 @@ void say_simulators(const Arguments& a, const std::vector<SimulatorSource>& sour
     if (edit.changed.empty()) {
       say("{}: nothing to change\n", sources[k].path.string());
     } else {
-      say("wrote {}, which is {} but for:\n", (a.common.out / sources[k].path.filename()).string(),
+      say("wrote {}, which is {} but for:\n", (a.common.out / sources[k].edited_name()).string(),
           sources[k].path.string());
     }
     for (const robots::NumberChanged& c : edit.changed) {

@@ -44,8 +44,8 @@ XmlText XmlText::parse(std::string text, std::string file) {
   XmlText out;
   out.text_ = std::move(text);
   out.file_ = std::move(file);
-  if (const std::size_t first = out.text_.find('\n'); first != std::string::npos && first > 0 &&
-                                                      out.text_[first - 1] == '\r') {
+  if (const std::size_t first = out.text_.find('\n');
+      first != std::string::npos && first > 0 && out.text_[first - 1] == '\r') {
     out.line_end_ = "\r\n";
   }
   out.scan();
@@ -91,8 +91,8 @@ void XmlText::scan() {
       open.pop_back();
       at = end;
     } else {
-      line += static_cast<std::size_t>(
-          std::count(text.begin() + static_cast<std::ptrdiff_t>(counted), text.begin() + static_cast<std::ptrdiff_t>(at), '\n'));
+      line += static_cast<std::size_t>(std::count(text.begin() + static_cast<std::ptrdiff_t>(counted),
+                                                  text.begin() + static_cast<std::ptrdiff_t>(at), '\n'));
       counted = at;
       Element element;
       element.line = line;
@@ -112,10 +112,11 @@ void XmlText::scan() {
           break;
         }
         const std::size_t name_end = text.find_first_of(" \t\r\n=", k);
-        const std::size_t equals = name_end == std::string_view::npos ? name_end : text.find_first_not_of(kBlanks, name_end);
-        const std::size_t quote =
-            equals == std::string_view::npos || text[equals] != '=' ? std::string_view::npos
-                                                                    : text.find_first_not_of(kBlanks, equals + 1);
+        const std::size_t equals =
+            name_end == std::string_view::npos ? name_end : text.find_first_not_of(kBlanks, name_end);
+        const std::size_t quote = equals == std::string_view::npos || text[equals] != '='
+                                      ? std::string_view::npos
+                                      : text.find_first_not_of(kBlanks, equals + 1);
         if (quote == std::string_view::npos || (text[quote] != '"' && text[quote] != '\'')) {
           fail(k, "an attribute without a value");
         }

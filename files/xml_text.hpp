@@ -65,12 +65,12 @@ class XmlText {
     Id parent = 0;
     bool fresh = false;
     std::size_t line = 0;
-    std::size_t begin = 0;       // of its '<'
-    std::size_t insert_at = 0;   // behind its last attribute, or its name
-    std::size_t open_end = 0;    // behind the '>' of its start tag
-    std::size_t close_begin = 0; // of its end tag; open_end for <a/>
-    std::size_t end = 0;         // behind it
-    bool closed_at_once = false; // <a/>
+    std::size_t begin = 0;        // of its '<'
+    std::size_t insert_at = 0;    // behind its last attribute, or its name
+    std::size_t open_end = 0;     // behind the '>' of its start tag
+    std::size_t close_begin = 0;  // of its end tag; open_end for <a/>
+    std::size_t end = 0;          // behind it
+    bool closed_at_once = false;  // <a/>
     std::vector<Attribute> attributes;
     std::vector<std::pair<std::string, std::string>> new_attributes;
     std::optional<std::string> new_text;

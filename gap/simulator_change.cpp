@@ -30,15 +30,19 @@ const std::map<std::string_view, Remedy>& remedies() {
   constexpr const char* kContact = "it is a property of the contacts, whose laws differ from engine to engine";
   constexpr const char* kReading = "it is in what the sensors say, not in the robot";
   static const std::map<std::string_view, Remedy> all = {
-      {"stribeck", {kFriction, "add c_s exp(-(w/omega_s)^2) sgn(w) against each wheel's speed w where torques are set"}},
-      {"quadratic_drag", {kFriction, "take c v|v| from the sum of the torques where they are set, v the robot's speed"}},
-      {"load_friction", {kFriction, "take the share k of each torque from it where torques are set, against the motion"}},
+      {"stribeck",
+       {kFriction, "add c_s exp(-(w/omega_s)^2) sgn(w) against each wheel's speed w where torques are set"}},
+      {"quadratic_drag",
+       {kFriction, "take c v|v| from the sum of the torques where they are set, v the robot's speed"}},
+      {"load_friction",
+       {kFriction, "take the share k of each torque from it where torques are set, against the motion"}},
       {"friction_drift", {"a file has no time", "write the friction of a warm robot, or change it while it runs"}},
       {"caster_drag", {kContact, "give the castor's contact the friction force c/r, at the distance p from the axle"}},
       {"lateral_scrub", {kContact, "give the wheels' contacts torsional friction (MuJoCo: condim 4)"}},
       {"torque_bias", {kCommand, "take b_R and b_L from the torques where they are set"}},
       {"actuator_lag",
-       {kCommand, "pass the commands through a lag of T (MuJoCo: a <general> actuator with dyntype=\"filter\" and dynprm)"}},
+       {kCommand,
+        "pass the commands through a lag of T (MuJoCo: a <general> actuator with dyntype=\"filter\" and dynprm)"}},
       {"delay", {kCommand, "hold every command back by T_d where torques are set"}},
       {"sensor_time_offset", {kReading, "stamp the simulated speeds later by dt"}},
       {"torque_deadzone", {kCommand, "take b from the size of each torque where torques are set, down to 0"}},
@@ -46,7 +50,8 @@ const std::map<std::string_view, Remedy>& remedies() {
        {"it needs a body and a joint more",
         "put the rotor on a joint of its own that meets the wheel at the ends of a narrow range"}},
       {"battery_sag", {kCommand, "multiply torques by 1 - k t - R_b (|tau_R| + |tau_L|) where they are set"}},
-      {"longitudinal_slip", {kContact, "soften the wheels' contacts along the rolling direction (Gazebo: slip1, slip2)"}},
+      {"longitudinal_slip",
+       {kContact, "soften the wheels' contacts along the rolling direction (Gazebo: slip1, slip2)"}},
       {"turning_slip", {kContact, "lower the wheels' friction sideways (Gazebo: mu2; MuJoCo: friction of the geoms)"}},
       {"curve_slip", {kContact, "lower the wheels' friction sideways (Gazebo: mu2; MuJoCo: friction of the geoms)"}},
       {"wheel_out_of_round", {"a wheel is a round shape", "move the wheels' shapes off their axles, or use meshes"}},
@@ -69,7 +74,8 @@ class Changes {
       change_.radius_factor *= 1.0 + c(0);
       because("radius_factor");
     } else if (name == "wheel_radius_asymmetric" && has({"epsilon"})) {
-      change_.radius_factor = change_.radius_factor.cwiseProduct(Eigen::Vector2d(Eigen::Vector2d::Ones() + c(0) * sides()));
+      change_.radius_factor =
+          change_.radius_factor.cwiseProduct(Eigen::Vector2d(Eigen::Vector2d::Ones() + c(0) * sides()));
       because("radius_factor");
     } else if (name == "track_width" && has({"narrowing"}) && c(0) < 1.0) {
       change_.track_factor /= 1.0 - c(0);
@@ -90,7 +96,8 @@ class Changes {
     if (remedy != remedies().end()) {
       tell(name, remedy->second.why, remedy->second.instead);
     } else {
-      tell(name, "there is no rule by which it becomes a number of a simulator's file", "program it where torques are set");
+      tell(name, "there is no rule by which it becomes a number of a simulator's file",
+           "program it where torques are set");
     }
   }
 
@@ -100,8 +107,8 @@ class Changes {
   // Causes that are torques, or of which a torque is known only where efforts are torques; false for any other.
   bool take_torque(const std::string& name) {
     const bool known = name == "payload" || name == "payload_offset" || name == "com_longitudinal" ||
-                       name == "com_lateral" || name == "coulomb" || name == "coulomb_asymmetric" || name == "viscous" ||
-                       name == "viscous_asymmetric" || name == "armature" || name == "saturation";
+                       name == "com_lateral" || name == "coulomb" || name == "coulomb_asymmetric" ||
+                       name == "viscous" || name == "viscous_asymmetric" || name == "armature" || name == "saturation";
     if (known && !unit_) {
       tell(name, "the log's efforts are no torques, and the robot file has no motor constants",
            "give the robot file `motor:` with torque_constant, gear_ratio (and resistance), and run again");
@@ -166,9 +173,10 @@ class Changes {
     because("damping");
     if (weighed && ((wanted - damping).abs() > half).any()) {
       tell("viscous", "friction straight ahead and in turns do not fit one damping of the wheels' joints",
-           fmt::format("straight ahead {:.4g} and in turns {:.4g} N·m·s/rad at each wheel were found, {:.4g} was written: "
-                       "what is left is friction of the ground or of castors",
-                       wanted[0], wanted[1], damping));
+           fmt::format(
+               "straight ahead {:.4g} and in turns {:.4g} N·m·s/rad at each wheel were found, {:.4g} was written: "
+               "what is left is friction of the ground or of castors",
+               wanted[0], wanted[1], damping));
     }
   }
 
@@ -184,9 +192,7 @@ class Changes {
   // What the first shape makes of a coefficient at the right and the left wheel (catalogue::side_or_opposite).
   [[nodiscard]] Eigen::Vector2d sides() const {
     const double side = cause_->shape.empty() ? 0.0 : cause_->shape[0];
-    return side > 1.5   ? Eigen::Vector2d(1.0, -1.0)
-           : side < 0.5 ? Eigen::Vector2d(1.0, 0.0)
-                        : Eigen::Vector2d(0.0, 1.0);
+    return side > 1.5 ? Eigen::Vector2d(1.0, -1.0) : side < 0.5 ? Eigen::Vector2d(1.0, 0.0) : Eigen::Vector2d(0.0, 1.0);
   }
   [[nodiscard]] double half_width(std::string_view parameter) const {
     for (const GapCause& cause : found_.causes) {
@@ -220,8 +226,8 @@ class Changes {
     }
   }
   void tell(const std::string& name, const std::string& why, const std::string& instead) {
-    const bool there = std::ranges::any_of(
-        change_.not_expressed, [&](const NotExpressed& n) { return n.cause == name && n.why == why; });
+    const bool there = std::ranges::any_of(change_.not_expressed,
+                                           [&](const NotExpressed& n) { return n.cause == name && n.why == why; });
     if (!there) {
       const std::string with = numbers(name);
       change_.not_expressed.push_back({name, why, with.empty() ? instead : instead + " (" + with + ")"});

@@ -20,7 +20,8 @@ namespace wheelwright::gap {
 ///
 /// - payload: its mass and moment, on the axle; payload_offset and com_*: first moments, r·m·a of the model over r.
 /// - coulomb*, viscous*, armature: torques at each joint. A changed f1 and f3 are one damping c of both joints,
-///   f1 = 2c/r² and f3 = c D²/(2r²); where they contradict each other, the mean by their intervals, and the rest is told.
+///   f1 = 2c/r² and f3 = c D²/(2r²); where they contradict each other, the mean by their intervals, and the rest is
+///   told.
 /// - torque_gain*: the command's excess e over what the model needs makes the gain 1/(1 + e).
 /// - wheel_radius*: 1 + ε; track_width: D(1 + ε) = D/(1 − c) of the share c by which the robot turns slower.
 /// - saturation: the limit of a wheel's torque.

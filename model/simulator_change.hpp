@@ -22,13 +22,13 @@ struct NotExpressed {
 
 /// Changes beside what a simulator has already. Pairs: right wheel, left wheel.
 struct SimulatorChange {
-  double mass = 0.0;           ///< more of the body, kg
-  double moment_ahead = 0.0;   ///< change of the body's first moment about the middle of the axle, kg·m, ahead
-  double moment_left = 0.0;    ///< likewise to the left
-  double yaw_inertia = 0.0;    ///< change of the robot's moment about the vertical through the middle of the axle, kg·m²
-  Eigen::Vector2d dry_friction = Eigen::Vector2d::Zero();  ///< more at the wheels' joints, N·m
-  Eigen::Vector2d damping = Eigen::Vector2d::Zero();       ///< likewise viscous, N·m·s/rad
-  Eigen::Vector2d armature = Eigen::Vector2d::Zero();      ///< more inertia of rotors and gears at the wheels, kg·m²
+  double mass = 0.0;          ///< more of the body, kg
+  double moment_ahead = 0.0;  ///< change of the body's first moment about the middle of the axle, kg·m, ahead
+  double moment_left = 0.0;   ///< likewise to the left
+  double yaw_inertia = 0.0;  ///< change of the robot's moment about the vertical through the middle of the axle, kg·m²
+  Eigen::Vector2d dry_friction = Eigen::Vector2d::Zero();   ///< more at the wheels' joints, N·m
+  Eigen::Vector2d damping = Eigen::Vector2d::Zero();        ///< likewise viscous, N·m·s/rad
+  Eigen::Vector2d armature = Eigen::Vector2d::Zero();       ///< more inertia of rotors and gears at the wheels, kg·m²
   Eigen::Vector2d radius_factor = Eigen::Vector2d::Ones();  ///< of the wheels
   double track_factor = 1.0;                                ///< of the distance of the wheels
   Eigen::Vector2d gain = Eigen::Vector2d::Ones();  ///< torque at the wheel per commanded one, times what it was

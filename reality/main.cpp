@@ -151,12 +151,13 @@ int run_replay(ReplayRequest request) {
     double Replay::*value;
   };
   const std::string after = fmt::format("_{}s", request.options.horizon);
-  const std::array<Figure, 6> figures = {{{"torque, sum", "N m", "torque_rms", "sum", &Replay::sum},
-                                          {"torque, difference", "N m2", "torque_rms", "difference", &Replay::difference},
-                                          {"velocity", "m/s", "rollout", "velocity", &Replay::velocity},
-                                          {"yaw rate", "rad/s", "rollout", "yaw_rate", &Replay::yaw_rate},
-                                          {"position", "m", "rollout", "position", &Replay::position},
-                                          {"heading", "rad", "rollout", "heading", &Replay::heading}}};
+  const std::array<Figure, 6> figures = {
+      {{"torque, sum", "N m", "torque_rms", "sum", &Replay::sum},
+       {"torque, difference", "N m2", "torque_rms", "difference", &Replay::difference},
+       {"velocity", "m/s", "rollout", "velocity", &Replay::velocity},
+       {"yaw rate", "rad/s", "rollout", "yaw_rate", &Replay::yaw_rate},
+       {"position", "m", "rollout", "position", &Replay::position},
+       {"heading", "rad", "rollout", "heading", &Replay::heading}}};
   fmt::print("{:<20}{:>6}", "robot - simulator", "");
   for (const fs::path& simulator : request.simulators) {
     fmt::print("  {:>18}", simulator.filename().string());

@@ -91,7 +91,7 @@ class Runner {
       body_[i] = model_->jnt_bodyid[id];
       for (int k = 0; k < model_->nu; ++k) {
         if (model_->actuator_trntype[k] == mjTRN_JOINT && model_->actuator_trnid[2 * k] == id &&
-            model_->actuator_biastype[k] == mjBIAS_NONE) {
+            model_->actuator_biastype[k] == mjBIAS_NONE && model_->actuator_gainprm[mjNGAIN * k] > 0.0) {
           motor_[i] = k;
         }
       }
@@ -101,7 +101,8 @@ class Runner {
         base_q_ = model_->jnt_qposadr[k];
         base_v_ = model_->jnt_dofadr[k];
         for (int body = 1; body < model_->nbody; ++body) {
-          mass_ += model_->body_rootid[body] == model_->body_rootid[model_->jnt_bodyid[k]] ? model_->body_mass[body] : 0.0;
+          mass_ +=
+              model_->body_rootid[body] == model_->body_rootid[model_->jnt_bodyid[k]] ? model_->body_mass[body] : 0.0;
         }
       }
     }
@@ -170,6 +171,22 @@ class Runner {
     }
   }
 
+  // Commands beyond a motor's limits are all one; and none is three times the log's largest.
+  [[nodiscard]] double within_limits(std::size_t i, double torque) const {
+    const int k = motor_[i];
+    double low = -3.0 * largest_, high = 3.0 * largest_;
+    if (k >= 0 && model_->actuator_ctrllimited[k]) {
+      low = std::max(low, model_->actuator_ctrlrange[2 * k]);
+      high = std::min(high, model_->actuator_ctrlrange[2 * k + 1]);
+    }
+    if (k >= 0 && model_->actuator_forcelimited[k]) {
+      const double gain = model_->actuator_gainprm[mjNGAIN * k];
+      low = std::max(low, model_->actuator_forcerange[2 * k] / gain);
+      high = std::min(high, model_->actuator_forcerange[2 * k + 1] / gain);
+    }
+    return std::clamp(torque, low, std::max(low, high));
+  }
+
   [[nodiscard]] std::size_t steps_of_a_row() const {
     return static_cast<std::size_t>(std::lround(period_ / model_->opt.timestep));
   }
@@ -200,7 +217,7 @@ class Runner {
         for (std::size_t i = 0; i < 2; ++i) {
           // The servo follows with a lag of h/kStiffness; it is given what comes then.
           const double wanted = at(speed_[i], place + h / kStiffness / period_);
-          const double torque = std::clamp(stiffness * (wanted - v()[dof_[i]]), -3.0 * largest_, 3.0 * largest_);
+          const double torque = within_limits(i, stiffness * (wanted - v()[dof_[i]]));
           command(i, torque);
           needed[i][k] += torque / static_cast<double>(inside);
         }
@@ -216,7 +233,8 @@ class Runner {
     const double slow = kRest * std::hypot(root_mean_square(speed_[right]), root_mean_square(speed_[left]));
     for (Eigen::Index k = 0; k < rows; ++k) {
       const auto j = static_cast<std::size_t>(k);
-      const double r = torque_[right][j] - needed[right][j], l = torque_[left][j] - needed[left][j];
+      const double r = within_limits(right, torque_[right][j]) - needed[right][j];
+      const double l = within_limits(left, torque_[left][j]) - needed[left][j];
       sum[k] = r + l;
       difference[k] = 0.5 * out.track_width * (r - l);
       resting[k] = std::min(std::abs(speed_[right][j]), std::abs(speed_[left][j])) < slow ? 1.0 : 0.0;

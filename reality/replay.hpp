@@ -23,12 +23,12 @@ struct ReplayOptions {
 
 /// Root mean squares of robot less simulator.
 struct Replay {
-  double sum = 0.0;         ///< τ_R + τ_L through f₂, N·m: what the simulator needs to turn its wheels as the log did
-  double difference = 0.0;  ///< D/2 (τ_R − τ_L), likewise, N·m²
-  double velocity = 0.0;    ///< by the wheels after `horizon` s in open loop, m/s
-  double yaw_rate = 0.0;    ///< likewise, rad/s
-  double position = 0.0;    ///< distance after `horizon` s, m
-  double heading = 0.0;     ///< likewise, rad
+  double sum = 0.0;  ///< τ_R + τ_L through f₂, N·m: what the simulator needs to turn its wheels as the log did
+  double difference = 0.0;                       ///< D/2 (τ_R − τ_L), likewise, N·m²
+  double velocity = 0.0;                         ///< by the wheels after `horizon` s in open loop, m/s
+  double yaw_rate = 0.0;                         ///< likewise, rad/s
+  double position = 0.0;                         ///< distance after `horizon` s, m
+  double heading = 0.0;                          ///< likewise, rad
   double wheel_radius = 0.0, track_width = 0.0;  ///< by which wheel speeds were read, m
   std::size_t rows = 0;                          ///< of the torque
   std::size_t runs = 0;
@@ -38,8 +38,9 @@ struct Replay {
 /// tau_r, tau_l, x, y, theta), in the engine's steps of the file, none longer than the log's.
 ///
 /// - Torque: its wheels are held at the log's speeds (a quadratic over five samples) by a stiff servo, whose commands
-///   are compared with the log's. A motor's command goes through its gear and limits; wheels without a motor take
-///   torques. Instants at which a wheel hardly moves are left out, as in a diagnosis.
+///   are compared with the log's. A motor's command goes through its gear, and what is beyond its limits counts as
+///   the limit on both sides; wheels without a motor take torques. Instants at which a
+///   wheel hardly moves are left out, as in a diagnosis.
 /// - Open loop: from the log's state every `every` s, the log's torques for `horizon` s.
 ///
 /// Throws Error where the engine rejects the file, or it has no such joints.

@@ -95,8 +95,7 @@ class MjcfDocument final : public SimulatorDocument {
         moments.insert(moments.end(), {tensor(0, 1), tensor(0, 2), tensor(1, 2)});
       }
       xml_.set_attribute(fresh, diagonal ? "diaginertia" : "fullinertia", number_list(moments));
-      record(fresh, "inertial",
-             fmt::format("mass {:.9g} of the geoms", link.inertial->mass),
+      record(fresh, "inertial", fmt::format("mass {:.9g} of the geoms", link.inertial->mass),
              fmt::format("mass {:.9g}, and centre and moments as numbers", wanted.mass));
       return;
     }
@@ -209,7 +208,8 @@ class MjcfDocument final : public SimulatorDocument {
       return xml_.place(actuator).text() + " has a gear of 0";
     }
     const auto text = resolved(actuator, kActuators, "forcerange");
-    const std::vector<double> before = text ? numbers(*text, 2, xml_.place(actuator), "forcerange") : std::vector<double>{};
+    const std::vector<double> before =
+        text ? numbers(*text, 2, xml_.place(actuator), "forcerange") : std::vector<double>{};
     write(actuator, "forcerange", xml_.attribute(actuator, "forcerange") ? before : std::vector<double>{},
           {-limit / gear, limit / gear}, "forcerange");
     if (const auto limited = resolved(actuator, kActuators, "forcelimited"); limited.value_or("") != "true") {
@@ -235,7 +235,9 @@ class MjcfDocument final : public SimulatorDocument {
 
   void read_compiler() {
     for (const Id element : xml_.children(0, "compiler")) {
-      const auto is = [&](const char* name, const char* value) { return xml_.attribute(element, name).value_or("") == value; };
+      const auto is = [&](const char* name, const char* value) {
+        return xml_.attribute(element, name).value_or("") == value;
+      };
       degrees_ = is("angle", "radian") ? false : is("angle", "degree") ? true : degrees_;
       from_geoms_ = xml_.attribute(element, "inertiafromgeom").value_or(from_geoms_);
       unlimited_ = unlimited_ || is("autolimits", "false");
@@ -313,9 +315,7 @@ class MjcfDocument final : public SimulatorDocument {
     return out;
   }
   // Before bodies are read their classes are not known: a joint of another type says so itself, or by its own class.
-  [[nodiscard]] std::string resolved_type(Id joint) const {
-    return resolved(joint, kJoint, "type").value_or("hinge");
-  }
+  [[nodiscard]] std::string resolved_type(Id joint) const { return resolved(joint, kJoint, "type").value_or("hinge"); }
 
   [[nodiscard]] std::optional<std::string> text_of(Id element, const std::vector<std::string>& kinds,
                                                    const std::string& name) const {
@@ -427,12 +427,14 @@ class MjcfDocument final : public SimulatorDocument {
       }
     }
     const std::size_t needed = type == "sphere" ? 1 : type == "capsule" || type == "cylinder" ? 2 : 3;
-    const bool solid = type == "sphere" || type == "capsule" || type == "cylinder" || type == "ellipsoid" || type == "box";
+    const bool solid =
+        type == "sphere" || type == "capsule" || type == "cylinder" || type == "ellipsoid" || type == "box";
     if (!solid || resolved(geom, kGeom, "mesh") || resolved(geom, kGeom, "shellinertia").value_or("false") == "true") {
       if (why != nullptr) {
-        *why = fmt::format("{} is a {} whose mass is reckoned by the engine: give its body an <inertial> "
-                           "(mj_saveLastXML writes it)",
-                           at.text(), solid ? "shell or mesh" : type);
+        *why = fmt::format(
+            "{} is a {} whose mass is reckoned by the engine: give its body an <inertial> "
+            "(mj_saveLastXML writes it)",
+            at.text(), solid ? "shell or mesh" : type);
       }
       return std::nullopt;
     }
@@ -575,7 +577,8 @@ class MjcfDocument final : public SimulatorDocument {
     }
     if (out.kind == "ellipsoid" && size.size() == 3) {
       for (Eigen::Index k = 0; k < 3; ++k) {
-        const double one = size[static_cast<std::size_t>((k + 1) % 3)], other = size[static_cast<std::size_t>((k + 2) % 3)];
+        const double one = size[static_cast<std::size_t>((k + 1) % 3)],
+                     other = size[static_cast<std::size_t>((k + 2) % 3)];
         if (one == other) {
           out.kind = size[static_cast<std::size_t>(k)] == one ? "sphere" : "cylinder";
           out.axis = at.linear().col(k);
@@ -613,11 +616,12 @@ class MjcfDocument final : public SimulatorDocument {
     out.place = xml_.place(joint);
     const std::string type = xml_.name(joint) == "freejoint" ? "free" : resolved_type(joint);
     const auto limited = resolved(joint, kJoint, "limited");
-    const bool range = resolved(joint, kJoint, "range").has_value() && !unlimited_ && limited.value_or("auto") == "auto";
+    const bool range =
+        resolved(joint, kJoint, "range").has_value() && !unlimited_ && limited.value_or("auto") == "auto";
     out.type = joints.size() > 1 || type == "free" || type == "ball" ? "floating"
-               : type == "slide"                                      ? "prismatic"
-               : limited.value_or("") == "true" || range              ? "revolute"
-                                                                      : "continuous";
+               : type == "slide"                                     ? "prismatic"
+               : limited.value_or("") == "true" || range             ? "revolute"
+                                                                     : "continuous";
     const auto pos = resolved(joint, kJoint, "pos");
     const auto axis = resolved(joint, kJoint, "axis");
     const Eigen::Vector3d along = axis ? vector(numbers(*axis, 3, out.place, "axis")) : Eigen::Vector3d(0, 0, 1);

@@ -12,7 +12,7 @@
 namespace wheelwright::robots {
 namespace {
 
-constexpr double kEndless = 1e8;     // rad: Gazebo writes 1e16 for a joint that turns without end
+constexpr double kEndless = 1e8;  // rad: Gazebo writes 1e16 for a joint that turns without end
 
 class SdfDocument final : public SimulatorDocument {
  public:
@@ -211,8 +211,8 @@ class SdfDocument final : public SimulatorDocument {
     const auto link = links_.find(name);
     const auto joint = joints_.find(name);
     if (link == links_.end() && joint == joints_.end()) {
-      tree_.place.fail(fmt::format("a pose is relative to {}, which is no link or joint: expected one that is",
-                                   files::shown(name)));
+      tree_.place.fail(
+          fmt::format("a pose is relative to {}, which is no link or joint: expected one that is", files::shown(name)));
     }
     const Id element = link != links_.end() ? link->second : joint->second;
     if (depth > links_.size() + joints_.size()) {
@@ -262,9 +262,10 @@ class SdfDocument final : public SimulatorDocument {
         const Eigen::Isometry3d at = isometry(shape, pose_numbers(shape));
         const auto geometry = xml_.child(shape, "geometry");
         for (const Id body : geometry ? xml_.children(*geometry) : std::vector<Id>{}) {
-          TreeShape out{xml_.name(body),     kind == std::string("collision"), 0.0, at.translation(),
-                        at.linear().col(2), xml_.place(body)};
-          if (const auto radius = xml_.child(body, "radius"); radius && (out.kind == "cylinder" || out.kind == "sphere")) {
+          TreeShape out{xml_.name(body), kind == std::string("collision"), 0.0, at.translation(), at.linear().col(2),
+                        xml_.place(body)};
+          if (const auto radius = xml_.child(body, "radius");
+              radius && (out.kind == "cylinder" || out.kind == "sphere")) {
             out.radius = number(*radius);
             if (!(out.radius > 0.0)) {
               xml_.place(*radius).fail("expected metres, > 0");

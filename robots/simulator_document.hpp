@@ -59,10 +59,11 @@ class SimulatorDocument {
   explicit SimulatorDocument(files::XmlText xml) : xml_(std::move(xml)) {}
 
   /// `count` finite numbers, apart by blanks; throws, naming `at`, for anything else. 0: any number of them.
-  [[nodiscard]] static std::vector<double> numbers(const std::string& text, std::size_t count, const files::FilePlace& at,
-                                                   const std::string& name);
+  [[nodiscard]] static std::vector<double> numbers(const std::string& text, std::size_t count,
+                                                   const files::FilePlace& at, const std::string& name);
   /// The attribute as numbers; `otherwise` where it is not there.
-  [[nodiscard]] std::vector<double> numbers_of(Id element, const std::string& name, std::vector<double> otherwise) const;
+  [[nodiscard]] std::vector<double> numbers_of(Id element, const std::string& name,
+                                               std::vector<double> otherwise) const;
   [[nodiscard]] static Eigen::Vector3d vector(const std::vector<double>& values) {
     return {values[0], values[1], values[2]};
   }

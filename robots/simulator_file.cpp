@@ -18,8 +18,8 @@ using model::SimulatorChange;
 
 namespace {
 
-constexpr double kSameModel = 0.02;   // of a number: file and robot file say the same
-constexpr double kTyre = 0.8;         // of the rolling radius: smaller round shapes are hubs
+constexpr double kSameModel = 0.02;  // of a number: file and robot file say the same
+constexpr double kTyre = 0.8;        // of the rolling radius: smaller round shapes are hubs
 
 class Editor {
  public:
@@ -110,7 +110,8 @@ class Editor {
         sum += link.inertial ? link.inertial->mass : 0.0;
       }
       for (std::size_t side = 0; side < 2; ++side) {
-        double spin = document_.has(JointNumber::armature) ? document_.joint_number(joint(side), JointNumber::armature) : 0.0;
+        double spin =
+            document_.has(JointNumber::armature) ? document_.joint_number(joint(side), JointNumber::armature) : 0.0;
         for (const std::string& name : turning_links(document_.tree(), joint(side))) {
           if (const TreeLink& link = *document_.tree().link(name); link.inertial) {
             spin += axle_.left.dot(link.inertial->tensor * axle_.left);
@@ -127,8 +128,8 @@ class Editor {
     double out = 0.0;
     for (const std::string& name : turning_links(document_.tree(), joint(side))) {
       for (const TreeShape& shape : document_.tree().link(name)->shapes) {
-        const bool round = shape.kind == "sphere" ||
-                           (shape.kind == "cylinder" && std::abs(shape.axis.dot(joint(side).axis)) > 0.99);
+        const bool round =
+            shape.kind == "sphere" || (shape.kind == "cylinder" && std::abs(shape.axis.dot(joint(side).axis)) > 0.99);
         out = round && shape.collision ? std::max(out, shape.radius) : out;
       }
     }
@@ -199,9 +200,10 @@ class Editor {
     if (reasons.empty()) {
       return;
     }
-    const std::string wanted = fmt::format("add {:.4g} kg, {:.4g} kg·m² about the vertical through the middle of the "
-                                           "axle, and first moments of {:.4g} kg·m ahead and {:.4g} kg·m to the left",
-                                           change_.mass, yaw, change_.moment_ahead, change_.moment_left);
+    const std::string wanted = fmt::format(
+        "add {:.4g} kg, {:.4g} kg·m² about the vertical through the middle of the "
+        "axle, and first moments of {:.4g} kg·m ahead and {:.4g} kg·m to the left",
+        change_.mass, yaw, change_.moment_ahead, change_.moment_left);
     if (const std::string why = document_.why_no_mass(*body_); !why.empty()) {
       out_.not_expressed.push_back({reasons, why, wanted});
       return;
@@ -391,7 +393,8 @@ void SimulatorDocument::write(Id element, const std::string& name, const std::ve
     std::size_t from = 0;
     for (std::size_t k = 0; k < after.size(); ++k) {
       from = old.find_first_not_of(" \t\r\n", from);
-      const std::size_t to = from == std::string::npos ? from : std::min(old.find_first_of(" \t\r\n", from), old.size());
+      const std::size_t to =
+          from == std::string::npos ? from : std::min(old.find_first_of(" \t\r\n", from), old.size());
       const bool stays = from != std::string::npos && std::abs(after[k] - before[k]) <= slack;
       kept += (k > 0 ? " " : "") + (stays ? old.substr(from, to - from) : number_list({after[k]}));
       from = to;
@@ -430,9 +433,10 @@ const char* name_of(SimulatorFormat format) {
 
 EditedSimulator edit_simulator(SimulatorFormat format, std::string text, const std::string& file,
                                const model::SimulatorChange& change, const Robot& robot, const SimulatorHints& hints) {
-  const std::unique_ptr<SimulatorDocument> document = format == SimulatorFormat::mjcf   ? open_mjcf(std::move(text), file)
-                                                      : format == SimulatorFormat::urdf ? open_urdf(std::move(text), file)
-                                                                                        : open_sdf(std::move(text), file);
+  const std::unique_ptr<SimulatorDocument> document = format == SimulatorFormat::mjcf ? open_mjcf(std::move(text), file)
+                                                      : format == SimulatorFormat::urdf
+                                                          ? open_urdf(std::move(text), file)
+                                                          : open_sdf(std::move(text), file);
   EditedSimulator out;
   out.format = format;
   out.not_expressed = change.not_expressed;

@@ -108,9 +108,9 @@ class UrdfDocument final : public SimulatorDocument {
     for (const TreeJoint& joint : tree_.joints) {
       if (joint.child == link) {
         const auto at = xml_.child(joints_.at(joint.name), "origin");
-        return frame(joint.parent) * (at ? pose(vector(numbers_of(*at, "xyz", {0, 0, 0})),
-                                                vector(numbers_of(*at, "rpy", {0, 0, 0})))
-                                         : Eigen::Isometry3d(Eigen::Isometry3d::Identity()));
+        return frame(joint.parent) *
+               (at ? pose(vector(numbers_of(*at, "xyz", {0, 0, 0})), vector(numbers_of(*at, "rpy", {0, 0, 0})))
+                   : Eigen::Isometry3d(Eigen::Isometry3d::Identity()));
       }
     }
     return Eigen::Isometry3d::Identity();

@@ -15,7 +15,8 @@ namespace {
 const std::string kSample =
     "\xEF\xBB\xBF<?xml version='1.0'?>\r\n<!-- <joint name=\"not this\"/> -->\r\n<robot name = 'a &amp; b'\r\n>\r\n"
     "  <link name=\"x\"><mass   value='1.50'  /></link>\r\n"
-    "  <joint name=\"j\"/>\r\n  <note><![CDATA[ <a> ]]></note>\r\n  <mass>\r\n    2.0\r\n  </mass>\r\n</robot>\r\n<!-- end -->\r\n";
+    "  <joint name=\"j\"/>\r\n  <note><![CDATA[ <a> ]]></note>\r\n  <mass>\r\n    2.0\r\n  </mass>\r\n</robot>\r\n<!-- "
+    "end -->\r\n";
 
 TEST(XmlText, WithoutEditsNothingChanges) {
   const XmlText xml = XmlText::parse(kSample, "a.xml");

@@ -102,8 +102,7 @@ TEST(SimulatorChange, NoCauseIsLost) {
     for (const ShapeParameter& s : effect.shapes) {
       shape.push_back(s.lower);
     }
-    const FittedEffect cause{effect, shape,
-                             Eigen::VectorXd::Constant(std::ssize(effect.parameters), 0.01)};
+    const FittedEffect cause{effect, shape, Eigen::VectorXd::Constant(std::ssize(effect.parameters), 0.01)};
     const SimulatorChange change = change_of({cause});
     EXPECT_TRUE(!change.because.empty() || !change.not_expressed.empty()) << effect.name;
     for (const model::NotExpressed& n : change.not_expressed) {

@@ -62,8 +62,8 @@ Robot cart() {
 
 TEST_F(SimulatorInTheEngine, EditedFileIsTheRobotThatWasMeant) {
   SimulatorChange change;
-  for (const char* member : {"mass", "yaw_inertia", "moment_ahead", "moment_left", "dry_friction", "damping", "armature",
-                             "gain", "effort_limit", "radius_factor", "track_factor"}) {
+  for (const char* member : {"mass", "yaw_inertia", "moment_ahead", "moment_left", "dry_friction", "damping",
+                             "armature", "gain", "effort_limit", "radius_factor", "track_factor"}) {
     change.because[member] = "a_cause";
   }
   change.mass = 2.0;
@@ -103,8 +103,8 @@ TEST_F(SimulatorInTheEngine, EditedFileIsTheRobotThatWasMeant) {
     const int body = after->jnt_bodyid[joint];
     EXPECT_NEAR(after->body_mass[body], before->body_mass[body], 1e-7);
     EXPECT_NEAR(after->geom_size[3 * after->body_geomadr[body]], 0.1 * change.radius_factor[side], 1e-9);
-    EXPECT_NEAR(after->body_pos[3 * body + 2], before->body_pos[3 * body + 2] + 0.1 * (change.radius_factor[side] - 1.0),
-                1e-9);
+    EXPECT_NEAR(after->body_pos[3 * body + 2],
+                before->body_pos[3 * body + 2] + 0.1 * (change.radius_factor[side] - 1.0), 1e-9);
   }
   SimulatorChange wider;
   wider.because["track_factor"] = "track_width";
@@ -120,8 +120,8 @@ TEST_F(SimulatorInTheEngine, EditedFileIsTheRobotThatWasMeant) {
 // Masses that come from densities are written as the engine itself reckons them.
 TEST_F(SimulatorInTheEngine, MassesOfGeomsAreTheEngines) {
   for (const char* geom :
-       {"type=\"box\" size=\"0.2 0.15 0.05\" pos=\"0.01 0.02 0.03\" euler=\"10 20 30\"", "type=\"sphere\" size=\"0.1\" mass=\"7\"",
-        "type=\"capsule\" fromto=\"-0.1 0 0 0.2 0.05 0.1\" size=\"0.06\"",
+       {"type=\"box\" size=\"0.2 0.15 0.05\" pos=\"0.01 0.02 0.03\" euler=\"10 20 30\"",
+        "type=\"sphere\" size=\"0.1\" mass=\"7\"", "type=\"capsule\" fromto=\"-0.1 0 0 0.2 0.05 0.1\" size=\"0.06\"",
         "type=\"ellipsoid\" size=\"0.2 0.1 0.05\" axisangle=\"1 1 0 40\"",
         "type=\"cylinder\" size=\"0.1 0.05\" density=\"700\" xyaxes=\"0 1 0 0 0 1\""}) {
     std::string text = testing::sample_mjcf;
@@ -145,7 +145,6 @@ TEST_F(SimulatorInTheEngine, MassesOfGeomsAreTheEngines) {
 struct LoopCase {
   std::string effect;
   std::uint64_t seed;
-  bool torque;  ///< shows in the torque; else in the pose
 };
 
 // A robot with a hidden effect, diagnosed against its designer's robot file; the designer's MJCF edited with what was
@@ -179,23 +178,21 @@ TEST_P(Loop, TheSimulatorComesNearerToTheRobot) {
   how.wheel_radius = floor.wheel_radius;
   how.track_width = floor.track_width;
   const Replay before = replay(nominal, c.fresh, how), after = replay(edited.text, c.fresh, how);
-  for (const auto& [name, r] : {std::pair{"healthy", floor}, {"before", before}, {"after", after}}) {
-    std::printf("%-10s %-8s torque %.4g %.4g  velocity %.4g %.4g  pose %.4g %.4g\n", GetParam().effect.c_str(), name, r.sum,
-                r.difference, r.velocity, r.yaw_rate, r.position, r.heading);
-  }
-  const auto torque = [&](const Replay& r) { return std::hypot(r.sum, r.difference / (0.5 * how.track_width.value())); };
-  if (GetParam().torque) {
-    EXPECT_LT(torque(after), 0.5 * torque(before));
-    EXPECT_LT(after.velocity, 0.8 * before.velocity);
-  }
-  EXPECT_LT(after.position + after.heading, before.position + before.heading);
-  EXPECT_LT(torque(after), 2.0 * torque(floor)) << "near what separates a healthy robot from its own simulator";
+  const auto torque = [&](const Replay& r) {
+    return std::hypot(r.sum, r.difference / (0.5 * how.track_width.value()));
+  };
+  EXPECT_LT(torque(after), 0.4 * torque(before));
+  EXPECT_LT(after.velocity, 0.6 * before.velocity);
+  EXPECT_LT(after.position, 0.6 * before.position);
+  // What separates a healthy robot from its own simulator: noise, and the servo.
+  EXPECT_LT(torque(after), 1.5 * torque(floor));
+  EXPECT_LT(after.velocity, 1.5 * floor.velocity);
+  EXPECT_LT(after.position, 1.5 * floor.position);
 }
 
 INSTANTIATE_TEST_SUITE_P(All, Loop,
-                         ::testing::Values(LoopCase{"payload", 5, true}, LoopCase{"coulomb", 5, true},
-                                           LoopCase{"armature", 5, true}, LoopCase{"wheel_radius", 5, false},
-                                           LoopCase{"saturation", 5, true}),
+                         ::testing::Values(LoopCase{"payload", 5}, LoopCase{"coulomb", 5}, LoopCase{"wheel_radius", 5},
+                                           LoopCase{"saturation", 5}),
                          [](const auto& info) { return info.param.effect; });
 
 }  // namespace

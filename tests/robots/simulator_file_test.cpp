@@ -141,10 +141,12 @@ TEST(Mjcf, FrictionGearAndLimitsAreAttributesOfTheirElements) {
   wanted.gain = {0.5, 1.0};
   wanted.effort_limit = 4.0;
   std::string expected = sample_mjcf;
-  expected = replaced(expected, "<joint name=\"left\" />", "<joint name=\"left\" frictionloss=\"0.5\" armature=\"0.015\" />");
+  expected =
+      replaced(expected, "<joint name=\"left\" />", "<joint name=\"left\" frictionloss=\"0.5\" armature=\"0.015\" />");
   expected = replaced(expected, "damping=\"0.03\"/>", "damping=\"0.04\" frictionloss=\"0.25\" armature=\"0.015\"/>");
   expected = replaced(expected, "joint=\"left\"/>", "joint=\"left\" forcerange=\"-2 2\" forcelimited=\"true\"/>");
-  expected = replaced(expected, "gear=\"2 0 0 0 0 0\"/>", "gear=\"1 0 0 0 0 0\" forcerange=\"-4 4\" forcelimited=\"true\"/>");
+  expected =
+      replaced(expected, "gear=\"2 0 0 0 0 0\"/>", "gear=\"1 0 0 0 0 0\" forcerange=\"-4 4\" forcelimited=\"true\"/>");
   const EditedSimulator out = edited(SimulatorFormat::mjcf, sample_mjcf, wanted);
   EXPECT_EQ(out.text, expected);
   EXPECT_TRUE(out.not_expressed.empty());
@@ -153,13 +155,13 @@ TEST(Mjcf, FrictionGearAndLimitsAreAttributesOfTheirElements) {
 }
 
 TEST(Mjcf, WhatMakesOtherBodiesIsRefused) {
-  for (const auto& [old, now] :
-       std::initializer_list<std::pair<std::string, std::string>>{
+  for (const auto& [old, now] : std::initializer_list<std::pair<std::string, std::string>>{
            {"<worldbody>", "<include file=\"a.xml\"/>\n<worldbody>"},
            {"<freejoint/>", "<freejoint/><frame pos=\"1 0 0\"/>"},
            {"angle=\"degree\"", "angle=\"degree\" coordinate=\"global\""},
            {"<mujoco model=\"cart\">", "<mujoco model=\"cart\"><default class=\"x\"><default/></default>"}}) {
-    EXPECT_THROW(static_cast<void>(edited(SimulatorFormat::mjcf, replaced(sample_mjcf, old, now), {})), InputError) << now;
+    EXPECT_THROW(static_cast<void>(edited(SimulatorFormat::mjcf, replaced(sample_mjcf, old, now), {})), InputError)
+        << now;
   }
   EXPECT_THROW(static_cast<void>(edited(SimulatorFormat::mjcf, "<robot name=\"a\"/>", {})), InputError);
 }
@@ -168,7 +170,8 @@ TEST(Mjcf, MassesThatTheEngineMakesAreNotWritten) {
   SimulatorChange wanted = change({"mass"});
   wanted.mass = 2.0;
   for (const char* compiler : {"inertiafromgeom=\"true\"", "settotalmass=\"20\""}) {
-    const std::string text = replaced(sample_mjcf, "autolimits=\"true\"", std::string("autolimits=\"true\" ") + compiler);
+    const std::string text =
+        replaced(sample_mjcf, "autolimits=\"true\"", std::string("autolimits=\"true\" ") + compiler);
     const EditedSimulator out = edited(SimulatorFormat::mjcf, text, wanted);
     EXPECT_EQ(out.text, text);
     ASSERT_EQ(out.not_expressed.size(), 1U);
@@ -262,13 +265,15 @@ TEST(Sdf, NumbersAreTextOfTheirElements) {
 }
 
 TEST(Sdf, OneRobotAndNoIncludes) {
-  EXPECT_THROW(static_cast<void>(edited(SimulatorFormat::sdf, replaced(sample_sdf, "<link name=\"chassis\">",
-                                                                       "<include><uri>a</uri></include><link name=\"chassis\">"),
+  EXPECT_THROW(static_cast<void>(edited(SimulatorFormat::sdf,
+                                        replaced(sample_sdf, "<link name=\"chassis\">",
+                                                 "<include><uri>a</uri></include><link name=\"chassis\">"),
                                         {})),
                InputError);
-  EXPECT_THROW(static_cast<void>(edited(SimulatorFormat::sdf,
-                                        replaced(sample_sdf, "relative_to=\"chassis\"", "relative_to=\"nowhere\""), {})),
-               InputError);
+  EXPECT_THROW(
+      static_cast<void>(
+          edited(SimulatorFormat::sdf, replaced(sample_sdf, "relative_to=\"chassis\"", "relative_to=\"nowhere\""), {})),
+      InputError);
 }
 
 }  // namespace

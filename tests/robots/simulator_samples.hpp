@@ -26,7 +26,8 @@ inline const std::string sample_mjcf = R"(<?xml version="1.0"?>
     <geom name="floor" type="plane" size="0 0 1" condim="1"/>
     <body name="chassis" pos="0 0 0.1">
       <freejoint/>
-      <inertial pos="0.02 0 0.05" quat="0.9659258262890683 0.25881904510252074 0 0" mass="12" diaginertia="0.3 0.35 0.4"/>
+      <inertial pos="0.02 0 0.05" quat="0.9659258262890683 0.25881904510252074 0 0"
+                mass="12" diaginertia="0.3 0.35 0.4"/>
       <geom type="box" size="0.25 0.15 0.05" pos="0 0 0.08" contype="0" conaffinity="0"/>
       <geom type="sphere" size="0.03" pos="0.2 0 -0.07" condim="1" friction="0 0 0" priority="1"/>
       <geom type="sphere" size="0.03" pos="-0.2 0 -0.07" condim="1" friction="0 0 0" priority="1"/>
@@ -65,12 +66,16 @@ inline const std::string sample_sdf = R"(<?xml version="1.0"?>
       <link name="left_wheel">
         <pose>0 0.2 0.1 -1.5707963267948966 0 0</pose>
         <inertial><mass>1</mass><inertia><ixx>0.003</ixx><iyy>0.003</iyy><izz>0.005</izz></inertia></inertial>
-        <collision name="c"><geometry><cylinder><radius> 0.1 </radius><length>0.04</length></cylinder></geometry></collision>
+        <collision name="c">
+          <geometry><cylinder><radius> 0.1 </radius><length>0.04</length></cylinder></geometry>
+        </collision>
       </link>
       <link name="right_wheel">
         <pose relative_to="chassis">0 -0.2 0 -1.5707963267948966 0 0</pose>
         <inertial><mass>1</mass><inertia><ixx>0.003</ixx><iyy>0.003</iyy><izz>0.005</izz></inertia></inertial>
-        <collision name="c"><geometry><cylinder><radius>0.1</radius><length>0.04</length></cylinder></geometry></collision>
+        <collision name="c">
+          <geometry><cylinder><radius>0.1</radius><length>0.04</length></cylinder></geometry>
+        </collision>
       </link>
       <joint name="left_joint" type="revolute">
         <parent>chassis</parent><child>left_wheel</child>
