@@ -185,7 +185,8 @@ TEST_P(Loop, TheSimulatorComesNearerToTheRobot) {
   EXPECT_LT(after.velocity, 0.6 * before.velocity);
   EXPECT_LT(after.position, 0.6 * before.position);
   // What separates a healthy robot from its own simulator: noise, and the servo.
-  EXPECT_LT(torque(after), 1.5 * torque(floor));
+  // At a limit the noise of the servo is cut off on one side: that is not in the healthy log.
+  EXPECT_LT(torque(after), 2.0 * torque(floor));
   EXPECT_LT(after.velocity, 1.5 * floor.velocity);
   EXPECT_LT(after.position, 1.5 * floor.position);
 }
