@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <array>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -13,11 +14,13 @@
 #include <wheelwright/gap/effect.hpp>
 #include <wheelwright/gap/prepared.hpp>
 #include <wheelwright/gap/selection.hpp>
+#include <wheelwright/gap/simulator_change.hpp>
 #include <wheelwright/logs/csv.hpp>
 #include <wheelwright/report/commission_report.hpp>
 #include <wheelwright/report/gap_report.hpp>
 #include <wheelwright/results/gap_json.hpp>
 #include <wheelwright/robots/robot_file.hpp>
+#include <wheelwright/robots/simulator_file.hpp>
 #include <wheelwright/words/gap_words.hpp>
 
 #include <wheelwright/gap/further_drive.hpp>
@@ -31,8 +34,22 @@ using namespace words;
 namespace gap_command {
 namespace {
 
+struct SimulatorOption {
+  robots::SimulatorFormat format;
+  const char* option;
+  const char* says;
+};
+constexpr std::array<SimulatorOption, 3> kSimulators = {
+    {{robots::SimulatorFormat::mjcf, "--write-mjcf",
+      "Write a copy of this MuJoCo file (MJCF) with the causes in it into --out"},
+     {robots::SimulatorFormat::urdf, "--write-urdf", "Write a copy of this URDF file with the causes in it into --out"},
+     {robots::SimulatorFormat::sdf, "--write-sdf",
+      "Write a copy of this Gazebo file (SDF) with the causes in it into --out"}}};
+
 struct Arguments {
   std::vector<std::filesystem::path> logs, baseline, fresh;
+  std::array<std::filesystem::path, kSimulators.size()> simulators;  // empty: none of this format
+  robots::SimulatorHints wheels;
   std::filesystem::path robot;
   std::optional<double> beta;
   std::vector<std::string> without;
@@ -48,13 +65,18 @@ constexpr const char* kHelp =
     "drive "
     "would tell.\n\n"
     "A baseline is a log of the same robot when it was healthy: parameters and noise are learnt from it, and what it "
-    "shows already is no news. Without one, the nominal values of the robot file are believed.";
+    "shows already is no news. Without one, the nominal values of the robot file are believed.\n\n"
+    "What is found goes back into the file of your own simulator (--write-mjcf, --write-urdf, --write-sdf): masses, "
+    "friction, geometry, gains and limits are edited, everything else stays byte for byte, and causes that such a file "
+    "has no number for are named with what to do instead.";
 
 constexpr const char* kExamples =
     "Examples:\n"
     "  wheelwright gap drive.csv --robot robot.yaml --baseline healthy.csv --out gap\n"
     "  wheelwright gap monday.csv tuesday.csv --robot robot.yaml --without slope --json > gap.json\n"
-    "  then wheelwright commission drive.csv --robot gap/robot_improved.yaml --out result\n\n"
+    "  then wheelwright commission drive.csv --robot gap/robot_improved.yaml --out result\n"
+    "  wheelwright gap drive.csv --robot robot.yaml --write-mjcf robot.xml --out gap   # writes "
+    "gap/robot_improved.xml\n\n"
     "Exit code: 0 a diagnosis was made, whatever it is; 2 bad input.";
 
 constexpr const char* kImproved = "robot_improved.yaml";
@@ -132,9 +154,119 @@ void write_beside(const Arguments& a, const Diagnosis& d, const gap::NextDrive& 
   }
 }
 
+// A file of the user's simulator.
+struct SimulatorSource {
+  robots::SimulatorFormat format = robots::SimulatorFormat::mjcf;
+  std::filesystem::path path;
+  std::string text;
+
+  // Name of the edited file in the directory of results: robot_improved.xml of robot.xml.
+  [[nodiscard]] std::string edited_name() const {
+    return path.stem().string() + "_improved" + path.extension().string();
+  }
+};
+
+// Files that are to be edited; what is wrong with them is told before the work begins.
+std::vector<SimulatorSource> simulator_sources(const Arguments& a, const Robot& robot) {
+  constexpr std::size_t kLongest = std::size_t{1} << 24;
+  std::vector<SimulatorSource> sources;
+  for (std::size_t k = 0; k < kSimulators.size(); ++k) {
+    const auto& [format, option, says] = kSimulators[k];
+    const std::filesystem::path& path = a.simulators[k];
+    if (path.empty()) {
+      continue;
+    }
+    if (a.common.out.empty()) {
+      throw InputError(fmt::format("{}: expected --out DIR with it: the edited file is written there", option));
+    }
+    if (!model::on_two_wheels(robot)) {
+      throw InputError(fmt::format("{}: {} is no robot on two driven wheels", option, a.robot.string()));
+    }
+    SimulatorSource source{format, path, files::read_bytes(path, kLongest)};
+    std::error_code none;
+    const std::filesystem::path target = a.common.out / source.edited_name();
+    if (std::filesystem::equivalent(path, target, none)) {
+      throw InputError(
+          fmt::format("{} {}: would be written over itself: expected another --out", option, path.string()));
+    }
+    for (const SimulatorSource& other : sources) {
+      if (other.edited_name() == source.edited_name()) {
+        throw InputError(fmt::format("{} {}: {} has the same name: expected one file for each", option, path.string(),
+                                     other.path.string()));
+      }
+    }
+    static_cast<void>(robots::edit_simulator(format, source.text, path.string(), {}, robot, a.wheels));
+    sources.push_back(std::move(source));
+  }
+  if (sources.empty() && !(a.wheels.left.empty() && a.wheels.right.empty())) {
+    throw InputError("--left and --right: expected --write-mjcf, --write-urdf or --write-sdf with them");
+  }
+  return sources;
+}
+
+// The causes as changes of a simulator; none, with the reason, where the diagnosis stands for nothing.
+model::SimulatorChange change_of(LogSource& log, LogSource* baseline, const Robot& robot, const Diagnosis& d,
+                                 const gap::DiagnoseOptions& options) {
+  if (d.verdict == gap::GapVerdict::no_gap || d.verdict == gap::GapVerdict::unexplained) {
+    model::SimulatorChange none;
+    if (d.verdict == gap::GapVerdict::unexplained) {
+      none.not_expressed.push_back({"", "what the best causes leave is above the noise floor",
+                                    "nothing was written: find what is missing first"});
+    }
+    return none;
+  }
+  const gap::PreparedGap prepared = gap::prepare_gap(log, baseline, robot, options);
+  // Without the motor's constants no torque goes into a file.
+  return gap::simulator_change(prepared.view.physical ? prepared.view.robot : robot, prepared.drive, d);
+}
+
+// Edits the files and writes those of which something changed; what an earlier run left of the others is removed.
+std::vector<robots::EditedSimulator> write_simulators(const Arguments& a, const std::vector<SimulatorSource>& sources,
+                                                      const model::SimulatorChange& change, const Robot& robot,
+                                                      Json& result) {
+  std::vector<robots::EditedSimulator> edits;
+  for (const SimulatorSource& source : sources) {
+    edits.push_back(robots::edit_simulator(source.format, source.text, source.path.string(), change, robot, a.wheels));
+    const robots::EditedSimulator& edit = edits.back();
+    const std::string name = source.edited_name();
+    if (edit.changed.empty()) {
+      std::filesystem::remove(a.common.out / name);
+    } else {
+      files::atomic_write(a.common.out / name, edit.text);
+    }
+    result["simulators"].push_back(
+        robots::to_json(edit, source.path.string(), edit.changed.empty() ? std::string() : name));
+  }
+  return edits;
+}
+
+void say_simulators(const Arguments& a, const std::vector<SimulatorSource>& sources,
+                    const std::vector<robots::EditedSimulator>& edits, const std::vector<Effect>& catalogue) {
+  for (std::size_t k = 0; k < edits.size(); ++k) {
+    const robots::EditedSimulator& edit = edits[k];
+    if (edit.changed.empty()) {
+      say("{}: nothing to change\n", sources[k].path.string());
+    } else {
+      say("wrote {}, which is {} but for:\n", (a.common.out / sources[k].edited_name()).string(),
+          sources[k].path.string());
+    }
+    for (const robots::NumberChanged& c : edit.changed) {
+      say("  {}: {}: {} {} -> {} ({})\n", c.where, c.element, c.number, c.before.empty() ? "(none)" : c.before, c.after,
+          in_words(c.because, catalogue));
+    }
+    for (const model::NotExpressed& n : edit.not_expressed) {
+      say("  not in it: {}{}: {}\n", n.cause.empty() ? "" : in_words(n.cause, catalogue) + ": ", n.why, n.instead);
+    }
+    for (const std::string& remark : edit.remarks) {
+      say("  note: {}\n", remark);
+    }
+  }
+}
+
 int run(const Arguments& a) {
   make_directory(a.common);
   Robot robot = read_robot(a.robot);
+  const std::vector<SimulatorSource> sources = simulator_sources(a, robot);
   const std::vector<Effect> catalogue = gap::effect_catalogue(model::make_model(robot));
   check_without(a.without, catalogue);
   const auto opened = open_robot_log(a.logs, robot, a.common);
@@ -155,19 +287,23 @@ int run(const Arguments& a) {
   Diagnosis diagnosis;
   gap::NextDrive next;
   std::vector<std::string> naive;
+  model::SimulatorChange change;
   try {
-    logs::require_columns(log, robots::needed_columns(robot));
+    logs::require_columns(log, gap::required_columns(log, robot));
     if (healthy != nullptr) {
-      logs::require_columns(*healthy, robots::needed_columns(robot));
+      logs::require_columns(*healthy, gap::required_columns(*healthy, robot));
     }
     diagnosis = diagnose(log, healthy, robot, options);
     if (!a.fresh.empty()) {
       const auto fresh = open_robot_log(a.fresh, robot, a.common);
-      logs::require_columns(*fresh, robots::needed_columns(robot));
+      logs::require_columns(*fresh, gap::required_columns(*fresh, robot));
       diagnosis.shrink.fresh_torque_rms = gap::torque_on(*fresh, healthy, robot, diagnosis, options);
     }
     next = a.no_manoeuvre ? gap::NextDrive{} : gap::what_next(log, healthy, robot, diagnosis, options);
     naive = a.naive ? naive_effects(log, healthy, robot, options) : naive;
+    if (!sources.empty()) {
+      change = change_of(log, healthy, robot, diagnosis, options);
+    }
   } catch (const Error& error) {
     if (!a.common.out.empty()) {
       files::atomic_write(a.common.out / "report.html", report::failure_report(error.what(), context));
@@ -203,6 +339,7 @@ int run(const Arguments& a) {
   if (a.naive) {
     result["naive"] = {{"effects", naive}};
   }
+  const std::vector<robots::EditedSimulator> edits = write_simulators(a, sources, change, robot, result);
   if (files) {
     write_beside(a, diagnosis, next);
   }
@@ -212,6 +349,7 @@ int run(const Arguments& a) {
     print_log(context.warnings);
     say("{}", summary(diagnosis, {files ? (a.common.out / "").string() : "", a.robot.string(),
                                   files && diagnosis.improved, promise, files && next.commands, a.naive, naive}));
+    say_simulators(a, sources, edits, catalogue);
     if (files) {
       say("wrote {} and {}\n", (a.common.out / "gap.json").string(), (a.common.out / "report.html").string());
     }
@@ -250,6 +388,14 @@ Run add_gap(CLI::App& program) {
       ->expected(1)
       ->allow_extra_args(false)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  for (std::size_t k = 0; k < kSimulators.size(); ++k) {
+    command.add_option(kSimulators[k].option, a->simulators[k], kSimulators[k].says)->type_name("FILE");
+  }
+  for (const auto& [name, joint, side] :
+       {std::tuple{"--left", &a->wheels.left, "left"}, {"--right", &a->wheels.right, "right"}}) {
+    command.add_option(name, *joint, fmt::format("Joint of the driven wheel on the {} side in that file", side))
+        ->type_name("JOINT");
+  }
   command.add_flag("--no-shrink", a->no_shrink, "Do not measure how far the gap shrinks: much faster");
   command.add_flag("--no-manoeuvre", a->no_manoeuvre, "Do not design a drive where causes cannot be told apart");
   command.add_flag("--naive", a->naive,

@@ -283,6 +283,15 @@ Case make_case(const Request& request, std::uint64_t index) {
   }
 }
 
+std::string designers_xml(const RobotDesign& robot) {
+  Body body = robot.body;
+  body.radius.fill(robot.radius);
+  body.half_track = robot.half_track;
+  body.friction.fill(0.0);
+  body.motor = "gear=\"1\"";
+  return engine_xml(body, 0.001);
+}
+
 std::string robot_yaml(const RobotDesign& robot, const std::string& name) {
   return fmt::format(
       "name: {}\nmodel: differential_drive\nwheel_radius: {:.6g}\ntrack_width: {:.6g}\nlever_arm: half_track\n"

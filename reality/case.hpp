@@ -66,6 +66,9 @@ struct Case {
 /// Case `index` of `request`; it does not depend on any other.
 [[nodiscard]] Case make_case(const Request& request, std::uint64_t index);
 
+/// The simulator's file (MJCF) of its designer: the robot of the data sheet, with motors called as its wheels' joints.
+[[nodiscard]] std::string designers_xml(const RobotDesign& robot);
+
 /// The robot file, as its designer would write it.
 [[nodiscard]] std::string robot_yaml(const RobotDesign& robot, const std::string& name);
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // wheelwright-reality: logs of robots in another physics engine, with an effect that is withheld.
+#include <array>
 #include <atomic>
 #include <cstdio>
 #include <exception>
@@ -7,6 +8,7 @@
 #include <map>
 #include <mutex>
 #include <thread>
+#include <vector>
 
 #include <fmt/format.h>
 #include <mujoco/mujoco.h>
@@ -17,7 +19,9 @@
 #include <wheelwright/files/bytes.hpp>
 #include <wheelwright/files/json.hpp>
 #include <wheelwright/logs/csv.hpp>
+#include <wheelwright/logs/log_file.hpp>
 #include <wheelwright/reality/case.hpp>
+#include <wheelwright/reality/replay.hpp>
 
 namespace {
 
@@ -69,6 +73,7 @@ Json write_case(const Request& request, std::uint64_t index, const fs::path& out
   logs::write_csv(out / "logs" / name / "real.csv.gz", c.real);
   logs::write_csv(out / "fresh" / name / "real.csv.gz", c.fresh);
   files::atomic_write(out / "logs" / name / "robot.yaml", robot_yaml(c.robot, name));
+  files::atomic_write(out / "logs" / name / "robot.xml", designers_xml(c.robot));
   return answer(c);
 }
 
@@ -110,6 +115,80 @@ int generate(const Request& request, std::uint64_t first, std::uint64_t cases, u
   return 0;
 }
 
+/// What `replay` is asked for.
+struct ReplayRequest {
+  std::vector<fs::path> logs, simulators;
+  fs::path gap, out;
+  ReplayOptions options;
+};
+
+// A figure of gap.json's shrink: before and after; nulls where it has none.
+Json promised(const Json& gap, const char* group, const std::string& name) {
+  if (!gap.contains("shrink") || !gap["shrink"].contains(group) || !gap["shrink"][group].contains(name)) {
+    return {nullptr, nullptr};
+  }
+  const Json& figure = gap["shrink"][group][name];
+  return {figure["before"], figure["after"]};
+}
+
+int run_replay(ReplayRequest request) {
+  Json gap = Json::object();
+  if (!request.gap.empty()) {
+    gap = Json::parse(files::read_bytes(request.gap, std::size_t{1} << 28));
+    request.options.beta = gap.at("filter").at("beta").get<double>();
+  }
+  const auto source = logs::open_log(request.logs);
+  const LogTable log = read_all(*source);
+  std::vector<Replay> all;
+  for (const fs::path& simulator : request.simulators) {
+    all.push_back(replay(files::read_bytes(simulator, std::size_t{1} << 24), log, request.options));
+    // What the wheels show is read as the first simulator has it.
+    request.options.wheel_radius = all.front().wheel_radius;
+    request.options.track_width = all.front().track_width;
+  }
+  struct Figure {
+    const char *name, *unit, *group, *key;
+    double Replay::*value;
+  };
+  const std::string after = fmt::format("_{}s", request.options.horizon);
+  const std::array<Figure, 6> figures = {
+      {{"torque, sum", "N m", "torque_rms", "sum", &Replay::sum},
+       {"torque, difference", "N m2", "torque_rms", "difference", &Replay::difference},
+       {"velocity", "m/s", "rollout", "velocity", &Replay::velocity},
+       {"yaw rate", "rad/s", "rollout", "yaw_rate", &Replay::yaw_rate},
+       {"position", "m", "rollout", "position", &Replay::position},
+       {"heading", "rad", "rollout", "heading", &Replay::heading}}};
+  fmt::print("{:<20}{:>6}", "robot - simulator", "");
+  for (const fs::path& simulator : request.simulators) {
+    fmt::print("  {:>18}", simulator.filename().string());
+  }
+  fmt::print("{}\n", request.gap.empty() ? "" : "    promised: before       after");
+  Json result = Json::object();
+  for (const Figure& f : figures) {
+    const bool loop = f.group == std::string("rollout");
+    const Json promise = promised(gap, f.group, loop ? f.key + after : std::string(f.key));
+    fmt::print("{:<20}{:>6}", f.name, f.unit);
+    Json values = Json::array();
+    for (const Replay& r : all) {
+      fmt::print("  {:>18.4g}", r.*f.value);
+      values.push_back(digits(r.*f.value));
+    }
+    if (!request.gap.empty()) {
+      for (const Json& number : promise) {
+        fmt::print("  {:>10}", number.is_number() ? fmt::format("{:.4g}", number.get<double>()) : "-");
+      }
+    }
+    fmt::print("\n");
+    result[loop ? f.key + after : std::string(f.key)] = {{"measured", values}, {"promised", promise}, {"unit", f.unit}};
+  }
+  fmt::print("root mean squares; torques through f2 at {} 1/s, the rest after {} s in open loop ({} runs)\n",
+             request.options.beta, request.options.horizon, all.front().runs);
+  if (!request.out.empty()) {
+    files::write_json(request.out, result);
+  }
+  return 0;
+}
+
 int list_laws() {
   for (const Subject& subject : subjects()) {
     const Law* law = subject.law;
@@ -138,6 +217,23 @@ int main(int count, char** arguments) try {
                                        "A set of cases: logs and robot files in DIR/logs, a second drive of "
                                        "each in DIR/fresh, answers in DIR/answers.json");
   CLI::App& list = *app.add_subcommand("laws", "Effects and the laws that they may follow");
+  CLI::App& again = *app.add_subcommand("replay",
+                                        "How far a robot's log and simulators (MJCF) are apart: the torque that each "
+                                        "simulator needs for the log's speeds, and where the log's torques take it");
+  ReplayRequest replayed;
+  again.add_option("LOG", replayed.logs, "logs of the robot: wheel speeds, torques and pose")->required();
+  again.add_option("--mjcf", replayed.simulators, "the simulator's file; several: before, after")
+      ->required()
+      ->expected(1)
+      ->allow_extra_args(false)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  again.add_option("--gap", replayed.gap, "gap.json: its filter is taken, and what it promises stands beside");
+  again.add_option("--right", replayed.options.right, "joint of the right wheel")->capture_default_str();
+  again.add_option("--left", replayed.options.left, "joint of the left wheel")->capture_default_str();
+  again.add_option("--horizon", replayed.options.horizon, "of runs in open loop, s")
+      ->check(CLI::Range(0.05, 60.0))
+      ->capture_default_str();
+  again.add_option("--out", replayed.out, "the same as JSON");
   Request request;
   std::uint64_t cases = 0;
   std::uint64_t first = 0;
@@ -178,6 +274,11 @@ int main(int count, char** arguments) try {
   if (list.parsed()) {
     return list_laws();
   }
+  // The engine writes its warnings into a file of its own in the working directory: the world looks at them itself.
+  mju_user_warning = [](const char*) {};
+  if (again.parsed()) {
+    return run_replay(std::move(replayed));
+  }
   request.hard = profile == "hard";
   request.low = severities.at(profile).low;
   request.high = severities.at(profile).high;
@@ -189,8 +290,6 @@ int main(int count, char** arguments) try {
   if (cases == 0) {
     cases = request.each ? subjects(request.effect).size() : 10;
   }
-  // The engine writes its warnings into a file of its own in the working directory: the world looks at them itself.
-  mju_user_warning = [](const char*) {};
   return generate(request, first, cases, threads, out);
 } catch (const InvalidArgument& error) {
   fmt::print(stderr, "wheelwright-reality: {}\n", error.what());

@@ -8,9 +8,9 @@
 #include <numbers>
 
 #include <fmt/format.h>
-#include <mujoco/mujoco.h>
 
 #include <wheelwright/core/error.hpp>
+#include <wheelwright/reality/engine.hpp>
 #include <wheelwright/reality/world.hpp>
 
 namespace wheelwright::reality {
@@ -136,17 +136,6 @@ Drive draw_drive(const RobotDesign& robot, Random& random, double duration) {
   return drive;
 }
 
-namespace {
-
-struct FreeModel {
-  void operator()(mjModel* model) const { mj_deleteModel(model); }
-};
-struct FreeData {
-  void operator()(mjData* data) const { mj_deleteData(data); }
-};
-using Model = std::unique_ptr<mjModel, FreeModel>;
-using Data = std::unique_ptr<mjData, FreeData>;
-
 Model compile(const std::string& xml) {
   // The engine's parser keeps its last document in a global.
   static std::mutex parser;
@@ -166,6 +155,8 @@ Model compile(const std::string& xml) {
   }
   return model;
 }
+
+namespace {
 
 /// Speed control with integrator and feed-forward, for sum and difference.
 class SpeedControl {

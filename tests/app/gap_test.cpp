@@ -6,6 +6,8 @@
 
 #include <wheelwright/robots/robot_file.hpp>
 
+#include "robots/simulator_samples.hpp"
+
 namespace wheelwright::app::gap_test {
 namespace {
 
@@ -96,6 +98,42 @@ TEST_F(Gap, AHealthyRobotHasNone) {
   EXPECT_FALSE(std::filesystem::exists(path("gap/robot_improved.yaml")));
 }
 
+// The file of the user's own simulator: the friction is put at its joints, and not a byte changes beside.
+TEST_F(Gap, WhatIsFoundGoesBackIntoTheSimulator) {
+  drive("healthy", "robot.yaml", 1, "", 40);
+  drive("real", "robot.yaml", 2, fmt::format("effects: [{{effect: coulomb, c: {}}}]\n", kCoulomb), 40);
+  put("robot.xml", testing::sample_mjcf);
+  const std::string gap = " --robot robot.yaml --baseline healthy.csv --no-shrink --write-mjcf robot.xml --out gap";
+  const Outcome told = run("gap real.csv" + gap);
+  ASSERT_EQ(told.code, 0) << told.err;
+  EXPECT_THAT(told.out, AllOf(HasSubstr("robot_improved.xml"), HasSubstr("frictionloss (none) -> 0.2")));
+  if (has_validator()) {
+    EXPECT_EQ(misfit("gap.schema.json", "gap/gap.json"), "");
+  }
+  const Json edit = files::read_json(path("gap/gap.json")).at("simulators").at(0);
+  EXPECT_EQ(edit.at("file"), "robot_improved.xml");
+  EXPECT_THAT(edit.at("not_expressed"), IsEmpty());
+  EXPECT_EQ(edit.at("wheels").at("right"), "right");
+  ASSERT_EQ(edit.at("changed").size(), 2U);
+  EXPECT_EQ(bytes(path("robot.xml")), testing::sample_mjcf);
+  std::string text = bytes(path("gap/robot_improved.xml"));
+  for (const Json& number : edit.at("changed")) {
+    EXPECT_EQ(number.at("number"), "frictionloss");
+    EXPECT_EQ(number.at("because"), "coulomb");
+    EXPECT_NEAR(std::stod(number.at("after").get<std::string>()), kCoulomb, 0.1 * kCoulomb);
+    const std::string added = " frictionloss=\"" + number.at("after").get<std::string>() + "\"";
+    ASSERT_THAT(text, HasSubstr(added));
+    text.erase(text.find(added), added.size());
+  }
+  EXPECT_EQ(text, testing::sample_mjcf);
+
+  // A healthy robot asks for nothing, and an edited file of an earlier run would contradict that.
+  const Outcome none = run("gap healthy.csv" + gap);
+  ASSERT_EQ(none.code, 0) << none.err;
+  EXPECT_TRUE(files::read_json(path("gap/gap.json")).at("simulators").at(0).at("file").is_null());
+  EXPECT_FALSE(std::filesystem::exists(path("gap/robot_improved.xml")));
+}
+
 TEST_F(Gap, WhatOneLeavesOutIsNotNamed) {
   drive("healthy", "robot.yaml", 1, "", 40);
   drive("real", "robot.yaml", 2, fmt::format("effects: [{{effect: coulomb, c: {}}}]\n", kCoulomb), 40);
@@ -126,6 +164,11 @@ TEST_F(Gap, SaysWhatIsWrong) {
   EXPECT_THAT(complaint("short.csv --robot robot.yaml --out short"), HasSubstr("drive longer"));
   EXPECT_THAT(names_in("short"), ElementsAre("report.html"));
   EXPECT_THAT(complaint("short.csv --robot robot.yaml --beta 0"), HasSubstr("--beta"));
+  put("robot.xml", "<mujoco>\n<worldbody>\n</mujoco>\n");
+  EXPECT_THAT(complaint("short.csv --robot robot.yaml --write-mjcf robot.xml"), HasSubstr("--out"));
+  EXPECT_THAT(complaint("short.csv --robot robot.yaml --write-mjcf robot.xml --out x"), HasSubstr("robot.xml:"));
+  EXPECT_THAT(complaint("short.csv --robot robot.yaml --write-sdf gone.sdf --out x"), HasSubstr("gone.sdf"));
+  EXPECT_THAT(complaint("short.csv --robot robot.yaml --left a --right b"), HasSubstr("--write-mjcf"));
 }
 
 }  // namespace

@@ -1,0 +1,262 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/gap/simulator_change.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <string>
+#include <string_view>
+
+#include <fmt/format.h>
+
+#include <wheelwright/core/check.hpp>
+#include <wheelwright/model/effect_law.hpp>
+
+namespace wheelwright::gap {
+
+using model::NotExpressed;
+using model::SimulatorChange;
+
+namespace {
+
+// What to do about an effect that is no number of a body or joint.
+struct Remedy {
+  const char* why;
+  const char* instead;
+};
+const std::map<std::string_view, Remedy>& remedies() {
+  constexpr const char* kFriction = "a joint has dry and viscous friction only";
+  constexpr const char* kCommand = "it lies between the command and the joint";
+  constexpr const char* kContact = "it is a property of the contacts, whose laws differ from engine to engine";
+  constexpr const char* kReading = "it is in what the sensors say, not in the robot";
+  static const std::map<std::string_view, Remedy> all = {
+      {"stribeck",
+       {kFriction, "add c_s exp(-(w/omega_s)^2) sgn(w) against each wheel's speed w where torques are set"}},
+      {"quadratic_drag",
+       {kFriction, "take c v|v| from the sum of the torques where they are set, v the robot's speed"}},
+      {"load_friction",
+       {kFriction, "take the share k of each torque from it where torques are set, against the motion"}},
+      {"friction_drift", {"a file has no time", "write the friction of a warm robot, or change it while it runs"}},
+      {"caster_drag", {kContact, "give the castor's contact the friction force c/r, at the distance p from the axle"}},
+      {"lateral_scrub", {kContact, "give the wheels' contacts torsional friction (MuJoCo: condim 4)"}},
+      {"torque_bias", {kCommand, "take b_R and b_L from the torques where they are set"}},
+      {"actuator_lag",
+       {kCommand,
+        "pass the commands through a lag of T (MuJoCo: a <general> actuator with dyntype=\"filter\" and dynprm)"}},
+      {"delay", {kCommand, "hold every command back by T_d where torques are set"}},
+      {"sensor_time_offset", {kReading, "stamp the simulated speeds later by dt"}},
+      {"torque_deadzone", {kCommand, "take b from the size of each torque where torques are set, down to 0"}},
+      {"backlash",
+       {"it needs a body and a joint more",
+        "put the rotor on a joint of its own that meets the wheel at the ends of a narrow range"}},
+      {"battery_sag", {kCommand, "multiply torques by 1 - k t - R_b (|tau_R| + |tau_L|) where they are set"}},
+      {"longitudinal_slip",
+       {kContact, "soften the wheels' contacts along the rolling direction (Gazebo: slip1, slip2)"}},
+      {"turning_slip", {kContact, "lower the wheels' friction sideways (Gazebo: mu2; MuJoCo: friction of the geoms)"}},
+      {"curve_slip", {kContact, "lower the wheels' friction sideways (Gazebo: mu2; MuJoCo: friction of the geoms)"}},
+      {"wheel_out_of_round", {"a wheel is a round shape", "move the wheels' shapes off their axles, or use meshes"}},
+      {"encoder_scale", {kReading, "scale the angle and speed of that wheel where the simulation is logged"}},
+      {"slope",
+       {"the ground is the world's", "tilt the ground, or take g_x and g_y from the gravity's x and y components"}},
+  };
+  return all;
+}
+
+class Changes {
+ public:
+  Changes(const Robot& robot, const Drive& drive, const Diagnosis& found)
+      : drive_(drive), found_(found), unit_(model::effort_per_torque(robot)) {}
+
+  void take(const FittedEffect& cause) {
+    cause_ = &cause;
+    const std::string& name = cause.effect.name;
+    if (name == "wheel_radius" && has({"epsilon"})) {
+      change_.radius_factor *= 1.0 + c(0);
+      because("radius_factor");
+    } else if (name == "wheel_radius_asymmetric" && has({"epsilon"})) {
+      change_.radius_factor =
+          change_.radius_factor.cwiseProduct(Eigen::Vector2d(Eigen::Vector2d::Ones() + c(0) * sides()));
+      because("radius_factor");
+    } else if (name == "track_width" && has({"narrowing"}) && c(0) < 1.0) {
+      change_.track_factor /= 1.0 - c(0);
+      because("track_factor");
+    } else if (name == "torque_gain" && has({"command_excess"}) && c(0) > -1.0) {
+      change_.gain /= 1.0 + c(0);
+      because("gain");
+    } else if (name == "torque_gain_asymmetric" && has({"command_excess"}) && std::abs(c(0)) < 1.0) {
+      change_.gain = change_.gain.cwiseQuotient(Eigen::Vector2d(Eigen::Vector2d::Ones() + c(0) * sides()));
+      because("gain");
+    } else if (!take_torque(name)) {
+      not_expressed(name);
+    }
+  }
+
+  void not_expressed(const std::string& name) {
+    const auto remedy = remedies().find(name);
+    if (remedy != remedies().end()) {
+      tell(name, remedy->second.why, remedy->second.instead);
+    } else {
+      tell(name, "there is no rule by which it becomes a number of a simulator's file",
+           "program it where torques are set");
+    }
+  }
+
+  SimulatorChange result() && { return std::move(change_); }
+
+ private:
+  // Causes that are torques, or of which a torque is known only where efforts are torques; false for any other.
+  bool take_torque(const std::string& name) {
+    const bool known = name == "payload" || name == "payload_offset" || name == "com_longitudinal" ||
+                       name == "com_lateral" || name == "coulomb" || name == "coulomb_asymmetric" ||
+                       name == "viscous" || name == "viscous_asymmetric" || name == "armature" || name == "saturation";
+    if (known && !unit_) {
+      tell(name, "the log's efforts are no torques, and the robot file has no motor constants",
+           "give the robot file `motor:` with torque_constant, gear_ratio (and resistance), and run again");
+      return true;
+    }
+    if (name == "payload" && has({"mass_kg", "yaw_inertia"})) {
+      add_payload(0.0);
+    } else if (name == "payload_offset" && has({"mass_kg", "yaw_inertia", "moment"})) {
+      add_payload(c(2));
+    } else if ((name == "com_longitudinal" && has({"a"})) || (name == "com_lateral" && has({"b"}))) {
+      const bool ahead = name == "com_longitudinal";
+      (ahead ? change_.moment_ahead : change_.moment_left) += c(0) * drive_.physical("mass");
+      because(ahead ? "moment_ahead" : "moment_left");
+      if (cause_->coefficients.size() > 1 && c(1) != 0.0) {
+        change_.yaw_inertia += c(1) * drive_.physical("yaw_inertia");
+        because("yaw_inertia");
+      }
+    } else if (name == "coulomb" && has({"c"}) && cause_->coefficients.size() == 1) {
+      change_.dry_friction.array() += torque(0);
+      because("dry_friction");
+    } else if (name == "coulomb_asymmetric" && has({"c_R", "c_L"})) {
+      change_.dry_friction += Eigen::Vector2d(torque(0), torque(1));
+      because("dry_friction");
+    } else if (name == "viscous" && has({"viscous_linear", "viscous_yaw"})) {
+      add_viscous();
+    } else if (name == "viscous_asymmetric" && has({"damping"})) {
+      change_.damping += torque(0) * sides();
+      because("damping");
+    } else if (name == "armature" && has({"armature"})) {
+      change_.armature.array() += torque(0);
+      because("armature");
+    } else if (name == "saturation" && cause_->effect.unit_coefficient && cause_->shape.size() == 1) {
+      change_.effort_limit = cause_->shape[0] / *unit_;
+      because("effort_limit");
+    } else {
+      return false;
+    }
+    return true;
+  }
+
+  void add_payload(double moment) {
+    change_.mass += c(0);
+    change_.yaw_inertia += c(1);
+    because("mass");
+    because("yaw_inertia");
+    if (moment != 0.0) {
+      change_.moment_ahead += moment;
+      because("moment_ahead");
+    }
+  }
+
+  // f1 = 2c/r² and f3 = c D²/(2r²) ask for a damping c each.
+  void add_viscous() {
+    const double r2 = drive_.wheel_radius * drive_.wheel_radius, d2 = drive_.track_width * drive_.track_width;
+    const Eigen::Array2d per(0.5 * r2, 2.0 * r2 / d2);
+    const Eigen::Array2d wanted = per * Eigen::Array2d(c(0), c(1));
+    const Eigen::Array2d half = per * Eigen::Array2d(half_width("viscous_linear"), half_width("viscous_yaw"));
+    const bool weighed = half.minCoeff() > 0.0;
+    const Eigen::Array2d weight = weighed ? Eigen::Array2d(half.square().inverse()) : Eigen::Array2d(1.0, 1.0);
+    const double damping = (weight * wanted).sum() / weight.sum();
+    change_.damping.array() += damping;
+    because("damping");
+    if (weighed && ((wanted - damping).abs() > half).any()) {
+      tell("viscous", "friction straight ahead and in turns do not fit one damping of the wheels' joints",
+           fmt::format(
+               "straight ahead {:.4g} and in turns {:.4g} N·m·s/rad at each wheel were found, {:.4g} was written: "
+               "what is left is friction of the ground or of castors",
+               wanted[0], wanted[1], damping));
+    }
+  }
+
+  [[nodiscard]] bool has(std::initializer_list<std::string_view> names) const {
+    std::size_t k = 0;
+    return cause_->effect.parameters.size() >= names.size() &&
+           cause_->coefficients.size() == std::ssize(cause_->effect.parameters) &&
+           std::ranges::all_of(names, [&](std::string_view n) { return cause_->effect.parameters[k++].name == n; });
+  }
+  [[nodiscard]] double c(Eigen::Index k) const { return cause_->coefficients[k]; }
+  // A coefficient in N·m (per unit of speed or acceleration).
+  [[nodiscard]] double torque(Eigen::Index k) const { return c(k) / *unit_; }
+  // What the first shape makes of a coefficient at the right and the left wheel (catalogue::side_or_opposite).
+  [[nodiscard]] Eigen::Vector2d sides() const {
+    const double side = cause_->shape.empty() ? 0.0 : cause_->shape[0];
+    return side > 1.5 ? Eigen::Vector2d(1.0, -1.0) : side < 0.5 ? Eigen::Vector2d(1.0, 0.0) : Eigen::Vector2d(0.0, 1.0);
+  }
+  [[nodiscard]] double half_width(std::string_view parameter) const {
+    for (const GapCause& cause : found_.causes) {
+      if (cause.effect == cause_->effect.name) {
+        for (const GapEstimate& number : cause.parameters) {
+          if (number.name == parameter) {
+            return 0.5 * (number.upper - number.lower);
+          }
+        }
+      }
+    }
+    return 0.0;
+  }
+  [[nodiscard]] std::string numbers(const std::string& effect) const {
+    std::string out;
+    for (const GapCause& cause : found_.causes) {
+      for (const GapEstimate& number : cause.parameters) {
+        if (cause.effect == effect) {
+          out += fmt::format("{}{} = {:.4g}{}", out.empty() ? "" : ", ", number.name, number.estimate,
+                             number.unit.empty() || number.unit == "1" ? "" : " " + number.unit);
+        }
+      }
+    }
+    return out;
+  }
+
+  void because(const std::string& member) {
+    std::string& names = change_.because[member];
+    if (names.find(cause_->effect.name) == std::string::npos) {
+      names += (names.empty() ? "" : ", ") + cause_->effect.name;
+    }
+  }
+  void tell(const std::string& name, const std::string& why, const std::string& instead) {
+    const bool there = std::ranges::any_of(change_.not_expressed,
+                                           [&](const NotExpressed& n) { return n.cause == name && n.why == why; });
+    if (!there) {
+      const std::string with = numbers(name);
+      change_.not_expressed.push_back({name, why, with.empty() ? instead : instead + " (" + with + ")"});
+    }
+  }
+
+  const Drive& drive_;
+  const Diagnosis& found_;
+  std::optional<double> unit_;
+  const FittedEffect* cause_ = nullptr;
+  SimulatorChange change_;
+};
+
+}  // namespace
+
+SimulatorChange simulator_change(const Robot& robot, const Drive& drive, const Diagnosis& found) {
+  check::that(drive.two_wheels(), "simulator_change drive", "a robot on two driven wheels");
+  Changes changes(robot, drive, found);
+  for (const FittedEffect& cause : found.fitted) {
+    changes.take(cause);
+  }
+  for (const GapCause& cause : found.causes) {
+    const bool fitted = std::ranges::any_of(
+        found.fitted, [&](const FittedEffect& effect) { return effect.effect.name == cause.effect; });
+    if (!fitted) {
+      changes.not_expressed(cause.effect);
+    }
+  }
+  return std::move(changes).result();
+}
+
+}  // namespace wheelwright::gap
