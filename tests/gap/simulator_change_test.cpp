@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -89,7 +90,7 @@ TEST(SimulatorChange, CurrentsNeedTheMotorsConstants) {
   EXPECT_EQ(blind.because.size(), 1U);
   ASSERT_EQ(blind.not_expressed.size(), 2U);
   EXPECT_NE(blind.not_expressed[0].instead.find("torque_constant"), std::string::npos);
-  robot.motor = model::Motor{.torque_constant = 0.05, .gear_ratio = 20.0};
+  robot.motor = model::Motor{0.05, std::nullopt, std::nullopt, 20.0};
   const SimulatorChange known = change_of(causes, robot);
   EXPECT_DOUBLE_EQ(known.dry_friction[0], 0.2 * 0.05 * 20.0);
   EXPECT_DOUBLE_EQ(known.mass, 3.0);
