@@ -131,7 +131,7 @@ TEST_P(Format, BrokenFilesAreRefusedWithTheirPlaceOrEdited) {
 
 INSTANTIATE_TEST_SUITE_P(All, Format,
                          ::testing::Values(SimulatorFormat::mjcf, SimulatorFormat::urdf, SimulatorFormat::sdf),
-                         [](const auto& info) { return std::string(name_of(info.param)); });
+                         [](const auto& tested) { return std::string(name_of(tested.param)); });
 
 TEST(Mjcf, FrictionGearAndLimitsAreAttributesOfTheirElements) {
   SimulatorChange wanted = change({"dry_friction", "damping", "armature", "gain", "effort_limit"});
