@@ -194,7 +194,7 @@ TEST_P(Loop, TheSimulatorComesNearerToTheRobot) {
 INSTANTIATE_TEST_SUITE_P(All, Loop,
                          ::testing::Values(LoopCase{"payload", 5}, LoopCase{"coulomb", 5}, LoopCase{"wheel_radius", 5},
                                            LoopCase{"saturation", 5}),
-                         [](const auto& info) { return info.param.effect; });
+                         [](const auto& tested) { return tested.param.effect; });
 
 }  // namespace
 }  // namespace wheelwright::reality::simulator_loop_test

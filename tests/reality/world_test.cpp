@@ -22,11 +22,11 @@ struct World {
   }
 
   [[nodiscard]] Signals healthy() const {
-    std::vector<Effect> none;
+    std::vector<reality::Effect> none;
     return signals_of(robot, run_world(robot, none, drive));
   }
   [[nodiscard]] Signals with(std::string_view name, std::vector<std::pair<std::string, double>>& parameters) const {
-    std::vector<Effect> effects;
+    std::vector<reality::Effect> effects;
     effects.push_back(find_entry(name).make(robot, Random(5, 0, 9), 1.0));
     parameters = effects[0].parameters;
     return signals_of(robot, run_world(robot, effects, drive));
