@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include <wheelwright/gap/effect.hpp>
 #include <wheelwright/gap/gap_rows.hpp>
@@ -440,10 +441,11 @@ Effect payload_offset() {
           },
       .physical =
           [](std::span<const double> c, Shape) {
-            return std::vector<PhysicalValue>{{"mass_kg", "kg", c[0]},
-                                              {"yaw_inertia", "kg·m²", c[1]},
-                                              {"moment", "kg·m", c[2]},
-                                              {"x_m", "m", c[0] > 0.0 ? c[2] / c[0] : 0.0}};
+            return std::vector<PhysicalValue>{
+                {"mass_kg", "kg", c[0]},
+                {"yaw_inertia", "kg·m²", c[1]},
+                {"moment", "kg·m", c[2]},
+                {"x_m", "m", c[0] > 0.0 ? c[2] / c[0] : std::numeric_limits<double>::quiet_NaN()}};
           }};
 }
 

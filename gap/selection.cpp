@@ -457,8 +457,11 @@ class Selector {
     result.all = rivals.front().set;
     result.structural = structural[rivals.front().structural];
     result.theta_moved = rivals.front().moves_theta;
-    const bool moves_theta = std::any_of(result.all.members.begin(), result.all.members.end(),
-                                         [&](std::size_t c) { return moves_theta_only_[table_.candidates[c].effect]; });
+    const bool moves_theta = std::ranges::any_of(result.all.members, [&](std::size_t c) {
+      const std::size_t effect = table_.candidates[c].effect;
+      // What stands for a cause of θ too has its size from θ held.
+      return moves_theta_only_[effect] || (nominal_trusted && !kinds_[effect].stands_for.empty());
+    });
     result.base = moves_theta ? BaseModel::nominal : BaseModel::refitted;
     std::vector<CauseSet> fewest;
     for (const Rival& rival : rivals) {

@@ -82,6 +82,26 @@ TEST(Diagnose, ExplainsAndSharesAddUp) {
   EXPECT_TRUE(found.looked_at[0].effects.empty());
 }
 
+// θ fitted again holds the load's mass, too: its size is that of the healthy robot's θ held.
+TEST(Diagnose, APayloadOffTheAxleHasItsSizeAndPlace) {
+  constexpr double kMass = 2.0, kAhead = 0.2, kOfRobot = 21.0;
+  const Robot world = robot_with("com_longitudinal", {{"a", kMass * kAhead / (kOfRobot + kMass)}});
+  Scenario loaded = noisy_scenario(world, 4);
+  loaded.parameters.mass = kOfRobot + kMass;
+  loaded.parameters.yaw_inertia += kMass * kAhead * kAhead;
+  const Diagnosis found = diagnosis_of(loaded, true, counted_robot());
+  EXPECT_EQ(found.verdict, GapVerdict::explained);
+  ASSERT_EQ(found.causes.size(), 1u);
+  EXPECT_EQ(found.causes[0].effect, "payload_offset");
+  const std::map<std::string, double> truth = {
+      {"mass_kg", kMass}, {"yaw_inertia", kMass * kAhead * kAhead}, {"moment", kMass * kAhead}, {"x_m", kAhead}};
+  for (const GapEstimate& number : found.causes[0].parameters) {
+    EXPECT_LE(number.lower, truth.at(number.name)) << number.name;
+    EXPECT_GE(number.upper, truth.at(number.name)) << number.name;
+    EXPECT_LT(number.upper - number.lower, 0.3 * truth.at(number.name)) << number.name;
+  }
+}
+
 void expect_same(const Diagnosis& a, const Diagnosis& b) {
   EXPECT_EQ(a.verdict, b.verdict);
   EXPECT_EQ(a.gap, b.gap);
