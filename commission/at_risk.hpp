@@ -19,8 +19,8 @@ struct AtRiskOptions {
   RiskSetOptions set{};
   std::vector<double> scales{0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0};  ///< s, of the detector's sums
   bool estimate = true;  ///< where the robot file leaves the efforts' noise to be estimated: see learn_at_risk()
-  /// Probability that a log which keeps to its assumptions is said to contradict them: by one sum, by the mean square of
-  /// many, or by what is left being like what was left before, a third each.
+  /// Probability that a log which keeps to its assumptions is said to contradict them: by one sum, by the mean square
+  /// of many, or by what is left being like what was left before, a third each.
   double test_risk = 3e-3;
 };
 
@@ -33,8 +33,8 @@ struct AtRiskOptions {
 ///
 /// Where the robot file leaves the efforts' noise to be estimated, so are the classes (error_estimate.hpp), with the
 /// least bias of which this log uses no more than half: the result is extrapolated, and holds while noise and driving
-/// stay as they were. Nothing is said where even a bias as large as the deviation is not enough. What is left may be like
-/// what was left before: an estimate takes what the log has of that into deviation and bias.
+/// stay as they were. Nothing is said where even a bias as large as the deviation is not enough. What is left may be
+/// like what was left before: an estimate takes what the log has of that into deviation and bias.
 ///
 /// Walks the log eight times; to estimate, about forty times.
 void learn_at_risk(LogSource& log, Commissioning& result, const AtRiskOptions& options = {});

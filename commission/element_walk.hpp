@@ -18,8 +18,8 @@
 
 namespace wheelwright::commission {
 
-/// Elements of `log` by `filter`: begin() where a segment does, each() for each element (ElementFilter::element()), end()
-/// where a segment's last element was.
+/// Elements of `log` by `filter`: begin() where a segment does, each() for each element (ElementFilter::element()),
+/// end() where a segment's last element was.
 template <typename Begin, typename Each, typename End>
 void walk_elements(LogSource& log, filter::ElementFilter& filter, Begin&& begin, Each&& each, End&& end) {
   const std::vector<std::size_t> pick = core::positions_of(log, filter.measurement().columns());

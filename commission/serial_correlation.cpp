@@ -27,8 +27,8 @@ constexpr double kLargestVariance = 16.0;  // for which the first of them is the
 constexpr double kRounding = 1e-10;        // relative, of eigenvalues
 constexpr double kStamps = 1e-6;           // relative, by which a correlation time is taken to be longer
 
-// Means of old elements [torque | Y], by filters of order kOrder that delay by several times each. Elements come in when
-// all samples that they hold are older than all that the newest element holds, by the correlation time.
+// Means of old elements [torque | Y], by filters of order kOrder that delay by several times each. Elements come in
+// when all samples that they hold are older than all that the newest element holds, by the correlation time.
 class OldElements {
  public:
   OldElements(const filter::ElementFilter& elements, std::vector<double> delays, double correlation)

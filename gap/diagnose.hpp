@@ -36,8 +36,8 @@ struct DiagnoseOptions {
   std::function<void(std::string_view stage, double share)> progress;  ///< may be empty
 };
 
-/// Columns that diagnose() needs of `log`, alternatives apart by "|": the motion of every joint, and its effort unless the
-/// log has the effort of none and a heading instead (`theta` or `gyro_z`).
+/// Columns that diagnose() needs of `log`, alternatives apart by "|": the motion of every joint, and its effort unless
+/// the log has the effort of none and a heading instead (`theta` or `gyro_z`).
 [[nodiscard]] std::vector<std::string> required_columns(const LogSource& log, const Robot& robot);
 
 /// Diagnoses `log` against the model of `robot`. With `baseline`, a log of the healthy robot, its θ is the nominal one

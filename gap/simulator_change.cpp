@@ -6,6 +6,7 @@
 #include <map>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -70,23 +71,13 @@ class Changes {
   void take(const FittedEffect& cause) {
     cause_ = &cause;
     const std::string& name = cause.effect.name;
-    if (name == "wheel_radius" && has({"epsilon"})) {
-      change_.radius_factor *= 1.0 + c(0);
-      because("radius_factor");
-    } else if (name == "wheel_radius_asymmetric" && has({"epsilon"})) {
-      change_.radius_factor =
-          change_.radius_factor.cwiseProduct(Eigen::Vector2d(Eigen::Vector2d::Ones() + c(0) * sides()));
-      because("radius_factor");
-    } else if (name == "track_width" && has({"narrowing"}) && c(0) < 1.0) {
-      change_.track_factor /= 1.0 - c(0);
-      because("track_factor");
-    } else if (name == "torque_gain" && has({"command_excess"}) && c(0) > -1.0) {
-      change_.gain /= 1.0 + c(0);
-      because("gain");
-    } else if (name == "torque_gain_asymmetric" && has({"command_excess"}) && std::abs(c(0)) < 1.0) {
-      change_.gain = change_.gain.cwiseQuotient(Eigen::Vector2d(Eigen::Vector2d::Ones() + c(0) * sides()));
-      because("gain");
-    } else if (!take_torque(name)) {
+    const auto rule = rules().find(name);
+    if (rule == rules().end()) {
+      not_expressed(name);
+    } else if (rule->second.torque && !unit_) {
+      tell(name, "the log's efforts are no torques, and the robot file has no motor constants",
+           "give the robot file `motor:` with torque_constant, gear_ratio (and resistance), and run again");
+    } else if (!has(rule->second.parameters) || !rule->second.apply(*this)) {
       not_expressed(name);
     }
   }
@@ -104,49 +95,38 @@ class Changes {
   SimulatorChange result() && { return std::move(change_); }
 
  private:
-  // Causes that are torques, or of which a torque is known only where efforts are torques; false for any other.
-  bool take_torque(const std::string& name) {
-    const bool known = name == "payload" || name == "payload_offset" || name == "com_longitudinal" ||
-                       name == "com_lateral" || name == "coulomb" || name == "coulomb_asymmetric" ||
-                       name == "viscous" || name == "viscous_asymmetric" || name == "armature" || name == "saturation";
-    if (known && !unit_) {
-      tell(name, "the log's efforts are no torques, and the robot file has no motor constants",
-           "give the robot file `motor:` with torque_constant, gear_ratio (and resistance), and run again");
-      return true;
-    }
-    if (name == "payload" && has({"mass_kg", "yaw_inertia"})) {
-      add_payload(0.0);
-    } else if (name == "payload_offset" && has({"mass_kg", "yaw_inertia", "moment"})) {
-      add_payload(c(2));
-    } else if ((name == "com_longitudinal" && has({"a"})) || (name == "com_lateral" && has({"b"}))) {
-      const bool ahead = name == "com_longitudinal";
-      (ahead ? change_.moment_ahead : change_.moment_left) += c(0) * drive_.physical("mass");
-      because(ahead ? "moment_ahead" : "moment_left");
-      if (cause_->coefficients.size() > 1 && c(1) != 0.0) {
-        change_.yaw_inertia += c(1) * drive_.physical("yaw_inertia");
-        because("yaw_inertia");
-      }
-    } else if (name == "coulomb" && has({"c"}) && cause_->coefficients.size() == 1) {
-      change_.dry_friction.array() += torque(0);
-      because("dry_friction");
-    } else if (name == "coulomb_asymmetric" && has({"c_R", "c_L"})) {
-      change_.dry_friction += Eigen::Vector2d(torque(0), torque(1));
-      because("dry_friction");
-    } else if (name == "viscous" && has({"viscous_linear", "viscous_yaw"})) {
-      add_viscous();
-    } else if (name == "viscous_asymmetric" && has({"damping"})) {
-      change_.damping += torque(0) * sides();
-      because("damping");
-    } else if (name == "armature" && has({"armature"})) {
-      change_.armature.array() += torque(0);
-      because("armature");
-    } else if (name == "saturation" && cause_->effect.unit_coefficient && cause_->shape.size() == 1) {
-      change_.effort_limit = cause_->shape[0] / *unit_;
-      because("effort_limit");
-    } else {
+  // How a cause of one name, whose parameters begin with these, becomes numbers; false where it cannot.
+  struct Rule {
+    std::vector<std::string_view> parameters;
+    bool (*apply)(Changes& changes);
+    bool torque = false;  // or a mass: known only where efforts are torques
+  };
+  static const std::map<std::string, Rule>& rules();
+
+  void scale_radius(const Eigen::Vector2d& factor) {
+    change_.radius_factor = change_.radius_factor.cwiseProduct(factor);
+    because("radius_factor");
+  }
+  // A command's excess e makes the gain 1/(1 + e).
+  bool lower_gain(const Eigen::Vector2d& excess) {
+    if (!((1.0 + excess.array()).minCoeff() > 0.0)) {
       return false;
     }
+    change_.gain.array() /= 1.0 + excess.array();
+    because("gain");
     return true;
+  }
+  void move_centre(double SimulatorChange::*moment, const char* member) {
+    change_.*moment += c(0) * drive_.physical("mass");
+    because(member);
+    if (cause_->coefficients.size() > 1 && c(1) != 0.0) {
+      change_.yaw_inertia += c(1) * drive_.physical("yaw_inertia");
+      because("yaw_inertia");
+    }
+  }
+  void add_torques(Eigen::Vector2d SimulatorChange::*of, const char* member, const Eigen::Vector2d& torques) {
+    change_.*of += torques;
+    because(member);
   }
 
   void add_payload(double moment) {
@@ -180,7 +160,7 @@ class Changes {
     }
   }
 
-  [[nodiscard]] bool has(std::initializer_list<std::string_view> names) const {
+  [[nodiscard]] bool has(const std::vector<std::string_view>& names) const {
     std::size_t k = 0;
     return cause_->effect.parameters.size() >= names.size() &&
            cause_->coefficients.size() == std::ssize(cause_->effect.parameters) &&
@@ -240,6 +220,114 @@ class Changes {
   const FittedEffect* cause_ = nullptr;
   SimulatorChange change_;
 };
+
+const std::map<std::string, Changes::Rule>& Changes::rules() {
+  using C = Changes;
+  const static std::map<std::string, Rule> all = {
+      {"wheel_radius",
+       {{"epsilon"},
+        [](C& o) {
+          o.scale_radius(Eigen::Vector2d::Constant(1.0 + o.c(0)));
+          return true;
+        }}},
+      {"wheel_radius_asymmetric",
+       {{"epsilon"},
+        [](C& o) {
+          o.scale_radius(Eigen::Vector2d::Ones() + o.c(0) * o.sides());
+          return true;
+        }}},
+      {"track_width",
+       {{"narrowing"},
+        [](C& o) {
+          if (!(o.c(0) < 1.0)) {
+            return false;
+          }
+          o.change_.track_factor /= 1.0 - o.c(0);
+          o.because("track_factor");
+          return true;
+        }}},
+      {"torque_gain", {{"command_excess"}, [](C& o) { return o.lower_gain(Eigen::Vector2d::Constant(o.c(0))); }}},
+      {"torque_gain_asymmetric", {{"command_excess"}, [](C& o) { return o.lower_gain(o.c(0) * o.sides()); }}},
+      {"payload",
+       {{"mass_kg", "yaw_inertia"},
+        [](C& o) {
+          o.add_payload(0.0);
+          return true;
+        },
+        true}},
+      {"payload_offset",
+       {{"mass_kg", "yaw_inertia", "moment"},
+        [](C& o) {
+          o.add_payload(o.c(2));
+          return true;
+        },
+        true}},
+      {"com_longitudinal",
+       {{"a"},
+        [](C& o) {
+          o.move_centre(&SimulatorChange::moment_ahead, "moment_ahead");
+          return true;
+        },
+        true}},
+      {"com_lateral",
+       {{"b"},
+        [](C& o) {
+          o.move_centre(&SimulatorChange::moment_left, "moment_left");
+          return true;
+        },
+        true}},
+      {"coulomb",
+       {{"c"},
+        [](C& o) {
+          if (o.cause_->coefficients.size() != 1) {
+            return false;
+          }
+          o.add_torques(&SimulatorChange::dry_friction, "dry_friction", Eigen::Vector2d::Constant(o.torque(0)));
+          return true;
+        },
+        true}},
+      {"coulomb_asymmetric",
+       {{"c_R", "c_L"},
+        [](C& o) {
+          o.add_torques(&SimulatorChange::dry_friction, "dry_friction", {o.torque(0), o.torque(1)});
+          return true;
+        },
+        true}},
+      {"viscous",
+       {{"viscous_linear", "viscous_yaw"},
+        [](C& o) {
+          o.add_viscous();
+          return true;
+        },
+        true}},
+      {"viscous_asymmetric",
+       {{"damping"},
+        [](C& o) {
+          o.add_torques(&SimulatorChange::damping, "damping", o.torque(0) * o.sides());
+          return true;
+        },
+        true}},
+      {"armature",
+       {{"armature"},
+        [](C& o) {
+          o.add_torques(&SimulatorChange::armature, "armature", Eigen::Vector2d::Constant(o.torque(0)));
+          return true;
+        },
+        true}},
+      {"saturation",
+       {{},
+        [](C& o) {
+          if (!o.cause_->effect.unit_coefficient || o.cause_->shape.size() != 1) {
+            return false;
+          }
+          o.change_.effort_limit = o.cause_->shape[0] / *o.unit_;
+          o.because("effort_limit");
+          return true;
+        },
+        true}},
+  };
+  return all;
+}
 
 }  // namespace
 

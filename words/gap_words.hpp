@@ -24,7 +24,7 @@ namespace wheelwright::words {
 /// "0.312 N·m [0.290, 0.330]".
 [[nodiscard]] std::string estimate_words(const gap::GapEstimate& estimate);
 
-/// "12.3 [12.1, 12.5]" of a parameter with the causes; of one below zero that cannot be, "not told from 0, at most 3.1".
+/// "12.3 [12.1, 12.5]" of a parameter with the causes; "not told from 0, at most 3.1" of one below zero that cannot be.
 [[nodiscard]] std::string shift_words(const gap::ParameterShift& shift);
 
 /// The headline: what the log says, in one sentence for each verdict.
