@@ -426,12 +426,6 @@ Robot stand_in(const LogTable& log) {
   return robot;
 }
 
-const std::string& effort_name(const Robot& robot, const model::Joint& joint) {
-  return robot.effort == EffortKind::torque    ? joint.torque
-         : robot.effort == EffortKind::current ? joint.current
-                                               : joint.voltage;
-}
-
 std::vector<double> smooth_speed(const HealthView& view, const JointView& joint) {
   const std::vector<double>& t = view.log->t;
   std::vector<double> out(t.size(), 0.0);
@@ -507,7 +501,7 @@ HealthView make_view(const LogTable& log, const std::optional<Robot>& robot) {
     JointView j;
     j.angle_name = joint.angle;
     j.speed_name = joint.speed;
-    j.effort_name = effort_name(view.robot, joint);
+    j.effort_name = model::effort_column(joint, view.robot.effort);
     j.angle = view.column(j.angle_name);
     j.speed = view.column(j.speed_name);
     j.effort = view.column(j.effort_name);

@@ -28,15 +28,6 @@ constexpr std::size_t kMostSpeeds = 200000;   // enough to find an encoder; long
 constexpr double kHalf = 0.5 * (1.0 - 1e-6);  // of a quantum: what rounding to it makes wrong, as printed
 constexpr double kEvenSteps = 0.02;           // steps further apart than this share are not one sampling interval
 
-std::string effort_column(const model::Joint& joint, model::EffortKind kind) {
-  switch (kind) {
-    case model::EffortKind::torque: return joint.torque;
-    case model::EffortKind::current: return joint.current;
-    case model::EffortKind::voltage: return joint.voltage;
-  }
-  return {};
-}
-
 template <typename Pick>
 bool has_all(const LogSource& log, const Model& model, Pick pick) {
   return std::ranges::all_of(model.joints,
@@ -129,7 +120,7 @@ Measurement find_measurement(LogSource& log, const Robot& robot, const Model& mo
   for (const model::Joint& joint : model.joints) {
     angles.push_back(joint.angle);
     speeds.push_back(joint.speed);
-    m.effort_columns.push_back(effort_column(joint, robot.effort));
+    m.effort_columns.push_back(model::effort_column(joint, robot.effort));
   }
   const bool have_angles = has_all(log, model, [](const model::Joint& j) { return j.angle; });
   const bool have_speeds = has_all(log, model, [](const model::Joint& j) { return j.speed; });
@@ -142,7 +133,7 @@ Measurement find_measurement(LogSource& log, const Robot& robot, const Model& mo
     throw InvalidArgument("filter order is 1, which works on speeds, but the log has angles only (" +
                           core::listed(angles) + "): expected order 2, or a log with " + core::listed(speeds));
   }
-  if (!has_all(log, model, [&](const model::Joint& j) { return effort_column(j, robot.effort); })) {
+  if (!has_all(log, model, [&](const model::Joint& j) { return model::effort_column(j, robot.effort); })) {
     throw InputError("the log has columns t, " + core::listed(log.columns()) +
                      ": expected the effort of every joint, " + core::listed(m.effort_columns) +
                      " (effort.kind in the robot file says which effort is used; --map " + "renames columns)");

@@ -219,6 +219,11 @@ ShapeParameter side_or_opposite() {
   return {.name = "right0_left1_opposite2", .unit = "1", .lower = 0.0, .upper = 2.0, .scan = 3, .discrete = true};
 }
 
+Eigen::Vector2d side_factors(std::span<const double> shape) {
+  const double side = shape.empty() ? 0.0 : shape[0];
+  return side > 1.5 ? Eigen::Vector2d(1.0, -1.0) : side < 0.5 ? Eigen::Vector2d(1.0, 0.0) : Eigen::Vector2d(0.0, 1.0);
+}
+
 std::vector<Eigen::VectorXd> on_side(double side, const Eigen::VectorXd& right, const Eigen::VectorXd& left) {
   const bool opposite = side > 1.5;
   return {opposite || side < 0.5 ? right : Eigen::VectorXd(), opposite     ? Eigen::VectorXd(-left)

@@ -185,6 +185,9 @@ void add(Column& a, const Column& b);
 /// The shape of an effect of one wheel (0 right, 1 left) or of both with opposite signs (2).
 [[nodiscard]] ShapeParameter side_or_opposite();
 
+/// The factors of that shape, the first of `shape` (0 where there is none), at the right and the left wheel.
+[[nodiscard]] Eigen::Vector2d side_factors(std::span<const double> shape);
+
 /// The signals of that shape: `right`, `left` or [right, −left]; empty where a wheel has none.
 [[nodiscard]] std::vector<Eigen::VectorXd> on_side(double side, const Eigen::VectorXd& right,
                                                    const Eigen::VectorXd& left);

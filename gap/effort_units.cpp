@@ -33,10 +33,6 @@ void add_to(Interval& interval, double offset) {
 
 }  // namespace
 
-std::string effort_column(const model::Joint& joint, EffortKind kind) {
-  return kind == EffortKind::current ? joint.current : kind == EffortKind::voltage ? joint.voltage : joint.torque;
-}
-
 TorqueView in_torques(const Robot& robot) {
   TorqueView view{robot, robot.effort, true, 1.0, {}};
   if (robot.effort == EffortKind::torque) {
@@ -93,7 +89,7 @@ void to_torques(LogTable& log, const TorqueView& view) {
     if (other != log.names.end()) {
       *other += "_logged";
     }
-    const auto effort = std::ranges::find(log.names, effort_column(joint, view.logged));
+    const auto effort = std::ranges::find(log.names, model::effort_column(joint, view.logged));
     if (effort == log.names.end()) {
       continue;
     }

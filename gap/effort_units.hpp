@@ -25,9 +25,6 @@ struct TorqueView {
   std::map<std::string, double> back_emf;  ///< viscous parameter -> what of it is the motor's, physical units
 };
 
-/// Name of the column that has the effort of `joint`.
-[[nodiscard]] std::string effort_column(const model::Joint& joint, model::EffortKind kind);
-
 /// The view of `robot`. Where torques are not physical it has no nominal values, and the widest priors that the motor's
 /// constant allows. Throws InvalidArgument for constants that are not > 0.
 [[nodiscard]] TorqueView in_torques(const Robot& robot);

@@ -25,7 +25,7 @@ constexpr double kMotorShare = 0.01;  // of a wheel's share of the mass, as the 
 class Improvement {
  public:
   Improvement(const Robot& robot, const Drive& drive, const Eigen::VectorXd& theta)
-      : drive_(drive), theta_(theta), improved_(robot), unit_(model::effort_per_torque(robot).value_or(1.0)) {}
+      : drive_(drive), theta_(theta), improved_(robot) {}
 
   // What changes θ and the geometry.
   void change_parameters(const FittedEffect& cause) {
@@ -179,12 +179,7 @@ class Improvement {
 
   [[nodiscard]] double coefficient(std::size_t k) const { return cause_->coefficients[static_cast<Eigen::Index>(k)]; }
   [[nodiscard]] double shape(std::size_t k) const { return cause_->shape[k]; }
-  // What the first shape makes of a coefficient at the right and at the left wheel (catalogue_parts: side,
-  // side_or_opposite).
-  [[nodiscard]] static Eigen::Vector2d sides(const FittedEffect& cause) {
-    const double side = cause.shape.empty() ? 0.0 : cause.shape[0];
-    return side > 1.5 ? Eigen::Vector2d(1.0, -1.0) : side < 0.5 ? Eigen::Vector2d(1.0, 0.0) : Eigen::Vector2d(0.0, 1.0);
-  }
+  [[nodiscard]] static Eigen::Vector2d sides(const FittedEffect& cause) { return catalogue::side_factors(cause.shape); }
   void set(const std::string& parameter, double value) { effect_.parameters[parameter] = {value, value}; }
 
   // The linear parameter is `factor` times the k-th coefficient.
@@ -215,8 +210,6 @@ class Improvement {
   [[nodiscard]] const std::vector<EffectParameterLaw>& known() const { return law_->parameters_of(improved_); }
   // k of effect_law.hpp.
   [[nodiscard]] double arm_ratio() const { return axis() ? 1.0 : 2.0 * drive_.lever_arm / drive_.track_width; }
-  // Efforts are `unit_` times torques.
-  [[nodiscard]] double per_torque() const { return 1.0 / unit_; }
   // The coefficient k; 0 where the fit has none.
   [[nodiscard]] double fitted(Eigen::Index k) const {
     return k < cause_->coefficients.size() ? cause_->coefficients[k] : 0.0;
@@ -234,7 +227,7 @@ class Improvement {
     for (const EffectParameterLaw& law : known()) {
       if (law.linear) {
         const double mass = law.times_mass ? drive_.physical("mass") / improved_.nominal.at("mass") : 1.0;
-        linear(law.name, linear_one++, per_torque() * mass);
+        linear(law.name, linear_one++, mass);
       } else {
         set(law.name, shape(fixed_one++));
       }
@@ -260,7 +253,7 @@ class Improvement {
   bool out_of_round() {
     for (std::size_t j = 0; j < cause_->effect.parameters.size(); ++j) {
       if (!cause_->effect.parameters[j].beside) {
-        set(cause_->effect.parameters[j].name, coefficient(j) / unit_);
+        set(cause_->effect.parameters[j].name, coefficient(j));
       }
     }
     return true;
@@ -271,12 +264,12 @@ class Improvement {
   bool keep_joints() {
     const double* const viscous = find("viscous_linear");
     const Eigen::Vector2d e = coefficient(0) * sides(*cause_);
-    const double b = viscous != nullptr ? -drive_.wheel_radius * *viscous * (e[0] - e[1]) / unit_ : 0.0;
+    const double b = viscous != nullptr ? -drive_.wheel_radius * *viscous * (e[0] - e[1]) : 0.0;
     // Inertia of the joints, J_R − J_L more at the right: −r m b = (J_R − J_L) D/(2 r), as of a centre of mass at b.
     const Eigen::Vector2d inertia = coefficient(1) * sides(*cause_);
     const double offset = find("mass") == nullptr
                               ? 0.0
-                              : -(inertia[0] - inertia[1]) / unit_ * drive_.track_width /
+                              : -(inertia[0] - inertia[1]) * drive_.track_width /
                                     (2.0 * std::pow(drive_.wheel_radius, 2) * improved_.nominal.at("mass"));
     return put_also("viscous_asymmetric", b) && put_also("com_lateral", offset);
   }
@@ -318,7 +311,7 @@ class Improvement {
     const Eigen::Vector2d found = both ? Eigen::Vector2d(core::LdltFactors(A).solve(Eigen::VectorXd(b)))
                                        : Eigen::Vector2d(b.cwiseQuotient(A.diagonal()));
     set("k", coefficient(0) != 0.0 ? found[0] : 0.0);
-    set("R_b", coefficient(1) != 0.0 ? found[1] * unit_ : 0.0);
+    set("R_b", coefficient(1) != 0.0 ? found[1] : 0.0);
     return true;
   }
 
@@ -328,7 +321,7 @@ class Improvement {
     constexpr double kNear = 0.3;  // root mean square
     const double* const viscous = find("viscous_linear");
     const double slope = viscous != nullptr ? 0.5 * drive_.wheel_radius * *viscous : 0.0;
-    const double dry = model::has_effect(improved_, "coulomb") ? unit_ * model::effect_value(improved_, "coulomb", "c")
+    const double dry = model::has_effect(improved_, "coulomb") ? model::effect_value(improved_, "coulomb", "c")
                        : find("coulomb") != nullptr            ? *find("coulomb")
                                                                : 0.0;
     double both = 0.0, friction = 0.0, lost = 0.0;
@@ -358,7 +351,7 @@ class Improvement {
     }
     const double rotor =
         kMotorShare * 0.5 * improved_.nominal.at("mass") * improved_.wheel_radius * improved_.wheel_radius;
-    set("gap", std::min(shape(0) / unit_ / rotor, 1.0));
+    set("gap", std::min(shape(0) / rotor, 1.0));
     return true;
   }
 
@@ -408,7 +401,6 @@ class Improvement {
   const Drive& drive_;
   Eigen::VectorXd theta_;
   Robot improved_;
-  double unit_;
   Eigen::Vector2d excess_ = Eigen::Vector2d::Zero();  // of the commands, share of what θ asks for
   std::string why_not_;
   const FittedEffect* cause_ = nullptr;
@@ -459,13 +451,13 @@ const std::map<std::string, Improvement::Way>& Improvement::ways() {
               r.scale("viscous_yaw", std::pow(1.0 + r.fitted(0), 2));
               r.add("yaw_inertia", r.fitted(1) * r.drive_.physical("yaw_inertia"));
             }}},
-      {"coulomb", {.convert = [](I& r) { return r.linear_all(r.per_torque()); }}},
-      {"coulomb_asymmetric", {.convert = [](I& r) { return r.linear_all(r.per_torque()); }}},
-      {"torque_bias", {.convert = [](I& r) { return r.linear_all(r.per_torque()); }}},
+      {"coulomb", {.convert = [](I& r) { return r.linear_all(1.0); }}},
+      {"coulomb_asymmetric", {.convert = [](I& r) { return r.linear_all(1.0); }}},
+      {"torque_bias", {.convert = [](I& r) { return r.linear_all(1.0); }}},
       {"stribeck",
        {.convert =
             [](I& r) {
-              r.linear("c_s", 0, r.per_torque());
+              r.linear("c_s", 0, 1.0);
               r.set("omega_s", r.shape(0));
               return true;
             }}},
@@ -474,15 +466,15 @@ const std::map<std::string, Improvement::Way>& Improvement::ways() {
         .convert =
             [](I& r) {
               const Eigen::Vector2d side = sides(*r.cause_);
-              r.linear("b", 0, r.per_torque() * (side[0] - side[1]));
+              r.linear("b", 0, side[0] - side[1]);
               return true;
             }}},
       {"quadratic_drag",
        {.convert =
             [](I& r) {
-              r.linear("c", 0, r.per_torque());
+              r.linear("c", 0, 1.0);
               if (!r.axis()) {
-                r.linear("c2", 1, r.per_torque() / r.arm_ratio());
+                r.linear("c2", 1, 1.0 / r.arm_ratio());
               }
               return true;
             }}},
@@ -494,14 +486,14 @@ const std::map<std::string, Improvement::Way>& Improvement::ways() {
       {"caster_drag",
        {.convert =
             [](I& r) {
-              r.linear("c", 0, r.per_torque());
+              r.linear("c", 0, 1.0);
               r.set("p", r.shape(0));
               return true;
             }}},
       {"lateral_scrub",
        {.convert =
             [](I& r) {
-              r.linear("mu", 0, r.per_torque() / r.arm_ratio());
+              r.linear("mu", 0, 1.0 / r.arm_ratio());
               return true;
             }}},
       {"torque_gain_asymmetric",
@@ -528,14 +520,14 @@ const std::map<std::string, Improvement::Way>& Improvement::ways() {
       {"saturation",
        {.convert =
             [](I& r) {
-              r.set_first(r.shape(0) / r.unit_);
+              r.set_first(r.shape(0));
               return true;
             }}},
       {"torque_deadzone",
        {.convert =
             [](I& r) {
               if (r.coefficient(0) > 0.0) {
-                r.set_first(r.coefficient(0) / r.unit_);
+                r.set_first(r.coefficient(0));
               }
               return true;
             },
@@ -575,7 +567,7 @@ const std::map<std::string, Improvement::Way>& Improvement::ways() {
                     "a robot file has slip as a share of the speed that ends at a largest share, and this "
                     "is another law of it");
               }
-              r.set_first(r.shape(0) / r.unit_);
+              r.set_first(r.shape(0));
               return true;
             }}},
       {"wheel_out_of_round", {.convert = [](I& r) { return r.out_of_round(); }, .adds_up = true}},
@@ -634,6 +626,7 @@ std::optional<Robot> improved_robot(const Robot& robot, const Drive& drive, cons
                                     const std::vector<std::vector<Interval>>& intervals, std::string& why_not) {
   check::that(theta.size() == static_cast<Eigen::Index>(drive.model.p()) && theta.allFinite(), "improved_robot theta",
               "p finite numbers");
+  check::that(robot.effort == model::EffortKind::torque, "improved_robot robot.effort", "torques");
   check::that(intervals.empty() || intervals.size() == causes.size(), "improved_robot intervals",
               "one list for each cause, or none");
   for (const FittedEffect& cause : causes) {

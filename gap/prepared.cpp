@@ -221,7 +221,7 @@ constexpr const char* kTiming = "timing";
 std::vector<std::string> effort_columns(const Robot& robot) {
   std::vector<std::string> names;
   for (const model::Joint& joint : model::make_model(robot).joints) {
-    names.push_back(effort_column(joint, robot.effort));
+    names.push_back(model::effort_column(joint, robot.effort));
   }
   return names;
 }

@@ -109,7 +109,6 @@ class Roller {
         geometry_(model::drive_geometry(robot)),
         parameters_(parameters_of(robot)),
         effects_(effects_of(robot)),
-        unit_(model::effort_per_torque(robot).value_or(1.0)),
         late_(model::effect_value(robot, "sensor_time_offset", "dt") / drive.step),
         margin_(static_cast<Eigen::Index>(std::ceil(rollout_margin(robot) / drive.step - 1e-9))),
         held_(drive.joints[0].held_effort.size() > 0) {}
@@ -184,12 +183,12 @@ class Roller {
   }
 
   [[nodiscard]] Eigen::Vector2d torque(const Seen& log, Eigen::Index k) const {
-    return both(log.effort, static_cast<double>(k)) / unit_;
+    return both(log.effort, static_cast<double>(k));
   }
 
   [[nodiscard]] sim::DriveState state_at(const Seen& log, double row) const {
     const Eigen::Vector2d wheels = both(log.speed, row + late_).cwiseQuotient(geometry_.encoder_scale);
-    const Eigen::Vector2d torque = both(log.effort, row) / unit_;
+    const Eigen::Vector2d torque = both(log.effort, row);
     const Eigen::Vector2d slip = sim::slip_share(effects_, torque.cwiseQuotient(geometry_.radius), wheels);
     const Eigen::Vector2d rim = wheels.cwiseProduct(geometry_.radius).array() / (1.0 + slip.array());
     sim::DriveState state;
@@ -215,7 +214,6 @@ class Roller {
   model::DriveGeometry geometry_;
   model::DriveParameters parameters_;
   sim::DriveEffects effects_;
-  double unit_;
   double late_;  // rows by which the sensors are late
   Eigen::Index margin_;
   bool held_;
@@ -251,6 +249,7 @@ void write(RolloutErrors& errors, std::size_t window, const Shown& simulated, co
 
 void check_robot(const Drive& drive, const Robot& robot) {
   check::that(drive.two_wheels() && model::on_two_wheels(robot), "rollouts", "a robot on two driven wheels");
+  check::that(robot.effort == model::EffortKind::torque, "rollouts robot.effort", "torques");
 }
 
 }  // namespace

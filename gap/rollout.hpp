@@ -55,7 +55,7 @@ struct RolloutRms {
 /// robot file with other numbers. The first state is the log's: wheel speeds and pose smoothed, over the window of the
 /// drive; its actuators have had the efforts before. Compared are speeds and pose; where the log has no pose (or no
 /// heading), odometry of the wheels on both sides. Throws InvalidArgument for a robot that is not on two driven wheels,
-/// or lacks a nominal value.
+/// has other efforts than torques, or lacks a nominal value.
 [[nodiscard]] std::vector<RolloutErrors> rollouts(const Drive& drive, const Robot& robot,
                                                   const std::vector<Eigen::Index>& starts,
                                                   const RolloutOptions& options = {});

@@ -103,9 +103,18 @@ class Changes {
   };
   static const std::map<std::string, Rule>& rules();
 
-  void scale_radius(const Eigen::Vector2d& factor) {
+  bool scale_radius(const Eigen::Vector2d& factor) {
     change_.radius_factor = change_.radius_factor.cwiseProduct(factor);
     because("radius_factor");
+    return true;
+  }
+  bool scale_track(double narrowing) {
+    if (!(narrowing < 1.0)) {
+      return false;
+    }
+    change_.track_factor /= 1.0 - narrowing;
+    because("track_factor");
+    return true;
   }
   // A command's excess e makes the gain 1/(1 + e).
   bool lower_gain(const Eigen::Vector2d& excess) {
@@ -116,20 +125,22 @@ class Changes {
     because("gain");
     return true;
   }
-  void move_centre(double SimulatorChange::*moment, const char* member) {
+  bool move_centre(double SimulatorChange::*moment, const char* member) {
     change_.*moment += c(0) * drive_.physical("mass");
     because(member);
     if (cause_->coefficients.size() > 1 && c(1) != 0.0) {
       change_.yaw_inertia += c(1) * drive_.physical("yaw_inertia");
       because("yaw_inertia");
     }
+    return true;
   }
-  void add_torques(Eigen::Vector2d SimulatorChange::*of, const char* member, const Eigen::Vector2d& torques) {
+  bool add_torques(Eigen::Vector2d SimulatorChange::*of, const char* member, const Eigen::Vector2d& torques) {
     change_.*of += torques;
     because(member);
+    return true;
   }
 
-  void add_payload(double moment) {
+  bool add_payload(double moment) {
     change_.mass += c(0);
     change_.yaw_inertia += c(1);
     because("mass");
@@ -138,10 +149,11 @@ class Changes {
       change_.moment_ahead += moment;
       because("moment_ahead");
     }
+    return true;
   }
 
   // f1 = 2c/r² and f3 = c D²/(2r²) ask for a damping c each.
-  void add_viscous() {
+  bool add_viscous() {
     const double r2 = drive_.wheel_radius * drive_.wheel_radius, d2 = drive_.track_width * drive_.track_width;
     const Eigen::Array2d per(0.5 * r2, 2.0 * r2 / d2);
     const Eigen::Array2d wanted = per * Eigen::Array2d(c(0), c(1));
@@ -158,6 +170,15 @@ class Changes {
                "what is left is friction of the ground or of castors",
                wanted[0], wanted[1], damping));
     }
+    return true;
+  }
+  bool limit_effort() {
+    if (!cause_->effect.unit_coefficient || cause_->shape.size() != 1) {
+      return false;
+    }
+    change_.effort_limit = cause_->shape[0] / *unit_;
+    because("effort_limit");
+    return true;
   }
 
   [[nodiscard]] bool has(const std::vector<std::string_view>& names) const {
@@ -169,11 +190,7 @@ class Changes {
   [[nodiscard]] double c(Eigen::Index k) const { return cause_->coefficients[k]; }
   // A coefficient in N·m (per unit of speed or acceleration).
   [[nodiscard]] double torque(Eigen::Index k) const { return c(k) / *unit_; }
-  // What the first shape makes of a coefficient at the right and the left wheel (catalogue::side_or_opposite).
-  [[nodiscard]] Eigen::Vector2d sides() const {
-    const double side = cause_->shape.empty() ? 0.0 : cause_->shape[0];
-    return side > 1.5 ? Eigen::Vector2d(1.0, -1.0) : side < 0.5 ? Eigen::Vector2d(1.0, 0.0) : Eigen::Vector2d(0.0, 1.0);
-  }
+  [[nodiscard]] Eigen::Vector2d sides() const { return catalogue::side_factors(cause_->shape); }
   [[nodiscard]] double half_width(std::string_view parameter) const {
     for (const GapCause& cause : found_.causes) {
       if (cause.effect == cause_->effect.name) {
@@ -223,108 +240,39 @@ class Changes {
 
 const std::map<std::string, Changes::Rule>& Changes::rules() {
   using C = Changes;
-  const static std::map<std::string, Rule> all = {
-      {"wheel_radius",
-       {{"epsilon"},
-        [](C& o) {
-          o.scale_radius(Eigen::Vector2d::Constant(1.0 + o.c(0)));
-          return true;
-        }}},
+  using Both = Eigen::Vector2d;
+  constexpr auto kDry = &SimulatorChange::dry_friction, kDamping = &SimulatorChange::damping,
+                 kArmature = &SimulatorChange::armature;
+  static const std::map<std::string, Rule> all = {
+      {"wheel_radius", {{"epsilon"}, [](C& o) { return o.scale_radius(Both::Constant(1.0 + o.c(0))); }}},
       {"wheel_radius_asymmetric",
-       {{"epsilon"},
-        [](C& o) {
-          o.scale_radius(Eigen::Vector2d::Ones() + o.c(0) * o.sides());
-          return true;
-        }}},
-      {"track_width",
-       {{"narrowing"},
-        [](C& o) {
-          if (!(o.c(0) < 1.0)) {
-            return false;
-          }
-          o.change_.track_factor /= 1.0 - o.c(0);
-          o.because("track_factor");
-          return true;
-        }}},
-      {"torque_gain", {{"command_excess"}, [](C& o) { return o.lower_gain(Eigen::Vector2d::Constant(o.c(0))); }}},
+       {{"epsilon"}, [](C& o) { return o.scale_radius(Both::Ones() + o.c(0) * o.sides()); }}},
+      {"track_width", {{"narrowing"}, [](C& o) { return o.scale_track(o.c(0)); }}},
+      {"torque_gain", {{"command_excess"}, [](C& o) { return o.lower_gain(Both::Constant(o.c(0))); }}},
       {"torque_gain_asymmetric", {{"command_excess"}, [](C& o) { return o.lower_gain(o.c(0) * o.sides()); }}},
-      {"payload",
-       {{"mass_kg", "yaw_inertia"},
-        [](C& o) {
-          o.add_payload(0.0);
-          return true;
-        },
-        true}},
-      {"payload_offset",
-       {{"mass_kg", "yaw_inertia", "moment"},
-        [](C& o) {
-          o.add_payload(o.c(2));
-          return true;
-        },
-        true}},
+      {"payload", {{"mass_kg", "yaw_inertia"}, [](C& o) { return o.add_payload(0.0); }, true}},
+      {"payload_offset", {{"mass_kg", "yaw_inertia", "moment"}, [](C& o) { return o.add_payload(o.c(2)); }, true}},
       {"com_longitudinal",
-       {{"a"},
-        [](C& o) {
-          o.move_centre(&SimulatorChange::moment_ahead, "moment_ahead");
-          return true;
-        },
-        true}},
-      {"com_lateral",
-       {{"b"},
-        [](C& o) {
-          o.move_centre(&SimulatorChange::moment_left, "moment_left");
-          return true;
-        },
-        true}},
+       {{"a"}, [](C& o) { return o.move_centre(&SimulatorChange::moment_ahead, "moment_ahead"); }, true}},
+      {"com_lateral", {{"b"}, [](C& o) { return o.move_centre(&SimulatorChange::moment_left, "moment_left"); }, true}},
       {"coulomb",
        {{"c"},
         [](C& o) {
-          if (o.cause_->coefficients.size() != 1) {
-            return false;
-          }
-          o.add_torques(&SimulatorChange::dry_friction, "dry_friction", Eigen::Vector2d::Constant(o.torque(0)));
-          return true;
+          return o.cause_->coefficients.size() == 1 && o.add_torques(kDry, "dry_friction", Both::Constant(o.torque(0)));
         },
         true}},
       {"coulomb_asymmetric",
        {{"c_R", "c_L"},
         [](C& o) {
-          o.add_torques(&SimulatorChange::dry_friction, "dry_friction", {o.torque(0), o.torque(1)});
-          return true;
+          return o.add_torques(kDry, "dry_friction", {o.torque(0), o.torque(1)});
         },
         true}},
-      {"viscous",
-       {{"viscous_linear", "viscous_yaw"},
-        [](C& o) {
-          o.add_viscous();
-          return true;
-        },
-        true}},
+      {"viscous", {{"viscous_linear", "viscous_yaw"}, [](C& o) { return o.add_viscous(); }, true}},
       {"viscous_asymmetric",
-       {{"damping"},
-        [](C& o) {
-          o.add_torques(&SimulatorChange::damping, "damping", o.torque(0) * o.sides());
-          return true;
-        },
-        true}},
+       {{"damping"}, [](C& o) { return o.add_torques(kDamping, "damping", o.torque(0) * o.sides()); }, true}},
       {"armature",
-       {{"armature"},
-        [](C& o) {
-          o.add_torques(&SimulatorChange::armature, "armature", Eigen::Vector2d::Constant(o.torque(0)));
-          return true;
-        },
-        true}},
-      {"saturation",
-       {{},
-        [](C& o) {
-          if (!o.cause_->effect.unit_coefficient || o.cause_->shape.size() != 1) {
-            return false;
-          }
-          o.change_.effort_limit = o.cause_->shape[0] / *o.unit_;
-          o.because("effort_limit");
-          return true;
-        },
-        true}},
+       {{"armature"}, [](C& o) { return o.add_torques(kArmature, "armature", Both::Constant(o.torque(0))); }, true}},
+      {"saturation", {{}, [](C& o) { return o.limit_effort(); }, true}},
   };
   return all;
 }

@@ -336,11 +336,7 @@ bool shows_kinematics(const LogSource& log, const Robot& robot) {
 
 bool has_effort(const LogSource& log, const Robot& robot, const Model& model) {
   return std::ranges::any_of(model.joints, [&](const model::Joint& joint) {
-    return log
-        .find(robot.effort == model::EffortKind::torque    ? joint.torque
-              : robot.effort == model::EffortKind::current ? joint.current
-                                                           : joint.voltage)
-        .has_value();
+    return log.find(model::effort_column(joint, robot.effort)).has_value();
   });
 }
 

@@ -76,6 +76,10 @@ void append(Model& model, const Model& more) {
 
 }  // namespace
 
+const std::string& effort_column(const Joint& joint, EffortKind kind) {
+  return kind == EffortKind::torque ? joint.torque : kind == EffortKind::current ? joint.current : joint.voltage;
+}
+
 double RobotEffect::value(const std::string& parameter) const {
   const auto found = parameters.find(parameter);
   check::that(found != parameters.end(), "effects." + name, "the parameter " + parameter);

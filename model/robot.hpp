@@ -21,6 +21,9 @@ enum class EffortKind {
   voltage,  ///< V
 };
 
+/// Name of the column that has efforts of this kind at `joint`.
+[[nodiscard]] const std::string& effort_column(const Joint& joint, EffortKind kind);
+
 /// Behaviour of the effort between two samples.
 enum class Hold {
   zero_order,   ///< a command, constant from its time stamp to the next one

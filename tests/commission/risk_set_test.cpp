@@ -16,6 +16,7 @@
 
 #include "support/exact_axis.hpp"
 #include "support/most_failures.hpp"
+#include "support/named_axes.hpp"
 
 namespace wheelwright::commission::risk_set_test {
 namespace {
@@ -23,6 +24,8 @@ namespace {
 using testing_support::ErrorLaw;
 using testing_support::ExactAxis;
 using testing_support::most_failures;
+using testing_support::NamedAxes;
+using testing_support::NamedAxis;
 
 Commissioning learn(const ExactAxis& axis, std::uint64_t seed) {
   const LogTable log = drive(axis, seed);
@@ -65,20 +68,8 @@ Coverage coverage(const ExactAxis& axis, std::size_t runs, std::uint64_t first) 
   return result;
 }
 
-struct Named {
-  std::string name;
-  ExactAxis axis;
-};
-void PrintTo(const Named& n, std::ostream* out) { *out << n.name; }
-
-std::vector<Named> worlds() {
-  std::vector<Named> all;
-  const auto add = [&](const std::string& name, auto change) {
-    ExactAxis axis;
-    axis.seconds = 30.0;
-    change(axis);
-    all.push_back({name, axis});
-  };
+std::vector<NamedAxis> worlds() {
+  NamedAxes add(30.0);
   add("two_point", [](ExactAxis&) {});
   add("uniform", [](ExactAxis& a) { a.law = ErrorLaw::uniform; });
   add("uniform_declared", [](ExactAxis& a) {
@@ -123,10 +114,10 @@ std::vector<Named> worlds() {
     a.bound = 1.0;
     a.deviation = 1.0;
   });
-  return all;
+  return std::move(add).all();
 }
 
-class AtRisk : public ::testing::TestWithParam<Named> {};
+class AtRisk : public ::testing::TestWithParam<NamedAxis> {};
 
 TEST_P(AtRisk, TheSetHoldsTheTruthAsOftenAsItSays) {
   constexpr std::size_t kRuns = 120;

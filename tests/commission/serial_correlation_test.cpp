@@ -12,6 +12,7 @@
 
 #include "support/exact_axis.hpp"
 #include "support/most_failures.hpp"
+#include "support/named_axes.hpp"
 
 namespace wheelwright::commission::serial_correlation_test {
 namespace {
@@ -19,22 +20,12 @@ namespace {
 using testing_support::ErrorLaw;
 using testing_support::ExactAxis;
 using testing_support::most_failures;
-
-struct Named {
-  std::string name;
-  ExactAxis axis;
-};
-void PrintTo(const Named& n, std::ostream* out) { *out << n.name; }
+using testing_support::NamedAxes;
+using testing_support::NamedAxis;
 
 // Worlds that keep to what they declare.
-std::vector<Named> worlds() {
-  std::vector<Named> all;
-  const auto add = [&](const std::string& name, auto change) {
-    ExactAxis axis;
-    axis.seconds = 30.0;
-    change(axis);
-    all.push_back({name, axis});
-  };
+std::vector<NamedAxis> worlds() {
+  NamedAxes add(30.0);
   add("two_point", [](ExactAxis&) {});
   add("skewed", [](ExactAxis& a) {
     a.law = ErrorLaw::skewed;
@@ -78,7 +69,7 @@ std::vector<Named> worlds() {
     a.count = 1e-3;
     a.position = testing_support::PositionLaw::two_point;
   });
-  return all;
+  return std::move(add).all();
 }
 
 Commissioning learn(const ExactAxis& axis, const Robot& robot, std::uint64_t seed) {
@@ -108,7 +99,7 @@ std::size_t told(const ExactAxis& axis, const Robot& robot, std::size_t runs, st
   return count;
 }
 
-class SerialCorrelation : public ::testing::TestWithParam<Named> {};
+class SerialCorrelation : public ::testing::TestWithParam<NamedAxis> {};
 
 TEST_P(SerialCorrelation, ErrorsThatKeepToTheAssumptionAreRarelySaidNotTo) {
   constexpr std::size_t kRuns = 60;

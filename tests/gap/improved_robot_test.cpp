@@ -22,18 +22,10 @@ namespace {
 using gap_example::drive_of_log;
 using gap_example::effect_called;
 using gap_example::fit_effects;
+using gap_example::fitted;
+using gap_example::plain_drive;
 using gap_example::plain_robot;
 using gap_example::simulated_drive;
-
-const Drive& plain_drive() {
-  static const Drive drive = drive_of_log(sim::simulate(simulated_drive(plain_robot())), plain_robot());
-  return drive;
-}
-
-FittedEffect fitted(const std::string& name, std::vector<double> coefficients, std::vector<double> shape = {}) {
-  return {effect_called(name), std::move(shape),
-          Eigen::Map<const Eigen::VectorXd>(coefficients.data(), std::ssize(coefficients))};
-}
 
 Robot improved(const std::vector<FittedEffect>& causes, const std::vector<std::vector<Interval>>& intervals = {}) {
   std::string why_not;

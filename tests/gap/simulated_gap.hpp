@@ -101,4 +101,16 @@ inline std::pair<Eigen::VectorXd, std::vector<FittedEffect>> fit_effects(const D
   return {theta, effects};
 }
 
+/// The drive of plain_robot().
+inline const Drive& plain_drive() {
+  static const Drive drive = drive_of_log(sim::simulate(simulated_drive(plain_robot())), plain_robot());
+  return drive;
+}
+
+/// The effect `name` of the catalogue with these numbers.
+inline FittedEffect fitted(const std::string& name, std::vector<double> coefficients, std::vector<double> shape = {}) {
+  return {effect_called(name), std::move(shape),
+          Eigen::Map<const Eigen::VectorXd>(coefficients.data(), std::ssize(coefficients))};
+}
+
 }  // namespace wheelwright::gap::gap_example

@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "support/exact_axis.hpp"
+#include "support/named_axes.hpp"
 #include "support/scratch.hpp"
 
 namespace wheelwright::results::risk_check_test {
@@ -22,6 +23,8 @@ using ::testing::IsEmpty;
 using ::testing::Not;
 using testing_support::ErrorLaw;
 using testing_support::ExactAxis;
+using testing_support::NamedAxes;
+using testing_support::NamedAxis;
 
 // A log of an axis and the model that it was commissioned to, as it is written.
 struct Commissioned {
@@ -52,20 +55,8 @@ ModelCheck check(const Commissioned& made, const Json& model) {
   return check_model(claims, source, report);
 }
 
-struct Named {
-  std::string name;
-  ExactAxis axis;
-};
-void PrintTo(const Named& n, std::ostream* out) { *out << n.name; }
-
-std::vector<Named> worlds() {
-  std::vector<Named> all;
-  const auto add = [&](const std::string& name, auto change) {
-    ExactAxis axis;
-    axis.seconds = 40.0;
-    change(axis);
-    all.push_back({name, axis});
-  };
+std::vector<NamedAxis> worlds() {
+  NamedAxes add(40.0);
   add("two_point", [](ExactAxis&) {});
   add("biased", [](ExactAxis& a) { a.bias = 0.1 * a.bound; });
   add("together", [](ExactAxis& a) {
@@ -82,10 +73,10 @@ std::vector<Named> worlds() {
     a.jitter = 0.3;
   });
   add("slow_clock", [](ExactAxis& a) { a.rate = 20.0; });
-  return all;
+  return std::move(add).all();
 }
 
-class HonestModel : public ::testing::TestWithParam<Named> {};
+class HonestModel : public ::testing::TestWithParam<NamedAxis> {};
 
 TEST_P(HonestModel, IsProved) {
   const Commissioned made = commissioned(GetParam().axis, robot_file(GetParam().axis));
