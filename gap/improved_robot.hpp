@@ -22,8 +22,8 @@ namespace wheelwright::gap {
 /// p finite entries.
 [[nodiscard]] Robot with_nominal(const Robot& robot, const Model& model, const Eigen::VectorXd& theta);
 
-/// The file of `robot`, whose efforts are torques, with `causes`, fitted on `drive` (made of it) beside `theta`: what the causes explain is in
-/// addition to Yθ, parametric ones included.
+/// The file of `robot`, whose efforts are torques, with `causes`, fitted on `drive` (made of it) beside `theta`: what
+/// the causes explain is in addition to Yθ, parametric ones included.
 ///
 /// - Parametric causes and what comes beside an effect (a changed inertia) become nominal values; wheel_radius and
 ///   track_width change these keys. Friction is in the joints: viscous values follow the geometry so that the joints'

@@ -168,6 +168,14 @@ double signal_rms(const Diagnosis& d, std::string_view channel) {
   return 0.0;
 }
 
+bool pose_alone(const Diagnosis& d) {
+  const auto has = [&d](gap::GapSpace space) {
+    return std::ranges::any_of(d.series,
+                               [space](const gap::ResidualSeries& s) { return s.space == space && s.t.size() > 0; });
+  };
+  return has(gap::GapSpace::kinematic) && !has(gap::GapSpace::dynamic);
+}
+
 std::string gap_verdict(const Diagnosis& d) {
   std::vector<std::string> names;
   double share = 0.0;
@@ -176,7 +184,10 @@ std::string gap_verdict(const Diagnosis& d) {
     share += cause.share;
   }
   switch (d.verdict) {
-    case GapVerdict::no_gap: return "No gap: the model explains the log to the noise floor.";
+    case GapVerdict::no_gap:
+      return pose_alone(d)
+                 ? "No gap in the pose: it is what the wheels say, to the noise floor; of the torque nothing is known."
+                 : "No gap: the model explains the log to the noise floor.";
     case GapVerdict::explained:
       return names.empty()       ? "The gap is explained."
              : names.size() == 1 ? cause_sentence(d.causes.front(), true)

@@ -27,6 +27,9 @@ namespace wheelwright::words {
 /// "12.3 [12.1, 12.5]" of a parameter with the causes; "not told from 0, at most 3.1" of one below zero that cannot be.
 [[nodiscard]] std::string shift_words(const gap::ParameterShift& shift);
 
+/// True where the log had no efforts, so that its pose alone was compared.
+[[nodiscard]] bool pose_alone(const Diagnosis& diagnosis);
+
 /// The headline: what the log says, in one sentence for each verdict.
 [[nodiscard]] std::string gap_verdict(const Diagnosis& diagnosis);
 

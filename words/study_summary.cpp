@@ -248,6 +248,9 @@ std::string next_step(const Diagnosis& d, const GapResults& r) {
       r.improved ? fmt::format("wheelwright commission LOG --robot {}", file("robot_improved.yaml")) : std::string();
   switch (d.verdict) {
     case gap::GapVerdict::no_gap:
+      if (words::pose_alone(d)) {
+        return "log the efforts, too: what changes the torque alone cannot be seen without them.";
+      }
       return fmt::format("wheelwright commission LOG --robot {}; nothing is to be added to it.", r.robot);
     case gap::GapVerdict::explained:
       return !improved.empty() ? improved + ", for thresholds that are not widened by what the model lacked."

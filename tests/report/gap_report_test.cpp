@@ -55,6 +55,16 @@ TEST(GapWords, EachVerdictHasItsOwnWords) {
   EXPECT_TRUE(example::holds(all_sentences(nothing), {"no effect of the catalogue explains it"}));
 }
 
+TEST(GapWords, WithoutEffortsNothingIsSaidOfTheTorque) {
+  Diagnosis pose = gap_example::no_gap();
+  ASSERT_FALSE(pose.series.empty());
+  for (gap::ResidualSeries& series : pose.series) {
+    series.space = gap::GapSpace::kinematic;
+  }
+  EXPECT_TRUE(example::holds(all_sentences(pose), {"No gap in the pose", "of the torque nothing is known"}));
+  EXPECT_TRUE(example::lacks(all_sentences(gap_example::no_gap()), {"in the pose"}));
+}
+
 TEST(GapWords, AnUnknownEffectIsCalledByItsName) {
   EXPECT_EQ(effect_noun("my_own_effect"), "my own effect");
   EXPECT_EQ(effect_nouns({}), "none");
