@@ -44,7 +44,7 @@ struct CommonOptions {
   std::filesystem::path out;                    ///< directory of results; empty: none
   bool json = false;                            ///< the result on standard output, and nothing else there
   bool quiet = false;                           ///< no progress, no summary
-  int threads = 1;                              ///< most threads
+  int threads = 1;                              ///< most threads; by default the machine's (add_common())
   std::uint64_t seed = 1;                       ///< of everything random
   std::vector<std::string> map;                 ///< name=column
   std::vector<std::filesystem::path> msg_path;  ///< directories with definitions of messages

@@ -184,6 +184,7 @@ int run(const Arguments& a) {
   const std::vector<robots::FleetListRobot> robots = robots::read_fleet(a.list);
   const std::optional<Robot> own = a.robot.empty() ? std::nullopt : std::optional(read_robot(a.robot));
   study::ExamineOptions examine;
+  examine.commission.at_risk = commission::CommissionOptions::AtRisk::detector;  // no record says what it will see
   examine.commission.noise_mode = a.statistical ? filter::NoiseMode::statistical : filter::NoiseMode::worst_case;
   ItemsToRun items;
   items.work.items = robots.size();

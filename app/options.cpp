@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "options.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <map>
+#include <thread>
 
 #include <CLI/CLI.hpp>
 
@@ -12,14 +14,21 @@
 #include "units.hpp"
 
 namespace wheelwright::app {
+namespace {
+
+constexpr int kMostThreads = 1024;
+
+}  // namespace
 
 void add_common(CLI::App& command, CommonOptions& options) {
   command.add_option("--out", options.out, "Write results and report.html into this directory")->type_name("DIR");
   command.add_flag("--json", options.json, "Print the result as JSON on standard output, and nothing else there");
+  // Of the processors that this process may use, so that ranks that are bound to one have one.
+  options.threads = std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, kMostThreads);
   command.add_option("--threads", options.threads, "Use at most N threads; results do not depend on it")
       ->type_name("N")
-      ->check(CLI::Range(1, 1024))
-      ->capture_default_str();
+      ->check(CLI::Range(1, kMostThreads))
+      ->default_str("all processors");
   command.add_option("--seed", options.seed, "Seed of everything random")->type_name("N")->capture_default_str();
   command.add_flag("--quiet", options.quiet, "No progress and no summary; errors are still told");
 }

@@ -198,7 +198,7 @@ void learn_at_risk(LogSource& log, Commissioning& result, const AtRiskOptions& o
       assumption.detail = estimate.reason;
     }
   }
-  if (model.at_risk) {
+  if (model.at_risk && options.reach) {
     result.reach = risk_reach(log, model);
   }
   result.assumptions.push_back(assumption);

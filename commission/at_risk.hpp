@@ -22,6 +22,7 @@ struct AtRiskOptions {
   /// Probability that a log which keeps to its assumptions is said to contradict them: by one sum, by the mean square
   /// of many, or by what is left being like what was left before, a third each.
   double test_risk = 3e-3;
+  bool reach = true;  ///< whether Commissioning::reach is asked for: a large part of the time
 };
 
 /// Adds Commissioning::at_risk and OnlineModel::at_risk to a guaranteed result whose robot file declares errors that

@@ -519,8 +519,10 @@ Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionO
 Commissioning commission_robot(LogSource& log, const Robot& robot, const CommissionOptions& options) {
   Commissioning result = commissioned(log, robot, options);
   settle_warrants(result);
-  learn_pose_at_risk(log, result);
-  learn_at_risk(log, result);
+  if (options.at_risk != CommissionOptions::AtRisk::nothing) {
+    learn_pose_at_risk(log, result);
+    learn_at_risk(log, result, {.reach = options.at_risk == CommissionOptions::AtRisk::reach});
+  }
   return result;
 }
 

@@ -110,6 +110,10 @@ struct CommissionOptions {
                                          ///< those of these options
   std::size_t outliers = 0;              ///< instants that the feasible set may leave out (θ̂ stands on all of them)
   detector::Persistence persistence;
+  /// What is asked for at a stated risk: nothing, set and detector, or what that detector will see (reach), too. The
+  /// first and the last each take as long as all the rest where the noise is estimated.
+  enum class AtRisk { nothing, detector, reach };
+  AtRisk at_risk = AtRisk::reach;
   std::function<void(std::string_view stage, double share)> progress;  ///< told of every stage; may be empty
 };
 

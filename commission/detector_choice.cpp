@@ -210,8 +210,9 @@ std::string assumption(Guarantee guarantee, double false_alarms) {
 class Search {
  public:
   Search(LogTable log, const Robot& robot, const DetectorChoiceOptions& options)
-      : log_(std::move(log)), robot_(&robot), options_(options) {
+      : log_(std::move(log)), robot_(&robot), at_risk_(options.trial.commission.at_risk), options_(options) {
     options_.trial.faults = faults_for(robot, options.trial.faults);
+    options_.trial.commission.at_risk = std::min(options.trial.commission.at_risk, CommissionOptions::AtRisk::detector);
     validate(options_.trial, robot);
     check::that(options.beta_factor > 1.0, "beta_factor", "a number > 1");
     check::that(options.tie >= 0.0, "tie", "a number >= 0");
@@ -236,6 +237,7 @@ class Search {
     const FilterDesign filter = choice_.candidates.front().filter;
     const Guarantee guarantee = choice_.candidates.front().guarantee;
     TrialOptions trial = options_.trial;
+    trial.commission.at_risk = at_risk_;
     trial.false_alarms = guarantee == Guarantee::never ? 0.0 : trial.false_alarms;
     choice_.chosen = try_detector(log_, *robot_, filter, {{}}, "", trial).commissioning;
     choice_.notes.push_back(assumption(guarantee, trial.false_alarms));
@@ -342,6 +344,7 @@ class Search {
 
   LogTable log_;
   const Robot* robot_;
+  CommissionOptions::AtRisk at_risk_;  // of the chosen one
   DetectorChoiceOptions options_;
   DetectorChoice choice_;
 };

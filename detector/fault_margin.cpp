@@ -11,9 +11,11 @@ namespace {
 
 constexpr double kPrecise = 1e-9;     // of a certain size, relative
 constexpr double kHidden = 1e-3;      // of a hidden size, relative
+constexpr double kSafe = 1e-12;       // relative, of sums that only tell whether it is worth while to look closer
 constexpr double kNegligible = 1e-9;  // share of the largest size that is as good as 0
 
 double largest_size(const Interval& side) { return std::max(std::abs(side.lower), std::abs(side.upper)); }
+double smallest_size(const Interval& side) { return std::max({0.0, side.lower, -side.upper}); }
 
 }  // namespace
 
@@ -40,6 +42,37 @@ FaultMargin::Sums FaultMargin::at(const FaultRow& row, double kappa, double side
   return {predicted, doubt, 10.0 * static_cast<double>(p + 4) * std::numeric_limits<double>::epsilon() * reach};
 }
 
+// For every θ of the set: h(seen) − min acting·θ >= (seen − acting)·θ, and Δ is worth at least Δ|θ| to the threshold.
+bool FaultMargin::cannot_be_certain(const FaultRow& row, double kappa, double side, Direction direction) const {
+  const std::vector<double>& theta = rule_.set().centre();
+  double added = side * kappa * row.c, against = 2.0 * row.dy + kappa * row.doubt;
+  for (std::size_t j = 0; j < theta.size(); ++j) {
+    added += (side * kappa * (row.g1[j] - row.s[j]) + kappa * kappa * row.g2[j]) * theta[j];
+    against += (2.0 * row.dY[j] + (row.range.empty() ? 0.0 : kappa * row.range[j])) * std::abs(theta[j]);
+  }
+  return (direction == Direction::up ? added : -added) <= against * (1.0 - kSafe);
+}
+
+// max acting·θ − h(seen) <= h(acting − seen), of which no size up to κ makes more than the terms' largest, and Δ is worth
+// at least Δ|θ| to the threshold.
+bool FaultMargin::cannot_be_possible(const FaultRow& row, double kappa, double side, double share,
+                                     Direction direction) const {
+  const double sign = direction == Direction::up ? side : -side;
+  double once = sign * row.c + row.doubt, twice = 0.0, doubt = 0.0, allowed = row.dy, reach = 2.0 * row.dy;
+  for (std::size_t j = 0; j < row.y.size(); ++j) {
+    const Interval& theta = rule_.set().hull().sides[j];
+    const double by = sign * (row.g1[j] - row.s[j]), by_twice = direction == Direction::up ? row.g2[j] : -row.g2[j];
+    const double most = largest_size(theta);
+    once += by * (by > 0.0 ? theta.upper : theta.lower) + (row.range.empty() ? 0.0 : row.range[j] * most);
+    twice += by_twice * (by_twice > 0.0 ? theta.upper : theta.lower);
+    doubt += row.read.empty() ? 0.0 : row.read[j] * theta.width();
+    allowed += row.dY[j] * smallest_size(theta);
+    reach += (std::abs(row.y[j]) + row.dY[j] + kappa * (std::abs(row.g1[j]) + std::abs(row.s[j]))) * most;
+  }
+  const double most = kappa * std::max(once, 0.0) + kappa * kappa * std::max(twice, 0.0) + doubt;
+  return most + kSafe * reach <= (1.0 - share) * allowed;
+}
+
 double FaultMargin::certain_excess(const FaultRow& row, double kappa, double side, std::size_t channel,
                                    Direction direction) {
   const Sums sums = at(row, kappa, side, 2.0);
@@ -61,8 +94,11 @@ double FaultMargin::possible_excess(const FaultRow& row, double kappa, double si
 }
 
 bool FaultMargin::certain(const FaultRow& row, double kappa, double side, std::size_t channel) {
-  return certain_excess(row, kappa, side, channel, Direction::up) > 0.0 ||
-         certain_excess(row, kappa, side, channel, Direction::down) > 0.0;
+  const auto is = [&](Direction direction) {
+    return !cannot_be_certain(row, kappa, side, direction) &&
+           certain_excess(row, kappa, side, channel, direction) > 0.0;
+  };
+  return is(Direction::up) || is(Direction::down);
 }
 
 double FaultMargin::missing(const FaultRow& row, double kappa, double side, std::size_t channel) {
@@ -82,6 +118,9 @@ std::optional<double> FaultMargin::smallest_certain(const FaultRow& row, double 
   std::optional<double> best;
   for (const Direction direction : {Direction::up, Direction::down}) {
     double above = best.value_or(largest);
+    if (cannot_be_certain(row, above, side, direction)) {
+      continue;
+    }
     double excess_above = certain_excess(row, above, side, channel, direction);
     if (!(excess_above > 0.0)) {
       continue;
@@ -114,6 +153,10 @@ std::optional<double> FaultMargin::smallest_certain(const FaultRow& row, double 
 
 double FaultMargin::largest_hidden(const FaultRow& row, double largest, double side, double share,
                                    std::size_t channel) {
+  if (cannot_be_possible(row, largest, side, share, Direction::up) &&
+      cannot_be_possible(row, largest, side, share, Direction::down)) {
+    return largest;
+  }
   double slope = row.doubt;  // of the threshold and of doubt, per unit of κ, at most
   double curvature = 0.0;    // |g2 θ|, at most
   for (std::size_t j = 0; j < row.y.size(); ++j) {
@@ -123,6 +166,9 @@ double FaultMargin::largest_hidden(const FaultRow& row, double largest, double s
   }
   double hidden = largest;
   for (const Direction direction : {Direction::up, Direction::down}) {
+    if (cannot_be_possible(row, hidden, side, share, direction)) {
+      continue;
+    }
     const auto excess = [&](double kappa) { return possible_excess(row, kappa, side, share, channel, direction); };
     // From the left, pieces on which no size can be seen are passed over; a quadratic rises above its chord by no more
     // than a fourth of its second coefficient times the squared width.

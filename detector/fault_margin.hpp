@@ -65,6 +65,10 @@ class FaultMargin {
     double predicted, doubt, rounding;  // seen θ̂; of the row, for all θ; of everything compared
   };
   [[nodiscard]] Sums at(const FaultRow& row, double kappa, double side, double errors);
+  // Cheap bounds from one θ of the set, and from its hull: no certain size up to κ; nothing possible up to κ.
+  [[nodiscard]] bool cannot_be_certain(const FaultRow& row, double kappa, double side, Direction direction) const;
+  [[nodiscard]] bool cannot_be_possible(const FaultRow& row, double kappa, double side, double share,
+                                        Direction direction) const;
   [[nodiscard]] double certain_excess(const FaultRow& row, double kappa, double side, std::size_t channel,
                                       Direction direction);
   [[nodiscard]] double possible_excess(const FaultRow& row, double kappa, double side, double share,

@@ -45,10 +45,12 @@ Eigen::MatrixXd or_zero(const Eigen::MatrixXd& matrix, std::size_t size) {
 }
 
 // What a fault whose profile is at `s` adds to the speeds v, and to those of the joints.
-ExtraMotion extra_motion(const FaultType& fault, const Eigen::MatrixXd& inverse, const Eigen::VectorXd& v,
-                         const Eigen::VectorXd& joints, double s) {
-  ExtraMotion extra{Eigen::VectorXd::Zero(v.size()), Eigen::VectorXd::Zero(joints.size()),
-                    Eigen::VectorXd::Zero(v.size()), Eigen::VectorXd::Zero(joints.size())};
+void extra_motion(const FaultType& fault, const Eigen::MatrixXd& inverse, const Eigen::VectorXd& v,
+                  const Eigen::VectorXd& joints, double s, ExtraMotion& extra) {
+  extra.moved.setZero(v.size());
+  extra.joint_moved.setZero(joints.size());
+  extra.seen.setZero(v.size());
+  extra.joint_seen.setZero(joints.size());
   if (fault.motion.size() > 0) {
     extra.moved += s * fault.motion * v;
   }
@@ -63,7 +65,6 @@ ExtraMotion extra_motion(const FaultType& fault, const Eigen::MatrixXd& inverse,
     extra.joint_seen =
         fault.whole ? Eigen::VectorXd(joints_of(inverse, v + extra.seen) - joints) : joints_of(inverse, extra.seen);
   }
-  return extra;
 }
 
 double evaluate(const Term& term, const Eigen::VectorXd& v, const Eigen::VectorXd& joints, double heading) {
@@ -143,8 +144,12 @@ Parts parts_of(const Term& term, const FaultType& fault, const Instant& at) {
 }
 
 // Signature at one instant; `held` is what a reading that stands still shows.
-FaultSignals signature(const FaultType& fault, const Model& model, const Instant& at, const core::RowMatrix& held) {
-  FaultSignals out = FaultSignals::none(model);
+void signature(const FaultType& fault, const Model& model, const Instant& at, const core::RowMatrix& held,
+               FaultSignals& out) {
+  out.g1.setZero();
+  out.g2.setZero();
+  out.s.setZero();
+  out.c.setZero();
   const auto n = static_cast<Eigen::Index>(model.n());
   const double s = at.profile;
   // Where a fault sets in encoders jump and the robot's own speed goes on: no acceleration that the ground could share.
@@ -169,7 +174,7 @@ FaultSignals signature(const FaultType& fault, const Model& model, const Instant
     }
   }
   if (at.only_changes) {
-    return out;
+    return;
   }
   if (fault.held_effort) {
     out.g1 -= s * fault.effort * held;
@@ -177,7 +182,6 @@ FaultSignals signature(const FaultType& fault, const Model& model, const Instant
   if (fault.offset.size() > 0) {
     out.c += s * fault.offset;
   }
-  return out;
 }
 
 }  // namespace
@@ -254,6 +258,10 @@ SignatureErrors::SignatureErrors(const FaultType& fault, const Model& model, con
     shortest = step > 0.0 ? std::min(shortest, step) : shortest;
   }
   sample_ = shorter(shortest) * errors.speed_sample;
+  if (sample_.size() > 0) {
+    moved_sample_ = motion_ * sample_;
+    seen_sample_ = seen_ * sample_;
+  }
   slope_ = Eigen::VectorXd::Zero(errors.speed.size());
   if (fault.profile.kind == FaultProfile::Kind::ramp) {
     slope_ = errors.speed / fault.profile.rise;
@@ -277,29 +285,33 @@ void SignatureErrors::begin(std::size_t onset) {
   onset_ = std::max(shorter(onset < step.size() ? step[onset] : 0.0), shorter(next)) * reference_->errors.speed_sample;
 }
 
-SignatureErrors::Row SignatureErrors::row(std::size_t k, std::size_t i, double since) const {
+const SignatureErrors::Row& SignatureErrors::row(std::size_t k, std::size_t i, double since) {
   const filter::SignalErrors& errors = reference_->errors;
   const auto n = static_cast<Eigen::Index>(model_->n());
   const auto dY = reference_->rows.dY.middleRows(static_cast<Eigen::Index>(k) * n, n);
   const bool angles = reference_->kind != MotionKind::speed;
   const double decay = std::exp(-design_.beta * since);
   const double newest = angles ? kernel_.gain() * (design_.order == 1 ? decay : kernel_.slow() * since * decay) : 0.0;
-  const Eigen::VectorXd cut = newest * onset_ + slope_;
+  cut_ = newest * onset_ + slope_;
   const auto at = static_cast<Eigen::Index>(i), p = static_cast<Eigen::Index>(model_->p());
   const auto own_error = [&](const Term& term) {
     return dY(static_cast<Eigen::Index>(term.output), static_cast<Eigen::Index>(term.parameter));
   };
-  Eigen::VectorXd of_acceleration = errors.acceleration, of_speed = errors.speed;
+  of_acceleration_ = errors.acceleration;
+  of_speed_ = errors.speed;
   for (const Term& term : model_->terms) {
     if (term.kind != Term::Kind::function && term.scale != 0.0) {
       double& most =
-          (term.kind == Term::Kind::speed ? of_speed : of_acceleration)[static_cast<Eigen::Index>(term.coordinate)];
+          (term.kind == Term::Kind::speed ? of_speed_ : of_acceleration_)[static_cast<Eigen::Index>(term.coordinate)];
       most = std::max(most, own_error(term) / std::abs(term.scale));
     }
   }
-  const Eigen::VectorXd acceleration = motion_ * of_acceleration, speed = motion_ * of_speed,
-                        sample = motion_ * sample_;
-  Row out{Eigen::RowVectorXd::Zero(p), Eigen::RowVectorXd::Zero(p), Eigen::RowVectorXd::Zero(p)};
+  acceleration_.noalias() = motion_ * of_acceleration_;
+  speed_.noalias() = motion_ * of_speed_;
+  out_.e1.setZero(p);
+  out_.e2.setZero(p);
+  out_.es.setZero(p);
+  out_.ec = 0.0;
   for (const Term& term : model_->terms) {
     const auto o = static_cast<Eigen::Index>(term.output), j = static_cast<Eigen::Index>(term.parameter),
                c = static_cast<Eigen::Index>(term.coordinate);
@@ -308,35 +320,35 @@ SignatureErrors::Row SignatureErrors::row(std::size_t k, std::size_t i, double s
     double own = own_error(term), moved = 0.0, seen = 0.0, own_cut = 0.0, moved_cut = 0.0;
     switch (term.kind) {
       case Term::Kind::acceleration:
-        moved = scale * (acceleration[c] + (c == 0 && lateral_ > 0.0 ? lateral_ * of_speed[1] : 0.0));
-        seen = scale * seen_.row(c).dot(of_acceleration);
-        own_cut = scale * cut[c];
-        moved_cut = scale * motion_.row(c).dot(cut);
+        moved = scale * (acceleration_[c] + (c == 0 && lateral_ > 0.0 ? lateral_ * of_speed_[1] : 0.0));
+        seen = scale * seen_.row(c).dot(of_acceleration_);
+        own_cut = scale * cut_[c];
+        moved_cut = scale * motion_.row(c).dot(cut_);
         break;
       case Term::Kind::speed:
-        moved = scale * speed[c];
-        seen = scale * seen_.row(c).dot(of_speed);
+        moved = scale * speed_[c];
+        seen = scale * seen_.row(c).dot(of_speed_);
         break;
       case Term::Kind::function: {
         // Functions of the motion are at most proportional to it, or do not depend on it but by signs.
         const auto beyond = [&](const Eigen::MatrixXd& share, const Eigen::VectorXd& error) {
           return scale * design_.static_gain() * (error.maxCoeff() + errors.heading * (1.0 + share.maxCoeff()));
         };
-        moved = moves_ ? beyond(motion_, sample) : 0.0;
-        seen = whole_ ? own : seen_.isZero(0.0) ? 0.0 : beyond(seen_, seen_ * sample_);
+        moved = moves_ ? beyond(motion_, moved_sample_) : 0.0;
+        seen = whole_ ? own : seen_.isZero(0.0) ? 0.0 : beyond(seen_, seen_sample_);
         own *= 2.0;
         break;
       }
     }
     if (o == at) {
-      out.e1[j] += moved;
-      out.es[j] += seen;
-      out.ec += theta_.size() > 0 ? theta_[j] * (own + own_cut) : 0.0;
+      out_.e1[j] += moved;
+      out_.es[j] += seen;
+      out_.ec += theta_.size() > 0 ? theta_[j] * (own + own_cut) : 0.0;
     }
-    out.e1[j] += effort_(at, o) * (own + own_cut);
-    out.e2[j] += effort_(at, o) * (moved + moved_cut);
+    out_.e1[j] += effort_(at, o) * (own + own_cut);
+    out_.e2[j] += effort_(at, o) * (moved + moved_cut);
   }
-  return out;
+  return out_;
 }
 
 FaultElements::FaultElements(FaultType fault, const Model& model, double static_gain, const ReferenceMotion& motion)
@@ -352,13 +364,15 @@ FaultElements::FaultElements(FaultType fault, const Model& model, double static_
   validate(fault_, model);
 }
 
-FaultElements::Point FaultElements::point(std::size_t k) const {
+void FaultElements::take_point(std::size_t k, Point& point) {
   const auto i = static_cast<Eigen::Index>(k), joint = static_cast<Eigen::Index>(fault_.profile.joint);
-  const double s =
+  point.profile =
       fault_.profile.at(motion_->instant[k] - motion_->instant[onset_],
                         motion_->joint_angle(joint, i) - motion_->joint_angle(joint, static_cast<Eigen::Index>(onset_)),
                         motion_->joint_speed(joint, i));
-  return {s, extra_motion(fault_, from_motion_, motion_->speed.col(i), motion_->joint_speed.col(i), s)};
+  v1_ = motion_->speed.col(i);
+  joints1_ = motion_->joint_speed.col(i);
+  extra_motion(fault_, from_motion_, v1_, joints1_, point.profile, point.extra);
 }
 
 void FaultElements::begin(std::size_t onset) {
@@ -384,7 +398,7 @@ void FaultElements::begin_broken(std::size_t first) {
   onset_ = k_ = first;
   fresh_ = false;
   jump_ = begin_ = end_signals_ = FaultSignals::none(*model_);
-  before_ = point(first);
+  take_point(first, before_);
   if (fault_.held_effort) {
     const auto n = static_cast<Eigen::Index>(model_->n());
     held_ = motion_->rows.Y.middleRows(static_cast<Eigen::Index>(first) * n, n) / static_gain_;
@@ -395,27 +409,27 @@ bool FaultElements::next() {
   if (k_ + 1 >= last_) {
     return false;
   }
-  const auto a = static_cast<Eigen::Index>(k_), b = a + 1;
+  const auto a = static_cast<Eigen::Index>(k_);
   shares_ = motion_->shares(k_);
   const double h = shares_[0] + shares_[1];
-  const Point after = point(k_ + 1);
-  const Eigen::VectorXd v0 = motion_->speed.col(a), v1 = motion_->speed.col(b);
-  const Eigen::VectorXd joints0 = motion_->joint_speed.col(a), joints1 = motion_->joint_speed.col(b);
-  const Eigen::VectorXd acceleration = (v1 - v0) / h, moved_rate = (after.extra.moved - before_.extra.moved) / h,
-                        seen_rate = (after.extra.seen - before_.extra.seen) / h;
+  v0_ = motion_->speed.col(a);
+  joints0_ = motion_->joint_speed.col(a);
+  take_point(k_ + 1, after_);
+  acceleration_ = (v1_ - v0_) / h;
+  moved_rate_ = (after_.extra.moved - before_.extra.moved) / h;
+  seen_rate_ = (after_.extra.seen - before_.extra.seen) / h;
   // The step that ends at the onset of a jump is still healthy.
   const bool healthy = sets_in_ = fresh_ && k_ == onset_;
-  begin_ =
-      signature(fault_, *model_,
-                {before_.profile, v0, joints0, motion_->heading[k_], acceleration, before_.extra.moved, moved_rate,
-                 before_.extra.joint_moved, before_.extra.seen, seen_rate, before_.extra.joint_seen, healthy, healthy},
-                held_);
-  end_signals_ =
-      signature(fault_, *model_,
-                {after.profile, v1, joints1, motion_->heading[k_ + 1], acceleration, after.extra.moved, moved_rate,
-                 after.extra.joint_moved, after.extra.seen, seen_rate, after.extra.joint_seen, healthy},
-                held_);
-  before_ = after;
+  signature(
+      fault_, *model_,
+      {before_.profile, v0_, joints0_, motion_->heading[k_], acceleration_, before_.extra.moved, moved_rate_,
+       before_.extra.joint_moved, before_.extra.seen, seen_rate_, before_.extra.joint_seen, healthy, healthy},
+      held_, begin_);
+  signature(fault_, *model_,
+            {after_.profile, v1_, joints1_, motion_->heading[k_ + 1], acceleration_, after_.extra.moved, moved_rate_,
+             after_.extra.joint_moved, after_.extra.seen, seen_rate_, after_.extra.joint_seen, healthy},
+            held_, end_signals_);
+  std::swap(before_, after_);
   ++k_;
   return true;
 }
@@ -616,7 +630,7 @@ bool FaultFilter::next() {
   if (read_errors_) {
     since_ += motion_->step[k_];
     for (Eigen::Index i = 0; i < n; ++i) {
-      const SignatureErrors::Row e = read_errors_->row(k_, static_cast<std::size_t>(i), since_);
+      const SignatureErrors::Row& e = read_errors_->row(k_, static_cast<std::size_t>(i), since_);
       row_range_.row(i) += e.e1 + most_kappa_ * e.e2 + e.es;
       row_doubt_[i] += e.ec;
     }
@@ -649,7 +663,8 @@ SettledRows settled_rows(const FaultType& fault, const Model& model, const Filte
   check::that(v.size() == c && a.size() == c, "operating point", "one speed and one acceleration for each coordinate");
   const Eigen::MatrixXd inverse = inverse_of(model);
   const Eigen::VectorXd joints = joints_of(inverse, v);
-  const ExtraMotion extra = extra_motion(fault, inverse, v, joints, 1.0);
+  ExtraMotion extra;
+  extra_motion(fault, inverse, v, joints, 1.0, extra);
   Eigen::VectorXd moved_rate = Eigen::VectorXd::Zero(c), seen_rate = moved_rate;
   if (fault.motion.size() > 0) {
     moved_rate += fault.motion * a;
@@ -664,10 +679,11 @@ SettledRows settled_rows(const FaultType& fault, const Model& model, const Filte
            model::regressor(
                model, {speed_list, {none.data(), speed_list.size()}, joint_list, {none.data(), joint_list.size()}},
                {a.data(), static_cast<std::size_t>(a.size())});
-  rows.signature = signature(
+  rows.signature = FaultSignals::none(model);
+  signature(
       fault, model,
       {1.0, v, joints, 0.0, a, extra.moved, moved_rate, extra.joint_moved, extra.seen, seen_rate, extra.joint_seen},
-      rows.Y / design.static_gain());
+      rows.Y / design.static_gain(), rows.signature);
   rows.signature.g1 *= design.static_gain();
   rows.signature.g2 *= design.static_gain();
   rows.signature.s *= design.static_gain();

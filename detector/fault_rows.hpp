@@ -104,8 +104,9 @@ class SignatureErrors {
   /// Largest error of the coordinates' speeds at the onset.
   [[nodiscard]] const Eigen::VectorXd& at_onset() const { return onset_; }
 
-  /// Of output `i` at instant `k` of the motion, `since` s (of the filter's steps) after the onset.
-  [[nodiscard]] Row row(std::size_t k, std::size_t i, double since) const;
+  /// Of output `i` at instant `k` of the motion, `since` s (of the filter's steps) after the onset. One object serves
+  /// one thread; the row holds until the next call.
+  [[nodiscard]] const Row& row(std::size_t k, std::size_t i, double since);
 
  private:
   [[nodiscard]] double shorter(double step) const;
@@ -121,6 +122,8 @@ class SignatureErrors {
   Eigen::VectorXd sample_;  // n_v of the shortest step
   Eigen::VectorXd slope_;   // per coordinate: what changes of s add where it does not jump
   bool moves_ = false, whole_ = false;
+  Eigen::VectorXd cut_, of_acceleration_, of_speed_, acceleration_, speed_, moved_sample_, seen_sample_;  // of one row
+  Row out_;
 };
 
 /// A fault's signature along a reference motion, element by element of the weak form (filter/element_filter.hpp): what
@@ -160,7 +163,7 @@ class FaultElements {
     double profile = 0.0;
     ExtraMotion extra;
   };
-  [[nodiscard]] Point point(std::size_t k) const;
+  void take_point(std::size_t k, Point& point);
 
   FaultType fault_;
   const Model* model_;
@@ -168,7 +171,8 @@ class FaultElements {
   const ReferenceMotion* motion_;
   core::RowMatrix held_;  // filtered rows at the onset over the static gain
   Eigen::MatrixXd from_motion_;
-  Point before_;
+  Point before_, after_;
+  Eigen::VectorXd v0_, v1_, joints0_, joints1_, acceleration_, moved_rate_, seen_rate_;  // of one element
   FaultSignals jump_, begin_, end_signals_;
   std::array<double, 2> shares_{};
   std::size_t onset_ = 0, k_ = 0, last_ = 0;

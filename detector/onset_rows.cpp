@@ -185,13 +185,13 @@ FaultSignals OnsetRows::filtered(std::size_t k) const {
           value(state.z1.c, state.z2.c, state.fast.c)};
 }
 
-OnsetRow OnsetRows::row(std::size_t k, std::size_t i) const {
+OnsetRow OnsetRows::row(std::size_t k, std::size_t i) {
   check::that(k > s_ && k < end_, "instant", "one after the onset");
   const auto at = static_cast<Eigen::Index>(i), p = static_cast<Eigen::Index>(model_->p());
   const FaultSignals step = filtered(k);
   const FaultSignals& signals = drifts(fault_) ? drifting_[k - s_] : step;
   const double x = way(s_, k), decay = std::exp(-design_.beta * x);
-  const SignatureErrors::Row errors = errors_.row(k, i, x);
+  const SignatureErrors::Row& errors = errors_.row(k, i, x);
   OnsetRow out{{},
                signals.g1.row(at),
                signals.g2.row(at),

@@ -63,7 +63,7 @@ class OnsetRows {
   /// The instant of t_s, b + 1.
   [[nodiscard]] std::size_t start() const { return s_; }
   /// Row of output `i` at instant k > start().
-  [[nodiscard]] OnsetRow row(std::size_t k, std::size_t i) const;
+  [[nodiscard]] OnsetRow row(std::size_t k, std::size_t i);
   /// |A|, |B| and |C| of output `i` are at most this for |θ_j| <= largest_j and |κ| <= `kappa`.
   [[nodiscard]] std::array<double, 3> left_bounds(std::size_t i, double kappa, const Eigen::VectorXd& largest) const;
   /// The same of an effort that was never larger than `effort` before t_s.

@@ -294,7 +294,9 @@ Commissioned commissioned(const LogTable& log, const Robot& robot) {
   Commissioned result;
   try {
     TableSource source(log);
-    Commissioning commissioning = commission_robot(source, robot);
+    commission::CommissionOptions options;
+    options.at_risk = commission::CommissionOptions::AtRisk::nothing;
+    Commissioning commissioning = commission_robot(source, robot, options);
     result.outputs = std::move(commissioning.validation);
     if (result.outputs.empty()) {
       result.why_not = commissioning.message;

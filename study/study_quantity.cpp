@@ -255,6 +255,7 @@ void read_off(LogSource& log, const StudyCase& subject, const std::vector<StudyQ
               const EvaluateOptions& options, CaseResult& result) {
   commission::CommissionOptions commissioning;
   commissioning.outliers = subject.outliers_allowed;
+  commissioning.at_risk = commission::CommissionOptions::AtRisk::nothing;
   const Commissioning c = commission_robot(log, subject.robot, commissioning);
   const bool model = !c.model.facets.empty();
   if (!model) {
