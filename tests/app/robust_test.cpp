@@ -185,7 +185,7 @@ TEST_F(Robust, AFleetWithLinksToItselfIsRead) {
 }
 
 TEST_F(Robust, AFleetListWithAZeroByteIsRefused) {
-  for (const std::string row : {std::string("amy,mon\0day.csv\n", 16), std::string("a\0my,monday.csv\n", 16)}) {
+  for (const std::string& row : {std::string("amy,mon\0day.csv\n", 16), std::string("a\0my,monday.csv\n", 16)}) {
     put("fleet.csv", "robot,log\n" + row);
     const Outcome outcome = run("fleet fleet.csv --robot robot.yaml");
     EXPECT_EQ(outcome.code, 2);
