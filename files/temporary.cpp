@@ -103,7 +103,8 @@ Temporary::Temporary(const fs::path& stem, Kind kind, const std::string& shown, 
     number += lock_ < 0 && !bury(path_, kind != Kind::file) ? 1 : 0;
   }
   if (lock_ < 0) {
-    throw InputError(shown + ": cannot be written (" + std::strerror(errno) + "): expected " + expected);
+    throw InputError(shown + (kind == Kind::file ? ": cannot be written (" : ": cannot be made (") +
+                     std::strerror(errno) + "): expected " + expected);
   }
   living().paths.insert(path_);
 }
