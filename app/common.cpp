@@ -72,6 +72,23 @@ std::unique_ptr<logs::RecordedLog> open_robot_log(const std::vector<std::filesys
   return logs::open_log(paths, reader);
 }
 
+void keep_existing(const std::filesystem::path& out) {
+  std::error_code ignored;
+  const std::filesystem::file_status there = std::filesystem::status(out, ignored);
+  if (std::filesystem::exists(there) && !std::filesystem::is_other(there)) {
+    throw InputError(out.string() + ": is there already: expected a new name, or --force");
+  }
+}
+
+void keep_inputs(const std::filesystem::path& out, const std::vector<std::filesystem::path>& read) {
+  for (const std::filesystem::path& path : read) {
+    std::error_code neither;
+    if (std::filesystem::equivalent(out, path, neither)) {
+      throw InputError(out.string() + ": is what is read: expected another name");
+    }
+  }
+}
+
 void make_directory(const CommonOptions& options) {
   if (options.out.empty()) {
     return;

@@ -77,6 +77,12 @@ void tell(fmt::format_string<Values...> text, Values&&... values) {
 [[nodiscard]] std::unique_ptr<logs::RecordedLog> open_robot_log(const std::vector<std::filesystem::path>& paths,
                                                                 const Robot& robot, const CommonOptions& options);
 
+/// Throws InputError where a file `out` is there already; pipes and devices are written to.
+void keep_existing(const std::filesystem::path& out);
+
+/// Throws InputError where writing `out` would replace one of the files `read`.
+void keep_inputs(const std::filesystem::path& out, const std::vector<std::filesystem::path>& read);
+
 /// Makes the result directory `out` where it is wanted. Throws InputError when that is impossible.
 void make_directory(const CommonOptions& options);
 

@@ -40,8 +40,8 @@ int run(const Arguments& a) {
   std::vector<std::filesystem::path> from = a.paths;
   const std::filesystem::path to = from.back();
   from.pop_back();
-  if (std::filesystem::exists(to) && !a.force) {
-    throw InputError(to.string() + ": it is there already: --force replaces it");
+  if (!a.force) {
+    keep_existing(to);
   }
   const std::unique_ptr<logs::RecordedLog> log = logs::open_log(from, reader_options(a.common));
   const logs::LogReport& report = log->report();

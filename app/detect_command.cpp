@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <unistd.h>
+
 #include <algorithm>
 #include <iostream>
 #include <memory>
@@ -46,7 +48,22 @@ constexpr const char* kExamples =
     "  wheelwright detect drive.csv --model result/model.json --out check\n"
     "  wheelwright detect drive.mcap --model result/model.json --series residual.mcap\n"
     "  robot_driver | wheelwright detect --follow --model result/model.json\n\n"
-    "Exit code: 0 no fault, 1 a fault was found, 2 bad input, or no instant of it could be decided.";
+    "Exit code: 0 no fault, 1 a fault was found, 2 bad input, or it could not be decided: at no instant, at fewer "
+    "than\n"
+    "half of the rows, or, with --follow, at none of the last ones. --follow tells such spells as they come (blind).";
+
+// Why the log as a whole is not decided; empty where it is: all but what the filter settles in, or half of it.
+std::string why_not_decided(const Detection& detection, const OnlineModel& model, const logs::RecordedLog& log) {
+  const logs::LogReport& report = log.report();
+  if (detection.instants == 0) {
+    return why_undecided(model, report.rows, log.median_step());
+  }
+  const double settling = model.filter.settle / (model.filter.beta * log.median_step());
+  const auto rows = static_cast<double>(report.rows_read);
+  return static_cast<double>(detection.instants) + settling < 0.5 * rows
+             ? why_mostly_undecided(detection.instants, report.rows_read, logs::sentences(report))
+             : std::string();
+}
 
 int run(const Arguments& a) {
   OnlineModel model = read_model(a.model);
@@ -58,11 +75,13 @@ int run(const Arguments& a) {
   logs::LogOptions reader = reader_options(a.common);
   reader.only = robots::useful_columns(model.robot);
   if (a.follow) {
-    return follow(std::cin, std::cout, std::move(detector), model, a.detector, reader, a.common.json);
+    return follow(files::LineReader(files::open_stream(STDIN_FILENO, "standard input"), "standard input"), std::cout,
+                  std::move(detector), model, a.detector, reader, a.common.json);
   }
   if (a.log.empty()) {
     throw InputError("detect: expected a LOG, or --follow to read rows from standard input");
   }
+  keep_inputs(a.series, {a.log, a.model});
   make_directory(a.common);
   const auto opened = logs::open_log({a.log}, reader);
   logs::RecordedLog& log = *opened;
@@ -82,8 +101,7 @@ int run(const Arguments& a) {
   const std::vector<detector::Isolation> isolations = commission::isolate_events(log, model, detection, isolation);
   const bool fault = !detection.events.empty() || !at_risk.events.empty() ||
                      (kinematic.detection && !kinematic.detection->events.empty());
-  const std::string undecided =
-      detection.instants == 0 ? why_undecided(model, log.report().rows, log.median_step()) : std::string();
+  const std::string undecided = why_not_decided(detection, model, log);
   if (!a.common.out.empty() || a.common.json) {
     Json json = results::to_json(detection, model, a.model.string(), a.log.string(), results::software());
     results::add_isolation(json, isolations);

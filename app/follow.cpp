@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include <wheelwright/commission/blind_watch.hpp>
 #include <wheelwright/commission/risk_watch.hpp>
 #include <wheelwright/logs/csv.hpp>
 
@@ -51,7 +52,8 @@ class Watch {
         sample_(pick_.size()),
         recorder_(model.model.n(), kMerge) {}
 
-  void take(const LogBlock& row, std::size_t number, std::ostream& out, bool json) {
+  /// Takes a row, tells an event that begins with it; whether there was a decision.
+  bool take(const LogBlock& row, std::size_t number, std::ostream& out, bool json) {
     if (!row.segment_starts.empty()) {
       detector_.restart();
     }
@@ -67,6 +69,7 @@ class Watch {
         out << (json ? files::json_text(results::to_json(event, model_), -1) : event_line(event, model_)) << std::endl;
       }
     }
+    return decision.valid;
   }
   [[nodiscard]] bool any() const { return !recorder_.events().empty(); }
   /// Rows at which a decision was made.
@@ -81,13 +84,72 @@ class Watch {
   std::size_t decisions_ = 0;
 };
 
+// Spells without a decision on the torque residual, with what the parser met in them.
+class Blindness {
+ public:
+  Blindness(const OnlineModel& model, logs::CsvRowParser& parser, std::ostream& out, bool json)
+      : model_(model),
+        parser_(parser),
+        out_(out),
+        json_(json),
+        watch_(model.measurement.nominal_step, model.filter.settle / model.filter.beta) {}
+
+  /// Before each line.
+  void begin_line() {
+    if (watch_.spell().rows == 0) {
+      parser_.begin_counts();
+      unreadable_ = {};
+    }
+  }
+  void decided(double t) {
+    if (const auto spell = watch_.decided(t)) {
+      tell(*spell, t);
+    }
+  }
+  void undecided(std::optional<double> t) {
+    if (const auto spell = watch_.undecided(t)) {
+      tell(*spell, std::nullopt);
+    }
+  }
+  void unreadable(const std::string& why) {
+    unreadable_.first = unreadable_.count++ == 0 ? why : unreadable_.first;
+    undecided(std::nullopt);
+  }
+  [[nodiscard]] bool blind() const { return watch_.blind(); }
+  [[nodiscard]] std::string line() const { return blind_line(watch_.spell(), std::nullopt, why()); }
+
+ private:
+  [[nodiscard]] std::string why() const {
+    logs::LogReport met = parser_.report();
+    met.wraps = met.angle_wraps = {};
+    std::vector<std::string> causes = logs::sentences(met);
+    if (unreadable_.count > 0) {
+      causes.push_back(fmt::format("{} line{} could not be read (first {})", unreadable_.count,
+                                   unreadable_.count == 1 ? "" : "s", unreadable_.first));
+    }
+    return why_blind(model_, causes);
+  }
+  void tell(const commission::BlindSpell& spell, std::optional<double> until) {
+    out_ << (json_ ? files::json_text({{"blind", results::to_json(spell, until, why())}}, -1)
+                   : blind_line(spell, until, why()))
+         << std::endl;
+  }
+
+  const OnlineModel& model_;
+  logs::CsvRowParser& parser_;
+  std::ostream& out_;
+  bool json_;
+  commission::BlindWatch watch_;
+  logs::Occurrences unreadable_;
+};
+
 }  // namespace
 
-ExitCode follow(std::istream& in, std::ostream& out, TorqueDetector detector, const OnlineModel& model,
+ExitCode follow(files::LineReader in, std::ostream& out, TorqueDetector detector, const OnlineModel& model,
                 const detector::DetectorOptions& options, const logs::CsvOptions& reader, bool json) {
-  std::string line;
+  std::string_view line;
   do {
-    if (!std::getline(in, line)) {
+    if (!in.next(line)) {
       throw InputError("standard input: expected a header line with the names of the columns, found its end");
     }
   } while (!logs::is_csv_content(line));
@@ -124,19 +186,29 @@ ExitCode follow(std::istream& in, std::ostream& out, TorqueDetector detector, co
                  : "at a stated risk, " + commission::sentence(event, model.model))
         << std::endl;
   };
+  Blindness blindness(model, parser, out, json);
   LogBlock row;
   std::size_t number = 0;
   std::vector<double> times;  // of the first rows
-  while (std::getline(in, line)) {
+  while (in.next(line)) {
+    blindness.begin_line();
     try {
       if (!parser.parse(line, row)) {
+        if (logs::is_csv_content(line)) {
+          blindness.undecided(std::nullopt);
+        }
         continue;
       }
     } catch (const InputError& error) {
       tell("wheelwright detect: {} (row left out)\n", error.what());
+      blindness.unreadable(error.what());
       continue;
     }
-    torque.take(row, number, out, json);
+    if (torque.take(row, number, out, json)) {
+      blindness.decided(row.t[0]);
+    } else {
+      blindness.undecided(row.t[0]);
+    }
     if (times.size() < kMostTimes) {
       times.push_back(row.t[0]);
     }
@@ -167,11 +239,15 @@ ExitCode follow(std::istream& in, std::ostream& out, TorqueDetector detector, co
       !pose_at_risk.watch().events.empty()) {
     return kNo;
   }
-  if (torque.decisions() > 0) {
-    return kDone;
+  if (torque.decisions() == 0) {
+    tell("wheelwright detect: {}\n", why_undecided(model, number, core::median_step(times)));
+    return kBadInput;
   }
-  tell("wheelwright detect: {}\n", why_undecided(model, number, core::median_step(times)));
-  return kBadInput;
+  if (blindness.blind()) {
+    tell("wheelwright detect: standard input ended {}\n", blindness.line());
+    return kBadInput;
+  }
+  return kDone;
 }
 
 }  // namespace wheelwright::app

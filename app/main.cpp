@@ -1,13 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <unistd.h>
+
+#include <csignal>
 #include <exception>
 #include <memory>
+#include <new>
 #include <sstream>
+#include <thread>
 #include <vector>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
 #include <wheelwright/core/error.hpp>
+#include <wheelwright/files/temporary.hpp>
 
 #include "command_tree.hpp"
 #include "commands.hpp"
@@ -33,6 +39,28 @@ std::string joined(int count, char** words) {
     line += std::string(" ") + words[k];
   }
   return line;
+}
+
+// When the program is interrupted, what it is writing is removed, and it ends with 128 + the signal's number. A thread
+// waits for the signal, since a handler must not touch files. Signals that whoever started the program has switched off
+// stay off.
+void end_when_interrupted() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+    struct sigaction now {};
+    if (sigaction(signal, nullptr, &now) == 0 && now.sa_handler != SIG_IGN) {
+      sigaddset(&signals, signal);
+    }
+  }
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  std::thread([signals] {
+    int signal = 0;
+    if (sigwait(&signals, &signal) == 0) {
+      wheelwright::files::remove_temporaries();
+      _exit(128 + signal);
+    }
+  }).detach();
 }
 
 int run(int argc, char** argv) {
@@ -82,6 +110,9 @@ int run(int argc, char** argv) {
   } catch (const wheelwright::Error& error) {
     tell("wheelwright: {}\n", error.what());
     return kBadInput;
+  } catch (const std::bad_alloc&) {
+    tell("wheelwright: not enough memory for this input: expected a shorter log, fewer threads or a larger machine\n");
+    return kInternal;
   } catch (const std::exception& error) {
     tell("wheelwright: internal failure: {}\nThis is a bug; please report it with the input.\n", error.what());
     return kInternal;
@@ -90,4 +121,7 @@ int run(int argc, char** argv) {
 
 }  // namespace
 
-int main(int argc, char** argv) { return finished(run(argc, argv)); }
+int main(int argc, char** argv) {
+  end_when_interrupted();
+  return finished(run(argc, argv));
+}

@@ -64,8 +64,8 @@ int run(const Arguments& a) {
     throw InputError("--out-file and --out: two places for one file: expected one of them");
   }
   const std::filesystem::path target = a.common.out.empty() ? a.file : a.common.out / "robot.yaml";
-  if (!target.empty() && !a.force && std::filesystem::exists(target)) {
-    throw InputError(target.string() + ": is there already: expected a new name, or --force");
+  if (!a.force) {
+    keep_existing(target);
   }
   const robots::RobotWithOrigins robot = made(a);
   const std::string text = robots::robot_yaml(robot);

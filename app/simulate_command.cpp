@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/files/json.hpp>
-#include <wheelwright/logs/csv.hpp>
+#include <wheelwright/logs/log_file.hpp>
 #include <wheelwright/results/scenario_file.hpp>
 #include <wheelwright/sim/simulation.hpp>
 
@@ -36,22 +36,29 @@ constexpr const char* kExamples =
     "  wheelwright simulate examples/scenarios/wheel_radius_fault.yaml --out fault.csv.gz --seed 7";
 
 int run(const Arguments& a) {
+  keep_inputs(a.out, {a.scenario});
   Scenario scenario = read_scenario(a.scenario);
   if (a.seed) {
     scenario.seed = *a.seed;
   }
   Simulation simulation(scenario);
-  const LogTable log = read_all(simulation);
-  logs::write_csv(a.out, log);
+  const auto writer = logs::create_csv(a.out, simulation.columns());
+  LogBlock block;
+  std::size_t rows = 0;
+  while (simulation.next(block)) {
+    writer->write(block);
+    rows += block.rows();
+  }
+  writer->commit();
   if (a.json) {
     say_json({{"schema", "wheelwright/simulation/1"},
               {"software", results::software()},
               {"scenario", a.scenario.string()},
               {"log", a.out.string()},
-              {"rows", log.rows()},
+              {"rows", rows},
               {"seed", scenario.seed}});
   } else if (!a.quiet) {
-    say("wrote {}: {} rows, {:.1f} s, seed {}\n", a.out.string(), log.rows(), scenario.duration, scenario.seed);
+    say("wrote {}: {} rows, {:.1f} s, seed {}\n", a.out.string(), rows, scenario.duration, scenario.seed);
   }
   return kDone;
 }

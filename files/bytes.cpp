@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/files/bytes.hpp>
 
+#include <unistd.h>
+
 #include <array>
 #include <cerrno>
 #include <cstdio>
@@ -18,6 +20,7 @@
 #include <zstd.h>
 
 #include <wheelwright/core/error.hpp>
+#include <wheelwright/files/words.hpp>
 
 namespace wheelwright::files {
 
@@ -251,6 +254,39 @@ std::unique_ptr<ByteSource> open_bytes(const std::filesystem::path& path, bool h
   return std::make_unique<PlainSource>(std::move(raw), std::move(head));
 }
 
+namespace {
+
+class StreamSource final : public ByteSource {
+ public:
+  StreamSource(int descriptor, std::string name) : descriptor_(descriptor), name_(std::move(name)) {}
+
+  std::size_t read(char* to, std::size_t size) override {
+    ssize_t got = -1;
+    do {
+      got = ::read(descriptor_, to, size);
+    } while (got < 0 && errno == EINTR);
+    if (got < 0) {
+      throw InputError(name_ + ": cannot be read (" + std::strerror(errno) + "): expected a readable stream");
+    }
+    bytes_ += static_cast<std::uint64_t>(got);
+    return static_cast<std::size_t>(got);
+  }
+  [[nodiscard]] std::uint64_t file_bytes() const override { return bytes_; }
+  [[nodiscard]] std::string hash() const override { return {}; }
+  [[nodiscard]] const char* packing() const override { return "plain"; }
+
+ private:
+  int descriptor_;
+  std::string name_;
+  std::uint64_t bytes_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<ByteSource> open_stream(int descriptor, std::string name) {
+  return std::make_unique<StreamSource>(descriptor, std::move(name));
+}
+
 std::string read_bytes(const std::filesystem::path& path, std::size_t limit) {
   const auto source = open_bytes(path);
   std::string text;
@@ -315,49 +351,77 @@ namespace {
                    "): expected enough room on the disk and the right to write");
 }
 
+constexpr int most_links = 40;
+
+/// Where what is written for a place goes: to a file, which is replaced, or to what is open or not a file at all.
+struct Destination {
+  std::filesystem::path file;
+  bool as_it_is = false;
+  int descriptor = -1;  ///< of a stream of this program that the place names
+};
+
+Destination destination(const std::filesystem::path& place) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  const fs::file_status status = fs::status(place, error);
+  if (fs::is_directory(status)) {
+    throw InputError(place.string() + ": is a directory: expected the name of a file to write");
+  }
+  const fs::path own_streams = fs::canonical("/proc/self/fd", error);
+  fs::path file = place;
+  for (int links = 0; fs::is_symlink(fs::symlink_status(file, error)); ++links) {
+    if (links == most_links) {
+      throw InputError(place.string() + ": is a link that leads nowhere: expected the name of a file to write");
+    }
+    if (!own_streams.empty() && fs::weakly_canonical(file.parent_path(), error) == own_streams) {
+      const int number = static_cast<int>(to_number(file.filename().string()).value_or(-1.0));
+      return {file, true, number};
+    }
+    file = file.parent_path() / fs::read_symlink(file, error);
+  }
+  return {file, fs::exists(status) && !fs::is_regular_file(status)};
+}
+
+/// The file that `place` leads to. Throws InputError where it is none.
+std::filesystem::path file_to_replace(const std::filesystem::path& place) {
+  const Destination to = destination(place);
+  if (to.as_it_is) {
+    throw InputError(place.string() + ": is a pipe or a device: expected a file, which can be written in any order");
+  }
+  return to.file;
+}
+
+constexpr const char* suffix = ".wheelwright-part";
+
+std::filesystem::path with_suffix(std::filesystem::path path) { return path += suffix; }
+
 }  // namespace
 
-FileBeside::FileBeside(std::filesystem::path place) : place_(std::move(place)) {
-  std::error_code ignored;
-  if (std::filesystem::is_directory(place_, ignored)) {
-    throw InputError(place_.string() + ": is a directory: expected the name of a file to write");
-  }
-  for (int attempt = 0; attempt < 1000; ++attempt) {
-    path_ = place_;
-    path_ += ".part" + std::to_string(attempt);
-    if (std::FILE* file = std::fopen(path_.c_str(), "wbx")) {
-      std::fclose(file);
-      return;
-    }
-    if (errno != EEXIST) {
-      break;
-    }
-  }
-  throw InputError(place_.string() + ": cannot be written (" + std::strerror(errno) +
-                   "): expected a file name in an existing, writable directory");
-}
-
-FileBeside::~FileBeside() {
-  if (!path_.empty()) {
-    std::error_code ignored;
-    std::filesystem::remove(path_, ignored);
-  }
-}
+FileBeside::FileBeside(std::filesystem::path place)
+    : place_(std::move(place)),
+      target_(file_to_replace(place_)),
+      beside_(with_suffix(target_), Temporary::Kind::file, place_.string(),
+              "a file name in an existing, writable directory") {}
 
 void FileBeside::put() {
-  std::error_code error;
-  std::filesystem::rename(path_, place_, error);
-  if (error) {
-    errno = error.value();
-    cannot(place_, "cannot be put in its place");
+  if (const std::string why = beside_.move_to(target_); !why.empty()) {
+    throw InputError(place_.string() + ": cannot be put in its place (" + why +
+                     "): expected enough room on the disk and the right to write");
   }
-  path_.clear();
 }
 
-AtomicFile::AtomicFile(std::filesystem::path path)
-    : beside_(std::move(path)), file_(std::fopen(beside_.path().c_str(), "wb")) {
+AtomicFile::AtomicFile(std::filesystem::path path) : place_(std::move(path)) {
+  const Destination to = destination(place_);
+  if (to.descriptor >= 0) {
+    file_ = fdopen(dup(to.descriptor), "wb");
+  } else if (to.as_it_is) {
+    file_ = std::fopen(place_.c_str(), "wb");
+  } else {
+    beside_.emplace(place_);
+    file_ = std::fopen(beside_->path().c_str(), "wb");
+  }
   if (file_ == nullptr) {
-    cannot(beside_.place(), "cannot be written");
+    cannot(place_, "cannot be written");
   }
 }
 
@@ -369,16 +433,18 @@ AtomicFile::~AtomicFile() {
 
 void AtomicFile::write(std::string_view bytes) {
   if (std::fwrite(bytes.data(), 1, bytes.size(), file_) != bytes.size()) {
-    cannot(beside_.place(), "cannot be written");
+    cannot(place_, "cannot be written");
   }
 }
 
 void AtomicFile::commit() {
   const bool flushed = std::fflush(file_) == 0;
   if (!flushed || std::fclose(std::exchange(file_, nullptr)) != 0) {
-    cannot(beside_.place(), "cannot be written");
+    cannot(place_, "cannot be written");
   }
-  beside_.put();
+  if (beside_) {
+    beside_->put();
+  }
 }
 
 void atomic_write(const std::filesystem::path& path, std::string_view content) {

@@ -9,9 +9,12 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include <wheelwright/files/temporary.hpp>
 
 struct XXH64_state_s;
 
@@ -55,6 +58,10 @@ class ByteSource {
 /// or a known format that is not text (zip, SQLite, HDF5, MCAP, xz, bzip2, UTF-16).
 [[nodiscard]] std::unique_ptr<ByteSource> open_bytes(const std::filesystem::path& path, bool hashed = false);
 
+/// What comes from the open descriptor `descriptor`, as it comes: read() waits for the first byte only. It is neither
+/// unpacked nor hashed; `name` is for messages.
+[[nodiscard]] std::unique_ptr<ByteSource> open_stream(int descriptor, std::string name);
+
 /// All bytes of `path`, unpacked. Throws InputError as open_bytes does, and when there are more than `limit`.
 [[nodiscard]] std::string read_bytes(const std::filesystem::path& path, std::size_t limit);
 
@@ -88,32 +95,33 @@ class LineReader {
 };
 
 /// A new, empty file beside the place that it is written for, for libraries that write by name. put() renames it; where
-/// that is not reached, nothing is left behind and an older file of the place's name stays as it was.
+/// that is not reached, nothing is left behind and an older file of the place's name stays as it was. Where the place is
+/// a symbolic link, what it leads to is replaced.
 class FileBeside {
  public:
   /// Makes the file. Throws InputError, naming the place, when it cannot be made (no such directory, no right to write,
-  /// the place is a directory).
+  /// the place is a directory, a pipe or a device).
   explicit FileBeside(std::filesystem::path place);
-  ~FileBeside();
-  FileBeside(const FileBeside&) = delete;
-  FileBeside& operator=(const FileBeside&) = delete;
 
   /// Of the file itself, until put().
-  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+  [[nodiscard]] const std::filesystem::path& path() const { return beside_.path(); }
   [[nodiscard]] const std::filesystem::path& place() const { return place_; }
-  /// Renames it, closed by its writer, to its place. Throws InputError when that fails. To be called once, last.
+  /// Renames it, closed by its writer, to its place, when all of it is on disk. Throws InputError when that fails. To be
+  /// called once, last.
   void put();
 
  private:
   std::filesystem::path place_;
-  std::filesystem::path path_;  ///< empty behind put()
+  std::filesystem::path target_;  ///< what the place leads to
+  Temporary beside_;
 };
 
-/// A file that is written beside its place under a temporary name and renamed into it by commit(). Where commit() is
-/// not reached, nothing is left behind and an older file of that name stays as it was.
+/// A file that is written from its beginning to its end: beside its place under a temporary name, and renamed into it by
+/// commit(), as FileBeside does. A pipe or a device is written to as it is, and so is a stream of the program's own
+/// ("/dev/stdout").
 class AtomicFile {
  public:
-  /// Opens the temporary. Throws InputError as FileBeside does.
+  /// Opens it. Throws InputError as FileBeside does, but for pipes and devices.
   explicit AtomicFile(std::filesystem::path path);
   ~AtomicFile();
   AtomicFile(const AtomicFile&) = delete;
@@ -125,7 +133,8 @@ class AtomicFile {
   void commit();
 
  private:
-  FileBeside beside_;
+  std::filesystem::path place_;
+  std::optional<FileBeside> beside_;  ///< none where the place is written to as it is
   std::FILE* file_ = nullptr;
 };
 

@@ -122,9 +122,11 @@ double JsonPlace::number() const {
   return value_->get<double>();
 }
 
-std::size_t JsonPlace::count() const {
-  if (!value_->is_number_unsigned() && !(value_->is_number_integer() && value_->get<std::int64_t>() >= 0)) {
-    fail("an integer >= 0");
+std::size_t JsonPlace::count(std::size_t most) const {
+  const bool whole = value_->is_number_unsigned() || (value_->is_number_integer() && value_->get<std::int64_t>() >= 0);
+  if (!whole || value_->get<std::size_t>() > most) {
+    fail(most == std::numeric_limits<std::size_t>::max() ? "an integer >= 0"
+                                                         : fmt::format("an integer from 0 to {}", most));
   }
   return value_->get<std::size_t>();
 }

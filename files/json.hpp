@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -53,8 +54,8 @@ class JsonPlace {
 
   /// A finite number.
   [[nodiscard]] double number() const;
-  /// An integer >= 0.
-  [[nodiscard]] std::size_t count() const;
+  /// An integer from 0 to `most`.
+  [[nodiscard]] std::size_t count(std::size_t most = std::numeric_limits<std::size_t>::max()) const;
   [[nodiscard]] bool boolean() const;
   [[nodiscard]] std::string text() const;
   /// An array of finite numbers.

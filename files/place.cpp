@@ -140,6 +140,12 @@ double YamlPlace::positive() const {
   return number("a number > 0", [](double value) { return value > 0.0; });
 }
 
+std::uint64_t YamlPlace::whole(std::uint64_t least, std::uint64_t most) const {
+  return static_cast<std::uint64_t>(number(fmt::format("a whole number from {} to {}", least, most), [&](double value) {
+    return value >= static_cast<double>(least) && value <= static_cast<double>(most) && value == std::floor(value);
+  }));
+}
+
 bool YamlPlace::boolean() const { return choice({"true", "false"}) == 0; }
 
 std::string YamlPlace::where() const { return node_->where(); }

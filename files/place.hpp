@@ -4,6 +4,7 @@
 /// files use them.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -66,6 +67,8 @@ class YamlPlace {
   [[nodiscard]] double number(std::string_view expected, const std::function<bool(double)>& accepted) const;
   /// A number > 0.
   [[nodiscard]] double positive() const;
+  /// A whole number from `least` to `most`, which is at most 2⁵³: whole numbers beyond it are not all doubles.
+  [[nodiscard]] std::uint64_t whole(std::uint64_t least, std::uint64_t most) const;
   /// true or false.
   [[nodiscard]] bool boolean() const;
 

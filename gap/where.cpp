@@ -25,28 +25,65 @@
 namespace wheelwright::gap {
 namespace {
 
-// Means over cells of equal duration; `filled` where a cell has a value.
+// Means over cells of equal duration, in their order: those that have values. A pause of the clock has none, however
+// long.
 struct Cells {
-  double width = 0.0;
-  Eigen::VectorXd value;
-  Eigen::VectorXd filled;
+  double count = 0.0;  // cells from the first time to the last, empty ones too
+  std::vector<Eigen::Index> index;
+  std::vector<double> value;
 };
 
 Cells cells_of(const Eigen::VectorXd& t, const Eigen::VectorXd& values, double width) {
-  const auto n = static_cast<Eigen::Index>((t[t.size() - 1] - t[0]) / width + 1.0 + 1e-9);
-  Cells cells{width, Eigen::VectorXd::Zero(n), Eigen::VectorXd::Zero(n)};
+  std::vector<std::pair<Eigen::Index, double>> placed;
+  placed.reserve(static_cast<std::size_t>(t.size()));
+  Cells cells;
+  cells.count = std::floor((t[t.size() - 1] - t[0]) / width + 1.0 + 1e-9);
   for (Eigen::Index k = 0; k < t.size(); ++k) {
-    const auto at = std::min(n - 1, static_cast<Eigen::Index>((t[k] - t[0]) / width + 1e-6));
-    cells.value[at] += values[k];
-    cells.filled[at] += 1.0;
-  }
-  for (Eigen::Index k = 0; k < n; ++k) {
-    if (cells.filled[k] > 0.0) {
-      cells.value[k] /= cells.filled[k];
-      cells.filled[k] = 1.0;
+    const double at = std::min(cells.count - 1.0, std::floor((t[k] - t[0]) / width + 1e-6));
+    if (at >= 0.0) {
+      placed.emplace_back(static_cast<Eigen::Index>(at), values[k]);
     }
   }
+  std::ranges::stable_sort(placed, {}, &std::pair<Eigen::Index, double>::first);
+  for (std::size_t k = 0; k < placed.size();) {
+    const Eigen::Index at = placed[k].first;
+    double sum = 0.0, filled = 0.0;
+    for (; k < placed.size() && placed[k].first == at; ++k) {
+      sum += placed[k].second;
+      filled += 1.0;
+    }
+    cells.index.push_back(at);
+    cells.value.push_back(sum / filled);
+  }
   return cells;
+}
+
+// Windows of `length` cells, overlapping by half, that are at least half filled: where each begins among the cells.
+struct Window {
+  Eigen::Index first = 0;          // cell
+  std::size_t begin = 0, end = 0;  // of Cells::index
+};
+
+std::vector<Window> windows_of(const Cells& cells, Eigen::Index length) {
+  const Eigen::Index half = length / 2;
+  std::vector<Window> windows;
+  Eigen::Index next = 0;  // windows before this one are done
+  for (std::size_t begin = 0; begin < cells.index.size();) {
+    const Eigen::Index earliest = (cells.index[begin] - length + half) / half;  // that holds the cell
+    const Eigen::Index number = std::max(next, earliest), first = number * half;
+    while (begin < cells.index.size() && cells.index[begin] < first) {
+      ++begin;
+    }
+    std::size_t end = begin;
+    while (end < cells.index.size() && cells.index[end] < first + length) {
+      ++end;
+    }
+    if (static_cast<double>(first + length) <= cells.count && 2 * (end - begin) >= static_cast<std::size_t>(length)) {
+      windows.push_back({first, begin, end});
+    }
+    next = number + 1;
+  }
+  return windows;
 }
 
 // The largest product of twos, threes and fives that is <= `length`: what a fast transform likes.
@@ -91,7 +128,7 @@ Spectrum spectrum(const Eigen::VectorXd& t, const Eigen::VectorXd& values, const
   }
   const double width = step * std::max(1.0, std::floor(0.25 / options.highest / step));
   const Cells cells = cells_of(t, values, width);
-  const double duration = static_cast<double>(cells.value.size()) * width;
+  const double duration = cells.count * width;
   const double window_seconds = duration >= 2.0 * options.window ? options.window : 0.5 * duration;
   const Eigen::Index length = smooth_length(static_cast<Eigen::Index>(window_seconds / width));
   if (length < 8) {
@@ -104,24 +141,24 @@ Spectrum spectrum(const Eigen::VectorXd& t, const Eigen::VectorXd& values, const
                                 (std::numbers::pi / static_cast<double>(length)))
                                    .sin()
                                    .square();
-  std::vector<Eigen::Index> starts;
-  for (Eigen::Index first = 0; first + length <= cells.value.size(); first += length / 2) {
-    if (cells.filled.segment(first, length).mean() >= 0.5) {
-      starts.push_back(first);
-    }
-  }
-  out.windows = starts.size();
-  if (starts.empty()) {
+  const std::vector<Window> windows = windows_of(cells, length);
+  out.windows = windows.size();
+  if (windows.empty()) {
     return {};
   }
   out.density = Eigen::VectorXd::Zero(bins);
   Eigen::FFT<double> transform;
   Eigen::VectorXd window(length);
   Eigen::VectorXcd transformed;
-  for (const Eigen::Index first : starts) {
-    window = taper * cells.value.segment(first, length).array();
+  for (const Window& at : windows) {
+    Eigen::ArrayXd value = Eigen::ArrayXd::Zero(length), filled = Eigen::ArrayXd::Zero(length);
+    for (std::size_t k = at.begin; k < at.end; ++k) {
+      value[cells.index[k] - at.first] = cells.value[k];
+      filled[cells.index[k] - at.first] = 1.0;
+    }
+    window = taper * value;
     transform.fwd(transformed, window);
-    const double norm = (taper * cells.filled.segment(first, length).array()).square().sum();
+    const double norm = (taper * filled).square().sum();
     out.density += (2.0 * width / norm) * transformed.segment(1, bins).cwiseAbs2();
   }
   out.density /= static_cast<double>(out.windows);

@@ -27,6 +27,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr std::size_t most_read_topics = 10'000;
+
 /// Files one behind the other.
 class Bag final : public BagReader {
  public:
@@ -198,6 +200,10 @@ class Bag final : public BagReader {
       const auto [same, added] = topic_places_.try_emplace({topic.name, topic.type, topic.encoding}, topics_.size());
       places_.push_back(same->second);
       if (added) {
+        if (topics_.size() == most_read_topics) {
+          throw InputError(fmt::format("{}: more than {} topics: expected a recording of one robot",
+                                       source_->report().path, most_read_topics));
+        }
         topics_.push_back(described(topic, places_.size() - 1));
       }
     }
@@ -343,7 +349,7 @@ constexpr std::size_t bag_piece = std::size_t{1} << 18;
 class PackedSource final : public Source {
  public:
   PackedSource(const std::filesystem::path& path, const SourceOptions& options)
-      : shown_(path.string()), file_(directory_.path() / "unpacked") {
+      : shown_(path.string()), file_(directory_->path() / "unpacked") {
     unpack(path, options);
     const std::string name = shown_ + " (unpacked)";
     switch (content_of(file_)) {
@@ -421,7 +427,7 @@ class PackedSource final : public Source {
   }
 
   std::string shown_;
-  TemporaryDirectory directory_;
+  std::unique_ptr<files::Temporary> directory_ = temporary_directory();
   std::filesystem::path file_;
   std::unique_ptr<Source> source_;
   std::uint64_t bytes_ = 0;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/logs/bag_files.hpp>
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <cerrno>
 #include <cstddef>
@@ -203,20 +205,12 @@ std::string metadata_text(const WrittenBag& bag) {
       bag.storage, duration, bag.first, bag.messages, bag.topics.empty() ? " []" : "", topics, quoted(bag.file));
 }
 
-TemporaryDirectory::TemporaryDirectory() {
+std::unique_ptr<files::Temporary> temporary_directory() {
   std::error_code error;
   const std::filesystem::path parent = std::filesystem::temp_directory_path(error);
-  std::string pattern = (parent / "wheelwright-bag-XXXXXX").string();
-  if (error || ::mkdtemp(pattern.data()) == nullptr) {
-    throw InputError((error ? "TMPDIR" : parent.string()) + ": no directory for temporary files can be made there (" +
-                     (error ? error.message() : std::strerror(errno)) + "): expected TMPDIR to name a writable one");
-  }
-  path_ = pattern;
-}
-
-TemporaryDirectory::~TemporaryDirectory() {
-  std::error_code ignored;
-  std::filesystem::remove_all(path_, ignored);
+  return std::make_unique<files::Temporary>(parent / fmt::format("wheelwright-copy-{}-", geteuid()),
+                                            files::Temporary::Kind::private_directory,
+                                            error ? "TMPDIR" : parent.string(), "TMPDIR to name a writable directory");
 }
 
 namespace {

@@ -11,6 +11,8 @@
 #include <string_view>
 #include <vector>
 
+#include <wheelwright/files/temporary.hpp>
+
 namespace wheelwright::logs::bag {
 
 /// Bytes of the largest journal of a database that is copied without LogOptions::trust.
@@ -70,20 +72,9 @@ struct WrittenBag {
 /// The text of metadata.yaml in version 5 (Humble), which later distributions read too.
 [[nodiscard]] std::string metadata_text(const WrittenBag& bag);
 
-/// A directory of its own in the system's directory for temporary files; gone, with all in it, when this is.
-class TemporaryDirectory {
- public:
-  /// Throws InputError, naming the directory, when it cannot be made.
-  TemporaryDirectory();
-  ~TemporaryDirectory();
-  TemporaryDirectory(const TemporaryDirectory&) = delete;
-  TemporaryDirectory& operator=(const TemporaryDirectory&) = delete;
-
-  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
+/// A directory of its own in the system's directory for temporary files. Throws InputError, naming that, when it cannot
+/// be made.
+[[nodiscard]] std::unique_ptr<files::Temporary> temporary_directory();
 
 /// True if a message is packed: it begins as a zstd frame does, and no CDR does.
 [[nodiscard]] bool is_packed(std::string_view data);

@@ -263,42 +263,31 @@ class SqliteSink final : public BagWriter::Sink {
 /// A directory that is made beside its place.
 class DirectoryBeside {
  public:
-  explicit DirectoryBeside(fs::path path) : path_(std::move(path)) {
-    std::error_code error;
-    if (fs::exists(path_, error) && !(fs::is_directory(path_, error) && fs::is_empty(path_, error))) {
-      throw InputError(path_.string() +
-                       ": is there already: expected a new directory for the recording, or a name in .mcap or .db3");
-    }
-    for (int attempt = 0; attempt < 1000 && !error; ++attempt) {
-      temporary_ = path_;
-      temporary_ += ".part" + std::to_string(attempt);
-      if (fs::create_directory(temporary_, error)) {
-        return;
-      }
-    }
-    throw InputError(fmt::format("{}: cannot be made ({}): expected a name in an existing, writable directory",
-                                 path_.string(), error.message()));
-  }
-  ~DirectoryBeside() {
-    std::error_code ignored;
-    fs::remove_all(temporary_, ignored);
-  }
-  DirectoryBeside(const DirectoryBeside&) = delete;
-  DirectoryBeside& operator=(const DirectoryBeside&) = delete;
+  explicit DirectoryBeside(fs::path path)
+      : path_(free(std::move(path))),
+        beside_(fs::path(path_) += ".wheelwright-part", files::Temporary::Kind::directory, path_.string(),
+                "a name in an existing, writable directory") {}
 
-  [[nodiscard]] const fs::path& temporary() const { return temporary_; }
+  [[nodiscard]] const fs::path& temporary() const { return beside_.path(); }
 
   void commit() {
-    std::error_code error;
-    fs::rename(temporary_, path_, error);
-    if (error) {
-      throw InputError(fmt::format("{}: cannot be put in its place ({})", path_.string(), error.message()));
+    if (const std::string why = beside_.move_to(path_); !why.empty()) {
+      throw InputError(fmt::format("{}: cannot be put in its place ({})", path_.string(), why));
     }
   }
 
  private:
+  static fs::path free(fs::path path) {
+    std::error_code error;
+    if (fs::exists(path, error) && !(fs::is_directory(path, error) && fs::is_empty(path, error))) {
+      throw InputError(path.string() +
+                       ": is there already: expected a new directory for the recording, or a name in .mcap or .db3");
+    }
+    return path;
+  }
+
   fs::path path_;
-  fs::path temporary_;
+  files::Temporary beside_;
 };
 
 fs::path without_slash(const fs::path& path) { return path.has_filename() ? path : path.parent_path(); }

@@ -370,6 +370,14 @@ CsvRowParser& CsvRowParser::operator=(CsvRowParser&&) noexcept = default;
 const std::vector<std::string>& CsvRowParser::columns() const { return impl_->names; }
 const LogReport& CsvRowParser::report() const { return impl_->report; }
 
+void CsvRowParser::begin_counts() {
+  LogReport& r = impl_->report;
+  for (Occurrences* of : {&r.empty, &r.not_finite, &r.uncovered, &r.duplicates, &r.truncated, &r.resets, &r.gaps,
+                          &r.wraps, &r.angle_wraps}) {
+    *of = {};
+  }
+}
+
 bool CsvRowParser::parse(std::string_view line, LogBlock& block) {
   Impl& own = *impl_;
   ++own.line_number;

@@ -62,6 +62,8 @@ class CsvRowParser {
   bool parse(std::string_view line, LogBlock& block);
   /// What was met so far; LogReport::files is empty.
   [[nodiscard]] const LogReport& report() const;
+  /// Begins the counts of report() anew: what was dropped, split and unwrapped from here on.
+  void begin_counts();
 
  private:
   struct Impl;

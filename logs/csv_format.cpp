@@ -407,6 +407,7 @@ class ZstdPacker final : public Packer {
     if (!context_) {
       throw Error("zstd cannot start");
     }
+    ZSTD_CCtx_setParameter(context_.get(), ZSTD_c_checksumFlag, 1);
   }
   void write(std::string_view text, bool last) override {
     ZSTD_inBuffer in{text.data(), text.size(), 0};

@@ -227,7 +227,7 @@ void DatabaseFile::find_journals(const fs::path& original, bool trust) {
 
 void DatabaseFile::copy(const fs::path& from, const char* name) {
   if (!directory_) {
-    directory_ = std::make_unique<TemporaryDirectory>();
+    directory_ = temporary_directory();
   }
   path_ = directory_->path() / name;
   std::error_code error;

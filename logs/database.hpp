@@ -105,7 +105,7 @@ class DatabaseFile {
   void copy(const std::filesystem::path& from, const char* name);
 
   std::filesystem::path path_;
-  std::unique_ptr<TemporaryDirectory> directory_;
+  std::unique_ptr<files::Temporary> directory_;
   bool journal_ = false;
   std::string defect_;
 };

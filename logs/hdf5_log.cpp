@@ -17,6 +17,7 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/files/bytes.hpp>
 #include <wheelwright/files/words.hpp>
+#include <wheelwright/logs/hdf5_header.hpp>
 #include <wheelwright/logs/log_file.hpp>
 #include <wheelwright/logs/mcap_format.hpp>
 #include <wheelwright/logs/recorded_log.hpp>
@@ -128,12 +129,21 @@ std::string refusal(hid_t dataset, hid_t type, hsize_t rows, bool trust) {
   return {};
 }
 
-/// Lists what a dataset offers.
-void list_dataset(hid_t file, const std::string& path, bool trust, std::vector<Source>& sources) {
+/// Lists what a dataset offers; `defect` says why it must not be opened.
+void list_dataset(hid_t file, const std::string& path, const std::string& defect, bool trust,
+                  std::vector<Source>& sources) {
+  if (!defect.empty()) {
+    sources.push_back({path, "", "", 0, defect});
+    return;
+  }
   const Handle dataset(H5Dopen2(file, path.c_str(), H5P_DEFAULT), H5Dclose);
   const Handle space(dataset ? H5Dget_space(dataset.get()) : -1, H5Sclose);
   const Handle type(dataset ? H5Dget_type(dataset.get()) : -1, H5Tclose);
-  if (!space || !type || H5Sget_simple_extent_ndims(space.get()) != 1) {
+  if (!dataset || !space || !type) {
+    sources.push_back({path, "", "", 0, "cannot be opened by the HDF5 library: the file is damaged"});
+    return;
+  }
+  if (H5Sget_simple_extent_ndims(space.get()) != 1) {
     return;
   }
   hsize_t rows = 0;
@@ -158,31 +168,39 @@ void list_dataset(hid_t file, const std::string& path, bool trust, std::vector<S
   }
 }
 
-/// All columns of a file, in the order of their paths.
-std::vector<Source> list_sources(hid_t file, const std::string& shown, bool trust) {
+/// All columns of the file `name`, in the order of their paths.
+std::vector<Source> list_sources(hid_t file, const std::filesystem::path& name, bool trust) {
   struct Found {
-    std::vector<std::string> paths;
+    std::vector<std::pair<std::string, haddr_t>> datasets;
     std::size_t objects = 0;
     bool too_deep = false;
   } found;
-  const auto visit = [](hid_t, const char* name, const H5O_info_t* info, void* to) -> herr_t {
+  const auto visit = [](hid_t, const char* found_name, const H5O_info_t* info, void* to) -> herr_t {
     auto& all = *static_cast<Found*>(to);
-    const std::string_view path(name);
+    const std::string_view path(found_name);
     all.too_deep = std::ranges::count(path, '/') >= deepest_group;
     if (info->type == H5O_TYPE_DATASET) {
-      all.paths.push_back(fmt::format("/{}", path));
+      all.datasets.emplace_back(fmt::format("/{}", path), info->addr);
     }
     return ++all.objects <= most_objects && !all.too_deep ? 0 : 1;
   };
   H5Ovisit2(file, H5_INDEX_NAME, H5_ITER_INC, visit, &found, H5O_INFO_BASIC);
   if (found.too_deep || found.objects > most_objects) {
-    throw InputError(fmt::format("{}: {}: expected a log, with at most {} objects in groups at most {} deep", shown,
+    throw InputError(fmt::format("{}: {}: expected a log, with at most {} objects in groups at most {} deep",
+                                 name.string(),
                                  found.too_deep ? "its groups lie too deep in each other" : "has too many objects",
                                  most_objects, deepest_group));
   }
+  const Handle made(H5Fget_create_plist(file), H5Pclose);
+  hdf5::FieldSizes sizes;
+  hsize_t base = 0;
+  if (!made || H5Pget_sizes(made.get(), &sizes.offset, &sizes.length) < 0 || H5Pget_userblock(made.get(), &base) < 0) {
+    throw InputError(name.string() + ": does not say how it is made: expected a whole HDF5 file");
+  }
+  mcap::WindowedFile bytes(name, false);
   std::vector<Source> sources;
-  for (const std::string& path : found.paths) {
-    list_dataset(file, path, trust, sources);
+  for (const auto& [path, address] : found.datasets) {
+    list_dataset(file, path, hdf5::header_defect(bytes, base + address, sizes), trust, sources);
   }
   return sources;
 }
@@ -431,7 +449,7 @@ class Hdf5File final : public RowFile {
  public:
   Hdf5File(std::filesystem::path path, const LogOptions& options) : path_(std::move(path)) {
     const Handle file = open_file(path_);
-    choice_ = DatasetChooser(path_.string(), options, list_sources(file.get(), path_.string(), options.trust)).choose();
+    choice_ = DatasetChooser(path_.string(), options, list_sources(file.get(), path_, options.trust)).choose();
     for (const auto& [name, source] : choice_.found) {
       if (name != "t") {
         names_.push_back(name);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <utility>
 
 #include <wheelwright/core/check.hpp>
@@ -20,9 +21,16 @@ std::unique_ptr<RecordedLog> open_log(const std::vector<std::filesystem::path>& 
   const auto origin = std::make_shared<std::optional<std::int64_t>>();
   std::vector<std::unique_ptr<RowFile>> files;
   for (const std::filesystem::path& path : paths) {
+    std::error_code ignored;
+    const std::filesystem::file_status status = std::filesystem::status(path, ignored);
+    if (std::filesystem::is_other(status)) {
+      throw InputError(path.string() +
+                       ": is a pipe or a device: expected a file, which can be read twice; rows of CSV "
+                       "as they come are read by `wheelwright detect --follow`");
+    }
     if (is_bag(path)) {
       files.push_back(bag_file(path, options, origin));
-    } else if (std::filesystem::is_directory(path)) {
+    } else if (std::filesystem::is_directory(status)) {
       throw InputError(path.string() +
                        ": is a directory: expected a file, or a directory with a recording "
                        "(metadata.yaml, *.mcap or *.db3)");

@@ -86,6 +86,14 @@ void add_isolation(Json& json, const std::vector<detector::Isolation>& isolation
   }
 }
 
+Json to_json(const commission::BlindSpell& spell, std::optional<double> until, const std::string& why) {
+  return {{"since", files::or_null(spell.since)},
+          {"until", files::or_null(until)},
+          {"rows", spell.rows},
+          {"seconds", spell.seconds},
+          {"reason", why}};
+}
+
 Json to_json(const commission::RiskEvent& e, const OnlineModel& model) {
   return {{"alarm", e.alarm},
           {"end", e.end},

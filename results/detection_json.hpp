@@ -4,9 +4,11 @@
 /// margins` and `wheelwright choose`.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
+#include <wheelwright/commission/blind_watch.hpp>
 #include <wheelwright/commission/detector_choice.hpp>
 #include <wheelwright/commission/detector_walk.hpp>
 #include <wheelwright/commission/margin_survey.hpp>
@@ -22,6 +24,9 @@ namespace wheelwright::results {
 
 /// One event as JSON.
 [[nodiscard]] Json to_json(const detector::Event& event, const OnlineModel& model);
+
+/// A spell without decisions as JSON, for the reason `why`; `until` (s) where it is over.
+[[nodiscard]] Json to_json(const commission::BlindSpell& spell, std::optional<double> until, const std::string& why);
 
 /// Adds what its first events are isolated to to a detection as JSON, before add_kinematic().
 void add_isolation(Json& detection, const std::vector<detector::Isolation>& isolations);

@@ -70,15 +70,8 @@ void read_noise(const JsonPlace& noise, ModelClaims& claims) {
     claims.errors.output[static_cast<Eigen::Index>(i)] = outputs.at(i).at("learning").number();
     claims.origin.push_back(files::value_of(robots::kNoiseOriginWords, outputs.at(i).at("origin")));
   }
-  const filter::SignalErrors& e = claims.errors;
-  const auto bounds = {e.output,
-                       e.acceleration,
-                       e.speed,
-                       e.speed_sample,
-                       Eigen::VectorXd::Constant(1, e.joint_sample).eval(),
-                       Eigen::VectorXd::Constant(1, e.heading).eval()};
-  if (!std::ranges::all_of(bounds, [](const Eigen::VectorXd& v) { return (v.array() >= 0.0).all(); })) {
-    noise.fail("bounds >= 0");
+  if (!(claims.errors.output.array() >= 0.0).all()) {
+    outputs.fail("bounds >= 0");
   }
 }
 
@@ -268,6 +261,9 @@ void read_data(const JsonPlace& place, ModelClaims& claims) {
 
 ModelClaims claims_from_json(const Json& json, const std::string& file) {
   const JsonPlace root = robots::model_root(json, file);
+  if (root.has("detector")) {
+    static_cast<void>(robots::model_from_json(json, file));  // what detectors refuse is not proved
+  }
   ModelClaims claims;
   claims.robot = robots::robot_from_json(root.at("robot").value(), root.at("robot").where());
   claims.model = model::make_model(claims.robot);

@@ -26,7 +26,7 @@ using files::YamlPlace;
 namespace {
 
 constexpr std::size_t longest_scenario = std::size_t{1} << 20;
-constexpr double largest_seed = 9007199254740992.0;  // 2⁵³: whole numbers beyond it are not all doubles
+constexpr std::uint64_t largest_seed = std::uint64_t{1} << 53;
 
 using Names = std::vector<std::string>;
 
@@ -191,9 +191,7 @@ struct ScenarioReader {
       scenario.time_jitter =
           place.number("a share of the period in [0, 0.5)", [](double value) { return value >= 0.0 && value < 0.5; });
     } else if (key == "seed") {
-      scenario.seed = static_cast<std::uint64_t>(place.number("a whole number from 0 to 2^53", [](double value) {
-        return value >= 0.0 && value <= largest_seed && value == std::floor(value);
-      }));
+      scenario.seed = place.whole(0, largest_seed);
     }
   }
 

@@ -6,6 +6,7 @@
 #include <optional>
 #include <utility>
 
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/core/error.hpp>
@@ -24,18 +25,17 @@ using files::YamlPlace;
 
 namespace {
 
+constexpr std::uint64_t kLargestSeed = std::uint64_t{1} << 53;
 constexpr std::size_t kLongestFile = std::size_t{1} << 20;
 
 double number_at(const YamlPlace& place) {
   return place.number("a number", [](double) { return true; });
 }
 
-double whole(const YamlPlace& place, double least, const std::string& expected) {
-  return place.number(expected, [&](double x) { return x >= least && x <= 9e15 && x == std::floor(x); });
-}
+constexpr Eigen::Index kMostPoints = 100'000;  // of a method, for each input that it moves
 
 Eigen::Index whole_from(const YamlPlace& place, int least) {
-  return static_cast<Eigen::Index>(whole(place, least, "a whole number of at least " + std::to_string(least)));
+  return static_cast<Eigen::Index>(place.whole(static_cast<std::uint64_t>(least), kMostPoints));
 }
 
 std::pair<double, double> two_numbers(const YamlPlace& place) {
@@ -70,7 +70,7 @@ struct StudyReader {
       } else if (key == "window") {
         result.study.evaluate.window = place.positive();
       } else if (key == "seed") {
-        seed = static_cast<std::uint64_t>(whole(place, 0.0, "a whole number >= 0"));
+        seed = place.whole(0, kLargestSeed);
       } else {
         (key == "scenario"     ? scenario
          : key == "log"        ? log
@@ -268,6 +268,9 @@ struct StudyReader {
       } else {
         (name == "points" ? options.points : options.replicates) = whole_from(value, 2);
       }
+    }
+    if (options.points > kMostPoints / options.replicates) {
+      place.fail(fmt::format("points times replicates of at most {}", kMostPoints));
     }
     result.study.methods.sobol = options;
   }

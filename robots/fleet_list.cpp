@@ -161,6 +161,9 @@ std::vector<FleetListRobot> read_list(const fs::path& path) {
       continue;
     }
     const std::string where = fmt::format("{}:{}", path.string(), lines.number());
+    if (std::ranges::any_of(line, [](char c) { return static_cast<unsigned char>(c) < 0x20 && c != '\t'; })) {
+      throw InputError(where + ": a control character: expected text, robot and log of a row as the header has them");
+    }
     const std::vector<std::string> fields = fields_of(line, where);
     if (header.empty()) {
       header = fields;
@@ -200,13 +203,24 @@ std::vector<FleetListRobot> read_list(const fs::path& path) {
   return fleet;
 }
 
-bool is_bag(const fs::path& path) { return fs::is_directory(path) && fs::exists(path / "metadata.yaml"); }
+// What cannot be looked at (a link that leads to itself) is neither.
+bool is_folder(const fs::path& path) {
+  std::error_code error;
+  return fs::is_directory(path, error);
+}
+
+bool is_file(const fs::path& path) {
+  std::error_code error;
+  return fs::is_regular_file(path, error);
+}
+
+bool is_bag(const fs::path& path) { return is_folder(path) && is_file(path / "metadata.yaml"); }
 
 bool is_log(const fs::path& path) {
   static constexpr std::array<std::string_view, 7> endings = {".csv", ".csv.gz", ".csv.zst", ".mcap",
                                                               ".db3", ".h5",     ".hdf5"};
   const std::string name = path.filename().string();
-  return is_bag(path) || (fs::is_regular_file(path) && std::ranges::any_of(endings, [&](std::string_view ending) {
+  return is_bag(path) || (is_file(path) && std::ranges::any_of(endings, [&](std::string_view ending) {
                             return name.ends_with(ending) && name.size() > ending.size();
                           }));
 }
@@ -248,7 +262,7 @@ std::vector<FleetListRobot> read_directory(const fs::path& directory) {
     std::vector<ListRow> rows;
     if (is_log(entry)) {
       rows.push_back({0, entry, std::nullopt, {}, {}});
-    } else if (fs::is_directory(entry)) {
+    } else if (is_folder(entry)) {
       for (const fs::path& log : entries_of(entry)) {
         if (is_log(log)) {
           rows.push_back({0, log, date_in(log.filename().string()), {}, {}});
@@ -262,7 +276,7 @@ std::vector<FleetListRobot> read_directory(const fs::path& directory) {
       continue;
     }
     FleetListRobot robot = robot_of(entry.filename().string(), std::move(rows));
-    if (fs::is_directory(entry) && !is_bag(entry) && fs::exists(entry / "robot.yaml")) {
+    if (is_folder(entry) && !is_bag(entry) && is_file(entry / "robot.yaml")) {
       robot.robot_file = entry / "robot.yaml";
     }
     fleet.push_back(std::move(robot));
@@ -270,13 +284,13 @@ std::vector<FleetListRobot> read_directory(const fs::path& directory) {
   return fleet;
 }
 
-// Size and time of change of a file, or of what is in a directory.
+// Size and time of change of a file, or of the files in a directory.
 std::string state_of(const fs::path& path) {
   std::error_code error;
-  if (fs::is_directory(path, error)) {
+  if (is_folder(path)) {
     std::string out;
     for (const fs::path& entry : entries_of(path)) {
-      out += entry.filename().string() + " " + state_of(entry) + ";";
+      out += entry.filename().string() + " " + (is_folder(entry) ? "a directory" : state_of(entry)) + ";";
     }
     return out;
   }

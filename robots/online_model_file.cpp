@@ -22,6 +22,30 @@ using files::vector_at;
 
 namespace {
 
+double bound_at(const JsonPlace& place) {
+  const double value = place.number();
+  if (!(value >= 0.0)) {
+    place.fail("a number >= 0");
+  }
+  return value;
+}
+
+Eigen::VectorXd bounds_at(const JsonPlace& place, std::size_t size) {
+  Eigen::VectorXd values = vector_at(place, size);
+  if (!(values.array() >= 0.0).all()) {
+    place.fail("numbers >= 0");
+  }
+  return values;
+}
+
+detector::Persistence persistence_at(const JsonPlace& place) {
+  const detector::Persistence rule{place.at("k").count(64), place.at("n").count(64)};
+  if (rule.k < 1 || rule.k > rule.n) {
+    place.fail("1 <= k <= n");
+  }
+  return rule;
+}
+
 /// What bounds motion and efforts between samples; null where nothing does.
 void read_between_samples(const JsonPlace& place, const Model& model, filter::SignalErrors& errors) {
   const JsonPlace between = place.at("between_samples");
@@ -55,16 +79,8 @@ void read_between_samples(const JsonPlace& place, const Model& model, filter::Si
 
 filter::SignalErrors read_errors(const JsonPlace& place, const Model& model) {
   filter::SignalErrors errors = motion_errors_at(place, model);
-  errors.output = vector_at(place.at("output"), model.n());
+  errors.output = bounds_at(place.at("output"), model.n());
   return errors;
-}
-
-double bound_at(const JsonPlace& place) {
-  const double value = place.number();
-  if (!(value >= 0.0)) {
-    place.fail("a number >= 0");
-  }
-  return value;
 }
 
 filter::OdometryMeasurement read_odometry(const JsonPlace& place) {
@@ -75,8 +91,8 @@ filter::OdometryMeasurement read_odometry(const JsonPlace& place) {
   m.heading = place.at("heading").boolean();
   m.gyro = place.at("gyro").boolean();
   m.held_pose = place.at("held_pose").boolean();
-  m.count = place.at("count").number();
-  m.nominal_step = place.at("nominal_step").number();
+  m.count = bound_at(place.at("count"));
+  m.nominal_step = bound_at(place.at("nominal_step"));
   return m;
 }
 
@@ -84,6 +100,14 @@ filter::OdometryMeasurement read_odometry(const JsonPlace& place) {
 Warrant kinematic_warrant(const JsonPlace& place) {
   const bool told = place.has("warrant") || !place.has("noise");
   return warrant_at(place, !told && all_declared(place.at("noise")) ? Warrant::guaranteed : Warrant::extrapolated);
+}
+
+/// What is remembered of a drive is as long as errors are correlated: `step` is the shortest between samples.
+void demand_short_correlation(const JsonPlace& errors, double correlation, double step) {
+  constexpr double most_steps = 1e6;
+  if (correlation > 0.0 && !(correlation <= most_steps * step)) {
+    errors.fail("correlation times of at most 10⁶ steps between samples");
+  }
 }
 
 filter::ErrorClass error_class_at(const JsonPlace& place) {
@@ -136,6 +160,8 @@ detector::PoseRiskModel pose_risk_at(const JsonPlace& place, const filter::Odome
   risk.errors.position = error_class_at(errors.at("position"));
   risk.errors.heading = error_class_at(errors.at("heading"));
   risk.errors.shortest_step = bound_at(errors.at("shortest_step"));
+  demand_short_correlation(errors, std::max(risk.errors.position.correlation, risk.errors.heading.correlation),
+                           risk.errors.shortest_step);
   const std::size_t weights = detector::pose_weights(measurement).size();
   risk.usual_position = variances_at(usual.at("position"), weights, risk.scales.size());
   risk.usual_heading = variances_at(usual.at("heading"), weights, risk.scales.size());
@@ -167,7 +193,7 @@ std::vector<core::Assumption> assumptions_at(const JsonPlace& place) {
 }
 
 FilterDesign filter_at(const JsonPlace& place) {
-  FilterDesign filter{.order = static_cast<int>(place.at("order").count()),
+  FilterDesign filter{.order = static_cast<int>(place.at("order").count(2)),
                       .alpha = place.at("alpha").number(),
                       .beta = place.at("beta").number(),
                       .settle = place.at("settle").number()};
@@ -187,9 +213,9 @@ Measurement measurement_at(const JsonPlace& place, const Model& model, const Rob
   m.heading_column = place.at("heading_column").text();
   m.hold = files::value_of(kHoldWords, place.at("hold"));
   m.effort_unsigned = place.at("effort_unsigned").boolean();
-  m.count = place.at("count").number();
-  m.nominal_step = place.at("nominal_step").number();
-  m.shortest_step = place.at("shortest_step").number();
+  m.count = bound_at(place.at("count"));
+  m.nominal_step = bound_at(place.at("nominal_step"));
+  m.shortest_step = bound_at(place.at("shortest_step"));
   m.changes = robot.effort_changes;
   m.delay = robot.effort_delay;
   m.correction = filter::effort_correction(robot);
@@ -201,15 +227,15 @@ Measurement measurement_at(const JsonPlace& place, const Model& model, const Rob
 
 filter::SignalErrors motion_errors_at(const JsonPlace& place, const Model& model) {
   const auto optional_vector = [&](std::string_view key) {
-    const Eigen::VectorXd values = vector_at(place.at(key));
-    return values.size() == 0 ? values : vector_at(place.at(key), model.coordinates.size());
+    const JsonPlace values = place.at(key);
+    return bounds_at(values, values.size() == 0 ? 0 : model.coordinates.size());
   };
   filter::SignalErrors errors;
   errors.acceleration = optional_vector("acceleration");
   errors.speed = optional_vector("speed");
   errors.speed_sample = optional_vector("speed_sample");
-  errors.joint_sample = place.at("joint_sample").number();
-  errors.heading = place.at("heading").number();
+  errors.joint_sample = bound_at(place.at("joint_sample"));
+  errors.heading = bound_at(place.at("heading"));
   read_between_samples(place, model, errors);
   return errors;
 }
@@ -296,8 +322,8 @@ std::optional<detector::KinematicModel> kinematic_from_json(const JsonPlace& pla
   model.errors.heading = bound_at(errors.at("heading"));
   model.errors.acceleration = bound_at(errors.at("acceleration"));
   model.errors.yaw_gain = bound_at(errors.at("yaw_gain"));
-  model.errors.estimated = vector_at(errors.at("estimated"), n);
-  model.persistence = {detector.at("persistence").at("k").count(), detector.at("persistence").at("n").count()};
+  model.errors.estimated = bounds_at(errors.at("estimated"), n);
+  model.persistence = persistence_at(detector.at("persistence"));
   model.facets = facets_at(set, p);
   model.box = box_at(set.at("hull"), p);
   try {
@@ -326,7 +352,7 @@ OnlineModel model_from_json(const Json& json, const std::string& file) {
   const JsonPlace detector = root.at("detector");
   model.estimate = vector_at(detector.at("estimate"), p);
   model.errors = read_errors(detector.at("error_bounds"), model.model);
-  model.persistence = {detector.at("persistence").at("k").count(), detector.at("persistence").at("n").count()};
+  model.persistence = persistence_at(detector.at("persistence"));
   model.facets = facets_at(root.at("feasible_set"), p);
   model.box = box_at(root.at("feasible_set").at("hull"), p);
   if (root.has("kinematic")) {
@@ -334,6 +360,10 @@ OnlineModel model_from_json(const Json& json, const std::string& file) {
   }
   if (root.has("at_risk")) {
     model.at_risk = risk_at(root.at("at_risk"), model.model);
+    const filter::ErrorClasses& errors = model.at_risk->errors;
+    demand_short_correlation(root.at("at_risk").at("errors"),
+                             std::max(errors.motion.correlation, errors.effort.correlation),
+                             std::min(errors.shortest_step, model.measurement.nominal_step));
   }
   model.warrant = model_warrant(root);
   model.assumptions = assumptions_at(root);

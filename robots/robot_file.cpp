@@ -249,7 +249,8 @@ struct RobotReader {
       } else if (name == "deviation") {
         bound.deviation = value.number("a root mean square > 0", [](double number) { return number > 0.0; });
       } else {
-        bound.correlation = value.number("a time >= 0 in s", not_negative);
+        bound.correlation =
+            value.number("a time from 0 to 600 s", [](double time) { return time >= 0.0 && time <= 600.0; });
       }
     }
     if (!bound.value || !bound.bias || *bound.bias > *bound.value || bound.deviation.value_or(0.0) > *bound.value) {

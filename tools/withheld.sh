@@ -52,9 +52,9 @@ logs=$set
 results=$out/results${only:+-$only}
 mkdir -p "$results"
 
-# Lines "case option…" of what is run.
+# Lines "case option…" of what is run. Names of answers.json become paths and options: others than ours are refused.
 python3 - "$set/answers.json" "$only" >"$results/runs" <<'PY'
-import json, sys
+import json, re, sys
 
 ALSO = {"coulomb": ["coulomb_asymmetric"], "armature": ["payload", "payload_offset"], "wheel_radius": ["wheel_radius_asymmetric"],
         "torque_gain": ["torque_gain_asymmetric"], "viscous": ["viscous_asymmetric"],
@@ -62,6 +62,9 @@ ALSO = {"coulomb": ["coulomb_asymmetric"], "armature": ["payload", "payload_offs
 answers, only = json.load(open(sys.argv[1], encoding="utf-8")), sys.argv[2]
 for case, answer in sorted(answers.items()):
     effects = [effect["effect"] for effect in answer["effects"]]
+    for name in [case] + effects:
+        if not re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9_-]*", name):
+            sys.exit(f"withheld: {sys.argv[1]}: {name!r}: expected a name of letters, digits, _ and -")
     if only == "naive":
         print(case, "--naive", "--no-shrink")
     elif only != "removed":
@@ -73,14 +76,15 @@ PY
 # Exit code 1 is an answer ("there is a gap"); anything above is a failure, which the score counts.
 export bin set logs results
 xargs -P "$jobs" -I '{}' sh -c '
-  set -- {}
+  set -f
+  set -- $1
   case=$1; shift
   rm -rf "$results/$case"
   fresh=$(dirname "$logs")/fresh/$case/real.csv.gz
   [ -f "$fresh" ] && set -- "$@" --fresh "$fresh"
   "$bin/wheelwright" gap "$logs/$case/real.csv.gz" --robot "$logs/$case/robot.yaml" \
     --baseline "$logs/$case/baseline.csv.gz" --out "$results/$case" --threads 1 --quiet --no-manoeuvre "$@" \
-    >"$results/$case.log" 2>&1 || [ $? -eq 1 ] || echo "withheld: $case failed, see $results/$case.log" >&2' \
+    >"$results/$case.log" 2>&1 || [ $? -eq 1 ] || echo "withheld: $case failed, see $results/$case.log" >&2' withheld '{}' \
   <"$results/runs"
 
 python3 "$root/tools/score_withheld.py" ${only:+"--$only"} "$set/answers.json" "$results"

@@ -215,6 +215,24 @@ std::string why_undecided(const OnlineModel& model, std::size_t rows, double ste
                     rows, rows == 1 ? "" : "s", step, model.filter.settle / model.filter.beta);
 }
 
+std::string why_mostly_undecided(std::size_t instants, std::size_t rows, const std::vector<std::string>& repairs) {
+  return fmt::format("only {} of {} rows could be decided on, so that of most of the log nothing is known{}{}",
+                     instants, rows, repairs.empty() ? "" : ": ", fmt::join(repairs, "; "));
+}
+
+std::string why_blind(const OnlineModel& model, const std::vector<std::string>& causes) {
+  return causes.empty()
+             ? fmt::format("rows too few, or too often interrupted, for the filter, which settles in {:.3g} s",
+                           model.filter.settle / model.filter.beta)
+             : fmt::format("{}", fmt::join(causes, "; "));
+}
+
+std::string blind_line(const commission::BlindSpell& spell, std::optional<double> until, const std::string& why) {
+  const std::string from = spell.since ? fmt::format("since t = {:.3f} s", *spell.since) : "from the start";
+  return fmt::format("blind {}{}: {} rows ({:.1f} s) without a decision, so that nothing is known of faults: {}", from,
+                     until ? fmt::format(" until {:.3f} s", *until) : "", spell.rows, spell.seconds, why);
+}
+
 std::string summary(const Detection& d, const OnlineModel& model) {
   std::string text;
   if (d.instants == 0) {

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include <wheelwright/commission/blind_watch.hpp>
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/commission/detector_walk.hpp>
 #include <wheelwright/commission/risk_watch.hpp>
@@ -38,6 +39,17 @@ namespace wheelwright::words {
 /// Why a detector of `model` decided at no instant of `rows` rows with the median step `step` (s), with what to do
 /// about it.
 [[nodiscard]] std::string why_undecided(const OnlineModel& model, std::size_t rows, double step);
+
+/// Why most of a log was not decided on: `instants` of the `rows` that were met; `repairs` says what reading found.
+[[nodiscard]] std::string why_mostly_undecided(std::size_t instants, std::size_t rows,
+                                               const std::vector<std::string>& repairs);
+
+/// Why rows of a stream bring no decision: `causes`, or that they are too few for the filter of `model`.
+[[nodiscard]] std::string why_blind(const OnlineModel& model, const std::vector<std::string>& causes);
+
+/// A spell without decisions in a line, for the reason `why`; `until` (s) where it is over.
+[[nodiscard]] std::string blind_line(const commission::BlindSpell& spell, std::optional<double> until,
+                                     const std::string& why);
 
 /// One event in a line.
 [[nodiscard]] std::string event_line(const detector::Event& event, const OnlineModel& model);

@@ -60,7 +60,7 @@ TEST_F(Convert, ReplacesNothingUnasked) {
   put("drive.csv", "mine");
   const Outcome refused = run("convert " + shipped() + " drive.csv");
   EXPECT_EQ(refused.code, 2);
-  EXPECT_THAT(refused.err, HasSubstr("drive.csv: it is there already: --force replaces it"));
+  EXPECT_THAT(refused.err, HasSubstr("drive.csv: is there already: expected a new name, or --force"));
   EXPECT_EQ(bytes(path("drive.csv")), "mine");
   EXPECT_EQ(run("convert " + shipped() + " drive.csv --force").code, 0);
   EXPECT_EQ(run("convert " + shipped()).code, 2);

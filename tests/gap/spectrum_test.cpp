@@ -45,6 +45,20 @@ TEST(GapSpectrum, AGapInTheLogTakesNothingFromNoise) {
   EXPECT_NEAR(spectrum(t, y).density.mean(), 0.1, 0.004);
 }
 
+TEST(GapSpectrum, AClockThatJumpsByDecadesCostsNoMemory) {
+  std::mt19937_64 generator(3);
+  std::normal_distribution<double> normal;
+  Eigen::VectorXd t(20000), y(20000);
+  for (Eigen::Index k = 0; k < t.size(); ++k) {
+    t[k] = 0.05 * static_cast<double>(k) + (k < 10000 ? 0.0 : 1.7e9);
+    y[k] = normal(generator);
+  }
+  const Spectrum s = spectrum(t, y);
+  EXPECT_NEAR(s.density.mean(), 0.1, 0.004);
+  EXPECT_GE(s.windows, 190);  // 10 s, half overlapping, of 500 s twice
+  EXPECT_LE(s.windows, 198);
+}
+
 TEST(GapSpectrum, DensityOfFilteredNoiseIntegratesToItsVariance) {
   double sum = 0.0;
   const double df = 1e-3;

@@ -177,6 +177,18 @@ TEST_F(Reach, AFileNamedOftenIsReadOnce) {
   EXPECT_THAT(all_losses(*reader), ::testing::HasSubstr("read once"));
 }
 
+TEST_F(Reach, ARecordingOfTenThousandTopicsIsNone) {
+  {
+    testing::Sql sql(path("topics.db3"));
+    sql.run(
+        "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, serialization_format TEXT);"
+        "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data BLOB);"
+        "WITH RECURSIVE n(k) AS (SELECT 1 UNION ALL SELECT k + 1 FROM n WHERE k <= 10000)"
+        " INSERT INTO topics SELECT k, '/t' || k, 'a/msg/B', 'cdr' FROM n");
+  }
+  expect_refusal([&] { (void)open_bag({path("topics.db3")}); }, {"topics.db3", "more than 10000 topics"});
+}
+
 TEST_F(Reach, APackedRecordingIsKnownByItsContent) {
   // Frames of one byte each, as a hostile or careless writer makes them.
   testing::write_humble(path("plain.db3"), sample_items(3));
@@ -270,6 +282,26 @@ TEST_F(Reach, Hdf5WithoutEndIsRefused) {
     H5Sclose(space);
   });
   expect_refusal([&] { (void)open_log({path("chunk.h5")}, speed); }, {"chunk.h5", "omega", "pieces of 134217728"});
+
+  // The library divides by what a chunk without dimensions has none of.
+  write_hdf5(path("sound.h5"), [](hid_t opened, hid_t space, hid_t how) {
+    const hsize_t piece = 10;
+    H5Pset_chunk(how, 1, &piece);
+    const hid_t dataset = H5Dcreate2(opened, "omega", H5T_IEEE_F64LE, space, H5P_DEFAULT, how, H5P_DEFAULT);
+    const std::vector<double> ones(50, 1.0);
+    H5Dwrite(dataset, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, ones.data());
+    H5Dclose(dataset);
+  });
+  const std::string sound = bytes(path("sound.h5")), sizes("\x0a\0\0\0\x08\0\0\0", 8);
+  const std::size_t layout = sound.find(sizes) - 11;
+  ASSERT_EQ(sound.substr(layout, 3), "\x03\x02\x02");  // version 3, chunked, one dimension and the element
+  for (const char dimensions : {'\0', '\1'}) {
+    std::string changed = sound;
+    changed[layout + 2] = dimensions;
+    put("flat.h5", changed);
+    expect_refusal([&] { (void)open_log({path("flat.h5")}, speed); }, {"flat.h5", "omega", "chunks of 0 dimensions"});
+    EXPECT_EQ(open_log({path("flat.h5")})->report().rows, 50u) << "what is not wanted does no harm";
+  }
 
   const hid_t file = H5Fcreate(path("deep.h5").c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
   hid_t group = file;

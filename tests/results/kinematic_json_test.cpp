@@ -131,6 +131,8 @@ TEST(KinematicJson, RefusesWhatIsImpossible) {
   expect_refused("/window", -1.0, "window");
   expect_refused("/window", "long", "/kinematic/window");
   expect_refused("/detector/error_bounds/heading", -0.1, "heading");
+  expect_refused("/detector/error_bounds/estimated/0", -0.1, "estimated");
+  expect_refused("/measurement/nominal_step", -0.01, "nominal_step");
   expect_refused("/detector/estimate", Json::array({1.0}), "4 numbers");
   expect_refused("/measurement/motion", "steps", "mean_speed");
   expect_refused("/measurement/heading", false, "kinematic");

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Rows of a stream that come without a decision: for how long nothing is known of faults.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+
+namespace wheelwright::commission {
+
+/// Rows in a row without a decision.
+struct BlindSpell {
+  std::optional<double> since;  ///< s, the last instant before them with a decision; nothing where there was none
+  std::size_t rows = 0;         ///< how many came, readable or not
+  double seconds = 0.0;  ///< how long they lasted at the model's rate, or by their own clock where that is longer
+};
+
+/// Tells when a stream has been undecided for longer than a filter needs to settle: one and a half times as long, and
+/// 20 rows at least. A pause in which no rows come is none: the filter settles behind it.
+class BlindWatch {
+ public:
+  /// `step`: seconds between rows as the model has them; `settling`: seconds that the filter needs from a standing
+  /// start. Throws InvalidArgument unless both are finite and >= 0.
+  BlindWatch(double step, double settling);
+
+  /// A row with a decision at time `t` (s). Returns the spell that it ends, where that had been told.
+  std::optional<BlindSpell> decided(double t);
+
+  /// A row without one; `t` (s) where it could be read. Returns the spell at the row from which on it is one.
+  std::optional<BlindSpell> undecided(std::optional<double> t);
+
+  /// Whether a spell stands that was told.
+  [[nodiscard]] bool blind() const { return told_; }
+  /// The rows without a decision that came last; none behind a decision.
+  [[nodiscard]] const BlindSpell& spell() const { return spell_; }
+
+ private:
+  double step_, longest_;
+  BlindSpell spell_;
+  std::optional<double> first_;  // time of the first row of the spell that has one
+  bool told_ = false;
+};
+
+}  // namespace wheelwright::commission

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/files/temporary.hpp>
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <mutex>
+#include <set>
+#include <system_error>
+#include <utility>
+
+#include <wheelwright/core/error.hpp>
+
+namespace wheelwright::files {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int most_numbers = 1000;
+constexpr off_t beyond_all_locks = off_t{1} << 62;  // libraries lock bytes of what they write, none so far behind
+
+struct Living {
+  std::mutex mutex;
+  std::set<fs::path> paths;
+};
+
+Living& living() {
+  static Living all;
+  return all;
+}
+
+bool holds_lock(int descriptor, bool directory) {
+  if (directory) {
+    return flock(descriptor, LOCK_EX | LOCK_NB) == 0;
+  }
+  struct flock lock {};
+  lock.l_type = F_WRLCK;
+  lock.l_whence = SEEK_SET;
+  lock.l_start = beyond_all_locks;
+  lock.l_len = 1;
+  return fcntl(descriptor, F_OFD_SETLK, &lock) == 0;
+}
+
+int opened(const fs::path& path, bool directory) {
+  return open(path.c_str(), (directory ? O_RDONLY | O_DIRECTORY : O_RDWR | O_NONBLOCK) | O_NOFOLLOW | O_CLOEXEC);
+}
+
+// Removes what a program of this user left that was killed; false where it is anything else.
+bool bury(const fs::path& path, bool directory) {
+  const int descriptor = opened(path, directory);
+  struct stat here {
+  }, there{};
+  const bool dead = descriptor >= 0 && fstat(descriptor, &here) == 0 && here.st_uid == geteuid() &&
+                    (directory || S_ISREG(here.st_mode)) && holds_lock(descriptor, directory) &&
+                    lstat(path.c_str(), &there) == 0 && there.st_ino == here.st_ino && there.st_dev == here.st_dev;
+  std::error_code error;
+  if (dead) {
+    fs::remove_all(path, error);
+  }
+  if (descriptor >= 0) {
+    close(descriptor);
+  }
+  return dead && !error;
+}
+
+// A new one with its lock; −1 and errno where there is none.
+int made(const fs::path& path, Temporary::Kind kind) {
+  const bool directory = kind != Temporary::Kind::file;
+  int descriptor = -1;
+  if (!directory) {
+    descriptor = open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+  } else if (mkdir(path.c_str(), kind == Temporary::Kind::private_directory ? 0700 : 0777) == 0) {
+    descriptor = opened(path, true);
+  }
+  if (descriptor < 0) {
+    return -1;
+  }
+  holds_lock(descriptor, directory);  // not on every file system: then nobody can tell that this one is dead
+  struct stat here {};
+  if (fstat(descriptor, &here) == 0 && here.st_nlink == 0) {  // somebody was faster, and took it for a dead one
+    close(descriptor);
+    errno = EEXIST;
+    return -1;
+  }
+  return descriptor;
+}
+
+}  // namespace
+
+Temporary::Temporary(const fs::path& stem, Kind kind, const std::string& shown, const std::string& expected) {
+  const std::scoped_lock guard(living().mutex);
+  for (int number = 0, tries = 0; number < most_numbers && lock_ < 0 && tries < 2 * most_numbers; ++tries) {
+    path_ = stem;
+    path_ += std::to_string(number);
+    lock_ = made(path_, kind);
+    if (lock_ < 0 && errno != EEXIST) {
+      break;
+    }
+    number += lock_ < 0 && !bury(path_, kind != Kind::file) ? 1 : 0;
+  }
+  if (lock_ < 0) {
+    throw InputError(shown + (kind == Kind::file ? ": cannot be written (" : ": cannot be made (") +
+                     std::strerror(errno) + "): expected " + expected);
+  }
+  living().paths.insert(path_);
+}
+
+Temporary::~Temporary() {
+  if (!path_.empty()) {
+    const std::scoped_lock guard(living().mutex);
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+    living().paths.erase(path_);
+  }
+  close(lock_);
+}
+
+std::string Temporary::move_to(const fs::path& place) {
+  const std::scoped_lock guard(living().mutex);
+  if (fsync(lock_) != 0 && errno != EINVAL && errno != ENOSYS) {
+    return std::strerror(errno);
+  }
+  std::error_code error;
+  fs::rename(path_, place, error);
+  if (error) {
+    return error.message();
+  }
+  living().paths.erase(std::exchange(path_, {}));
+  return {};
+}
+
+void remove_temporaries() {
+  living().mutex.lock();  // and never given back
+  for (const fs::path& path : living().paths) {
+    std::error_code ignored;
+    fs::remove_all(path, ignored);
+  }
+}
+
+}  // namespace wheelwright::files

@@ -1,0 +1,228 @@
+// SPDX-License-Identifier: Apache-2.0
+// Nothing lost, nothing let in: a stream that goes blind says so, places that are no files stay what they are, and what
+// is interrupted leaves nothing behind.
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <functional>
+#include <thread>
+
+#include "app/program.hpp"
+
+namespace wheelwright::app::robust_test {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::AnyOf;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using testing::Outcome;
+
+class Robust : public testing::ProgramTest {
+ protected:
+  /// The shipped log with its rows from `from` on (the header is row 0) changed by `change`, which may drop them.
+  void put_changed(std::size_t from, std::size_t to,
+                   const std::function<std::string(std::size_t, std::string)>& change) {
+    std::vector<std::string> lines;
+    const std::vector<std::string> healthy = healthy_lines();
+    for (std::size_t k = 0; k < healthy.size(); ++k) {
+      lines.push_back(k >= from && k < to ? change(k, healthy[k]) : healthy[k]);
+    }
+    std::erase(lines, "");
+    put_lines("log.csv", lines);
+  }
+  static std::string with_time(const std::string& line, double t) {
+    return fmt::format("{}{}", t, line.substr(line.find(',')));
+  }
+};
+
+constexpr std::size_t kHalf = 6001, kAll = 20000;
+
+TEST_F(Robust, AStreamThatGoesBlindSaysSinceWhenAndWhy) {
+  commission_shipped();
+  const std::vector<std::string> healthy = healthy_lines();
+  const double half = std::stod(healthy[kHalf]);
+  struct Case {
+    std::string name, reason;
+    std::function<std::string(std::size_t, std::string)> change;
+  };
+  const std::vector<Case> cases = {
+      {"all values", "NaN or infinite",
+       [](std::size_t, const std::string& line) {
+         return line.substr(0, line.find(',')) + ",nan,nan,nan,nan,nan,nan";
+       }},
+      {"one sensor", "column tau_l",
+       [](std::size_t, const std::string& line) { return line.substr(0, line.rfind(',')) + ",nan"; }},
+      {"a clock that stands", "the same time stamp",
+       [&](std::size_t, const std::string& line) { return with_time(line, half); }},
+      {"a clock that runs backwards", "time goes backwards",
+       [&](std::size_t k, const std::string& line) {
+         return with_time(line, half - 0.01 * static_cast<double>(k - kHalf));
+       }},
+      {"rows swapped", "time goes backwards",
+       [&](std::size_t k, const std::string&) {
+         return healthy[std::min(kHalf + ((k - kHalf) ^ 1U), healthy.size() - 1)];
+       }},
+      {"every sixth row", "gaps longer than",
+       [](std::size_t k, const std::string& line) { return k % 6 == 0 ? line : ""; }},
+      {"text", "could not be read", [](std::size_t, const std::string&) { return std::string("E: sensor lost"); }},
+  };
+  for (const Case& each : cases) {
+    put_changed(kHalf, kAll, each.change);
+    const Outcome text = run("detect --follow --model model/model.json", "log.csv");
+    EXPECT_EQ(text.code, 2) << each.name;
+    EXPECT_THAT(text.out, AllOf(AnyOf(HasSubstr("blind since t = 59.99"), HasSubstr("blind since t = 60.0")),
+                                HasSubstr(each.reason)))
+        << each.name;
+    EXPECT_THAT(text.err, HasSubstr("standard input ended blind since t = ")) << each.name;
+    const Outcome json = run("detect --follow --model model/model.json --json", "log.csv");
+    const std::vector<std::string> told = testing::lines_of(json.out);
+    ASSERT_EQ(told.size(), 1u) << each.name << json.out;
+    const Json blind = Json::parse(told.front()).at("blind");
+    EXPECT_NEAR(blind.at("since").get<double>(), half, 0.05) << each.name;
+    EXPECT_TRUE(blind.at("until").is_null());
+    EXPECT_THAT(blind.at("reason").get<std::string>(), HasSubstr(each.reason)) << each.name;
+  }
+}
+
+TEST_F(Robust, AStreamThatSeesAgainSaysSoAndIsAnswered) {
+  commission_shipped();
+  put_changed(4000, 5000,
+              [](std::size_t, const std::string& line) { return line.substr(0, line.rfind(',')) + ",nan"; });
+  const Outcome json = run("detect --follow --model model/model.json --json", "log.csv");
+  EXPECT_EQ(json.code, 0) << json.err;
+  const std::vector<std::string> told = testing::lines_of(json.out);
+  ASSERT_EQ(told.size(), 2u) << json.out;
+  const Json noticed = Json::parse(told[0]).at("blind"), over = Json::parse(told[1]).at("blind");
+  EXPECT_EQ(noticed.at("since"), over.at("since"));
+  EXPECT_GE(over.at("until").get<double>(), 49.99);
+  EXPECT_GE(over.at("rows").get<int>(), 1000);
+  EXPECT_THAT(over.at("reason").get<std::string>(), HasSubstr("column tau_l"));
+}
+
+TEST_F(Robust, AShortLossOfASensorIsNoBlindness) {
+  commission_shipped();
+  put_changed(4000, 4050,
+              [](std::size_t, const std::string& line) { return line.substr(0, line.rfind(',')) + ",nan"; });
+  const Outcome text = run("detect --follow --model model/model.json", "log.csv");
+  EXPECT_EQ(text.code, 0) << text.err;
+  EXPECT_THAT(text.out, IsEmpty());
+}
+
+TEST_F(Robust, ALogOfWhichMostCannotBeDecidedIsNotHealthy) {
+  commission_shipped();
+  put_changed(2000, kAll,
+              [](std::size_t, const std::string& line) { return line.substr(0, line.rfind(',')) + ",nan"; });
+  const Outcome text = run("detect log.csv --model model/model.json --out found");
+  EXPECT_EQ(text.code, 2);
+  EXPECT_THAT(text.err, AllOf(HasSubstr("of 12001 rows could be decided on"), HasSubstr("column tau_l")));
+  EXPECT_THAT(files::read_json(path("found/detection.json")).at("undecided").get<std::string>(),
+              HasSubstr("column tau_l"));
+}
+
+TEST_F(Robust, ALineWithoutEndEndsTheStreamBeforeItFillsTheMemory) {
+  commission_shipped();
+  put("log.csv", healthy_lines().front() + "\n" + std::string(std::size_t{1} << 20, '1'));
+  const Outcome text = run("detect --follow --model model/model.json", "log.csv");
+  EXPECT_EQ(text.code, 2);
+  EXPECT_THAT(text.err, HasSubstr("standard input:2: a line of more than 262144 bytes"));
+}
+
+TEST_F(Robust, APipeIsNoLogAndIsNotWaitedFor) {
+  ASSERT_EQ(mkfifo(path("pipe").c_str(), 0600), 0);
+  const Outcome outcome = run("doctor pipe --robot robot.yaml", "/dev/null", "timeout 60");
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_THAT(outcome.err, AllOf(HasSubstr("pipe: is a pipe or a device"), HasSubstr("--follow")));
+}
+
+TEST_F(Robust, OutputGoesIntoPipesAndThroughLinks) {
+  const std::string scenario = "'" + (examples() / "scenarios" / "shipped.yaml").string() + "'";
+  simulate("shipped.yaml", "plain.csv");
+  const Outcome piped = run("simulate " + scenario + " --out /dev/stdout --quiet");
+  EXPECT_EQ(piped.code, 0) << piped.err;
+  EXPECT_EQ(piped.out, bytes(path("plain.csv")));
+  EXPECT_TRUE(fs::is_symlink("/dev/stdout"));
+
+  put("real.csv", "old");
+  fs::create_symlink("real.csv", path("link.csv"));
+  EXPECT_EQ(run("simulate " + scenario + " --out link.csv").code, 0);
+  EXPECT_TRUE(fs::is_symlink(path("link.csv")));
+  EXPECT_EQ(bytes(path("real.csv")), bytes(path("plain.csv")));
+}
+
+TEST_F(Robust, WhatIsReadIsNotReplaced) {
+  fs::copy_file(examples() / "scenarios" / "shipped.yaml", path("drive.yaml"));
+  fs::create_hard_link(path("drive.yaml"), path("same.csv"));
+  const Outcome outcome = run("simulate drive.yaml --out same.csv");
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("same.csv: is what is read: expected another name"));
+}
+
+TEST_F(Robust, AnInterruptedSimulationLeavesNothing) {
+  put("long.yaml",
+      "robot: robot.yaml\nparameters: {mass: 21.0, yaw_inertia: 0.9, viscous_linear: 4.0, viscous_yaw: 0.5}\n"
+      "trajectory: {kind: straight, speed: 0.6, period: 6}\nduration: 900000\n");
+  for (const auto& [signal, code] : {std::pair{"TERM", 143}, std::pair{"INT", 130}}) {
+    fs::create_directory(path("out"));
+    const Outcome outcome = run("simulate long.yaml --out out/long.csv", "/dev/null",
+                                fmt::format("timeout --foreground -s {} --preserve-status 2", signal));
+    EXPECT_EQ(outcome.code, code) << outcome.err;
+    EXPECT_THAT(names_in("out"), IsEmpty());
+    fs::remove_all(path("out"));
+  }
+}
+
+TEST_F(Robust, AFleetWithLinksToItselfIsRead) {
+  fs::create_directories(path("fleet/amy"));
+  fs::copy_file(examples() / "healthy.csv.gz", path("fleet/amy/monday.csv.gz"));
+  fs::create_directory_symlink(path("fleet"), path("fleet/amy/fleet"));
+  fs::create_symlink("loop.csv", path("fleet/loop.csv"));
+  const Outcome outcome = run("fleet fleet --robot robot.yaml --json --quiet");
+  EXPECT_LE(outcome.code, 1) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("amy"));
+}
+
+TEST_F(Robust, AFleetListWithAZeroByteIsRefused) {
+  for (const std::string& row : {std::string("amy,mon\0day.csv\n", 16), std::string("a\0my,monday.csv\n", 16)}) {
+    put("fleet.csv", "robot,log\n" + row);
+    const Outcome outcome = run("fleet fleet.csv --robot robot.yaml");
+    EXPECT_EQ(outcome.code, 2);
+    EXPECT_THAT(outcome.err, HasSubstr("fleet.csv:2: a control character"));
+  }
+}
+
+TEST_F(Robust, AModelWithImpossibleNumbersIsNeitherUsedNorProved) {
+  commission_shipped();
+  const Json model = files::read_json(path("model/model.json"));
+  const std::string log = "'" + (examples() / "healthy.csv.gz").string() + "'";
+  const std::vector<std::pair<std::string, Json>> cases = {{"/detector/error_bounds/output/0", -0.1},
+                                                           {"/filter/order", (std::uint64_t{1} << 32) + 2},
+                                                           {"/at_risk/errors/effort/correlation", 1e12}};
+  for (const auto& [pointer, value] : cases) {
+    Json changed = model;
+    changed.at(Json::json_pointer(pointer)) = value;
+    put("changed.json", changed.dump());
+    for (const std::string& command : {"detect " + log + " --model changed.json", "check changed.json " + log}) {
+      const Outcome outcome = run(command);
+      EXPECT_EQ(outcome.code, 2) << command;
+      EXPECT_THAT(outcome.err, HasSubstr("changed.json: " + pointer.substr(0, 12))) << command;
+    }
+  }
+}
+
+TEST_F(Robust, AClockThatJumpsByDecadesIsDiagnosed) {
+  std::vector<std::string> lines = healthy_lines();
+  for (std::size_t k = 4000; k < lines.size(); ++k) {
+    lines[k] = with_time(lines[k], 1.7e9 + 0.01 * static_cast<double>(k));
+  }
+  put_lines("log.csv", lines);
+  const Outcome outcome = run("gap log.csv --robot robot.yaml --no-manoeuvre --no-shrink --json --quiet", "/dev/null",
+                              "ulimit -v 4000000;");
+  EXPECT_LE(outcome.code, 1) << outcome.err;
+  EXPECT_THAT(Json::parse(outcome.out).at("schema"), "wheelwright/gap/1");
+}
+
+}  // namespace
+}  // namespace wheelwright::app::robust_test

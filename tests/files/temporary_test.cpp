@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: Apache-2.0
+// Files that are written whole or not at all: what a killed program left is cleared away, what lives is left alone, and
+// pipes, devices and links stay what they are.
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <string>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <wheelwright/core/error.hpp>
+#include <wheelwright/files/bytes.hpp>
+#include <wheelwright/files/temporary.hpp>
+
+#include "support/scratch.hpp"
+
+namespace wheelwright::files::temporary_test {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+
+class Temporaries : public testing::ScratchTest {
+ protected:
+  /// What stands in the directory of the test.
+  [[nodiscard]] std::vector<std::string> names() const {
+    std::vector<std::string> all;
+    for (const auto& entry : fs::directory_iterator(directory_)) {
+      all.push_back(entry.path().filename());
+    }
+    return all;
+  }
+
+  /// Runs `work` in a process that is killed afterwards, as a full machine kills.
+  template <typename Work>
+  static void killed_after(const Work& work) {
+    const pid_t child = fork();
+    if (child == 0) {
+      work();
+      kill(getpid(), SIGKILL);
+    }
+    int status = 0;
+    ASSERT_EQ(waitpid(child, &status, 0), child);
+    ASSERT_TRUE(WIFSIGNALED(status));
+  }
+};
+
+TEST_F(Temporaries, WhatAKilledWriterLeftIsRemovedByTheNext) {
+  killed_after([&] {
+    auto* file = new AtomicFile(path("log.csv"));
+    file->write("half a log");
+  });
+  ASSERT_EQ(names().size(), 1u);
+  EXPECT_FALSE(fs::exists(path("log.csv")));
+  atomic_write(path("log.csv"), "a log");
+  EXPECT_THAT(names(), ::testing::ElementsAre("log.csv"));
+  EXPECT_EQ(bytes(path("log.csv")), "a log");
+}
+
+TEST_F(Temporaries, ADirectoryOfAKilledProgramIsRemovedByTheNext) {
+  const auto make = [&] { return new Temporary(path("copy-"), Temporary::Kind::private_directory, "it", "room"); };
+  killed_after([&] { atomic_write(make()->path() / "large.db3", "bytes"); });
+  ASSERT_TRUE(fs::exists(path("copy-0/large.db3")));
+  const std::unique_ptr<Temporary> next(make());
+  EXPECT_EQ(next->path(), path("copy-0"));
+  EXPECT_TRUE(fs::is_empty(path("copy-0")));
+}
+
+TEST_F(Temporaries, OfWritersThatLiveEachKeepsItsOwn) {
+  AtomicFile first(path("log.csv"));
+  first.write("first");
+  AtomicFile second(path("log.csv"));
+  second.write("second");
+  EXPECT_EQ(names().size(), 2u);
+  first.commit();
+  EXPECT_EQ(bytes(path("log.csv")), "first");
+  second.commit();
+  EXPECT_EQ(bytes(path("log.csv")), "second");
+  EXPECT_THAT(names(), ::testing::ElementsAre("log.csv"));
+}
+
+TEST_F(Temporaries, WhatIsNoFileOfOursIsLeftAlone) {
+  fs::create_directory(path("log.csv.wheelwright-part0"));
+  put("somewhere", "dear");
+  fs::create_symlink(path("somewhere"), path("log.csv.wheelwright-part1"));
+  atomic_write(path("log.csv"), "a log");
+  EXPECT_TRUE(fs::is_directory(path("log.csv.wheelwright-part0")));
+  EXPECT_TRUE(fs::is_symlink(path("log.csv.wheelwright-part1")));
+  EXPECT_EQ(bytes(path("somewhere")), "dear");
+}
+
+TEST_F(Temporaries, APipeIsWrittenToAndStaysOne) {
+  ASSERT_EQ(mkfifo(path("pipe").c_str(), 0600), 0);
+  std::string got;
+  std::thread reader([&] {
+    const auto source = open_stream(open(path("pipe").c_str(), O_RDONLY), "pipe");
+    std::string buffer(4096, '\0');
+    while (const std::size_t size = source->read(buffer.data(), buffer.size())) {
+      got += buffer.substr(0, size);
+    }
+  });
+  atomic_write(path("pipe"), "rows");
+  reader.join();
+  EXPECT_EQ(got, "rows");
+  EXPECT_TRUE(fs::is_fifo(path("pipe")));
+  EXPECT_THAT(testing::input_error([&] { FileBeside file(path("pipe")); }), HasSubstr("pipe: is a pipe or a device"));
+}
+
+TEST_F(Temporaries, ADeviceAndAStreamOfOurOwnAreWrittenTo) {
+  atomic_write("/dev/null", "gone");
+  EXPECT_TRUE(fs::is_character_file("/dev/null"));
+  put("out", "");
+  const int out = open(path("out").c_str(), O_WRONLY);
+  ASSERT_EQ(write(out, "before ", 7), 7);
+  atomic_write("/proc/self/fd/" + std::to_string(out), "the log ");
+  ASSERT_EQ(write(out, "after", 5), 5);
+  close(out);
+  EXPECT_EQ(bytes(path("out")), "before the log after");
+}
+
+TEST_F(Temporaries, ALinkStaysOneAndWhatItLeadsToIsReplaced) {
+  fs::create_directory(path("data"));
+  put("data/log.csv", "old");
+  fs::create_symlink("data/log.csv", path("near"));
+  fs::create_symlink(path("near"), path("far"));
+  atomic_write(path("far"), "new");
+  EXPECT_TRUE(fs::is_symlink(path("far")));
+  EXPECT_TRUE(fs::is_symlink(path("near")));
+  EXPECT_EQ(bytes(path("data/log.csv")), "new");
+
+  fs::create_symlink("data/later.csv", path("dangling"));
+  atomic_write(path("dangling"), "made");
+  EXPECT_EQ(bytes(path("data/later.csv")), "made");
+
+  fs::create_symlink("loop", path("loop"));
+  EXPECT_THAT(testing::input_error([&] { atomic_write(path("loop"), "x"); }), HasSubstr("loop: is a link"));
+}
+
+TEST_F(Temporaries, ALineWithoutEndIsRefusedBeforeItFillsTheMemory) {
+  int ends[2];
+  ASSERT_EQ(pipe(ends), 0);
+  std::thread writer([&] {
+    signal(SIGPIPE, SIG_IGN);
+    const std::string piece(65536, '1');
+    for (int k = 0; k < 16 && write(ends[1], piece.data(), piece.size()) > 0; ++k) {
+    }
+    close(ends[1]);
+  });
+  {
+    LineReader lines(open_stream(ends[0], "standard input"), "standard input");
+    std::string_view line;
+    EXPECT_THAT(testing::input_error([&] { lines.next(line); }),
+                HasSubstr("standard input:1: a line of more than 262144 bytes"));
+  }
+  close(ends[0]);
+  writer.join();
+}
+
+}  // namespace
+}  // namespace wheelwright::files::temporary_test
