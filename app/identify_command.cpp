@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <iterator>
 #include <memory>
 
 #include <fmt/format.h>
@@ -17,6 +18,7 @@
 #include "commands.hpp"
 #include "common.hpp"
 #include "options.hpp"
+#include "sound_log.hpp"
 
 namespace wheelwright::app {
 using namespace words;
@@ -58,13 +60,14 @@ bool for_kinematics_only(const LogSource& log, const Robot& robot) {
 int run(const Arguments& a) {
   make_directory(a.common);
   Robot robot = read_robot(a.robot);
-  const auto opened = open_robot_log(a.logs, robot, a.common);
-  logs::RecordedLog& log = *opened;
+  const SoundLog opened = open_sound_log(a.logs, robot, a.common, WheelPose::hidden);
+  logs::RecordedLog& log = *opened.log;
   robot = model::with_column_errors(robot, logs::interpolation_errors(log.report()));
   if (!for_kinematics_only(log, robot)) {
     logs::require_columns(log, robots::needed_columns(robot));
   }
   report::ReportContext context = report_context(a.common, log.report(), log);
+  std::ranges::copy(opened.remarks, std::back_inserter(context.warnings));
   context.seeds = {{"bootstrap and signs", a.common.seed}};
   Progress progress(a.common.quiet);
   inference::IdentificationOptions options;
@@ -102,6 +105,7 @@ Run add_identify(CLI::App& program) {
   command.add_option("--robot", a->robot, "Robot file (YAML)")->required()->type_name("FILE");
   command.add_flag("--no-shapes", a->no_shapes, "Do not look for delay, lags and Stribeck speed");
   add_map(command, a->common);
+  add_despite(command, a->common);
   return finish(command, a, kExamples, run);
 }
 
