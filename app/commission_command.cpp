@@ -83,8 +83,7 @@ int run(const Arguments& a) {
   if (!a.common.columns.empty()) {
     model["robot"]["columns"] = a.common.columns;
   }
-  publish(a.common, model, "model.json",
-          report::commission_report(result, context));
+  publish(a.common, model, "model.json", report::commission_report(result, context));
   if (!a.common.quiet && !a.common.json) {
     print_log(context.warnings);
     say("{}", summary(result));

@@ -20,8 +20,8 @@
 #include "commands.hpp"
 #include "common.hpp"
 #include "options.hpp"
-#include "sound_log.hpp"
 #include "run_items.hpp"
+#include "sound_log.hpp"
 
 namespace wheelwright::app {
 namespace fleet_command {

@@ -144,8 +144,8 @@ void write_beside(const Arguments& a, const Diagnosis& d, const gap::NextDrive& 
   results::write_residuals(out / kResiduals, d.series);
   // What an earlier run left would contradict this one.
   if (d.improved) {
-    files::atomic_write(out / kImproved, origin(a, d) + robots::robot_yaml(*d.improved) +
-                                           robots::columns_yaml(a.common.columns));
+    files::atomic_write(out / kImproved,
+                        origin(a, d) + robots::robot_yaml(*d.improved) + robots::columns_yaml(a.common.columns));
   } else {
     std::filesystem::remove(out / kImproved);
   }

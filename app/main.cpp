@@ -45,7 +45,8 @@ int run(int argc, char** argv) {
   program.require_subcommand(1);
   program.formatter(std::make_shared<ShortList>());
   program.footer(
-      "Start with:  wheelwright try BAG --urdf robot.urdf, or wheelwright commission LOG --robot robot.yaml --out result\n"
+      "Start with:  wheelwright try BAG --urdf robot.urdf, or wheelwright commission LOG --robot robot.yaml --out "
+      "result\n"
       "Each command has its own --help.");
   const std::vector<std::pair<std::string, Run>> commands = {{"try", add_try(program)},
                                                              {"commission", add_commission(program)},

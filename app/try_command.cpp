@@ -44,7 +44,8 @@ struct Arguments {
 };
 
 constexpr const char* kHelp =
-    "From a recording to an answer, without a robot file: finds topics, joints and sides, the kind of effort and how it "
+    "From a recording to an answer, without a robot file: finds topics, joints and sides, the kind of effort and how "
+    "it "
     "is held, encoder counts, and the geometry (from --urdf, a robot description in the recording, or odometry or a "
     "pose in it), and says where each came from. Then it runs doctor, commission, margins and, where the robot's mass "
     "is known, gap, and leaves one page that begins with the answer.\n\n"
@@ -58,10 +59,10 @@ constexpr const char* kExamples =
     "  then wheelwright detect this_afternoon/ --model result/commission/model.json\n\n"
     "Exit code: 0 a model was made, 1 none could be made of this log (the page says why and what to do), 2 bad input.";
 
-constexpr std::size_t kLookedAt = 200000;   // rows
-constexpr double kStartRadius = 0.1;        // m, where a search for the geometry begins
-constexpr double kStartTrack = 0.4;         // m
-constexpr double kHalfAStep = 0.25;         // of a step, about half a one
+constexpr std::size_t kLookedAt = 200000;  // rows
+constexpr double kStartRadius = 0.1;       // m, where a search for the geometry begins
+constexpr double kStartTrack = 0.4;        // m
+constexpr double kHalfAStep = 0.25;        // of a step, about half a one
 
 /// The text on a topic .../robot_description (std_msgs/String) of a recording; empty where there is none.
 std::string description_in(const std::vector<std::filesystem::path>& paths, const CommonOptions& common) {
@@ -222,9 +223,10 @@ struct Page {
 
   void section(const std::string& name, const std::vector<std::string>& sentences) {
     content.sections.push_back(
-        {name, name, report::bullets(sentences) + report::paragraph(fmt::format("<a href=\"{0}/report.html\">All that "
-                                                                               "<code>{0}</code> says</a>",
-                                                                               name))});
+        {name, name,
+         report::bullets(sentences) + report::paragraph(fmt::format("<a href=\"{0}/report.html\">All that "
+                                                                    "<code>{0}</code> says</a>",
+                                                                    name))});
   }
 };
 
@@ -250,7 +252,8 @@ bool call(Run (*add)(CLI::App&), std::vector<std::string> words, std::string& wh
 /// "mass 21.01 [20.95, 21.04] kg (extrapolated)".
 std::vector<std::string> quantities(const Json& model) {
   std::vector<std::string> out;
-  for (const auto& [name, of] : model.value("physical", Json::object()).items()) {
+  const Json physical = model.value("physical", Json::object());
+  for (const auto& [name, of] : physical.items()) {
     if (of.at("estimate").is_number() && of.at("lower").is_number() && of.at("upper").is_number()) {
       out.push_back(fmt::format("{} {:.4g} {}, {} between {:.4g} and {:.4g}", name, of.at("estimate").get<double>(),
                                 of.at("unit").get<std::string>(), model.value("warrant", "extrapolated"),
@@ -267,9 +270,8 @@ std::string smallest_change(const Json& model) {
       least = std::min(least, kappa->get<double>());
     }
   }
-  return std::isfinite(least)
-             ? fmt::format("a change of the wheel radius by {:.2g} % is certainly seen", 100.0 * least)
-             : "";
+  return std::isfinite(least) ? fmt::format("a change of the wheel radius by {:.2g} % is certainly seen", 100.0 * least)
+                              : "";
 }
 
 std::vector<std::string> troubles(const Json& doctor, const std::string& severity) {
@@ -307,8 +309,8 @@ int run(const Arguments& given) {
     }
     robot = made.robot;
     yaml = robots::robot_yaml(made) + robots::columns_yaml(a.common.columns);
-    for (const char* key : {"wheel_radius", "track_width", "nominal.mass", "effort.kind", "effort.hold",
-                            "encoder_counts_per_turn"}) {
+    for (const char* key :
+         {"wheel_radius", "track_width", "nominal.mass", "effort.kind", "effort.hold", "encoder_counts_per_turn"}) {
       if (const auto origin = made.origins.find(key); origin != made.origins.end()) {
         took.push_back(fmt::format("{}: {}", key, origin->second));
       }
@@ -400,8 +402,8 @@ int run(const Arguments& given) {
   const std::vector<std::string> warnings = troubles(doctor, "warning");
   said.insert(said.end(), warnings.begin(), warnings.end());
   if (page.model) {
-    said.push_back(fmt::format("Next: wheelwright detect LOG --model {}",
-                               (out / "commission" / "model.json").string()));
+    said.push_back(
+        fmt::format("Next: wheelwright detect LOG --model {}", (out / "commission" / "model.json").string()));
   }
   page.content.verdict = verdict;
   page.content.status = page.model ? warnings.empty() ? "good" : "caution" : "bad";
@@ -437,7 +439,8 @@ Run add_try(CLI::App& program) {
   command.add_option("--urdf", a->urdf, "Robot description; without it one in the recording")->type_name("FILE");
   command.add_option("--ros2-control", a->ros2_control, "Parameters of the diff_drive_controller (YAML)")
       ->type_name("FILE");
-  command.add_option("--robot", a->robot, "Robot file (YAML) that settles it; without it DIR/robot.yaml of an earlier run")
+  command
+      .add_option("--robot", a->robot, "Robot file (YAML) that settles it; without it DIR/robot.yaml of an earlier run")
       ->type_name("FILE");
   command.add_option("--wheel-radius", a->hints.wheel_radius, "Wheel radius, m; goes before all files")
       ->transform(in_unit("m"))

@@ -12,6 +12,7 @@
 #include <Eigen/Core>
 
 #include <wheelwright/core/linear_algebra.hpp>
+#include <wheelwright/filter/encoder.hpp>
 
 namespace wheelwright::commission {
 namespace {
@@ -22,13 +23,13 @@ constexpr double kExactWay = 1e-5;      // m
 constexpr double kLeastChange = 1e-2;   // rad or m, rms in a window: less says nothing
 constexpr double kOfTheCounts = 1.0 / 3.0;
 constexpr double kOfTheRounding = 1.2;
-constexpr std::size_t kMostKept = 200000;   // rows that are looked at for poses of other stamps
-constexpr std::size_t kFewestDrives = 4;    // between two rests
-constexpr double kRest = 0.2;               // s to both sides that are a rest
-constexpr double kStraight = 1e-9;          // rad: second differences below are those of a straight line
-constexpr double kOfInterpolation = 1.25;   // second differences of samples are not the largest second derivative
-constexpr double kLongestPoseStep = 0.25;   // s
-constexpr double kBendSpan = 0.05;          // s
+constexpr std::size_t kMostKept = 200000;  // rows that are looked at for poses of other stamps
+constexpr std::size_t kFewestDrives = 4;   // between two rests
+constexpr double kRest = 0.2;              // s to both sides that are a rest
+constexpr double kStraight = 1e-9;         // rad: second differences below are those of a straight line
+constexpr double kOfInterpolation = 1.25;  // second differences of samples are not the largest second derivative
+constexpr double kLongestPoseStep = 0.25;  // s
+constexpr double kBendSpan = 0.05;         // s
 constexpr double kWholeTurn = 2.0 * std::numbers::pi;
 
 // The coarsest decimal unit of which all values are multiples, as they are or wrapped into a turn; 0 where there is
@@ -152,10 +153,11 @@ std::optional<double> between_rests(const std::vector<Kept>& segments) {
   return drives.rest(kFewestDrives);
 }
 
-// What the wheels leave of a heading that is linear between stamps of its own, where no window leaves more than the
-// interpolation h²/8·|d²/dt²| at its ends; nothing where one does. h is that of the kinks: a sample bends the line at
-// two rows at most.
-std::optional<double> within_interpolation(const std::vector<Kept>& segments, double window, double step) {
+// What the wheels leave of a heading that is linear between stamps of its own, where that is no more than the
+// interpolation h²/8·|d²/dt²| at both ends of each window and a count of each wheel there; nothing where it is more. h is
+// that of the kinks: a sample bends the line at two rows at most.
+std::optional<double> within_interpolation(const std::vector<Kept>& segments, double window, double step,
+                                           double count) {
   Combination windows;
   std::size_t bent = 0, moving = 0;
   std::vector<std::pair<const Kept*, std::array<std::size_t, 2>>> places;
@@ -183,10 +185,12 @@ std::optional<double> within_interpolation(const std::vector<Kept>& segments, do
   const auto around = static_cast<std::size_t>(std::ceil(between)) + 1;
   const auto span = static_cast<std::size_t>(std::max(1.0, std::round(kBendSpan / step)));
   const Eigen::Vector2d c = windows.weights();
+  const double by_counts = 2.0 * count * c.cwiseAbs().sum();
   const std::vector<double> left = windows.rests();
+  double squares = 0.0, expected = 0.0;
   for (std::size_t i = 0; i < places.size(); ++i) {
     const auto& [log, ends] = places[i];
-    double allowed = kExactHeading;
+    double by_lines = kExactHeading;
     for (const std::size_t end : ends) {
       double bend = 0.0;
       const std::size_t last = std::min(end + around, log->rows() - 1 - span);
@@ -194,13 +198,22 @@ std::optional<double> within_interpolation(const std::vector<Kept>& segments, do
         bend = std::max(bend, std::abs(c[0]) * Kept::bend(log->wheel[0], k, span) +
                                   std::abs(c[1]) * Kept::bend(log->wheel[1], k, span));
       }
-      allowed += kOfInterpolation * between * between / 8.0 * bend;
+      by_lines += kOfInterpolation * between * between / 8.0 * bend;
     }
-    if (std::abs(left[i]) > allowed) {
+    if (std::abs(left[i]) > by_lines + by_counts) {
       return std::nullopt;
     }
+    squares += left[i] * left[i];
+    // Rounding: 1/12 of a count² at the row, two thirds of that between two samples, at both ends.
+    expected += 0.5 * by_lines * by_lines + 5.0 / 18.0 * count * count * c.squaredNorm();
   }
-  return windows.rest();
+  return squares <= kOfTheRounding * expected ? windows.rest() : std::nullopt;
+}
+
+// The count of the encoder that steps of an angle are made of, rad; 0 where they are not.
+double rounding_of(const std::vector<double>& steps) {
+  const auto encoder = filter::find_encoder_of_angles(steps);
+  return encoder ? encoder->speed_step : 0.0;
 }
 
 // Wheel angles since the window began, by three rules of integration (angles: all alike).
@@ -220,6 +233,7 @@ PoseOrigin pose_origin(LogSource& log, const filter::OdometryMeasurement& m, dou
   Decimals decimals;
   Turned turned{};
   std::vector<Kept> kept;
+  std::vector<double> wheel_steps;
   std::size_t kept_rows = 0;
   double heading = 0.0, way = 0.0, begin = 0.0, before = 0.0;
   std::array<double, 2> motion{};
@@ -246,8 +260,11 @@ PoseOrigin pose_origin(LogSource& log, const filter::OdometryMeasurement& m, dou
                                    : first ? 0.0
                                            : segment.wheel[j].back() + 0.5 * (t - before) * (now[j] + motion[j]));
       }
-      segment.heading.push_back(
-          first ? theta_now : segment.heading.back() + std::remainder(theta_now - theta_before, kWholeTurn));
+      if (!first && m.motion == MotionKind::angle) {
+        wheel_steps.push_back(now[0] - motion[0]);
+      }
+      segment.heading.push_back(first ? theta_now
+                                      : segment.heading.back() + std::remainder(theta_now - theta_before, kWholeTurn));
       segment.t.push_back(t);
     }
     if (starts) {
@@ -307,10 +324,11 @@ PoseOrigin pose_origin(LogSource& log, const filter::OdometryMeasurement& m, dou
     if (const auto rest = between_rests(kept); rest && *rest < kExactHeading) {
       origin.heading_rest = *rest;
       by_stamps = "from one rest to the next";
-    } else if (const auto linear = within_interpolation(kept, window, m.nominal_step); linear && !m.held_pose) {
+    } else if (const auto linear = within_interpolation(kept, window, m.nominal_step, rounding_of(wheel_steps));
+               linear && !m.held_pose) {
       origin.heading_rest = *linear;
-      by_stamps = fmt::format(
-          "over {:.3g} s, no more than lines between the samples of a pose that repeats the wheels", window);
+      by_stamps = fmt::format("over {:.3g} s, no more than lines between the samples of a pose that repeats the wheels",
+                              window);
     }
     origin.heading_repeats = !by_stamps.empty();
   }

@@ -18,13 +18,13 @@
 namespace wheelwright::doctor {
 namespace {
 
-constexpr double kSome = 0.02;        // share of the rows that makes a manoeuvre count
+constexpr double kSome = 0.02;              // share of the rows that makes a manoeuvre count
 constexpr double kTractionSpan = 0.1;       // s to both sides, for an acceleration
 constexpr double kMostTraction = 25.0;      // m/s²: two and a half times that of gravity
 constexpr double kChangedPlaces = 0.15;     // sum of |log| of two ratios to nominal values
 constexpr double kMostTimesNominal = 20.0;  // a robot may carry a load
 constexpr double kLeastTimesNominal = 0.2;  // and loses less
-constexpr double kUnusedRisk = 1e-3;  // for fit_log; not used further
+constexpr double kUnusedRisk = 1e-3;        // for fit_log; not used further
 
 LogFinding about_motion(const char* id, FindingSeverity severity, std::string sentence, std::string next, double value,
                         std::string unit) {
@@ -196,16 +196,17 @@ void check_traction(const HealthView& view, std::vector<LogFinding>& out) {
     }
     const double high = quantile(std::move(rim), 0.99);
     if (high > kMostTraction) {
-      out.push_back({.id = "units.wheel_speed",
-                     .topic = FindingTopic::units,
-                     .severity = FindingSeverity::fatal,
-                     .sentence = fmt::format("By {} and the robot file's radius the rim accelerates at {:.3g} m/s², which "
-                                             "no tyre holds (at {:.3g} m/s): degrees or rpm?",
-                                             j.motion_name(), high, view.robot.wheel_radius * j.top),
-                     .next = "Convert the wheels' motion to rad and rad/s at the wheel, or correct wheel_radius.",
-                     .columns = {j.motion_name()},
-                     .value = high,
-                     .unit = "m/s²"});
+      out.push_back(
+          {.id = "units.wheel_speed",
+           .topic = FindingTopic::units,
+           .severity = FindingSeverity::fatal,
+           .sentence = fmt::format("By {} and the robot file's radius the rim accelerates at {:.3g} m/s², which "
+                                   "no tyre holds (at {:.3g} m/s): degrees or rpm?",
+                                   j.motion_name(), high, view.robot.wheel_radius * j.top),
+           .next = "Convert the wheels' motion to rad and rad/s at the wheel, or correct wheel_radius.",
+           .columns = {j.motion_name()},
+           .value = high,
+           .unit = "m/s²"});
       return;
     }
   }
@@ -246,7 +247,7 @@ void check_mirrored(const HealthView& view, const commission::Setting& s, const 
     const auto off = [&](double m, double i) {
       return std::abs(std::log(m / nominal.at("mass"))) + std::abs(std::log(i / nominal.at("yaw_inertia")));
     };
-    changed_places = off(*mass, *inertia) > kChangedPlaces + 4.0 * off(*inertia / square, *mass * square);
+    changed_places = off(*mass, *inertia) > kChangedPlaces + 2.0 * off(*inertia / square, *mass * square);
   }
   out.push_back({.id = "units.wheel_mirrored",
                  .topic = FindingTopic::units,

@@ -282,7 +282,7 @@ class Chooser {
         for (const std::string& joint : joints) {
           fields.push_back(fmt::format("{}[{}]", array, joint));
         }
-        const BagColumn::Rule rule = joints.size() == 1   ? BagColumn::Rule::value
+        const BagColumn::Rule rule = joints.size() == 1 ? BagColumn::Rule::value
                                      : column == effort ? BagColumn::Rule::sum
                                                         : BagColumn::Rule::mean;
         offer(k, column, std::move(fields), 1, rule);

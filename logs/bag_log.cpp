@@ -312,8 +312,7 @@ class BagWalk final : public RowWalk {
     if (!waiting.empty() && time < waiting.back().time - longest_late) {
       release(k, std::numeric_limits<std::int64_t>::max());
     }
-    const auto later =
-        std::ranges::upper_bound(waiting, time, {}, [](const Waiting& message) { return message.time; });
+    const auto later = std::ranges::upper_bound(waiting, time, {}, [](const Waiting& message) { return message.time; });
     reading.late += later != waiting.end() ? 1U : 0U;
     waiting.insert(later, {time, reading.values});
     release(k, waiting.back().time - longest_late);
@@ -363,14 +362,16 @@ class BagWalk final : public RowWalk {
                       reading.unstamped, reading.messages, topic));
     }
     if (reading.without > 0) {
-      file.notes.push_back(fmt::format("{} of {} messages of {} have none of the columns that are read (other joints, or "
-                                       "NaN) and were left out",
-                                       reading.without, reading.messages, topic));
+      file.notes.push_back(
+          fmt::format("{} of {} messages of {} have none of the columns that are read (other joints, or "
+                      "NaN) and were left out",
+                      reading.without, reading.messages, topic));
     }
     if (reading.late > 0) {
-      file.notes.push_back(fmt::format("{} of {} messages of {} were recorded after later ones and put in the order of "
-                                       "their stamps",
-                                       reading.late, reading.messages, topic));
+      file.notes.push_back(
+          fmt::format("{} of {} messages of {} were recorded after later ones and put in the order of "
+                      "their stamps",
+                      reading.late, reading.messages, topic));
     }
     if (const std::size_t stale = aligner_->stale(stream); stale > 0) {
       file.notes.push_back(fmt::format("{} of {} messages of {} are not later than the one before and were left out",

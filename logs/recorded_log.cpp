@@ -206,7 +206,7 @@ std::string column_of_path(std::string_view text) {
                                : last == "effort"   ? "tau_"
                                                     : "";
   return side.empty() || quantity.empty() || plain_name(before).find("wheel") == std::string::npos ? ""
-                                                                                                    : quantity + side;
+                                                                                                   : quantity + side;
 }
 
 }  // namespace

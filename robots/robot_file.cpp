@@ -52,10 +52,10 @@ struct RobotReader {
   static bool drive(const Robot& robot) { return robot.model == "differential_drive"; }
 
   void read() {
-    const auto members =
-        root.members({"name", "model", "wheel_radius", "track_width", "footprint", "lever_arm", "friction",
-                      "parameters", "effort", "nominal", "prior", "noise", "filter", "encoder_counts_per_turn",
-                      "speed_source", "limits", "kinematic", "motor", "effects", "columns"});
+    const auto members = root.members(
+        {"name",         "model",  "wheel_radius", "track_width", "footprint", "lever_arm", "friction",
+         "parameters",   "effort", "nominal",      "prior",       "noise",     "filter",    "encoder_counts_per_turn",
+         "speed_source", "limits", "kinematic",    "motor",       "effects",   "columns"});
     for (const auto& [key, place] : members) {
       read_basics(key, place);
     }

@@ -91,8 +91,10 @@ struct Maker {
     }
     robot.model = "differential_drive";
     if (wheels) {
-      out.origins["model"] = fmt::format("{}, left {}, right {}: {}", wheels->others.empty() ? "one driven wheel a side" : "several driven wheels a side",
-                                         wheels->left.place.text(), wheels->right.place.text(), wheels->reason);
+      out.origins["model"] =
+          fmt::format("{}, left {}, right {}: {}",
+                      wheels->others.empty() ? "one driven wheel a side" : "several driven wheels a side",
+                      wheels->left.place.text(), wheels->right.place.text(), wheels->reason);
     } else {
       out.origins["model"] = controller->place.text();
       if (controller->left.size() != controller->right.size()) {

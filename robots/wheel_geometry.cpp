@@ -103,8 +103,10 @@ WheelJoints driven_wheels(const RobotTree& tree, const NamedWheels& named) {
                                  named.left.size(), named.right.size()));
   }
   if (!named.left.empty()) {
-    WheelJoints out{by_name(tree, named.right.front(), named.by), by_name(tree, named.left.front(), named.by),
-                    "named by " + named.by, {}};
+    WheelJoints out{by_name(tree, named.right.front(), named.by),
+                    by_name(tree, named.left.front(), named.by),
+                    "named by " + named.by,
+                    {}};
     require_sides(out);
     for (std::size_t k = 1; k < named.left.size(); ++k) {
       out.others.push_back(by_name(tree, named.right[k], named.by));
@@ -124,8 +126,10 @@ WheelJoints driven_wheels(const RobotTree& tree, const NamedWheels& named) {
     std::ranges::stable_sort(found, std::greater(), [](const TreeJoint& j) { return j.origin.x(); });
     std::ranges::stable_partition(found, [](const TreeJoint& j) { return j.origin.y() > 0.0; });
     const auto second = static_cast<std::ptrdiff_t>(found.size() / 2);
-    WheelJoints out{found[static_cast<std::size_t>(second)], found.front(),
-                    "the continuous joints whose axes lie across the robot", {}};
+    WheelJoints out{found[static_cast<std::size_t>(second)],
+                    found.front(),
+                    "the continuous joints whose axes lie across the robot",
+                    {}};
     require_names_agree(out);
     out.others.assign(found.begin() + 1, found.begin() + second);
     out.others.insert(out.others.end(), found.begin() + second + 1, found.end());
@@ -283,9 +287,10 @@ Axle axle(const RobotTree& tree, const WheelJoints& wheels) {
                   static_cast<double>(2 + wheels.others.size());
   }
   if (!wheels.others.empty()) {
-    out.remarks.push_back(fmt::format("{} wheels: the wheels of a side are taken to turn as one; such robots scrub in "
-                                      "curves, so that `identify` finds a wider track",
-                                      2 + wheels.others.size()));
+    out.remarks.push_back(
+        fmt::format("{} wheels: the wheels of a side are taken to turn as one; such robots scrub in "
+                    "curves, so that `identify` finds a wider track",
+                    2 + wheels.others.size()));
   }
   out.track_width = out.left.dot(apart);
   const double of_joints = out.left.dot(left.origin - right.origin);

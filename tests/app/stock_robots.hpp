@@ -180,7 +180,8 @@ inline void add_wheel_odometry(StockBag& bag, const std::string& topic, const St
 
 /// A description: a body and wheels (x, half the track) on the ground.
 inline std::string stock_urdf(const std::string& name, double body_mass, double body_inertia, double radius,
-                              double wheel_mass, const std::vector<std::pair<std::string, std::pair<double, double>>>& wheels) {
+                              double wheel_mass,
+                              const std::vector<std::pair<std::string, std::pair<double, double>>>& wheels) {
   std::string out = fmt::format(
       "<robot name=\"{0}\"><link name=\"base_link\"><inertial><mass value=\"{1}\"/><inertia ixx=\"{2}\" iyy=\"{2}\" "
       "izz=\"{2}\" ixy=\"0\" ixz=\"0\" iyz=\"0\"/></inertial></link>",

@@ -145,9 +145,9 @@ TEST_F(Try, CommandsStopAtUnitsAndSignsThatCannotBe) {
       "nominal: {mass: 20, yaw_inertia: 1, viscous_linear: 6, viscous_yaw: 0.5}\n"
       "noise: {wheel_speed: 0.5, effort: 0.2}\n");
   const std::vector<StockRow> rows = testing::stock_drive({0.1, 0.4, 20.0, 1.0}, 40.0);
-  for (const auto& [name, speed, effort, finding] :
-       {std::tuple{"degrees", 180.0 / M_PI, 1.0, "units.effort"}, {"rpm", 30.0 / M_PI, 1.0, "units.effort"},
-        {"negated", 1.0, -1.0, "units.effort_sign"}}) {
+  for (const auto& [name, speed, effort, finding] : {std::tuple{"degrees", 180.0 / M_PI, 1.0, "units.effort"},
+                                                     {"rpm", 30.0 / M_PI, 1.0, "units.effort"},
+                                                     {"negated", 1.0, -1.0, "units.effort_sign"}}) {
     put(fmt::format("{}.csv", name), csv(rows, speed, effort));
     for (const char* command : {"commission", "identify", "gap"}) {
       const Outcome told = run(fmt::format("{} {}.csv --robot robot.yaml --out made", command, name));
@@ -157,8 +157,8 @@ TEST_F(Try, CommandsStopAtUnitsAndSignsThatCannotBe) {
   }
   put("sound.csv", csv(rows, 1.0, 1.0));
   EXPECT_EQ(run("commission sound.csv --robot robot.yaml --quiet").code, 0);
-  EXPECT_EQ(run("commission rpm.csv --robot robot.yaml --despite units.effort --despite units.wheel_speed --quiet").code,
-            0);
+  EXPECT_EQ(
+      run("commission rpm.csv --robot robot.yaml --despite units.effort --despite units.wheel_speed --quiet").code, 0);
 }
 
 }  // namespace

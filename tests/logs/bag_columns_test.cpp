@@ -94,12 +94,12 @@ TEST(BagColumns, FourWheelsAreTwoSidesAndItIsSaid) {
           all_arrays);
   const BagChoice choice = bag.choose();
   ASSERT_EQ(choice.sources.size(), 1U);
+  EXPECT_THAT(
+      choice.sources[0].columns,
+      Contains(BagColumn{"tau_r", {"effort[front_right_wheel]", "effort[rear_right_wheel]"}, BagColumn::Rule::sum}));
   EXPECT_THAT(choice.sources[0].columns,
-              Contains(BagColumn{"tau_r", {"effort[front_right_wheel]", "effort[rear_right_wheel]"},
-                                 BagColumn::Rule::sum}));
-  EXPECT_THAT(choice.sources[0].columns,
-              Contains(BagColumn{"omega_l", {"velocity[front_left_wheel]", "velocity[rear_left_wheel]"},
-                                 BagColumn::Rule::mean}));
+              Contains(BagColumn{
+                  "omega_l", {"velocity[front_left_wheel]", "velocity[rear_left_wheel]"}, BagColumn::Rule::mean}));
   EXPECT_THAT(choice.notes, Contains(HasSubstr("the right side is the mean motion and the sum of the efforts of "
                                                "front_right_wheel and rear_right_wheel")));
 }
