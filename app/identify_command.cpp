@@ -64,7 +64,11 @@ int run(const Arguments& a) {
   logs::RecordedLog& log = *opened.log;
   robot = model::with_column_errors(robot, logs::interpolation_errors(log.report()));
   if (!for_kinematics_only(log, robot)) {
-    logs::require_columns(log, robots::needed_columns(robot));
+    try {
+      logs::require_columns(log, robots::needed_columns(robot));
+    } catch (const InputError& error) {
+      throw InputError(fmt::format("{}. {}", error.what(), fmt::join(opened.remarks, " ")));
+    }
   }
   report::ReportContext context = report_context(a.common, log.report(), log);
   std::ranges::copy(opened.remarks, std::back_inserter(context.warnings));
@@ -74,12 +78,8 @@ int run(const Arguments& a) {
   options.seed = a.common.seed;
   options.shapes = !a.no_shapes;
   options.progress = [&](std::string_view stage, double share) { progress.tell(stage, share); };
-  const inference::Identification result = or_failure_page(a.common, context, [&] {
-    if (!for_kinematics_only(log, robot)) {
-      logs::require_columns(log, robots::needed_columns(robot));
-    }
-    return inference::identify(log, robot, options);
-  });
+  const inference::Identification result =
+      or_failure_page(a.common, context, [&] { return inference::identify(log, robot, options); });
   publish(a.common, results::to_json(result, log.report(), results::software(), a.common.seed), "identification.json",
           report::identify_report(result, context));
   if (!a.common.quiet && !a.common.json) {

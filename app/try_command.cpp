@@ -50,7 +50,9 @@ constexpr const char* kHelp =
     "pose in it), and says where each came from. Then it runs doctor, commission, margins and, where the robot's mass "
     "is known, gap, and leaves one page that begins with the answer.\n\n"
     "What was settled goes to DIR/robot.yaml: later runs with the same --out, and every other command with --robot "
-    "DIR/robot.yaml, need no option twice, --map included. Edit it where it is wrong.";
+    "DIR/robot.yaml, need no option twice, --map included. Edit it where it is wrong; options of the geometry settle "
+    "it "
+    "anew.";
 
 constexpr const char* kExamples =
     "Examples:\n"
@@ -292,7 +294,8 @@ int run(const Arguments& given) {
   const std::filesystem::path file = out / "robot.yaml";
   std::vector<std::string> took;
   Robot robot;
-  if (a.robot.empty() && std::filesystem::exists(file)) {
+  const bool anew = !a.urdf.empty() || !a.ros2_control.empty() || a.hints.wheel_radius || a.hints.track_width;
+  if (a.robot.empty() && !anew && std::filesystem::exists(file)) {
     a.robot = file;
     take_columns(a.robot, a.common);
   }

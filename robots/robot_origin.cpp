@@ -207,12 +207,12 @@ struct Maker {
     if (!lump.moving.empty()) {
       out.remarks.push_back("joints that may move, taken at zero: " + core::listed(lump.moving));
     }
-    offset("com_longitudinal", "a", lump.ahead, "before");
-    offset("com_lateral", "b", lump.left, "left of");
+    offset("com_longitudinal", "a", lump.ahead, lump.ahead < 0.0 ? "behind" : "before");
+    offset("com_lateral", "b", lump.left, lump.left < 0.0 ? "right of" : "left of");
   }
 
   void offset(const std::string& effect, const std::string& parameter, double value, const std::string& side) {
-    const std::string words = fmt::format("centre of mass {:.4g} m {} the middle of the axle", value, side);
+    const std::string words = fmt::format("centre of mass {:.4g} m {} the middle of the axle", std::abs(value), side);
     if (std::abs(value) > largest_offset * out.robot.track_width) {
       out.robot.effects.push_back({effect, {{parameter, Interval{value, value}}}});
       out.origins["effects." + effect] = fmt::format(

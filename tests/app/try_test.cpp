@@ -66,6 +66,9 @@ TEST_F(Try, JackalWithItsDescriptionAndController) {
   EXPECT_TRUE(robot.effects.empty());  // the middle is that of all wheels
   EXPECT_NEAR(estimate(model(), "mass"), jackal.mass, 0.02 * jackal.mass);
   EXPECT_NEAR(estimate(model(), "yaw_inertia"), jackal.yaw_inertia, 0.02 * jackal.yaw_inertia);
+  if (has_validator()) {
+    EXPECT_EQ(misfit("try.schema.json", "wheelwright_try/try.json"), "");
+  }
   EXPECT_THAT(names_in("wheelwright_try"), ::testing::IsSupersetOf({"report.html", "robot.yaml", "try.json"}));
 }
 
