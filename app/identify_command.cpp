@@ -67,6 +67,9 @@ int run(const Arguments& a) {
     try {
       logs::require_columns(log, robots::needed_columns(robot));
     } catch (const InputError& error) {
+      if (opened.remarks.empty()) {
+        throw;
+      }
       throw InputError(fmt::format("{}. {}", error.what(), fmt::join(opened.remarks, " ")));
     }
   }

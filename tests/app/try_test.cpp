@@ -4,6 +4,7 @@
 #include "app/stock_robots.hpp"
 
 #include <tuple>
+#include <utility>
 
 #include <wheelwright/robots/robot_file.hpp>
 
@@ -34,7 +35,7 @@ class Try : public testing::ProgramTest {
   }
 };
 
-// Four wheels, efforts that begin with NaN, and a controller whose wheel_separation_multiplier is 1.5.
+// Four wheels, efforts that begin with NaN, messages that come late, and a controller whose wheel_separation_multiplier is 1.5.
 TEST_F(Try, JackalWithItsDescriptionAndController) {
   const double r = 0.098, track = 0.37559;
   const std::vector<std::string> wheels = {"front_left_wheel", "front_right_wheel", "rear_left_wheel",
@@ -51,14 +52,18 @@ TEST_F(Try, JackalWithItsDescriptionAndController) {
       "    wheel_separation_multiplier: 1.5\n    wheel_radius: 0.098\n");
   const StockRobot jackal{r, 1.5 * track, 18.9, 0.7};
   StockBag bag;
-  for (const StockRow& row : testing::stock_drive(jackal, 40.0)) {
+  std::vector<StockRow> rows = testing::stock_drive(jackal, 40.0);
+  for (std::size_t k = 10; k + 1 < rows.size(); k += 25) {
+    std::swap(rows[k], rows[k + 1]);
+  }
+  for (const StockRow& row : rows) {
     bag.add_joints("/joint_states", row, wheels, row.t > 0.5);
   }
   put("jackal.mcap", bag.bytes());
   const Outcome told = run("try jackal.mcap --urdf jackal.urdf --ros2-control control.yaml");
   ASSERT_EQ(told.code, 0) << told.err << told.out;
   EXPECT_THAT(told.out, AllOf(HasSubstr("certainly seen"), HasSubstr("front_right_wheel and rear_right_wheel"),
-                              HasSubstr("effort.hold")));
+                              HasSubstr("put in the order of their stamps"), HasSubstr("effort.hold")));
   const Robot robot = robots::read_robot(path("wheelwright_try/robot.yaml"));
   EXPECT_NEAR(robot.track_width, jackal.D, 1e-6);
   EXPECT_NEAR(robot.wheel_radius, r, 1e-9);
@@ -132,6 +137,23 @@ TEST_F(Try, HuskyRemembersItsMap) {
   EXPECT_EQ(robots::read_columns(path("wheelwright_try/robot.yaml")).at("tau_r"), "/a.effort[right]");
   EXPECT_EQ(run("detect husky.mcap --model wheelwright_try/commission/model.json").code, 0);
   EXPECT_EQ(run("try husky.mcap --quiet").code, 0);
+}
+
+TEST_F(Try, PlotJugglersTableWithCountedTimes) {
+  std::string table = "__time";
+  for (const char* field : {"left_wheel_joint/velocity", "left_wheel_joint/effort", "right_wheel_joint/velocity",
+                            "right_wheel_joint/effort"}) {
+    table += fmt::format(",/joint_states/{}", field);
+  }
+  for (const StockRow& row : testing::stock_drive({0.1, 0.4, 20.0, 1.0}, 40.0)) {
+    table += fmt::format("\n{},{},{},{},{}", 1'764'000'000'000'000'000 + std::llround(1e9 * row.t), row.speed[1],
+                         row.effort[1], row.speed[0], row.effort[0]);
+  }
+  put("drive.csv", table + "\n");
+  const Outcome told = run("try drive.csv --wheel-radius 10cm --track-width 40cm");
+  ASSERT_EQ(told.code, 0) << told.err << told.out;
+  EXPECT_THAT(told.out, HasSubstr("times are counts of ns"));
+  EXPECT_NEAR(estimate(model(), "yaw_inertia"), 1.0, 0.02);
 }
 
 TEST_F(Try, AsksForTheGeometryThatNothingTells) {
