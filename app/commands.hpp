@@ -49,5 +49,7 @@ using Run = std::function<int(const std::string& command_line)>;
 [[nodiscard]] Run add_sensitivity(CLI::App& program);
 /// wheelwright simulate SCENARIO.yaml --out LOG
 [[nodiscard]] Run add_simulate(CLI::App& program);
+/// wheelwright try LOG... [--urdf FILE]
+[[nodiscard]] Run add_try(CLI::App& program);
 
 }  // namespace wheelwright::app

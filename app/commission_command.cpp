@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cstdio>
+#include <iterator>
 #include <memory>
 
 #include <fmt/format.h>
@@ -19,6 +21,7 @@
 #include "commands.hpp"
 #include "common.hpp"
 #include "options.hpp"
+#include "sound_log.hpp"
 
 namespace wheelwright::app {
 using namespace words;
@@ -51,10 +54,11 @@ constexpr const char* kExamples =
 int run(const Arguments& a) {
   make_directory(a.common);
   Robot robot = read_robot(a.robot);
-  const auto opened = open_robot_log(a.logs, robot, a.common);
-  logs::RecordedLog& log = *opened;
+  const SoundLog opened = open_sound_log(a.logs, robot, a.common, WheelPose::judged);
+  logs::RecordedLog& log = *opened.log;
   robot = model::with_column_errors(robot, logs::interpolation_errors(log.report()));
   report::ReportContext context = report_context(a.common, log.report(), log);
+  std::ranges::copy(opened.remarks, std::back_inserter(context.warnings));
   Progress progress(a.common.quiet);
   commission::CommissionOptions options;
   options.noise_mode = a.statistical ? filter::NoiseMode::statistical : filter::NoiseMode::worst_case;
@@ -75,8 +79,11 @@ int run(const Arguments& a) {
     }
     throw;
   }
-  publish(a.common, results::to_json(result, log.report(), results::software()), "model.json",
-          report::commission_report(result, context));
+  Json model = results::to_json(result, log.report(), results::software());
+  if (!a.common.columns.empty()) {
+    model["robot"]["columns"] = a.common.columns;
+  }
+  publish(a.common, model, "model.json", report::commission_report(result, context));
   if (!a.common.quiet && !a.common.json) {
     print_log(context.warnings);
     say("{}", summary(result));
@@ -104,6 +111,7 @@ Run add_commission(CLI::App& program) {
       ->capture_default_str();
   add_persistence(command, a->persistence, "1/1");
   add_map(command, a->common);
+  add_despite(command, a->common);
   return finish(command, a, kExamples, run);
 }
 

@@ -46,6 +46,7 @@ logs::LogOptions reader_options(const CommonOptions& options) {
   logs::LogOptions reader;
   reader.msg_path = options.msg_path;
   reader.trust = options.trust;
+  reader.map = options.columns;
   for (const std::string& entry : options.map) {
     const std::size_t at = entry.find('=');
     if (at == std::string::npos || at == 0 || at + 1 == entry.size()) {
@@ -65,11 +66,33 @@ logs::LogOptions reader_options(const CommonOptions& options) {
   return reader;
 }
 
-std::unique_ptr<logs::RecordedLog> open_robot_log(const std::vector<std::filesystem::path>& paths, const Robot& robot,
-                                                  const CommonOptions& options) {
+logs::LogOptions robot_reader(const Robot& robot, const CommonOptions& options) {
   logs::LogOptions reader = reader_options(options);
   reader.only = robots::useful_columns(robot);
-  return logs::open_log(paths, reader);
+  return reader;
+}
+
+std::unique_ptr<logs::RecordedLog> open_robot_log(const std::vector<std::filesystem::path>& paths, const Robot& robot,
+                                                  const CommonOptions& options) {
+  return logs::open_log(paths, robot_reader(robot, options));
+}
+
+namespace {
+
+std::vector<std::filesystem::path>& made_directories() {
+  static std::vector<std::filesystem::path> made;  // the innermost first
+  return made;
+}
+
+}  // namespace
+
+void remove_empty_directories() {
+  std::error_code none;
+  for (const std::filesystem::path& made : made_directories()) {
+    if (std::filesystem::is_directory(made, none)) {
+      std::filesystem::remove(made, none);  // fails where something is in it
+    }
+  }
 }
 
 void keep_existing(const std::filesystem::path& out) {
@@ -94,6 +117,12 @@ void make_directory(const CommonOptions& options) {
     return;
   }
   std::error_code error;
+  std::vector<std::filesystem::path>& made = made_directories();
+  for (std::filesystem::path at = options.out; !at.empty() && !std::filesystem::exists(at, error);
+       at = at.parent_path()) {
+    made.push_back(at);
+  }
+  error.clear();
   std::filesystem::create_directories(options.out, error);
   if (error || !std::filesystem::is_directory(options.out)) {
     throw InputError("--out " + options.out.string() + ": cannot make this directory" +

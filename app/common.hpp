@@ -47,8 +47,10 @@ struct CommonOptions {
   int threads = 1;                              ///< most threads; by default the machine's (add_common())
   std::uint64_t seed = 1;                       ///< of everything random
   std::vector<std::string> map;                 ///< name=column
+  robots::ColumnMap columns;                    ///< of the robot file or model.json; `map` goes before
   std::vector<std::filesystem::path> msg_path;  ///< directories with definitions of messages
   bool trust = false;                           ///< a log may reach for files beside it
+  std::vector<std::string> despite;             ///< the doctor's findings that are passed over
   std::string command_line;                     ///< as the user gave it
 };
 
@@ -73,6 +75,9 @@ void tell(fmt::format_string<Values...> text, Values&&... values) {
 /// --map as reader options. Throws InputError where an entry is not name=column, or its name none of the log contract.
 [[nodiscard]] logs::LogOptions reader_options(const CommonOptions& options);
 
+/// reader_options() for the columns that `robot` can use.
+[[nodiscard]] logs::LogOptions robot_reader(const Robot& robot, const CommonOptions& options);
+
 /// The log in `paths`, with the columns that `robot` can use. Throws InputError as open_log does.
 [[nodiscard]] std::unique_ptr<logs::RecordedLog> open_robot_log(const std::vector<std::filesystem::path>& paths,
                                                                 const Robot& robot, const CommonOptions& options);
@@ -85,6 +90,8 @@ void keep_inputs(const std::filesystem::path& out, const std::vector<std::filesy
 
 /// Makes the result directory `out` where it is wanted. Throws InputError when that is impossible.
 void make_directory(const CommonOptions& options);
+/// Removes what make_directory() made and nothing was put into: a run that failed leaves no empty directories.
+void remove_empty_directories();
 
 /// Writes `result` to out/name and report to out/report.html where a directory is wanted, and the result to standard
 /// output with --json.

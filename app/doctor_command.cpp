@@ -15,6 +15,7 @@
 #include "commands.hpp"
 #include "common.hpp"
 #include "options.hpp"
+#include "sound_log.hpp"
 
 namespace wheelwright::app {
 namespace doctor_command {
@@ -41,30 +42,6 @@ constexpr const char* kExamples =
     "  wheelwright doctor drive.csv --robot robot.yaml --out examined    # doctor.json, report.html\n"
     "  wheelwright doctor drive.csv --robot robot.yaml --all             # also what is as it should be\n\n"
     "Exit code: 0 the log can be commissioned, 1 it cannot or should not be as it stands, 2 bad input.";
-
-// At most `most` rows of `log`, in memory.
-LogTable first_rows(LogSource& log, std::size_t most) {
-  LogTable table;
-  table.names = log.columns();
-  table.columns.resize(table.names.size());
-  LogBlock block;
-  log.rewind();
-  while (table.rows() < most && log.next(block)) {
-    const std::size_t take = std::min(block.rows(), most - table.rows());
-    for (const std::size_t start : block.segment_starts) {
-      if (start < take) {
-        table.segment_starts.push_back(table.rows() + start);
-      }
-    }
-    for (std::size_t c = 0; c < table.columns.size(); ++c) {
-      table.columns[c].insert(table.columns[c].end(), block.columns[c].begin(),
-                              block.columns[c].begin() + static_cast<std::ptrdiff_t>(take));
-    }
-    table.t.insert(table.t.end(), block.t.begin(), block.t.begin() + static_cast<std::ptrdiff_t>(take));
-  }
-  log.rewind();
-  return table;
-}
 
 std::string stretches(const doctor::LogFinding& finding) {
   if (finding.when.empty()) {
@@ -121,11 +98,7 @@ void tell(const doctor::LogHealth& health, bool all) {
 int run(const Arguments& a) {
   make_directory(a.common);
   const std::optional<Robot> robot = a.robot.empty() ? std::nullopt : std::optional(read_robot(a.robot));
-  logs::LogOptions reader = reader_options(a.common);
-  if (robot) {
-    reader.only = robots::useful_columns(*robot);
-  }
-  const auto opened = logs::open_log(a.logs, reader);
+  const auto opened = logs::open_log(a.logs, robot ? robot_reader(*robot, a.common) : reader_options(a.common));
   logs::RecordedLog& log = *opened;
   const LogTable table = first_rows(log, a.most_rows);
   doctor::LogHealth health = doctor::examine(table, robot, results::reader_counts(log.report()));

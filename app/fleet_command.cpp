@@ -21,6 +21,7 @@
 #include "common.hpp"
 #include "options.hpp"
 #include "run_items.hpp"
+#include "sound_log.hpp"
 
 namespace wheelwright::app {
 namespace fleet_command {
@@ -78,7 +79,9 @@ study::FleetLog log_of(const robots::FleetListRobot& robot, const std::vector<ro
       throw InputError("no robot file: expected --robot, or a robot.yaml or robot_file of its own");
     }
     const Robot declared = file.empty() ? *fleet : read_robot(file);
-    std::unique_ptr<logs::RecordedLog> log = open_robot_log(paths, declared, common);
+    CommonOptions options = common;
+    take_columns(file, options);
+    std::unique_ptr<logs::RecordedLog> log = open_sound_log(paths, declared, options, WheelPose::judged).log;
     logs::require_columns(*log, robots::needed_columns(declared));
     Robot robot_with_errors = model::with_column_errors(declared, logs::interpolation_errors(log->report()));
     return study::OpenedLog{std::move(log), std::move(robot_with_errors)};
@@ -107,6 +110,7 @@ results::StoredPlan plan_of(const Arguments& a, const std::optional<Robot>& flee
     maps += map + " ";
   }
   plan.emplace_back("--map", maps);
+  plan.emplace_back("--despite", fmt::format("{}", fmt::join(a.common.despite, " ")));
   return plan;
 }
 
@@ -145,6 +149,9 @@ std::string command_of(const Arguments& a) {
   out += a.statistical ? " --statistical" : "";
   for (const std::string& map : a.common.map) {
     out += " --map " + map;
+  }
+  for (const std::string& name : a.common.despite) {
+    out += " --despite " + name;
   }
   return out + " --out DIR";
 }
@@ -250,6 +257,7 @@ Run add_fleet(CLI::App& program) {
                    "Propagate declared sensor noise at a confidence of 99.9 % instead of in the worst case");
   add_scale_options(command, a->scale);
   add_map(command, a->common);
+  add_despite(command, a->common);
   return finish(command, a, kExamples, run);
 }
 

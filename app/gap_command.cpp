@@ -28,6 +28,7 @@
 #include "commands.hpp"
 #include "common.hpp"
 #include "options.hpp"
+#include "sound_log.hpp"
 
 namespace wheelwright::app {
 using namespace words;
@@ -143,7 +144,8 @@ void write_beside(const Arguments& a, const Diagnosis& d, const gap::NextDrive& 
   results::write_residuals(out / kResiduals, d.series);
   // What an earlier run left would contradict this one.
   if (d.improved) {
-    files::atomic_write(out / kImproved, origin(a, d) + robots::robot_yaml(*d.improved));
+    files::atomic_write(out / kImproved,
+                        origin(a, d) + robots::robot_yaml(*d.improved) + robots::columns_yaml(a.common.columns));
   } else {
     std::filesystem::remove(out / kImproved);
   }
@@ -269,12 +271,16 @@ int run(const Arguments& a) {
   const std::vector<SimulatorSource> sources = simulator_sources(a, robot);
   const std::vector<Effect> catalogue = gap::effect_catalogue(model::make_model(robot));
   check_without(a.without, catalogue);
-  const auto opened = open_robot_log(a.logs, robot, a.common);
-  logs::RecordedLog& log = *opened;
-  const auto baseline = a.baseline.empty() ? nullptr : open_robot_log(a.baseline, robot, a.common);
-  logs::RecordedLog* const healthy = baseline.get();
+  const SoundLog opened = open_sound_log(a.logs, robot, a.common, WheelPose::hidden);
+  logs::RecordedLog& log = *opened.log;
+  const SoundLog baseline =
+      a.baseline.empty() ? SoundLog{} : open_sound_log(a.baseline, robot, a.common, WheelPose::hidden);
+  logs::RecordedLog* const healthy = baseline.log.get();
   robot = model::with_column_errors(robot, logs::interpolation_errors(log.report()));
   report::ReportContext context = report_context(a.common, log.report(), log);
+  for (const SoundLog* of : {&opened, &baseline}) {
+    context.warnings.insert(context.warnings.end(), of->remarks.begin(), of->remarks.end());
+  }
   context.seeds = {{"permutations, bootstrap and search", a.common.seed}};
   Progress progress(a.common.quiet);
   gap::DiagnoseOptions options;
@@ -295,9 +301,9 @@ int run(const Arguments& a) {
     }
     diagnosis = diagnose(log, healthy, robot, options);
     if (!a.fresh.empty()) {
-      const auto fresh = open_robot_log(a.fresh, robot, a.common);
-      logs::require_columns(*fresh, gap::required_columns(*fresh, robot));
-      diagnosis.shrink.fresh_torque_rms = gap::torque_on(*fresh, healthy, robot, diagnosis, options);
+      const SoundLog fresh = open_sound_log(a.fresh, robot, a.common, WheelPose::hidden);
+      logs::require_columns(*fresh.log, gap::required_columns(*fresh.log, robot));
+      diagnosis.shrink.fresh_torque_rms = gap::torque_on(*fresh.log, healthy, robot, diagnosis, options);
     }
     next = a.no_manoeuvre ? gap::NextDrive{} : gap::what_next(log, healthy, robot, diagnosis, options);
     naive = a.naive ? naive_effects(log, healthy, robot, options) : naive;
@@ -401,6 +407,7 @@ Run add_gap(CLI::App& program) {
   command.add_flag("--naive", a->naive,
                    "Also say what forward selection by BIC over samples would say, to be compared with");
   add_map(command, a->common);
+  add_despite(command, a->common);
   return finish(command, a, kExamples, run);
 }
 

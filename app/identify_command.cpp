@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <iterator>
 #include <memory>
 
 #include <fmt/format.h>
@@ -17,6 +18,7 @@
 #include "commands.hpp"
 #include "common.hpp"
 #include "options.hpp"
+#include "sound_log.hpp"
 
 namespace wheelwright::app {
 using namespace words;
@@ -58,25 +60,29 @@ bool for_kinematics_only(const LogSource& log, const Robot& robot) {
 int run(const Arguments& a) {
   make_directory(a.common);
   Robot robot = read_robot(a.robot);
-  const auto opened = open_robot_log(a.logs, robot, a.common);
-  logs::RecordedLog& log = *opened;
+  const SoundLog opened = open_sound_log(a.logs, robot, a.common, WheelPose::hidden);
+  logs::RecordedLog& log = *opened.log;
   robot = model::with_column_errors(robot, logs::interpolation_errors(log.report()));
   if (!for_kinematics_only(log, robot)) {
-    logs::require_columns(log, robots::needed_columns(robot));
+    try {
+      logs::require_columns(log, robots::needed_columns(robot));
+    } catch (const InputError& error) {
+      if (opened.remarks.empty()) {
+        throw;
+      }
+      throw InputError(fmt::format("{}. {}", error.what(), fmt::join(opened.remarks, " ")));
+    }
   }
   report::ReportContext context = report_context(a.common, log.report(), log);
+  std::ranges::copy(opened.remarks, std::back_inserter(context.warnings));
   context.seeds = {{"bootstrap and signs", a.common.seed}};
   Progress progress(a.common.quiet);
   inference::IdentificationOptions options;
   options.seed = a.common.seed;
   options.shapes = !a.no_shapes;
   options.progress = [&](std::string_view stage, double share) { progress.tell(stage, share); };
-  const inference::Identification result = or_failure_page(a.common, context, [&] {
-    if (!for_kinematics_only(log, robot)) {
-      logs::require_columns(log, robots::needed_columns(robot));
-    }
-    return inference::identify(log, robot, options);
-  });
+  const inference::Identification result =
+      or_failure_page(a.common, context, [&] { return inference::identify(log, robot, options); });
   publish(a.common, results::to_json(result, log.report(), results::software(), a.common.seed), "identification.json",
           report::identify_report(result, context));
   if (!a.common.quiet && !a.common.json) {
@@ -102,6 +108,7 @@ Run add_identify(CLI::App& program) {
   command.add_option("--robot", a->robot, "Robot file (YAML)")->required()->type_name("FILE");
   command.add_flag("--no-shapes", a->no_shapes, "Do not look for delay, lags and Stribeck speed");
   add_map(command, a->common);
+  add_despite(command, a->common);
   return finish(command, a, kExamples, run);
 }
 

@@ -73,9 +73,11 @@ int run(int argc, char** argv) {
   program.require_subcommand(1);
   program.formatter(std::make_shared<ShortList>());
   program.footer(
-      "Start with:  wheelwright commission LOG --robot robot.yaml --out result\n"
+      "Start with:  wheelwright try BAG --urdf robot.urdf, or wheelwright commission LOG --robot robot.yaml --out "
+      "result\n"
       "Each command has its own --help.");
-  const std::vector<std::pair<std::string, Run>> commands = {{"commission", add_commission(program)},
+  const std::vector<std::pair<std::string, Run>> commands = {{"try", add_try(program)},
+                                                             {"commission", add_commission(program)},
                                                              {"detect", add_detect(program)},
                                                              {"doctor", add_doctor(program)},
                                                              {"check", add_check(program)},
@@ -108,6 +110,7 @@ int run(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return program.exit(error) == 0 ? kDone : kBadInput;
   } catch (const wheelwright::Error& error) {
+    remove_empty_directories();
     tell("wheelwright: {}\n", error.what());
     return kBadInput;
   } catch (const std::bad_alloc&) {

@@ -33,6 +33,12 @@ void add_common(CLI::App& command, CommonOptions& options) {
   command.add_flag("--quiet", options.quiet, "No progress and no summary; errors are still told");
 }
 
+void take_columns(const std::filesystem::path& file, CommonOptions& options) {
+  if (!file.empty()) {
+    options.columns = robots::read_columns(file);
+  }
+}
+
 void add_footer(CLI::App& command, const char* text) { command.footer(text); }
 
 void add_map(CLI::App& command, CommonOptions& options) {
@@ -56,6 +62,16 @@ void add_map(CLI::App& command, CommonOptions& options) {
   command.add_flag("--trust", options.trust,
                    "Read also what a log reaches for outside of itself and its directory: links, HDF5's external and "
                    "virtual datasets, very large journals and packed files");
+}
+
+void add_despite(CLI::App& command, CommonOptions& options) {
+  command
+      .add_option("--despite", options.despite,
+                  "Go on despite this finding of `wheelwright doctor`, e.g. units.effort (repeatable)")
+      ->type_name("NAME")
+      ->expected(1)
+      ->allow_extra_args(false)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
 }
 
 void add_persistence(CLI::App& command, std::optional<detector::Persistence>& persistence,

@@ -24,6 +24,9 @@ void add_common(CLI::App& command, CommonOptions& options);
 /// Text below the options in the help of `command`.
 void add_footer(CLI::App& command, const char* text);
 
+/// Takes the key `columns` of a robot file or model.json, unless `file` is empty, for the logs of a run.
+void take_columns(const std::filesystem::path& file, CommonOptions& options);
+
 /// The end of every registration: the common options, the examples, and what runs the command. `Arguments` has a member
 /// `common`.
 template <typename Arguments>
@@ -33,11 +36,19 @@ template <typename Arguments>
   add_footer(command, examples);
   return [arguments, run](const std::string& command_line) {
     arguments->common.command_line = command_line;
+    if constexpr (requires { arguments->robot.native(); }) {
+      take_columns(arguments->robot, arguments->common);
+    }
+    if constexpr (requires { arguments->model.native(); }) {
+      take_columns(arguments->model, arguments->common);
+    }
     return run(*arguments);
   };
 }
 /// Adds --map and --msg-path to a command that reads logs.
 void add_map(CLI::App& command, CommonOptions& options);
+/// Adds --despite to a command that opens logs by open_sound_log().
+void add_despite(CLI::App& command, CommonOptions& options);
 
 /// Adds --persistence K/N; `persistence` stays empty where it is not given. `otherwise` says what holds then.
 void add_persistence(CLI::App& command, std::optional<detector::Persistence>& persistence,

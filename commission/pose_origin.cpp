@@ -12,6 +12,7 @@
 #include <Eigen/Core>
 
 #include <wheelwright/core/linear_algebra.hpp>
+#include <wheelwright/filter/encoder.hpp>
 
 namespace wheelwright::commission {
 namespace {
@@ -22,6 +23,13 @@ constexpr double kExactWay = 1e-5;      // m
 constexpr double kLeastChange = 1e-2;   // rad or m, rms in a window: less says nothing
 constexpr double kOfTheCounts = 1.0 / 3.0;
 constexpr double kOfTheRounding = 1.2;
+constexpr std::size_t kMostKept = 200000;  // rows that are looked at for poses of other stamps
+constexpr std::size_t kFewestDrives = 4;   // between two rests
+constexpr double kRest = 0.2;              // s to both sides that are a rest
+constexpr double kStraight = 1e-9;         // rad: second differences below are those of a straight line
+constexpr double kOfInterpolation = 1.25;  // second differences of samples are not the largest second derivative
+constexpr double kLongestPoseStep = 0.25;  // s
+constexpr double kBendSpan = 0.05;         // s
 constexpr double kWholeTurn = 2.0 * std::numbers::pi;
 
 // The coarsest decimal unit of which all values are multiples, as they are or wrapped into a turn; 0 where there is
@@ -66,18 +74,28 @@ class Combination {
     square_ += value * value;
     rows_.push_back({right, left, value});
   }
-  [[nodiscard]] std::optional<double> rest() const {
-    const auto n = static_cast<double>(rows_.size());
-    if (rows_.size() < kFewestPoseWindows || std::sqrt(square_ / n) < kLeastChange) {
+  [[nodiscard]] std::optional<double> rest(std::size_t fewest = kFewestPoseWindows) const {
+    if (!tells(fewest)) {
       return std::nullopt;
     }
-    const Eigen::Vector2d c = core::minimum_norm_solution(gram_, moment_);
     double sum = 0.0;
-    for (const auto& [right, left, value] : rows_) {
-      const double e = value - c[0] * right - c[1] * left;
+    for (const double e : rests()) {
       sum += e * e;
     }
-    return std::sqrt(sum / n);
+    return std::sqrt(sum / static_cast<double>(rows_.size()));
+  }
+  [[nodiscard]] bool tells(std::size_t fewest = kFewestPoseWindows) const {
+    return rows_.size() >= fewest && std::sqrt(square_ / static_cast<double>(rows_.size())) >= kLeastChange;
+  }
+  [[nodiscard]] Eigen::Vector2d weights() const { return core::minimum_norm_solution(gram_, moment_); }
+  /// What is left of each value.
+  [[nodiscard]] std::vector<double> rests() const {
+    const Eigen::Vector2d c = weights();
+    std::vector<double> out;
+    for (const auto& [right, left, value] : rows_) {
+      out.push_back(value - c[0] * right - c[1] * left);
+    }
+    return out;
   }
 
  private:
@@ -90,6 +108,114 @@ class Combination {
   std::vector<Row> rows_;
 };
 
+// The rows of one segment: wheel angles (speeds integrated by the trapezium) and the unwrapped heading.
+struct Kept {
+  std::vector<double> t, heading;
+  std::array<std::vector<double>, 2> wheel;
+
+  [[nodiscard]] std::size_t rows() const { return t.size(); }
+  // |second difference| of a signal about row k, by rows `span` away: counts of an encoder weigh less by its square.
+  static double bend(const std::vector<double>& of, std::size_t k, std::size_t span = 1) {
+    return std::abs(of[k + span] - 2.0 * of[k] + of[k - span]) / static_cast<double>(span * span);
+  }
+};
+
+// Change between rows a and b of a segment.
+void add_change(const Kept& log, std::size_t a, std::size_t b, Combination& out) {
+  out.add(log.wheel[0][b] - log.wheel[0][a], log.wheel[1][b] - log.wheel[1][a], log.heading[b] - log.heading[a]);
+}
+
+// The rows in the middle of rests: both wheels stand still for kRest to both sides.
+std::vector<std::size_t> rests_of(const Kept& log) {
+  std::vector<std::size_t> out;
+  std::size_t begin = 0;
+  for (std::size_t k = 1; k <= log.rows(); ++k) {
+    if (k < log.rows() && log.wheel[0][k] == log.wheel[0][begin] && log.wheel[1][k] == log.wheel[1][begin]) {
+      continue;
+    }
+    if (log.t[k - 1] - log.t[begin] >= 2.0 * kRest) {
+      out.push_back(begin + (k - begin) / 2);
+    }
+    begin = k;
+  }
+  return out;
+}
+
+// What the wheels leave of the heading from rest to rest: there no stamp, hold or lag matters.
+std::optional<double> between_rests(const std::vector<Kept>& segments) {
+  Combination drives;
+  for (const Kept& log : segments) {
+    const std::vector<std::size_t> rests = rests_of(log);
+    for (std::size_t i = 1; i < rests.size(); ++i) {
+      add_change(log, rests[i - 1], rests[i], drives);
+    }
+  }
+  return drives.rest(kFewestDrives);
+}
+
+// What the wheels leave of a heading that is linear between stamps of its own, where that is no more than the
+// interpolation h²/8·|d²/dt²| at both ends of each window and a count of each wheel there; nothing where it is more. h is
+// that of the kinks: a sample bends the line at two rows at most.
+std::optional<double> within_interpolation(const std::vector<Kept>& segments, double window, double step,
+                                           double count) {
+  Combination windows;
+  std::size_t bent = 0, moving = 0;
+  std::vector<std::pair<const Kept*, std::array<std::size_t, 2>>> places;
+  for (const Kept& log : segments) {
+    std::size_t a = 0;
+    for (std::size_t k = 1; k + 1 < log.rows(); ++k) {
+      if (Kept::bend(log.wheel[0], k) + Kept::bend(log.wheel[1], k) > kStraight) {
+        ++moving;
+        bent += Kept::bend(log.heading, k) > kStraight ? 1U : 0U;
+      }
+      if (log.t[k] - log.t[a] >= window) {
+        add_change(log, a, k, windows);
+        places.push_back({&log, {a, k}});
+        a = k;
+      }
+    }
+  }
+  if (!windows.tells() || bent == 0) {
+    return std::nullopt;
+  }
+  const double between = 2.0 * static_cast<double>(moving) / static_cast<double>(bent);  // rows
+  if (between * step > kLongestPoseStep) {
+    return std::nullopt;
+  }
+  const auto around = static_cast<std::size_t>(std::ceil(between)) + 1;
+  const auto span = static_cast<std::size_t>(std::max(1.0, std::round(kBendSpan / step)));
+  const Eigen::Vector2d c = windows.weights();
+  const double by_counts = 2.0 * count * c.cwiseAbs().sum();
+  const std::vector<double> left = windows.rests();
+  double squares = 0.0, expected = 0.0;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const auto& [log, ends] = places[i];
+    double by_lines = kExactHeading;
+    for (const std::size_t end : ends) {
+      double bend = 0.0;
+      const std::size_t last = std::min(end + around, log->rows() - 1 - span);
+      for (std::size_t k = std::max(end, around + span) - around; k <= last; ++k) {
+        bend = std::max(bend, std::abs(c[0]) * Kept::bend(log->wheel[0], k, span) +
+                                  std::abs(c[1]) * Kept::bend(log->wheel[1], k, span));
+      }
+      by_lines += kOfInterpolation * between * between / 8.0 * bend;
+    }
+    if (std::abs(left[i]) > by_lines + by_counts) {
+      return std::nullopt;
+    }
+    squares += left[i] * left[i];
+    // Rounding: 1/12 of a count² at the row, two thirds of that between two samples, at both ends.
+    expected += 0.5 * by_lines * by_lines + 5.0 / 18.0 * count * count * c.squaredNorm();
+  }
+  return squares <= kOfTheRounding * expected ? windows.rest() : std::nullopt;
+}
+
+// The count of the encoder that steps of an angle are made of, rad; 0 where they are not.
+double rounding_of(const std::vector<double>& steps) {
+  const auto encoder = filter::find_encoder_of_angles(steps);
+  return encoder ? encoder->speed_step : 0.0;
+}
+
 // Wheel angles since the window began, by three rules of integration (angles: all alike).
 using Turned = std::array<std::array<double, 2>, 3>;
 
@@ -97,7 +223,7 @@ using Turned = std::array<std::array<double, 2>, 3>;
 
 PoseOrigin pose_origin(LogSource& log, const filter::OdometryMeasurement& m, double window, double counts_per_turn) {
   PoseOrigin origin;
-  if (!m.heading || m.held_pose) {
+  if (!m.heading) {
     return origin;
   }
   const std::array<std::size_t, 2> wheel = {*log.find(m.motion_columns[0]), *log.find(m.motion_columns[1])};
@@ -106,6 +232,9 @@ PoseOrigin pose_origin(LogSource& log, const filter::OdometryMeasurement& m, dou
   std::array<Combination, 3> headings, ways;
   Decimals decimals;
   Turned turned{};
+  std::vector<Kept> kept;
+  std::vector<double> wheel_steps;
+  std::size_t kept_rows = 0;
   double heading = 0.0, way = 0.0, begin = 0.0, before = 0.0;
   std::array<double, 2> motion{};
   double theta_before = 0.0, x_before = 0.0, y_before = 0.0;
@@ -119,6 +248,25 @@ PoseOrigin pose_origin(LogSource& log, const filter::OdometryMeasurement& m, dou
     const std::array<double, 2> now = {block.columns[wheel[0]][k], block.columns[wheel[1]][k]};
     const double theta_now = block.columns[theta][k], x_now = block.columns[x][k], y_now = block.columns[y][k];
     decimals.add(theta_now);
+    if (kept_rows++ < kMostKept) {
+      if (starts) {
+        kept.emplace_back();
+      }
+      Kept& segment = kept.back();
+      const bool first = starts || segment.t.empty();
+      for (std::size_t j = 0; j < 2; ++j) {
+        const bool angle = m.motion == MotionKind::angle;
+        segment.wheel[j].push_back(angle   ? now[j]
+                                   : first ? 0.0
+                                           : segment.wheel[j].back() + 0.5 * (t - before) * (now[j] + motion[j]));
+      }
+      if (!first && m.motion == MotionKind::angle) {
+        wheel_steps.push_back(now[0] - motion[0]);
+      }
+      segment.heading.push_back(first ? theta_now
+                                      : segment.heading.back() + std::remainder(theta_now - theta_before, kWholeTurn));
+      segment.t.push_back(t);
+    }
     if (starts) {
       restart(t);
     } else {
@@ -159,7 +307,7 @@ PoseOrigin pose_origin(LogSource& log, const filter::OdometryMeasurement& m, dou
     }
     return best;
   };
-  if (const auto rest = least(headings)) {
+  if (const auto rest = m.held_pose ? std::nullopt : least(headings)) {
     origin.heading_rest = *rest;
     const double count = m.count > 0.0           ? m.count * m.nominal_step
                          : counts_per_turn > 0.0 ? kWholeTurn / counts_per_turn
@@ -171,11 +319,30 @@ PoseOrigin pose_origin(LogSource& log, const filter::OdometryMeasurement& m, dou
     origin.heading_repeats =
         *rest < kExactHeading || (*rest <= kOfTheRounding * rounding && *rest < kOfTheCounts * by_counts);
   }
-  if (const auto rest = m.position ? least(ways) : std::nullopt) {
-    origin.position_rest = *rest;
-    origin.position_repeats = origin.heading_repeats || *rest < kExactWay;
+  std::string by_stamps;
+  if (!origin.heading_repeats) {
+    if (const auto rest = between_rests(kept); rest && *rest < kExactHeading) {
+      origin.heading_rest = *rest;
+      by_stamps = "from one rest to the next";
+    } else if (const auto linear = within_interpolation(kept, window, m.nominal_step, rounding_of(wheel_steps));
+               linear && !m.held_pose) {
+      origin.heading_rest = *linear;
+      by_stamps = fmt::format("over {:.3g} s, no more than lines between the samples of a pose that repeats the wheels",
+                              window);
+    }
+    origin.heading_repeats = !by_stamps.empty();
   }
-  if (origin.heading_repeats) {
+  if (const auto rest = m.position && !m.held_pose ? least(ways) : std::nullopt) {
+    origin.position_rest = *rest;
+    origin.position_repeats = *rest < kExactWay;
+  }
+  origin.position_repeats = origin.position_repeats || (m.position && origin.heading_repeats);
+  if (!by_stamps.empty()) {
+    origin.sentence = fmt::format(
+        "{} wheel odometry over again, not measured independently: a combination of the wheel angles leaves {:.2g} rad "
+        "of the heading {}",
+        m.position ? "the pose is" : "the heading is", origin.heading_rest, by_stamps);
+  } else if (origin.heading_repeats) {
     origin.sentence = fmt::format(
         "{} wheel odometry over again, not measured independently: a combination of the wheel angles leaves {:.2g} rad "
         "of "

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
+#include <numbers>
+#include <optional>
 
 #include <fmt/format.h>
 
@@ -16,8 +18,13 @@
 namespace wheelwright::doctor {
 namespace {
 
-constexpr double kSome = 0.02;        // share of the rows that makes a manoeuvre count
-constexpr double kUnusedRisk = 1e-3;  // for fit_log; not used further
+constexpr double kSome = 0.02;              // share of the rows that makes a manoeuvre count
+constexpr double kTractionSpan = 0.1;       // s to both sides, for an acceleration
+constexpr double kMostTraction = 25.0;      // m/s²: two and a half times that of gravity
+constexpr double kChangedPlaces = 0.15;     // sum of |log| of two ratios to nominal values
+constexpr double kMostTimesNominal = 20.0;  // a robot may carry a load
+constexpr double kLeastTimesNominal = 0.2;  // and loses less
+constexpr double kUnusedRisk = 1e-3;        // for fit_log; not used further
 
 LogFinding about_motion(const char* id, FindingSeverity severity, std::string sentence, std::string next, double value,
                         std::string unit) {
@@ -169,6 +176,94 @@ struct TorqueUnit {
 constexpr TorqueUnit kTorqueUnits[] = {
     {1000.0, "mN·m"}, {141.6, "ozf·in"}, {100.0, "N·cm"}, {10.197, "kgf·cm"}, {8.851, "lbf·in"}};
 
+// By how much masses come out too small where wheel speeds are in another unit.
+constexpr TorqueUnit kSpeedUnits[] = {{std::numbers::pi / 180.0, "deg/s"}, {std::numbers::pi / 30.0, "rpm"}};
+
+// Accelerations that no tyre holds: the motion is in another unit than rad.
+void check_traction(const HealthView& view, std::vector<LogFinding>& out) {
+  if (!view.robot_given || !model::on_two_wheels(view.robot) || !(view.step > 0.0)) {
+    return;
+  }
+  const auto span = static_cast<std::size_t>(std::max(5.0, std::round(kTractionSpan / view.step)));
+  const std::vector<double>& t = view.log->t;
+  for (const JointView& j : view.joints) {
+    std::vector<double> rim;
+    for (const auto& [first, last] : view.segments) {
+      for (std::size_t k = first + span; k + span < last; ++k) {
+        rim.push_back(view.robot.wheel_radius *
+                      std::abs((j.smooth[k + span] - j.smooth[k - span]) / (t[k + span] - t[k - span])));
+      }
+    }
+    const double high = quantile(std::move(rim), 0.99);
+    if (high > kMostTraction) {
+      out.push_back(
+          {.id = "units.wheel_speed",
+           .topic = FindingTopic::units,
+           .severity = FindingSeverity::fatal,
+           .sentence = fmt::format("By {} and the robot file's radius the rim accelerates at {:.3g} m/s², which "
+                                   "no tyre holds (at {:.3g} m/s): degrees or rpm?",
+                                   j.motion_name(), high, view.robot.wheel_radius * j.top),
+           .next = "Convert the wheels' motion to rad and rad/s at the wheel, or correct wheel_radius.",
+           .columns = {j.motion_name()},
+           .value = high,
+           .unit = "m/s²"});
+      return;
+    }
+  }
+}
+
+// Without a gyro or a pose nothing tells whether one wheel counts backwards, efforts and all: driving and turning then
+// change places. A drive that is mostly turning is told; with nominal values that fit only if they change back, it is
+// wrong.
+void check_mirrored(const HealthView& view, const commission::Setting& s, const commission::Fit& fit,
+                    std::vector<LogFinding>& out) {
+  if (view.joints.size() != 2 || view.column("gyro_z") != nullptr || view.column("theta") != nullptr) {
+    return;
+  }
+  double along = 0.0, turn = 0.0;
+  for (std::size_t k = 0; k < view.log->rows(); ++k) {
+    const double right = view.joints[0].smooth[k], left = view.joints[1].smooth[k];
+    along += (right + left) * (right + left);
+    turn += (right - left) * (right - left);
+  }
+  if (!(turn > along)) {
+    return;
+  }
+  const auto scales = commission::physical_scales(s.robot, s.model);
+  const auto found = [&](const char* name) -> std::optional<double> {
+    for (std::size_t j = 0; scales && j < s.model.p(); ++j) {
+      if (s.model.parameters[j].physical == name && fit.excitation[j].state == identify::Excitation::identified) {
+        const double value = (*scales)[j].scale * fit.estimate[static_cast<Eigen::Index>(j)] - (*scales)[j].offset;
+        return value > 0.0 ? std::optional(value) : std::nullopt;
+      }
+    }
+    return std::nullopt;
+  };
+  const auto mass = found("mass"), inertia = found("yaw_inertia");
+  const auto& nominal = s.robot.nominal;
+  bool changed_places = false;
+  if (view.robot_given && mass && inertia && nominal.contains("mass") && nominal.contains("yaw_inertia")) {
+    const double square = 0.25 * s.robot.track_width * s.robot.track_width;
+    const auto off = [&](double m, double i) {
+      return std::abs(std::log(m / nominal.at("mass"))) + std::abs(std::log(i / nominal.at("yaw_inertia")));
+    };
+    changed_places = off(*mass, *inertia) > kChangedPlaces + 2.0 * off(*inertia / square, *mass * square);
+  }
+  out.push_back({.id = "units.wheel_mirrored",
+                 .topic = FindingTopic::units,
+                 .severity = changed_places ? FindingSeverity::fatal : FindingSeverity::warning,
+                 .sentence = fmt::format("As its wheels count, the robot turns on the spot more than it drives ({:.2g} "
+                                         "times as fast){}, and the log has neither gyro nor pose to tell.",
+                                         std::sqrt(turn / along),
+                                         changed_places ? "; mass and yaw inertia fit the robot file if one wheel, its "
+                                                          "effort included, counts backwards"
+                                                        : ""),
+                 .next = "Look whether both wheels count up when it drives ahead; log a gyro to have it checked.",
+                 .columns = {view.joints[0].motion_name(), view.joints[1].motion_name()},
+                 .value = std::sqrt(turn / along),
+                 .unit = "1"});
+}
+
 void check_effort_scale(const HealthView& view, const commission::Setting& s, const commission::Fit& fit,
                         std::vector<LogFinding>& out) {
   const auto scales = commission::physical_scales(s.robot, s.model);
@@ -193,7 +288,12 @@ void check_effort_scale(const HealthView& view, const commission::Setting& s, co
     if (s.robot.motor && s.robot.motor->gear_ratio > 1.0 && std::abs(ratio * s.robot.motor->gear_ratio - 1.0) < 0.3) {
       hint = " as if efforts were those of the motor's shaft, before the gear";
     }
-    const bool far = ratio > 20.0 || ratio < 0.05;
+    for (const TorqueUnit& known : kSpeedUnits) {
+      if (std::abs(ratio / known.ratio - 1.0) < 0.3) {
+        hint = fmt::format(" as if the wheels' motion were in {}", known.unit);
+      }
+    }
+    const bool far = ratio > kMostTimesNominal || ratio < kLeastTimesNominal;
     out.push_back(
         {.id = "units.effort",
          .topic = FindingTopic::units,
@@ -306,12 +406,17 @@ void check_delay(const HealthView& view, const commission::Setting& s, const com
   const bool matters = commission::is_latency(*timing, view.step) ||
                        (std::abs(delay) > 3.0 * error && left < 0.95 && std::abs(delay) > 0.25 * view.step);
   const bool large = matters && std::abs(delay) > 0.75 * view.step;
+  const bool latency = view.robot_given && commission::is_latency(*timing, view.step);
+  // Declared errors may allow for a step of it: commissioning weighs that.
+  const model::SensorNoise& declared = view.robot.noise;
+  const bool weighed = declared.effort.value && (declared.wheel_speed.value || declared.wheel_angle.value) &&
+                       timing->beyond() <= view.step;
   LogFinding f{.id = "time.effort_delay",
                .topic = FindingTopic::time,
-               .severity = view.robot_given && commission::is_latency(*timing, view.step) ? FindingSeverity::fatal
-                           : large                                                        ? FindingSeverity::warning
-                           : matters                                                      ? FindingSeverity::notice
-                                                                                          : FindingSeverity::fine};
+               .severity = latency && !weighed ? FindingSeverity::fatal
+                           : large || latency  ? FindingSeverity::warning
+                           : matters           ? FindingSeverity::notice
+                                               : FindingSeverity::fine};
   f.columns = s.measurement.effort_columns;
   f.value = delay;
   f.unit = std::string("s");
@@ -358,6 +463,7 @@ bool check_motion(const HealthView& view, std::vector<LogFinding>& findings) {
     return false;
   }
   check_directions(view, findings);
+  check_traction(view, findings);
   if (!view.has_effort()) {
     return false;
   }
@@ -371,6 +477,7 @@ bool check_motion(const HealthView& view, std::vector<LogFinding>& findings) {
     if (excited) {
       check_effort_scale(view, s, fit, findings);
       check_sides(s, fit, findings);
+      check_mirrored(view, s, fit, findings);
       check_remainder(s, fit, findings);
       check_delay(view, s, fit, findings);
     }

@@ -102,30 +102,6 @@ std::vector<std::string> yaw_fields(const std::string& orientation) {
   return fields;
 }
 
-/// Words of a name: split at what is no letter, and before a capital behind a small letter.
-std::vector<std::string> words_of(const std::string& name) {
-  std::vector<std::string> words(1);
-  char before = '_';
-  for (const char c : name) {
-    const auto u = static_cast<unsigned char>(c);
-    if (std::isalpha(u) == 0) {
-      words.emplace_back();
-    } else {
-      if (std::isupper(u) != 0 && std::islower(static_cast<unsigned char>(before)) != 0) {
-        words.emplace_back();
-      }
-      words.back() += static_cast<char>(std::tolower(u));
-    }
-    before = c;
-  }
-  std::erase(words, "");
-  return words;
-}
-
-bool has_word(const std::vector<std::string>& words, std::string_view word) {
-  return std::ranges::find(words, word) != words.end();
-}
-
 bool contains(std::string_view text, std::string_view part) { return text.find(part) != std::string_view::npos; }
 
 /// What could be read, and how gladly: of two offers of a column the one with the smaller rank is taken.
@@ -204,11 +180,11 @@ class Chooser {
     const bool yaw = path == "yaw" || path.ends_with(".yaw");
     check_element(*found, name, path);
     const std::vector<std::string> numbers = numeric_paths(*own.definition);
-    std::vector<std::string> fields{path};
     if (yaw && std::ranges::find(numbers, path) == numbers.end()) {
-      fields = yaw_fields(path.substr(0, path.size() - 4));
+      take(*found, {name, yaw_fields(path.substr(0, path.size() - 4)), BagColumn::Rule::yaw});
+    } else {
+      take(*found, {name, {path}});
     }
-    take(*found, {name, std::move(fields)});
   }
 
   /// Throws where the path's element is named and the topic's first message does not name it.
@@ -227,9 +203,10 @@ class Chooser {
     }
   }
 
-  void offer(std::size_t k, std::string name, std::vector<std::string> fields, int rank) {
+  void offer(std::size_t k, std::string name, std::vector<std::string> fields, int rank,
+             BagColumn::Rule rule = BagColumn::Rule::value) {
     if (!options_.only || std::ranges::find(*options_.only, name) != options_.only->end()) {
-      offers_.push_back({k, {std::move(name), std::move(fields)}, rank});
+      offers_.push_back({k, {std::move(name), std::move(fields), rule}, rank});
     }
   }
 
@@ -273,7 +250,7 @@ class Chooser {
   void offer_pose(std::size_t k, const std::string& pose, int rank) {
     offer(k, "x", {pose + ".position.x"}, rank);
     offer(k, "y", {pose + ".position.y"}, rank);
-    offer(k, "theta", yaw_fields(pose + ".orientation"), rank);
+    offer(k, "theta", yaw_fields(pose + ".orientation"), rank, BagColumn::Rule::yaw);
   }
 
   void offer_odometry(std::size_t k) {
@@ -295,34 +272,57 @@ class Chooser {
     const auto filled = [&](std::string_view array) {
       return std::ranges::find(view.filled, array) != view.filled.end();
     };
-    const auto give = [&](const std::string& joint, const std::string& angle, const std::string& speed,
+    const auto give = [&](const std::vector<std::string>& joints, const std::string& angle, const std::string& speed,
                           const std::string& effort) {
       for (const auto& [array, column] : {std::pair("position", angle), {"velocity", speed}, {"effort", effort}}) {
-        if (filled(array)) {
-          offer(k, column, {fmt::format("{}[{}]", array, joint)}, 1);
+        if (!filled(array)) {
+          continue;
         }
+        std::vector<std::string> fields;
+        for (const std::string& joint : joints) {
+          fields.push_back(fmt::format("{}[{}]", array, joint));
+        }
+        const BagColumn::Rule rule = joints.size() == 1 ? BagColumn::Rule::value
+                                     : column == effort ? BagColumn::Rule::sum
+                                                        : BagColumn::Rule::mean;
+        offer(k, column, std::move(fields), 1, rule);
       }
     };
+    const auto give_side = [&](const std::vector<std::string>& joints, const std::string& side) {
+      give(joints, "phi_" + side, "omega_" + side, "tau_" + side);
+    };
     if (view.names.size() == 1) {
-      give(view.names.front(), "position", "velocity", "effort");
+      give(view.names, "position", "velocity", "effort");
+      std::string side = side_of_joint(view.names.front());
+      side = side.empty() ? side_of_joint(view.topic->name) : side;
+      if (!side.empty()) {
+        give_side(view.names, side);
+      }
       return;
     }
     std::vector<std::string> wheels;
-    std::ranges::copy_if(view.names, std::back_inserter(wheels),
-                         [](const std::string& name) { return contains(plain_name(name), "wheel"); });
+    std::ranges::copy_if(view.names, std::back_inserter(wheels), [](const std::string& name) {
+      const std::string plain = plain_name(name);
+      return contains(plain, "wheel") && !contains(plain, "caster") && !contains(plain, "steer");
+    });
     const std::vector<std::string>& joints = wheels.empty() ? view.names : wheels;
     for (const std::string side : {"r", "l"}) {
       std::vector<std::string> of_side;
       std::ranges::copy_if(joints, std::back_inserter(of_side),
                            [&](const std::string& name) { return side_of_joint(name) == side; });
-      if (of_side.size() == 1) {
-        give(of_side.front(), "phi_" + side, "omega_" + side, "tau_" + side);
-      } else if (of_side.size() > 1) {
+      const char* const word = side == "r" ? "right" : "left";
+      if (of_side.size() == 1 || (of_side.size() > 1 && !wheels.empty())) {
+        give_side(of_side, side);
+      }
+      if (of_side.size() > 1) {
         choice_.notes.push_back(
-            fmt::format("{} has {} {} joints ({}): none was taken; --map omega_{}={}.velocity[{}] "
-                        "and the like choose one",
-                        view.topic->name, of_side.size(), side == "r" ? "right" : "left", core::listed(of_side), side,
-                        view.topic->name, of_side.front()));
+            wheels.empty()
+                ? fmt::format("{} has {} {} joints ({}): none was taken; --map omega_{}={}.velocity[{}] and the like "
+                              "choose one",
+                              view.topic->name, of_side.size(), word, core::listed(of_side), side, view.topic->name,
+                              of_side.front())
+                : fmt::format("{}: the {} side is the mean motion and the sum of the efforts of {}", view.topic->name,
+                              word, core::listed(of_side, " and ")));
       }
     }
   }
@@ -389,14 +389,6 @@ class Chooser {
 };
 
 }  // namespace
-
-std::string side_of_joint(const std::string& name) {
-  const std::vector<std::string> words = words_of(name);
-  const std::string plain = plain_name(name);
-  const bool right = has_word(words, "right") || has_word(words, "r") || contains(plain, "right");
-  const bool left = has_word(words, "left") || has_word(words, "l") || contains(plain, "left");
-  return right == left ? "" : right ? "r" : "l";
-}
 
 BagChoice choose_bag_columns(const std::vector<BagTopicView>& topics, const CsvOptions& options,
                              const std::string& path) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <deque>
 #include <limits>
 #include <map>
 #include <utility>
@@ -25,6 +26,8 @@ constexpr std::int64_t wall_clock = 100'000'000 * one_second;
 constexpr std::size_t first_messages = 2000;
 constexpr std::size_t looked_at = 20000;  ///< messages at least, for topics that a recording without index has
 
+constexpr std::int64_t longest_late = one_second;
+
 constexpr std::array<const char*, 3> joint_arrays = {"position", "velocity", "effort"};
 
 /// Everything about a bag that one looks at before its rows are read.
@@ -37,31 +40,51 @@ struct BagPlan {
   BagClocks clocks;                        ///< of each source
 };
 
-/// The names and filled arrays of the first message of every topic that has them.
+/// Adds the names of a message and the arrays that have numbers in it.
+void look_at(const BagTopic& topic, std::string_view data, BagTopicView& view) {
+  const std::vector<std::string> names = read_names(*topic.definition, data).value_or(std::vector<std::string>{});
+  std::vector<std::string> paths;
+  for (const char* array : joint_arrays) {
+    for (std::size_t k = 0; k < names.size(); ++k) {
+      paths.push_back(fmt::format("{}[{}]", array, k));
+    }
+  }
+  for (const std::string& name : names) {
+    if (std::ranges::find(view.names, name) == view.names.end()) {
+      view.names.push_back(name);
+    }
+  }
+  RosExtractor extractor(*topic.definition, paths);
+  std::vector<double> values(paths.size());
+  if (!extractor.read(data, values)) {
+    return;
+  }
+  for (std::size_t k = 0; k < joint_arrays.size(); ++k) {
+    const auto first = values.begin() + static_cast<std::ptrdiff_t>(k * names.size());
+    const bool numbers = std::any_of(first, first + static_cast<std::ptrdiff_t>(names.size()),
+                                     [](double value) { return !std::isnan(value); });
+    if (numbers && std::ranges::find(view.filled, joint_arrays[k]) == view.filled.end()) {
+      view.filled.emplace_back(joint_arrays[k]);
+    }
+  }
+}
+
+/// The names and filled arrays of every topic that has them. The first messages are looked at one by one, since drivers
+/// begin with NaN and publishers share topics; later ones now and then, as long as an array is empty.
 std::vector<BagTopicView> view_topics(BagReader& bag) {
+  constexpr std::size_t each = 50, then_every = 100;
   std::map<std::size_t, BagTopicView> met;
+  std::map<std::size_t, std::size_t> counts;
   BagMessage message;
   std::size_t read = 0;
   while ((read < looked_at || met.size() < bag.topics().size()) && bag.next(message)) {
     ++read;
     const BagTopic& topic = bag.topics()[message.topic];
-    auto [entry, is_new] = met.try_emplace(message.topic);
-    if (!is_new || topic.type != "sensor_msgs/msg/JointState" || !topic.definition) {
-      continue;
-    }
-    entry->second.names = read_names(*topic.definition, message.data).value_or(std::vector<std::string>{});
-    std::vector<std::string> paths;
-    for (const char* array : joint_arrays) {
-      paths.push_back(std::string(array) + "[0]");
-    }
-    RosExtractor extractor(*topic.definition, paths);
-    std::array<double, joint_arrays.size()> values{};
-    if (extractor.read(message.data, values)) {
-      for (std::size_t k = 0; k < values.size(); ++k) {
-        if (!std::isnan(values[k])) {
-          entry->second.filled.emplace_back(joint_arrays[k]);
-        }
-      }
+    BagTopicView& view = met[message.topic];
+    const std::size_t count = counts[message.topic]++;
+    if (topic.type == "sensor_msgs/msg/JointState" && topic.definition &&
+        (count < each || (view.filled.size() < joint_arrays.size() && count % then_every == 0))) {
+      look_at(topic, message.data, view);
     }
   }
   std::vector<BagTopicView> views;
@@ -102,6 +125,24 @@ double yaw_of(const double* q) {
   return std::atan2(2.0 * (q[3] * q[2] + q[0] * q[1]), q[3] * q[3] + q[0] * q[0] - q[1] * q[1] - q[2] * q[2]);
 }
 
+/// What `column` makes of its fields.
+double value_of(const BagColumn& column, const double* numbers) {
+  if (column.is_yaw()) {
+    return yaw_of(numbers);
+  }
+  double sum = 0.0;
+  for (std::size_t k = 0; k < column.fields.size(); ++k) {
+    sum += numbers[k];
+  }
+  return column.rule == BagColumn::Rule::mean ? sum / static_cast<double>(column.fields.size()) : sum;
+}
+
+/// A message that waits for earlier ones that come late.
+struct Waiting {
+  std::int64_t time = 0;
+  std::vector<double> values;
+};
+
 /// What the walk reads from one topic.
 struct Reading {
   std::size_t topic = 0;
@@ -114,6 +155,9 @@ struct Reading {
   std::size_t messages = 0;     ///< of the topic so far
   std::size_t damaged = 0;
   std::size_t unstamped = 0;
+  std::size_t without = 0;      ///< messages that have none of the columns
+  std::size_t late = 0;         ///< messages that came after later ones
+  std::deque<Waiting> waiting;  ///< by their times
   std::string first_damage;
 };
 
@@ -220,6 +264,9 @@ class BagWalk final : public RowWalk {
   void read_on() {
     BagMessage message;
     if (!bag_->next(message)) {
+      for (std::size_t k = 0; k < readings_.size(); ++k) {
+        release(k, std::numeric_limits<std::int64_t>::max());
+      }
       aligner_->finish();
       finished_ = true;
       return;
@@ -247,10 +294,36 @@ class BagWalk final : public RowWalk {
     }
     const double* number = reading.numbers.data();
     for (std::size_t k = 0; k < reading.columns.size(); ++k) {
-      reading.values[k] = reading.columns[k].is_yaw() ? yaw_of(number) : *number;
+      reading.values[k] = value_of(reading.columns[k], number);
       number += reading.columns[k].fields.size();
     }
-    aligner_->push(static_cast<std::size_t>(found - readings_.begin()), time + reading.clock.shift, reading.values);
+    if (std::ranges::all_of(reading.values, [](double value) { return std::isnan(value); })) {
+      ++reading.without;
+      return;
+    }
+    put_in_order(static_cast<std::size_t>(found - readings_.begin()), time + reading.clock.shift);
+  }
+
+  /// Keeps the values of a reading back until none that is up to longest_late earlier can come. A time that goes back by
+  /// more is another recording.
+  void put_in_order(std::size_t k, std::int64_t time) {
+    Reading& reading = readings_[k];
+    std::deque<Waiting>& waiting = reading.waiting;
+    if (!waiting.empty() && time < waiting.back().time - longest_late) {
+      release(k, std::numeric_limits<std::int64_t>::max());
+    }
+    const auto later = std::ranges::upper_bound(waiting, time, {}, [](const Waiting& message) { return message.time; });
+    reading.late += later != waiting.end() ? 1U : 0U;
+    waiting.insert(later, {time, reading.values});
+    release(k, waiting.back().time - longest_late);
+  }
+
+  void release(std::size_t k, std::int64_t until) {
+    std::deque<Waiting>& waiting = readings_[k].waiting;
+    while (!waiting.empty() && waiting.front().time <= until) {
+      aligner_->push(k, waiting.front().time, waiting.front().values);
+      waiting.pop_front();
+    }
   }
 
   /// A column of another topic that has no value in this row.
@@ -287,6 +360,18 @@ class BagWalk final : public RowWalk {
       file.notes.push_back(
           fmt::format("{} of {} messages of {} have no time stamp, unlike the others, and were left out",
                       reading.unstamped, reading.messages, topic));
+    }
+    if (reading.without > 0) {
+      file.notes.push_back(
+          fmt::format("{} of {} messages of {} have none of the columns that are read (other joints, or "
+                      "NaN) and were left out",
+                      reading.without, reading.messages, topic));
+    }
+    if (reading.late > 0) {
+      file.notes.push_back(
+          fmt::format("{} of {} messages of {} were recorded after later ones and put in the order of "
+                      "their stamps",
+                      reading.late, reading.messages, topic));
     }
     if (const std::size_t stale = aligner_->stale(stream); stale > 0) {
       file.notes.push_back(fmt::format("{} of {} messages of {} are not later than the one before and were left out",

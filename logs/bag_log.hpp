@@ -50,9 +50,17 @@ struct BagClocks {
 
 /// One column of a log and where a message has it.
 struct BagColumn {
+  /// What is made of the fields.
+  enum class Rule {
+    value,  ///< one field as it is
+    yaw,    ///< of the quaternion x, y, z, w
+    mean,   ///< of all: motion of the wheels of one side
+    sum,    ///< of all: efforts of the wheels of one side
+  };
   std::string name;                 ///< of the contract
-  std::vector<std::string> fields;  ///< paths for RosExtractor: one, or the quaternion x, y, z, w that it is the yaw of
-  [[nodiscard]] bool is_yaw() const { return fields.size() == 4; }
+  std::vector<std::string> fields;  ///< paths for RosExtractor
+  Rule rule = Rule::value;
+  [[nodiscard]] bool is_yaw() const { return rule == Rule::yaw; }
   bool operator==(const BagColumn&) const = default;
 };
 
@@ -69,19 +77,20 @@ struct BagChoice {
   std::vector<std::string> notes;   ///< what was taken or left although one might have thought otherwise
 };
 
-/// A topic and, of a type that names its elements (JointState), the names in its first message.
+/// A topic and, of a type that names its elements (JointState), the names in its first messages.
 struct BagTopicView {
   const BagTopic* topic = nullptr;
   bool silent = false;  ///< has no messages: nothing is taken from it unasked
   std::vector<std::string> names;
-  std::vector<std::string> filled;  ///< arrays beside `names` that had elements in that message
+  std::vector<std::string> filled;  ///< arrays beside `names` that had numbers in one of these messages
 };
 
 /// Chooses columns. What `options.map` says goes first: NAME=TOPIC.PATH, e.g.
 /// omega_r=/joint_states.velocity[right_wheel], the PATH as RosExtractor takes it, or ending in `.yaw` behind a
 /// quaternion. Else:
-/// - sensor_msgs/JointState: the joints that alone are named right and left (of those named wheel, where there are any)
-///   give phi, omega and tau; a topic with one joint gives position, velocity and effort;
+/// - sensor_msgs/JointState: the joints that are named right and left (of those named wheel, where there are any; no
+///   casters) give phi, omega and tau; of several wheels a side the mean of the motion and the sum of the efforts; a
+///   topic with one joint gives position, velocity and effort, too, and its own name may tell the side;
 /// - geometry_msgs/PoseStamped and PoseWithCovarianceStamped, else nav_msgs/Odometry, give x, y and theta; an Odometry
 ///   topic whose name says that it comes from the wheels is left out, since that is no independent measurement;
 /// - sensor_msgs/Imu gives gyro_z and accel_x;
@@ -90,9 +99,6 @@ struct BagTopicView {
 /// efforts. Throws InputError for entries of the map that name no topic, and as RosExtractor for their fields.
 [[nodiscard]] BagChoice choose_bag_columns(const std::vector<BagTopicView>& topics, const CsvOptions& options,
                                            const std::string& path);
-
-/// The sides that `name` of a joint tells: "r", "l" or nothing.
-[[nodiscard]] std::string side_of_joint(const std::string& name);
 
 /// Origin of the times of all bags of a log, ns: set by the first that is opened.
 using TimeOrigin = std::shared_ptr<std::optional<std::int64_t>>;

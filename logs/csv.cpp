@@ -77,7 +77,11 @@ std::vector<std::string> fields_without(const CsvHeader& header, const std::vect
 }
 
 void describe_file(const FileWalk& lines, const CsvHeader& header, const std::vector<std::string>& names,
-                   LogFileReport& file) {
+                   const CsvRowReader& rows, LogFileReport& file) {
+  if (!rows.clock_unit().empty()) {
+    file.time_origin = rows.clock_origin();
+    file.notes.push_back(fmt::format("times are counts of {}, and were read as such", rows.clock_unit()));
+  }
   const files::ByteSource& source = lines.lines.source();
   file.format = "csv";
   file.packing = source.packing();
@@ -108,7 +112,7 @@ class CsvWalk final : public RowWalk {
   }
   [[nodiscard]] double t() const override { return rows_.t(); }
   [[nodiscard]] const double* values() const override { return rows_.values(); }
-  void describe(LogFileReport& file) const override { describe_file(lines_, header_, names_, file); }
+  void describe(LogFileReport& file) const override { describe_file(lines_, header_, names_, rows_, file); }
 
  private:
   const std::vector<std::string>& names_;
@@ -178,7 +182,7 @@ class MergedCsvWalk final : public RowWalk {
   [[nodiscard]] double t() const override { return cleaner_.t(); }
   [[nodiscard]] const double* values() const override { return row_.data() + 1; }
   void describe(LogFileReport& file) const override {
-    describe_file(lines_, header_, names_, file);
+    describe_file(lines_, header_, names_, rows_, file);
     for (std::size_t s = 1; s < streams_.size(); ++s) {
       for (const std::size_t c : streams_[s].columns) {
         file.interpolated.push_back({names_[c],

@@ -206,6 +206,7 @@ void CsvRowReader::begin_file(const CsvHeader& header, std::string path) {
   path_ = std::move(path);
   fields_ = header.fields;
   separator_ = header.separator;
+  clock_ = {};
   slots_.assign(fields_.size(), -1);
   const auto take = [&](const std::string& name, int slot) {
     const auto found = header.found.find(name);
@@ -252,6 +253,8 @@ std::size_t CsvRowReader::read_fields(std::string_view line, Defect& defect) {
       const char* q = files::parse_number(p, end, value);
       if (q == nullptr || (q != end && *q != separator)) {
         q = read_odd_field(p, end, field, value, defect);
+      } else if (slot == 0 && (!clock_.known || clock_.seconds < 1.0)) {
+        convert_time({p, static_cast<std::size_t>(q - p)});
       } else if (!(std::abs(value) <= limits[index])) {
         const Fault fault = std::isfinite(value) ? Fault::limit : may_miss(index) ? Fault::none : Fault::not_finite;
         if (fault > defect.fault) {
@@ -264,6 +267,29 @@ std::size_t CsvRowReader::read_fields(std::string_view line, Defect& defect) {
       return field + 1;
     }
     ++p;
+  }
+}
+
+void CsvRowReader::convert_time(std::string_view text) {
+  double& t = values_[0];
+  std::int64_t count = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), count);
+  const bool whole = error == std::errc() && end == text.data() + text.size();
+  if (!clock_.known) {
+    clock_.known = true;
+    if (whole && t > cleaner_.limits()[0]) {
+      constexpr double a_year = 3.2e7;  // s: later than 1971, whichever unit
+      for (const auto& [seconds, unit] : {std::pair{1e-9, "ns"}, {1e-6, "µs"}, {1e-3, "ms"}}) {
+        if (t * seconds > a_year && t * seconds < 1e3 * a_year) {
+          const auto second = static_cast<std::int64_t>(std::round(1.0 / seconds));
+          clock_ = {true, seconds, unit, count / second * second};
+          break;
+        }
+      }
+    }
+  }
+  if (clock_.seconds < 1.0) {
+    t = (whole ? static_cast<double>(count - clock_.origin) : t - static_cast<double>(clock_.origin)) * clock_.seconds;
   }
 }
 
@@ -296,6 +322,8 @@ const char* CsvRowReader::read_odd_field(const char* p, const char* end, std::si
     fault = means_missing(text) ? Fault::empty : Fault::text;
   } else if (!std::isfinite(value)) {
     fault = Fault::not_finite;
+  } else if (slots_[field] == 0 && (!clock_.known || clock_.seconds < 1.0)) {
+    convert_time(text);
   } else if (!(std::abs(value) <= cleaner_.limits()[static_cast<std::size_t>(slots_[field])])) {
     fault = Fault::limit;
   }

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <span>
@@ -56,6 +57,11 @@ class CsvRowReader {
   /// or a name is not in the header.
   void begin_file(const CsvHeader& header, std::string path);
 
+  /// Unit of the times that were read where they are whole counts of a wall clock: "ms", "µs", "ns"; else nothing.
+  [[nodiscard]] std::string_view clock_unit() const { return clock_.unit; }
+  /// What such times are counted from, s.
+  [[nodiscard]] double clock_origin() const { return static_cast<double>(clock_.origin) * clock_.seconds; }
+
   /// Steps longer than `seconds` are gaps.
   void set_longest_step(double seconds) { cleaner_.set_longest_step(seconds); }
 
@@ -87,6 +93,16 @@ class CsvRowReader {
     std::string_view text;
   };
 
+  /// Times beyond LogColumn::limit are counts since 1970, of a unit that the first of a file tells by its size. A double
+  /// does not hold nanoseconds since 1970: they are taken from the first whole second.
+  struct Clock {
+    bool known = false;
+    double seconds = 1.0;
+    std::string_view unit;
+    std::int64_t origin = 0;
+  };
+  void convert_time(std::string_view text);
+
   std::size_t read_fields(std::string_view line, Defect& defect);
   const char* read_odd_field(const char* p, const char* end, std::size_t field, double& value, Defect& defect);
   [[nodiscard]] std::string describe(const Defect& defect) const;
@@ -97,6 +113,7 @@ class CsvRowReader {
 
   std::string path_;
   std::vector<std::string> fields_;
+  Clock clock_;
   std::vector<int> slots_;  ///< field -> index in values_, or −1
   char separator_ = ',';
   std::vector<double> values_;  ///< time, then the columns

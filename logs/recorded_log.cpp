@@ -148,6 +148,67 @@ bool same_unit(std::string_view written, std::string_view expected) {
   return false;
 }
 
+/// Words of a name: split at what is no letter, and before a capital behind a small letter.
+std::vector<std::string> words_of(const std::string& name) {
+  std::vector<std::string> words(1);
+  char before = '_';
+  for (const char c : name) {
+    const auto u = static_cast<unsigned char>(c);
+    if (std::isalpha(u) == 0) {
+      words.emplace_back();
+    } else {
+      if (std::isupper(u) != 0 && std::islower(static_cast<unsigned char>(before)) != 0) {
+        words.emplace_back();
+      }
+      words.back() += static_cast<char>(std::tolower(u));
+    }
+    before = c;
+  }
+  std::erase(words, "");
+  return words;
+}
+
+bool has_word(const std::vector<std::string>& words, std::string_view word) {
+  return std::ranges::find(words, word) != words.end();
+}
+
+/// Parts of "/joint_states/left_wheel_joint/velocity", as PlotJuggler writes fields of messages.
+std::vector<std::string> path_parts(std::string_view text) {
+  std::vector<std::string> parts(1);
+  for (const char c : text) {
+    if (c == '/') {
+      parts.emplace_back();
+    } else {
+      parts.back() += c;
+    }
+  }
+  std::erase(parts, "");
+  return parts;
+}
+
+/// The column that a path of at least three parts names by its last ones; empty where it names none.
+std::string column_of_path(std::string_view text) {
+  const std::vector<std::string> parts = path_parts(text);
+  if (parts.size() < 3) {
+    return {};
+  }
+  const std::string& last = parts.back();
+  const std::string& before = parts[parts.size() - 2];
+  if ((before == "position" || before == "orientation") && parts[parts.size() - 3] == "pose") {
+    return before == "orientation" ? (last == "yaw" ? "theta" : "") : last == "x" || last == "y" ? last : "";
+  }
+  if (before == "angular_velocity" || before == "linear_acceleration") {
+    return before == "angular_velocity" ? (last == "z" ? "gyro_z" : "") : last == "x" ? "accel_x" : "";
+  }
+  const std::string side = side_of_joint(before);
+  const std::string quantity = last == "position"   ? "phi_"
+                               : last == "velocity" ? "omega_"
+                               : last == "effort"   ? "tau_"
+                                                    : "";
+  return side.empty() || quantity.empty() || plain_name(before).find("wheel") == std::string::npos ? ""
+                                                                                                   : quantity + side;
+}
+
 }  // namespace
 
 std::span<const LogColumn> log_columns() { return all().columns; }
@@ -162,7 +223,7 @@ const LogColumn* recognise_log_column(std::string_view text) {
   const std::string_view unit = take_unit(text);
   const auto it = all().known.find(plain_name(text));
   if (it == all().known.end()) {
-    return nullptr;
+    return find_log_column(column_of_path(text));
   }
   const LogColumn& column = all().columns[it->second];
   return unit.empty() || same_unit(unit, column.unit) ? &column : nullptr;
@@ -175,6 +236,14 @@ int row_weight(std::string_view name) {
   return begins({"tau", "current", "voltage", "effort"})    ? 10000
          : begins({"omega", "phi", "position", "velocity"}) ? 100
                                                             : 1;
+}
+
+std::string side_of_joint(const std::string& name) {
+  const std::vector<std::string> words = words_of(name);
+  const std::string plain = plain_name(name);
+  const bool right = has_word(words, "right") || has_word(words, "r") || plain.find("right") != std::string::npos;
+  const bool left = has_word(words, "left") || has_word(words, "l") || plain.find("left") != std::string::npos;
+  return right == left ? "" : right ? "r" : "l";
 }
 
 std::string plain_name(std::string_view text) {

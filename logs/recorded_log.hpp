@@ -43,6 +43,9 @@ struct LogColumn {
 /// `text` in lower case, blanks, '-', '.' and '/' as single '_', none at the ends.
 [[nodiscard]] std::string plain_name(std::string_view text);
 
+/// The sides that `name` of a joint tells: "r", "l" or nothing.
+[[nodiscard]] std::string side_of_joint(const std::string& name);
+
 /// Count of a defect, and the place of the first one.
 struct Occurrences {
   std::size_t count = 0;

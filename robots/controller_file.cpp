@@ -151,11 +151,10 @@ struct ControllerReader {
     out.place = controller.place;
     out.left = joints({"left_wheel_names", "left_wheel"});
     out.right = joints({"right_wheel_names", "right_wheel"});
-    if (const auto count = positive("wheels_per_side", ""); count && count->value > 1.0) {
-      find("wheels_per_side")->fail("1: robots with two or more wheels a side have no model yet (skid_steer)");
-    }
     out.track_width = positive("wheel_separation", " in m");
-    multiply(out.track_width, positive("wheel_separation_multiplier", ""));
+    const auto multiplier = positive("wheel_separation_multiplier", "");
+    multiply(out.track_width, multiplier);
+    out.track_multiplier = multiplier ? multiplier->value : 1.0;
     out.wheel_radius = positive("wheel_radius", " in m");
     multiply(out.wheel_radius, positive("wheel_radius_multiplier", ""));
     const auto left = positive("left_wheel_radius_multiplier", "");

@@ -10,6 +10,7 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/detector/pose_sums.hpp>
 #include <wheelwright/detector/scale_detector.hpp>
+#include <wheelwright/files/bytes.hpp>
 #include <wheelwright/model/robot.hpp>
 #include <wheelwright/robots/robot_file.hpp>
 #include <wheelwright/robots/robot_keys.hpp>
@@ -370,8 +371,18 @@ OnlineModel model_from_json(const Json& json, const std::string& file) {
   return model;
 }
 
+namespace {
+constexpr std::size_t longest_model = std::size_t{1} << 30;
+}  // namespace
+
 OnlineModel read_model(const std::filesystem::path& path) {
-  return model_from_json(files::read_json(path), path.string());
+  const std::string text = files::read_bytes(path, longest_model);
+  if (const std::size_t first = text.find_first_not_of(" \t\r\n"); first != std::string::npos && text[first] != '{') {
+    throw InputError(path.string() +
+                     ": is no model.json: expected the file that `wheelwright commission` writes into --out (from a "
+                     "robot file, --robot, and a log)");
+  }
+  return model_from_json(files::parse_json(text, path.string()), path.string());
 }
 
 }  // namespace wheelwright::robots

@@ -61,7 +61,8 @@ struct TreeJoint {
 struct DriveFacts {
   std::vector<std::string> left, right;                 ///< names of joints
   std::optional<files::OriginNumber> wheel_radius;      ///< m
-  std::optional<files::OriginNumber> track_width;       ///< m
+  std::optional<files::OriginNumber> track_width;       ///< m, times its multiplier
+  double track_multiplier = 1.0;                        ///< that is in it
   std::optional<files::OriginNumber> speed;             ///< limit of |v1|, m/s
   std::optional<files::OriginNumber> yaw_rate;          ///< limit of |v2|, rad/s
   std::optional<files::OriginNumber> acceleration;      ///< limit of |v̇1|, m/s²

@@ -10,6 +10,7 @@
 #include <wheelwright/files/bytes.hpp>
 #include <wheelwright/files/place.hpp>
 #include <wheelwright/files/words.hpp>
+#include <wheelwright/logs/recorded_log.hpp>
 #include <wheelwright/robots/robot_keys.hpp>
 
 namespace wheelwright::robots {
@@ -35,6 +36,7 @@ using files::YamlPlace;
 namespace {
 
 constexpr std::size_t longest_robot_file = std::size_t{1} << 20;
+constexpr std::size_t longest_model_file = std::size_t{1} << 28;
 constexpr double longest_radius = 10.0;  // m: beyond this the file means millimetres
 constexpr double longest_track = 100.0;  // m
 constexpr double longest_delay = 1.0;    // s: beyond this the file means milliseconds
@@ -50,10 +52,10 @@ struct RobotReader {
   static bool drive(const Robot& robot) { return robot.model == "differential_drive"; }
 
   void read() {
-    const auto members =
-        root.members({"name", "model", "wheel_radius", "track_width", "footprint", "lever_arm", "friction",
-                      "parameters", "effort", "nominal", "prior", "noise", "filter", "encoder_counts_per_turn",
-                      "speed_source", "limits", "kinematic", "motor", "effects"});
+    const auto members = root.members(
+        {"name",         "model",  "wheel_radius", "track_width", "footprint", "lever_arm", "friction",
+         "parameters",   "effort", "nominal",      "prior",       "noise",     "filter",    "encoder_counts_per_turn",
+         "speed_source", "limits", "kinematic",    "motor",       "effects",   "columns"});
     for (const auto& [key, place] : members) {
       read_basics(key, place);
     }
@@ -289,6 +291,11 @@ struct RobotReader {
   }
 };
 
+/// A key of a YAML file and its value: JSON on one line is YAML's flow style.
+std::string yaml_line(const std::string& key, const Json& value) {
+  return key + ": " + files::json_text(value, -1) + "\n";
+}
+
 Robot read_from(const YamlPlace& root) {
   RobotReader reader{root, {}, {}};
   reader.read();
@@ -302,6 +309,35 @@ Robot parse_robot(std::string_view text, const std::string& file) { return read_
 Robot read_robot(const std::filesystem::path& path) {
   return parse_robot(files::read_bytes(path, longest_robot_file), path.string());
 }
+
+ColumnMap read_columns(const std::filesystem::path& path) {
+  std::string text = files::read_bytes(path, longest_model_file);
+  std::string where = path.string();
+  if (const std::size_t first = text.find_first_not_of(" \t\r\n"); first != std::string::npos && text[first] == '{') {
+    const Json object = files::parse_json(text, where);
+    const Json robot = object.value("robot", Json::object());
+    if (!robot.is_object() || !robot.contains("columns")) {
+      return {};
+    }
+    text = files::json_text(robot, -1);
+    where += ": /robot";
+  }
+  Names known;
+  for (const logs::LogColumn& column : logs::log_columns()) {
+    known.push_back(column.name);
+  }
+  ColumnMap columns;
+  for (const auto& [key, place] : YamlPlace::parse(text, where).members()) {
+    if (key == "columns") {
+      for (const auto& [name, column] : place.members(known)) {
+        columns[name] = column.text();
+      }
+    }
+  }
+  return columns;
+}
+
+std::string columns_yaml(const ColumnMap& columns) { return columns.empty() ? "" : yaml_line("columns", columns); }
 
 Robot robot_from_json(const Json& object, const std::string& where) {
   // JSON is YAML: one reader, one set of rules.
@@ -370,11 +406,6 @@ Json effects_of(const std::vector<model::RobotEffect>& effects) {
     out.push_back(std::move(entry));
   }
   return out;
-}
-
-/// A key of a YAML file and its value: JSON on one line is YAML's flow style.
-std::string yaml_line(const std::string& key, const Json& value) {
-  return key + ": " + files::json_text(value, -1) + "\n";
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -29,13 +30,25 @@ namespace wheelwright::robots {
 ///     noise: estimate | {wheel_speed, wheel_angle, effort, position, heading: bound | estimate},
 ///     filter: auto | {order: 1 | 2, alpha, beta: 1/s}, encoder_counts_per_turn, speed_source: auto |
 ///     encoder_difference | measured, limits: {effort, speed, acceleration}, motor: {torque_constant, resistance,
-///     back_emf, gear_ratio}, effects: [{effect: name, parameter: value | [lo, hi], ...}] (model/effect_law.hpp)
+///     back_emf, gear_ratio}, effects: [{effect: name, parameter: value | [lo, hi], ...}] (model/effect_law.hpp),
+///     columns: {name: column}, which read_columns() hands out
 ///
 /// Physical names: mass, yaw_inertia, viscous_linear, viscous_yaw, coulomb (differential_drive; viscous_x and viscous_y
 /// instead of viscous_linear where the friction is anisotropic); inertia, viscous, coulomb, offset (single_axis).
 /// Throws InputError, naming file, line, key, value and what was expected, for unknown or repeated keys, wrong types
 /// and impossible values.
 [[nodiscard]] Robot read_robot(const std::filesystem::path& path);
+
+/// Where the robot's logs have the columns of the log contract: name -> column of a file, or TOPIC.FIELD of a bag, as
+/// LogOptions::map has them.
+using ColumnMap = std::map<std::string, std::string>;
+
+/// The key `columns` of a robot file, or of the robot in a model.json; empty where there is none. Throws InputError as
+/// read_robot().
+[[nodiscard]] ColumnMap read_columns(const std::filesystem::path& path);
+
+/// The line of a robot file with that key; nothing where `columns` is empty.
+[[nodiscard]] std::string columns_yaml(const ColumnMap& columns);
 
 /// The same from text; `file` is for messages.
 [[nodiscard]] Robot parse_robot(std::string_view text, const std::string& file);

@@ -91,12 +91,15 @@ struct Maker {
     }
     robot.model = "differential_drive";
     if (wheels) {
-      out.origins["model"] = fmt::format("one driven wheel a side, left {}, right {}: {}", wheels->left.place.text(),
-                                         wheels->right.place.text(), wheels->reason);
+      out.origins["model"] =
+          fmt::format("{}, left {}, right {}: {}",
+                      wheels->others.empty() ? "one driven wheel a side" : "several driven wheels a side",
+                      wheels->left.place.text(), wheels->right.place.text(), wheels->reason);
     } else {
       out.origins["model"] = controller->place.text();
-      if (controller->left.size() > 1 || controller->right.size() > 1) {
-        controller->place.fail("names several wheels a side: robots that skid have no model yet (skid_steer)");
+      if (controller->left.size() != controller->right.size()) {
+        controller->place.fail(fmt::format("names {} left and {} right wheels: expected as many on each side",
+                                           controller->left.size(), controller->right.size()));
       }
     }
     out.origins["lever_arm"] = "default, because a wheel's force has the arm D/2";
@@ -124,9 +127,17 @@ struct Maker {
     std::vector<OriginNumber> radii, tracks;
     std::string no_radius =
         controller != nullptr ? controller->place.text() + ": has no wheel_radius: give --wheel-radius" : "";
+    // A robot that scrubs turns like a wider one: a multiplier that makes the wheels' own distance the controller's goes
+    // before it.
+    bool scrubs = false;
     if (tree != nullptr) {
       const Axle line = axle(*tree, *wheels);
-      tracks.push_back({line.track_width, {"", line.origin}});
+      const auto like = [&](double track) {
+        return std::abs(track / controller->track_width->value - 1.0) <= contradiction;
+      };
+      scrubs = controller != nullptr && controller->track_width && !like(line.track_width) &&
+               like(line.track_width * controller->track_multiplier);
+      tracks.push_back(scrubs ? *controller->track_width : OriginNumber{line.track_width, {"", line.origin}});
       out.remarks.insert(out.remarks.end(), line.remarks.begin(), line.remarks.end());
       // A radius that is given settles what the shapes leave open, and shapes that contradict each other.
       if (!hints.wheel_radius) {
@@ -142,7 +153,7 @@ struct Maker {
       if (facts != nullptr && facts->wheel_radius) {
         radii.push_back(*facts->wheel_radius);
       }
-      if (facts != nullptr && facts->track_width) {
+      if (facts != nullptr && facts->track_width && !(scrubs && facts == controller)) {
         tracks.push_back(*facts->track_width);
       }
     }
@@ -196,12 +207,12 @@ struct Maker {
     if (!lump.moving.empty()) {
       out.remarks.push_back("joints that may move, taken at zero: " + core::listed(lump.moving));
     }
-    offset("com_longitudinal", "a", lump.ahead, "before");
-    offset("com_lateral", "b", lump.left, "left of");
+    offset("com_longitudinal", "a", lump.ahead, lump.ahead < 0.0 ? "behind" : "before");
+    offset("com_lateral", "b", lump.left, lump.left < 0.0 ? "right of" : "left of");
   }
 
   void offset(const std::string& effect, const std::string& parameter, double value, const std::string& side) {
-    const std::string words = fmt::format("centre of mass {:.4g} m {} the middle of the axle", value, side);
+    const std::string words = fmt::format("centre of mass {:.4g} m {} the middle of the axle", std::abs(value), side);
     if (std::abs(value) > largest_offset * out.robot.track_width) {
       out.robot.effects.push_back({effect, {{parameter, Interval{value, value}}}});
       out.origins["effects." + effect] = fmt::format(

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <functional>
 
 #include <fmt/format.h>
 
@@ -13,10 +14,6 @@ namespace wheelwright::robots {
 namespace {
 
 constexpr double across = 0.99939;  // cos 2°
-
-constexpr const char* kSkidSteer =
-    "robots that skid with two or more wheels a side have no model yet (skid_steer): expected one driven wheel a side; "
-    "where the wheels of a side turn as one and the others hardly slip, name one of each with --left and --right";
 
 std::string lower(const TreeJoint& joint) {
   std::string out = joint.name + " " + joint.child;
@@ -101,23 +98,42 @@ WheelJoints driven_wheels(const RobotTree& tree, const NamedWheels& named) {
   if (named.left.empty() != named.right.empty()) {
     throw InputError(fmt::format("{}: names the wheels of one side only: expected both", named.by));
   }
-  if (named.left.size() > 1 || named.right.size() > 1) {
-    throw InputError(fmt::format("{}: names {} left and {} right wheels: {}", named.by, named.left.size(),
-                                 named.right.size(), kSkidSteer));
+  if (named.left.size() != named.right.size()) {
+    throw InputError(fmt::format("{}: names {} left and {} right wheels: expected as many on each side", named.by,
+                                 named.left.size(), named.right.size()));
   }
   if (!named.left.empty()) {
-    WheelJoints out{by_name(tree, named.right.front(), named.by), by_name(tree, named.left.front(), named.by),
-                    "named by " + named.by};
+    WheelJoints out{by_name(tree, named.right.front(), named.by),
+                    by_name(tree, named.left.front(), named.by),
+                    "named by " + named.by,
+                    {}};
     require_sides(out);
+    for (std::size_t k = 1; k < named.left.size(); ++k) {
+      out.others.push_back(by_name(tree, named.right[k], named.by));
+      out.others.push_back(by_name(tree, named.left[k], named.by));
+    }
     return out;
   }
   std::vector<TreeJoint> found = candidates_of(tree);
   if (found.size() > 2) {
     const auto left = std::count_if(found.begin(), found.end(), [](const auto& j) { return j.origin.y() > 0.0; });
-    const bool pairs = found.size() % 2 == 0 && 2 * left == static_cast<std::ptrdiff_t>(found.size());
-    throw InputError(fmt::format("{}: {} joints may be driven wheels{}:{}\n{}", tree.place.text(), found.size(),
-                                 pairs ? ", as many on each side" : "", described(found),
-                                 pairs ? kSkidSteer : "expected two: name them with --left and --right"));
+    if (2 * left != static_cast<std::ptrdiff_t>(found.size())) {
+      throw InputError(
+          fmt::format("{}: {} joints may be driven wheels:{}\nexpected as many on each side: name them with --left and "
+                      "--right",
+                      tree.place.text(), found.size(), described(found)));
+    }
+    std::ranges::stable_sort(found, std::greater(), [](const TreeJoint& j) { return j.origin.x(); });
+    std::ranges::stable_partition(found, [](const TreeJoint& j) { return j.origin.y() > 0.0; });
+    const auto second = static_cast<std::ptrdiff_t>(found.size() / 2);
+    WheelJoints out{found[static_cast<std::size_t>(second)],
+                    found.front(),
+                    "the continuous joints whose axes lie across the robot",
+                    {}};
+    require_names_agree(out);
+    out.others.assign(found.begin() + 1, found.begin() + second);
+    out.others.insert(out.others.end(), found.begin() + second + 1, found.end());
+    return out;
   }
   if (found.size() < 2) {
     std::vector<TreeJoint> any;
@@ -130,7 +146,7 @@ WheelJoints driven_wheels(const RobotTree& tree, const NamedWheels& named) {
   if (found[0].origin.y() > found[1].origin.y()) {
     std::swap(found[0], found[1]);
   }
-  WheelJoints out{found[0], found[1], "the continuous joints whose axes lie across the robot"};
+  WheelJoints out{found[0], found[1], "the continuous joints whose axes lie across the robot", {}};
   require_sides(out);
   require_names_agree(out);
   return out;
@@ -243,7 +259,7 @@ WheelRadius wheel_radius(const RobotTree& tree, const WheelJoints& wheels) {
 }
 
 Axle axle(const RobotTree& tree, const WheelJoints& wheels) {
-  const auto& [right, left, reason] = wheels;
+  const TreeJoint &right = wheels.right, &left = wheels.left;
   Axle out;
   const Eigen::Vector3d c_r = centre(tree, right), c_l = centre(tree, left);
   const Eigen::Vector3d apart = c_l - c_r;
@@ -266,6 +282,16 @@ Axle axle(const RobotTree& tree, const WheelJoints& wheels) {
   out.ahead = out.left.cross(Eigen::Vector3d::UnitZ()).normalized();
   out.up = out.ahead.cross(out.left);
   out.middle = 0.5 * (c_r + c_l);
+  for (const TreeJoint& other : wheels.others) {
+    out.middle += out.ahead * out.ahead.dot(centre(tree, other) - 0.5 * (c_r + c_l)) /
+                  static_cast<double>(2 + wheels.others.size());
+  }
+  if (!wheels.others.empty()) {
+    out.remarks.push_back(
+        fmt::format("{} wheels: the wheels of a side are taken to turn as one; such robots scrub in "
+                    "curves, so that `identify` finds a wider track",
+                    2 + wheels.others.size()));
+  }
   out.track_width = out.left.dot(apart);
   const double of_joints = out.left.dot(left.origin - right.origin);
   out.origin = fmt::format("between the origins of {} and {}", left.place.text(), right.place.text());

@@ -13,11 +13,12 @@
 
 namespace wheelwright::robots {
 
-/// The joints of the two driven wheels, and why these.
+/// The joints of the driven wheels, and why these.
 struct WheelJoints {
   TreeJoint right;
   TreeJoint left;
   std::string reason;  ///< "named by --left and --right", "the only continuous joints ...", "robot.urdf:80: ..."
+  std::vector<TreeJoint> others{};  ///< further wheels of robots that skid: each side turns as one
 };
 
 /// Names of the wheels' joints from outside the description, and who gave them ("--left and --right", "robot.urdf:9:
@@ -29,10 +30,10 @@ struct NamedWheels {
 
 /// The driven wheels of `tree`: those named; else the continuous joints with a level axis across the robot (within 2°
 /// of y) whose name, or whose link's name, does not say caster; where these are more than two, those that say wheel.
-/// Left is the one with the larger y. Throws InputError where this leaves other than one wheel on each side, listing
-/// the candidates and the options to give; where names and sides contradict each other; for a name that is no such
-/// joint (with the nearest that is); and for robots with two or more wheels a side, of which there is no model yet
-/// (skid steer).
+/// Left is the one with the larger y. As many wheels on each side are a robot that skids: the first of each side are
+/// `right` and `left`. Throws InputError where this leaves other than as many wheels on each side, listing the candidates
+/// and the options to give; where names and sides contradict each other; for a name that is no such joint (with the
+/// nearest that is).
 [[nodiscard]] WheelJoints driven_wheels(const RobotTree& tree, const NamedWheels& named);
 
 /// The axle of a differential drive, in the robot's frame.
@@ -64,7 +65,7 @@ struct WheelRadius {
 /// The axle through the centres of the wheels: D = uᵀ(c_L − c_R) with the wheels' common axis u. The centre of a wheel
 /// is that of its round collision shape (visual without one), projected on the joint's axis; without one the joint's
 /// origin. Throws InputError unless the axes are parallel to each other and to the line between the centres within 2°,
-/// and level within 2°.
+/// and level within 2°. Where there are further wheels, the middle is that of all, along the way ahead.
 [[nodiscard]] Axle axle(const RobotTree& tree, const WheelJoints& wheels);
 
 /// A robot as the model sees it: one body that carries the turning wheels.

@@ -112,7 +112,8 @@ TEST_F(Identify, FitsItsSchema) {
   double x = 0.0, y = 0.0, theta = 0.0;
   for (int k = 0; k < 3000; ++k) {
     const double t = 0.01 * k, r = 5.0 + 2.0 * std::sin(0.7 * t), l = 5.0 + 2.0 * std::cos(0.9 * t);
-    kinematics += fmt::format("{},{},{},{},{},{}\n", t, r, l, x, y, theta);
+    // Without an error of its own it would be the wheels over again.
+    kinematics += fmt::format("{},{},{},{},{},{}\n", t, r, l, x, y, theta + 0.003 * std::sin(1.7 * k));
     x += 0.01 * 0.0975 * 0.5 * (r + l) * std::cos(theta);
     y += 0.01 * 0.0975 * 0.5 * (r + l) * std::sin(theta);
     theta += 0.01 * 0.0975 * (r - l) / 0.381;

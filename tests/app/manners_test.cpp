@@ -81,12 +81,13 @@ TEST_F(Manners, EveryCommandHasExamples) {
 }
 
 TEST_F(Manners, MisspeltWordsAreUnderstood) {
-  for (const auto& [words, meant] : {std::pair{"comission x.csv", "did you mean 'commission' instead of 'comission'?"},
-                                     {"detect x.csv --modle m.json", "did you mean '--model' instead of '--modle'?"},
-                                     {"detect --qiuet x.csv", "'--quiet'"},
-                                     {"--verison", "'--version'"},
-                                     {"frobnicate", "there is no command 'frobnicate': expected one of commission"},
-                                     {"man dettect", "did you mean 'detect'?"}}) {
+  for (const auto& [words, meant] :
+       {std::pair{"comission x.csv", "did you mean 'commission' instead of 'comission'?"},
+        {"detect x.csv --modle m.json", "did you mean '--model' instead of '--modle'?"},
+        {"detect --qiuet x.csv", "'--quiet'"},
+        {"--verison", "'--version'"},
+        {"frobnicate", "there is no command 'frobnicate': expected one of try, commission"},
+        {"man dettect", "did you mean 'detect'?"}}) {
     const Outcome outcome = run(words);
     EXPECT_EQ(outcome.code, 2) << words;
     EXPECT_THAT(outcome.out, IsEmpty());

@@ -215,6 +215,43 @@ TEST_F(LogHealthTest, APoseFromTheWheelsIsTold) {
   expect("signals.pose_repeats_wheels", kWarning);
 }
 
+// Wheel odometry that a driver publishes at moments of its own, and a reader brings to the rows.
+TEST_F(LogHealthTest, APoseOfItsOwnStampsThatRepeatsTheWheels) {
+  const double c = 0.0975 / 0.381;
+  const std::vector<double>&right = log.column("phi_r"), &left = log.column("phi_l");
+  const auto heading = [&](double row) {
+    const auto k = std::min(static_cast<std::size_t>(row), log.rows() - 2);
+    const double part = row - static_cast<double>(k);
+    return c * ((1.0 - part) * (right[k] - left[k]) + part * (right[k + 1] - left[k + 1]));
+  };
+  std::vector<double>& theta = log.column("theta");
+  const std::vector<double> measured = theta;
+  for (std::size_t k = 0; k < log.rows(); ++k) {
+    const double before = 0.4 + 3.3 * std::floor((static_cast<double>(k) - 0.4) / 3.3);
+    const double part = (static_cast<double>(k) - before) / 3.3;
+    theta[k] = (1.0 - part) * heading(std::max(before, 0.0)) + part * heading(before + 3.3);
+  }
+  expect("signals.pose_repeats_wheels", kWarning);
+  theta = measured;
+  EXPECT_EQ(examine(log, robot).find("signals.pose_repeats_wheels"), nullptr);
+}
+
+TEST_F(LogHealthTest, DegreesAndRpmAreKnownWithoutAPose) {
+  remove({"x", "y", "theta", "gyro_z", "phi_r", "phi_l"});
+  scale({"omega_r", "omega_l"}, 30.0 / std::numbers::pi);
+  EXPECT_THAT(expect("units.effort", kFatal).sentence, ::testing::HasSubstr("rpm"));
+  scale({"omega_r", "omega_l"}, 6.0);
+  EXPECT_THAT(expect("units.effort", kFatal).sentence, ::testing::HasSubstr("deg/s"));
+}
+
+// Its speed, angle and effort alike: without a gyro, driving and turning change places.
+TEST_F(LogHealthTest, AMirroredMotorIsToldFromTheNominalValues) {
+  remove({"x", "y", "theta", "gyro_z"});
+  EXPECT_EQ(examine(log, robot).find("units.wheel_mirrored"), nullptr);
+  scale({"omega_l", "phi_l", "tau_l"}, -1.0);
+  expect("units.wheel_mirrored", kFatal);
+}
+
 TEST_F(LogHealthTest, ALatePoseIsTimed) {
   constexpr std::size_t kLate = 10;
   for (const char* name : {"x", "y", "theta"}) {

@@ -87,15 +87,40 @@ TEST(BagColumns, ArraysThatAreNotFilledAreNoColumns) {
             (Places{{"omega_r", "/joint_states.velocity[right]"}, {"omega_l", "/joint_states.velocity[left]"}}));
 }
 
-TEST(BagColumns, FourWheelsAreNotGuessedButSaid) {
+TEST(BagColumns, FourWheelsAreTwoSidesAndItIsSaid) {
   Bag bag;
   bag.add("/joint_states", "sensor_msgs/msg/JointState",
-          {"front_left_wheel", "front_right_wheel", "rear_left_wheel", "rear_right_wheel"}, all_arrays);
+          {"front_left_wheel", "front_right_wheel", "rear_left_wheel", "rear_right_wheel", "left_caster_wheel"},
+          all_arrays);
+  const BagChoice choice = bag.choose();
+  ASSERT_EQ(choice.sources.size(), 1U);
+  EXPECT_THAT(
+      choice.sources[0].columns,
+      Contains(BagColumn{"tau_r", {"effort[front_right_wheel]", "effort[rear_right_wheel]"}, BagColumn::Rule::sum}));
+  EXPECT_THAT(choice.sources[0].columns,
+              Contains(BagColumn{
+                  "omega_l", {"velocity[front_left_wheel]", "velocity[rear_left_wheel]"}, BagColumn::Rule::mean}));
+  EXPECT_THAT(choice.notes, Contains(HasSubstr("the right side is the mean motion and the sum of the efforts of "
+                                               "front_right_wheel and rear_right_wheel")));
+}
+
+TEST(BagColumns, JointsOfSeveralTopicsGiveTheirSide) {
+  Bag bag;
+  bag.add("/left/joint_states", "sensor_msgs/msg/JointState", {"wheel"}, {"velocity"});
+  bag.add("/motors/b", "sensor_msgs/msg/JointState", {"right_wheel"}, {"velocity"});
+  const Places found = bag.places();
+  EXPECT_EQ(found.at("omega_l"), "/left/joint_states.velocity[wheel]");
+  EXPECT_EQ(found.at("omega_r"), "/motors/b.velocity[right_wheel]");
+}
+
+TEST(BagColumns, SeveralJointsASideThatAreNoWheelsAreNotGuessed) {
+  Bag bag;
+  bag.add("/joint_states", "sensor_msgs/msg/JointState", {"left_hip", "left_knee", "right_hip", "right_knee"},
+          all_arrays);
   const BagChoice choice = bag.choose();
   EXPECT_THAT(choice.sources, IsEmpty());
-  EXPECT_THAT(choice.notes,
-              Contains(HasSubstr("has 2 right joints (front_right_wheel, rear_right_wheel): none was taken; "
-                                 "--map omega_r=/joint_states.velocity[front_right_wheel]")));
+  EXPECT_THAT(choice.notes, Contains(HasSubstr("has 2 right joints (right_hip, right_knee): none was taken; "
+                                               "--map omega_r=/joint_states.velocity[right_hip]")));
 }
 
 TEST(BagColumns, OneJointIsAnAxis) {
