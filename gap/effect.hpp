@@ -95,6 +95,7 @@ struct Effect {
                          ///< sampling interval); added to what an explanation with it may leave
   bool after_reversals = false;  ///< acts just after reversals of the torque, more sharply than its columns can
   bool above_band = false;       ///< it is the cause where the band above the filter's shows more just after them
+  bool free_form = false;        ///< its columns span many laws: no robot file and no simulator has a number for each
   std::string excite{};          ///< the manoeuvre that would show it
   DirectMeasurement measured_by = DirectMeasurement::none;
   std::function<Applicability(const Drive&)> applies{};  ///< empty: on every drive
