@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <wheelwright/gap/effect.hpp>
@@ -165,6 +166,75 @@ Effect viscous_asymmetric() {
               }};
 }
 
+// Viscous friction of any bend: Σ b_k g_k(ω) with b_k >= 0 and increasing g_k, ω/(1 + |ω|/ω_k) at two speeds, of which
+// mixtures make every friction whose slope falls with the speed as a power does, or slower (Stieltjes functions); ω; and
+// ω³ for a slope that grows. None of them is as steep about 0 as dry friction. The speeds are given, not looked for:
+// those of the drive on which the shape was chosen.
+std::vector<Signal> bent_signals(const Drive& drive, std::size_t joint, double bend) {
+  constexpr std::array kSpeeds{0.4, 1.5};  // of the bend
+  const Eigen::ArrayXd w = drive.joints[joint].smooth_speed.array() / bend;
+  std::vector<Signal> signals{w};
+  for (const double speed : kSpeeds) {
+    signals.emplace_back(w / (1.0 + w.abs() / speed));
+  }
+  signals.emplace_back(w.cube());
+  return signals;
+}
+
+ShapeParameter bend() {
+  return {.name = "bend",
+          .unit = "rad/s",
+          .lower = 1.0,
+          .upper = 1.0,
+          .scan = 1,
+          .discrete = true,
+          .scale = typical_speed};
+}
+
+std::vector<EffectParameter> bent_parameters() {
+  return {{"linear", "N·m", 1}, {"early_bend", "N·m", 1}, {"late_bend", "N·m", 1}, {"cubic", "N·m", 1}};
+}
+
+Effect viscous_bent() {
+  return {.name = "viscous",
+          .sentence = "Viscous friction whose slope changes with the speed.",
+          .parameters = bent_parameters(),
+          .shapes = {bend()},
+          .free_form = true,
+          .excite = "drive at different steady speeds, straight and turning",
+          .measured_by = DirectMeasurement::lifted_wheels,
+          .columns = [](const Drive& drive, Shape shape) {
+            std::vector<Column> columns(bent_parameters().size());
+            for (std::size_t j = 0; j < drive.joints.size(); ++j) {
+              const std::vector<Signal> signals = bent_signals(drive, j, shape[0]);
+              for (std::size_t k = 0; k < columns.size(); ++k) {
+                add(columns[k], at_joints(drive, only(drive, j, signals[k])));
+              }
+            }
+            return columns;
+          }};
+}
+
+Effect viscous_bent_on_one_side() {
+  return {.name = "viscous_asymmetric",
+          .sentence = "More viscous friction at one wheel than at the other, whose slope changes with the speed.",
+          .common = "viscous",
+          .parameters = bent_parameters(),
+          .shapes = {side(), bend()},
+          .free_form = true,
+          .excite = "drive straight at different steady speeds, with the pose logged",
+          .measured_by = DirectMeasurement::lifted_wheels,
+          .applies = needs_two_wheels,
+          .columns = [](const Drive& drive, Shape shape) {
+            const std::size_t j = shape[0] < 0.5 ? 0 : 1;
+            std::vector<Column> columns;
+            for (const Signal& signal : bent_signals(drive, j, shape[1])) {
+              columns.push_back(at_joints(drive, only(drive, j, signal)));
+            }
+            return columns;
+          }};
+}
+
 Effect quadratic_drag(std::size_t joints) {
   Effect effect{.name = "quadratic_drag",
                 .sentence = "Drag that grows with the square of the speed.",
@@ -191,20 +261,37 @@ Effect quadratic_drag(std::size_t joints) {
   return effect;
 }
 
+// Oil that gears churn in: of each wheel by itself.
+Effect drag_of_wheels() {
+  return {.name = "quadratic_drag",
+          .sentence = "Drag at each wheel that grows with the square of its speed.",
+          .parameters = {{"c_wheel", "N·m·s²/rad²", 1}},
+          .free_form = true,
+          .excite = "drive from slow to as fast as it goes, straight and turning",
+          .measured_by = DirectMeasurement::lifted_wheels,
+          .applies = needs_two_wheels,
+          .columns = [](const Drive& drive, Shape) {
+            return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
+                                           const auto w = drive.joints[j].smooth_speed.array();
+                                           return w * w.abs();
+                                         }))};
+          }};
+}
+
+Applicability needs_signed_efforts(const Drive& drive) {
+  return drive.efforts_unsigned ? Applicability{false,
+                                                "the log has the size of the efforts only, so that this friction would "
+                                                "be all of them"}
+                                : Applicability{};
+}
+
 Effect load_friction() {
   return {.name = "load_friction",
           .sentence = "Friction in proportion to the torque that is passed on, as in a worm or harmonic drive.",
           .parameters = {{"k", "1", 1}},
           .excite = "accelerate and brake hard, and drive at constant speed",
           .measured_by = DirectMeasurement::lifted_wheels,
-          .applies =
-              [](const Drive& drive) {
-                return drive.efforts_unsigned
-                           ? Applicability{false,
-                                           "the log has the size of the efforts only, so that this friction would "
-                                           "be all of them"}
-                           : Applicability{};
-              },
+          .applies = needs_signed_efforts,
           .columns =
               [](const Drive& drive, Shape) {
                 return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
@@ -212,6 +299,53 @@ Effect load_friction() {
                                                       speed_sign(drive, j).array();
                                              }))};
               }};
+}
+
+// Root mean square of the joints' efforts.
+double typical_load(const Drive& drive) {
+  double square = 0.0, count = 0.0;
+  for (const JointSignals& joint : drive.joints) {
+    square += joint.smooth_effort.squaredNorm();
+    count += static_cast<double>(joint.smooth_effort.size());
+  }
+  return std::max(std::sqrt(square / count), 1e-12);
+}
+
+// Friction that grows with the load in any way, from nothing: Σ c_k g_k(u) with c_k >= 0, u the load over a typical one,
+// g = u/(1 + 2u) for what grows early, u, and what lies above two loads for what grows late.
+Effect load_friction_of_any_growth() {
+  return {.name = "load_friction",
+          .sentence = "Friction that grows with the torque that is passed on.",
+          .parameters = {{"early", "N·m", 1}, {"even", "N·m", 1}, {"late", "N·m", 1}, {"latest", "N·m", 1}},
+          .shapes = {{.name = "load",
+                      .unit = "N·m",
+                      .lower = 1.0,
+                      .upper = 1.0,
+                      .scan = 1,
+                      .discrete = true,
+                      .scale = typical_load}},
+          .free_form = true,
+          .excite = "accelerate and brake hard, and drive at constant speed",
+          .measured_by = DirectMeasurement::lifted_wheels,
+          .applies = needs_signed_efforts,
+          .columns = [](const Drive& drive, Shape shape) {
+            constexpr std::array kAbove{0.5, 1.0};
+            std::vector<std::vector<Signal>> efforts(2 + kAbove.size());
+            for (std::size_t j = 0; j < drive.joints.size(); ++j) {
+              const Eigen::ArrayXd u = drive.joints[j].smooth_effort.array().abs() / shape[0];
+              const Eigen::ArrayXd sign = speed_sign(drive, j).array();
+              efforts[0].emplace_back(sign * u / (1.0 + 2.0 * u));
+              efforts[1].emplace_back(sign * u);
+              for (std::size_t k = 0; k < kAbove.size(); ++k) {
+                efforts[2 + k].emplace_back(sign * (u - kAbove[k]).max(0.0));
+              }
+            }
+            std::vector<Column> columns;
+            for (const std::vector<Signal>& effort : efforts) {
+              columns.push_back(at_joints(drive, effort));
+            }
+            return columns;
+          }};
 }
 
 Effect friction_drift() {
@@ -293,9 +427,11 @@ Effect lateral_scrub() {
 
 std::vector<Effect> friction_effects(std::size_t joints) {
   std::vector<Effect> effects{coulomb(),       stribeck(),       viscous(joints),       quadratic_drag(joints),
-                              load_friction(), friction_drift(), coulomb_of_bristles(), coulomb_smoothed()};
+                              load_friction(), friction_drift(), coulomb_of_bristles(), coulomb_smoothed(),
+                              viscous_bent(), load_friction_of_any_growth()};
   if (joints == 2) {
-    for (auto* make : {&coulomb_asymmetric, &viscous_asymmetric, &caster_drag, &lateral_scrub}) {
+    for (auto* make : {&coulomb_asymmetric, &viscous_asymmetric, &caster_drag, &lateral_scrub, &viscous_bent_on_one_side,
+                       &drag_of_wheels}) {
       effects.push_back(make());
     }
   }

@@ -7,6 +7,8 @@
 #include <limits>
 #include <optional>
 #include <random>
+#include <set>
+#include <string>
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/statistics.hpp>
@@ -57,7 +59,8 @@ class Selector {
   Selector(const CandidateTable& table, const std::vector<EffectKind>& kinds, double floor_error,
            const SelectionOptions& options)
       : table_(table), kinds_(kinds), floor_(floor_error), options_(options) {
-    const auto tried = static_cast<double>(std::max<std::size_t>(kinds.size(), 1));
+    const std::set<std::string> tried_names(table.names.begin(), table.names.end());  // laws of one name are one try
+    const auto tried = static_cast<double>(std::max<std::size_t>(tried_names.size(), 1));
     level_ = options.significance / (2.0 * tried);  // two tests of each
     critical_ = core::normal_upper_quantile(level_);
     moves_theta_only_.assign(kinds.size(), true);
@@ -320,6 +323,11 @@ class Selector {
     return table_.names[table_.candidates[candidate].effect];
   }
 
+  // Whether a member of `set` is an effect of this candidate's name.
+  [[nodiscard]] bool takes_name(const CauseSet& set, std::size_t candidate) const {
+    return std::ranges::any_of(set.members, [&](std::size_t c) { return name_of(c) == name_of(candidate); });
+  }
+
   // Parametric causes that let `structural` do with θ nominal as well as with θ fitted: sets of one or two, best first;
   // an empty one where none is needed. Nothing where no such set does.
   [[nodiscard]] std::vector<CauseSet> explain_theta(const CauseSet& structural) const {
@@ -347,12 +355,15 @@ class Selector {
         }
       };
       for (std::size_t i = 0; i < movers.size(); ++i) {
+        if (takes_name(held, movers[i])) {
+          continue;
+        }
         if (count == 1) {
           try_set({movers[i]});
           continue;
         }
         for (std::size_t j = i + 1; j < movers.size(); ++j) {
-          if (name_of(movers[i]) != name_of(movers[j])) {
+          if (name_of(movers[i]) != name_of(movers[j]) && !takes_name(held, movers[j])) {
             try_set({movers[i], movers[j]});
           }
         }
@@ -525,28 +536,57 @@ Selection select_causes(const CandidateTable& table, const std::vector<EffectKin
   return Selector(table, kinds, floor_error, options).run(nominal_trusted);
 }
 
+namespace {
+
+// Σ column² that is left beside the columns `on` with coefficients of these signs.
+double left_beside(const BlockGram& gram, std::size_t column, const std::vector<std::size_t>& on,
+                   const std::vector<int>& sign) {
+  const auto n = static_cast<Eigen::Index>(on.size());
+  Eigen::MatrixXd A(n, n);
+  Eigen::VectorXd b(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const std::size_t c = on[static_cast<std::size_t>(i)];
+    const double unit = 1.0 / std::sqrt(std::max(gram.square(c), std::numeric_limits<double>::min()));
+    b[i] = unit * gram.product(c, column);
+    for (Eigen::Index j = 0; j <= i; ++j) {
+      const std::size_t d = on[static_cast<std::size_t>(j)];
+      A(i, j) = A(j, i) =
+          unit * gram.product(c, d) / std::sqrt(std::max(gram.square(d), std::numeric_limits<double>::min()));
+    }
+  }
+  const Eigen::VectorXd x = signed_least_squares(A, b, sign).x;
+  return std::max(gram.square(column) + x.dot(A * x) - 2.0 * x.dot(b), 0.0);
+}
+
+}  // namespace
+
 double unexplained_by(const CandidateTable& table, const std::vector<std::size_t>& a, const std::vector<std::size_t>& b,
                       BaseModel base) {
-  const auto columns_of = [&](const std::vector<std::size_t>& members) {
-    std::vector<std::size_t> columns;
-    for (const std::size_t c : members) {
-      columns.insert(columns.end(), table.candidates[c].columns.begin(), table.candidates[c].columns.end());
-    }
-    return columns;
-  };
   const std::vector<std::size_t>& theta = base == BaseModel::refitted ? table.base : table.unknown;
-  const std::vector<std::size_t> of = columns_of(a);
   std::vector<std::size_t> on = theta;
-  for (const std::size_t column : columns_of(b)) {
-    on.push_back(column);
+  std::vector<int> sign(theta.size(), 0), opposite = sign;
+  for (const std::size_t c : b) {
+    const Candidate& member = table.candidates[c];
+    for (std::size_t k = 0; k < member.columns.size(); ++k) {
+      on.push_back(member.columns[k]);
+      sign.push_back(member.unit_coefficient ? 0 : member.sign[k]);
+      opposite.push_back(-sign.back());
+    }
   }
-  const Eigen::MatrixXd alone = remainder(*table.gram, of, theta);
-  const Eigen::MatrixXd beside = remainder(*table.gram, of, on);
   double share = 0.0;
-  for (Eigen::Index i = 0; i < alone.rows(); ++i) {
-    // What θ takes up is no column beside it.
-    if (alone(i, i) > 1e-6 * table.gram->square(of[static_cast<std::size_t>(i)])) {
-      share = std::max(share, std::clamp(beside(i, i) / alone(i, i), 0.0, 1.0));
+  for (const std::size_t c : a) {
+    const Candidate& member = table.candidates[c];
+    for (std::size_t k = 0; k < member.columns.size(); ++k) {
+      const std::size_t column = member.columns[k];
+      const double alone = left_beside(*table.gram, column, theta, {});
+      // What θ takes up is no column beside it.
+      if (!(alone > 1e-6 * table.gram->square(column))) {
+        continue;
+      }
+      const int way = member.unit_coefficient ? 1 : member.sign[k];
+      const double up = way < 0 ? 0.0 : left_beside(*table.gram, column, on, sign);
+      const double down = way > 0 ? 0.0 : left_beside(*table.gram, column, on, opposite);
+      share = std::max(share, std::clamp(std::max(up, down) / alone, 0.0, 1.0));
     }
   }
   return share;
