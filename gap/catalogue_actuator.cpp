@@ -68,6 +68,50 @@ Effect actuator_lag() {
           }};
 }
 
+// What is taken of an effort is taken at its peaks or edges only: more would be none of the robot's but a way to be rid
+// of the signal.
+bool leaves_most(const Signal& taken, const Signal& effort) {
+  constexpr double kMostSquare = 0.4;
+  return taken.squaredNorm() <= kMostSquare * effort.squaredNorm();
+}
+
+// u followed no faster than `slew`, from y = u at each segment's start.
+Signal followed(const Drive& drive, const Signal& u, double slew) {
+  const double most = slew * drive.step;
+  Signal y = u;
+  for (std::size_t s = 0; s < drive.segment_starts.size(); ++s) {
+    const auto [first, last] = drive.segment(s);
+    for (Eigen::Index k = first + 1; k < last; ++k) {
+      y[k] = y[k - 1] + std::clamp(u[k] - y[k - 1], -most, most);
+    }
+  }
+  return y;
+}
+
+Effect limited_rate() {
+  return {.name = "actuator_lag",
+          .sentence = "The actuator's torque follows its command no faster than at a largest rate.",
+          .family = "late_torque",
+          .shapes = {{.name = "rate",
+                      .unit = "N·m/s",
+                      .lower = 1.5,
+                      .upper = 40.0,
+                      .scan = 10,
+                      .logarithmic = true,
+                      .scale = typical_effort}},
+          .unit_coefficient = true,
+          .free_form = true,
+          .excite = "change the torque fast: steps and high frequencies",
+          .measured_by = DirectMeasurement::timing,
+          .columns = [](const Drive& drive, Shape shape) {
+            return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
+                                           const Signal& u = drive.joints[j].effort;
+                                           const Signal taken = u - followed(drive, u, shape[0]);
+                                           return leaves_most(taken, u) ? taken : Signal::Zero(u.size());
+                                         }))};
+          }};
+}
+
 Effect delay() {
   return {.name = "delay",
           .sentence = "The torque arrives later than it was commanded.",
@@ -193,12 +237,17 @@ Effect torque_deadzone() {
 // What a limit takes from an effort. A limit shows at peaks: one that most of the drive lies above, or that takes most
 // of the effort away, is none of the robot's but a way to be rid of the signal, and its column is nothing.
 Signal beyond_limit(const Signal& effort, double limit) {
-  constexpr double kMostSamples = 0.25, kMostSquare = 0.4;
+  constexpr double kMostSamples = 0.25;
   const Signal beyond = effort - effort.cwiseMax(-limit).cwiseMin(limit);
   const double samples = static_cast<double>((beyond.array() != 0.0).count());
-  const bool peaks = samples <= kMostSamples * static_cast<double>(effort.size()) &&
-                     beyond.squaredNorm() <= kMostSquare * effort.squaredNorm();
+  const bool peaks = samples <= kMostSamples * static_cast<double>(effort.size()) && leaves_most(beyond, effort);
   return peaks ? beyond : Signal::Zero(effort.size());
+}
+
+Applicability needs_commands(const Drive& drive) {
+  return drive.efforts_flowed
+             ? Applicability{false, "the efforts are currents that flowed, which no limit cut off"}
+             : Applicability{};
 }
 
 Effect saturation() {
@@ -213,18 +262,39 @@ Effect saturation() {
                       .scale = typical_effort}},
           .unit_coefficient = true,
           .excite = "accelerate as hard as it goes",
-          .applies =
-              [](const Drive& drive) {
-                return drive.efforts_flowed
-                           ? Applicability{false, "the efforts are currents that flowed, which no limit cut off"}
-                           : Applicability{};
-              },
-          .columns =
-              [](const Drive& drive, Shape shape) {
-                return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
-                                               return beyond_limit(drive.joints[j].effort, shape[0]);
-                                             }))};
-              }};
+          .applies = needs_commands,
+          .columns = [](const Drive& drive, Shape shape) {
+            return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
+                                           return beyond_limit(drive.joints[j].effort, shape[0]);
+                                         }))};
+          }};
+}
+
+// A limit that is neared little by little: τ of a command u is u/(1 + |u/τ_max|^p)^(1/p).
+Effect soft_saturation() {
+  return {.name = "saturation",
+          .sentence = "The actuator's torque falls short of what is commanded, the more the larger it is.",
+          .shapes = {{.name = "tau_max",
+                      .unit = "N·m",
+                      .lower = 1.5,
+                      .upper = 12.0,
+                      .scan = 8,
+                      .logarithmic = true,
+                      .scale = typical_effort},
+                     {.name = "sharpness", .unit = "1", .lower = 1.5, .upper = 6.0, .scan = 3, .logarithmic = true}},
+          .unit_coefficient = true,
+          .free_form = true,
+          .excite = "accelerate as hard as it goes",
+          .applies = needs_commands,
+          .columns = [](const Drive& drive, Shape shape) {
+            return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
+                                           const Signal& u = drive.joints[j].effort;
+                                           const Eigen::ArrayXd part =
+                                               (1.0 + (u.array().abs() / shape[0]).pow(shape[1])).pow(-1.0 / shape[1]);
+                                           const Signal taken = u.array() * (1.0 - part);
+                                           return leaves_most(taken, u) ? taken : Signal::Zero(u.size());
+                                         }))};
+          }};
 }
 
 // The inertia of a joint whose torque is all for acceleration.
@@ -339,7 +409,7 @@ Effect battery_sag() {
 std::vector<Effect> actuator_effects(std::size_t joints) {
   std::vector<Effect> effects{torque_bias(joints)};
   for (auto* make : {&actuator_lag, &delay, &sensor_time_offset, &torque_gain, &torque_deadzone, &saturation, &backlash,
-                     &battery_sag}) {
+                     &battery_sag, &limited_rate, &soft_saturation}) {
     effects.push_back(make());
   }
   if (joints == 2) {

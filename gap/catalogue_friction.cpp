@@ -31,38 +31,43 @@ Effect coulomb() {
 
 // Bristles that bend before they slide, over an angle δ: ż = ω (1 − z sgn ω), z of δ (Dahl 1968; LuGre without its
 // fading). What the sign does at once takes them a turn of 2δ.
+Signal bent_bristles(const Drive& drive, std::size_t joint, double bending) {
+  const Signal& speed = drive.joints[joint].smooth_speed;
+  Signal z = Signal::Zero(speed.size());
+  for (std::size_t s = 0; s < drive.segment_starts.size(); ++s) {
+    const auto [first, last] = drive.segment(s);
+    for (Eigen::Index k = first + 1; k < last; ++k) {
+      const double turn = 0.5 * (speed[k - 1] + speed[k]) * drive.step / bending;
+      const double towards = turn > 0.0 ? 1.0 : -1.0;
+      z[k] = towards + (z[k - 1] - towards) * std::exp(-std::abs(turn));
+    }
+  }
+  return z;
+}
+
+ShapeParameter bending() {
+  return {.name = "bending",
+          .unit = "rad",
+          .lower = 0.002,
+          .upper = 0.3,
+          .scan = 6,
+          .logarithmic = true,
+          .scale = [](const Drive& drive) { return typical_speed(drive) * kSecond; }};
+}
+
 Effect coulomb_of_bristles() {
   return {.name = "coulomb",
           .sentence = "Dry friction at every joint, whose contacts bend a little before they slide.",
           .family = "dry_friction",
           .parameters = {{"c", "N·m", 1}},
-          .shapes = {{.name = "bending",
-                      .unit = "rad",
-                      .lower = 0.01,
-                      .upper = 0.3,
-                      .scan = 4,
-                      .logarithmic = true,
-                      .scale = [](const Drive& drive) { return typical_speed(drive) * kSecond; }}},
+          .shapes = {bending()},
           .excite = "reverse often, turn on the spot, drive at several speeds",
           .measured_by = DirectMeasurement::lifted_wheels,
           .applies = [](const Drive& drive) { return needs_no(drive, "coulomb"); },
-          .columns =
-              [](const Drive& drive, Shape shape) {
-                return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
-                                               const Signal& speed = drive.joints[j].smooth_speed;
-                                               Signal z = Signal::Zero(speed.size());
-                                               for (std::size_t s = 0; s < drive.segment_starts.size(); ++s) {
-                                                 const auto [first, last] = drive.segment(s);
-                                                 for (Eigen::Index k = first + 1; k < last; ++k) {
-                                                   const double turn =
-                                                       0.5 * (speed[k - 1] + speed[k]) * drive.step / shape[0];
-                                                   const double towards = turn > 0.0 ? 1.0 : -1.0;
-                                                   z[k] = towards + (z[k - 1] - towards) * std::exp(-std::abs(turn));
-                                                 }
-                                               }
-                                               return z;
-                                             }))};
-              }};
+          .columns = [](const Drive& drive, Shape shape) {
+            return std::vector{at_joints(
+                drive, each_joint(drive, [&](std::size_t j) { return bent_bristles(drive, j, shape[0]); }))};
+          }};
 }
 
 // A smoothed sign, wider than that of coulomb().
@@ -100,6 +105,17 @@ Effect coulomb_asymmetric() {
             return std::vector{at_joints(drive, only(drive, 0, speed_sign(drive, 0))),
                                at_joints(drive, only(drive, 1, speed_sign(drive, 1)))};
           }};
+}
+
+Effect coulomb_asymmetric_of_bristles() {
+  Effect effect = coulomb_asymmetric();
+  effect.sentence = "Dry friction that differs between the wheels, whose contacts bend a little before they slide.";
+  effect.shapes = {bending()};
+  effect.columns = [](const Drive& drive, Shape shape) {
+    return std::vector{at_joints(drive, only(drive, 0, bent_bristles(drive, 0, shape[0]))),
+                       at_joints(drive, only(drive, 1, bent_bristles(drive, 1, shape[0])))};
+  };
+  return effect;
 }
 
 Effect stribeck() {
@@ -431,7 +447,7 @@ std::vector<Effect> friction_effects(std::size_t joints) {
                               viscous_bent(), load_friction_of_any_growth()};
   if (joints == 2) {
     for (auto* make : {&coulomb_asymmetric, &viscous_asymmetric, &caster_drag, &lateral_scrub, &viscous_bent_on_one_side,
-                       &drag_of_wheels}) {
+                       &drag_of_wheels, &coulomb_asymmetric_of_bristles}) {
       effects.push_back(make());
     }
   }

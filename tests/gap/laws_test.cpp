@@ -47,6 +47,8 @@ struct Side {
   double wheel = 0.0;   // rad/s, seen by the encoder
   double ground = 0.0;  // m/s
   double ahead = 0.0;   // rad, of the motor, from the middle of the play
+  double angle = 0.0;   // rad, of the wheel
+  bool is_left = false;
 };
 
 /// Play of ±half between rotor and wheel. Where they touch they hold together for as long as they push, and part with
@@ -91,6 +93,19 @@ struct Sliding {
   }
 };
 
+/// Wheel and motor in one, which a further torque `lost(side, torque)` works against.
+template <typename Lost>
+struct Resisted {
+  Lost lost;
+
+  void advance(Side& s, double torque) const {
+    s.wheel += kFine * (torque - kDamping * s.wheel - lost(s, torque)) / kLoad;
+    s.angle += kFine * s.wheel;
+    s.motor = s.wheel;
+    s.ground = kRadius * s.wheel;
+  }
+};
+
 /// 80 s under a speed controller, as a log: encoder counts, noise of torque and pose, `t` at the middle of each
 /// interval.
 template <typename Law>
@@ -105,6 +120,7 @@ LogTable log_of(const Law& law, std::uint64_t seed) {
   const double phases[6] = {phase(generator), phase(generator), phase(generator),
                             phase(generator), phase(generator), phase(generator)};
   Side sides[2];
+  sides[1].is_left = true;
   double angle[2] = {0.0, 0.0}, sum[2] = {0.0, 0.0}, x = 0.0, y = 0.0, heading = 0.0;
   double counted[2] = {0.0, 0.0};
   const double count = 2.0 * 3.141592653589793 / 8192.0;
@@ -208,6 +224,64 @@ TEST(Laws, SlipIsFoundByTheFrictionOfItsContact) {
     EXPECT_TRUE(is_kept(found, "longitudinal_slip")) << law.most << " N: " << kept(found);
     EXPECT_NE(found.verdict, GapVerdict::no_gap);
   }
+}
+
+template <typename Lost>
+std::string causes_against(const Lost& lost) {
+  const Diagnosis found = diagnosis_of(Resisted<Lost>{lost});
+  const std::set<std::string> names = names_of(found);
+  return core::enumerated({names.begin(), names.end()}) + (found.verdict == GapVerdict::unexplained ? ", unexplained" : "");
+}
+
+constexpr double kTop = 6.0;  // rad/s, that these drives come to
+
+TEST(Laws, ViscousFrictionMayBendInAnyWay) {
+  const auto palmgren = [](const Side& s, double) { return std::copysign(std::pow(std::abs(s.wheel), 2.0 / 3.0), s.wheel); };
+  const auto sheared = [](const Side& s, double) { return std::asinh(s.wheel / (0.15 * kTop)); };
+  const auto carreau = [](const Side& s, double) { return s.wheel / std::pow(1.0 + s.wheel * s.wheel, 0.35); };
+  const auto thickening = [](const Side& s, double) { return s.wheel * std::exp(std::abs(s.wheel) / kTop); };
+  const auto on_both = [](const auto& law, double size) {
+    return causes_against([=](const Side& s, double t) { return size * law(s, t); });
+  };
+  const auto on_left = [](const auto& law, double size) {
+    return causes_against([=](const Side& s, double t) { return s.is_left ? size * law(s, t) : 0.0; });
+  };
+  EXPECT_EQ(on_both(palmgren, 0.1), "viscous");
+  EXPECT_EQ(on_both(sheared, 0.12), "viscous");
+  EXPECT_EQ(on_both(thickening, 0.04), "viscous");
+  EXPECT_EQ(on_left(palmgren, 0.12), "viscous_asymmetric");
+  EXPECT_EQ(on_left(carreau, 0.2), "viscous_asymmetric");
+}
+
+TEST(Laws, DryFrictionIsNoBentViscousOne) {
+  EXPECT_EQ(causes_against([](const Side& s, double) { return 0.2 * std::tanh(s.wheel / 0.1); }), "coulomb");
+}
+
+TEST(Laws, FrictionMayGrowWithTheLoadInAnyWay) {
+  const auto against = [](const auto& by_load) {
+    return causes_against([=](const Side& s, double t) { return by_load(std::abs(t)) * std::tanh(s.wheel / 0.02); });
+  };
+  EXPECT_EQ(against([](double load) { return 0.15 * std::pow(load, 0.6); }), "load_friction");
+  EXPECT_EQ(against([](double load) { return 0.4 * std::max(load - 0.3, 0.0); }), "load_friction");
+}
+
+TEST(Laws, DragMayBeThatOfTheWheels) {
+  EXPECT_EQ(causes_against([](const Side& s, double) { return 0.02 * s.wheel * std::abs(s.wheel); }), "quadratic_drag");
+}
+
+// A flat, as a bump of the axle's height once a turn, and an oval; magnets that pull a motor into places are no wheel.
+TEST(Laws, WheelsMayBeOfAnyForm) {
+  const auto bump = [](const Side& s, double) {
+    return 0.4 * std::sin(s.angle) * std::exp(2.0 * (std::cos(s.angle) - 1.0));
+  };
+  const auto oval = [](const Side& s, double) {
+    return s.is_left ? 0.2 * std::cos(2.0 * s.angle) + 0.08 * std::sin(3.0 * s.angle) : 0.0;
+  };
+  EXPECT_EQ(causes_against(bump), "wheel_out_of_round");
+  EXPECT_EQ(causes_against(oval), "wheel_out_of_round");
+  const Diagnosis cogged = diagnosis_of(Resisted{[](const Side& s, double) { return 0.2 * std::sin(9.0 * s.angle); }});
+  EXPECT_EQ(cogged.verdict, GapVerdict::unexplained);
+  EXPECT_FALSE(names_of(cogged).contains("wheel_out_of_round"));
 }
 
 TEST(Laws, ALoadOffTheMiddleIsOneCause) {
