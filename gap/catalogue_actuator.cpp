@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include <wheelwright/filter/kernel.hpp>
 #include <wheelwright/gap/effect.hpp>
 
 namespace wheelwright::gap {
@@ -11,20 +10,6 @@ namespace {
 using namespace catalogue;
 using Signal = Eigen::VectorXd;
 using Shape = std::span<const double>;
-
-// u through T y' = u − y, from y = u at each segment's start.
-Signal lagged(const Drive& drive, const Signal& u, double T) {
-  const filter::StepWeights w(1.0 / T, drive.step);
-  Signal y(u.size());
-  for (std::size_t s = 0; s < drive.segment_starts.size(); ++s) {
-    const auto [first, last] = drive.segment(s);
-    y[first] = u[first];
-    for (Eigen::Index k = first + 1; k < last; ++k) {
-      y[k] = w.decay() * y[k - 1] + (w.begin1() * u[k - 1] + w.end1() * u[k]) / T;
-    }
-  }
-  return y;
-}
 
 // u(t − delay), linear between instants, held at a segment's ends.
 Signal shifted(const Drive& drive, const Signal& u, double delay) {
@@ -41,8 +26,6 @@ Signal shifted(const Drive& drive, const Signal& u, double delay) {
   }
   return y;
 }
-
-double typical_effort(const Drive& drive) { return std::max(deviation(drive.joints[0].smooth_effort), 1e-12); }
 
 ShapeParameter duration(const char* name) {
   return {.name = name, .unit = "s", .lower = 0.004, .upper = 0.25, .scan = 40, .logarithmic = true, .resolution = 0.1};
@@ -404,12 +387,37 @@ Effect battery_sag() {
           }};
 }
 
+// Sag by what is drawn: at once, with a lag of some seconds (a second resistance beside a capacity), and by power.
+Effect battery_sag_by_load() {
+  return {.name = "battery_sag",
+          .sentence = "The torque falls short as the battery empties, and by what was drawn just now.",
+          .parameters = {{"k", "1/s", 1}, {"R_b", "1/(N·m)", 1}, {"R_slow", "1/(N·m)", 1}, {"by_power", "1/W", 1}},
+          .free_form = true,
+          .excite = "drive for long, and with heavy loads now and then",
+          .columns = [](const Drive& drive, Shape) {
+            constexpr double kSlow = 3.0;  // s
+            Signal load = Signal::Zero(drive.rows()), power = load;
+            for (const JointSignals& joint : drive.joints) {
+              load += joint.smooth_effort.cwiseAbs();
+              power += joint.smooth_effort.cwiseProduct(joint.smooth_speed);
+            }
+            std::vector<Column> columns;
+            for (const Signal& drawn : {Signal(drive.t.array() - drive.t[0]), load, lagged(drive, load, kSlow),
+                                        Signal(power.cwiseMax(0.0))}) {
+              columns.push_back(at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
+                                            return drawn.cwiseProduct(drive.joints[j].expected_effort);
+                                          })));
+            }
+            return columns;
+          }};
+}
+
 }  // namespace
 
 std::vector<Effect> actuator_effects(std::size_t joints) {
   std::vector<Effect> effects{torque_bias(joints)};
   for (auto* make : {&actuator_lag, &delay, &sensor_time_offset, &torque_gain, &torque_deadzone, &saturation, &backlash,
-                     &battery_sag, &limited_rate, &soft_saturation}) {
+                     &battery_sag, &limited_rate, &soft_saturation, &battery_sag_by_load}) {
     effects.push_back(make());
   }
   if (joints == 2) {

@@ -31,8 +31,7 @@ Effect coulomb() {
 
 // Bristles that bend before they slide, over an angle δ: ż = ω (1 − z sgn ω), z of δ (Dahl 1968; LuGre without its
 // fading). What the sign does at once takes them a turn of 2δ.
-Signal bent_bristles(const Drive& drive, std::size_t joint, double bending) {
-  const Signal& speed = drive.joints[joint].smooth_speed;
+Signal bent_bristles(const Drive& drive, const Signal& speed, double bending) {
   Signal z = Signal::Zero(speed.size());
   for (std::size_t s = 0; s < drive.segment_starts.size(); ++s) {
     const auto [first, last] = drive.segment(s);
@@ -65,8 +64,9 @@ Effect coulomb_of_bristles() {
           .measured_by = DirectMeasurement::lifted_wheels,
           .applies = [](const Drive& drive) { return needs_no(drive, "coulomb"); },
           .columns = [](const Drive& drive, Shape shape) {
-            return std::vector{at_joints(
-                drive, each_joint(drive, [&](std::size_t j) { return bent_bristles(drive, j, shape[0]); }))};
+            return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) {
+                                           return bent_bristles(drive, drive.joints[j].smooth_speed, shape[0]);
+                                         }))};
           }};
 }
 
@@ -112,8 +112,11 @@ Effect coulomb_asymmetric_of_bristles() {
   effect.sentence = "Dry friction that differs between the wheels, whose contacts bend a little before they slide.";
   effect.shapes = {bending()};
   effect.columns = [](const Drive& drive, Shape shape) {
-    return std::vector{at_joints(drive, only(drive, 0, bent_bristles(drive, 0, shape[0]))),
-                       at_joints(drive, only(drive, 1, bent_bristles(drive, 1, shape[0])))};
+    std::vector<Column> columns;
+    for (std::size_t j = 0; j < 2; ++j) {
+      columns.push_back(at_joints(drive, only(drive, j, bent_bristles(drive, drive.joints[j].smooth_speed, shape[0]))));
+    }
+    return columns;
   };
   return effect;
 }
@@ -182,17 +185,19 @@ Effect viscous_asymmetric() {
               }};
 }
 
-// Viscous friction of any bend: Σ b_k g_k(ω) with b_k >= 0 and increasing g_k, ω/(1 + |ω|/ω_k) at two speeds, of which
-// mixtures make every friction whose slope falls with the speed as a power does, or slower (Stieltjes functions); ω; and
+// Viscous friction of any bend: Σ b_k g_k(ω) with b_k >= 0 and increasing g_k, ω; ω/(1 + |ω|/ω_k) at two speeds, of which
+// mixtures make every friction whose slope falls with the speed as a power does, or slower (Stieltjes functions); ω|ω| and
 // ω³ for a slope that grows. None of them is as steep about 0 as dry friction. The speeds are given, not looked for:
-// those of the drive on which the shape was chosen.
+// those of the drive on which the shape was chosen. ω is the measured one, as in the base model, so that θ fitted again
+// takes it all.
 std::vector<Signal> bent_signals(const Drive& drive, std::size_t joint, double bend) {
   constexpr std::array kSpeeds{0.4, 1.5};  // of the bend
   const Eigen::ArrayXd w = drive.joints[joint].smooth_speed.array() / bend;
-  std::vector<Signal> signals{w};
+  std::vector<Signal> signals{drive.joints[joint].speed / bend};
   for (const double speed : kSpeeds) {
     signals.emplace_back(w / (1.0 + w.abs() / speed));
   }
+  signals.emplace_back(w * w.abs());
   signals.emplace_back(w.cube());
   return signals;
 }
@@ -208,7 +213,7 @@ ShapeParameter bend() {
 }
 
 std::vector<EffectParameter> bent_parameters() {
-  return {{"linear", "N·m", 1}, {"early_bend", "N·m", 1}, {"late_bend", "N·m", 1}, {"cubic", "N·m", 1}};
+  return {{"linear", "N·m", 1}, {"early_bend", "N·m", 1}, {"late_bend", "N·m", 1}, {"square", "N·m", 1}, {"cubic", "N·m", 1}};
 }
 
 Effect viscous_bent() {
@@ -328,11 +333,13 @@ double typical_load(const Drive& drive) {
 }
 
 // Friction that grows with the load in any way, from nothing: Σ c_k g_k(u) with c_k >= 0, u the load over a typical one,
-// g = u/(1 + 2u) for what grows early, u, and what lies above two loads for what grows late.
+// g = u/(1 + 2u) for what grows early, u, and what lies above two loads for what grows late; and u where the wheel drives
+// the motor, which gears lose more of.
 Effect load_friction_of_any_growth() {
   return {.name = "load_friction",
           .sentence = "Friction that grows with the torque that is passed on.",
-          .parameters = {{"early", "N·m", 1}, {"even", "N·m", 1}, {"late", "N·m", 1}, {"latest", "N·m", 1}},
+          .parameters = {{"early", "N·m", 1}, {"even", "N·m", 1}, {"late", "N·m", 1}, {"latest", "N·m", 1},
+                         {"driven_back", "N·m", 1}},
           .shapes = {{.name = "load",
                       .unit = "N·m",
                       .lower = 1.0,
@@ -346,7 +353,7 @@ Effect load_friction_of_any_growth() {
           .applies = needs_signed_efforts,
           .columns = [](const Drive& drive, Shape shape) {
             constexpr std::array kAbove{0.5, 1.0};
-            std::vector<std::vector<Signal>> efforts(2 + kAbove.size());
+            std::vector<std::vector<Signal>> efforts(3 + kAbove.size());
             for (std::size_t j = 0; j < drive.joints.size(); ++j) {
               const Eigen::ArrayXd u = drive.joints[j].smooth_effort.array().abs() / shape[0];
               const Eigen::ArrayXd sign = speed_sign(drive, j).array();
@@ -355,12 +362,32 @@ Effect load_friction_of_any_growth() {
               for (std::size_t k = 0; k < kAbove.size(); ++k) {
                 efforts[2 + k].emplace_back(sign * (u - kAbove[k]).max(0.0));
               }
+              const Eigen::ArrayXd back = -sign * drive.joints[j].smooth_effort.array() / shape[0];
+              efforts.back().emplace_back(sign * back.max(0.0));
             }
             std::vector<Column> columns;
             for (const std::vector<Signal>& effort : efforts) {
               columns.push_back(at_joints(drive, effort));
             }
             return columns;
+          }};
+}
+
+// The load as it was a moment ago: what presses the parts together follows it with a lag.
+Effect load_friction_that_lags() {
+  return {.name = "load_friction",
+          .sentence = "Friction in proportion to the torque that was passed on a moment ago.",
+          .parameters = {{"k", "1", 1}},
+          .shapes = {{.name = "lag", .unit = "s", .lower = 0.04, .upper = 0.5, .scan = 4, .logarithmic = true}},
+          .free_form = true,
+          .excite = "accelerate and brake hard, and drive at constant speed",
+          .measured_by = DirectMeasurement::lifted_wheels,
+          .applies = needs_signed_efforts,
+          .columns = [](const Drive& drive, Shape shape) {
+            return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
+                                           const Signal load = drive.joints[j].smooth_effort.cwiseAbs();
+                                           return lagged(drive, load, shape[0]).cwiseProduct(speed_sign(drive, j));
+                                         }))};
           }};
 }
 
@@ -439,15 +466,63 @@ Effect lateral_scrub() {
           }};
 }
 
+// Tyres that bend before they slide, by the angle turned.
+Effect scrub_of_bristles() {
+  Effect effect = lateral_scrub();
+  effect.sentence = "Tyres that bend and then scrub when the robot turns.";
+  effect.free_form = true;
+  effect.shapes = {{.name = "bending",
+                    .unit = "rad",
+                    .lower = 0.003,
+                    .upper = 0.3,
+                    .scan = 4,
+                    .logarithmic = true,
+                    .scale = [](const Drive& drive) {
+                      return std::max(deviation(drive.coordinates[1].smooth_speed), 1e-12) * kSecond;
+                    }}};
+  effect.columns = [](const Drive& drive, Shape shape) {
+    Column column;
+    column.effort = {{}, bent_bristles(drive, drive.coordinates[1].smooth_speed, shape[0])};
+    return std::vector{column};
+  };
+  return effect;
+}
+
+// A castor whose force grows with its speed, as a power of it below 1.
+Effect caster_drag_that_grows() {
+  constexpr std::array kPowers{0.0, 0.6};
+  Effect effect = caster_drag();
+  effect.sentence = "A castor or skid that drags, the more the faster it moves.";
+  effect.free_form = true;
+  effect.parameters = {{"c", "N·m", 1}, {"c_growing", "N·m·(s/m)^0.6", 1}};
+  effect.shapes[1].scan = 1;
+  effect.shapes[1].discrete = true;
+  effect.columns = [kPowers](const Drive& drive, Shape shape) {
+    const double p = shape[0];
+    const auto v1 = drive.coordinates[0].smooth_speed.array();
+    const auto v2 = drive.coordinates[1].smooth_speed.array();
+    const Eigen::ArrayXd v = (v1.square() + (p * v2).square() + shape[1] * shape[1]).sqrt();
+    std::vector<Column> columns;
+    for (const double power : kPowers) {
+      Column column;
+      column.effort = {v1 * v.pow(power - 1.0), p * p * v2 * v.pow(power - 1.0)};
+      columns.push_back(std::move(column));
+    }
+    return columns;
+  };
+  return effect;
+}
+
 }  // namespace
 
 std::vector<Effect> friction_effects(std::size_t joints) {
   std::vector<Effect> effects{coulomb(),       stribeck(),       viscous(joints),       quadratic_drag(joints),
                               load_friction(), friction_drift(), coulomb_of_bristles(), coulomb_smoothed(),
-                              viscous_bent(), load_friction_of_any_growth()};
+                              viscous_bent(), load_friction_of_any_growth(),
+                              load_friction_that_lags()};
   if (joints == 2) {
     for (auto* make : {&coulomb_asymmetric, &viscous_asymmetric, &caster_drag, &lateral_scrub, &viscous_bent_on_one_side,
-                       &drag_of_wheels, &coulomb_asymmetric_of_bristles}) {
+                       &drag_of_wheels, &coulomb_asymmetric_of_bristles, &scrub_of_bristles, &caster_drag_that_grows}) {
       effects.push_back(make());
     }
   }

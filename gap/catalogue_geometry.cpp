@@ -354,7 +354,7 @@ Effect longitudinal_slip() {
                       .logarithmic = true,
                       .scale =
                           [](const Drive& drive) {
-                            return std::max(deviation(drive.joints[0].smooth_effort), 1e-12) / drive.wheel_radius;
+                            return typical_effort(drive) / drive.wheel_radius;
                           }},
                      {.name = "largest", .unit = "1", .lower = 0.05, .upper = 1.0, .scan = 3, .logarithmic = true}},
           .unit_coefficient = true,

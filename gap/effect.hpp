@@ -141,6 +141,12 @@ namespace wheelwright::gap::catalogue {
 /// Typical speed of the joints (standard deviation of the first one's), rad/s; > 0.
 [[nodiscard]] double typical_speed(const Drive& drive);
 
+/// Typical effort of the joints (standard deviation of the first one's), > 0.
+[[nodiscard]] double typical_effort(const Drive& drive);
+
+/// `signal` through the lag T y' = signal − y, from y = signal at each segment's start.
+[[nodiscard]] Eigen::VectorXd lagged(const Drive& drive, const Eigen::VectorXd& signal, double T);
+
 /// The column of additional efforts at the joints (empty ones stand for zeros): Model::input times them.
 [[nodiscard]] Column at_joints(const Drive& drive, const std::vector<Eigen::VectorXd>& effort);
 

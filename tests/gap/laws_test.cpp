@@ -3,8 +3,10 @@
 /// Effects that follow laws which no column of the catalogue has: play with any contact, slip by a contact's own
 /// friction. The worlds here integrate two masses on each wheel and know nothing of the columns.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
+#include <memory>
 #include <random>
 #include <set>
 #include <string>
@@ -255,6 +257,23 @@ TEST(Laws, ViscousFrictionMayBendInAnyWay) {
 
 TEST(Laws, DryFrictionIsNoBentViscousOne) {
   EXPECT_EQ(causes_against([](const Side& s, double) { return 0.2 * std::tanh(s.wheel / 0.1); }), "coulomb");
+  const auto bristles = [z = std::make_shared<std::array<double, 2>>()](const Side& s, double) {
+    double& bent = (*z)[s.is_left ? 1 : 0];
+    bent += kFine * s.wheel * (1.0 - bent * std::copysign(1.0, s.wheel)) / 0.03;
+    return (s.is_left ? 0.1 : 0.25) * bent;
+  };
+  EXPECT_EQ(causes_against(bristles), "coulomb_asymmetric");
+}
+
+TEST(Laws, TorqueMayFallShortOfItsCommandInAnyWay) {
+  const auto soft = [](const Side&, double t) { return t - 1.5 * std::tanh(t / 1.5); };
+  const auto slow = [y = std::make_shared<std::array<double, 2>>()](const Side& s, double t) {
+    double& torque = (*y)[s.is_left ? 1 : 0];
+    torque += std::clamp(t - torque, -3.0 * kFine, 3.0 * kFine);
+    return t - torque;
+  };
+  EXPECT_EQ(causes_against(soft), "saturation");
+  EXPECT_EQ(causes_against(slow), "actuator_lag");
 }
 
 TEST(Laws, FrictionMayGrowWithTheLoadInAnyWay) {
