@@ -488,31 +488,6 @@ Effect scrub_of_bristles() {
   return effect;
 }
 
-// A castor whose force grows with its speed, as a power of it below 1.
-Effect caster_drag_that_grows() {
-  constexpr std::array kPowers{0.0, 0.6};
-  Effect effect = caster_drag();
-  effect.sentence = "A castor or skid that drags, the more the faster it moves.";
-  effect.free_form = true;
-  effect.parameters = {{"c", "N·m", 1}, {"c_growing", "N·m·(s/m)^0.6", 1}};
-  effect.shapes[1].scan = 1;
-  effect.shapes[1].discrete = true;
-  effect.columns = [kPowers](const Drive& drive, Shape shape) {
-    const double p = shape[0];
-    const auto v1 = drive.coordinates[0].smooth_speed.array();
-    const auto v2 = drive.coordinates[1].smooth_speed.array();
-    const Eigen::ArrayXd v = (v1.square() + (p * v2).square() + shape[1] * shape[1]).sqrt();
-    std::vector<Column> columns;
-    for (const double power : kPowers) {
-      Column column;
-      column.effort = {v1 * v.pow(power - 1.0), p * p * v2 * v.pow(power - 1.0)};
-      columns.push_back(std::move(column));
-    }
-    return columns;
-  };
-  return effect;
-}
-
 }  // namespace
 
 std::vector<Effect> friction_effects(std::size_t joints) {
@@ -522,7 +497,7 @@ std::vector<Effect> friction_effects(std::size_t joints) {
                               load_friction_that_lags()};
   if (joints == 2) {
     for (auto* make : {&coulomb_asymmetric, &viscous_asymmetric, &caster_drag, &lateral_scrub, &viscous_bent_on_one_side,
-                       &drag_of_wheels, &coulomb_asymmetric_of_bristles, &scrub_of_bristles, &caster_drag_that_grows}) {
+                       &drag_of_wheels, &coulomb_asymmetric_of_bristles, &scrub_of_bristles}) {
       effects.push_back(make());
     }
   }
