@@ -228,9 +228,8 @@ Signal beyond_limit(const Signal& effort, double limit) {
 }
 
 Applicability needs_commands(const Drive& drive) {
-  return drive.efforts_flowed
-             ? Applicability{false, "the efforts are currents that flowed, which no limit cut off"}
-             : Applicability{};
+  return drive.efforts_flowed ? Applicability{false, "the efforts are currents that flowed, which no limit cut off"}
+                              : Applicability{};
 }
 
 Effect saturation() {

@@ -63,11 +63,12 @@ Effect coulomb_of_bristles() {
           .excite = "reverse often, turn on the spot, drive at several speeds",
           .measured_by = DirectMeasurement::lifted_wheels,
           .applies = [](const Drive& drive) { return needs_no(drive, "coulomb"); },
-          .columns = [](const Drive& drive, Shape shape) {
-            return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) {
-                                           return bent_bristles(drive, drive.joints[j].smooth_speed, shape[0]);
-                                         }))};
-          }};
+          .columns =
+              [](const Drive& drive, Shape shape) {
+                return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) {
+                                               return bent_bristles(drive, drive.joints[j].smooth_speed, shape[0]);
+                                             }))};
+              }};
 }
 
 // A smoothed sign, wider than that of coulomb().
@@ -185,11 +186,11 @@ Effect viscous_asymmetric() {
               }};
 }
 
-// Viscous friction of any bend: Σ b_k g_k(ω) with b_k >= 0 and increasing g_k, ω; ω/(1 + |ω|/ω_k) at two speeds, of which
-// mixtures make every friction whose slope falls with the speed as a power does, or slower (Stieltjes functions); ω|ω| and
-// ω³ for a slope that grows. None of them is as steep about 0 as dry friction. The speeds are given, not looked for:
-// those of the drive on which the shape was chosen. ω is the measured one, as in the base model, so that θ fitted again
-// takes it all.
+// Viscous friction of any bend: Σ b_k g_k(ω) with b_k >= 0 and increasing g_k, ω; ω/(1 + |ω|/ω_k) at two speeds, of
+// which mixtures make every friction whose slope falls with the speed as a power does, or slower (Stieltjes functions);
+// ω|ω| and ω³ for a slope that grows. None of them is as steep about 0 as dry friction. The speeds are given, not looked
+// for: those of the drive on which the shape was chosen. The linear ω is the measured one, as in the base model, so that
+// θ fitted again takes it all.
 std::vector<Signal> bent_signals(const Drive& drive, std::size_t joint, double bend) {
   constexpr std::array kSpeeds{0.4, 1.5};  // of the bend
   const Eigen::ArrayXd w = drive.joints[joint].smooth_speed.array() / bend;
@@ -203,17 +204,16 @@ std::vector<Signal> bent_signals(const Drive& drive, std::size_t joint, double b
 }
 
 ShapeParameter bend() {
-  return {.name = "bend",
-          .unit = "rad/s",
-          .lower = 1.0,
-          .upper = 1.0,
-          .scan = 1,
-          .discrete = true,
-          .scale = typical_speed};
+  return {
+      .name = "bend", .unit = "rad/s", .lower = 1.0, .upper = 1.0, .scan = 1, .discrete = true, .scale = typical_speed};
 }
 
 std::vector<EffectParameter> bent_parameters() {
-  return {{"linear", "N·m", 1}, {"early_bend", "N·m", 1}, {"late_bend", "N·m", 1}, {"square", "N·m", 1}, {"cubic", "N·m", 1}};
+  return {{"linear", "N·m", 1},
+          {"early_bend", "N·m", 1},
+          {"late_bend", "N·m", 1},
+          {"square", "N·m", 1},
+          {"cubic", "N·m", 1}};
 }
 
 Effect viscous_bent() {
@@ -313,13 +313,12 @@ Effect load_friction() {
           .excite = "accelerate and brake hard, and drive at constant speed",
           .measured_by = DirectMeasurement::lifted_wheels,
           .applies = needs_signed_efforts,
-          .columns =
-              [](const Drive& drive, Shape) {
-                return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
-                                               return drive.joints[j].smooth_effort.array().abs() *
-                                                      speed_sign(drive, j).array();
-                                             }))};
-              }};
+          .columns = [](const Drive& drive, Shape) {
+            return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
+                                           return drive.joints[j].smooth_effort.array().abs() *
+                                                  speed_sign(drive, j).array();
+                                         }))};
+          }};
 }
 
 // Root mean square of the joints' efforts.
@@ -332,13 +331,16 @@ double typical_load(const Drive& drive) {
   return std::max(std::sqrt(square / count), 1e-12);
 }
 
-// Friction that grows with the load in any way, from nothing: Σ c_k g_k(u) with c_k >= 0, u the load over a typical one,
-// g = u/(1 + 2u) for what grows early, u, and what lies above two loads for what grows late; and u where the wheel drives
-// the motor, which gears lose more of.
+// Friction that grows with the load in any way, from nothing: Σ c_k g_k(u) with c_k >= 0, u the load over a typical
+// one, g = u/(1 + 2u) for what grows early, u, and what lies above two loads for what grows late; and u where the wheel
+// drives the motor, which gears lose more of.
 Effect load_friction_of_any_growth() {
   return {.name = "load_friction",
           .sentence = "Friction that grows with the torque that is passed on.",
-          .parameters = {{"early", "N·m", 1}, {"even", "N·m", 1}, {"late", "N·m", 1}, {"latest", "N·m", 1},
+          .parameters = {{"early", "N·m", 1},
+                         {"even", "N·m", 1},
+                         {"late", "N·m", 1},
+                         {"latest", "N·m", 1},
                          {"driven_back", "N·m", 1}},
           .shapes = {{.name = "load",
                       .unit = "N·m",
@@ -491,13 +493,21 @@ Effect scrub_of_bristles() {
 }  // namespace
 
 std::vector<Effect> friction_effects(std::size_t joints) {
-  std::vector<Effect> effects{coulomb(),       stribeck(),       viscous(joints),       quadratic_drag(joints),
-                              load_friction(), friction_drift(), coulomb_of_bristles(), coulomb_smoothed(),
-                              viscous_bent(), load_friction_of_any_growth(),
+  std::vector<Effect> effects{coulomb(),
+                              stribeck(),
+                              viscous(joints),
+                              quadratic_drag(joints),
+                              load_friction(),
+                              friction_drift(),
+                              coulomb_of_bristles(),
+                              coulomb_smoothed(),
+                              viscous_bent(),
+                              load_friction_of_any_growth(),
                               load_friction_that_lags()};
   if (joints == 2) {
-    for (auto* make : {&coulomb_asymmetric, &viscous_asymmetric, &caster_drag, &lateral_scrub, &viscous_bent_on_one_side,
-                       &drag_of_wheels, &coulomb_asymmetric_of_bristles, &scrub_of_bristles}) {
+    for (auto* make :
+         {&coulomb_asymmetric, &viscous_asymmetric, &caster_drag, &lateral_scrub, &viscous_bent_on_one_side,
+          &drag_of_wheels, &coulomb_asymmetric_of_bristles, &scrub_of_bristles}) {
       effects.push_back(make());
     }
   }

@@ -352,10 +352,7 @@ Effect longitudinal_slip() {
                       .upper = 1500.0,
                       .scan = 12,
                       .logarithmic = true,
-                      .scale =
-                          [](const Drive& drive) {
-                            return typical_effort(drive) / drive.wheel_radius;
-                          }},
+                      .scale = [](const Drive& drive) { return typical_effort(drive) / drive.wheel_radius; }},
                      {.name = "largest", .unit = "1", .lower = 0.05, .upper = 1.0, .scan = 3, .logarithmic = true}},
           .unit_coefficient = true,
           .excite = "accelerate and brake as hard as it goes, with the pose logged",

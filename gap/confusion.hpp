@@ -40,8 +40,8 @@ struct Signature {
                                         const std::vector<std::optional<Signature>>& of_effect,
                                         const std::string& name);
 
-/// Pairs of effects (first_of_name) of which, of `of_effect` (signatures()), the one explains at least `least` of the other's
-/// signature, most alike first; of the two directions the larger similarity counts.
+/// Pairs of effects (first_of_name) of which, of `of_effect` (signatures()), the one explains at least `least` of the
+/// other's signature, most alike first; of the two directions the larger similarity counts.
 [[nodiscard]] std::vector<ConfusablePair> confusable_pairs(const CandidateTable& table,
                                                            const std::vector<std::optional<Signature>>& of_effect,
                                                            BaseModel base, double least = 0.9);

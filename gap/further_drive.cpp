@@ -106,7 +106,6 @@ double largest(const Drive& drive, Eigen::VectorXd JointSignals::*signal) {
   return value;
 }
 
-
 // Whether each column of `a` is a sum of columns of `b`, which has more.
 bool special_case(const CandidateTable& table, const Signature& a, const Signature& b, BaseModel base) {
   const std::size_t count = own_columns(table.candidates[a.candidate]).size();
@@ -297,8 +296,8 @@ std::vector<Rival> fitted_rivals(const PreparedGap& prepared, const Diagnosis& d
     for (std::size_t e = 0; e < prepared.catalogue.size(); ++e) {
       const std::string& name = prepared.catalogue[e].name;
       const auto other = law.find(name);
-      const bool here = std::ranges::find(member.effects, name) != member.effects.end() &&
-                        (other == law.end() || other->second == e);
+      const bool here =
+          std::ranges::find(member.effects, name) != member.effects.end() && (other == law.end() || other->second == e);
       parametric = parametric || (here && prepared.catalogue[e].parametric);
       if (!here) {
         shapes[e].clear();

@@ -232,13 +232,16 @@ template <typename Lost>
 std::string causes_against(const Lost& lost) {
   const Diagnosis found = diagnosis_of(Resisted<Lost>{lost});
   const std::set<std::string> names = names_of(found);
-  return core::enumerated({names.begin(), names.end()}) + (found.verdict == GapVerdict::unexplained ? ", unexplained" : "");
+  return core::enumerated({names.begin(), names.end()}) +
+         (found.verdict == GapVerdict::unexplained ? ", unexplained" : "");
 }
 
 constexpr double kTop = 6.0;  // rad/s, that these drives come to
 
 TEST(Laws, ViscousFrictionMayBendInAnyWay) {
-  const auto palmgren = [](const Side& s, double) { return std::copysign(std::pow(std::abs(s.wheel), 2.0 / 3.0), s.wheel); };
+  const auto palmgren = [](const Side& s, double) {
+    return std::copysign(std::pow(std::abs(s.wheel), 2.0 / 3.0), s.wheel);
+  };
   const auto sheared = [](const Side& s, double) { return std::asinh(s.wheel / (0.15 * kTop)); };
   const auto carreau = [](const Side& s, double) { return s.wheel / std::pow(1.0 + s.wheel * s.wheel, 0.35); };
   const auto thickening = [](const Side& s, double) { return s.wheel * std::exp(std::abs(s.wheel) / kTop); };
