@@ -58,19 +58,6 @@ bool leaves_most(const Signal& taken, const Signal& effort) {
   return taken.squaredNorm() <= kMostSquare * effort.squaredNorm();
 }
 
-// u followed no faster than `slew`, from y = u at each segment's start.
-Signal followed(const Drive& drive, const Signal& u, double slew) {
-  const double most = slew * drive.step;
-  Signal y = u;
-  for (std::size_t s = 0; s < drive.segment_starts.size(); ++s) {
-    const auto [first, last] = drive.segment(s);
-    for (Eigen::Index k = first + 1; k < last; ++k) {
-      y[k] = y[k - 1] + std::clamp(u[k] - y[k - 1], -most, most);
-    }
-  }
-  return y;
-}
-
 Effect limited_rate() {
   return {.name = "actuator_lag",
           .sentence = "The actuator's torque follows its command no faster than at a largest rate.",

@@ -321,16 +321,6 @@ Effect load_friction() {
           }};
 }
 
-// Root mean square of the joints' efforts.
-double typical_load(const Drive& drive) {
-  double square = 0.0, count = 0.0;
-  for (const JointSignals& joint : drive.joints) {
-    square += joint.smooth_effort.squaredNorm();
-    count += static_cast<double>(joint.smooth_effort.size());
-  }
-  return std::max(std::sqrt(square / count), 1e-12);
-}
-
 // Friction that grows with the load in any way, from nothing: Σ c_k g_k(u) with c_k >= 0, u the load over a typical
 // one, g = u/(1 + 2u) for what grows early, u, and what lies above two loads for what grows late; and u where the wheel
 // drives the motor, which gears lose more of.
@@ -348,7 +338,7 @@ Effect load_friction_of_any_growth() {
                       .upper = 1.0,
                       .scan = 1,
                       .discrete = true,
-                      .scale = typical_load}},
+                      .scale = typical_effort}},
           .free_form = true,
           .excite = "accelerate and brake hard, and drive at constant speed",
           .measured_by = DirectMeasurement::lifted_wheels,

@@ -440,15 +440,7 @@ Effect slip_at_the_limit() {
           .columns = [](const Drive& drive, Shape shape) {
             const auto lost = [&](std::size_t j) -> Signal {
               const Signal rim = rim_speed(drive, j);
-              Signal ground = rim;
-              const double most = shape[0] * drive.step;
-              for (std::size_t s = 0; s < drive.segment_starts.size(); ++s) {
-                const auto [first, last] = drive.segment(s);
-                for (Eigen::Index k = first + 1; k < last; ++k) {
-                  ground[k] = ground[k - 1] + std::clamp(rim[k] - ground[k - 1], -most, most);
-                }
-              }
-              return ground - rim;
+              return followed(drive, rim, shape[0]) - rim;
             };
             return std::vector{unseen_rim_speeds(drive, lost(0), lost(1), false)};
           }};

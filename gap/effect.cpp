@@ -134,6 +134,18 @@ Eigen::VectorXd lagged(const Drive& drive, const Eigen::VectorXd& signal, double
   return y;
 }
 
+Eigen::VectorXd followed(const Drive& drive, const Eigen::VectorXd& signal, double rate) {
+  const double most = rate * drive.step;
+  Eigen::VectorXd y = signal;
+  for (std::size_t s = 0; s < drive.segment_starts.size(); ++s) {
+    const auto [first, last] = drive.segment(s);
+    for (Eigen::Index k = first + 1; k < last; ++k) {
+      y[k] = y[k - 1] + std::clamp(signal[k] - y[k - 1], -most, most);
+    }
+  }
+  return y;
+}
+
 double sign_width(const Drive& drive) { return std::max(0.006 * typical_speed(drive), 0.4 * drive.count); }
 
 Eigen::VectorXd speed_sign(const Drive& drive, std::size_t joint) {

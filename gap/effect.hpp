@@ -147,6 +147,9 @@ namespace wheelwright::gap::catalogue {
 /// `signal` through the lag T y' = signal − y, from y = signal at each segment's start.
 [[nodiscard]] Eigen::VectorXd lagged(const Drive& drive, const Eigen::VectorXd& signal, double T);
 
+/// `signal` followed no faster than `rate`, its unit per second, from each segment's start.
+[[nodiscard]] Eigen::VectorXd followed(const Drive& drive, const Eigen::VectorXd& signal, double rate);
+
 /// The column of additional efforts at the joints (empty ones stand for zeros): Model::input times them.
 [[nodiscard]] Column at_joints(const Drive& drive, const std::vector<Eigen::VectorXd>& effort);
 
