@@ -238,7 +238,7 @@ std::string causes_against(const Lost& lost) {
 
 constexpr double kTop = 6.0;  // rad/s, that these drives come to
 
-TEST(Laws, ViscousFrictionMayBendInAnyWay) {
+TEST(Laws, SlowViscousFrictionMayBendInAnyWay) {
   const auto palmgren = [](const Side& s, double) {
     return std::copysign(std::pow(std::abs(s.wheel), 2.0 / 3.0), s.wheel);
   };
