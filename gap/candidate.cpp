@@ -193,6 +193,62 @@ std::vector<std::string> names_of(const CandidateTable& table, const CauseSet& s
   return names;
 }
 
+namespace {
+
+// Σ column² that is left beside the columns `on` with coefficients of these signs.
+double left_beside(const BlockGram& gram, std::size_t column, const std::vector<std::size_t>& on,
+                   const std::vector<int>& sign) {
+  const auto n = static_cast<Eigen::Index>(on.size());
+  Eigen::MatrixXd A(n, n);
+  Eigen::VectorXd b(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const std::size_t c = on[static_cast<std::size_t>(i)];
+    const double unit = 1.0 / std::sqrt(std::max(gram.square(c), std::numeric_limits<double>::min()));
+    b[i] = unit * gram.product(c, column);
+    for (Eigen::Index j = 0; j <= i; ++j) {
+      const std::size_t d = on[static_cast<std::size_t>(j)];
+      A(i, j) = A(j, i) =
+          unit * gram.product(c, d) / std::sqrt(std::max(gram.square(d), std::numeric_limits<double>::min()));
+    }
+  }
+  const Eigen::VectorXd x = signed_least_squares(A, b, sign).x;
+  return std::max(gram.square(column) + x.dot(A * x) - 2.0 * x.dot(b), 0.0);
+}
+
+}  // namespace
+
+double unexplained_by(const CandidateTable& table, const std::vector<std::size_t>& a, const std::vector<std::size_t>& b,
+                      BaseModel base) {
+  const std::vector<std::size_t>& theta = base == BaseModel::refitted ? table.base : table.unknown;
+  std::vector<std::size_t> on = theta;
+  std::vector<int> sign(theta.size(), 0), opposite = sign;
+  for (const std::size_t c : b) {
+    const Candidate& member = table.candidates[c];
+    for (std::size_t k = 0; k < member.columns.size(); ++k) {
+      on.push_back(member.columns[k]);
+      sign.push_back(member.unit_coefficient ? 0 : member.sign[k]);
+      opposite.push_back(-sign.back());
+    }
+  }
+  double share = 0.0;
+  for (const std::size_t c : a) {
+    const Candidate& member = table.candidates[c];
+    for (std::size_t k = 0; k < member.columns.size(); ++k) {
+      const std::size_t column = member.columns[k];
+      const double alone = left_beside(*table.gram, column, theta, {});
+      // What θ takes up is no column beside it.
+      if (!(alone > 1e-6 * table.gram->square(column))) {
+        continue;
+      }
+      const int way = member.unit_coefficient ? 1 : member.sign[k];
+      const double up = way < 0 ? 0.0 : left_beside(*table.gram, column, on, sign);
+      const double down = way > 0 ? 0.0 : left_beside(*table.gram, column, on, opposite);
+      share = std::max(share, std::clamp(std::max(up, down) / alone, 0.0, 1.0));
+    }
+  }
+  return share;
+}
+
 std::vector<std::vector<CauseSet>> search_causes(const CandidateTable& table, const CauseSearchOptions& options) {
   return Search(table, options).run();
 }

@@ -70,6 +70,11 @@ struct CauseSet {
 /// Their names.
 [[nodiscard]] std::vector<std::string> names_of(const CandidateTable& table, const CauseSet& set);
 
+/// Unexplained fraction: the largest share of a column of `a`, after θ is fitted, that the columns of `b` do not make
+/// up with coefficients of their signs; 0 where b contains a.
+[[nodiscard]] double unexplained_by(const CandidateTable& table, const std::vector<std::size_t>& a,
+                                    const std::vector<std::size_t>& b, BaseModel base);
+
 /// Options of search_causes().
 struct CauseSearchOptions {
   BaseModel base = BaseModel::refitted;

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include <wheelwright/filter/kernel.hpp>
 #include <wheelwright/gap/effect.hpp>
 
 namespace wheelwright::gap {
@@ -11,20 +10,6 @@ namespace {
 using namespace catalogue;
 using Signal = Eigen::VectorXd;
 using Shape = std::span<const double>;
-
-// u through T y' = u − y, from y = u at each segment's start.
-Signal lagged(const Drive& drive, const Signal& u, double T) {
-  const filter::StepWeights w(1.0 / T, drive.step);
-  Signal y(u.size());
-  for (std::size_t s = 0; s < drive.segment_starts.size(); ++s) {
-    const auto [first, last] = drive.segment(s);
-    y[first] = u[first];
-    for (Eigen::Index k = first + 1; k < last; ++k) {
-      y[k] = w.decay() * y[k - 1] + (w.begin1() * u[k - 1] + w.end1() * u[k]) / T;
-    }
-  }
-  return y;
-}
 
 // u(t − delay), linear between instants, held at a segment's ends.
 Signal shifted(const Drive& drive, const Signal& u, double delay) {
@@ -41,8 +26,6 @@ Signal shifted(const Drive& drive, const Signal& u, double delay) {
   }
   return y;
 }
-
-double typical_effort(const Drive& drive) { return std::max(deviation(drive.joints[0].smooth_effort), 1e-12); }
 
 ShapeParameter duration(const char* name) {
   return {.name = name, .unit = "s", .lower = 0.004, .upper = 0.25, .scan = 40, .logarithmic = true, .resolution = 0.1};
@@ -64,6 +47,37 @@ Effect actuator_lag() {
             return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
                                            const Signal& u = drive.joints[j].effort;
                                            return u - lagged(drive, u, shape[0]);
+                                         }))};
+          }};
+}
+
+// What is taken of an effort is taken at its peaks or edges only: more would be none of the robot's but a way to be rid
+// of the signal.
+bool leaves_most(const Signal& taken, const Signal& effort) {
+  constexpr double kMostSquare = 0.4;
+  return taken.squaredNorm() <= kMostSquare * effort.squaredNorm();
+}
+
+Effect limited_rate() {
+  return {.name = "actuator_lag",
+          .sentence = "The actuator's torque follows its command no faster than at a largest rate.",
+          .family = "late_torque",
+          .shapes = {{.name = "rate",
+                      .unit = "N·m/s",
+                      .lower = 1.5,
+                      .upper = 40.0,
+                      .scan = 10,
+                      .logarithmic = true,
+                      .scale = typical_effort}},
+          .unit_coefficient = true,
+          .free_form = true,
+          .excite = "change the torque fast: steps and high frequencies",
+          .measured_by = DirectMeasurement::timing,
+          .columns = [](const Drive& drive, Shape shape) {
+            return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
+                                           const Signal& u = drive.joints[j].effort;
+                                           const Signal taken = u - followed(drive, u, shape[0]);
+                                           return leaves_most(taken, u) ? taken : Signal::Zero(u.size());
                                          }))};
           }};
 }
@@ -193,12 +207,16 @@ Effect torque_deadzone() {
 // What a limit takes from an effort. A limit shows at peaks: one that most of the drive lies above, or that takes most
 // of the effort away, is none of the robot's but a way to be rid of the signal, and its column is nothing.
 Signal beyond_limit(const Signal& effort, double limit) {
-  constexpr double kMostSamples = 0.25, kMostSquare = 0.4;
+  constexpr double kMostSamples = 0.25;
   const Signal beyond = effort - effort.cwiseMax(-limit).cwiseMin(limit);
   const double samples = static_cast<double>((beyond.array() != 0.0).count());
-  const bool peaks = samples <= kMostSamples * static_cast<double>(effort.size()) &&
-                     beyond.squaredNorm() <= kMostSquare * effort.squaredNorm();
+  const bool peaks = samples <= kMostSamples * static_cast<double>(effort.size()) && leaves_most(beyond, effort);
   return peaks ? beyond : Signal::Zero(effort.size());
+}
+
+Applicability needs_commands(const Drive& drive) {
+  return drive.efforts_flowed ? Applicability{false, "the efforts are currents that flowed, which no limit cut off"}
+                              : Applicability{};
 }
 
 Effect saturation() {
@@ -213,18 +231,39 @@ Effect saturation() {
                       .scale = typical_effort}},
           .unit_coefficient = true,
           .excite = "accelerate as hard as it goes",
-          .applies =
-              [](const Drive& drive) {
-                return drive.efforts_flowed
-                           ? Applicability{false, "the efforts are currents that flowed, which no limit cut off"}
-                           : Applicability{};
-              },
-          .columns =
-              [](const Drive& drive, Shape shape) {
-                return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
-                                               return beyond_limit(drive.joints[j].effort, shape[0]);
-                                             }))};
-              }};
+          .applies = needs_commands,
+          .columns = [](const Drive& drive, Shape shape) {
+            return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
+                                           return beyond_limit(drive.joints[j].effort, shape[0]);
+                                         }))};
+          }};
+}
+
+// A limit that is neared little by little: τ of a command u is u/(1 + |u/τ_max|^p)^(1/p).
+Effect soft_saturation() {
+  return {.name = "saturation",
+          .sentence = "The actuator's torque falls short of what is commanded, the more the larger it is.",
+          .shapes = {{.name = "tau_max",
+                      .unit = "N·m",
+                      .lower = 1.5,
+                      .upper = 12.0,
+                      .scan = 8,
+                      .logarithmic = true,
+                      .scale = typical_effort},
+                     {.name = "sharpness", .unit = "1", .lower = 1.5, .upper = 6.0, .scan = 3, .logarithmic = true}},
+          .unit_coefficient = true,
+          .free_form = true,
+          .excite = "accelerate as hard as it goes",
+          .applies = needs_commands,
+          .columns = [](const Drive& drive, Shape shape) {
+            return std::vector{at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
+                                           const Signal& u = drive.joints[j].effort;
+                                           const Eigen::ArrayXd part =
+                                               (1.0 + (u.array().abs() / shape[0]).pow(shape[1])).pow(-1.0 / shape[1]);
+                                           const Signal taken = u.array() * (1.0 - part);
+                                           return leaves_most(taken, u) ? taken : Signal::Zero(u.size());
+                                         }))};
+          }};
 }
 
 // The inertia of a joint whose torque is all for acceleration.
@@ -334,12 +373,37 @@ Effect battery_sag() {
           }};
 }
 
+// Sag by what is drawn: at once, with a lag of some seconds (a second resistance beside a capacity), and by power.
+Effect battery_sag_by_load() {
+  return {.name = "battery_sag",
+          .sentence = "The torque falls short as the battery empties, and by what was drawn just now.",
+          .parameters = {{"k", "1/s", 1}, {"R_b", "1/(N·m)", 1}, {"R_slow", "1/(N·m)", 1}, {"by_power", "1/W", 1}},
+          .free_form = true,
+          .excite = "drive for long, and with heavy loads now and then",
+          .columns = [](const Drive& drive, Shape) {
+            constexpr double kSlow = 3.0;  // s
+            Signal load = Signal::Zero(drive.rows()), power = load;
+            for (const JointSignals& joint : drive.joints) {
+              load += joint.smooth_effort.cwiseAbs();
+              power += joint.smooth_effort.cwiseProduct(joint.smooth_speed);
+            }
+            std::vector<Column> columns;
+            for (const Signal& drawn : {Signal(drive.t.array() - drive.t[0]), load, lagged(drive, load, kSlow),
+                                        Signal(power.cwiseMax(0.0))}) {
+              columns.push_back(at_joints(drive, each_joint(drive, [&](std::size_t j) -> Signal {
+                                            return drawn.cwiseProduct(drive.joints[j].expected_effort);
+                                          })));
+            }
+            return columns;
+          }};
+}
+
 }  // namespace
 
 std::vector<Effect> actuator_effects(std::size_t joints) {
   std::vector<Effect> effects{torque_bias(joints)};
   for (auto* make : {&actuator_lag, &delay, &sensor_time_offset, &torque_gain, &torque_deadzone, &saturation, &backlash,
-                     &battery_sag}) {
+                     &battery_sag, &limited_rate, &soft_saturation, &battery_sag_by_load}) {
     effects.push_back(make());
   }
   if (joints == 2) {

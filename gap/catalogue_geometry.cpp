@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include <fmt/format.h>
+
 #include <wheelwright/gap/effect.hpp>
 #include <wheelwright/gap/gap_rows.hpp>
 
@@ -145,6 +147,40 @@ Effect wheel_out_of_round() {
                                                   {"offset_R", "m", std::hypot(c[1], c[3])},
                                                   {"offset_L", "m", std::hypot(c[5], c[7])}};
               }};
+}
+
+// Flats, ovals and eccentric wheels of any form: further harmonics of the torque. More than four would take a motor's
+// cogging for a wheel.
+Effect wheel_by_harmonics() {
+  constexpr int kHarmonics = 4;
+  Effect effect = wheel_out_of_round();
+  effect.sentence = "Wheels that are out of round: eccentric, oval, or with a flat.";
+  effect.free_form = true;
+  for (const char* side : {"R", "L"}) {
+    for (int k = 2; k <= kHarmonics; ++k) {
+      effect.parameters.push_back({fmt::format("A{}_{}", k, side), "N·m", 0});
+      effect.parameters.push_back({fmt::format("B{}_{}", k, side), "N·m", 0});
+    }
+  }
+  effect.columns = [first = effect.columns](const Drive& drive, Shape shape) {
+    std::vector<Column> columns = first(drive, shape);
+    for (std::size_t j = 0; j < 2; ++j) {
+      const auto angle = drive.joints[j].angle.array();
+      for (int k = 2; k <= kHarmonics; ++k) {
+        columns.push_back(at_joints(drive, only(drive, j, (k * angle).cos())));
+        columns.push_back(at_joints(drive, only(drive, j, (k * angle).sin())));
+      }
+    }
+    return columns;
+  };
+  effect.physical = [first = effect.physical, names = effect.parameters](std::span<const double> c, Shape shape) {
+    std::vector<PhysicalValue> values = first(c, shape);
+    for (std::size_t k = 8; k < c.size(); ++k) {
+      values.push_back({names[k].name, names[k].unit, c[k]});
+    }
+    return values;
+  };
+  return effect;
 }
 
 Effect wheel_radius() {
@@ -316,10 +352,7 @@ Effect longitudinal_slip() {
                       .upper = 1500.0,
                       .scan = 12,
                       .logarithmic = true,
-                      .scale =
-                          [](const Drive& drive) {
-                            return std::max(deviation(drive.joints[0].smooth_effort), 1e-12) / drive.wheel_radius;
-                          }},
+                      .scale = [](const Drive& drive) { return typical_effort(drive) / drive.wheel_radius; }},
                      {.name = "largest", .unit = "1", .lower = 0.05, .upper = 1.0, .scan = 3, .logarithmic = true}},
           .unit_coefficient = true,
           .excite = "accelerate and brake as hard as it goes, with the pose logged",
@@ -343,6 +376,7 @@ Effect slip_by_force(bool share) {
                 .sentence = share ? "The wheels lose a share of their speed that grows with the force they pass on."
                                   : "The wheels slide at a speed that grows with the force they pass on.",
                 .inexact = kLoadOfWheels,
+                .free_form = true,
                 .excite = "accelerate and brake as hard as it goes, with the pose logged",
                 .applies = needs_heading};
   effect.shapes = {
@@ -400,20 +434,13 @@ Effect slip_at_the_limit() {
                             return std::max(drive.wheel_radius * deviation(drive.joints[0].smooth_acceleration), 1e-12);
                           }}},
           .inexact = kLoadOfWheels,
+          .free_form = true,
           .excite = "accelerate and brake as hard as it goes, with the pose logged",
           .applies = needs_heading,
           .columns = [](const Drive& drive, Shape shape) {
             const auto lost = [&](std::size_t j) -> Signal {
               const Signal rim = rim_speed(drive, j);
-              Signal ground = rim;
-              const double most = shape[0] * drive.step;
-              for (std::size_t s = 0; s < drive.segment_starts.size(); ++s) {
-                const auto [first, last] = drive.segment(s);
-                for (Eigen::Index k = first + 1; k < last; ++k) {
-                  ground[k] = ground[k - 1] + std::clamp(rim[k] - ground[k - 1], -most, most);
-                }
-              }
-              return ground - rim;
+              return followed(drive, rim, shape[0]) - rim;
             };
             return std::vector{unseen_rim_speeds(drive, lost(0), lost(1), false)};
           }};
@@ -490,7 +517,7 @@ std::vector<Effect> geometry_effects(std::size_t joints) {
   if (joints == 2) {
     for (auto* make : {&com_longitudinal, &com_lateral, &slope, &wheel_out_of_round, &wheel_radius_asymmetric,
                        &longitudinal_slip, &turning_slip, &curve_slip, &wheel_radius, &track_width, &encoder_scale,
-                       &armature, &payload_offset, &slip_at_the_limit}) {
+                       &armature, &payload_offset, &slip_at_the_limit, &wheel_by_harmonics}) {
       effects.push_back(make());
     }
     effects.push_back(slip_by_force(false));

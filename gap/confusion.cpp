@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <limits>
 #include <optional>
+#include <string>
+#include <utility>
 
 #include <wheelwright/gap/block_gram.hpp>
 
@@ -92,13 +94,23 @@ double made_up(const CandidateTable& table, const Signature& a, const Signature&
   return std::clamp(1.0 - left / square, 0.0, 1.0);
 }
 
+std::size_t first_of_name(const CandidateTable& table, const std::vector<std::optional<Signature>>& of_effect,
+                          const std::string& name) {
+  std::size_t e = 0;
+  while (e < of_effect.size() && !(of_effect[e] && table.names[e] == name)) {
+    ++e;
+  }
+  return e;
+}
+
 std::vector<ConfusablePair> confusable_pairs(const CandidateTable& table,
                                              const std::vector<std::optional<Signature>>& of_effect, BaseModel base,
                                              double least) {
+  const auto stands = [&](std::size_t e) { return first_of_name(table, of_effect, table.names[e]) == e; };
   std::vector<ConfusablePair> pairs;
   for (std::size_t a = 0; a < of_effect.size(); ++a) {
     for (std::size_t b = a + 1; b < of_effect.size(); ++b) {
-      if (!of_effect[a] || !of_effect[b] || table.names[a] == table.names[b]) {
+      if (!stands(a) || !stands(b)) {
         continue;
       }
       const double similarity = std::max(made_up(table, *of_effect[a], *of_effect[b], base),
@@ -127,12 +139,17 @@ std::vector<std::string> not_excited(const CandidateTable& table, const std::vec
     }
   }
   std::vector<std::string> sentences;
+  const auto say = [&sentences](std::string sentence) {
+    if (std::ranges::find(sentences, sentence) == sentences.end()) {
+      sentences.push_back(std::move(sentence));
+    }
+  };
   for (std::size_t e = 0; e < catalogue.size(); ++e) {
     const Applicability applies = applicability(catalogue[e], drive);
     if (!applies.applies) {
-      sentences.push_back(catalogue[e].name + ": " + applies.reason);
+      say(catalogue[e].name + ": " + applies.reason);
     } else if (beyond[e] < least && !catalogue[e].parametric) {
-      sentences.push_back(catalogue[e].name + ": this log does not show it; " + catalogue[e].excite);
+      say(catalogue[e].name + ": this log does not show it; " + catalogue[e].excite);
     }
   }
   return sentences;

@@ -34,8 +34,14 @@ struct Signature {
 /// Explained fraction of signature `a` by the own columns of `b` beside θ, in [0, 1]; 1 where θ alone explains it.
 [[nodiscard]] double made_up(const CandidateTable& table, const Signature& a, const Signature& b, BaseModel base);
 
-/// Pairs of effects of which, of `of_effect` (signatures()), the one explains at least `least` of the other's
-/// signature, most alike first; of the two directions the larger similarity counts.
+/// The first effect called `name` that has a signature of `of_effect` (signatures()), which stands for all laws of this
+/// name; the number of effects where none has.
+[[nodiscard]] std::size_t first_of_name(const CandidateTable& table,
+                                        const std::vector<std::optional<Signature>>& of_effect,
+                                        const std::string& name);
+
+/// Pairs of effects (first_of_name) of which, of `of_effect` (signatures()), the one explains at least `least` of the
+/// other's signature, most alike first; of the two directions the larger similarity counts.
 [[nodiscard]] std::vector<ConfusablePair> confusable_pairs(const CandidateTable& table,
                                                            const std::vector<std::optional<Signature>>& of_effect,
                                                            BaseModel base, double least = 0.9);

@@ -12,6 +12,7 @@
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/linear_algebra.hpp>
+#include <wheelwright/filter/kernel.hpp>
 #include <wheelwright/model/effect_law.hpp>
 
 namespace wheelwright::gap {
@@ -116,6 +117,33 @@ Eigen::VectorXd soft_sign(const Eigen::VectorXd& signal, double width) {
 
 double typical_speed(const Drive& drive) {
   return std::max({deviation(drive.joints[0].smooth_speed), drive.count, 1e-12});
+}
+
+double typical_effort(const Drive& drive) { return std::max(deviation(drive.joints[0].smooth_effort), 1e-12); }
+
+Eigen::VectorXd lagged(const Drive& drive, const Eigen::VectorXd& signal, double T) {
+  const filter::StepWeights w(1.0 / T, drive.step);
+  Eigen::VectorXd y(signal.size());
+  for (std::size_t s = 0; s < drive.segment_starts.size(); ++s) {
+    const auto [first, last] = drive.segment(s);
+    y[first] = signal[first];
+    for (Eigen::Index k = first + 1; k < last; ++k) {
+      y[k] = w.decay() * y[k - 1] + (w.begin1() * signal[k - 1] + w.end1() * signal[k]) / T;
+    }
+  }
+  return y;
+}
+
+Eigen::VectorXd followed(const Drive& drive, const Eigen::VectorXd& signal, double rate) {
+  const double most = rate * drive.step;
+  Eigen::VectorXd y = signal;
+  for (std::size_t s = 0; s < drive.segment_starts.size(); ++s) {
+    const auto [first, last] = drive.segment(s);
+    for (Eigen::Index k = first + 1; k < last; ++k) {
+      y[k] = y[k - 1] + std::clamp(signal[k] - y[k - 1], -most, most);
+    }
+  }
+  return y;
 }
 
 double sign_width(const Drive& drive) { return std::max(0.006 * typical_speed(drive), 0.4 * drive.count); }

@@ -95,6 +95,7 @@ struct Effect {
                          ///< sampling interval); added to what an explanation with it may leave
   bool after_reversals = false;  ///< acts just after reversals of the torque, more sharply than its columns can
   bool above_band = false;       ///< it is the cause where the band above the filter's shows more just after them
+  bool free_form = false;        ///< its columns span many laws: no robot file and no simulator has a number for each
   std::string excite{};          ///< the manoeuvre that would show it
   DirectMeasurement measured_by = DirectMeasurement::none;
   std::function<Applicability(const Drive&)> applies{};  ///< empty: on every drive
@@ -139,6 +140,15 @@ namespace wheelwright::gap::catalogue {
 
 /// Typical speed of the joints (standard deviation of the first one's), rad/s; > 0.
 [[nodiscard]] double typical_speed(const Drive& drive);
+
+/// Typical effort of the joints (standard deviation of the first one's), > 0.
+[[nodiscard]] double typical_effort(const Drive& drive);
+
+/// `signal` through the lag T y' = signal − y, from y = signal at each segment's start.
+[[nodiscard]] Eigen::VectorXd lagged(const Drive& drive, const Eigen::VectorXd& signal, double T);
+
+/// `signal` followed no faster than `rate`, its unit per second, from each segment's start.
+[[nodiscard]] Eigen::VectorXd followed(const Drive& drive, const Eigen::VectorXd& signal, double rate);
 
 /// The column of additional efforts at the joints (empty ones stand for zeros): Model::input times them.
 [[nodiscard]] Column at_joints(const Drive& drive, const std::vector<Eigen::VectorXd>& effort);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <random>
 
@@ -105,10 +106,6 @@ double largest(const Drive& drive, Eigen::VectorXd JointSignals::*signal) {
   return value;
 }
 
-std::size_t effect_index(const CandidateTable& table, const std::string& name) {
-  return static_cast<std::size_t>(std::ranges::find(table.names, name) - table.names.begin());
-}
-
 // Whether each column of `a` is a sum of columns of `b`, which has more.
 bool special_case(const CandidateTable& table, const Signature& a, const Signature& b, BaseModel base) {
   const std::size_t count = own_columns(table.candidates[a.candidate]).size();
@@ -209,7 +206,7 @@ void judge_pairs(std::vector<ConfusablePair>& pairs, const CandidateTable& table
   ShapeGrids shapes(prepared.catalogue.size());
   for (const ConfusablePair& pair : pairs) {
     for (const std::string& name : {pair.first, pair.second}) {
-      const std::size_t e = effect_index(table, name);
+      const std::size_t e = first_of_name(table, on_log, name);
       shapes[e] = {table.candidates[on_log[e]->candidate].shape};
     }
   }
@@ -234,7 +231,8 @@ void judge_pairs(std::vector<ConfusablePair>& pairs, const CandidateTable& table
       here[e] = {c, on_log[e]->weights};
     }
     for (std::size_t k = 0; k < pairs.size(); ++k) {
-      const Signature &a = here[effect_index(table, pairs[k].first)], &b = here[effect_index(table, pairs[k].second)];
+      const Signature &a = here[first_of_name(table, on_log, pairs[k].first)],
+                      &b = here[first_of_name(table, on_log, pairs[k].second)];
       judged[k].separable = judged[k].separable || made_up(problem.table, a, b, base) < 1.0 - kImitated ||
                             made_up(problem.table, b, a, base) < 1.0 - kImitated;
       judged[k].first_is_special = judged[k].first_is_special && special_case(problem.table, a, b, base);
@@ -242,8 +240,8 @@ void judge_pairs(std::vector<ConfusablePair>& pairs, const CandidateTable& table
     }
   }
   for (std::size_t k = 0; k < pairs.size(); ++k) {
-    const Effect& first = prepared.catalogue[effect_index(table, pairs[k].first)];
-    const Effect& second = prepared.catalogue[effect_index(table, pairs[k].second)];
+    const Effect& first = prepared.catalogue[first_of_name(table, on_log, pairs[k].first)];
+    const Effect& second = prepared.catalogue[first_of_name(table, on_log, pairs[k].second)];
     pairs[k].reason = reason_for(judged[k], first, second, prepared.catalogue);
     pairs[k].inseparable = !judged[k].separable && !judged[k].first_is_special && !judged[k].second_is_special;
   }
@@ -281,9 +279,12 @@ Rival rival_of(const FittedCauses& fitted, const std::vector<Effect>& catalogue,
   return rival;
 }
 
-// Each member of the credible set fitted to the drive; θ beside the first of them goes to `theta`.
+// Each member of the credible set fitted to the drive; θ beside the first of them goes to `theta`. An effect follows
+// one law in all of them, which is the first of its name in `catalogue` afterwards.
 std::vector<Rival> fitted_rivals(const PreparedGap& prepared, const Diagnosis& diagnosis,
-                                 const DiagnoseOptions& options, Eigen::VectorXd& theta) {
+                                 const DiagnoseOptions& options, Eigen::VectorXd& theta,
+                                 std::vector<Effect>& catalogue) {
+  std::map<std::string, std::size_t> law;  // of each effect, its place in prepared.catalogue
   const bool trusted = std::ranges::find(prepared.trusted, true) != prepared.trusted.end();
   std::vector<Rival> rivals;
   for (const CredibleCauses& member : diagnosis.credible) {
@@ -293,7 +294,10 @@ std::vector<Rival> fitted_rivals(const PreparedGap& prepared, const Diagnosis& d
     ShapeGrids shapes = all_shapes(prepared.catalogue, prepared.drive);
     bool parametric = false;
     for (std::size_t e = 0; e < prepared.catalogue.size(); ++e) {
-      const bool here = std::ranges::find(member.effects, prepared.catalogue[e].name) != member.effects.end();
+      const std::string& name = prepared.catalogue[e].name;
+      const auto other = law.find(name);
+      const bool here =
+          std::ranges::find(member.effects, name) != member.effects.end() && (other == law.end() || other->second == e);
       parametric = parametric || (here && prepared.catalogue[e].parametric);
       if (!here) {
         shapes[e].clear();
@@ -306,12 +310,18 @@ std::vector<Rival> fitted_rivals(const PreparedGap& prepared, const Diagnosis& d
     const BlockGram gram(problem.rows.spaces, blocks);
     problem.table.gram = &gram;
     const BaseModel base = parametric && trusted ? BaseModel::nominal : BaseModel::refitted;
-    const FittedCauses fitted =
-        fit_causes(prepared, problem, best_set(problem.table, member.effects, base), base, blocks);
+    const CauseSet set = best_set(problem.table, member.effects, base);
+    const FittedCauses fitted = fit_causes(prepared, problem, set, base, blocks);
     if (rivals.empty()) {
       theta = fitted.theta;
     }
-    rivals.push_back(rival_of(fitted, prepared.catalogue, prepared.drive));
+    for (const std::size_t c : set.members) {
+      const std::size_t e = problem.table.candidates[c].effect;
+      if (law.emplace(prepared.catalogue[e].name, e).second) {
+        catalogue.insert(catalogue.begin(), prepared.catalogue[e]);
+      }
+    }
+    rivals.push_back(rival_of(fitted, catalogue, prepared.drive));
   }
   return rivals;
 }
@@ -323,7 +333,8 @@ NextDrive next_drive(LogSource& log, LogSource* baseline, const Robot& robot, co
   const PreparedGap prepared = prepare_gap(log, baseline, robot, options);
   NextDrive next;
   Eigen::VectorXd theta = prepared.theta;
-  next.rivals = fitted_rivals(prepared, diagnosis, options, theta);
+  std::vector<Effect> catalogue = prepared.catalogue;
+  next.rivals = fitted_rivals(prepared, diagnosis, options, theta, catalogue);
   if (next.rivals.size() < 2) {
     return next;
   }
@@ -346,7 +357,7 @@ NextDrive next_drive(LogSource& log, LogSource* baseline, const Robot& robot, co
   };
   const design::MotionLimits limits = limits_within(prepared, prepared.view.robot);
   const DiscriminationDesign design =
-      design_for_discrimination(subject, limits, next.rivals, prepared.catalogue, noise, search, &prepared.drive);
+      design_for_discrimination(subject, limits, next.rivals, catalogue, noise, search, &prepared.drive);
   next.sentence = core::listed(design.sentences, " ");
   if (design.worst()) {
     next.commands = design::command_table(design.manoeuvre.plan, subject.model);

@@ -29,7 +29,8 @@ class Improvement {
 
   // What changes θ and the geometry.
   void change_parameters(const FittedEffect& cause) {
-    if (const Way* const way = way_of(cause.effect.name); way != nullptr && way->change != nullptr) {
+    const Way* const way = way_of(cause.effect.name);
+    if (way != nullptr && way->change != nullptr && !cause.effect.free_form) {
       cause_ = &cause;
       way->change(*this);
     }
@@ -50,6 +51,9 @@ class Improvement {
   // What becomes an effect of the robot file; false where the file cannot have it.
   bool add_effect(const FittedEffect& cause, const std::vector<Interval>& intervals) {
     const std::string& name = cause.effect.name;
+    if (cause.effect.free_form) {
+      return refuse("a robot file has " + name + " by one law, and what was found follows another one");
+    }
     const Way* const way = way_of(name);
     if (way != nullptr && way->convert == nullptr) {
       return true;
@@ -559,17 +563,7 @@ const std::map<std::string, Improvement::Way>& Improvement::ways() {
             },
         .adds_up = true}},
       {"battery_sag", {.convert = [](I& r) { return r.convert_sag(); }, .adds_up = true}},
-      {"longitudinal_slip",
-       {.convert =
-            [](I& r) {
-              if (!r.cause_->effect.unit_coefficient) {
-                return r.refuse(
-                    "a robot file has slip as a share of the speed that ends at a largest share, and this "
-                    "is another law of it");
-              }
-              r.set_first(r.shape(0));
-              return true;
-            }}},
+      {"longitudinal_slip", {.convert = [](I& r) { return r.first_shape(1.0); }}},
       {"wheel_out_of_round", {.convert = [](I& r) { return r.out_of_round(); }, .adds_up = true}},
       {"friction_drift", {.convert = [](I& r) { return r.convert_drift(); }, .of_others = true}},
       {"backlash", {.convert = [](I& r) { return r.convert_backlash(); }}},

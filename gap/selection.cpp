@@ -7,6 +7,8 @@
 #include <limits>
 #include <optional>
 #include <random>
+#include <set>
+#include <string>
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/statistics.hpp>
@@ -57,7 +59,8 @@ class Selector {
   Selector(const CandidateTable& table, const std::vector<EffectKind>& kinds, double floor_error,
            const SelectionOptions& options)
       : table_(table), kinds_(kinds), floor_(floor_error), options_(options) {
-    const auto tried = static_cast<double>(std::max<std::size_t>(kinds.size(), 1));
+    const std::set<std::string> tried_names(table.names.begin(), table.names.end());  // laws of one name are one try
+    const auto tried = static_cast<double>(std::max<std::size_t>(tried_names.size(), 1));
     level_ = options.significance / (2.0 * tried);  // two tests of each
     critical_ = core::normal_upper_quantile(level_);
     moves_theta_only_.assign(kinds.size(), true);
@@ -272,8 +275,14 @@ class Selector {
     return chosen;
   }
 
+  [[nodiscard]] std::vector<std::string> sorted_names(const CauseSet& set) const {
+    std::vector<std::string> names = names_of(table_, set);
+    std::ranges::sort(names);
+    return names;
+  }
+
   // Sets of as many causes that are as good as `best`, itself first. A set that merely contains another one is left
-  // out.
+  // out, unless it is the same causes by other laws: these may say what θ did, too.
   [[nodiscard]] std::vector<CauseSet> rivals_of(const CauseSet& best, const std::vector<CauseSet>& level) const {
     std::vector<CauseSet> rivals{best};
     for (const CauseSet& set : level) {
@@ -283,7 +292,7 @@ class Selector {
         continue;
       }
       const bool contains = std::any_of(rivals.begin(), rivals.end(), [&](const CauseSet& other) {
-        return other.coefficients < set.coefficients &&
+        return other.coefficients < set.coefficients && sorted_names(other) != sorted_names(set) &&
                unexplained_by(table_, other.members, set.members, BaseModel::refitted) < options_.contained;
       });
       if (!contains) {
@@ -320,6 +329,11 @@ class Selector {
     return table_.names[table_.candidates[candidate].effect];
   }
 
+  // Whether a member of `set` is an effect of this candidate's name.
+  [[nodiscard]] bool takes_name(const CauseSet& set, std::size_t candidate) const {
+    return std::ranges::any_of(set.members, [&](std::size_t c) { return name_of(c) == name_of(candidate); });
+  }
+
   // Parametric causes that let `structural` do with θ nominal as well as with θ fitted: sets of one or two, best first;
   // an empty one where none is needed. Nothing where no such set does.
   [[nodiscard]] std::vector<CauseSet> explain_theta(const CauseSet& structural) const {
@@ -347,12 +361,15 @@ class Selector {
         }
       };
       for (std::size_t i = 0; i < movers.size(); ++i) {
+        if (takes_name(held, movers[i])) {
+          continue;
+        }
         if (count == 1) {
           try_set({movers[i]});
           continue;
         }
         for (std::size_t j = i + 1; j < movers.size(); ++j) {
-          if (name_of(movers[i]) != name_of(movers[j])) {
+          if (name_of(movers[i]) != name_of(movers[j]) && !takes_name(held, movers[j])) {
             try_set({movers[i], movers[j]});
           }
         }
@@ -523,33 +540,6 @@ Selection select_causes(const CandidateTable& table, const std::vector<EffectKin
   check::that(table.gram != nullptr, "CandidateTable::gram", "set");
   check::that(kinds.size() == table.names.size(), "kinds", "one for each effect");
   return Selector(table, kinds, floor_error, options).run(nominal_trusted);
-}
-
-double unexplained_by(const CandidateTable& table, const std::vector<std::size_t>& a, const std::vector<std::size_t>& b,
-                      BaseModel base) {
-  const auto columns_of = [&](const std::vector<std::size_t>& members) {
-    std::vector<std::size_t> columns;
-    for (const std::size_t c : members) {
-      columns.insert(columns.end(), table.candidates[c].columns.begin(), table.candidates[c].columns.end());
-    }
-    return columns;
-  };
-  const std::vector<std::size_t>& theta = base == BaseModel::refitted ? table.base : table.unknown;
-  const std::vector<std::size_t> of = columns_of(a);
-  std::vector<std::size_t> on = theta;
-  for (const std::size_t column : columns_of(b)) {
-    on.push_back(column);
-  }
-  const Eigen::MatrixXd alone = remainder(*table.gram, of, theta);
-  const Eigen::MatrixXd beside = remainder(*table.gram, of, on);
-  double share = 0.0;
-  for (Eigen::Index i = 0; i < alone.rows(); ++i) {
-    // What θ takes up is no column beside it.
-    if (alone(i, i) > 1e-6 * table.gram->square(of[static_cast<std::size_t>(i)])) {
-      share = std::max(share, std::clamp(beside(i, i) / alone(i, i), 0.0, 1.0));
-    }
-  }
-  return share;
 }
 
 namespace {

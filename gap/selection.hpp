@@ -91,11 +91,6 @@ struct EffectKind {
 [[nodiscard]] Selection select_causes(const CandidateTable& table, const std::vector<EffectKind>& kinds,
                                       bool nominal_trusted, double floor_error, const SelectionOptions& options = {});
 
-/// Unexplained fraction: the largest share of a column of `a`, after θ is fitted, that the columns of `b` do not span;
-/// 0 where b contains a.
-[[nodiscard]] double unexplained_by(const CandidateTable& table, const std::vector<std::size_t>& a,
-                                    const std::vector<std::size_t>& b, BaseModel base);
-
 /// A set of causes that the naive rule chose.
 struct NaiveChoice {
   std::vector<std::size_t> members;  ///< indices of candidates, in the order in which they were taken

@@ -72,7 +72,7 @@ class Changes {
     cause_ = &cause;
     const std::string& name = cause.effect.name;
     const auto rule = rules().find(name);
-    if (rule == rules().end()) {
+    if (rule == rules().end() || cause.effect.free_form) {
       not_expressed(name);
     } else if (rule->second.torque && !unit_) {
       tell(name, "the log's efforts are no torques, and the robot file has no motor constants",

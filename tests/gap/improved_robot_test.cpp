@@ -174,6 +174,16 @@ TEST(ImprovedRobot, SaysWhyARobotFileCannotCarryACause) {
   };
   EXPECT_NE(refused(fitted("sensor_time_offset", {}, {-0.02})).find("early"), std::string::npos);
   EXPECT_NE(refused(fitted("payload", {-30.0, 0.0})).find("mass"), std::string::npos);
+  std::size_t free_forms = 0;
+  for (const Effect& effect : effect_catalogue()) {
+    if (effect.free_form) {
+      const std::vector<double> shape = shape_grid(effect, plain_drive()).front();
+      EXPECT_NE(refused({effect, shape, Eigen::VectorXd::Ones(std::ssize(effect.parameters))}).find(effect.name),
+                std::string::npos);
+      ++free_forms;
+    }
+  }
+  EXPECT_GT(free_forms, 5U);
   FittedEffect own = fitted("coulomb", {0.1});
   own.effect.name = "tether";
   EXPECT_NE(refused(own).find("tether"), std::string::npos);

@@ -3,8 +3,10 @@
 /// Effects that follow laws which no column of the catalogue has: play with any contact, slip by a contact's own
 /// friction. The worlds here integrate two masses on each wheel and know nothing of the columns.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
+#include <memory>
 #include <random>
 #include <set>
 #include <string>
@@ -47,6 +49,8 @@ struct Side {
   double wheel = 0.0;   // rad/s, seen by the encoder
   double ground = 0.0;  // m/s
   double ahead = 0.0;   // rad, of the motor, from the middle of the play
+  double angle = 0.0;   // rad, of the wheel
+  bool is_left = false;
 };
 
 /// Play of ±half between rotor and wheel. Where they touch they hold together for as long as they push, and part with
@@ -91,6 +95,19 @@ struct Sliding {
   }
 };
 
+/// Wheel and motor in one, which a further torque `lost(side, torque)` works against.
+template <typename Lost>
+struct Resisted {
+  Lost lost;
+
+  void advance(Side& s, double torque) const {
+    s.wheel += kFine * (torque - kDamping * s.wheel - lost(s, torque)) / kLoad;
+    s.angle += kFine * s.wheel;
+    s.motor = s.wheel;
+    s.ground = kRadius * s.wheel;
+  }
+};
+
 /// 80 s under a speed controller, as a log: encoder counts, noise of torque and pose, `t` at the middle of each
 /// interval.
 template <typename Law>
@@ -105,6 +122,7 @@ LogTable log_of(const Law& law, std::uint64_t seed) {
   const double phases[6] = {phase(generator), phase(generator), phase(generator),
                             phase(generator), phase(generator), phase(generator)};
   Side sides[2];
+  sides[1].is_left = true;
   double angle[2] = {0.0, 0.0}, sum[2] = {0.0, 0.0}, x = 0.0, y = 0.0, heading = 0.0;
   double counted[2] = {0.0, 0.0};
   const double count = 2.0 * 3.141592653589793 / 8192.0;
@@ -208,6 +226,84 @@ TEST(Laws, SlipIsFoundByTheFrictionOfItsContact) {
     EXPECT_TRUE(is_kept(found, "longitudinal_slip")) << law.most << " N: " << kept(found);
     EXPECT_NE(found.verdict, GapVerdict::no_gap);
   }
+}
+
+template <typename Lost>
+std::string causes_against(const Lost& lost) {
+  const Diagnosis found = diagnosis_of(Resisted<Lost>{lost});
+  const std::set<std::string> names = names_of(found);
+  return core::enumerated({names.begin(), names.end()}) +
+         (found.verdict == GapVerdict::unexplained ? ", unexplained" : "");
+}
+
+constexpr double kTop = 6.0;  // rad/s, that these drives come to
+
+TEST(Laws, SlowViscousFrictionMayBendInAnyWay) {
+  const auto palmgren = [](const Side& s, double) {
+    return std::copysign(std::pow(std::abs(s.wheel), 2.0 / 3.0), s.wheel);
+  };
+  const auto sheared = [](const Side& s, double) { return std::asinh(s.wheel / (0.15 * kTop)); };
+  const auto carreau = [](const Side& s, double) { return s.wheel / std::pow(1.0 + s.wheel * s.wheel, 0.35); };
+  const auto thickening = [](const Side& s, double) { return s.wheel * std::exp(std::abs(s.wheel) / kTop); };
+  const auto on_both = [](const auto& law, double size) {
+    return causes_against([=](const Side& s, double t) { return size * law(s, t); });
+  };
+  const auto on_left = [](const auto& law, double size) {
+    return causes_against([=](const Side& s, double t) { return s.is_left ? size * law(s, t) : 0.0; });
+  };
+  EXPECT_EQ(on_both(palmgren, 0.1), "viscous");
+  EXPECT_EQ(on_both(sheared, 0.12), "viscous");
+  EXPECT_EQ(on_both(thickening, 0.04), "viscous");
+  EXPECT_EQ(on_left(palmgren, 0.12), "viscous_asymmetric");
+  EXPECT_EQ(on_left(carreau, 0.2), "viscous_asymmetric");
+}
+
+TEST(Laws, DryFrictionIsNoBentViscousOne) {
+  EXPECT_EQ(causes_against([](const Side& s, double) { return 0.2 * std::tanh(s.wheel / 0.1); }), "coulomb");
+  const auto bristles = [z = std::make_shared<std::array<double, 2>>()](const Side& s, double) {
+    double& bent = (*z)[s.is_left ? 1 : 0];
+    bent += kFine * s.wheel * (1.0 - bent * std::copysign(1.0, s.wheel)) / 0.03;
+    return (s.is_left ? 0.1 : 0.25) * bent;
+  };
+  EXPECT_EQ(causes_against(bristles), "coulomb_asymmetric");
+}
+
+TEST(Laws, TorqueMayFallShortOfItsCommandInAnyWay) {
+  const auto soft = [](const Side&, double t) { return t - 1.5 * std::tanh(t / 1.5); };
+  const auto slow = [y = std::make_shared<std::array<double, 2>>()](const Side& s, double t) {
+    double& torque = (*y)[s.is_left ? 1 : 0];
+    torque += std::clamp(t - torque, -3.0 * kFine, 3.0 * kFine);
+    return t - torque;
+  };
+  EXPECT_EQ(causes_against(soft), "saturation");
+  EXPECT_EQ(causes_against(slow), "actuator_lag");
+}
+
+TEST(Laws, FrictionMayGrowWithTheLoadInAnyWay) {
+  const auto against = [](const auto& by_load) {
+    return causes_against([=](const Side& s, double t) { return by_load(std::abs(t)) * std::tanh(s.wheel / 0.02); });
+  };
+  EXPECT_EQ(against([](double load) { return 0.15 * std::pow(load, 0.6); }), "load_friction");
+  EXPECT_EQ(against([](double load) { return 0.4 * std::max(load - 0.3, 0.0); }), "load_friction");
+}
+
+TEST(Laws, DragMayBeThatOfTheWheels) {
+  EXPECT_EQ(causes_against([](const Side& s, double) { return 0.02 * s.wheel * std::abs(s.wheel); }), "quadratic_drag");
+}
+
+// A flat, as a bump of the axle's height once a turn, and an oval; magnets that pull a motor into places are no wheel.
+TEST(Laws, WheelsMayBeOfAnyForm) {
+  const auto bump = [](const Side& s, double) {
+    return 0.4 * std::sin(s.angle) * std::exp(2.0 * (std::cos(s.angle) - 1.0));
+  };
+  const auto oval = [](const Side& s, double) {
+    return s.is_left ? 0.2 * std::cos(2.0 * s.angle) + 0.08 * std::sin(3.0 * s.angle) : 0.0;
+  };
+  EXPECT_EQ(causes_against(bump), "wheel_out_of_round");
+  EXPECT_EQ(causes_against(oval), "wheel_out_of_round");
+  const Diagnosis cogged = diagnosis_of(Resisted{[](const Side& s, double) { return 0.2 * std::sin(9.0 * s.angle); }});
+  EXPECT_EQ(cogged.verdict, GapVerdict::unexplained);
+  EXPECT_FALSE(names_of(cogged).contains("wheel_out_of_round"));
 }
 
 TEST(Laws, ALoadOffTheMiddleIsOneCause) {
