@@ -35,7 +35,7 @@ void add_common(CLI::App& command, CommonOptions& options) {
 
 void take_columns(const std::filesystem::path& file, CommonOptions& options) {
   if (!file.empty()) {
-    options.columns = robots::read_columns(file);
+    options.columns = robots::read_columns(file, log_column_names());
   }
 }
 

@@ -420,11 +420,10 @@ bool FaultElements::next() {
   seen_rate_ = (after_.extra.seen - before_.extra.seen) / h;
   // The step that ends at the onset of a jump is still healthy.
   const bool healthy = sets_in_ = fresh_ && k_ == onset_;
-  signature(
-      fault_, *model_,
-      {before_.profile, v0_, joints0_, motion_->heading[k_], acceleration_, before_.extra.moved, moved_rate_,
-       before_.extra.joint_moved, before_.extra.seen, seen_rate_, before_.extra.joint_seen, healthy, healthy},
-      held_, begin_);
+  signature(fault_, *model_,
+            {before_.profile, v0_, joints0_, motion_->heading[k_], acceleration_, before_.extra.moved, moved_rate_,
+             before_.extra.joint_moved, before_.extra.seen, seen_rate_, before_.extra.joint_seen, healthy, healthy},
+            held_, begin_);
   signature(fault_, *model_,
             {after_.profile, v1_, joints1_, motion_->heading[k_ + 1], acceleration_, after_.extra.moved, moved_rate_,
              after_.extra.joint_moved, after_.extra.seen, seen_rate_, after_.extra.joint_seen, healthy},

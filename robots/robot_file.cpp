@@ -4,13 +4,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/files/bytes.hpp>
 #include <wheelwright/files/place.hpp>
 #include <wheelwright/files/words.hpp>
-#include <wheelwright/logs/recorded_log.hpp>
 #include <wheelwright/robots/robot_keys.hpp>
 
 namespace wheelwright::robots {
@@ -310,31 +310,33 @@ Robot read_robot(const std::filesystem::path& path) {
   return parse_robot(files::read_bytes(path, longest_robot_file), path.string());
 }
 
-ColumnMap read_columns(const std::filesystem::path& path) {
-  std::string text = files::read_bytes(path, longest_model_file);
-  std::string where = path.string();
-  if (const std::size_t first = text.find_first_not_of(" \t\r\n"); first != std::string::npos && text[first] == '{') {
-    const Json object = files::parse_json(text, where);
-    const Json robot = object.value("robot", Json::object());
-    if (!robot.is_object() || !robot.contains("columns")) {
-      return {};
-    }
-    text = files::json_text(robot, -1);
-    where += ": /robot";
-  }
-  Names known;
-  for (const logs::LogColumn& column : logs::log_columns()) {
-    known.push_back(column.name);
-  }
-  ColumnMap columns;
-  for (const auto& [key, place] : YamlPlace::parse(text, where).members()) {
-    if (key == "columns") {
-      for (const auto& [name, column] : place.members(known)) {
-        columns[name] = column.text();
+ColumnMap read_columns(const std::filesystem::path& path, const std::vector<std::string>& names) {
+  const std::string text = files::read_bytes(path, longest_model_file);
+  const std::size_t first = text.find_first_not_of(" \t\r\n");
+  std::optional<YamlPlace> columns;
+  try {
+    if (first != std::string::npos && text[first] == '{') {
+      const Json robot = files::parse_json(text, path.string()).at("robot");
+      if (robot.contains("columns")) {
+        columns = YamlPlace::parse(files::json_text(robot["columns"], -1), path.string() + ": /robot/columns");
+      }
+    } else {
+      for (const auto& [key, place] : YamlPlace::parse(text, path.string()).members()) {
+        if (key == "columns") {
+          columns = place;
+        }
       }
     }
+  } catch (const InputError&) {
+  } catch (const Json::exception&) {
   }
-  return columns;
+  ColumnMap map;
+  if (columns) {
+    for (const auto& [name, column] : columns->members(names)) {
+      map[name] = column.text();
+    }
+  }
+  return map;
 }
 
 std::string columns_yaml(const ColumnMap& columns) { return columns.empty() ? "" : yaml_line("columns", columns); }

@@ -43,9 +43,10 @@ namespace wheelwright::robots {
 /// LogOptions::map has them.
 using ColumnMap = std::map<std::string, std::string>;
 
-/// The key `columns` of a robot file, or of the robot in a model.json; empty where there is none. Throws InputError as
-/// read_robot().
-[[nodiscard]] ColumnMap read_columns(const std::filesystem::path& path);
+/// The key `columns` of a robot file, or of the robot in a model.json; empty where there is none, and where the file is
+/// neither (its own reader says so). Throws InputError for a file that cannot be read and for a name that is none of
+/// `names`.
+[[nodiscard]] ColumnMap read_columns(const std::filesystem::path& path, const std::vector<std::string>& names);
 
 /// The line of a robot file with that key; nothing where `columns` is empty.
 [[nodiscard]] std::string columns_yaml(const ColumnMap& columns);
