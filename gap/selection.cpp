@@ -125,7 +125,8 @@ class Selector {
     result.reaches_floor =
         result.left <= std::max({options_.tolerated * result.refitted_excess + inexact(result.structural),
                                  std::min(options_.tolerated_nominal * gap_, 4.0 * options_.tolerated_floor),
-                                 options_.tolerated_floor});
+                                 options_.tolerated_floor}) &&
+        !arbitrary(result.credible);
     return result;
   }
 
@@ -327,6 +328,16 @@ class Selector {
 
   [[nodiscard]] const std::string& name_of(std::size_t candidate) const {
     return table_.names[table_.candidates[candidate].effect];
+  }
+
+  // Whether that many combinations of that many causes do equally well that they are a fit and no explanation.
+  [[nodiscard]] bool arbitrary(const std::vector<CredibleSet>& credible) const {
+    constexpr std::size_t kCauses = 3, kCombinations = 10;
+    std::set<std::vector<std::string>> combinations;
+    for (const CredibleSet& member : credible) {
+      combinations.insert(sorted_names(member.set));
+    }
+    return combinations.size() >= kCombinations && credible.front().set.members.size() >= kCauses;
   }
 
   // Whether a member of `set` is an effect of this candidate's name.

@@ -74,7 +74,7 @@ struct Selection {
   double left = 0.0;             ///< excess of `structural`
   BaseModel base = BaseModel::refitted;  ///< what `all` was judged with
   bool theta_moved = false;              ///< θ differs from nominal and no parametric cause says why
-  bool reaches_floor = true;             ///< what is left is tolerable
+  bool reaches_floor = true;             ///< what is left is tolerable, and not by any of many combinations
   bool any_cause = false;
   bool enough_blocks = true;        ///< else no gain could have been significant over so few blocks of time
   std::vector<CauseSet> looked_at;  ///< every single effect and the best pairs and triples, θ fitted again
