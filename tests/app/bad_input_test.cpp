@@ -212,8 +212,11 @@ TEST_F(BadInput, ModelFile) {
     return refused_command("detect log.csv --model model.json");
   };
   EXPECT_THAT(refused_command("detect log.csv --model no.json"), HasSubstr("no.json: no such file"));
-  EXPECT_THAT(message("not json"), AllOf(HasSubstr("model.json:1:"), HasSubstr("expected JSON")));
-  EXPECT_THAT(message("[]"), HasSubstr("model.json: expected a model written by `wheelwright commission`"));
+  EXPECT_THAT(message("{not json"), AllOf(HasSubstr("model.json:1:"), HasSubstr("expected JSON")));
+  for (const char* other : {"not json", "[]", "name: robot\n"}) {
+    EXPECT_THAT(message(other),
+                HasSubstr("model.json: is no model.json: expected the file that `wheelwright commission`"));
+  }
   EXPECT_THAT(message(R"({"schema": "wheelwright/gap/1"})"), HasSubstr("\"schema\": \"wheelwright/model/1\""));
   EXPECT_THAT(message(R"({"schema": "wheelwright/model/1", "message": "says nothing"})"),
               HasSubstr("model.json: holds no model: says nothing"));
