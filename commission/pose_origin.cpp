@@ -154,8 +154,8 @@ std::optional<double> between_rests(const std::vector<Kept>& segments) {
 }
 
 // What the wheels leave of a heading that is linear between stamps of its own, where that is no more than the
-// interpolation h²/8·|d²/dt²| at both ends of each window and a count of each wheel there; nothing where it is more. h is
-// that of the kinks: a sample bends the line at two rows at most.
+// interpolation h²/8·|d²/dt²| at both ends of each window and a count of each wheel there; nothing where it is more. h
+// is that of the kinks: a sample bends the line at two rows at most.
 std::optional<double> within_interpolation(const std::vector<Kept>& segments, double window, double step,
                                            double count) {
   Combination windows;

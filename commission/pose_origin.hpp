@@ -26,12 +26,12 @@ struct PoseOrigin {
 /// A heading repeats the wheels where less is left than 10⁻⁶ rad rms, which no sensor of its own would agree to with
 /// wheels on a floor; or where no more is left than the rounding of the heading's decimals, and that is less than a
 /// third of what the wheels' own counts (where they are known: half a count each) would leave of an independent
-/// heading. Poses that have stamps of their own repeat the wheels, too (of the first 200,000 rows): where less than 10⁻⁶
-/// rad rms is left from one rest of the wheels to the next (four and more of these), since there no stamp, hold or lag
-/// matters; or where no window leaves more than h²/8·|θ̈| at both its ends, the error of lines between samples h apart,
-/// θ̈ by the wheels: no sensor of its own stays within that where the robot hardly accelerates. A way repeats them below
-/// 10⁻⁵ m, and where the heading does. Nothing is claimed of fewer than eight windows, or of a robot that hardly
-/// turns (drives). Walks `log` once.
+/// heading. Poses that have stamps of their own repeat the wheels, too (of the first 200,000 rows): where less than
+/// 10⁻⁶ rad rms is left from one rest of the wheels to the next (four and more of these), since there no stamp, hold or
+/// lag matters; or where no window leaves more than h²/8·|θ̈| at both its ends, the error of lines between samples h
+/// apart, θ̈ by the wheels: no sensor of its own stays within that where the robot hardly accelerates. A way repeats
+/// them below 10⁻⁵ m, and where the heading does. Nothing is claimed of fewer than eight windows, or of a robot that
+/// hardly turns (drives). Walks `log` once.
 [[nodiscard]] PoseOrigin pose_origin(LogSource& log, const filter::OdometryMeasurement& measurement, double window,
                                      double counts_per_turn = 0.0);
 

@@ -53,8 +53,8 @@ bool FaultMargin::cannot_be_certain(const FaultRow& row, double kappa, double si
   return (direction == Direction::up ? added : -added) <= against * (1.0 - kSafe);
 }
 
-// max acting·θ − h(seen) <= h(acting − seen), of which no size up to κ makes more than the terms' largest, and Δ is worth
-// at least Δ|θ| to the threshold.
+// max acting·θ − h(seen) <= h(acting − seen), of which no size up to κ makes more than the terms' largest, and Δ is
+// worth at least Δ|θ| to the threshold.
 bool FaultMargin::cannot_be_possible(const FaultRow& row, double kappa, double side, double share,
                                      Direction direction) const {
   const double sign = direction == Direction::up ? side : -side;

@@ -95,8 +95,8 @@ class LineReader {
 };
 
 /// A new, empty file beside the place that it is written for, for libraries that write by name. put() renames it; where
-/// that is not reached, nothing is left behind and an older file of the place's name stays as it was. Where the place is
-/// a symbolic link, what it leads to is replaced.
+/// that is not reached, nothing is left behind and an older file of the place's name stays as it was. Where the place
+/// is a symbolic link, what it leads to is replaced.
 class FileBeside {
  public:
   /// Makes the file. Throws InputError, naming the place, when it cannot be made (no such directory, no right to write,
@@ -106,8 +106,8 @@ class FileBeside {
   /// Of the file itself, until put().
   [[nodiscard]] const std::filesystem::path& path() const { return beside_.path(); }
   [[nodiscard]] const std::filesystem::path& place() const { return place_; }
-  /// Renames it, closed by its writer, to its place, when all of it is on disk. Throws InputError when that fails. To be
-  /// called once, last.
+  /// Renames it, closed by its writer, to its place, when all of it is on disk. Throws InputError when that fails. To
+  /// be called once, last.
   void put();
 
  private:
@@ -116,8 +116,8 @@ class FileBeside {
   Temporary beside_;
 };
 
-/// A file that is written from its beginning to its end: beside its place under a temporary name, and renamed into it by
-/// commit(), as FileBeside does. A pipe or a device is written to as it is, and so is a stream of the program's own
+/// A file that is written from its beginning to its end: beside its place under a temporary name, and renamed into it
+/// by commit(), as FileBeside does. A pipe or a device is written to as it is, and so is a stream of the program's own
 /// ("/dev/stdout").
 class AtomicFile {
  public:

@@ -62,7 +62,7 @@ Effect limited_rate() {
   return {.name = "actuator_lag",
           .sentence = "The actuator's torque follows its command no faster than at a largest rate.",
           .family = "late_torque",
-          .shapes = {{.name = "rate",
+          .shapes = {{.name = "largest_rate",
                       .unit = "N·m/s",
                       .lower = 1.5,
                       .upper = 40.0,

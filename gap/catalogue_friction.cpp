@@ -188,9 +188,9 @@ Effect viscous_asymmetric() {
 
 // Viscous friction of any bend: Σ b_k g_k(ω) with b_k >= 0 and increasing g_k, ω; ω/(1 + |ω|/ω_k) at two speeds, of
 // which mixtures make every friction whose slope falls with the speed as a power does, or slower (Stieltjes functions);
-// ω|ω| and ω³ for a slope that grows. None of them is as steep about 0 as dry friction. The speeds are given, not looked
-// for: those of the drive on which the shape was chosen. The linear ω is the measured one, as in the base model, so that
-// θ fitted again takes it all.
+// ω|ω| and ω³ for a slope that grows. None of them is as steep about 0 as dry friction. The speeds are given, not
+// looked for: those of the drive on which the shape was chosen. The linear ω is the measured one, as in the base model,
+// so that θ fitted again takes it all.
 std::vector<Signal> bent_signals(const Drive& drive, std::size_t joint, double bend) {
   constexpr std::array kSpeeds{0.4, 1.5};  // of the bend
   const Eigen::ArrayXd w = drive.joints[joint].smooth_speed.array() / bend;

@@ -304,8 +304,8 @@ class BagWalk final : public RowWalk {
     put_in_order(static_cast<std::size_t>(found - readings_.begin()), time + reading.clock.shift);
   }
 
-  /// Keeps the values of a reading back until none that is up to longest_late earlier can come. A time that goes back by
-  /// more is another recording.
+  /// Keeps the values of a reading back until none that is up to longest_late earlier can come. A time that goes back
+  /// by more is another recording.
   void put_in_order(std::size_t k, std::int64_t time) {
     Reading& reading = readings_[k];
     std::deque<Waiting>& waiting = reading.waiting;

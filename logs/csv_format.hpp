@@ -93,8 +93,8 @@ class CsvRowReader {
     std::string_view text;
   };
 
-  /// Times beyond LogColumn::limit are counts since 1970, of a unit that the first of a file tells by its size. A double
-  /// does not hold nanoseconds since 1970: they are taken from the first whole second.
+  /// Times beyond LogColumn::limit are counts since 1970, of a unit that the first of a file tells by its size. A
+  /// double does not hold nanoseconds since 1970: they are taken from the first whole second.
   struct Clock {
     bool known = false;
     double seconds = 1.0;

@@ -17,8 +17,8 @@ struct FieldSizes {
 };
 
 /// Why the dataset whose object header stands at the byte `address` of `file` must not be opened: the library (1.10.8)
-/// divides by the size of a chunk without dimensions. Empty where nothing speaks against it; what is damaged otherwise is
-/// left to the library. The headers are those of "HDF5 File Format Specification", version 3.0, sections IV.A.1 and
+/// divides by the size of a chunk without dimensions. Empty where nothing speaks against it; what is damaged otherwise
+/// is left to the library. The headers are those of "HDF5 File Format Specification", version 3.0, sections IV.A.1 and
 /// IV.A.2.i.
 [[nodiscard]] std::string header_defect(mcap::WindowedFile& file, std::uint64_t address, FieldSizes sizes);
 

@@ -127,8 +127,8 @@ struct Maker {
     std::vector<OriginNumber> radii, tracks;
     std::string no_radius =
         controller != nullptr ? controller->place.text() + ": has no wheel_radius: give --wheel-radius" : "";
-    // A robot that scrubs turns like a wider one: a multiplier that makes the wheels' own distance the controller's goes
-    // before it.
+    // A robot that scrubs turns like a wider one: a multiplier that makes the wheels' own distance the controller's
+    // goes before it.
     bool scrubs = false;
     if (tree != nullptr) {
       const Axle line = axle(*tree, *wheels);

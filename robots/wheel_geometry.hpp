@@ -31,9 +31,9 @@ struct NamedWheels {
 /// The driven wheels of `tree`: those named; else the continuous joints with a level axis across the robot (within 2°
 /// of y) whose name, or whose link's name, does not say caster; where these are more than two, those that say wheel.
 /// Left is the one with the larger y. As many wheels on each side are a robot that skids: the first of each side are
-/// `right` and `left`. Throws InputError where this leaves other than as many wheels on each side, listing the candidates
-/// and the options to give; where names and sides contradict each other; for a name that is no such joint (with the
-/// nearest that is).
+/// `right` and `left`. Throws InputError where this leaves other than as many wheels on each side, listing the
+/// candidates and the options to give; where names and sides contradict each other; for a name that is no such joint
+/// (with the nearest that is).
 [[nodiscard]] WheelJoints driven_wheels(const RobotTree& tree, const NamedWheels& named);
 
 /// The axle of a differential drive, in the robot's frame.

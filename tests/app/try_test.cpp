@@ -35,7 +35,8 @@ class Try : public testing::ProgramTest {
   }
 };
 
-// Four wheels, efforts that begin with NaN, messages that come late, and a controller whose wheel_separation_multiplier is 1.5.
+// Four wheels, efforts that begin with NaN, messages that come late, and a controller whose wheel_separation_multiplier
+// is 1.5.
 TEST_F(Try, JackalWithItsDescriptionAndController) {
   const double r = 0.098, track = 0.37559;
   const std::vector<std::string> wheels = {"front_left_wheel", "front_right_wheel", "rear_left_wheel",
