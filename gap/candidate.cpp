@@ -89,6 +89,13 @@ class Search {
     return set;
   }
 
+  // Three causes of which one takes any form fit nearly anything.
+  [[nodiscard]] bool crowded(const Members& members, std::size_t effect) const {
+    return members.size() >= 2 && !table_.free_form.empty() &&
+           (table_.free_form[effect] ||
+            std::ranges::any_of(members, [&](std::size_t c) { return table_.free_form[table_.candidates[c].effect]; }));
+  }
+
   // Every set of the first `beam` of `level` with every further effect, best first, each combination of effects once.
   [[nodiscard]] std::vector<Grown> grow(const std::vector<Grown>& level, std::size_t beam) const {
     struct Task {
@@ -101,7 +108,7 @@ class Search {
         const bool there = std::any_of(level[i].members.begin(), level[i].members.end(), [&](std::size_t c) {
           return table_.names[table_.candidates[c].effect] == table_.names[e];
         });
-        if (!there) {
+        if (!there && !crowded(level[i].members, e)) {
           tasks.push_back({i, e});
         }
       }

@@ -36,6 +36,7 @@ struct CandidateTable {
   std::vector<std::size_t> unknown;   ///< those of them that have no nominal value: fitted in any case
   std::vector<Candidate> candidates;  ///< of one effect side by side
   std::vector<std::string> names;     ///< of the effects, by index
+  std::vector<bool> free_form{};      ///< of the effects, by index (Effect::free_form); empty: none
   std::vector<std::pair<std::size_t, double>>
       inertias{};  ///< columns of θ that are inertias, with the nominal values that their coefficients add to
 };

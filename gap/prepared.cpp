@@ -449,6 +449,7 @@ GapProblem make_problem(const Drive& drive, const NoiseFloor& floor, const std::
     }
   }
   for (const Effect& effect : catalogue) {
+    problem.table.free_form.push_back(effect.free_form);
     EffectKind kind{effect.inexact, {}};
     for (std::size_t e = 0; e < catalogue.size(); ++e) {
       if (std::ranges::find(effect.stands_for, catalogue[e].name) != effect.stands_for.end()) {

@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <wheelwright/core/error.hpp>
@@ -281,7 +282,9 @@ TEST(SelectCauses, SaysWhenNothingCouldBeSignificant) {
   const Selection found = select_causes(table.table, table.kinds, false, 1.0);
   EXPECT_EQ(found.enough_blocks, true) << "the signs of eight blocks have a chance of 1/256, three effects want 1/120";
   table.kinds.resize(30);
-  table.table.names.resize(30);
+  for (std::size_t e = table.table.names.size(); e < 30; ++e) {
+    table.table.names.push_back(fmt::format("effect {}", e));
+  }
   const Selection many = select_causes(table.table, table.kinds, false, 1.0);
   EXPECT_FALSE(many.enough_blocks);
   EXPECT_FALSE(many.any_cause);
