@@ -10,12 +10,6 @@
 #include <wheelwright/robots/robot_file.hpp>
 
 namespace wheelwright::app {
-namespace {
-
-constexpr std::size_t kExaminedRows = 200000;
-
-}  // namespace
-
 LogTable first_rows(LogSource& log, std::size_t most) {
   LogTable table;
   table.names = log.columns();

@@ -18,6 +18,9 @@
 
 namespace wheelwright::app {
 
+/// Rows by which a log is judged before a command uses it.
+inline constexpr std::size_t kExaminedRows = 200000;
+
 /// At most `most` rows of `log`, in memory; the log is rewound.
 [[nodiscard]] LogTable first_rows(LogSource& log, std::size_t most);
 
@@ -33,7 +36,7 @@ struct SoundLog {
   std::vector<std::string> remarks;  ///< what was hidden and why, and what was passed over; one sentence each
 };
 
-/// The log in `paths` with the columns that `robot` can use, after the doctor's checks of its first 200,000 rows: where
+/// The log in `paths` with the columns that `robot` can use, after the doctor's checks of its first kExaminedRows: where
 /// units, signs or sides cannot be right, InputError names the findings, and what to do. CommonOptions::despite passes
 /// over findings by their names. Other fatal findings (nothing excited, a dead signal, efforts late) are left to the
 /// commands, which have an answer of their own to each. A log that lacks columns is not examined. Throws as open_log().

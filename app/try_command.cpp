@@ -60,7 +60,7 @@ constexpr const char* kExamples =
     "  then wheelwright detect this_afternoon/ --model result/commission/model.json\n\n"
     "Exit code: 0 a model was made, 1 none could be made of this log (the page says why and what to do), 2 bad input.";
 
-constexpr std::size_t kLookedAt = 200000;  // rows
+constexpr std::size_t kMessages = 200000;  // that are looked at for a robot description
 constexpr double kStartRadius = 0.1;       // m, where a search for the geometry begins
 constexpr double kStartTrack = 0.4;        // m
 constexpr double kHalfAStep = 0.25;        // of a step, about half a one
@@ -74,7 +74,7 @@ std::string description_in(const std::vector<std::filesystem::path>& paths, cons
     }
     const auto bag = logs::open_bag({path}, {.msg_path = common.msg_path, .hashed = false, .trust = common.trust});
     logs::BagMessage message;
-    for (std::size_t k = 0; k < kLookedAt && bag->next(message); ++k) {
+    for (std::size_t k = 0; k < kMessages && bag->next(message); ++k) {
       const logs::BagTopic& topic = bag->topics()[message.topic];
       if (topic.type == "std_msgs/msg/String" && topic.name.ends_with("robot_description") &&
           message.data.size() > header && message.data[1] == 1) {
@@ -132,7 +132,7 @@ void geometry_from_log(const Arguments& a, RobotWithOrigins& made) {
     log = logs::open_log(a.logs, reader);
     from = topic;
   }
-  LogTable table = first_rows(*log, kLookedAt);
+  LogTable table = first_rows(*log, kExaminedRows);
   add_speeds(table);
   const auto has = [&](const char* name) { return std::ranges::count(table.names, name) > 0; };
   const std::string wanted =
@@ -187,17 +187,25 @@ RobotWithOrigins geometry(const Arguments& a) {
   return made;
 }
 
+/// Whether the log has the efforts of all joints of `robot`, of this kind.
+bool has_efforts(const LogSource& log, const Robot& robot, model::EffortKind kind) {
+  return std::ranges::all_of(model::make_model(robot).joints, [&](const model::Joint& joint) {
+    return log.find(model::effort_column(joint, kind)).has_value();
+  });
+}
+
 /// Kind and hold of the efforts, and encoder counts, as the log shows them.
 void settle_from_log(const Arguments& a, RobotWithOrigins& made) {
   const auto log = logs::open_log(a.logs, reader_options(a.common));
-  const auto both = [&](const char* right, const char* left) { return log->find(right) && log->find(left); };
   Robot& robot = made.robot;
-  robot.effort = both("tau_r", "tau_l")           ? model::EffortKind::torque
-                 : both("current_r", "current_l") ? model::EffortKind::current
-                 : both("voltage_r", "voltage_l") ? model::EffortKind::voltage
-                                                  : robot.effort;
+  for (const auto kind : {model::EffortKind::torque, model::EffortKind::current, model::EffortKind::voltage}) {
+    if (has_efforts(*log, robot, kind)) {
+      robot.effort = kind;
+      break;
+    }
+  }
   made.origins["effort.kind"] = "by the columns of the log";
-  const LogTable table = first_rows(*log, kLookedAt);
+  const LogTable table = first_rows(*log, kExaminedRows);
   const doctor::LogHealth health = doctor::examine(table, robot);
   const doctor::LogFinding* delay = health.find("time.effort_delay");
   if (delay != nullptr && health.median_step > 0.0) {
@@ -361,11 +369,7 @@ int run(const Arguments& given) {
   const Json doctor = files::read_json(out / "doctor" / "doctor.json");
   std::string verdict;
   std::vector<std::string>& said = page.content.sentences;
-  const std::vector<model::Joint> joints = model::make_model(robot).joints;
-  const bool efforts = std::ranges::all_of(joints, [&](const model::Joint& joint) {
-    return log->find(model::effort_column(joint, robot.effort)).has_value();
-  });
-  if (!efforts) {
+  if (!has_efforts(*log, robot, robot.effort)) {
     verdict = "No model: the log has no efforts of both wheels.";
     if (call(add_identify, words("identify", with_robot, kAll), why)) {
       page.section("identify", {"what wheels and pose alone say"});

@@ -371,12 +371,8 @@ OnlineModel model_from_json(const Json& json, const std::string& file) {
   return model;
 }
 
-namespace {
-constexpr std::size_t longest_model = std::size_t{1} << 30;
-}  // namespace
-
 OnlineModel read_model(const std::filesystem::path& path) {
-  const std::string text = files::read_bytes(path, longest_model);
+  const std::string text = files::read_bytes(path, longest_model_file);
   if (const std::size_t first = text.find_first_not_of(" \t\r\n"); first != std::string::npos && text[first] != '{') {
     throw InputError(path.string() +
                      ": is no model.json: expected the file that `wheelwright commission` writes into --out (from a "

@@ -36,7 +36,6 @@ using files::YamlPlace;
 namespace {
 
 constexpr std::size_t longest_robot_file = std::size_t{1} << 20;
-constexpr std::size_t longest_model_file = std::size_t{1} << 28;
 constexpr double longest_radius = 10.0;  // m: beyond this the file means millimetres
 constexpr double longest_track = 100.0;  // m
 constexpr double longest_delay = 1.0;    // s: beyond this the file means milliseconds

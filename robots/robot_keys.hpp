@@ -3,6 +3,7 @@
 /// Parsers of parts of a robot file: effort, limits, effects; and the words of enumerations, which model.json has too.
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include <wheelwright/core/warrant.hpp>
@@ -15,6 +16,9 @@
 #include <wheelwright/robots/wheel_geometry.hpp>
 
 namespace wheelwright::robots {
+
+/// Bytes of the longest model.json that is read: as many as files::read_json() takes.
+inline constexpr std::size_t longest_model_file = std::size_t{1} << 30;
 
 inline constexpr files::Words<core::Warrant, 3> kWarrantWords{
     {{core::Warrant::guaranteed, core::warrant_word(core::Warrant::guaranteed)},
