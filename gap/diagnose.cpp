@@ -213,13 +213,12 @@ void add_fast_band(Diagnosis& result, const FastBand& fast, const std::vector<Ef
         set.effects.push_back(play->name);
       }
     }
-    result.notes.push_back(
-        fmt::format("between {:.0f} and {:.0f} 1/s, above the filter's band, the mean square of what the model leaves "
-                    "is {:.2f} times "
-                    "the healthy log's just after reversals of the torque and {:.2f} times elsewhere: play. How wide "
-                    "it is cannot be "
-                    "said without the rotor's inertia",
-                    result.beta, fast.beta, fast.after_reversals, fast.elsewhere));
+    result.notes.push_back(fmt::format(
+        "between {:.0f} and {:.0f} 1/s, above the filter's band, the mean square of what the model leaves "
+        "is {:.2f} times "
+        "the healthy log's just after reversals of the torque and {:.2f} times elsewhere, while it changes as "
+        "fast: play. How wide it is cannot be said without the rotor's inertia",
+        result.beta, fast.beta, fast.after_reversals, fast.elsewhere));
   } else if (fast.above && result.verdict == GapVerdict::no_gap) {
     result.verdict = GapVerdict::unexplained;
     result.notes.push_back(fmt::format(

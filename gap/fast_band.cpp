@@ -2,6 +2,7 @@
 #include <wheelwright/gap/fast_band.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <span>
 #include <utility>
@@ -109,10 +110,32 @@ Signal smoothed(const Drive& drive, const Signal& signal, double window) {
   return smooth;
 }
 
+// How fast the joints' torque changes: the sum of squares of its steps over the last `after` s. Over so wide a window that
+// neither play's impact nor its missing torque adds to it.
+Signal slew_of(const Drive& drive, double after) {
+  constexpr double kWindow = 0.6;  // s
+  const Eigen::Index back = std::max<Eigen::Index>(1, std::lround(after / drive.step));
+  Signal slew = Signal::Zero(drive.rows());
+  for (const JointSignals& joint : drive.joints) {
+    const Signal effort = smoothed(drive, joint.effort, kWindow);
+    for (std::size_t s = 0; s < drive.segment_starts.size(); ++s) {
+      const auto [first, last] = drive.segment(s);
+      double sum = 0.0;
+      const auto step = [&](Eigen::Index k) { return k > first ? std::pow(effort[k] - effort[k - 1], 2) : 0.0; };
+      for (Eigen::Index k = first; k < last; ++k) {
+        sum += step(k) - (k - back > first ? step(k - back) : 0.0);
+        slew[k] += sum;
+      }
+    }
+  }
+  return slew;
+}
+
 // Where a row lies.
 struct Places {
   Mask reversal;  // just after a reversal of the torque
   Mask counts;    // not just after one of the speed
+  Signal slew;    // of the torque
 };
 
 Places places_of(const Drive& drive, const std::vector<Eigen::Index>& rows, double after) {
@@ -123,12 +146,45 @@ Places places_of(const Drive& drive, const std::vector<Eigen::Index>& rows, doub
     speeds.push_back(joint.smooth_speed);
   }
   const Mask torque = after_sign_changes(drive, efforts, after), speed = after_sign_changes(drive, speeds, after);
-  Places places{Mask(static_cast<Eigen::Index>(rows.size())), Mask(static_cast<Eigen::Index>(rows.size()))};
+  const auto count = static_cast<Eigen::Index>(rows.size());
+  Places places{Mask(count), Mask(count), picked(slew_of(drive, after), rows)};
   for (std::size_t k = 0; k < rows.size(); ++k) {
     places.reversal[static_cast<Eigen::Index>(k)] = torque[rows[k]];
     places.counts[static_cast<Eigen::Index>(k)] = !speed[rows[k]];
   }
   return places;
+}
+
+// Weights that give the rows elsewhere the slews of those just after reversals: by quarters of the latter. A torque
+// reverses while it changes fast, and what is wrong with its delay, its friction or its limits shows whenever it does.
+Signal equal_slew_weights(const Places& places) {
+  constexpr std::size_t kQuarters = 4;
+  const Eigen::Index n = places.reversal.size();
+  std::vector<double> after;
+  for (Eigen::Index k = 0; k < n; ++k) {
+    if (places.counts[k] && places.reversal[k]) {
+      after.push_back(places.slew[k]);
+    }
+  }
+  std::ranges::sort(after);
+  const auto quarter_of = [&after](double slew) {
+    const auto rank = static_cast<std::size_t>(std::ranges::upper_bound(after, slew) - after.begin());
+    return std::min(kQuarters * rank / std::max<std::size_t>(after.size(), 1), kQuarters - 1);
+  };
+  std::array<double, kQuarters> after_of{}, elsewhere_of{};
+  for (Eigen::Index k = 0; k < n; ++k) {
+    if (places.counts[k]) {
+      (places.reversal[k] ? after_of : elsewhere_of)[quarter_of(places.slew[k])] += 1.0;
+    }
+  }
+  Signal weights = Signal::Ones(n);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    if (places.counts[k] && !places.reversal[k]) {
+      const std::size_t quarter = quarter_of(places.slew[k]);
+      weights[k] = after_of[quarter] / elsewhere_of[quarter];
+    }
+  }
+  return weights;
 }
 
 // Mean squares just after reversals and elsewhere, over all rows and over equal parts of the time.
@@ -139,7 +195,7 @@ struct Contrast {
 };
 
 Contrast contrast_of(const std::vector<RowSpace>& spaces, const std::vector<Signal>& left, const Places& places,
-                     std::size_t parts) {
+                     const Signal& weights, std::size_t parts) {
   constexpr double kFewest = 5.0;  // rows of a part
   Contrast contrast;
   double sums[2] = {0.0, 0.0}, counts[2] = {0.0, 0.0};
@@ -152,8 +208,8 @@ Contrast contrast_of(const std::vector<RowSpace>& spaces, const std::vector<Sign
       for (Eigen::Index k = from; k < to; ++k) {
         if (places.counts[k]) {
           const std::size_t side = places.reversal[k] ? 0 : 1;
-          sum[side] += std::pow(left[i][k] / spaces[i].floor, 2);
-          count[side] += 1.0;
+          sum[side] += weights[k] * std::pow(left[i][k] / spaces[i].floor, 2);
+          count[side] += weights[k];
         }
       }
     }
@@ -246,20 +302,30 @@ std::optional<FastBand> look_at_fast_band(const PreparedGap& prepared, const std
   const BandFit fitted = fit_band(spaces, options.blocks);
   found.left = fitted.fit.held_out_error;
 
-  const Contrast now = contrast_of(spaces, fitted.left, places_of(drive, rows, options.after), kParts);
-  const Contrast before =
-      contrast_of(reference, healthy_fit.left, places_of(healthy, healthy_rows, options.after), kParts);
-  found.after_reversals = now.after;
-  found.elsewhere = now.elsewhere;
+  const Places places = places_of(drive, rows, options.after);
+  const Places healthy_places = places_of(healthy, healthy_rows, options.after);
+  const auto compared = [&](bool equal_slew) {
+    const auto weights = [&](const Places& of) {
+      return equal_slew ? equal_slew_weights(of) : Signal::Ones(of.reversal.size()).eval();
+    };
+    return std::pair(contrast_of(spaces, fitted.left, places, weights(places), kParts),
+                     contrast_of(reference, healthy_fit.left, healthy_places, weights(healthy_places), kParts));
+  };
+  const auto [now, before] = compared(false);
+  const auto [now_alike, before_alike] = compared(true);
+  const double usual = std::max(before.ratio(), 1.0), usual_alike = std::max(before_alike.ratio(), 1.0);
+  found.after_reversals = now_alike.after;
+  found.elsewhere = now_alike.elsewhere;
   found.presence = now.presence;
-  const double usual = std::max(before.ratio(), 1.0);
   std::vector<double> beyond;
   for (std::size_t p = 0; p < now.after_of.size(); ++p) {
     beyond.push_back(now.after_of[p] - usual * now.elsewhere_of[p]);
   }
-  found.play = now.ratio() > options.contrast * usual && median_above_zero_p(beyond) < options.significance;
+  found.play = now.ratio() > options.contrast * usual && now_alike.ratio() > options.contrast * usual_alike &&
+               median_above_zero_p(beyond) < options.significance;
   if (efforts > 0.0) {
-    found.effort_square = std::max(now.after - usual * now.elsewhere, 0.0) * now.presence * floor_square / efforts;
+    found.effort_square =
+        std::max(now_alike.after - usual_alike * now_alike.elsewhere, 0.0) * now.presence * floor_square / efforts;
   }
   std::size_t more = 0, blocks = 0;
   for (Eigen::Index b = 0; b < fitted.counts.size(); ++b) {

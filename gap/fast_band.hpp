@@ -17,7 +17,7 @@ struct FastBand {
   double left = 1.0;   ///< held out, with θ and the causes fitted again in this band
   bool above = false;  ///< `left` is above the healthy log's by more than a quarter, in nearly all blocks of time
   double after_reversals = 0.0;  ///< just after reversals of a joint's torque
-  double elsewhere = 0.0;        ///< away from them
+  double elsewhere = 0.0;        ///< away from them, while the torque changes as fast
   double presence = 0.0;         ///< share of the rows that are just after such a reversal
   bool play =
       false;  ///< it is the reversals that bring it: more than on the healthy log, in more blocks than by chance
@@ -29,7 +29,7 @@ struct FastBandOptions {
   double beta = 40.0;          ///< upper corner, 1/s; lower where the log's step is long
   double row_step = 0.4;       ///< in 1/β
   double after = 0.15;         ///< s, how long after a reversal its play is crossed and the impact over
-  double contrast = 1.25;      ///< least ratio after_reversals/elsewhere over that of the healthy log, for play
+  double contrast = 1.25;      ///< least ratio of what is left after reversals and elsewhere over the healthy log's
   double significance = 0.05;  ///< of it, over blocks of time
   double above = 0.25;         ///< mean square above the healthy log's that counts as a gap of its own
   BlockOptions blocks{};
@@ -41,7 +41,8 @@ struct FastBandOptions {
 ///
 /// Play is crossed after each reversal of the torque, within hundredths of a second: whatever the contact is like, the
 /// torque is missing first and then an impact. Below the band nothing of it is left. Rows just after a joint's speed
-/// has changed its sign, where friction acts, do not count. Nothing for a preparation without a healthy log, without
+/// has changed its sign, where friction acts, do not count. A torque reverses while it changes fast, when whatever is
+/// wrong with its delay or its limits shows too: it must also stand out against moments at which it changes as fast. Nothing for a preparation without a healthy log, without
 /// efforts or with too few rows.
 [[nodiscard]] std::optional<FastBand> look_at_fast_band(const PreparedGap& prepared,
                                                         const std::vector<FittedEffect>& causes,
