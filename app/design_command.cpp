@@ -166,7 +166,7 @@ gap::Drive ordinary_drive(const design::DesignSubject& subject, const design::Mo
 
 gap::DiscriminationDesign discriminate(const Arguments& a, const design::DesignSubject& subject,
                                        const design::MotionLimits& limits, const design::DesignOptions& options) {
-  const std::vector<Effect> catalogue = gap::effect_catalogue(subject.model);
+  std::vector<Effect> catalogue = gap::effect_catalogue(subject.model);
   const gap::Drive drive = ordinary_drive(subject, limits);
   gap::PlannedNoise noise = gap::expected_noise(subject);
   const std::vector<gap::Rival> rivals = a.gap.empty() ? rivals_named(a.between, a.sizes, catalogue, drive)

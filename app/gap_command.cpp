@@ -341,7 +341,7 @@ int run(const Arguments& a) {
   }
   Json result = results::to_json(diagnosis, names);
   result["improved"] = files && diagnosis.improved ? Json(kImproved) : Json(nullptr);
-  results::add_rivals(result, next.rivals, catalogue);
+  results::add_rivals(result, next);
   if (a.naive) {
     result["naive"] = {{"effects", naive}};
   }

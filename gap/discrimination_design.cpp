@@ -242,7 +242,7 @@ DiscriminationDesign design_for_discrimination(const design::DesignSubject& subj
     return discrimination(planned_drive(plan, subject), rivals, catalogue, noise);
   };
   design.promised = pairs(design.manoeuvre.plan);
-  if (any && subject.model.on_two_wheels) {
+  if (any && analysed == nullptr && subject.model.on_two_wheels) {
     design.figure_eight = design::find_figure_eight(subject, limits, objective);
   }
   if (design.figure_eight) {

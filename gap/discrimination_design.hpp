@@ -57,10 +57,11 @@ struct DiscriminationDesign {
 /// Measurement that separates two rivals which no log of efforts, wheel speeds and pose separates.
 [[nodiscard]] std::string splitting_measurement(const Rival& a, const Rival& b, const std::vector<Effect>& catalogue);
 
-/// design_manoeuvre() for tell_apart() over the decidable pairs, and the best figure eight beside it. An ordered pair
+/// design_manoeuvre() for tell_apart() over the decidable pairs; for comparison beside it the drive that was analysed,
+/// or the best figure eight where there is none. An ordered pair
 /// (A, B) is decidable where on one of some random manoeuvres within the limits B fails to imitate more than 10⁻⁴ of
 /// A's signature, and θ does not take up the signature but for errors of sampling (3·10⁻⁴ of its sum of squares).
-/// `analysed`: the drive that was analysed, with predicted efforts, for comparison; may be null. Throws InvalidArgument
+/// `analysed`: with predicted efforts; may be null. Throws InvalidArgument
 /// as discrimination() and design_manoeuvre() do.
 [[nodiscard]] DiscriminationDesign design_for_discrimination(
     const design::DesignSubject& subject, const design::MotionLimits& limits, const std::vector<Rival>& rivals,

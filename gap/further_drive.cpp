@@ -249,7 +249,8 @@ void judge_pairs(std::vector<ConfusablePair>& pairs, const CandidateTable& table
 
 namespace {
 
-constexpr std::size_t kMostRivals = 4;  // pairs grow with the square
+constexpr std::size_t kMostRivals = 4;   // pairs grow with the square
+constexpr std::size_t kMostShapes = 40;  // of a rival's cause: each is tried for every plan that is looked at
 
 // The best fit of a set of effects at any of their shapes.
 CauseSet best_set(const CandidateTable& table, const std::vector<std::string>& effects, BaseModel base) {
@@ -279,11 +280,17 @@ Rival rival_of(const FittedCauses& fitted, const std::vector<Effect>& catalogue,
   return rival;
 }
 
+// Whether a plan can be looked at a hundred times within seconds.
+bool quickly_planned(const Rival& rival, const std::vector<Effect>& laws, const Drive& drive) {
+  return std::ranges::all_of(rival.causes, [&](const RivalCause& cause) {
+    return shape_grid(*std::ranges::find(laws, cause.effect, &Effect::name), drive).size() <= kMostShapes;
+  });
+}
+
 // Each member of the credible set fitted to the drive; θ beside the first of them goes to `theta`. An effect follows
-// one law in all of them, which is the first of its name in `catalogue` afterwards.
+// one law in all of them, which is the one in `laws`.
 std::vector<Rival> fitted_rivals(const PreparedGap& prepared, const Diagnosis& diagnosis,
-                                 const DiagnoseOptions& options, Eigen::VectorXd& theta,
-                                 std::vector<Effect>& catalogue) {
+                                 const DiagnoseOptions& options, Eigen::VectorXd& theta, std::vector<Effect>& laws) {
   std::map<std::string, std::size_t> law;  // of each effect, its place in prepared.catalogue
   const bool trusted = std::ranges::find(prepared.trusted, true) != prepared.trusted.end();
   std::vector<Rival> rivals;
@@ -318,10 +325,10 @@ std::vector<Rival> fitted_rivals(const PreparedGap& prepared, const Diagnosis& d
     for (const std::size_t c : set.members) {
       const std::size_t e = problem.table.candidates[c].effect;
       if (law.emplace(prepared.catalogue[e].name, e).second) {
-        catalogue.insert(catalogue.begin(), prepared.catalogue[e]);
+        laws.push_back(prepared.catalogue[e]);
       }
     }
-    rivals.push_back(rival_of(fitted, catalogue, prepared.drive));
+    rivals.push_back(rival_of(fitted, laws, prepared.drive));
   }
   return rivals;
 }
@@ -333,9 +340,18 @@ NextDrive next_drive(LogSource& log, LogSource* baseline, const Robot& robot, co
   const PreparedGap prepared = prepare_gap(log, baseline, robot, options);
   NextDrive next;
   Eigen::VectorXd theta = prepared.theta;
-  std::vector<Effect> catalogue = prepared.catalogue;
-  next.rivals = fitted_rivals(prepared, diagnosis, options, theta, catalogue);
+  next.rivals = fitted_rivals(prepared, diagnosis, options, theta, next.laws);
   if (next.rivals.size() < 2) {
+    return next;
+  }
+  std::vector<Rival> planned;
+  std::ranges::copy_if(next.rivals, std::back_inserter(planned),
+                       [&](const Rival& rival) { return quickly_planned(rival, next.laws, prepared.drive); });
+  if (planned.size() < 2) {
+    next.sentence = fmt::format(
+        "No drive was designed to tell {} from {}, of which there are too many kinds; what would "
+        "split them: {}.",
+        next.rivals[0].name(), next.rivals[1].name(), splitting_measurement(next.rivals[0], next.rivals[1], next.laws));
     return next;
   }
   const design::DesignSubject subject = subject_of(prepared, prepared.view.robot, theta);
@@ -347,7 +363,7 @@ NextDrive next_drive(LogSource& log, LogSource* baseline, const Robot& robot, co
   design::DesignOptions search;
   search.samples = 60;
   search.descents = 2;
-  search.steps = 120;
+  search.steps = 80;
   search.seed = options.seed;
   search.threads = options.threads;
   search.progress = [&](std::string_view, double share) {
@@ -357,7 +373,7 @@ NextDrive next_drive(LogSource& log, LogSource* baseline, const Robot& robot, co
   };
   const design::MotionLimits limits = limits_within(prepared, prepared.view.robot);
   const DiscriminationDesign design =
-      design_for_discrimination(subject, limits, next.rivals, catalogue, noise, search, &prepared.drive);
+      design_for_discrimination(subject, limits, planned, next.laws, noise, search, &prepared.drive);
   next.sentence = core::listed(design.sentences, " ");
   if (design.worst()) {
     next.commands = design::command_table(design.manoeuvre.plan, subject.model);

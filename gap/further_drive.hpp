@@ -52,6 +52,7 @@ void judge_pairs(std::vector<ConfusablePair>& pairs, const CandidateTable& table
 /// The next drive to record.
 struct NextDrive {
   std::vector<Rival> rivals;         ///< members of the credible set as fitted to the log, in its order
+  std::vector<Effect> laws;          ///< that their causes follow, one of each name
   std::optional<LogTable> commands;  ///< of the wheels; nothing where no drive tells any two of the rivals apart
   std::string sentence;              ///< what the drive promises, and what no drive can
 };
@@ -59,7 +60,8 @@ struct NextDrive {
 /// Designs the drive for the credible set of `diagnosis`, the first few members of it: each fitted to the log again, of
 /// the robot and options that diagnosed it. Limits are those of the robot file; where it has none, what the log itself
 /// drove: speeds, accelerations, and with a pose the distance from the start. Four fifths of the effort are planned
-/// with, for the controller to have the rest. It lasts a third of the log, between 20 and 60 s.
+/// with, for the controller to have the rest. It lasts a third of the log, between 20 and 60 s. Where too few members
+/// can be planned for in seconds, having shapes by the hundred, the sentence has the measurement that would split them.
 [[nodiscard]] NextDrive next_drive(LogSource& log, LogSource* baseline, const Robot& robot, const Diagnosis& diagnosis,
                                    const DiagnoseOptions& options);
 

@@ -416,7 +416,7 @@ std::shared_ptr<DiagnosisObject> gap(LogObject& log, const RobotObject& robot, L
     }
     out->json = results::to_json(d, files);
     out->json["improved"] = nullptr;
-    results::add_rivals(out->json, out->next.rivals, catalogue);
+    results::add_rivals(out->json, out->next);
     return out;
   });
 }

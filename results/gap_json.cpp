@@ -194,6 +194,32 @@ void take(gap::RivalCause& cause, const Effect& effect, const files::JsonPlace& 
   }
 }
 
+// Whether `parameters` has just those of the law, by "effect.parameter".
+bool follows(const Effect& law, const files::JsonPlace& parameters) {
+  const std::string prefix = law.name + ".";
+  const auto has = [&](const auto& parameter) { return parameters.has(prefix + parameter.name); };
+  const auto of_effect = [&](const std::string& name) { return name.starts_with(prefix); };
+  return std::ranges::all_of(law.parameters, has) && std::ranges::all_of(law.shapes, has) &&
+         static_cast<std::size_t>(std::ranges::count_if(parameters.keys(), of_effect)) ==
+             law.parameters.size() + law.shapes.size();
+}
+
+// Makes the law that has the parameters of a member of the credible set the first of its name.
+void prefer_its_laws(std::vector<Effect>& catalogue, const std::vector<std::string>& effects,
+                     const files::JsonPlace& member) {
+  if (!member.has("parameters")) {
+    return;
+  }
+  const files::JsonPlace parameters = member.at("parameters");
+  for (const std::string& name : effects) {
+    const auto law = std::ranges::find_if(
+        catalogue, [&](const Effect& effect) { return effect.name == name && follows(effect, parameters); });
+    if (law != catalogue.end()) {
+      std::rotate(catalogue.begin(), law, law + 1);
+    }
+  }
+}
+
 void take_noise(const files::JsonPlace& root, const Model& model, gap::PlannedNoise& noise) {
   if (!root.has("filter") || !root.at("filter").has("beta") || !root.has("shrink")) {
     return;
@@ -213,7 +239,7 @@ void take_noise(const files::JsonPlace& root, const Model& model, gap::PlannedNo
 
 }  // namespace
 
-std::vector<gap::Rival> rivals_of_gap(const std::filesystem::path& file, const std::vector<Effect>& catalogue,
+std::vector<gap::Rival> rivals_of_gap(const std::filesystem::path& file, std::vector<Effect>& catalogue,
                                       const gap::Drive& drive, gap::PlannedNoise& noise) {
   const Json json = files::read_json(file);
   const files::JsonPlace root(json, file.string());
@@ -229,6 +255,7 @@ std::vector<gap::Rival> rivals_of_gap(const std::filesystem::path& file, const s
   std::vector<gap::Rival> rivals;
   for (std::size_t i = 0; i < credible.size(); ++i) {
     const std::vector<std::string> effects = credible.at(i).at("effects").texts();
+    prefer_its_laws(catalogue, effects, credible.at(i));
     const bool known = std::ranges::all_of(effects, [&](const std::string& name) {
       const Effect* effect = find(catalogue, name);
       return effect != nullptr && gap::applicability(*effect, drive).applies;
@@ -256,12 +283,12 @@ std::vector<gap::Rival> rivals_of_gap(const std::filesystem::path& file, const s
   return rivals;
 }
 
-void add_rivals(Json& result, const std::vector<gap::Rival>& rivals, const std::vector<Effect>& catalogue) {
-  for (const gap::Rival& rival : rivals) {
+void add_rivals(Json& result, const gap::NextDrive& next) {
+  for (const gap::Rival& rival : next.rivals) {
     std::vector<std::string> effects;
     Json parameters = Json::object();
     for (const gap::RivalCause& cause : rival.causes) {
-      const Effect& effect = *std::ranges::find(catalogue, cause.effect, &Effect::name);
+      const Effect& effect = *std::ranges::find(next.laws, cause.effect, &Effect::name);
       const auto add = [&](const auto& parameter, double value) {
         parameters[effect.name + "." + parameter.name] = {{"estimate", value}, {"unit", parameter.unit}};
       };

@@ -11,6 +11,7 @@
 #include <wheelwright/files/json.hpp>
 #include <wheelwright/gap/diagnosis.hpp>
 #include <wheelwright/gap/discrimination.hpp>
+#include <wheelwright/gap/further_drive.hpp>
 
 namespace wheelwright::results {
 
@@ -47,13 +48,13 @@ void write_residuals(const std::filesystem::path& path, const std::vector<gap::R
 
 /// Members of the credible set of a gap.json. Parameters are those of credible_set[].parameters, keyed
 /// "effect.parameter", else of `causes` where the effects are the same; a member without any is as large as
-/// typical_rival() makes it. Noise and filter of the analysed log, where the file has them, take the place of those in
-/// `noise`. Throws InputError where fewer than two members are left that the catalogue knows.
-[[nodiscard]] std::vector<gap::Rival> rivals_of_gap(const std::filesystem::path& file,
-                                                    const std::vector<Effect>& catalogue, const gap::Drive& drive,
-                                                    gap::PlannedNoise& noise);
+/// typical_rival() makes it. The laws that have these parameters become the first of their names in `catalogue`. Noise
+/// and filter of the analysed log, where the file has them, take the place of those in `noise`. Throws InputError where
+/// fewer than two members are left that the catalogue knows.
+[[nodiscard]] std::vector<gap::Rival> rivals_of_gap(const std::filesystem::path& file, std::vector<Effect>& catalogue,
+                                                    const gap::Drive& drive, gap::PlannedNoise& noise);
 
-/// Adds the parameters of `rivals` to the members of the credible set of a gap.json: `design --gap` begins from them.
-void add_rivals(Json& result, const std::vector<gap::Rival>& rivals, const std::vector<Effect>& catalogue);
+/// Adds the parameters of the rivals to the members of the credible set of a gap.json: `design --gap` begins from them.
+void add_rivals(Json& result, const gap::NextDrive& next);
 
 }  // namespace wheelwright::results

@@ -218,6 +218,25 @@ TEST(Laws, PlayIsFoundWhateverItsContact) {
   }
 }
 
+// A torque reverses while it changes fast, when a motor that holds its command for a while is furthest from it.
+TEST(Laws, ATorqueThatFollowsInStepsHasNoPlay) {
+  struct Held {
+    double value = 0.0;
+    int left = 0;
+  };
+  const auto in_steps = [of = std::make_shared<std::array<Held, 2>>()](const Side& s, double t) {
+    Held& held = (*of)[s.is_left ? 1 : 0];
+    if (held.left-- == 0) {
+      held = {t, static_cast<int>(std::lround(0.12 / kFine)) - 1};
+    }
+    return t - held.value;
+  };
+  const std::set<std::string> names = names_of(diagnosis_of(Resisted{in_steps}));
+  EXPECT_FALSE(names.contains("backlash"));
+  EXPECT_TRUE(names.contains("delay") || names.contains("actuator_lag"))
+      << core::enumerated({names.begin(), names.end()});
+}
+
 // Where these contacts slide. One that only creeps makes the ground's speed lag behind the rim's, as by clocks that
 // differ, and nothing here could tell.
 TEST(Laws, SlipIsFoundByTheFrictionOfItsContact) {

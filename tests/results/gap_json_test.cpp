@@ -12,6 +12,7 @@
 
 #include <wheelwright/results/gap_json.hpp>
 
+#include "gap/simulated_gap.hpp"
 #include "report/gap_example.hpp"
 #include "support/scratch.hpp"
 
@@ -104,6 +105,36 @@ TEST(GapJson, SchemaNamesEveryKeyAndRequiresIt) {
 }
 
 using GapJsonFile = testing::ScratchTest;
+
+// An effect can have laws with more parameters and with fewer: a plan begins from the one that was fitted.
+TEST_F(GapJsonFile, RivalsKeepTheLawThatWasFitted) {
+  const gap::Drive& drive = gap::gap_example::plain_drive();
+  const std::vector<Effect> catalogue = gap::effect_catalogue();
+  std::size_t looked_at = 0;
+  for (std::size_t later = 0; later < catalogue.size(); ++later) {
+    const Effect& law = catalogue[later];
+    const Effect& first = *std::ranges::find(catalogue, law.name, &Effect::name);
+    if (&first == &law || law.name == "coulomb" || !gap::applicability(law, drive).applies ||
+        (first.parameters.size() == law.parameters.size() && first.shapes.size() == law.shapes.size())) {
+      continue;
+    }
+    gap::NextDrive next;
+    next.laws = {law, *std::ranges::find(catalogue, "coulomb", &Effect::name)};
+    next.rivals = {gap::typical_rival({law.name}, next.laws, drive), gap::typical_rival({"coulomb"}, next.laws, drive)};
+    Json result = to_json(Diagnosis{}, GapFiles{});
+    result["credible_set"] = {{{"effects", {law.name}}}, {{"effects", {"coulomb"}}}};
+    add_rivals(result, next);
+    std::vector<Effect> laws = catalogue;
+    gap::PlannedNoise noise;
+    const std::vector<gap::Rival> read = rivals_of_gap(put("gap.json", result.dump()), laws, drive, noise);
+    ASSERT_EQ(read.size(), 2U);
+    EXPECT_EQ(read[0].causes[0].coefficients, next.rivals[0].causes[0].coefficients) << law.name << " " << later;
+    EXPECT_EQ(read[0].causes[0].shape, next.rivals[0].causes[0].shape) << law.name << " " << later;
+    EXPECT_NO_THROW(gap::validate(read[0], laws, drive)) << law.name << " " << later;
+    ++looked_at;
+  }
+  EXPECT_GT(looked_at, 3U);
+}
 
 TEST_F(GapJsonFile, HasALinePerRowAndChannel) {
   const auto file = path("residuals.csv");
