@@ -282,6 +282,31 @@ Effect quadratic_drag(std::size_t joints) {
   return effect;
 }
 
+// Drag that grows faster than in proportion to the body's speed, in any way: Σ c_k v|v|^p with c_k >= 0.
+Effect drag_of_any_growth() {
+  static constexpr std::array<double, 3> kPowers{0.5, 1.0, 2.0};
+  return {.name = "quadratic_drag",
+          .sentence = "Drag that grows faster than the speed.",
+          .parameters = {{"c_early", "N·(s/m)^1.5", 1},
+                         {"c_square", "N·s²/m²", 1},
+                         {"c_cube", "N·s³/m³", 1},
+                         {"c2_square", "N·m²·s²/rad²", 1}},
+          .free_form = true,
+          .excite = "drive from slow to as fast as it goes, straight and turning",
+          .measured_by = DirectMeasurement::lifted_wheels,
+          .applies = needs_two_wheels,
+          .columns = [](const Drive& drive, Shape) {
+            const auto v1 = drive.coordinates[0].smooth_speed.array();
+            const auto v2 = drive.coordinates[1].smooth_speed.array();
+            std::vector<Column> columns(kPowers.size() + 1);
+            for (std::size_t k = 0; k < kPowers.size(); ++k) {
+              columns[k].effort = {Signal(v1 * v1.abs().pow(kPowers[k])), {}};
+            }
+            columns.back().effort = {{}, v2 * v2.abs()};
+            return columns;
+          }};
+}
+
 // Oil that gears churn in: of each wheel by itself.
 Effect drag_of_wheels() {
   return {.name = "quadratic_drag",
@@ -386,6 +411,7 @@ Effect load_friction_that_lags() {
 Effect friction_drift() {
   return {.name = "friction_drift",
           .sentence = "Friction, viscous and dry, that changes as the drive warms up.",
+          .steady = {"coulomb", "viscous"},
           .common = "viscous",
           .parameters = {{"loss", "N·m·s/rad", 0}, {"loss_dry", "N·m", 0}},
           .shapes = {{.name = "T", .unit = "s", .lower = 10.0, .upper = 200.0, .scan = 8, .logarithmic = true}},
@@ -497,7 +523,7 @@ std::vector<Effect> friction_effects(std::size_t joints) {
   if (joints == 2) {
     for (auto* make :
          {&coulomb_asymmetric, &viscous_asymmetric, &caster_drag, &lateral_scrub, &viscous_bent_on_one_side,
-          &drag_of_wheels, &coulomb_asymmetric_of_bristles, &scrub_of_bristles}) {
+          &drag_of_any_growth, &drag_of_wheels, &coulomb_asymmetric_of_bristles, &scrub_of_bristles}) {
       effects.push_back(make());
     }
   }

@@ -67,16 +67,49 @@ std::vector<std::string> reported_names(const CandidateTable& table, const std::
   return names;
 }
 
+bool same_causes(std::vector<std::string> a, std::vector<std::string> b) {
+  std::ranges::sort(a);
+  std::ranges::sort(b);
+  return a == b;
+}
+
+bool are_listed(const std::vector<CredibleCauses>& credible, const std::vector<std::string>& effects) {
+  return std::ranges::any_of(credible,
+                             [&](const CredibleCauses& other) { return same_causes(other.effects, effects); });
+}
+
+// Leaves out what does as well with one of its causes steady in time, but for the best.
+void leave_out_unsteady(std::vector<CredibleCauses>& credible, const std::vector<Effect>& catalogue) {
+  const auto needless = [&](const CredibleCauses& set) {
+    for (std::size_t k = 0; k < set.effects.size(); ++k) {
+      std::vector<std::string> effects = set.effects;
+      for (const std::string& steady : std::ranges::find(catalogue, set.effects[k], &Effect::name)->steady) {
+        effects[k] = steady;
+        if (are_listed(credible, effects)) {
+          return true;
+        }
+      }
+    }
+    return false;
+  };
+  std::vector<CredibleCauses> kept;
+  for (const CredibleCauses& set : credible) {
+    if (kept.empty() || !needless(set)) {
+      kept.push_back(set);
+    }
+  }
+  credible = std::move(kept);
+}
+
 void list_credible(Diagnosis& result, const Selection& found, const CandidateTable& table,
                    const std::vector<Effect>& catalogue) {
   for (const CredibleSet& member : found.credible) {
     CredibleCauses causes{reported_names(table, catalogue, member.set), member.set.held_out_error, member.p_value};
-    const bool there = std::any_of(result.credible.begin(), result.credible.end(),
-                                   [&](const CredibleCauses& other) { return other.effects == causes.effects; });
-    if (!there) {
+    if (!are_listed(result.credible, causes.effects)) {
       result.credible.push_back(std::move(causes));
     }
   }
+  leave_out_unsteady(result.credible, catalogue);
 }
 
 void list_looked_at(Diagnosis& result, const Selection& found, const CandidateTable& table) {

@@ -82,6 +82,7 @@ struct Effect {
   std::string noun{};                     ///< as sentences call it; empty: as catalogue_noun(name)
   std::string sentence{};                 ///< description for people
   std::string family{};                   ///< name shared by effects that are the same cause; empty: none
+  std::vector<std::string> steady{};      ///< causes that it is when nothing changes in time: no rival of them
   std::string common{};                   ///< parametric cause that is a part of this effect: unequal gains have a
                                           ///< mean. Where both are found it is one cause; empty: none
   std::vector<std::string> stands_for{};  ///< effects that this one is together: a load off the middle adds mass and

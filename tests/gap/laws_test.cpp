@@ -298,6 +298,16 @@ TEST(Laws, TorqueMayFallShortOfItsCommandInAnyWay) {
   EXPECT_EQ(causes_against(slow), "actuator_lag");
 }
 
+TEST(Laws, TheSameCausesByOtherLawsAreOneAnswer) {
+  const auto growing = [t = std::make_shared<double>(0.0)](const Side& s, double) {
+    *t += 0.5 * kFine;
+    return 0.03 * (1.0 + 0.4 * *t / 80.0) * std::tanh(s.wheel / 0.02);
+  };
+  const Diagnosis found = diagnosis_of(Resisted{growing});
+  EXPECT_EQ(names_of(found), (std::set<std::string>{"coulomb", "friction_drift"}));
+  EXPECT_EQ(found.verdict, GapVerdict::explained) << kept(found);
+}
+
 TEST(Laws, FrictionMayGrowWithTheLoadInAnyWay) {
   const auto against = [](const auto& by_load) {
     return causes_against([=](const Side& s, double t) { return by_load(std::abs(t)) * std::tanh(s.wheel / 0.02); });
