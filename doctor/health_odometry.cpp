@@ -22,6 +22,7 @@ namespace {
 constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kWindow = 1.0;     // s
 constexpr std::size_t kFewest = 8;  // windows
+constexpr double kNeeded = 0.05;    // of a mean square, that the other one alone leaves
 constexpr double kClear = 4.0;      // standard errors
 constexpr double kFastest = 10.0;   // rad in a window
 constexpr double kAligned = 0.8;    // of displacements with the heading, for a forward direction
@@ -91,7 +92,7 @@ std::vector<Window> windows_of(const HealthView& view) {
 // value = along·S + turn·T over windows, S and T the wheels' mean and half difference.
 struct WheelFit {
   double along = 0.0, turn = 0.0;
-  bool along_clear = false, turn_clear = false;  // told from zero
+  bool along_clear = false, turn_clear = false;  // told from zero, and needed beside the other
   double explained = 0.0;                        // share of the variation
 };
 
@@ -116,8 +117,15 @@ std::optional<WheelFit> fit_wheels(const std::vector<Window>& windows, const std
   const double rest = (b - A * c).squaredNorm();
   const double variance = rest / static_cast<double>(n - 2);
   WheelFit fit{.along = c[0], .turn = c[1]};
-  fit.along_clear = std::abs(c[0]) > kClear * std::sqrt(variance * inverse(0, 0)) && gram(0, 0) > 1e-3 * scale;
-  fit.turn_clear = std::abs(c[1]) > kClear * std::sqrt(variance * inverse(1, 1)) && gram(1, 1) > 1e-3 * scale;
+  // On a circle either one tells everything.
+  const auto needed = [&](Eigen::Index other) {
+    const double beside = gram(other, other) > 0.0 ? std::pow(A.col(other).dot(b), 2) / gram(other, other) : 0.0;
+    return b.squaredNorm() - beside > kNeeded * b.squaredNorm();
+  };
+  fit.along_clear =
+      std::abs(c[0]) > kClear * std::sqrt(variance * inverse(0, 0)) && gram(0, 0) > 1e-3 * scale && needed(1);
+  fit.turn_clear =
+      std::abs(c[1]) > kClear * std::sqrt(variance * inverse(1, 1)) && gram(1, 1) > 1e-3 * scale && needed(0);
   fit.explained = 1.0 - rest / b.squaredNorm();
   return fit;
 }

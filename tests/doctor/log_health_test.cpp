@@ -16,6 +16,7 @@
 #include <wheelwright/robots/robot_file.hpp>
 #include <wheelwright/sim/simulation.hpp>
 
+#include "support/drives.hpp"
 #include "support/kinematic_drives.hpp"
 #include "support/skip.hpp"
 
@@ -377,6 +378,21 @@ TEST_F(LogHealthTest, GeometryThatDoesNotFit) {
   Robot narrow = robot;
   narrow.track_width *= 0.6;
   EXPECT_EQ(examine(log, narrow).find("units.track_width")->severity, kWarning);
+}
+
+// On a circle the heading follows the wheels' sum as well as their difference: nothing can be said of a sign.
+TEST_F(LogHealthTest, ACircleTellsNoSign) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    Scenario circle = testing_support::noisy_drive(seed, 120.0);
+    circle.trajectory = {.kind = sim::Trajectory::Kind::circle, .speed = 0.6, .yaw_rate = 0.8};
+    circle.sensors.wheel_speed = 0.02;
+    circle.sensors.position = 0.002;
+    circle.sensors.heading = 0.003;
+    circle.sensors.speeds = true;
+    const LogHealth found = examine(sim::simulate(circle), circle.robot);
+    EXPECT_EQ(found.find("units.wheel_sign"), nullptr) << seed;
+    EXPECT_EQ(found.find("units.sides"), nullptr) << seed;
+  }
 }
 
 TEST_F(LogHealthTest, SignsAndSides) {
